@@ -12,6 +12,9 @@ use crate::model::vocabulary::{Fact, LaneChoice, Light, Priority, RoadKind, Word
 /// This tolerates the digits that an author rounds away and those of binary fractions, but no measurable distance.
 const EQUAL_PART: f64 = 1e-9;
 
+/// Below this, an f64 without a fraction was not rounded to be so.
+const EXACT: f64 = (1_u64 << 52) as f64;
+
 /// A call of a function with at most so many parameters allocates nothing.
 const FEW: usize = 4;
 
@@ -257,15 +260,16 @@ pub(crate) fn compare(op: Comparison, left: Value, right: Value) -> bool {
 }
 
 /// Whether numbers are equal, or differ by [`EQUAL_PART`] of the larger one at most: the language's numbers are exact, and
-/// 0.1 + 0.2 is another f64 than 0.3. Whole numbers are exact as f64, too.
+/// 0.1 + 0.2 is another f64 than 0.3. Whole numbers below [`EXACT`] are exact in both.
 fn are_equal(left: f64, right: f64) -> bool {
     let apart = (left - right).abs();
-    let are_whole = || left.fract() == 0.0 && right.fract() == 0.0;
+    let largest = left.abs().max(right.abs());
+    let are_exact = || left.fract() == 0.0 && right.fract() == 0.0 && largest < EXACT;
     // Where nobody is near, the nearest is infinitely far, which is no number of ten digits.
-    left == right || apart.is_finite() && apart <= EQUAL_PART * left.abs().max(right.abs()) && !are_whole()
+    left == right || apart.is_finite() && apart <= EQUAL_PART * largest && !are_exact()
 }
 
-/// Of two numbers one is less, or they are equal.
+/// Compares with that tolerance. Of less, equal and greater exactly one holds, unless a number is NaN.
 fn compare_numbers(op: Comparison, left: f64, right: f64) -> bool {
     let equal = are_equal(left, right);
     match op {
@@ -354,12 +358,23 @@ mod tests {
     }
 
     #[test]
-    fn equal_is_what_differs_in_the_tenth_digit_and_is_not_whole() {
-        let equal = [(0.3, 0.1 + 0.2), (0.3, 0.3 * (1.0 + 0.9 * EQUAL_PART)), (0.0, -0.0), (1e300, 1e300)];
-        assert!(equal.into_iter().all(|(left, right)| are_equal(left, right) && are_equal(right, left)));
-        let apart =
-            [(0.3, 0.3 * (1.0 + 1.1 * EQUAL_PART)), (1e-12, 2e-12), (0.0, 1e-300), (1e12, 1e12 + 1.0)];
-        assert!(apart.into_iter().all(|(left, right)| !are_equal(left, right) && !are_equal(right, left)));
+    fn numbers_within_a_billionth_are_equal_unless_both_are_whole() {
+        let billionth = |part: f64| (0.3, 0.3 * (1.0 + part * EQUAL_PART));
+        let equal = [
+            (0.3, 0.1 + 0.2),
+            billionth(0.9),
+            (0.0, -0.0),
+            (1e300, 1e300),
+            (1e9 + 0.5, 1e9),
+            // Both are whole only because they are so large.
+            ((0.1 + 0.2) * 3e16, 0.3 * 3e16),
+        ];
+        let apart = [billionth(1.1), (1e-12, 2e-12), (0.0, 1e-300), (1e12, 1e12 + 1.0)];
+        let all = equal.map(|pair| (pair, true)).into_iter().chain(apart.map(|pair| (pair, false)));
+        for ((left, right), expected) in all {
+            assert_eq!(are_equal(left, right), expected, "{left} {right}");
+            assert_eq!(are_equal(right, left), expected, "{right} {left}");
+        }
         assert!(!are_equal(f64::INFINITY, 1.0) && !are_equal(f64::NAN, f64::NAN));
     }
 

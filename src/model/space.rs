@@ -16,7 +16,7 @@ use crate::model::vocabulary::{
 };
 use crate::road::{LanePlace, RoadMap, Route};
 use crate::syntax::ast::Span;
-use crate::units::Rational;
+use crate::units::{Rational, Unit, decimal, quantity, quantity_in, unit_of_all};
 
 /// Name of the verdict that decides which collisions count. Every space has it: the checker adds the
 /// paper's where the author declares none.
@@ -170,6 +170,17 @@ pub struct Parameter {
     /// The `where` condition, which may name the parameters before this one.
     pub condition: Option<Expr>,
     pub span: Span,
+}
+
+impl Parameter {
+    /// The unit in which people read its listed values, if it is not SI's.
+    pub fn unit(&self) -> Option<&'static Unit> {
+        let (Type::Quantity(dimension), Domain::Values(values)) = (self.ty, &self.domain) else {
+            return None;
+        };
+        let numbers: Vec<f64> = values.iter().map(|value| value.number()).collect();
+        unit_of_all(&numbers, dimension)
+    }
 }
 
 impl ActionDef {
@@ -415,13 +426,21 @@ impl Space {
         body.own.map_or_else(|| body.like.name(), |own| &self.bodies[own].name)
     }
 
-    /// A value as the language spells it.
+    /// A listed value of a parameter as people read it, in the unit that [`Parameter::unit`] gives.
+    pub fn show_listed(&self, value: Value, parameter: &Parameter, unit: Option<&Unit>) -> String {
+        match (value, parameter.ty) {
+            (Value::Number(number), Type::Quantity(dimension)) => quantity_in(number, dimension, unit),
+            _ => self.show(value, parameter.ty),
+        }
+    }
+
+    /// A value as the language spells it, in SI.
     pub fn show(&self, value: Value, ty: Type) -> String {
         match (value, ty) {
             (Value::Bool(truth), _) => truth.to_string(),
             (Value::Variant(of, variant), _) => self.enums[of.0].variants[variant].clone(),
-            (Value::Number(number), Type::Quantity(dimension)) => crate::units::quantity(number, dimension),
-            (Value::Number(number), _) => crate::units::decimal(number, false),
+            (Value::Number(number), Type::Quantity(dimension)) => quantity(number, dimension),
+            (Value::Number(number), _) => decimal(number, false),
         }
     }
 }

@@ -134,8 +134,9 @@ fn distinct(values: &[Value]) -> Vec<Value> {
 }
 
 fn remark(space: &Space, parameter: &Parameter, values: &[Value], rules: &[usize]) -> Diagnostic {
+    let unit = parameter.unit();
     let mut shown: Vec<String> =
-        values.iter().map(|value| format!("`{}`", space.show(*value, parameter.ty))).collect();
+        values.iter().map(|value| format!("`{}`", space.show_listed(*value, parameter, unit))).collect();
     if shown.len() > NAMED_MAX + 1 {
         shown.truncate(NAMED_MAX);
         shown.push(format!("{} others", values.len() - NAMED_MAX));

@@ -15,6 +15,7 @@ use crate::model::{
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::prove::moment::{Case, may_hold_together, newcomers, ranges_named};
 use crate::syntax::{Diagnostic, listed};
+use crate::units::Unit;
 
 /// Rounds of narrowing: a bound may depend on another one, rarely on two.
 const ROUNDS: usize = 3;
@@ -35,6 +36,8 @@ pub(crate) fn rows(space: &Space) -> Vec<Row> {
     for (index, action) in space.actions.iter().enumerate() {
         let bound: Arc<[usize]> =
             (0..space.rules.len()).filter(|rule| space.rules[*rule].body.binds(index)).collect();
+        let units: Vec<Option<&Unit>> =
+            action.parameters.iter().filter(|parameter| parameter.axis).map(Parameter::unit).collect();
         for values in products(space, action) {
             let axes: Vec<(Arc<str>, Value)> = action
                 .parameters
@@ -43,9 +46,10 @@ pub(crate) fn rows(space: &Space) -> Vec<Row> {
                 .filter(|(parameter, _)| parameter.axis)
                 .map(|(parameter, value)| (parameter.name.clone(), *value))
                 .collect();
-            let shown = axes.iter().zip(action.parameters.iter().filter(|p| p.axis));
-            let shown: Vec<String> =
-                shown.map(|((name, value), p)| format!("{name}: {}", space.show(*value, p.ty))).collect();
+            let shown = axes.iter().zip(action.parameters.iter().filter(|p| p.axis)).zip(&units);
+            let shown: Vec<String> = shown
+                .map(|(((name, value), p), unit)| format!("{name}: {}", space.show_listed(*value, p, *unit)))
+                .collect();
             let label = format!("{}({})", action.name, shown.join(", "));
             let rules = bound.clone();
             let mut row = Row { index: rows.len(), action: index, axes, label, rules, roads: Vec::new() };

@@ -104,7 +104,7 @@ fn may_lack_a_value(expr: &Expr) -> bool {
 /// Whether comparisons that must all hold exclude each other: `a > b` and `b > a`, `a > b + 1` and `a < b`. All that they
 /// name is a fact or a drawn number, so that it is the same wherever it is named.
 ///
-/// Two measured numbers are equal if they are nearly so, and `a == b` and `a < b + 1e-12` may both hold: with `are_apart`,
+/// Two measured numbers are equal if they are nearly so, and `a == b` and `a == b + 1e-12` may both hold: with `are_apart`,
 /// that is passed over for `==`, and what is left is no proof. For `<=` it is passed over always (docs/open.md).
 pub(super) fn oppose(conditions: &[&Expr], known: &Known<'_>, are_apart: bool) -> bool {
     let mut comparisons = Vec::new();

@@ -150,7 +150,7 @@ impl Search<'_> {
     /// What there is with this memory before the row.
     pub fn at(&self, memory: &Memory) -> Found {
         self.left.take_box();
-        if self.asks_about_moment() && !self.may_run(&points(memory.cells())) {
+        if self.asks_about_moment() && !self.may_run(&followed(memory)) {
             return Found::Never;
         }
         let lent = self.left.tries.get().min(TRIES_A_MEMORY);
@@ -203,7 +203,7 @@ impl Search<'_> {
     fn numbers(&self, chosen: &[Value], memory: &Memory, wish: &Wish<'_>) -> Option<Vec<Value>> {
         let action = self.action();
         let open: Vec<usize> = action.drawn_numbers().collect();
-        let before = points(memory.cells());
+        let before = followed(memory);
         let corners = 0..1_usize << open.len().min(CORNER_BITS);
         let mut boxes = VecDeque::from([self.ranges(chosen, &open)]);
         for _ in 0..BOXES_MAX.min(self.left.boxes.get()) {
@@ -332,8 +332,7 @@ impl Search<'_> {
                     let may_come = !self.asks_about_moment() || self.is_left_open(candidate);
                     if !may_come {
                         let ranges = self.ranges(&values, &open);
-                        is_complete &=
-                            self.rules.narrow(ranges, &points(memory.cells()), self.moment).is_none();
+                        is_complete &= self.rules.narrow(ranges, &followed(memory), self.moment).is_none();
                     } else if is_kept && !after.contains(&led_to) {
                         after.push(led_to);
                     }
@@ -346,7 +345,7 @@ impl Search<'_> {
 
     /// Whether some moment or place, which an empty world does not have, might meet all conditions with these values.
     fn is_left_open(&self, candidate: Candidate<'_>) -> bool {
-        let (locals, cells) = (points(candidate.values), points(candidate.after.cells()));
+        let (locals, cells) = (points(candidate.values), followed(candidate.after));
         let known = Known { case: self.moment, ..self.rules.known(&locals, &cells) };
         let newcomers = newcomers(self.action(), &known, true);
         let conditions = self.rules.conditions();
@@ -415,6 +414,18 @@ impl Search<'_> {
 
 fn points(values: &[Value]) -> Vec<Values> {
     values.iter().map(|value| Values::point(*value)).collect()
+}
+
+/// The cells of a memory to which an episode comes. What was computed on the way is rounded: 0.3 - 0.1 - 0.1 is
+/// 0.09999999999999998, where a draw that takes 0.1 away has 0, because these are equal to it.
+fn followed(memory: &Memory) -> Vec<Values> {
+    let cell = |value: &Value| match value {
+        Value::Number(number) => {
+            Values::Number(Rational::from_computed(*number).map_or(Interval::ALL, Interval::point))
+        }
+        _ => Values::point(*value),
+    };
+    memory.cells().iter().map(cell).collect()
 }
 
 /// Every choice of the listed values, the first values first; what is a range stays as it is.

@@ -1,10 +1,10 @@
-//! Numbers as text: the shortest decimal that reads back to the same f64, in SI wherever that is short.
+//! Numbers as text: the shortest decimal that reads back to the same f64, in SI or in a unit that people read.
 
 use super::dimension::Dimension;
 use super::rational::Rational;
-use super::unit::UNITS;
+use super::unit::{UNITS, Unit};
 
-/// A number of more characters is shown in another unit than SI's, if that makes it shorter.
+/// A number of at most so many characters is short.
 const SHORT: usize = 9;
 
 /// The shortest decimal without an exponent that reads back to the same f64; a whole number keeps
@@ -15,27 +15,43 @@ pub fn decimal(value: f64, point: bool) -> String {
     if point && value.is_finite() && !text.contains('.') { format!("{text}.0") } else { text }
 }
 
-/// A quantity as people read it: `20.625 m`, `0.5`, and `50 km/h` in place of `13.88888888888889 m/s`. It reads back to the
-/// same f64.
+/// A quantity in its SI unit: `20.625 m`, `0.5`.
 pub fn quantity(value: f64, dimension: Dimension) -> String {
-    let number = decimal(value, false);
-    let (number, unit) = match number.len() {
-        ..=SHORT => (number, dimension.si_unit()),
-        _ => in_another_unit(value, dimension).unwrap_or((number, dimension.si_unit())),
-    };
-    if unit.is_empty() { number } else { format!("{number} {unit}") }
+    with_unit(decimal(value, false), &dimension.si_unit())
 }
 
-/// The shortest of the short texts in other units, if there is one.
-fn in_another_unit(value: f64, dimension: Dimension) -> Option<(String, String)> {
-    let short = |unit: &&super::unit::Unit| {
-        let factor = unit.factor();
-        let number = decimal((value / factor.to_f64() * 1e6).round() / 1e6, false);
-        let exact = Rational::from_decimal(&number)?.checked_mul(factor)?;
-        (number.len() <= SHORT && exact.to_f64() == value).then(|| (number, unit.word.to_owned()))
+/// The unit in which people read such quantities, if it is not SI's: where one is long in SI, the first in which each is
+/// short and reads back to the same f64 (`50 km/h` in place of `13.88888888888889 m/s`).
+pub fn unit_of_all(values: &[f64], dimension: Dimension) -> Option<&'static Unit> {
+    if values.iter().all(|&value| is_short(&decimal(value, false))) {
+        return None;
+    }
+    let fits = |unit: &&Unit| {
+        unit.dimension == dimension && values.iter().all(|&value| number_of(value, unit).is_some())
     };
-    let units = UNITS.iter().filter(|unit| unit.dimension == dimension);
-    units.filter_map(|unit| short(&unit)).min_by_key(|(number, _)| number.len())
+    UNITS.iter().find(fits)
+}
+
+/// A quantity in a unit in which it is short; in SI where it is not.
+pub fn quantity_in(value: f64, dimension: Dimension, unit: Option<&Unit>) -> String {
+    let short = unit.and_then(|unit| Some(with_unit(number_of(value, unit)?, unit.word)));
+    short.unwrap_or_else(|| quantity(value, dimension))
+}
+
+/// The number that a value is in a unit, if it is short and reads back to the same f64.
+fn number_of(value: f64, unit: &Unit) -> Option<String> {
+    // To a millionth, because the division rounds.
+    let number = decimal((value / unit.factor().to_f64() * 1e6).round() / 1e6, false);
+    let exact = Rational::from_decimal(&number)?.checked_mul(unit.factor())?;
+    (is_short(&number) && exact.to_f64() == value).then_some(number)
+}
+
+fn is_short(number: &str) -> bool {
+    number.trim_start_matches('-').len() <= SHORT
+}
+
+fn with_unit(number: String, unit: &str) -> String {
+    if unit.is_empty() { number } else { format!("{number} {unit}") }
 }
 
 #[cfg(test)]
@@ -52,20 +68,22 @@ mod tests {
     }
 
     #[test]
-    fn a_long_number_is_shown_in_the_unit_that_it_was_written_in() {
-        let read = |number: &str, word: &str| {
+    fn long_numbers_are_shown_in_a_unit_in_which_all_are_short() {
+        let shown = |word: &str, numbers: &[&str]| {
             let unit = crate::units::unit(word).unwrap();
-            Rational::from_decimal(number).unwrap().checked_mul(unit.factor()).unwrap().to_f64()
+            let value =
+                |number: &&str| Rational::from_decimal(number).unwrap().checked_mul(unit.factor()).unwrap();
+            let values: Vec<f64> = numbers.iter().map(|number| value(number).to_f64()).collect();
+            let shared = unit_of_all(&values, unit.dimension);
+            let texts = values.iter().map(|&value| quantity_in(value, unit.dimension, shared));
+            texts.collect::<Vec<_>>().join(", ")
         };
-        let written = [("20", "km/h"), ("50", "km/h"), ("-12.5", "km/h"), ("33.33", "mph"), ("90", "deg")];
-        for (number, word) in written {
-            let unit = crate::units::unit(word).unwrap();
-            assert_eq!(quantity(read(number, word), unit.dimension), format!("{number} {word}"));
-        }
-        // Short in SI, or long in all units.
-        assert_eq!(quantity(read("36", "km/h"), Dimension::SPEED), "10 m/s");
-        assert_eq!(quantity(read("1", "%"), Dimension::RATIO), "0.01");
-        assert_eq!(quantity(1.0 / 3.0, Dimension::LENGTH), "0.3333333333333333 m");
+        assert_eq!(shown("km/h", &["20", "36", "-12.5"]), "20 km/h, 36 km/h, -12.5 km/h");
+        assert_eq!(shown("mph", &["33.33"]), "33.33 mph");
+        assert_eq!(shown("deg", &["0", "90"]), "0 deg, 90 deg");
+        assert_eq!(shown("km/h", &["36", "-18"]), "10 m/s, -5 m/s", "short in SI");
+        assert!(unit_of_all(&[1.0 / 3.0, 2.0], Dimension::LENGTH).is_none());
+        assert!(unit_of_all(&[], Dimension::LENGTH).is_none());
     }
 
     proptest! {

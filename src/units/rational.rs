@@ -101,6 +101,18 @@ impl Rational {
     ///
     /// A proof that took the f64 for exact would tell 30 km/h (25/3 m/s) from the limit of 30 km/h in a rule.
     pub fn from_rounded(value: f64) -> Option<Rational> {
+        Rational::simplest(value, |found| found == value)
+    }
+
+    /// As [`Rational::from_rounded`] for a number that was computed and may have been rounded on the way: the simplest
+    /// fraction within 1e-12 of it, if its denominator has at most six digits.
+    pub fn from_computed(value: f64) -> Option<Rational> {
+        let near = Rational::simplest(value, |found| (found - value).abs() <= 1e-12 * value.abs());
+        near.filter(|near| near.denominator < 1_000_000).or_else(|| Rational::from_rounded(value))
+    }
+
+    /// The first convergent of a number's continued fraction that will do, else the number itself.
+    fn simplest(value: f64, will_do: impl Fn(f64) -> bool) -> Option<Rational> {
         let exact = Rational::from_f64(value)?;
         let (mut rest, mut divisor) = (exact.numerator.abs(), exact.denominator);
         // The last two convergents; their parts grow up to those of the exact fraction.
@@ -110,7 +122,7 @@ impl Rational {
             (before, now) = (now, (whole * now.0 + before.0, whole * now.1 + before.1));
             (rest, divisor) = (divisor, rest % divisor);
             let found = Rational { numerator: exact.numerator.signum() * now.0, denominator: now.1 };
-            if found.to_f64() == value {
+            if will_do(found.to_f64()) {
                 return Some(found);
             }
         }
@@ -332,6 +344,16 @@ mod tests {
         fn the_number_of_a_text_is_found_again(numerator in -99_999_999_i128..99_999_999, denominator in 1_i128..99_999) {
             let written = Rational::new(numerator, denominator).unwrap();
             prop_assert_eq!(Rational::from_rounded(written.to_f64()), Some(written));
+        }
+
+        #[test]
+        fn what_was_meant_is_found_in_what_was_computed(
+            numerator in 1_i128..99_999, denominator in 1_i128..999, off in 0_u64..9,
+        ) {
+            let meant = Rational::new(numerator, denominator).unwrap();
+            let computed = f64::from_bits(meant.to_f64().to_bits() + off - 4);
+            prop_assert_eq!(Rational::from_computed(computed), Some(meant));
+            prop_assert_eq!(Rational::from_computed(-computed), meant.checked_neg());
         }
 
         #[test]

@@ -1,4 +1,5 @@
 """Does the interval of an estimate hold what it promises, in the simulator? Does `compare` see weaker brakes, and how soon?
+What is gained where crashes are rarer still?
 
     python3 tests/interop/coverage.py AVASTRA [FOLDER] [REPEATS] [EPISODES]
 
@@ -10,6 +11,9 @@ sixteen times.
 
 Brakes: the driving system against itself with brakes that are 10 % weaker, in the same episodes (`compare`) and by counting
 each on its own. What is printed is how many kilometres each needs to tell them apart.
+
+Rarer: the same crash where chance does nothing 10 and 250 times as often, and how much longer counting would take for an
+interval as narrow.
 """
 
 import json
@@ -24,13 +28,14 @@ FOLDER = Path(sys.argv[2] if len(sys.argv) > 2 else ROOT / "target/interop/cover
 REPEATS = int(sys.argv[3]) if len(sys.argv) > 3 else 200
 EPISODES = int(sys.argv[4]) if len(sys.argv) > 4 else 250
 # Two steps an episode, in which chance mostly does nothing.
-SPACE = f"""language 1
-use "{ROOT}/scenarios/avastra45.ava"
+SPACE = """language 1
+use "{root}/scenarios/avastra45.ava"
 state quiet: Bool = false
 action nothing() {{ set quiet = false }}
-odds actions {{ nothing => 40 }}
+odds actions {{ nothing => {nothing} }}
 override episode {{ roads: [corner], limit: 2 steps }}
 """
+NOTHING = (40, 400, 10000)
 CRASHES = ["--ads", "reactive", "--traffic", "released", "--event", "collision"]
 WEAKER = "control: { actuators: { brake_mps2_max: 7.65 } }\n"
 # Of 8.5 m/s², see scenarios/ads/default.yaml.
@@ -53,9 +58,23 @@ def estimate(space, name, *how):
     return json.loads((out / "results.json").read_text())["together"]
 
 
+def rare(nothing):
+    """The space in which chance does nothing so many times as often as any other row."""
+    space = FOLDER / f"rare_{nothing}.ava"
+    space.write_text(SPACE.format(root=ROOT, nothing=nothing))
+    return space
+
+
+def rarer():
+    for nothing in NOTHING:
+        found = estimate(rare(nothing), f"rarer_{nothing}", "--method", "probe", "--parts", 10, "--episodes", 200)
+        low, high = found["interval"]["low"], found["interval"]["high"]
+        print(f"nothing => {nothing}: {found['probability']:.3g} [{low:.3g}, {high:.3g}] in {found['simulated_h']:.0f} h, "
+              f"{found['gain']:.1f} times less than counting")
+
+
 def coverage():
-    space = FOLDER / "rare.ava"
-    space.write_text(SPACE)
+    space = rare(NOTHING[0])
     how = ["--method", "probe", "--parts", 2, "--episodes", EPISODES]
     found = []
     for seed in range(1, REPEATS + 1):
@@ -101,4 +120,5 @@ def brakes():
 FOLDER.mkdir(parents=True, exist_ok=True)
 holds = coverage()
 brakes()
+rarer()
 sys.exit(0 if holds else 1)
