@@ -4,6 +4,10 @@
 
 use core::ops::RangeInclusive;
 
+use crate::model::eval::compare;
+use crate::model::expr::Comparison;
+use crate::model::value::Value;
+
 /// The tick of physics, ms: an observation period is a whole number of ticks.
 pub const TICK_MS: u32 = 20;
 
@@ -35,12 +39,16 @@ pub const COMMANDED_MAX: u32 = 10;
 pub const LIMIT_PART_MAX: f64 = 1.5;
 
 /// Why the world must not be asked for a spawn with these figures, whatever the rules say; `None` if it
-/// may. NaN is out of bounds, too.
+/// may. Bounds are compared as rules are: what rounding alone puts beyond one is not. NaN is out of bounds, too.
 pub(crate) fn spawn_out_of_bounds(speed_mps: f64, distance_m: f64) -> Option<String> {
     let figures =
         [("speed", speed_mps, "m/s", SPAWN_SPEED_MPS), ("distance", distance_m, "m", SPAWN_DISTANCE_M)];
+    let is_within = |value: f64, range: &RangeInclusive<f64>| {
+        let holds = |op, bound: f64| compare(op, Value::Number(value), Value::Number(bound));
+        holds(Comparison::GreaterEqual, *range.start()) && holds(Comparison::LessEqual, *range.end())
+    };
     let (what, value, unit, range) =
-        figures.into_iter().find(|(_, value, _, range)| !range.contains(value))?;
+        figures.into_iter().find(|(_, value, _, range)| !is_within(*value, range))?;
     let (low, high) = range.into_inner();
     Some(format!("the spawn's {what} is {value} {unit}, possible is {low} .. {high} {unit}"))
 }
@@ -51,7 +59,7 @@ mod tests {
 
     #[test]
     fn no_spawn_lies_out_of_bounds() {
-        for (speed_mps, distance_m) in [(0.0, 0.0), (70.0, 1000.0)] {
+        for (speed_mps, distance_m) in [(0.0, 0.0), (70.0, 1000.0), (70.0 * (0.1 + 0.2) / 0.3, 1000.0)] {
             assert_eq!(spawn_out_of_bounds(speed_mps, distance_m), None);
         }
         for speed_mps in [-0.1, 70.1, f64::NAN] {

@@ -221,13 +221,10 @@ impl<'a> RowRules<'a> {
             for bound in self.bounds().filter(|bound| bound.rule == Some(*rule)) {
                 let parameter = &parameters[bound.local];
                 let limit = allowed(bound.op, &enclose(&bound.limit, &known).interval());
-                let unit = match parameter.ty {
-                    Type::Quantity(dimension) => dimension.si_unit(),
-                    Type::Int | Type::Bool | Type::Enum(_) => String::new(),
-                };
+                let unit = in_si(parameter.ty);
                 let declared = locals[bound.local].interval();
                 let is = if declared.single().is_some() { "it is" } else { "its range is" };
-                figures.push(format!("`{}` wants {limit} {unit}, {is} {declared} {unit}", parameter.name));
+                figures.push(format!("`{}` wants {limit}{unit}, {is} {declared}{unit}", parameter.name));
             }
             match figures.as_slice() {
                 [] => without_figures.push(name.as_str()),
@@ -249,11 +246,7 @@ impl<'a> RowRules<'a> {
             .collect();
         let newcomers = newcomers(&self.space.actions[self.row.action], &known, false);
         for (fact, range) in ranges_named(&conditions, &known, &self.space.episode, &newcomers) {
-            let unit = match fact.ty() {
-                Type::Quantity(dimension) => format!(" {}", dimension.si_unit()),
-                Type::Int | Type::Bool | Type::Enum(_) => String::new(),
-            };
-            parts.push(format!("`{}` is within {range}{unit}", fact.name()));
+            parts.push(format!("`{}` is within {range}{}", fact.name(), in_si(fact.ty())));
         }
         match parts.as_slice() {
             [] => "its own ranges and conditions leave no value".to_owned(),
@@ -271,6 +264,14 @@ impl<'a> RowRules<'a> {
             // Other rows of the action may obey the rule.
             false => format!("rule `{name}` cannot hold in `{}`", self.row.label),
         }
+    }
+}
+
+/// What follows a number of a type: a blank and its unit, or nothing.
+fn in_si(ty: Type) -> String {
+    match ty {
+        Type::Quantity(dimension) if !dimension.si_unit().is_empty() => format!(" {}", dimension.si_unit()),
+        _ => String::new(),
     }
 }
 
