@@ -9,8 +9,9 @@ use crate::model::body::OwnBody;
 use crate::model::expr::Expr;
 use crate::model::rules::{Before, Candidate, Choose, Clause, Nearest, Room, RowRules, TRIES_MAX, Unsolved};
 use crate::model::{
-    ActionDef, BodyWord, Domain, EffectDef, Facts, Memory, MomentFacts, Parameter, Space, SpawnDef, Type,
-    Value, WorldFacts, evaluate, locals, spawn_out_of_bounds,
+    ActionDef, BodyWord, Domain, EffectDef, Facts, Memory, MomentFacts, Parameter, SPAWN_DISTANCE_M,
+    SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value, WorldFacts, evaluate, locals, rounded_into,
+    spawn_out_of_bounds,
 };
 use crate::rng;
 use crate::rng::{Rng, Stream};
@@ -234,8 +235,8 @@ impl<'a> Judge<'a> {
             lane: spawn.lane.word(functions, &facts),
             side: spawn.side.word(functions, &facts),
             then: spawn.then.word(functions, &facts),
-            speed_mps: evaluate(&spawn.speed, functions, &facts).number(),
-            distance_m: evaluate(&spawn.distance, functions, &facts).number(),
+            speed_mps: rounded_into(evaluate(&spawn.speed, functions, &facts).number(), SPAWN_SPEED_MPS),
+            distance_m: rounded_into(evaluate(&spawn.distance, functions, &facts).number(), SPAWN_DISTANCE_M),
             cover: cover.map(|cover| cover.like),
         }
     }

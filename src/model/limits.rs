@@ -38,17 +38,23 @@ pub const COMMANDED_MAX: u32 = 10;
 /// Most of a lane's limit at which ambient vehicles drive, whatever their profile.
 pub const LIMIT_PART_MAX: f64 = 1.5;
 
+/// The bound itself for a figure that equals it to the rules, but lies beyond it: 70 m/s * (0.1 + 0.2) / 0.3 is
+/// 70.00000000000001 m/s. Any other figure is left as it is.
+pub(crate) fn rounded_into(figure: f64, bounds: RangeInclusive<f64>) -> f64 {
+    let equals = |bound: f64| compare(Comparison::Equal, Value::Number(figure), Value::Number(bound));
+    match bounds.contains(&figure) {
+        true => figure,
+        false => [*bounds.start(), *bounds.end()].into_iter().find(|&bound| equals(bound)).unwrap_or(figure),
+    }
+}
+
 /// Why the world must not be asked for a spawn with these figures, whatever the rules say; `None` if it
-/// may. Bounds are compared as rules are: what rounding alone puts beyond one is not. NaN is out of bounds, too.
+/// may. NaN is out of bounds, too.
 pub(crate) fn spawn_out_of_bounds(speed_mps: f64, distance_m: f64) -> Option<String> {
     let figures =
         [("speed", speed_mps, "m/s", SPAWN_SPEED_MPS), ("distance", distance_m, "m", SPAWN_DISTANCE_M)];
-    let is_within = |value: f64, range: &RangeInclusive<f64>| {
-        let holds = |op, bound: f64| compare(op, Value::Number(value), Value::Number(bound));
-        holds(Comparison::GreaterEqual, *range.start()) && holds(Comparison::LessEqual, *range.end())
-    };
     let (what, value, unit, range) =
-        figures.into_iter().find(|(_, value, _, range)| !is_within(*value, range))?;
+        figures.into_iter().find(|(_, value, _, range)| !range.contains(value))?;
     let (low, high) = range.into_inner();
     Some(format!("the spawn's {what} is {value} {unit}, possible is {low} .. {high} {unit}"))
 }
@@ -59,9 +65,11 @@ mod tests {
 
     #[test]
     fn no_spawn_lies_out_of_bounds() {
-        for (speed_mps, distance_m) in [(0.0, 0.0), (70.0, 1000.0), (70.0 * (0.1 + 0.2) / 0.3, 1000.0)] {
+        for (speed_mps, distance_m) in [(0.0, 0.0), (70.0, 1000.0)] {
             assert_eq!(spawn_out_of_bounds(speed_mps, distance_m), None);
         }
+        let rounded = |speed_mps| rounded_into(speed_mps, SPAWN_SPEED_MPS);
+        assert_eq!([70.0 * (0.1 + 0.2) / 0.3, 70.0, 69.9, 70.1].map(rounded), [70.0, 70.0, 69.9, 70.1]);
         for speed_mps in [-0.1, 70.1, f64::NAN] {
             assert!(spawn_out_of_bounds(speed_mps, 10.0).is_some_and(|reason| reason.contains("speed")));
         }

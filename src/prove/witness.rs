@@ -16,7 +16,8 @@ use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Before, Candidate, Choose, Demand, Nearest, Room, RowRules};
 use crate::model::{
     ActionDef, Domain, EffectDef, End, Facts, Initial, Interval, Memory, Parameter, Road, Row, RulesInForce,
-    SetDef, Space, SpawnFacts, StateDef, Type, Value, WorldFacts, evaluate, locals, spawn_out_of_bounds,
+    SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, SetDef, Space, SpawnFacts, StateDef, Type, Value, WorldFacts,
+    evaluate, locals, rounded_into, spawn_out_of_bounds,
 };
 use crate::prove::enclose::{Known, Values};
 use crate::prove::moment::{Case, may_hold_together, newcomers};
@@ -283,7 +284,8 @@ impl Search<'_> {
         let mut spawns = Vec::new();
         for effect in &action.effects {
             let EffectDef::Spawn(spawn) = effect else { continue };
-            let (speed_mps, distance_m) = (number(&spawn.speed), number(&spawn.distance));
+            let speed_mps = rounded_into(number(&spawn.speed), SPAWN_SPEED_MPS);
+            let distance_m = rounded_into(number(&spawn.distance), SPAWN_DISTANCE_M);
             if spawn_out_of_bounds(speed_mps, distance_m).is_some() {
                 return false;
             }
