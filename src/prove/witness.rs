@@ -418,8 +418,9 @@ fn points(values: &[Value]) -> Vec<Values> {
     values.iter().map(|value| Values::point(*value)).collect()
 }
 
-/// The cells of a memory to which an episode comes. What was computed on the way is rounded: 0.3 - 0.1 - 0.1 is
-/// 0.09999999999999998, where a draw that takes 0.1 away has 0, because these are equal to it.
+/// The cells of a memory to which an episode comes, each as the short fraction beside it. What was computed on the way is
+/// rounded: 0.3 - 0.1 - 0.1 is 0.09999999999999998, and a draw that takes 0.1 from that has 0, because it takes them for
+/// equal; a proof that took it for exact would have less.
 fn followed(memory: &Memory) -> Vec<Values> {
     let cell = |value: &Value| match value {
         Value::Number(number) => {
