@@ -31,6 +31,7 @@ pub mod units;
 pub mod rng;
 pub mod statistics;
 pub mod geometry;
+pub mod kinematics;
 pub mod road;
 pub mod syntax;
 pub mod model;

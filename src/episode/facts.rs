@@ -8,6 +8,7 @@
 //! can. Not taken over: that a second pedestrian of an episode never counts.
 
 use crate::geometry::Vec2;
+use crate::kinematics::STANDING_MPS;
 use crate::model::OutcomeFacts;
 use crate::model::vocabulary::Priority;
 use crate::sim::{Contact, VehicleParameters};
@@ -16,9 +17,6 @@ use super::log::Collision;
 
 /// A collision this soon after the obstacle appeared is sudden, s (published package).
 const SUDDEN_S: f64 = 0.75;
-/// An ego vehicle slower than this stands: any contact is an obstacle that ran into it, m/s. The published
-/// package has the figure for pedestrians; ours is to use it for all obstacles.
-const STANDING_MPS: f64 = 1.0;
 /// An obstacle that moves towards the ego vehicle's side faster than this ran into it, m/s: the ego vehicle
 /// itself does not move sideways.
 const SIDEWAYS_MPS: f64 = 0.1;
@@ -46,10 +44,15 @@ const CORNER_M: f64 = 1e-3;
 
 /// Whether the obstacle ran into the ego vehicle rather than the other way round, whoever had to give way.
 ///
-/// True if the ego vehicle stood; if it was hit at the rear; if it was hit at the side behind its
-/// front axle, or before it by an obstacle moving towards that side; and at a front corner if the
-/// obstacle moved sideways onto it faster than the ego vehicle drove.
+/// What stands runs into nothing, so this is false for an obstacle that stood. Otherwise it is true if the ego
+/// vehicle stood; if it was hit at the rear; if it was hit at the side behind its front axle, or before it by an
+/// obstacle moving towards that side; and at a front corner if the obstacle moved sideways onto it faster than the
+/// ego vehicle drove.
 pub fn struck(contact: &Contact, ego: &VehicleParameters) -> bool {
+    if contact.obstacle_velocity_mps.norm() < STANDING_MPS {
+        return false;
+    }
+    // The published package takes 1 m/s, which is a car that creeps into somebody.
     if contact.ego_speed_mps < STANDING_MPS {
         return true;
     }
@@ -122,15 +125,15 @@ mod tests {
     use crate::model::BodyWord;
     use crate::model::vocabulary::{Body, Priority, Verb};
 
-    fn collision(x_m: f64, y_m: f64, ego_speed_mps: f64, obstacle_left_mps: f64) -> Collision {
+    fn collision(x_m: f64, y_m: f64, ego_speed_mps: f64, (ahead_mps, left_mps): (f64, f64)) -> Collision {
         let contact = Contact {
             time_s: 10.0,
             obstacle: 1,
             point: Vec2::zeros(),
             on_ego: Vec2::new(x_m, y_m),
             ego_speed_mps,
-            obstacle_velocity_mps: Vec2::zeros(),
-            obstacle_velocity_on_ego_mps: Vec2::new(0.0, obstacle_left_mps),
+            obstacle_velocity_mps: Vec2::new(ahead_mps, left_mps),
+            obstacle_velocity_on_ego_mps: Vec2::new(ahead_mps, left_mps),
             closing_speed_mps: 1.0,
             priority: Priority::None,
         };
@@ -148,19 +151,26 @@ mod tests {
     fn the_vehicle_that_struck_the_other_is_found() {
         let mkz = VehicleParameters::MKZ;
         let cases = [
-            ("front", collision(2.35, 0.3, 8.0, 0.0), false),
-            ("standing", collision(2.35, 0.3, 0.5, 0.0), true),
-            ("rear", collision(-2.35, 0.0, 8.0, 0.0), true),
-            ("flank", collision(0.0, 1.03, 8.0, 0.0), true),
-            ("front corner, turning into a standing vehicle", collision(2.0, 1.03, 8.0, 0.0), false),
-            ("front corner, hit from the left", collision(2.0, 1.03, 8.0, -1.5), true),
-            ("front corner, hit from the right", collision(2.0, -1.03, 8.0, 1.5), true),
-            ("front corner, a vehicle on the right moving away", collision(2.0, -1.03, 8.0, -1.5), false),
-            ("the corner itself, front by a hair", collision(2.35002, 1.03, 8.0, -1.5), false),
-            ("the corner itself, side by a hair", collision(2.35, 1.03002, 8.0, -1.5), false),
+            ("front", collision(2.35, 0.3, 8.0, (3.0, 0.0)), false),
+            ("standing", collision(2.35, 0.3, 0.0, (-3.0, 0.0)), true),
+            ("creeping", collision(2.35, 0.3, 0.5, (-3.0, 0.0)), false),
+            ("both standing", collision(2.35, 0.3, 0.0, (0.0, 0.05)), false),
+            ("rear", collision(-2.35, 0.0, 8.0, (12.0, 0.0)), true),
+            ("flank", collision(0.0, 1.03, 8.0, (8.0, -0.5)), true),
+            ("flank, swung into a standing vehicle", collision(0.0, 1.03, 8.0, (0.0, 0.0)), false),
+            ("front corner, turning into a standing vehicle", collision(2.0, 1.03, 8.0, (0.0, 0.0)), false),
+            ("front corner, hit from the left", collision(2.0, 1.03, 8.0, (0.0, -1.5)), true),
+            ("front corner, hit from the right", collision(2.0, -1.03, 8.0, (0.0, 1.5)), true),
+            (
+                "front corner, a vehicle on the right moving away",
+                collision(2.0, -1.03, 8.0, (0.0, -1.5)),
+                false,
+            ),
+            ("the corner itself, front by a hair", collision(2.35002, 1.03, 8.0, (0.0, -1.5)), false),
+            ("the corner itself, side by a hair", collision(2.35, 1.03002, 8.0, (0.0, -1.5)), false),
             (
                 "the corner itself, by a vehicle faster than the ego vehicle",
-                collision(2.35, 1.03, 4.0, -9.0),
+                collision(2.35, 1.03, 4.0, (0.0, -9.0)),
                 true,
             ),
         ];

@@ -16,8 +16,8 @@ use crate::model::vocabulary::RoadKind;
 /// Events that the wider class weighs, in as many trials as have so many there: one lucky event tells little, and a row
 /// without any is not safe before its trials exclude one. Ours.
 const PRIOR_EVENTS: f64 = 1.0;
-/// Below this the ego vehicle stands, above the next it drives fast, m/s. Ours.
-const STANDING_MPS_MAX: f64 = 2.0;
+/// Below this the ego vehicle crawls, above the next it drives fast, m/s. Ours.
+const CRAWLING_MPS_MAX: f64 = 2.0;
 const SLOW_MPS_MAX: f64 = 8.0;
 
 /// A row on a road in a class of situations.
@@ -85,7 +85,7 @@ impl Situation {
             RoadKind::InJunction => 3,
         };
         let speed = match moment.ego_speed_mps {
-            speed_mps if speed_mps < STANDING_MPS_MAX => 0,
+            speed_mps if speed_mps < CRAWLING_MPS_MAX => 0,
             speed_mps if speed_mps < SLOW_MPS_MAX => 1,
             _ => 2,
         };

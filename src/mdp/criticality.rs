@@ -6,6 +6,7 @@
 
 use crate::ads::Rss;
 use crate::geometry::{Bounds, OrientedBox, Pose, Sweep, Vec2, distance_m, first_contact, wrap_angle};
+use crate::kinematics::STANDING_MPS;
 use crate::sim::{FRAME_S, FRAME_TICKS, Obstacle, World};
 
 /// Contacts later than this are not looked for, s.
@@ -16,8 +17,6 @@ const PET_S_MAX: f64 = 5.0;
 const PIECE: usize = 8;
 /// Ways that differ less in heading than this do not cross, rad: 30°.
 const CROSSING_RAD: f64 = core::f64::consts::PI / 6.0;
-/// A slower ego vehicle has no time headway, m/s.
-const STANDING_MPS: f64 = 0.1;
 
 /// The most critical values over some time, of all road users around the ego vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]

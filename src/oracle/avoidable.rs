@@ -6,8 +6,9 @@
 //! watches for some time before it takes over. If none of the careful drivers avoids the collision,
 //! evasive manoeuvres that begin at the onset without any delay are tried.
 //!
-//! Beside that, each careful driver is asked to the letter of UN R157 (`letter`): the ego vehicle drives along its
-//! recorded path at its recorded speed until the model reacts, and then only brakes. The regulation speaks of a
+//! Beside that, each careful driver is asked to the letter of UN R157 (`r157_letter`): from the first conflict of ways
+//! on, the ego vehicle drives along its recorded path at its recorded speed until the model reacts, and then only
+//! brakes. The regulation speaks of a
 //! vehicle that keeps its lane and speed on a motorway. A careful driver in a town does more: it slows down for
 //! bends and for those that have priority before there is a risk. So the first replay counts, and the letter is
 //! reported: where only the first avoids a collision, foresight was missing rather than a reaction.
@@ -23,14 +24,13 @@ use crate::ads::{Ads, Careful, Evasion};
 use crate::episode;
 use crate::episode::{Choice, EpisodeLog, Moment, Script, Setup};
 use crate::geometry::{OrientedBox, Pose, wrap_angle};
+use crate::kinematics::GRAVITY_MPS2;
 use crate::model::Avoidability;
 use crate::sim::{Contact, DT_S, EgoMotion, FRAME_TICKS, VehicleParameters, World};
 use crate::syntax::listed;
 
-use super::hazard::onset;
+use super::hazard::{Onset, onset};
 use crate::episode::struck;
-
-const GRAVITY_MPS2: f64 = 9.81;
 
 /// Settings of the verdict. Every run records them.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -221,9 +221,11 @@ pub fn judge_one(
 ) -> Judgement {
     let last = recording.len() - 1;
     // No driver can react to what was never in sight: the takeover is then at the last moment.
-    let from = onset(recording, contact.obstacle, met).unwrap_or(last);
-    let from = from.max((last + 1).saturating_sub(ticks(settings.rewind_s)));
+    let onset = onset(recording, contact.obstacle, met).unwrap_or(Onset { first: last, conflict: last });
+    let earliest = (last + 1).saturating_sub(ticks(settings.rewind_s));
+    let from = onset.first.max(earliest);
     let case = Case { recording, from, obstacle: contact.obstacle, settings };
+    let to_the_letter = Case { from: onset.conflict.max(earliest), ..case };
     let avoids = |name: &&String| {
         let entry = ads::by_name(name).expect("settings name drivers that exist");
         case.avoids((entry.build)(recording[from].scene(), 0).as_mut())
@@ -231,7 +233,8 @@ pub fn judge_one(
     let careful: Vec<String> = settings.careful.iter().filter(avoids).cloned().collect();
     let reported: Vec<String> = settings.reported.iter().filter(avoids).cloned().collect();
     let brakes_in_time = |name: &&String| {
-        ads::careful(name, recording[from].scene()).is_some_and(|mut driver| case.brakes(driver.as_mut()))
+        ads::careful(name, recording[from].scene())
+            .is_some_and(|mut driver| to_the_letter.brakes(driver.as_mut()))
     };
     let r157_letter: Vec<String> = settings.careful.iter().filter(brakes_in_time).cloned().collect();
     let evasion = if careful.is_empty() { case.evasion() } else { None };
@@ -247,6 +250,7 @@ pub fn judge_one(
 }
 
 /// A collision that is to be driven again.
+#[derive(Clone, Copy)]
 struct Case<'a> {
     recording: &'a [World],
     /// Index of the onset.

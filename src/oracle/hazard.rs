@@ -1,29 +1,46 @@
 //! The onset of a hazard: when a collision began to take shape.
 //!
-//! The onset is the first moment of the last uninterrupted time before the contact in which the
-//! obstacle was on the ego vehicle's way or heading for it, and in which it could be seen. The way is
-//! the one that the ego vehicle took, as wide as the vehicle and the 0.375 m by which careful drivers
+//! A moment belongs to the hazard if the obstacle was on the ego vehicle's way or heading for it, or if one of the two
+//! visibly did what the other need not expect: it was beyond the middle of the road or beside its lane, came out of its
+//! lane sideways, was in a junction that it had entered at a red light, or was on foot on the carriageway. The onset is
+//! the first such moment, of the last uninterrupted time of them before the contact, at which the obstacle could be
+//! seen. So the judgement begins with the first violation or visible intention, whichever of the two shows it.
+//!
+//! The way is the one that the ego vehicle took, as wide as the vehicle and the 0.375 m by which careful drivers
 //! wander (UN R157, Annex 4, Appendix 3); heading is to go on at constant velocity until the time of
 //! the contact. Both compare places alone, not times: a driver may see that two ways cross before it is
 //! clear which vehicle will be there first.
 
 use crate::ads::in_sight;
-use crate::geometry::{OrientedBox, distance_m};
-use crate::sim::{DT_S, FRAME_TICKS, World};
+use crate::geometry::{OrientedBox, Pose, distance_m};
+use crate::sim::{DT_S, FRAME_TICKS, Obstacle, World};
 
 /// By how much drivers wander in their lane, m.
 const WANDER_M: f64 = 0.375;
 /// Places of a prediction and of the ego vehicle's way are compared at this many ticks, 0.2 s.
 const STRIDE: usize = 2 * FRAME_TICKS as usize;
 
-/// Index of the onset in a recording of the worlds up to the contact with `obstacle`, `None` if it was
-/// never in sight. `met` is the ego vehicle's outline at the contact.
-pub fn onset(recording: &[World], obstacle: u32, met: OrientedBox) -> Option<usize> {
+/// Two beginnings of a hazard, as indices in a recording of the worlds up to the contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Onset {
+    /// The first violation, visible intention or conflict of ways.
+    pub first: usize,
+    /// The first conflict of ways: what a driver sees that knows no rules. UN R157's models begin here.
+    pub conflict: usize,
+}
+
+/// The onset in a recording of the worlds up to the contact with `obstacle`; `None` if that was never in sight. `met` is
+/// the ego vehicle's outline at the contact.
+pub fn onset(recording: &[World], obstacle: u32, met: OrientedBox) -> Option<Onset> {
     let mut way: Vec<OrientedBox> = vec![met];
     let mut sensed = recording.last()?.sensed();
     // Backwards in time: whether a moment of the hazard was found, and the earliest at which it was seen.
     let mut began = false;
     let mut first = None;
+    // The same for conflicts of ways alone, and whether their uninterrupted time is over.
+    let mut conflict_began = false;
+    let mut conflict_over = false;
+    let mut conflict = None;
     for (index, world) in recording.iter().enumerate().rev() {
         let left = recording.len() - index;
         if left.is_multiple_of(STRIDE) {
@@ -33,25 +50,45 @@ pub fn onset(recording: &[World], obstacle: u32, met: OrientedBox) -> Option<usi
             continue;
         }
         let Some(other) = world.obstacle(obstacle) else { break };
-        let conflicts = (0..=left.div_ceil(STRIDE)).any(|step| {
-            let mut then = other.outline;
-            then.pose.position += other.velocity_mps * (step * STRIDE) as f64 * DT_S;
-            way.iter().any(|ego| near(ego, &then))
-        });
-        if !conflicts {
+        let conflicts = !conflict_over
+            && (0..=left.div_ceil(STRIDE)).any(|step| {
+                let mut then = other.outline;
+                then.pose.position += other.velocity_mps * (step * STRIDE) as f64 * DT_S;
+                way.iter().any(|ego| near(ego, &then))
+            });
+        if !conflicts && !is_out_of_order(world, other) {
             if began {
                 break;
             }
             continue;
         }
+        conflict_over |= conflict_began && !conflicts;
+        conflict_began |= conflicts;
         began = true;
         world.sense(&mut sensed);
         let seen = sensed.objects.iter().find(|object| object.id == obstacle);
         if seen.is_some_and(|object| in_sight(object, &sensed.conditions)) {
             first = Some(index);
+            conflict = if conflicts { first } else { conflict };
         }
     }
-    first
+    let first = first?;
+    // Without a conflict that was seen, a driver that knows no rules takes over at the last moment.
+    Some(Onset { first, conflict: conflict.unwrap_or(recording.len() - 1) })
+}
+
+/// Whether the ego vehicle or an obstacle visibly does what the other need not expect.
+fn is_out_of_order(world: &World, obstacle: &Obstacle) -> bool {
+    let map = &world.scene().map;
+    if world.is_astray() || world.ego_runs_red() || map.is_beyond_middle(&world.ego_outline()) {
+        return true;
+    }
+    let (outline, Pose { position, heading_rad }) = (&obstacle.outline, obstacle.outline.pose);
+    if obstacle.body.is_vehicle() {
+        obstacle.moves_aside() || world.runs_red(obstacle.id) || map.is_beyond_middle(outline)
+    } else {
+        map.nearest(position, heading_rad, 0.0).is_some()
+    }
 }
 
 /// Whether two outlines are no farther apart than drivers wander.

@@ -3,11 +3,13 @@
 //! Delta-v is the change of velocity of a perfectly inelastic impact of two bodies across the gap that closes:
 //! `m2 / (m1 + m2)` of the speed at which it closes where they meet. What slides along the contact changes nothing,
 //! so a scrape at 20 m/s is no crash at 20 m/s. Both are taken to be hit in line with their centres; an impact
-//! beside them turns the bodies and changes their velocity less, so this is an upper bound. Injury models are left
-//! out: their curves describe whole populations.
+//! beside them turns the bodies and changes their velocity less, so this is an upper bound. The world carries the same
+//! impact out (`sim::contact`), as far as a car can follow: neither backwards nor sideways. Injury models are left out:
+//! their curves describe whole populations.
 
 use crate::episode::Collision;
 use crate::geometry::Vec2;
+use crate::kinematics::STANDING_MPS;
 use crate::sim::VehicleParameters;
 
 use crate::episode::side;
@@ -30,9 +32,6 @@ pub struct Severity {
     /// `from the left` or `from the right`.
     pub approach: &'static str,
 }
-
-/// Slower than this an obstacle stands, m/s.
-const STANDING_MPS: f64 = 0.3;
 
 /// The severity of a collision.
 pub fn severity(collision: &Collision) -> Severity {

@@ -16,7 +16,8 @@ use crate::sim::testing::Heading;
 use crate::sim::{Contact, Control, DT_S, Sensed, Start, VehicleParameters, World, testing};
 
 use super::avoidable::{AvoidabilitySettings, Judgement, judge_one};
-use super::hazard::onset;
+use super::hazard::{Onset, onset};
+use super::severity::severity;
 use crate::episode::{collision_facts, struck};
 
 /// A lane along +x for 800 m, 3 m wide: too narrow to pass another vehicle.
@@ -95,6 +96,32 @@ fn an_ordinary_stop_of_the_leader_is_avoidable() {
     assert_eq!(judgement.avoided_by, ["cc", "fsm", "rss", "r157"]);
 }
 
+#[test]
+fn the_change_of_velocity_that_is_told_is_the_one_that_was_driven() {
+    for (slower_mps, verb) in [(10.0, Verb::DriveAhead), (3.0, Verb::DriveAhead), (0.0, Verb::Stand)] {
+        let mut world = world();
+        let mut blind = Blind(ads::Idm::new(world.scene()));
+        let mut sensed = world.sensed();
+        let contact = loop {
+            if world.ticks() == 600 {
+                appear(&mut world, verb, 40.0, (world.ego().speed_mps - slower_mps).max(0.5));
+            }
+            world.sense(&mut sensed);
+            let control = blind.drive(&sensed);
+            if let Some(contact) = world.tick(&control).first().copied() {
+                break contact;
+            }
+        };
+        let mass_t = world.body(contact.obstacle).expect("it is still there").mass_t;
+        let body = BodyWord::engine(Body::Sedan);
+        let collision = Collision { contact, step: 0, body, mass_t, verb, spawned_s: 12.0 };
+        let told = severity(&collision);
+        let driven_mps = contact.ego_speed_mps - world.ego().speed_mps;
+        assert!(contact.closing_speed_mps > 1.0, "{contact:?}");
+        assert!((told.delta_v_mps - driven_mps).abs() < 1e-9, "{told:?}, driven {driven_mps}");
+    }
+}
+
 /// Judges a vehicle that is 30 km/h slower and appears this far ahead of an ego vehicle at about 11 m/s.
 fn appears(distance_m: f64) -> Judgement {
     judged(0.0, |world| {
@@ -139,7 +166,7 @@ fn what_was_never_in_sight_has_no_onset() {
     let met = hidden.ego_outline();
     assert_eq!(onset(&[hidden.clone()], 1, met), None, "20 m away and no way leads there");
     let there = hidden.obstacle(1).expect("it was put there").outline;
-    assert_eq!(onset(&[hidden.clone()], 1, there), Some(0));
+    assert_eq!(onset(&[hidden.clone()], 1, there), Some(Onset { first: 0, conflict: 0 }));
     assert_eq!(onset(&[hidden], 2, there), None, "no obstacle has that number");
 }
 

@@ -4,6 +4,7 @@
 //! 0.774 g. The time in which the brake builds up is left out: it only adds to the distance, and this proof
 //! needs a lower bound. The world computes the whole distance (`spawn_gap >= safety_gap`).
 
+use crate::kinematics::{CAREFUL_BRAKING_MPS2, CAREFUL_PERCEPTION_S, CAREFUL_REACTION_S, stopping_m};
 use crate::model::rules::{Demand, RowRules};
 use crate::model::vocabulary::{Known, Verb, Word};
 use crate::model::{
@@ -17,9 +18,7 @@ use crate::units::decimal;
 const BOXES_MAX: usize = 50_000;
 
 /// Perception and reaction, s.
-const REACTION_S: f64 = 0.4 + 0.75;
-/// 0.774 g, m/s².
-const BRAKING_MPS2: f64 = 0.774 * 9.80665;
+const DELAY_S: f64 = CAREFUL_PERCEPTION_S + CAREFUL_REACTION_S;
 /// A smaller difference between the distances is taken for rounding, m.
 const MARGIN_M: f64 = 0.01;
 
@@ -67,7 +66,7 @@ pub(super) fn unfair(
 
 /// Way from a speed to rest: reaction, then full brakes, m.
 fn braked_m(speed_mps: f64) -> f64 {
-    speed_mps * REACTION_S + speed_mps * speed_mps / (2.0 * BRAKING_MPS2)
+    stopping_m(speed_mps, DELAY_S, CAREFUL_BRAKING_MPS2)
 }
 
 /// The spawn, and the gap that a driver at the road's limit needs.
@@ -85,7 +84,7 @@ fn figures(space: &Space, road: &Road, spawn: &SpawnDef, values: &[Value], memor
     let ego_mps = road.facts.limit_mps;
     let needed_m = match spawn.verb.word(&space.functions, &facts) {
         Verb::DriveAhead => braked_m((ego_mps - speed_mps).max(0.0)),
-        Verb::DriveOpposite => braked_m(ego_mps) + speed_mps * (REACTION_S + ego_mps / BRAKING_MPS2),
+        Verb::DriveOpposite => braked_m(ego_mps) + speed_mps * (DELAY_S + ego_mps / CAREFUL_BRAKING_MPS2),
         Verb::CrossRoad | Verb::Walk | Verb::Stand => braked_m(ego_mps),
         // A vehicle from behind sees the ego vehicle, which need do nothing.
         Verb::Overtake => 0.0,

@@ -10,6 +10,7 @@ use std::fmt::Write;
 
 use crate::ads::{PerceivedObject, Status};
 use crate::geometry::{Bounds, OrientedBox, Vec2};
+use crate::kinematics::STANDING_MPS;
 use crate::model::vocabulary::{Body, Word};
 use crate::road::Lane;
 use crate::sim::{Contact, Obstacle, SignalColour, World};
@@ -35,8 +36,6 @@ const CHEVRON_EVERY_M: f64 = 15.0;
 const CHEVRON_M: f64 = 0.7;
 /// An arrow for a velocity is as long as the way driven in this time, s.
 const VELOCITY_S: f64 = 1.0;
-/// Slower than this nothing gets an arrow, m/s.
-const STANDING_MPS: f64 = 0.3;
 /// Height of names, px.
 const NAME_PX: f64 = 12.0;
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use crate::geometry::{Bounds, Path, Vec2, wrap_angle};
+use crate::geometry::{Bounds, OrientedBox, Path, Vec2, wrap_angle};
 
 use super::heights::Heights;
 use super::index::LaneGrid;
@@ -327,6 +327,20 @@ impl RoadMap {
             }
         }
         best.map(|(_, _, place)| place)
+    }
+
+    /// Whether a point lies on lanes that all run against a heading: beyond the middle of the road.
+    pub fn runs_against(&self, point: Vec2, heading_rad: f64) -> bool {
+        let fits = |place: LanePlace| {
+            let lane_rad = self.lane(place.lane).centre.heading_at(place.station_m);
+            wrap_angle(lane_rad - heading_rad).abs() <= core::f64::consts::FRAC_PI_2
+        };
+        self.nearest(point, heading_rad, 0.0).is_some_and(|place| !fits(place))
+    }
+
+    /// Whether any corner of a body is beyond the middle of the road, seen along its heading.
+    pub fn is_beyond_middle(&self, outline: &OrientedBox) -> bool {
+        outline.corners().iter().any(|corner| self.runs_against(*corner, outline.pose.heading_rad))
     }
 }
 

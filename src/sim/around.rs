@@ -1,10 +1,11 @@
 //! What a road user may look at while it decides how to move.
 
 use crate::geometry::{OrientedBox, Vec2};
+use crate::kinematics::GRAVITY_MPS2;
 use crate::road::is_apart;
 
 use super::body::BodyParameters;
-use super::environment::{GRAVITY_MPS2, Grip};
+use super::environment::Grip;
 use super::npc::Driver;
 use super::pedestrian::Walker;
 use super::road_user::{Motion, Obstacle, RoadUser};

@@ -1,13 +1,13 @@
 //! Contacts of the ego vehicle with obstacles, and what they do to it.
 //!
-//! Outlines are swept from tick to tick, so nothing passes through anything. The impact is plastic
-//! and acts along the ego vehicle's heading alone: enough for what follows a first contact, and no
-//! claim about damage. Contacts among obstacles are in `incident`.
+//! Outlines are swept from tick to tick, so nothing passes through anything. The impact is plastic and acts across
+//! the gap that closed, as among obstacles (`incident`): what `oracle::severity` says of a contact is what the
+//! bodies then do, as far as a car can do it. Neither is pushed backwards or sideways or turned, and a person who was
+//! hit stays where it was.
 
 use crate::geometry::{Sweep, Vec2, first_contact};
 use crate::model::vocabulary::Priority;
 
-use super::ego::VehicleParameters;
 use super::world::DT_S;
 
 /// The ego vehicle touched an obstacle that it did not touch in the tick before.
@@ -40,14 +40,21 @@ pub(super) struct Party {
     pub velocity_mps: Vec2,
 }
 
-/// The contact that begins within the tick after `tick`, if there is one.
-pub(super) fn meet(ego: &Party, ego_speed_mps: f64, obstacle: &Party, id: u32, tick: u64) -> Option<Contact> {
+/// The contact that begins within the tick after `tick`, if there is one, and the unit vector from the ego vehicle to
+/// the obstacle across the gap that closed; a zero vector if they touched already.
+pub(super) fn meet(
+    ego: &Party,
+    ego_speed_mps: f64,
+    obstacle: &Party,
+    id: u32,
+    tick: u64,
+) -> Option<(Contact, Vec2)> {
     let first = first_contact(&ego.sweep, &obstacle.sweep)?;
     let ego_pose = ego.sweep.at(first.fraction).pose;
     // The velocities of the points that meet, not of the centres: a corner that swings out closes a gap, too.
     let rate_m = |party: &Party| party.sweep.rate_m(first.fraction, first.point);
     let closing_mps = (rate_m(ego) - rate_m(obstacle)).dot(&first.normal) / DT_S;
-    Some(Contact {
+    let contact = Contact {
         time_s: (tick as f64 + first.fraction) * DT_S,
         obstacle: id,
         point: first.point,
@@ -60,24 +67,6 @@ pub(super) fn meet(ego: &Party, ego_speed_mps: f64, obstacle: &Party, id: u32, t
         ),
         closing_speed_mps: closing_mps.max(0.0),
         priority: Priority::None,
-    })
-}
-
-/// Common speed along the ego vehicle's heading after a plastic impact with a mass, at least 0, m/s.
-pub(super) fn common_speed_mps(ego_speed_mps: f64, other_along_mps: f64, other_mass_t: f64) -> f64 {
-    let ego_mass_t = VehicleParameters::MKZ.mass_t;
-    let momentum = ego_mass_t * ego_speed_mps + other_mass_t * other_along_mps;
-    (momentum / (ego_mass_t + other_mass_t)).max(0.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn masses_share_the_momentum() {
-        assert!((common_speed_mps(10.0, 0.0, VehicleParameters::MKZ.mass_t) - 5.0).abs() < 1e-12);
-        assert!(common_speed_mps(10.0, 0.0, 0.075) > 9.6);
-        assert_eq!(common_speed_mps(10.0, -10.0, 11.0), 0.0);
-    }
+    };
+    Some((contact, first.normal))
 }

@@ -6,9 +6,9 @@
 //! angles: what the tyres cannot give is cut off instead.
 
 use crate::geometry::{Frame, OrientedBox, Pose, Vec2, unit_vector, wrap_angle};
+use crate::kinematics::GRAVITY_MPS2;
 use crate::model::SPEED_MPS_MAX;
 
-use super::environment::GRAVITY_MPS2;
 use super::sense::EgoMotion;
 use super::trace::Trace;
 

@@ -27,9 +27,6 @@ use crate::model::vocabulary::{Level, Phenomenon, TimeOfDay};
 use super::sense::Conditions;
 use super::trace::Trace;
 
-/// Standard gravity, m/s².
-pub(super) const GRAVITY_MPS2: f64 = 9.80665;
-
 /// Light for Morning, Noon and Night, 1 at noon. Ours: a low sun costs a camera some contrast, and
 /// street lamps leave it the recognition range that low beams give (35 to 50 %) on few pixels.
 const LIGHT: [f64; 3] = [0.8, 1.0, 0.15];

@@ -86,8 +86,18 @@ pub(super) fn bump(users: &[RoadUser], index: usize, end: &Pose, tick: u64) -> O
 /// Velocities of two masses after a plastic impact across the unit vector `normal`, m/s; unchanged if the gap
 /// does not close.
 pub(super) fn impact(normal: Vec2, first: (f64, Vec2), second: (f64, Vec2)) -> (Vec2, Vec2) {
+    let closing_mps = (first.1 - second.1).dot(&normal).max(0.0);
+    exchange(normal, closing_mps, first, second)
+}
+
+/// As [`impact`], where the gap closes at a given speed: that of the points that meet, if bodies turn.
+pub(super) fn exchange(
+    normal: Vec2,
+    closing_mps: f64,
+    first: (f64, Vec2),
+    second: (f64, Vec2),
+) -> (Vec2, Vec2) {
     let ((first_t, first_mps), (second_t, second_mps)) = (first, second);
-    let closing_mps = (first_mps - second_mps).dot(&normal).max(0.0);
     let lost_mps = closing_mps * second_t / (first_t + second_t);
     (first_mps - normal * lost_mps, second_mps + normal * (closing_mps - lost_mps))
 }

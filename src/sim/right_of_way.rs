@@ -23,11 +23,16 @@
 //! pedestrian may not step onto the road without regard to distance and speed of what comes (20.6), and a
 //! driver must not endanger pedestrians and be able to stop for what can be foreseen (21.1, 13.1). So the ego
 //! vehicle has priority only over one that steps onto the carriageway too late for its brakes, and otherwise
-//! neither has.
+//! neither has. It loses that priority once it could have stopped for the pedestrian in its view after all, and it
+//! has none at walking pace: who drives so slowly can stop for anybody.
+//!
+//! Of two that come towards each other outside junctions, the one that is beyond the middle of the road has to give
+//! way (articles 10.3 and 12), with whatever part of its body: a bus whose rear swings over the line, too.
 //!
 //! The state is kept for each road user ([`Rights`]), looked at ten times a second, and read at a contact.
 
 use crate::geometry::{OrientedBox, Vec2};
+use crate::kinematics::{CAREFUL_BRAKING_MPS2, WALKING_MPS, stopping_m};
 use crate::model::vocabulary::Priority;
 use crate::road::{LaneIndex, RoadMap, Route, RouteLane, RouteStopLine};
 
@@ -52,7 +57,7 @@ const REACTION_S: f64 = 0.4;
 /// Way behind another vehicle that may not be cut off, s at its speed (UN R79, 5.6.4.7).
 const HEADWAY_S: f64 = 1.0;
 /// Hardest braking that is expected for a pedestrian, m/s² (UN R157's careful driver, 0.774 g).
-const EMERGENCY_MPS2: f64 = 0.774 * 9.81;
+const EMERGENCY_MPS2: f64 = CAREFUL_BRAKING_MPS2;
 /// Vehicles that leave a conflict area this long before the other comes are not in its way, s. Ours.
 const CLEAR_S: f64 = 0.5;
 /// A conflict area farther away than this from either vehicle is not looked at yet, m.
@@ -64,7 +69,7 @@ const AREA_M: f64 = 60.0;
 const HOLDS_S: f64 = 2.0;
 /// A vehicle that moves faster than this to its side comes into another lane, m/s. Ours: less than any lane
 /// change, more than any wandering.
-const SIDEWAYS_MPS: f64 = 0.15;
+pub(super) const SIDEWAYS_MPS: f64 = 0.15;
 /// Vehicles with more room than this between them are not in each other's lane in any way that matters, m: one
 /// that is 16 m/s faster brakes at 3 m/s² after 0.4 s within 49 m.
 const LANE_M: f64 = 50.0;
@@ -152,6 +157,15 @@ impl PassedLight {
         Some(PassedLight { signal: line.signal, was_red: colour(line.signal) == SignalColour::Red })
     }
 
+    /// Whether the light was red, and the body is still in the junction behind it.
+    pub fn is_being_run(&self, map: &RoadMap, outline: &OrientedBox) -> bool {
+        let here = || map.nearest(outline.pose.position, outline.pose.heading_rad, 0.0);
+        let junction = map.signals[self.signal].junction;
+        self.was_red
+            && junction.is_some()
+            && here().is_some_and(|here| map.lane(here.lane).junction == junction)
+    }
+
     pub fn trace(passed: Option<&PassedLight>, trace: &mut Trace) {
         trace.word(passed.map_or(0, |passed| 2 + 2 * passed.signal as u64 + u64::from(passed.was_red)));
     }
@@ -190,18 +204,25 @@ enum Place {
 }
 
 impl Rights {
+    /// The light that the road user passed last.
+    pub fn passed_light(&self) -> Option<&PassedLight> {
+        self.passed.as_ref()
+    }
+
     /// Notes the light of a stop line that the road user's front passes in this tick.
     pub fn pass(&mut self, way: &Way, from_m: f64, to_m: f64, around: &Around) {
         let colour = |signal| around.signals.colour(&around.scene.map, signal, around.tick);
         self.passed = PassedLight::between(&way.stop_lines, from_m, to_m, colour).or(self.passed);
     }
 
-    /// Looks whether one of the two came into the other's way; ten times a second.
+    /// Looks whether one of the two came into the other's way; ten times a second. `in_sight` says whether the ego
+    /// vehicle sees the road user.
     pub fn watch(
         &mut self,
         this: &Obstacle,
         motion: &Motion,
         ego_passed: Option<PassedLight>,
+        in_sight: bool,
         around: &Around,
     ) {
         match motion {
@@ -209,7 +230,7 @@ impl Rights {
                 self.watch_driver(this, driver, ego_passed, around);
             }
             Motion::Walk(_) | Motion::Stand if this.distance_m <= APPROACH_M => {
-                self.watch_pedestrian(this, around);
+                self.watch_pedestrian(this, in_sight, around);
             }
             Motion::Drive(_) | Motion::Walk(_) | Motion::Stand => {}
         }
@@ -232,14 +253,21 @@ impl Rights {
         self.wreck.unwrap_or(if stands { Priority::Other } else { Priority::None })
     }
 
-    /// Who had priority, now that the two touch.
-    pub fn at_contact(&self, this: &Obstacle, motion: &Motion, around: &Around) -> Priority {
+    /// Who had priority, now that the two touch at `point`.
+    pub fn at_contact(&self, this: &Obstacle, motion: &Motion, point: Vec2, around: &Around) -> Priority {
         let holds = |meeting: &&Meeting| (around.tick - meeting.tick) as f64 * DT_S <= HOLDS_S;
+        let is_creeping = around.ego.speed_mps <= WALKING_MPS;
         match (self.meeting.as_ref().filter(holds), motion) {
-            (Some(meeting), _) => meeting.priority,
-            (None, Motion::Drive(driver)) => Side::of(this, driver, around)
-                .map_or(Priority::None, |side| side.at_contact(driver.is_changing_lanes())),
-            (None, Motion::Walk(_) | Motion::Stand) => on_foot(&Strip::of(this, around), around),
+            (Some(meeting), Motion::Drive(_)) => meeting.priority,
+            (None, Motion::Drive(driver)) => Side::of(this, driver, around).map_or(Priority::None, |side| {
+                let changes = driver.is_changing_lanes();
+                side.at_contact(changes, || beyond_middle(this, around, Some(point)))
+            }),
+            (found, Motion::Walk(_) | Motion::Stand) => {
+                let priority =
+                    found.map_or_else(|| on_foot(&Strip::of(this, around), around), |found| found.priority);
+                if is_creeping && priority == Priority::Ego { Priority::None } else { priority }
+            }
         }
     }
 
@@ -285,7 +313,8 @@ impl Rights {
             Some(meeting) if meeting.place == Place::Lane && side.is_gentle() => self.meeting = None,
             Some(meeting) if meeting.place == Place::Lane => meeting.tick = around.tick,
             Some(_) | None if began => {
-                let priority = side.at_coming(driver.is_changing_lanes());
+                let beyond = || beyond_middle(this, around, None);
+                let priority = side.at_coming(driver.is_changing_lanes(), beyond);
                 let found = |priority| Meeting { place: Place::Lane, priority, tick: around.tick };
                 self.meeting = priority.map(found).or(self.meeting);
             }
@@ -293,7 +322,7 @@ impl Rights {
         }
     }
 
-    fn watch_pedestrian(&mut self, this: &Obstacle, around: &Around) {
+    fn watch_pedestrian(&mut self, this: &Obstacle, in_sight: bool, around: &Around) {
         let strip = Strip::of(this, around);
         let position = this.outline.pose.position;
         // The step onto the carriageway is what counts: from there on the ego vehicle may expect the rest.
@@ -310,8 +339,13 @@ impl Rights {
             && strip.ahead_m > -this.outline.half_length_m - strip.length_m
             && (strip.aside_m < BESIDE_M || is_on_road());
         if shares {
-            let known = self.meeting.filter(|_| self.shares == Some(true));
-            let priority = known.map_or_else(|| on_foot(&strip, around), |meeting| meeting.priority);
+            let known = self.meeting.filter(|_| self.shares == Some(true)).map(|meeting| meeting.priority);
+            let priority = match known {
+                // It came too late, and yet the ego vehicle can now stop for it: it is no surprise any more.
+                Some(Priority::Ego) if in_sight && strip.leaves_room(around) => Priority::None,
+                Some(known) => known,
+                None => on_foot(&strip, around),
+            };
             self.meeting = Some(Meeting { place: Place::Lane, priority, tick: around.tick });
         }
         self.shares = Some(shares);
@@ -489,6 +523,11 @@ impl Side {
         })
     }
 
+    /// Whether the two come towards each other.
+    fn is_oncoming(&self) -> bool {
+        self.along < -0.5
+    }
+
     /// Whether the vehicle behind keeps its distance to the one ahead if it brakes gently, or not at all.
     fn is_gentle(&self) -> bool {
         let (behind_mps, ahead_mps) =
@@ -512,7 +551,14 @@ impl Side {
     }
 
     /// Who has priority when the two begin to be in one lane; `None` if that is as for any two in a lane.
-    fn at_coming(&self, other_changes: bool) -> Option<Priority> {
+    fn at_coming(
+        &self,
+        other_changes: bool,
+        beyond_middle: impl FnOnce() -> Option<Priority>,
+    ) -> Option<Priority> {
+        if self.is_oncoming() {
+            return beyond_middle();
+        }
         let priority = self.comes(other_changes)?;
         let comes_behind = (priority == Priority::Ego) == self.ego_is_ahead;
         if self.is_gentle() || (self.along > 0.0 && self.apart_m > 0.0 && comes_behind) {
@@ -522,18 +568,34 @@ impl Side {
     }
 
     /// Who has priority in a contact of two that did not come abruptly into one lane.
-    fn at_contact(&self, other_changes: bool) -> Priority {
+    fn at_contact(&self, other_changes: bool, beyond_middle: impl FnOnce() -> Option<Priority>) -> Priority {
         // Half of the smallest body's width.
         let is_in_line = self.aside_m < -0.5;
-        if self.along < -0.5 {
-            // The other keeps to its way, so the ego vehicle is in its lane, unless it changes lanes.
-            return if other_changes { Priority::Ego } else { Priority::Other };
+        if self.is_oncoming() {
+            // Where no side of the road tells, as in a junction, the other keeps to its way unless it changes lanes.
+            let by_lane = || if other_changes { Priority::Ego } else { Priority::Other };
+            return beyond_middle().unwrap_or_else(by_lane);
         }
         if is_in_line && self.along > 0.5 {
             // It keeps its distance, article 13.5.
             return if self.ego_is_ahead { Priority::Ego } else { Priority::Other };
         }
         self.comes(other_changes).unwrap_or(Priority::None)
+    }
+}
+
+/// Who has priority because the other is beyond the middle of the road, where lanes run against its heading alone: at
+/// a point `at` where the two touch, or else with any corner. `None` if both are, or neither.
+fn beyond_middle(this: &Obstacle, around: &Around, at: Option<Vec2>) -> Option<Priority> {
+    let map = &around.scene.map;
+    let is_beyond = |outline: &OrientedBox| match at {
+        Some(point) => map.runs_against(point, outline.pose.heading_rad),
+        None => map.is_beyond_middle(outline),
+    };
+    match (is_beyond(around.ego_outline), is_beyond(&this.outline)) {
+        (true, false) => Some(Priority::Other),
+        (false, true) => Some(Priority::Ego),
+        (true, true) | (false, false) => None,
     }
 }
 
@@ -575,6 +637,11 @@ impl Strip {
             length_m: VehicleParameters::MKZ.length_m,
         }
     }
+
+    /// Whether the ego vehicle can stop before the pedestrian.
+    fn leaves_room(&self, around: &Around) -> bool {
+        can_stop(around.ego.speed_mps, self.ahead_m, EMERGENCY_MPS2)
+    }
 }
 
 /// Who has priority, the ego vehicle or a pedestrian that steps onto the carriageway or into its way now.
@@ -591,13 +658,12 @@ fn on_foot(strip: &Strip, around: &Around) -> Priority {
             return Priority::Other;
         }
     }
-    if can_stop(around.ego.speed_mps, strip.ahead_m, EMERGENCY_MPS2) { Priority::None } else { Priority::Ego }
+    if strip.leaves_room(around) { Priority::None } else { Priority::Ego }
 }
 
 /// Whether a vehicle that begins to brake after [`REACTION_S`] is at rest within a distance.
 fn can_stop(speed_mps: f64, room_m: f64, braking_mps2: f64) -> bool {
-    let rolled_m = speed_mps * REACTION_S + speed_mps * speed_mps / (2.0 * braking_mps2);
-    rolled_m <= room_m
+    stopping_m(speed_mps, REACTION_S, braking_mps2) <= room_m
 }
 
 /// Half of the length and of the width of an outline, seen along a direction, m.

@@ -3,17 +3,17 @@
 
 use std::sync::Arc;
 
-use crate::geometry::{OrientedBox, Pose, Vec2, distance_m};
+use crate::geometry::{OrientedBox, Pose, Sweep, Vec2, distance_m, unit_vector};
+use crate::kinematics::GRAVITY_MPS2;
 use crate::model::vocabulary::{Body, Colour, Verb};
 use crate::road::is_apart;
 
 use super::ambient::COMMANDED_MAX;
 use super::around::Around;
 use super::body::BodyParameters;
-use super::environment::GRAVITY_MPS2;
 use super::npc::Driver;
 use super::pedestrian::Walker;
-use super::right_of_way::Rights;
+use super::right_of_way::{Rights, SIDEWAYS_MPS};
 use super::trace::Trace;
 use super::world::DT_S;
 
@@ -52,6 +52,12 @@ impl Obstacle {
     /// Whether it is ambient traffic, which no action made appear.
     pub fn is_ambient(&self) -> bool {
         self.id > COMMANDED_MAX
+    }
+
+    /// Whether a vehicle comes out of its lane sideways, as in a lane change.
+    pub fn moves_aside(&self) -> bool {
+        let lane = unit_vector(self.lane_heading_rad);
+        self.body.is_vehicle() && lane.perp(&self.velocity_mps).abs() > SIDEWAYS_MPS
     }
 }
 
@@ -227,6 +233,15 @@ impl Mover {
             Motion::Walk(walker) => walker.step(this, in_sight, around),
             Motion::Stand => Some(rest),
         }
+    }
+
+    /// Its motion of a tick, as far as it can hit anything.
+    pub fn sweep(&self, mut start: OrientedBox, end: Pose) -> Sweep {
+        if let Motion::Walk(_) = self.motion {
+            // A person who turns round does so on the spot: no elbow sweeps half a circle within a tick.
+            start.pose.heading_rad = end.heading_rad;
+        }
+        Sweep { start, end }
     }
 
     /// It touched the ego vehicle: from now on it goes at most `speed_mps`, until its brakes stop it.

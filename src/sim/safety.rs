@@ -10,11 +10,11 @@
 //! versions of the driver have before the brake; the regulation's table has none. The regulation knows
 //! only leaders; [`oncoming_m`] and [`from_behind_m`] are ours.
 
-use super::environment::GRAVITY_MPS2;
+use crate::kinematics::{
+    CAREFUL_BRAKING_MPS2 as BRAKING_MPS2, CAREFUL_PERCEPTION_S as PERCEPTION_S,
+    CAREFUL_REACTION_S as REACTION_S, GRAVITY_MPS2, stopping_m,
+};
 
-const PERCEPTION_S: f64 = 0.4;
-const REACTION_S: f64 = 0.75;
-const BRAKING_MPS2: f64 = 0.774 * GRAVITY_MPS2;
 const JERK_MPS3: f64 = 12.65;
 
 /// Gap that closes until a careful driver is no faster than a road user ahead, m; 0 if the gap opens.
@@ -61,7 +61,7 @@ pub(super) fn noticing_m(own_mps: f64) -> f64 {
 /// driver chose to come near, so no time goes into perceiving.
 pub(super) fn from_behind_m(behind_mps: f64, ego_mps: f64, braking_mps2: f64) -> f64 {
     let closing_mps = (behind_mps - ego_mps).max(0.0);
-    closing_mps * REACTION_S + closing_mps * closing_mps / (2.0 * braking_mps2)
+    stopping_m(closing_mps, REACTION_S, braking_mps2)
 }
 
 #[cfg(test)]

@@ -17,10 +17,10 @@ use crate::road::{RouteLaneChange, is_apart};
 
 use super::ambient::{Ambient, RENEWAL_TICKS, is_gone};
 use super::around::Around;
-use super::contact::{Contact, Party, common_speed_mps, meet};
+use super::contact::{Contact, Party, meet};
 use super::ego::{Control, Ego, VehicleParameters};
 use super::environment::Environment;
-use super::incident::{Bump, Incident, bump, impact};
+use super::incident::{Bump, Incident, bump, exchange, impact};
 use super::moment::npc_facts;
 use super::placement;
 use super::placement::Arrivals;
@@ -37,7 +37,7 @@ use super::traffic::TrafficProfile;
 
 /// Name of this simulated world. Raised whenever the same seed no longer gives the same episode and trace, so that an
 /// old scenario is told apart from a refuted one.
-pub const ENGINE: &str = "plane/7";
+pub const ENGINE: &str = "plane/8";
 
 /// The first world whose episodes were those of this one, whatever their traces: results that hold no trace are good in
 /// both.
@@ -407,6 +407,18 @@ impl World {
             })
     }
 
+    /// Whether the ego vehicle is in a junction that it entered at a red light.
+    pub fn ego_runs_red(&self) -> bool {
+        self.ego_passed.is_some_and(|passed| passed.is_being_run(&self.scene.map, &self.ego.outline))
+    }
+
+    /// Whether the road user with an id is in a junction that it entered at a red light.
+    pub fn runs_red(&self, id: u32) -> bool {
+        let user = self.users.iter().find(|user| user.obstacle.id == id);
+        let passed = user.and_then(|user| Some((user.mover.rights.passed_light()?, &user.obstacle.outline)));
+        passed.is_some_and(|(passed, outline)| passed.is_being_run(&self.scene.map, outline))
+    }
+
     /// Whether the ego vehicle has left its lane without a contact: the middle of its rear axle is beside it. During a
     /// lane change it is in one of two lanes.
     pub fn is_astray(&self) -> bool {
@@ -500,7 +512,8 @@ impl World {
             if mover.has_crashed() {
                 mover.rights.watch_wreck(obstacle, &around);
             } else {
-                mover.rights.watch(obstacle, &mover.motion, self.ego_passed, &around);
+                let in_sight = around.is_in_sight(obstacle, mover.visible_fraction);
+                mover.rights.watch(obstacle, &mover.motion, self.ego_passed, in_sight, &around);
             }
         }
         self.users = users;
@@ -537,27 +550,29 @@ impl World {
         if mover.touched || is_apart(self.ego_elevation_m, obstacle.elevation_m) {
             return true;
         }
-        let sweep = Sweep { start: before.outline, end: moved.pose };
+        let sweep = mover.sweep(before.outline, moved.pose);
         if before.distance_m > ego.sweep.most_m() + sweep.most_m() + NEAR_M {
             // The gap is wider than both together can close it in a tick.
             return true;
         }
         let other = Party { sweep, velocity_mps: moved.velocity_mps };
-        if let Some(contact) = meet(ego, ego_mps, &other, before.id, self.ticks) {
+        if let Some((contact, normal)) = meet(ego, ego_mps, &other, before.id, self.ticks) {
             let around = self.around([&[], &[]]);
             let priority = if mover.has_crashed() {
                 mover.rights.at_contact_with_wreck(obstacle)
             } else {
-                mover.rights.at_contact(obstacle, &mover.motion, &around)
+                mover.rights.at_contact(obstacle, &mover.motion, contact.point, &around)
             };
-            let heading = self.ego.frame.forward();
-            let along_mps = heading.dot(&moved.velocity_mps);
-            // Impacts chain: the second acts on the speed that the first left.
-            let common_mps = common_speed_mps(self.ego.motion.speed_mps, along_mps, mover.size.mass_t);
-            self.ego.motion.speed_mps = common_mps;
+            // Impacts chain: of two in a tick, the second acts on the speed that the first left.
+            let now_mps = self.ego.velocity_mps();
+            let lost_mps = (ego.velocity_mps - now_mps).dot(&normal);
+            let closing_mps = (contact.closing_speed_mps - lost_mps).max(0.0);
+            let this = (VehicleParameters::MKZ.mass_t, now_mps);
+            let that = (mover.size.mass_t, moved.velocity_mps);
+            let (ego_mps, other_mps) = exchange(normal, closing_mps, this, that);
+            self.ego.motion.speed_mps = self.ego.frame.forward().dot(&ego_mps).max(0.0);
             self.ego.motion.touched = true;
-            // A vehicle that is pushed forward goes on at what the push gives; one that is stopped stays.
-            mover.touch((moved.forward.dot(&heading) * common_mps).max(0.0));
+            mover.touch(moved.forward.dot(&other_mps).max(0.0));
             self.contacts.push(Contact { priority, ..contact });
         }
         true

@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use crate::cases::root;
 
 /// From left to right, as in `src/lib.rs` and ARCHITECTURE.md.
-const ORDER: [&str; 26] = [
+const ORDER: [&str; 27] = [
     "units",
     "rng",
     "statistics",
     "geometry",
+    "kinematics",
     "road",
     "syntax",
     "model",

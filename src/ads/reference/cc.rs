@@ -11,18 +11,16 @@
 //! the way when the ego vehicle comes there is critical at 2 s, too, from whatever side it comes. Left out
 //! is the automatic emergency brake (0.85 g within 0.6 s) that the table adds once the two overlap in full.
 
+use crate::kinematics::CAREFUL_BRAKING_MPS2;
+
 use super::encounter::Encounter;
 use super::model::Model;
 use super::reflex::Braking;
-
-const GRAVITY_MPS2: f64 = 9.81;
 
 /// Critical time to collision and critical time headway, s.
 const CRITICAL_S: f64 = 2.0;
 /// A deceleration of the vehicle ahead beyond this is seen as hard braking, m/s² (esmini).
 const LEADER_MPS2: f64 = 5.0;
-/// Deceleration of the hardest braking, m/s².
-const BRAKING_MPS2: f64 = 0.774 * GRAVITY_MPS2;
 /// A vehicle within this distance of its course merely wanders, m.
 const WANDER_M: f64 = 0.375;
 
@@ -37,7 +35,7 @@ impl Model for CarefulHuman {
             reaction_s: 0.75,
             release_mps2: 0.4,
             jerk_mps3: 12.65,
-            deceleration_mps2_max: BRAKING_MPS2,
+            deceleration_mps2_max: CAREFUL_BRAKING_MPS2,
         }
     }
 
@@ -50,6 +48,6 @@ impl Model for CarefulHuman {
             && encounter.closing_mps() > 0.0;
         let is_noticed = encounter.crosses || encounter.aside_m > WANDER_M;
         let will_meet = is_noticed && encounter.meeting_s.is_some_and(|time_s| time_s <= CRITICAL_S);
-        if closing_in || braking_ahead || will_meet { BRAKING_MPS2 } else { 0.0 }
+        if closing_in || braking_ahead || will_meet { CAREFUL_BRAKING_MPS2 } else { 0.0 }
     }
 }

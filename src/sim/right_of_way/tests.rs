@@ -145,8 +145,8 @@ fn one_who_cuts_in_and_stops_has_not_given_way_before_the_distance_is_back() {
         other_towards_mps: 1.0,
     };
     // As fast as the ego vehicle, less than a second before it.
-    assert_eq!(side(4.0, 10.0).at_coming(true), Some(Priority::Ego));
-    assert_eq!(side(11.0, 10.0).at_coming(true), None);
+    assert_eq!(side(4.0, 10.0).at_coming(true, || None), Some(Priority::Ego));
+    assert_eq!(side(11.0, 10.0).at_coming(true, || None), None);
     // What was found stays while it brakes to rest, and until there is room to brake gently for it.
     assert!(!side(4.0, 10.0).is_gentle() && !side(6.0, 5.0).is_gentle() && !side(4.0, 0.0).is_gentle());
     assert!(side(22.0, 0.0).is_gentle());

@@ -57,11 +57,12 @@ impl World {
             let known = before.iter().find(|(id, _)| *id == obstacle.id);
             let start = known.map_or(obstacle.outline, |(_, outline)| *outline);
             let other = Party {
-                sweep: Sweep { start, end: obstacle.outline.pose },
+                sweep: mover.sweep(start, obstacle.outline.pose),
                 velocity_mps: obstacle.velocity_mps,
             };
             let tick = recorded.ticks - 1;
-            self.contacts.extend(meet(&ego, ego_mps, &other, obstacle.id, tick));
+            let met = meet(&ego, ego_mps, &other, obstacle.id, tick);
+            self.contacts.extend(met.map(|(contact, _)| contact));
         }
         if self.ticks.is_multiple_of(FRAME_TICKS) {
             self.look();
