@@ -104,7 +104,8 @@ fn the_change_of_velocity_that_is_told_is_the_one_that_was_driven() {
         let mut sensed = world.sensed();
         let contact = loop {
             if world.ticks() == 600 {
-                appear(&mut world, verb, 40.0, (world.ego().speed_mps - slower_mps).max(0.5));
+                let speed_mps = (world.ego().speed_mps - slower_mps).max(0.5);
+                appear(&mut world, verb, 40.0, speed_mps);
             }
             world.sense(&mut sensed);
             let control = blind.drive(&sensed);
