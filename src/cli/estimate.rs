@@ -4,15 +4,17 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use crate::action::ActionTable;
 use crate::estimate::{
     Comparison, ComparisonResults, Estimate, EstimateDatabase, EstimateResults, EstimateSettings, EventKind,
-    Found, Mass, Met, Method, PILOT, Part, Pilot, Plan, Played, Probability, Stopping, compared, pilot,
-    play_parts,
+    Found, Mass, Met, Method, PILOT, Part, Pilot, Plan, Played, Probability, Stopping, WrittenScenario,
+    compared, pilot, play_parts,
 };
-use crate::run::{Numbered, Run, RunSettings, Shard, Units};
+use crate::run::{DatabaseError, Numbered, Run, RunSettings, Shard, Units};
 use crate::statistics::Interval;
+use crate::syntax::yaml_mistake;
 
-use super::arguments::{CompareArguments, EstimateArguments, EventArgument, MethodArgument};
+use super::arguments::{CompareArguments, EstimateArguments, EventArgument, Format, MethodArgument};
 use super::error::Failure;
 use super::files::{remove, write};
 use super::findings::doubts;
@@ -22,7 +24,7 @@ use super::output::{Output, plural};
 use super::parallel::jobs;
 use super::progress::{Progress, Working};
 use super::run::{critical_text, cut_short};
-use super::run_directory::{Held, Resumed, write_scenario};
+use super::run_directory::{Held, Resumed, WrittenFile, write_scenario};
 use super::{conditions, load, run_directory, shard};
 
 /// Plays what an estimate still lacks and prints its result.
@@ -64,9 +66,9 @@ fn play_all(
     let path = held.path.clone();
     let file = path.join("estimate.db");
     let stop = stop_on_interrupt();
-    let mut database =
-        EstimateDatabase::open(&file, &settings).map_err(|error| Failure::file("open", &file, error))?;
+    let mut database: EstimateDatabase = run_directory::open_to_go_on(output, &file, &settings)?;
     let unread = |error| Failure::file("read", &file, error);
+    run_directory::restore(output, "estimate", &files_of(&path, database.scenarios().map_err(unread)?))?;
     let shard = shard::kept(&path)?;
     output.tell(&format!("{}, into {}", heading(&estimate), path.display()));
     let jobs = jobs(asked_jobs, estimate.run().program())?;
@@ -110,19 +112,10 @@ fn play_all(
             }
             database.add(&estimate, &played, &scenarios).map_err(|error| Failure::file("write", &file, error))
         })?;
-        // What was played beyond this look, before a kill, with other rules or in shards, does not count at it.
-        let (mut records, mut events) =
-            (database.parts().map_err(unread)?, database.events().map_err(unread)?);
-        records.retain(|record| is_at_look(&record.part));
-        events.retain(|(part, _)| is_at_look(part));
-        let pilot_s = pilot.whole_s + pilot.tried_s;
-        let found = Found { records: &records, events: &events, pilot_s, labels: &labels };
-        let at_look = EstimateResults::new(estimate.settings(), found);
-        let is_unfinished = records.len() < wanted.len();
-        let is_over = is_unfinished
-            || at_look.together.as_ref().is_some_and(|found| estimate.settings().is_enough(found));
-        let kept: Vec<Part> = records.iter().map(|record| record.part).collect();
-        results = Some((at_look, kept, is_unfinished));
+        let looked = at_look(estimate.settings(), &database, &pilot, &labels, look).map_err(unread)?;
+        let is_unfinished = looked.parts.len() < wanted.len();
+        let is_over = is_unfinished || looked.is_enough;
+        results = Some((looked.results, looked.parts, is_unfinished));
         if is_over {
             break;
         }
@@ -155,6 +148,101 @@ fn play_all(
     Ok(())
 }
 
+/// What an estimate has found up to a look.
+struct Looked {
+    results: EstimateResults,
+    /// The parts that it is made of.
+    parts: Vec<Part>,
+    /// Whether its stopping rules are met.
+    is_enough: bool,
+}
+
+/// What a database says up to a look. What was played beyond it, before a kill, with other rules or in shards, does not count.
+fn at_look(
+    settings: &EstimateSettings,
+    database: &EstimateDatabase,
+    pilot: &Pilot,
+    labels: &[String],
+    look: u32,
+) -> Result<Looked, DatabaseError> {
+    let (mut records, mut events) = (database.parts()?, database.events()?);
+    let is_known = |part: &Part| part.road < settings.run.roads.len();
+    if !records.iter().all(|record| is_known(&record.part))
+        || events.iter().any(|(_, event)| event.row.is_some_and(|row| row >= labels.len()))
+    {
+        let what = "it has roads or rows that the estimate has not".to_owned();
+        return Err(DatabaseError::Damaged { what });
+    }
+    records.retain(|record| record.part.number < look);
+    events.retain(|(part, _)| part.number < look);
+    let pilot_s = pilot.whole_s + pilot.tried_s;
+    let results =
+        EstimateResults::new(settings, Found { records: &records, events: &events, pilot_s, labels });
+    let is_enough = results.together.as_ref().is_some_and(|found| settings.is_enough(found));
+    Ok(Looked { results, parts: records.iter().map(|record| record.part).collect(), is_enough })
+}
+
+/// What a directory of an estimate holds, finished or not.
+pub struct Contents {
+    /// The text of its settings.
+    pub settings: String,
+    /// `None` before the first part is played.
+    pub results: Option<EstimateResults>,
+    /// What else is to be known of it.
+    pub remarks: Vec<String>,
+}
+
+/// Reads the directory of an estimate, and plays nothing.
+pub fn read(directory: &Path) -> Result<Contents, Failure> {
+    let (path, file) = (directory.join("estimate.yaml"), directory.join("estimate.db"));
+    let text = load::text(&path)?;
+    if !file.is_file() {
+        return Ok(Contents { settings: text, results: None, remarks: Vec::new() });
+    }
+    let settings: EstimateSettings = serde_yaml::from_str(&text)
+        .map_err(|error| Failure::file("read", &path, yaml_mistake(&error, &text)))?;
+    let unread = |error| Failure::file("read", &file, error);
+    let (database, damaged) = run_directory::open_to_read::<EstimateDatabase>(&file, &text)?;
+    let mut remarks: Vec<String> = damaged.into_iter().collect();
+    remarks.extend(run_directory::remarks_on(&files_of(directory, database.scenarios().map_err(unread)?)));
+    // In this form what is wrong with a file is only collected.
+    let table = load::table(&Output::of(Format::Sarif), &directory.join(&settings.run.space)).ok();
+    let is_it = |table: &ActionTable| table.space().meaning.is_sealed_by(&settings.run.space_digest);
+    let labels: Vec<String> = match table.filter(is_it) {
+        Some(table) => table.rows().iter().map(|row| row.label.clone()).collect(),
+        None => {
+            let remark = "the space of the estimate cannot be read or has changed: its rows have numbers only";
+            remarks.push(remark.to_owned());
+            let rows = database.events().map_err(unread)?.into_iter().filter_map(|(_, event)| event.row);
+            let last = rows.filter(|&row| row < ROWS_MAX).max();
+            (0..=last.unwrap_or(0)).map(|row| format!("row {row}")).collect()
+        }
+    };
+    let pilot = database.pilot().map_err(unread)?.unwrap_or_default();
+    let all = database.parts().map_err(unread)?.len();
+    let mut results = None;
+    for look in settings.looks() {
+        let looked = at_look(&settings, &database, &pilot, &labels, look).map_err(unread)?;
+        let is_whole = looked.parts.len() == look as usize * settings.run.roads.len();
+        // A look that lacks parts, because they are damaged or another shard's, does not end it: more was played than that.
+        let is_last = looked.parts.len() == all || (is_whole && looked.is_enough);
+        results = Some(looked.results);
+        if is_last {
+            break;
+        }
+    }
+    Ok(Contents { settings: text, results: results.filter(|_| all > 0), remarks })
+}
+
+/// More rows than this no table has.
+const ROWS_MAX: usize = 1_000_000;
+
+/// The files of scenarios in a directory.
+fn files_of(directory: &Path, scenarios: Vec<WrittenScenario>) -> Vec<WrittenFile> {
+    let critical = directory.join("critical");
+    scenarios.into_iter().map(|found| (critical.join(found.name), found.text)).collect()
+}
+
 /// Settles the database with these parts alone; what was found in others goes, too.
 fn settled(
     settings: &EstimateSettings,
@@ -165,15 +253,14 @@ fn settled(
     let file = directory.join("estimate.db");
     let unread = |error| Failure::file("read", &file, error);
     let wanted: BTreeSet<i64> = parts.iter().map(|part| settings.place(*part)).chain([PILOT]).collect();
-    let (kept, left): (Vec<i64>, Vec<i64>) =
-        database.numbers().map_err(unread)?.into_iter().partition(|number| wanted.contains(number));
-    for part in left {
-        for name in database.scenarios(part).map_err(unread)? {
-            let scenario = directory.join("critical").join(name);
-            remove(&load::answers_path(&scenario))?;
-            remove(&scenario)?;
-        }
+    let mut scenarios = database.scenarios().map_err(unread)?;
+    scenarios.retain(|scenario| !wanted.contains(&scenario.part));
+    for (scenario, _) in files_of(directory, scenarios) {
+        remove(&load::answers_path(&scenario))?;
+        remove(&scenario)?;
     }
+    let mut kept = database.numbers().map_err(unread)?;
+    kept.retain(|number| wanted.contains(number));
     let kept: Vec<Numbered> = kept.into_iter().map(|number| (number, number)).collect();
     database.settle(&file, &kept).map_err(|error| Failure::file("write", &file, error))
 }
@@ -203,8 +290,13 @@ fn piloted(
     Ok(found)
 }
 
-/// Writes what a part met as scenarios, where the space's verdict counts it; the file of each event, if there is one.
-fn written(estimate: &Estimate, directory: &Path, played: &Played) -> Result<Vec<Option<String>>, Failure> {
+/// Writes what a part met as scenarios, where the space's verdict counts it; name and text of the file of each event, if
+/// there is one.
+fn written(
+    estimate: &Estimate,
+    directory: &Path,
+    played: &Played,
+) -> Result<Vec<Option<(String, String)>>, Failure> {
     let settings = &estimate.settings().run;
     let rules = [&settings.without[..], &settings.with];
     let critical = directory.join("critical");
@@ -221,8 +313,9 @@ fn written(estimate: &Estimate, directory: &Path, played: &Played) -> Result<Vec
         };
         let name = format!("{}_{:04}{tried}.ava", met.log.road, met.summary.episode);
         let (table, episode) = (estimate.run().table(), (&met.log, &met.summary));
-        write_scenario(&critical.join(&name), "estimate", table, episode, &settings.agent, rules)?;
-        Ok(Some(name))
+        let text =
+            write_scenario(&critical.join(&name), "estimate", table, episode, &settings.agent, rules)?;
+        Ok(Some((name, text)))
     };
     played.met.iter().map(write_one).collect()
 }

@@ -1,15 +1,16 @@
 //! `avastra merge`: the shards of a run, a study or an estimate as the directory that one machine would have made.
 //!
 //! The units of all shards are taken over into one database, whichever shard has them, with the scenarios that were written
-//! of them. What comes out is a directory in which all is played. It is ended by the command itself, which settles the
-//! database and writes the results: there is no second writer, and the bytes are those of the unsharded directory.
+//! of them. The database has their texts, so it does not matter what became of their files. What comes out is a directory in
+//! which all is played. It is ended by the command itself, which settles the database and writes the results: there is no
+//! second writer, and the bytes are those of the unsharded directory.
 //!
 //! Shards may have been copied from where they were played. What their settings name outside them, the space above all, is
 //! looked for where they say, and else by the end of its path from the folder that one works in and those above: whatever
 //! means the same serves.
 //!
 //! Until it is whole, the directory has the name `OUT.partial`. It gets its own name only if its space still means what it
-//! meant; then it is ended.
+//! meant; then it is ended. A merge that was killed in between is ended by the next one.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, Path, PathBuf};
@@ -18,8 +19,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::ads::external::Attached;
-use crate::estimate::{EstimateDatabase, EstimateSettings, PILOT};
-use crate::model::digest;
+use crate::estimate::{EstimateDatabase, EstimateSettings, WrittenScenario};
 use crate::run::{
     Database, DatabaseError, Numbered, PolicyReference, RunSettings, Shard, Units, settings_differences,
 };
@@ -29,7 +29,7 @@ use crate::syntax::{parse, print_expr};
 
 use super::arguments::{Format, MergeArguments};
 use super::error::Failure;
-use super::files::write;
+use super::files::{remove, write};
 use super::output::{Output, plural};
 use super::timing::Times;
 use super::{estimate, load, pack, run, run_directory, shard, study, timing};
@@ -79,7 +79,12 @@ trait Cut: Serialize + DeserializeOwned {
     /// The numbers of the units of a file, each with the one in a settled file.
     fn numbered(&self, database: &Self::Database) -> Result<Vec<Numbered>, DatabaseError>;
     /// Takes a shard's units over, with the files that were written of them.
-    fn take(into: &mut Self::Database, shard: &Played<Self>, way: &Way) -> Result<(), Failure>;
+    fn take(
+        output: &Output,
+        into: &mut Self::Database,
+        shard: &Played<Self>,
+        way: &Way,
+    ) -> Result<(), Failure>;
     /// Ends a directory in which all is played.
     fn conclude(output: &Output, directory: &Path) -> Result<(), Failure>;
 }
@@ -184,8 +189,8 @@ fn merged<C: Cut>(output: &Output, directories: &[PathBuf], out: Option<&Path>) 
         Survey::of::<C>(directories, (&partial, &outside), &|file, error| Err(unusable(file, error)))
             .and_then(|survey| {
                 survey.complete()?;
-                bring_together::<C>(directories, (&partial, &outside), &survey.settings)?;
-                publish::<C>(output, out, &partial)?;
+                bring_together::<C>(output, directories, (&partial, &outside), &survey.settings)?;
+                publish::<C>(output, out, (&partial, &outside), &survey.settings)?;
                 Ok(survey.shards)
             });
     if brought.is_err() && partial.exists() {
@@ -308,6 +313,7 @@ fn discard(partial: &Path) -> Result<(), Failure> {
 
 /// Writes settings, database and scenarios.
 fn bring_together<C: Cut>(
+    output: &Output,
     directories: &[PathBuf],
     (partial, outside): (&Path, &Outside),
     text: &str,
@@ -320,14 +326,19 @@ fn bring_together<C: Cut>(
         let mut played = Played::<C>::read(path, partial, outside)?;
         played.open().map_err(|error| Failure::file("open", &played.file(), error))?;
         if played.database.is_some() {
-            C::take(&mut into, &played, &Way { from: path, to: partial, outside })?;
+            C::take(output, &mut into, &played, &Way { from: path, to: partial, outside })?;
         }
     }
     Ok(())
 }
 
-/// Gives the merged directory its name, unless it stands there already, to the byte.
-fn publish<C: Cut>(output: &Output, out: &Path, partial: &Path) -> Result<(), Failure> {
+/// Gives the merged directory its name, unless it stands there already, to the byte. `text` are its settings.
+fn publish<C: Cut>(
+    output: &Output,
+    out: &Path,
+    (partial, outside): (&Path, &Outside),
+    text: &str,
+) -> Result<(), Failure> {
     // Its warnings are told when the directory is ended; why it cannot be is told here.
     let resumed = |output| run_directory::resume::<C>(output, partial, C::KIND, C::KIND).map(drop);
     resumed(&Output::of(Format::Sarif)).or_else(|_| resumed(output))?;
@@ -338,24 +349,40 @@ fn publish<C: Cut>(output: &Output, out: &Path, partial: &Path) -> Result<(), Fa
         return std::fs::remove_file(&mark).map_err(|error| Failure::file("remove", &mark, error));
     }
     // In JSON, a command prints at its end, which this has not.
-    C::conclude(&Output::of(Format::Json), partial)?;
-    let (mut merged, mut known) = (files_of(partial)?, files_of(out)?);
+    let silent = Output::of(Format::Json);
+    C::conclude(&silent, partial)?;
+    // A merge that was killed after it had named the directory has left one in which all is played, and which is not ended.
+    if holds_all::<C>(out, (partial, outside), text).unwrap_or(false) {
+        C::conclude(&silent, out)?;
+    }
+    let (mut merged, known) = (files_of(partial)?, files_of(out)?);
     // Machines need not have taken the same time.
     for name in [MARK, timing::FILE] {
         merged.remove(Path::new(name));
-        known.remove(Path::new(name));
     }
     let is_equal = |(name, path): (&PathBuf, &PathBuf)| -> Result<bool, Failure> {
         let read = |path| std::fs::read(path).map_err(|error| Failure::file("read", path, error));
         known.get(name).map_or(Ok(false), |known| Ok(read(known)? == read(path)?))
     };
     let equal: Vec<bool> = merged.iter().map(is_equal).collect::<Result<_, _>>()?;
-    let is_it = merged.len() == known.len() && equal.into_iter().all(|is_equal| is_equal);
+    // What else is there, a page for example, does not make it another.
+    let is_it = equal.into_iter().all(|is_equal| is_equal);
     discard(partial)?;
     match is_it {
-        true => Ok(()),
+        true => remove(&out.join(MARK)),
         false => Err(Failure::usage(format!("`{}` is not empty: name a new directory", out.display()))),
     }
+}
+
+/// Whether a directory has the settings and the units of the merged one, so that it can be ended without playing anything.
+fn holds_all<C: Cut>(out: &Path, (partial, outside): (&Path, &Outside), text: &str) -> Result<bool, Failure> {
+    let places = |path: &Path| -> Result<(String, BTreeSet<i64>), Failure> {
+        let mut played = Played::<C>::read(path, partial, outside)?;
+        played.open().map_err(|error| Failure::file("open", &played.file(), error))?;
+        Ok((played.text(), played.units.iter().map(|(_, place)| *place).collect()))
+    };
+    let ((settings, there), (_, merged)) = (places(out)?, places(partial)?);
+    Ok(settings == text && there.is_superset(&merged))
 }
 
 /// All files of a directory, by their paths in it.
@@ -480,16 +507,26 @@ impl Way<'_> {
     }
 }
 
-/// Copies a scenario with what lies beside it, and gives its text. What it uses is named by a path from the file.
-fn copy_scenario(name: &str, way: &Way) -> Result<String, Failure> {
-    let source = way.from.join(name);
-    let text = moved_scenario(&load::text(&source)?, way)?;
+/// Writes a scenario of another directory, with what lies beside it there, and gives its text. What it uses is named by a path
+/// from the file.
+fn copy_scenario(name: &str, text: &str, way: &Way) -> Result<String, Failure> {
+    let text = moved_scenario(text, way)?;
     copy_text(&way.to.join(name), &text)?;
-    let answers = load::answers_path(&source);
+    let answers = load::answers_path(&way.from.join(name));
     if answers.is_file() {
         copy_text(&load::answers_path(&way.to.join(name)), &load::text(&answers)?)?;
     }
     Ok(text)
+}
+
+/// As [`copy_scenario`], of a scenario whose text stands in the database; says so if its file was edited.
+fn copy_written(output: &Output, name: &str, text: &str, way: &Way) -> Result<String, Failure> {
+    let file = (way.from.join(name), text.to_owned());
+    if run_directory::is_edited(&file) {
+        let path = file.0.display();
+        output.warn(&format!("{path} was edited since it was written: what was written is taken"));
+    }
+    copy_scenario(name, text, way)
 }
 
 /// Writes a text where none is; one that is there must be the same.
@@ -555,7 +592,12 @@ impl Cut for RunSettings {
         as_they_are(database)
     }
 
-    fn take(into: &mut Database, shard: &Played<RunSettings>, way: &Way) -> Result<(), Failure> {
+    fn take(
+        output: &Output,
+        into: &mut Database,
+        shard: &Played<RunSettings>,
+        way: &Way,
+    ) -> Result<(), Failure> {
         let [from, to] = way.within("critical");
         std::fs::create_dir_all(&to).map_err(|error| Failure::file("create", &to, error))?;
         let critical = Way { from: &from, to: &to, ..*way };
@@ -566,18 +608,9 @@ impl Cut for RunSettings {
         let database = shard.database.iter().map(Database::scenarios).next();
         let written = database.transpose().map_err(|error| Failure::file("read", &shard.file(), error))?;
         let mut scenarios = Vec::new();
-        for (episode, road, known) in written.unwrap_or_default() {
+        for (episode, road, text) in written.unwrap_or_default() {
             let name = format!("{}.ava", run_directory::scenario_name(&road, episode));
-            let source = from.join(&name);
-            if load::read(&source).ok().is_none_or(|text| digest(text.as_bytes()) != known) {
-                return Err(Failure::usage(format!(
-                    "`{}` is gone or was edited: delete it, and `avastra run --resume {}` writes it again",
-                    source.display(),
-                    way.from.display()
-                )));
-            }
-            let text = copy_scenario(&name, &critical)?;
-            scenarios.push((episode, digest(text.as_bytes())));
+            scenarios.push((episode, copy_written(output, &name, &text, &critical)?));
         }
         let [from, to] = way.within("failures");
         let failures = Way { from: &from, to: &to, ..*way };
@@ -587,7 +620,7 @@ impl Cut for RunSettings {
                 let path = entry.map_err(failed)?.path();
                 let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
                 match path.extension().and_then(std::ffi::OsStr::to_str) {
-                    Some("ava") => drop(copy_scenario(&name, &failures)?),
+                    Some("ava") => drop(copy_scenario(&name, &load::text(&path)?, &failures)?),
                     Some("txt") => copy_text(&to.join(name), &load::text(&path)?)?,
                     _ => {}
                 }
@@ -632,7 +665,12 @@ impl Cut for StudySettings {
         database.places(self)
     }
 
-    fn take(into: &mut StudyDatabase, shard: &Played<StudySettings>, way: &Way) -> Result<(), Failure> {
+    fn take(
+        _: &Output,
+        into: &mut StudyDatabase,
+        shard: &Played<StudySettings>,
+        way: &Way,
+    ) -> Result<(), Failure> {
         let mut times = Times::read(way.to, into)?;
         if let Some(database) = &shard.database {
             times.extend(Times::read(&shard.path, database)?);
@@ -671,17 +709,23 @@ impl Cut for EstimateSettings {
         as_they_are(database)
     }
 
-    fn take(into: &mut EstimateDatabase, shard: &Played<EstimateSettings>, way: &Way) -> Result<(), Failure> {
+    fn take(
+        output: &Output,
+        into: &mut EstimateDatabase,
+        shard: &Played<EstimateSettings>,
+        way: &Way,
+    ) -> Result<(), Failure> {
         let [from, to] = way.within("critical");
         std::fs::create_dir_all(&to).map_err(|error| Failure::file("create", &to, error))?;
-        for (part, _) in shard.units.iter().filter(|(part, _)| *part != PILOT) {
-            let names = shard.database.iter().map(|database| database.scenarios(*part)).next().transpose();
-            let names = names.map_err(|error| Failure::file("read", &shard.file(), error))?;
-            for name in names.unwrap_or_default() {
-                copy_scenario(&name, &Way { from: &from, to: &to, ..*way })?;
-            }
+        let critical = Way { from: &from, to: &to, ..*way };
+        let written = shard.database.iter().map(EstimateDatabase::scenarios).next();
+        let written = written.transpose().map_err(|error| Failure::file("read", &shard.file(), error))?;
+        let mut scenarios = Vec::new();
+        for found in written.unwrap_or_default() {
+            let text = copy_written(output, &found.name, &found.text, &critical)?;
+            scenarios.push(WrittenScenario { text, ..found });
         }
-        let taken = into.take(&shard.file(), &shard.units, &|_| Ok(()));
+        let taken = into.take_parts(&shard.file(), &shard.units, &scenarios);
         taken.map_err(|error| Failure::file("merge", &shard.file(), error))
     }
 

@@ -9,7 +9,8 @@ use crate::action::ActionTable;
 use crate::check::normal;
 use crate::report;
 use crate::report::{Page, Scene, record, record_another};
-use crate::run::{Asked, Database, Units};
+use crate::run::{Asked, Database, DatabaseError};
+use crate::study::StudyResults;
 
 use super::arguments::{FilesArguments, ReportArguments};
 use super::error::Failure;
@@ -18,7 +19,7 @@ use super::load;
 use super::output::{Output, plural};
 use super::parallel::{PerFile, each_file};
 use super::replay::refutation;
-use super::shrink;
+use super::{estimate, run_directory, shrink, study};
 
 /// Name of the page in a directory.
 const NAME: &str = "report.html";
@@ -140,46 +141,67 @@ fn of_directory(output: &Output, directory: &Path) -> Result<Found, Failure> {
         }
     }
     let settings = |command: &str| directory.join(command).with_extension("yaml");
+    let mut remarks = Vec::new();
     if settings("run").is_file() {
-        of_run(output, directory, &load::text(&settings("run"))?, &mut found)?;
+        remarks = of_run(output, directory, &load::text(&settings("run"))?, &mut found)?;
     } else if settings("study").is_file() {
-        found.overview = report::of_study(&results(directory, "study")?, &load::text(&settings("study"))?);
+        let played = match directory.join("study.db").is_file() {
+            true => Some(study::read_sound(directory)?).filter(|(_, cells, _)| !cells.is_empty()),
+            false => None,
+        };
+        let (of_study, cells, remark) = played.ok_or_else(|| unfinished(directory, "study"))?;
+        remarks.extend(remark);
+        let results = in_json(&StudyResults::new(&of_study, &cells));
+        found.overview = report::of_study(&results, &load::text(&settings("study"))?);
     } else if settings("estimate").is_file() {
-        let results = results(directory, "estimate")?;
-        found.overview = report::of_estimate(&results, &load::text(&settings("estimate"))?);
+        let contents = estimate::read(directory)?;
+        let results = contents.results.ok_or_else(|| unfinished(directory, "estimate"))?;
+        remarks = contents.remarks;
+        found.overview = report::of_estimate(&in_json(&results), &contents.settings);
     } else if found.files.is_empty() {
         found.files = load::sources_in(directory)?;
     }
+    remarks.iter().for_each(|remark| output.warn(remark));
+    found.remarks.extend(remarks);
     Ok(found)
 }
 
-/// What `command` wrote at its end into its directory.
-fn results(directory: &Path, command: &str) -> Result<Value, Failure> {
-    let path = directory.join("results.json");
-    if !path.is_file() {
-        let directory = directory.display();
-        return Err(Failure::usage(format!(
-            "`{directory}` has no results yet: finish it with `avastra {command} --resume {directory}`"
-        )));
-    }
-    serde_json::from_str(&load::text(&path)?).map_err(|error| Failure::file("read", &path, error))
+/// There is nothing yet to make a page of.
+fn unfinished(directory: &Path, command: &str) -> Failure {
+    let directory = directory.display();
+    Failure::usage(format!(
+        "`{directory}` has no results yet: finish it with `avastra {command} --resume {directory}`"
+    ))
 }
 
-/// Adds what the database of a run or training says. `settings` is the text of its `run.yaml`.
-fn of_run(output: &Output, directory: &Path, settings: &str, found: &mut Found) -> Result<(), Failure> {
+fn in_json(results: &impl serde::Serialize) -> Value {
+    serde_json::to_value(results).expect("results have string keys only")
+}
+
+/// Adds what the database of a run or training says, and gives what else is to be known of it. `settings` is the text of its
+/// `run.yaml`.
+fn of_run(
+    output: &Output,
+    directory: &Path,
+    settings: &str,
+    found: &mut Found,
+) -> Result<Vec<String>, Failure> {
     #[derive(serde::Deserialize)]
     struct Begun {
         space: PathBuf,
     }
     let path = directory.join("run.db");
     if !path.is_file() {
-        let remark = format!("`{}` is missing: only scenarios are shown", path.display());
-        output.warn(&remark);
-        found.remarks.push(remark);
-        return Ok(());
+        return Ok(vec![format!("`{}` is missing: only scenarios are shown", path.display())]);
     }
     let unread = |error| Failure::file("read", &path, error);
-    let database = Database::open(&path, settings).map_err(unread)?;
+    let (database, damaged) = run_directory::open_to_read::<Database>(&path, settings)?;
+    let mut remarks: Vec<String> = damaged.into_iter().collect();
+    let written = database.scenarios().map_err(unread)?.into_iter().map(|(episode, road, text)| {
+        let name = run_directory::scenario_name(&road, episode);
+        (directory.join("critical").join(format!("{name}.ava")), text)
+    });
+    remarks.extend(run_directory::remarks_on(&written.collect::<Vec<_>>()));
     let space = serde_yaml::from_str::<Begun>(settings).ok().map(|begun| directory.join(begun.space));
     // A page of what was found is worth having without the names of the rows.
     let table: Option<ActionTable> = space.and_then(|space| load::table(output, &space).ok());
@@ -187,17 +209,21 @@ fn of_run(output: &Output, directory: &Path, settings: &str, found: &mut Found) 
         found.remarks.push("the space of the run cannot be read: its rows have numbers only".to_owned());
     }
     // A training that is not finished has not been judged yet, and a run never is.
-    let results = match directory.join("results.json").is_file() {
-        true => Some(results(directory, "train")?),
-        false => None,
+    let results = match database.results() {
+        Err(error @ DatabaseError::Results) => {
+            remarks.push(unread(error).to_string());
+            None
+        }
+        results => results.map_err(unread)?,
     };
+    let results: Option<Value> = results.and_then(|text| serde_json::from_str(&text).ok());
     found.overview = report::of_run(&database, table.as_ref(), settings, results.as_ref()).map_err(unread)?;
     let groups = database.groups().map_err(unread)?;
     let name = |road: &str, episode: i64| format!("{road}_{episode:04}");
     found.examples = groups.iter().map(|group| name(&group.road, group.episode)).collect();
     let worst = database.worst().map_err(unread)?;
     found.worst = worst.iter().map(|(road, episode)| name(road, *episode)).collect();
-    Ok(())
+    Ok(remarks)
 }
 
 /// The files to play, and how many are left out: the worst comes first, then one of each kind of failure, then the others,

@@ -7,13 +7,14 @@ use crate::action::ActionTable;
 use crate::agent::Face;
 use crate::emit;
 use crate::episode::EpisodeLog;
-use crate::model::{Policy, digest};
+use crate::model::Policy;
 use crate::run::{
     EpisodeSummary, Group, PolicyReference, RefusalCount, Run, RunSettings, Shard, Totals, Units, play,
 };
 
 use super::arguments::{FaceArgument, RunArguments};
 use super::error::Failure;
+use super::files::write_answers;
 use super::findings::{doubts, failures_text};
 use super::interrupt::stop_on_interrupt;
 use super::never::Never;
@@ -22,7 +23,7 @@ use super::output::plural;
 use super::pack::pack_space;
 use super::parallel::jobs;
 use super::progress::Progress;
-use super::run_directory::{Resumed, RunDirectory};
+use super::run_directory::{Resumed, RunDirectory, WrittenFile};
 use super::verify::acting;
 use super::{compile, conditions, load, run_directory, shard};
 
@@ -207,7 +208,7 @@ fn resumed(output: &Output, path: &Path) -> Result<(Run, RunDirectory), Failure>
     };
     let face = settings.policy.as_ref().map_or(Face::Network, |reference| reference.face);
     let run = ready(table, settings, policy.as_ref(), face)?;
-    let directory = RunDirectory::open(held, &text)?;
+    let directory = RunDirectory::open_to_go_on(output, held, &text)?;
     restore(output, &run, &directory)?;
     Ok((run, directory))
 }
@@ -263,7 +264,7 @@ fn keep(
         .map_err(|error| Failure::file("write", &directory.path.join("run.db"), error))
 }
 
-/// Writes the scenario of an episode, and gives the digest of the file.
+/// Writes the scenario of an episode, and gives the text of the file.
 fn write_scenario(
     run: &Run,
     directory: &RunDirectory,
@@ -275,29 +276,17 @@ fn write_scenario(
     directory.write_critical("run", run.table(), (log, summary), &settings.agent, rules)
 }
 
-/// Plays again the episodes whose scenarios are gone, and writes these; names those that were edited.
+/// Writes the scenarios again that are gone, with the answers of an external driving system; names those that were edited.
 fn restore(output: &Output, run: &Run, directory: &RunDirectory) -> Result<(), Failure> {
-    let unread = |error| Failure::file("read", &directory.path, error);
-    let mut edited = Vec::new();
-    for (episode, road, written) in directory.database.scenarios().map_err(unread)? {
-        let path = directory.critical(&road, episode);
-        match load::read(&path) {
-            Ok(text) if digest(text.as_bytes()) == written => {}
-            Ok(_) => edited.push(path.display().to_string()),
-            Err(_) if path.exists() => edited.push(path.display().to_string()),
-            Err(_) => {
-                let (summary, log) = run.judged(episode);
-                write_scenario(run, directory, &summary, &log)?;
-                output.tell(&format!("{}: was missing, is written again", path.display()));
+    let (episodes, files): (Vec<usize>, Vec<WrittenFile>) = directory.written()?.into_iter().unzip();
+    let restored = run_directory::restore(output, "run", &files)?;
+    if run.program().is_some() {
+        // The database has the text of a scenario, but not the answers beside it: the program is asked for them again.
+        for (episode, (path, _)) in episodes.into_iter().zip(&files) {
+            if restored.contains(path) {
+                write_answers(path, &run.episode(episode))?;
             }
         }
-    }
-    if !edited.is_empty() {
-        let files = if edited.len() == 1 { "it" } else { "them" };
-        output.tell(&format!(
-            "edited since the run wrote {files}: {}; delete {files} and resume again to get {files} back",
-            edited.join(", ")
-        ));
     }
     Ok(())
 }

@@ -2,6 +2,9 @@
 //!
 //! A directory is begun when its settings stand in it. What a kill leaves before that counts as empty, so the
 //! directory can be begun again; what it leaves after that can be resumed. One process at a time works in it.
+//!
+//! The truth of a directory is its database. It has the text of each scenario too: one that is gone is written again, one
+//! that was edited is told.
 
 use std::ffi::OsStr;
 use std::fs::{File, TryLockError};
@@ -12,7 +15,7 @@ use crate::action::ActionTable;
 use crate::ads::external::{Attached, ExternalSettings};
 use crate::emit;
 use crate::episode::EpisodeLog;
-use crate::model::digest;
+use crate::estimate::PILOT;
 use crate::run::{Database, EpisodeSummary, Units, VERSION};
 use crate::sim::ENGINE;
 use crate::syntax::yaml_mistake;
@@ -20,7 +23,7 @@ use crate::syntax::yaml_mistake;
 use super::error::Failure;
 use super::files::{write, write_answers};
 use super::load;
-use super::output::Output;
+use super::output::{Output, plural};
 use super::pack;
 
 /// A directory that no other process works in while this lives.
@@ -205,6 +208,93 @@ pub fn what_was_begun(directory: &Path) -> Option<&'static str> {
     Some(if settings.contains_key("hyperparameters") { "training" } else { "run" })
 }
 
+/// A scenario that a directory has written: its file, and its text by the database.
+pub type WrittenFile = (PathBuf, String);
+
+/// Whether the file of a scenario has something else than what was written; one that is gone has not.
+pub fn is_edited((path, text): &WrittenFile) -> bool {
+    match load::read(path) {
+        Ok(found) => found != *text,
+        Err(_) => !is_gone(path),
+    }
+}
+
+/// Whether nothing is at a path, not even a link that leads nowhere.
+fn is_gone(path: &Path) -> bool {
+    std::fs::symlink_metadata(path).is_err_and(|error| error.kind() == ErrorKind::NotFound)
+}
+
+/// Writes the scenarios again whose files are gone, and names those that were edited. `what` was begun, in a word. Gives the
+/// files that were written.
+pub fn restore(output: &Output, what: &str, written: &[WrittenFile]) -> Result<Vec<PathBuf>, Failure> {
+    let mut restored = Vec::new();
+    for (path, text) in written.iter().filter(|(path, _)| is_gone(path)) {
+        write(path, text)?;
+        output.tell(&format!("{}: was missing, is written again", path.display()));
+        restored.push(path.clone());
+    }
+    let edited: Vec<String> =
+        written.iter().filter(|file| is_edited(file)).map(|(path, _)| path.display().to_string()).collect();
+    if !edited.is_empty() {
+        let files = if edited.len() == 1 { "it" } else { "them" };
+        output.tell(&format!(
+            "edited since the {what} wrote {files}: {}; delete {files} and resume again to get {files} back",
+            edited.join(", ")
+        ));
+    }
+    Ok(restored)
+}
+
+/// What a page says of scenarios that are not as they were written.
+pub fn remarks_on(written: &[WrittenFile]) -> Vec<String> {
+    let edited = written.iter().filter(|file| is_edited(file));
+    let edited = edited.map(|(path, _)| format!("{} was edited since it was written", path.display()));
+    let gone = written.iter().filter(|(path, _)| is_gone(path)).count();
+    let gone = (gone > 0).then(|| {
+        format!("{} gone from `critical`: `--resume` writes what is missing again", plural(gone, "scenario"))
+    });
+    edited.chain(gone).collect()
+}
+
+/// Opens the database of a directory that is gone on with. Units whose rows were changed behind its back are told and
+/// dropped, so that they are played again.
+pub fn open_to_go_on<D: Units>(output: &Output, file: &Path, settings: &str) -> Result<D, Failure> {
+    let (database, damaged) =
+        D::open_and_drop(file, settings).map_err(|error| Failure::file("open", file, error))?;
+    if !damaged.is_empty() {
+        let changed = changed::<D>(file, &damaged);
+        output.warn(&format!("{changed}: what they were of is played again"));
+    }
+    Ok(database)
+}
+
+/// Opens the database of a directory to read it. Units whose rows were changed are left out, and a remark says so.
+pub fn open_to_read<D: Units>(file: &Path, settings: &str) -> Result<(D, Option<String>), Failure> {
+    let (database, damaged) =
+        D::open_without_damaged(file, settings).map_err(|error| Failure::file("read", file, error))?;
+    let remark = || format!("{}: they count for nothing", changed::<D>(file, &damaged));
+    let remark = (!damaged.is_empty()).then(remark);
+    Ok((database, remark))
+}
+
+/// Units that are named as changed.
+const NAMED_MAX: usize = 8;
+
+/// Says that rows of units were changed.
+fn changed<D: Units>(file: &Path, damaged: &[i64]) -> String {
+    let unit = D::layout().unit;
+    // What a pilot saw is a part with a number that no part has.
+    let name = |&number: &i64| match number {
+        PILOT => "the pilot".to_owned(),
+        number => format!("{unit} {number}"),
+    };
+    let named: Vec<String> = damaged.iter().take(NAMED_MAX).map(name).collect();
+    let more = damaged.len() - named.len();
+    let more = if more > 0 { format!(" and of {more} more") } else { String::new() };
+    let file = file.display();
+    format!("`{file}`: the rows of {}{more} were changed since they were written", named.join(", "))
+}
+
 impl RunDirectory {
     /// A directory with its database; `settings` is the text of `run.yaml`.
     pub fn open(held: Held, settings: &str) -> Result<RunDirectory, Failure> {
@@ -212,6 +302,22 @@ impl RunDirectory {
         let database =
             Database::open(&file, settings).map_err(|error| Failure::file("open", &file, error))?;
         Ok(RunDirectory { path: held.path.clone(), database, _held: held })
+    }
+
+    /// The directory of a run that is gone on with, whose damaged episodes can be played again.
+    pub fn open_to_go_on(output: &Output, held: Held, settings: &str) -> Result<RunDirectory, Failure> {
+        let database = open_to_go_on(output, &held.path.join("run.db"), settings)?;
+        Ok(RunDirectory { path: held.path.clone(), database, _held: held })
+    }
+
+    /// The scenarios that were written into the directory, each with the number of its episode.
+    pub fn written(&self) -> Result<Vec<(usize, WrittenFile)>, Failure> {
+        let scenarios =
+            self.database.scenarios().map_err(|error| Failure::file("read", &self.path, error))?;
+        let with_path = |(episode, road, text): (usize, String, String)| {
+            (episode, (self.critical(&road, episode), text))
+        };
+        Ok(scenarios.into_iter().map(with_path).collect())
     }
 
     /// Writes an episode that an external driving system failed in: `failures/ROAD_NNNN.txt` says how, and a scenario of
@@ -251,7 +357,7 @@ impl RunDirectory {
         self.path.join("critical").join(format!("{}.ava", scenario_name(road, episode)))
     }
 
-    /// Writes the counted collisions of an episode as a scenario, `critical/ROAD_NNNN.ava`, and gives the digest of the
+    /// Writes the counted collisions of an episode as a scenario, `critical/ROAD_NNNN.ava`, and gives the text of the
     /// file. `agent` is the one that played it, `rules` are those switched off and those switched on.
     pub fn write_critical(
         &self,
@@ -266,7 +372,7 @@ impl RunDirectory {
     }
 }
 
-/// Writes the counted collisions of an episode as a scenario that has the name of the file, and gives its digest. `agent`
+/// Writes the counted collisions of an episode as a scenario that has the name of the file, and gives its text. `agent`
 /// is the one that played it, `rules` are those switched off and those switched on.
 pub fn write_scenario(
     path: &Path,
@@ -285,7 +391,7 @@ pub fn write_scenario(
     let text = crate::syntax::print(&file);
     write_answers(path, log)?;
     write(path, &text)?;
-    Ok(digest(text.as_bytes()))
+    Ok(text)
 }
 
 pub fn scenario_name(road: &str, episode: usize) -> String {

@@ -78,8 +78,7 @@ fn play_all(
     let file = path.join("study.db");
     let unread = |error| Failure::file("read", &file, error);
     let unwritten = |error| Failure::file("write", &file, error);
-    let mut database =
-        StudyDatabase::open(&file, &settings).map_err(|error| Failure::file("open", &file, error))?;
+    let mut database: StudyDatabase = run_directory::open_to_go_on(output, &file, &settings)?;
     let shard = shard::kept(&path)?;
     let all = study.jobs();
     let costs: Vec<u64> = all.iter().map(|job| study.episodes(job)).collect();
@@ -179,7 +178,21 @@ fn played_elsewhere(directories: &[PathBuf], study: &Study) -> Result<Vec<Reused
 }
 
 /// The settings of a study's directory and its cells, finished or not.
+///
+/// # Errors
+/// If it is no such directory, or something in it was changed.
 pub fn read(directory: &Path) -> Result<(StudySettings, Vec<CellRecord>), Failure> {
+    match read_sound(directory)? {
+        (settings, cells, None) => Ok((settings, cells)),
+        (.., Some(remark)) => {
+            let directory = directory.display();
+            Err(Failure::usage(format!("{remark}; go on with `avastra study --resume {directory}`")))
+        }
+    }
+}
+
+/// As [`read`], but cells that were changed are left out, and a remark says so.
+pub fn read_sound(directory: &Path) -> Result<(StudySettings, Vec<CellRecord>, Option<String>), Failure> {
     let (path, file) = (directory.join("study.yaml"), directory.join("study.db"));
     if !path.is_file() || !file.is_file() {
         let directory = directory.display();
@@ -191,12 +204,12 @@ pub fn read(directory: &Path) -> Result<(StudySettings, Vec<CellRecord>), Failur
     let settings: StudySettings = serde_yaml::from_str(&text)
         .map_err(|error| Failure::file("read", &path, yaml_mistake(&error, &text)))?;
     let unread = |error| Failure::file("read", &file, error);
-    let database = StudyDatabase::open(&file, &text).map_err(unread)?;
+    let (database, remark) = run_directory::open_to_read::<StudyDatabase>(&file, &text)?;
     let cells = Times::read(directory, &database)?.on(database.cells().map_err(unread)?);
     if !FailedCell::among(&cells).is_empty() {
         return Err(Failure::file("use", &file, "the driving system failed in it, so there are no results"));
     }
-    Ok((settings, cells))
+    Ok((settings, cells, remark))
 }
 
 /// The cells that the driving system failed in, and what to do.

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use crate::action::Draw;
 use crate::ads::external::Attached;
 use crate::agent;
 use crate::agent::{Kind, QPolicy, Settings};
@@ -26,7 +27,7 @@ use super::output::Output;
 use super::output::plural;
 use super::pack::pack_space;
 use super::progress::{TrainingProgress, Working};
-use super::run_directory::{Resumed, RunDirectory};
+use super::run_directory::{Resumed, RunDirectory, WrittenFile};
 use super::{distill, load, run_directory};
 
 /// Episodes between two checkpoints: at most so many are played again after a kill.
@@ -123,6 +124,9 @@ fn resumed(output: &Output, path: &Path) -> Result<(Training, RunDirectory), Fai
         None => Training::new(table, settings)?,
         Some(checkpoint) => Training::resumed(table, settings, checkpoint.episodes, &checkpoint.learner)?,
     };
+    // What was written after the checkpoint comes again.
+    let written: Vec<WrittenFile> = directory.written()?.into_iter().map(|(_, file)| file).collect();
+    run_directory::restore(output, "training", &written)?;
     Ok((training, directory))
 }
 
@@ -142,18 +146,22 @@ fn keep(
     }
     // A training with an observation period of its own writes no scenario, because a replay would use the period
     // of the space.
-    if trained.summary.counted() > 0 && settings.hyperparameters.observation_period_s().is_none() {
+    let has_scenario =
+        trained.summary.counted() > 0 && settings.hyperparameters.observation_period_s().is_none();
+    let scenario = has_scenario.then(|| {
         let log = training.log_of_space(&trained.log);
         let episode = (&log, &trained.summary);
-        directory.write_critical("train", training.table(), episode, &settings.agent, rules)?;
-    }
+        directory.write_critical("train", training.table(), episode, &settings.agent, rules)
+    });
+    let scenario = scenario.transpose()?;
     let is_due = training.episodes().is_multiple_of(CHECKPOINT_EPISODES)
         || training.is_done()
         || stop.load(Ordering::Relaxed);
     let checkpoint = is_due.then(|| training.checkpoint());
+    let in_words = |draw: &Draw| emit::action_text(training.table(), draw);
     directory
         .database
-        .add_trained(trained, checkpoint.as_deref(), |draw| emit::action_text(training.table(), draw))
+        .add_trained(trained, checkpoint.as_deref(), in_words, scenario.as_deref())
         .map_err(|error| Failure::file("write", &directory.path.join("run.db"), error))
 }
 
@@ -226,6 +234,8 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
     });
     let results = serde_json::json!({ "simulated_h": simulated_h, "rules": rules, "evaluation": evaluation });
     let text = serde_json::to_string_pretty(&results).expect("results have string keys only");
+    let unwritten = |error| Failure::file("write", &directory.path.join("run.db"), error);
+    directory.database.keep_results(&text).map_err(unwritten)?;
     write(&directory.path.join("results.json"), &format!("{text}\n"))?;
     output.result(serde_json::json!({
         "reproducible": doubts.is_empty(),

@@ -1,8 +1,10 @@
 //! `estimate.db`: the pilot, the parts and the events of an estimate, in SQLite, one transaction for each part.
 
+use std::path::Path;
+
 use rusqlite::{Connection, OptionalExtension, params};
 
-use crate::run::{DatabaseError, Layout, Units};
+use crate::run::{DatabaseError, Layout, Numbered, Units, plain_name};
 
 use crate::estimate::part::{Event, Part, PartRecord, Played};
 use crate::estimate::plan::{Cell, Pilot, Seen, Situation};
@@ -10,12 +12,13 @@ use crate::estimate::ready::Estimate;
 
 /// Versions begin at 2001, so that it is never taken for another database.
 const LAYOUT: Layout = Layout {
-    version: 2002,
+    version: 2003,
     older: &[],
     unit: "part",
-    tables: &["part", "event", "pilot", "seen"],
+    tables: &["part", "event", "scenario", "pilot", "seen"],
     naming: None,
-    local: &[],
+    // A scenario names its space by a path from the file.
+    local: &["scenario"],
 };
 
 /// What a pilot saw stands under a part that no estimate has.
@@ -30,7 +33,11 @@ CREATE TABLE part (
 ) STRICT;
 CREATE TABLE event (
   part INTEGER NOT NULL REFERENCES part, event INTEGER NOT NULL, episode INTEGER NOT NULL, step INTEGER NOT NULL,
-  action_row INTEGER, weight REAL NOT NULL, scenario TEXT, PRIMARY KEY (part, event)
+  action_row INTEGER, weight REAL NOT NULL, PRIMARY KEY (part, event)
+) STRICT;
+CREATE TABLE scenario (
+  part INTEGER NOT NULL REFERENCES part, event INTEGER NOT NULL, name TEXT NOT NULL, text TEXT NOT NULL,
+  PRIMARY KEY (part, event)
 ) STRICT;
 CREATE TABLE pilot (
   part INTEGER PRIMARY KEY, whole_s REAL NOT NULL, tried_s REAL NOT NULL, tried INTEGER NOT NULL
@@ -41,6 +48,17 @@ CREATE TABLE seen (
   chance REAL NOT NULL, PRIMARY KEY (part, action_row, road, situation)
 ) STRICT;
 ";
+
+/// A file that was written of an event.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WrittenScenario {
+    /// Place of the part, and number of the event in it.
+    pub part: i64,
+    pub event: i64,
+    /// Name and text of the file.
+    pub name: String,
+    pub text: String,
+}
 
 /// An open database of an estimate.
 pub struct EstimateDatabase {
@@ -66,7 +84,7 @@ impl Units for EstimateDatabase {
 }
 
 impl EstimateDatabase {
-    /// Adds a part. `scenarios` has the file that was written of each of its events, if one was.
+    /// Adds a part. `scenarios` has name and text of the file that was written of each of its events, if one was.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -74,7 +92,7 @@ impl EstimateDatabase {
         &mut self,
         estimate: &Estimate,
         played: &Played,
-        scenarios: &[Option<String>],
+        scenarios: &[Option<(String, String)>],
     ) -> Result<(), DatabaseError> {
         let record = &played.record;
         let Part { road, number } = record.part;
@@ -101,9 +119,15 @@ impl EstimateDatabase {
             let Event { episode, step, row, weight } = met.event;
             let row = row.map(|row| row as i64);
             transaction.execute(
-                "INSERT INTO event VALUES (?, ?, ?, ?, ?, ?, ?)",
-                params![place, index as i64, episode, step as i64, row, weight, scenario],
+                "INSERT INTO event VALUES (?, ?, ?, ?, ?, ?)",
+                params![place, index as i64, episode, step as i64, row, weight],
             )?;
+            if let Some((name, text)) = scenario {
+                transaction.execute(
+                    "INSERT INTO scenario VALUES (?, ?, ?, ?)",
+                    params![place, index as i64, name, text],
+                )?;
+            }
         }
         LAYOUT.seal(&transaction, place)?;
         transaction.commit()?;
@@ -173,16 +197,46 @@ impl EstimateDatabase {
         Ok(Some(pilot))
     }
 
-    /// The files that were written of the events of a part.
+    /// The files that were written, in the order of their events.
     ///
     /// # Errors
-    /// If the file cannot be read.
-    pub fn scenarios(&self, part: i64) -> Result<Vec<String>, DatabaseError> {
-        let mut query = self.connection.prepare_cached(
-            "SELECT scenario FROM event WHERE part = ? AND scenario IS NOT NULL ORDER BY event",
-        )?;
-        let names = query.query_map([part], |row| row.get(0))?;
-        Ok(names.collect::<Result<_, _>>()?)
+    /// If the file cannot be read, or gives a scenario the name of a file elsewhere.
+    pub fn scenarios(&self) -> Result<Vec<WrittenScenario>, DatabaseError> {
+        let mut query =
+            self.connection.prepare("SELECT part, event, name, text FROM scenario ORDER BY part, event")?;
+        let scenarios = query.query_map([], |row| {
+            Ok(WrittenScenario {
+                part: row.get(0)?,
+                event: row.get(1)?,
+                name: row.get(2)?,
+                text: row.get(3)?,
+            })
+        })?;
+        let plain = |found: Result<WrittenScenario, rusqlite::Error>| -> Result<_, DatabaseError> {
+            let found = found?;
+            Ok(WrittenScenario { name: plain_name(found.name)?, ..found })
+        };
+        scenarios.map(plain).collect()
+    }
+
+    /// As [`Units::take`]. `scenarios` are those that were written anew.
+    ///
+    /// # Errors
+    /// As [`Units::take`].
+    pub fn take_parts(
+        &mut self,
+        other: &Path,
+        units: &[Numbered],
+        scenarios: &[WrittenScenario],
+    ) -> Result<(), DatabaseError> {
+        self.take(other, units, &|connection| {
+            let mut update =
+                connection.prepare("UPDATE scenario SET text = ? WHERE part = ? AND event = ?")?;
+            for WrittenScenario { part, event, text, .. } in scenarios {
+                update.execute(params![text, part, event])?;
+            }
+            Ok(())
+        })
     }
 
     /// All parts so far, in order.

@@ -20,7 +20,7 @@ mod settings;
 mod splitting;
 
 pub use compare::{Comparison, ComparisonResults, Pair, Side, compared};
-pub use database::{EstimateDatabase, PILOT};
+pub use database::{EstimateDatabase, PILOT, WrittenScenario};
 pub use part::{Event, Met, Part, PartRecord, Played, play_parts};
 pub use plan::{Pilot, Plan};
 pub use probing::pilot;

@@ -17,13 +17,13 @@ use crate::model::vocabulary::Word;
 use crate::oracle;
 
 use crate::run::offered::{RowCount, without_figures};
-use crate::run::sealed::{DatabaseError, Layout};
+use crate::run::sealed::{DatabaseError, Layout, plain_name};
 use crate::run::settled::{Numbered, Units};
 use crate::run::shape::Shape;
 use crate::run::summary::{EpisodeSummary, Finding};
 
 pub(crate) const LAYOUT: Layout = Layout {
-    version: 9,
+    version: 10,
     older: &[],
     unit: "episode",
     tables: &["episode", "step", "held", "offer", "collision", "failure", "learning", "scenario"],
@@ -33,7 +33,7 @@ pub(crate) const LAYOUT: Layout = Layout {
 };
 
 /// `held` says what held the speed of the ego vehicle back, from a time until that of the next row. `offer` says for each row in how many steps of an episode it was legal (reason 0) or was refused for a reason; a
-/// training leaves it empty. `scenario` has the digest of the file that a run wrote of an episode. `learning` and `checkpoint` belong to a training (`train::record`) and stay empty in a run.
+/// training leaves it empty. `scenario` has the text of the file that was written of an episode. `learning`, `checkpoint` and `result` belong to a training (`train::record`) and stay empty in a run.
 const SCHEMA: &str = "
 CREATE TABLE episode (
   episode INTEGER PRIMARY KEY, road TEXT NOT NULL, seed TEXT NOT NULL, ended TEXT NOT NULL,
@@ -52,7 +52,7 @@ CREATE TABLE collision (
   obstacle_delta_v_mps REAL NOT NULL, cause TEXT, shape TEXT, priority TEXT NOT NULL, r157_letter TEXT NOT NULL,
   PRIMARY KEY (episode, number)
 ) STRICT;
-CREATE TABLE scenario (episode INTEGER PRIMARY KEY REFERENCES episode, digest TEXT NOT NULL) STRICT;
+CREATE TABLE scenario (episode INTEGER PRIMARY KEY REFERENCES episode, text TEXT NOT NULL) STRICT;
 CREATE TABLE failure (
   episode INTEGER PRIMARY KEY REFERENCES episode, kind TEXT NOT NULL, problem TEXT NOT NULL, stage TEXT NOT NULL,
   detail TEXT NOT NULL, exit TEXT, stderr TEXT NOT NULL
@@ -74,6 +74,9 @@ CREATE TABLE learning (
 CREATE TABLE checkpoint (
   only INTEGER PRIMARY KEY CHECK (only = 1), episodes INTEGER NOT NULL, digest TEXT NOT NULL,
   learner BLOB NOT NULL
+) STRICT;
+CREATE TABLE result (
+  only INTEGER PRIMARY KEY CHECK (only = 1), digest TEXT NOT NULL, text TEXT NOT NULL
 ) STRICT;
 ";
 
@@ -102,7 +105,7 @@ impl Units for Database {
 
 impl Database {
     /// Adds a whole episode, or nothing. `in_words` says what a draw does in the space's own words; `scenario` is the
-    /// digest of the file that was written of it.
+    /// text of the file that was written of it.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -114,11 +117,7 @@ impl Database {
         scenario: Option<&str>,
     ) -> Result<(), DatabaseError> {
         let transaction = self.connection.transaction()?;
-        add_all(&transaction, summary, log, in_words)?;
-        if let Some(digest) = scenario {
-            let mut insert = transaction.prepare_cached("INSERT INTO scenario VALUES (?, ?)")?;
-            insert.execute(params![summary.episode as i64, digest])?;
-        }
+        add_all(&transaction, summary, log, in_words, scenario)?;
         LAYOUT.seal(&transaction, summary.episode as i64)?;
         transaction.commit()?;
         Ok(())
@@ -135,24 +134,24 @@ impl Database {
         numbers.map(|found| number(found?)).collect()
     }
 
-    /// The episodes of which a scenario was written: number, road, and the digest of the file.
+    /// The episodes of which a scenario was written: number, road, and the text of the file.
     ///
     /// # Errors
-    /// If the file cannot be read.
+    /// If the file cannot be read, or names a road that is no name of a file.
     pub fn scenarios(&self) -> Result<Vec<(usize, String, String)>, DatabaseError> {
         let query =
-            "SELECT episode, road, digest FROM scenario JOIN episode USING (episode) ORDER BY episode";
+            "SELECT episode, road, text FROM scenario JOIN episode USING (episode) ORDER BY episode";
         let mut statement = self.connection.prepare(query)?;
         let rows = statement.query_map([], |row| Ok((row.get::<_, i64>(0)?, row.get(1)?, row.get(2)?)))?;
         rows.map(|row| {
-            let (found, road, digest) = row?;
+            let (found, road, text) = row?;
             let episode = usize::try_from(found).map_err(|_| DatabaseError::Episode { found })?;
-            Ok((episode, road, digest))
+            Ok((episode, plain_name(road)?, text))
         })
         .collect()
     }
 
-    /// As [`Units::take`]. `scenarios` has the episodes of which a scenario was written anew, with the digest of the file.
+    /// As [`Units::take`]. `scenarios` has the episodes of which a scenario was written anew, with the text of the file.
     ///
     /// # Errors
     /// As [`Units::take`].
@@ -163,9 +162,9 @@ impl Database {
         scenarios: &[(usize, String)],
     ) -> Result<(), DatabaseError> {
         self.take(other, units, &|connection| {
-            let mut update = connection.prepare("UPDATE scenario SET digest = ? WHERE episode = ?")?;
-            for (episode, digest) in scenarios {
-                update.execute(params![digest, *episode as i64])?;
+            let mut update = connection.prepare("UPDATE scenario SET text = ? WHERE episode = ?")?;
+            for (episode, text) in scenarios {
+                update.execute(params![text, *episode as i64])?;
             }
             Ok(())
         })
@@ -374,12 +373,13 @@ fn step_table() -> String {
     )
 }
 
-/// An episode with its steps and collisions.
+/// An episode with its steps, its collisions and the text of its scenario, if one was written.
 pub(crate) fn add_all(
     transaction: &Transaction,
     summary: &EpisodeSummary,
     log: &EpisodeLog,
     in_words: impl Fn(&Draw) -> String,
+    scenario: Option<&str>,
 ) -> Result<(), DatabaseError> {
     add_episode(transaction, summary, log)?;
     for (index, step) in log.steps.iter().enumerate() {
@@ -441,6 +441,10 @@ pub(crate) fn add_all(
         ])?;
     }
     add_offers(transaction, summary)?;
+    if let Some(text) = scenario {
+        let mut insert = transaction.prepare_cached("INSERT INTO scenario VALUES (?, ?)")?;
+        insert.execute(params![summary.episode as i64, text])?;
+    }
     Ok(())
 }
 

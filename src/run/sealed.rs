@@ -5,7 +5,8 @@
 //! all its rows, written in the same transaction. SQLite's own check finds torn pages, a seal finds values that were
 //! changed. Neither is a protection against somebody who writes seals of their own.
 
-use std::path::Path;
+use std::ffi::OsStr;
+use std::path::{Component, Path};
 
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, OptionalExtension, Row, params};
@@ -27,12 +28,19 @@ pub enum DatabaseError {
     Layout { found: i64, wanted: i64 },
     #[error("it names an episode {found}")]
     Episode { found: i64 },
+    #[error("it names a file `{found}`, which is no name of a file in its directory")]
+    Name { found: String },
     #[error("its checkpoint is damaged: begin a new training")]
     Checkpoint,
     #[error("the settings were edited since it was begun: {what}; undo that, or begin a new one")]
     Settings { what: String },
-    #[error("its rows of {unit} {number} were changed since they were written: begin a new one")]
+    #[error(
+        "its rows of {unit} {number} were changed since they were written: `--resume` plays it again, and a training must \
+         be begun anew"
+    )]
     Rows { unit: &'static str, number: i64 },
+    #[error("its results were changed since they were written: `avastra train --resume` writes them again")]
+    Results,
     #[error("it is damaged ({what}): begin a new one")]
     Damaged { what: String },
     #[error(
@@ -86,6 +94,23 @@ impl Layout {
     /// # Errors
     /// If the file cannot be opened, has another layout or other settings, or was damaged or changed.
     pub fn open(&self, path: &Path, tables: &str, settings: &str) -> Result<Connection, DatabaseError> {
+        let (connection, damaged) = self.open_damaged(path, tables, settings)?;
+        match damaged.first() {
+            Some(&number) => Err(DatabaseError::Rows { unit: self.unit, number }),
+            None => Ok(connection),
+        }
+    }
+
+    /// As [`Layout::open`], but units whose rows were changed are no error: their numbers come beside the connection.
+    ///
+    /// # Errors
+    /// As [`Layout::open`], but for changed rows.
+    pub(super) fn open_damaged(
+        &self,
+        path: &Path,
+        tables: &str,
+        settings: &str,
+    ) -> Result<(Connection, Vec<i64>), DatabaseError> {
         let mut connection = Connection::open(path)?;
         let found: i64 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
         if found == 0 {
@@ -100,10 +125,11 @@ impl Layout {
         } else {
             self.check(&connection, settings)?;
         }
-        Ok(connection)
+        let damaged = self.damaged(&connection)?;
+        Ok((connection, damaged))
     }
 
-    /// Whether all is as it was written.
+    /// Whether its pages are sound and its settings the ones that it was begun with.
     fn check(&self, connection: &Connection, settings: &str) -> Result<(), DatabaseError> {
         let state: String = connection.pragma_query_value(None, "quick_check", |row| row.get(0))?;
         if state != "ok" {
@@ -113,16 +139,40 @@ impl Layout {
         if let Some(what) = differences(&begun, settings) {
             return Err(DatabaseError::Settings { what });
         }
-        let (unit, main) = (self.unit, self.tables[0]);
-        let query = format!("SELECT {unit} FROM {main} UNION SELECT unit FROM seal ORDER BY 1");
-        let mut numbers = connection.prepare(&query)?;
+        Ok(())
+    }
+
+    /// The units whose rows are not as they were written, rising; one that has rows in any table and no seal is among them.
+    fn damaged(&self, connection: &Connection) -> Result<Vec<i64>, DatabaseError> {
+        let unit = self.unit;
+        let of_tables: String =
+            self.tables.iter().map(|table| format!("SELECT {unit} FROM {table} UNION ")).collect();
+        let mut numbers = connection.prepare(&format!("{of_tables}SELECT unit FROM seal ORDER BY 1"))?;
+        let mut damaged = Vec::new();
         for number in numbers.query_map([], |row| row.get::<_, i64>(0))? {
             let number = number?;
             let mut seal = connection.prepare_cached("SELECT digest FROM seal WHERE unit = ?")?;
             let seal: Option<String> = seal.query_row([number], |row| row.get(0)).optional()?;
             if seal != Some(self.rows_digest(connection, number)?) {
-                return Err(DatabaseError::Rows { unit, number });
+                damaged.push(number);
             }
+        }
+        Ok(damaged)
+    }
+
+    /// Hides units from all that is asked over this connection from now on. The file stays as it is: a name without the name
+    /// of a file stands for the temporary view, and not for the table.
+    pub(super) fn hide(&self, connection: &Connection, numbers: &[i64]) -> Result<(), rusqlite::Error> {
+        connection.execute_batch("CREATE TEMP TABLE hidden (unit INTEGER PRIMARY KEY) STRICT")?;
+        let mut insert = connection.prepare("INSERT INTO temp.hidden VALUES (?)")?;
+        for number in numbers {
+            insert.execute([number])?;
+        }
+        let tables = self.tables.iter().map(|table| (*table, self.unit)).chain([("seal", "unit")]);
+        for (table, unit) in tables {
+            connection.execute_batch(&format!(
+                "CREATE TEMP VIEW {table} AS SELECT * FROM main.{table} WHERE {unit} NOT IN (SELECT unit FROM temp.hidden)"
+            ))?;
         }
         Ok(())
     }
@@ -131,6 +181,17 @@ impl Layout {
     pub fn seal(&self, connection: &Connection, number: i64) -> Result<(), rusqlite::Error> {
         let digest = self.rows_digest(connection, number)?;
         connection.prepare_cached("INSERT INTO seal VALUES (?, ?)")?.execute(params![number, digest])?;
+        Ok(())
+    }
+
+    /// Deletes the rows of a unit.
+    pub(super) fn delete(&self, connection: &Connection, number: i64) -> Result<(), rusqlite::Error> {
+        for table in self.tables.iter().rev() {
+            connection
+                .prepare_cached(&format!("DELETE FROM {table} WHERE {} = ?", self.unit))?
+                .execute([number])?;
+        }
+        connection.prepare_cached("DELETE FROM seal WHERE unit = ?")?.execute([number])?;
         Ok(())
     }
 
@@ -202,6 +263,15 @@ fn row_digest(row: &Row, columns: usize) -> Result<[u8; 32], rusqlite::Error> {
         }
     }
     Ok(hash.finalize().into())
+}
+
+/// A name from a database, if it is that of a file in a folder. Others lead out of it, and whoever has made a database can seal it.
+///
+/// # Errors
+/// If it leads anywhere else.
+pub(crate) fn plain_name(found: String) -> Result<String, DatabaseError> {
+    let is_plain = Path::new(&found).components().eq([Component::Normal(OsStr::new(&found))]);
+    if is_plain { Ok(found) } else { Err(DatabaseError::Name { found }) }
 }
 
 /// Settings that are named as different.
@@ -296,6 +366,7 @@ mod tests {
             ("DELETE FROM seal WHERE unit = 2", "episode 2"),
             ("UPDATE reason SET text = 'no lane'", "episode 1"),
             ("INSERT INTO reason VALUES (0, 'a red light')", "episode 0"),
+            ("INSERT INTO step VALUES (9, 0, 0.5, NULL)", "episode 9"),
         ];
         for (change, what) in changes {
             let scratch = tempfile::tempdir().unwrap();
@@ -307,6 +378,44 @@ mod tests {
             let refused = LAYOUT.open(&path, OWN, SETTINGS).unwrap_err().to_string();
             assert!(refused.contains(what), "{change}: {refused}");
         }
+    }
+
+    #[test]
+    fn names_stay_in_their_folder() {
+        for name in ["corner", "corner_0001.ava", "..a", "ä b"] {
+            assert_eq!(plain_name(name.to_owned()).unwrap(), name);
+        }
+        for name in ["", ".", "..", "/", "/a", "a/", "a/b", "../a", "./a"] {
+            let refused = plain_name(name.to_owned()).unwrap_err().to_string();
+            assert!(refused.contains(&format!("`{name}`")), "{refused}");
+        }
+    }
+
+    #[test]
+    fn a_damaged_unit_can_be_hidden_or_deleted() {
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("run.db");
+        let connection = begun(&path);
+        let damage = "UPDATE step SET x = 0.25 WHERE episode = 1; INSERT INTO step VALUES (9, 0, 0.5, NULL)";
+        connection.execute_batch(damage).unwrap();
+        drop(connection);
+        let rows = |connection: &Connection| -> [i64; 3] {
+            ["episode", "step", "seal"].map(|table| {
+                let query = format!("SELECT count(*) FROM {table}");
+                connection.query_row(&query, [], |row| row.get(0)).unwrap()
+            })
+        };
+        let (hiding, damaged) = LAYOUT.open_damaged(&path, OWN, SETTINGS).unwrap();
+        assert_eq!(damaged, [1, 9]);
+        assert_eq!(rows(&hiding), [3, 4, 3]);
+        LAYOUT.hide(&hiding, &damaged).unwrap();
+        assert_eq!(rows(&hiding), [2, 2, 2]);
+        // Nobody else sees it so.
+        let (deleting, damaged) = LAYOUT.open_damaged(&path, OWN, SETTINGS).unwrap();
+        assert_eq!(rows(&deleting), [3, 4, 3]);
+        damaged.iter().for_each(|&number| LAYOUT.delete(&deleting, number).unwrap());
+        let sound = LAYOUT.open(&path, OWN, SETTINGS).unwrap();
+        assert_eq!(rows(&sound), [2, 2, 2]);
     }
 
     #[test]

@@ -36,6 +36,35 @@ pub trait Units: Sized {
         Ok(Self::from_connection(Self::layout().open(path, &Self::schema(), settings)?))
     }
 
+    /// As [`Units::open`], but units whose rows were changed are deleted; their numbers come beside the database.
+    ///
+    /// # Errors
+    /// As [`Units::open`], but for changed rows.
+    fn open_and_drop(path: &Path, settings: &str) -> Result<(Self, Vec<i64>), DatabaseError> {
+        let layout = Self::layout();
+        let (mut connection, damaged) = layout.open_damaged(path, &Self::schema(), settings)?;
+        let transaction = connection.transaction()?;
+        for &number in &damaged {
+            layout.delete(&transaction, number)?;
+        }
+        transaction.commit()?;
+        Ok((Self::from_connection(connection), damaged))
+    }
+
+    /// As [`Units::open`], but units whose rows were changed are as if they were not there; the file stays as it is. Their
+    /// numbers come beside the database.
+    ///
+    /// # Errors
+    /// As [`Units::open`], but for changed rows.
+    fn open_without_damaged(path: &Path, settings: &str) -> Result<(Self, Vec<i64>), DatabaseError> {
+        let layout = Self::layout();
+        let (connection, damaged) = layout.open_damaged(path, &Self::schema(), settings)?;
+        if !damaged.is_empty() {
+            layout.hide(&connection, &damaged)?;
+        }
+        Ok((Self::from_connection(connection), damaged))
+    }
+
     /// The numbers of all units, in order.
     ///
     /// # Errors

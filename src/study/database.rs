@@ -73,7 +73,7 @@ impl Units for StudyDatabase {
 }
 
 impl StudyDatabase {
-    /// Adds all cells of a job, or nothing.
+    /// Adds all cells of a job that are not there yet, or nothing.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -83,6 +83,10 @@ impl StudyDatabase {
         for record in cells {
             let seed = record.training_seed.map(|seed| seed.to_string());
             let CellRecord { agent, road, number, spent, .. } = record;
+            let known = "SELECT 1 FROM cell WHERE agent = ? AND road = ? AND number = ?";
+            if transaction.prepare_cached(known)?.exists(params![agent, road, number])? {
+                continue;
+            }
             if layout == TIMED {
                 let insert = "INSERT INTO cell (agent, road, number, training_seed, wall_s, cpu_s) VALUES (?, ?, ?, ?, ?, ?)";
                 transaction.execute(insert, params![agent, road, number, seed, spent.wall_s, spent.cpu_s])?;
@@ -141,9 +145,13 @@ impl StudyDatabase {
             self.connection.prepare("SELECT 1 FROM cell WHERE agent = ? AND road = ? AND number = ?")?;
         let mut missing = Vec::new();
         for job in jobs {
-            // All cells of a job come together.
-            let (agent, road) = (&settings.agents[job.agent].label, &settings.roads[job.roads[0]]);
-            if !is_there.exists(params![agent, road, job.number])? {
+            let agent = &settings.agents[job.agent].label;
+            // All cells of a job come together, but one of them may have been dropped since.
+            let mut is_whole = true;
+            for &road in &job.roads {
+                is_whole &= is_there.exists(params![agent, settings.roads[road], job.number])?;
+            }
+            if !is_whole {
                 missing.push(job);
             }
         }

@@ -1,10 +1,12 @@
 //! A study as it was played, in short: its settings, and of each cell the measures. A study's directory holds every
 //! episode; this is what is kept of it beside the study's file, as text that can be committed.
 //!
-//! The text is JSON Lines: what it is, and then a cell a line, so that a study that is played on adds lines.
+//! The text is JSON Lines: what it is, and then a cell a line, so that a study that is played on adds lines. The last line is
+//! the seal, a digest of all lines before it, by which an edited figure is noticed.
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::model::digest;
 use crate::sim::first_with_episodes_of;
 use crate::study::measures::{MEASURES, MeasuredCell};
 use crate::study::record::{CellRecord, Spent};
@@ -54,6 +56,29 @@ struct Line {
     values: Vec<Option<f64>>,
 }
 
+/// The last line.
+#[derive(serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Seal {
+    /// Digest of the bytes of all lines before.
+    seal: String,
+}
+
+/// What to do about a text whose seal does not fit.
+const UNSEALED: &str =
+    "get it back as it was, or remove it and add its study again with `avastra results --add DIR`";
+
+/// The lines before the seal, if it is theirs.
+fn unsealed(text: &str) -> Result<&str, String> {
+    let last = text.strip_suffix('\n').unwrap_or(text).rfind('\n').map_or(0, |end| end + 1);
+    let (lines, last) = text.split_at(last);
+    match serde_json::from_str::<Seal>(last) {
+        Ok(Seal { seal }) if seal == digest(lines.as_bytes()) => Ok(lines),
+        Ok(_) => Err(format!("it was changed since it was written: {UNSEALED}")),
+        Err(_) => Err(format!("its last line is not the seal of those before: {UNSEALED}")),
+    }
+}
+
 impl Played {
     /// What is kept of a study's cells, in the order of agents, roads and numbers.
     pub fn new(settings: StudySettings, cells: &[CellRecord], commit: Option<String>) -> Played {
@@ -86,16 +111,19 @@ impl Played {
             text.push_str(&serde_json::to_string(&line).expect("it has string keys only"));
             text.push('\n');
         }
+        let seal = Seal { seal: digest(text.as_bytes()) };
+        text.push_str(&serde_json::to_string(&seal).expect("it has string keys only"));
+        text.push('\n');
         text
     }
 
     /// Reads the text back. A measure that it does not have has no values.
     ///
     /// # Errors
-    /// If it has another form: the line and the reason.
+    /// If it was changed since it was written, or has another form: the line and the reason.
     pub fn from_text(text: &str) -> Result<Played, String> {
         let at = |index: usize| move |reason: serde_json::Error| format!("line {}: {reason}", index + 1);
-        let mut lines = text.lines().enumerate();
+        let mut lines = unsealed(text)?.lines().enumerate();
         let (_, head) = lines.next().ok_or("it is empty")?;
         let head: Head = serde_json::from_str(head).map_err(at(0))?;
         if head.schema != SCHEMA {

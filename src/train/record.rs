@@ -1,4 +1,4 @@
-//! A training in the run database: learning curves, and checkpoints to go on from.
+//! A training in the run database: learning curves, checkpoints to go on from, and what came of it.
 //!
 //! A checkpoint and the episodes up to it are committed together. Episodes after the last checkpoint are deleted
 //! when a training is resumed, and played again to the same bytes.
@@ -18,7 +18,8 @@ pub struct Checkpoint {
 }
 
 impl Database {
-    /// Adds an episode of a training, and with it a checkpoint if there is one to keep.
+    /// Adds an episode of a training, and with it a checkpoint if there is one to keep. `in_words` and `scenario` are as for
+    /// [`Database::add`].
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -27,10 +28,11 @@ impl Database {
         trained: &TrainedEpisode,
         checkpoint: Option<&[u8]>,
         in_words: impl Fn(&Draw) -> String,
+        scenario: Option<&str>,
     ) -> Result<(), DatabaseError> {
         let transaction = self.connection.transaction()?;
         let episode = trained.summary.episode;
-        add_all(&transaction, &trained.summary, &trained.log, in_words)?;
+        add_all(&transaction, &trained.summary, &trained.log, in_words, scenario)?;
         transaction.prepare_cached("INSERT INTO learning VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)")?.execute(
             params![
                 episode as i64,
@@ -53,6 +55,31 @@ impl Database {
         LAYOUT.seal(&transaction, episode as i64)?;
         transaction.commit()?;
         Ok(())
+    }
+
+    /// Keeps what came of a finished training, as JSON, in place of what was kept before.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn keep_results(&self, text: &str) -> Result<(), DatabaseError> {
+        let seal = digest(text.as_bytes());
+        self.connection.execute("INSERT OR REPLACE INTO result VALUES (1, ?, ?)", params![seal, text])?;
+        Ok(())
+    }
+
+    /// What came of a training, as JSON, if it is finished.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or the results were changed.
+    pub fn results(&self) -> Result<Option<String>, DatabaseError> {
+        let kept: Option<(String, String)> = self
+            .connection
+            .query_row("SELECT digest, text FROM result", [], |row| Ok((row.get(0)?, row.get(1)?)))
+            .optional()?;
+        match kept {
+            Some((seal, text)) if digest(text.as_bytes()) != seal => Err(DatabaseError::Results),
+            kept => Ok(kept.map(|(_, text)| text)),
+        }
     }
 
     /// Time simulated for the episodes of a training so far, s.

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use crate::cases::root;
 use crate::command::{avastra, outcome};
+use crate::report::index_of;
 use crate::world::FLICKER;
 
 /// A command that takes longer hangs, also on a busy machine.
@@ -150,14 +151,31 @@ fn a_run_that_was_edited_is_not_gone_on_with() {
     let (status, stderr) = resume("study", &out);
     assert!(status == 1 && stderr.contains("holds a run"), "{stderr}");
 
-    let database = rusqlite::Connection::open(scratch.path("run/run.db")).expect("it is a database");
-    database
-        .execute_batch("UPDATE step SET proc = 0.5 WHERE episode = 1 AND step = 0")
-        .expect("it can be changed");
-    drop(database);
-    let (status, stderr) = resume("run", &out);
-    assert!(status == 1 && stderr.contains("its rows of episode 1 were changed"), "{stderr}");
+    // What was changed in an episode is told, counts for nothing, and is played again.
     let bytes = std::fs::read(scratch.path("run/run.db")).expect("it is readable");
+    let database = rusqlite::Connection::open(scratch.path("run/run.db")).expect("it is a database");
+    let change = "UPDATE step SET proc = 0.5 WHERE episode = 1 AND step = 0;
+                  UPDATE episode SET distance_m = 1e9 WHERE episode = 1;
+                  PRAGMA foreign_keys = OFF;
+                  INSERT INTO held VALUES (9, 0, 1.0, 'nothing')";
+    database.execute_batch(change).expect("it can be changed");
+    drop(database);
+    let changed = "the rows of episode 1, episode 9 were changed since they were written";
+    let page = scratch.path("page.html");
+    let (status, _, stderr) = outcome(&mut avastra(&["report", &out, "--out", &page.display().to_string()]));
+    assert!(status == 0 && stderr.contains(&format!("{changed}: they count for nothing")), "{stderr}");
+    let html = std::fs::read_to_string(&page).expect("it is written");
+    let overview = &index_of(&html)["overview"];
+    assert_eq!(overview["totals"]["episodes"], 2, "{overview}");
+    assert!(overview["totals"]["driven_m"].as_f64().is_some_and(|driven_m| driven_m < 1e6), "{overview}");
+    let (status, _, stderr) = outcome(&mut avastra(&["merge", &out, "--missing"]));
+    assert!(status == 0 && stderr.contains("its rows of episode 1 were changed"), "{stderr}");
+    let (status, stderr) = resume("run", &out);
+    let again = format!("{changed}: what they were of is played again");
+    assert!(status == 0 && stderr.contains(&again), "{stderr}");
+    assert!(std::fs::read(scratch.path("run/run.db")).expect("it is readable") == bytes);
+    let (status, stderr) = resume("run", &out);
+    assert!(status == 0 && !stderr.contains("changed"), "{stderr}");
     let torn: Vec<u8> =
         bytes.iter().enumerate().map(|(at, byte)| if at % 991 == 990 { !byte } else { *byte }).collect();
     std::fs::write(scratch.path("run/run.db"), torn).expect("it is writable");

@@ -1,12 +1,13 @@
 //! Estimates: they depend on their settings alone, and bad requests are refused. That the methods have no bias is tested
 //! beside them, on twins whose probability is known.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
 use crate::cases::expect_snapshot;
 use crate::command::{avastra, outcome};
+use crate::report::index_of;
 
 const SPACE: &str = "scenarios/avastra45.ava";
 
@@ -30,8 +31,8 @@ fn kept(directory: &Path) -> Vec<u8> {
 /// Leaves the directory of an estimate as a kill after its first part does, in the middle of the next.
 fn cut(directory: &Path) {
     let database = rusqlite::Connection::open(directory.join("estimate.db")).expect("it is a database");
-    let later =
-        "DELETE FROM event WHERE part > 0; DELETE FROM seal WHERE unit > 0; DELETE FROM part WHERE part > 0;";
+    let later = "DELETE FROM scenario WHERE part > 0; DELETE FROM event WHERE part > 0;
+                 DELETE FROM seal WHERE unit > 0; DELETE FROM part WHERE part > 0;";
     database.execute_batch(later).expect("it can be cut");
     let left: u32 =
         database.query_row("SELECT count(*) FROM part", [], |row| row.get(0)).expect("it has parts");
@@ -61,7 +62,7 @@ fn an_estimate_depends_on_its_settings_alone() {
     }
     // What was tried out beside the episodes replays like any episode: it has their seeds and a script of its own.
     let critical = scratch.path().join("probe/critical");
-    let mut files: Vec<_> = std::fs::read_dir(critical)
+    let mut files: Vec<PathBuf> = std::fs::read_dir(critical)
         .expect("every estimate has it")
         .map(|entry| entry.expect("it is readable").path())
         .collect();
@@ -69,6 +70,47 @@ fn an_estimate_depends_on_its_settings_alone() {
     assert!(!files.is_empty(), "a trial found something");
     let verified = outcome(avastra(&["verify"]).args(files.iter().take(3)));
     assert_eq!(verified.0, 0, "{verified:?}");
+    only_its_database_counts(scratch.path(), &files);
+}
+
+/// The pages, the merges and the scenarios of an estimate follow from its database, whatever became of its other files.
+fn only_its_database_counts(scratch: &Path, files: &[PathBuf]) {
+    let directory = scratch.join("probe");
+    let text = |path: &Path| std::fs::read_to_string(path).expect("it is readable");
+    let [gone, edited, ..] = files else { panic!("two trials found something: {files:?}") };
+    let (gone_text, edited_text, results) = (text(gone), text(edited), kept(&directory));
+    std::fs::remove_file(gone).expect("it is there");
+    std::fs::write(edited, format!("// mine\n{edited_text}")).expect("it is writable");
+    std::fs::write(directory.join("results.json"), "{}").expect("it is writable");
+    let named = |name: &str| scratch.join(name).display().to_string();
+    let [out, page, merged] = ["probe", "page.html", "merged"].map(named);
+
+    let (status, _, stderr) = outcome(&mut avastra(&["report", &out, "--most", "1", "--out", &page]));
+    let is_told =
+        stderr.contains("was edited since it was written") && stderr.contains("1 scenario gone from");
+    assert!(status == 0 && is_told, "{stderr}");
+    let overview = index_of(&text(Path::new(&page)))["overview"].clone();
+    assert_eq!(overview["estimate"], serde_json::from_slice::<Value>(&results).expect("it is JSON"));
+
+    let (status, _, stderr) = outcome(&mut avastra(&["merge", &out, "--out", &merged]));
+    assert!(status == 0 && stderr.contains("was edited since it was written"), "{stderr}");
+    assert_eq!(kept(Path::new(&merged)), results);
+    for (file, written) in [(gone, &gone_text), (edited, &edited_text)] {
+        let name = file.file_name().expect("it has a name");
+        assert_eq!(text(&scratch.join("merged/critical").join(name)), *written);
+    }
+
+    // A part that was changed is played again.
+    let database = rusqlite::Connection::open(directory.join("estimate.db")).expect("it is a database");
+    database.execute_batch("UPDATE part SET probability = 0.9 WHERE part = 2").expect("it can be changed");
+    drop(database);
+    let (status, stdout, stderr) = outcome(&mut avastra(&["estimate", "--resume", &out]));
+    assert!(status == 0 && stderr.contains("the rows of part 2 were changed"), "{stderr}");
+    let is_told = stdout.contains("was missing, is written again")
+        && stdout.contains("edited since the estimate wrote it");
+    assert!(is_told, "{stdout}");
+    assert_eq!(text(gone), gone_text);
+    assert_eq!(kept(&directory), results);
 }
 
 #[test]

@@ -89,6 +89,20 @@ fn merged(command: &[&str], kind: &str, order: &[u32]) -> tempfile::TempDir {
         assert!(status == 0 && is_told, "{stdout}{stderr}");
         equal(&at("whole"), &at(out));
     }
+    // A merge that was killed after it had named the directory is ended by the next one.
+    let database = rusqlite::Connection::open(at("merged").join(format!("{kind}.db")));
+    database.expect("it is a database").execute_batch("VACUUM").expect("it can be written anew");
+    let results = at("merged/results.json");
+    if results.is_file() {
+        std::fs::remove_file(results).expect("it is there");
+    }
+    std::fs::write(at("merged/merge.partial"), "").expect("it is writable");
+    std::fs::write(at("merged/report.html"), "a page").expect("it is writable");
+    directories.pop();
+    let (status, _, stderr) = merge(&directories, &["--out", text(&at("merged"))]);
+    assert_eq!(status, 0, "{stderr}");
+    std::fs::remove_file(at("merged/report.html")).expect("it is left alone");
+    equal(&at("whole"), &at("merged"));
     // What is merged is a directory like any other.
     done(&[kind, "--resume", text(&at("again"))]);
     equal(&at("whole"), &at("again"));

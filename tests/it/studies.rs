@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
+use avastra::model::digest;
 use avastra::run::{Database, Units};
 use avastra::sim::ENGINE;
 use avastra::study::StudyDatabase;
@@ -10,6 +11,7 @@ use serde_json::Value;
 
 use crate::cases::{expect_snapshot, root};
 use crate::command::{avastra, background, outcome};
+use crate::report::index_of;
 use crate::world::FLICKER;
 
 /// Plays the smoke study into a directory.
@@ -98,6 +100,33 @@ fn what_another_study_has_played_is_taken_over() {
         let bytes = |of: &Path| std::fs::read(of.join(name)).expect("every study writes it");
         assert!(bytes(&alone) == bytes(&with), "{name} differs");
     }
+    // The page follows from the cells. One that was changed counts for nothing there, is not taken over, and is played again.
+    let sound = std::fs::read(alone.join("study.db")).expect("it is readable");
+    let whole = results(&alone);
+    std::fs::write(alone.join("results.json"), "{}").expect("it is writable");
+    let (at, page) = (alone.display().to_string(), scratch.path().join("page.html"));
+    let overview = || {
+        let report = ["report", &at, "--out", &page.display().to_string()];
+        let (status, _, stderr) = outcome(&mut avastra(&report));
+        assert_eq!(status, 0, "{stderr}");
+        let html = std::fs::read_to_string(&page).expect("it is written");
+        (index_of(&html)["overview"]["study"].clone(), stderr)
+    };
+    assert_eq!(overview().0, whole);
+    let database = rusqlite::Connection::open(alone.join("study.db")).expect("it is a database");
+    let change = "UPDATE evaluated SET distance_m = 1e9 WHERE cell = 1 AND episode = 0";
+    database.execute_batch(change).expect("it can be changed");
+    drop(database);
+    let (damaged, stderr) = overview();
+    assert!(stderr.contains("the rows of cell 1 were changed"), "{stderr}");
+    assert_eq!(damaged["cells"].as_u64().map(|cells| cells + 1), whole["cells"].as_u64());
+    let ((status, _, stderr), _) = play(&second, "refused", &["--reuse", &at]);
+    assert!(status == 1 && stderr.contains("go on with `avastra study --resume"), "{stderr}");
+    let (status, _, stderr) = outcome(&mut avastra(&["study", "--resume", &at]));
+    assert!(status == 0 && stderr.contains("is played again"), "{stderr}");
+    assert!(std::fs::read(alone.join("study.db")).expect("it is readable") == sound);
+    assert_eq!(results(&alone), whole);
+
     // What is there already is not taken over again.
     let resume = ["study", "--resume", &with.display().to_string()];
     let (status, stdout, stderr) = outcome(&mut avastra(&[&resume[..], &reuse].concat()));
@@ -177,6 +206,9 @@ fn kept_and_written_again(scratch: &Path, played: &Path) {
     // What is kept is not replaced by less; a file that has more than was played is no such file.
     let kept = scenarios.join("studies/smoke.jsonl");
     let text = std::fs::read_to_string(&kept).expect("it was kept");
+    let (lines, _) = text.rsplit_once("{\"seal\"").expect("its seal is the last line");
+    let sealed = |lines: &str| format!("{lines}{{\"seal\":\"{}\"}}\n", digest(lines.as_bytes()));
+    assert_eq!(sealed(lines), text);
     let refused = |text: &str, reason: &str| {
         std::fs::write(&kept, text).expect("it is writable");
         let mut command = avastra(&["results", "scenarios/studies", "--out", &out, "--add"]);
@@ -184,16 +216,21 @@ fn kept_and_written_again(scratch: &Path, played: &Path) {
         assert!(status == 1 && stderr.contains(reason), "{stderr}");
         assert_eq!(std::fs::read_to_string(&kept).expect("it is readable"), text, "it is left as it was");
     };
-    let last = text.lines().last().expect("it has cells");
+    let last = lines.lines().last().expect("it has cells");
     let more = last.replacen("\"number\":0", "\"number\":9", 1);
     assert_ne!(more, last, "the last cell is the first of its agent");
-    refused(&format!("{text}{more}\n"), "`avastra merge` brings shards together");
-    refused(&format!("{text}{last}\n"), "this cell is there already");
+    refused(&sealed(&format!("{lines}{more}\n")), "`avastra merge` brings shards together");
+    refused(&sealed(&format!("{lines}{last}\n")), "this cell is there already");
+    // Nor is one that somebody has changed since.
+    let edited = lines.replacen("\"values\":[", "\"values\":[1", 1);
+    assert_ne!(edited, lines);
+    refused(&text.replacen(lines, &edited, 1), "it was changed since it was written");
+    refused(lines, "its last line is not the seal of those before");
 
     // Another world is told, but not one with the same episodes.
     for (world, is_told) in [("plane/5", true), ("plane/6", false)] {
-        std::fs::write(&kept, text.replace(&format!("\"{ENGINE}\""), &format!("\"{world}\"")))
-            .expect("it is writable");
+        let other = lines.replace(&format!("\"{ENGINE}\""), &format!("\"{world}\""));
+        std::fs::write(&kept, sealed(&other)).expect("it is writable");
         let written = write(&[]);
         assert!(written.contains(&format!("world `{world}`")), "{written}");
         assert_eq!(written.contains(&format!("the world is `{ENGINE}` by now")), is_told, "{world}");

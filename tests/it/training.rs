@@ -1,7 +1,7 @@
 //! Training: a killed one resumes to the same bytes, its policies keep their claims, and damaged policies are
 //! refused.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Stdio;
 use std::time::Duration;
 
@@ -11,8 +11,9 @@ use avastra::run::{Database, Units};
 use avastra::syntax::ast::FileId;
 
 use crate::cases::root;
-use crate::command::avastra;
-use crate::world::{SMALL, read};
+use crate::command::{avastra, outcome};
+use crate::report::index_of;
+use crate::world::{FLICKER, SMALL, read};
 
 /// A training of a few episodes with a network of a few neurons, into a directory.
 fn training(out: &Path) -> Vec<String> {
@@ -133,6 +134,47 @@ fn kept(out: &Path) -> Vec<(String, Vec<u8>)> {
     let checkpoint = database.return_to_checkpoint().expect("it is sound").expect("it has ended");
     files.push(("checkpoint".to_owned(), checkpoint.learner));
     files
+}
+
+#[test]
+fn scenarios_of_a_training_that_are_gone_or_edited_are_noticed() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let out = scratch.path().join("training");
+    let at = out.display().to_string();
+    let train = ["train", "scenarios/avastra45.ava", "--road", "corner", "--agent", "constant"];
+    let how = ["--seed", "5", "--episodes", "12", "--ads-config", FLICKER, "--out", &at];
+    let (status, _, stderr) = outcome(&mut avastra(&[&train[..], &how].concat()));
+    assert_eq!(status, 0, "{stderr}");
+    let critical = std::fs::read_dir(out.join("critical")).expect("it is there").flatten();
+    let mut files: Vec<PathBuf> = critical.map(|entry| entry.path()).collect();
+    files.sort();
+    let [gone, edited, ..] = files.as_slice() else { panic!("the training finds two crashes: {files:?}") };
+    let read = |path: &Path| std::fs::read_to_string(path).expect("it is readable");
+    let written = read(gone);
+    std::fs::remove_file(gone).expect("it is there");
+    std::fs::write(edited, format!("// mine\n{}", read(edited))).expect("it is writable");
+    let (status, stdout, stderr) = outcome(&mut avastra(&["train", "--resume", &at]));
+    assert_eq!(status, 0, "{stderr}");
+    assert!(stdout.contains("was missing, is written again"), "{stdout}");
+    assert!(stdout.contains("edited since the training wrote it"), "{stdout}");
+    assert_eq!(read(gone), written);
+
+    // Each episode depends on those before, so one that was changed cannot be played again alone; a page goes without it.
+    let database = rusqlite::Connection::open(out.join("run.db")).expect("it is a database");
+    let change = "UPDATE learning SET return = 9 WHERE episode = 3; UPDATE result SET text = '{}'";
+    database.execute_batch(change).expect("it can be changed");
+    drop(database);
+    let (status, _, stderr) = outcome(&mut avastra(&["train", "--resume", &at]));
+    assert!(status == 1 && stderr.contains("a training must be begun anew"), "{stderr}");
+    let page = scratch.path().join("page.html");
+    let (status, _, stderr) =
+        outcome(&mut avastra(&["report", &at, "--most", "1", "--out", &page.display().to_string()]));
+    let is_told = stderr.contains("the rows of episode 3 were changed")
+        && stderr.contains("its results were changed since they were written");
+    assert!(status == 0 && is_told, "{stderr}");
+    let index = index_of(&read(&page));
+    assert_eq!(index["overview"]["totals"]["episodes"], 11);
+    assert!(index["overview"]["evaluation"].is_null());
 }
 
 #[test]
