@@ -192,6 +192,7 @@ pub const SHAPES: &[Shape] = &[
         fields: &[
             f("directory", "text", "the run directory"),
             f("totals", "object", "as in `run`"),
+            f("groups[]", "object", "a distinct failure of the training, as in `run`"),
             f("simulated_h", "number", "time driven"),
             f("policy", "text?", "path of the policy; a search has none"),
             f("rules", "object?", "what its readable rules achieve"),
@@ -376,6 +377,7 @@ pub const SHAPES: &[Shape] = &[
                 "object",
                 "`file`, `output`, steps and actions before and after, claims `refuted`",
             ),
+            REPRODUCIBLE,
             FAILED,
         ],
     },
