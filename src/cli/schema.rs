@@ -50,7 +50,7 @@ const FAILED: Field = f("failed[]", "object", "a file for which nothing was foun
 const REPRODUCIBLE: Field = f(
     "reproducible",
     "bool",
-    "false if a driving system of your own says that it is not deterministic, or missed steps",
+    "false if a driving system of your own is not deterministic, as it says or as was found, or missed steps",
 );
 
 /// What would be played.
