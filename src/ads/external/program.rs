@@ -240,12 +240,13 @@ impl Program {
         locked(&self.idle).push(session);
     }
 
-    /// Ends all processes that no episode uses.
+    /// Ends all processes that no episode uses. What was given up may be tried again.
     ///
     /// # Errors
     /// How the first that did not end by itself with status 0 ended.
     pub fn close(&self) -> Result<(), String> {
         let idle: Vec<Session> = core::mem::take(&mut *locked(&self.idle));
+        *locked(&self.unreached) = Unreached::default();
         let limit_s = self.settings.timeouts.close_s;
         // Each is closed, whatever became of the ones before.
         idle.into_iter().map(|session| session.close(limit_s)).fold(Ok(()), Result::and)
