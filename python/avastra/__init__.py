@@ -23,7 +23,7 @@ nothing but Python:
 Then `avastra run SPACE --ads-cmd 'python3 cruise.py'`. PROTOCOL.md describes what is sent.
 """
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, List
 
 from .driver import Driver
 from .messages import (Acceleration, Answer, Conditions, Control, Crosswalk, Ego, Event, Goal, Init, Internal, Lane,
@@ -34,9 +34,24 @@ from .serve import serve
 from .way import Way
 
 if TYPE_CHECKING:
-    from .engine import (ENGINE, EpisodeError, Episodes, Snapshot, Space, SpaceError, Variable, compile, episode_seed,
-                         read_run, step_all, variables)
-    from .notebook import Run, Scenario, runs
+    # Under their own names: for a type checker this is what makes them names of this package.
+    from .engine import ENGINE as ENGINE
+    from .engine import EpisodeError as EpisodeError
+    from .engine import Episodes as Episodes
+    from .engine import Snapshot as Snapshot
+    from .engine import Space as Space
+    from .engine import SpaceError as SpaceError
+    from .engine import Variable as Variable
+    from .engine import compile as compile
+    from .engine import episode_seed as episode_seed
+    from .engine import read_run as read_run
+    from .engine import step_all as step_all
+    from .engine import variables as variables
+    from .notebook import Run as Run
+    from .notebook import Scenario as Scenario
+    from .notebook import runs as runs
+
+__version__ = "0.1.0"
 
 _ENGINE = [
     "ENGINE", "EpisodeError", "Episodes", "Snapshot", "Space", "SpaceError", "Variable", "compile", "episode_seed",
@@ -51,16 +66,18 @@ __all__ = [
 ]
 
 
-def __getattr__(name):
-    # Loaded when it is asked for: a driving system under test works without the engine.
-    if name in _ENGINE:
-        from . import engine
-        return getattr(engine, name)
-    if name in _NOTEBOOK:
-        from . import notebook
-        return getattr(notebook, name)
-    raise AttributeError(f"module 'avastra' has no attribute '{name}'")
+# A type checker knows the names from above. With this function it would take any name for one of them.
+if not TYPE_CHECKING:
+    def __getattr__(name: str) -> Any:
+        # Loaded when it is asked for: a driving system under test works without the engine.
+        if name in _ENGINE:
+            from . import engine
+            return getattr(engine, name)
+        if name in _NOTEBOOK:
+            from . import notebook
+            return getattr(notebook, name)
+        raise AttributeError(f"module 'avastra' has no attribute '{name}'")
 
 
-def __dir__():
+def __dir__() -> List[str]:
     return sorted([*globals(), *_ENGINE, *_NOTEBOOK])

@@ -128,8 +128,9 @@ class Info(TypedDict, total=False):
 class Episodes:
     """Episodes of a space on one road against one driving system, one at a time.
 
-    The conditions are those of `avastra run`: `ads` is a name, `ads_config` a profile, `ambient` a number of vehicles of
-    ambient traffic, `traffic` a name or a profile, `with_rules` and `without_rules` names of rules.
+    The conditions are those of `avastra run`: `ads` is a name, `ads_config` a profile, `ads_cmd` the command of a driving
+    system of your own, `ambient` a number of vehicles of ambient traffic, `traffic` a name or a profile, `with_rules` and
+    `without_rules` names of rules.
 
     `observation` is `raw` (the variables of `variables()`, SI units, shape (44,)) or `scaled` (the inputs that `avastra
     train` gives its network, about 1 in size, categories as one-hot, shape (36,)), each of `float32`.
@@ -143,7 +144,7 @@ class Episodes:
     """
 
     def __init__(self, space: Space, road: str, *, ads: str = "modular", ads_config: Optional[_Path] = None,
-                 ambient: int = 0, traffic: Optional[str] = None, with_rules: Sequence[str] = (),
+                 ads_cmd: Optional[str] = None, ambient: int = 0, traffic: Optional[str] = None, with_rules: Sequence[str] = (),
                  without_rules: Sequence[str] = (), observation: Literal["raw", "scaled"] = "raw",
                  reward: Literal["space", "judged"] = "space") -> None: ...
     #: Length of an observation.
@@ -167,7 +168,7 @@ class Episodes:
 
         An illegal row loses the step: nothing happens in it but driving, and `refused` says which rule forbids it. `None`
         passes, and so does any row while none is legal. An episode goes on after a collision. Collisions are judged when
-        it ends: `info["ended"]`.
+        it ends: `info["ended"]`. Raises `EpisodeError` if there is no such row.
         """
 
     def findings(self) -> List[Finding]:
@@ -179,6 +180,11 @@ class Episodes:
     def restore(self, snapshot: Snapshot) -> Tuple[NDArray[np.float32], NDArray[np.bool_]]:
         """Returns to a moment, of this object or of a sibling: its observation, and which rows are legal. An episode that had
         ended then has ended again: `step` raises `EpisodeError`.
+        """
+
+    def close(self) -> None:
+        """Ends the episode under way and, where a driving system of your own is under test, its processes that no episode
+        uses; siblings share them. `reset` starts it again.
         """
 
 class Snapshot:

@@ -4,6 +4,9 @@ import copyreg
 import os
 from typing import Any, Dict, Tuple, Union
 
+import numpy as np
+from numpy.typing import NDArray
+
 try:
     from ._native import (ENGINE, EpisodeError, Episodes, Snapshot, Space, SpaceError, Variable, episode_seed,
                           read_table, step_all, variables)
@@ -46,7 +49,7 @@ def compile(path: _Path) -> Space:
     return Space(path)
 
 
-def read_run(directory: _Path) -> "Dict[str, Dict[str, object]]":
+def read_run(directory: _Path) -> "Dict[str, Dict[str, NDArray[np.generic]]]":
     """What a run or a training wrote: for each of the tables `episode`, `step`, `collision` and `learning` a dict of
     NumPy arrays of equal length, by the names of the columns of `run.db`.
 

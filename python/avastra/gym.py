@@ -26,7 +26,7 @@ Needs `gymnasium>=1.1,<2`: `pip install './python[gym]'`.
 """
 
 import os
-from typing import Any, Dict, List, Optional, Sequence, Union
+from typing import Any, Dict, List, Literal, Mapping, Optional, Sequence, Tuple, Union
 
 import gymnasium
 import numpy as np
@@ -42,19 +42,22 @@ __all__ = ["Env", "VectorEnv"]
 #: Stands for a bound that avastra does not promise: environments should be bounded, and nothing comes near it.
 FAR = 1e9
 
+_Seen = Literal["raw", "scaled"]
+_Reward = Literal["space", "judged"]
+
 
 class Env(gymnasium.Env):
     """One episode after another on one road.
 
     `space` is a path or a compiled `Space`, `road` the name of one of its roads (without one: the first). `observation` and
     `reward` are as in `avastra.Episodes`, and so are the other keywords (`ads`, `ads_config`, `ambient`, `traffic`,
-    `with_rules`, `without_rules`). `mask` is `info`, or `observation` for a dict of `observation` and `action_mask`.
+    `with_rules`, `without_rules`, `ads_cmd`). `mask` is `info`, or `observation` for a dict of `observation` and `action_mask`.
     """
 
     metadata = {"render_modes": []}
 
     def __init__(self, space: "Union[str, os.PathLike[str], Space]", road: Optional[str] = None, *,
-                 observation: str = "scaled", reward: str = "judged", mask: str = "info", **conditions: Any) -> None:
+                 observation: _Seen = "scaled", reward: _Reward = "judged", mask: str = "info", **conditions: Any) -> None:
         compiled = _compiled(space)
         self.episodes = _episodes(compiled, road, observation, reward, conditions)
         self.rows = compiled.rows
@@ -64,23 +67,29 @@ class Env(gymnasium.Env):
         self.observation_space = _observation_space(self.episodes, observation, self._is_masked)
         self._legal = np.zeros(self.episodes.rows, dtype=bool)
 
-    def reset(self, *, seed: Optional[int] = None, options: Optional[Dict[str, Any]] = None):
+    def reset(self, *, seed: Optional[int] = None,
+              options: Optional[Dict[str, Any]] = None) -> Tuple[Any, Dict[str, Any]]:
         super().reset(seed=seed)
         seed = _drawn(self.np_random) if seed is None else int(seed)
         observation, self._legal = self.episodes.reset(seed)
         return self._shown(observation), {"seed": seed, "action_mask": self._legal.copy()}
 
-    def step(self, action):
+    def step(self, action: Any) -> Tuple[Any, float, bool, bool, Dict[str, Any]]:
         observation, reward, end, info = self.episodes.step(int(action))
         self._legal = info["action_mask"]
         terminated = _is_terminal(end)
-        return self._shown(observation), reward, terminated, end is not None and not terminated, info
+        return self._shown(observation), reward, terminated, end is not None and not terminated, dict(info)
 
     def action_masks(self) -> np.ndarray:
         """Which rows are legal now, shape (rows,). If none is, any row passes."""
         return self._legal.copy()
 
-    def _shown(self, observation):
+    def close(self) -> None:
+        """Ends the episode and the processes of a driving system of your own; `reset` starts it again."""
+        self.episodes.close()
+        super().close()
+
+    def _shown(self, observation: np.ndarray) -> Any:
         return _with_mask(observation, self._legal) if self._is_masked else observation
 
 
@@ -96,7 +105,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
     """
 
     def __init__(self, num_envs: int, space: "Union[str, os.PathLike[str], Space]",
-                 road: Union[str, Sequence[str], None] = None, *, observation: str = "scaled", reward: str = "judged",
+                 road: Union[str, Sequence[str], None] = None, *, observation: _Seen = "scaled", reward: _Reward = "judged",
                  mask: str = "info", threads: Optional[int] = None,
                  autoreset_mode: Union[str, AutoresetMode] = AutoresetMode.NEXT_STEP, **conditions: Any) -> None:
         compiled = _compiled(space)
@@ -122,7 +131,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._has_ended = np.zeros(num_envs, dtype=bool)
 
     def reset(self, *, seed: Union[int, Sequence[Optional[int]], None] = None,
-              options: Optional[Dict[str, Any]] = None):
+              options: Optional[Dict[str, Any]] = None) -> Tuple[Any, Dict[str, Any]]:
         which = np.ones(self.num_envs, dtype=bool)
         if options and "reset_mask" in options:
             which = np.asarray(options["reset_mask"], dtype=bool)
@@ -135,11 +144,11 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         infos = self._begin(np.flatnonzero(which), seed)
         return self._shown(), infos
 
-    def step(self, actions):
-        begin = np.flatnonzero(self._has_ended)
-        if self.autoreset_mode == AutoresetMode.DISABLED and len(begin):
-            raise EpisodeError(f"the episodes of worlds {begin.tolist()} have ended: reset them with `reset_mask`")
-        seeds = [None] * self.num_envs
+    def step(self, actions: Any) -> Tuple[Any, np.ndarray, np.ndarray, np.ndarray, Dict[str, Any]]:
+        begin: List[int] = np.flatnonzero(self._has_ended).tolist()
+        if self.autoreset_mode == AutoresetMode.DISABLED and begin:
+            raise EpisodeError(f"the episodes of worlds {begin} have ended: reset them with `reset_mask`")
+        seeds: List[Optional[int]] = [None] * self.num_envs
         for world in begin:
             seeds[world] = self._next_seed(world)
         rows = [int(action) for action in actions]
@@ -160,14 +169,19 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         """Which rows are legal now, shape (worlds, rows). If none is, any row passes."""
         return self._legal.copy()
 
+    def close_extras(self, **_: Any) -> None:
+        """Ends the episodes and the processes of a driving system of your own."""
+        for world in self.worlds:
+            world.close()
+
     def _begin(self, worlds: np.ndarray, seeds: Sequence[Optional[int]]) -> Dict[str, Any]:
         """Begins the next episodes of some worlds. A seed also begins a world's own sequence of seeds."""
         drawn = []
-        for world in worlds:
-            seed = seeds[world]
-            if seed is not None:
-                self._generators[world] = seeding.np_random(int(seed))[0]
-            drawn.append(self._next_seed(world) if seed is None else int(seed))
+        for world in worlds.tolist():
+            wanted = seeds[world]
+            if wanted is not None:
+                self._generators[world] = seeding.np_random(int(wanted))[0]
+            drawn.append(self._next_seed(world) if wanted is None else int(wanted))
         some = [self.worlds[world] for world in worlds]
         observations, legal, _, ends, found = step_all(some, [None] * len(some), drawn, self.threads)
         self._observations[worlds], self._legal[worlds] = observations, legal
@@ -181,10 +195,10 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._add_masks(infos)
         return infos
 
-    def _begin_at_once(self, infos: Dict[str, Any], found: List[Dict[str, Any]]) -> Dict[str, Any]:
+    def _begin_at_once(self, infos: Dict[str, Any], found: Sequence[Mapping[str, Any]]) -> Dict[str, Any]:
         last = self._shown()
         ended = np.flatnonzero(self._has_ended)
-        for world in ended:
+        for world in ended.tolist():
             own = {key: value[world] for key, value in last.items()} if self._is_masked else last[world]
             final = {**_with_whole_seed(found[world]), "action_mask": self._legal[world].copy()}
             kept = {"final_obs": own, "final_info": final}
@@ -203,15 +217,16 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             generator = self._generators[world] = seeding.np_random(None)[0]
         return _drawn(generator)
 
-    def _shown(self):
+    def _shown(self) -> Any:
         return _with_mask(self._observations.copy(), self._legal) if self._is_masked else self._observations.copy()
 
 
-def _compiled(space) -> Space:
+def _compiled(space: "Union[str, os.PathLike[str], Space]") -> Space:
     return space if isinstance(space, Space) else Space(space)
 
 
-def _episodes(space: Space, road: Optional[str], observation: str, reward: str, conditions: Dict[str, Any]) -> Episodes:
+def _episodes(space: Space, road: Optional[str], observation: _Seen, reward: _Reward,
+              conditions: Dict[str, Any]) -> Episodes:
     return Episodes(space, road or space.roads[0], observation=observation, reward=reward, **conditions)
 
 
@@ -221,7 +236,7 @@ def _is_masked(mask: str) -> bool:
     return mask == "observation"
 
 
-def _observation_space(episodes: Episodes, observation: str, is_masked: bool) -> spaces.Space:
+def _observation_space(episodes: Episodes, observation: str, is_masked: bool) -> "spaces.Space[Any]":
     low = np.full(episodes.observation_len, -FAR, dtype=np.float32)
     high = -low
     if observation == "raw":
@@ -238,7 +253,7 @@ def _with_mask(observation: np.ndarray, legal: np.ndarray) -> Dict[str, np.ndarr
     return {"observation": observation, "action_mask": legal.astype(np.int8)}
 
 
-def _with_whole_seed(info: Dict[str, Any]) -> Dict[str, Any]:
+def _with_whole_seed(info: Mapping[str, Any]) -> Dict[str, Any]:
     # Gymnasium gathers Python's integers as int64, which half of the seeds of a run exceed.
     return {**info, "seed": np.uint64(info["seed"])}
 

@@ -104,7 +104,7 @@ def runs(path: "Union[str, os.PathLike[str]]", frames: str = "pandas") -> Run:
 
 
 def _pandas(pandas: Any, table: Any) -> Any:
-    def column(values):
+    def column(values: Any) -> Any:
         # -1 is no number of anything: it stands for none.
         has_none = values.dtype.kind == "i" and (values < 0).any()
         return pandas.Series(values).astype("Int64").mask(values < 0) if has_none else values
@@ -113,7 +113,7 @@ def _pandas(pandas: Any, table: Any) -> Any:
 
 
 def _polars(polars: Any, table: Any) -> Any:
-    def column(name, values):
+    def column(name: str, values: Any) -> Any:
         if values.dtype.kind == "O":
             return polars.Series(name, values.tolist(), dtype=polars.String)
         series = polars.Series(name, values)

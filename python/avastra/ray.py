@@ -24,6 +24,7 @@ import re
 import shutil
 import subprocess
 import sys
+from typing import Any, Callable, Deque, Dict, Iterable, List, NoReturn, Optional, Sequence, Tuple
 
 COMMANDS = ("run", "study", "estimate")
 #: How often Ray plays a shard again whose worker or program was killed.
@@ -36,6 +37,9 @@ ENDED = (0, 4, 5)
 #: The file that says what the shards of a folder are of.
 RECORD = "command.json"
 
+#: What the shards of a folder are of, and how they are played.
+Work = Dict[str, Any]
+
 
 class Refused(Exception):
     """Says to the user what cannot be done, and what would help."""
@@ -44,12 +48,12 @@ class Refused(Exception):
 class Ended(Exception):
     """The program refuses the command, and has said why."""
 
-    def __init__(self, status):
+    def __init__(self, status: int) -> None:
         super().__init__(status)
         self.status = status
 
 
-def main(arguments=None):
+def main(arguments: Optional[Sequence[str]] = None) -> int:
     """The command line. Returns the exit status: that of `avastra`, where it is the one that failed."""
     try:
         options, passed = _parsed(arguments)
@@ -67,7 +71,7 @@ def main(arguments=None):
         return 130
 
 
-def play(number, shards, work):
+def play(number: int, shards: int, work: Work) -> Tuple[int, str]:
     """Plays one shard, on whatever node Ray has chosen: its exit status and the last lines that it said.
 
     Raises `ChildProcessError` if the program was killed, so that Ray tries again.
@@ -87,6 +91,7 @@ def play(number, shards, work):
     command += ["--jobs", str(work["jobs"]), *work["anew"]]
     child = subprocess.Popen(_bound(command), cwd=work["working_directory"], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                              stderr=subprocess.PIPE, text=True, errors="replace")
+    assert child.stderr is not None, "it was asked for"
     told = _told(child.stderr, f"{number}/{shards}")
     status = child.wait()
     if status < 0:
@@ -94,7 +99,7 @@ def play(number, shards, work):
     return status, told
 
 
-def _parsed(arguments):
+def _parsed(arguments: Optional[Sequence[str]]) -> Tuple[argparse.Namespace, List[str]]:
     parser = _Parser(
         prog="python -m avastra.ray", allow_abbrev=False, formatter_class=argparse.RawDescriptionHelpFormatter,
         description="Play a run, a study or an estimate of avastra in shards on a Ray cluster, and bring them together.",
@@ -135,17 +140,17 @@ def _parsed(arguments):
 
 
 class _Parser(argparse.ArgumentParser):
-    def error(self, message):
+    def error(self, message: str) -> NoReturn:
         raise Refused(f"{message} (`python -m avastra.ray --help`)")
 
 
-def _number(text):
+def _number(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"`{text}` is no number from 1")
     return int(text)
 
 
-def _program(program):
+def _program(program: str) -> str:
     found = shutil.which(program)
     if found is None:
         raise Refused(f"there is no program `{program}`: `cargo install --path .` in avastra's repository installs it, or name it "
@@ -153,7 +158,7 @@ def _program(program):
     return os.path.abspath(found)
 
 
-def _shards_max(options, passed):
+def _shards_max(options: argparse.Namespace, passed: List[str]) -> int:
     """Into how many shards the command can be cut. What the program refuses, it says itself, and that ends this program, too.
 
     It is asked before there is a cluster, which takes seconds to begin.
@@ -169,18 +174,18 @@ def _shards_max(options, passed):
         if asked.returncode != 0:
             _say(asked.stderr.rstrip())
             raise Ended(max(asked.returncode, 1))
-    most = json.loads(asked.stdout)["planned"]["shards_max"]
+    most: int = json.loads(asked.stdout)["planned"]["shards_max"]
     if options.shards and options.shards > most:
         raise Refused(f"{options.shards} shards are too many: it can be cut into {most}")
     return most
 
 
-def _anew(options):
+def _anew(options: argparse.Namespace) -> List[str]:
     """What is said again of a shard that is gone on with."""
     return [*(["--reuse", options.reuse] if options.reuse else []), *(["--fail-on-collision"] if options.fail_on_collision else [])]
 
 
-def _cluster(options, passed, shards, most):
+def _cluster(options: argparse.Namespace, passed: List[str], shards: Optional[int], most: int) -> int:
     try:
         import ray
     except ImportError as error:
@@ -198,18 +203,20 @@ def _cluster(options, passed, shards, most):
         ray.shutdown()
 
 
-def _run(ray, options, passed, shards, most):
+def _run(ray: Any, options: argparse.Namespace, passed: List[str], shards: Optional[int], most: int) -> int:
     processors = int(ray.cluster_resources().get("CPU", 1))
     if options.jobs > processors:
         raise Refused(f"no shard with {options.jobs} threads can begin: the cluster has {processors} processors")
     shards = shards or options.shards or min(max(1, processors // options.jobs), most)
     work = _begun(options, passed, shards)
-    tell = (lambda text: None) if options.quiet else _say
+    tell: Callable[[str], None] = (lambda text: None) if options.quiet else _say
     tell(f"{shards} shards on {processors} processors, in {work['folder']}")
     task = ray.remote(play).options(num_cpus=options.jobs, max_retries=RETRIES, retry_exceptions=[ChildProcessError],
                                     scheduling_strategy="SPREAD", name=f"avastra {options.command}")
     numbers = iter(range(1, shards + 1))
-    under_way, ended_count, worst = {}, 0, 0
+    under_way: Dict[Any, int] = {}
+    ended_count, worst = 0, 0
+    status: int
     while ended_count < shards:
         for number in itertools.islice(numbers, TASKS - len(under_way)):
             under_way[task.remote(number, shards, work)] = number
@@ -232,13 +239,13 @@ def _run(ray, options, passed, shards, most):
     return _merged(options, work, shards) or worst
 
 
-def _work(options, passed):
+def _work(options: argparse.Namespace, passed: List[str]) -> Tuple[Work, str]:
     """What is asked for, as the record keeps it, and the folder of the shards."""
     known = {"command": options.command, "arguments": passed, "working_directory": os.getcwd()}
     return known, f"{os.path.abspath(options.out)}.shards"
 
 
-def _kept(options, passed):
+def _kept(options: argparse.Namespace, passed: List[str]) -> Optional[int]:
     """Into how many shards this command was cut when it began; `None` if it is new."""
     known, folder = _work(options, passed)
     record, out = os.path.join(folder, RECORD), os.path.abspath(options.out)
@@ -247,7 +254,7 @@ def _kept(options, passed):
     if left and os.path.isfile(record):
         with open(record, encoding="utf-8") as file:
             begun = json.load(file)
-        shards = begun.pop("shards")
+        shards: int = begun.pop("shards")
         if begun != known or options.shards not in (None, shards):
             was = " ".join([begun["command"], *begun["arguments"]])
             raise Refused(f"`{folder}` has {shards} shards of `{was}`, begun in `{begun['working_directory']}`: say the same command "
@@ -258,7 +265,7 @@ def _kept(options, passed):
     return None
 
 
-def _begun(options, passed, shards):
+def _begun(options: argparse.Namespace, passed: List[str], shards: int) -> Work:
     """The work of all shards, whose folder and record are there."""
     known, folder = _work(options, passed)
     record = os.path.join(folder, RECORD)
@@ -273,20 +280,20 @@ def _begun(options, passed, shards):
     return {**known, "program": options.program, "folder": folder, "jobs": options.jobs, "anew": _anew(options)}
 
 
-def _merged(options, work, shards):
+def _merged(options: argparse.Namespace, work: Work, shards: int) -> int:
     """Brings all shards together, on this node; its exit status."""
     directories = [os.path.join(work["folder"], str(number)) for number in range(1, shards + 1)]
     merge = [work["program"], "merge", *directories, "--out", os.path.abspath(options.out), *_how(options)]
     return subprocess.run(merge).returncode
 
 
-def _how(options):
+def _how(options: argparse.Namespace) -> List[str]:
     """How the result is to be told."""
     return [*(["--format", options.format] if options.format else []), *(["--color", options.color] if options.color else []),
             *(["--quiet"] if options.quiet else []), *(["--verbose"] if options.verbose else [])]
 
 
-def _bound(command):
+def _bound(command: List[str]) -> List[str]:
     """A command that ends with this process, however that ends. Only Linux can do that: elsewhere the command is as it was."""
     if not sys.platform.startswith("linux"):
         return command
@@ -301,9 +308,9 @@ def _bound(command):
     return [sys.executable, "-S", "-c", before, str(os.getpid()), *command]
 
 
-def _told(lines, shard):
+def _told(lines: Iterable[str], shard: str) -> str:
     """Reads what a program says to its end: the last lines. How far it is becomes gauges of Ray's dashboard."""
-    last = collections.deque(maxlen=30)
+    last: Deque[str] = collections.deque(maxlen=30)
     gauges = _gauges()
     for line in lines:
         last.append(line.rstrip("\n"))
@@ -314,7 +321,7 @@ def _told(lines, shard):
     return "\n".join(last)
 
 
-def _gauges():
+def _gauges() -> Sequence[Any]:
     try:
         from ray.util.metrics import Gauge
     except ImportError:
@@ -324,7 +331,7 @@ def _gauges():
             Gauge("avastra_collisions_counted", "Counted collisions in them.", tag_keys=tags))
 
 
-def _say(text):
+def _say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 

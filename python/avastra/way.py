@@ -4,7 +4,7 @@ Objects are not looked at here: whom to follow and whom to give way to is what a
 """
 
 import math
-from typing import List, Optional, Tuple
+from typing import List, Optional, Set, Tuple
 
 from .messages import Map, Reset, Step, TrajectoryPoint, Vehicle
 from .path import Path
@@ -31,7 +31,7 @@ class Way:
         self.path = Path([(point.x, point.y) for point in reset.route.path])
         self._speeds = _speeds(reset, lateral_accel, decel)
         self._signs_done = 0
-        self._held = set()
+        self._held: Set[int] = set()
 
     def speed(self, station: float) -> float:
         """What limits and bends, here and ahead, allow, m/s."""

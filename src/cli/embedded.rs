@@ -63,6 +63,7 @@ pub struct Conditions {
     pub roads: Vec<String>,
     pub ads: String,
     pub ads_config: Option<PathBuf>,
+    pub ads_cmd: Option<String>,
     pub ambient: u32,
     pub traffic: Option<String>,
     pub with: Vec<String>,
@@ -74,13 +75,13 @@ pub struct Conditions {
 /// # Errors
 /// In words: what does not exist, cannot be read or does not fit together.
 pub fn run(table: ActionTable, conditions: &Conditions) -> Result<Run, String> {
-    let Conditions { roads, ads, ads_config, ambient, traffic, with, without } = conditions;
+    let Conditions { roads, ads, ads_config, ads_cmd, ambient, traffic, with, without } = conditions;
     let ambient_max = crate::model::AMBIENT_MAX;
     if *ambient > ambient_max {
         return Err(format!("{ambient} vehicles of ambient traffic: at most {ambient_max} are possible"));
     }
     let UnderTest { ads, profile, external } =
-        load::under_test(ads, ads_config.as_deref(), None).map_err(|error| error.to_string())?;
+        load::under_test(ads, ads_config.as_deref(), ads_cmd.as_deref()).map_err(|error| error.to_string())?;
     let traffic = traffic.as_deref().map(load::traffic).transpose().map_err(|error| error.to_string())?;
     let settings = RunSettings {
         roads: roads_or_all(roads, table.space()),

@@ -31,6 +31,12 @@ pub enum Failure {
     /// An external driving system failed.
     #[error("the driving system failed {count}", count = super::output::plural(*findings, "time"))]
     Ads { findings: usize },
+    /// An external driving system was given up: what was played is saved.
+    #[error(
+        "the driving system could not be reached again and again, so the rest was not played: {reason}\n  when it \
+         answers, go on with `avastra {command} --resume {}`", directory.display()
+    )]
+    Unreached { command: &'static str, directory: PathBuf, reason: String },
     #[error("{count} failing", count = super::output::plural(*scenarios, "scenario"))]
     Failing { scenarios: usize },
     /// Ctrl-C: this file, or some of several.
@@ -61,7 +67,7 @@ impl Failure {
             | Failure::NotPlayed { in_source: true, .. } => 2,
             Failure::Refuted { .. } => 3,
             Failure::Collision { .. } | Failure::Failing { .. } => 4,
-            Failure::Ads { .. } => 5,
+            Failure::Ads { .. } | Failure::Unreached { .. } => 5,
             // What a shell reports for a process that SIGINT ended.
             Failure::Stopped | Failure::Interrupted { .. } => 130,
         }

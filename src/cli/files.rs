@@ -81,6 +81,37 @@ pub fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
     })
 }
 
+/// A new folder in the one for temporary files, for this process alone. It is removed with all that is in it when this
+/// is dropped.
+pub struct Scratch {
+    pub path: PathBuf,
+}
+
+impl Scratch {
+    /// # Errors
+    /// If no folder can be made there.
+    pub fn new(purpose: &str) -> Result<Scratch, Failure> {
+        let folder = std::env::temp_dir();
+        for number in 0.. {
+            let path = folder.join(format!("avastra-{purpose}-{}-{number}", std::process::id()));
+            // It fails where anything has the name, a link included, so nothing is written through what others put there.
+            match std::fs::create_dir(&path) {
+                Ok(()) => return Ok(Scratch { path }),
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(Failure::file("create", &path, error)),
+            }
+        }
+        unreachable!("there is always a next number")
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        // What cannot be removed is left to whoever clears the folder for temporary files.
+        let _ = std::fs::remove_dir_all(&self.path);
+    }
+}
+
 /// Removes a file, if it is there.
 pub fn remove(file: &Path) -> Result<(), Failure> {
     match std::fs::remove_file(file) {

@@ -1,13 +1,22 @@
 //! What commands say of a driving system of one's own that failed, or that need not repeat itself.
 
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::ads::Selected;
+use crate::ads::external::message::EXTREME_MPS2;
 use crate::ads::external::{FailureKind, Program};
-use crate::run::FailureCount;
+use crate::run::{FailureCount, Stage};
 
-use super::output::plural;
+use super::arguments::Format;
+use super::error::Failure;
+use super::load;
+use super::output::{Output, plural};
 use super::run::cut_short;
+
+/// So many scenarios are tried for a spot check: in some the driving system may fail.
+const SPOT_CHECKS_MAX: usize = 3;
 
 /// Why the same command need not lead to the same run, if an external driving system gives a reason.
 pub fn doubts(program: Option<&Arc<Program>>) -> Vec<String> {
@@ -20,6 +29,13 @@ pub fn doubts(program: Option<&Arc<Program>>) -> Vec<String> {
             attached.name()
         )
     });
+    let otherwise = program.otherwise().map(|found| {
+        format!(
+            "{} says that it is deterministic and is not: asked an episode again, {found}; the same seed need not lead to \
+             the same episodes again, and scenarios replay from the recorded answers",
+            attached.name()
+        )
+    });
     let missed = (program.missed() > 0).then(|| {
         let waited_s = program.missed() as f64 * program.settings().timeouts.step_s;
         format!(
@@ -28,7 +44,44 @@ pub fn doubts(program: Option<&Arc<Program>>) -> Vec<String> {
             plural(program.missed() as usize, "step")
         )
     });
-    loose.into_iter().chain(missed).collect()
+    loose.into_iter().chain(otherwise).chain(missed).collect()
+}
+
+/// That answers asked for more than any vehicle can do, if some did.
+pub fn cut_off(program: Option<&Arc<Program>>) -> Option<String> {
+    let answers = program?.extreme_answers() as usize;
+    (answers > 0).then(|| {
+        format!(
+            "{} asked for an acceleration beyond {EXTREME_MPS2} m/s² and got what the vehicle can do",
+            plural(answers, "answer")
+        )
+    })
+}
+
+/// Asks a driving system that says it is deterministic one of these scenarios again; what differs is among its
+/// [`doubts`] then.
+pub fn spot_check<'a>(program: Option<&Arc<Program>>, files: impl Iterator<Item = &'a Path>) {
+    let Some(program) = program else { return };
+    let ads = Selected::external(Arc::clone(program));
+    // What there is to say of a file was said when it was read the first time.
+    let silent = Output::of(Format::Sarif);
+    for file in files.take(SPOT_CHECKS_MAX) {
+        let Ok((table, scenario)) = load::scenario(&silent, file) else { continue };
+        let Ok(stage) = Stage::new(&table, &scenario) else { continue };
+        // Its answers are known by now.
+        let Some(first) = stage.play(&ads, &mut |_, _, _| {}).conversation else { continue };
+        if program.spot_check(&first, || stage.play(&ads, &mut |_, _, _| {}).conversation) {
+            return;
+        }
+    }
+}
+
+/// Why a command ends before its end: Ctrl-C, or a driving system that was given up.
+pub fn unfinished(command: &'static str, directory: PathBuf, program: Option<&Arc<Program>>) -> Failure {
+    match program.and_then(|program| program.given_up()) {
+        Some(last) => Failure::Unreached { command, directory, reason: last.in_words() },
+        None => Failure::Interrupted { command, directory },
+    }
 }
 
 /// Findings about an external driving system, by what is wrong and when; `place` says where they happened or stand.

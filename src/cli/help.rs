@@ -23,8 +23,9 @@ Exit status:
        for `--resume`, another driving system than the one begun with
   3    a claim is refuted
   4    a counted collision (`run --fail-on-collision`), or a failing `test`
-  5    a driving system of your own failed (`ads check`, `study`, `replay`,
-       `run --fail-on-collision`)
+  5    a driving system of your own failed (`ads check`, `study`, `estimate`,
+       `replay`, `run --fail-on-collision`; `run` and `train` if it drove no
+       episode to its end, or could not be reached any more)
        Of several, the first in this order holds: 1 and 2 before 3, 4, 5.
   130  Ctrl-C; what was done is saved, and `--resume` goes on
 

@@ -177,15 +177,7 @@ pub fn below(folder: &Path) -> Vec<PathBuf> {
 /// # Errors
 /// As [`load`], and if the file declares no action, or is a scenario.
 pub fn table(output: &Output, path: &Path) -> Result<ActionTable, Failure> {
-    table_of(output, read_and_check(path)?, path)
-}
-
-/// The action table of a space that was read.
-///
-/// # Errors
-/// As [`table`].
-pub fn table_of(output: &Output, loaded: Loaded, path: &Path) -> Result<ActionTable, Failure> {
-    let loaded = sound(output, loaded)?;
+    let loaded = load(output, path)?;
     if loaded.scenario.is_some() {
         let path = path.display();
         return Err(Failure::usage(format!("`{path}` is a scenario: `avastra replay {path}` plays it")));

@@ -21,9 +21,9 @@ const STARTER: [(&str, &str); 3] = [
     ("roads/corner.xodr", include_str!("../../scenarios/roads/corner.xodr")),
 ];
 
-/// The text of a file of the paper's space, which is in the program.
-pub fn shipped(name: &str) -> Option<&'static str> {
-    USED.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
+/// The files of the paper's space, which are in the program: their names, from its folder, and their texts.
+pub fn shipped() -> &'static [(&'static str, &'static str)] {
+    &USED
 }
 
 /// What the examples use.

@@ -1,9 +1,12 @@
 //! `avastra run`: plays episodes and writes their crashes as scenarios.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use crate::action::ActionTable;
+use crate::ads::external::{Conversation, Problem};
 use crate::agent::Face;
 use crate::emit;
 use crate::episode::EpisodeLog;
@@ -15,7 +18,7 @@ use crate::run::{
 use super::arguments::{FaceArgument, RunArguments};
 use super::error::Failure;
 use super::files::write_answers;
-use super::findings::{doubts, failures_text};
+use super::findings::{cut_off, doubts, failures_text, unfinished};
 use super::interrupt::stop_on_interrupt;
 use super::never::Never;
 use super::output::Output;
@@ -51,7 +54,8 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     if arguments.fail_on_collision && found.counted > 0 {
         return Err(Failure::Collision { collisions: found.counted as usize });
     }
-    if arguments.fail_on_collision && found.failed > 0 {
+    // Where no episode was driven to its end, nothing was tested, whatever was asked for.
+    if found.failed > 0 && (arguments.fail_on_collision || found.failed == found.episodes) {
         return Err(Failure::Ads { findings: found.failed as usize });
     }
     Ok(())
@@ -82,9 +86,18 @@ fn play_all(
     let started = Instant::now();
     let jobs = jobs(asked_jobs, run.program())?;
     let mut progress = Progress::new(output, "counted", own.len() as u64, (own.len() - todo.len()) as u64);
+    let mut driven: Option<(usize, Arc<Conversation>)> = None;
     play(&run, &todo, jobs, &stop, &mut |summary, log| {
+        // An episode that nothing drove is not kept: it is left for `--resume`.
+        if log.failure.as_ref().is_some_and(|failure| failure.problem == Problem::GivenUp) {
+            stop.store(true, Ordering::Relaxed);
+            return Ok(());
+        }
         keep(&run, &mut directory, &summary, &log)?;
         progress.episode(summary.counted());
+        if driven.is_none() && log.failure.is_none() {
+            driven = log.conversation.clone().map(|conversation| (summary.episode, conversation));
+        }
         Ok::<_, Failure>(())
     })?;
     drop(progress);
@@ -117,14 +130,21 @@ fn play_all(
         let place = format!("; each is in {}/failures", directory.path.display());
         output.say(&failures_text(&failures, &place));
     }
+    if let Some(program) = run.program()
+        && let Some((number, first)) = driven
+        && !stop.load(Ordering::Relaxed)
+    {
+        program.spot_check(&first, || run.episode(number).conversation);
+    }
     let doubts = doubts(run.program());
     doubts.iter().for_each(|doubt| output.warn(doubt));
+    cut_off(run.program()).iter().for_each(|note| output.warn(note));
     output.result(serde_json::json!({
         "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups, "never": never,
         "critical": critical, "failures": failures, "reproducible": doubts.is_empty(),
     }));
     if !is_over {
-        return Err(Failure::Interrupted { command: "run", directory: directory.path });
+        return Err(unfinished("run", directory.path, run.program()));
     }
     if !shard.is_whole() {
         output.say(&shard::next_step(shard));
@@ -378,7 +398,7 @@ fn refusals_text(refusals: &[RefusalCount]) -> String {
 }
 
 /// Distinct failures, each with how often it was found and a scenario that shows it.
-fn groups_text(groups: &[Group]) -> String {
+pub fn groups_text(groups: &[Group]) -> String {
     let line = |group: &Group| {
         let cause = match group.cause.as_deref() {
             None => String::new(),

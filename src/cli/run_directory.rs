@@ -343,10 +343,6 @@ impl RunDirectory {
             text.push_str(&format!("\nthe end of its standard error:\n{}", failure.stderr));
         }
         write(&path.with_extension("txt"), &text)?;
-        // Without a step there is nothing to replay.
-        if log.steps.is_empty() {
-            return Ok(());
-        }
         write_answers(&path, log)?;
         let file = emit::failure(table, log, &failure.in_words(), &source);
         write(&path, &crate::syntax::print(&file))

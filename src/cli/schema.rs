@@ -50,7 +50,7 @@ const FAILED: Field = f("failed[]", "object", "a file for which nothing was foun
 const REPRODUCIBLE: Field = f(
     "reproducible",
     "bool",
-    "false if a driving system of your own says that it is not deterministic, or missed steps",
+    "false if a driving system of your own is not deterministic, as it says or as was found, or missed steps",
 );
 
 /// What would be played.
@@ -192,6 +192,7 @@ pub const SHAPES: &[Shape] = &[
         fields: &[
             f("directory", "text", "the run directory"),
             f("totals", "object", "as in `run`"),
+            f("groups[]", "object", "a distinct failure of the training, as in `run`"),
             f("simulated_h", "number", "time driven"),
             f("policy", "text?", "path of the policy; a search has none"),
             f("rules", "object?", "what its readable rules achieve"),
@@ -376,6 +377,7 @@ pub const SHAPES: &[Shape] = &[
                 "object",
                 "`file`, `output`, steps and actions before and after, claims `refuted`",
             ),
+            REPRODUCIBLE,
             FAILED,
         ],
     },

@@ -13,6 +13,7 @@ use crate::run::{Asked, EpisodeSummary, Stage};
 use super::arguments::ShrinkArguments;
 use super::error::Failure;
 use super::files::{write, write_answers};
+use super::findings::{doubts, spot_check};
 use super::load;
 use super::output::Output;
 use super::output::plural;
@@ -63,11 +64,14 @@ pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failur
             counted(after.1, "action"),
         ));
     }
+    spot_check(asked.external.as_ref(), done.iter().map(|small| small.path.as_path()));
+    let doubts = doubts(asked.external.as_ref());
+    doubts.iter().for_each(|doubt| output.warn(doubt));
     output.result(serde_json::json!({
         "median_steps_before": before.0, "median_actions_before": before.1,
         "median_steps": after.0, "median_actions": after.1, "kept": kept,
         "scenarios": done.iter().map(Small::in_json).collect::<Vec<_>>(),
-        "failed": shrunk.failed_in_json(),
+        "reproducible": doubts.is_empty(), "failed": shrunk.failed_in_json(),
     }));
     let refuted = done.iter().map(|small| small.refuted).sum();
     shrunk.complete("shrunk")?;

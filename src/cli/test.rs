@@ -18,7 +18,7 @@ use crate::syntax::{Diagnostic, apply_fixes};
 use super::arguments::TestArguments;
 use super::error::Failure;
 use super::files::{write, write_answers};
-use super::findings::doubts;
+use super::findings::{doubts, spot_check};
 use super::load;
 use super::load::Emitted;
 use super::output::Output;
@@ -93,6 +93,11 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
         "{}: {fails} still fail, {fixed} fixed, {changed} changed, {errors} not played",
         plural(cases.len(), "scenario")
     ));
+    let driven = cases.iter().filter(|case| {
+        matches!(&case.outcome, Outcome::Played(found) | Outcome::Allowed(found)
+            if !matches!(found, Regression::AdsFailed(_) | Regression::FailsAgain(_)))
+    });
+    spot_check(suite.asked.external.as_ref(), driven.map(|case| case.file.as_path()));
     let doubts = doubts(suite.asked.external.as_ref());
     doubts.iter().for_each(|doubt| output.warn(doubt));
     if ads_failed > 0 {

@@ -20,13 +20,14 @@ use super::conditions::roads_or_all;
 use super::distill::rules_text;
 use super::error::Failure;
 use super::files::write;
-use super::findings::{doubts, failures_text, kinds_text};
+use super::findings::{cut_off, doubts, failures_text, kinds_text, unfinished};
 use super::interrupt::stop_on_interrupt;
 use super::load::UnderTest;
 use super::output::Output;
 use super::output::plural;
 use super::pack::pack_space;
 use super::progress::{TrainingProgress, Working};
+use super::run::groups_text;
 use super::run_directory::{Resumed, RunDirectory, WrittenFile};
 use super::{distill, load, run_directory};
 
@@ -47,12 +48,16 @@ pub fn train(output: &Output, arguments: &TrainArguments) -> Result<(), Failure>
     let mut progress = TrainingProgress::new(output, settings.episodes as u64, training.episodes() as u64);
     while !training.is_done() && !stop.load(Ordering::Relaxed) {
         let trained = training.episode();
+        // The rest would be episodes that nothing drives. This one is kept with a checkpoint.
+        if training.arena().program().is_some_and(|program| program.given_up().is_some()) {
+            stop.store(true, Ordering::Relaxed);
+        }
         keep(&training, &mut directory, &trained, &stop)?;
         progress.episode(&trained);
     }
     drop(progress);
     if !training.is_done() {
-        return Err(Failure::Interrupted { command: "train", directory: directory.path });
+        return Err(unfinished("train", directory.path, training.arena().program()));
     }
     finish(output, &training, &directory)
 }
@@ -196,6 +201,10 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
         plural(evaluation.counted as usize, "collision"),
         plural(evaluation.colliding as usize, "episode"),
     ));
+    let groups = directory.database.groups().map_err(read)?;
+    if !groups.is_empty() {
+        output.say(&groups_text(&groups));
+    }
     let rules = kept.as_ref().and_then(|(_, policy)| policy.claims.as_ref()?.rules.as_ref());
     match &kept {
         Some((path, policy)) => {
@@ -216,16 +225,18 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
         output.say(&format!("\nthe driving system failed in the episodes of what it learned: {kinds}"));
     }
     let failed = totals.failed as usize + failed(&evaluation);
+    let all = totals.episodes as usize + played(settings, &evaluation);
     if failed > 0 {
         output.warn(&format!(
             "the driving system failed in {} of {}, which ended there: that these have few collisions says nothing; \
              `avastra ads check` looks at the driving system alone",
             failed,
-            plural(totals.episodes as usize + played(settings, &evaluation), "episode"),
+            plural(all, "episode"),
         ));
     }
     let doubts = doubts(training.arena().program());
     doubts.iter().for_each(|doubt| output.warn(doubt));
+    cut_off(training.arena().program()).iter().for_each(|note| output.warn(note));
     let evaluation = serde_json::json!({
         "episodes": played(settings, &evaluation), "collisions": evaluation.collisions,
         "counted": evaluation.counted, "colliding": evaluation.colliding,
@@ -239,10 +250,11 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
     write(&directory.path.join("results.json"), &format!("{text}\n"))?;
     output.result(serde_json::json!({
         "reproducible": doubts.is_empty(),
-        "directory": directory.path, "totals": totals, "policy": kept.as_ref().map(|(path, _)| path),
+        "directory": directory.path, "totals": totals, "groups": groups, "policy": kept.as_ref().map(|(path, _)| path),
         "rules": rules, "simulated_h": simulated_h, "failures": failures, "evaluation": evaluation,
     }));
-    Ok(())
+    // What was learned of a driving system that drove no episode to its end is worth nothing.
+    if failed > 0 && failed == all { Err(Failure::Ads { findings: failed }) } else { Ok(()) }
 }
 
 /// Where to find what a search found, which has no policy file.

@@ -225,10 +225,13 @@ impl Database {
     /// # Errors
     /// If the file cannot be read.
     pub fn failures(&self) -> Result<Vec<FailureCount>, DatabaseError> {
-        // The bare columns of an aggregate query with `min` are those of the row that has the minimum.
+        // The bare columns of an aggregate query with `min` are those of the row that has the minimum. Steps are one stage:
+        // the limits of `init`, `map`, `reset` and `step` are others, and the text of one must not stand for another.
         let mut statement = self.connection.prepare(
-            "SELECT kind, problem, count(*), min(failure.episode), stage, detail, exit, road FROM failure
-             JOIN episode USING (episode) GROUP BY kind, problem ORDER BY count(*) DESC, kind, problem",
+            "SELECT kind, problem, count(*), min(failure.episode), stage, detail, exit, road,
+                    CASE WHEN stage LIKE 'step %' THEN 'step' ELSE stage END AS when_failed
+             FROM failure JOIN episode USING (episode) GROUP BY kind, problem, when_failed
+             ORDER BY count(*) DESC, kind, problem, when_failed",
         )?;
         let counts = statement.query_map([], |row| {
             let (episode, stage, detail): (i64, String, String) = (row.get(3)?, row.get(4)?, row.get(5)?);

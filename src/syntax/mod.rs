@@ -34,6 +34,7 @@ pub use print::{print, print_expr, print_item};
 pub use record::{
     DiagnosticRecord, EditRecord, FixRecord, LabelRecord, PlaceRecord, SCHEMA, apply_fixes, record,
 };
+pub(crate) use scan::is_bidi;
 
 pub use yaml::yaml_mistake;
 

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Lints and builds the Python package with its engine, checks its metadata, runs its tests with Gymnasium 1.2.2 and 1.4.0, the
-# oldest and the newest that are tested, and its notebooks. PROFILE=dev builds faster. Needs Python 3.9 or later with venv, Rust, and PyPI for the first run.
+# oldest and the newest that are tested, its notebooks, and mypy. PROFILE=dev builds faster. Needs Python 3.9 or later with venv, Rust, and PyPI for the first run.
 set -eu
 cd "$(dirname "$0")/../.."
 root=target/interop/wheel
@@ -33,3 +33,6 @@ for gymnasium in 1.2.2 1.4.0; do
     (cd python/tests && "$OLDPWD/$venv/bin/python" -m unittest discover -s .)
     "$venv/bin/python" tests/interop/notebook.py
 done
+# What a user's type checker sees of the package, its own modules included.
+"$venv/bin/pip" install --quiet mypy
+(cd python && "$OLDPWD/$venv/bin/python" -m mypy --strict avastra)

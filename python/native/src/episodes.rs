@@ -19,9 +19,22 @@ use pyo3::types::{PyDict, PyList};
 use crate::info::{findings, info};
 use crate::space::Space;
 
-create_exception!(avastra, EpisodeError, PyRuntimeError, "An episode cannot be stepped so.");
+create_exception!(
+    avastra,
+    EpisodeError,
+    PyRuntimeError,
+    "An episode cannot be stepped so: it has ended or not begun, or there is no such row. Or it ended as it began."
+);
 
 /// Episodes of a space on one road against one driving system, one at a time.
+///
+/// The conditions are those of `avastra run`: `ads` is a name, `ads_config` a profile, `ads_cmd` the command of a driving
+/// system of your own, `ambient` a number of vehicles of ambient traffic, `traffic` a name or a profile, `with_rules` and
+/// `without_rules` names of rules.
+///
+/// `observation` is `raw` (the variables of `variables()`, SI units, shape (44,)) or `scaled` (the inputs that `avastra
+/// train` gives its network, shape (36,)), each of `float32`. `reward` is `space` (the space's own) or `judged` (20 for a
+/// collision that counts, 0 for one that does not, paid at the collision's own step).
 #[pyclass(frozen, module = "avastra")]
 pub struct Episodes {
     run: Arc<Run>,
@@ -77,7 +90,7 @@ pub struct Ended {
 #[pymethods]
 impl Episodes {
     #[new]
-    #[pyo3(signature = (space, road, *, ads="modular", ads_config=None, ambient=0, traffic=None, with_rules=Vec::new(), without_rules=Vec::new(), observation="raw", reward="space"))]
+    #[pyo3(signature = (space, road, *, ads="modular", ads_config=None, ads_cmd=None, ambient=0, traffic=None, with_rules=Vec::new(), without_rules=Vec::new(), observation="raw", reward="space"))]
     #[allow(clippy::too_many_arguments, reason = "keyword arguments of Python")]
     fn new(
         py: Python<'_>,
@@ -85,6 +98,7 @@ impl Episodes {
         road: String,
         ads: &str,
         ads_config: Option<PathBuf>,
+        ads_cmd: Option<String>,
         ambient: u32,
         traffic: Option<String>,
         with_rules: Vec<String>,
@@ -109,6 +123,7 @@ impl Episodes {
             roads: vec![road],
             ads: ads.to_owned(),
             ads_config,
+            ads_cmd,
             ambient,
             traffic,
             with: with_rules,
@@ -136,6 +151,10 @@ impl Episodes {
         self.run.table().rows().len()
     }
 
+    /// Begins the episode of a seed: an observation, and which rows are legal, shape (rows,).
+    ///
+    /// The seed decides everything but the rows. `episode_seed` gives those of a run. Raises `EpisodeError` with the end if
+    /// an external driving system fails as the episode begins.
     fn reset<'py>(&self, py: Python<'py>, seed: u64) -> PyResult<(Array<'py, f32>, Array<'py, bool>)> {
         let seen = py.detach(|| self.begin(&mut self.now(), seed));
         if let Some(end) = seen.end() {
@@ -146,13 +165,20 @@ impl Episodes {
         Ok((PyArray1::from_vec(py, seen.observation), PyArray1::from_vec(py, seen.legal)))
     }
 
+    /// Carries a row out and drives for one observation period (`Space.step_s`): observation, reward, how the episode
+    /// ended (`None`: it goes on), and what else is to say.
+    ///
+    /// An illegal row loses the step: nothing happens in it but driving, and `refused` says which rule forbids it. `None`
+    /// passes, and so does any row while none is legal. An episode goes on after a collision. Collisions are judged when
+    /// it ends: `info["ended"]`. Raises `EpisodeError` if there is no such row.
     #[pyo3(signature = (row))]
     #[allow(clippy::type_complexity, reason = "the tuple that Python gets")]
     fn step<'py>(
         &self,
         py: Python<'py>,
-        row: Option<usize>,
+        row: Option<i64>,
     ) -> PyResult<(Array<'py, f32>, f64, Option<&'static str>, Bound<'py, PyDict>)> {
+        let row = self.row(row).map_err(EpisodeError::new_err)?;
         let seen = py.detach(|| self.advance(&mut self.now(), row)).map_err(EpisodeError::new_err)?;
         let info = info(py, &seen)?;
         info.set_item("action_mask", PyArray1::from_slice(py, &seen.legal))?;
@@ -160,7 +186,7 @@ impl Episodes {
         Ok((PyArray1::from_vec(py, seen.observation), reward, end, info))
     }
 
-    /// The collisions of the episode so far, judged.
+    /// The collisions of the episode so far, judged. A verdict does not change any more.
     fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let judged = || {
             let mut now = self.now();
@@ -171,11 +197,14 @@ impl Episodes {
         findings(py, &found)
     }
 
+    /// This moment, to return to as often as wanted: the world, and what the driving system has in mind.
     fn snapshot(&self, py: Python<'_>) -> PyResult<Snapshot> {
         let kept = py.detach(|| self.now().clone()).ok_or_else(|| EpisodeError::new_err(NOT_BEGUN))?;
         Ok(Snapshot { kept: Mutex::new(kept), run: Arc::clone(&self.run) })
     }
 
+    /// Returns to a moment, of this object or of a sibling: its observation, and which rows are legal. An episode that had
+    /// ended then has ended again: `step` raises `EpisodeError`.
     fn restore<'py>(
         &self,
         py: Python<'py>,
@@ -193,6 +222,18 @@ impl Episodes {
         Ok((PyArray1::from_vec(py, seen.observation), PyArray1::from_vec(py, seen.legal)))
     }
 
+    /// Ends the episode under way and, where a driving system of your own is under test, its processes that no episode
+    /// uses; siblings share them. `reset` starts it again.
+    fn close(&self, py: Python<'_>) {
+        py.detach(|| {
+            *self.now() = None;
+            if let Some(program) = self.run.program() {
+                // How it ends is of no interest any more.
+                let _ = program.close();
+            }
+        });
+    }
+
     fn __repr__(&self) -> String {
         let settings = self.run.settings();
         let road = settings.roads.join(", ");
@@ -205,6 +246,13 @@ pub type Array<'py, T> = Bound<'py, PyArray1<T>>;
 const NOT_BEGUN: &str = "no episode has begun: reset first";
 
 impl Episodes {
+    /// A row as Python gives it. A negative one is refused in the words for a row beyond the last.
+    pub fn row(&self, row: Option<i64>) -> Result<Option<usize>, String> {
+        let last = self.run.table().rows().len() - 1;
+        let known = |row: i64| usize::try_from(row).map_err(|_| format!("no row {row}: the table has rows 0 to {last}"));
+        row.map(known).transpose()
+    }
+
     /// The episode under way. Where a thread panicked in it, it is half stepped, so there is none any more.
     pub fn now(&self) -> MutexGuard<'_, Option<Stepped>> {
         self.now.lock().unwrap_or_else(|poisoned| {

@@ -10,7 +10,7 @@ use pyo3::types::PyList;
 
 use crate::diagnostics;
 
-/// A space that was compiled.
+/// A space that was compiled: the rows of its action table, and its roads.
 #[pyclass(frozen, module = "avastra")]
 pub struct Space {
     pub table: ActionTable,
@@ -26,36 +26,43 @@ impl Space {
         Ok(Space { table: compiled.table, path, said: compiled.diagnostics })
     }
 
+    /// The path that it was compiled from.
     #[getter]
     fn path(&self) -> PathBuf {
         self.path.clone()
     }
 
+    /// Labels of the rows, by their numbers.
     #[getter]
     fn rows(&self) -> Vec<&str> {
         self.table.rows().iter().map(|row| row.label.as_str()).collect()
     }
 
+    /// Names of the roads.
     #[getter]
     fn roads(&self) -> Vec<&str> {
         self.table.space().roads.iter().map(|road| road.name.as_str()).collect()
     }
 
+    /// Names of the space's own states.
     #[getter]
     fn states(&self) -> Vec<&str> {
         self.table.space().states.iter().map(|state| state.name.as_str()).collect()
     }
 
+    /// Observation period: how long a step drives, s.
     #[getter]
     fn step_s(&self) -> f64 {
         self.table.space().episode.step_s
     }
 
+    /// Most steps of an episode.
     #[getter]
     fn step_limit(&self) -> u32 {
         self.table.space().episode.step_limit
     }
 
+    /// What the space means: equal for two files that mean the same.
     #[getter]
     fn digest(&self) -> String {
         self.table.space().meaning.seal()

@@ -19,7 +19,7 @@ use crate::info::info;
 pub fn step_all<'py>(
     py: Python<'py>,
     worlds: Vec<Py<Episodes>>,
-    rows: Vec<Option<usize>>,
+    rows: Vec<Option<i64>>,
     seeds: Vec<Option<u64>>,
     threads: usize,
 ) -> PyResult<(
@@ -33,6 +33,12 @@ pub fn step_all<'py>(
         return Err(PyValueError::new_err("`rows` and `seeds` have one value for each of the episodes"));
     }
     let worlds: Vec<&Episodes> = worlds.iter().map(Py::get).collect();
+    let row = |(index, world): (usize, &&Episodes)| match seeds[index] {
+        Some(_) => Ok(None),
+        None => world.row(rows[index]).map_err(|reason| format!("world {index}: {reason}")),
+    };
+    let rows = worlds.iter().enumerate().map(row).collect::<Result<Vec<Option<usize>>, String>>();
+    let rows = rows.map_err(EpisodeError::new_err)?;
     let seen = py.detach(|| play_all(&worlds, &rows, &seeds, threads)).map_err(EpisodeError::new_err)?;
     let infos = seen.iter().map(|seen| info(py, seen)).collect::<PyResult<_>>()?;
     let (ends, rewards) = (seen.iter().map(Seen::end).collect(), seen.iter().map(Seen::reward).collect());

@@ -28,6 +28,21 @@ class Failing(avastra.Driver):
 
 avastra.serve(Failing)
 """
+#: One that says when it is ended.
+CRUISE = """
+import avastra
+
+class Cruise(avastra.Driver):
+    answer = "acceleration"
+
+    def step(self, step):
+        return avastra.Acceleration(8.0 - step.ego.speed)
+
+    def close(self):
+        open({ended!r}, "w").close()
+
+avastra.serve(Cruise)
+"""
 
 
 def failing_profile(folder):
@@ -128,8 +143,11 @@ class Stepping(unittest.TestCase):
         with self.assertRaisesRegex(avastra.EpisodeError, "reset"):
             episodes.snapshot()
         episodes.reset(1)
-        with self.assertRaisesRegex(avastra.EpisodeError, "no row 45"):
-            episodes.step(45)
+        for row in (45, -1):
+            with self.assertRaisesRegex(avastra.EpisodeError, f"no row {row}: the table has rows 0 to 44"):
+                episodes.step(row)
+        with self.assertRaisesRegex(avastra.EpisodeError, "world 0: no row -1"):
+            avastra.step_all([episodes], [-1], [None], 1)
         with self.assertRaises(OverflowError):
             episodes.reset(-1)
         end = None
@@ -211,6 +229,28 @@ class Stepping(unittest.TestCase):
         self.assertEqual((rewards.tolist(), infos[0]["seed"]), ([0.0], 2))
         self.assertEqual(infos[0]["ended"]["end"], ends[0])
         self.assertEqual((infos[0]["ended"]["duration_s"], infos[0]["ended"]["findings"]), (0.0, []))
+
+    def test_a_driving_system_of_ones_own_is_ended_and_begins_again(self):
+        with tempfile.TemporaryDirectory() as folder:
+            program, ended = Path(folder) / "cruise.py", Path(folder) / "ended"
+            program.write_text(CRUISE.format(ended=str(ended)))
+            episodes = self.episodes(ads_cmd=f"'{sys.executable}' '{program}'")
+            for _ in range(2):
+                episodes.reset(1)
+                episodes.step(None)
+                self.assertFalse(ended.exists())
+                episodes.close()
+                self.assertTrue(ended.exists(), "it was told to close, and has")
+                ended.unlink()
+            with self.assertRaisesRegex(avastra.EpisodeError, "reset"):
+                episodes.step(None)
+
+    def test_everything_says_what_it_does(self):
+        for thing in (avastra.Space, avastra.Episodes, avastra.Snapshot):
+            self.assertTrue(thing.__doc__)
+            for name, member in vars(thing).items():
+                if not name.startswith("_"):
+                    self.assertTrue(member.__doc__, f"{thing.__name__}.{name}")
 
     def test_python_runs_while_episodes_drive(self):
         first = self.episodes()

@@ -13,7 +13,7 @@ use crate::ads::status::{PerceivedObject, Reason, Status};
 use crate::geometry::{Pose, Vec2};
 use crate::sim::{Control, DT_S, Scene, Sensed};
 
-use super::finding::{Failure, Problem};
+use super::finding::{Failure, FailureKind, Problem, harmless};
 use super::follow::Follower;
 use super::message::{Answer, Event, Question};
 use super::program::{MapLine, Program};
@@ -141,9 +141,12 @@ impl External {
             None => {
                 let outcome =
                     self.asked(&question, step).unwrap_or_else(|failure| Outcome::Failed(failure.into()));
+                if matches!(&outcome, Outcome::Answer(answer) if answer.is_extreme()) {
+                    self.program.cut_off();
+                }
                 // That no process may be started is no answer.
                 let is_absent =
-                    matches!(&outcome, Outcome::Failed(found) if found.problem == Problem::NoProcess);
+                    matches!(&outcome, Outcome::Failed(found) if found.kind() == FailureKind::Absent);
                 if !is_absent {
                     self.program.learn(key, outcome.clone());
                 }
@@ -194,7 +197,7 @@ impl External {
             }
             let again = self.answer(&mut session, &exchange.question, step)?;
             // What says that it may answer otherwise is not at fault when it does.
-            if session.identity.deterministic && !again.means(&exchange.outcome) {
+            if self.program.is_deterministic() && !again.means(&exchange.outcome) {
                 let stage = step.map_or("reset".to_owned(), |(seq, _)| format!("step {seq}"));
                 let text = |outcome: &Outcome| serde_json::to_string(&outcome.essence()).unwrap_or_default();
                 let detail = format!(
@@ -261,7 +264,8 @@ impl External {
             (None, _) => {}
         }
         self.status.reason = Reason::Reported;
-        self.status.reported = internal.and_then(|internal| internal.reason.as_deref()).map(Arc::from);
+        let reason = internal.and_then(|internal| internal.reason.as_deref());
+        self.status.reported = reason.map(|reason| harmless(reason).into());
         if let Some(at) = internal.and_then(|internal| internal.localized.as_ref()) {
             self.status.localized = Some(Pose { position: Vec2::new(at.x, at.y), heading_rad: at.heading });
         }

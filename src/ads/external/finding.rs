@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::syntax::is_bidi;
+
 /// The kinds of findings; PROTOCOL.md, "What goes wrong".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum FailureKind {
@@ -68,10 +70,11 @@ pub enum Problem {
     Reported,
     OtherAnswer,
     NoProcess,
+    GivenUp,
 }
 
 impl Problem {
-    pub const ALL: [Problem; 18] = [
+    pub const ALL: [Problem; 19] = [
         Problem::Exited,
         Problem::Closed,
         Problem::NotStarted,
@@ -90,6 +93,7 @@ impl Problem {
         Problem::Reported,
         Problem::OtherAnswer,
         Problem::NoProcess,
+        Problem::GivenUp,
     ];
 
     pub fn kind(self) -> FailureKind {
@@ -110,7 +114,7 @@ impl Problem {
             Problem::Stderr => FailureKind::Flood,
             Problem::Reported => FailureKind::Error,
             Problem::OtherAnswer => FailureKind::Nondeterministic,
-            Problem::NoProcess => FailureKind::Absent,
+            Problem::NoProcess | Problem::GivenUp => FailureKind::Absent,
         }
     }
 
@@ -134,6 +138,7 @@ impl Problem {
             Problem::Reported => "reported",
             Problem::OtherAnswer => "other_answer",
             Problem::NoProcess => "no_process",
+            Problem::GivenUp => "given_up",
         }
     }
 
@@ -173,6 +178,7 @@ impl Problem {
             Problem::NoProcess => {
                 "answers are recorded for one way only: give the program with `--ads-cmd` or `--ads-config`"
             }
+            Problem::GivenUp => "see that the program runs and answers `init`, then play what is left",
         }
     }
 }
@@ -198,7 +204,8 @@ pub struct Failure {
 
 impl Failure {
     pub fn new(problem: Problem, stage: impl Into<String>, detail: impl Into<String>) -> Failure {
-        Failure { problem, stage: stage.into(), detail: detail.into(), exit: None, stderr: String::new() }
+        let detail = harmless(&detail.into());
+        Failure { problem, stage: stage.into(), detail, exit: None, stderr: String::new() }
     }
 
     pub fn kind(&self) -> FailureKind {
@@ -227,9 +234,22 @@ impl Failure {
     }
 }
 
+/// Text of a program as it may stand on a terminal. Characters that would move the cursor, colour what stands there or
+/// turn it around become U+FFFD; line feeds and tabs stay, and a carriage return before a line feed goes.
+pub(super) fn harmless(text: &str) -> String {
+    let is_kept = |c: char| matches!(c, '\n' | '\t') || !(c.is_control() || is_bidi(c));
+    text.replace("\r\n", "\n").chars().map(|c| if is_kept(c) { c } else { '\u{fffd}' }).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_a_program_says_cannot_steer_a_terminal() {
+        let failure = Failure::new(Problem::Reported, "step 1", "lost \u{1b}[2J\u{202e}\r\n\there\u{7}");
+        assert_eq!(failure.detail, "lost \u{fffd}[2J\u{fffd}\n\there\u{fffd}");
+    }
 
     const PROTOCOL: &str = include_str!("../../../PROTOCOL.md");
 

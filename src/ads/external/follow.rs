@@ -9,7 +9,7 @@ use crate::ads::steering::{Steering, SteeringConfig};
 use crate::geometry::{Pose, Vec2, wrap_angle};
 use crate::sim::{Control, EgoMotion, Scene, pedals_for};
 
-use super::message::{Answer, ControlMessage, TrajectoryMessage};
+use super::message::{Answer, ControlMessage, EXTREME_MPS2, TrajectoryMessage};
 
 /// Braking after the last point of a trajectory, magnitude, m/s².
 const AFTER_MPS2: f64 = 3.0;
@@ -134,7 +134,7 @@ impl Course {
             .collect();
         let (guide, stations_m) = Guide::through(&poses);
         let acceleration_mps2 = |index: usize| {
-            given[index].a.unwrap_or_else(|| {
+            given[index].a.map(|a| a.clamp(-EXTREME_MPS2, EXTREME_MPS2)).unwrap_or_else(|| {
                 let from = index.min(given.len() - 2);
                 let duration_s = (given[from + 1].t_us - given[from].t_us) as f64 * 1e-6;
                 (given[from + 1].v - given[from].v) / duration_s

@@ -20,7 +20,7 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::signal::{Signal, killpg};
 use nix::unistd::Pid;
 
-use super::finding::Problem;
+use super::finding::{Problem, harmless};
 use super::settings::{ExternalSettings, Target};
 
 /// A line from a driving system is at most this long, bytes.
@@ -346,7 +346,7 @@ impl Link {
     pub fn stderr(&mut self) -> String {
         self.read_all();
         let kept = &self.stderr[self.stderr.len().saturating_sub(STDERR_BYTES_KEPT)..];
-        String::from_utf8_lossy(kept).into_owned()
+        harmless(&String::from_utf8_lossy(kept))
     }
 
     /// Says that no more comes, and waits for the process to end; then ends it.

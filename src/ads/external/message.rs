@@ -2,19 +2,30 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::schema::{InRange, Schema, fields_schema};
+use super::link::Broken;
+use super::schema::{Bounds, InRange, Schema, fields_schema, inside, length_beyond, value_beyond};
+
+/// An acceleration beyond this, m/s², is a formula gone astray: of a textbook's car-following model at a small gap, for
+/// example.
+pub const EXTREME_MPS2: f64 = 100.0;
 
 /// The name and version of the protocol.
 pub const PROTOCOL: &str = "avastra-ads/1";
 
-/// A struct of a message: each field once, with its description and, for numbers, its range. Fields after `?` are
-/// optional. Serde, the schema and the check of ranges follow from it.
+/// A struct of a message: each field once, with its description and, for numbers, its range; after `=> length`, how long a
+/// text or list is. Fields after `?` are optional. Serde, the schema and the check of bounds follow from it.
 macro_rules! message {
     (
         $(#[doc = $about:literal])*
         pub struct $name:ident {
-            $( $(#[doc = $doc:literal])* $field:ident: $type:ty $(, $low:literal ..= $high:literal)?; )*
-            $(? $(#[doc = $more:literal])* $option:ident: $inner:ty $(, $from:literal ..= $to:literal)?; )*
+            $(
+                $(#[doc = $doc:literal])* $field:ident: $type:ty $(, $low:literal ..= $high:literal)?
+                $(=> length $least:literal ..= $most:literal)?;
+            )*
+            $(
+                ? $(#[doc = $more:literal])* $option:ident: $inner:ty $(, $from:literal ..= $to:literal)?
+                $(=> length $fewest:literal ..= $longest:literal)?;
+            )*
         }
     ) => {
         $(#[doc = $about])*
@@ -29,31 +40,34 @@ macro_rules! message {
                 fields_schema(
                     concat!($($about),*),
                     &[
-                        $((stringify!($field), concat!($($doc),*), <$type as Schema>::schema(), range!($($low, $high)?), true),)*
-                        $((stringify!($option), concat!($($more),*), <$inner as Schema>::schema(), range!($($from, $to)?), false),)*
+                        $((stringify!($field), concat!($($doc),*), <$type as Schema>::schema(), bounds!($($low, $high)? $(=> $least, $most)?), true),)*
+                        $((stringify!($option), concat!($($more),*), <$inner as Schema>::schema(), bounds!($($from, $to)? $(=> $fewest, $longest)?), false),)*
                     ],
                 )
             }
         }
 
         impl InRange for $name {
-            fn out_of_range(&self, at: &str) -> Option<String> {
+            fn out_of_range(&self, at: &str) -> Option<Broken> {
                 let _ = at;
-                $( if let Some(found) = checked!(&self.$field, &format!("{at}{}", stringify!($field)) $(, $low, $high)?) { return Some(found); } )*
+                $( if let Some(found) = checked!(&self.$field, &inside(at, stringify!($field)) $(, $low, $high)? $(=> $least, $most)?) { return Some(found); } )*
                 $( if let Some(value) = &self.$option
-                    && let Some(found) = checked!(value, &format!("{at}{}", stringify!($option)) $(, $from, $to)?) { return Some(found); } )*
+                    && let Some(found) = checked!(value, &inside(at, stringify!($option)) $(, $from, $to)? $(=> $fewest, $longest)?) { return Some(found); } )*
                 None
             }
         }
     };
 }
 
-macro_rules! range {
+macro_rules! bounds {
     () => {
         None
     };
     ($low:literal, $high:literal) => {
-        Some(($low as f64, $high as f64))
+        Some(Bounds::Value($low as f64, $high as f64))
+    };
+    (=> $least:literal, $most:literal) => {
+        Some(Bounds::Length($least, $most))
     };
 }
 
@@ -61,11 +75,12 @@ macro_rules! checked {
     ($value:expr, $at:expr) => {
         InRange::out_of_range($value, $at)
     };
-    ($value:expr, $at:expr, $low:literal, $high:literal) => {{
-        let found: f64 = *$value;
-        (!($low as f64..=$high as f64).contains(&found))
-            .then(|| format!("`{}` is {found}; it must be from {} to {}", $at, $low as f64, $high as f64))
-    }};
+    ($value:expr, $at:expr, $low:literal, $high:literal) => {
+        value_beyond(*$value, $at, $low as f64, $high as f64)
+    };
+    ($value:expr, $at:expr => $least:literal, $most:literal) => {
+        length_beyond($value, $at, $least, $most).or_else(|| InRange::out_of_range($value, $at))
+    };
 }
 
 /// A closed set of words.
@@ -84,7 +99,7 @@ macro_rules! words {
         }
 
         impl InRange for $name {
-            fn out_of_range(&self, _at: &str) -> Option<String> {
+            fn out_of_range(&self, _at: &str) -> Option<Broken> {
                 None
             }
         }
@@ -440,9 +455,9 @@ message! {
         ? /// Name and version of the protocol.
         protocol: String;
         ? /// What is under test.
-        name: String;
+        name: String => length 1..=100;
         ? /// Its version.
-        version: String;
+        version: String => length 1..=100;
         ? /// The kind of every answer to a step.
         answer: AnswerKind;
         ? /// Whether the same questions lead to the same answers.
@@ -456,8 +471,8 @@ message! {
         seq: u64;
         /// Wanted angle of the road wheels, rad.
         steer: f64, -3.2..=3.2;
-        ? /// m/s²; negative brakes.
-        accel: f64, -100..=100;
+        ? /// m/s²; negative brakes. The vehicle does what it can of it.
+        accel: f64;
         ? /// Position of the pedal.
         throttle: f64, 0..=1;
         ? /// Position of the pedal.
@@ -472,7 +487,7 @@ message! {
     pub struct TrajectoryMessage {
         seq: u64;
         /// By rising time, from not later than the step to at least 1 s after it.
-        points: Vec<TrajectoryPoint>;
+        points: Vec<TrajectoryPoint> => length 2..=1000;
         ? /// What it believes and wants.
         internal: Internal;
     }
@@ -488,8 +503,8 @@ message! {
         heading: f64, -1000..=1000;
         /// Along the vehicle, m/s.
         v: f64, 0..=100;
-        ? /// m/s²; by default from the speeds.
-        a: f64, -100..=100;
+        ? /// m/s²; by default from the speeds. The vehicle does what it can of it.
+        a: f64;
     }
 }
 
@@ -497,8 +512,8 @@ message! {
     /// A wanted acceleration; avastra steers along the route.
     pub struct AccelerationMessage {
         seq: u64;
-        /// m/s²; negative brakes.
-        accel: f64, -100..=100;
+        /// m/s²; negative brakes. The vehicle does what it can of it.
+        accel: f64;
         ? /// What it believes and wants.
         internal: Internal;
     }
@@ -507,10 +522,10 @@ message! {
 message! {
     /// What a driving system believes and wants, for pictures and logs.
     pub struct Internal {
-        ? /// What holds the speed back now; at most 200 characters.
-        reason: String;
+        ? /// What holds the speed back now.
+        reason: String => length 0..=200;
         ? /// Where the rear axle shall be, every 0.1 s from now on.
-        planned: Vec<Point>;
+        planned: Vec<Point> => length 0..=1000;
         ? /// Where it believes its rear axle is.
         localized: PoseMessage;
         ? /// Time that planning took, ms.
@@ -526,8 +541,8 @@ message! {
 message! {
     /// The driving system cannot go on.
     pub struct ErrorMessage {
-        /// At most 2,000 characters.
-        message: String;
+        /// What lies beyond 2,000 characters is cut off.
+        message: String => length 0..=2000;
     }
 }
 
@@ -571,6 +586,17 @@ impl Answer {
             Answer::Trajectory(answer) => Some(answer.seq),
             Answer::Acceleration(answer) => Some(answer.seq),
             Answer::Ready(_) | Answer::Error(_) => None,
+        }
+    }
+
+    /// Whether it asks for an acceleration that no vehicle has, which is cut off at what ours can do.
+    pub fn is_extreme(&self) -> bool {
+        let is_beyond = |accel: f64| accel.abs() > EXTREME_MPS2;
+        match self {
+            Answer::Control(answer) => answer.accel.is_some_and(is_beyond),
+            Answer::Trajectory(answer) => answer.points.iter().filter_map(|point| point.a).any(is_beyond),
+            Answer::Acceleration(answer) => is_beyond(answer.accel),
+            Answer::Ready(_) | Answer::Error(_) => false,
         }
     }
 

@@ -7,10 +7,10 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use crate::road::RoadMap;
 
-use super::finding::Failure;
+use super::finding::{Failure, Problem};
 use super::message::{Init, Question};
 use super::question;
-use super::record::{Attached, Key, Outcome};
+use super::record::{Attached, Conversation, Key, Outcome};
 use super::session::{Identity, Session};
 use super::settings::ExternalSettings;
 
@@ -18,6 +18,9 @@ use super::settings::ExternalSettings;
 const KNOWN_BYTES_MAX: usize = 128 << 20;
 /// Most maps whose message is kept.
 const MAPS_MAX: usize = 16;
+/// After so many failures in a row to start it, or to connect to it, it is given up: each may take as long as the limit of
+/// `init`.
+const ATTEMPTS_MAX: u32 = 3;
 
 /// An external driving system.
 pub struct Program {
@@ -30,6 +33,17 @@ pub struct Program {
     known: Mutex<Known>,
     maps: Mutex<Vec<Arc<MapLine>>>,
     missed: AtomicU64,
+    cut_off: AtomicU64,
+    unreached: Mutex<Unreached>,
+    /// How it answered otherwise when it was asked the same again, if it ever did.
+    otherwise: OnceLock<String>,
+}
+
+/// Failures in a row to start a program, or to connect to it, and the last of them.
+#[derive(Default)]
+struct Unreached {
+    times: u32,
+    last: Option<Failure>,
 }
 
 /// Answers by what was asked, so that an episode that is played again needs no process; the oldest go first.
@@ -83,6 +97,9 @@ impl Program {
             known: Mutex::default(),
             maps: Mutex::default(),
             missed: AtomicU64::new(0),
+            cut_off: AtomicU64::new(0),
+            unreached: Mutex::default(),
+            otherwise: OnceLock::new(),
         })
     }
 
@@ -120,6 +137,58 @@ impl Program {
         self.missed.load(Ordering::Relaxed)
     }
 
+    /// Notes that an answer asked for more than any vehicle can do.
+    pub(super) fn cut_off(&self) {
+        self.cut_off.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Answers that asked for more than any vehicle can do, since avastra was started.
+    pub fn extreme_answers(&self) -> u64 {
+        self.cut_off.load(Ordering::Relaxed)
+    }
+
+    /// Why it is not tried any more: the last of several failures in a row to start it, or to connect to it.
+    pub fn given_up(&self) -> Option<Failure> {
+        let unreached = locked(&self.unreached);
+        unreached.last.clone().filter(|_| unreached.times >= ATTEMPTS_MAX)
+    }
+
+    /// Plays an episode `again`, without what is known of it, and notes if the answers are others than the `first` ones:
+    /// the test of a program that says it is deterministic. Gives whether there was such a test. An episode in which it
+    /// failed is none, nor one with answers that came too late.
+    pub fn spot_check(
+        &self,
+        first: &Conversation,
+        again: impl FnOnce() -> Option<Arc<Conversation>>,
+    ) -> bool {
+        let is_due = self.may_start
+            && self.is_deterministic()
+            && self.missed() == 0
+            && self.given_up().is_none()
+            && !matches!(first.exchanges.last(), None | Some((_, Outcome::Failed(_))));
+        if !is_due {
+            return false;
+        }
+        self.forget();
+        let found = again().and_then(|again| first.difference(&again));
+        if let Some((_, found)) = found
+            && self.missed() == 0
+        {
+            self.otherwise.get_or_init(|| found);
+        }
+        true
+    }
+
+    /// Whether it says that it answers alike to the like, and was never found to do otherwise.
+    pub fn is_deterministic(&self) -> bool {
+        self.attached().is_deterministic() && self.otherwise().is_none()
+    }
+
+    /// How it answered otherwise when it was asked the same again, though it says that it is deterministic.
+    pub fn otherwise(&self) -> Option<&str> {
+        self.otherwise.get().map(String::as_str)
+    }
+
     pub fn settings(&self) -> &ExternalSettings {
         &self.settings
     }
@@ -147,7 +216,17 @@ impl Program {
 
     /// A new process, or a new connection.
     fn opened(&self) -> Result<Session, Failure> {
-        let mut session = Session::open(&self.settings, &self.init)?;
+        if let Some(last) = self.given_up() {
+            let detail = format!("given up after {ATTEMPTS_MAX} failures in a row, the last: {}", last.in_words());
+            return Err(Failure::new(Problem::GivenUp, "start", detail));
+        }
+        let opened = Session::open(&self.settings, &self.init);
+        {
+            let mut unreached = locked(&self.unreached);
+            unreached.last = opened.as_ref().err().cloned();
+            unreached.times = if opened.is_ok() { 0 } else { unreached.times + 1 };
+        }
+        let mut session = opened?;
         let first = self.identity.get_or_init(|| session.identity.clone());
         if *first != session.identity {
             let detail =
@@ -161,12 +240,13 @@ impl Program {
         locked(&self.idle).push(session);
     }
 
-    /// Ends all processes that no episode uses.
+    /// Ends all processes that no episode uses. What was given up may be tried again.
     ///
     /// # Errors
     /// How the first that did not end by itself with status 0 ended.
     pub fn close(&self) -> Result<(), String> {
         let idle: Vec<Session> = core::mem::take(&mut *locked(&self.idle));
+        *locked(&self.unreached) = Unreached::default();
         let limit_s = self.settings.timeouts.close_s;
         // Each is closed, whatever became of the ones before.
         idle.into_iter().map(|session| session.close(limit_s)).fold(Ok(()), Result::and)

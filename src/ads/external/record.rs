@@ -173,6 +173,21 @@ pub struct Conversation {
     pub exchanges: Vec<(Key, Outcome)>,
 }
 
+impl Conversation {
+    /// The first step from which on the same episode was answered otherwise, and how.
+    pub fn difference(&self, again: &Conversation) -> Option<(usize, String)> {
+        let mut pairs = self.exchanges.iter().zip(&again.exchanges);
+        let index = pairs.position(|((_, first), (_, second))| !first.means(second))?;
+        let text = |(_, outcome): &(Key, Outcome)| match outcome {
+            Outcome::Failed(failure) => failure.in_words(),
+            other => serde_json::to_string(&other.essence()).unwrap_or_default(),
+        };
+        let (first, second) = (text(&self.exchanges[index]), text(&again.exchanges[index]));
+        let step = index.saturating_sub(1);
+        Some((step, format!("from step {step} on it answered {second} instead of {first}")))
+    }
+}
+
 /// Why a file of answers cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum RecordError {

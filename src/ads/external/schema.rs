@@ -4,15 +4,64 @@
 
 use serde_json::{Value, json};
 
+use super::finding::Problem;
+use super::link::Broken;
+
+/// Integers are at most this, 2^53 - 1: every language reads them exactly.
+const INTEGER_MAX: u64 = (1 << 53) - 1;
+
 /// A type that has a JSON Schema.
 pub trait Schema {
     fn schema() -> Value;
 }
 
-/// A value that may be out of its range.
+/// A value that may be out of its range, or too long.
 pub trait InRange {
-    /// What is out of its range, in words; `at` is the path to the value.
-    fn out_of_range(&self, at: &str) -> Option<String>;
+    /// What is out of its range or too long; `at` is the path to the value.
+    fn out_of_range(&self, at: &str) -> Option<Broken>;
+}
+
+/// A text or a list.
+pub trait Long {
+    /// Characters or items, and their name.
+    fn length(&self) -> (usize, &'static str);
+}
+
+impl Long for String {
+    fn length(&self) -> (usize, &'static str) {
+        (self.chars().count(), "characters")
+    }
+}
+
+impl<T> Long for Vec<T> {
+    fn length(&self) -> (usize, &'static str) {
+        (self.len(), "items")
+    }
+}
+
+/// What bounds a field.
+#[derive(Debug, Clone, Copy)]
+pub enum Bounds {
+    Value(f64, f64),
+    Length(usize, usize),
+}
+
+/// The path to a field of what lies at `at`; nothing is the message itself.
+pub fn inside(at: &str, field: &str) -> String {
+    if at.is_empty() { field.to_owned() } else { format!("{at}.{field}") }
+}
+
+/// What is wrong with a number that is beyond its range.
+pub fn value_beyond(found: f64, at: &str, low: f64, high: f64) -> Option<Broken> {
+    let detail = || format!("`{at}` is {found}; it must be from {low} to {high}");
+    (!(low..=high).contains(&found)).then(|| Broken { problem: Problem::OutOfRange, detail: detail() })
+}
+
+/// What is wrong with a text or a list that is too short or too long.
+pub fn length_beyond(value: &impl Long, at: &str, least: usize, most: usize) -> Option<Broken> {
+    let (found, what) = value.length();
+    let detail = || format!("`{at}` has {found} {what}; it must have from {least} to {most}");
+    (!(least..=most).contains(&found)).then(|| Broken { problem: Problem::WrongShape, detail: detail() })
 }
 
 macro_rules! plain {
@@ -25,7 +74,7 @@ macro_rules! plain {
             }
 
             impl InRange for $type {
-                fn out_of_range(&self, _at: &str) -> Option<String> {
+                fn out_of_range(&self, _at: &str) -> Option<Broken> {
                     None
                 }
             }
@@ -35,9 +84,21 @@ macro_rules! plain {
 
 plain! {
     f64 => json!({ "type": "number" }),
-    u64 => json!({ "type": "integer", "minimum": 0 }),
     bool => json!({ "type": "boolean" }),
     String => json!({ "type": "string" }),
+}
+
+impl Schema for u64 {
+    fn schema() -> Value {
+        json!({ "type": "integer", "minimum": 0, "maximum": INTEGER_MAX })
+    }
+}
+
+impl InRange for u64 {
+    fn out_of_range(&self, at: &str) -> Option<Broken> {
+        let detail = || format!("`{at}` is {self}; integers are at most {INTEGER_MAX}");
+        (*self > INTEGER_MAX).then(|| Broken { problem: Problem::OutOfRange, detail: detail() })
+    }
 }
 
 impl<T: Schema> Schema for Vec<T> {
@@ -47,8 +108,8 @@ impl<T: Schema> Schema for Vec<T> {
 }
 
 impl<T: InRange> InRange for Vec<T> {
-    fn out_of_range(&self, at: &str) -> Option<String> {
-        self.iter().enumerate().find_map(|(index, item)| item.out_of_range(&format!("{at}[{index}].")))
+    fn out_of_range(&self, at: &str) -> Option<Broken> {
+        self.iter().enumerate().find_map(|(index, item)| item.out_of_range(&format!("{at}[{index}]")))
     }
 }
 
@@ -59,7 +120,7 @@ impl<T: Schema, const N: usize> Schema for [T; N] {
 }
 
 impl<T: InRange, const N: usize> InRange for [T; N] {
-    fn out_of_range(&self, at: &str) -> Option<String> {
+    fn out_of_range(&self, at: &str) -> Option<Broken> {
         self.iter().find_map(|item| item.out_of_range(at))
     }
 }
@@ -71,25 +132,33 @@ impl<T: Schema> Schema for Option<T> {
 }
 
 impl<T: InRange> InRange for Option<T> {
-    fn out_of_range(&self, at: &str) -> Option<String> {
+    fn out_of_range(&self, at: &str) -> Option<Broken> {
         self.as_ref()?.out_of_range(at)
     }
 }
 
-/// A field: name, description, schema, range, whether it is required.
-pub(super) type FieldSchema = (&'static str, &'static str, Value, Option<(f64, f64)>, bool);
+/// A field: name, description, schema, bounds, whether it is required.
+pub(super) type FieldSchema = (&'static str, &'static str, Value, Option<Bounds>, bool);
 
 /// The schema of a struct. Unknown fields are allowed: later versions may add some.
 pub(super) fn fields_schema(about: &str, fields: &[FieldSchema]) -> Value {
     let mut properties = serde_json::Map::new();
-    for (name, about, schema, range, _) in fields {
+    for (name, about, schema, bounds, _) in fields {
         let mut schema = schema.clone();
         if !about.is_empty() {
             schema["description"] = about.trim().into();
         }
-        if let Some((low, high)) = range {
-            schema["minimum"] = json!(low);
-            schema["maximum"] = json!(high);
+        match bounds {
+            None => {}
+            Some(Bounds::Value(low, high)) => {
+                schema["minimum"] = json!(low);
+                schema["maximum"] = json!(high);
+            }
+            Some(Bounds::Length(least, most)) => {
+                let what = if schema["type"] == "string" { "Length" } else { "Items" };
+                schema[format!("min{what}")] = json!(least);
+                schema[format!("max{what}")] = json!(most);
+            }
         }
         properties.insert((*name).to_owned(), schema);
     }

@@ -2,18 +2,14 @@
 
 use serde_json::Value;
 
-use super::finding::{Failure, Problem};
+use super::finding::{Failure, Problem, harmless};
 use super::link::{Broken, Deadline, Link};
 use super::message::{Answer, AnswerKind, Close, Init, PROTOCOL, Question, Ready};
 use super::schema::InRange;
 use super::settings::ExternalSettings;
 
-/// Names and versions are at most this long, characters.
-const NAME_CHARS_MAX: usize = 100;
-const REASON_CHARS_MAX: usize = 200;
+/// An `error` is cut off here, characters.
 const ERROR_CHARS_MAX: usize = 2000;
-/// Most points of a trajectory and of a plan.
-const POINTS_MAX: usize = 1000;
 /// A trajectory reaches at least this far beyond its step, µs.
 const REACH_US_MIN: u64 = 1_000_000;
 
@@ -55,7 +51,7 @@ impl Session {
             Link::open(settings).map_err(|broken| Failure::new(broken.problem, "start", broken.detail))?;
         link.send(&Question::Init(init.clone()).line());
         let line = link.line(deadline);
-        let found = line.map_err(|broken| told(broken, settings.timeouts.init_s)).and_then(|line| {
+        let found = line.map_err(|broken| told(broken, "init", settings.timeouts.init_s)).and_then(|line| {
             let Answer::Ready(ready) = read(&line, "ready")? else { return Err(wrong_type(&line, "ready")) };
             identity(ready, init)
         });
@@ -96,7 +92,7 @@ impl Session {
         let result = loop {
             let line = match self.link.line(deadline) {
                 Ok(line) => line,
-                Err(broken) => break Err(told(broken, limit_s)),
+                Err(broken) => break Err(told(broken, stage, limit_s)),
             };
             match read(&line, "ready") {
                 Ok(Answer::Ready(_)) => break Ok(()),
@@ -160,7 +156,7 @@ impl Session {
 
     /// The finding that a step was not answered in time; the driving system is killed.
     pub fn too_late(&mut self, seq: u64, limit_s: f64) -> Failure {
-        let broken = Broken { problem: Problem::NoAnswer, detail: in_time(limit_s) };
+        let broken = Broken { problem: Problem::NoAnswer, detail: in_time("step", limit_s) };
         failed(&mut self.link, broken, format!("step {seq}"))
     }
 
@@ -189,15 +185,16 @@ fn failed(link: &mut Link, broken: Broken, stage: impl Into<String>) -> Failure 
     Failure { exit, stderr, ..Failure::new(broken.problem, stage, broken.detail) }
 }
 
-fn told(broken: Broken, limit_s: f64) -> Broken {
+/// `limit` names the limit as the profile does.
+fn told(broken: Broken, limit: &str, limit_s: f64) -> Broken {
     match broken.problem {
-        Problem::NoAnswer => Broken { detail: in_time(limit_s), ..broken },
+        Problem::NoAnswer => Broken { detail: in_time(limit, limit_s), ..broken },
         _ => broken,
     }
 }
 
-fn in_time(limit_s: f64) -> String {
-    format!("no answer within {limit_s} s")
+fn in_time(limit: &str, limit_s: f64) -> String {
+    format!("no answer within {limit_s} s (`timeouts.{limit}`)")
 }
 
 fn twice(seq: Option<u64>) -> Broken {
@@ -236,8 +233,8 @@ pub(super) fn read(line: &[u8], wanted: &str) -> Result<Answer, Broken> {
     if !["ready", "control", "trajectory", "acceleration", "error"].contains(&word) {
         return Err(wrong_type(line, wanted));
     }
-    let word = word.to_owned();
-    let answer: Answer = serde_json::from_value(value).map_err(|error| {
+    // From the text and not from the value, which has lost all but the last of a field that stands twice.
+    let answer: Answer = serde_json::from_slice(line).map_err(|error| {
         let detail = format!("in `{word}`: {error}: {}", shown(line));
         Broken { problem: Problem::WrongShape, detail }
     })?;
@@ -269,6 +266,9 @@ fn outside_strings(text: &str, word: &str) -> bool {
 
 /// Who a driving system is, by its first `ready`.
 fn identity(ready: Ready, init: &Init) -> Result<Identity, Broken> {
+    if let Some(broken) = ready.out_of_range("") {
+        return Err(broken);
+    }
     let missing = |name: &str| Broken {
         problem: Problem::WrongShape,
         detail: format!("the first `ready` has no `{name}`"),
@@ -280,13 +280,9 @@ fn identity(ready: Ready, init: &Init) -> Result<Identity, Broken> {
     }
     let (name, version) =
         (ready.name.ok_or_else(|| missing("name"))?, ready.version.ok_or_else(|| missing("version"))?);
-    for text in [&name, &version] {
-        let count = text.chars().count();
-        if !(1..=NAME_CHARS_MAX).contains(&count) || text.chars().any(char::is_control) {
-            let detail =
-                "`name` and `version` have 1 to 100 characters, and no control characters".to_owned();
-            return Err(Broken { problem: Problem::WrongShape, detail });
-        }
+    if [&name, &version].into_iter().any(|text| *text != harmless(text) || text.contains(['\n', '\t'])) {
+        let detail = "`name` and `version` have no control characters".to_owned();
+        return Err(Broken { problem: Problem::WrongShape, detail });
     }
     let answer = ready.answer.ok_or_else(|| missing("answer"))?;
     if let Some(wanted) = init.answer.filter(|wanted| *wanted != answer) {
@@ -306,8 +302,8 @@ fn judged(answer: Answer, t_us: u64) -> Result<Answer, Broken> {
         Answer::Acceleration(acceleration) => acceleration.out_of_range(""),
         Answer::Ready(_) | Answer::Error(_) => None,
     };
-    if let Some(detail) = out_of_range {
-        return wrong(Problem::OutOfRange, detail);
+    if let Some(broken) = out_of_range {
+        return Err(broken);
     }
     if let Answer::Control(control) = &answer {
         let pedals = (control.accel.is_some(), control.throttle.is_some(), control.brake.is_some());
@@ -318,10 +314,6 @@ fn judged(answer: Answer, t_us: u64) -> Result<Answer, Broken> {
     }
     if let Answer::Trajectory(trajectory) = &answer {
         let points = &trajectory.points;
-        if !(2..=POINTS_MAX).contains(&points.len()) {
-            let detail = format!("{} points; a trajectory has 2 to {POINTS_MAX}", points.len());
-            return wrong(Problem::WrongShape, detail);
-        }
         if points.windows(2).any(|pair| pair[1].t_us <= pair[0].t_us) {
             return wrong(Problem::OutOfRange, "`t_us` of the points does not rise".to_owned());
         }
@@ -331,16 +323,6 @@ fn judged(answer: Answer, t_us: u64) -> Result<Answer, Broken> {
                 "the points reach from {first} to {last} µs; the step is at {t_us} µs, and they must reach 1 s beyond it"
             );
             return wrong(Problem::OutOfRange, detail);
-        }
-    }
-    if let Some(internal) = answer.internal() {
-        if internal.reason.as_ref().is_some_and(|reason| reason.chars().count() > REASON_CHARS_MAX) {
-            let detail = format!("`internal.reason` has more than {REASON_CHARS_MAX} characters");
-            return wrong(Problem::WrongShape, detail);
-        }
-        if internal.planned.as_ref().is_some_and(|planned| planned.len() > POINTS_MAX) {
-            let detail = format!("`internal.planned` has more than {POINTS_MAX} points");
-            return wrong(Problem::WrongShape, detail);
         }
     }
     Ok(answer)
@@ -375,6 +357,9 @@ mod tests {
             (r#"{"type":"control","seq":1,"steer":0,"accel":1,"brake":0}"#, Problem::WrongShape),
             (r#"{"type":"control","seq":1,"steer":0,"throttle":2,"brake":0}"#, Problem::OutOfRange),
             (r#"{"type":"control","seq":1,"steer":30,"accel":1}"#, Problem::OutOfRange),
+            (r#"{"type":"control","seq":1,"steer":0,"accel":-5,"accel":1}"#, Problem::WrongShape),
+            (r#"{"type":"control","type":"control","seq":1,"steer":0,"accel":1}"#, Problem::WrongShape),
+            (r#"{"type":"control","seq":9007199254740992,"steer":0,"accel":1}"#, Problem::OutOfRange),
             (r#"{"type":"error","message":"lost"}"#, Problem::Reported),
         ] {
             assert_eq!(problem(line, "control"), wanted, "{line}");
@@ -393,6 +378,9 @@ mod tests {
             point(2_000_000)
         );
         assert!(read(fine.as_bytes(), "trajectory").and_then(|answer| judged(answer, 1_000_000)).is_ok());
-        assert!(read(br#"{"type":"control","seq":1,"steer":0,"accel":1}"#, "control").is_ok());
+        // What no vehicle can do is cut off, as the wheel is.
+        let braking = br#"{"type":"control","seq":1,"steer":0,"accel":-1257.3}"#;
+        let answer = read(braking, "control").and_then(|answer| judged(answer, 0)).expect("it is obeyed");
+        assert!(answer.is_extreme());
     }
 }

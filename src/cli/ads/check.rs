@@ -3,7 +3,6 @@
 //! It drives whole episodes with what may happen around the ego vehicle, because a driving system that answers one step
 //! well may fail at the hundredth. Whatever fails is named with its stage and what to do about it.
 
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -11,11 +10,13 @@ use serde::Serialize;
 
 use crate::action::ActionTable;
 use crate::ads::Selected;
-use crate::ads::external::{ExternalSettings, Failure as Finding, Outcome, Program, Target, odd_orders};
+use crate::ads::external::{ExternalSettings, Failure as Finding, Problem, Program, Target, odd_orders};
 use crate::agent;
 use crate::agent::Kind;
 use crate::cli::arguments::AdsCheckArguments;
 use crate::cli::error::Failure;
+use crate::cli::files::{Scratch, write_new};
+use crate::cli::findings::cut_off;
 use crate::cli::load;
 use crate::cli::new::shipped;
 use crate::cli::output::Output;
@@ -70,9 +71,12 @@ pub fn check(output: &Output, arguments: &AdsCheckArguments) -> Result<(), Failu
             return Err(Failure::usage("the profile has no `ads` block, and there is no command after `--`"));
         }
     };
-    let table = match &arguments.space {
-        Some(path) => load::table(output, path)?,
-        None => own_space(output)?,
+    let (table, _scratch) = match &arguments.space {
+        Some(path) => (load::table(output, path)?, None),
+        None => {
+            let (table, scratch) = own_space(output)?;
+            (table, Some(scratch))
+        }
     };
     let road = match &arguments.road {
         Some(road) => road.clone(),
@@ -98,16 +102,14 @@ pub fn check(output: &Output, arguments: &AdsCheckArguments) -> Result<(), Failu
     if failed > 0 { Err(Failure::Ads { findings: failed }) } else { Ok(()) }
 }
 
-/// The paper's space, from the program itself.
-fn own_space(output: &Output) -> Result<ActionTable, Failure> {
-    let folder = Path::new("avastra-ads-check");
-    let read = |path: &Path| -> Result<String, crate::check::ReadError> {
-        let name = path.strip_prefix(folder).unwrap_or(path).to_string_lossy().into_owned();
-        shipped(&name).map(str::to_owned).ok_or_else(|| crate::check::ReadError("no such file".to_owned()))
-    };
-    let path: PathBuf = folder.join(SPACE);
-    let loaded = crate::check::load(&path, &read).map_err(|error| Failure::file("read", &path, error))?;
-    load::table_of(output, loaded, &path)
+/// The paper's space, which is in the program, and the folder that it is written to: a planner may open the OpenDRIVE
+/// file of its map, so that must lie on disk as long as the planner is checked.
+fn own_space(output: &Output) -> Result<(ActionTable, Scratch), Failure> {
+    let scratch = Scratch::new("ads-check")?;
+    for (name, text) in shipped() {
+        write_new(&scratch.path.join(name), text)?;
+    }
+    Ok((load::table(output, &scratch.path.join(SPACE))?, scratch))
 }
 
 struct Checks<'a> {
@@ -160,7 +162,7 @@ impl Checks<'_> {
         let began = Instant::now();
         self.drive(&arena, 0, self.steps);
         let own_s = began.elapsed().as_secs_f64();
-        let questions = exchanges(&first).len();
+        let questions = first.conversation.as_ref().map_or(0, |conversation| conversation.exchanges.len());
         let taken_s = (asked_s - own_s).max(1e-9);
         let share = taken_s / asked_s.max(1e-9);
         let round_trips_per_s = questions as f64 / taken_s;
@@ -168,11 +170,12 @@ impl Checks<'_> {
         self.pass(
             "episode",
             format!(
-                "{questions} questions on `{road}`, {:.0} m driven, end `{}`, {}; {round_trips_per_s:.0} round trips/s, {:.0} % of the episode's time",
+                "{questions} questions on `{road}`, {:.0} m driven, end `{}`, {}; {round_trips_per_s:.0} round trips/s, {:.0} % of the episode's time{}",
                 first.distance_m,
                 first.end.name(),
                 crate::cli::output::plural(first.collisions.len(), "collision"),
-                100.0 * share
+                100.0 * share,
+                cut_off(Some(&program)).map_or_else(String::new, |note| format!("; {note}"))
             ),
         );
 
@@ -196,6 +199,8 @@ impl Checks<'_> {
         ) {
             return Ok(());
         }
+        // What comes first is for a process that has seen nothing yet.
+        let ended = program.close().and(ended);
         let setup = arena.setup(0, self.seed);
         let sensed = World::new(Arc::clone(&setup.scene), &setup.start).sensed();
         match odd_orders(&program, &setup.scene, &sensed, self.seed) {
@@ -247,25 +252,17 @@ impl Checks<'_> {
             self.fail(stage, "it fails", failure.clone());
             return false;
         }
-        let pairs = exchanges(first).iter().zip(exchanges(again));
-        let differs = pairs.clone().position(|((_, a), (_, b))| !a.means(b));
-        let Some(index) = differs else {
+        let conversations = first.conversation.as_deref().zip(again.conversation.as_deref());
+        let Some((step, how)) = conversations.and_then(|(first, again)| first.difference(again)) else {
             self.pass(stage, format!("{what} gets the same answers"));
             return true;
         };
         if !self.is_deterministic {
-            let step = index.saturating_sub(1);
             self.pass(stage, format!("{what} gets other answers from step {step} on, as it says it may"));
             return true;
         }
-        let text = |outcome: &Outcome| serde_json::to_string(&outcome.essence()).unwrap_or_default();
-        let found = format!(
-            "{what} gets other answers from step {} on: {} instead of {}; forget everything at `reset`, seed all that is random from it, and use no clock",
-            index.saturating_sub(1),
-            text(&exchanges(again)[index].1),
-            text(&exchanges(first)[index].1)
-        );
-        self.note(stage, false, found, None);
+        let advice = Problem::OtherAnswer.advice();
+        self.note(stage, false, format!("{what} gets other answers: {how}; {advice}"), None);
         false
     }
 
@@ -288,6 +285,20 @@ impl Checks<'_> {
     }
 }
 
-fn exchanges(log: &EpisodeLog) -> &[(crate::ads::external::Key, Outcome)] {
-    log.conversation.as_ref().map_or(&[], |conversation| &conversation.exchanges)
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::arguments::Format;
+
+    #[test]
+    fn the_maps_that_a_planner_is_told_of_exist_as_long_as_it_is_checked() {
+        let (table, scratch) = own_space(&Output::of(Format::Json)).expect("our own space is sound");
+        for road in &table.space().roads {
+            let file = road.map.file.as_ref().expect("the map was read from a file");
+            assert!(file.is_file(), "{}", file.display());
+        }
+        let folder = scratch.path.clone();
+        drop(scratch);
+        assert!(!folder.exists(), "nothing is left behind");
+    }
 }

@@ -89,6 +89,9 @@ impl Toy<'_> {
             }
             Question::Step(step) => {
                 self.steps += 1;
+                if self.resets == 0 && self.misbehaves(Misbehaviour::CrashBeforeReset) {
+                    return Err(crashed());
+                }
                 return self.step(&step);
             }
             Question::Event(_) | Question::Close(_) => return Ok(None),
@@ -111,7 +114,9 @@ impl Toy<'_> {
             return Ok(Some(right));
         };
         Ok(Some(match how {
-            Misbehaviour::CrashAtStart | Misbehaviour::CrashAtReset => right,
+            Misbehaviour::CrashAtStart
+            | Misbehaviour::CrashAtReset
+            | Misbehaviour::CrashBeforeReset => right,
             Misbehaviour::CrashInEpisode => return Err(crashed()),
             Misbehaviour::Hang => {
                 std::thread::sleep(Duration::from_secs(3600));

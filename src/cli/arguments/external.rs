@@ -77,6 +77,7 @@ pub enum Misbehaviour {
     CrashAtStart,
     CrashInEpisode,
     CrashAtReset,
+    CrashBeforeReset,
     Hang,
     Garbage,
     Nan,
