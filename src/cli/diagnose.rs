@@ -379,3 +379,73 @@ fn likelihood_text(likelihood: &Likelihood) -> String {
         likelihood.high * 100.0
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ads::Module;
+    use crate::oracle::{Chance, ModuleFinding};
+
+    /// A diagnosis of a driving system that differs from the baseline in perception, or in nothing.
+    fn diagnosis(verdict: Verdict, cause: &[Module], differs: bool) -> Diagnosis {
+        let told_apart = Comparison { vanished: 10, prevents: 10, brings: 0, low: 0.69, high: 1.0 };
+        let finding = |module| {
+            let is_asked = module == Module::Perception;
+            ModuleFinding {
+                module,
+                restored: (differs && is_asked).then_some(Fate::Vanished),
+                idealised: if is_asked { Fate::Vanished } else { Fate::Crash },
+                alone: Fate::Crash,
+                noise: (is_asked && verdict != Verdict::Chance).then_some(told_apart),
+                noise_alone: None,
+            }
+        };
+        let measure = Measure { module: Module::Perception, what: "error, m", worst: 2.0, bound: 1.0 };
+        let evidence = Evidence {
+            modules: Module::ALL.into_iter().map(finding).collect(),
+            baseline: differs.then_some(Fate::Vanished),
+            ideal: Fate::Vanished,
+            weaknesses: Vec::new(),
+            pairs: Vec::new(),
+            chance: Some(Chance { replays: 64, vanished: 61 }),
+            measured: vec![measure],
+            from_s: 0.0,
+        };
+        Diagnosis { cause: cause.to_vec(), verdict, weakness: None, evidence }
+    }
+
+    #[test]
+    fn a_sentence_says_what_the_table_says() {
+        let perception = [Module::Perception];
+        for (found, wanted) in [
+            (
+                diagnosis(Verdict::Outside, &perception, true),
+                "perception is at fault: as in the baseline, there is no crash, and its errors alone lead to it",
+            ),
+            (
+                diagnosis(Verdict::Measured, &perception, false),
+                "perception is at fault by what it gave this time: error, m was 2.00, and 1.00 is specified; \
+                 without errors, there is no crash",
+            ),
+            (
+                diagnosis(Verdict::Brittle, &[Module::Planning], false),
+                "planning is brittle: it could not bear the errors of perception, which are within their \
+                 specification",
+            ),
+            (
+                diagnosis(Verdict::Chance, &[], true),
+                "no module is named: what prevents the crash with its own noise (perception as in the baseline) is \
+                 not told apart from chance: other sensor noise alone prevents it in 61 of 64 replays",
+            ),
+        ] {
+            assert_eq!(sentence(&found), wanted);
+        }
+    }
+
+    #[test]
+    fn a_table_has_the_counts_of_the_replays() {
+        let text = table_text(&diagnosis(Verdict::Outside, &[Module::Perception], true).evidence);
+        assert!(text.contains("prevents 10, brings 0 (69 to 100 %)"), "{text}");
+        assert!(text.contains("no crash in 61 of 64"), "{text}");
+    }
+}

@@ -29,7 +29,7 @@ use super::measured::measure;
 /// changes to be told apart from chance.
 const AGAIN: usize = 10;
 /// Most replays with other noise: a collision that happens in a tenth of them can be explained.
-const REPLAYS_MAX: u32 = 64;
+const REPLAYS_MAX: u32 = 100;
 /// If it happens in fewer of them, no change can be told apart from chance, and none is tried.
 const AGAIN_MIN: usize = 6;
 
