@@ -7,7 +7,7 @@
 //! - each module alone is made as in the baseline, and made free of errors; and all of them together are;
 //! - each documented weakness alone is switched off;
 //! - the module's errors are left alone: all others are as in the baseline, or free of errors;
-//! - two modules together, if no change alone prevents the collision.
+//! - two modules together, if no change alone prevents the collision, told apart from chance.
 //!
 //! What prevents the collision is played again with other sensor noise, beside the same noise alone, to tell it
 //! from chance. What follows from all this is decided in `evidence`.
@@ -27,7 +27,7 @@ use super::measured::measure;
 
 /// The collision is played with other noise until it has happened so many times again: enough for each of several
 /// changes to be told apart from chance.
-const AGAIN: usize = 10;
+const AGAIN: usize = 12;
 /// Most replays with other noise: a collision that happens in a tenth of them can be explained.
 const REPLAYS_MAX: u32 = 100;
 /// If it happens in fewer of them, no change can be told apart from chance, and none is tried.
@@ -133,11 +133,28 @@ impl<'a> Inquiry<'a> {
         let differs = evidence.differs();
         let is_prevented = evidence.modules.iter().any(|found| found.vanishes(differs))
             || (!differs && evidence.weaknesses.iter().any(WeaknessFinding::vanishes));
-        if !is_prevented {
-            evidence.pairs = self.pairs(&evidence, baseline);
+        let mut unchanged = Vec::new();
+        if is_prevented {
+            unchanged = self.unchanged();
+            evidence.chance = Some(Chance::of(&unchanged));
+            if again(&unchanged) < AGAIN_MIN {
+                return evidence;
+            }
+            self.tell_apart(&mut evidence, baseline, &unchanged);
+            if evidence.is_told_apart() {
+                return evidence;
+            }
         }
-        if is_prevented || !evidence.pairs.is_empty() {
-            self.tell_from_chance(&mut evidence, baseline);
+        evidence.pairs = self.pairs(&evidence, baseline);
+        let Some(first) = evidence.pairs.first().map(|pair| pair.modules) else { return evidence };
+        if unchanged.is_empty() {
+            unchanged = self.unchanged();
+            evidence.chance = Some(Chance::of(&unchanged));
+        }
+        if again(&unchanged) >= AGAIN_MIN {
+            let changed = first.into_iter().fold(own, |own, module| change(&own, module, baseline, differs));
+            let tries = evidence.pairs.len();
+            evidence.pairs[0].noise = Some(self.compared(&changed, &unchanged, tries));
         }
         evidence
     }
@@ -177,7 +194,8 @@ impl<'a> Inquiry<'a> {
         .collect()
     }
 
-    /// Pairs of modules that prevent the collision together; first those each of which alone leads to it. If some
+    /// Pairs of modules that prevent the collision together; first those each of which alone leads to it, and only
+    /// these if a module alone prevents it, though not told apart from chance: with it every pair may do so. If some
     /// modules differ from the baseline, only these are asked.
     fn pairs(&self, evidence: &Evidence, baseline: &ModularConfig) -> Vec<PairFinding> {
         if evidence.baseline.is_some_and(|fate| fate != Fate::Vanished) {
@@ -186,14 +204,15 @@ impl<'a> Inquiry<'a> {
         let differs = evidence.differs();
         let asked: Vec<&ModuleFinding> =
             evidence.modules.iter().filter(|found| !differs || found.restored.is_some()).collect();
+        let sufficient_min = if evidence.chance.is_some() { 2 } else { 0 };
         let mut found = Vec::new();
         for (index, first) in asked.iter().enumerate() {
             for second in &asked[index + 1..] {
+                let sufficient = [first, second].iter().filter(|one| one.alone == Fate::Crash).count();
                 let both = [first.module, second.module];
                 let changed =
                     both.into_iter().fold(self.profile, |own, module| change(&own, module, baseline, differs));
-                if self.fate(&changed) == Fate::Vanished {
-                    let sufficient = [first, second].iter().filter(|one| one.alone == Fate::Crash).count();
+                if sufficient >= sufficient_min && self.fate(&changed) == Fate::Vanished {
                     found.push((sufficient, PairFinding { modules: both, noise: None }));
                 }
             }
@@ -202,40 +221,24 @@ impl<'a> Inquiry<'a> {
         found.into_iter().map(|(_, pair)| pair).collect()
     }
 
-    /// Plays the collision again with other noise, and what prevents it beside.
-    fn tell_from_chance(&self, evidence: &mut Evidence, baseline: &ModularConfig) {
+    /// Plays the collision again with other noise and what prevents it beside, each module or weakness alone.
+    fn tell_apart(&self, evidence: &mut Evidence, baseline: &ModularConfig, unchanged: &[bool]) {
         let (own, differs) = (self.profile, evidence.differs());
-        let unchanged = self.unchanged();
-        let again = unchanged.iter().filter(|vanished| !**vanished).count();
-        evidence.chance =
-            Some(Chance { replays: unchanged.len() as u32, vanished: (unchanged.len() - again) as u32 });
-        if again < AGAIN_MIN {
-            return;
-        }
-        let compared = |profile: &ModularConfig, tries: usize| {
-            let replays = unchanged.iter().zip(1_u32..);
-            let both = replays.map(|(vanished, noise)| (*vanished, self.vanishes(profile, noise)));
-            Comparison::of(both, tries)
-        };
         if !differs {
             let tries = evidence.weaknesses.iter().filter(|found| found.vanishes()).count();
             for (found, (_, weaknesses)) in evidence.weaknesses.iter_mut().zip(own.weaknesses.each_off()) {
                 let without = ModularConfig { weaknesses, ..own };
-                found.noise = found.vanishes().then(|| compared(&without, tries));
+                found.noise = found.vanishes().then(|| self.compared(&without, unchanged, tries));
             }
         }
         // A weakness says more than its module without any errors.
-        if evidence.weakness().is_none() {
-            let tries = evidence.modules.iter().filter(|found| found.vanishes(differs)).count();
-            for found in &mut evidence.modules {
-                let changed = change(&own, found.module, baseline, differs);
-                found.noise = found.vanishes(differs).then(|| compared(&changed, tries));
-            }
+        if evidence.is_told_apart() {
+            return;
         }
-        if let Some(pair) = evidence.pairs.first_mut() {
-            let changed =
-                pair.modules.into_iter().fold(own, |own, module| change(&own, module, baseline, differs));
-            pair.noise = Some(compared(&changed, 1));
+        let tries = evidence.modules.iter().filter(|found| found.vanishes(differs)).count();
+        for found in &mut evidence.modules {
+            let changed = change(&own, found.module, baseline, differs);
+            found.noise = found.vanishes(differs).then(|| self.compared(&changed, unchanged, tries));
         }
         if differs && evidence.told_apart().count() > 1 {
             let modules = evidence.modules.iter_mut();
@@ -248,20 +251,30 @@ impl<'a> Inquiry<'a> {
         }
     }
 
+    /// Replays with a change, beside the same noise alone; `tries` is the number of changes that are compared.
+    fn compared(&self, changed: &ModularConfig, unchanged: &[bool], tries: usize) -> Comparison {
+        let replays = unchanged.iter().zip(1_u32..);
+        let both = replays.map(|(vanished, noise)| (*vanished, self.vanishes(changed, noise)));
+        Comparison::of(both, tries)
+    }
+
     /// Whether the collision vanishes in each replay with other noise and nothing else changed: until it has happened
     /// [`AGAIN`] times again, but at most [`REPLAYS_MAX`]. When to end does not depend on what changes do.
     fn unchanged(&self) -> Vec<bool> {
-        let (mut vanished, mut again) = (Vec::new(), 0);
+        let mut vanished = Vec::new();
         for noise in 1..=REPLAYS_MAX {
-            let is_gone = self.vanishes(&self.profile, noise);
-            vanished.push(is_gone);
-            again += usize::from(!is_gone);
-            if again == AGAIN {
+            vanished.push(self.vanishes(&self.profile, noise));
+            if again(&vanished) == AGAIN {
                 break;
             }
         }
         vanished
     }
+}
+
+/// The number of replays in which the collision happens again.
+fn again(vanished: &[bool]) -> usize {
+    vanished.iter().filter(|vanished| !**vanished).count()
 }
 
 /// A profile with one module as in the baseline, if any module differs from it, or else without errors.

@@ -18,12 +18,12 @@
 //! 1. The modules differ from the baseline: one prevents the collision if it is as there, told apart from chance. Of
 //!    several the one whose errors alone also lead to the collision most often.
 //! 2. They do not: a documented weakness, switched off, prevents the collision, told apart from chance.
-//! 3. A module whose output was beyond its specification in the seconds before (see `measured`), and without whose
+//! 3. No change alone is told apart from chance, and two modules together prevent the collision, told apart from it.
+//! 4. A module whose output was beyond its specification in the seconds before (see `measured`), and without whose
 //!    errors, or as in the baseline, there is no collision with the same noise. What chance has made is seen there.
-//! 4. The driving system is the baseline, and a module that decides (planning, control, emergency braking) prevents
+//! 5. The driving system is the baseline, and a module that decides (planning, control, emergency braking) prevents
 //!    the collision without its errors, told apart from chance.
-//! 5. As 4, of a module that gives planning its picture: its errors are those that it may have, so planning is brittle.
-//! 6. Two modules prevent it together, told apart from chance.
+//! 6. As 5, of a module that gives planning its picture: its errors are those that it may have, so planning is brittle.
 //!
 //! Otherwise no module is named, and the verdict says why.
 
@@ -84,7 +84,8 @@ pub struct Evidence {
     pub ideal: Fate,
     /// The collision without each documented weakness that is switched on.
     pub weaknesses: Vec<WeaknessFinding>,
-    /// Pairs that prevent the collision together, looked for if no module and no weakness does alone.
+    /// Pairs that prevent the collision together, looked for if no module and no weakness alone does, told apart from
+    /// chance.
     pub pairs: Vec<PairFinding>,
     /// The collision with other sensor noise and nothing else changed; `None` if no change prevents it.
     pub chance: Option<Chance>,
@@ -154,6 +155,14 @@ pub struct Comparison {
     pub high: f64,
 }
 
+impl Chance {
+    /// Of replays in which the collision vanishes or not.
+    pub(super) fn of(vanished: &[bool]) -> Chance {
+        let gone = vanished.iter().filter(|vanished| **vanished).count();
+        Chance { replays: vanished.len() as u32, vanished: gone as u32 }
+    }
+}
+
 impl Comparison {
     /// Of replays in which the collision vanishes or not, first by the noise alone and then with the change; `tries`
     /// is the number of changes that are compared.
@@ -198,6 +207,11 @@ impl Evidence {
         self.modules.iter().filter(|found| is_told_apart(found.noise))
     }
 
+    /// Whether a module or a weakness alone prevents the collision, told apart from chance.
+    pub(super) fn is_told_apart(&self) -> bool {
+        self.told_apart().next().is_some() || self.weakness().is_some()
+    }
+
     fn conclude(&self) -> (Verdict, Vec<Module>, Option<&'static str>) {
         let differs = self.differs();
         if differs && let Some(found) = foremost(self.told_apart()) {
@@ -205,6 +219,9 @@ impl Evidence {
         }
         if let Some(found) = self.weakness() {
             return (Verdict::Weakness, vec![found.module], Some(found.weakness));
+        }
+        if let Some(pair) = self.pairs.iter().find(|pair| is_told_apart(pair.noise)) {
+            return (Verdict::Together, pair.modules.to_vec(), None);
         }
         if let Some(found) = self.beyond_specification() {
             return (Verdict::Measured, vec![found.module], None);
@@ -215,19 +232,18 @@ impl Evidence {
         if !differs && self.told_apart().next().is_some() {
             return (Verdict::Brittle, vec![Module::Planning], None);
         }
-        if let Some(pair) = self.pairs.iter().find(|pair| is_told_apart(pair.noise)) {
-            return (Verdict::Together, pair.modules.to_vec(), None);
-        }
-        let verdict = match self.baseline {
-            _ if self.chance.is_some() => Verdict::Chance,
-            Some(fate) if fate != Fate::Vanished => Verdict::Baseline,
-            Some(_) | None => Verdict::Unexplained,
+        let verdict = if self.chance.is_some() {
+            Verdict::Chance
+        } else if self.baseline.is_some_and(|fate| fate != Fate::Vanished) {
+            Verdict::Baseline
+        } else {
+            Verdict::Unexplained
         };
         (verdict, Vec::new(), None)
     }
 
     /// The documented weakness that makes the collision most often, told apart from chance.
-    pub(super) fn weakness(&self) -> Option<&WeaknessFinding> {
+    fn weakness(&self) -> Option<&WeaknessFinding> {
         let told_apart = self.weaknesses.iter().filter(|found| is_told_apart(found.noise));
         told_apart.min_by_key(|found| Reverse(found.noise.map(|noise| noise.vanished)))
     }

@@ -28,6 +28,8 @@ const WINDOW_S: f64 = 5.0;
 /// Place in a forecast of the position after [`AHEAD_S`]: forecasts have a position every 0.5 s.
 const AHEAD_INDEX: usize = 1;
 const AHEAD_S: f64 = 1.0;
+/// A change of the given velocity within this time may be taken for an acceleration, s.
+const CHANGE_S: f64 = 0.5;
 /// Error of a forecast after a second that is within a prediction's specification, m: half a lane. Ours.
 const FORECAST_M: f64 = 1.75;
 /// Misses in a run of which 95 % are shorter, as a multiple of the mean: runs have an exponential distribution.
@@ -76,6 +78,8 @@ struct Gauge {
     forecast_m: f64,
     /// Forecasts that have not come due.
     forecasts: Vec<Forecast>,
+    /// Errors of the velocity that prediction was given last, and when, s.
+    velocity_errors_mps: Vec<(f64, Vec2)>,
     detected_before: bool,
     /// Most objects within reach of the sensors.
     objects: usize,
@@ -93,6 +97,8 @@ struct Forecast {
     velocity_mps: Vec2,
     /// The velocity that prediction was given, less the true one.
     velocity_error_mps: Vec2,
+    /// The acceleration that only the change of this error makes believe, magnitude, m/s².
+    change_mps2: f64,
 }
 
 impl Forecast {
@@ -102,11 +108,13 @@ impl Forecast {
     /// - Where the obstacle was taken to be does not matter: ways are compared, not places.
     /// - The way may contain the error of the given velocity, or any part of it along some direction, because
     ///   prediction may take it at its word or know better, as from the lane: all such ways end on a sphere whose
-    ///   poles are the way without that error and with all of it, and what lies inside counts as right, too.
+    ///   poles are the way without that error and with all of it, and what lies inside counts as right, too. The
+    ///   same holds for an acceleration that only a change of that error makes believe.
     /// - What the obstacle decides later none can know, so its way at constant velocity is as good as its true one.
     fn error_m(&self, position: Vec2) -> f64 {
         let excused = self.velocity_error_mps * (AHEAD_S / 2.0);
-        let error_m = |way: Vec2| ((self.way - way - excused).norm() - excused.norm()).max(0.0);
+        let change_m = self.change_mps2 * AHEAD_S * AHEAD_S / 2.0;
+        let error_m = |way: Vec2| ((self.way - way - excused).norm() - excused.norm() - change_m).max(0.0);
         error_m(position - self.position).min(error_m(self.velocity_mps * AHEAD_S))
     }
 }
@@ -142,6 +150,7 @@ impl Gauge {
             unknown: Spell::default(),
             forecast_m: 0.0,
             forecasts: Vec::new(),
+            velocity_errors_mps: Vec::new(),
             detected_before: false,
             objects: 0,
         }
@@ -190,16 +199,20 @@ impl Gauge {
             }
             !is_due
         });
-        let forecast = perceived.and_then(|perceived| {
-            Some(Forecast {
-                due_s: time_s + AHEAD_S,
-                way: *perceived.predicted.get(AHEAD_INDEX)? - perceived.pose.position,
-                position: truth,
-                velocity_mps: obstacle.velocity_mps,
-                velocity_error_mps: perceived.velocity_mps - obstacle.velocity_mps,
-            })
-        });
-        self.forecasts.extend(forecast);
+        let Some(perceived) = perceived else { return };
+        let velocity_error_mps = perceived.velocity_mps - obstacle.velocity_mps;
+        self.velocity_errors_mps.retain(|(then_s, _)| time_s - then_s <= CHANGE_S + 1e-6);
+        let changes_mps = self.velocity_errors_mps.iter().map(|(_, then)| (velocity_error_mps - then).norm());
+        let change_mps2 = changes_mps.fold(0.0, f64::max) / CHANGE_S;
+        self.velocity_errors_mps.push((time_s, velocity_error_mps));
+        self.forecasts.extend(perceived.predicted.get(AHEAD_INDEX).map(|expected| Forecast {
+            due_s: time_s + AHEAD_S,
+            way: expected - perceived.pose.position,
+            position: truth,
+            velocity_mps: obstacle.velocity_mps,
+            velocity_error_mps,
+            change_mps2,
+        }));
     }
 
     fn measures(self, own: &ModularConfig, baseline: &ModularConfig) -> Vec<Measure> {
@@ -266,6 +279,7 @@ mod tests {
             position: Vec2::new(100.0, 50.0),
             velocity_mps: true_mps,
             velocity_error_mps: given_mps - true_mps,
+            change_mps2: 0.0,
         }
     }
 
@@ -280,6 +294,9 @@ mod tests {
         // Nothing that it was given led it farther.
         assert!((forecast(given_mps * 2.0, still, given_mps).error_m(there) - 3.77).abs() < 1e-9);
         assert!((forecast(given_mps, still, still).error_m(there) - 3.77).abs() < 1e-9);
+        // A velocity that was 0 half a second before looks like an acceleration.
+        let hasty = Forecast { change_mps2: 3.77 * 2.0, ..forecast(given_mps * 2.0, still, given_mps) };
+        assert!(hasty.error_m(there) < 1e-9);
     }
 
     #[test]
