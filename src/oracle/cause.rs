@@ -16,7 +16,7 @@
 
 use std::sync::Arc;
 
-use crate::ads::{Foresight, ModularConfig, Module, Selected};
+use crate::ads::{Foresight, ModularConfig, Module};
 use crate::episode::{EpisodeLog, Setup};
 
 use super::crash::{Crash, Fate, play};
