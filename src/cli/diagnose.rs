@@ -4,12 +4,15 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::action::ActionTable;
-use crate::ads::{ModularConfig, Module, Selected};
+use crate::ads::{ModularConfig, Selected};
 use crate::episode::{Collision, EpisodeLog};
 use crate::model::Scenario;
 use crate::model::vocabulary::Word;
 use crate::oracle;
-use crate::oracle::{Diagnosis, Likelihood, Measure, MechanismShare, Mechanisms, WeaknessFinding};
+use crate::oracle::{
+    Comparison, Diagnosis, Evidence, Fate, Likelihood, Measure, MechanismShare, Mechanisms, Verdict,
+    WeaknessFinding,
+};
 use crate::run::{Asked, Stage};
 use crate::statistics::Estimate;
 
@@ -63,9 +66,10 @@ fn causes(found: &[Explained]) -> Vec<(String, usize)> {
 /// All about one collision.
 fn tell_one(output: &Output, found: &Explained) {
     output.tell(&heading(&found.body, &found.collision));
-    output.say(&table_text(&found.diagnosis));
-    output.say(&weaknesses_text(&found.diagnosis.weaknesses));
-    output.say(&measured_text(&found.diagnosis.measured));
+    let evidence = &found.diagnosis.evidence;
+    output.say(&table_text(evidence));
+    output.say(&weaknesses_text(&evidence.weaknesses));
+    output.say(&measured_text(&evidence.measured));
     output.say(&format!("\n{}", sentence(&found.diagnosis)));
     if let Some(likelihood) = &found.likelihood {
         output.say(&likelihood_text(likelihood));
@@ -209,41 +213,59 @@ fn heading(body: &str, collision: &Collision) -> String {
     )
 }
 
-fn table_text(diagnosis: &Diagnosis) -> String {
+fn table_text(evidence: &Evidence) -> String {
     let mut text = format!(
-        "\n{:<14}{:<20}{:<20}{:<18}{:<14}{}",
-        "module", "as in the baseline", "without its errors", "its errors alone", "other noise", "varied"
+        "\n{:<14}{:<20}{:<20}{:<18}{}",
+        "module", "as in the baseline", "without its errors", "its errors alone", "with other noise"
     );
-    let percent = |share: Option<f64>| share.map_or(String::new(), |share| format!("{:.0} %", share * 100.0));
-    for found in &diagnosis.modules {
-        let line = format!(
-            "{:<14}{:<20}{:<20}{:<18}{:<14}{}",
-            found.module.name(),
-            found.restored.map_or("the same", oracle::Fate::in_words),
-            found.idealised.in_words(),
-            found.alone.in_words(),
-            percent(found.share),
-            percent(found.prevented)
-        );
+    let mut line = |name: &str, restored: Option<Fate>, idealised: Fate, alone: &str, noise: &str| {
+        let restored = restored.map_or("the same", Fate::in_words);
+        let idealised = idealised.in_words();
+        let line = format!("{name:<14}{restored:<20}{idealised:<20}{alone:<18}{noise}");
         text.push('\n');
         text.push_str(line.trim_end());
+    };
+    for found in &evidence.modules {
+        let noise = found.noise.map_or(String::new(), noise_text);
+        line(found.module.name(), found.restored, found.idealised, found.alone.in_words(), &noise);
     }
-    text.push_str(&format!("\n{:<34}{}", "all of them", diagnosis.ideal.in_words()));
-    text.push_str(&format!("\n{:<72}{}", "nothing changed (chance)", percent(Some(diagnosis.placebo))));
-    for [first, second] in &diagnosis.pairs {
-        text.push_str(&format!(
-            "\n{} and {}: no crash without the errors of both",
-            first.name(),
-            second.name()
-        ));
+    line("all of them", evidence.baseline, evidence.ideal, "", "");
+    if let Some(chance) = evidence.chance {
+        let count = format!("no crash in {} of {}", chance.vanished, chance.replays);
+        text.push_str(&format!("\n{:<72}{count}", "nothing changed (chance)"));
+    }
+    for found in &evidence.pairs {
+        let [first, second] = found.modules.map(|module| module.name());
+        let noise = found.noise.map_or(String::new(), |noise| format!("; {}", noise_text(noise)));
+        text.push_str(&format!("\n{first} and {second}: no crash {}{noise}", changed_text(evidence)));
     }
     text
 }
 
+/// How the modules were changed that are asked about.
+fn changed_text(evidence: &Evidence) -> &'static str {
+    if evidence.differs() { "as in the baseline" } else { "without errors" }
+}
+
+/// What a change does in replays with other noise.
+fn noise_text(noise: Comparison) -> String {
+    let percent = |share: f64| share * 100.0;
+    format!(
+        "prevents {}, brings {} ({:.0} to {:.0} %)",
+        noise.prevents,
+        noise.brings,
+        percent(noise.low),
+        percent(noise.high)
+    )
+}
+
 fn weaknesses_text(weaknesses: &[WeaknessFinding]) -> String {
-    let mut text = format!("\n{:<34}{}", "weakness", "without it");
+    let mut text = format!("\n{:<34}{:<14}{}", "weakness", "without it", "with other noise");
     for found in weaknesses {
-        text.push_str(&format!("\n{:<34}{}", found.weakness, found.without.in_words()));
+        let noise = found.noise.map_or(String::new(), noise_text);
+        let line = format!("{:<34}{:<14}{noise}", found.weakness, found.without.in_words());
+        text.push('\n');
+        text.push_str(line.trim_end());
     }
     text
 }
@@ -258,64 +280,93 @@ fn measured_text(measured: &[Measure]) -> String {
     text
 }
 
-/// The cause in a sentence.
+/// The verdict in a sentence. It says what the evidence says, and nothing else.
 fn sentence(diagnosis: &Diagnosis) -> String {
-    let others: Vec<&str> = diagnosis
-        .modules
-        .iter()
-        .filter(|found| found.suffices() && !diagnosis.cause.contains(&found.module))
+    let Diagnosis { cause, verdict, weakness, evidence } = diagnosis;
+    let name = cause.iter().map(|module| module.name()).collect::<Vec<_>>().join(" and ");
+    let changed = changed_text(evidence);
+    // Other modules that prevent it, told apart from chance.
+    let told_apart: Vec<&str> = evidence
+        .told_apart()
+        .filter(|found| !cause.contains(&found.module))
         .map(|found| found.module.name())
         .collect();
-    let finding = |module: Module| diagnosis.modules.iter().find(|found| found.module == module);
-    match diagnosis.cause.as_slice() {
-        [module] if diagnosis.by_measure => {
-            let found = diagnosis.measured.iter().find(|found| found.module == *module);
-            let error = found.map_or(String::new(), |found| {
-                format!(": {} was {:.2}, beyond {:.2}", found.what, found.worst, found.bound)
-            });
-            let name = module.name();
-            format!("{name} is at fault by what it gave this time, as other noise prevents the crash{error}")
-        }
-        [] if diagnosis.varied_crashes.is_some() || !others.is_empty() => {
-            "it hung by a hair: chance prevents it as often as any module, and none can be named".to_owned()
-        }
-        [] => "no module is at fault alone, nor are two together".to_owned(),
-        [module] if diagnosis.brittle => {
-            let name = module.name();
-            let senses = match others.as_slice() {
-                [] => String::new(),
-                names => format!("; {} would have made up for it", names.join(", ")),
+    let others = match told_apart.as_slice() {
+        [] => String::new(),
+        names => format!("; {} would have made up for it", names.join(", ")),
+    };
+    match verdict {
+        Verdict::Outside => {
+            let is_alone = |alone: Fate| alone == Fate::Crash && evidence.baseline == Some(Fate::Vanished);
+            let found = evidence.modules.iter().find(|found| cause.contains(&found.module));
+            let alone = match found {
+                Some(found) if is_alone(found.alone) => ", and its errors alone lead to it",
+                Some(_) | None => "",
             };
+            format!("{name} is at fault: {changed}, there is no crash{alone}{others}")
+        }
+        Verdict::Weakness => {
+            let weakness = weakness.unwrap_or_default();
+            format!("{name} is at fault by a documented weakness: without `{weakness}` there is no crash")
+        }
+        Verdict::Measured => {
+            let error = evidence.beyond_specification().map_or(String::new(), |found| {
+                format!("{} was {:.2}, and {:.2} is specified", found.what, found.worst, found.bound)
+            });
+            let is_told_apart = evidence.told_apart().any(|found| cause.contains(&found.module));
+            let chance =
+                if is_told_apart { String::new() } else { format!(", which is {}", chance_text(evidence)) };
             format!(
-                "{name} is brittle: all modules are within their specifications, and it could not bear their \
-                 errors{senses}"
+                "{name} is at fault by what it gave this time: {error}; {changed}, there is no crash{chance}"
             )
         }
-        [module] => {
-            let found = finding(*module);
-            let alone = found.is_some_and(|found| found.alone == oracle::Fate::Crash);
-            let cure = match found.and_then(|found| found.restored) {
-                Some(oracle::Fate::Vanished) => "as in the baseline, there is no crash",
-                _ => "without its errors there is no crash",
-            };
-            let alone = if alone && diagnosis.ideal == oracle::Fate::Vanished {
-                ", and they alone lead to it"
-            } else {
-                ""
-            };
-            let others = match others.as_slice() {
-                [] => String::new(),
-                names => format!("; {} would have made up for it", names.join(", ")),
-            };
-            let name = module.name();
-            format!("{name} is at fault: {cure}{alone}{others}")
+        Verdict::Deciding => format!("{name} is at fault: {changed}, there is no crash{others}"),
+        Verdict::Brittle => format!(
+            "{name} is brittle: it could not bear the errors of {}, which are within their specification",
+            told_apart.join(", ")
+        ),
+        Verdict::Together => {
+            format!("{name} are at fault together: both {changed}, there is no crash")
         }
-        modules => {
-            let names: Vec<&str> = modules.iter().map(|module| module.name()).collect();
-            let names = names.join(" and ");
-            format!("{names} are at fault together: without the errors of both there is no crash")
+        Verdict::Baseline => {
+            let baseline = evidence.baseline.map_or("the same", Fate::in_words);
+            format!(
+                "no module is at fault by what differs from the baseline: with all as in the baseline, there is {}",
+                if baseline == "crash" { "the crash as well" } else { baseline }
+            )
         }
+        Verdict::Chance => format!(
+            "no module is named: what prevents the crash with its own noise ({}) is {}",
+            preventing(evidence).join(", "),
+            chance_text(evidence)
+        ),
+        Verdict::Unexplained => "no module is at fault alone, nor are two together".to_owned(),
     }
+}
+
+/// That replays do not tell, and how often chance alone prevents the collision.
+fn chance_text(evidence: &Evidence) -> String {
+    let alone = evidence.chance.map_or(String::new(), |chance| {
+        format!(
+            ": other sensor noise alone prevents it in {} of {} replays",
+            chance.vanished, chance.replays
+        )
+    });
+    format!("not told apart from chance{alone}")
+}
+
+/// The changes that prevent the collision with the noise that it had.
+fn preventing(evidence: &Evidence) -> Vec<String> {
+    let (differs, changed) = (evidence.differs(), changed_text(evidence));
+    let modules = evidence.modules.iter().filter(|found| found.vanishes(differs));
+    let weaknesses = evidence.weaknesses.iter().filter(|found| !differs && found.vanishes());
+    let modules = modules.map(|found| format!("{} {changed}", found.module.name()));
+    let weaknesses = weaknesses.map(|found| format!("no `{}`", found.weakness));
+    let pairs = evidence.pairs.iter().map(|found| {
+        let [first, second] = found.modules.map(|module| module.name());
+        format!("{first} and {second} {changed}")
+    });
+    modules.chain(weaknesses).chain(pairs).collect()
 }
 
 fn likelihood_text(likelihood: &Likelihood) -> String {
@@ -327,4 +378,74 @@ fn likelihood_text(likelihood: &Likelihood) -> String {
         likelihood.low * 100.0,
         likelihood.high * 100.0
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ads::Module;
+    use crate::oracle::{Chance, ModuleFinding};
+
+    /// A diagnosis of a driving system that differs from the baseline in perception, or in nothing.
+    fn diagnosis(verdict: Verdict, cause: &[Module], differs: bool) -> Diagnosis {
+        let told_apart = Comparison { vanished: 10, prevents: 10, brings: 0, low: 0.69, high: 1.0 };
+        let finding = |module| {
+            let is_asked = module == Module::Perception;
+            ModuleFinding {
+                module,
+                restored: (differs && is_asked).then_some(Fate::Vanished),
+                idealised: if is_asked { Fate::Vanished } else { Fate::Crash },
+                alone: Fate::Crash,
+                noise: (is_asked && verdict != Verdict::Chance).then_some(told_apart),
+                noise_alone: None,
+            }
+        };
+        let measure = Measure { module: Module::Perception, what: "error, m", worst: 2.0, bound: 1.0 };
+        let evidence = Evidence {
+            modules: Module::ALL.into_iter().map(finding).collect(),
+            baseline: differs.then_some(Fate::Vanished),
+            ideal: Fate::Vanished,
+            weaknesses: Vec::new(),
+            pairs: Vec::new(),
+            chance: Some(Chance { replays: 64, vanished: 61 }),
+            measured: vec![measure],
+            from_s: 0.0,
+        };
+        Diagnosis { cause: cause.to_vec(), verdict, weakness: None, evidence }
+    }
+
+    #[test]
+    fn a_sentence_says_what_the_table_says() {
+        let perception = [Module::Perception];
+        for (found, wanted) in [
+            (
+                diagnosis(Verdict::Outside, &perception, true),
+                "perception is at fault: as in the baseline, there is no crash, and its errors alone lead to it",
+            ),
+            (
+                diagnosis(Verdict::Measured, &perception, false),
+                "perception is at fault by what it gave this time: error, m was 2.00, and 1.00 is specified; \
+                 without errors, there is no crash",
+            ),
+            (
+                diagnosis(Verdict::Brittle, &[Module::Planning], false),
+                "planning is brittle: it could not bear the errors of perception, which are within their \
+                 specification",
+            ),
+            (
+                diagnosis(Verdict::Chance, &[], true),
+                "no module is named: what prevents the crash with its own noise (perception as in the baseline) is \
+                 not told apart from chance: other sensor noise alone prevents it in 61 of 64 replays",
+            ),
+        ] {
+            assert_eq!(sentence(&found), wanted);
+        }
+    }
+
+    #[test]
+    fn a_table_has_the_counts_of_the_replays() {
+        let text = table_text(&diagnosis(Verdict::Outside, &[Module::Perception], true).evidence);
+        assert!(text.contains("prevents 10, brings 0 (69 to 100 %)"), "{text}");
+        assert!(text.contains("no crash in 61 of 64"), "{text}");
+    }
 }

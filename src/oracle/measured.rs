@@ -1,15 +1,16 @@
-//! Errors of the sensing modules, measured in the seconds before a collision.
+//! Errors of the modules that give planning its picture, measured in the seconds before a collision.
 //!
-//! The scenario is played once more by its own driving system. Ten times a second what a module gave is compared
-//! with the truth, and the worst of it with what the module's specification leaves room for: the baseline's
-//! settings, or a bound that is ours where there is none.
+//! The scenario is played once more by its own driving system. Ten times a second what a module gave is held against
+//! what it was given itself, so that the errors of one module are not booked to the next, and the worst of it is
+//! compared with what the module's specification leaves room for: the baseline's settings, or a bound that is ours
+//! where there is none.
 //!
-//! | module | measured | bound |
-//! |---|---|---|
-//! | localisation | error of the position, m | three standard deviations, and the way in its latency |
-//! | perception | longest time in which the obstacle was in sight and not detected, s | 95 % of runs of misses |
-//! | tracking | longest time in which it was detected and not known, s | publication and latency |
-//! | prediction | error of the most probable future after a second, m | half a lane, ours |
+//! | module | measured | held against | bound |
+//! |---|---|---|---|
+//! | localisation | error of the position, m | the true position | three standard deviations, and the way in its latency |
+//! | perception | longest time without a detection of the obstacle, s | whether it was in sight | 95 % of runs of misses |
+//! | tracking | longest time in which it was not known, s | whether it was detected | publication, and the time that looks take |
+//! | prediction | error of the most probable future after a second, m | see [`Forecast::error_m`] | half a lane, ours |
 //!
 //! Draws within the specification exceed these bounds now and then: that a module was so far off in these seconds
 //! says that it had bad luck, or that its specification allows too much. Left out: planning, control and emergency
@@ -27,6 +28,8 @@ const WINDOW_S: f64 = 5.0;
 /// Place in a forecast of the position after [`AHEAD_S`]: forecasts have a position every 0.5 s.
 const AHEAD_INDEX: usize = 1;
 const AHEAD_S: f64 = 1.0;
+/// A change of the given velocity within this time may be taken for an acceleration, s.
+const CHANGE_S: f64 = 0.5;
 /// Error of a forecast after a second that is within a prediction's specification, m: half a lane. Ours.
 const FORECAST_M: f64 = 1.75;
 /// Misses in a run of which 95 % are shorter, as a multiple of the mean: runs have an exponential distribution.
@@ -50,8 +53,9 @@ impl Measure {
     }
 }
 
-/// Measures the sensing modules in the seconds before a collision; `baseline` is their specification.
-pub(super) fn measure(crash: &Crash, baseline: &ModularConfig) -> Vec<Measure> {
+/// Measures the modules in the seconds before a collision of a driving system with the profile `own`; `baseline` is
+/// their specification.
+pub(super) fn measure(crash: &Crash, own: &ModularConfig, baseline: &ModularConfig) -> Vec<Measure> {
     let contact = &crash.collision.contact;
     let mut gauge = Gauge::new(contact.obstacle, contact.time_s);
     episode::run(
@@ -59,7 +63,7 @@ pub(super) fn measure(crash: &Crash, baseline: &ModularConfig) -> Vec<Measure> {
         &mut |moment| crash.script.choose(crash.setup.table, moment),
         &mut |world, ads, _| gauge.look(world, ads),
     );
-    gauge.measures(baseline)
+    gauge.measures(own, baseline)
 }
 
 /// What was seen of one obstacle so far.
@@ -72,9 +76,47 @@ struct Gauge {
     undetected: Spell,
     unknown: Spell,
     forecast_m: f64,
-    /// Forecasts that have not come due: when, and where the obstacle should be then.
-    forecasts: Vec<(f64, Vec2)>,
+    /// Forecasts that have not come due.
+    forecasts: Vec<Forecast>,
+    /// Errors of the velocity that prediction was given last, and when, s.
+    velocity_errors_mps: Vec<(f64, Vec2)>,
     detected_before: bool,
+    /// Most objects within reach of the sensors.
+    objects: usize,
+}
+
+/// A forecast of the obstacle, and what prediction was given for it.
+#[derive(Debug, Clone, Copy)]
+struct Forecast {
+    /// When it comes due, s.
+    due_s: f64,
+    /// The way of [`AHEAD_S`] that it forecasts.
+    way: Vec2,
+    /// The true place and velocity when it was made.
+    position: Vec2,
+    velocity_mps: Vec2,
+    /// The velocity that prediction was given, less the true one.
+    velocity_error_mps: Vec2,
+    /// The acceleration that only the change of this error makes believe, magnitude, m/s².
+    change_mps2: f64,
+}
+
+impl Forecast {
+    /// How far it is from what the obstacle's motion makes of what prediction was given, m; the obstacle is now at
+    /// `position`.
+    ///
+    /// - Where the obstacle was taken to be does not matter: ways are compared, not places.
+    /// - The way may contain the error of the given velocity, or any part of it along some direction, because
+    ///   prediction may take it at its word or know better, as from the lane: all such ways end on a sphere whose
+    ///   poles are the way without that error and with all of it, and what lies inside counts as right, too. The
+    ///   same holds for an acceleration that only a change of that error makes believe.
+    /// - What the obstacle decides later none can know, so its way at constant velocity is as good as its true one.
+    fn error_m(&self, position: Vec2) -> f64 {
+        let excused = self.velocity_error_mps * (AHEAD_S / 2.0);
+        let change_m = self.change_mps2 * AHEAD_S * AHEAD_S / 2.0;
+        let error_m = |way: Vec2| ((self.way - way - excused).norm() - excused.norm() - change_m).max(0.0);
+        error_m(position - self.position).min(error_m(self.velocity_mps * AHEAD_S))
+    }
 }
 
 struct Before {
@@ -108,7 +150,9 @@ impl Gauge {
             unknown: Spell::default(),
             forecast_m: 0.0,
             forecasts: Vec::new(),
+            velocity_errors_mps: Vec::new(),
             detected_before: false,
+            objects: 0,
         }
     }
 
@@ -147,22 +191,37 @@ impl Gauge {
         let is_visible = seen.is_some_and(|object| in_sight(object, &before.sensed.conditions));
         self.undetected.note(is_visible && self.detected_before && !detected);
         self.unknown.note(detected && perceived.is_none());
-        self.forecasts.retain(|&(due_s, expected)| {
-            let is_due = time_s >= due_s - 1e-6;
+        self.objects = self.objects.max(before.sensed.objects.len());
+        self.forecasts.retain(|forecast| {
+            let is_due = time_s >= forecast.due_s - 1e-6;
             if is_due {
-                self.forecast_m = self.forecast_m.max((expected - truth).norm());
+                self.forecast_m = self.forecast_m.max(forecast.error_m(truth));
             }
             !is_due
         });
-        let predicted = perceived.and_then(|perceived| perceived.predicted.get(AHEAD_INDEX));
-        self.forecasts.extend(predicted.map(|expected| (time_s + AHEAD_S, *expected)));
+        let Some(perceived) = perceived else { return };
+        let velocity_error_mps = perceived.velocity_mps - obstacle.velocity_mps;
+        self.velocity_errors_mps.retain(|(then_s, _)| time_s - then_s <= CHANGE_S + 1e-6);
+        let changes_mps = self.velocity_errors_mps.iter().map(|(_, then)| (velocity_error_mps - then).norm());
+        let change_mps2 = changes_mps.fold(0.0, f64::max) / CHANGE_S;
+        self.velocity_errors_mps.push((time_s, velocity_error_mps));
+        self.forecasts.extend(perceived.predicted.get(AHEAD_INDEX).map(|expected| Forecast {
+            due_s: time_s + AHEAD_S,
+            way: expected - perceived.pose.position,
+            position: truth,
+            velocity_mps: obstacle.velocity_mps,
+            velocity_error_mps,
+            change_mps2,
+        }));
     }
 
-    fn measures(self, baseline: &ModularConfig) -> Vec<Measure> {
+    fn measures(self, own: &ModularConfig, baseline: &ModularConfig) -> Vec<Measure> {
         let ModularConfig { localization, perception, tracking, .. } = baseline;
         // Both axes, in streets; 20 m/s is faster than any road of a town allows.
         let sigma_m = localization.position_sigma_m * localization.street_factor * core::f64::consts::SQRT_2;
-        let publication = f64::from(tracking.frames_to_publish + perception.latency_frames) * FRAME_S;
+        // Tracking is given looks that are as old as the driving system's own latency makes them.
+        let latency_frames = own.perception.latency_frames as usize + own.latency.load_frames(self.objects);
+        let publication_s = (tracking.frames_to_publish as usize + latency_frames) as f64 * FRAME_S;
         let of = |module, what, worst, bound| Measure { module, what, worst, bound };
         vec![
             of(
@@ -181,7 +240,7 @@ impl Gauge {
                 Module::Tracking,
                 "longest time detected and not known, s",
                 self.unknown.longest_s,
-                publication,
+                publication_s,
             ),
             of(Module::Prediction, "error of its forecast after a second, m", self.forecast_m, FORECAST_M),
         ]
@@ -205,9 +264,50 @@ mod tests {
     fn an_error_is_judged_against_the_specification() {
         let mut gauge = Gauge::new(1, 10.0);
         (0..15).for_each(|_| gauge.undetected.note(true));
-        let found = gauge.measures(&ModularConfig::default());
+        let default = ModularConfig::default();
+        let found = gauge.measures(&default, &default);
         let of = |module: Module| found.iter().find(|found| found.module == module).unwrap().excess();
         assert!((of(Module::Perception) - 1.25).abs() < 1e-9, "{found:?}");
         assert_eq!(of(Module::Tracking), 0.0);
+    }
+
+    /// A forecast of a way along x, for an obstacle of one velocity that was taken to have another.
+    fn forecast(way: Vec2, true_mps: Vec2, given_mps: Vec2) -> Forecast {
+        Forecast {
+            due_s: 1.0,
+            way,
+            position: Vec2::new(100.0, 50.0),
+            velocity_mps: true_mps,
+            velocity_error_mps: given_mps - true_mps,
+            change_mps2: 0.0,
+        }
+    }
+
+    #[test]
+    fn a_wreck_that_was_taken_to_move_is_no_error_of_prediction() {
+        let (still, given_mps) = (Vec2::zeros(), Vec2::new(3.77, 0.0));
+        let there = Vec2::new(100.0, 50.0);
+        // It went by the velocity that it was given, or believed none of it, or only the part along a lane.
+        for way in [given_mps, still, Vec2::new(3.77 / 2.0, 3.77 / 2.0)] {
+            assert!(forecast(way, still, given_mps).error_m(there) < 1e-9, "{way}");
+        }
+        // Nothing that it was given led it farther.
+        assert!((forecast(given_mps * 2.0, still, given_mps).error_m(there) - 3.77).abs() < 1e-9);
+        assert!((forecast(given_mps, still, still).error_m(there) - 3.77).abs() < 1e-9);
+        // A velocity that was 0 half a second before looks like an acceleration.
+        let hasty = Forecast { change_mps2: 3.77 * 2.0, ..forecast(given_mps * 2.0, still, given_mps) };
+        assert!(hasty.error_m(there) < 1e-9);
+    }
+
+    #[test]
+    fn a_frozen_forecast_is_an_error_of_prediction_unless_its_velocity_was_none() {
+        let moves_mps = Vec2::new(8.0, 0.0);
+        let there = Vec2::new(108.0, 50.0);
+        assert!((forecast(Vec2::zeros(), moves_mps, moves_mps).error_m(there) - 8.0).abs() < 1e-9);
+        assert!(forecast(Vec2::zeros(), moves_mps, Vec2::zeros()).error_m(there) < 1e-9, "tracking gave none");
+        // It brakes as nobody could know.
+        let braked = Vec2::new(105.0, 50.0);
+        assert!(forecast(moves_mps, moves_mps, moves_mps).error_m(braked) < 1e-9);
+        assert!(forecast(Vec2::new(5.0, 0.0), moves_mps, moves_mps).error_m(braked) < 1e-9, "it was foreseen");
     }
 }

@@ -4,7 +4,7 @@
 //! hazard. If the play ends in another crash, the crash does not count as vanished.
 //!
 //! **Chance.** Any change to a near crash may save it: other sensor noise alone, with nothing mended, makes some
-//! vanish. That is the placebo. So each crash is also played with [`VARIATIONS`] other noises, once with nothing
+//! vanish. That is the placebo. So each crash is also played with [`NOISES`] other noises, once with nothing
 //! mended and once without each weakness, and what a weakness does *beyond* the placebo of the same noises is its own.
 //!
 //! Left out: the mended system from the start, which is elsewhere by then, so that the hazard is another or none.
@@ -16,6 +16,9 @@ use crate::statistics::{Estimate, proportion};
 
 use super::cause::{Inquiry, NoModules};
 use super::crash::{Crash, Fate};
+
+/// Number of replays with other sensor noise, of each crash and each weakness.
+const NOISES: u32 = 8;
 
 /// What becomes of a crash without each documented weakness that is switched on.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -42,12 +45,16 @@ pub struct WithoutMechanism {
 pub fn mechanisms(setup: &Setup, log: &EpisodeLog, index: usize) -> Result<Mechanisms, NoModules> {
     let crash = Crash::new(setup, log, index);
     let inquiry = Inquiry::new(&crash)?;
+    let vanished = |profile: &ModularConfig| {
+        let vanished = (1..=NOISES).filter(|noise| inquiry.vanishes(profile, *noise)).count();
+        vanished as f64 / f64::from(NOISES)
+    };
     let each = inquiry.profile.weaknesses.each_off().into_iter();
     let without = each.map(|(mechanism, weaknesses)| {
         let mended = ModularConfig { weaknesses, ..inquiry.profile };
-        WithoutMechanism { mechanism, fate: inquiry.fate(&mended), vanished: inquiry.vanished(&mended) }
+        WithoutMechanism { mechanism, fate: inquiry.fate(&mended), vanished: vanished(&mended) }
     });
-    Ok(Mechanisms { without: without.collect(), placebo: inquiry.vanished(&inquiry.profile) })
+    Ok(Mechanisms { without: without.collect(), placebo: vanished(&inquiry.profile) })
 }
 
 /// How many of many crashes vanish without one weakness.

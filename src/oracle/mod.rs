@@ -4,6 +4,7 @@
 mod avoidable;
 mod cause;
 mod crash;
+mod evidence;
 mod facts;
 mod hazard;
 mod measured;
@@ -19,8 +20,11 @@ pub use avoidable::{
     AvoidabilityError, AvoidabilitySettings, DrivenPlace, Judgement, ReferenceDrive, judge, judge_one,
     judge_with_drives,
 };
-pub use cause::{Diagnosis, ModuleFinding, NoModules, WeaknessFinding, diagnose, fate};
+pub use cause::{NoModules, diagnose, fate};
 pub use crash::{Fate, Regression, regression};
+pub use evidence::{
+    Chance, Comparison, Diagnosis, Evidence, ModuleFinding, PairFinding, Verdict, WeaknessFinding,
+};
 pub use facts::{counted, counts, facts};
 pub use measured::Measure;
 pub use mechanisms::{

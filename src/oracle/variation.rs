@@ -9,7 +9,6 @@
 
 use std::sync::Arc;
 
-use crate::ads::{Foresight, Selected};
 use crate::episode::{Choice, EpisodeLog, Moment, Setup};
 use crate::model::{Type, Value};
 use crate::rng;
@@ -46,44 +45,26 @@ pub struct Likelihood {
 /// A variation crashes if the ego vehicle runs into the same obstacle.
 pub fn likelihood(setup: &Setup, log: &EpisodeLog, index: usize, variations: u32) -> Likelihood {
     let crash = Crash::new(setup, log, index);
-    let crashes =
-        (1..=variations).filter(|&number| crash.again(&Variation::of(&crash, number).log).is_some());
+    let crashes = (1..=variations).filter(|&number| crash.again(&varied(&crash, number)).is_some());
     let crashes = crashes.count() as u32;
     let (share, [low, high]) = proportion(crashes, variations);
     Likelihood { variations, crashes, share, low, high }
 }
 
-/// A scenario with small changes, played.
-pub(super) struct Variation<'a> {
-    pub setup: Setup<'a>,
-    pub log: EpisodeLog,
-    pub foresight: Arc<Foresight>,
-    seed: u64,
-}
-
-impl<'a> Variation<'a> {
-    /// The variation with a number; the same number gives the same variation.
-    pub fn of(crash: &Crash<'a>, number: u32) -> Variation<'a> {
-        let seed = rng::child_seed(crash.setup.seed, Stream::Variation, u64::from(number));
-        let mut rng = rng::stream(seed, Stream::Variation, 0);
-        let mut setup = crash.setup.clone();
-        setup.seed = seed;
-        setup.start.signal_phase_s = (setup.start.signal_phase_s + cut_normal(&mut rng) * TIME_S).max(0.0);
-        let mut late_ticks = 0;
-        for _ in 1..crash.script.steps.len() {
-            let next_ticks = (cut_normal(&mut rng) * TIME_S / DT_S).round() as i32;
-            setup.period_shifts.push(next_ticks - late_ticks);
-            late_ticks = next_ticks;
-        }
-        let (log, foresight) = play(&setup, |moment| choose(crash, seed, moment));
-        Variation { setup, log, foresight, seed }
+/// Plays a scenario with small changes; the same number makes the same changes.
+fn varied(crash: &Crash, number: u32) -> EpisodeLog {
+    let seed = rng::child_seed(crash.setup.seed, Stream::Variation, u64::from(number));
+    let mut rng = rng::stream(seed, Stream::Variation, 0);
+    let mut setup = crash.setup.clone();
+    setup.seed = seed;
+    setup.start.signal_phase_s = (setup.start.signal_phase_s + cut_normal(&mut rng) * TIME_S).max(0.0);
+    let mut late_ticks = 0;
+    for _ in 1..crash.script.steps.len() {
+        let next_ticks = (cut_normal(&mut rng) * TIME_S / DT_S).round() as i32;
+        setup.period_shifts.push(next_ticks - late_ticks);
+        late_ticks = next_ticks;
     }
-
-    /// The same changes with another driving system.
-    pub fn play(&self, crash: &Crash, ads: &Selected) -> EpisodeLog {
-        let setup = Setup { ads: ads.clone(), ..self.setup.clone() };
-        play(&setup, |moment| choose(crash, self.seed, moment)).0
-    }
+    play(&setup, |moment| choose(crash, seed, moment)).0
 }
 
 /// The action of a step with other speeds. Where none of several draws is legal, the action is tried as it

@@ -6,7 +6,7 @@ use avastra::ads::{ModularConfig, Module};
 use avastra::episode::EpisodeLog;
 use avastra::model::Space;
 use avastra::oracle;
-use avastra::oracle::Fate;
+use avastra::oracle::{Diagnosis, Fate, Verdict};
 use avastra::run::{Profile, Run, RunSettings};
 
 use crate::cases::root;
@@ -92,6 +92,62 @@ fn the_module_at_fault_is_named() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
+/// Crashes of a profile of which localisation, perception, latency and control differ from the default.
+const CRASHES: usize = 3;
+
+/// A module that is as in the baseline is not blamed for what differs from it; and if nothing differs, the verdict
+/// still follows from the table.
+#[test]
+fn what_is_as_in_the_baseline_is_not_blamed() {
+    let degraded = profile("scenarios/ads/degraded.yaml");
+    let planted = degraded.with_module_of(Module::Perception, &fault("perception_flicker"));
+    let default = ModularConfig::default();
+    let usual = run_of(made(SHIPPED), EPISODES, 3, &[]);
+    let settings = RunSettings { profile: Some(Profile::new(&planted)), ..usual.settings().clone() };
+    let run = Run::new(usual.table().clone(), settings).expect("the settings name what exists");
+    let mut diagnosed = 0;
+    for number in 0..run.episodes() {
+        let (summary, log) = run.judged(number);
+        let Some(index) = summary.collisions.iter().find(|finding| finding.counted) else { continue };
+        let (setup, index) = (run.setup(number), index.number);
+        let against = |baseline: &ModularConfig| {
+            oracle::diagnose(&setup, &log, index, baseline).expect("it has modules")
+        };
+        let found = against(&default);
+        let as_default = |module: &Module| planted.with_module_of(*module, &default) == planted;
+        assert!(!found.cause.iter().any(as_default), "episode {number}: {found:?}");
+        assert!(found.evidence.differs() && follows(&found), "episode {number}: {found:?}");
+        let own = against(&planted);
+        assert!(!own.evidence.differs() && follows(&own), "episode {number}: {own:?}");
+        diagnosed += 1;
+        if diagnosed == CRASHES {
+            return;
+        }
+    }
+    panic!("{diagnosed} crashes in {} episodes", run.episodes());
+}
+
+/// Whether a verdict follows from the table that is printed above it.
+fn follows(found: &Diagnosis) -> bool {
+    let evidence = &found.evidence;
+    let told_apart: Vec<Module> = evidence.told_apart().map(|found| found.module).collect();
+    let excess = |module: Module| {
+        let own = evidence.measured.iter().find(|measure| measure.module == module);
+        own.map_or(0.0, |measure| measure.excess())
+    };
+    match (found.verdict, found.cause.as_slice()) {
+        (Verdict::Outside | Verdict::Deciding, [module]) => told_apart.contains(module),
+        (Verdict::Weakness, [_]) => found.weakness.is_some(),
+        (Verdict::Measured, [module]) => excess(*module) > 1.0,
+        (Verdict::Brittle, [Module::Planning]) => told_apart.iter().all(|module| excess(*module) <= 1.0),
+        (Verdict::Together, [_, _]) => !evidence.pairs.is_empty(),
+        (Verdict::Baseline, []) => evidence.baseline.is_some_and(|fate| fate != Fate::Vanished),
+        (Verdict::Chance, []) => evidence.chance.is_some() && told_apart.is_empty(),
+        (Verdict::Unexplained, []) => evidence.chance.is_none(),
+        _ => false,
+    }
+}
+
 /// A space in which obstacles may be unavoidable; the notes about that are no mistakes here.
 fn made(name: &str) -> Arc<Space> {
     let loaded = avastra::check::load(&root().join(name), &read).expect("it is there");
@@ -114,8 +170,12 @@ fn crash(run: &Run, number: usize, module: Module) -> Option<(usize, EpisodeLog,
 
 /// A shipped fault.
 fn fault(name: &str) -> ModularConfig {
-    let path = root().join("scenarios/ads/faults").join(format!("{name}.yaml"));
-    let text = std::fs::read_to_string(path).expect("it is shipped");
+    profile(&format!("scenarios/ads/faults/{name}.yaml"))
+}
+
+/// A shipped profile.
+fn profile(name: &str) -> ModularConfig {
+    let text = std::fs::read_to_string(root().join(name)).expect("it is shipped");
     ModularConfig::from_yaml(&text).expect("it is a profile")
 }
 

@@ -4,12 +4,9 @@
 //! brakes at 50 %; a limit for perception is ours. The vehicle drives on as soon as the module is back. Left
 //! out: a hang has no cause of its own, it is planted; and no module is restarted or replaced.
 
-use crate::sim::{Control, DT_S, FRAME_S};
+use crate::sim::{Control, DT_S};
 
 use super::config::LatencyConfig;
-
-/// Under the heaviest load perception is later by no more frames than this.
-pub const LOAD_FRAMES_MAX: usize = 5;
 
 #[derive(Debug, Clone)]
 pub struct Watchdog {
@@ -27,8 +24,7 @@ impl Watchdog {
 
     /// How many frames later perception is with so many objects within reach.
     pub fn load_frames(&self, objects: usize) -> usize {
-        let excess = objects.saturating_sub(self.config.budget_objects as usize) as f64;
-        ((excess * self.config.per_object_s / FRAME_S + 0.5) as usize).min(LOAD_FRAMES_MAX)
+        self.config.load_frames(objects)
     }
 
     /// Whether localisation gives a pose at a moment of the drive; to be asked once a tick.
@@ -90,11 +86,9 @@ mod tests {
 
     #[test]
     fn load_makes_late_beyond_the_budget() {
-        let watchdog = Watchdog::new(&LatencyConfig::default());
-        assert_eq!(
-            [0, 12, 16, 17, 22, 32, 500].map(|count| watchdog.load_frames(count)),
-            [0, 0, 0, 1, 1, 2, 5]
-        );
+        let default = LatencyConfig::default();
+        let counts = [0, 12, 16, 17, 22, 32, 500];
+        assert_eq!(counts.map(|count| default.load_frames(count)), [0, 0, 0, 1, 1, 2, 5]);
     }
 
     /// When the degraded mode holds during a drive of 20 s, as the number of ticks and the first of them.

@@ -21,7 +21,7 @@ pub use module::Module;
 pub use read::ConfigError;
 pub use safety::EmergencyConfig;
 pub use sensing::{LocalizationConfig, PerceptionConfig, TrackingConfig};
-pub use timing::LatencyConfig;
+pub use timing::{LOAD_FRAMES_MAX, LatencyConfig};
 pub use weaknesses::Weaknesses;
 
 /// Settings of [`Modular`](super::Modular). Keys that a file leaves out keep their default.

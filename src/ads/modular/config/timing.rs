@@ -1,6 +1,7 @@
 //! Settings of time: how late modules are, and what watches that.
 
 use crate::ads::settings::section;
+use crate::sim::FRAME_S;
 
 section! {
     /// Latency under load, modules that hang, and the watchdog that notices.
@@ -27,5 +28,16 @@ section! {
         trajectory_s_max: f64 = 2.0, 0.0..=60.0;
         /// Brake of the degraded mode, %, in `[0, 100]`. Apollo `soft_estop_brake`: 50.
         brake_pct: f64 = 50.0, 0.0..=100.0;
+    }
+}
+
+/// Under the heaviest load perception is later by no more frames than this.
+pub const LOAD_FRAMES_MAX: usize = 5;
+
+impl LatencyConfig {
+    /// How many frames later perception is with so many objects within reach.
+    pub fn load_frames(&self, objects: usize) -> usize {
+        let excess = objects.saturating_sub(self.budget_objects as usize) as f64;
+        ((excess * self.per_object_s / FRAME_S + 0.5) as usize).min(LOAD_FRAMES_MAX)
     }
 }

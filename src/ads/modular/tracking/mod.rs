@@ -18,9 +18,8 @@ use crate::geometry::Vec2;
 use crate::sim::FRAME_S;
 
 use self::association::Association;
-use super::config::TrackingConfig;
+use super::config::{LOAD_FRAMES_MAX, TrackingConfig};
 use super::perception::Detection;
-use super::watchdog::LOAD_FRAMES_MAX;
 
 pub use track::Track;
 
