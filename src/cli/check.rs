@@ -11,7 +11,7 @@ use crate::trial::places::{self, Scenes};
 
 use super::arguments::{CheckArguments, Dump};
 use super::error::Failure;
-use super::files::write;
+use super::files::write_named;
 use super::load;
 use super::output::Output;
 use super::output::plural;
@@ -98,7 +98,7 @@ fn fix(output: &Output, path: &Path, loaded: &Loaded) -> Result<bool, Failure> {
     let root = FileId::default();
     let (text, made) = apply_fixes(root, loaded.sources.text(root), &loaded.diagnostics);
     if made > 0 {
-        write(path, &text)?;
+        write_named(path, &text)?;
         output.tell(&format!("{}: {} made", path.display(), plural(made, "change")));
     }
     Ok(made > 0)

@@ -8,7 +8,7 @@ use crate::model::{
 
 use super::arguments::DocArguments;
 use super::error::Failure;
-use super::files::write;
+use super::files::write_named;
 use super::load;
 use super::output::Output;
 use super::output::plural;
@@ -19,7 +19,7 @@ pub fn doc(output: &Output, arguments: &DocArguments) -> Result<(), Failure> {
     let text = page(table.space());
     match &arguments.output {
         Some(path) => {
-            write(path, &text)?;
+            write_named(path, &text)?;
             output.tell(&path.display().to_string());
         }
         None => output.say(text.trim_end()),

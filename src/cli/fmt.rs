@@ -7,7 +7,7 @@ use crate::syntax::{FormatError, Sources};
 
 use super::arguments::FmtArguments;
 use super::error::Failure;
-use super::files::write;
+use super::files::write_named;
 use super::load;
 use super::output::Output;
 
@@ -29,7 +29,7 @@ pub fn fmt(output: &Output, arguments: &FmtArguments) -> Result<(), Failure> {
             output.say(formatted.trim_end_matches('\n'));
             texts.push(formatted);
         } else if !is_formatted {
-            write(path, &formatted)?;
+            write_named(path, &formatted)?;
             output.tell(&format!("{}: formatted", path.display()));
         }
     }

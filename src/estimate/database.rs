@@ -2,6 +2,7 @@
 
 use rusqlite::{Connection, OptionalExtension, params};
 
+use crate::files::PlainName;
 use crate::run::{DatabaseError, Layout, Units};
 
 use crate::estimate::part::{Event, Part, PartRecord, Played};
@@ -176,13 +177,13 @@ impl EstimateDatabase {
     /// The files that were written of the events of a part.
     ///
     /// # Errors
-    /// If the file cannot be read.
-    pub fn scenarios(&self, part: i64) -> Result<Vec<String>, DatabaseError> {
+    /// If it cannot be read, or names a file outside of its folder.
+    pub fn scenarios(&self, part: i64) -> Result<Vec<PlainName>, DatabaseError> {
         let mut query = self.connection.prepare_cached(
             "SELECT scenario FROM event WHERE part = ? AND scenario IS NOT NULL ORDER BY event",
         )?;
-        let names = query.query_map([part], |row| row.get(0))?;
-        Ok(names.collect::<Result<_, _>>()?)
+        let names = query.query_map([part], |row| row.get::<_, String>(0))?;
+        names.map(|name| Ok(PlainName::new(name?)?)).collect()
     }
 
     /// All parts so far, in order.

@@ -11,6 +11,7 @@ use sha2::{Digest, Sha256};
 use crate::action::Draw;
 use crate::ads::external::Failure;
 use crate::episode::{EpisodeLog, Outcome};
+use crate::files::PlainName;
 use crate::mdp::STATE_LEN;
 use crate::model::policy::VARIABLES;
 use crate::model::vocabulary::Word;
@@ -138,16 +139,17 @@ impl Database {
     /// The episodes of which a scenario was written: number, road, and the digest of the file.
     ///
     /// # Errors
-    /// If the file cannot be read.
-    pub fn scenarios(&self) -> Result<Vec<(usize, String, String)>, DatabaseError> {
+    /// If the file cannot be read, or a road has a name that no file can have.
+    pub fn scenarios(&self) -> Result<Vec<(usize, PlainName, String)>, DatabaseError> {
         let query =
             "SELECT episode, road, digest FROM scenario JOIN episode USING (episode) ORDER BY episode";
         let mut statement = self.connection.prepare(query)?;
-        let rows = statement.query_map([], |row| Ok((row.get::<_, i64>(0)?, row.get(1)?, row.get(2)?)))?;
+        let rows =
+            statement.query_map([], |row| Ok((row.get::<_, i64>(0)?, row.get::<_, String>(1)?, row.get(2)?)))?;
         rows.map(|row| {
             let (found, road, digest) = row?;
             let episode = usize::try_from(found).map_err(|_| DatabaseError::Episode { found })?;
-            Ok((episode, road, digest))
+            Ok((episode, PlainName::new(road)?, digest))
         })
         .collect()
     }

@@ -12,6 +12,8 @@ use rusqlite::{Connection, OptionalExtension, Row, params};
 use serde_json::{Map, Value};
 use sha2::{Digest, Sha256};
 
+use crate::files;
+use crate::files::NotPlain;
 use crate::model::digest_text;
 
 /// Tables that every layout has.
@@ -39,6 +41,8 @@ pub enum DatabaseError {
         "its {unit} {number} is another than that of the directories before: one of them was not played alike"
     )]
     Differs { unit: &'static str, number: i64 },
+    #[error("{0}: begin a new one")]
+    Name(#[from] NotPlain),
     #[error(transparent)]
     File(#[from] std::io::Error),
     #[error(transparent)]
@@ -84,8 +88,10 @@ impl Layout {
     /// YAML; an older file must have been begun with the same, and be whole.
     ///
     /// # Errors
-    /// If the file cannot be opened, has another layout or other settings, or was damaged or changed.
+    /// If the file cannot be opened, is a link, has another layout or other settings, or was damaged or changed.
     pub fn open(&self, path: &Path, tables: &str, settings: &str) -> Result<Connection, DatabaseError> {
+        // What SQLite writes goes where a link leads.
+        files::own_file(path)?;
         let mut connection = Connection::open(path)?;
         let found: i64 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
         if found == 0 {

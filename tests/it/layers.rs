@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::cases::root;
 
 /// From left to right, as in `src/lib.rs` and ARCHITECTURE.md.
-const ORDER: [&str; 26] = [
+const ORDER: [&str; 27] = [
     "units",
     "rng",
     "statistics",
@@ -22,6 +22,7 @@ const ORDER: [&str; 26] = [
     "agent",
     "episode",
     "oracle",
+    "files",
     "run",
     "estimate",
     "train",
