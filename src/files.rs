@@ -271,7 +271,7 @@ pub fn own_folder(path: &Path) -> Result<()> {
 
 fn own(path: &Path, fits: fn(&Metadata) -> bool, otherwise: &'static str) -> Result<()> {
     match std::fs::symlink_metadata(path) {
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
+        Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Ok(()),
         Err(error) => Err(error),
         Ok(found) if found.is_symlink() => Err(Error::other(LINK)),
         Ok(found) if fits(&found) => Ok(()),

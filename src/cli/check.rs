@@ -46,7 +46,7 @@ pub fn check(output: &Output, arguments: &CheckArguments) -> Result<(), Failure>
             None => None,
         };
         if let Some(dump) = &dump {
-            output.say(&serde_json::to_string_pretty(dump).expect("it is JSON already"));
+            output.document(&serde_json::to_string_pretty(dump).expect("it is JSON already"));
         }
         let audit = table.as_ref().filter(|_| arguments.audit && wrong == 0).map(audit);
         if let Some(audit) = &audit {

@@ -26,7 +26,7 @@ pub fn fmt(output: &Output, arguments: &FmtArguments) -> Result<(), Failure> {
                 output.say(&format!("{}: not formatted", path.display()));
             }
         } else if from_stdin {
-            output.say(formatted.trim_end_matches('\n'));
+            output.document(formatted.trim_end_matches('\n'));
             texts.push(formatted);
         } else if !is_formatted {
             write_named(path, &formatted)?;

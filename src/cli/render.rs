@@ -50,7 +50,7 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
     }
     let svg = picture(&moments, &subject);
     if on_stdout {
-        output.say(svg.trim_end());
+        output.document(svg.trim_end());
     } else {
         write_result(arguments.output.as_ref(), &path, &svg)?;
         output.tell(&path.display().to_string());

@@ -26,7 +26,7 @@ pub fn road(output: &Output, arguments: &RoadArguments) -> Result<(), Failure> {
     let (map, route) = read(output, arguments)?;
     let picture = arguments.svg.as_ref().map(|path| (path, draw(&map, route.as_ref())));
     match &picture {
-        Some((path, svg)) if path.as_path() == Path::new("-") => output.say(svg.trim_end()),
+        Some((path, svg)) if path.as_path() == Path::new("-") => output.document(svg.trim_end()),
         Some((path, svg)) => {
             write_named(path, svg)?;
             output.say(words(&map, route.as_ref()).trim_end());

@@ -237,7 +237,8 @@ pub(super) fn read(line: &[u8], wanted: &str) -> Result<Answer, Broken> {
         return Err(wrong_type(line, wanted));
     }
     let word = word.to_owned();
-    let answer: Answer = serde_json::from_value(value).map_err(|error| {
+    // Read anew, because a `Value` keeps the last of two fields with one name, and this refuses them.
+    let answer: Answer = serde_json::from_slice(line).map_err(|error| {
         let detail = format!("in `{word}`: {error}: {}", shown(line));
         Broken { problem: Problem::WrongShape, detail }
     })?;
@@ -373,6 +374,8 @@ mod tests {
             (r#"{"type":"control","seq":1,"accel":"fast","steer":0}"#, Problem::WrongShape),
             (r#"{"type":"control","seq":1,"steer":0}"#, Problem::WrongShape),
             (r#"{"type":"control","seq":1,"steer":0,"accel":1,"brake":0}"#, Problem::WrongShape),
+            (r#"{"type":"control","seq":1,"seq":2,"steer":0,"accel":1}"#, Problem::WrongShape),
+            (r#"{"type":"control","type":"ready","seq":1,"steer":0,"accel":1}"#, Problem::WrongShape),
             (r#"{"type":"control","seq":1,"steer":0,"throttle":2,"brake":0}"#, Problem::OutOfRange),
             (r#"{"type":"control","seq":1,"steer":30,"accel":1}"#, Problem::OutOfRange),
             (r#"{"type":"error","message":"lost"}"#, Problem::Reported),
