@@ -37,7 +37,7 @@ impl Study {
             }
         }
         // The jobs, and whoever goes on with the study, must meet the same one. One that was not started says nothing new.
-        if !study.settings.external.as_ref().is_some_and(|external| external.is_recorded) {
+        if study.settings.external.as_ref().is_none_or(|external| !external.is_recorded) {
             study.settings.external = attached;
         }
         Ok(study)

@@ -107,7 +107,7 @@ const WRITING: [&str; 13] = [
     "fs::create_dir",
     "fs::hard_link",
     "fs::set_permissions",
-    "fs::symlink",
+    "fs::symlink(",
     "DirBuilder",
     "Connection::open(",
 ];
