@@ -44,6 +44,7 @@ pub mod mdp;
 pub mod agent;
 pub mod episode;
 pub mod oracle;
+pub mod files;
 pub mod run;
 pub mod estimate;
 pub mod train;

@@ -11,7 +11,7 @@ use crate::trial::places::{self, Scenes};
 
 use super::arguments::{CheckArguments, Dump};
 use super::error::Failure;
-use super::files::write;
+use super::files::write_named;
 use super::load;
 use super::output::Output;
 use super::output::plural;
@@ -46,7 +46,7 @@ pub fn check(output: &Output, arguments: &CheckArguments) -> Result<(), Failure>
             None => None,
         };
         if let Some(dump) = &dump {
-            output.say(&serde_json::to_string_pretty(dump).expect("it is JSON already"));
+            output.document(&serde_json::to_string_pretty(dump).expect("it is JSON already"));
         }
         let audit = table.as_ref().filter(|_| arguments.audit && wrong == 0).map(audit);
         if let Some(audit) = &audit {
@@ -98,7 +98,7 @@ fn fix(output: &Output, path: &Path, loaded: &Loaded) -> Result<bool, Failure> {
     let root = FileId::default();
     let (text, made) = apply_fixes(root, loaded.sources.text(root), &loaded.diagnostics);
     if made > 0 {
-        write(path, &text)?;
+        write_named(path, &text)?;
         output.tell(&format!("{}: {} made", path.display(), plural(made, "change")));
     }
     Ok(made > 0)

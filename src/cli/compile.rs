@@ -9,10 +9,13 @@ use crate::trial::{Cell, TrialSettings};
 
 use super::arguments::{CompileArguments, TableArguments};
 use super::error::Failure;
-use super::files::write;
+use super::files::{folder, write, write_result};
 use super::output::Output;
 use super::output::plural;
 use super::{load, trials};
+
+/// The folder of tables that nobody gave another place.
+const FOLDER: &str = "build";
 
 /// The file that names the table for `avastra run` without a space.
 const LAST: &str = "build/last";
@@ -22,11 +25,12 @@ pub fn compile(output: &Output, arguments: &CompileArguments) -> Result<(), Fail
     let table = load::table(output, &arguments.file)?;
     let path = arguments.output.clone().unwrap_or_else(|| {
         let stem = arguments.file.file_stem().unwrap_or_default().to_string_lossy();
-        PathBuf::from(format!("build/{stem}.table.yaml"))
+        Path::new(FOLDER).join(format!("{stem}.table.yaml"))
     });
     let file = table.file();
     let text = serde_yaml::to_string(&file).map_err(|error| Failure::file("write", &path, error))?;
-    write(&path, &text)?;
+    folder(Path::new(""), FOLDER)?;
+    write_result(arguments.output.as_ref(), &path, &text)?;
     write(Path::new(LAST), &format!("{}\n", path.display()))?;
     output.tell(&format!("{}: {} -> {}", arguments.file.display(), size(&table), path.display()));
     output.result(serde_json::json!({ "table": path, "rows": table.rows().len() }));

@@ -12,7 +12,7 @@ use crate::train;
 
 use super::arguments::DistillArguments;
 use super::error::Failure;
-use super::files::write;
+use super::files::write_result;
 use super::load;
 use super::output::{Output, plural};
 use super::progress::Working;
@@ -48,7 +48,7 @@ pub fn distill(output: &Output, arguments: &DistillArguments) -> Result<(), Fail
     let path = arguments.output.clone().unwrap_or_else(|| arguments.file.with_extension("distilled.ava"));
     let folder = path.parent().map_or(PathBuf::new(), PathBuf::from);
     let space_path = load::relative(&folder, &table.space().path)?;
-    write(&path, &emit::policy_text(&policy, table.space(), &space_path))?;
+    write_result(arguments.output.as_ref(), &path, &emit::policy_text(&policy, table.space(), &space_path))?;
     let claims = policy.claims.as_ref();
     if let Some((claims, rules)) = claims.and_then(|claims| Some((claims, claims.rules.as_ref()?))) {
         output.say(&rules_text(policy.rules.len(), claims.return_mean, rules));

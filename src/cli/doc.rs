@@ -8,7 +8,7 @@ use crate::model::{
 
 use super::arguments::DocArguments;
 use super::error::Failure;
-use super::files::write;
+use super::files::write_named;
 use super::load;
 use super::output::Output;
 use super::output::plural;
@@ -19,7 +19,7 @@ pub fn doc(output: &Output, arguments: &DocArguments) -> Result<(), Failure> {
     let text = page(table.space());
     match &arguments.output {
         Some(path) => {
-            write(path, &text)?;
+            write_named(path, &text)?;
             output.tell(&path.display().to_string());
         }
         None => output.say(text.trim_end()),
@@ -32,7 +32,7 @@ fn page(space: &Space) -> String {
     let mut text = String::new();
     let stem = space.path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     // Writing to a String cannot fail.
-    let _ = write!(text, "# {stem}\n\n{}", paragraph(&space.docs));
+    let _ = write!(text, "# {}\n\n{}", tagless(&stem), paragraph(&space.docs));
     let _ = writeln!(text, "## Actions\n\n{}.\n", plural(space.rows.len(), "row"));
     for (index, action) in space.actions.iter().enumerate() {
         action_section(&mut text, space, index, action);
@@ -70,7 +70,7 @@ fn page(space: &Space) -> String {
     }
     text.push_str("## Roads\n\n| road | limit | map | meaning |\n|---|---|---|---|\n");
     for road in &space.roads {
-        let map = road.map_path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let map = cell(&road.map_path.file_name().unwrap_or_default().to_string_lossy());
         let limit = crate::units::decimal((road.facts.limit_mps * 1000.0).round() / 1000.0, false);
         let _ = writeln!(text, "| `{}` | {limit} m/s | {map} | {} |", road.name, inline(&road.docs));
     }
@@ -219,9 +219,41 @@ pub fn unit(ty: Type) -> String {
 }
 
 fn paragraph(docs: &[String]) -> String {
-    if docs.is_empty() { String::new() } else { format!("{}\n\n", docs.join("\n")) }
+    if docs.is_empty() { String::new() } else { format!("{}\n\n", tagless(&docs.join("\n"))) }
 }
 
 fn inline(docs: &[String]) -> String {
-    docs.join(" ").replace('|', "\\|")
+    cell(&docs.join(" "))
+}
+
+/// A text in a cell of a table.
+fn cell(text: &str) -> String {
+    tagless(text).replace('|', "\\|")
+}
+
+/// A text in which no tag of HTML begins. Markdown hands tags on, and whoever reads the page need not trust its space.
+fn tagless(text: &str) -> String {
+    let begins_tag = |next: char| next.is_ascii_alphabetic() || matches!(next, '/' | '!' | '?');
+    let mut safe = String::with_capacity(text.len());
+    let mut rest = text.chars().peekable();
+    while let Some(c) = rest.next() {
+        match c {
+            '<' if rest.peek().is_some_and(|&next| begins_tag(next)) => safe.push_str("&lt;"),
+            c => safe.push(c),
+        }
+    }
+    safe
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_tag_begins_in_a_page() {
+        let hostile = "<script>a</script> <!-- x --> <?php 1 < 2 <= 3 | <";
+        assert_eq!(tagless(hostile), "&lt;script>a&lt;/script> &lt;!-- x --> &lt;?php 1 < 2 <= 3 | <");
+        assert_eq!(cell("a < b | <b>"), "a < b \\| &lt;b>");
+        assert_eq!(paragraph(&["<im".to_owned(), "g>".to_owned()]), "&lt;im\ng>\n\n");
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::arguments::EditorFilesArguments;
 use super::error::Failure;
-use super::files::write;
+use super::files::{make_way, write};
 use super::lsp::editor_files::files;
 use super::output::Output;
 
@@ -11,6 +11,7 @@ pub fn editor_files(output: &Output, arguments: &EditorFilesArguments) -> Result
     let mut paths = Vec::new();
     for (name, text) in files() {
         let path = arguments.directory.join(name);
+        make_way(&arguments.directory, &path)?;
         write(&path, &text)?;
         output.tell(&path.display().to_string());
         paths.push(path);

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use crate::action::ActionTable;
+use crate::ads::external::Attached;
 use crate::estimate::{
     Comparison, ComparisonResults, Estimate, EstimateDatabase, EstimateResults, EstimateSettings, EventKind,
     Found, Mass, Met, Method, PILOT, Part, Pilot, Plan, Played, Probability, Stopping, WrittenScenario,
@@ -30,7 +31,7 @@ use super::{conditions, load, run_directory, shard};
 /// Plays what an estimate still lacks and prints its result.
 pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Failure> {
     let begun = match &arguments.resume {
-        Some(path) => resumed(output, path)?,
+        Some(path) => resumed(output, path, false)?,
         None => {
             let (estimate, shard) = wanted(output, arguments)?;
             if arguments.shard.dry_run {
@@ -54,7 +55,7 @@ pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Fa
 
 /// Ends an estimate whose parts were all played, in shards.
 pub fn conclude(output: &Output, path: &Path) -> Result<(), Failure> {
-    play_all(output, resumed(output, path)?, None)
+    play_all(output, resumed(output, path, true)?, None)
 }
 
 /// Plays the parts that a directory still lacks, and says what all of them came to.
@@ -100,6 +101,9 @@ fn play_all(
         let done: Vec<Part> = database.parts().map_err(unread)?.iter().map(|record| record.part).collect();
         let wanted: Vec<Part> = own.iter().copied().filter(is_at_look).collect();
         let todo: Vec<Part> = wanted.iter().copied().filter(|part| !done.contains(part)).collect();
+        if !todo.is_empty() {
+            run_directory::refuse_to_play(&path, "estimate", is_started(&estimate))?;
+        }
         play_parts(&estimate, &todo, &plan, jobs, &stop, &mut |played| {
             // Such a part says nothing, and is not kept: with a repaired system the estimate can go on.
             if played.record.failed > 0 {
@@ -265,6 +269,11 @@ fn settled(
     database.settle(&file, &kept).map_err(|error| Failure::file("write", &file, error))
 }
 
+/// Whether its driving system can drive other episodes than those that were played.
+fn is_started(estimate: &Estimate) -> bool {
+    estimate.run().program().is_none_or(|program| program.can_start())
+}
+
 /// What the pilot of an estimate saw: kept, or played now. `None` if it was stopped; nothing for a method without one.
 fn piloted(
     output: &Output,
@@ -280,6 +289,7 @@ fn piloted(
     if kept.is_some() {
         return Ok(kept);
     }
+    run_directory::refuse_to_play(file.parent().unwrap_or(file), "estimate", is_started(estimate))?;
     let found = {
         let _working = Working::new(output, "a pilot learns which rows are dangerous");
         pilot(estimate, jobs, stop)
@@ -338,6 +348,10 @@ fn wanted(output: &Output, arguments: &EstimateArguments) -> Result<(Estimate, S
         stopping: Stopping { precision: arguments.precision, hours: arguments.hours },
         run: conditions::settings(table.space(), conditions, &conditions.agent, under_test, episodes)?,
     };
+    let settings = match arguments.shard.dry_run {
+        true => EstimateSettings { run: settings.run.unstarted(), ..settings },
+        false => settings,
+    };
     Ok((Estimate::new(table, settings).map_err(Failure::usage)?, shard))
 }
 
@@ -359,10 +373,14 @@ fn begun(
 }
 
 /// The rest of an interrupted estimate, with the text of its settings.
-fn resumed(output: &Output, path: &Path) -> Result<(Estimate, Held, String), Failure> {
+/// With `is_played`, nothing of it is left to play, and no program is started.
+fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Estimate, Held, String), Failure> {
     let resumed: Resumed<EstimateSettings> = run_directory::resume(output, path, "estimate", "estimate")?;
     let Resumed { settings, text, table, held } = resumed;
-    let external = settings.run.external.map(|attached| run_directory::from_record(path, attached));
+    let external = settings.run.external.map(|attached| Attached {
+        is_recorded: is_played,
+        ..run_directory::from_record(path, attached)
+    });
     let settings = EstimateSettings { run: RunSettings { external, ..settings.run }, ..settings };
     Ok((Estimate::new(table, settings).map_err(Failure::usage)?, held, text))
 }

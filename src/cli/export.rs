@@ -9,7 +9,7 @@ use crate::export::{ExportError, Recording, record};
 
 use super::arguments::{ExportArguments, ExportEgo, ExportFormat, ExportProfile, ExportVersion};
 use super::error::Failure;
-use super::files::{copy_map, write};
+use super::files::{copy_map, folder, make, write};
 use super::load;
 use super::output::{Output, plural};
 use super::parallel::each_file;
@@ -143,6 +143,11 @@ fn write_all(
     target: &Path,
     maps: &Mutex<()>,
 ) -> Result<(Vec<PathBuf>, Vec<String>), Failure> {
+    let into = target.parent().unwrap_or(Path::new(""));
+    match &arguments.out {
+        Some(named) => make(named)?,
+        None => drop(folder(into.parent().unwrap_or(Path::new("")), FOLDER)?),
+    }
     match arguments.to {
         ExportFormat::Openscenario => {
             let name = map_name(&recording.map_path)?;

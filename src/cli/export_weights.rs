@@ -5,7 +5,7 @@ use crate::emit;
 
 use super::arguments::ExportWeightsArguments;
 use super::error::Failure;
-use super::files::write;
+use super::files::write_result;
 use super::load;
 use super::output::Output;
 use super::verify::acting;
@@ -15,7 +15,7 @@ pub fn export_weights(output: &Output, arguments: &ExportWeightsArguments) -> Re
     let (table, policy) = load::policy(output, &arguments.file)?;
     let acting = acting(&table, &policy, Face::Network)?;
     let path = arguments.output.clone().unwrap_or_else(|| arguments.file.with_extension("safetensors"));
-    write(&path, &emit::safetensors(acting.network()))?;
+    write_result(arguments.output.as_ref(), &path, &emit::safetensors(acting.network()))?;
     let (shape, count) = (acting.network().shape(), acting.network().parameters().len());
     let widths: Vec<String> = shape.layers.iter().map(ToString::to_string).collect();
     let head = if shape.dueling { ", and the state's value as the last output" } else { "" };

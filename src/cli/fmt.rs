@@ -7,7 +7,7 @@ use crate::syntax::{FormatError, Sources};
 
 use super::arguments::FmtArguments;
 use super::error::Failure;
-use super::files::write;
+use super::files::write_named;
 use super::load;
 use super::output::Output;
 
@@ -26,10 +26,10 @@ pub fn fmt(output: &Output, arguments: &FmtArguments) -> Result<(), Failure> {
                 output.say(&format!("{}: not formatted", path.display()));
             }
         } else if from_stdin {
-            output.say(formatted.trim_end_matches('\n'));
+            output.document(formatted.trim_end_matches('\n'));
             texts.push(formatted);
         } else if !is_formatted {
-            write(path, &formatted)?;
+            write_named(path, &formatted)?;
             output.tell(&format!("{}: formatted", path.display()));
         }
     }

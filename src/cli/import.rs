@@ -7,6 +7,7 @@ use crate::action::ActionTable;
 use crate::check;
 use crate::check::ReadError;
 use crate::episode::{End, Outcome};
+use crate::files::PlainName;
 use crate::import;
 use crate::import::{Files, Imported, Refusal};
 use crate::model::Scenario;
@@ -14,7 +15,7 @@ use crate::run::Stage;
 
 use super::arguments::ImportArguments;
 use super::error::Failure;
-use super::files::{copy_map, write_new};
+use super::files::{copy_map, folder, make, write_new};
 use super::load;
 use super::output::{Output, plural};
 
@@ -31,7 +32,7 @@ pub fn import(output: &Output, arguments: &ImportArguments) -> Result<(), Failur
     let mut written: BTreeSet<PathBuf> = BTreeSet::new();
     let (mut refused, mut results) = (Vec::new(), Vec::new());
     for (file, target) in arguments.files.iter().zip(targets) {
-        match one(file, &target, arguments.ego.as_deref(), &parameters)? {
+        match one(file, &target, arguments, &parameters)? {
             Ok((imported, map)) => {
                 output.say(&format!("{}: {}", file.display(), target.display()));
                 for note in &imported.notes {
@@ -68,21 +69,28 @@ pub fn import(output: &Output, arguments: &ImportArguments) -> Result<(), Failur
 fn one(
     file: &Path,
     target: &Path,
-    ego: Option<&str>,
+    arguments: &ImportArguments,
     parameters: &BTreeMap<String, String>,
 ) -> Result<Result<(Imported, PathBuf), Vec<Refusal>>, Failure> {
     let text = load::text(file)?;
-    let folder = file.parent().unwrap_or(Path::new(""));
-    let name = file.file_stem().unwrap_or_default().to_string_lossy();
-    let imported = match import::openscenario(&text, &name, ego, parameters, &Beside { folder }) {
+    let beside = file.parent().unwrap_or(Path::new(""));
+    let (name, ego) = (file.file_stem().unwrap_or_default().to_string_lossy(), arguments.ego.as_deref());
+    let imported = match import::openscenario(&text, &name, ego, parameters, &Beside { folder: beside }) {
         Ok(imported) => imported,
         Err(refusals) => return Ok(Err(refusals)),
     };
-    let source = folder.join(slashed(&imported.map));
-    let map = target.with_file_name(source.file_name().unwrap_or_default());
+    let source = beside.join(slashed(&imported.map));
+    // The file names its map: the copy has that name, and must lie beside the scenario.
+    let name = source.file_name().unwrap_or_default().to_string_lossy();
+    let name = PlainName::new(name).map_err(|error| Failure::file("import", file, error))?;
+    let map = target.with_file_name(&*name);
     if let Err(reason) = plays(&imported, target, &map, &source) {
         let refusal = Refusal { line: 1, element: "OpenSCENARIO".to_owned(), reason };
         return Ok(Err(vec![refusal]));
+    }
+    match &arguments.out {
+        Some(named) => make(named)?,
+        None => drop(folder(beside, FOLDER)?),
     }
     copy_map(&source, &map)?;
     match load::read(target) {

@@ -232,7 +232,7 @@ pub struct UnderTest {
 /// If the file cannot be read or is no profile, or the command is none.
 pub fn under_test(ads: &str, config: Option<&Path>, command: Option<&str>) -> Result<UnderTest, Failure> {
     if let Some(settings) = external(config, command)? {
-        let external = Some(Attached { identity: None, settings });
+        let external = Some(Attached { identity: None, settings, is_recorded: false });
         return Ok(UnderTest { ads: EXTERNAL.to_owned(), profile: None, external });
     }
     let settings = match config {

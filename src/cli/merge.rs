@@ -13,6 +13,7 @@
 //! meant; then it is ended. A merge that was killed in between is ended by the next one.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::OsStr;
 use std::path::{Component, Path, PathBuf};
 
 use serde::Serialize;
@@ -20,6 +21,8 @@ use serde::de::DeserializeOwned;
 
 use crate::ads::external::Attached;
 use crate::estimate::{EstimateDatabase, EstimateSettings, WrittenScenario};
+use crate::files;
+use crate::files::PlainName;
 use crate::run::{
     Database, DatabaseError, Numbered, PolicyReference, RunSettings, Shard, Units, settings_differences,
 };
@@ -29,7 +32,7 @@ use crate::syntax::{parse, print_expr};
 
 use super::arguments::{Format, MergeArguments};
 use super::error::Failure;
-use super::files::{remove, write};
+use super::files::{folder, make, remove, write};
 use super::output::{Output, plural};
 use super::timing::Times;
 use super::{estimate, load, pack, run, run_directory, shard, study, timing};
@@ -281,13 +284,15 @@ impl Survey {
 fn begin_partial(out: &Path) -> Result<PathBuf, Failure> {
     let mut name = out.file_name().ok_or_else(|| Failure::usage("`--out` needs a name"))?.to_owned();
     name.push(".partial");
-    let partial = out.with_file_name(name);
-    if partial.join(MARK).exists() {
+    let beside = out.parent().unwrap_or(Path::new(""));
+    make(beside)?;
+    let partial = folder(beside, &name)?;
+    if partial.join(MARK).is_file() {
         discard(&partial)?;
+        folder(beside, &name)?;
     }
-    let failed = |error| Failure::file("create", &partial, error);
-    std::fs::create_dir_all(&partial).map_err(failed)?;
-    if std::fs::read_dir(&partial).map_err(failed)?.next().is_some() {
+    let unread = |error| Failure::file("read", &partial, error);
+    if std::fs::read_dir(&partial).map_err(unread)?.next().is_some() {
         return Err(Failure::usage(format!(
             "`{}` is in the way: a merge is written there before it has its name",
             partial.display()
@@ -301,14 +306,14 @@ fn begin_partial(out: &Path) -> Result<PathBuf, Failure> {
 fn discard(partial: &Path) -> Result<(), Failure> {
     let failed = |error| Failure::file("remove", partial, error);
     for entry in std::fs::read_dir(partial).map_err(failed)? {
-        let path = entry.map_err(failed)?.path();
-        if path.file_name().is_some_and(|name| name == MARK) {
+        let entry = entry.map_err(failed)?;
+        if entry.file_name() == MARK {
             continue;
         }
-        if path.is_dir() { std::fs::remove_dir_all(&path) } else { std::fs::remove_file(&path) }
-            .map_err(failed)?;
+        let (path, is_folder) = (entry.path(), entry.file_type().map_err(failed)?.is_dir());
+        if is_folder { files::remove_all(&path) } else { files::remove(&path) }.map_err(failed)?;
     }
-    std::fs::remove_dir_all(partial).map_err(failed)
+    files::remove_all(partial).map_err(failed)
 }
 
 /// Writes settings, database and scenarios.
@@ -344,9 +349,8 @@ fn publish<C: Cut>(
     resumed(&Output::of(Format::Sarif)).or_else(|_| resumed(output))?;
     if !out.exists() || std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_none()) {
         // In this order: a kill in between leaves a whole directory, and not a partial one that nobody would take up.
-        std::fs::rename(partial, out).map_err(|error| Failure::file("write", out, error))?;
-        let mark = out.join(MARK);
-        return std::fs::remove_file(&mark).map_err(|error| Failure::file("remove", &mark, error));
+        files::rename(partial, out).map_err(|error| Failure::file("write", out, error))?;
+        return remove(&out.join(MARK));
     }
     // In JSON, a command prints at its end, which this has not.
     let silent = Output::of(Format::Json);
@@ -392,8 +396,10 @@ fn files_of(directory: &Path) -> Result<BTreeMap<PathBuf, PathBuf>, Failure> {
     while let Some(folder) = open.pop() {
         let failed = |error| Failure::file("read", &folder, error);
         for entry in std::fs::read_dir(&folder).map_err(failed)? {
-            let path = entry.map_err(failed)?.path();
-            if path.is_dir() {
+            let entry = entry.map_err(failed)?;
+            let path = entry.path();
+            // A link is not followed: links may go in a circle.
+            if entry.file_type().map_err(failed)?.is_dir() {
                 open.push(path);
             } else {
                 let name = path.strip_prefix(directory).expect("it is below").to_owned();
@@ -482,9 +488,16 @@ impl Way<'_> {
         self.moved(path, &self.outside.space)
     }
 
+    /// The driving system is not started here, so the folder that it is started in need not be on this machine.
     fn external(&self, external: Option<Attached>) -> Result<Option<Attached>, Failure> {
-        let moved =
-            |external| run_directory::to_record(self.to, run_directory::from_record(self.from, external));
+        let moved = |external| {
+            let attached = run_directory::from_record(self.from, external);
+            let is_absent = attached.settings.working_directory.as_ref().is_some_and(|place| !place.is_dir());
+            match is_absent {
+                true => run_directory::to_record_absent(self.to, attached),
+                false => run_directory::to_record(self.to, attached),
+            }
+        };
         external.map(moved).transpose()
     }
 
@@ -501,32 +514,40 @@ impl Way<'_> {
         })
     }
 
-    /// The same way, in folders of the two directories.
-    fn within(&self, folder: &str) -> [PathBuf; 2] {
-        [self.from, self.to].map(|directory| directory.join(folder))
+    /// The same way, in folders of the two directories. That of the first may be missing, and must be no link.
+    fn within(&self, folder: &str) -> Result<[PathBuf; 2], Failure> {
+        let [from, to] = [self.from, self.to].map(|directory| directory.join(folder));
+        files::own_folder(&from).map_err(|error| Failure::file("merge", &from, error))?;
+        Ok([from, to])
     }
 }
 
 /// Writes a scenario of another directory, with what lies beside it there, and gives its text. What it uses is named by a path
 /// from the file.
-fn copy_scenario(name: &str, text: &str, way: &Way) -> Result<String, Failure> {
+fn copy_scenario(name: &PlainName, text: &str, way: &Way) -> Result<String, Failure> {
     let text = moved_scenario(text, way)?;
     copy_text(&way.to.join(name), &text)?;
     let answers = load::answers_path(&way.from.join(name));
     if answers.is_file() {
-        copy_text(&load::answers_path(&way.to.join(name)), &load::text(&answers)?)?;
+        copy_text(&load::answers_path(&way.to.join(name)), &own_text(&answers)?)?;
     }
     Ok(text)
 }
 
 /// As [`copy_scenario`], of a scenario whose text stands in the database; says so if its file was edited.
-fn copy_written(output: &Output, name: &str, text: &str, way: &Way) -> Result<String, Failure> {
+fn copy_written(output: &Output, name: &PlainName, text: &str, way: &Way) -> Result<String, Failure> {
     let file = (way.from.join(name), text.to_owned());
     if run_directory::is_edited(&file) {
         let path = file.0.display();
         output.warn(&format!("{path} was edited since it was written: what was written is taken"));
     }
     copy_scenario(name, text, way)
+}
+
+/// The text of a file that lies in a shard and is no link to one outside.
+fn own_text(file: &Path) -> Result<String, Failure> {
+    files::own_file(file).map_err(|error| Failure::file("merge", file, error))?;
+    load::text(file)
 }
 
 /// Writes a text where none is; one that is there must be the same.
@@ -553,15 +574,17 @@ fn moved_scenario(text: &str, way: &Way) -> Result<String, Failure> {
     Ok(moved)
 }
 
-/// Copies a folder with all that is in it.
-fn copy_folder(from: &Path, to: &Path) -> Result<(), Failure> {
-    let failed = |error| Failure::file("read", from, error);
-    for entry in std::fs::read_dir(from).map_err(failed)? {
+/// Copies the folder of a name with all that is in it.
+fn copy_folder(name: &OsStr, [from, to]: [&Path; 2]) -> Result<(), Failure> {
+    let (from, to) = (from.join(name), folder(to, name)?);
+    let failed = |error| Failure::file("merge", &from, error);
+    files::own_folder(&from).map_err(failed)?;
+    for entry in std::fs::read_dir(&from).map_err(failed)? {
         let entry = entry.map_err(failed)?;
-        let (path, target) = (entry.path(), to.join(entry.file_name()));
-        match path.is_dir() {
-            true => copy_folder(&path, &target)?,
-            false => copy_text(&target, &load::text(&path)?)?,
+        let name = entry.file_name();
+        match entry.file_type().map_err(failed)?.is_dir() {
+            true => copy_folder(&name, [&from, &to])?,
+            false => copy_text(&to.join(&name), &own_text(&entry.path())?)?,
         }
     }
     Ok(())
@@ -598,30 +621,32 @@ impl Cut for RunSettings {
         shard: &Played<RunSettings>,
         way: &Way,
     ) -> Result<(), Failure> {
-        let [from, to] = way.within("critical");
-        std::fs::create_dir_all(&to).map_err(|error| Failure::file("create", &to, error))?;
+        let [from, to] = way.within("critical")?;
+        folder(way.to, "critical")?;
         let critical = Way { from: &from, to: &to, ..*way };
-        let space = from.join(pack::SPACE);
-        if space.is_dir() {
-            copy_folder(&space, &to.join(pack::SPACE))?;
+        if from.join(pack::SPACE).is_dir() {
+            copy_folder(OsStr::new(pack::SPACE), [&from, &to])?;
         }
         let database = shard.database.iter().map(Database::scenarios).next();
         let written = database.transpose().map_err(|error| Failure::file("read", &shard.file(), error))?;
         let mut scenarios = Vec::new();
         for (episode, road, text) in written.unwrap_or_default() {
-            let name = format!("{}.ava", run_directory::scenario_name(&road, episode));
+            let name = PlainName::new(format!("{}.ava", run_directory::scenario_name(&road, episode)));
+            let name = name.map_err(|error| Failure::file("merge", &shard.file(), error))?;
             scenarios.push((episode, copy_written(output, &name, &text, &critical)?));
         }
-        let [from, to] = way.within("failures");
+        let [from, to] = way.within("failures")?;
         let failures = Way { from: &from, to: &to, ..*way };
         if from.is_dir() {
+            folder(way.to, "failures")?;
             let failed = |error| Failure::file("read", &from, error);
             for entry in std::fs::read_dir(&from).map_err(failed)? {
                 let path = entry.map_err(failed)?.path();
-                let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-                match path.extension().and_then(std::ffi::OsStr::to_str) {
-                    Some("ava") => drop(copy_scenario(&name, &load::text(&path)?, &failures)?),
-                    Some("txt") => copy_text(&to.join(name), &load::text(&path)?)?,
+                let name = PlainName::new(path.file_name().unwrap_or_default().to_string_lossy());
+                let name = name.map_err(|error| Failure::file("merge", &path, error))?;
+                match path.extension().and_then(OsStr::to_str) {
+                    Some("ava") => drop(copy_scenario(&name, &own_text(&path)?, &failures)?),
+                    Some("txt") => copy_text(&to.join(name), &own_text(&path)?)?,
                     _ => {}
                 }
             }
@@ -715,8 +740,8 @@ impl Cut for EstimateSettings {
         shard: &Played<EstimateSettings>,
         way: &Way,
     ) -> Result<(), Failure> {
-        let [from, to] = way.within("critical");
-        std::fs::create_dir_all(&to).map_err(|error| Failure::file("create", &to, error))?;
+        let [from, to] = way.within("critical")?;
+        folder(way.to, "critical")?;
         let critical = Way { from: &from, to: &to, ..*way };
         let written = shard.database.iter().map(EstimateDatabase::scenarios).next();
         let written = written.transpose().map_err(|error| Failure::file("read", &shard.file(), error))?;

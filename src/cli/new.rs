@@ -10,7 +10,7 @@ use crate::road::{RoadMap, propose};
 
 use super::arguments::NewArguments;
 use super::error::Failure;
-use super::files::write;
+use super::files::{make_way, write_new};
 use super::load;
 use super::output::Output;
 
@@ -77,11 +77,12 @@ pub fn new(output: &Output, arguments: &NewArguments) -> Result<(), Failure> {
         (None, None) => STARTER.map(|(name, text)| (name.to_owned(), text.to_owned())).to_vec(),
     };
     let paths: Vec<_> = files.iter().map(|(name, text)| (arguments.directory.join(name), text)).collect();
-    if let Some((path, _)) = paths.iter().find(|(path, _)| path.exists()) {
+    if let Some((path, _)) = paths.iter().find(|(path, _)| path.exists() || path.is_symlink()) {
         return Err(Failure::usage(format!("`{}` exists: name another directory", path.display())));
     }
     for (path, text) in &paths {
-        write(path, text.as_str())?;
+        make_way(&arguments.directory, path)?;
+        write_new(path, text)?;
         output.tell(&path.display().to_string());
     }
     let space = paths[0].0.display().to_string();

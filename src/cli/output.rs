@@ -4,7 +4,7 @@ use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::sync::Mutex;
 
-use crate::syntax::{Diagnostic, DiagnosticRecord, Sources, Style};
+use crate::syntax::{Diagnostic, DiagnosticRecord, Sources, Style, visible};
 
 use super::arguments::{Format, OutputArguments, When};
 use super::error::Failure;
@@ -115,19 +115,21 @@ impl Output {
 
     /// One of several failures of a command, on stderr; JSON has it in the result.
     pub fn fault(&self, failure: &Failure) {
-        match (self.is_json(), self.colour) {
-            (true, _) => {}
-            (false, true) => remark(&format!("\x1b[1;31merror\x1b[0m: {failure}")),
-            (false, false) => remark(&format!("error: {failure}")),
-        }
+        self.head("error", "31", &failure.to_string());
     }
 
     /// What the user should know though the command does not fail, on stderr; JSON has it in the result.
     pub fn warn(&self, text: &str) {
+        self.head("warning", "33", text);
+    }
+
+    /// A text after a word in a colour, on stderr.
+    fn head(&self, word: &str, colour: &str, text: &str) {
+        let text = visible(text);
         match (self.is_json(), self.colour) {
             (true, _) => {}
-            (false, true) => remark(&format!("\x1b[1;33mwarning\x1b[0m: {text}")),
-            (false, false) => remark(&format!("warning: {text}")),
+            (false, true) => drawn(&format!("\x1b[1;{colour}m{word}\x1b[0m: {text}")),
+            (false, false) => drawn(&format!("{word}: {text}")),
         }
     }
 
@@ -164,6 +166,11 @@ impl Output {
 
     /// Text for people on stdout; nothing in JSON.
     pub fn say(&self, text: &str) {
+        self.document(&visible(text));
+    }
+
+    /// A text that a program may read, as it is: a source, a picture or JSON; nothing in JSON, whose result has it.
+    pub fn document(&self, text: &str) {
         if !self.is_json() && !self.is_sarif() {
             self.print(text);
         }
@@ -193,10 +200,10 @@ impl Output {
             } else if self.is_json() {
                 let record = crate::syntax::record(diagnostic, sources);
                 let line = serde_json::to_string(&record).expect("records have string keys only");
-                remark(&line);
+                drawn(&line);
             } else {
                 let style = if self.colour { Style::Human } else { Style::Plain };
-                remark(&format!("{}\n", crate::syntax::render(diagnostic, sources, style).trim_end()));
+                drawn(&format!("{}\n", crate::syntax::render(diagnostic, sources, style).trim_end()));
             }
         }
     }
@@ -230,8 +237,14 @@ pub fn unless_closed(error: std::io::Error) -> std::io::Result<()> {
     if error.kind() == std::io::ErrorKind::BrokenPipe { Ok(()) } else { Err(error) }
 }
 
-/// A line on stderr. If it is lost, there is no place left to say so; the exit status says what is wrong.
+/// A line on stderr.
 pub fn remark(text: &str) {
+    drawn(&visible(text));
+}
+
+/// A line on stderr in which nothing acts on a terminal that is not meant to. If it is lost, there is no place left to say so;
+/// the exit status says what is wrong.
+fn drawn(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }
 

@@ -7,12 +7,13 @@ use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
 use crate::check::{Loaded, LoadedFile, WrittenPath, normal};
+use crate::files;
 use crate::syntax::ast::{Expr, ExprKind, FileId};
 use crate::syntax::print_expr;
 
 use super::arguments::PackArguments;
 use super::error::Failure;
-use super::files::write;
+use super::files::{make_way, write};
 use super::load;
 use super::output::{Output, plural};
 
@@ -41,7 +42,7 @@ pub fn pack(output: &Output, arguments: &PackArguments) -> Result<(), Failure> {
             packed.push(target);
         }
     }
-    plan.carry_out(&|| packed.iter().try_for_each(|target| load::load(output, target).map(drop)))?;
+    plan.carry_out(folder, &|| packed.iter().try_for_each(|target| load::load(output, target).map(drop)))?;
     output.say(&format!("{}: {} with all that they use", folder.display(), plural(packed.len(), "file")));
     output.result(serde_json::json!({ "directory": folder, "files": packed }));
     Ok(())
@@ -54,7 +55,7 @@ pub fn pack_space(output: &Output, space: &Path, folder: &Path) -> Result<PathBu
     let moves = moves(&loaded, folder)?;
     let mut plan = Plan::default();
     plan.copy(&loaded, &moves)?;
-    plan.carry_out(&|| Ok(()))?;
+    plan.carry_out(folder, &|| Ok(()))?;
     Ok(moves[&space].clone())
 }
 
@@ -113,23 +114,23 @@ impl Plan {
         Ok(())
     }
 
-    /// Writes what is not there yet. If that fails, or the check of it afterwards, what was written is removed.
-    fn carry_out(&self, check: &dyn Fn() -> Result<(), Failure>) -> Result<(), Failure> {
-        let (mut files, mut folders) = (Vec::new(), Vec::new());
-        let written = self.texts.iter().filter(|(path, _)| !path.exists()).try_for_each(|(path, text)| {
+    /// Writes what is not there yet below the folder that can be moved. If that fails, or the check of it afterwards, what
+    /// was written is removed.
+    fn carry_out(&self, folder: &Path, check: &dyn Fn() -> Result<(), Failure>) -> Result<(), Failure> {
+        let (mut written, mut folders) = (Vec::new(), Vec::new());
+        let done = self.texts.iter().filter(|(path, _)| !path.exists()).try_for_each(|(path, text)| {
             let missing = path
                 .ancestors()
                 .skip(1)
                 .take_while(|folder| !folder.as_os_str().is_empty() && !folder.exists());
             folders.extend(missing.map(Path::to_owned));
-            files.push(path);
-            write(path, text)
+            make_way(folder, path).and_then(|()| write(path, text)).map(|()| written.push(path))
         });
-        written.and_then(|()| check()).inspect_err(|_| {
+        done.and_then(|()| check()).inspect_err(|_| {
             // What cannot be removed either is left: the failure is told.
-            files.iter().for_each(|file| drop(std::fs::remove_file(file)));
+            written.iter().for_each(|file| drop(files::remove(file)));
             folders.sort_by_key(|folder| core::cmp::Reverse(folder.components().count()));
-            folders.iter().for_each(|folder| drop(std::fs::remove_dir(folder)));
+            folders.iter().for_each(|folder| drop(files::remove_empty(folder)));
         })
     }
 }

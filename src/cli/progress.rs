@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::syntax::visible;
 use crate::train::TrainedEpisode;
 
 use super::output::{Output, Telling, plural, remark};
@@ -88,7 +89,7 @@ impl Working {
     pub fn new(output: &Output, doing: impl Into<String>) -> Working {
         let bar = (output.telling() == Telling::Bar).then(|| {
             let style = ProgressStyle::with_template("{spinner} {elapsed}, {wide_msg}");
-            let bar = ProgressBar::new_spinner().with_message(doing.into());
+            let bar = ProgressBar::new_spinner().with_message(visible(&doing.into()).into_owned());
             bar.set_style(style.expect("a fixed template"));
             bar.enable_steady_tick(Duration::from_millis(200));
             bar

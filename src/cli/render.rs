@@ -12,7 +12,7 @@ use crate::sim::{DT_S, World};
 
 use super::arguments::RenderArguments;
 use super::error::Failure;
-use super::files::{must_end_in, write};
+use super::files::{must_end_in, write_result};
 use super::load;
 use super::output::Output;
 
@@ -50,9 +50,9 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
     }
     let svg = picture(&moments, &subject);
     if on_stdout {
-        output.say(svg.trim_end());
+        output.document(svg.trim_end());
     } else {
-        write(&path, &svg)?;
+        write_result(arguments.output.as_ref(), &path, &svg)?;
         output.tell(&path.display().to_string());
     }
     let svg = on_stdout.then_some(svg);

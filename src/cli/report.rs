@@ -14,7 +14,7 @@ use crate::study::StudyResults;
 
 use super::arguments::{FilesArguments, ReportArguments};
 use super::error::Failure;
-use super::files::{must_end_in, write};
+use super::files::{must_end_in, write_result};
 use super::load;
 use super::output::{Output, plural};
 use super::parallel::{PerFile, each_file};
@@ -85,7 +85,7 @@ pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failur
     let compared_with = arguments.compare.clone();
     let page = Page { title, overview: found.overview, remarks, scenes, compared_with };
     let html = page.html();
-    write(&path, &html)?;
+    write_result(arguments.output.as_ref(), &path, &html)?;
     output.say(&format!(
         "{}: {}, {:.1} MB; open it with a browser",
         path.display(),

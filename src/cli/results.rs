@@ -8,7 +8,7 @@ use crate::study::Played;
 
 use super::arguments::ResultsArguments;
 use super::error::Failure;
-use super::files::write;
+use super::files::{write, write_named};
 use super::load;
 use super::output::{Output, plural};
 use super::study;
@@ -40,7 +40,7 @@ pub fn results(output: &Output, arguments: &ResultsArguments) -> Result<(), Fail
         chapter.played = Some(played);
     }
     let folder = arguments.studies.to_string_lossy();
-    write(&arguments.out, &report::results(folder.trim_end_matches('/'), &chapters))?;
+    write_named(&arguments.out, &report::results(folder.trim_end_matches('/'), &chapters))?;
     let there = chapters.iter().filter(|chapter| chapter.played.is_some()).count();
     output.say(&format!("{}: {there} of {} studies are played", arguments.out.display(), chapters.len()));
     let listed = chapters.iter().map(|chapter| {

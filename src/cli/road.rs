@@ -13,7 +13,7 @@ use crate::road::{Lane, LaneIndex, LaneKey, LanePlace, Neighbour, RoadMap, Route
 
 use super::arguments::RoadArguments;
 use super::error::Failure;
-use super::files::write;
+use super::files::write_named;
 use super::load;
 use super::output::Output;
 use super::output::plural;
@@ -26,9 +26,9 @@ pub fn road(output: &Output, arguments: &RoadArguments) -> Result<(), Failure> {
     let (map, route) = read(output, arguments)?;
     let picture = arguments.svg.as_ref().map(|path| (path, draw(&map, route.as_ref())));
     match &picture {
-        Some((path, svg)) if path.as_path() == Path::new("-") => output.say(svg.trim_end()),
+        Some((path, svg)) if path.as_path() == Path::new("-") => output.document(svg.trim_end()),
         Some((path, svg)) => {
-            write(path, svg)?;
+            write_named(path, svg)?;
             output.say(words(&map, route.as_ref()).trim_end());
         }
         None => output.say(words(&map, route.as_ref()).trim_end()),

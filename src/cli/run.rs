@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use crate::action::ActionTable;
-use crate::ads::external::{Conversation, Problem};
+use crate::ads::external::{Attached, Conversation, Problem};
 use crate::agent::Face;
 use crate::emit;
 use crate::episode::EpisodeLog;
@@ -36,7 +36,7 @@ const NAMED_MAX: usize = 10;
 /// Plays the episodes of a new run, or those that an interrupted one still lacks.
 pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     let (run, directory) = match &arguments.resume {
-        Some(path) => resumed(output, path)?,
+        Some(path) => resumed(output, path, false)?,
         None => {
             let wanted = wanted(output, arguments)?;
             if arguments.shard.dry_run {
@@ -63,7 +63,7 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
 
 /// Ends a run whose episodes were all played, in shards.
 pub fn conclude(output: &Output, path: &Path) -> Result<(), Failure> {
-    let (run, directory) = resumed(output, path)?;
+    let (run, directory) = resumed(output, path, true)?;
     play_all(output, run, directory, None).map(drop)
 }
 
@@ -80,6 +80,10 @@ fn play_all(
     let own = shard.share(&vec![1; run.episodes()]);
     let done = directory.database.episodes().map_err(unread)?;
     let todo: Vec<usize> = own.iter().copied().filter(|number| !done.contains(number)).collect();
+    if !todo.is_empty() {
+        let is_started = run.program().is_none_or(|program| program.can_start());
+        run_directory::refuse_to_play(&path, "run", is_started)?;
+    }
 
     let stop = stop_on_interrupt();
     #[allow(clippy::disallowed_methods, reason = "this is cli, and the time goes nowhere but the summary")]
@@ -174,6 +178,7 @@ fn wanted(output: &Output, arguments: &RunArguments) -> Result<Wanted, Failure> 
     let under_test = conditions::named(&arguments.under_test)?;
     let settings = conditions::settings(space, &arguments.conditions, agent, under_test, arguments.episodes)?;
     let settings = RunSettings { causes: arguments.causes, ..settings };
+    let settings = if arguments.shard.dry_run { settings.unstarted() } else { settings };
     let face = match arguments.face {
         FaceArgument::Network => Face::Network,
         FaceArgument::Rules => Face::Rules,
@@ -207,11 +212,14 @@ fn begun(output: &Output, arguments: &RunArguments, wanted: Wanted) -> Result<(R
     Ok((run, RunDirectory::open(held, &text)?))
 }
 
-/// The rest of an interrupted run.
-fn resumed(output: &Output, path: &Path) -> Result<(Run, RunDirectory), Failure> {
+/// The rest of an interrupted run. With `is_played`, nothing of it is left to play, and no program is started.
+fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Run, RunDirectory), Failure> {
     let resumed: Resumed<RunSettings> = run_directory::resume(output, path, "run", "run")?;
     let Resumed { settings, text, table, held } = resumed;
-    let external = settings.external.map(|attached| run_directory::from_record(path, attached));
+    let external = settings.external.map(|attached| Attached {
+        is_recorded: is_played,
+        ..run_directory::from_record(path, attached)
+    });
     let settings = RunSettings { external, ..settings };
     let policy = match &settings.policy {
         None => None,
@@ -229,7 +237,9 @@ fn resumed(output: &Output, path: &Path) -> Result<(Run, RunDirectory), Failure>
     let face = settings.policy.as_ref().map_or(Face::Network, |reference| reference.face);
     let run = ready(table, settings, policy.as_ref(), face)?;
     let directory = RunDirectory::open_to_go_on(output, held, &text)?;
-    restore(output, &run, &directory)?;
+    if !is_played {
+        restore(output, &run, &directory)?;
+    }
     Ok((run, directory))
 }
 

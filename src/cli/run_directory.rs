@@ -13,18 +13,24 @@ use std::path::{Path, PathBuf};
 
 use crate::action::ActionTable;
 use crate::ads::external::{Attached, ExternalSettings};
+use crate::check::normal;
 use crate::emit;
 use crate::episode::EpisodeLog;
 use crate::estimate::PILOT;
+use crate::files;
+use crate::files::PlainName;
 use crate::run::{Database, EpisodeSummary, Units, VERSION};
 use crate::sim::ENGINE;
 use crate::syntax::yaml_mistake;
 
 use super::error::Failure;
-use super::files::{write, write_answers};
+use super::files::{folder, make, write, write_answers};
 use super::load;
 use super::output::{Output, plural};
-use super::pack;
+use super::{pack, shard};
+
+/// The folders that a run, a training or an estimate writes into.
+const FOLDERS: [&str; 3] = ["critical", "failures", "policy"];
 
 /// A directory that no other process works in while this lives.
 pub struct Held {
@@ -51,8 +57,7 @@ pub fn create_empty(out: Option<&Path>) -> Result<Held, Failure> {
 /// Makes a run directory, with `critical/` for its scenarios.
 pub fn create(out: Option<&Path>) -> Result<Held, Failure> {
     let held = create_empty(out)?;
-    let critical = held.path.join("critical");
-    std::fs::create_dir_all(&critical).map_err(|error| Failure::file("create", &critical, error))?;
+    folder(&held.path, "critical")?;
     Ok(held)
 }
 
@@ -89,6 +94,21 @@ pub fn write_settings(
 pub fn to_record(directory: &Path, attached: Attached) -> Result<Attached, Failure> {
     let folder = attached.settings.working_directory.as_deref().unwrap_or(Path::new("."));
     let working_directory = Some(PathBuf::from(load::relative(directory, folder)?));
+    Ok(Attached { settings: ExternalSettings { working_directory, ..attached.settings }, ..attached })
+}
+
+/// The same where the working directory is missing: the paths are compared by their names alone.
+///
+/// # Errors
+/// If this process has no folder that it works in.
+pub fn to_record_absent(directory: &Path, attached: Attached) -> Result<Attached, Failure> {
+    let absolute = |path: &Path| {
+        let found = std::path::absolute(path).map_err(|error| Failure::file("find", path, error));
+        found.map(|path| normal(&path))
+    };
+    let folder = attached.settings.working_directory.as_deref().unwrap_or(Path::new("."));
+    let between = load::path_between(&absolute(directory)?, &absolute(folder)?)?;
+    let working_directory = Some(PathBuf::from(between));
     Ok(Attached { settings: ExternalSettings { working_directory, ..attached.settings }, ..attached })
 }
 
@@ -140,6 +160,7 @@ pub fn resume<S: serde::de::DeserializeOwned>(
         )));
     }
     let held = hold(directory)?;
+    tidy(directory)?;
     // The scenarios of a run whose database is lost cannot be told from new ones.
     let database = directory.join(format!("{kind}.db"));
     let left = load::sources_in(&directory.join("critical")).unwrap_or_default();
@@ -171,6 +192,35 @@ pub fn resume<S: serde::de::DeserializeOwned>(
         )));
     }
     Ok(Resumed { settings, text, table, held })
+}
+
+/// Makes sure that nothing is written through a link when a directory is gone on with, and removes what a kill left half
+/// written.
+fn tidy(directory: &Path) -> Result<(), Failure> {
+    let swept = |folder: &Path| files::sweep(folder).map_err(|error| Failure::file("tidy", folder, error));
+    swept(directory)?;
+    for name in FOLDERS {
+        let folder = directory.join(name);
+        files::own_folder(&folder).map_err(|error| Failure::file("use", &folder, error))?;
+        if folder.is_dir() {
+            swept(&folder)?;
+        }
+    }
+    Ok(())
+}
+
+/// Refuses to play the rest of a directory with a driving system that was not started, because all was said to be played.
+pub fn refuse_to_play(directory: &Path, command: &str, is_started: bool) -> Result<(), Failure> {
+    match is_started {
+        true => Ok(()),
+        false => {
+            let directory = directory.display();
+            Err(Failure::usage(format!(
+                "`{directory}` is not played to the end, and no program that a file names is started for that: look at its \
+                 settings, then go on with `avastra {command} --resume {directory}`"
+            )))
+        }
+    }
 }
 
 /// The settings in the file `KIND.yaml` and their text, if they were written by this version of avastra.
@@ -314,7 +364,7 @@ impl RunDirectory {
     pub fn written(&self) -> Result<Vec<(usize, WrittenFile)>, Failure> {
         let scenarios =
             self.database.scenarios().map_err(|error| Failure::file("read", &self.path, error))?;
-        let with_path = |(episode, road, text): (usize, String, String)| {
+        let with_path = |(episode, road, text): (usize, PlainName, String)| {
             (episode, (self.critical(&road, episode), text))
         };
         Ok(scenarios.into_iter().map(with_path).collect())
@@ -331,8 +381,7 @@ impl RunDirectory {
         [without, with]: [&[String]; 2],
     ) -> Result<(), Failure> {
         let Some(failure) = &log.failure else { return Ok(()) };
-        let folder = self.path.join("failures");
-        std::fs::create_dir_all(&folder).map_err(|error| Failure::file("create", &folder, error))?;
+        let folder = folder(&self.path, "failures")?;
         let name = format!("{}_{:04}", log.road, summary.episode);
         let space_path = load::relative(&folder, &table.space().path)?;
         let (name, space_path, episode) = (name.as_str(), space_path.as_str(), summary.episode);
@@ -395,7 +444,7 @@ pub fn scenario_name(road: &str, episode: usize) -> String {
 }
 
 fn make_empty(path: &Path) -> Result<Held, Failure> {
-    std::fs::create_dir_all(path).map_err(|error| Failure::file("create", path, error))?;
+    make(path)?;
     let held = hold(path)?;
     if !is_unbegun(path).map_err(|error| Failure::file("read", path, error))? {
         return Err(Failure::usage(format!(
@@ -421,12 +470,15 @@ pub fn refuse_used(out: Option<&Path>) -> Result<(), Failure> {
 /// Whether a directory is empty but for what a kill leaves before the settings are written.
 pub fn is_unbegun(path: &Path) -> std::io::Result<bool> {
     for entry in std::fs::read_dir(path)? {
-        let name = entry?.file_name();
+        let entry = entry?;
+        let name = entry.file_name();
+        let settings = ["run.yaml", "study.yaml", "estimate.yaml", shard::FILE];
         let is_left = match name.to_str() {
-            Some("run.yaml.partial" | "study.yaml.partial" | "estimate.yaml.partial") => true,
-            Some("shard.yaml" | "shard.yaml.partial") => true,
-            Some("critical") => {
-                let inside: Vec<_> = std::fs::read_dir(path.join(name))?.collect::<Result<_, _>>()?;
+            Some(shard::FILE) => true,
+            Some(name) if settings.iter().any(|of| files::is_partial(name, of)) => true,
+            // Of a link, this is not true.
+            Some("critical") if entry.file_type()?.is_dir() => {
+                let inside: Vec<_> = std::fs::read_dir(path.join(&name))?.collect::<Result<_, _>>()?;
                 inside.iter().all(|entry| entry.file_name() == OsStr::new(pack::SPACE))
             }
             _ => false,
@@ -440,10 +492,10 @@ pub fn is_unbegun(path: &Path) -> std::io::Result<bool> {
 
 /// Makes the first directory `NNNN` that does not exist yet.
 fn next_free(runs: &Path) -> Result<PathBuf, Failure> {
-    std::fs::create_dir_all(runs).map_err(|error| Failure::file("create", runs, error))?;
+    let runs = folder(Path::new(""), runs)?;
     for number in 1.. {
         let path = runs.join(format!("{number:04}"));
-        match std::fs::create_dir(&path) {
+        match files::make_new(&path) {
             Ok(()) => return Ok(path),
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
             Err(error) => return Err(Failure::file("create", &path, error)),

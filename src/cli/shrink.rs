@@ -12,7 +12,7 @@ use crate::run::{Asked, EpisodeSummary, Stage};
 
 use super::arguments::ShrinkArguments;
 use super::error::Failure;
-use super::files::{write, write_answers};
+use super::files::{folder, make, write_answers, write_result};
 use super::findings::{doubts, spot_check};
 use super::load;
 use super::output::Output;
@@ -41,8 +41,7 @@ pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failur
     }
     let asked = load::asked(None, arguments.own.ads_config.as_deref(), arguments.own.ads_cmd.as_deref())?;
     let shrunk = each_file(output, &arguments.many, asked.external.as_ref(), |file| {
-        let path = arguments.output.clone().unwrap_or_else(|| apart(file));
-        smaller(output, file, &path, &asked)
+        smaller(output, file, arguments.output.as_ref(), &asked)
     })?;
     let done = &shrunk.done;
     for small in done {
@@ -115,16 +114,16 @@ impl Small {
     }
 }
 
-/// Where the shrunk scenario of a file goes: into the folder `shrunk`, which lies in a run directory and not in its
-/// `critical`.
-fn apart(file: &Path) -> PathBuf {
-    let folder = file.parent().unwrap_or(Path::new(""));
-    let folder = if folder.ends_with("critical") { folder.parent().unwrap_or(folder) } else { folder };
-    folder.join(FOLDER).join(file.file_name().unwrap_or_default())
+/// Where the shrunk scenario of a file goes: into the folder `shrunk`, which is made, and lies in a run directory and not in
+/// its `critical`.
+fn apart(file: &Path) -> Result<PathBuf, Failure> {
+    let beside = file.parent().unwrap_or(Path::new(""));
+    let beside = if beside.ends_with("critical") { beside.parent().unwrap_or(beside) } else { beside };
+    Ok(folder(beside, FOLDER)?.join(file.file_name().unwrap_or_default()))
 }
 
-/// Shrinks the scenario of a file into another.
-fn smaller(output: &Output, file: &Path, path: &Path, asked: &Asked) -> Result<Small, Failure> {
+/// Shrinks the scenario of a file into another, for which the user may have named a path.
+fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked) -> Result<Small, Failure> {
     let (table, scenario) = load::scenario(output, file)?;
     let (ads, _) = asked.selected_for(&scenario)?;
     if ads.program().is_some_and(|program| !program.can_start()) {
@@ -142,10 +141,10 @@ fn smaller(output: &Output, file: &Path, path: &Path, asked: &Asked) -> Result<S
     };
     let shrunk = oracle::shrink(&stage.setup(&ads), &log, index, &judgements, stage.avoidability());
 
+    let path = named.map_or_else(|| apart(file), |path| Ok(path.clone()))?;
+    let path = path.as_path();
     let folder = path.parent().unwrap_or(Path::new(""));
-    if !folder.as_os_str().is_empty() {
-        std::fs::create_dir_all(folder).map_err(|error| Failure::file("create", folder, error))?;
-    }
+    make(folder)?;
     let origin = &scenario.origin;
     let name = format!("{}{SUFFIX}", found_name(&scenario.name));
     let source = emit::Provenance {
@@ -166,7 +165,8 @@ fn smaller(output: &Output, file: &Path, path: &Path, asked: &Asked) -> Result<S
     if scenario.claims.iter().any(|claim| matches!(claim, Claim::Cause { .. })) {
         summary.find_causes(&setup, &shrunk.log).map_err(Failure::usage)?;
     }
-    write(path, &crate::syntax::print(&emit::scenario(&table, &shrunk.log, &summary, &source)))?;
+    let text = crate::syntax::print(&emit::scenario(&table, &shrunk.log, &summary, &source));
+    write_result(named, path, &text)?;
     write_answers(path, &shrunk.log)?;
     let actions = shrunk.log.steps.iter().filter_map(|step| match &step.outcome {
         Outcome::Done { draw, .. } => Some(emit::action_text(&table, draw)),

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use crate::action::ActionTable;
-use crate::ads::external::Program;
+use crate::ads::external::{Attached, Program};
 use crate::report;
 use crate::run::{RunError, TrafficRecord, Units};
 use crate::study::{
@@ -30,7 +30,7 @@ use super::{load, run_directory, shard};
 pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure> {
     let (begun, reused) = match &arguments.resume {
         Some(path) => {
-            let resumed = resumed(output, path)?;
+            let resumed = resumed(output, path, false)?;
             let reused = played_elsewhere(&arguments.reuse, &resumed.0)?;
             (resumed, reused)
         }
@@ -38,7 +38,6 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
             let file = arguments.file.as_ref().expect("clap asks for it where there is no `--resume`");
             let shard = shard::asked(output, arguments.shard.shard)?;
             let study = begun(output, file, arguments)?;
-            let reused = played_elsewhere(&arguments.reuse, &study)?;
             if arguments.shard.dry_run {
                 run_directory::refuse_used(arguments.out.as_deref())?;
                 let costs: Vec<u64> = study.jobs().iter().map(|job| study.episodes(job)).collect();
@@ -47,6 +46,8 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
                 shard::planned(output, &heading(&study), &what, &costs, shard);
                 return Ok(());
             }
+            // A driving system that was not started has no name to compare.
+            let reused = played_elsewhere(&arguments.reuse, &study)?;
             let held = run_directory::create_empty(arguments.out.as_deref())?;
             shard::keep(&held.path, shard)?;
             let space = load::relative(&held.path, &study.table().space().path)?;
@@ -63,7 +64,7 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
 
 /// Ends a study whose jobs were all played, in shards.
 pub fn conclude(output: &Output, path: &Path) -> Result<(), Failure> {
-    play_all(output, resumed(output, path)?, &[], None)
+    play_all(output, resumed(output, path, true)?, &[], None)
 }
 
 /// Plays the jobs that a directory still lacks, and says what all of them came to.
@@ -102,7 +103,9 @@ fn play_all(
     let episodes = |jobs: &[_]| jobs.iter().map(|job| study.episodes(job)).sum::<u64>();
     let (episodes, left) = (episodes(&own), episodes(&todo));
     // Each job has a process, or a connection, of its own: these are only to see that they can be had.
-    let probe = study.settings().external.as_ref().map(|attached| Program::new(attached.settings.clone()));
+    let external = study.settings().external.as_ref().filter(|_| !todo.is_empty());
+    run_directory::refuse_to_play(&path, "study", external.is_none_or(|attached| !attached.is_recorded))?;
+    let probe = external.map(|attached| Program::new(attached.settings.clone()));
     let jobs = jobs(asked_jobs, probe.as_ref())?;
     drop(probe);
     let mut progress = Progress::new(output, "counted", episodes, episodes - left);
@@ -236,6 +239,7 @@ fn failed_text(directory: &Path, cells: &[FailedCell]) -> String {
 fn begun(output: &Output, path: &Path, arguments: &StudyArguments) -> Result<Study, Failure> {
     let (_, table, settings) = wanted(output, path, arguments.ads_cmd.as_deref())?;
     let settings = if arguments.quick { settings.quick() } else { settings };
+    let settings = if arguments.shard.dry_run { settings.unstarted() } else { settings };
     Study::new(table, settings).map_err(|error| Failure::file("use", path, error))
 }
 
@@ -265,11 +269,15 @@ pub fn wanted(
     Ok((file, table, settings))
 }
 
-/// The rest of an interrupted study, with the text of its settings.
-fn resumed(output: &Output, path: &Path) -> Result<(Study, Held, String), Failure> {
+/// The rest of an interrupted study, with the text of its settings. With `is_played`, nothing of it is left to play, and no
+/// program is started.
+fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Study, Held, String), Failure> {
     let resumed: Resumed<StudySettings> = run_directory::resume(output, path, "study", "study")?;
     let Resumed { settings, text, table, held } = resumed;
-    let external = settings.external.map(|attached| run_directory::from_record(path, attached));
+    let external = settings.external.map(|attached| Attached {
+        is_recorded: is_played,
+        ..run_directory::from_record(path, attached)
+    });
     let settings = StudySettings { external, ..settings };
     let study = Study::new(table, settings).map_err(|error| match error {
         StudyError::Agent { error: error @ RunError::OtherProgram { .. }, .. } => error.into(),

@@ -7,6 +7,7 @@ use std::time::Instant;
 use crate::action::ActionTable;
 use crate::ads::external::{Failure as AdsFailure, FailureKind};
 use crate::check::{Loaded, normal};
+use crate::files;
 use crate::model::{Claim, Scenario, code};
 use crate::oracle;
 use crate::oracle::Regression;
@@ -17,7 +18,7 @@ use crate::syntax::{Diagnostic, apply_fixes};
 
 use super::arguments::TestArguments;
 use super::error::Failure;
-use super::files::{write, write_answers};
+use super::files::{write, write_answers, write_named};
 use super::findings::{doubts, spot_check};
 use super::load;
 use super::load::Emitted;
@@ -75,7 +76,7 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
         if folder.is_some_and(|folder| !folder.is_dir()) {
             return Err(Failure::file("write", path, "its folder does not exist"));
         }
-        write(path, &junit(&named, &cases))?;
+        write_named(path, &junit(&named, &cases))?;
     }
     let count = |is: &dyn Fn(&Outcome) -> bool| cases.iter().filter(|case| is(&case.outcome)).count();
     let fails = count(&|outcome| {
@@ -127,6 +128,10 @@ fn suite_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut files: Vec<PathBuf> = Vec::new();
     for path in paths {
         let of_run = ["critical", "failures"].map(|folder| path.join(folder));
+        // What is accepted is written there.
+        for folder in &of_run {
+            files::own_folder(folder).map_err(|error| Failure::file("use", folder, error))?;
+        }
         let found = match path {
             _ if of_run[0].is_dir() => {
                 let folders = of_run.iter().filter(|folder| folder.is_dir());

@@ -19,7 +19,7 @@ use super::conditions;
 use super::conditions::roads_or_all;
 use super::distill::rules_text;
 use super::error::Failure;
-use super::files::write;
+use super::files::{folder, write};
 use super::findings::{cut_off, doubts, failures_text, kinds_text, unfinished};
 use super::interrupt::stop_on_interrupt;
 use super::load::UnderTest;
@@ -336,8 +336,7 @@ fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Pol
 
 /// Writes `policy/NAME.ava`.
 fn write_policy(policy: &Policy, space: &Space, directory: &Path) -> Result<PathBuf, Failure> {
-    let folder = directory.join("policy");
-    std::fs::create_dir_all(&folder).map_err(|error| Failure::file("create", &folder, error))?;
+    let folder = folder(directory, "policy")?;
     let space_path = load::relative(&folder, &space.path)?;
     let path = folder.join(format!("{}.ava", policy.name));
     write(&path, &emit::policy_text(policy, space, &space_path))?;

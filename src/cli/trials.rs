@@ -14,7 +14,7 @@ use super::arguments::TableArguments;
 use super::compile::TableResult;
 use super::conditions::roads_or_all;
 use super::error::Failure;
-use super::files::write;
+use super::files::{make, write};
 use super::load;
 use super::output::Output;
 use super::progress::Pieces;
@@ -55,7 +55,7 @@ fn emit_sample(
     let log = trials.again(road, cell.row, sample);
     let name = format!("row{:02}_{}", cell.row, cell.road);
     let path = directory.join(format!("{name}.ava"));
-    std::fs::create_dir_all(directory).map_err(|error| Failure::file("make", directory, error))?;
+    make(directory)?;
     let source = Provenance {
         command: "table --try",
         name: &name,

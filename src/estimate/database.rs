@@ -4,7 +4,8 @@ use std::path::Path;
 
 use rusqlite::{Connection, OptionalExtension, params};
 
-use crate::run::{DatabaseError, Layout, Numbered, Units, plain_name};
+use crate::files::PlainName;
+use crate::run::{DatabaseError, Layout, Numbered, Units};
 
 use crate::estimate::part::{Event, Part, PartRecord, Played};
 use crate::estimate::plan::{Cell, Pilot, Seen, Situation};
@@ -56,7 +57,7 @@ pub struct WrittenScenario {
     pub part: i64,
     pub event: i64,
     /// Name and text of the file.
-    pub name: String,
+    pub name: PlainName,
     pub text: String,
 }
 
@@ -204,19 +205,14 @@ impl EstimateDatabase {
     pub fn scenarios(&self) -> Result<Vec<WrittenScenario>, DatabaseError> {
         let mut query =
             self.connection.prepare("SELECT part, event, name, text FROM scenario ORDER BY part, event")?;
-        let scenarios = query.query_map([], |row| {
-            Ok(WrittenScenario {
-                part: row.get(0)?,
-                event: row.get(1)?,
-                name: row.get(2)?,
-                text: row.get(3)?,
-            })
+        let rows = query.query_map([], |row| {
+            Ok((row.get(0)?, row.get(1)?, row.get::<_, String>(2)?, row.get(3)?))
         })?;
-        let plain = |found: Result<WrittenScenario, rusqlite::Error>| -> Result<_, DatabaseError> {
-            let found = found?;
-            Ok(WrittenScenario { name: plain_name(found.name)?, ..found })
-        };
-        scenarios.map(plain).collect()
+        rows.map(|row| {
+            let (part, event, name, text) = row?;
+            Ok(WrittenScenario { part, event, name: PlainName::new(name)?, text })
+        })
+        .collect()
     }
 
     /// As [`Units::take`]. `scenarios` are those that were written anew.

@@ -11,13 +11,14 @@ use sha2::{Digest, Sha256};
 use crate::action::Draw;
 use crate::ads::external::Failure;
 use crate::episode::{EpisodeLog, Outcome};
+use crate::files::PlainName;
 use crate::mdp::STATE_LEN;
 use crate::model::policy::VARIABLES;
 use crate::model::vocabulary::Word;
 use crate::oracle;
 
 use crate::run::offered::{RowCount, without_figures};
-use crate::run::sealed::{DatabaseError, Layout, plain_name};
+use crate::run::sealed::{DatabaseError, Layout};
 use crate::run::settled::{Numbered, Units};
 use crate::run::shape::Shape;
 use crate::run::summary::{EpisodeSummary, Finding};
@@ -137,16 +138,17 @@ impl Database {
     /// The episodes of which a scenario was written: number, road, and the text of the file.
     ///
     /// # Errors
-    /// If the file cannot be read, or names a road that is no name of a file.
-    pub fn scenarios(&self) -> Result<Vec<(usize, String, String)>, DatabaseError> {
+    /// If the file cannot be read, or a road has a name that no file can have.
+    pub fn scenarios(&self) -> Result<Vec<(usize, PlainName, String)>, DatabaseError> {
         let query =
             "SELECT episode, road, text FROM scenario JOIN episode USING (episode) ORDER BY episode";
         let mut statement = self.connection.prepare(query)?;
-        let rows = statement.query_map([], |row| Ok((row.get::<_, i64>(0)?, row.get(1)?, row.get(2)?)))?;
+        let rows =
+            statement.query_map([], |row| Ok((row.get::<_, i64>(0)?, row.get::<_, String>(1)?, row.get(2)?)))?;
         rows.map(|row| {
             let (found, road, text) = row?;
             let episode = usize::try_from(found).map_err(|_| DatabaseError::Episode { found })?;
-            Ok((episode, plain_name(road)?, text))
+            Ok((episode, PlainName::new(road)?, text))
         })
         .collect()
     }

@@ -43,7 +43,6 @@ pub use profile::{
 };
 pub(crate) use profile::{traffic_of, under_test};
 pub(crate) use sealed::differences as settings_differences;
-pub(crate) use sealed::plain_name;
 pub use sealed::{DatabaseError, Layout};
 pub use settings::{EPISODES_MAX, PolicyReference, RunError, RunSettings, VERSION};
 pub(crate) use settings::{agent_named, check_episodes};

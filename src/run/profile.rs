@@ -93,7 +93,7 @@ pub fn recorded_traffic(scenario: &Scenario) -> Result<TrafficProfile, RunError>
 }
 
 /// The driving system that the settings of a run or a training name, with their profile if they have one. An external
-/// one is started once, to see that it can be and is still the same.
+/// one is started once, to see that it can be and is still the same, unless it is known by its record alone.
 ///
 /// # Errors
 /// If there is none of that name, it has no settings, or they mean something else in this version; if an external one
@@ -103,11 +103,13 @@ pub(crate) fn under_test(
     profile: Option<&Profile>,
     external: Option<&Attached>,
 ) -> Result<Selected, RunError> {
-    if let Some(Attached { identity, settings }) = external {
-        let program = started(settings)?;
+    if let Some(begun) = external {
+        if begun.is_recorded {
+            return Ok(Selected::external(Program::recorded(begun.clone(), Vec::new())));
+        }
+        let program = started(&begun.settings)?;
         let found = program.attached();
-        if identity.is_some() && *identity != found.identity {
-            let begun = Attached { identity: identity.clone(), settings: settings.clone() };
+        if begun.identity.is_some() && begun.identity != found.identity {
             return Err(RunError::OtherProgram { begun: begun.name(), found: found.name() });
         }
         return Ok(Selected::external(program));

@@ -6,11 +6,12 @@
 //! takes over units from other files in the same way. Training is one thread that writes in order, and is not settled.
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use rusqlite::Connection;
 use sha2::{Digest, Sha256};
 
+use crate::files::Temporary;
 use crate::run::sealed::{DatabaseError, Layout, add_rows};
 
 /// A unit to take over: its number in the other file, and the one that it gets.
@@ -98,24 +99,13 @@ pub trait Units: Sized {
         let settings: String = self.connection().query_row(query, [], |row| row.get(0))?;
         // The last connection to a file removes its journal.
         drop(self);
-        let named = |ending: &str| {
-            let mut name = path.as_os_str().to_owned();
-            name.push(ending);
-            PathBuf::from(name)
-        };
-        let partial = named(".partial");
-        for left in [&partial, &named(".partial-journal")] {
-            if left.exists() {
-                std::fs::remove_file(left)?;
-            }
-        }
-        let mut settled = Self::open(&partial, &settings)?;
+        let (temporary, file) = Temporary::beside(path)?;
+        // SQLite opens it by its name, and takes an empty file for a new database.
+        drop(file);
+        let mut settled = Self::open(temporary.path(), &settings)?;
         settled.take(path, units, &|_| Ok(()))?;
         drop(settled);
-        std::fs::rename(&partial, path)?;
-        // Where a folder cannot be synchronised, the old file may come back after a loss of power; it is whole, too.
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let _ = std::fs::File::open(folder).and_then(|folder| folder.sync_all());
+        temporary.take_place_of(path)?;
         Ok(Self::from_connection(Connection::open(path)?))
     }
 }

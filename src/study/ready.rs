@@ -36,8 +36,10 @@ impl Study {
                 attached = run.attached();
             }
         }
-        // The jobs, and whoever goes on with the study, must meet the same one.
-        study.settings.external = attached;
+        // The jobs, and whoever goes on with the study, must meet the same one. One that was not started says nothing new.
+        if study.settings.external.as_ref().is_none_or(|external| !external.is_recorded) {
+            study.settings.external = attached;
+        }
         Ok(study)
     }
 

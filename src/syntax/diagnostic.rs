@@ -4,6 +4,8 @@
 //! are drawn. Codes are never reused or renumbered. The caller decides when to stop, and with which
 //! exit status.
 
+use std::borrow::Cow;
+
 use annotate_snippets::{Annotation, AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 use serde::Serialize;
 
@@ -181,6 +183,30 @@ pub enum Style {
 /// Width at which long source lines are cut, in characters.
 const WIDTH: usize = 140;
 
+/// A text as a terminal may be given it: a control character that a file, a name or a driving system brought is written as its
+/// number (`\u{1b}`), and so are the signs that turn the direction of writing. Ends of lines and tabs stay.
+pub fn visible(text: &str) -> Cow<'_, str> {
+    let acts = |c: char| match c {
+        '\n' | '\t' => false,
+        '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => true,
+        c => c.is_control(),
+    };
+    if !text.contains(acts) {
+        return Cow::Borrowed(text);
+    }
+    let mut shown = String::with_capacity(text.len() + 16);
+    let mut rest = text.chars().peekable();
+    while let Some(c) = rest.next() {
+        match c {
+            // The end of a line as Windows has it.
+            '\r' if rest.peek() == Some(&'\n') => shown.push(c),
+            c if acts(c) => shown.extend(c.escape_unicode()),
+            c => shown.push(c),
+        }
+    }
+    Cow::Owned(shown)
+}
+
 /// Draws one diagnostic, without a line break at its end.
 pub fn render(diagnostic: &Diagnostic, sources: &Sources, style: Style) -> String {
     let level = match diagnostic.severity {
@@ -188,25 +214,27 @@ pub fn render(diagnostic: &Diagnostic, sources: &Sources, style: Style) -> Strin
         Severity::Warning => Level::WARNING,
         Severity::Note => Level::NOTE,
     };
-    let title = level.primary_title(diagnostic.message.as_str()).id(diagnostic.code);
+    let title = level.primary_title(visible(&diagnostic.message)).id(diagnostic.code);
     let mut group = Group::with_title(title);
     for file in files_in_order(diagnostic) {
         group = match snippet(diagnostic, sources, file) {
             Some(snippet) => group.element(snippet),
-            None => group.element(Origin::path(sources.name(file))),
+            None => group.element(Origin::path(visible(sources.name(file)))),
         };
     }
     for note in &diagnostic.notes {
-        group = group.element(Level::NOTE.no_name().message(note.as_str()));
+        group = group.element(Level::NOTE.no_name().message(visible(note)));
     }
     if let Some(help) = &diagnostic.help {
-        group = group.element(Level::HELP.message(help.as_str()));
+        group = group.element(Level::HELP.message(visible(help)));
     }
     let renderer = match style {
         Style::Human => Renderer::styled(),
         Style::Plain => Renderer::plain(),
     };
-    renderer.term_width(WIDTH).render(&[group])
+    let drawn = renderer.term_width(WIDTH).render(&[group]);
+    // In source lines the renderer leaves the control characters of Latin-1, which some terminals obey.
+    drawn.replace(|c: char| ('\u{80}'..='\u{9f}').contains(&c), "\u{fffd}")
 }
 
 /// The files that a diagnostic names: the one with the mistake first.
@@ -242,9 +270,9 @@ fn snippet<'a>(
         let to = floor_boundary(text, label.span.end).max(from);
         let kind = if label.primary { AnnotationKind::Primary } else { AnnotationKind::Context };
         let annotation = kind.span(from - start..to - start);
-        if label.text.is_empty() { annotation } else { annotation.label(label.text.as_str()) }
+        if label.text.is_empty() { annotation } else { annotation.label(visible(&label.text)) }
     });
-    let snippet = Snippet::source(&text[start..end]).line_start(line).path(sources.name(file));
+    let snippet = Snippet::source(&text[start..end]).line_start(line).path(visible(sources.name(file)));
     Some(snippet.annotations(annotations))
 }
 
@@ -312,6 +340,22 @@ mod tests {
         assert!(plain.contains("= units are types"), "{plain}");
         assert!(plain.contains("= help: divide one by a speed"), "{plain}");
         assert!(render(&diagnostic, &sources, Style::Human).contains('\u{1b}'));
+    }
+
+    #[test]
+    fn nothing_acts_on_a_terminal() {
+        assert_eq!(visible("a\tb\r\n\u{1b}[2J\r\u{9b}x\u{202e}"), "a\tb\r\n\\u{1b}[2J\\u{d}\\u{9b}x\\u{202e}");
+        let mut sources = Sources::new();
+        let file = sources.add("\u{1b}]0;name\u{7}.ava", "let x = \u{1b}[31m \u{9b}3\n");
+        let diagnostic = Diagnostic::error("AV0201", "an \u{1b}[2J odd one")
+            .at(Span::new(file, 4, 5), "\u{1b}[8m here")
+            .note("\u{1b}c")
+            .help("\u{1b}c");
+        let plain = render(&diagnostic, &sources, Style::Plain);
+        assert!(!plain.contains(|c: char| c.is_control() && c != '\n'), "{plain:?}");
+        for drawn in ["[2J odd", "]0;name", "[8m here", "[31m "] {
+            assert!(plain.contains(drawn), "{plain}");
+        }
     }
 
     #[test]

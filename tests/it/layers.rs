@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::cases::root;
 
 /// From left to right, as in `src/lib.rs` and ARCHITECTURE.md.
-const ORDER: [&str; 27] = [
+const ORDER: [&str; 28] = [
     "units",
     "rng",
     "statistics",
@@ -23,6 +23,7 @@ const ORDER: [&str; 27] = [
     "agent",
     "episode",
     "oracle",
+    "files",
     "run",
     "estimate",
     "train",
@@ -86,11 +87,54 @@ fn cli_alone_touches_files_and_the_environment() {
         let is_test = path.components().any(|part| part.as_os_str().to_string_lossy().contains("test"));
         // Time limits of an external driving system are by the wall clock; in one place.
         let may_wait = path.ends_with("ads/external/link.rs") && text.matches("Instant::now").count() == 1;
-        // A database that was written anew takes the place of the old one; in one place.
-        let may_rename = path.ends_with("run/settled.rs");
+        // What is written, by `cli` and by databases, is written there.
+        let may_write = path.ends_with("src/files.rs");
         for word in ["std::fs", "std::env::var", "Instant::now", "SystemTime"] {
-            let may = (may_wait && word == "Instant::now") || (may_rename && word == "std::fs");
+            let may = (may_wait && word == "Instant::now") || (may_write && word == "std::fs");
             assert!(is_test || may || !text.contains(word), "{} names {word}", path.display());
+        }
+    }
+}
+
+/// What makes, replaces, renames or removes files and folders.
+const WRITING: [&str; 13] = [
+    "File::create",
+    "File::options",
+    "OpenOptions",
+    "fs::write",
+    "fs::remove_",
+    "fs::rename",
+    "fs::copy",
+    "fs::create_dir",
+    "fs::hard_link",
+    "fs::set_permissions",
+    "fs::symlink(",
+    "DirBuilder",
+    "Connection::open(",
+];
+
+/// SQLite writes by itself. These look at the path first, or have it from `files`.
+const WRITING_DATABASES: [&str; 2] = ["src/run/sealed.rs", "src/run/settled.rs"];
+
+#[test]
+fn files_alone_writes_and_removes() {
+    let is_test = |path: &Path| {
+        let name = path.strip_prefix(root()).expect("it is below").to_string_lossy().into_owned();
+        name.contains("/tests") || name.ends_with("testing.rs")
+    };
+    for path in sources(&root().join("src")) {
+        if path == root().join("src/files.rs") || is_test(&path) {
+            continue;
+        }
+        let text = std::fs::read_to_string(&path).expect("a source file is readable");
+        let text = text.split("#[cfg(test)]").next().unwrap_or(&text);
+        let is_database = WRITING_DATABASES.iter().any(|name| path.ends_with(name));
+        for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with("//")) {
+            for word in WRITING.iter().filter(|word| line.contains(**word)) {
+                let may = is_database && *word == "Connection::open(";
+                let place = format!("{}:{}", path.display(), number + 1);
+                assert!(may, "{place} names `{word}`: `crate::files` does that, and follows no link");
+            }
         }
     }
 }

@@ -23,6 +23,7 @@ mod imports;
 mod json;
 mod language;
 mod layers;
+mod links;
 mod maps;
 mod pedestrians;
 mod policies;

@@ -119,7 +119,7 @@ impl Program {
     /// # Errors
     /// Why it does not.
     pub fn reserve(&self, jobs: usize) -> Result<(), Failure> {
-        if self.settings.command.is_socket() {
+        if self.may_start && self.settings.command.is_socket() {
             let missing = jobs.saturating_sub(locked(&self.idle).len());
             let opened = (0..missing).map(|_| self.opened()).collect::<Result<Vec<_>, _>>()?;
             locked(&self.idle).extend(opened);
@@ -200,7 +200,8 @@ impl Program {
 
     /// Who it is, as far as it was asked, and how.
     pub fn attached(&self) -> Attached {
-        Attached { identity: self.identity.get().cloned(), settings: self.settings.clone() }
+        let identity = self.identity.get().cloned();
+        Attached { identity, settings: self.settings.clone(), is_recorded: false }
     }
 
     /// A process that no episode uses; one that has the map, if there is any.

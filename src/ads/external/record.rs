@@ -126,13 +126,17 @@ pub struct Attached {
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub identity: Option<Identity>,
     pub settings: ExternalSettings,
+    /// An order to whatever makes a driving system of this: start nothing, what was recorded is all there is. It is no part of
+    /// what identifies the driving system, and is never written.
+    #[serde(skip)]
+    pub is_recorded: bool,
 }
 
 impl Attached {
     /// As one line, for [`Attached::from_line`]. Where the program lay on a disk is left out: nothing is started from there.
     pub fn to_line(&self) -> String {
         let settings = ExternalSettings { working_directory: None, ..self.settings.clone() };
-        let line = Attached { identity: self.identity.clone(), settings };
+        let line = Attached { settings, ..self.clone() };
         serde_json::to_string(&line).expect("settings are plain data")
     }
 

@@ -355,6 +355,8 @@ mod tests {
             (r#"{"type":"control","seq":1,"accel":"fast","steer":0}"#, Problem::WrongShape),
             (r#"{"type":"control","seq":1,"steer":0}"#, Problem::WrongShape),
             (r#"{"type":"control","seq":1,"steer":0,"accel":1,"brake":0}"#, Problem::WrongShape),
+            (r#"{"type":"control","seq":1,"seq":2,"steer":0,"accel":1}"#, Problem::WrongShape),
+            (r#"{"type":"control","type":"ready","seq":1,"steer":0,"accel":1}"#, Problem::WrongShape),
             (r#"{"type":"control","seq":1,"steer":0,"throttle":2,"brake":0}"#, Problem::OutOfRange),
             (r#"{"type":"control","seq":1,"steer":30,"accel":1}"#, Problem::OutOfRange),
             (r#"{"type":"control","seq":1,"steer":0,"accel":-5,"accel":1}"#, Problem::WrongShape),

@@ -37,6 +37,6 @@ fn schema(output: &Output) {
         "oneOf": alternatives, "$defs": messages,
     });
     let text = serde_json::to_string_pretty(&document).expect("schemas are plain data");
-    output.say(&text);
+    output.document(&text);
     output.result(serde_json::json!({ "checks": [], "speed": null, "protocol": document }));
 }

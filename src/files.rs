@@ -1,0 +1,427 @@
+//! The one place where files and folders are made, replaced, renamed and removed; `tests/it/layers.rs` keeps it so.
+//!
+//! A directory may come from somebody else: a repository that was cloned, a shard, a run that was sent. What lies in it is
+//! not trusted, so three rules hold here. A file is written under a name that nothing had before, and takes its place by a
+//! rename, which replaces a symbolic link and never follows it. A folder of ours inside of a directory is used only if it is
+//! a folder and no link. A name that a database or a file gives is a [`PlainName`], or what gives it is refused.
+//! Only a path that the user wrote in the command is followed wherever it leads ([`write_named`], [`make`]).
+//!
+//! Nothing protects against a process that changes the directory at the same moment: it has the user's rights already.
+//! Reading is the business of `cli::load`.
+
+use std::fs::{File, Metadata};
+use std::io::{Error, ErrorKind, Result, Write};
+use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+use std::path::{Component, Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use nix::errno::Errno;
+use nix::fcntl::OFlag;
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+
+/// Longest name of a file that common file systems take, in bytes.
+const NAME_BYTES_MAX: usize = 255;
+
+/// The names of files that are not whole yet end so.
+const ENDING: &str = ".partial";
+
+/// Why a link is not used.
+const LINK: &str = "it is a symbolic link, which may lead anywhere: put what it leads to in its place";
+
+/// Number of the next temporary file of this process.
+static NEXT: AtomicU64 = AtomicU64::new(0);
+
+/// The name of a file or folder inside of a folder: no separator, neither `.` nor `..`, no control character, not empty.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct PlainName(String);
+
+/// A text that would lead out of its folder, or nowhere.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{}` is no plain name: it would lead out of its folder, or has signs that no name of a file needs", name.escape_debug())]
+pub struct NotPlain {
+    name: String,
+}
+
+impl PlainName {
+    /// # Errors
+    /// If the text is no plain name.
+    pub fn new(name: impl Into<String>) -> std::result::Result<PlainName, NotPlain> {
+        let name = name.into();
+        let mut parts = Path::new(&name).components();
+        // `a/` has one part, too, but that part is `a`.
+        let is_one = parts.next() == Some(Component::Normal(name.as_ref())) && parts.next().is_none();
+        let is_plain = is_one && !name.contains('\\') && !name.contains(char::is_control);
+        if is_plain { Ok(PlainName(name)) } else { Err(NotPlain { name }) }
+    }
+}
+
+impl std::ops::Deref for PlainName {
+    type Target = str;
+
+    fn deref(&self) -> &str {
+        &self.0
+    }
+}
+
+impl AsRef<Path> for PlainName {
+    fn as_ref(&self) -> &Path {
+        Path::new(&self.0)
+    }
+}
+
+/// A new file beside the one whose place it is to take. Unless it takes it, dropping this removes the file.
+pub struct Temporary {
+    path: PathBuf,
+    is_placed: bool,
+}
+
+impl Temporary {
+    /// Makes the file, under a name that nothing has: what others write at the same time, and links that lie about, do not
+    /// matter.
+    ///
+    /// # Errors
+    /// If it cannot be made.
+    pub fn beside(destination: &Path) -> Result<(Temporary, File)> {
+        let name = destination.file_name().ok_or_else(|| Error::other("the path has no name"))?;
+        let name = name.to_string_lossy();
+        loop {
+            let number = NEXT.fetch_add(1, Ordering::Relaxed);
+            let ending = format!(".{}-{number}{ENDING}", std::process::id());
+            let kept = name.floor_char_boundary(NAME_BYTES_MAX - ending.len());
+            let path = destination.with_file_name(format!("{}{ending}", &name[..kept]));
+            match File::create_new(&path) {
+                // A killed process with the same number may have left it.
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+                made => {
+                    let file = made?;
+                    return Ok((Temporary { path, is_placed: false }, file));
+                }
+            }
+        }
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Gives the file the name of the destination, in place of whatever has it; of a link, the link is replaced.
+    ///
+    /// # Errors
+    /// If that is not possible, because a folder has the name for example.
+    pub fn take_place_of(mut self, destination: &Path) -> Result<()> {
+        std::fs::rename(&self.path, destination)?;
+        self.is_placed = true;
+        // Where a folder cannot be synchronised, the old file may come back after a loss of power; it is whole, too.
+        let _ = File::open(folder_of(destination)).and_then(|folder| folder.sync_all());
+        Ok(())
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        if !self.is_placed {
+            // What made the file useless is told; that it is left as well says nothing more.
+            let _ = std::fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Writes a file of a folder that is there, completely or not at all: after a kill or a loss of power the old one or the new
+/// one is there. Whatever has its name is replaced; a link is not followed.
+///
+/// # Errors
+/// If it cannot be written; then nothing of it is left.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    let (temporary, mut file) = Temporary::beside(path)?;
+    file.write_all(bytes)?;
+    // Without this, a loss of power can leave an empty file under the new name.
+    file.sync_all()?;
+    drop(file);
+    temporary.take_place_of(path)
+}
+
+/// Writes a file that the user named. Its folders are made, a symbolic link is followed, and what is no regular file (a pipe,
+/// a terminal, the null device) is written to and not replaced.
+///
+/// # Errors
+/// As [`write`].
+pub fn write_named(path: &Path, bytes: &[u8]) -> Result<()> {
+    if std::fs::metadata(path).is_ok_and(|found| !found.is_file()) {
+        let _reader = is_read(path)?;
+        return std::fs::write(path, bytes);
+    }
+    let followed = std::fs::canonicalize(path);
+    if followed.is_err() && path.is_symlink() {
+        return Err(Error::other("it is a link to a file that does not exist"));
+    }
+    make(folder_of(path))?;
+    write(followed.as_deref().unwrap_or(path), bytes)
+}
+
+/// Writes a file where nothing is: what is there, links included, or what others put there meanwhile, stays.
+///
+/// # Errors
+/// If something is there, or the file cannot be written; then nothing of it is left.
+pub fn write_new(path: &Path, bytes: &[u8]) -> Result<()> {
+    let mut file = File::create_new(path).map_err(|error| match error.kind() {
+        ErrorKind::AlreadyExists => Error::other("something is there already"),
+        _ => error,
+    })?;
+    file.write_all(bytes).and_then(|()| file.sync_all()).inspect_err(|_| {
+        // A part of it would be in the way of the whole.
+        let _ = std::fs::remove_file(path);
+    })
+}
+
+/// Removes a file, if it is there; of a link, the link.
+///
+/// # Errors
+/// If it is there and cannot be removed.
+pub fn remove(file: &Path) -> Result<()> {
+    match std::fs::remove_file(file) {
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// Removes a folder with all that is in it; links in it are removed and not followed.
+///
+/// # Errors
+/// If something cannot be removed.
+pub fn remove_all(folder: &Path) -> Result<()> {
+    own_folder(folder)?;
+    std::fs::remove_dir_all(folder)
+}
+
+/// Removes a folder if it is empty.
+///
+/// # Errors
+/// If it is not, or cannot be removed.
+pub fn remove_empty(folder: &Path) -> Result<()> {
+    std::fs::remove_dir(folder)
+}
+
+/// Gives a folder another name, under which nothing or an empty folder is.
+///
+/// # Errors
+/// If that is not possible.
+pub fn rename(from: &Path, to: &Path) -> Result<()> {
+    std::fs::rename(from, to)
+}
+
+/// Makes a folder that the user named, with those on the way to it.
+///
+/// # Errors
+/// If that is not possible.
+pub fn make(folder: &Path) -> Result<()> {
+    std::fs::create_dir_all(folder)
+}
+
+/// Makes a folder where nothing is.
+///
+/// # Errors
+/// If something is there (`AlreadyExists`), or it cannot be made.
+pub fn make_new(folder: &Path) -> Result<()> {
+    std::fs::create_dir(folder)
+}
+
+/// A folder inside of a directory, by one name or several; what is missing of it is made. None of its parts may be a link.
+///
+/// # Errors
+/// If a part is no folder, or cannot be made.
+pub fn folder(directory: &Path, inside: impl AsRef<Path>) -> Result<PathBuf> {
+    let mut folder = directory.to_owned();
+    for part in inside.as_ref().components() {
+        let Component::Normal(name) = part else { return Err(Error::other("its path leads out of its folder")) };
+        folder.push(name);
+        match std::fs::create_dir(&folder) {
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => own_folder(&folder)?,
+            made => made?,
+        }
+    }
+    Ok(folder)
+}
+
+/// Makes a directory that the user named, and the folders in it on the way to a file. None of these may be a link.
+///
+/// # Errors
+/// If a part is no folder, or cannot be made.
+pub fn make_way(directory: &Path, file: &Path) -> Result<()> {
+    let inside = file.strip_prefix(directory).map_err(Error::other)?;
+    make(directory)?;
+    folder(directory, inside.parent().unwrap_or(Path::new(""))).map(drop)
+}
+
+/// Refuses what is in the place of a regular file of ours and is none: a link, above all.
+///
+/// # Errors
+/// Why it is refused.
+pub fn own_file(path: &Path) -> Result<()> {
+    own(path, Metadata::is_file, "it is no regular file")
+}
+
+/// Refuses what is in the place of a folder of ours and is none: a link, above all.
+///
+/// # Errors
+/// Why it is refused.
+pub fn own_folder(path: &Path) -> Result<()> {
+    own(path, Metadata::is_dir, "it is no folder")
+}
+
+fn own(path: &Path, fits: fn(&Metadata) -> bool, otherwise: &'static str) -> Result<()> {
+    match std::fs::symlink_metadata(path) {
+        Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Ok(()),
+        Err(error) => Err(error),
+        Ok(found) if found.is_symlink() => Err(Error::other(LINK)),
+        Ok(found) if fits(&found) => Ok(()),
+        Ok(_) => Err(Error::other(otherwise)),
+    }
+}
+
+/// Whether a name is one under which a file of another name was written, before it was whole.
+pub fn is_partial(name: &str, of: &str) -> bool {
+    name.strip_prefix(of).is_some_and(|rest| rest.starts_with('.') && rest.ends_with(ENDING))
+}
+
+/// Removes what killed processes left of writing into a folder. What a process that runs is writing stays.
+///
+/// # Errors
+/// If the folder cannot be read, or a file cannot be removed.
+pub fn sweep(folder: &Path) -> Result<()> {
+    for entry in std::fs::read_dir(folder)? {
+        let entry = entry?;
+        let writer = entry.file_name().to_str().and_then(writer_of);
+        let is_left = writer.is_some_and(|process| !runs(process));
+        if is_left && entry.file_type().is_ok_and(|kind| kind.is_file()) {
+            remove(&entry.path())?;
+        }
+    }
+    Ok(())
+}
+
+/// The process that writes, or wrote, a temporary file, by the file's name.
+fn writer_of(name: &str) -> Option<i32> {
+    // A database that is written anew has a journal beside it.
+    let name = name.strip_suffix("-journal").unwrap_or(name);
+    let (_, numbers) = name.strip_suffix(ENDING)?.rsplit_once('.')?;
+    let (process, number) = numbers.split_once('-')?;
+    number.parse::<u64>().ok()?;
+    process.parse().ok()
+}
+
+fn runs(process: i32) -> bool {
+    // No signal is sent: this only asks.
+    kill(Pid::from_raw(process), None::<Signal>) != Err(Errno::ESRCH)
+}
+
+/// The folder of a path, as a path that can be opened.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Asks whether somebody reads from a named pipe: to open one that nobody reads would wait without end. As long as the
+/// result lives, the pipe has a writer.
+fn is_read(path: &Path) -> Result<Option<File>> {
+    if !std::fs::metadata(path)?.file_type().is_fifo() {
+        return Ok(None);
+    }
+    let opened = File::options().write(true).custom_flags(OFlag::O_NONBLOCK.bits()).open(path);
+    opened.map(Some).map_err(|error| match error.raw_os_error() {
+        Some(number) if number == Errno::ENXIO as i32 => Error::other("it is a pipe, and nothing reads from it"),
+        _ => error,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plain_names_stay_in_their_folder() {
+        for plain in ["a", "corner_0004.ava", "ä ö", ".hidden", "..."] {
+            assert_eq!(&*PlainName::new(plain).unwrap(), plain);
+        }
+        for other in ["", ".", "..", "/", "/a", "a/", "a/b", "../a", "./a", "a\\b", "a\nb", "a\0", "\u{1b}[2J"] {
+            assert!(PlainName::new(other).is_err(), "{other:?}");
+        }
+    }
+
+    #[test]
+    fn the_longest_names_are_written_and_nothing_else_is_left() {
+        let scratch = tempfile::tempdir().unwrap();
+        for name in ["a".repeat(255), "ä".repeat(127), "b".repeat(248)] {
+            let path = scratch.path().join(&name);
+            write(&path, b"text").unwrap();
+            assert_eq!(std::fs::read_to_string(&path).unwrap(), "text");
+        }
+        std::fs::create_dir(scratch.path().join("folder")).unwrap();
+        assert!(write(&scratch.path().join("folder"), b"text").is_err());
+        assert_eq!(std::fs::read_dir(scratch.path()).unwrap().count(), 4, "no partial file is left");
+    }
+
+    #[test]
+    fn links_are_replaced_refused_or_followed_as_the_user_wants() {
+        let scratch = tempfile::tempdir().unwrap();
+        let at = |name: &str| scratch.path().join(name);
+        let read = |name: &str| std::fs::read_to_string(at(name)).unwrap();
+        std::fs::write(at("other"), "other").unwrap();
+        std::fs::create_dir(at("elsewhere")).unwrap();
+        for (link, to) in [("own", "other"), ("named", "other"), ("dangling", "nowhere"), ("folder", "elsewhere")] {
+            std::os::unix::fs::symlink(to, at(link)).unwrap();
+        }
+        write(&at("own"), b"new").unwrap();
+        assert_eq!((read("own").as_str(), read("other").as_str()), ("new", "other"));
+        assert!(!at("own").is_symlink());
+        assert!(write_new(&at("dangling"), b"new").is_err() && !at("nowhere").exists());
+        assert!(write_named(&at("dangling"), b"new").is_err() && !at("nowhere").exists());
+        write_named(&at("named"), b"new").unwrap();
+        assert_eq!(read("other"), "new");
+        assert!(at("named").is_symlink());
+        for refused in ["folder", "folder/inner", "../out"] {
+            assert!(folder(scratch.path(), refused).is_err(), "{refused}");
+        }
+        assert!(own_folder(&at("folder")).is_err() && own_file(&at("named")).is_err());
+        assert!(remove_all(&at("folder")).is_err());
+        assert_eq!(std::fs::read_dir(at("elsewhere")).unwrap().count(), 0);
+        assert_eq!(folder(scratch.path(), "a/b").unwrap(), at("a/b"));
+        make_way(&at("made"), &at("made/x/y.ava")).unwrap();
+        assert!(at("made/x").is_dir() && !at("made/x/y.ava").exists());
+    }
+
+    #[test]
+    fn what_the_dead_left_is_swept_away() {
+        let scratch = tempfile::tempdir().unwrap();
+        let own = format!("run.db.{}-7.partial", std::process::id());
+        // No process has so high a number.
+        let left = ["run.db.2147483647-0.partial", "run.db.2147483647-0.partial-journal"];
+        for name in [own.as_str(), "notes.partial", "x.2147483647.partial"].iter().chain(&left) {
+            std::fs::write(scratch.path().join(name), "").unwrap();
+        }
+        sweep(scratch.path()).unwrap();
+        let kept: Vec<_> = std::fs::read_dir(scratch.path()).unwrap().flatten().map(|entry| entry.file_name()).collect();
+        assert_eq!(kept.len(), 3, "{kept:?}");
+        assert!(is_partial(&own, "run.db") && is_partial("run.yaml.partial", "run.yaml"));
+        assert!(!is_partial("run.yaml", "run.yaml") && !is_partial("other.partial", "run.yaml"));
+    }
+
+    #[test]
+    fn a_pipe_that_nobody_reads_is_refused() {
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("pipe");
+        let name = std::ffi::CString::new(path.to_str().unwrap()).unwrap();
+        // SAFETY: the name is a string with an end.
+        assert_eq!(unsafe { libc::mkfifo(name.as_ptr(), 0o600) }, 0);
+        let refused = write_named(&path, b"text").unwrap_err().to_string();
+        assert!(refused.contains("nothing reads from it"), "{refused}");
+        let reader = std::thread::spawn({
+            let path = path.clone();
+            move || std::fs::read_to_string(path).unwrap()
+        });
+        let long = "x".repeat(1 << 20);
+        while write_named(&path, long.as_bytes()).is_err() {
+            std::thread::yield_now();
+        }
+        assert_eq!(reader.join().unwrap(), long);
+    }
+}
