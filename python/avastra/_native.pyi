@@ -94,7 +94,7 @@ class Finding(TypedDict):
 class Ended(TypedDict):
     """An episode that has ended, judged."""
 
-    #: `arrived`, `stalled`, `blocked`, `astray`, `limit`, or the failure of an external driving system.
+    #: `arrived`, `stalled`, `blocked`, `astray`, `left_the_map`, `limit`, or the failure of an external driving system.
     end: str
     duration_s: float
     distance_m: float

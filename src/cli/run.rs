@@ -354,6 +354,7 @@ fn totals_text(totals: &Totals, elapsed_s: f64, played: usize) -> String {
         (totals.stalled, "stalled"),
         (totals.blocked, "blocked by others"),
         (totals.astray, "out of its lane"),
+        (totals.left_map, "off the map"),
         (totals.step_limit, "at the step limit"),
         (totals.failed, "because the driving system failed"),
     ];

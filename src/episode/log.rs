@@ -159,6 +159,9 @@ pub enum End {
     Blocked,
     /// The same, because the ego vehicle has left its lane and does not find back.
     Astray,
+    /// It drove beyond the end of its way, or away from every road: there is nothing to drive on. The way up to there
+    /// counts.
+    LeftMap,
     /// The space's limit of steps was reached: truncated.
     StepLimit,
     /// The script of a replay has no more steps.
@@ -174,6 +177,7 @@ impl End {
             End::Stalled => "stalled",
             End::Blocked => "blocked",
             End::Astray => "astray",
+            End::LeftMap => "left_the_map",
             End::StepLimit => "limit",
             End::Script => "script",
             End::Failed(kind) => kind.name(),
@@ -187,7 +191,15 @@ mod tests {
 
     #[test]
     fn every_end_can_be_claimed() {
-        let driven = [End::Arrived, End::Stalled, End::Blocked, End::Astray, End::StepLimit, End::Script];
+        let driven = [
+            End::Arrived,
+            End::Stalled,
+            End::Blocked,
+            End::Astray,
+            End::LeftMap,
+            End::StepLimit,
+            End::Script,
+        ];
         let ends = driven.into_iter().chain(FailureKind::ALL.map(End::Failed));
         assert_eq!(ends.map(End::name).collect::<Vec<_>>(), crate::model::ENDS);
     }

@@ -320,7 +320,7 @@ impl Play {
         self.memory = memory;
     }
 
-    /// Drives for one observation period (OTP), or until the goal.
+    /// Drives for one observation period (OTP), or until the goal or the end of the map.
     fn observation_period(
         &mut self,
         setup: &Setup,
@@ -348,7 +348,8 @@ impl Play {
             if near.is_none_or(|near| now.probability > near.probability) {
                 near = Some(now);
             }
-            if setup.table.space().episode.stop_arrived && self.world.arrived() {
+            let arrived = setup.table.space().episode.stop_arrived && self.world.arrived();
+            if arrived || self.world.left_the_map() {
                 break;
             }
         }
@@ -460,6 +461,8 @@ impl Play {
             Some(end)
         } else if episode.stop_arrived && self.world.arrived() {
             Some(End::Arrived)
+        } else if self.world.left_the_map() {
+            Some(End::LeftMap)
         } else if episode.stalled_steps.is_some_and(|limit| self.stalled >= limit) {
             Some(match () {
                 () if self.world.is_blocked() => End::Blocked,

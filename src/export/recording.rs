@@ -13,6 +13,12 @@ use crate::road::{LaneIndex, LanePlace, RoadMap};
 use crate::run::{RunError, Stage};
 use crate::sim::DT_S;
 
+use super::standalone::{Standalone, standalone};
+
+/// Names of the facts that hold the scenario as text of the language, and what that text lacks.
+pub const SCENARIO_TEXT: &str = "scenario_text";
+pub const SCENARIO_TEXT_LACKS: &str = "scenario_text_lacks";
+
 /// A replay as [`Recorder`] saw it, with its road and the facts of its file.
 #[derive(Debug, Clone)]
 pub struct Recording {
@@ -27,7 +33,7 @@ pub struct Recording {
     /// The lanes of its route, in order.
     pub route: Vec<LaneIndex>,
     pub seen: Recorder,
-    /// Where the scenario comes from and what it claims: name and value.
+    /// Where the scenario comes from, what it claims, and the scenario as text of the language: name and value.
     pub facts: Vec<(String, String)>,
 }
 
@@ -69,6 +75,11 @@ pub fn record(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Resul
         return Err(ExportError::Refuted { claims });
     }
     let road = &table.space().roads[scenario.road];
+    let mut facts = facts(scenario, &road.name);
+    if let Some(Standalone { text, lacks }) = standalone(table.space(), scenario, &log) {
+        facts.push((SCENARIO_TEXT.to_owned(), text));
+        facts.extend((!lacks.is_empty()).then(|| (SCENARIO_TEXT_LACKS.to_owned(), lacks.join("; "))));
+    }
     Ok(Recording {
         name: scenario.name.clone(),
         docs: scenario.docs.clone(),
@@ -77,7 +88,7 @@ pub fn record(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Resul
         goal: road.goal,
         route: road.route.lanes.iter().map(|part| part.lane).collect(),
         seen,
-        facts: facts(scenario, &road.name),
+        facts,
     })
 }
 

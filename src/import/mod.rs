@@ -8,13 +8,14 @@
 //! `vocabulary` refuses what no file may hold. `story` reads the file, with `body`, `position`, `action`, `trigger` and `weather`
 //! for what stands in it, through `source`, which fills in each `parameter` and its `expression`; `ground` finds places on the map,
 //! `scene` decides who is where and does what, `condition` turns triggers into conditions of the language, and `write` prints the
-//! scenario. No file is read here: `cli` gives texts.
+//! scenario. A file that avastra exported carries its scenario (`own`). No file is read here: `cli` gives texts.
 
 mod action;
 mod body;
 mod condition;
 mod expression;
 mod ground;
+mod own;
 mod parameter;
 mod position;
 mod scene;
@@ -85,6 +86,11 @@ pub fn openscenario(
         vec![Refusal { line, element: "OpenSCENARIO".to_owned(), reason }]
     })?;
     let mut source = Source::new(text, parameters);
+    // Another ego vehicle, or other values, are read from the file as it stands.
+    let is_as_written = ego.is_none() && parameters.is_empty();
+    if let Some(own) = is_as_written.then(|| own::read(&mut source, &document)).flatten() {
+        return Ok(write::own(&own, name, source.notes()));
+    }
     let imported = story::read(&mut source, &document, ego, files)
         .and_then(|story| Scene::of(&mut source, story, files))
         .map(|scene| write::scenario(&scene, name, source.notes()));

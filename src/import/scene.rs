@@ -186,11 +186,7 @@ impl Scene {
             -1 => "Right",
             _ => return source.refuse_at(mark, "only the ego vehicle's lane and those beside it are read"),
         });
-        if ahead_m >= 0.0 {
-            if *mps == 0.0 {
-                source.note("a vehicle that stands in the file creeps at 0.1 m/s");
-            }
-        } else if behind_m >= 0.0 {
+        if ahead_m < 0.0 && behind_m >= 0.0 {
             (spawn.does, spawn.is_behind, spawn.gap_m) = ("Overtake", true, behind_m);
             if beside.lanes_left == 0 {
                 return source
@@ -200,7 +196,7 @@ impl Scene {
                 return source
                     .refuse_at(mark, "a vehicle that comes from behind is faster than the ego vehicle");
             }
-        } else {
+        } else if ahead_m < 0.0 {
             return source
                 .refuse_at(mark, "it begins beside the ego vehicle; vehicles appear before or behind it");
         }

@@ -8,22 +8,13 @@ use crate::syntax::ast::FileId;
 use crate::syntax::format;
 
 use super::Imported;
+use super::own::Own;
 use super::scene::{Other, Scene};
 
 /// The file: its space, with a body for each road user and one action that lets all of them appear, and the scenario.
 pub fn scenario(scene: &Scene, name: &str, notes: BTreeSet<String>) -> Imported {
-    let mut text = String::new();
-    let description = one_line(&scene.description);
-    let title = if description.is_empty() { name.to_owned() } else { description };
-    let _ = writeln!(
-        text,
-        "//! {title}\n//!\n//! From OpenSCENARIO XML by `avastra import`. What differs from the file:"
-    );
-    for note in &notes {
-        let _ = writeln!(text, "//! - {}", one_line(note));
-    }
+    let mut text = head(&scene.description, name, &notes);
     let own = identifier(name);
-    text += "language 1\n\n";
     let map = scene.map.rsplit(['/', '\\']).next().unwrap_or_default();
     let _ = writeln!(
         text,
@@ -92,6 +83,27 @@ pub fn scenario(scene: &Scene, name: &str, notes: BTreeSet<String>) -> Imported 
     // A text that does not parse is refused when it is checked.
     let text = format(FileId(0), &text).unwrap_or(text);
     Imported { text, map: scene.map.clone(), notes }
+}
+
+/// The file of a scenario that the other file carries.
+pub fn own(own: &Own, name: &str, notes: BTreeSet<String>) -> Imported {
+    let text = head(&own.description, name, &notes) + &own.text + "\n";
+    let text = format(FileId(0), &text).unwrap_or(text);
+    Imported { text, map: own.map.clone(), notes }
+}
+
+/// How a file begins: what it is, what differs, and the version of the language.
+fn head(description: &str, name: &str, notes: &BTreeSet<String>) -> String {
+    let description = one_line(description);
+    let title = if description.is_empty() { name.to_owned() } else { description };
+    let mut text = format!(
+        "//! {title}\n//!\n//! From OpenSCENARIO XML by `avastra import`. What differs from the file:\n"
+    );
+    for note in notes {
+        let _ = writeln!(text, "//! - {}", one_line(note));
+    }
+    text += "language 1\n\n";
+    text
 }
 
 fn spawn(body: &str, other: &Other) -> String {

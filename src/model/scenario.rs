@@ -207,11 +207,12 @@ pub const MODULES: [&str; 8] =
 pub const DRIVERS: [&str; 8] = ["modular", "frenet", "reactive", "idm", "cc", "fsm", "rss", "r157"];
 
 /// How an episode may end, in the words of `expect end == …`.
-pub const ENDS: [&str; 13] = [
+pub const ENDS: [&str; 14] = [
     "arrived",
     "stalled",
     "blocked",
     "astray",
+    "left_the_map",
     "limit",
     "script",
     "ads_crash",

@@ -9,7 +9,7 @@ use super::heights::Heights;
 use super::index::LaneGrid;
 use super::lane_change::permitted;
 use super::map::{
-    Junction, Lane, LaneIndex, LaneKey, Neighbour, Precedence, RoadError, RoadMap, Strip, Turn,
+    Junction, Lane, LaneIndex, LaneKey, LeftOut, Neighbour, Precedence, RoadError, RoadMap, Strip, Turn,
 };
 use super::opendrive::{Contact, Document, RoadElement, RoadLink, SectionElement, wrong};
 use super::phases::share_phases;
@@ -108,6 +108,7 @@ impl<'a> Builder<'a> {
             has_levels: false,
             warnings: document.warnings.clone(),
             warned_at: document.warned_at.clone(),
+            left_out: BTreeMap::new(),
             grid: LaneGrid::default(),
         };
         Ok(Builder { document, map, roads, junctions: junctions.collect(), lanes: BTreeMap::new() })
@@ -140,23 +141,33 @@ impl<'a> Builder<'a> {
                 self.warn(road.line, message);
             }
             for (section_index, section) in road.sections.iter().enumerate() {
-                for element in section.lanes.iter().filter(|element| element.driving) {
+                for element in &section.lanes {
+                    let left_out = (road.id.clone(), element.id);
+                    if let Some(undriven) = &element.undriven {
+                        self.map.left_out.entry(left_out).or_insert_with(|| undriven.clone());
+                        continue;
+                    }
+                    let undrivable = |what: &str| LeftOut { what: what.to_owned(), for_vehicles: true };
                     let at = format!("lane {} of road `{}` at s {}", element.id, road.id, section.begin_m);
                     let centre = match centre_line(road, section, element.id) {
                         Ok(centre) => centre,
                         Err(NoCentreLine::Short) => {
+                            self.map.left_out.insert(left_out, undrivable("without length"));
                             self.warn(element.line, format!("left out {at}: it has no length"));
                             continue;
                         }
                         // The corner has its own warning.
                         Err(NoCentreLine::Broken) => continue,
                         Err(reason) => {
+                            self.map.left_out.insert(left_out, undrivable("one that cannot be drawn"));
                             let begin = road.reference.at(section.begin_m).position;
                             self.warn_at(element.line, begin, format!("left out {at}: {reason}"));
                             continue;
                         }
                     };
                     if junction.is_some() && is_tight(&centre.path) {
+                        let turn = undrivable("a turn that no car can drive in one go");
+                        self.map.left_out.insert(left_out, turn);
                         tight.push(at);
                         continue;
                     }

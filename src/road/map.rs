@@ -1,6 +1,6 @@
 //! The lane graph, and how places on it are named and found.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use crate::geometry::{Bounds, OrientedBox, Path, Vec2, wrap_angle};
@@ -176,6 +176,15 @@ pub struct Crosswalk {
     pub height_m: f64,
 }
 
+/// A lane of the map that is left out, because no car drives on it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LeftOut {
+    /// For example ``of type `bus` ``.
+    pub what: String,
+    /// Whether some vehicles would use it, so that an author may look for it.
+    pub for_vehicles: bool,
+}
+
 /// A lane that is no driving lane, as far as it matters to people on foot.
 #[derive(Debug, Clone)]
 pub struct Strip {
@@ -223,6 +232,8 @@ pub struct RoadMap {
     pub warnings: Vec<String>,
     /// The places in the plane that warnings are about: index of the warning, position.
     pub warned_at: Vec<(usize, Vec2)>,
+    /// The map's lanes on which no car drives, by road and lane id.
+    pub left_out: BTreeMap<(String, i32), LeftOut>,
     pub(super) grid: LaneGrid,
 }
 
@@ -274,15 +285,14 @@ impl RoadMap {
         let on_road = || self.lanes.iter().enumerate().filter(|(_, candidate)| candidate.key.road == road);
         if on_road().next().is_none() {
             let roads: BTreeSet<&str> = self.lanes.iter().map(|lane| lane.key.road.as_str()).collect();
-            return Err(missing(format!("no driving lane on a road `{road}`; there are {}", listed(roads))));
+            let message = format!("no driving lane on a road `{road}`; there are {}", listed(roads));
+            return Err(missing(message + &self.left_out_text(road, lane)));
         }
         let in_lane = || on_road().filter(|(_, candidate)| candidate.key.lane == lane);
         if in_lane().next().is_none() {
             let lanes: BTreeSet<i32> = on_road().map(|(_, candidate)| candidate.key.lane).collect();
-            return Err(missing(format!(
-                "road `{road}` has no driving lane {lane}; it has {}",
-                listed(lanes)
-            )));
+            let message = format!("road `{road}` has no driving lane {lane}; it has {}", listed(lanes));
+            return Err(missing(message + &self.left_out_text(road, lane)));
         }
         // Where two sections meet, the place is in the section that begins there.
         let held = in_lane().rfind(|(_, candidate)| {
@@ -300,6 +310,14 @@ impl RoadMap {
             )));
         };
         Ok(LanePlace { lane: LaneIndex(index), station_m: candidate.station_of(s_m), offset_m: 0.0 })
+    }
+
+    /// What the map has in place of a driving lane, to be appended to a message; empty if it has nothing.
+    fn left_out_text(&self, road: &str, lane: i32) -> String {
+        let Some(LeftOut { what, .. }) = self.left_out.get(&(road.to_owned(), lane)) else {
+            return String::new();
+        };
+        format!("; the map's lane {lane} is {what}, and no car drives on it")
     }
 
     /// The nearest lane within `reach_m`, its own width included; among equals the one whose heading

@@ -38,8 +38,8 @@ pub use footway::{FootWay, Kerb};
 pub use heights::{Heights, is_apart};
 pub use lane_change::STRIP_M_MAX;
 pub use map::{
-    Crosswalk, Junction, Lane, LaneIndex, LaneKey, LanePlace, Neighbour, Precedence, RoadError, RoadMap,
-    Side, Sign, SignKind, SignLine, Signal, Solid, StopLine, Strip, StripKind, Turn,
+    Crosswalk, Junction, Lane, LaneIndex, LaneKey, LanePlace, LeftOut, Neighbour, Precedence, RoadError,
+    RoadMap, Side, Sign, SignKind, SignLine, Signal, Solid, StopLine, Strip, StripKind, Turn,
 };
 pub use opendrive::well_formed;
 pub use proposal::{Proposal, propose};

@@ -271,7 +271,7 @@ impl Database {
                         (SELECT coalesce(sum(priority = 'ego'), 0) FROM collision),
                         (SELECT coalesce(sum(priority = 'other'), 0) FROM collision),
                         coalesce(sum(ended = 'blocked'), 0), (SELECT count(*) FROM failure),
-                        coalesce(sum(ended = 'astray'), 0)
+                        coalesce(sum(ended = 'astray'), 0), coalesce(sum(ended = 'left_the_map'), 0)
                  FROM episode",
             [],
             |row| {
@@ -300,6 +300,7 @@ impl Database {
                     blocked: row.get(21)?,
                     failed: row.get(22)?,
                     astray: row.get(23)?,
+                    left_map: row.get(24)?,
                 })
             },
         )?)
@@ -340,6 +341,8 @@ pub struct Totals {
     pub stalled: i64,
     pub blocked: i64,
     pub astray: i64,
+    /// Ended because the ego vehicle drove off the map.
+    pub left_map: i64,
     /// Ended because an external driving system failed.
     pub failed: i64,
     pub step_limit: i64,

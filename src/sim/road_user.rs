@@ -199,11 +199,12 @@ impl Mover {
         self.crashed_with.is_some()
     }
 
-    /// Whether it stands and will not go by itself: a wreck, or a driver that has given up waiting.
+    /// Whether it stands and will not go by itself: a wreck, a driver that has given up waiting, or one that was asked to
+    /// stand.
     pub fn is_stuck(&self, this: &Obstacle) -> bool {
         match &self.motion {
             _ if self.is_wreck() => this.velocity_mps == Vec2::zeros(),
-            Motion::Drive(driver) => driver.has_given_up(),
+            Motion::Drive(driver) => driver.has_given_up() || driver.is_parked(),
             Motion::Walk(_) | Motion::Stand => false,
         }
     }

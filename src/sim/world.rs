@@ -9,7 +9,7 @@ mod tests;
 use std::sync::Arc;
 
 use crate::action::{Effect, LaneChangeRules, SpawnRequest};
-use crate::geometry::{Frame, OrientedBox, Sweep, Vec2};
+use crate::geometry::{Frame, OrientedBox, Pose, Sweep, Vec2};
 use crate::model::body::BodyParameters;
 use crate::model::vocabulary::{Level, TimeOfDay};
 use crate::model::{COMMANDED_MAX, NpcFacts, TICK_MS};
@@ -61,6 +61,10 @@ const QUEUE_M: f64 = 40.0;
 
 /// A queue before a light is at most this long, m: seven cars.
 const LIGHT_QUEUE_M: f64 = 50.0;
+
+/// An ego vehicle this far from its way is looked for on all lanes of the map, and has left the map if it is as far from
+/// each of them, m. What went astray beside a street is nearer.
+const OFF_MAP_M: f64 = 20.0;
 
 /// Added to the way of two bodies before they are taken to be too far apart to touch, m: far more than rounding.
 const NEAR_M: f64 = 1e-3;
@@ -427,6 +431,17 @@ impl World {
         let half_m = self.scene.map.lane(here.lane).width_at(station_m - here.from_m) / 2.0;
         let changes = |change: &RouteLaneChange| (change.begin_m..change.latest_m).contains(&station_m);
         !self.ego.motion.touched && self.ego_offset_m.abs() > half_m && !route.changes.iter().any(changes)
+    }
+
+    /// Whether the ego vehicle has driven off the map: its front bumper is beyond the end of its way (the end of the
+    /// lanes, or 60 m past the goal), or no lane is near it. Nothing can happen there, because road users appear beside
+    /// the way.
+    pub fn left_the_map(&self) -> bool {
+        let (map, path) = (&self.scene.map, &self.scene.route.path);
+        let Pose { position, heading_rad } = self.ego.motion.rear_axle;
+        let aside_m = (position - path.position_at(self.ego_station_m)).norm();
+        let is_near_road = aside_m <= OFF_MAP_M || map.nearest(position, heading_rad, OFF_MAP_M).is_some();
+        !is_near_road || self.ego_front_m() >= path.length_m()
     }
 
     /// Station of the ego vehicle's front bumper on the route, m.

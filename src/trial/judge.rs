@@ -7,7 +7,7 @@
 //!
 //! | verb | realised if |
 //! |---|---|
-//! | drive ahead | it appears ahead at the asked gap, in the asked lane, heading along it, and moves |
+//! | drive ahead | it appears ahead at the asked gap, in the asked lane, heading along it, and moves; if it is asked to stand, it does not move at all |
 //! | overtake | it appears behind the ego vehicle and gets wholly in front of it |
 //! | drive opposite | it appears in a lane that runs against the route, and passes the ego vehicle head-on |
 //! | cross road | it appears on a lane that is not of the route and comes onto the route's path before the ego vehicle has passed there |
@@ -15,8 +15,9 @@
 //! | stand | it stands on the route's path |
 //!
 //! A vehicle that is to keep its lane does not change it; a vehicle that is to change it does so once.
-//! An overtaker in the ego vehicle's own lane changes it once to get past, and comes back if it is
-//! to change. Changes inside junctions, where lanes lie over each other, are not counted.
+//! An overtaker in the ego vehicle's own lane changes it once to get past, and comes back: it must if it is
+//! to change, and may when it is well ahead otherwise. Changes inside junctions, where lanes lie over each other, are
+//! not counted.
 
 use crate::action::SpawnRequest;
 use crate::geometry::wrap_angle;
@@ -56,10 +57,15 @@ pub(super) fn verdict(scene: &Scene, request: &SpawnRequest, seen: &Sighting) ->
             appears_ahead(scene, request, first)?;
             let last = &seen.frames[seen.frames.len() - 1];
             let way_m = (last.outline.pose.position - first.outline.pose.position).norm();
-            if way_m < MOVES_M {
+            if request.speed_mps == 0.0 && way_m > 0.0 && seen.ending != Ending::TouchedEgo {
+                return Err("it does not stand".to_owned());
+            }
+            // What crawls has done enough after half of its way.
+            if way_m < MOVES_M.min(request.speed_mps * HORIZON_S / 2.0) {
                 return Err(ended(seen, "it had moved"));
             }
-            changes(&scene.map, request, seen, usize::from(request.then == Then::Change), 0)
+            let asked = usize::from(request.then == Then::Change);
+            changes(&scene.map, request, seen, [asked, asked], 0)
         }
         Verb::Overtake => {
             drives()?;
@@ -71,7 +77,8 @@ pub(super) fn verdict(scene: &Scene, request: &SpawnRequest, seen: &Sighting) ->
             };
             let out = usize::from(request.lane == LaneChoice::Current);
             let back = usize::from(request.then == Then::Change);
-            changes(&scene.map, request, seen, out + back, if back > 0 { passed } else { 0 })
+            let after = if back > 0 { passed } else { 0 };
+            changes(&scene.map, request, seen, [out + back, out + out.max(back)], after)
         }
         Verb::DriveOpposite => {
             drives()?;
@@ -79,7 +86,8 @@ pub(super) fn verdict(scene: &Scene, request: &SpawnRequest, seen: &Sighting) ->
                 return Err("it does not appear against the direction of the route".to_owned());
             }
             meets(seen)?;
-            changes(&scene.map, request, seen, usize::from(request.then == Then::Change), 0)
+            let asked = usize::from(request.then == Then::Change);
+            changes(&scene.map, request, seen, [asked, asked], 0)
         }
         Verb::CrossRoad => {
             drives()?;
@@ -90,7 +98,8 @@ pub(super) fn verdict(scene: &Scene, request: &SpawnRequest, seen: &Sighting) ->
             }
             let crossing = crosses(seen)?;
             let until = Sighting { frames: seen.frames[..=crossing].to_vec(), ending: seen.ending };
-            changes(&scene.map, request, &until, usize::from(request.then == Then::Change), 0)
+            let asked = usize::from(request.then == Then::Change);
+            changes(&scene.map, request, &until, [asked, asked], 0)
         }
     }
 }
@@ -203,12 +212,13 @@ fn stands(seen: &Sighting) -> Result<(), String> {
     if stands && on_route { Ok(()) } else { Err("it does not stand on the route".to_owned()) }
 }
 
-/// Whether it changed its lane as often as asked, the last time after frame `after`.
+/// Whether it changed its lane as often as asked, the last time after frame `after`; one that keeps its lane, no more
+/// often than it may.
 fn changes(
     map: &RoadMap,
     request: &SpawnRequest,
     seen: &Sighting,
-    asked: usize,
+    [asked, at_most]: [usize; 2],
     after: usize,
 ) -> Result<(), String> {
     let found = lane_changes(map, &seen.frames);
@@ -216,7 +226,7 @@ fn changes(
         let what = if found.is_empty() { "it had changed its lane" } else { "it had changed its lane back" };
         return Err(ended(seen, what));
     }
-    if request.then == Then::Keep && found.len() > asked {
+    if request.then == Then::Keep && found.len() > at_most {
         return Err("it changed its lane".to_owned());
     }
     match found.last() {

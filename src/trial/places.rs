@@ -102,6 +102,10 @@ pub fn warn(loaded: &mut Loaded, scenes: &mut Scenes) {
         let warning = Diagnostic::warning(code::NEVER_ENABLED, message)
             .at(definition.span, "never enabled, as far as can be seen")
             .note(format!("{}: {}", first.row.label, first.reasons()));
+        let warning = match first.left_out() {
+            Some(left_out) => warning.note(left_out),
+            None => warning,
+        };
         let help = "remove the rows with `where`, or add a road that has such a place; `avastra table FILE --try` drives them";
         loaded.diagnostics.push(warning.help(help));
     }
@@ -140,6 +144,25 @@ impl Lost<'_> {
         };
         count(self.refusals.entry(road).or_default(), &reason);
         false
+    }
+
+    /// Lanes of the map beside the route that are left out, if the row asks for a lane that is not there.
+    fn left_out(&self) -> Option<String> {
+        let mut found = BTreeSet::new();
+        for (road, counts) in &self.refusals {
+            if !counts.iter().any(|count| count.reason.contains("no lane on the ")) {
+                continue;
+            }
+            let road = &self.space.roads[*road];
+            let passed = road.route.lanes.iter().map(|part| road.map.lane(part.lane).key.road.as_str());
+            let passed: BTreeSet<&str> = passed.collect();
+            let beside = road.map.left_out.iter().filter(|(_, left_out)| left_out.for_vehicles);
+            let beside = beside.filter(|((id, _), _)| passed.contains(id.as_str()));
+            let named = beside.map(|((id, lane), left_out)| format!("lane {id}/{lane}, {}", left_out.what));
+            found.extend(named);
+        }
+        let named: Vec<String> = found.into_iter().take(ROWS_SHOWN).collect();
+        (!named.is_empty()).then(|| format!("the map has, and no car drives on it: {}", named.join("; ")))
     }
 
     /// The most frequent reason on each road.

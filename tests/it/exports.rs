@@ -225,7 +225,7 @@ fn every_format_has_everyone_where_the_table_has_them() {
 }
 
 /// The shipped crash.
-fn crash() -> PathBuf {
+pub fn crash() -> PathBuf {
     let entries = std::fs::read_dir(root().join("scenarios/found")).expect("it is shipped").flatten();
     let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
     files.retain(|file| file.extension().is_some_and(|extension| extension == "ava"));

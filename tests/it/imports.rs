@@ -1,6 +1,7 @@
 //! What `avastra import` makes of OpenSCENARIO files: the scenario that it writes, or all that it refuses with its lines.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use avastra::import::{Files, openscenario};
 use avastra::rng;
@@ -8,8 +9,12 @@ use avastra::rng::Stream;
 
 use crate::cases::{expect_snapshot, root};
 use crate::command::{avastra, outcome};
+use crate::exports::crash;
 
 const AREA: &str = "tests/cases/imports";
+
+/// A scenario by hand, in which the weather changes.
+const WET: &str = "tests/cases/exports/wet_corner.ava";
 
 #[test]
 fn every_file_becomes_a_scenario_or_is_refused_with_its_lines() {
@@ -50,6 +55,50 @@ fn every_file_becomes_a_scenario_or_is_refused_with_its_lines() {
             outcome(&mut avastra(&["import", "--out", &folder, &format!("{AREA}/{name}.xosc")]));
         assert_eq!(status, 0, "{name} again");
     }
+}
+
+/// Whatever the kind of the export, it carries the scenario: with the trace of every bit, if the drive is claimed.
+#[test]
+fn an_export_of_ours_comes_back_and_replays() {
+    let crash = crash().display().to_string();
+    for (file, claims) in [(crash.as_str(), &["expect collision with npc#", "expect trace =="][..]), (WET, &[])] {
+        let stem = Path::new(file).file_stem().expect("it is a file").to_string_lossy();
+        for more in [&[][..], &["--natural"], &["--profile", "carla"]] {
+            let scratch = tempfile::tempdir().expect("a scratch directory");
+            let folder = scratch.path().display().to_string();
+            let export = ["export", "--to", "openscenario", "--out", &folder, file];
+            let (status, _, stderr) = outcome(&mut avastra(&[&export[..], more].concat()));
+            assert_eq!(status, 0, "{file} {more:?}: {stderr}");
+            let exported = scratch.path().join(format!("{stem}.xosc")).display().to_string();
+            let (status, stdout, stderr) = outcome(&mut avastra(&["import", &exported]));
+            assert_eq!(status, 0, "{file} {more:?}: {stdout}{stderr}");
+            assert!(stdout.contains("an export of avastra"), "what is not kept is said: {stdout}");
+            let imported = scratch.path().join(format!("imported/{stem}.ava"));
+            let text = std::fs::read_to_string(&imported).expect("it was written");
+            assert!(claims.iter().all(|claim| text.contains(claim)), "{text}");
+            let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &imported.display().to_string()]));
+            assert_eq!(status, 0, "{file} {more:?}: {stdout}{stderr}");
+        }
+    }
+}
+
+/// What a file says of its scenario is text from somewhere else: it reads no file but its map.
+#[test]
+fn an_export_that_was_tampered_with_uses_no_other_file() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let folder = scratch.path().display().to_string();
+    let (status, _, stderr) =
+        outcome(&mut avastra(&["export", "--to", "openscenario", "--out", &folder, WET]));
+    assert_eq!(status, 0, "{stderr}");
+    let file = scratch.path().join("wet_corner.xosc");
+    let text = std::fs::read_to_string(&file).expect("it was written");
+    std::fs::write(scratch.path().join("other.ava"), "language 1\n").expect("it can be written");
+    let begin = "name=\"scenario_text\" value=\"";
+    let text = text.replace(begin, &format!("{begin}use &quot;../other.ava&quot; "));
+    std::fs::write(&file, text).expect("it can be written");
+    let (status, stdout, _) = outcome(&mut avastra(&["import", &file.display().to_string()]));
+    assert!(status == 2 && stdout.contains("does not compile"), "{status} {stdout}");
+    assert!(!scratch.path().join("imported").join("wet_corner.ava").exists());
 }
 
 #[test]

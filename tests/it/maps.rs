@@ -146,3 +146,18 @@ fn a_wait_at_a_red_light_is_no_stall() {
     }
     assert!(waits > 0, "no episode met a light that was red for long");
 }
+
+#[test]
+fn an_episode_that_no_goal_ends_ends_where_the_map_does() {
+    let space = space_at(&path("no_goal.ava"));
+    let way_m = space.roads[0].route.path.length_m();
+    for entry in ["modular", "frenet", "reactive", "idm", "cc"] {
+        let settings = RunSettings { ads: entry.to_owned(), ..RunSettings::new(&space, "none", 1, 1) };
+        let run = Run::new(ActionTable::new(space.clone()), settings).expect("the settings are sound");
+        let log = run.episode(0);
+        assert_eq!(log.end, End::LeftMap, "{entry}");
+        // The front bumper is 3.7 m ahead of the rear axle, which the way is measured at. Bends are cut a little.
+        let driven_m = log.distance_m + 3.705;
+        assert!((way_m - 5.0..=way_m + 1.0).contains(&driven_m), "{entry}: {driven_m} m of {way_m} m");
+    }
+}

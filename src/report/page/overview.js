@@ -120,6 +120,7 @@ function totals(sums, simulatedH) {
     ["stalled", "stalled"],
     ["blocked", "blocked"],
     ["astray", "out of its lane"],
+    ["left_map", "off the map"],
     ["step_limit", "at the step limit"],
     ["failed", "driving system failed"],
   ];

@@ -27,6 +27,7 @@ export const ENDS = {
   stalled: "it stood for several steps",
   blocked: "others blocked its way",
   astray: "it left its lane",
+  left_the_map: "it drove off the map",
   limit: "the step limit was reached",
   script: "the scenario ends here",
 };

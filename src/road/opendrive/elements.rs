@@ -1,7 +1,7 @@
 //! The elements of an OpenDRIVE file that are read, in OpenDRIVE's own terms.
 
 use crate::geometry::Vec2;
-use crate::road::{SignKind, StripKind};
+use crate::road::{LeftOut, SignKind, StripKind};
 
 use super::cubic::{Cubics, Jet};
 use super::geometry::ReferenceLine;
@@ -68,6 +68,8 @@ pub struct LaneElement {
     pub line: u32,
     /// Whether cars may drive on it, in one direction.
     pub driving: bool,
+    /// What it is if it is no driving lane.
+    pub undriven: Option<LeftOut>,
     /// What a lane that is no driving lane is to people on foot.
     pub beside: Option<StripKind>,
     /// Width over the distance from the section's begin.

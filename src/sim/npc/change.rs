@@ -69,6 +69,13 @@ pub(super) struct Change {
     pub duration_s: f64,
 }
 
+impl Change {
+    /// The part of the change that a metre of the way does at a speed.
+    pub fn progress_per_m(&self, speed_mps: f64) -> f64 {
+        1.0 / (speed_mps.max(CHANGE_FULL_MPS) * self.duration_s)
+    }
+}
+
 impl Driver {
     /// Begins the next lane change of the plan if it is due, or one for its own gain, there is a lane, and it
     /// is free.
@@ -217,7 +224,7 @@ impl Driver {
             change.to.path.project_from(from.position, guess_m).map_or(guess_m, |found| found.station_m);
         let to = change.to.body_at(change.to_station_m, size);
         let to_lane_rad = change.to.path.heading_at(change.to_station_m);
-        let progress_per_m = 1.0 / (self.speed_mps.max(CHANGE_FULL_MPS) * change.duration_s);
+        let progress_per_m = change.progress_per_m(self.speed_mps);
         change.progress += progress_per_m * way_m;
         if change.progress >= 1.0 {
             (self.way, self.station_m) = (Arc::clone(&change.to), change.to_station_m);

@@ -35,6 +35,9 @@ pub(super) const GAP_M_MIN: f64 = 2.0;
 pub(super) const LOOK_AHEAD_M: f64 = 25.0;
 /// Room that drivers want free beside the outline, m.
 pub(super) const SIDE_ROOM_M: f64 = 0.2;
+/// A wish below this is met exactly, m/s: the model's acceleration would swing about so low a speed. What shall stand
+/// has a wish of 0.
+const CRAWL_MPS: f64 = 0.1;
 /// A driver slower than this when a wait ends sets out anew, m/s.
 const SETS_OUT_MPS: f64 = 1.0;
 
@@ -191,8 +194,8 @@ impl Driver {
         if self.is_beyond_map() && !in_sight {
             return None;
         }
-        // What stands is where it was; a look may have laid its way anew.
-        if way_m == 0.0 && self.change.is_none() && !looks {
+        // What stands is where it was, to the bit, also if a look has laid its way anew.
+        if way_m == 0.0 && self.change.is_none() {
             return Some(Moved::at_rest(this));
         }
         Some(self.advance_change(way_m, this.outline.pose.position, size))
@@ -238,7 +241,7 @@ impl Driver {
         if let Some(change) = &self.change {
             bend_mps = bend_mps.min(change.to.speed_mps_max(change.to_station_m));
         }
-        let wish_mps = self.cruise_mps.min(bend_mps).max(0.1);
+        let wish_mps = self.cruise_mps.min(bend_mps);
         let front_m = self.station_m + size.length_m / 2.0;
         let end_m = if self.change.is_none() { self.way.end_m } else { None };
         let line_ahead_m = [
@@ -251,10 +254,13 @@ impl Driver {
         if around.traffic.rays {
             return self.tending_mps2(size, around, wish_mps, line_ahead_m);
         }
-        let ratio = self.speed_mps / wish_mps;
         // To be too fast is no emergency.
-        let free_mps2 =
-            (size.acceleration_mps2_max * (1.0 - ratio * ratio * ratio * ratio)).max(-COMFORT_MPS2);
+        let free_mps2 = if wish_mps < CRAWL_MPS {
+            ((wish_mps - self.speed_mps) / DT_S).clamp(-COMFORT_MPS2, size.acceleration_mps2_max)
+        } else {
+            let ratio = self.speed_mps / wish_mps;
+            (size.acceleration_mps2_max * (1.0 - ratio * ratio * ratio * ratio)).max(-COMFORT_MPS2)
+        };
         let mut wanted_mps2 = free_mps2;
         if let Some(leader) = &self.leader {
             wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, leader, free_mps2));
@@ -279,6 +285,11 @@ impl Driver {
     /// Whether it has waited for others so long that it would leave if it were not seen.
     pub fn has_given_up(&self) -> bool {
         f64::from(self.waited_ticks) * DT_S >= GIVE_UP_S
+    }
+
+    /// Whether it was asked to stand.
+    pub fn is_parked(&self) -> bool {
+        self.cruise_mps == 0.0
     }
 
     /// Whether no action commanded it.

@@ -3,7 +3,7 @@
 //! A leader is ahead on the own way and within a corridor as wide as the vehicle. What would come into
 //! the way beside that corridor is found in `foresight`.
 
-use crate::geometry::{OrientedBox, Pose, Vec2};
+use crate::geometry::{OrientedBox, Pose, Vec2, smooth_step};
 use crate::road::is_apart;
 
 use crate::sim::around::{Around, Other};
@@ -13,6 +13,7 @@ use crate::sim::road_user::Obstacle;
 use crate::sim::way::Way;
 
 use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, LOOK_AHEAD_M, SIDE_ROOM_M};
+use super::manners::STANDS_MPS;
 
 /// IDM: time gap, s. Ours.
 pub(super) const TIME_GAP_S: f64 = 1.2;
@@ -65,7 +66,8 @@ impl Driver {
             if delta.norm_squared() > reach_m * reach_m || forward.dot(&delta) < 0.0 {
                 continue;
             }
-            let on_own_way = in_corridor(&self.way, self.station_m, here, size, other);
+            let on_own_way = in_corridor(&self.way, self.station_m, here, size, other)
+                .filter(|leader| !self.evades(leader, size, other));
             let on_next_way = self
                 .change
                 .as_ref()
@@ -77,6 +79,24 @@ impl Driver {
             }
         }
         nearest
+    }
+
+    /// Whether a lane change under way leads past what stands in the lane that it leaves: where the front comes to it, the
+    /// vehicle is already beside it. What moves is a leader up to the end of the change.
+    fn evades(&self, leader: &Leader, size: &BodyParameters, other: Other) -> bool {
+        let Some(change) = self.change.as_ref().filter(|_| other.velocity_mps.norm() < STANDS_MPS) else {
+            return false;
+        };
+        let there_m = self.station_m + leader.gap_m + size.length_m / 2.0;
+        let Some(beside) = self.way.path.project_from(other.outline.pose.position, there_m) else {
+            return false;
+        };
+        let target = change.to.path.position_at(change.to_station_m);
+        let over_m = self.way.path.pose_at(self.station_m).to_local(target).y;
+        let progress = change.progress + change.progress_per_m(self.speed_mps) * leader.gap_m.max(0.0);
+        let moved_m = over_m * smooth_step(progress).value;
+        let (_, half_width_m) = extent_m(other.outline, other.forward, beside.forward);
+        (beside.offset_m - moved_m).abs() - half_width_m - size.width_m / 2.0 > SIDE_ROOM_M
     }
 
     /// Acceleration behind a leader, m/s²: IDM's, or the braking that still avoids the leader if that is harder.

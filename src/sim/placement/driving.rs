@@ -19,6 +19,9 @@ use super::{ahead_m, commanded};
 const CHANGE_AFTER_S: f64 = 1.0;
 /// How far in front of the ego vehicle an overtaker cuts in, m.
 const CUT_IN_M: f64 = 5.0;
+/// How far in front of the ego vehicle an overtaker is back in its lane that only wants to pass, m: two seconds in town.
+/// Ours.
+const RETURN_M: f64 = 20.0;
 
 pub(super) fn drive_ahead(
     around: &Around,
@@ -72,16 +75,15 @@ pub(super) fn overtake(
     let lane = chosen_lane(around, around.ego_station_m, request.lane)?;
     let mut rng = choices(around.seed, id, 0);
     let mut plan = Vec::new();
-    let cut_in = |towards| Manoeuvre { when: When::AheadOfEgo(CUT_IN_M), towards };
+    let when_ahead = |gap_m, towards| Manoeuvre { when: When::AheadOfEgo(gap_m), towards };
     match (request.lane, request.then) {
         (LaneChoice::Current, then) => {
             plan.push(Manoeuvre { when: When::Tick(around.tick), towards: Towards::Either });
-            if then == Then::Change {
-                plan.push(cut_in(Towards::Back));
-            }
+            let gap_m = if then == Then::Change { CUT_IN_M } else { RETURN_M };
+            plan.push(when_ahead(gap_m, Towards::Back));
         }
-        (LaneChoice::Left, Then::Change) => plan.push(cut_in(Towards::To(Side::Right))),
-        (LaneChoice::Right, Then::Change) => plan.push(cut_in(Towards::To(Side::Left))),
+        (LaneChoice::Left, Then::Change) => plan.push(when_ahead(CUT_IN_M, Towards::To(Side::Right))),
+        (LaneChoice::Right, Then::Change) => plan.push(when_ahead(CUT_IN_M, Towards::To(Side::Left))),
         (LaneChoice::Left | LaneChoice::Right, Then::Keep) => {}
     }
     // Its front bumper is `distance_m` behind the ego vehicle's rear bumper, measured in its own lane.

@@ -69,6 +69,53 @@ fn vehicles_that_touch_slide_to_rest_by_friction() {
 }
 
 #[test]
+fn a_vehicle_that_is_asked_to_stand_stands_to_the_bit() {
+    let mut world = testing::world(&testing::straight());
+    let stands = spawn(&mut world, request(Verb::DriveAhead, 30.0, 0.0));
+    for _ in 0..500 {
+        let control = hold(&world, 0.0);
+        world.tick(&control);
+        let now = world.obstacle(stands.id).expect("it stands in sight");
+        assert_eq!((now.outline, now.velocity_mps), (stands.outline, Vec2::zeros()));
+    }
+    assert!(world.is_blocked(), "it will not go");
+}
+
+#[test]
+fn a_lane_change_leads_past_what_stands_in_the_lane_before() {
+    let mut world = testing::world(&testing::straight());
+    let stands = spawn(&mut world, request(Verb::DriveAhead, 60.0, 0.0));
+    let changes = SpawnRequest { then: Then::Change, ..request(Verb::DriveAhead, 20.0, 8.0) };
+    let changes = spawn(&mut world, changes);
+    drive(&mut world, 0.0, 15.0);
+    let now = world.obstacle(changes.id).expect("it drives on");
+    assert!(now.outline.pose.position.x > stands.outline.pose.position.x + 20.0, "{now:?}");
+    assert!((now.outline.pose.position.y + 5.25).abs() < 1e-6, "{now:?}");
+}
+
+#[test]
+fn an_overtaker_that_keeps_its_lane_comes_back_to_it_well_ahead() {
+    let mut world = testing::world(&testing::straight());
+    drive(&mut world, 8.0, 8.0);
+    let passing = spawn(&mut world, request(Verb::Overtake, 12.0, 14.0));
+    // Where its rear is before the ego vehicle's front when it begins to come back, m.
+    let mut begins_m = None;
+    let mut most_aside_m: f64 = 0.0;
+    for _ in 0..1200 {
+        let control = hold(&world, 8.0);
+        world.tick(&control);
+        let now = world.obstacle(passing.id).expect("it drives on");
+        most_aside_m = most_aside_m.max(-1.75 - now.outline.pose.position.y);
+        if most_aside_m > 3.4 && now.velocity_mps.y > 0.1 {
+            begins_m = begins_m.or(Some(now.distance_m));
+        }
+    }
+    let begins_m = begins_m.expect("it comes back");
+    assert!((20.0..25.0).contains(&begins_m), "{begins_m}");
+    assert!((y_m(&world, passing.id) + 1.75).abs() < 1e-6);
+}
+
+#[test]
 fn vehicles_stand_at_a_stop_sign_before_they_cross() {
     let (none, stop) = ("274", "206");
     for (sign, stands) in [(stop, true), (none, false)] {

@@ -125,6 +125,26 @@ fn a_vehicle_that_left_its_lane_is_astray() {
 }
 
 #[test]
+fn beyond_the_end_of_its_way_and_far_from_all_lanes_the_ego_vehicle_has_left_the_map() {
+    let scene = testing::straight();
+    let drive = |steer_rad: f64| {
+        let mut world = testing::world(&scene);
+        while !world.left_the_map() {
+            let throttle_pct = if world.ego().speed_mps < 10.0 { 40.0 } else { 0.0 };
+            world.tick(&Control { throttle_pct, steer_rad, ..Control::default() });
+            assert!(world.time_s() < 120.0);
+        }
+        world.ego_outline().pose.position
+    };
+    let ahead = drive(0.0);
+    // The goal is at x = 500, and the way ends 60 m beyond it.
+    assert!((ahead.x + 2.35 - 560.0).abs() < 0.3 && (ahead.y + 1.75).abs() < 0.1, "{ahead}");
+    // The outermost lane ends at y = 7: 20 m beyond it.
+    let aside = drive(0.02);
+    assert!(aside.x < 400.0 && (27.0..30.0).contains(&aside.y), "{aside}");
+}
+
+#[test]
 fn the_ego_vehicle_arrives_and_counts_red_lights() {
     let mut world = testing::world(&testing::crossing());
     let throttle = Control { throttle_pct: 40.0, ..Control::default() };

@@ -1,6 +1,6 @@
 //! Reads lane sections and their lanes.
 
-use crate::road::{RoadError, StripKind};
+use crate::road::{LeftOut, RoadError, StripKind};
 
 use super::super::elements::{LaneElement, MarkElement, MarkRule, SectionElement};
 use super::super::xml::{Element, wrong};
@@ -68,12 +68,15 @@ impl Reader {
         }
         let kind = lane.attribute("type").unwrap_or("none");
         let mut driving = is_driving(kind);
-        if !driving && !BESIDE_THE_ROAD.contains(&kind) {
+        let for_vehicles = !BESIDE_THE_ROAD.contains(&kind);
+        let mut undriven = (!driving).then(|| LeftOut { what: format!("of type `{kind}`"), for_vehicles });
+        if !driving && for_vehicles {
             self.ignore(format!("lanes of type `{kind}`"));
         }
         if let Some(direction @ ("reversed" | "both")) = lane.attribute("direction").filter(|_| driving) {
             self.ignore(format!("lanes of direction `{direction}`"));
             driving = false;
+            undriven = Some(LeftOut { what: format!("of direction `{direction}`"), for_vehicles });
         }
         let beside = if driving { None } else { strip_kind(kind) };
         let widths = cubics(lane.children("width"), "sOffset")?;
@@ -88,6 +91,7 @@ impl Reader {
             id,
             line: lane.line(),
             driving,
+            undriven,
             beside,
             widths,
             borders,
