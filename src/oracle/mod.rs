@@ -21,7 +21,7 @@ pub use avoidable::{
 };
 pub use cause::{Diagnosis, ModuleFinding, NoModules, WeaknessFinding, diagnose, fate};
 pub use crash::{Fate, Regression, regression};
-pub use facts::{counted, counts, facts};
+pub use facts::{counted, counted_at_need, counts, facts};
 pub use measured::Measure;
 pub use mechanisms::{
     MechanismShare, Mechanisms, Share, WithoutMechanism, mechanism_shares, mechanisms, placebo,

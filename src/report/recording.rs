@@ -57,6 +57,8 @@ pub struct Recording {
     log: EpisodeLog,
     /// Index of the collision that it is about: the first that counts, or the first.
     main: Option<usize>,
+    /// Whether that collision counts.
+    main_counts: bool,
     /// Claims of its file that the replay refutes.
     pub refuted: Vec<ClaimResult>,
     /// Facts for the list of scenarios.
@@ -98,16 +100,17 @@ pub fn record_another(
     let change = match (first.main, recording.main, recording.log.end) {
         (Some(index), _, _) => {
             let at_s = first.log.collisions[index].contact.time_s;
-            match oracle::regression(&stage.setup(ads), &first.log, index, other) {
-                Regression::StillFails { time_s } if (time_s - at_s).abs() < SAME_S => {
-                    json!({ "kind": "same" })
-                }
-                Regression::StillFails { time_s } => {
-                    json!({ "kind": "other_time", "later_s": time_s - at_s })
+            let settings = stage.avoidability();
+            match oracle::regression(&stage.setup(ads), &first.log, index, other, settings) {
+                Regression::NotCounted { .. } if first.main_counts => json!({ "kind": "not_counted" }),
+                Regression::StillFails { time_s } | Regression::NotCounted { time_s } => {
+                    match (time_s - at_s).abs() < SAME_S {
+                        true => json!({ "kind": "same" }),
+                        false => json!({ "kind": "other_time", "later_s": time_s - at_s }),
+                    }
                 }
                 Regression::Fixed => json!({ "kind": "gone" }),
                 Regression::OtherCrash => json!({ "kind": "other_crash" }),
-                Regression::Struck => json!({ "kind": "struck" }),
                 Regression::NeverMet => json!({ "kind": "never_met" }),
                 Regression::AdsFailed(_) | Regression::FailsAgain(_) => json!({ "kind": "failed" }),
             }
@@ -176,7 +179,8 @@ fn played(
     });
     let main = counted.first().copied().or(if log.collisions.is_empty() { None } else { Some(0) });
     let packed = columns.pack(&header);
-    Ok(Recording { log, main, refuted, summary, packed, ground: ground(&setup.scene) })
+    let main_counts = !counted.is_empty();
+    Ok(Recording { log, main, main_counts, refuted, summary, packed, ground: ground(&setup.scene) })
 }
 
 /// Where a scenario comes from: name and text of each.

@@ -89,6 +89,11 @@ impl<'a> Stage<'a> {
         (log, judgements, first)
     }
 
+    /// Indices of the collisions of a log of it that the space's verdict counts.
+    pub fn counted(&self, ads: &Selected, log: &EpisodeLog) -> Vec<usize> {
+        oracle::counted_at_need(self.table.space(), log, || self.judge(ads, log))
+    }
+
     /// Checks its claims against a log of it.
     pub fn verify(&self, ads: &Selected, log: &EpisodeLog) -> Vec<ClaimResult> {
         let setup = self.setup(ads);

@@ -266,6 +266,36 @@ impl Found {
     }
 }
 
+/// What counts is for the space to say, also if there the other one runs into the ego vehicle; and however many threads
+/// play a suite, it tells the same in the same order.
+#[test]
+fn a_suite_is_judged_by_the_verdict_of_its_space() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let path = |name: &str| scratch.path().join(name).display().to_string();
+    let (space, run, profile) = (path("struck.ava"), path("run"), "scenarios/ads/degraded.yaml");
+    let used = root().join("scenarios/avastra45.ava");
+    let text = format!(
+        "language 1\nuse \"{}\"\noverride verdict counted: collision and struck\n",
+        used.display()
+    );
+    std::fs::write(&space, text).expect("it is writable");
+    let settings = ["--road", "crossroad", "--episodes", "40", "--seed", "5", "--traffic", "released"];
+    avastra(&[&["run", &space, "--ads-config", profile, "--out", &run], &settings[..]].concat())
+        .assert()
+        .success();
+    let test = |more: &[&str]| {
+        let (status, stdout, stderr) = outcome(&mut avastra(&[&["test", &run][..], more].concat()));
+        assert_eq!(status, 4, "{stdout}{stderr}");
+        stdout
+    };
+    let told = test(&["--jobs", "1"]);
+    let all = told.lines().filter(|line| line.starts_with("still fails")).count();
+    assert!(all > 0 && told.contains(&format!(": {all} still fail, 0 fixed, 0 changed, 0 not played")), "{told}");
+    assert_eq!(test(&["--jobs", "3"]), told);
+    // The same profile by its file: now each is played a second time.
+    assert_eq!(test(&["--ads-config", profile]), told);
+}
+
 #[test]
 fn a_self_contained_run_is_a_folder_that_moves() {
     let found = Found::new(&["--self-contained"]);
