@@ -280,9 +280,8 @@ fn a_suite_is_judged_by_the_verdict_of_its_space() {
     );
     std::fs::write(&space, text).expect("it is writable");
     let settings = ["--road", "crossroad", "--episodes", "40", "--seed", "5", "--traffic", "released"];
-    avastra(&[&["run", &space, "--ads-config", profile, "--out", &run], &settings[..]].concat())
-        .assert()
-        .success();
+    let begin = ["run", &space, "--ads-config", profile, "--out", &run];
+    avastra(&[&begin[..], &settings[..]].concat()).assert().success();
     let test = |more: &[&str]| {
         let (status, stdout, stderr) = outcome(&mut avastra(&[&["test", &run][..], more].concat()));
         assert_eq!(status, 4, "{stdout}{stderr}");
