@@ -210,7 +210,19 @@ pub fn table_of(output: &Output, loaded: Loaded, path: &Path) -> Result<ActionTa
 /// # Errors
 /// As [`load`], and if the file has no scenario.
 pub fn scenario(output: &Output, path: &Path) -> Result<(ActionTable, Scenario), Failure> {
-    let mut loaded = load(output, path)?;
+    scenario_in(output, path, read_and_check(path)?)
+}
+
+/// The table and the scenario of a file that was read and checked.
+///
+/// # Errors
+/// As [`scenario`].
+pub fn scenario_in(
+    output: &Output,
+    path: &Path,
+    loaded: Loaded,
+) -> Result<(ActionTable, Scenario), Failure> {
+    let mut loaded = sound(output, loaded)?;
     let Some(scenario) = loaded.scenario.take() else {
         let path = path.display();
         let hint = match (&loaded.policy, &loaded.space) {

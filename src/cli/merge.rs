@@ -563,6 +563,11 @@ impl Cut for RunSettings {
         if space.is_dir() {
             copy_folder(&space, &to.join(pack::SPACE))?;
         }
+        // Copies of one meaning may differ in comments: that of the first directory is kept.
+        let [space, copy] = way.within(pack::SPACE);
+        if space.is_dir() && !copy.is_dir() {
+            copy_folder(&space, &copy)?;
+        }
         let database = shard.database.iter().map(Database::scenarios).next();
         let written = database.transpose().map_err(|error| Failure::file("read", &shard.file(), error))?;
         let mut scenarios = Vec::new();

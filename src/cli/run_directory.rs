@@ -322,7 +322,7 @@ pub fn is_unbegun(path: &Path) -> std::io::Result<bool> {
         let name = entry?.file_name();
         let is_left = match name.to_str() {
             Some("run.yaml.partial" | "study.yaml.partial" | "estimate.yaml.partial") => true,
-            Some("shard.yaml" | "shard.yaml.partial") => true,
+            Some("shard.yaml" | "shard.yaml.partial" | pack::SPACE) => true,
             Some("critical") => {
                 let inside: Vec<_> = std::fs::read_dir(path.join(name))?.collect::<Result<_, _>>()?;
                 inside.iter().all(|entry| entry.file_name() == OsStr::new(pack::SPACE))

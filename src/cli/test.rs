@@ -7,7 +7,7 @@ use std::time::Instant;
 use crate::action::ActionTable;
 use crate::ads::external::{Failure as AdsFailure, FailureKind};
 use crate::check::{Loaded, normal};
-use crate::model::{Claim, Scenario, code};
+use crate::model::{Claim, Scenario};
 use crate::oracle;
 use crate::oracle::Regression;
 use crate::run;
@@ -21,6 +21,7 @@ use super::files::{write, write_answers};
 use super::findings::doubts;
 use super::load;
 use super::load::Emitted;
+use super::look::{is_outdated, meaning_text};
 use super::output::Output;
 use super::output::plural;
 use super::parallel::each_file;
@@ -331,14 +332,6 @@ fn tell_outdated(output: &Output, outdated: &[Told]) {
     }
 }
 
-/// What of the space means something else, in words: the first note of the diagnostic, unless that gives the digest alone.
-fn meaning_text(loaded: &Loaded) -> String {
-    let notes = loaded.diagnostics.iter().filter(|found| found.code == code::DIGEST);
-    let notes: Vec<String> = notes.filter_map(|found| found.notes.split_last()?.1.first().cloned()).collect();
-    let what = if notes.is_empty() { String::new() } else { format!(": {}", notes.join("; ")) };
-    format!("the space means something else by now{what}")
-}
-
 /// How an external driving system fails at the end of a scenario, if the scenario claims so.
 fn claimed_failure(scenario: &Scenario) -> Option<FailureKind> {
     let end = scenario.claims.iter().find_map(|claim| match claim {
@@ -346,12 +339,6 @@ fn claimed_failure(scenario: &Scenario) -> Option<FailureKind> {
         _ => None,
     })?;
     FailureKind::ALL.into_iter().find(|kind| kind.name() == end)
-}
-
-/// Whether the only mistakes of a scenario are digests, which it may accept.
-fn is_outdated(loaded: &Loaded) -> bool {
-    let mut errors = loaded.diagnostics.iter().filter(|found| found.is_error()).peekable();
-    errors.peek().is_some() && errors.all(|found| found.code == code::DIGEST && !found.fixes.is_empty())
 }
 
 impl Outcome {

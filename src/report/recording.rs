@@ -15,7 +15,7 @@ use crate::episode;
 use crate::episode::{Actor, End, EpisodeLog, Held, Moment, Outcome, Recorder, Sample, Script, Sky};
 use crate::geometry::{Pose, wrap_angle};
 use crate::model::vocabulary::Word;
-use crate::model::{Claim, Scenario, digest_text};
+use crate::model::{Claim, Scenario};
 use crate::oracle;
 use crate::oracle::{ClaimResult, ReferenceDrive, Regression};
 use crate::run;
@@ -59,6 +59,8 @@ pub struct Recording {
     main: Option<usize>,
     /// Whether that collision counts.
     main_counts: bool,
+    /// Whether the replay is the recorded episode, to the bit; `None` if the file does not say.
+    pub is_same: Option<bool>,
     /// Claims of its file that the replay refutes.
     pub refuted: Vec<ClaimResult>,
     /// Facts for the list of scenarios.
@@ -161,11 +163,12 @@ fn played(
         })
         .collect();
     let refuted = stage.refuted(ads, &log, &judgements, asked);
+    let is_same = stage.is_as_recorded(&log);
     let summary = json!({
         "name": scenario.name, "road": log.road, "ads": ads.name(), "duration_s": log.duration_s, "end": log.end.name(),
         "steps": log.steps.len(), "actions": log.steps.iter().filter(|step| matches!(step.outcome, Outcome::Done { .. })).count(),
         "collisions": collisions.iter().map(without_ways).collect::<Vec<_>>(),
-        "refuted": refuted, "same": is_same(scenario, &log),
+        "refuted": refuted, "same": is_same,
     });
     let steps: Vec<Value> =
         log.steps.iter().enumerate().map(|(index, _)| step(table, &log, index, offers.get(index))).collect();
@@ -180,7 +183,8 @@ fn played(
     let main = counted.first().copied().or(if log.collisions.is_empty() { None } else { Some(0) });
     let packed = columns.pack(&header);
     let main_counts = !counted.is_empty();
-    Ok(Recording { log, main, main_counts, refuted, summary, packed, ground: ground(&setup.scene) })
+    let ground = ground(&setup.scene);
+    Ok(Recording { log, main, main_counts, is_same, refuted, summary, packed, ground })
 }
 
 /// Where a scenario comes from: name and text of each.
@@ -199,14 +203,6 @@ fn origin(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Vec<(&'st
         ("chosen by", origin.policy.clone()),
     ];
     known.into_iter().filter_map(|(name, text)| Some((name, text?))).collect()
-}
-
-/// Whether the replay is the recorded episode, to the bit; `None` if the scenario does not say.
-fn is_same(scenario: &Scenario, log: &EpisodeLog) -> Option<bool> {
-    scenario.claims.iter().find_map(|claim| match claim {
-        Claim::Trace(digest) => Some(*digest == digest_text(&log.trace())),
-        _ => None,
-    })
 }
 
 /// The rows of a step: those that are legal, and the others by what refuses them.
