@@ -233,7 +233,9 @@ pub fn make_new(folder: &Path) -> Result<()> {
 pub fn folder(directory: &Path, inside: impl AsRef<Path>) -> Result<PathBuf> {
     let mut folder = directory.to_owned();
     for part in inside.as_ref().components() {
-        let Component::Normal(name) = part else { return Err(Error::other("its path leads out of its folder")) };
+        let Component::Normal(name) = part else {
+            return Err(Error::other("its path leads out of its folder"));
+        };
         folder.push(name);
         match std::fs::create_dir(&folder) {
             Err(error) if error.kind() == ErrorKind::AlreadyExists => own_folder(&folder)?,
@@ -328,7 +330,9 @@ fn is_read(path: &Path) -> Result<Option<File>> {
     }
     let opened = File::options().write(true).custom_flags(OFlag::O_NONBLOCK.bits()).open(path);
     opened.map(Some).map_err(|error| match error.raw_os_error() {
-        Some(number) if number == Errno::ENXIO as i32 => Error::other("it is a pipe, and nothing reads from it"),
+        Some(number) if number == Errno::ENXIO as i32 => {
+            Error::other("it is a pipe, and nothing reads from it")
+        }
         _ => error,
     })
 }
@@ -342,7 +346,9 @@ mod tests {
         for plain in ["a", "corner_0004.ava", "ä ö", ".hidden", "..."] {
             assert_eq!(&*PlainName::new(plain).unwrap(), plain);
         }
-        for other in ["", ".", "..", "/", "/a", "a/", "a/b", "../a", "./a", "a\\b", "a\nb", "a\0", "\u{1b}[2J"] {
+        for other in
+            ["", ".", "..", "/", "/a", "a/", "a/b", "../a", "./a", "a\\b", "a\nb", "a\0", "\u{1b}[2J"]
+        {
             assert!(PlainName::new(other).is_err(), "{other:?}");
         }
     }
@@ -367,7 +373,9 @@ mod tests {
         let read = |name: &str| std::fs::read_to_string(at(name)).unwrap();
         std::fs::write(at("other"), "other").unwrap();
         std::fs::create_dir(at("elsewhere")).unwrap();
-        for (link, to) in [("own", "other"), ("named", "other"), ("dangling", "nowhere"), ("folder", "elsewhere")] {
+        for (link, to) in
+            [("own", "other"), ("named", "other"), ("dangling", "nowhere"), ("folder", "elsewhere")]
+        {
             std::os::unix::fs::symlink(to, at(link)).unwrap();
         }
         write(&at("own"), b"new").unwrap();
@@ -399,7 +407,8 @@ mod tests {
             std::fs::write(scratch.path().join(name), "").unwrap();
         }
         sweep(scratch.path()).unwrap();
-        let kept: Vec<_> = std::fs::read_dir(scratch.path()).unwrap().flatten().map(|entry| entry.file_name()).collect();
+        let kept: Vec<_> =
+            std::fs::read_dir(scratch.path()).unwrap().flatten().map(|entry| entry.file_name()).collect();
         assert_eq!(kept.len(), 3, "{kept:?}");
         assert!(is_partial(&own, "run.db") && is_partial("run.yaml.partial", "run.yaml"));
         assert!(!is_partial("run.yaml", "run.yaml") && !is_partial("other.partial", "run.yaml"));

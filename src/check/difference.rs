@@ -1,17 +1,16 @@
-//! What differs between two spaces: rows, ranges, rules and declarations, compared by their meaning.
+//! What differs between two spaces: declarations, rules, rows and ranges.
 //!
-//! Rows are matched by their labels. Rules are compared by what they leave of each range that both spaces have;
-//! if the ranges show no difference, a rule with another text is called changed.
+//! Declarations are compared by the texts that the digest covers (`meaning`), so that a change of the digest is always
+//! told, and by nothing that it does not cover. Rules are also compared by what they leave of each range that both
+//! spaces have, rows by their labels, draws by the ranges that all rules together leave.
 
 use core::fmt;
 use std::collections::BTreeMap;
 
-use crate::check::load::{Loaded, standing_items};
+use crate::check::load::Loaded;
 use crate::model::rules::RowRules;
 use crate::model::{Interval, Reach, Road, Row, RuleBody, RulesInForce, Space, Type};
 use crate::prove::Values;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::{listed, print_item};
 
 /// One difference; its parts together make a sentence.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -28,7 +27,7 @@ pub struct Difference {
 pub enum Change {
     Added,
     Removed,
-    /// It has another row number.
+    /// It has another row number, or comes before another declaration.
     Moved,
     /// It forbids more.
     Tightened,
@@ -50,73 +49,84 @@ impl fmt::Display for Change {
     }
 }
 
-/// Every difference from one space to another, declarations first; `None` if one is unsound.
+/// Every difference from one space to another, declarations first; `None` if one is unsound. There is one if and only if
+/// the digests of the two differ, because each declaration that the digest covers is held against the other space's.
 pub fn differences(old: &Loaded, new: &Loaded) -> Option<Vec<Difference>> {
-    let (old_space, new_space) = (old.space.as_deref()?, new.space.as_deref()?);
-    let (old_texts, new_texts) = (texts(old), texts(new));
-    let mut found = declarations(&old_texts, &new_texts);
-    found.extend(rules((old_space, &old_texts), (new_space, &new_texts)));
-    found.extend(rows(old_space, new_space));
-    found.extend(reaches(old_space, new_space));
+    let (old, new) = (Side::new(old.space.as_deref()?), Side::new(new.space.as_deref()?));
+    // Equal texts in equal order make equal tables, whatever files they stand in.
+    if old.space.meaning.digest() == new.space.meaning.digest() {
+        return Some(Vec::new());
+    }
+    let mut found = declarations(&old, &new);
+    found.extend(order(&old, &new));
+    found.extend(rows(old.space, new.space));
+    found.extend(reaches(old.space, new.space));
     Some(found)
 }
 
-fn difference(change: Change, subject: String, detail: impl Into<String>) -> Difference {
-    Difference { change, subject, detail: detail.into() }
+fn difference(change: Change, subject: impl Into<String>, detail: impl Into<String>) -> Difference {
+    Difference { change, subject: subject.into(), detail: detail.into() }
 }
 
-/// The formatted text of every declaration, by keyword and name.
-type Texts = BTreeMap<(String, String), String>;
+/// One of the two spaces.
+struct Side<'a> {
+    space: &'a Space,
+    /// What the digest covers of each declaration, by its title. Effects of every step, and more effects of an action,
+    /// may stand in several places: these are one text.
+    texts: BTreeMap<&'a str, String>,
+}
 
-fn texts(loaded: &Loaded) -> Texts {
-    let items = standing_items(loaded);
-    let named = items.iter().filter(|item| {
-        !matches!(
-            item.kind,
-            ItemKind::Language(_)
-                | ItemKind::Use(_)
-                | ItemKind::Expect(_)
-                | ItemKind::Scenario(_)
-                | ItemKind::Policy(_)
-        )
-    });
-    let mut texts = Texts::new();
-    for item in named {
-        let name = match &item.kind {
-            ItemKind::Also(also) => {
-                let on: Vec<&str> = also.on.iter().map(|name| name.text.as_str()).collect();
-                format!(" {}", listed(&on))
-            }
-            kind => kind.name().map_or(String::new(), |name| format!(" `{}`", name.text)),
-        };
-        let text = texts.entry((item.kind.keyword().to_owned(), name)).or_default();
-        // Effects of every step, and more effects of an action, may stand in several places.
-        text.push_str(&print_item(&item.kind));
-        text.push('\n');
+impl<'a> Side<'a> {
+    fn new(space: &'a Space) -> Side<'a> {
+        let mut texts: BTreeMap<&str, String> = BTreeMap::new();
+        for (title, text) in space.meaning.declarations() {
+            let known = texts.entry(title).or_default();
+            known.push_str(text);
+            known.push('\n');
+        }
+        Side { space, texts }
     }
-    texts
+
+    /// The index of the rule with this title.
+    fn rule(&self, title: &str) -> Option<usize> {
+        let name = title.strip_prefix("rule `")?.strip_suffix('`')?;
+        self.space.rules.iter().position(|rule| rule.name == name)
+    }
 }
 
-/// Differences between declarations other than rules and actions, which are compared by their meaning.
-fn declarations(old: &Texts, new: &Texts) -> Vec<Difference> {
+/// Differences between declarations: of rules by what they forbid where that can be said, of all others by what is
+/// written.
+fn declarations(old: &Side<'_>, new: &Side<'_>) -> Vec<Difference> {
     let mut found = Vec::new();
-    let of_table = |keyword: &str| matches!(keyword, "rule" | "action");
-    for ((keyword, name), text) in old.iter().filter(|((keyword, _), _)| !of_table(keyword)) {
-        let subject = format!("{keyword}{name}");
-        match new.get(&(keyword.clone(), name.clone())) {
-            None => found.push(difference(Change::Removed, subject, "")),
-            Some(other) if other != text => {
-                found.push(difference(Change::Changed, subject, format!("{} → {}", flat(text), flat(other))));
+    for (&title, text) in &old.texts {
+        let Some(other) = new.texts.get(title) else {
+            found.push(difference(Change::Removed, title, flat(text)));
+            continue;
+        };
+        match (old.rule(title), new.rule(title)) {
+            (Some(rule), Some(same)) => {
+                let texts = (text.as_str(), other.as_str());
+                found.extend(of_rule((old.space, rule), (new.space, same), title, texts));
             }
-            Some(_) => {}
+            _ if text != other => found.push(difference(Change::Changed, title, changed_lines(text, other))),
+            _ => {}
         }
     }
-    for (key @ (keyword, name), text) in new.iter().filter(|((keyword, _), _)| !of_table(keyword)) {
-        if !old.contains_key(key) {
-            found.push(difference(Change::Added, format!("{keyword}{name}"), flat(text)));
-        }
-    }
+    let added = new.texts.iter().filter(|(title, _)| !old.texts.contains_key(**title));
+    found.extend(added.map(|(&title, text)| difference(Change::Added, title, flat(text))));
     found
+}
+
+/// The first declaration that comes before another one than it did. The order of those that may stand in any order
+/// is the same in both.
+fn order(old: &Side<'_>, new: &Side<'_>) -> Option<Difference> {
+    let shared = |of: &Side<'_>, other: &Side<'_>| -> Vec<String> {
+        let titles = of.space.meaning.declarations().map(|(title, _)| title);
+        titles.filter(|title| other.texts.contains_key(*title)).map(str::to_owned).collect()
+    };
+    let (before, after) = (shared(old, new), shared(new, old));
+    let (was, is) = before.iter().zip(&after).find(|(was, is)| was != is)?;
+    Some(difference(Change::Moved, is.as_str(), format!("it comes before {was} now")))
 }
 
 /// A declaration on one line.
@@ -124,41 +134,48 @@ fn flat(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-fn rules(
-    (old_space, old_texts): (&Space, &Texts),
-    (new_space, new_texts): (&Space, &Texts),
-) -> Vec<Difference> {
-    let text = |texts: &Texts, name: &str| {
-        texts.get(&("rule".to_owned(), format!(" `{name}`"))).map_or(String::new(), |text| flat(text))
-    };
-    let mut found = Vec::new();
-    for (index, rule) in old_space.rules.iter().enumerate() {
-        let subject = format!("rule `{}`", rule.name);
-        let Some(other) = new_space.rules.iter().position(|known| known.name == rule.name) else {
-            found.push(difference(Change::Removed, subject, text(old_texts, &rule.name)));
-            continue;
-        };
-        let optional = new_space.rules[other].optional;
-        if optional != rule.optional {
-            let (change, detail) = match optional {
-                true => (Change::Loosened, "it is optional now"),
-                false => (Change::Tightened, "it is no longer optional"),
-            };
-            found.push(difference(change, subject.clone(), detail));
-        }
-        let (before, after) = (text(old_texts, &rule.name), text(new_texts, &rule.name));
-        let written = || format!("{before} → {after}");
-        match compared((old_space, index), (new_space, other)) {
-            Some((change, detail)) => found.push(difference(change, subject, detail)),
-            None if before != after => found.push(difference(Change::Changed, subject, written())),
-            None => {}
-        }
+/// What differs between two texts of a declaration: the lines from the first to the last that differ.
+fn changed_lines(old: &str, new: &str) -> String {
+    let (old, new): (Vec<&str>, Vec<&str>) = (old.lines().collect(), new.lines().collect());
+    let begin = old.iter().zip(&new).take_while(|(one, other)| one == other).count();
+    let (old, new) = (&old[begin..], &new[begin..]);
+    let end = old.iter().rev().zip(new.iter().rev()).take_while(|(one, other)| one == other).count();
+    let (old, new) = (&old[..old.len() - end], &new[..new.len() - end]);
+    let (old, new) = (flat(&old.join(" ")), flat(&new.join(" ")));
+    match (old.is_empty(), new.is_empty()) {
+        (true, _) => format!("now with {new}"),
+        (_, true) => format!("now without {old}"),
+        _ => format!("{old} → {new}"),
     }
-    for rule in &new_space.rules {
-        if !old_space.rules.iter().any(|known| known.name == rule.name) {
-            let subject = format!("rule `{}`", rule.name);
-            found.push(difference(Change::Added, subject, text(new_texts, &rule.name)));
+}
+
+/// What has changed about a rule that both spaces have: whether it is optional, and what it forbids. Another text is
+/// always told; a rule whose text is the same may forbid something else because of a function or a constant.
+fn of_rule(
+    old: (&Space, usize),
+    new: (&Space, usize),
+    title: &str,
+    (before, after): (&str, &str),
+) -> Vec<Difference> {
+    let mut found = Vec::new();
+    let (was_optional, is_optional) = (old.0.rules[old.1].optional, new.0.rules[new.1].optional);
+    if was_optional != is_optional {
+        let (change, detail) = match is_optional {
+            true => (Change::Loosened, "it is optional now"),
+            false => (Change::Tightened, "it is no longer optional"),
+        };
+        found.push(difference(change, title, detail));
+    }
+    let mandatory = |text: &str| text.strip_prefix("optional ").unwrap_or(text).to_owned();
+    let (before, after) = (mandatory(before), mandatory(after));
+    let written = (before != after).then(|| changed_lines(&before, &after));
+    match (compared(old, new), written) {
+        (Some((change, detail)), None) => found.push(difference(change, title, detail)),
+        (Some((change, detail)), Some(written)) => {
+            found.push(difference(change, title, format!("{detail}; {written}")));
         }
+        (None, Some(written)) => found.push(difference(Change::Changed, title, written)),
+        (None, None) => {}
     }
     found
 }

@@ -2,7 +2,6 @@
 //!
 //! Files are read through a function that `cli` gives; nothing here reads the disk itself.
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
@@ -54,13 +53,6 @@ pub struct Loaded {
     pub policy: Option<Policy>,
     /// What was found of the rows of the root. A scenario or a policy claims nothing of its space.
     pub runs: Runs,
-    /// Indices of files, imports before the files that use them.
-    order: Vec<usize>,
-}
-
-/// The declarations that stand, overridden ones replaced; imports come before the files that use them.
-pub(super) fn standing_items(loaded: &Loaded) -> Vec<Cow<'_, ast::Item>> {
-    overriding::resolve(&loaded.files, &loaded.order).0
 }
 
 /// A path that is written in a file: of a file that it uses, or of a map.
@@ -152,7 +144,7 @@ pub fn load_with(root: &Path, read: &ReadFile<'_>, cache: &mut MapCache) -> Resu
     let (diagnostics, remarks) = (merged(diagnostics), merged(remarks));
     let space = space.map(Arc::new);
     let runs = if has_scenario || has_policy { Runs::default() } else { runs };
-    Ok(Loaded { sources, diagnostics, remarks, files, references, space, scenario, policy, runs, order })
+    Ok(Loaded { sources, diagnostics, remarks, files, references, space, scenario, policy, runs })
 }
 
 /// Diagnostics that say the same of the same place become one, which shows the other places of all.
@@ -184,14 +176,14 @@ pub fn files_used(root: &Path, read: &ReadFile<'_>) -> Vec<PathBuf> {
 
 fn check_space(files: &[LoadedFile], order: &[usize], maps: &mut MapReader<'_>, is_whole: bool) -> Checked {
     let declares = |file: &LoadedFile| {
-        file.tree.items.iter().any(|item| {
-            match &item.kind {
-                ItemKind::Language(_) | ItemKind::Scenario(_) | ItemKind::Policy(_) => false,
-                // A `use` that leaves something out makes a space of its own.
-                ItemKind::Use(used) => !used.without.is_empty(),
-                _ => true,
-            }
-        })
+        let declares = |item: &ast::Item| match &item.kind {
+            ItemKind::Language(_) | ItemKind::Scenario(_) | ItemKind::Policy(_) => false,
+            // A `use` that leaves something out makes a space of its own.
+            ItemKind::Use(used) => !used.without.is_empty(),
+            _ => true,
+        };
+        // What several files declare together is the space of none of them.
+        uses(file).count() > 1 || file.tree.items.iter().any(declares)
     };
     // A scenario file declares no space: its space is the first file that declares something.
     let index = files.iter().position(declares).unwrap_or(0);

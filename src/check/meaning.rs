@@ -42,11 +42,7 @@ pub(super) fn meaning(
             }
             kind => kind.clone(),
         };
-        let keyword = kind.keyword();
-        let title = match kind.name() {
-            Some(name) => format!("{keyword} `{}`", name.text),
-            None => format!("`{keyword}`"),
-        };
+        let title = title(&kind);
         let sorted_by = if has_free_order(&kind) { title.clone() } else { String::new() };
         declarations.push((sorted_by, (title, print_item(&kind))));
     }
@@ -54,7 +50,20 @@ pub(super) fn meaning(
     declarations.sort_by(|(left, _), (right, _)| left.cmp(right));
     let declarations: Vec<(String, String)> =
         declarations.into_iter().map(|(_, declared)| declared).collect();
-    Some(Meaning::new(&declarations))
+    Some(Meaning::new(declarations))
+}
+
+/// What a declaration is called in messages: ``rule `npc_gap` ``, `` `on vehicles also` ``.
+fn title(kind: &ItemKind) -> String {
+    let keyword = kind.keyword();
+    match (kind, kind.name()) {
+        (ItemKind::Also(also), _) => {
+            let on: Vec<&str> = also.on.iter().map(|name| name.text.as_str()).collect();
+            format!("`{keyword} {} also`", on.join(", "))
+        }
+        (_, Some(name)) => format!("{keyword} `{}`", name.text),
+        (_, None) => format!("`{keyword}`"),
+    }
 }
 
 /// Whether these declarations may stand in any order without any effect.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::check::state_argument::memory_from;
-use crate::check::{Loaded, ReadError, load, suggest_uses};
+use crate::check::{Loaded, ReadError, differences, load, suggest_uses};
 use crate::model::vocabulary::{Body, Priority, Word};
 use crate::model::{
     Avoidability, BodyWord, Claim, Facts, Memory, Obstacle, ObstacleKind, OutcomeFacts, Reach, RulesInForce,
@@ -586,4 +586,74 @@ rule far on ahead: long(distance) >= distance + {}
     let value =
         evaluate(&long.body, &space.functions, &Facts::new(&[Value::Number(0.5)], &Memory::default()));
     assert_eq!(value, Value::Number(64.5));
+}
+
+/// Files that only use others are a space together: their claims, digest and differences are those of all of them.
+#[test]
+fn a_file_that_uses_several_is_a_space_of_its_own() {
+    let with = |more: &str| {
+        let first = format!("{BASE}expect count(actions) == 6\n");
+        let root = "language 1\nuse \"a.ava\"\nuse \"b.ava\"\n";
+        let more = format!("language 1\nstate calm: Bool = false\n{more}");
+        load_files(&[("s.ava", root), ("a.ava", &first), ("b.ava", &more)])
+    };
+    let (one, other) = (with("action rest() { set calm = true }\n"), with(""));
+    assert!(codes(&one).is_empty() && codes(&other).is_empty(), "{}", shown(&one));
+    let space = one.space.as_ref().expect("it has no mistakes");
+    assert_eq!((space.path.as_path(), space.rows.len()), (Path::new("s.ava"), 7));
+    assert_eq!(differences(&other, &one).map(|found| found.len()), Some(2), "the action and its row");
+}
+
+/// What the digest sees, `diff` tells: also what changes neither a row nor a range.
+#[test]
+fn every_declaration_that_differs_is_told() {
+    let more = "state calm: Bool = false
+on ahead also { set calm = true }
+each step { set calm = false }
+rule calm_first on ahead: speed <= road.limit
+rule roomy: spawn_gap >= safety_gap
+reward {
+  collision => 1
+  _ => 0
+}
+";
+    let loaded = |text: &str| load_files(&[("a.ava", text)]);
+    let text = format!("{BASE}{CLOCK}{more}");
+    let old = loaded(&text);
+    assert!(codes(&old).is_empty(), "{}", shown(&old));
+    let told = |from: &str, to: &str| -> String {
+        assert!(text.contains(from), "{from}");
+        let new = loaded(&text.replacen(from, to, 1));
+        assert!(codes(&new).is_empty(), "{}", shown(&new));
+        let line = |found: &crate::check::Difference| {
+            format!("{} {}: {}", found.change, found.subject, found.detail)
+        };
+        let found = differences(&old, &new).expect("both are sound");
+        found.iter().map(line).collect::<Vec<_>>().join("\n")
+    };
+    assert_eq!(told("language 1\n", "language 1\n// looked at\n"), "");
+    assert_eq!(
+        told("distance {", "distance + 5 m {"),
+        "changed action `ahead`: spawn vehicle ahead distance { lane: lane, speed: speed, does: DriveAhead } → \
+         spawn vehicle ahead distance + 5 m { lane: lane, speed: speed, does: DriveAhead }"
+    );
+    for (from, to, wanted) in [
+        ("speed: speed, does", "speed: speed - 1 m/s, does", "changed action `ahead`: spawn vehicle "),
+        ("speed: speed, does", "speed: speed, colour: Red, does", "changed action `ahead`: spawn vehicle "),
+        ("{ set time = to }", "{ set time = to set sky = None }", "changed action `set_time`: "),
+        ("set calm = false", "set calm = calm", "changed `each step`: "),
+        ("set calm = true", "set calm = not calm", "changed `on ahead also`: "),
+        ("collision => 1", "collision => 2", "changed `reward`: collision => 1 → collision => 2"),
+        ("and not repeated", "and not sudden", "changed verdict `counted`: "),
+        ("at 105.88 m", "at 100 m", "changed road `corner`: start: lane 1/-1 at 105.88 m → "),
+        ("spawn_gap >=", "spawn_gap >", "changed rule `roomy`: "),
+        ("speed <= road.limit", "speed <= 90 % * road.limit", "tightened rule `calm_first`: speed "),
+        ("rule roomy: spawn_gap >= safety_gap\n", "", "removed rule `roomy`: rule roomy: spawn_gap"),
+        ("rule roomy", "optional rule roomy", "loosened rule `roomy`: it is optional now"),
+    ] {
+        assert!(told(from, to).starts_with(wanted), "`{wanted}` in\n{}", told(from, to));
+    }
+    let rules = "rule calm_first on ahead: speed <= road.limit\nrule roomy: spawn_gap >= safety_gap\n";
+    let turned = "rule roomy: spawn_gap >= safety_gap\nrule calm_first on ahead: speed <= road.limit\n";
+    assert_eq!(told(rules, turned), "moved rule `roomy`: it comes before rule `calm_first` now");
 }

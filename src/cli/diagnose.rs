@@ -347,10 +347,7 @@ fn sentence(diagnosis: &Diagnosis) -> String {
 /// That replays do not tell, and how often chance alone prevents the collision.
 fn chance_text(evidence: &Evidence) -> String {
     let alone = evidence.chance.map_or(String::new(), |chance| {
-        format!(
-            ": other sensor noise alone prevents it in {} of {} replays",
-            chance.vanished, chance.replays
-        )
+        format!(": other sensor noise alone prevents it in {} of {} replays", chance.vanished, chance.replays)
     });
     format!("not told apart from chance{alone}")
 }

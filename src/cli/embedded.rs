@@ -81,7 +81,8 @@ pub fn run(table: ActionTable, conditions: &Conditions) -> Result<Run, String> {
         return Err(format!("{ambient} vehicles of ambient traffic: at most {ambient_max} are possible"));
     }
     let UnderTest { ads, profile, external } =
-        load::under_test(ads, ads_config.as_deref(), ads_cmd.as_deref()).map_err(|error| error.to_string())?;
+        load::under_test(ads, ads_config.as_deref(), ads_cmd.as_deref())
+            .map_err(|error| error.to_string())?;
     let traffic = traffic.as_deref().map(load::traffic).transpose().map_err(|error| error.to_string())?;
     let settings = RunSettings {
         roads: roads_or_all(roads, table.space()),

@@ -215,7 +215,8 @@ pub fn read(directory: &Path) -> Result<Contents, Failure> {
     let labels: Vec<String> = match table.filter(is_it) {
         Some(table) => table.rows().iter().map(|row| row.label.clone()).collect(),
         None => {
-            let remark = "the space of the estimate cannot be read or has changed: its rows have numbers only";
+            let remark =
+                "the space of the estimate cannot be read or has changed: its rows have numbers only";
             remarks.push(remark.to_owned());
             let rows = database.events().map_err(unread)?.into_iter().filter_map(|(_, event)| event.row);
             let last = rows.filter(|&row| row < ROWS_MAX).max();
@@ -323,8 +324,7 @@ fn written(
         };
         let name = format!("{}_{:04}{tried}.ava", met.log.road, met.summary.episode);
         let (table, episode) = (estimate.run().table(), (&met.log, &met.summary));
-        let text =
-            write_scenario(&critical.join(&name), "estimate", table, episode, &settings.agent, rules)?;
+        let text = write_scenario(&critical.join(&name), "estimate", table, episode, &settings.agent, rules)?;
         Ok(Some((name, text)))
     };
     played.met.iter().map(write_one).collect()
@@ -377,10 +377,10 @@ fn begun(
 fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Estimate, Held, String), Failure> {
     let resumed: Resumed<EstimateSettings> = run_directory::resume(output, path, "estimate", "estimate")?;
     let Resumed { settings, text, table, held } = resumed;
-    let external = settings.run.external.map(|attached| Attached {
-        is_recorded: is_played,
-        ..run_directory::from_record(path, attached)
-    });
+    let external = settings
+        .run
+        .external
+        .map(|attached| Attached { is_recorded: is_played, ..run_directory::from_record(path, attached) });
     let settings = EstimateSettings { run: RunSettings { external, ..settings.run }, ..settings };
     Ok((Estimate::new(table, settings).map_err(Failure::usage)?, held, text))
 }

@@ -57,6 +57,14 @@ pub fn load(output: &Output, path: &Path) -> Result<Loaded, Failure> {
 /// If the source has mistakes.
 fn sound(output: &Output, loaded: Loaded) -> Result<Loaded, Failure> {
     output.diagnostics(&loaded.sources, &loaded.diagnostics);
+    without_mistakes(loaded)
+}
+
+/// A file whose diagnostics are not printed here.
+///
+/// # Errors
+/// If the source has mistakes.
+pub fn without_mistakes(loaded: Loaded) -> Result<Loaded, Failure> {
     match loaded.diagnostics.iter().filter(|diagnostic| diagnostic.is_error()).count() {
         0 => Ok(loaded),
         errors => Err(Failure::Source { errors }),
@@ -194,7 +202,15 @@ pub fn table(output: &Output, path: &Path) -> Result<ActionTable, Failure> {
 /// # Errors
 /// As [`load`], and if the file has no scenario.
 pub fn scenario(output: &Output, path: &Path) -> Result<(ActionTable, Scenario), Failure> {
-    let mut loaded = load(output, path)?;
+    scenario_in(output, path, read_and_check(path)?)
+}
+
+/// The table and the scenario of a file that was read and checked.
+///
+/// # Errors
+/// As [`scenario`].
+pub fn scenario_in(output: &Output, path: &Path, loaded: Loaded) -> Result<(ActionTable, Scenario), Failure> {
+    let mut loaded = sound(output, loaded)?;
     let Some(scenario) = loaded.scenario.take() else {
         let path = path.display();
         let hint = match (&loaded.policy, &loaded.space) {
@@ -329,15 +345,14 @@ pub enum Emitted {
 /// # Errors
 /// As [`load`], and if the file has neither.
 pub fn emitted(output: &Output, path: &Path) -> Result<Emitted, Failure> {
-    emitted_in(output, path, read_and_check(path)?)
+    emitted_in(path, sound(output, read_and_check(path)?)?)
 }
 
-/// What a file that was read and checked holds.
+/// What a file without mistakes holds.
 ///
 /// # Errors
-/// As [`emitted`].
-pub fn emitted_in(output: &Output, path: &Path, loaded: Loaded) -> Result<Emitted, Failure> {
-    let mut loaded = sound(output, loaded)?;
+/// If it has neither a scenario nor a policy.
+pub fn emitted_in(path: &Path, mut loaded: Loaded) -> Result<Emitted, Failure> {
     if let Some(policy) = loaded.policy.take() {
         return Ok(Emitted::Policy(ActionTable::new(space(loaded, path)?), Box::new(policy)));
     }

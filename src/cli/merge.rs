@@ -627,6 +627,10 @@ impl Cut for RunSettings {
         if from.join(pack::SPACE).is_dir() {
             copy_folder(OsStr::new(pack::SPACE), [&from, &to])?;
         }
+        // Copies of one meaning may differ in comments: that of the first directory is kept.
+        if way.from.join(pack::SPACE).is_dir() && !way.to.join(pack::SPACE).exists() {
+            copy_folder(OsStr::new(pack::SPACE), [way.from, way.to])?;
+        }
         let database = shard.database.iter().map(Database::scenarios).next();
         let written = database.transpose().map_err(|error| Failure::file("read", &shard.file(), error))?;
         let mut scenarios = Vec::new();

@@ -25,6 +25,7 @@ mod help;
 mod import;
 mod interrupt;
 mod load;
+mod look;
 pub mod lsp;
 mod merge;
 mod never;

@@ -48,9 +48,10 @@ pub fn pack(output: &Output, arguments: &PackArguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Copies a space with all that it uses into a folder, and returns the path of its copy.
-pub fn pack_space(output: &Output, space: &Path, folder: &Path) -> Result<PathBuf, Failure> {
-    let loaded = load::load(output, space)?;
+/// Copies a space with all that it uses into a folder, and returns the path of its copy. The space was read before, so
+/// what is to be said of it has been said.
+pub fn pack_space(space: &Path, folder: &Path) -> Result<PathBuf, Failure> {
+    let loaded = load::without_mistakes(load::read_and_check(space)?)?;
     let space = absolute(space)?;
     let moves = moves(&loaded, folder)?;
     let mut plan = Plan::default();

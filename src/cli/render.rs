@@ -14,6 +14,7 @@ use super::arguments::RenderArguments;
 use super::error::Failure;
 use super::files::{must_end_in, write_result};
 use super::load;
+use super::look::{self, Looked};
 use super::output::Output;
 
 /// A contact is marked this long after it happened, s.
@@ -31,15 +32,20 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
     if !on_stdout {
         must_end_in(&path, "svg")?;
     }
-    let (table, scenario) = load::scenario(output, &arguments.file)?;
+    let Looked { table, scenario, changed } = look::scenario(output, &arguments.file)?;
     let scenario = &scenario;
     let times_s = times(arguments, scenario, table.space().episode.step_s)?;
     let asked = load::against(&arguments.against)?;
     let (ads, is_recorded) = asked.selected_for(scenario)?;
-    let (moments, mut subject) = moments(&table, scenario, &ads, &times_s)?;
+    let (moments, mut subject, is_same) = moments(&table, scenario, &ads, &times_s)?;
+    let is_same = is_same.filter(|_| is_recorded);
     if !is_recorded {
         subject.title = title_of_another(arguments, scenario, &subject);
+    } else if changed.is_some() && is_same == Some(false) {
+        subject.title = format!("{}: what plays now, not what was recorded", scenario.name);
     }
+    let banner = changed.map(|changed| changed.banner(is_same));
+    banner.iter().for_each(|banner| output.warn(&format!("{}: {banner}", arguments.file.display())));
     // A strip ends with its scenario.
     if moments.is_empty() || (!arguments.strip && moments.len() < times_s.len()) {
         return Err(Failure::usage(format!(
@@ -56,7 +62,9 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
         output.tell(&path.display().to_string());
     }
     let svg = on_stdout.then_some(svg);
-    output.result(serde_json::json!({ "picture": path, "times_s": times_s[..moments.len()], "svg": svg }));
+    output.result(serde_json::json!({
+        "picture": path, "times_s": times_s[..moments.len()], "changed": banner, "svg": svg,
+    }));
     Ok(())
 }
 
@@ -89,13 +97,14 @@ fn times(arguments: &RenderArguments, scenario: &Scenario, step_s: f64) -> Resul
     Ok(STRIP_S.iter().map(|before_s| (first_s - before_s).max(0.0)).collect())
 }
 
-/// The world at the first tick at or after each time, as far as the episode lasts; and what the picture is about.
+/// The world at the first tick at or after each time, as far as the episode lasts; what the picture is about; and whether
+/// the episode is the recorded one, if the file says.
 fn moments(
     table: &ActionTable,
     scenario: &Scenario,
     ads: &Selected,
     times_s: &[f64],
-) -> Result<(Vec<Snapshot>, Subject), Failure> {
+) -> Result<(Vec<Snapshot>, Subject, Option<bool>), Failure> {
     let mut seen: Vec<(World, Status)> = Vec::new();
     let mut recorder = Recorder::default();
     let stage = Stage::new(table, scenario)?;
@@ -125,7 +134,7 @@ fn moments(
         Some(doc) => format!("{}: {}", scenario.name, doc.trim()),
         None => scenario.name.clone(),
     };
-    Ok((moments, Subject { title, hit, names }))
+    Ok((moments, Subject { title, hit, names }, stage.is_as_recorded(&log)))
 }
 
 /// The title of a drive that is not the recorded one: whose it is, and what happens, because what the file says of its crash

@@ -14,6 +14,7 @@ use crate::run::{Asked, Gauges, Stage};
 use super::arguments::ReplayArguments;
 use super::error::Failure;
 use super::load;
+use super::look::{self, Changed, Looked};
 use super::output::Output;
 use super::output::plural;
 use super::parallel::each_file;
@@ -22,17 +23,17 @@ use super::parallel::each_file;
 pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failure> {
     let asked = load::against(&arguments.against)?;
     let played = each_file(output, &arguments.many, asked.external.as_ref(), |path| {
-        let (table, scenario) = load::scenario(output, path)?;
+        let Looked { table, scenario, changed } = look::scenario(output, path)?;
         let (ads, is_recorded) = asked.selected_for(&scenario)?;
         if is_recorded {
-            return play(&table, &scenario, path, (&ads, None));
+            return play(&table, &scenario, path, (&ads, None), changed.as_ref());
         }
         let name = match (&arguments.against.ads_config, ads.program()) {
             (_, Some(program)) => program.attached().name(),
             (Some(path), None) => format!("{} with {}", ads.name(), path.display()),
             (None, None) => ads.name().to_owned(),
         };
-        play(&table, &scenario, path, (&ads, Some(name)))
+        play(&table, &scenario, path, (&ads, Some(name)), changed.as_ref())
     })?;
     let tally = tell(output, &played.done);
     output.result(serde_json::json!({
@@ -58,6 +59,9 @@ pub struct Tally {
 pub fn tell<'a>(output: &Output, played: impl IntoIterator<Item = &'a Played>) -> Tally {
     let mut tally = Tally::default();
     let (mut files, mut refuted_files) = (0, 0);
+    let played: Vec<&Played> = played.into_iter().collect();
+    let banner = |played: &&Played| Some((played.path.display().to_string(), played.banner.clone()?));
+    look::together(played.iter().filter_map(banner)).iter().for_each(|banner| output.warn(banner));
     for played in played {
         files += 1;
         let Some(verdicts) = &played.claims else {
@@ -101,6 +105,8 @@ pub struct Played {
     name: String,
     /// Its claims, if it was played as it was recorded.
     claims: Option<Vec<oracle::ClaimResult>>,
+    /// What has changed since the file was written, if anything has.
+    banner: Option<String>,
     /// What happened, in words.
     told: String,
     /// Another driving system than the recorded one failed.
@@ -129,15 +135,17 @@ pub fn play_recorded(
             run::recorded_name(scenario)
         )));
     }
-    play(table, scenario, path, (&ads, None))
+    play(table, scenario, path, (&ads, None), None)
 }
 
-/// Plays a scenario. With a name for the driving system it is another one than the recorded: no claim is checked.
+/// Plays a scenario. With a name for the driving system it is another one than the recorded: no claim is checked. `changed`
+/// is what has changed since the file was written.
 fn play(
     table: &ActionTable,
     scenario: &Scenario,
     path: &Path,
     (ads, other): (&Selected, Option<String>),
+    changed: Option<&Changed>,
 ) -> Result<Played, Failure> {
     let stage = Stage::new(table, scenario)?;
     let mut gauges = Gauges::default();
@@ -183,15 +191,18 @@ fn play(
             lines.chain(failure).collect::<Vec<_>>().join("\n")
         }
     };
+    let is_same = if other.is_none() { stage.is_as_recorded(&log) } else { None };
+    let banner = changed.map(|changed| changed.banner(is_same));
     let result = serde_json::json!({
-        "file": path, "scenario": scenario.name, "ads": other.as_deref().unwrap_or(ads.name()),
+        "file": path, "changed": banner, "scenario": scenario.name, "ads": other.as_deref().unwrap_or(ads.name()),
         "claims": claims, "end": log.end.name(), "collisions": log.collisions.len(), "counted": counted, "judgements": judgements,
         "reproducible": doubts.is_empty(), "failure": log.failure.as_ref().map(|failure| failure.in_words()),
         "held": log.held.iter().map(|held| serde_json::json!({ "from_s": held.from_s, "by": held.text() })).collect::<Vec<_>>(),
         "severities": severities, "priorities": priorities, "criticality": criticality, "pet_s": pet_s,
     });
     let has_ads_failed = other.is_some() && log.failure.is_some();
-    Ok(Played { path: path.to_owned(), name: scenario.name.clone(), claims, told, has_ads_failed, result })
+    let (path, name) = (path.to_owned(), scenario.name.clone());
+    Ok(Played { path, name, claims, banner, told, has_ads_failed, result })
 }
 
 /// How hard a collision was, in a line.

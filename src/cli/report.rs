@@ -16,6 +16,7 @@ use super::arguments::{FilesArguments, ReportArguments};
 use super::error::Failure;
 use super::files::{must_end_in, write_result};
 use super::load;
+use super::look::{self, Looked};
 use super::output::{Output, plural};
 use super::parallel::{PerFile, each_file};
 use super::replay::refutation;
@@ -33,6 +34,7 @@ pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failur
     let path = arguments.output.clone().unwrap_or_else(|| default_path(&arguments.paths));
     must_end_in(&path, "html")?;
     let asked = compared(arguments)?;
+    let is_folder = matches!(arguments.paths.as_slice(), [directory] if directory.is_dir());
     let found = match arguments.paths.as_slice() {
         [directory] if directory.is_dir() => of_directory(output, directory)?,
         files => of_files(files)?,
@@ -58,20 +60,29 @@ pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failur
     }
     let failed = played.as_ref().map_or_else(Vec::new, PerFile::failed_in_json);
     for failed in &failed {
+        let file = failed["file"].as_str().unwrap_or_default();
+        let mistake =
+            look::first_mistake(Path::new(file)).map_or_else(String::new, |found| format!(": {found}"));
         remarks.push(format!(
-            "{} cannot be played: {}",
-            failed["file"].as_str().unwrap_or_default(),
+            "{file} cannot be played: {}{mistake}",
             failed["error"].as_str().unwrap_or_default()
         ));
     }
     if found.overview.is_null() && played.as_ref().is_none_or(|played| played.done.is_empty()) {
-        return match played {
-            Some(played) => played.complete("played"),
-            None => Err(Failure::usage(format!("`{}` holds nothing to report", found.title))),
-        };
+        match played {
+            // The page of a folder then lists what could not be played, and why.
+            Some(_) if is_folder => {}
+            Some(played) => return played.complete("played"),
+            None => return Err(Failure::usage(format!("`{}` holds nothing to report", found.title))),
+        }
     }
     let mut scenes = played.as_mut().map_or_else(Vec::new, |played| std::mem::take(&mut played.done));
     name_apart(&mut scenes);
+    let banner = |scene: &Scene| Some((scene.file.clone(), scene.changed.clone()?));
+    for banner in look::together(scenes.iter().filter_map(banner)) {
+        output.warn(&banner);
+        remarks.push(banner);
+    }
     let refuted = scenes.iter().map(|scene| scene.recording.refuted.len()).sum();
     for Scene { file, recording, .. } in scenes.iter().filter(|scene| !scene.recording.refuted.is_empty()) {
         let first = &recording.refuted[0];
@@ -256,7 +267,7 @@ fn compared(arguments: &ReportArguments) -> Result<Option<Asked>, Failure> {
 }
 
 fn scene(output: &Output, file: &Path, compared: Option<&Asked>) -> Result<Scene, Failure> {
-    let (table, scenario) = load::scenario(output, file)?;
+    let Looked { table, scenario, changed } = look::scenario(output, file)?;
     let source = load::text(file)?;
     let (ads, _) = Asked::default().selected_for(&scenario)?;
     let recording = record(&table, &scenario, &ads, &source)?;
@@ -265,9 +276,10 @@ fn scene(output: &Output, file: &Path, compared: Option<&Asked>) -> Result<Scene
         record_another((&table, &scenario), (&recording, &ads), &other, &source)
     };
     let compared = compared.map(another).transpose()?;
+    let changed = changed.map(|changed| changed.banner(recording.is_same));
     let is_shrunk = file.parent().is_some_and(|folder| folder.ends_with(shrink::FOLDER));
     let shrunk_from = is_shrunk.then(|| shrink::found_name(&scenario.name).to_owned());
-    Ok(Scene { file: file.display().to_string(), recording, compared, shrunk_from })
+    Ok(Scene { file: file.display().to_string(), recording, compared, shrunk_from, changed })
 }
 
 /// How many crashes became what with the other driving system, by the page's words for it.

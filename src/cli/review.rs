@@ -68,16 +68,8 @@ pub fn review(
     asked: &Asked,
     text: &str,
 ) -> Result<Review, Failure> {
-    let mut differences = Vec::new();
     let mut scenario = scenario.clone();
-    if let Some(engine) = scenario.origin.engine.replace(ENGINE.to_owned()).filter(|engine| engine != ENGINE)
-    {
-        differences.push(format!("the world is `{ENGINE}` in place of `{engine}`"));
-    }
-    if matches!(recorded_traffic(&scenario), Err(RunError::TrafficDigest { .. })) {
-        scenario.origin.traffic_digest = None;
-        differences.push("the settings of its traffic mean something else by now".to_owned());
-    }
+    let mut differences = as_now(&mut scenario);
     let (ads, is_recorded) = match asked.selected_for(&scenario) {
         Err(RunError::ProfileDigest { .. }) => {
             scenario.origin.profile_digest = None;
@@ -149,6 +141,20 @@ pub fn review(
     let is_refuted: Vec<bool> = results.iter().map(ClaimResult::is_refuted).collect();
     let now = rewritten(text, &told_anew, &is_refuted);
     Ok(Review { change, differences, illegal, now: Some((now, log)) })
+}
+
+/// Has a scenario say that it was made in the world and with the traffic of now, and says what of these has changed.
+pub fn as_now(scenario: &mut Scenario) -> Vec<String> {
+    let mut differences = Vec::new();
+    let origin = &mut scenario.origin;
+    if let Some(engine) = origin.engine.replace(ENGINE.to_owned()).filter(|engine| engine != ENGINE) {
+        differences.push(format!("the world is `{ENGINE}` in place of `{engine}`"));
+    }
+    if matches!(recorded_traffic(scenario), Err(RunError::TrafficDigest { .. })) {
+        scenario.origin.traffic_digest = None;
+        differences.push("the settings of its traffic mean something else by now".to_owned());
+    }
+    differences
 }
 
 /// The first step that is refused: without it, what is played is another scenario.

@@ -193,8 +193,10 @@ fn begun(output: &Output, arguments: &RunArguments, wanted: Wanted) -> Result<(R
     let held = run_directory::create(arguments.out.as_deref())?;
     let path = &held.path;
     shard::keep(path, shard)?;
+    // Whatever becomes of the author's file: in its copy, scenarios can be looked at as they were recorded.
+    let folder = if arguments.self_contained { path.join("critical") } else { path.clone() };
+    let copy = pack_space(&run.space().path, &folder)?;
     let run = if arguments.self_contained {
-        let copy = pack_space(output, &run.space().path, &path.join("critical"))?;
         ready(load::table(output, &copy)?, run.settings().clone(), policy.as_ref(), face)?
     } else {
         run
@@ -216,10 +218,9 @@ fn begun(output: &Output, arguments: &RunArguments, wanted: Wanted) -> Result<(R
 fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Run, RunDirectory), Failure> {
     let resumed: Resumed<RunSettings> = run_directory::resume(output, path, "run", "run")?;
     let Resumed { settings, text, table, held } = resumed;
-    let external = settings.external.map(|attached| Attached {
-        is_recorded: is_played,
-        ..run_directory::from_record(path, attached)
-    });
+    let external = settings
+        .external
+        .map(|attached| Attached { is_recorded: is_played, ..run_directory::from_record(path, attached) });
     let settings = RunSettings { external, ..settings };
     let policy = match &settings.policy {
         None => None,

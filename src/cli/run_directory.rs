@@ -476,7 +476,8 @@ pub fn is_unbegun(path: &Path) -> std::io::Result<bool> {
         let is_left = match name.to_str() {
             Some(shard::FILE) => true,
             Some(name) if settings.iter().any(|of| files::is_partial(name, of)) => true,
-            // Of a link, this is not true.
+            // Of a link, these are not true.
+            Some(pack::SPACE) if entry.file_type()?.is_dir() => true,
             Some("critical") if entry.file_type()?.is_dir() => {
                 let inside: Vec<_> = std::fs::read_dir(path.join(&name))?.collect::<Result<_, _>>()?;
                 inside.iter().all(|entry| entry.file_name() == OsStr::new(pack::SPACE))

@@ -334,8 +334,8 @@ pub const SHAPES: &[Shape] = &[
             f(
                 "scenarios[]",
                 "object",
-                "`file`, `scenario`, `ads`, `claims`, `end`, the `failure` of a driving system of your own, whether it is \
-                 `reproducible`; what its speed was `held` by, from when on; collisions and how hard they were",
+                "`file`, `scenario`, what has `changed` since it was written, `ads`, `claims`, `end`, the `failure` of a \
+                 driving system of your own, whether it is `reproducible`; what its speed was `held` by, from when on; collisions and how hard they were",
             ),
             FAILED,
         ],
@@ -456,6 +456,7 @@ pub const SHAPES: &[Shape] = &[
         fields: &[
             f("picture", "text", "its path"),
             f("times_s[]", "number", "moments drawn"),
+            f("changed", "text?", "what has changed since the scenario was written"),
             f("svg", "text?", "the picture, if its path is `-`"),
         ],
     },

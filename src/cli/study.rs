@@ -274,10 +274,9 @@ pub fn wanted(
 fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Study, Held, String), Failure> {
     let resumed: Resumed<StudySettings> = run_directory::resume(output, path, "study", "study")?;
     let Resumed { settings, text, table, held } = resumed;
-    let external = settings.external.map(|attached| Attached {
-        is_recorded: is_played,
-        ..run_directory::from_record(path, attached)
-    });
+    let external = settings
+        .external
+        .map(|attached| Attached { is_recorded: is_played, ..run_directory::from_record(path, attached) });
     let settings = StudySettings { external, ..settings };
     let study = Study::new(table, settings).map_err(|error| match error {
         StudyError::Agent { error: error @ RunError::OtherProgram { .. }, .. } => error.into(),

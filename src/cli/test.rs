@@ -8,22 +8,24 @@ use crate::action::ActionTable;
 use crate::ads::external::{Failure as AdsFailure, FailureKind};
 use crate::check::{Loaded, normal};
 use crate::files;
-use crate::model::{Claim, Scenario, code};
+use crate::model::{Claim, Scenario};
 use crate::oracle;
 use crate::oracle::Regression;
 use crate::run;
 use crate::run::{Asked, RunError, Stage};
 use crate::syntax::ast::FileId;
-use crate::syntax::{Diagnostic, apply_fixes};
+use crate::syntax::{Diagnostic, Sources, apply_fixes};
 
-use super::arguments::TestArguments;
+use super::arguments::{FilesArguments, TestArguments};
 use super::error::Failure;
 use super::files::{write, write_answers, write_named};
 use super::findings::{doubts, spot_check};
 use super::load;
 use super::load::Emitted;
+use super::look::{is_outdated, meaning_text};
 use super::output::Output;
 use super::output::plural;
+use super::parallel::each_file;
 use super::review::{Change, Review, review};
 
 /// The result for one scenario.
@@ -54,22 +56,30 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
     if let Some(name) = &arguments.against.ads {
         run::driving_system(name)?;
     }
-    let mut suite =
-        Suite { output, arguments, asked, outdated: Vec::new(), reviewed: Vec::new(), accepted: 0 };
-    let mut cases = Vec::new();
-    for file in suite_files(&arguments.paths)? {
-        let Some(case) = suite.play(&file)? else { continue };
+    let suite = Suite { arguments, asked };
+    let many = FilesArguments { files: suite_files(&arguments.paths)?, jobs: arguments.jobs };
+    let program = suite.asked.external.as_ref();
+    let mut played = each_file(output, &many, program, |file| Ok(suite.play(file)))?;
+    let (mut cases, mut outdated, mut reviewed) = (Vec::new(), Vec::new(), Vec::new());
+    let mut accepted = 0;
+    for (case, notes) in std::mem::take(&mut played.done).into_iter().flatten() {
+        notes.told.iter().for_each(|(sources, diagnostics)| output.diagnostics(sources, diagnostics));
+        notes.said.iter().for_each(|line| output.say(line));
         let (word, reason) = case.outcome.in_words();
         let reason = if reason.is_empty() { String::new() } else { format!(": {reason}") };
         output.tell(&format!("{word:<12}{}{reason}", case.file.display()));
         cases.push(case);
+        outdated.extend(notes.outdated);
+        reviewed.extend(notes.reviewed);
+        accepted += usize::from(notes.is_accepted);
     }
+    played.complete("played")?;
     let named: Vec<String> = arguments.paths.iter().map(|path| path.display().to_string()).collect();
     let named = named.join(" ");
     if cases.is_empty() {
         return Err(Failure::usage(format!("no scenario in `{named}`")));
     }
-    suite.tell_outdated();
+    tell_outdated(output, &outdated);
     if let Some(path) = &arguments.junit {
         // A folder that is misspelt is not made.
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
@@ -88,7 +98,7 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
     let errors = count(&|outcome| matches!(outcome, Outcome::NotPlayed { .. }));
     let in_source = count(&|outcome| matches!(outcome, Outcome::NotPlayed { in_source: true, .. }));
     if arguments.accept {
-        output.say(&format!("{} written anew", plural(suite.accepted, "scenario")));
+        output.say(&format!("{} written anew", plural(accepted, "scenario")));
     }
     output.say(&format!(
         "{}: {fails} still fail, {fixed} fixed, {changed} changed, {errors} not played",
@@ -114,7 +124,7 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
         .collect();
     output.result(
         serde_json::json!({ "still_fails": fails, "fixed": fixed, "changed": changed, "errors": errors, "ads_failed": ads_failed, "reproducible": doubts.is_empty(),
-                                      "accepted": suite.accepted, "reviewed": suite.reviewed, "scenarios": listed }),
+                                      "accepted": accepted, "reviewed": reviewed, "scenarios": listed }),
     );
     let failing = count(&Outcome::is_failure);
     if errors > 0 {
@@ -150,25 +160,45 @@ fn suite_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
 }
 
 struct Suite<'a> {
-    output: &'a Output,
     arguments: &'a TestArguments,
     asked: Asked,
-    /// Scenarios that use a space which means something else now.
-    outdated: Vec<Loaded>,
-    /// What differs in meaning, of each scenario that was reviewed.
-    reviewed: Vec<serde_json::Value>,
-    /// Number of scenarios that `--accept` wrote anew.
-    accepted: usize,
+}
+
+/// Diagnostics, and the texts that they point into.
+type Told = (Sources, Vec<Diagnostic>);
+
+/// What there is to say of a file beside its result. Files are played on threads; it is said in the order of the files.
+#[derive(Default)]
+struct Notes {
+    told: Vec<Told>,
+    /// What a review says, line by line, and the same for JSON.
+    said: Vec<String>,
+    reviewed: Option<serde_json::Value>,
+    /// The mistakes of a scenario that uses a space which means something else now.
+    outdated: Option<Told>,
+    /// Whether `--accept` wrote the scenario anew.
+    is_accepted: bool,
+}
+
+impl Notes {
+    /// What a file holds. Its diagnostics are noted.
+    fn emitted(&mut self, file: &Path, loaded: Loaded) -> Result<Emitted, Failure> {
+        if !loaded.diagnostics.is_empty() {
+            self.told.push((loaded.sources.clone(), loaded.diagnostics.clone()));
+        }
+        load::emitted_in(file, load::without_mistakes(loaded)?)
+    }
 }
 
 impl Suite<'_> {
     /// Plays one file; `None` if it holds no scenario.
-    fn play(&mut self, file: &Path) -> Result<Option<Case>, Failure> {
+    fn play(&self, file: &Path) -> Option<(Case, Notes)> {
         #[allow(clippy::disallowed_methods, reason = "this is cli, and the time goes nowhere but the report")]
         let started = Instant::now();
         let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let (scenario, road, outcome) = match self.open(file) {
-            Ok((Emitted::Policy(..), _)) => return Ok(None),
+        let mut notes = Notes::default();
+        let (scenario, road, outcome) = match self.open(file, &mut notes) {
+            Ok((Emitted::Policy(..), _)) => return None,
             Ok((Emitted::Scenario(table, scenario), reviewed)) => {
                 let road = table.space().roads[scenario.road].name.clone();
                 let not_played =
@@ -183,25 +213,30 @@ impl Suite<'_> {
             }
         };
         let elapsed_s = started.elapsed().as_secs_f64();
-        Ok(Some(Case { file: file.to_owned(), scenario, road, outcome, elapsed_s }))
+        Some((Case { file: file.to_owned(), scenario, road, outcome, elapsed_s }, notes))
     }
 
     /// Reads a file. One whose space has changed is noted, or reviewed; then it may be known already what comes of it.
-    fn open(&mut self, file: &Path) -> Result<(Emitted, Option<Outcome>), Failure> {
+    fn open(&self, file: &Path, notes: &mut Notes) -> Result<(Emitted, Option<Outcome>), Failure> {
         let loaded = load::read_and_check(file)?;
         if self.arguments.accept || self.arguments.review {
-            return self.review(file, &loaded);
+            return self.review(file, &loaded, notes);
         }
         if !is_outdated(&loaded) {
-            return Ok((load::emitted_in(self.output, file, loaded)?, None));
+            return Ok((notes.emitted(file, loaded)?, None));
         }
-        self.outdated.push(loaded);
+        notes.outdated = Some((loaded.sources, loaded.diagnostics));
         Err(Failure::Outdated)
     }
 
     /// Plays a scenario as things are now, says what differs in meaning, and takes it over if asked. What is gone or cannot
     /// be played stays as it is.
-    fn review(&mut self, file: &Path, loaded: &Loaded) -> Result<(Emitted, Option<Outcome>), Failure> {
+    fn review(
+        &self,
+        file: &Path,
+        loaded: &Loaded,
+        notes: &mut Notes,
+    ) -> Result<(Emitted, Option<Outcome>), Failure> {
         let root = FileId::default();
         let (before, mut spaces) = (loaded.sources.text(root), Vec::new());
         let text = match is_outdated(loaded) {
@@ -215,13 +250,13 @@ impl Suite<'_> {
         for mistake in checked.diagnostics.iter_mut().filter(|_| !spaces.is_empty()) {
             mistake.notes.push("the space has changed since the scenario was written".to_owned());
         }
-        let emitted = load::emitted_in(self.output, file, checked)?;
+        let emitted = notes.emitted(file, checked)?;
         let Emitted::Scenario(table, scenario) = &emitted else { return Ok((emitted, None)) };
         let Review { change, mut differences, illegal, now } = review(table, scenario, &self.asked, &text)?;
         differences.splice(0..0, spaces);
-        self.output.say(&format!("{}: {}", file.display(), change.in_words()));
-        differences.iter().for_each(|difference| self.output.say(&format!("    {difference}")));
-        self.reviewed.push(serde_json::json!({
+        notes.said.push(format!("{}: {}", file.display(), change.in_words()));
+        notes.said.extend(differences.iter().map(|difference| format!("    {difference}")));
+        notes.reviewed = Some(serde_json::json!({
             "file": file, "scenario": scenario.name, "change": change.in_words(), "differences": differences,
         }));
         let Some((text, log)) = now else {
@@ -237,34 +272,13 @@ impl Suite<'_> {
         if text == before {
             return Ok((emitted, None));
         }
-        let emitted = load::emitted_in(self.output, file, load::check_text(file, &text)?)?;
+        let emitted = notes.emitted(file, load::check_text(file, &text)?)?;
         if self.arguments.accept {
             write_answers(file, &log)?;
             write(file, &text)?;
-            self.accepted += 1;
+            notes.is_accepted = true;
         }
         Ok((emitted, None))
-    }
-
-    /// One diagnostic for all scenarios of which the same is to be said.
-    fn tell_outdated(&self) {
-        let mut told: Vec<(&Loaded, &Diagnostic, usize)> = Vec::new();
-        for loaded in &self.outdated {
-            for diagnostic in &loaded.diagnostics {
-                match told.iter_mut().find(|(_, other, _)| other.notes == diagnostic.notes) {
-                    Some((_, _, times)) => *times += 1,
-                    None => told.push((loaded, diagnostic, 1)),
-                }
-            }
-        }
-        for (loaded, diagnostic, times) in told {
-            let mut diagnostic = diagnostic.clone();
-            if times > 1 {
-                let others = plural(times - 1, "other scenario");
-                diagnostic = diagnostic.note(format!("the same holds for {others} of the suite"));
-            }
-            self.output.diagnostics(&loaded.sources, &[diagnostic]);
-        }
     }
 
     /// The crash of a scenario with the driving system that it was found with, and with the one under test.
@@ -280,15 +294,21 @@ impl Suite<'_> {
                 Some(found) => Regression::AdsFailed(found),
             }));
         }
-        let (log, judgements, first) = stage.first_counted(&recorded);
-        if first.is_none() {
+        let log = stage.play(&recorded, &mut |_, _, _| {});
+        let counted = stage.counted(&recorded, &log);
+        if counted.is_empty() {
             let reason = "it has no counted collision with the driving system that it was found with";
             return Ok(Outcome::NotPlayed { reason: reason.to_owned(), in_source: false });
         }
-        let counted = oracle::counted(table.space(), &log, &judgements);
         let is_own = |index: &usize| scenario.crashes_with(log.collisions[*index].contact.obstacle);
         let found = match counted.into_iter().find(is_own) {
-            Some(index) => oracle::regression(&stage.setup(&recorded), &log, index, &ads),
+            // Played again it would be the same, to the bit.
+            Some(index) if self.asked.is_nothing() => {
+                Regression::StillFails { time_s: log.collisions[index].contact.time_s }
+            }
+            Some(index) => {
+                oracle::regression(&stage.setup(&recorded), &log, index, &ads, stage.avoidability())
+            }
             // Already with the driving system that it was found with.
             None => Regression::OtherCrash,
         };
@@ -301,12 +321,25 @@ impl Suite<'_> {
     }
 }
 
-/// What of the space means something else, in words: the first note of the diagnostic, unless that gives the digest alone.
-fn meaning_text(loaded: &Loaded) -> String {
-    let notes = loaded.diagnostics.iter().filter(|found| found.code == code::DIGEST);
-    let notes: Vec<String> = notes.filter_map(|found| found.notes.split_last()?.1.first().cloned()).collect();
-    let what = if notes.is_empty() { String::new() } else { format!(": {}", notes.join("; ")) };
-    format!("the space means something else by now{what}")
+/// One diagnostic for all scenarios of which the same is to be said.
+fn tell_outdated(output: &Output, outdated: &[Told]) {
+    let mut told: Vec<(&Sources, &Diagnostic, usize)> = Vec::new();
+    for (sources, diagnostics) in outdated {
+        for diagnostic in diagnostics {
+            match told.iter_mut().find(|(_, other, _)| other.notes == diagnostic.notes) {
+                Some((_, _, times)) => *times += 1,
+                None => told.push((sources, diagnostic, 1)),
+            }
+        }
+    }
+    for (sources, diagnostic, times) in told {
+        let mut diagnostic = diagnostic.clone();
+        if times > 1 {
+            let others = plural(times - 1, "other scenario");
+            diagnostic = diagnostic.note(format!("the same holds for {others} of the suite"));
+        }
+        output.diagnostics(sources, &[diagnostic]);
+    }
 }
 
 /// How an external driving system fails at the end of a scenario, if the scenario claims so.
@@ -316,12 +349,6 @@ fn claimed_failure(scenario: &Scenario) -> Option<FailureKind> {
         _ => None,
     })?;
     FailureKind::ALL.into_iter().find(|kind| kind.name() == end)
-}
-
-/// Whether the only mistakes of a scenario are digests, which it may accept.
-fn is_outdated(loaded: &Loaded) -> bool {
-    let mut errors = loaded.diagnostics.iter().filter(|found| found.is_error()).peekable();
-    errors.peek().is_some() && errors.all(|found| found.code == code::DIGEST && !found.fixes.is_empty())
 }
 
 impl Outcome {
@@ -360,7 +387,10 @@ impl Outcome {
             Regression::FailsAgain(kind) => ("still fails", format!("{} again", kind.name())),
             Regression::Fixed => ("fixed", String::new()),
             Regression::OtherCrash => ("changed", format!("another obstacle is hit{more}")),
-            Regression::Struck => ("changed", format!("the same obstacle runs into the ego vehicle{more}")),
+            Regression::NotCounted { time_s } => {
+                let how = format!("the same obstacle is hit at {time_s:.2} s, and it does not count");
+                ("changed", format!("{how}{more}"))
+            }
             Regression::NeverMet => ("changed", "the obstacle never appears".to_owned()),
             Regression::AdsFailed(kind) => {
                 ("ads failed", format!("{}: `avastra ads check` says more", kind.name()))
@@ -454,8 +484,11 @@ mod tests {
             case("b", Outcome::Played(Regression::Fixed)),
             case("c", Outcome::Played(Regression::OtherCrash)),
             case("d", Outcome::Played(Regression::NeverMet)),
-            case("f", Outcome::Played(Regression::Struck)),
-            Case { file: PathBuf::from("other/f.ava"), ..case("f", Outcome::Allowed(Regression::Struck)) },
+            case("f", Outcome::Played(Regression::NotCounted { time_s: 3.0 })),
+            Case {
+                file: PathBuf::from("other/f.ava"),
+                ..case("f", Outcome::Allowed(Regression::NotCounted { time_s: 3.0 }))
+            },
             case("g", Outcome::Gone("step 3 is not legal any more".to_owned())),
             case(
                 "e <&> \"\u{1}\"",

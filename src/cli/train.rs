@@ -85,8 +85,9 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
     let mut training = Training::new(table, settings)?;
     let held = run_directory::create(arguments.out.as_deref())?;
     let path = &held.path;
+    let folder = if arguments.self_contained { path.join("critical") } else { path.clone() };
+    let copy = pack_space(&training.table().space().path, &folder)?;
     if arguments.self_contained {
-        let copy = pack_space(output, &training.table().space().path, &path.join("critical"))?;
         training = Training::new(load::table(output, &copy)?, training.settings().clone())?;
     }
     let space = load::relative(path, &training.table().space().path)?;

@@ -205,9 +205,8 @@ impl EstimateDatabase {
     pub fn scenarios(&self) -> Result<Vec<WrittenScenario>, DatabaseError> {
         let mut query =
             self.connection.prepare("SELECT part, event, name, text FROM scenario ORDER BY part, event")?;
-        let rows = query.query_map([], |row| {
-            Ok((row.get(0)?, row.get(1)?, row.get::<_, String>(2)?, row.get(3)?))
-        })?;
+        let rows = query
+            .query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get::<_, String>(2)?, row.get(3)?)))?;
         rows.map(|row| {
             let (part, event, name, text) = row?;
             Ok(WrittenScenario { part, event, name: PlainName::new(name)?, text })

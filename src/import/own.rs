@@ -26,7 +26,8 @@ pub struct Own {
 /// The scenario that a file of avastra's carries; `None` if it is a file of another's.
 pub fn read(source: &mut Source, document: &Document) -> Option<Own> {
     let root = document.root_element();
-    let header = element(root, "FileHeader").filter(|header| header.attribute("author") == Some("avastra"))?;
+    let header =
+        element(root, "FileHeader").filter(|header| header.attribute("author") == Some("avastra"))?;
     let properties = root.descendants().filter(|node| node.has_tag_name("Property"));
     let fact = |property: Node<'_, '_>| {
         Some((property.attribute("name")?.to_owned(), property.attribute("value")?.to_owned()))

@@ -27,20 +27,24 @@ pub struct Meaning {
 struct Declaration {
     /// For example ``rule `npc_gap` ``.
     title: String,
+    /// What the digest covers of it.
+    text: String,
     mark: String,
 }
 
 impl Meaning {
     /// The meaning of declarations, each with its title and its canonical text. Their order counts.
-    pub fn new(declarations: &[(String, String)]) -> Meaning {
+    pub fn new(declarations: Vec<(String, String)>) -> Meaning {
         let whole: Vec<&str> = declarations.iter().map(|(_, text)| text.as_str()).collect();
-        Meaning {
-            digest: digest(whole.join("\n").as_bytes()),
-            declarations: declarations
-                .iter()
-                .map(|(title, text)| Declaration { title: title.clone(), mark: mark(text) })
-                .collect(),
-        }
+        let digest = digest(whole.join("\n").as_bytes());
+        let declaration = |(title, text): (String, String)| Declaration { mark: mark(&text), title, text };
+        Meaning { digest, declarations: declarations.into_iter().map(declaration).collect() }
+    }
+
+    /// The title and the canonical text of each declaration. The digest is that of these texts in this order, so two
+    /// meanings have one digest if and only if they have the same texts in the same order.
+    pub fn declarations(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.declarations.iter().map(|declaration| (declaration.title.as_str(), declaration.text.as_str()))
     }
 
     /// `sha256:…`
@@ -68,7 +72,7 @@ impl Meaning {
             *before.entry(&marks[at * MARK_LETTERS..][..MARK_LETTERS]).or_default() += 1;
         }
         let mut differ: Vec<&str> = Vec::new();
-        for Declaration { title, mark } in &self.declarations {
+        for Declaration { title, mark, .. } in &self.declarations {
             match before.get_mut(mark.as_str()).filter(|left| **left > 0) {
                 Some(left) => *left -= 1,
                 None => differ.push(title),
@@ -113,7 +117,7 @@ mod tests {
 
     fn meaning(declarations: &[&str]) -> Meaning {
         let titled = |text: &&str| ((*text).split('=').next().unwrap().trim().to_owned(), (*text).to_owned());
-        Meaning::new(&declarations.iter().map(titled).collect::<Vec<_>>())
+        Meaning::new(declarations.iter().map(titled).collect())
     }
 
     #[test]

@@ -210,8 +210,9 @@ impl<'a> Inquiry<'a> {
             for second in &asked[index + 1..] {
                 let sufficient = [first, second].iter().filter(|one| one.alone == Fate::Crash).count();
                 let both = [first.module, second.module];
-                let changed =
-                    both.into_iter().fold(self.profile, |own, module| change(&own, module, baseline, differs));
+                let changed = both
+                    .into_iter()
+                    .fold(self.profile, |own, module| change(&own, module, baseline, differs));
                 if sufficient >= sufficient_min && self.fate(&changed) == Fate::Vanished {
                     found.push((sufficient, PairFinding { modules: both, noise: None }));
                 }

@@ -11,6 +11,8 @@ use crate::ads::{Foresight, Selected};
 use crate::episode;
 use crate::episode::{Choice, Collision, End, EpisodeLog, Moment, Outcome, Script, Setup};
 
+use super::avoidable::{AvoidabilitySettings, judge};
+use super::facts::counted_at_need;
 use crate::episode::at_fault;
 
 /// What became of a collision in another play.
@@ -39,17 +41,18 @@ impl Fate {
     }
 }
 
-/// What became of a scenario that was found with a collision, played by another driving system.
+/// What became of a scenario that was found with a collision, played by another driving system. The space's verdict
+/// says which collisions count.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Regression {
-    /// It runs into the same obstacle.
+    /// A collision with the same obstacle counts.
     StillFails { time_s: f64 },
-    /// It touches no road user, or only others that ran into it.
+    /// It does not touch the obstacle, and no other collision counts.
     Fixed,
-    /// It runs into another road user.
+    /// A collision with another road user counts.
     OtherCrash,
-    /// The same obstacle runs into it, or had to give way.
-    Struck,
+    /// It touches the same obstacle, but no collision counts.
+    NotCounted { time_s: f64 },
     /// The obstacle never appears, because another drive left no legal place for it.
     NeverMet,
     /// An external driving system failed before it hit anything.
@@ -59,24 +62,36 @@ pub enum Regression {
 }
 
 impl Regression {
-    /// Whether a crash remains that is not the one of the scenario: with another obstacle, or another side.
+    /// Whether a crash remains that is not the one of the scenario: with another obstacle, or one that does not count.
     pub fn is_other_crash(self) -> bool {
-        matches!(self, Regression::OtherCrash | Regression::Struck)
+        matches!(self, Regression::OtherCrash | Regression::NotCounted { .. })
     }
 }
 
 /// Plays what led to the nth collision of a log with another driving system; `setup` is what the log was
-/// played from.
-pub fn regression(setup: &Setup, log: &EpisodeLog, index: usize, ads: &Selected) -> Regression {
+/// played from. Which collisions count is for the space's verdict to say; `settings` are those of its avoidability.
+pub fn regression(
+    setup: &Setup,
+    log: &EpisodeLog,
+    index: usize,
+    ads: &Selected,
+    settings: &AvoidabilitySettings,
+) -> Regression {
     let crash = Crash::new(setup, log, index);
     let again = crash.play(ads);
-    match (crash.fate(&again), crash.again(&again), again.end) {
-        (_, Some(collision), _) => Regression::StillFails { time_s: collision.contact.time_s },
-        (Fate::Crash, None, _) => Regression::Struck,
-        (Fate::Other, None, _) => Regression::OtherCrash,
-        (Fate::Vanished | Fate::Absent, None, End::Failed(kind)) => Regression::AdsFailed(kind),
-        (Fate::Vanished, None, _) => Regression::Fixed,
-        (Fate::Absent, None, _) => Regression::NeverMet,
+    let by_other = Setup { ads: ads.clone(), ..setup.clone() };
+    let judge = || judge(&by_other, &crash.script, &again, settings);
+    let counted = counted_at_need(setup.table.space(), &again, judge);
+    let obstacle = crash.obstacle(&again);
+    let is_own = |collision: &&Collision| obstacle == Some(collision.contact.obstacle);
+    let own_counted = counted.iter().map(|&index| &again.collisions[index]).find(is_own);
+    match (own_counted, again.collisions.iter().find(is_own), again.end) {
+        (Some(own), _, _) => Regression::StillFails { time_s: own.contact.time_s },
+        _ if !counted.is_empty() => Regression::OtherCrash,
+        (None, Some(own), _) => Regression::NotCounted { time_s: own.contact.time_s },
+        (None, None, End::Failed(kind)) => Regression::AdsFailed(kind),
+        (None, None, _) if obstacle.is_none() => Regression::NeverMet,
+        (None, None, _) => Regression::Fixed,
     }
 }
 

@@ -452,7 +452,10 @@ mod tests {
             assert_eq!(is_named, !cause.is_empty(), "{verdict:?}");
             let of = |module: Module| &found.modules[module as usize];
             for &module in &cause {
-                assert!(!found.differs() || of(module).restored.is_some(), "{module:?} is as in the baseline");
+                assert!(
+                    !found.differs() || of(module).restored.is_some(),
+                    "{module:?} is as in the baseline"
+                );
                 let says_so = verdict == Verdict::Brittle || of(module).vanishes(found.differs());
                 assert!(says_so, "{verdict:?} of {module:?}, without which there is the collision as well");
             }
@@ -461,7 +464,10 @@ mod tests {
                     let own = found.measured.iter().find(|measure| measure.module == one.module);
                     own.is_none_or(|measure| measure.excess() <= 1.0)
                 };
-                assert!(found.told_apart().all(within), "what planning could not bear is within its specification");
+                assert!(
+                    found.told_apart().all(within),
+                    "what planning could not bear is within its specification"
+                );
             }
         }
         assert!(named > 800, "{named}");

@@ -304,10 +304,16 @@ mod tests {
         let moves_mps = Vec2::new(8.0, 0.0);
         let there = Vec2::new(108.0, 50.0);
         assert!((forecast(Vec2::zeros(), moves_mps, moves_mps).error_m(there) - 8.0).abs() < 1e-9);
-        assert!(forecast(Vec2::zeros(), moves_mps, Vec2::zeros()).error_m(there) < 1e-9, "tracking gave none");
+        assert!(
+            forecast(Vec2::zeros(), moves_mps, Vec2::zeros()).error_m(there) < 1e-9,
+            "tracking gave none"
+        );
         // It brakes as nobody could know.
         let braked = Vec2::new(105.0, 50.0);
         assert!(forecast(moves_mps, moves_mps, moves_mps).error_m(braked) < 1e-9);
-        assert!(forecast(Vec2::new(5.0, 0.0), moves_mps, moves_mps).error_m(braked) < 1e-9, "it was foreseen");
+        assert!(
+            forecast(Vec2::new(5.0, 0.0), moves_mps, moves_mps).error_m(braked) < 1e-9,
+            "it was foreseen"
+        );
     }
 }

@@ -25,7 +25,7 @@ pub use crash::{Fate, Regression, regression};
 pub use evidence::{
     Chance, Comparison, Diagnosis, Evidence, ModuleFinding, PairFinding, Verdict, WeaknessFinding,
 };
-pub use facts::{counted, counts, facts};
+pub use facts::{counted, counted_at_need, counts, facts};
 pub use measured::Measure;
 pub use mechanisms::{
     MechanismShare, Mechanisms, Share, WithoutMechanism, mechanism_shares, mechanisms, placebo,

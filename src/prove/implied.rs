@@ -1,7 +1,9 @@
-//! Rules that change nothing: they always hold, or they follow from other rules.
+//! Rules that change nothing: they always hold, on every road or on those of the space, or they follow from other rules.
 
+use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Demand, RowRules};
-use crate::model::{Row, RuleBody, RulesInForce, Space, code};
+use crate::model::{Road, RoadFacts, Row, RuleBody, RulesInForce, Space, code};
+use crate::prove::enclose::{Known, VARIANTS_MAX, Values, enclose};
 use crate::prove::moment::always_holds;
 use crate::syntax::{Diagnostic, listed};
 
@@ -11,8 +13,12 @@ const WORK_MAX: usize = 1_000_000;
 /// The most starts of an episode that are looked at for one rule.
 const STARTS_MAX: usize = 1_000;
 
+/// The most combinations of words and truths that a condition is tried with.
+const SPLITS_MAX: usize = 64;
+
 /// One warning for each rule that can never refuse anything, on any road and with any memory. If two rules
-/// follow from each other, the later one is named.
+/// follow from each other, the later one is named. A rule that by itself refuses nothing on the roads of the space may be
+/// meant for others: that is a remark.
 pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     let mut work = WORK_MAX;
@@ -20,6 +26,9 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     for rule in (0..space.rules.len()).rev() {
         let others = kept.except(rule);
         if !follows(space, rule, &others, &mut work) {
+            if is_idle_on_the_roads(space, rule, &mut work) {
+                diagnostics.push(remark(space, rule));
+            }
             continue;
         }
         let mut reasons = others.clone();
@@ -56,6 +65,34 @@ fn warning(space: &Space, rule: usize, reasons: &[usize]) -> Diagnostic {
     warning.help("remove it, or make it the stricter one")
 }
 
+fn remark(space: &Space, rule: usize) -> Diagnostic {
+    let definition = &space.rules[rule];
+    let roads: Vec<&str> = space.roads.iter().map(|road| road.name.as_str()).collect();
+    let message = format!("rule `{}` refuses nothing on {}", definition.name, listed(&roads));
+    Diagnostic::remark(code::NEVER_ACTS, message)
+        .at(definition.span, "holds there for every value that its actions can have")
+        .help(
+            "if it is meant for other roads, all is well; else look at its bound: `80 * x` is not `80 % * x`",
+        )
+}
+
+/// Whether the rule by itself holds on each road of the space, for every row that it binds and every value; also `false`
+/// if the work left does not suffice.
+fn is_idle_on_the_roads(space: &Space, rule: usize, work: &mut usize) -> bool {
+    let bound = || space.rows.iter().filter(|row| row.rules.contains(&rule));
+    let (count, none) = (bound().count(), RulesInForce::none(space));
+    let Some(left) = work.checked_sub(count * space.roads.len()) else { return false };
+    *work = left;
+    if count == 0 || space.roads.is_empty() || matches!(space.rules[rule].body, RuleBody::Moves { .. }) {
+        return false;
+    }
+    let holds_on = |road: &Road| {
+        let facts = Some(&road.facts);
+        bound().all(|row| holds(space, row, rule, &none, facts, work))
+    };
+    space.roads.iter().all(holds_on) && start_holds(space, rule, &none)
+}
+
 /// Whether the rule holds for every row that it binds and every value that `others` leave; also `false` if
 /// the work left does not suffice.
 fn follows(space: &Space, rule: usize, others: &RulesInForce, work: &mut usize) -> bool {
@@ -78,7 +115,7 @@ fn follows(space: &Space, rule: usize, others: &RulesInForce, work: &mut usize) 
             })
         }
         RuleBody::During(_) | RuleBody::Holds(_) => {
-            bound().all(|row| holds(space, row, rule, others)) && start_holds(space, rule, others)
+            bound().all(|row| holds(space, row, rule, others, None, work)) && start_holds(space, rule, others)
         }
     }
 }
@@ -95,13 +132,92 @@ fn start_holds(space: &Space, rule: usize, others: &RulesInForce) -> bool {
     })
 }
 
-fn holds(space: &Space, row: &Row, rule: usize, others: &RulesInForce) -> bool {
+/// Whether the rule holds for a row and every value that `others` leave, on a road or on any.
+fn holds(
+    space: &Space,
+    row: &Row,
+    rule: usize,
+    others: &RulesInForce,
+    road: Option<&RoadFacts>,
+    work: &mut usize,
+) -> bool {
     let body = &space.rules[rule].body;
     let demanded = body.demand(row.action).and_then(Demand::condition);
     let Some(condition) = demanded.or_else(|| body.during(row.action)) else { return false };
-    let rules = RowRules { space, row, road: None, in_force: others };
+    let rules = RowRules { space, row, road, in_force: others };
     // If the other rules leave the row no value, the row says nothing about this rule.
     let Some(locals) = rules.settle() else { return false };
     let after = space.cells_after(row.action, &locals, &space.cells_unknown());
-    always_holds(condition, &rules.known(&locals, &after), &space.episode)
+    let known = rules.known(&locals, &after);
+    always_holds(condition, &known, &space.episode) || always_holds_split(condition, &known, work)
+}
+
+/// Whether the condition holds in each combination of the words and truths that it names: of all their values at once it
+/// cannot be seen that `time == Night or time != Night` always holds. Also `false` if there are too many combinations, or
+/// the work left does not suffice.
+fn always_holds_split(condition: &Expr, known: &Known<'_>, work: &mut usize) -> bool {
+    let mut named: Vec<Named> = Vec::new();
+    condition.walk(&mut |part| {
+        let name = match part.kind {
+            ExprKind::Local(local) => Named::Local(local),
+            ExprKind::Cell(cell) => Named::Cell(cell),
+            _ => return,
+        };
+        if !named.contains(&name) {
+            named.push(name);
+        }
+    });
+    named.retain(|name| name.values(known).len() > 1);
+    let counts = named.iter().map(|name| name.values(known).len());
+    let combinations = counts.fold(1_usize, usize::saturating_mul);
+    if named.is_empty() || combinations > SPLITS_MAX {
+        return false;
+    }
+    let Some(left) = work.checked_sub(combinations) else { return false };
+    *work = left;
+    holds_in_each(condition, known, &named)
+}
+
+fn holds_in_each(condition: &Expr, known: &Known<'_>, named: &[Named]) -> bool {
+    let Some((name, later)) = named.split_first() else { return !enclose(condition, known).may_fail() };
+    name.values(known).into_iter().all(|value| {
+        let (mut locals, mut cells) = (known.locals.to_vec(), known.cells.to_vec());
+        match *name {
+            Named::Local(local) => locals[local] = value,
+            Named::Cell(cell) => cells[cell] = value,
+        }
+        holds_in_each(condition, &Known { locals: &locals, cells: &cells, ..*known }, later)
+    })
+}
+
+/// A parameter of the row, or a cell of the memory.
+#[derive(Clone, Copy, PartialEq)]
+enum Named {
+    Local(usize),
+    Cell(usize),
+}
+
+impl Named {
+    /// Its words or truths, one by one; empty for a number.
+    fn values(self, known: &Known<'_>) -> Vec<Values> {
+        let whole = match self {
+            Named::Local(local) => known.locals[local],
+            Named::Cell(cell) => known.cells[cell],
+        };
+        match whole {
+            Values::Number(_) => Vec::new(),
+            Values::Truth { may_hold, may_fail } => {
+                let truths = [(true, may_hold), (false, may_fail)];
+                truths
+                    .into_iter()
+                    .filter(|(_, may_be)| *may_be)
+                    .map(|(truth, _)| Values::truth(truth))
+                    .collect()
+            }
+            Values::Variants(set) => (0..VARIANTS_MAX)
+                .filter(|at| set >> at & 1 == 1)
+                .map(|at| Values::Variants(1 << at))
+                .collect(),
+        }
+    }
 }

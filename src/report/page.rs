@@ -54,6 +54,8 @@ pub struct Scene {
     pub compared: Option<(Recording, Value)>,
     /// Name of the scenario of which this is the shrunk one.
     pub shrunk_from: Option<String>,
+    /// What has changed since its file was written, and whether it is shown as it was recorded.
+    pub changed: Option<String>,
 }
 
 /// Everything that a page shows.
@@ -79,7 +81,7 @@ impl Page {
         let mut grounds: BTreeMap<String, String> = BTreeMap::new();
         let mut listed = Vec::new();
         for (number, scene) in self.scenes.iter().enumerate() {
-            let Scene { file, recording, compared, shrunk_from } = scene;
+            let Scene { file, recording, compared, shrunk_from, changed } = scene;
             blob(&mut blobs, &format!("s{number}"), &recording.packed);
             let ground = ground_id(&mut grounds, &recording.ground);
             if let Some((compared, _)) = compared {
@@ -88,7 +90,7 @@ impl Page {
             let change = compared.as_ref().map(|(_, change)| change);
             listed.push(json!({
                 "n": number, "file": file, "ground": ground, "summary": recording.summary, "shrunk_from": shrunk_from,
-                "compared": compared.is_some(), "change": change,
+                "compared": compared.is_some(), "change": change, "changed": changed,
             }));
         }
         for (packed, id) in &grounds {

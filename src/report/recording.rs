@@ -15,7 +15,7 @@ use crate::episode;
 use crate::episode::{Actor, End, EpisodeLog, Held, Moment, Outcome, Recorder, Sample, Script, Sky};
 use crate::geometry::{Pose, wrap_angle};
 use crate::model::vocabulary::Word;
-use crate::model::{Claim, Scenario, digest_text};
+use crate::model::{Claim, Scenario};
 use crate::oracle;
 use crate::oracle::{ClaimResult, ReferenceDrive, Regression};
 use crate::run;
@@ -57,6 +57,10 @@ pub struct Recording {
     log: EpisodeLog,
     /// Index of the collision that it is about: the first that counts, or the first.
     main: Option<usize>,
+    /// Whether that collision counts.
+    main_counts: bool,
+    /// Whether the replay is the recorded episode, to the bit; `None` if the file does not say.
+    pub is_same: Option<bool>,
     /// Claims of its file that the replay refutes.
     pub refuted: Vec<ClaimResult>,
     /// Facts for the list of scenarios.
@@ -98,16 +102,17 @@ pub fn record_another(
     let change = match (first.main, recording.main, recording.log.end) {
         (Some(index), _, _) => {
             let at_s = first.log.collisions[index].contact.time_s;
-            match oracle::regression(&stage.setup(ads), &first.log, index, other) {
-                Regression::StillFails { time_s } if (time_s - at_s).abs() < SAME_S => {
-                    json!({ "kind": "same" })
-                }
-                Regression::StillFails { time_s } => {
-                    json!({ "kind": "other_time", "later_s": time_s - at_s })
+            let settings = stage.avoidability();
+            match oracle::regression(&stage.setup(ads), &first.log, index, other, settings) {
+                Regression::NotCounted { .. } if first.main_counts => json!({ "kind": "not_counted" }),
+                Regression::StillFails { time_s } | Regression::NotCounted { time_s } => {
+                    match (time_s - at_s).abs() < SAME_S {
+                        true => json!({ "kind": "same" }),
+                        false => json!({ "kind": "other_time", "later_s": time_s - at_s }),
+                    }
                 }
                 Regression::Fixed => json!({ "kind": "gone" }),
                 Regression::OtherCrash => json!({ "kind": "other_crash" }),
-                Regression::Struck => json!({ "kind": "struck" }),
                 Regression::NeverMet => json!({ "kind": "never_met" }),
                 Regression::AdsFailed(_) | Regression::FailsAgain(_) => json!({ "kind": "failed" }),
             }
@@ -158,11 +163,12 @@ fn played(
         })
         .collect();
     let refuted = stage.refuted(ads, &log, &judgements, asked);
+    let is_same = stage.is_as_recorded(&log);
     let summary = json!({
         "name": scenario.name, "road": log.road, "ads": ads.name(), "duration_s": log.duration_s, "end": log.end.name(),
         "steps": log.steps.len(), "actions": log.steps.iter().filter(|step| matches!(step.outcome, Outcome::Done { .. })).count(),
         "collisions": collisions.iter().map(without_ways).collect::<Vec<_>>(),
-        "refuted": refuted, "same": is_same(scenario, &log),
+        "refuted": refuted, "same": is_same,
     });
     let steps: Vec<Value> =
         log.steps.iter().enumerate().map(|(index, _)| step(table, &log, index, offers.get(index))).collect();
@@ -176,7 +182,9 @@ fn played(
     });
     let main = counted.first().copied().or(if log.collisions.is_empty() { None } else { Some(0) });
     let packed = columns.pack(&header);
-    Ok(Recording { log, main, refuted, summary, packed, ground: ground(&setup.scene) })
+    let main_counts = !counted.is_empty();
+    let ground = ground(&setup.scene);
+    Ok(Recording { log, main, main_counts, is_same, refuted, summary, packed, ground })
 }
 
 /// Where a scenario comes from: name and text of each.
@@ -195,14 +203,6 @@ fn origin(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Vec<(&'st
         ("chosen by", origin.policy.clone()),
     ];
     known.into_iter().filter_map(|(name, text)| Some((name, text?))).collect()
-}
-
-/// Whether the replay is the recorded episode, to the bit; `None` if the scenario does not say.
-fn is_same(scenario: &Scenario, log: &EpisodeLog) -> Option<bool> {
-    scenario.claims.iter().find_map(|claim| match claim {
-        Claim::Trace(digest) => Some(*digest == digest_text(&log.trace())),
-        _ => None,
-    })
 }
 
 /// The rows of a step: those that are legal, and the others by what refuses them.

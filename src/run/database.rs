@@ -140,11 +140,10 @@ impl Database {
     /// # Errors
     /// If the file cannot be read, or a road has a name that no file can have.
     pub fn scenarios(&self) -> Result<Vec<(usize, PlainName, String)>, DatabaseError> {
-        let query =
-            "SELECT episode, road, text FROM scenario JOIN episode USING (episode) ORDER BY episode";
+        let query = "SELECT episode, road, text FROM scenario JOIN episode USING (episode) ORDER BY episode";
         let mut statement = self.connection.prepare(query)?;
-        let rows =
-            statement.query_map([], |row| Ok((row.get::<_, i64>(0)?, row.get::<_, String>(1)?, row.get(2)?)))?;
+        let rows = statement
+            .query_map([], |row| Ok((row.get::<_, i64>(0)?, row.get::<_, String>(1)?, row.get(2)?)))?;
         rows.map(|row| {
             let (found, road, text) = row?;
             let episode = usize::try_from(found).map_err(|_| DatabaseError::Episode { found })?;

@@ -7,7 +7,7 @@ use crate::ads::{ModularConfig, Selected};
 use crate::episode;
 use crate::episode::{EpisodeLog, Script, Watch};
 use crate::mdp::ProcKind;
-use crate::model::{Claim, RulesInForce, Scenario};
+use crate::model::{Claim, RulesInForce, Scenario, digest_text};
 use crate::oracle;
 use crate::oracle::{AvoidabilitySettings, ClaimResult, Judgement, NoModules, NoTries, Replays};
 use crate::sim::{ENGINE, Scene, Start, TrafficProfile};
@@ -87,6 +87,19 @@ impl<'a> Stage<'a> {
         let judgements = self.judge(ads, &log);
         let first = oracle::counted(self.table.space(), &log, &judgements).first().copied();
         (log, judgements, first)
+    }
+
+    /// Indices of the collisions of a log of it that the space's verdict counts.
+    pub fn counted(&self, ads: &Selected, log: &EpisodeLog) -> Vec<usize> {
+        oracle::counted_at_need(self.table.space(), log, || self.judge(ads, log))
+    }
+
+    /// Whether a log of it is the recorded episode, to the bit; `None` if the scenario does not say.
+    pub fn is_as_recorded(&self, log: &EpisodeLog) -> Option<bool> {
+        self.scenario.claims.iter().find_map(|claim| match claim {
+            Claim::Trace(digest) => Some(*digest == digest_text(&log.trace())),
+            _ => None,
+        })
     }
 
     /// Checks its claims against a log of it.

@@ -344,7 +344,10 @@ mod tests {
 
     #[test]
     fn nothing_acts_on_a_terminal() {
-        assert_eq!(visible("a\tb\r\n\u{1b}[2J\r\u{9b}x\u{202e}"), "a\tb\r\n\\u{1b}[2J\\u{d}\\u{9b}x\\u{202e}");
+        assert_eq!(
+            visible("a\tb\r\n\u{1b}[2J\r\u{9b}x\u{202e}"),
+            "a\tb\r\n\\u{1b}[2J\\u{d}\\u{9b}x\\u{202e}"
+        );
         let mut sources = Sources::new();
         let file = sources.add("\u{1b}]0;name\u{7}.ava", "let x = \u{1b}[31m \u{9b}3\n");
         let diagnostic = Diagnostic::error("AV0201", "an \u{1b}[2J odd one")

@@ -26,7 +26,9 @@ mod record;
 mod scan;
 mod yaml;
 
-pub use diagnostic::{Diagnostic, Edit, Fix, Label, Severity, Sources, Style, listed, nearest, render, visible};
+pub use diagnostic::{
+    Diagnostic, Edit, Fix, Label, Severity, Sources, Style, listed, nearest, render, visible,
+};
 pub(crate) use diagnostic::{enumerated, one_of};
 pub use format::{FormatError, format, same_meaning};
 pub use parse::{DEPTH_MAX, LANGUAGE, OPERATORS_MAX, parse, parse_fields};

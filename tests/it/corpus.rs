@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use avastra::check::explain::PAGES;
-use avastra::check::{Loaded, ReadError, load};
+use avastra::check::{Loaded, MapCache, ReadError, differences, load, load_with};
 use avastra::syntax::ast::FileId;
 use avastra::syntax::{Diagnostic, Severity, apply_fixes};
 
@@ -210,6 +210,61 @@ fn differences_are_told_by_their_meaning() {
     ] {
         assert!(stdout.contains(line), "`{line}` in\n{stdout}");
     }
+}
+
+/// Whatever is edited in a space, the digests differ if and only if `diff` tells a difference.
+#[test]
+fn digests_differ_if_and_only_if_a_difference_is_told() {
+    let shipped = ["scenarios/avastra45.ava", "scenarios/examples/night_and_fog.ava"];
+    let shipped = shipped.map(|name| root().join(name));
+    let own = cases("spaces").into_iter().map(|(_, path)| path);
+    let (mut alike, mut different) = (0, 0);
+    let mut maps = MapCache::default();
+    for path in shipped.into_iter().chain(own) {
+        let text = std::fs::read_to_string(&path).expect("it is readable");
+        let mut loaded = |edited: &str| {
+            let read = |file: &Path| match file == path {
+                true => Ok(edited.to_owned()),
+                false => std::fs::read_to_string(file).map_err(|error| ReadError(error.to_string())),
+            };
+            load_with(&path, &read, &mut maps).expect("it is readable")
+        };
+        let digest = |loaded: &Loaded| loaded.space.as_ref().map(|space| space.meaning.digest().to_owned());
+        let old = loaded(&text);
+        for edited in edits(&text).into_iter().step_by(7) {
+            let new = loaded(&edited);
+            let Some(found) = differences(&old, &new) else { continue };
+            let is_same = digest(&old) == digest(&new);
+            assert_eq!(is_same, found.is_empty(), "{found:?} in {}:\n{edited}", path.display());
+            match is_same {
+                true => alike += 1,
+                false => different += 1,
+            }
+        }
+    }
+    assert!(alike >= 10 && different >= 10, "{alike} edits mean the same, {different} do not");
+}
+
+/// A text with one line left out, written twice, in the place of the next one, or with another number, each in turn.
+fn edits(text: &str) -> Vec<String> {
+    let lines: Vec<&str> = text.lines().collect();
+    let mut edited = Vec::new();
+    for (at, line) in lines.iter().enumerate() {
+        let mut with = |replaced: &[&str], end: usize| {
+            edited.push([&lines[..at], replaced, &lines[end..]].concat().join("\n"));
+        };
+        with(&[], at + 1);
+        with(&[*line, *line], at + 1);
+        if let Some(next) = lines.get(at + 1) {
+            with(&[*next, *line], at + 2);
+        }
+        if let Some(digit) = line.rfind(|letter: char| letter.is_ascii_digit()) {
+            let other = if line[digit..].starts_with('3') { "4" } else { "3" };
+            let changed = format!("{}{other}{}", &line[..digit], &line[digit + 1..]);
+            with(&[changed.as_str()], at + 1);
+        }
+    }
+    edited
 }
 
 #[test]

@@ -97,8 +97,7 @@ fn every_misbehaviour_is_a_finding_and_leaves_nothing_behind() {
         if how == "crash-at-reset" {
             // Before the first step there is a scenario, too, for the day on which the crash is gone.
             let well = profile(&folder, &[], "1", "");
-            let (status, stdout, stderr) =
-                outcome(&mut avastra(&["test", &scenario, "--ads-config", &well]));
+            let (status, stdout, stderr) = outcome(&mut avastra(&["test", &scenario, "--ads-config", &well]));
             assert!(status == 0 && stdout.contains("1 fixed"), "{stdout}{stderr}");
         }
     }

@@ -61,7 +61,9 @@ fn every_file_becomes_a_scenario_or_is_refused_with_its_lines() {
 #[test]
 fn an_export_of_ours_comes_back_and_replays() {
     let crash = crash().display().to_string();
-    for (file, claims) in [(crash.as_str(), &["expect collision with npc#", "expect trace =="][..]), (WET, &[])] {
+    for (file, claims) in
+        [(crash.as_str(), &["expect collision with npc#", "expect trace =="][..]), (WET, &[])]
+    {
         let stem = Path::new(file).file_stem().expect("it is a file").to_string_lossy();
         for more in [&[][..], &["--natural"], &["--profile", "carla"]] {
             let scratch = tempfile::tempdir().expect("a scratch directory");
@@ -76,7 +78,8 @@ fn an_export_of_ours_comes_back_and_replays() {
             let imported = scratch.path().join(format!("imported/{stem}.ava"));
             let text = std::fs::read_to_string(&imported).expect("it was written");
             assert!(claims.iter().all(|claim| text.contains(claim)), "{text}");
-            let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &imported.display().to_string()]));
+            let (status, stdout, stderr) =
+                outcome(&mut avastra(&["replay", &imported.display().to_string()]));
             assert_eq!(status, 0, "{file} {more:?}: {stdout}{stderr}");
         }
     }

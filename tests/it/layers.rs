@@ -129,7 +129,9 @@ fn files_alone_writes_and_removes() {
         let text = std::fs::read_to_string(&path).expect("a source file is readable");
         let text = text.split("#[cfg(test)]").next().unwrap_or(&text);
         let is_database = WRITING_DATABASES.iter().any(|name| path.ends_with(name));
-        for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with("//")) {
+        for (number, line) in
+            text.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with("//"))
+        {
             for word in WRITING.iter().filter(|word| line.contains(**word)) {
                 let may = is_database && *word == "Connection::open(";
                 let place = format!("{}:{}", path.display(), number + 1);

@@ -60,7 +60,11 @@ const ATTACKS: &[Attack] = &[
     linked(&[("d.md.partial", "mine.txt")], &["doc", "SPACE", "-o", "d.md"], Done),
     linked(&[("r.svg.partial", "mine.txt")], &["render", "FOUND", "--at", "1", "-o", "r.svg"], Done),
     linked(&[("m.svg.partial", "mine.txt")], &["road", "SPACE", "--road", "corner", "--svg", "m.svg"], Done),
-    linked(&[("w.safetensors.partial", "mine.txt")], &["export-weights", "POLICY", "-o", "w.safetensors"], Done),
+    linked(
+        &[("w.safetensors.partial", "mine.txt")],
+        &["export-weights", "POLICY", "-o", "w.safetensors"],
+        Done,
+    ),
     linked(&[("s.ava.partial", "mine.txt")], &["shrink", "FOUND", "-o", "s.ava"], Done),
     linked(&[("j.xml.partial", "mine.txt")], &["test", "run", "--junit", "j.xml"], Any),
     linked(&[("out/corner_0000.ava.partial", "mine.txt")], &["pack", "FOUND", "--out", "out"], Done),
@@ -69,14 +73,22 @@ const ATTACKS: &[Attack] = &[
         &["run", "--resume", "run"],
         Done,
     ),
-    linked(&[("begun/run.yaml.partial", "mine.txt")], &["run", "SPACE", "QUICK", "1", "--out", "begun"], Done),
+    linked(
+        &[("begun/run.yaml.partial", "mine.txt")],
+        &["run", "SPACE", "QUICK", "1", "--out", "begun"],
+        Done,
+    ),
     // Destinations that are links.
     linked(&[("run/report.html", "mine.txt")], &["report", "run"], Done),
     linked(&[("run/report.html", "folder")], &["report", "run"], Done),
     linked(&[("corner_0000.svg", "mine.txt")], &["render", "FOUND", "--at", "1"], Done),
     linked(&[("corner_0000.html", "mine.txt")], &["report", "FOUND"], Done),
     linked(
-        &[("build/last", "mine.txt"), ("build/avastra45.table.yaml", "mine.txt"), ("build/last.partial", "mine.txt")],
+        &[
+            ("build/last", "mine.txt"),
+            ("build/avastra45.table.yaml", "mine.txt"),
+            ("build/last.partial", "mine.txt"),
+        ],
         &["compile", "SPACE"],
         Done,
     ),
@@ -92,7 +104,11 @@ const ATTACKS: &[Attack] = &[
         Refused("in the place of the map"),
     ),
     linked(&[("osc/cut_in.ava", "nowhere")], &["import", "XOSC", "--out", "osc"], Refused("there already")),
-    linked(&[("osc/boulevard.xodr", "nowhere")], &["import", "XOSC", "--out", "osc"], Refused("in the place of the map")),
+    linked(
+        &[("osc/boulevard.xodr", "nowhere")],
+        &["import", "XOSC", "--out", "osc"],
+        Refused("in the place of the map"),
+    ),
     linked(&[("fresh/space.ava", "nowhere")], &["new", "fresh"], Refused("exists")),
     linked(
         &[("e1/results.json", "mine.txt"), ("e1/results.json.partial", "mine.txt")],
@@ -128,7 +144,11 @@ const ATTACKS: &[Attack] = &[
     linked(&[("e1/estimate.db", "nowhere")], &["estimate", "--resume", "e1"], Refused(LINK)),
     // Folders that are links.
     linked(&[("runs", "folder")], &["run", "SPACE", "QUICK", "1"], Refused(LINK)),
-    linked(&[("begun/critical", "folder")], &["run", "SPACE", "QUICK", "1", "--out", "begun"], Refused("not empty")),
+    linked(
+        &[("begun/critical", "folder")],
+        &["run", "SPACE", "QUICK", "1", "--out", "begun"],
+        Refused("not empty"),
+    ),
     linked(
         &[("begun/critical/space", "folder")],
         &["run", "SPACE", "QUICK", "1", "--self-contained", "--out", "begun"],
@@ -204,7 +224,12 @@ const ATTACKS: &[Attack] = &[
         command: &["merge", "run", "--out", "m"],
         end: Refused("is no plain name"),
     },
-    Attack { links: &[], change: Some(road_in_run), command: &["run", "--resume", "run"], end: Refused("plain name") },
+    Attack {
+        links: &[],
+        change: Some(road_in_run),
+        command: &["run", "--resume", "run"],
+        end: Refused("plain name"),
+    },
     // Programs that files name: the fixture's leaves a file beside the clone when it is started.
     linked(&[], &["study", "theirs.yaml", "--dry-run"], Done),
     linked(&[], &["run", "SPACE", "--ads-config", "profile.yaml", "--dry-run"], Done),
@@ -306,7 +331,8 @@ fn make_home(home: &Path) {
         assert_eq!(status, 0, "{arguments:?}: {stderr}");
     };
     let corner = ["--road", "corner"];
-    let found = ["--self-contained", "--episodes", "8", "--seed", "5", "--ads-config", &flicker, "--out", "run"];
+    let found =
+        ["--self-contained", "--episodes", "8", "--seed", "5", "--ads-config", &flicker, "--out", "run"];
     played(&[&["run", &space][..], &corner, &found].concat());
     assert!(clone.join(FOUND).is_file(), "the run finds a crash: choose another seed");
     for (shard, parts, external) in [("1/2", "e1", "p1"), ("2/2", "e2", "p2")] {
@@ -453,7 +479,8 @@ fn pages_written_at_once_and_to_a_full_disk_leave_nothing_behind() {
         names
     };
     // A file that may not grow fails as a full disk does.
-    let script = format!("trap '' XFSZ; ulimit -f 16; exec '{}' report '{out}'", cargo_bin("avastra").display());
+    let script =
+        format!("trap '' XFSZ; ulimit -f 16; exec '{}' report '{out}'", cargo_bin("avastra").display());
     let full = std::process::Command::new("sh").args(["-c", &script]).output().expect("it starts");
     let stderr = String::from_utf8_lossy(&full.stderr);
     assert!(full.status.code() == Some(1) && stderr.contains("cannot write"), "{stderr}");
@@ -475,11 +502,17 @@ fn pages_written_at_once_and_to_a_full_disk_leave_nothing_behind() {
 fn nothing_that_a_file_or_a_program_brings_acts_on_the_terminal() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let named = scratch.path().join("\u{1b}[2J\u{9b}1m.ava");
-    std::fs::write(&named, "language 1\nlet a = \u{1b}]0;title\u{7} 3 m + 1 s // \u{9b}31m\n").expect("it is writable");
+    std::fs::write(&named, "language 1\nlet a = \u{1b}]0;title\u{7} 3 m + 1 s // \u{9b}31m\n")
+        .expect("it is writable");
     let named = named.display().to_string();
     let shouting = ["ads", "check", "--", "sh", "-c", r"printf '\033[2Jgone\n' >&2; exit 3"];
-    let commands: [&[&str]; 5] =
-        [&["check", &named], &["check", &named, "--format", "plain"], &["fmt", &named], &["run", &named], &shouting];
+    let commands: [&[&str]; 5] = [
+        &["check", &named],
+        &["check", &named, "--format", "plain"],
+        &["fmt", &named],
+        &["run", &named],
+        &shouting,
+    ];
     for arguments in commands {
         let (_, stdout, stderr) = outcome(&mut avastra(arguments));
         let said = format!("{stdout}{stderr}");

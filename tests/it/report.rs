@@ -52,7 +52,8 @@ fn walk() -> (ActionTable, Scenario, Selected) {
 }
 
 fn page_of(recording: Recording) -> String {
-    let scene = Scene { file: "walk.ava".to_owned(), recording, compared: None, shrunk_from: None };
+    let scene =
+        Scene { file: "walk.ava".to_owned(), recording, compared: None, shrunk_from: None, changed: None };
     let title = "runs/<walk> & {{script}}".to_owned();
     Page { title, overview: Value::Null, remarks: Vec::new(), scenes: vec![scene], compared_with: None }
         .html()

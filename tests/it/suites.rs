@@ -111,6 +111,52 @@ fn a_suite_outlives_changes_of_its_space() {
     assert_eq!(unchanged as u64, kept);
 }
 
+/// Whatever becomes of its space, a scenario is shown: as it was recorded where the run's copy of the space is, else as it
+/// plays now, and the banner says which of the two.
+#[test]
+fn findings_can_always_be_looked_at() {
+    let found = Found::new(&[]);
+    let (run, space) = (found.path("run"), "space/avastra45.ava");
+    let first = found.files("run/critical")[0].display().to_string();
+    let strip = found.path("strip.svg");
+    let looks: [&[&str]; 3] =
+        [&["replay", &first], &["render", &first, "--strip", "-o", &strip], &["report", &run]];
+    let told = |wanted: &[i32], says: &str| {
+        for look in looks {
+            let (status, stdout, stderr) = outcome(&mut avastra(look));
+            assert!(wanted.contains(&status) && stderr.contains(says), "{look:?}: {status} {stdout}{stderr}");
+        }
+    };
+    // No scenario meets this change.
+    found.edit(space, "let weight_mode = 1.0", "let weight_mode = 1.0\nodds Side { Left => 3 }");
+    told(&[0], "changed or new: odds `Side`; shown as it was recorded, in the copy of its space at `");
+    std::fs::rename(found.path("run/space"), found.path("away")).expect("the run keeps a copy");
+    told(&[0], "odds `Side`; it still plays as it was recorded, to the bit");
+    // The road is in all of them, and begins elsewhere now.
+    found.edit("space/roads.ava", "start: lane 1/-1 at 105.88 m", "start: lane 1/-1 at 100 m");
+    told(&[0, 3], "what is shown is what plays now, not what was recorded");
+    let page = std::fs::read_to_string(found.path("run/report.html")).expect("it is written");
+    assert!(page.contains("--self-contained"), "the banner stands on the page");
+    // Without its space a scenario means nothing, but for the copy.
+    std::fs::remove_file(found.path(space)).expect("it is there");
+    let (status, _, stderr) = outcome(&mut avastra(looks[0]));
+    assert!(status == 2 && stderr.contains("cannot read"), "{status} {stderr}");
+    std::fs::rename(found.path("away"), found.path("run/space")).expect("it goes back");
+    told(&[0], "its space cannot be read any more, or has mistakes; shown as it was recorded");
+}
+
+/// What cannot be played is listed on the page of its folder, with the reason.
+#[test]
+fn the_page_of_a_folder_lists_what_cannot_be_played() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let text = "language 1\nuse \"none.ava\"\nscenario lost {\n  road: corner\n  steps { 0: wait() }\n}\n";
+    std::fs::write(scratch.path().join("lost.ava"), text).expect("it is writable");
+    let (status, _, stderr) = outcome(&mut avastra(&["report", &scratch.path().display().to_string()]));
+    assert!(status == 2 && stderr.contains("cannot read"), "{status} {stderr}");
+    let page = std::fs::read_to_string(scratch.path().join("report.html")).expect("it is written");
+    assert!(page.contains("lost.ava cannot be played: 1 mistake in the source: cannot read"), "{page}");
+}
+
 /// Scenarios that say what is not so are shown with what differs in meaning, and written anew to the byte.
 #[test]
 fn a_review_says_what_differs_in_meaning() {
@@ -264,6 +310,36 @@ impl Found {
         let read = |path: &PathBuf| std::fs::read_to_string(path).expect("it is readable");
         self.files("run/critical").iter().map(read).collect()
     }
+}
+
+/// What counts is for the space to say, also if there the other one runs into the ego vehicle; and however many threads
+/// play a suite, it tells the same in the same order.
+#[test]
+fn a_suite_is_judged_by_the_verdict_of_its_space() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let path = |name: &str| scratch.path().join(name).display().to_string();
+    let (space, run, profile) = (path("struck.ava"), path("run"), "scenarios/ads/degraded.yaml");
+    let used = root().join("scenarios/avastra45.ava");
+    let text =
+        format!("language 1\nuse \"{}\"\noverride verdict counted: collision and struck\n", used.display());
+    std::fs::write(&space, text).expect("it is writable");
+    let settings = ["--road", "crossroad", "--episodes", "40", "--seed", "5", "--traffic", "released"];
+    let begin = ["run", &space, "--ads-config", profile, "--out", &run];
+    avastra(&[&begin[..], &settings[..]].concat()).assert().success();
+    let test = |more: &[&str]| {
+        let (status, stdout, stderr) = outcome(&mut avastra(&[&["test", &run][..], more].concat()));
+        assert_eq!(status, 4, "{stdout}{stderr}");
+        stdout
+    };
+    let told = test(&["--jobs", "1"]);
+    let all = told.lines().filter(|line| line.starts_with("still fails")).count();
+    assert!(
+        all > 0 && told.contains(&format!(": {all} still fail, 0 fixed, 0 changed, 0 not played")),
+        "{told}"
+    );
+    assert_eq!(test(&["--jobs", "3"]), told);
+    // The same profile by its file: now each is played a second time.
+    assert_eq!(test(&["--ads-config", profile]), told);
 }
 
 #[test]

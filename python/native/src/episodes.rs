@@ -249,7 +249,9 @@ impl Episodes {
     /// A row as Python gives it. A negative one is refused in the words for a row beyond the last.
     pub fn row(&self, row: Option<i64>) -> Result<Option<usize>, String> {
         let last = self.run.table().rows().len() - 1;
-        let known = |row: i64| usize::try_from(row).map_err(|_| format!("no row {row}: the table has rows 0 to {last}"));
+        let known = |row: i64| {
+            usize::try_from(row).map_err(|_| format!("no row {row}: the table has rows 0 to {last}"))
+        };
         row.map(known).transpose()
     }
 

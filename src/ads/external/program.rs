@@ -218,7 +218,8 @@ impl Program {
     /// A new process, or a new connection.
     fn opened(&self) -> Result<Session, Failure> {
         if let Some(last) = self.given_up() {
-            let detail = format!("given up after {ATTEMPTS_MAX} failures in a row, the last: {}", last.in_words());
+            let detail =
+                format!("given up after {ATTEMPTS_MAX} failures in a row, the last: {}", last.in_words());
             return Err(Failure::new(Problem::GivenUp, "start", detail));
         }
         let opened = Session::open(&self.settings, &self.init);

@@ -114,9 +114,7 @@ impl Toy<'_> {
             return Ok(Some(right));
         };
         Ok(Some(match how {
-            Misbehaviour::CrashAtStart
-            | Misbehaviour::CrashAtReset
-            | Misbehaviour::CrashBeforeReset => right,
+            Misbehaviour::CrashAtStart | Misbehaviour::CrashAtReset | Misbehaviour::CrashBeforeReset => right,
             Misbehaviour::CrashInEpisode => return Err(crashed()),
             Misbehaviour::Hang => {
                 std::thread::sleep(Duration::from_secs(3600));

@@ -175,7 +175,7 @@ pub struct TestArguments {
     /// Scenarios, directories of them, and run directories.
     #[arg(required = true, value_name = "PATH")]
     pub paths: Vec<PathBuf>,
-    /// Let pass what crashes with another obstacle, or is hit from another side, than its scenario says.
+    /// Let pass what crashes with another obstacle than its scenario says, or in a way that does not count.
     #[arg(long)]
     pub allow_changed: bool,
     /// Where space, rules, driving system or engine have changed: say of each scenario what differs in meaning.
@@ -189,6 +189,9 @@ pub struct TestArguments {
     /// Write the results as JUnit XML, too.
     #[arg(long, value_name = "FILE")]
     pub junit: Option<PathBuf>,
+    /// Worker threads over files [default: one for each core].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub jobs: Option<u32>,
 }
 
 #[derive(Debug, Args)]

@@ -107,6 +107,7 @@ class Watch {
       el("p", { class: "crumbs" }, el("a", { href: linkToList() }, "← All scenarios")),
       el("h1", {}, nameOf(entry).replace(/^.*\//, ""), entry.shrunk_from ? " (shrunk)" : ""),
       el("p", { class: "lead" }, collision ? `${collisionInWords(collision, header.summary.road)}.` : "No collision."),
+      entry.changed && el("p", { class: "warning", id: "changed" }, entry.changed),
       refutedClaims(entry.summary),
       origin(header),
       this.#change(),

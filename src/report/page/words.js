@@ -75,7 +75,7 @@ export function collisionInWords(collision, road) {
 export const CHANGES = {
   same: "same crash",
   other_time: "same crash, at another time",
-  struck: "the same obstacle runs into it",
+  not_counted: "the same obstacle is hit, and it does not count",
   other_crash: "another crash",
   gone: "no crash any more",
   never_met: "the obstacle never appears",

@@ -1,0 +1,171 @@
+//! Scenarios to look at: `render`, `report` and `replay` show them also when what they were made with has changed.
+//!
+//! A run keeps a copy of its space. A scenario whose space has changed is played in that copy, as it was recorded.
+//! Where there is none, it is played as things are now, and the digest of its trace tells whether that is what was
+//! recorded. Either way a banner says what has changed, and how the scenario can be brought along. `test`, `verify`,
+//! `shrink`, `diagnose` and `export` judge by the space, so they ask for one that has not changed.
+
+use std::path::{Path, PathBuf};
+
+use crate::action::ActionTable;
+use crate::check::{Loaded, normal};
+use crate::model::{Scenario, code};
+use crate::run;
+use crate::run::RunError;
+use crate::syntax::ast::{Expr, ExprKind, FileId};
+use crate::syntax::{Diagnostic, apply_fixes, print_expr};
+
+use super::error::Failure;
+use super::load;
+use super::output::{Output, plural};
+use super::pack::SPACE;
+use super::review::as_now;
+
+/// How a scenario is brought along.
+const BRING_ALONG: &str = "`avastra test --review` says what the change means for it, and `--accept` takes it over; \
+                           `avastra run --self-contained` and `avastra pack` keep scenarios and their space together";
+
+/// A scenario to look at.
+pub struct Looked {
+    pub table: ActionTable,
+    pub scenario: Scenario,
+    /// What has changed since it was written; `None` if nothing has.
+    pub changed: Option<Changed>,
+}
+
+/// What has changed since a scenario was written, and how it is shown all the same.
+pub struct Changed {
+    what: Vec<String>,
+    /// The copy of its space in which it is played as it was recorded.
+    copy: Option<PathBuf>,
+}
+
+impl Changed {
+    /// The banner. `is_same` tells whether what was played is the recorded episode, if that can be told.
+    pub fn banner(&self, is_same: Option<bool>) -> String {
+        let shown = match (&self.copy, is_same) {
+            (Some(copy), None | Some(true)) => {
+                format!("shown as it was recorded, in the copy of its space at `{}`", copy.display())
+            }
+            (None, Some(true)) => "it still plays as it was recorded, to the bit".to_owned(),
+            (_, Some(false)) => "what is shown is what plays now, not what was recorded".to_owned(),
+            (None, None) => "what is shown is what plays now, which need not be what was recorded".to_owned(),
+        };
+        format!("{}; {shown}. {BRING_ALONG}", self.what.join("; "))
+    }
+}
+
+/// Banners of files, one for all files of which the same is to be said.
+pub fn together(banners: impl IntoIterator<Item = (String, String)>) -> Vec<String> {
+    let mut told: Vec<(String, String, usize)> = Vec::new();
+    for (file, banner) in banners {
+        match told.iter_mut().find(|(_, known, _)| *known == banner) {
+            Some((_, _, files)) => *files += 1,
+            None => told.push((file, banner, 1)),
+        }
+    }
+    let in_words = |(file, banner, files): (String, String, usize)| match files {
+        1 => format!("{file}: {banner}"),
+        more => format!("{file} and {}: {banner}", plural(more - 1, "other scenario")),
+    };
+    told.into_iter().map(in_words).collect()
+}
+
+/// The scenario of a file, also if its space, the engine or the settings that it names have changed since.
+///
+/// # Errors
+/// If the file cannot be read, has no scenario, or has no meaning any more.
+pub fn scenario(output: &Output, path: &Path) -> Result<Looked, Failure> {
+    let loaded = load::read_and_check(path)?;
+    let mut changed = Changed { what: Vec::new(), copy: None };
+    let loaded = match loaded.diagnostics.iter().any(Diagnostic::is_error) {
+        false => loaded,
+        true => match kept(path, &loaded) {
+            Some((copy, kept)) => {
+                changed = Changed { what: vec![meaning_text(&loaded)], copy: Some(copy) };
+                kept
+            }
+            None if is_outdated(&loaded) => {
+                changed.what.push(meaning_text(&loaded));
+                as_it_is_now(path, &loaded)?
+            }
+            None => loaded,
+        },
+    };
+    let (table, mut scenario) = load::scenario_in(output, path, loaded)?;
+    let mut beside = as_now(&mut scenario);
+    if matches!(run::recorded(&scenario), Err(RunError::ProfileDigest { .. })) {
+        scenario.origin.profile_digest = None;
+        beside.push("the settings of its driving system mean something else by now".to_owned());
+    }
+    if !beside.is_empty() {
+        // In its own space it plays otherwise, too.
+        changed.copy = None;
+    }
+    changed.what.extend(beside);
+    let changed = (!changed.what.is_empty()).then_some(changed);
+    Ok(Looked { table, scenario, changed })
+}
+
+/// The first mistake of a file that cannot be played, in words.
+pub fn first_mistake(path: &Path) -> Option<String> {
+    let loaded = load::read_and_check(path).ok()?;
+    let first = loaded.diagnostics.iter().find(|found| found.is_error())?;
+    let note = first.notes.first().map_or_else(String::new, |note| format!("; {note}"));
+    Some(format!("{}{note}", first.message))
+}
+
+/// The file in the space as it is now: with the digest that the space has.
+fn as_it_is_now(path: &Path, loaded: &Loaded) -> Result<Loaded, Failure> {
+    let root = FileId::default();
+    let (text, _) = apply_fixes(root, loaded.sources.text(root), &loaded.diagnostics);
+    let mut checked = load::check_text(path, &text)?;
+    for mistake in &mut checked.diagnostics {
+        mistake.notes.push("the space has changed since the scenario was written".to_owned());
+    }
+    Ok(checked)
+}
+
+/// The file in a copy of its space as that was when the scenario was written, and the path of the copy. A run keeps one
+/// in its folder `space`, `--self-contained` and `pack` put one beside the scenarios.
+fn kept(path: &Path, loaded: &Loaded) -> Option<(PathBuf, Loaded)> {
+    let root = FileId::default();
+    let written: Vec<_> = loaded.written_paths().into_iter().filter(|used| used.span.file == root).collect();
+    let [used] = written.as_slice() else { return None };
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let copies = ["", ".."].map(|up| load::below(&normal(&folder.join(up).join(SPACE)))).concat();
+    copies.into_iter().filter(|copy| copy.file_name() == used.target.file_name()).find_map(|copy| {
+        let written = load::relative(folder, &copy).ok()?;
+        let mut text = loaded.sources.text(root).to_owned();
+        let written = print_expr(&Expr::built(ExprKind::Text(written)));
+        text.replace_range(used.span.start..used.span.end, &written);
+        // The digest in the file tells whether it is the space that was meant.
+        let found = load::check_text(path, &text).ok()?;
+        let is_sound = !found.diagnostics.iter().any(Diagnostic::is_error);
+        (is_sound && is_sealed(&found)).then_some((copy, found))
+    })
+}
+
+/// Whether the file says which space it means, by a digest: nothing else tells a copy from another space.
+fn is_sealed(loaded: &Loaded) -> bool {
+    let mut used = loaded.files[0].tree.items.iter().filter_map(|item| item.kind.as_use());
+    used.all(|used| used.digest.is_some())
+}
+
+/// Whether the only mistakes of a scenario are digests, which it may accept.
+pub fn is_outdated(loaded: &Loaded) -> bool {
+    let mut errors = loaded.diagnostics.iter().filter(|found| found.is_error()).peekable();
+    errors.peek().is_some() && errors.all(|found| found.code == code::DIGEST && !found.fixes.is_empty())
+}
+
+/// What of the space means something else, in words: the first note of the diagnostic, unless that gives the digest alone.
+pub fn meaning_text(loaded: &Loaded) -> String {
+    let mut errors = loaded.diagnostics.iter().filter(|found| found.is_error());
+    if errors.any(|found| found.code != code::DIGEST) {
+        return "its space cannot be read any more, or has mistakes".to_owned();
+    }
+    let notes = loaded.diagnostics.iter().filter(|found| found.code == code::DIGEST);
+    let notes: Vec<String> = notes.filter_map(|found| found.notes.split_last()?.1.first().cloned()).collect();
+    let what = if notes.is_empty() { String::new() } else { format!(": {}", notes.join("; ")) };
+    format!("the space means something else by now{what}")
+}
