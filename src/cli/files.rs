@@ -62,7 +62,7 @@ impl Scratch {
         for number in 0.. {
             let path = folder.join(format!("avastra-{purpose}-{}-{number}", std::process::id()));
             // It fails where anything has the name, a link included, so nothing is written through what others put there.
-            match std::fs::create_dir(&path) {
+            match files::make_new(&path) {
                 Ok(()) => return Ok(Scratch { path }),
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(Failure::file("create", &path, error)),
@@ -75,7 +75,7 @@ impl Scratch {
 impl Drop for Scratch {
     fn drop(&mut self) {
         // What cannot be removed is left to whoever clears the folder for temporary files.
-        let _ = std::fs::remove_dir_all(&self.path);
+        let _ = files::remove_all(&self.path);
     }
 }
 

@@ -15,7 +15,7 @@ use crate::agent;
 use crate::agent::Kind;
 use crate::cli::arguments::AdsCheckArguments;
 use crate::cli::error::Failure;
-use crate::cli::files::{Scratch, write_new};
+use crate::cli::files::{Scratch, make_way, write_new};
 use crate::cli::findings::cut_off;
 use crate::cli::load;
 use crate::cli::new::shipped;
@@ -107,7 +107,9 @@ pub fn check(output: &Output, arguments: &AdsCheckArguments) -> Result<(), Failu
 fn own_space(output: &Output) -> Result<(ActionTable, Scratch), Failure> {
     let scratch = Scratch::new("ads-check")?;
     for (name, text) in shipped() {
-        write_new(&scratch.path.join(name), text)?;
+        let file = scratch.path.join(name);
+        make_way(&scratch.path, &file)?;
+        write_new(&file, text)?;
     }
     Ok((load::table(output, &scratch.path.join(SPACE))?, scratch))
 }
