@@ -16,7 +16,7 @@ const JOINED_M: f64 = 3.0;
 /// Limits on the search for crossings outside junctions: on those that are told, on the pairs of lanes that are looked at,
 /// and on the segments that are held against each other. A city in which streets end at junctions is far within them.
 const CROSSINGS_MAX: usize = 1000;
-const PAIRS_MAX: usize = 10_000_000;
+const PAIRS_MAX: usize = 5_000_000;
 const CROSSING_STEPS_MAX: u64 = 50_000_000;
 
 /// Added to distances because of rounding, m.
