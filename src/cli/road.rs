@@ -30,7 +30,7 @@ pub fn road(output: &Output, arguments: &RoadArguments) -> Result<(), Failure> {
     match &picture {
         Some((path, svg)) if path.as_path() == Path::new("-") => output.document(svg.trim_end()),
         Some((path, svg)) => {
-write_named(path, svg)?;
+            write_named(path, svg)?;
             output.say(words(&map, route.as_ref(), &warnings).trim_end());
         }
         None => output.say(words(&map, route.as_ref(), &warnings).trim_end()),
