@@ -96,10 +96,8 @@ pub enum NoCentreLine {
     Broken,
 }
 
-/// Steps of work for a place on a centre line, beside one for each lane between it and the reference line.
-const PLACE_STEPS: u64 = 8;
-
-/// Samples the centre of a lane of a section, and adds the steps of work to those in `steps`, also where it fails.
+/// Samples the centre of a lane of a section, and adds the steps of work to those in `steps`, also where it fails: for each
+/// place those of the reference line, and one for each lane between.
 ///
 /// # Errors
 /// If the lane is too short, too large, or narrower than zero.
@@ -234,7 +232,8 @@ impl Curve<'_> {
     /// The offset curve `R + t N` of the reference line `R`: with `T' = k N` and `N' = -k T` its
     /// derivatives are `(1 - k t) T + t' N` and `-(k' t + 2 k t') T + ((1 - k t) k + t'') N`.
     fn at(&self, s_m: f64) -> Sample {
-        self.steps.set(self.steps.get() + PLACE_STEPS + self.across.lane_count() as u64);
+        let steps = self.road.reference.place_steps() + self.across.lane_count() as u64;
+        self.steps.set(self.steps.get() + steps);
         let reference = self.road.reference.at(s_m);
         let (t, width) = self.across.at(s_m);
         let (k, k_rate) = (reference.curvature_per_m, reference.curvature_rate_per_m2);

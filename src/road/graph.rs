@@ -39,14 +39,18 @@ const TIGHT_M_MIN: f64 = 3.0;
 /// as well.
 const LINK_RAD_MAX: f64 = 60.0 * core::f64::consts::PI / 180.0;
 
-/// Limits on what all lanes of a map need together: vertices of centre lines, and length, m. A curved lane has a vertex
-/// at each metre; a straight one has two.
-const VERTICES_MAX: usize = 5_000_000;
-const LANES_M_MAX: f64 = 5e7;
+/// Limit on the vertices of all centre lines of a map: for any map, and more for each of its roads. A curved lane has a
+/// vertex at each metre; a straight one has two.
+const VERTICES_MAX: usize = 2_000_000;
+const VERTICES_A_ROAD: usize = 100;
 
-/// Limit on the work for all centre lines, in the steps of `centre_line`. A map within the limit on vertices needs as much
-/// only if it has tens of lanes beside each other whose widths change all the time.
-const STEPS_MAX: u64 = 250_000_000;
+/// Limit on the work for all centre lines in the steps of `centre_line`, likewise. A map within the limit on vertices needs as
+/// much only if it curls, or if tens of lanes beside each other change their widths all the time.
+const STEPS_MAX: u64 = 80_000_000;
+const STEPS_A_ROAD: u64 = 5_000;
+
+/// Limit on the length of all lanes of a map together, m.
+const LANES_M_MAX: f64 = 5e7;
 
 /// Limits on the lanes inside one junction, and on their vertices: each is held against each other one.
 const JUNCTION_LANES_MAX: usize = 1000;
@@ -104,11 +108,15 @@ fn refuse_long_bends(document: &Document) -> Result<(), RoadError> {
                 bent_m += road.reference.bent_m(section.begin_m, section.end_m) * sampled as f64;
             }
         }
-        if bent_m > VERTICES_MAX as f64 * CHORD_M_MAX {
+        if bent_m > vertices_max(document) as f64 * CHORD_M_MAX {
             return Err(too_large(road, "its curved lanes are too long"));
         }
     }
     Ok(())
+}
+
+fn vertices_max(document: &Document) -> usize {
+    VERTICES_MAX + VERTICES_A_ROAD * document.roads.len()
 }
 
 /// Whether a lane gets a centre line.
@@ -123,15 +131,26 @@ fn too_large(road: &RoadElement, what: &str) -> RoadError {
     wrong(road.line, message)
 }
 
-/// What the lanes of a map have needed so far.
-#[derive(Default)]
+/// What the lanes of a map have needed so far, and what they may need.
 struct Spent {
     steps: Cell<u64>,
+    steps_max: u64,
     vertices: usize,
+    vertices_max: usize,
     length_m: f64,
 }
 
 impl Spent {
+    fn new(document: &Document) -> Spent {
+        Spent {
+            steps: Cell::new(0),
+            steps_max: STEPS_MAX + STEPS_A_ROAD * document.roads.len() as u64,
+            vertices: 0,
+            vertices_max: vertices_max(document),
+            length_m: 0.0,
+        }
+    }
+
     /// The centre line of a lane, counted, or why the lane has none.
     ///
     /// # Errors
@@ -147,10 +166,10 @@ impl Spent {
             self.vertices += centre.path.points().len();
             self.length_m += centre.path.length_m();
         }
-        if self.steps.get() > STEPS_MAX {
+        if self.steps.get() > self.steps_max {
             return Err(too_large(road, "its lanes bend and widen too often"));
         }
-        if self.vertices > VERTICES_MAX {
+        if self.vertices > self.vertices_max {
             return Err(too_large(road, "its curved lanes are too long"));
         }
         if self.length_m > LANES_M_MAX {
@@ -209,7 +228,7 @@ impl<'a> Builder<'a> {
             grid: LaneGrid::default(),
         };
         let (junctions, lanes) = (junctions.collect(), BTreeMap::new());
-        Ok(Builder { document, map, roads, junctions, lanes, spent: Spent::default() })
+        Ok(Builder { document, map, roads, junctions, lanes, spent: Spent::new(document) })
     }
 
     pub fn warn(&mut self, line: u32, message: impl AsRef<str>) {
