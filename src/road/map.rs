@@ -437,6 +437,13 @@ impl Lane {
     }
 }
 
+/// Names that a message lists at most: a city has as many roads as a book has words.
+const LISTED_MAX: usize = 40;
+
 fn listed(items: impl IntoIterator<Item = impl ToString>) -> String {
-    items.into_iter().map(|item| item.to_string()).collect::<Vec<_>>().join(", ")
+    let mut names: Vec<String> = items.into_iter().map(|item| item.to_string()).collect();
+    let more = names.len().saturating_sub(LISTED_MAX);
+    names.truncate(LISTED_MAX);
+    names.extend((more > 0).then(|| format!("{more} more")));
+    names.join(", ")
 }
