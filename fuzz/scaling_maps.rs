@@ -274,7 +274,7 @@ fn sections_and_offsets(size: usize) -> String {
 
 fn sections_and_limits(size: usize) -> String {
     let step_m = length_of(size) / size as f64;
-    let limit = |n| format!(r#"<type s="{}" type="town"><speed max="10"/></type>"#, step_m * n as f64);
+    let limit = |n: usize| format!(r#"<type s="{}" type="town"><speed max="10"/></type>"#, step_m * n as f64);
     sections(size, &all(size, limit), "")
 }
 
@@ -506,13 +506,13 @@ fn objects(objects: &str, length_m: f64) -> String {
 
 fn crosswalks(size: usize) -> String {
     let one =
-        |at_m| format!(r#"<object type="crosswalk" id="{at_m}" s="{at_m}" t="0" length="3" width="7" hdg="0"/>"#);
+        |at_m: f64| format!(r#"<object type="crosswalk" id="{at_m}" s="{at_m}" t="0" length="3" width="7" hdg="0"/>"#);
     objects(&along(size, one), 100.0)
 }
 
 fn walls(size: usize) -> String {
     let repeat = r#"<repeat s="0" length="90000" distance="0" tStart="9" tEnd="9"/>"#;
-    let one = |n| format!(r#"<object type="wall" id="{n}" s="0" t="9" width="0.3">{repeat}</object>"#);
+    let one = |n: usize| format!(r#"<object type="wall" id="{n}" s="0" t="9" width="0.3">{repeat}</object>"#);
     objects(&all(size, one), 90_000.0)
 }
 
