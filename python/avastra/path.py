@@ -10,6 +10,10 @@ from typing import List, NamedTuple, Sequence, Tuple
 # A projection first looks at every so many vertices, then at all around the nearest of them.
 _STRIDE = 8
 
+# Lanes that follow each other may miss each other by this much, m: what maps are rounded to. A point nearer than this to the
+# one before it says nothing of where the path leads.
+_SEAM_M = 0.01
+
 
 class Pose(NamedTuple):
     """A place in the frame of the map: m, m, rad counter-clockwise from +x."""
@@ -31,14 +35,24 @@ class Beside(NamedTuple):
 
 
 class Path:
-    """A polyline of at least two different points, measured from its first point."""
+    """A polyline of at least two different points, measured from its first point.
+
+    Points within a centimetre of the one before are left out: lanes of a map may miss those that follow by millimetres,
+    and the way across such a seam, which may even lead backwards, is no heading of the road. The last point stays.
+    """
 
     def __init__(self, points: Sequence[Sequence[float]]):
         kept: List[Tuple[float, float]] = []
         for point in points:
-            x, y = float(point[0]), float(point[1])
-            if not kept or math.hypot(x - kept[-1][0], y - kept[-1][1]) > 1e-6:
-                kept.append((x, y))
+            here = float(point[0]), float(point[1])
+            if not kept or math.dist(here, kept[-1]) > _SEAM_M:
+                kept.append(here)
+        if kept and kept[-1] != here:
+            # The path ends where it is said to end: its last point takes the place of those that are as near as a seam.
+            while len(kept) > 1 and math.dist(here, kept[-1]) <= _SEAM_M:
+                kept.pop()
+            if math.dist(here, kept[-1]) > 1e-6:
+                kept.append(here)
         if len(kept) < 2:
             raise ValueError(f"a path needs two different points, and has {len(kept)}")
         self.xy = kept

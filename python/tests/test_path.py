@@ -40,6 +40,24 @@ class Paths(unittest.TestCase):
         self.assertLess(max(abs(path.project(*point).offset) for point in smooth.xy), 0.2)
         self.assertEqual((smooth.xy[0], smooth.xy[-1]), (path.xy[0], path.xy[-1]))
 
+    def test_a_seam_of_millimetres_has_no_heading_of_its_own(self):
+        seam = avastra.Path([(0.0, 0.0), (2.0, 0.0), (1.9999, -0.0005), (4.0, 0.0)])
+        self.assertAlmostEqual(seam.at(2.0).heading, 0.0)
+        self.assertEqual(seam.length, 4.0)
+        for gap in (1e-7, 1e-4, 2e-3, 9e-3):
+            for side in range(8):
+                angle = side * math.pi / 4.0
+                begin = (10.0 + gap * math.cos(angle), gap * math.sin(angle))
+                path = avastra.Path([(0.0, 0.0), (5.0, 0.0), (10.0, 0.0), begin, (15.0, 0.0), (20.0, 0.0)])
+                for tenth in range(0, 201):
+                    pose = path.at(tenth / 10.0)
+                    self.assertAlmostEqual(pose.heading, 0.0, delta=0.003)
+                    self.assertAlmostEqual(pose.y, 0.0, delta=0.01)
+
+    def test_a_path_ends_where_its_last_point_is(self):
+        self.assertEqual(avastra.Path([(0.0, 0.0), (5.0, 0.0), (10.0, 0.0), (10.004, 0.0)]).xy[-1], (10.004, 0.0))
+        self.assertEqual(avastra.Path([(0.0, 0.0), (0.004, 0.0)]).length, 0.004)
+
     def test_a_path_needs_two_points(self):
         with self.assertRaisesRegex(ValueError, "two different points, and has 1"):
             avastra.Path([(1.0, 1.0), (1.0, 1.0)])

@@ -24,14 +24,16 @@ const SPACING_M: f64 = 1.0;
 /// Prints a map and, if asked for, a route.
 pub fn road(output: &Output, arguments: &RoadArguments) -> Result<(), Failure> {
     let (map, route) = read(output, arguments)?;
+    let crossings = map.crossings_without_junction();
+    let warnings: Vec<String> = map.warnings.iter().cloned().chain(crossings).collect();
     let picture = arguments.svg.as_ref().map(|path| (path, draw(&map, route.as_ref())));
     match &picture {
         Some((path, svg)) if path.as_path() == Path::new("-") => output.document(svg.trim_end()),
         Some((path, svg)) => {
             write_named(path, svg)?;
-            output.say(words(&map, route.as_ref()).trim_end());
+            output.say(words(&map, route.as_ref(), &warnings).trim_end());
         }
-        None => output.say(words(&map, route.as_ref()).trim_end()),
+        None => output.say(words(&map, route.as_ref(), &warnings).trim_end()),
     }
     if !output.is_json() {
         return Ok(());
@@ -52,7 +54,7 @@ pub fn road(output: &Output, arguments: &RoadArguments) -> Result<(), Failure> {
             "outline_m": crosswalk.outline.iter().map(|corner| [corner.x, corner.y]).collect::<Vec<_>>(),
         })).collect::<Vec<_>>(),
         "route": route.as_ref().map(|route| route_json(&map, route)),
-        "warnings": warnings(&map),
+        "warnings": warnings,
         "svg": on_stdout.map(|(_, svg)| svg),
     }));
     Ok(())
@@ -101,12 +103,8 @@ fn place(map: &RoadMap, text: &str) -> Result<LanePlace, Failure> {
     map.place(road, lane, s_m).map_err(Failure::usage)
 }
 
-/// What is odd about a map.
-fn warnings(map: &RoadMap) -> Vec<String> {
-    map.warnings.iter().cloned().chain(map.crossings_without_junction()).collect()
-}
-
-fn words(map: &RoadMap, route: Option<&Route>) -> String {
+/// `warnings` say what is odd about the map.
+fn words(map: &RoadMap, route: Option<&Route>, warnings: &[String]) -> String {
     let roads: std::collections::BTreeSet<&str> =
         map.lanes.iter().map(|lane| lane.key.road.as_str()).collect();
     let length_m: f64 = map.lanes.iter().map(|lane| lane.centre.length_m()).sum();
@@ -138,7 +136,7 @@ fn words(map: &RoadMap, route: Option<&Route>) -> String {
         ));
     }
     lines.extend(route.map(|route| route_words(map, route)));
-    lines.extend(warnings(map).iter().map(|warning| format!("warning: {warning}")));
+    lines.extend(warnings.iter().map(|warning| format!("warning: {warning}")));
     lines.join("\n")
 }
 

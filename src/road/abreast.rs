@@ -154,12 +154,19 @@ impl RoadMap {
 
     /// The ways through a junction, by rising index of the lanes they come from and use.
     pub fn connections(&self, junction: usize) -> Vec<Connection> {
+        self.ways_through(junction).expect("a map in which they are too many is refused")
+    }
+
+    /// As [`RoadMap::connections`]; `None` if they are too many, which takes lanes inside that lead into each other.
+    pub(super) fn ways_through(&self, junction: usize) -> Option<Vec<Connection>> {
         let inside = |lane: LaneIndex| self.lane(lane).junction == Some(junction);
+        let mut lanes_left = WAY_LANES_MAX;
         let mut found = Vec::new();
         for first in self.junctions[junction].lanes.iter().copied() {
             for from in self.lane(first).predecessors.iter().copied().filter(|from| !inside(*from)) {
                 let mut open = vec![vec![first]];
                 while let Some(lanes) = open.pop() {
+                    lanes_left = lanes_left.checked_sub(lanes.len())?;
                     for next in self.lane(lanes[lanes.len() - 1]).successors.iter().copied() {
                         if !inside(next) {
                             found.push(Connection { from, lanes: lanes.clone(), to: next });
@@ -171,9 +178,12 @@ impl RoadMap {
             }
         }
         found.sort();
-        found
+        Some(found)
     }
 }
+
+/// Limit on the lanes of all ways through a junction together, each counted for every way that uses it.
+const WAY_LANES_MAX: usize = 100_000;
 
 /// A way through a junction.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]

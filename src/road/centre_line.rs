@@ -16,7 +16,7 @@ const HEADING_ERROR_RAD: f64 = 5e-4;
 const STATION_ERROR_M: f64 = 2e-3;
 
 /// Longest chord where anything bends or widens, m.
-const CHORD_M_MAX: f64 = 1.0;
+pub const CHORD_M_MAX: f64 = 1.0;
 
 /// Distance of the last vertex before a jump in curvature from that jump, m. Without this vertex, linear
 /// interpolation would spread the jump over the whole straight.
@@ -96,7 +96,8 @@ pub enum NoCentreLine {
     Broken,
 }
 
-/// Samples the centre of a lane of a section.
+/// Samples the centre of a lane of a section, and adds the steps of work to those in `steps`, also where it fails: for each
+/// place those of the reference line, and one for each lane between.
 ///
 /// # Errors
 /// If the lane is too short, too large, or narrower than zero.
@@ -104,12 +105,14 @@ pub fn centre_line(
     road: &RoadElement,
     section: &SectionElement,
     lane: i32,
+    steps: &Cell<u64>,
 ) -> Result<CentreLine, NoCentreLine> {
-    let inside = |at_m: &f64| *at_m > section.begin_m - 1e-6 && *at_m < section.end_m + 1e-6;
-    if road.reference.breaks_m().iter().any(inside) {
+    if road.reference.breaks_between(section.begin_m - 1e-6, section.end_m + 1e-6) {
         return Err(NoCentreLine::Broken);
     }
-    let mut breaks_m: Vec<f64> = road.reference.beginnings().chain(road.lane_offset.beginnings()).collect();
+    let of_reference = road.reference.beginnings_between(section.begin_m, section.end_m);
+    let of_offset = road.lane_offset.beginnings_between(section.begin_m, section.end_m);
+    let mut breaks_m: Vec<f64> = of_reference.chain(of_offset).collect();
     for element in section.lanes.iter().filter(|element| element.id.signum() == lane.signum()) {
         let within = element.widths.beginnings().chain(element.borders.beginnings());
         breaks_m.extend(within.map(|begin_m| section.begin_m + begin_m));
@@ -119,7 +122,7 @@ pub fn centre_line(
     breaks_m.sort_by(f64::total_cmp);
     breaks_m.dedup_by(|a, b| (*a - *b).abs() < 1e-6);
 
-    let curve = Curve { road, across: road.across(section, lane), left_at: Cell::default() };
+    let curve = Curve { road, across: road.across(section, lane), left_at: Cell::default(), steps };
     let mut samples: Vec<Sample> = Vec::new();
     for (i, piece) in breaks_m.windows(2).enumerate() {
         let (begin_m, limit_m) = (piece[0], piece[1]);
@@ -222,12 +225,15 @@ struct Curve<'a> {
     across: Across<'a>,
     /// The heading that was met last, rad, and the unit vector to its left: a straight has one for all its places.
     left_at: Cell<Option<(f64, Vec2)>>,
+    steps: &'a Cell<u64>,
 }
 
 impl Curve<'_> {
     /// The offset curve `R + t N` of the reference line `R`: with `T' = k N` and `N' = -k T` its
     /// derivatives are `(1 - k t) T + t' N` and `-(k' t + 2 k t') T + ((1 - k t) k + t'') N`.
     fn at(&self, s_m: f64) -> Sample {
+        let steps = self.road.reference.place_steps() + self.across.lane_count() as u64;
+        self.steps.set(self.steps.get() + steps);
         let reference = self.road.reference.at(s_m);
         let (t, width) = self.across.at(s_m);
         let (k, k_rate) = (reference.curvature_per_m, reference.curvature_rate_per_m2);

@@ -89,16 +89,28 @@ fn dense(path: &Path) -> Vec<PathPoint> {
 
 /// Where two paths cross: (station on the first, station on the second), m.
 pub fn crossings(a: &Path, b: &Path) -> Vec<(f64, f64)> {
+    let mut steps = u64::MAX;
+    crossings_within(a, b, &mut steps)
+}
+
+/// As [`crossings`], as long as there are steps of work left: one for each segment of the first path, and one for each
+/// that is held against it. What it takes is subtracted.
+pub fn crossings_within(a: &Path, b: &Path, steps: &mut u64) -> Vec<(f64, f64)> {
     let mut found: Vec<(f64, f64)> = Vec::new();
     // A little larger because of rounding.
     let near = b.bounds().grown(1e-3);
     for p in a.points().windows(2) {
+        *steps = steps.saturating_sub(1);
+        if *steps == 0 {
+            break;
+        }
         // Most segments of a route are far from the other lane: their boxes tell so quickly.
         let here = Bounds::of(p);
         if !here.meets(&near) {
             continue;
         }
         for q in b.segments_near(&here.grown(1e-3)) {
+            *steps = steps.saturating_sub(1);
             let Some((x, y)) = segment_crossing(p[0].position, p[1].position, q[0].position, q[1].position)
             else {
                 continue;
@@ -129,7 +141,9 @@ pub fn segment_crossing(a: Vec2, b: Vec2, c: Vec2, d: Vec2) -> Option<(f64, f64)
 pub fn spans_inside(path: &Path, outline: &[Vec2]) -> Vec<(f64, f64)> {
     let edges = || outline.iter().zip(outline.iter().cycle().skip(1));
     let mut cuts_m = vec![0.0, path.length_m()];
-    for pair in path.points().windows(2) {
+    // A little larger because of rounding.
+    let near = Bounds::around(outline).grown(1e-3);
+    for pair in path.segments_near(&near) {
         for (c, d) in edges() {
             if let Some((x, _)) = segment_crossing(pair[0].position, pair[1].position, *c, *d) {
                 cuts_m.push(pair[0].station_m + (pair[1].station_m - pair[0].station_m) * x);

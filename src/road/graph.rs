@@ -1,17 +1,23 @@
 //! From OpenDRIVE elements to the lane graph: lanes, their links, neighbours and limits.
+//!
+//! The cost of a map grows with its text, and where it could grow faster there is a limit: a file past it is refused in
+//! words that say what to make smaller. A whole city, 50,000 roads with 100,000 lane sections, is well within all limits.
 
-use std::collections::BTreeMap;
+use core::cell::Cell;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::geometry::{Path, Vec2, wrap_angle};
 
-use super::centre_line::{CentreLine, NoCentreLine, centre_line};
+use super::centre_line::{CHORD_M_MAX, CentreLine, NoCentreLine, centre_line};
 use super::heights::Heights;
 use super::index::LaneGrid;
 use super::lane_change::permitted;
 use super::map::{
     Junction, Lane, LaneIndex, LaneKey, LeftOut, Neighbour, Precedence, RoadError, RoadMap, Strip, Turn,
 };
-use super::opendrive::{Contact, Document, RoadElement, RoadLink, SectionElement, wrong};
+use super::opendrive::{
+    Contact, Document, JunctionElement, LaneElement, RoadElement, RoadLink, SectionElement, wrong,
+};
 use super::phases::share_phases;
 use super::signals::{add_objects, add_signals, set_precedence};
 
@@ -33,18 +39,36 @@ const TIGHT_M_MIN: f64 = 3.0;
 /// as well.
 const LINK_RAD_MAX: f64 = 60.0 * core::f64::consts::PI / 180.0;
 
+/// Limit on the vertices of all centre lines of a map: for any map, and more for each of its roads. A curved lane has a
+/// vertex at each metre; a straight one has two.
+const VERTICES_MAX: usize = 2_000_000;
+const VERTICES_A_ROAD: usize = 100;
+
+/// Limit on the work for all centre lines in the steps of `centre_line`, likewise. A map within the limit on vertices needs as
+/// much only if it curls, or if tens of lanes beside each other change their widths all the time.
+const STEPS_MAX: u64 = 80_000_000;
+const STEPS_A_ROAD: u64 = 5_000;
+
+/// Limit on the length of all lanes of a map together, m.
+const LANES_M_MAX: f64 = 5e7;
+
+/// Limits on the lanes inside one junction, and on their vertices: each is held against each other one.
+const JUNCTION_LANES_MAX: usize = 1000;
+const JUNCTION_VERTICES_MAX: usize = 50_000;
+
 /// Builds the map of a file.
 pub fn build(document: &Document) -> Result<RoadMap, RoadError> {
     let mut builder = Builder::new(document)?;
+    refuse_long_bends(document)?;
     builder.add_lanes()?;
     builder.link_sections();
     builder.link_roads();
     builder.link_junctions();
     builder.unlink_corners();
     builder.set_neighbours();
-    add_signals(&mut builder);
+    add_signals(&mut builder)?;
     add_objects(&mut builder);
-    builder.add_strips();
+    builder.add_strips()?;
     let mut map = builder.map;
     map.warnings.extend(loose_links(&map));
     for lane in &mut map.lanes {
@@ -57,11 +81,102 @@ pub fn build(document: &Document) -> Result<RoadMap, RoadError> {
             map.junctions[junction].lanes.push(LaneIndex(index));
         }
     }
+    for (index, junction) in document.junctions.iter().enumerate() {
+        if map.ways_through(index).is_none() {
+            let message = format!(
+                "junction `{}` has too many ways through it: its connecting roads lead into each other; link each of \
+                 them to roads outside",
+                junction.id
+            );
+            return Err(wrong(junction.line, message));
+        }
+    }
     map.has_levels = map.find_levels();
     share_phases(&mut map);
     set_precedence(document, &mut map);
     map.grid = LaneGrid::new(&map.lanes);
     Ok(map)
+}
+
+/// Refuses a map whose curves alone need more vertices than a map may have, before any is computed.
+fn refuse_long_bends(document: &Document) -> Result<(), RoadError> {
+    let mut bent_m = 0.0;
+    for road in &document.roads {
+        for section in &road.sections {
+            let sampled = section.lanes.iter().filter(|lane| is_sampled(lane)).count();
+            if sampled > 0 {
+                bent_m += road.reference.bent_m(section.begin_m, section.end_m) * sampled as f64;
+            }
+        }
+        if bent_m > vertices_max(document) as f64 * CHORD_M_MAX {
+            return Err(too_large(road, "its curved lanes are too long"));
+        }
+    }
+    Ok(())
+}
+
+fn vertices_max(document: &Document) -> usize {
+    VERTICES_MAX + VERTICES_A_ROAD * document.roads.len()
+}
+
+/// Whether a lane gets a centre line.
+fn is_sampled(lane: &LaneElement) -> bool {
+    lane.driving || lane.beside.is_some()
+}
+
+/// The error for a map that is past a limit up to a road.
+fn too_large(road: &RoadElement, what: &str) -> RoadError {
+    let message =
+        format!("the map is too large, up to road `{}`: {what}; cut out the part to be driven", road.id);
+    wrong(road.line, message)
+}
+
+/// What the lanes of a map have needed so far, and what they may need.
+struct Spent {
+    steps: Cell<u64>,
+    steps_max: u64,
+    vertices: usize,
+    vertices_max: usize,
+    length_m: f64,
+}
+
+impl Spent {
+    fn new(document: &Document) -> Spent {
+        Spent {
+            steps: Cell::new(0),
+            steps_max: STEPS_MAX + STEPS_A_ROAD * document.roads.len() as u64,
+            vertices: 0,
+            vertices_max: vertices_max(document),
+            length_m: 0.0,
+        }
+    }
+
+    /// The centre line of a lane, counted, or why the lane has none.
+    ///
+    /// # Errors
+    /// If the map is past a limit.
+    fn centre_line(
+        &mut self,
+        road: &RoadElement,
+        section: &SectionElement,
+        lane: i32,
+    ) -> Result<Result<CentreLine, NoCentreLine>, RoadError> {
+        let found = centre_line(road, section, lane, &self.steps);
+        if let Ok(centre) = &found {
+            self.vertices += centre.path.points().len();
+            self.length_m += centre.path.length_m();
+        }
+        if self.steps.get() > self.steps_max {
+            return Err(too_large(road, "its lanes bend and widen too often"));
+        }
+        if self.vertices > self.vertices_max {
+            return Err(too_large(road, "its curved lanes are too long"));
+        }
+        if self.length_m > LANES_M_MAX {
+            return Err(too_large(road, "its lanes are too long"));
+        }
+        Ok(found)
+    }
 }
 
 /// A map while it is being built.
@@ -74,6 +189,7 @@ pub struct Builder<'a> {
     pub junctions: BTreeMap<&'a str, usize>,
     /// Lanes by road index, section and lane id.
     lanes: BTreeMap<(usize, usize, i32), LaneIndex>,
+    spent: Spent,
 }
 
 impl<'a> Builder<'a> {
@@ -111,7 +227,8 @@ impl<'a> Builder<'a> {
             left_out: BTreeMap::new(),
             grid: LaneGrid::default(),
         };
-        Ok(Builder { document, map, roads, junctions: junctions.collect(), lanes: BTreeMap::new() })
+        let (junctions, lanes) = (junctions.collect(), BTreeMap::new());
+        Ok(Builder { document, map, roads, junctions, lanes, spent: Spent::new(document) })
     }
 
     pub fn warn(&mut self, line: u32, message: impl AsRef<str>) {
@@ -131,6 +248,8 @@ impl<'a> Builder<'a> {
         let document = self.document;
         let mut limitless = 0;
         let mut tight: Vec<String> = Vec::new();
+        // Lanes and vertices inside each junction.
+        let mut inside = vec![(0, 0); document.junctions.len()];
         for (road_index, road) in document.roads.iter().enumerate() {
             let junction = road.junction.as_ref().and_then(|id| self.junctions.get(id.as_str()).copied());
             if let (Some(id), None) = (&road.junction, junction) {
@@ -149,7 +268,7 @@ impl<'a> Builder<'a> {
                     }
                     let undrivable = |what: &str| LeftOut { what: what.to_owned(), for_vehicles: true };
                     let at = format!("lane {} of road `{}` at s {}", element.id, road.id, section.begin_m);
-                    let centre = match centre_line(road, section, element.id) {
+                    let centre = match self.spent.centre_line(road, section, element.id)? {
                         Ok(centre) => centre,
                         Err(NoCentreLine::Short) => {
                             self.map.left_out.insert(left_out, undrivable("without length"));
@@ -177,6 +296,13 @@ impl<'a> Builder<'a> {
                             unfolded.off_m
                         );
                         self.warn_at(element.line, unfolded.position, message);
+                    }
+                    if let Some(junction) = junction {
+                        let (lanes, vertices) = &mut inside[junction];
+                        (*lanes, *vertices) = (*lanes + 1, *vertices + centre.path.points().len());
+                        if *lanes > JUNCTION_LANES_MAX || *vertices > JUNCTION_VERTICES_MAX {
+                            return Err(crowded(&document.junctions[junction]));
+                        }
                     }
                     let limit_mps = speed_limit_mps(road, section, element.id);
                     limitless += usize::from(limit_mps.is_none());
@@ -211,18 +337,18 @@ impl<'a> Builder<'a> {
 
     /// Adds what lies beside the driving lanes. A strip that cannot be drawn is left out: it only helps to find
     /// the kerb.
-    fn add_strips(&mut self) {
+    fn add_strips(&mut self) -> Result<(), RoadError> {
         for road in &self.document.roads {
             for section in &road.sections {
                 for element in &section.lanes {
                     let Some(kind) = element.beside else { continue };
-                    let Ok(CentreLine { path, widths_m, .. }) = centre_line(road, section, element.id) else {
-                        continue;
-                    };
+                    let found = self.spent.centre_line(road, section, element.id)?;
+                    let Ok(CentreLine { path, widths_m, .. }) = found else { continue };
                     self.map.strips.push(Strip { kind, bounds: path.bounds(), centre: path, widths_m });
                 }
             }
         }
+        Ok(())
     }
 
     fn link_sections(&mut self) {
@@ -367,7 +493,11 @@ impl<'a> Builder<'a> {
                 return;
             }
         };
-        if !self.map.lanes[from.0].successors.contains(&to) {
+        // A thousand lanes may lead into one: the shorter list tells as well.
+        let (ahead, behind) = (&self.map.lanes[from.0].successors, &self.map.lanes[to.0].predecessors);
+        let is_known =
+            if ahead.len() < behind.len() { ahead.contains(&to) } else { behind.contains(&from) };
+        if !is_known {
             self.map.lanes[from.0].successors.push(to);
             self.map.lanes[to.0].predecessors.push(from);
         }
@@ -375,6 +505,7 @@ impl<'a> Builder<'a> {
 
     /// Removes the links between lanes that meet at a corner which nothing on wheels can follow.
     fn unlink_corners(&mut self) {
+        let mut unlinked: BTreeSet<(LaneIndex, LaneIndex)> = BTreeSet::new();
         for index in 0..self.map.lanes.len() {
             let lane = &self.map.lanes[index];
             let end = lane.centre.pose_at(lane.centre.length_m());
@@ -395,9 +526,16 @@ impl<'a> Builder<'a> {
                 );
                 self.map.warned_at.push((self.map.warnings.len(), end.position));
                 self.map.warnings.push(message);
-                self.map.lanes[index].successors.retain(|other| *other != next);
-                self.map.lanes[next.0].predecessors.retain(|other| other.0 != index);
+                unlinked.insert((LaneIndex(index), next));
             }
+        }
+        if unlinked.is_empty() {
+            return;
+        }
+        for (index, lane) in self.map.lanes.iter_mut().enumerate() {
+            let here = LaneIndex(index);
+            lane.successors.retain(|next| !unlinked.contains(&(here, *next)));
+            lane.predecessors.retain(|before| !unlinked.contains(&(*before, here)));
         }
     }
 
@@ -545,6 +683,16 @@ fn turn(path: &Path) -> Turn {
     }
 }
 
+/// The error for a junction with more lanes than can be held against each other.
+fn crowded(junction: &JunctionElement) -> RoadError {
+    let message = format!(
+        "junction `{}` is too large: more than {JUNCTION_LANES_MAX} lanes, or {JUNCTION_VERTICES_MAX} m of curved ones, \
+         lie inside; make several junctions of it",
+        junction.id
+    );
+    wrong(junction.line, message)
+}
+
 /// The lowest speed limit on a lane of a section; a limit of the lane itself goes before the road's.
 fn speed_limit_mps(road: &RoadElement, section: &SectionElement, lane: i32) -> Option<f64> {
     let own = &section.lane(lane)?.speeds;
@@ -552,19 +700,19 @@ fn speed_limit_mps(road: &RoadElement, section: &SectionElement, lane: i32) -> O
         .or_else(|| lowest_limit(&road.speeds, section.begin_m, section.end_m))
 }
 
+/// The lowest limit between two stations; each of the records, by rising station, holds until the next.
 fn lowest_limit(records: &[(f64, Option<f64>)], from_m: f64, to_m: f64) -> Option<f64> {
-    let holds = records.iter().enumerate().filter(|(i, (begin_m, _))| {
-        let end_m = records.get(i + 1).map_or(f64::INFINITY, |next| next.0);
-        *begin_m < to_m && end_m > from_m
-    });
-    holds.filter_map(|(_, (_, limit))| *limit).min_by(f64::total_cmp)
+    let begun = records.partition_point(|(begin_m, _)| *begin_m <= from_m);
+    let ended = records.partition_point(|(begin_m, _)| *begin_m < to_m);
+    let holding = records.get(begun.saturating_sub(1)..ended)?;
+    holding.iter().filter_map(|(_, limit)| *limit).min_by(f64::total_cmp)
 }
 
 /// Width of the gap between two lanes, measured in the middle of a section, m.
 fn gap_m(road: &RoadElement, section: &SectionElement, left: i32, right: i32) -> f64 {
     let middle_m = (section.begin_m + section.end_m) / 2.0;
-    let (left_centre, left_width) = road.lane_at(section, left, middle_m);
-    let (right_centre, right_width) = road.lane_at(section, right, middle_m);
+    let (left_centre, left_width) = road.across(section, left).at(middle_m);
+    let (right_centre, right_width) = road.across(section, right).at(middle_m);
     let pitch_m = left_centre.value - right_centre.value;
     let gap_m = pitch_m - (left_width.value + right_width.value) / 2.0;
     // Rounding leaves tiny gaps between lanes that share a line.

@@ -1,9 +1,9 @@
 //! Heights of roads: they tell which roads pass over each other. Slopes change nothing else; everything drives as on
 //! the flat.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
-use super::conflict::crossings;
+use super::conflict::crossings_within;
 use super::map::{Lane, RoadMap};
 
 /// Surfaces farther apart than this lie on two levels, m. Ours: the highest body of the engine has 3.2 m, and the
@@ -12,6 +12,15 @@ const LEVEL_M: f64 = 3.5;
 
 /// Crossings nearer than this to the end of a lane are joints, m. Ours.
 const JOINED_M: f64 = 3.0;
+
+/// Limits on the search for crossings outside junctions: on those that are told, on the pairs of lanes that are looked at,
+/// and on the segments that are held against each other. A city in which streets end at junctions is far within them.
+const CROSSINGS_MAX: usize = 1000;
+const PAIRS_MAX: usize = 5_000_000;
+const CROSSING_STEPS_MAX: u64 = 50_000_000;
+
+/// Added to distances because of rounding, m.
+const SLACK_M: f64 = 1e-3;
 
 /// Distance of two stations at which a lane's height is taken, m. In between it is linear: where a road goes from
 /// level to a slope of 10 % within 100 m, that is 3 mm wrong.
@@ -80,33 +89,55 @@ impl RoadMap {
     }
 
     /// A warning for each two roads that cross on one level and outside junctions: nobody gives way there, because only
-    /// junctions say who does. It is asked for where a map is looked at, as it takes longer than reading.
+    /// junctions say who does. It is asked for where a map is looked at, not where it is driven.
     pub fn crossings_without_junction(&self) -> Vec<String> {
-        let streets: Vec<&Lane> = self.lanes.iter().filter(|lane| lane.junction.is_none()).collect();
-        let mut known: BTreeSet<[&str; 2]> = BTreeSet::new();
+        let road_of = self.road_numbers();
+        let street_of = |lane: usize| self.lanes[lane].junction.is_none().then(|| road_of[lane]);
+        let (pairs, mut is_whole) = self.grid.sharing_cells(PAIRS_MAX, street_of);
+        let mut steps = CROSSING_STEPS_MAX;
+        let mut known: BTreeSet<[usize; 2]> = BTreeSet::new();
         let mut warnings = Vec::new();
-        for (nth, a) in streets.iter().enumerate() {
-            for b in &streets[nth + 1..] {
-                let roads = [a.key.road.as_str(), b.key.road.as_str()];
-                if roads[0] == roads[1] || known.contains(&roads) {
-                    continue;
-                }
-                // Where roads are joined, their lanes may overlap a little.
-                let is_inside =
-                    |lane: &Lane, at_m: f64| (JOINED_M..lane.centre.length_m() - JOINED_M).contains(&at_m);
-                let crosses = crossings(&a.centre, &b.centre).into_iter().find(|(a_m, b_m)| {
-                    is_inside(a, *a_m) && is_inside(b, *b_m) && !a.is_apart_at(*a_m, b, *b_m)
-                });
-                let Some((at_m, _)) = crosses else { continue };
-                known.insert(roads);
-                let at = a.centre.position_at(at_m);
-                warnings.push(format!(
-                    "roads `{}` and `{}` cross at {:.1}, {:.1} on one level without a junction: nobody gives way \
-                     there; make it a junction, or give one of them its height",
-                    roads[0], roads[1], at.x, at.y
-                ));
+        for (first, second) in pairs {
+            let (a, b) = (&self.lanes[first], &self.lanes[second]);
+            let roads = [road_of[first], road_of[second]];
+            if known.contains(&roads) || !a.centre.bounds().grown(SLACK_M).meets(&b.centre.bounds()) {
+                continue;
             }
+            // Where roads are joined, their lanes may overlap a little.
+            let is_inside =
+                |lane: &Lane, at_m: f64| (JOINED_M..lane.centre.length_m() - JOINED_M).contains(&at_m);
+            let crosses = crossings_within(&a.centre, &b.centre, &mut steps).into_iter().find(|(a_m, b_m)| {
+                is_inside(a, *a_m) && is_inside(b, *b_m) && !a.is_apart_at(*a_m, b, *b_m)
+            });
+            if steps == 0 || (crosses.is_some() && warnings.len() == CROSSINGS_MAX) {
+                is_whole = false;
+                break;
+            }
+            let Some((at_m, _)) = crosses else { continue };
+            known.insert(roads);
+            let at = a.centre.position_at(at_m);
+            warnings.push(format!(
+                "roads `{}` and `{}` cross at {:.1}, {:.1} on one level without a junction: nobody gives way \
+                 there; make it a junction, or give one of them its height",
+                a.key.road, b.key.road, at.x, at.y
+            ));
+        }
+        if !is_whole {
+            warnings.push(
+                "so many roads lie over each other that not all were looked at: more may cross without a junction"
+                    .to_owned(),
+            );
         }
         warnings
+    }
+
+    /// For each lane a number that it shares with the lanes of its road alone; it rises with the index of the lane.
+    fn road_numbers(&self) -> Vec<usize> {
+        let mut numbers: BTreeMap<&str, usize> = BTreeMap::new();
+        let number = |road| {
+            let next = numbers.len();
+            *numbers.entry(road).or_insert(next)
+        };
+        self.lanes.iter().map(|lane| lane.key.road.as_str()).map(number).collect()
     }
 }

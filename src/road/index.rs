@@ -1,23 +1,29 @@
 //! A grid over the plane that finds the lanes near a point.
 
 use core::ops::RangeInclusive;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::geometry::{Bounds, Path, Pose, Projection, Vec2, wrap_angle};
 
 use super::map::{Lane, LaneIndex};
 
-/// Side of a cell, m.
+/// Side of a cell, m; larger where lanes would lie in more cells than [`CELLS_WANTED`]: the grid of a country must not
+/// need more memory than its lanes.
 const CELL_M: f64 = 8.0;
+const CELLS_WANTED: f64 = 500_000.0;
 
-/// A lane is entered into the grid by stretches of this length, m.
-const STRETCH_M: f64 = 4.0;
+/// A lane is entered into the grid by stretches of this part of a cell.
+const STRETCH_PART: f64 = 0.5;
 
 /// Added to distances because of rounding, m.
 const SLACK_M: f64 = 1e-3;
 
 /// Added to angles because of rounding, rad.
 const SLACK_RAD: f64 = 1e-6;
+
+/// Of so few lanes it is quicker to try each than to look into cells, and so it is where a box has more columns of cells.
+const LANES_FEW: usize = 500;
+const COLUMNS_MAX: i64 = 64;
 
 /// Above this number of cells, every lane is tried instead: with a reach that wide nearly all lanes are in it,
 /// and each stands in many cells.
@@ -26,6 +32,8 @@ const CELLS_MAX: i64 = 36;
 /// Which stretches of which lanes touch which cell.
 #[derive(Debug, Clone, Default)]
 pub struct LaneGrid {
+    /// Side of a cell, m.
+    cell_m: f64,
     cells: BTreeMap<(i64, i64), Vec<Stretch>>,
     /// Half the width of the widest lane, m.
     half_width_m: f64,
@@ -71,9 +79,15 @@ impl LaneGrid {
         let widest_m = widths_m.copied().fold(0.0, f64::max);
         let boxes = lanes.iter().map(|lane| lane.centre.bounds()).collect();
         let headings = lanes.iter().map(|lane| Headings::of(&lane.centre)).collect();
-        let mut grid = LaneGrid { cells: BTreeMap::new(), half_width_m: widest_m / 2.0, boxes, headings };
+        let all_m: f64 = lanes.iter().map(|lane| lane.centre.length_m()).sum();
+        let mut cell_m = CELL_M;
+        while all_m > cell_m * CELLS_WANTED {
+            cell_m *= 2.0;
+        }
+        let cells = BTreeMap::new();
+        let mut grid = LaneGrid { cell_m, cells, half_width_m: widest_m / 2.0, boxes, headings };
         for (index, lane) in lanes.iter().enumerate() {
-            let stretches = (lane.centre.length_m() / STRETCH_M).ceil().max(1.0);
+            let stretches = (lane.centre.length_m() / (cell_m * STRETCH_PART)).ceil().max(1.0);
             let step_m = lane.centre.length_m() / stretches;
             for i in 0..stretches as u32 {
                 let from_m = step_m * f64::from(i);
@@ -93,8 +107,8 @@ impl LaneGrid {
     fn insert(&mut self, path: &Path, stretch: Stretch) {
         let (a, b) = (path.pose_at(stretch.from_m).position, path.pose_at(stretch.to_m).position);
         // A curve lies less than half its length away from its chord.
-        let margin = Vec2::new(STRETCH_M, STRETCH_M) / 2.0;
-        let (low, high) = (cell(a.inf(&b) - margin), cell(a.sup(&b) + margin));
+        let margin = Vec2::repeat(self.cell_m * STRETCH_PART / 2.0);
+        let (low, high) = (self.cell(a.inf(&b) - margin), self.cell(a.sup(&b) + margin));
         for x in low.0..=high.0 {
             for y in low.1..=high.1 {
                 let entries = self.cells.entry((x, y)).or_default();
@@ -122,6 +136,15 @@ impl LaneGrid {
         let forward = pose.forward();
         let left = Vec2::new(-forward.y, forward.x);
         let position = pose.position;
+        let near = (self.boxes.len() > LANES_FEW).then(|| {
+            let corner = |ahead_m: f64, aside_m: f64| position + forward * ahead_m + left * aside_m;
+            let (right_m, left_m) = (*aside_m.start(), *aside_m.end());
+            let corners = [(-ahead_m, right_m), (ahead_m, right_m), (-ahead_m, left_m), (ahead_m, left_m)];
+            let around = Bounds::around(&corners.map(|(ahead_m, aside_m)| corner(ahead_m, aside_m)));
+            self.lanes_in(&around.grown(SLACK_M))
+        });
+        let near = near.flatten();
+        let every = if near.is_some() { 0..0 } else { 0..self.boxes.len() };
         let may_be = move |&Bounds { least, most }: &Bounds| {
             let (middle, half) = ((least + most) / 2.0 - position, (most - least) / 2.0);
             let within = |axis: &Vec2, from_m: f64, to_m: f64| {
@@ -130,10 +153,56 @@ impl LaneGrid {
             };
             within(&forward, -ahead_m, ahead_m) && within(&left, *aside_m.start(), *aside_m.end())
         };
-        let candidates = (0..self.boxes.len()).filter(move |index| {
+        let candidates = every.chain(near.into_iter().flatten()).filter(move |index| {
             may_be(&self.boxes[*index]) && self.headings[*index].may_be_parallel(heading_rad, within_rad)
         });
         candidates.map(LaneIndex)
+    }
+
+    /// The indices of all lanes with a place in a box; others near it may be among them. `None` if the box has so many
+    /// columns of cells that to try every lane is quicker.
+    fn lanes_in(&self, around: &Bounds) -> Option<BTreeSet<usize>> {
+        let (low, high) = (self.cell(around.least), self.cell(around.most));
+        if high.0.saturating_sub(low.0) > COLUMNS_MAX {
+            return None;
+        }
+        let columns = (low.0..=high.0).map(|x| self.cells.range((x, low.1)..=(x, high.1)));
+        let stretches = columns.flatten().flat_map(|(_, stretches)| stretches);
+        Some(stretches.map(|stretch| stretch.lane.0).collect())
+    }
+
+    /// Pairs of lanes of different groups that have a cell in common, the lower index first, in order; and whether these
+    /// are all, because at most so many are looked at. A lane without a group is left out. The numbers of the groups rise
+    /// with the indices of the lanes.
+    pub fn sharing_cells(
+        &self,
+        most: usize,
+        group_of: impl Fn(usize) -> Option<usize>,
+    ) -> (Vec<(usize, usize)>, bool) {
+        let (mut pairs, mut is_whole) = (Vec::new(), true);
+        'all: for stretches in self.cells.values() {
+            let lanes = stretches.iter().map(|stretch| stretch.lane.0);
+            let here: Vec<(usize, usize)> = lanes.filter_map(|lane| Some((group_of(lane)?, lane))).collect();
+            let mut rest = here.as_slice();
+            while let Some((group, _)) = rest.first() {
+                let (own, others) = rest.split_at(rest.partition_point(|(other, _)| other <= group));
+                for (_, a) in own {
+                    if pairs.len() + others.len() > most {
+                        is_whole = false;
+                        break 'all;
+                    }
+                    pairs.extend(others.iter().map(|(_, b)| (*a, *b)));
+                }
+                rest = others;
+            }
+        }
+        pairs.sort_unstable();
+        pairs.dedup();
+        (pairs, is_whole)
+    }
+
+    fn cell(&self, point: Vec2) -> (i64, i64) {
+        ((point.x / self.cell_m).floor() as i64, (point.y / self.cell_m).floor() as i64)
     }
 
     /// The nearest point of each lane whose centre comes within `reach_m` and half a lane width of a
@@ -141,7 +210,7 @@ impl LaneGrid {
     pub fn near(&self, lanes: &[Lane], point: Vec2, reach_m: f64) -> Vec<(LaneIndex, Projection)> {
         let radius_m = reach_m.max(0.0) + self.half_width_m;
         let margin = Vec2::new(radius_m, radius_m);
-        let (low, high) = (cell(point - margin), cell(point + margin));
+        let (low, high) = (self.cell(point - margin), self.cell(point + margin));
         let cells = (high.0 - low.0 + 1).saturating_mul(high.1 - low.1 + 1);
         if cells > CELLS_MAX {
             let in_reach = lanes.iter().zip(&self.boxes).enumerate().filter_map(|(index, (lane, bounds))| {
@@ -171,8 +240,4 @@ impl LaneGrid {
         }
         found
     }
-}
-
-fn cell(point: Vec2) -> (i64, i64) {
-    ((point.x / CELL_M).floor() as i64, (point.y / CELL_M).floor() as i64)
 }

@@ -6,7 +6,7 @@
 use crate::geometry::{Pose, SMOOTH_STEP_BEND_MAX, Vec2, smooth_step, wrap_angle};
 
 use super::map::{Lane, LaneIndex, RoadMap, Side};
-use super::opendrive::{MarkRule, RoadElement, SectionElement};
+use super::opendrive::{Across, MarkRule, RoadElement, SectionElement};
 
 /// A lane narrower than this cannot be driven in yet, m: bays open from nothing.
 const WIDTH_M_MIN: f64 = 2.0;
@@ -52,21 +52,27 @@ pub fn permitted(
     // The line between two lanes belongs to the lane that is nearer to the reference line.
     let inner = if left.abs() < right.abs() { left } else { right };
     let marks = section.lane(inner).map_or(&[][..], |lane| &lane.marks);
+    let sides = [road.across(section, left), road.across(section, right)];
     let steps = ((section.end_m - section.begin_m) / STEP_M).ceil().clamp(1.0, 1e6) as usize;
     let step_m = (section.end_m - section.begin_m) / steps as f64;
-    let mut cuts_m: Vec<f64> = (0..=steps).map(|i| section.begin_m + step_m * i as f64).collect();
+    // Lanes of one width are as wide at their ends as everywhere between.
+    let stride = if sides.iter().all(Across::is_constant) { steps } else { 1 };
+    let cuts_m = (0..=steps).step_by(stride).map(|i| section.begin_m + step_m * i as f64);
+    let mut cuts_m: Vec<f64> = cuts_m.collect();
     cuts_m.extend(marks.iter().map(|mark| section.begin_m + mark.begin_m));
     cuts_m.retain(|at_m| (section.begin_m..=section.end_m).contains(at_m));
     cuts_m.sort_by(f64::total_cmp);
+    let is_wide: Vec<bool> = cuts_m.iter().map(|at_m| wide(&sides, section, *at_m)).collect();
     let mut both = [Vec::new(), Vec::new()];
-    for pair in cuts_m.windows(2) {
+    for (index, pair) in cuts_m.windows(2).enumerate() {
         let (from_m, to_m) = (pair[0], pair[1]);
-        if to_m - from_m < 1e-9 || ![from_m, to_m].iter().all(|at_m| wide(road, section, left, right, *at_m))
-        {
+        if to_m - from_m < 1e-9 || !is_wide[index] || !is_wide[index + 1] {
             continue;
         }
         let middle_m = (from_m + to_m) / 2.0 - section.begin_m;
-        let rule = marks.iter().rfind(|mark| mark.begin_m <= middle_m).map_or(MarkRule::Both, |m| m.rule);
+        // Marks stand by rising beginning.
+        let begun = marks.partition_point(|mark| mark.begin_m <= middle_m);
+        let rule = marks[..begun].last().map_or(MarkRule::Both, |mark| mark.rule);
         // Lane ids fall from left to right.
         let allowed = [
             matches!(rule, MarkRule::Both | MarkRule::Decrease),
@@ -79,11 +85,11 @@ pub fn permitted(
     both
 }
 
-fn wide(road: &RoadElement, section: &SectionElement, left: i32, right: i32, s_m: f64) -> bool {
+fn wide([left, right]: &[Across; 2], section: &SectionElement, s_m: f64) -> bool {
     // At its end the polynomials of the next section hold; just before it still those of this one.
     let s_m = s_m.min(section.end_m - 1e-7);
-    let (left_centre, left_width) = road.lane_at(section, left, s_m);
-    let (right_centre, right_width) = road.lane_at(section, right, s_m);
+    let (left_centre, left_width) = left.at(s_m);
+    let (right_centre, right_width) = right.at(s_m);
     let strip_m = left_centre.value - right_centre.value - (left_width.value + right_width.value) / 2.0;
     left_width.value >= WIDTH_M_MIN && right_width.value >= WIDTH_M_MIN && strip_m <= STRIP_M_MAX
 }

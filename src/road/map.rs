@@ -263,12 +263,13 @@ impl RoadMap {
     /// [`APPROACH_M`] long or come out of another junction.
     pub fn approach(&self, lane: LaneIndex) -> impl Iterator<Item = LaneIndex> + '_ {
         let mut away_m = 0.0;
-        core::iter::successors(Some(lane), move |after| {
+        let lanes = core::iter::successors(Some(lane), move |after| {
             let before = *self.lane(*after).predecessors.first()?;
             let is_near = away_m < APPROACH_M && self.lane(before).junction.is_none();
             away_m += self.lane(before).centre.length_m();
             is_near.then_some(before)
-        })
+        });
+        lanes.take(APPROACH_LANES_MAX)
     }
 
     /// The stop line before a lane inside a junction, or on it.
@@ -365,6 +366,9 @@ impl RoadMap {
 /// How far before a junction its lights and signs may stand, m. Ours.
 const APPROACH_M: f64 = 40.0;
 
+/// Limit on the lanes of an approach: no real one has sections of 20 cm.
+const APPROACH_LANES_MAX: usize = 200;
+
 /// How much a metre beside the centre of a lane weighs against a turn, rad.
 const MISFIT_RAD_PER_M: f64 = 0.1;
 
@@ -433,6 +437,13 @@ impl Lane {
     }
 }
 
+/// Names that a message lists at most: a city has as many roads as a book has words.
+const LISTED_MAX: usize = 40;
+
 fn listed(items: impl IntoIterator<Item = impl ToString>) -> String {
-    items.into_iter().map(|item| item.to_string()).collect::<Vec<_>>().join(", ")
+    let mut names: Vec<String> = items.into_iter().map(|item| item.to_string()).collect();
+    let more = names.len().saturating_sub(LISTED_MAX);
+    names.truncate(LISTED_MAX);
+    names.extend((more > 0).then(|| format!("{more} more")));
+    names.join(", ")
 }

@@ -4,7 +4,7 @@
 //! controller of its own. Ways from opposite arms share a phase, as everywhere in towns: who turns across oncoming
 //! traffic gives way to it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::geometry::wrap_angle;
 
@@ -17,11 +17,25 @@ const OPPOSITE_RAD_MIN: f64 = 135.0 * core::f64::consts::PI / 180.0;
 /// Gives the groups of every junction their phases: each group the first phase in which it crosses no other.
 /// A junction in which nothing crosses keeps the groups of its file.
 pub fn share_phases(map: &mut RoadMap) {
-    for index in 0..map.junctions.len() {
+    // One pass over lanes and signals serves all junctions.
+    let mut stopping: Vec<BTreeSet<usize>> = vec![BTreeSet::new(); map.junctions.len()];
+    for line in map.lanes.iter().flat_map(|lane| &lane.stop_lines) {
+        let signal = &map.signals[line.signal];
+        if let Some(junction) = signal.junction {
+            stopping[junction].insert(signal.group);
+        }
+    }
+    let mut signals: Vec<Vec<usize>> = vec![Vec::new(); map.junctions.len()];
+    for (index, signal) in map.signals.iter().enumerate() {
+        if let Some(junction) = signal.junction {
+            signals[junction].push(index);
+        }
+    }
+    for (index, groups) in stopping.into_iter().enumerate() {
         if map.junctions[index].groups < 2 {
             continue;
         }
-        let ways = ways_by_group(map, index);
+        let ways = ways_by_group(map, index, groups);
         let mut phases: Vec<Vec<LaneIndex>> = Vec::new();
         let mut phase_of = BTreeMap::new();
         for (group, lanes) in &ways {
@@ -37,7 +51,8 @@ pub fn share_phases(map: &mut RoadMap) {
             // Its lights then stop traffic for something that the map does not hold, such as people on foot.
             continue;
         }
-        for signal in map.signals.iter_mut().filter(|signal| signal.junction == Some(index)) {
+        for signal in &signals[index] {
+            let signal = &mut map.signals[*signal];
             // A group that holds no way stops nobody, whenever it is red.
             signal.group = phase_of.get(&signal.group).copied().unwrap_or(0);
         }
@@ -45,16 +60,18 @@ pub fn share_phases(map: &mut RoadMap) {
     }
 }
 
-/// The ways through a junction that each group of its lights holds. Groups that hold no lane are left out.
-fn ways_by_group(map: &RoadMap, junction: usize) -> BTreeMap<usize, Vec<LaneIndex>> {
-    let mut ways: BTreeMap<usize, Vec<LaneIndex>> = BTreeMap::new();
+/// The ways through a junction that each group of its lights holds. `groups` are those with a stop line on some lane.
+fn ways_by_group(
+    map: &RoadMap,
+    junction: usize,
+    groups: BTreeSet<usize>,
+) -> BTreeMap<usize, Vec<LaneIndex>> {
+    let mut ways: BTreeMap<usize, Vec<LaneIndex>> =
+        groups.into_iter().map(|group| (group, Vec::new())).collect();
     let here = |line: &StopLine| {
         let signal = &map.signals[line.signal];
         (signal.junction == Some(junction)).then_some(signal.group)
     };
-    for group in map.lanes.iter().flat_map(|lane| &lane.stop_lines).filter_map(here) {
-        ways.entry(group).or_default();
-    }
     for lane in &map.junctions[junction].lanes {
         if let Some(group) = map.stop_line_of(*lane).as_ref().and_then(here) {
             ways.entry(group).or_default().push(*lane);

@@ -1,16 +1,18 @@
 //! Traffic lights with their groups and stop lines, signs that say who gives way, crosswalks, and solid things.
 
-use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::geometry::{Bounds, Pose, Vec2};
 
 use super::graph::Builder;
 use super::map::{
-    Crosswalk, Lane, LaneIndex, Precedence, RoadMap, Sign, SignKind, SignLine, Signal, Solid, StopLine,
+    Crosswalk, Lane, LaneIndex, Precedence, RoadError, RoadMap, Sign, SignKind, SignLine, Signal, Solid,
+    StopLine,
 };
 use super::opendrive::{
-    Document, Meaning, ObjectKind, Orientation, Outline, RoadElement, RoadLink, SignalElement,
+    ControllerElement, Document, JunctionElement, Meaning, ObjectKind, Orientation, Outline, RoadElement,
+    RoadLink, SignalElement, wrong,
 };
 
 /// Signal heads of one group that are nearer to each other than this share a stop line, m.
@@ -19,14 +21,28 @@ const SHARED_LINE_M: f64 = 1.0;
 /// A light so near to the beginning of a lane that leaves a junction stops no traffic of that lane, m.
 const AT_THE_MOUTH_M: f64 = 1.0;
 
+/// Limit on the lanes that all signals hold for, each counted for every signal: a thousand lanes may meet at one light.
+const HELD_MAX: usize = 1_000_000;
+
 /// Adds all lights and signs: lights with a stop line on each lane they hold for.
-pub fn add_signals(builder: &mut Builder) {
+///
+/// # Errors
+/// If they hold for more lanes than a map may have.
+pub fn add_signals(builder: &mut Builder) -> Result<(), RoadError> {
     let mut placed = place_signals(builder);
     warn_of_controllers(builder, &placed);
+    let mut held_lanes = 0;
     for (road_index, road) in builder.document.roads.iter().enumerate() {
         for (signal_index, signal) in road.signals.iter().enumerate() {
             if let Some(found) = placed.of(road_index, signal_index, signal) {
                 let held = lanes_of(builder, road_index, signal);
+                held_lanes += held.len();
+                if held_lanes > HELD_MAX {
+                    let message = format!(
+                        "the signals up to here hold for more than {HELD_MAX} lanes in all; leave some out"
+                    );
+                    return Err(wrong(signal.line, message));
+                }
                 match found {
                     Found::Light(index) => placed.held[index].extend(held),
                     Found::Sign(index) => builder.map.signs[index].lanes.extend(held),
@@ -36,11 +52,13 @@ pub fn add_signals(builder: &mut Builder) {
     }
     let lights: Vec<Vec<(LaneIndex, f64)>> = core::mem::take(&mut placed.held);
     set_groups(builder, &placed, &lights);
+    let mut of_groups = GroupLines::new();
     for (index, held) in lights.iter().enumerate() {
         builder.map.signals[index].lanes = held.iter().map(|(lane, _)| *lane).collect();
-        add_stop_lines(builder, index, held);
+        add_stop_lines(builder, index, held, &mut of_groups);
     }
     warn_of_idle_lights(builder, &placed, &lights);
+    Ok(())
 }
 
 /// What a signal of the file became: an index in the map's signals or in its signs.
@@ -208,10 +226,13 @@ fn arm(
 /// Junction and group of each signal that a junction's controller switches.
 fn switched<'a>(builder: &mut Builder<'a>) -> BTreeMap<&'a str, (usize, usize)> {
     let document = builder.document;
+    // The first of several with one id holds.
+    let controllers: BTreeMap<&str, &'a ControllerElement> =
+        document.controllers.iter().rev().map(|controller| (controller.id.as_str(), controller)).collect();
     let mut groups = BTreeMap::new();
     for (junction_index, junction) in document.junctions.iter().enumerate() {
         for (group, (id, line)) in junction.controllers.iter().enumerate() {
-            let Some(controller) = document.controllers.iter().find(|controller| controller.id == *id) else {
+            let Some(controller) = controllers.get(id.as_str()).copied() else {
                 let message =
                     format!("junction `{}` names controller `{id}`, which does not exist", junction.id);
                 builder.warn(*line, message);
@@ -253,16 +274,29 @@ fn warn_of_idle_lights(builder: &mut Builder, placed: &Placed, held: &[Vec<(Lane
     }
 }
 
-fn add_stop_lines(builder: &mut Builder, index: usize, held: &[(LaneIndex, f64)]) {
+/// The stations of the stop lines of each lane, junction and group, as bits: those of numbers of 0 and more are in the order
+/// of the numbers.
+type GroupLines = BTreeMap<(LaneIndex, usize, usize), BTreeSet<u64>>;
+
+fn add_stop_lines(
+    builder: &mut Builder,
+    index: usize,
+    held: &[(LaneIndex, f64)],
+    of_groups: &mut GroupLines,
+) {
+    let Signal { junction, group, .. } = builder.map.signals[index];
     for &(lane_index, station_m) in held {
-        let same_light = |other: &StopLine| {
-            let (a, b) = (&builder.map.signals[other.signal], &builder.map.signals[index]);
-            let same_group = a.junction.is_some() && (a.junction, a.group) == (b.junction, b.group);
-            same_group && (other.station_m - station_m).abs() < SHARED_LINE_M
-        };
-        if !builder.map.lane(lane_index).stop_lines.iter().any(same_light) {
-            builder.map.lanes[lane_index.0].stop_lines.push(StopLine { station_m, signal: index });
+        if let Some(junction) = junction {
+            let known = of_groups.entry((lane_index, junction, group)).or_default();
+            let bits = station_m.max(0.0).to_bits();
+            let beside = [known.range(..=bits).next_back(), known.range(bits..).next()];
+            let shares = |other: &u64| (f64::from_bits(*other) - station_m).abs() < SHARED_LINE_M;
+            if beside.into_iter().flatten().any(shares) {
+                continue;
+            }
+            known.insert(bits);
         }
+        builder.map.lanes[lane_index.0].stop_lines.push(StopLine { station_m, signal: index });
     }
 }
 
@@ -326,23 +360,25 @@ pub fn set_precedence(document: &Document, map: &mut RoadMap) {
             let lane = &mut map.lanes[index.0];
             if lane.stop_lines.is_empty() {
                 lane.sign_lines.push(SignLine { station_m, kind: sign.kind });
-                lane.sign_lines.sort_by(|a, b| a.station_m.total_cmp(&b.station_m));
             }
         }
     }
-    let on_priority_road = |lane: LaneIndex| {
-        let mut signs = map.signs.iter().filter(|sign| sign.kind == SignKind::PriorityRoad);
-        signs.any(|sign| sign.lanes.iter().any(|(held, _)| *held == lane))
-    };
+    for lane in &mut map.lanes {
+        lane.sign_lines.sort_by(|a, b| a.station_m.total_cmp(&b.station_m));
+    }
+    let priority_signs = map.signs.iter().filter(|sign| sign.kind == SignKind::PriorityRoad);
+    let on_priority_road: BTreeSet<LaneIndex> =
+        priority_signs.flat_map(|sign| sign.lanes.iter().map(|(lane, _)| *lane)).collect();
+    let records: Vec<Records> = document.junctions.iter().map(Records::of).collect();
     let precedence = |lane: LaneIndex| {
         if map.stop_line_of(lane).is_some() {
             Precedence::Equal
         } else if map.approach(lane).any(|lane| !map.lane(lane).sign_lines.is_empty()) {
             Precedence::Yield
-        } else if map.approach(lane).any(on_priority_road) {
+        } else if map.approach(lane).any(|lane| on_priority_road.contains(&lane)) {
             Precedence::Priority
         } else {
-            recorded(document, map, lane)
+            recorded(&records, map, lane)
         }
     };
     let inside = map.junctions.iter().flat_map(|junction| junction.lanes.iter().copied());
@@ -352,18 +388,32 @@ pub fn set_precedence(document: &Document, map: &mut RoadMap) {
     }
 }
 
+/// The roads that the `priority` records of a junction name.
+struct Records<'a> {
+    high: BTreeSet<&'a str>,
+    low: BTreeSet<&'a str>,
+}
+
+impl<'a> Records<'a> {
+    fn of(junction: &'a JunctionElement) -> Records<'a> {
+        let records = &junction.priorities;
+        Records {
+            high: records.iter().map(|(high, _)| high.as_str()).collect(),
+            low: records.iter().map(|(_, low)| low.as_str()).collect(),
+        }
+    }
+}
+
 /// What the `priority` records of its junction say of a lane inside: they name its road or the road before it.
-fn recorded(document: &Document, map: &RoadMap, index: LaneIndex) -> Precedence {
+fn recorded(records: &[Records], map: &RoadMap, index: LaneIndex) -> Precedence {
     let lane = map.lane(index);
     let Some(junction) = lane.junction else { return Precedence::Equal };
-    let roads: Vec<&str> = core::iter::once(&lane.key.road)
-        .chain(lane.predecessors.iter().map(|before| &map.lane(*before).key.road))
-        .map(String::as_str)
-        .collect();
-    let records = &document.junctions[junction].priorities;
-    if records.iter().any(|(_, low)| roads.contains(&low.as_str())) {
+    let before = lane.predecessors.iter().map(|before| &map.lane(*before).key.road);
+    let mut roads = core::iter::once(&lane.key.road).chain(before).map(String::as_str);
+    let Records { high, low } = &records[junction];
+    if roads.clone().any(|road| low.contains(road)) {
         Precedence::Yield
-    } else if records.iter().any(|(high, _)| roads.contains(&high.as_str())) {
+    } else if roads.any(|road| high.contains(road)) {
         Precedence::Priority
     } else {
         Precedence::Equal

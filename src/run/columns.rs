@@ -5,8 +5,9 @@ use std::path::Path;
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, OpenFlags};
 
-use crate::run::database::LAYOUT;
-use crate::run::sealed::DatabaseError;
+use crate::run::database::{Database, LAYOUT};
+use crate::run::sealed::{DatabaseError, check_tables};
+use crate::run::settled::Units;
 
 /// A column of a table.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,6 +37,7 @@ pub fn columns(path: &Path, table: &str) -> Result<Vec<Column>, DatabaseError> {
     if found != LAYOUT.version {
         return Err(DatabaseError::Layout { found, wanted: LAYOUT.version });
     }
+    check_tables(&connection, &Database::schema())?;
     let mut described = connection
         .prepare("SELECT name, type, pk FROM pragma_table_info(?) WHERE type <> 'BLOB' ORDER BY cid")?;
     let described: Vec<(String, String, i64)> = described

@@ -3,8 +3,11 @@
 //!
 //! The settings stand in the database as they were when it was begun. Every episode (or cell) has a seal: a digest of
 //! all its rows, written in the same transaction. SQLite's own check finds torn pages, a seal finds values that were
-//! changed. Neither is a protection against somebody who writes seals of their own.
+//! changed. Neither is a protection against somebody who writes seals of their own. A file from elsewhere may hold what runs
+//! for ever when it is read, such as a view in the place of a table: before anything is read, its tables must be those that
+//! this version makes.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use rusqlite::types::ValueRef;
@@ -126,6 +129,7 @@ impl Layout {
         } else if found != self.version && !self.older.contains(&found) {
             return Err(DatabaseError::Layout { found, wanted: self.version });
         } else {
+            check_tables(&connection, tables)?;
             self.check(&connection, settings)?;
         }
         let damaged = self.damaged(&connection)?;
@@ -219,6 +223,75 @@ impl Layout {
         }
         Ok(digest_text(&whole.finalize().into()))
     }
+}
+
+/// The columns of a table: the name, the type and the place in the table's key of each; the place is 0 if it is in none.
+type Columns = Vec<(String, String, i64)>;
+
+/// Refuses a file unless its tables are those that `tables` makes, see [`check_plain`].
+pub(super) fn check_tables(connection: &Connection, tables: &str) -> Result<(), DatabaseError> {
+    let pattern = Connection::open_in_memory()?;
+    pattern.execute_batch(TABLES)?;
+    pattern.execute_batch(tables)?;
+    check_plain(connection, "main", &plain_tables(&pattern, "main")?)
+}
+
+/// Refuses an attached file unless it holds nothing but plain tables, and those wanted with their columns and keys. Keys
+/// matter, because without them every search for a unit would go through all rows.
+pub(super) fn check_plain(
+    connection: &Connection,
+    file: &str,
+    wanted: &BTreeMap<String, Columns>,
+) -> Result<(), DatabaseError> {
+    let found = plain_tables(connection, file)?;
+    let is_there = |name: &str, columns: &Columns| {
+        found.get(name).is_some_and(|there| columns.iter().all(|column| there.contains(column)))
+    };
+    match wanted.iter().find(|(name, columns)| !is_there(name, columns)) {
+        None => Ok(()),
+        Some((name, _)) => {
+            Err(DatabaseError::Damaged { what: format!("`{name}` is not there or has other columns") })
+        }
+    }
+}
+
+/// The tables of an attached file.
+///
+/// # Errors
+/// If it holds anything else: a view, a trigger, a virtual table, an index of its own, or a column that is computed. To read
+/// them would run what somebody wrote into the file.
+pub(super) fn plain_tables(
+    connection: &Connection,
+    file: &str,
+) -> Result<BTreeMap<String, Columns>, DatabaseError> {
+    let strange =
+        |name: &str| DatabaseError::Damaged { what: format!("`{name}` is no table that avastra makes") };
+    let mut schema = connection.prepare(&format!("SELECT type, name, sql FROM {file}.sqlite_schema"))?;
+    let rows = schema.query_map([], |row| {
+        Ok((row.get::<_, String>(0)?, row.get::<_, String>(1)?, row.get::<_, Option<String>>(2)?))
+    })?;
+    let mut tables = BTreeMap::new();
+    for row in rows {
+        let (kind, name, sql) = row?;
+        match (kind.as_str(), sql) {
+            // SQLite itself writes these words at the beginning, whatever stood there.
+            ("table", Some(sql)) if sql.starts_with("CREATE TABLE ") => {}
+            // What a key needs has no text.
+            ("index", None) => continue,
+            _ => return Err(strange(&name)),
+        }
+        let (mut columns, mut is_plain) = (Columns::new(), true);
+        connection.pragma(Some(file), "table_xinfo", name.as_str(), |row| {
+            columns.push((row.get("name")?, row.get("type")?, row.get("pk")?));
+            is_plain &= row.get::<_, i64>("hidden")? == 0;
+            Ok(())
+        })?;
+        if !is_plain {
+            return Err(strange(&name));
+        }
+        tables.insert(name, columns);
+    }
+    Ok(tables)
 }
 
 /// Adds the rows of a unit in a table to a digest. SQLite need not give them in one order, so each has a digest, and these
@@ -399,6 +472,35 @@ mod tests {
         damaged.iter().for_each(|&number| LAYOUT.delete(&deleting, number).unwrap());
         let sound = LAYOUT.open(&path, OWN, SETTINGS).unwrap();
         assert_eq!(rows(&sound), [2, 2, 2]);
+    }
+
+    #[test]
+    fn only_tables_that_avastra_makes_are_read() {
+        let endless = "WITH RECURSIVE n(reason, text) AS (SELECT 1, 'a' UNION ALL SELECT reason + 1, 'a' FROM n)";
+        let view = format!(
+            "ALTER TABLE reason RENAME TO other; CREATE VIEW reason AS {endless} SELECT reason, text FROM n"
+        );
+        let changes = [
+            (view.as_str(), "`reason` is no table"),
+            ("CREATE VIEW more AS SELECT 1", "`more` is no table"),
+            ("CREATE TRIGGER t AFTER INSERT ON step BEGIN DELETE FROM episode; END", "`t` is no table"),
+            ("CREATE INDEX i ON step (hex(x))", "`i` is no table"),
+            ("CREATE VIRTUAL TABLE places USING rtree(id, a, b)", "`places` is no table"),
+            ("ALTER TABLE reason ADD COLUMN more TEXT AS (hex(text))", "`reason` is no table"),
+            ("DROP TABLE reason", "`reason` is not there"),
+            ("ALTER TABLE step DROP COLUMN x", "`step` is not there or has other columns"),
+            (
+                "DROP TABLE seal; CREATE TABLE seal (unit INTEGER, digest TEXT NOT NULL) STRICT",
+                "`seal` is not there or has other columns",
+            ),
+        ];
+        for (change, what) in changes {
+            let scratch = tempfile::tempdir().unwrap();
+            let path = scratch.path().join("run.db");
+            begun(&path).execute_batch(change).unwrap();
+            let refused = LAYOUT.open(&path, OWN, SETTINGS).unwrap_err();
+            assert!(refused.is_torn() && refused.to_string().contains(what), "{change}: {refused}");
+        }
     }
 
     #[test]

@@ -12,7 +12,7 @@ use rusqlite::Connection;
 use sha2::{Digest, Sha256};
 
 use crate::files::Temporary;
-use crate::run::sealed::{DatabaseError, Layout, add_rows};
+use crate::run::sealed::{DatabaseError, Layout, add_rows, check_plain, plain_tables};
 
 /// A unit to take over: its number in the other file, and the one that it gets.
 pub type Numbered = (i64, i64);
@@ -127,7 +127,9 @@ impl Layout {
         // Not made absolute: the folder that one works in may have a name that is no text. A name alone may look like a URI.
         let other = Path::new(".").join(other);
         connection.execute("ATTACH DATABASE ? AS other", [other.to_string_lossy()])?;
-        let taken = self.take_attached(connection, units, adjust);
+        let taken = plain_tables(connection, "main")
+            .and_then(|wanted| check_plain(connection, "other", &wanted))
+            .and_then(|()| self.take_attached(connection, units, adjust));
         // Without a transaction under way, detaching cannot fail for a reason of its own.
         let detached = connection.execute_batch("DETACH DATABASE other");
         taken?;

@@ -32,6 +32,7 @@ mod references;
 mod report;
 mod road;
 mod rules;
+mod scaling_maps;
 mod shards;
 mod studies;
 mod suites;

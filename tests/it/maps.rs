@@ -161,3 +161,23 @@ fn an_episode_that_no_goal_ends_ends_where_the_map_does() {
         assert!((way_m - 5.0..=way_m + 1.0).contains(&driven_m), "{entry}: {driven_m} m of {way_m} m");
     }
 }
+
+#[test]
+fn lanes_of_our_maps_meet_those_that_follow() {
+    let shipped =
+        ["boulevard", "corner", "crossroad", "residential"].map(|name| format!("scenarios/roads/{name}.xodr"));
+    let made = PLACES.map(|place| path(&format!("{place}.xodr")));
+    for file in shipped.into_iter().chain(made) {
+        let text = std::fs::read_to_string(root().join(&file)).expect("it is there");
+        let map = RoadMap::from_opendrive("map", &text).expect("it is sound");
+        for lane in &map.lanes {
+            for next in lane.successors.iter().map(|next| map.lane(*next)) {
+                let end = lane.centre.pose_at(lane.centre.length_m()).position;
+                let gap_m = (next.centre.pose_at(0.0).position - end).norm();
+                // The widths of a road's own lane sections are rounded.
+                let most_m = if lane.key.road == next.key.road { 1e-4 } else { 1e-6 };
+                assert!(gap_m < most_m, "{file}: {:?} misses {:?} by {gap_m} m", lane.key, next.key);
+            }
+        }
+    }
+}

@@ -67,6 +67,18 @@ impl Cubics {
         self.0.iter().map(|piece| piece.begin_m)
     }
 
+    /// Those of the beginnings that lie between two stations, m.
+    pub fn beginnings_between(&self, from_m: f64, to_m: f64) -> impl Iterator<Item = f64> {
+        let first = self.0.partition_point(|piece| piece.begin_m <= from_m);
+        self.0[first..].iter().map(|piece| piece.begin_m).take_while(move |at_m| *at_m < to_m)
+    }
+
+    /// Whether the value is the same everywhere.
+    pub fn is_constant(&self) -> bool {
+        let is_flat = |piece: &Cubic| piece.b == 0.0 && piece.c == 0.0 && piece.d == 0.0;
+        self.0.len() < 2 && self.0.iter().all(is_flat)
+    }
+
     /// 0 if there are no pieces.
     pub fn at(&self, station_m: f64) -> Jet {
         let after = self.0.partition_point(|piece| piece.begin_m <= station_m);
@@ -96,5 +108,8 @@ mod tests {
         assert_eq!(pieces.at(4.0), Jet { value: 5.0, first: 0.5, second: 0.0 });
         assert_eq!(pieces.at(12.0), Jet { value: 25.0, first: 28.0, second: 26.0 });
         assert_eq!(Cubics::default().at(1.0), Jet::default());
+        assert_eq!(pieces.beginnings_between(-1.0, 10.0).collect::<Vec<_>>(), [0.0]);
+        assert_eq!(pieces.beginnings_between(0.0, 11.0).collect::<Vec<_>>(), [10.0]);
+        assert!(!pieces.is_constant() && Cubics::default().is_constant());
     }
 }

@@ -29,7 +29,7 @@ pub struct RoadElement {
     pub left_hand: bool,
     pub predecessor: Option<RoadLink>,
     pub successor: Option<RoadLink>,
-    /// Station from which a speed limit holds, m, and the limit, m/s; `None` where it ends.
+    /// Station from which a speed limit holds, m, and the limit, m/s; `None` where it ends. By rising station.
     pub speeds: Vec<(f64, Option<f64>)>,
     pub reference: ReferenceLine,
     /// Height of the reference line, m. Banks and crossfalls are not read.
@@ -162,6 +162,7 @@ pub enum Outline {
 #[derive(Debug, Clone)]
 pub struct JunctionElement {
     pub id: String,
+    pub line: u32,
     pub name: String,
     pub connections: Vec<ConnectionElement>,
     /// Pairs of roads, incoming or connecting ones: traffic of the first goes before traffic of the second.
@@ -198,11 +199,6 @@ impl RoadElement {
         (lane < 0) != self.left_hand
     }
 
-    /// Centre (m left of the reference line) and width of a lane of a section, at a station.
-    pub fn lane_at(&self, section: &SectionElement, lane: i32, s_m: f64) -> (Jet, Jet) {
-        self.across(section, lane).at(s_m)
-    }
-
     /// What decides where a lane of a section lies.
     pub fn across<'a>(&'a self, section: &'a SectionElement, lane: i32) -> Across<'a> {
         let side = lane.signum();
@@ -221,6 +217,17 @@ pub struct Across<'a> {
 }
 
 impl Across<'_> {
+    /// Number of lanes from the reference line to this one, which is counted, too.
+    pub fn lane_count(&self) -> usize {
+        self.lanes.len()
+    }
+
+    /// Whether the lane has one width along its section, and those between it and the reference line, too.
+    pub fn is_constant(&self) -> bool {
+        let is_constant = |lane: &&LaneElement| lane.widths.is_constant() && lane.borders.is_constant();
+        self.lanes.iter().flatten().all(is_constant)
+    }
+
     /// Centre (m left of the reference line) and width at a station.
     pub fn at(&self, s_m: f64) -> (Jet, Jet) {
         let zero = self.lane_offset.at(s_m);
@@ -242,6 +249,7 @@ impl Across<'_> {
 
 impl SectionElement {
     pub fn lane(&self, id: i32) -> Option<&LaneElement> {
-        self.lanes.iter().find(|lane| lane.id == id)
+        let found = self.lanes.binary_search_by(|lane| id.cmp(&lane.id));
+        found.ok().map(|index| &self.lanes[index])
     }
 }

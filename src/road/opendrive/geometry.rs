@@ -10,6 +10,7 @@ pub struct ReferenceLine {
     roundings: Vec<Piece>,
     /// Stations at which the line turns so sharply that no vehicle can follow, m.
     breaks_m: Vec<f64>,
+    place_steps: u64,
 }
 
 /// A place where two pieces meet at an angle.
@@ -66,7 +67,11 @@ pub enum Shape {
     },
     Spiral {
         begin_per_m: f64,
-        end_per_m: f64,
+        rate_per_m2: f64,
+        /// Places at equal steps of the station, in the frame of the piece's beginning, and the last of them at its end:
+        /// a place between two of them needs one step of quadrature and not all before it.
+        nodes: Vec<Vec2>,
+        step_m: f64,
     },
     /// `u(p)`, `v(p)` in the frame of the piece's beginning.
     Cubic {
@@ -81,6 +86,10 @@ pub enum Shape {
 /// Steps of the arc length table of a parametric cubic.
 const CUBIC_STEPS: u32 = 64;
 
+/// Steps of the table of a clothoid: for each radian by which it would turn with its greatest curvature, and at most.
+const SPIRAL_STEPS_PER_RAD: f64 = 4.0;
+const SPIRAL_STEPS_MAX: f64 = 1000.0;
+
 /// Abscissae and weights of the five-point Gauss-Legendre rule on `[-1, 1]`.
 const GAUSS: [(f64, f64); 5] = [
     (0.0, 0.568_888_888_888_888_9),
@@ -93,18 +102,41 @@ const GAUSS: [(f64, f64); 5] = [
 impl ReferenceLine {
     /// From at least one piece, by rising beginning.
     pub fn new(pieces: Vec<Piece>) -> Option<ReferenceLine> {
-        (!pieces.is_empty()).then_some(ReferenceLine { pieces, roundings: Vec::new(), breaks_m: Vec::new() })
+        let place_steps = pieces.iter().map(|piece| piece.shape.steps()).max()?;
+        Some(ReferenceLine { pieces, roundings: Vec::new(), breaks_m: Vec::new(), place_steps })
     }
 
-    /// Stations from which another curve holds, m.
-    pub fn beginnings(&self) -> impl Iterator<Item = f64> {
-        let rounded = self.roundings.iter().flat_map(|curve| [curve.begin_m, curve.begin_m + curve.length_m]);
-        self.pieces.iter().map(|piece| piece.begin_m).chain(rounded)
+    /// Steps of work for a place on the line, where its curves are dearest.
+    pub fn place_steps(&self) -> u64 {
+        self.place_steps
     }
 
-    /// Stations at which the line turns so sharply that no vehicle can follow, m.
-    pub fn breaks_m(&self) -> &[f64] {
-        &self.breaks_m
+    /// The stations between two others from which another curve holds, m. A road may have as many curves as lane
+    /// sections, so only those between are looked at.
+    pub fn beginnings_between(&self, from_m: f64, to_m: f64) -> impl Iterator<Item = f64> {
+        let first = self.pieces.partition_point(|piece| piece.begin_m <= from_m);
+        let pieces = self.pieces[first..].iter().map(|piece| piece.begin_m);
+        let first = self.roundings.partition_point(|curve| curve.begin_m + curve.length_m <= from_m);
+        let rounded =
+            self.roundings[first..].iter().flat_map(|curve| [curve.begin_m, curve.begin_m + curve.length_m]);
+        let within = move |at_m: &f64| *at_m < to_m;
+        pieces.take_while(within).chain(rounded.take_while(within))
+    }
+
+    /// Whether the line turns between two stations so sharply that no vehicle can follow.
+    pub fn breaks_between(&self, from_m: f64, to_m: f64) -> bool {
+        let first = self.breaks_m.partition_point(|at_m| *at_m <= from_m);
+        self.breaks_m.get(first).is_some_and(|at_m| *at_m < to_m)
+    }
+
+    /// Length of all that is not straight between two stations, m.
+    pub fn bent_m(&self, from_m: f64, to_m: f64) -> f64 {
+        let first = self.pieces.partition_point(|piece| piece.begin_m <= from_m).max(1) - 1;
+        let pieces = self.pieces[first..].iter().take_while(|piece| piece.begin_m < to_m);
+        let bent = pieces.filter(|piece| !matches!(piece.shape, Shape::Line));
+        let within_m =
+            |piece: &Piece| (piece.begin_m + piece.length_m).min(to_m) - piece.begin_m.max(from_m);
+        bent.map(|piece| within_m(piece).max(0.0)).sum()
     }
 
     /// Puts a curve in the place of each corner, and tells all corners.
@@ -195,6 +227,22 @@ fn rounding(from: ReferencePoint, to: ReferencePoint) -> Option<Shape> {
 }
 
 impl Shape {
+    /// A clothoid from one curvature to another over a length, m.
+    pub fn spiral(begin_per_m: f64, end_per_m: f64, length_m: f64) -> Shape {
+        let rate_per_m2 = (end_per_m - begin_per_m) / length_m;
+        let sharpest_per_m = begin_per_m.abs().max(end_per_m.abs());
+        let steps = (length_m * sharpest_per_m * SPIRAL_STEPS_PER_RAD).ceil().clamp(1.0, SPIRAL_STEPS_MAX);
+        let step_m = length_m / steps;
+        let mut at = Vec2::zeros();
+        let mut nodes = vec![at];
+        for i in 0..steps as u32 {
+            let (from_m, to_m) = (step_m * f64::from(i), step_m * f64::from(i + 1));
+            at += spiral_step(begin_per_m, rate_per_m2, from_m, to_m);
+            nodes.push(at);
+        }
+        Shape::Spiral { begin_per_m, rate_per_m2, nodes, step_m }
+    }
+
     /// A parametric cubic with `p` from 0 to `p_max`. `None` if it stands still somewhere.
     pub fn cubic(u: [f64; 4], v: [f64; 4], p_max: f64) -> Option<Shape> {
         let mut lengths_m = vec![0.0];
@@ -210,6 +258,23 @@ impl Shape {
         }
         let rising = lengths_m.windows(2).all(|pair| pair[1] > pair[0]);
         (rising && length_m.is_finite()).then_some(Shape::Cubic { u, v, lengths_m, p_max })
+    }
+
+    /// Steps of work for a place: about 20 ns each.
+    fn steps(&self) -> u64 {
+        match self {
+            Shape::Line => 1,
+            Shape::Arc { .. } => 2,
+            Shape::Spiral { .. } | Shape::Cubic { .. } => 10,
+        }
+    }
+
+    /// The parameter at which a parametric cubic has a length, m; `None` for other shapes.
+    pub fn parameter_at(&self, length_m: f64) -> Option<f64> {
+        match self {
+            Shape::Cubic { u, v, lengths_m, p_max } => Some(parameter_at(u, v, lengths_m, *p_max, length_m)),
+            Shape::Line | Shape::Arc { .. } | Shape::Spiral { .. } => None,
+        }
     }
 }
 
@@ -240,8 +305,13 @@ impl Piece {
         let local = match &self.shape {
             Shape::Line => local_point(distance_m, 0.0, 0.0, 0.0, 0.0),
             Shape::Arc { curvature_per_m } => arc(*curvature_per_m, distance_m),
-            Shape::Spiral { begin_per_m, end_per_m } => {
-                spiral(*begin_per_m, (end_per_m - begin_per_m) / self.length_m, distance_m)
+            Shape::Spiral { begin_per_m, rate_per_m2, nodes, step_m } => {
+                let node = ((distance_m / step_m).max(0.0) as usize).min(nodes.len() - 1);
+                let from_m = *step_m * node as f64;
+                let position = nodes[node] + spiral_step(*begin_per_m, *rate_per_m2, from_m, distance_m);
+                let heading_rad = spiral_heading_rad(*begin_per_m, *rate_per_m2, distance_m);
+                let curvature_per_m = begin_per_m + rate_per_m2 * distance_m;
+                local_point(position.x, position.y, heading_rad, curvature_per_m, *rate_per_m2)
             }
             Shape::Cubic { u, v, lengths_m, p_max } => {
                 // OpenDRIVE counts stations as arc lengths; where the stated length disagrees with the
@@ -276,20 +346,19 @@ fn arc(curvature_per_m: f64, distance_m: f64) -> ReferencePoint {
     local_point(sin / curvature_per_m, (1.0 - cos) / curvature_per_m, turn_rad, curvature_per_m, 0.0)
 }
 
-/// A clothoid by quadrature: below 1e-9 m of error, as no step turns by more than a quarter radian.
-fn spiral(begin_per_m: f64, rate_per_m2: f64, distance_m: f64) -> ReferencePoint {
-    let heading_at = |s: f64| s * (begin_per_m + s * rate_per_m2 / 2.0);
-    let end_per_m = begin_per_m + rate_per_m2 * distance_m;
-    let sharpest_per_m = begin_per_m.abs().max(end_per_m.abs());
-    let steps = (distance_m.abs() * sharpest_per_m * 4.0).ceil().clamp(1.0, 100_000.0);
-    let step_m = distance_m / steps;
-    let (mut x_m, mut y_m) = (0.0, 0.0);
-    for i in 0..steps as u32 {
-        let from_m = step_m * f64::from(i);
-        x_m += quadrature(from_m, from_m + step_m, |s| libm::cos(heading_at(s)));
-        y_m += quadrature(from_m, from_m + step_m, |s| libm::sin(heading_at(s)));
-    }
-    local_point(x_m, y_m, heading_at(distance_m), end_per_m, rate_per_m2)
+/// Heading of a clothoid against that of its beginning, rad.
+fn spiral_heading_rad(begin_per_m: f64, rate_per_m2: f64, distance_m: f64) -> f64 {
+    distance_m * (begin_per_m + distance_m * rate_per_m2 / 2.0)
+}
+
+/// The way along a clothoid from one station to another by quadrature: below 1e-9 m of error, as no step turns by more
+/// than a quarter radian.
+fn spiral_step(begin_per_m: f64, rate_per_m2: f64, from_m: f64, to_m: f64) -> Vec2 {
+    let heading_rad = |s_m: f64| spiral_heading_rad(begin_per_m, rate_per_m2, s_m);
+    Vec2::new(
+        quadrature(from_m, to_m, |s_m| libm::cos(heading_rad(s_m))),
+        quadrature(from_m, to_m, |s_m| libm::sin(heading_rad(s_m))),
+    )
 }
 
 fn cubic(u: &[f64; 4], v: &[f64; 4], p: f64) -> ReferencePoint {
@@ -354,7 +423,7 @@ mod tests {
     #[test]
     fn a_spiral_is_the_fresnel_integral() {
         let end_per_m = core::f64::consts::PI;
-        let end = piece(1.0, Shape::Spiral { begin_per_m: 0.0, end_per_m }).at(1.0);
+        let end = piece(1.0, Shape::spiral(0.0, end_per_m, 1.0)).at(1.0);
         assert!((end.position - Vec2::new(0.779_893_400_4, 0.438_259_147_4)).norm() < 1e-9, "{end:?}");
         assert!((end.heading_rad - FRAC_PI_2).abs() < 1e-12);
     }
@@ -391,7 +460,7 @@ mod tests {
         let back = Piece::new(4.0, 4.0, (Vec2::new(4.0, 0.0), 3.0), Shape::Line);
         let mut line = ReferenceLine::new(vec![there, back]).unwrap();
         assert_eq!(line.round_corners()[0].off_m, None);
-        assert_eq!(line.breaks_m(), [4.0]);
+        assert!(line.breaks_between(3.0, 5.0) && !line.breaks_between(4.0, 8.0));
     }
 
     #[test]
@@ -399,7 +468,7 @@ mod tests {
         let shapes = [
             Shape::Line,
             Shape::Arc { curvature_per_m: -0.2 },
-            Shape::Spiral { begin_per_m: 0.1, end_per_m: -0.3 },
+            Shape::spiral(0.1, -0.3, 10.0),
             Shape::cubic([0.0, 12.0, 1.0, -2.0], [0.0, 0.0, 5.0, -1.0], 1.0).unwrap(),
             Shape::cubic([0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.01, 0.002], 10.0).unwrap(),
         ];

@@ -8,3 +8,4 @@ mod heights;
 mod places;
 mod poses;
 mod reading;
+mod scaling;

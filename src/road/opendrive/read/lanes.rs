@@ -66,6 +66,7 @@ impl Reader {
         for speed in lane.children("speed") {
             speeds.push((speed.number_or("sOffset", 0.0)?, self.speed(speed)?));
         }
+        speeds.sort_by(|a, b| a.0.total_cmp(&b.0));
         let kind = lane.attribute("type").unwrap_or("none");
         let mut driving = is_driving(kind);
         let for_vehicles = !BESIDE_THE_ROAD.contains(&kind);

@@ -35,7 +35,7 @@ fn not_xml(text: &str, error: &roxmltree::Error) -> RoadError {
 /// # Errors
 /// If it is not well-formed, and in which line.
 pub fn well_formed(text: &str) -> Result<roxmltree::Document<'_>, RoadError> {
-    refuse_crowded_tags(text)?;
+    refuse_costly_tags(text)?;
     roxmltree::Document::parse(text).map_err(|error| not_xml(text, &error))
 }
 
@@ -43,9 +43,20 @@ pub fn well_formed(text: &str) -> Result<roxmltree::Document<'_>, RoadError> {
 /// every attribute of an element with every other.
 const ATTRIBUTES_MAX: usize = 256;
 
-/// Refuses elements with more attributes than any real file has, in one pass over the text.
-fn refuse_crowded_tags(text: &str) -> Result<(), RoadError> {
+/// Limit on the elements around an element that declare namespaces. The XML reader copies the namespaces of all of them
+/// for each further one, and compares each with every other.
+const NAMESPACES_MAX: usize = 32;
+
+/// Refuses what makes the XML reader slow and no real file has, in one pass over the text: elements with too many
+/// attributes, and too many namespaces within each other.
+fn refuse_costly_tags(text: &str) -> Result<(), RoadError> {
     let mut at = 0;
+    // For each open element, whether it declares a namespace, and how many of them do.
+    let (mut open, mut declaring): (Vec<bool>, usize) = (Vec::new(), 0);
+    let refused = |begin: usize, message: String| {
+        let line = text[..begin].bytes().filter(|byte| *byte == b'\n').count() + 1;
+        Err(wrong(u32::try_from(line).unwrap_or(u32::MAX), message))
+    };
     while let Some(begin) = text[at..].find('<').map(|found| at + found) {
         let rest = &text[begin..];
         let hidden = [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>")];
@@ -68,10 +79,24 @@ fn refuse_crowded_tags(text: &str) -> Result<(), RoadError> {
             }
         }
         if equals > ATTRIBUTES_MAX {
-            let line = text[..begin].bytes().filter(|byte| *byte == b'\n').count() + 1;
             let message =
                 format!("an element has {equals} attributes; no file needs more than {ATTRIBUTES_MAX}");
-            return Err(wrong(u32::try_from(line).unwrap_or(u32::MAX), message));
+            return refused(begin, message);
+        }
+        let tag = &rest[..end];
+        if tag.starts_with("</") {
+            declaring -= usize::from(open.pop() == Some(true));
+        } else if !tag.ends_with('/') {
+            let declares = tag.contains("xmlns");
+            declaring += usize::from(declares);
+            open.push(declares);
+            if declaring > NAMESPACES_MAX {
+                let message = format!(
+                    "more than {NAMESPACES_MAX} elements within each other declare namespaces; no file needs as \
+                     many"
+                );
+                return refused(begin, message);
+            }
         }
         at = begin + end.max(1);
     }
@@ -92,7 +117,8 @@ pub fn read(name: &str, text: &str) -> Result<Document, RoadError> {
     if root.name() != "OpenDRIVE" {
         return Err(root.wrong(format!("the root element is `{}`; `OpenDRIVE` is expected", root.name())));
     }
-    let mut reader = Reader { warnings: Vec::new(), warned_at: Vec::new(), ignored: BTreeMap::new() };
+    let mut reader =
+        Reader { warnings: Vec::new(), warned_at: Vec::new(), ignored: BTreeMap::new(), corners: 0 };
     let header_name = root.child("header").and_then(|header| header.attribute("name")).unwrap_or("");
     let roads: Vec<_> = root.children("road").map(|road| reader.road(road)).collect::<Result<_, _>>()?;
     if roads.is_empty() {
@@ -120,6 +146,8 @@ struct Reader {
     warned_at: Vec<(usize, Vec2)>,
     /// Each kind of thing that was left out, with its number.
     ignored: BTreeMap<String, usize>,
+    /// Corners and copies of all objects so far.
+    corners: usize,
 }
 
 impl Reader {
@@ -160,6 +188,8 @@ impl Reader {
             let limit = kind.child("speed").map(|speed| self.speed(speed)).transpose()?;
             speeds.push((kind.number_or("s", 0.0)?, limit.flatten()));
         }
+        // OpenDRIVE asks for this order; not every file keeps it.
+        speeds.sort_by(|a, b| a.0.total_cmp(&b.0));
         let elevation = self.elevation(road);
         self.ignore_slopes(road)?;
         if let Some(rule) = road.attribute("rule").filter(|rule| !["LHT", "RHT"].contains(rule)) {
@@ -179,7 +209,7 @@ impl Reader {
             lane_offset: cubics(lanes.children("laneOffset"), "s")?,
             sections: self.sections(lanes, &id, length_m)?,
             signals: self.signals(road),
-            objects: self.objects(road),
+            objects: self.objects(road)?,
             id,
             length_m,
         })
@@ -300,6 +330,7 @@ fn junction(junction: Element) -> Result<JunctionElement, RoadError> {
     });
     let controllers = junction.children("controller");
     Ok(JunctionElement {
+        line: junction.line(),
         id: junction.text("id")?.to_owned(),
         name: junction.attribute("name").unwrap_or("").to_owned(),
         connections: connections.collect::<Result<_, _>>()?,

@@ -9,9 +9,15 @@ use super::{ROAD_M_MAX, Reader};
 /// Limit on the copies of one crosswalk.
 const REPEATS_MAX: f64 = 1000.0;
 
+/// Limit on the corners and copies of all objects of a map: a hundred bytes of a file may stand for a thousand copies.
+const CORNERS_MAX: usize = 2_000_000;
+
 impl Reader {
     /// The objects of a road. One that cannot be read is left out, with a warning.
-    pub(super) fn objects(&mut self, road: Element) -> Vec<ObjectElement> {
+    ///
+    /// # Errors
+    /// If the map's objects are more than can be held.
+    pub(super) fn objects(&mut self, road: Element) -> Result<Vec<ObjectElement>, RoadError> {
         let mut all = Vec::new();
         for object in road.child("objects").into_iter().flat_map(|objects| objects.children("object")) {
             let word = object.attribute("type").unwrap_or("");
@@ -21,10 +27,24 @@ impl Reader {
             };
             match self.object(object, word, kind) {
                 Ok(read) => all.extend(read),
+                Err(error) if self.corners > CORNERS_MAX => return Err(error),
                 Err(error) => self.leave_out(&error),
             }
         }
-        all
+        Ok(all)
+    }
+
+    /// Counts corners or copies of an object.
+    fn count_corners(&mut self, object: Element, number: usize) -> Result<(), RoadError> {
+        self.corners = self.corners.saturating_add(number);
+        if self.corners > CORNERS_MAX {
+            let message = format!(
+                "the objects up to here have more than {CORNERS_MAX} corners and copies in all: leave some out, or \
+                 repeat them at greater distances"
+            );
+            return Err(object.wrong(message));
+        }
+        Ok(())
     }
 
     /// An object, or its copies.
@@ -42,6 +62,7 @@ impl Reader {
         if kind == ObjectKind::Solid
             && let Some(corners) = stretched(object, s_m, t_m)?
         {
+            self.count_corners(object, corners.len())?;
             let (outline, heading_rad) = (Outline::Road(corners), 0.0);
             return Ok(vec![ObjectElement { id: id.to_owned(), kind, s_m, t_m, heading_rad, outline }]);
         }
@@ -55,7 +76,10 @@ impl Reader {
             return Ok(Vec::new());
         };
         let heading_rad = object.number_or("hdg", 0.0)?;
-        let copies = repeats(object, s_m, t_m)?.into_iter().map(|(moved_m, t_m)| ObjectElement {
+        let places = self.repeats(object, s_m, t_m)?;
+        let (Outline::Local(corners) | Outline::Road(corners)) = &outline;
+        self.count_corners(object, places.len().saturating_mul(corners.len()))?;
+        let copies = places.into_iter().map(|(moved_m, t_m)| ObjectElement {
             id: id.to_owned(),
             kind,
             s_m: s_m + moved_m,
@@ -70,6 +94,33 @@ impl Reader {
         });
         Ok(copies.collect())
     }
+
+    /// Offsets of an object, m: ahead of its own station, and to the left of the reference line.
+    fn repeats(&mut self, object: Element, s_m: f64, t_m: f64) -> Result<Vec<(f64, f64)>, RoadError> {
+        let mut places = Vec::new();
+        for repeat in object.children("repeat") {
+            let (begin_m, length_m) = (repeat.number("s")?, repeat.number_or("length", 0.0)?);
+            let distance_m = repeat.number_or("distance", 0.0)?;
+            let (from_m, to_m) = (repeat.number_or("tStart", t_m)?, repeat.number_or("tEnd", t_m)?);
+            // Without a distance, `repeat` means one body stretched over the length; a crosswalk is not such a
+            // body.
+            let times = if distance_m > 1e-3 {
+                (length_m / distance_m + 1e-9).floor().clamp(0.0, REPEATS_MAX)
+            } else {
+                0.0
+            };
+            self.count_corners(object, times as usize + 1)?;
+            for i in 0..=times as u32 {
+                let ahead_m = distance_m * f64::from(i);
+                let fraction = if length_m > 0.0 { ahead_m / length_m } else { 0.0 };
+                places.push((begin_m + ahead_m - s_m, from_m + (to_m - from_m) * fraction));
+            }
+        }
+        if places.is_empty() {
+            places.push((0.0, t_m));
+        }
+        Ok(places)
+    }
 }
 
 /// What an object is to people on foot; `None` for one that is nothing to them, like paint.
@@ -81,32 +132,6 @@ fn object_kind(kind: &str) -> Option<ObjectKind> {
         | "trailer" => Some(ObjectKind::Solid),
         _ => None,
     }
-}
-
-/// Offsets of an object, m: ahead of its own station, and to the left of the reference line.
-fn repeats(object: Element, s_m: f64, t_m: f64) -> Result<Vec<(f64, f64)>, RoadError> {
-    let mut places = Vec::new();
-    for repeat in object.children("repeat") {
-        let (begin_m, length_m) = (repeat.number("s")?, repeat.number_or("length", 0.0)?);
-        let distance_m = repeat.number_or("distance", 0.0)?;
-        let (from_m, to_m) = (repeat.number_or("tStart", t_m)?, repeat.number_or("tEnd", t_m)?);
-        // Without a distance, `repeat` means one body stretched over the length; a crosswalk is not such a
-        // body.
-        let times = if distance_m > 1e-3 {
-            (length_m / distance_m + 1e-9).floor().clamp(0.0, REPEATS_MAX)
-        } else {
-            0.0
-        };
-        for i in 0..=times as u32 {
-            let ahead_m = distance_m * f64::from(i);
-            let fraction = if length_m > 0.0 { ahead_m / length_m } else { 0.0 };
-            places.push((begin_m + ahead_m - s_m, from_m + (to_m - from_m) * fraction));
-        }
-    }
-    if places.is_empty() {
-        places.push((0.0, t_m));
-    }
-    Ok(places)
 }
 
 /// Corners, along the road, of one body stretched over a length: what `repeat` without a distance means for a

@@ -71,10 +71,11 @@ fn piece(geometry: Element) -> Result<Piece, RoadError> {
         Some(shape) => match shape.name() {
             "line" => Shape::Line,
             "arc" => Shape::Arc { curvature_per_m: curvature(shape, "curvature", length_m)? },
-            "spiral" => Shape::Spiral {
-                begin_per_m: curvature(shape, "curvStart", length_m)?,
-                end_per_m: curvature(shape, "curvEnd", length_m)?,
-            },
+            "spiral" => {
+                let (begin_per_m, end_per_m) =
+                    (curvature(shape, "curvStart", length_m)?, curvature(shape, "curvEnd", length_m)?);
+                Shape::spiral(begin_per_m, end_per_m, length_m)
+            }
             "paramPoly3" => {
                 let p_max = if shape.attribute("pRange") == Some("arcLength") { length_m } else { 1.0 };
                 let u = [shape.number("aU")?, shape.number("bU")?, shape.number("cU")?, shape.number("dU")?];
@@ -118,17 +119,17 @@ fn cubic_shape(
     Ok(cubic)
 }
 
-/// A curve `v(u)`. The file does not state the last `u`; bisection finds the one at which the curve has its
-/// length.
+/// Rounds in which the last parameter of a `poly3` is found; each comes nearer by a factor of about 64.
+const POLY3_ROUNDS: usize = 6;
+
+/// A curve `v(u)`. The file does not state the last `u`, but the length of the curve. It is at most that length, because
+/// the curve is nowhere shorter than its `u`.
 fn poly3(shape: Element, v: [f64; 4], length_m: f64) -> Result<Shape, RoadError> {
-    let (mut low, mut high) = (0.0, length_m);
-    for _ in 0..60 {
-        let middle = (low + high) / 2.0;
-        match Shape::cubic([0.0, 1.0, 0.0, 0.0], v, middle) {
-            Some(Shape::Cubic { lengths_m, .. }) if lengths_m[lengths_m.len() - 1] < length_m => low = middle,
-            Some(_) => high = middle,
-            None => return Err(shape.wrong("this curve has no direction")),
-        }
+    let u = [0.0, 1.0, 0.0, 0.0];
+    let mut last = length_m;
+    for _ in 0..POLY3_ROUNDS {
+        let curve = Shape::cubic(u, v, last).ok_or_else(|| shape.wrong("this curve has no direction"))?;
+        last = curve.parameter_at(length_m).unwrap_or(last);
     }
-    cubic_shape(shape, [0.0, 1.0, 0.0, 0.0], v, high, length_m)
+    cubic_shape(shape, u, v, last, length_m)
 }
