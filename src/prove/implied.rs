@@ -1,7 +1,7 @@
 //! Rules that change nothing: they always hold, or they follow from other rules.
 
 use crate::model::rules::{Demand, RowRules};
-use crate::model::{Row, RuleBody, RulesInForce, Space, code};
+use crate::model::{Row, RuleBody, RulesInForce, Space, code, effort};
 use crate::prove::moment::always_holds;
 use crate::syntax::{Diagnostic, listed};
 
@@ -18,12 +18,18 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut work = WORK_MAX;
     let mut kept = RulesInForce::by_default(space);
     for rule in (0..space.rules.len()).rev() {
+        if effort::is_spent() {
+            break;
+        }
         let others = kept.except(rule);
         if !follows(space, rule, &others, &mut work) {
             continue;
         }
         let mut reasons = others.clone();
         for other in others.all() {
+            if effort::is_spent() {
+                break;
+            }
             let fewer = reasons.except(other);
             if follows(space, rule, &fewer, &mut work) {
                 reasons = fewer;
@@ -59,7 +65,11 @@ fn warning(space: &Space, rule: usize, reasons: &[usize]) -> Diagnostic {
 /// Whether the rule holds for every row that it binds and every value that `others` leave; also `false` if
 /// the work left does not suffice.
 fn follows(space: &Space, rule: usize, others: &RulesInForce, work: &mut usize) -> bool {
-    let bound = || space.rows.iter().filter(|row| row.rules.contains(&rule));
+    let actions = space.rules[rule].body.actions();
+    let bound_rows = || actions.iter().flat_map(|action| space.rows_of(*action));
+    // A row that sets another key than the rule is about is not bound.
+    let bound = || bound_rows().filter(|row| row.rules.binary_search(&rule).is_ok());
+    effort::spend(bound_rows().count());
     let count = bound().count();
     let Some(left) = work.checked_sub(count * (1 + others.all().count())) else { return false };
     *work = left;
@@ -87,6 +97,9 @@ fn follows(space: &Space, rule: usize, others: &RulesInForce, work: &mut usize) 
 fn start_holds(space: &Space, rule: usize, others: &RulesInForce) -> bool {
     if space.rules[rule].start.is_none() {
         return true;
+    }
+    if space.start_count() > STARTS_MAX {
+        return false;
     }
     let alone = RulesInForce::only(space, rule);
     space.roads.iter().all(|road| {
