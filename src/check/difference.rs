@@ -4,7 +4,7 @@
 //! if the ranges show no difference, a rule with another text is called changed.
 
 use core::fmt;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::check::load::{Loaded, standing_items};
 use crate::model::rules::RowRules;
@@ -55,10 +55,34 @@ pub fn differences(old: &Loaded, new: &Loaded) -> Option<Vec<Difference>> {
     let (old_space, new_space) = (old.space.as_deref()?, new.space.as_deref()?);
     let (old_texts, new_texts) = (texts(old), texts(new));
     let mut found = declarations(&old_texts, &new_texts);
-    found.extend(rules((old_space, &old_texts), (new_space, &new_texts)));
-    found.extend(rows(old_space, new_space));
-    found.extend(reaches(old_space, new_space));
+    let pairs = Pairs::of(old_space, new_space);
+    found.extend(rules((old_space, &old_texts), (new_space, &new_texts), &pairs));
+    found.extend(rows(old_space, new_space, &pairs));
+    found.extend(reaches(old_space, new_space, &pairs));
     Some(found)
+}
+
+/// The rows of two spaces by their labels.
+struct Pairs<'a> {
+    old: BTreeMap<&'a str, &'a Row>,
+    new: BTreeMap<&'a str, &'a Row>,
+}
+
+impl<'a> Pairs<'a> {
+    fn of(old: &'a Space, new: &'a Space) -> Pairs<'a> {
+        // Of rows with the same label the first counts.
+        let by_label =
+            |space: &'a Space| space.rows.iter().rev().map(|row| (row.label.as_str(), row)).collect();
+        Pairs { old: by_label(old), new: by_label(new) }
+    }
+
+    fn now(&self, row: &Row) -> Option<&'a Row> {
+        self.new.get(row.label.as_str()).copied()
+    }
+
+    fn before(&self, row: &Row) -> Option<&'a Row> {
+        self.old.get(row.label.as_str()).copied()
+    }
 }
 
 fn difference(change: Change, subject: String, detail: impl Into<String>) -> Difference {
@@ -127,14 +151,19 @@ fn flat(text: &str) -> String {
 fn rules(
     (old_space, old_texts): (&Space, &Texts),
     (new_space, new_texts): (&Space, &Texts),
+    pairs: &Pairs<'_>,
 ) -> Vec<Difference> {
     let text = |texts: &Texts, name: &str| {
         texts.get(&("rule".to_owned(), format!(" `{name}`"))).map_or(String::new(), |text| flat(text))
     };
+    let named = |space: &Space| -> BTreeMap<String, usize> {
+        space.rules.iter().enumerate().map(|(index, rule)| (rule.name.clone(), index)).collect()
+    };
+    let (known, now) = (named(old_space), named(new_space));
     let mut found = Vec::new();
     for (index, rule) in old_space.rules.iter().enumerate() {
         let subject = format!("rule `{}`", rule.name);
-        let Some(other) = new_space.rules.iter().position(|known| known.name == rule.name) else {
+        let Some(&other) = now.get(&rule.name) else {
             found.push(difference(Change::Removed, subject, text(old_texts, &rule.name)));
             continue;
         };
@@ -148,14 +177,14 @@ fn rules(
         }
         let (before, after) = (text(old_texts, &rule.name), text(new_texts, &rule.name));
         let written = || format!("{before} → {after}");
-        match compared((old_space, index), (new_space, other)) {
+        match compared((old_space, index), (new_space, other), pairs) {
             Some((change, detail)) => found.push(difference(change, subject, detail)),
             None if before != after => found.push(difference(Change::Changed, subject, written())),
             None => {}
         }
     }
     for rule in &new_space.rules {
-        if !old_space.rules.iter().any(|known| known.name == rule.name) {
+        if !known.contains_key(&rule.name) {
             let subject = format!("rule `{}`", rule.name);
             found.push(difference(Change::Added, subject, text(new_texts, &rule.name)));
         }
@@ -164,7 +193,11 @@ fn rules(
 }
 
 /// Whether a rule forbids more or less than before, by its moves or by what it leaves of each range.
-fn compared(old: (&Space, usize), new: (&Space, usize)) -> Option<(Change, String)> {
+fn compared(
+    old: (&Space, usize),
+    new: (&Space, usize),
+    pairs: &Pairs<'_>,
+) -> Option<(Change, String)> {
     let mut turns = Turns::default();
     if let (
         RuleBody::Moves { state, allowed: before, .. },
@@ -189,9 +222,10 @@ fn compared(old: (&Space, usize), new: (&Space, usize)) -> Option<(Change, Strin
             }
         }
     } else {
-        for row in old.0.rows.iter().filter(|row| row.rules.contains(&old.1)) {
-            let Some(other) = new.0.rows.iter().find(|other| other.label == row.label) else { continue };
-            let unbound = !other.rules.contains(&new.1);
+        let binds = |row: &Row, rule: usize| row.rules.binary_search(&rule).is_ok();
+        for row in old.0.rows.iter().filter(|row| binds(row, old.1)) {
+            let Some(other) = pairs.now(row) else { continue };
+            let unbound = !binds(other, new.1);
             if unbound {
                 turns.looser.push(format!("binds `{}` no longer", row.label));
                 continue;
@@ -201,9 +235,8 @@ fn compared(old: (&Space, usize), new: (&Space, usize)) -> Option<(Change, Strin
                 turns.judge(&before, &after, &road.name);
             }
         }
-        for row in new.0.rows.iter().filter(|row| row.rules.contains(&new.1)) {
-            let known = old.0.rows.iter().find(|other| other.label == row.label);
-            if known.is_some_and(|known| !known.rules.contains(&old.1)) {
+        for row in new.0.rows.iter().filter(|row| binds(row, new.1)) {
+            if pairs.before(row).is_some_and(|known| !binds(known, old.1)) {
                 turns.tighter.push(format!("binds `{}`", row.label));
             }
         }
@@ -237,12 +270,9 @@ impl Turns {
     /// The change as a whole, and its parts in words; `None` if there is no change.
     fn in_words(&self) -> Option<(Change, String)> {
         let shown = |parts: &[String]| {
-            let mut kept: Vec<&str> = Vec::new();
-            for part in parts {
-                if !kept.contains(&part.as_str()) {
-                    kept.push(part);
-                }
-            }
+            let mut seen: BTreeSet<&str> = BTreeSet::new();
+            let kept: Vec<&str> =
+                parts.iter().map(String::as_str).filter(|part| seen.insert(*part)).collect();
             match kept.len() {
                 0..=4 => kept.join("; "),
                 more => format!("{}; and {} more", kept[..4].join("; "), more - 4),
@@ -284,20 +314,18 @@ fn shared_roads<'a>(old: &'a Space, new: &'a Space) -> Vec<(&'a Road, &'a Road)>
     old.roads.iter().filter_map(same).collect()
 }
 
-fn rows(old: &Space, new: &Space) -> Vec<Difference> {
-    let index: BTreeMap<&str, usize> = new.rows.iter().map(|row| (row.label.as_str(), row.index)).collect();
-    let known: BTreeMap<&str, usize> = old.rows.iter().map(|row| (row.label.as_str(), row.index)).collect();
+fn rows(old: &Space, new: &Space, pairs: &Pairs<'_>) -> Vec<Difference> {
     let subject = |row: &Row| format!("row `{}`", row.label);
     let mut found = Vec::new();
     let mut moved = 0;
     for row in &old.rows {
-        match index.get(row.label.as_str()) {
+        match pairs.now(row) {
             None => found.push(difference(Change::Removed, subject(row), format!("it was {}", row.index))),
-            Some(now) if *now != row.index => moved += 1,
+            Some(now) if now.index != row.index => moved += 1,
             Some(_) => {}
         }
     }
-    let added = new.rows.iter().filter(|row| !known.contains_key(row.label.as_str()));
+    let added = new.rows.iter().filter(|row| pairs.before(row).is_none());
     found.extend(added.map(|row| difference(Change::Added, subject(row), format!("it is {}", row.index))));
     if moved > 0 {
         let detail = "a policy learned on the old table does not fit the new one";
@@ -307,12 +335,20 @@ fn rows(old: &Space, new: &Space) -> Vec<Difference> {
 }
 
 /// Differences in what all rules together leave of the ranges.
-fn reaches(old: &Space, new: &Space) -> Vec<Difference> {
+fn reaches(old: &Space, new: &Space, pairs: &Pairs<'_>) -> Vec<Difference> {
     let mut found: Vec<Difference> = Vec::new();
+    let mut told: BTreeSet<(Change, usize, String)> = BTreeSet::new();
+    let shared: Vec<(usize, usize, &Road)> = old
+        .roads
+        .iter()
+        .enumerate()
+        .filter_map(|(index, road)| {
+            Some((index, new.roads.iter().position(|known| known.name == road.name)?, road))
+        })
+        .collect();
     for row in &old.rows {
-        let Some(other) = new.rows.iter().find(|other| other.label == row.label) else { continue };
-        for (index, road) in old.roads.iter().enumerate() {
-            let Some(same) = new.roads.iter().position(|known| known.name == road.name) else { continue };
+        let Some(other) = pairs.now(row) else { continue };
+        for &(index, same, road) in &shared {
             let action = &old.actions[row.action].name;
             let mut turns = Turns::default();
             let ranges = |reach: &Reach| match reach {
@@ -321,9 +357,8 @@ fn reaches(old: &Space, new: &Space) -> Vec<Difference> {
             };
             turns.judge(&ranges(&row.roads[index]), &ranges(&other.roads[same]), &road.name);
             let Some((change, detail)) = turns.in_words() else { continue };
-            let difference = difference(change, format!("draws of `{action}`"), detail);
-            if !found.contains(&difference) {
-                found.push(difference);
+            if told.insert((change, row.action, detail.clone())) {
+                found.push(difference(change, format!("draws of `{action}`"), detail));
             }
         }
     }
