@@ -17,7 +17,7 @@ use avastra::trial::places::{self, Scenes};
 const AVASTRA: &str = include_str!("../scenarios/avastra45.ava");
 
 /// Four names for one road, so that no time goes into reading maps.
-const ROADS: &str = r#"language 1
+pub const ROADS: &str = r#"language 1
 road corner { map: "straight.xodr", start: lane 1/-2 at 10 m, goal: lane 1/-2 at 190 m }
 road residential { map: "straight.xodr", start: lane 1/-2 at 10 m, goal: lane 1/-2 at 190 m }
 road boulevard { map: "straight.xodr", start: lane 1/-2 at 10 m, goal: lane 1/-2 at 190 m }
@@ -25,7 +25,7 @@ road crossroad { map: "straight.xodr", start: lane 1/-2 at 10 m, goal: lane 1/-1
 "#;
 
 /// A straight road with three lanes in each direction.
-const STRAIGHT: &str = r#"<OpenDRIVE><header name="straight"/><road id="1" length="200" junction="-1">
+pub const STRAIGHT: &str = r#"<OpenDRIVE><header name="straight"/><road id="1" length="200" junction="-1">
 <type s="0" type="town"><speed max="13" unit="m/s"/></type>
 <planView><geometry s="0" x="0" y="0" hdg="0" length="200"><line/></geometry></planView>
 <lanes><laneSection s="0">

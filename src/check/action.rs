@@ -1,13 +1,15 @@
 //! Actions and groups: parameters with their domains, effects with the engine's words.
 
+use std::collections::BTreeSet;
+
 use crate::check::checker::{Checker, docs, each, literal};
 use crate::check::declaration::unknown_word;
 use crate::check::expression::{Place, is_number};
-use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, field};
 use crate::check::rule::locals;
 use crate::model::expr::{Expr, ExprKind};
+use crate::model::rules::rules_by_action;
 use crate::model::vocabulary::{Colour, LaneChoice, Side, Site, SpaceClaim, SpawnField, Then, Verb, Word};
 use crate::model::{
     ActionDef, BodyWord, Domain, EffectDef, GroupDef, Parameter, RuleDef, SetDef, SpawnDef, Type, Value,
@@ -21,12 +23,25 @@ use crate::units::{Dimension, Rational};
 /// Largest number of rows in a table.
 pub(crate) const ROWS_MAX: u64 = 100_000;
 
-/// Limit on the number of proofs, which is rows times the rules that bind them times roads. More would take
-/// long.
-const PROOFS_MAX: u64 = 500_000;
+/// Limit on the number of proofs, which is rows times the rules that bind them times roads. It leaves room for four rules
+/// on every row of the longest table on four roads; how many steps they take is counted while they are made.
+const PROOFS_MAX: u64 = 2_000_000;
 
 /// Largest number of values in an `Int` range.
 const VALUES_MAX: i64 = 100_000;
+
+/// Largest number of values that the parameters of all actions list together; a value counts as often as its odds say.
+const LISTED_MAX: usize = 2_000_000;
+
+/// Largest number of parameters of an action or a function.
+const PARAMETERS_MAX: usize = 100;
+
+/// Largest number of actions that all groups name together.
+const MEMBERS_MAX: usize = 1_000_000;
+
+/// Largest number of operations that are compiled for single actions, in conditions and effects that are written for
+/// many.
+const COMPILED_MAX: usize = 500_000;
 
 impl Checker {
     pub(super) fn declare_actions(&mut self, items: &[&ast::Item]) {
@@ -35,15 +50,31 @@ impl Checker {
         for (item, declared) in actions {
             let (action, is_whole) = self.action(item, declared).unzip();
             if is_whole == Some(false) {
-                self.half_broken.push(self.actions.len());
+                self.half_broken.insert(self.actions.len());
             }
+            let names = action.iter().flat_map(|action: &ActionDef| &action.parameters);
+            self.parameter_names.extend(names.map(|parameter| parameter.name.to_string()));
             self.actions.push(action);
         }
+    }
+
+    /// Whether something has no more parameters than can be checked; reports it if it has.
+    pub(super) fn has_few_parameters(&mut self, name: &ast::Name, count: usize) -> bool {
+        if count > PARAMETERS_MAX {
+            let message = format!("`{}` has {count} parameters", name.text);
+            let error = Diagnostic::error(code::TOO_MUCH, message)
+                .at(name.span, format!("at most {PARAMETERS_MAX} are possible"));
+            self.report(error.help("make several of it, each with fewer parameters"));
+        }
+        count <= PARAMETERS_MAX
     }
 
     /// The action, and whether all its effects are sound. The sound ones are kept in any case, so that rules on
     /// this action are checked too.
     pub(super) fn action(&mut self, item: &ast::Item, declared: &ast::Action) -> Option<(ActionDef, bool)> {
+        if !self.has_few_parameters(&declared.name, declared.params.len()) {
+            return None;
+        }
         let owner = Symbol::Action(declared.name.text.clone());
         let mut locals: Vec<(String, Type)> = Vec::new();
         let mut parameters = Vec::new();
@@ -150,6 +181,15 @@ impl Checker {
             Domain::Values(values) if !axis => Domain::Values(self.by_odds(values, declared)?),
             domain => domain,
         };
+        if let Domain::Values(values) = &domain {
+            self.listed += values.len();
+            if self.listed > LISTED_MAX {
+                let message = format!("the parameters list more than {LISTED_MAX} values together");
+                let error = Diagnostic::error(code::TOO_MUCH, message).at(declared.span, "here the limit is passed");
+                let help = "list fewer values, give them smaller odds, or draw a quantity from a range";
+                return self.reject(error.help(help));
+            }
+        }
         if axis && matches!(domain, Domain::Range(..)) {
             let name = self.references.type_name(ty);
             let message = format!("`each` over `{}` has no end of rows", declared.name.text);
@@ -412,7 +452,7 @@ impl Checker {
 
     pub(super) fn declare_groups(&mut self, items: &[&ast::Item]) {
         for (item, declared) in each(items, ItemKind::as_group) {
-            let taken = self.groups.iter().any(|group| group.name == declared.name.text);
+            let taken = self.group_places.contains_key(&declared.name.text);
             if taken || self.action_names.get(&declared.name.text).is_some() {
                 let message = format!("the name `{}` is taken", declared.name.text);
                 let error = Diagnostic::error(code::DUPLICATE, message).at(declared.name.span, "again here");
@@ -420,8 +460,17 @@ impl Checker {
                 self.doubles.insert(item.span);
                 continue;
             }
-            let actions = declared.members.iter().flat_map(|member| self.targets(member)).collect();
+            let actions = self.all_targets(&declared.members);
+            self.members += actions.len();
+            if self.members > MEMBERS_MAX {
+                let message = format!("the groups name more than {MEMBERS_MAX} actions together");
+                let error = Diagnostic::error(code::TOO_MUCH, message);
+                let error = error.at(declared.name.span, "here the limit is passed");
+                self.report(error.help("make fewer groups, or smaller ones; `actions` names all actions"));
+                return;
+            }
             let name = declared.name.text.clone();
+            self.group_places.insert(name.clone(), self.groups.len());
             self.groups.push(GroupDef { name, docs: docs(item), actions });
         }
     }
@@ -432,28 +481,31 @@ impl Checker {
             for (action, effect) in self.also(declared) {
                 self.actions[action].iter_mut().for_each(|known| known.effects.push(effect.clone()));
             }
+            if self.has_compiled_too_much(declared.on.first().map_or(Span::NONE, |name| name.span)) {
+                return;
+            }
         }
     }
 
     /// The effects that are added, each with its action.
     pub(super) fn also(&mut self, declared: &ast::Also) -> Vec<(usize, EffectDef)> {
-        let mut actions: Vec<usize> = declared.on.iter().flat_map(|name| self.targets(name)).collect();
+        let mut actions = self.all_targets(&declared.on);
         actions.sort_unstable();
-        actions.dedup();
         let mut added = Vec::new();
         for action in actions {
             // A broken action was reported where it is declared.
-            let Some(definition) = self.actions[action].clone() else { continue };
-            let locals = locals(&definition);
-            let owner = Symbol::Action(definition.name);
+            let Some(definition) = &self.actions[action] else { continue };
+            let locals = locals(definition);
+            let owner = Symbol::Action(definition.name.clone());
             let place = Place { locals: &locals, owner: Some(&owner), states: true, ..Place::default() };
-            added.extend(
-                declared
-                    .effects
-                    .iter()
-                    .filter_map(|effect| self.effect(effect, &place))
-                    .map(|effect| (action, effect)),
-            );
+            for effect in &declared.effects {
+                let Some(effect) = self.effect(effect, &place) else { continue };
+                self.compiled += operations_of(&effect);
+                added.push((action, effect));
+            }
+            if self.compiled > COMPILED_MAX {
+                break;
+            }
         }
         added
     }
@@ -476,21 +528,65 @@ impl Checker {
         sets.collect()
     }
 
+    /// Whether more was compiled for single actions than can be checked; reports that once.
+    pub(super) fn has_compiled_too_much(&mut self, span: Span) -> bool {
+        let is_passed = self.compiled > COMPILED_MAX;
+        if is_passed && !self.diagnostics.iter().any(|one| one.code == code::TOO_MUCH) {
+            let message = "what rules and `on … also` say of many actions is too much to check";
+            let error = Diagnostic::error(code::TOO_MUCH, message).at(span, "here the limit is passed");
+            self.report(error.note(format!("written out for each action, it has more than {COMPILED_MAX} operations")).help(
+                "let rules bind fewer actions by `on`, make one action with an `each` parameter of several, or shorten conditions",
+            ));
+        }
+        is_passed
+    }
+
+    /// The actions that some names mean, each once, in the order of the names.
+    pub(super) fn all_targets(&mut self, names: &[ast::Name]) -> Vec<usize> {
+        let (mut found, mut asked) = (Vec::new(), BTreeSet::new());
+        let mut seen = vec![false; self.actions.len()];
+        for name in names {
+            // The actions of a name that was met before are there already.
+            if asked.contains(name.text.as_str()) {
+                self.references.uses_target(name.span, &name.text);
+                continue;
+            }
+            let actions = self.targets(name);
+            if !actions.is_empty() {
+                asked.insert(name.text.as_str());
+            }
+            for action in actions {
+                if !core::mem::replace(&mut seen[action], true) {
+                    found.push(action);
+                }
+            }
+        }
+        found
+    }
+
+    /// Whether a name stands for any action.
+    pub(super) fn is_target(&self, name: &str) -> bool {
+        let is_filled = |group: &usize| !self.groups[*group].actions.is_empty();
+        self.action_names.get(name).is_some()
+            || self.group_places.get(name).is_some_and(is_filled)
+            || name == SpaceClaim::Actions.name() && !self.actions.is_empty()
+    }
+
     /// The indices of the actions that a name means: one action, or the members of a group.
     pub(super) fn targets(&mut self, name: &ast::Name) -> Vec<usize> {
         self.references.uses_target(name.span, &name.text);
         if let Some(action) = self.action_names.get(&name.text) {
             return vec![action];
         }
-        if let Some(group) = self.groups.iter().find(|group| group.name == name.text) {
-            return group.actions.clone();
+        if let Some(group) = self.group_places.get(&name.text) {
+            return self.groups[*group].actions.clone();
         }
         if name.text == SpaceClaim::Actions.name() {
             self.references.word(name.span, SpaceClaim::Actions);
             return (0..self.actions.len()).collect();
         }
         let groups = self.groups.iter().map(|group| group.name.as_str());
-        let error = unknown(
+        let error = self.unknown(
             "action",
             &name.text,
             name.span,
@@ -503,22 +599,21 @@ impl Checker {
     /// Counts the rows of every action. Reports a table that would be too long, before it is made.
     pub(super) fn count_rows(&mut self, rules: &[RuleDef], roads: usize) {
         let mut total = 0_u64;
-        for action in self.actions.clone() {
-            // A count of 0 means that an axis is broken, which is reported where it is declared.
-            let count = action.as_ref().map(product_size).filter(|count| *count > 0);
-            if let (Some(count), Some(action)) = (count, &action) {
-                total = total.saturating_add(count);
-                if count > ROWS_MAX {
-                    let message = format!("`{}` multiplies to {count} rows", action.name);
-                    let axes = action.parameters.iter().filter(|parameter| parameter.axis);
-                    let axes: Vec<String> = axes.map(|parameter| parameter.name.to_string()).collect();
-                    let error = Diagnostic::error(code::TOO_MANY_ROWS, message)
-                        .at(action.span, format!("the product of {}", listed(&axes)));
-                    self.report(error.help(format!("at most {ROWS_MAX} are possible; draw some with `any`")));
-                    return;
-                }
+        // A count of 0 means that an axis is broken, which is reported where it is declared.
+        let size = |action: &Option<ActionDef>| action.as_ref().map(product_size).filter(|count| *count > 0);
+        self.row_counts = self.actions.iter().map(size).collect();
+        for (action, count) in self.actions.iter().zip(&self.row_counts) {
+            let (Some(action), Some(count)) = (action, *count) else { continue };
+            total = total.saturating_add(count);
+            if count > ROWS_MAX {
+                let message = format!("`{}` multiplies to {count} rows", action.name);
+                let axes = action.parameters.iter().filter(|parameter| parameter.axis);
+                let axes: Vec<String> = axes.map(|parameter| parameter.name.to_string()).collect();
+                let error = Diagnostic::error(code::TOO_MANY_ROWS, message)
+                    .at(action.span, format!("the product of {}", listed(&axes)));
+                self.report(error.help(format!("at most {ROWS_MAX} are possible; draw some with `any`")));
+                return;
             }
-            self.row_counts.push(count);
         }
         if total > ROWS_MAX {
             let error =
@@ -527,10 +622,10 @@ impl Checker {
             return;
         }
         // Each row is proved on each road under each rule that binds it.
-        let bound = |action: usize| rules.iter().filter(|rule| rule.body.binds(action)).count() as u64;
-        let counts = self.row_counts.iter().enumerate();
+        let binding = rules_by_action(rules, self.actions.len());
+        let counts = self.row_counts.iter().zip(&binding);
         let work: u64 = counts
-            .map(|(action, count)| count.unwrap_or(0) * (1 + bound(action)) * roads.max(1) as u64)
+            .map(|(count, rules)| count.unwrap_or(0) * (1 + rules.len() as u64) * roads.max(1) as u64)
             .sum();
         if work > PROOFS_MAX {
             let message = format!("rows, rules and roads multiply to {work} proofs");
@@ -539,6 +634,14 @@ impl Checker {
                 "at most {PROOFS_MAX} are possible; draw some parameters with `any`, or bind fewer actions"
             )));
         }
+    }
+}
+
+/// The operations of an effect; spawns count little beside what rules say of them.
+fn operations_of(effect: &EffectDef) -> usize {
+    match effect {
+        EffectDef::Set(set) => 1 + set.key.iter().chain([&set.value]).map(Expr::operations).sum::<usize>(),
+        EffectDef::Spawn(_) => 1,
     }
 }
 

@@ -11,20 +11,29 @@ use crate::check::references::{References, Symbol};
 use crate::check::report::Report;
 use crate::check::road::Maps;
 use crate::check::{style, unused};
+use crate::model::effort;
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::rules::{bounds, clauses};
+use crate::model::rules::{bounds, clauses, rules_by_action};
 use crate::model::vocabulary::TYPES;
 use crate::model::{
     ActionDef, BodyDef, EnumDef, FnDef, GroupDef, Meaning, SetDef, Space, StateDef, Type, Value, code,
 };
 use crate::prove;
-use crate::prove::{Known, RunsIn, Values, enclose};
+use crate::prove::{Known, RunsIn, Values, enclose, product_size};
 use crate::syntax::ast::{FileId, ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
 use crate::units::Rational;
 
 /// The most diagnostics of a file: more are of no use, and each is found in the text by its place.
-const DIAGNOSTICS_MAX: usize = 1_000;
+pub(super) const DIAGNOSTICS_MAX: usize = 1_000;
+
+/// The most steps of all proofs about a space: about a second of an optimised build.
+const STEPS_MAX: u64 = 40_000_000;
+
+/// Steps beside these for each row on each road, for at most so many: the longest table on four roads is promised, and a
+/// row on a road takes some 80 steps.
+const STEPS_A_ROW: u64 = 100;
+const ROWS_ON_ROADS_MAX: u64 = 400_000;
 
 /// A function's parameters, its result type, and the span of its header.
 pub(super) type Signature = (Vec<(String, Type)>, Type, Span);
@@ -36,22 +45,36 @@ pub(super) struct Checker {
     pub(super) enum_names: Names,
     pub(super) enums: Vec<EnumDef>,
     pub(super) states: Vec<StateDef>,
+    /// Positions in `states`, by name.
+    pub(super) state_places: BTreeMap<String, usize>,
     pub(super) bodies: Vec<BodyDef>,
     /// Each constant is folded to a literal; `None` stands for a broken one.
     pub(super) constants: Vec<(String, Option<Expr>)>,
+    /// Positions in `constants`, by name.
+    pub(super) constant_places: BTreeMap<String, usize>,
     pub(super) function_names: Names,
     /// Every declared road, driven or not.
     pub(super) road_names: Vec<String>,
     /// Names of all functions. Constants are checked before them and cannot call them.
-    pub(super) functions_to_come: Vec<String>,
+    pub(super) functions_to_come: BTreeSet<String>,
     /// `None` stands for a function with a broken header.
     pub(super) signatures: Vec<Option<Signature>>,
     pub(super) functions: Vec<FnDef>,
     pub(super) action_names: Names,
     pub(super) actions: Vec<Option<ActionDef>>,
+    /// The parameters of all actions.
+    pub(super) parameter_names: BTreeSet<String>,
     /// Indices of actions with a broken effect: no rule reports that such an action lacks an effect.
-    pub(super) half_broken: Vec<usize>,
+    pub(super) half_broken: BTreeSet<usize>,
     pub(super) groups: Vec<GroupDef>,
+    /// Positions in `groups`, by name.
+    pub(super) group_places: BTreeMap<String, usize>,
+    /// Values that parameters list, so far.
+    pub(super) listed: usize,
+    /// Actions that groups name, so far.
+    pub(super) members: usize,
+    /// Operations that were compiled for single actions so far, in conditions of rules and in what `on … also` adds.
+    pub(super) compiled: usize,
     /// The effects of every step.
     pub(super) each_step: Vec<SetDef>,
     /// Number of rows of each action; `None` if an axis is broken.
@@ -62,6 +85,8 @@ pub(super) struct Checker {
     pub(super) claims: Vec<Claim>,
     /// Declarations that are not checked, because another has their name.
     pub(super) doubles: BTreeSet<Span>,
+    /// Whether what is reported now is dropped.
+    pub(super) is_quiet: bool,
 }
 
 /// A claim that rows can run.
@@ -108,7 +133,7 @@ pub(super) fn space(
 ) -> Checked {
     let mut checker = Checker { references, ..Checker::default() };
     checker.declare_enums(items);
-    checker.references.enums = checker.enums.clone();
+    checker.references.set_enums(checker.enums.clone());
     let functions = each(items, ItemKind::as_fn);
     checker.functions_to_come = functions.map(|(_, function)| function.name.text.clone()).collect();
     let roads = each(items, ItemKind::as_road);
@@ -140,8 +165,7 @@ pub(super) fn space(
         return checker.finish(None, RunsIn::default());
     }
     let actions: Vec<ActionDef> = core::mem::take(&mut checker.actions).into_iter().flatten().collect();
-    let bounds = bounds(&actions, &rules);
-    let mut space = Space {
+    let space = Space {
         path: root.path,
         meaning: root.meaning,
         docs: root.docs,
@@ -158,19 +182,49 @@ pub(super) fn space(
         verdicts,
         roads,
         rows: Vec::new(),
-        bounds,
+        bounds: Vec::new(),
         clauses: Vec::new(),
     };
-    space.clauses = clauses(&space);
-    space.rows = prove::rows(&space);
-    let (realisable, runs_in) = prove::realise(&space);
-    space.rows = prove::with_dead(&space, &realisable);
-    checker.expects(&own, &space, &realisable);
-    checker.diagnostics.extend(unused::report(&own, items));
-    checker.diagnostics.extend(style::report(&own));
-    checker.diagnostics.extend(prove::report(&space, &realisable));
+    let is_told = checker.diagnostics.len();
+    let rows: u64 = checker.row_counts.iter().flatten().sum();
+    let on_roads = rows.saturating_mul(space.roads.len() as u64).min(ROWS_ON_ROADS_MAX);
+    let steps_max = STEPS_MAX + STEPS_A_ROW * on_roads;
+    let ((space, runs_in), sufficed) = effort::within(steps_max, || checker.proved(space, &own, items));
+    if !sufficed {
+        // What was found until then says nothing of the rest.
+        checker.diagnostics.truncate(is_told);
+        checker.claims.clear();
+        checker.report(too_much(&space));
+        return checker.finish(None, RunsIn::default());
+    }
     let is_sound = !checker.has_errors();
     checker.finish(is_sound.then_some(space), runs_in)
+}
+
+/// The error for a space whose proofs take too many steps, with the numbers that multiply.
+fn too_much(space: &Space) -> Diagnostic {
+    let Space { rows, rules, states, roads, actions, .. } = space;
+    let cells: usize = states.iter().map(|state| state.cells).sum();
+    let error = Diagnostic::error(code::TOO_MUCH, "this space takes too many steps to check");
+    let binding = rules_by_action(rules, actions.len());
+    let bound =
+        |action: &usize| product_size(&actions[*action]).saturating_mul(1 + binding[*action].len() as u64);
+    let error = match (0..actions.len()).max_by_key(bound) {
+        Some(action) => error.at(actions[action].span, "most of them are for the rows and rules of this action"),
+        None => error,
+    };
+    let rows = rows.len();
+    error
+        .note(format!(
+            "it has {} actions with {rows} rows, {} rules, {} roads, and states of {cells} values; these numbers multiply",
+            actions.len(),
+            rules.len(),
+            roads.len(),
+        ))
+        .help(
+            "make the largest of them smaller: draw parameters with `any` rather than `each`, bind rules to fewer actions \
+             by `on`, shorten their conditions, or give fewer values to states that begin as `any`",
+        )
 }
 
 impl Report for Checker {
@@ -180,6 +234,20 @@ impl Report for Checker {
 }
 
 impl Checker {
+    /// The space with its rows, and what is reported of a space whose names and types are right.
+    fn proved(&mut self, mut space: Space, own: &[&ast::Item], items: &[&ast::Item]) -> (Space, RunsIn) {
+        space.bounds = bounds(&space.actions, &space.rules);
+        space.clauses = clauses(&space);
+        space.rows = prove::rows(&space);
+        let (realisable, runs_in) = prove::realise(&space);
+        space.rows = prove::with_dead(&space, &realisable);
+        self.expects(own, &space, &realisable);
+        self.diagnostics.extend(unused::report(own, items));
+        self.diagnostics.extend(style::report(own));
+        self.diagnostics.extend(prove::report(&space, &realisable));
+        (space, runs_in)
+    }
+
     pub(super) fn has_errors(&self) -> bool {
         self.diagnostics.iter().any(Diagnostic::is_error)
     }
@@ -198,12 +266,6 @@ impl Checker {
             }
         }
         kept.sort_by_key(Diagnostic::place);
-        if kept.len() > DIAGNOSTICS_MAX {
-            let left: Vec<Diagnostic> = kept.split_off(DIAGNOSTICS_MAX);
-            let message = format!("{} further mistakes are not listed", left.len());
-            let worst = left.iter().find(|one| one.is_error()).unwrap_or(&left[0]);
-            kept.push(Diagnostic { severity: worst.severity, ..Diagnostic::error(worst.code, message) });
-        }
         let runs = Runs { claims: self.claims, runs_in };
         Checked { space, runs, diagnostics: kept, references: self.references }
     }
@@ -211,9 +273,24 @@ impl Checker {
     /// Looks at what is broken already, for its names alone: no mistake is reported.
     pub(super) fn quietly<T>(&mut self, look: impl FnOnce(&mut Self) -> T) -> T {
         let reported = self.diagnostics.len();
+        let was_quiet = core::mem::replace(&mut self.is_quiet, true);
         let found = look(self);
+        self.is_quiet = was_quiet;
         self.diagnostics.truncate(reported);
         found
+    }
+
+    /// The diagnostic for a name that is not declared. Candidates are looked at only where somebody will read of them:
+    /// there may be as many as there are such names.
+    pub(super) fn unknown<'a>(
+        &self,
+        kind: &str,
+        name: &str,
+        span: Span,
+        candidates: impl IntoIterator<Item = &'a str>,
+    ) -> Diagnostic {
+        let is_read = !self.is_quiet && self.diagnostics.len() < DIAGNOSTICS_MAX;
+        unknown(kind, name, span, candidates.into_iter().take(if is_read { usize::MAX } else { 0 }))
     }
 
     /// Notes the names of all that the checks before did not see.
@@ -291,7 +368,8 @@ impl Checker {
         }
         found.or_else(|| {
             let candidates = TYPES.iter().map(|(word, ..)| *word).chain(self.enum_names.all());
-            self.reject(unknown("type", &name.text, name.span, candidates))
+            let error = self.unknown("type", &name.text, name.span, candidates);
+            self.reject(error)
         })
     }
 

@@ -1,8 +1,9 @@
 //! Checks the declarations of enums, constants, functions and states.
 
+use std::collections::BTreeSet;
+
 use crate::check::checker::{Checker, Signature, docs, each};
 use crate::check::expression::Place;
-use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::check::rule::names_in;
@@ -13,6 +14,9 @@ use crate::prove::VARIANTS_MAX;
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast, listed, nearest};
 
+/// Most values that states hold together: proofs copy them.
+const CELLS_MAX: usize = 10_000;
+
 /// Limit on a function's operations with every call inlined; nested calls multiply.
 const OPERATIONS_MAX: u64 = 10_000;
 
@@ -20,7 +24,7 @@ const OPERATIONS_MAX: u64 = 10_000;
 const CALLS_MAX: u32 = 64;
 
 /// Limit on how deep operators and calls stand in one another, with every call inlined: evaluation recurses so deep.
-const HEIGHT_MAX: u32 = 4_096;
+pub(super) const HEIGHT_MAX: u32 = 4_096;
 
 /// Size of a function with every call inlined.
 #[derive(Debug, Clone, Copy)]
@@ -93,7 +97,7 @@ impl Checker {
         let mut odds: Vec<Option<u32>> = vec![None; self.actions.len()];
         for arm in &declared.arms {
             let value = self.odds_of(&arm.value, ACTION_ODDS_MAX).unwrap_or(1);
-            let named: Vec<usize> = arm.patterns.iter().flat_map(|pattern| self.targets(pattern)).collect();
+            let named = self.all_targets(&arm.patterns);
             let taken = if arm.patterns.is_empty() { (0..odds.len()).collect() } else { named };
             self.share_out(arm, value, &taken, &mut odds);
         }
@@ -127,7 +131,7 @@ impl Checker {
                 arm.patterns.iter().for_each(|pattern| self.references.variant(pattern, None));
                 self.look_at(&arm.value, &Place::default(), None);
             }
-            let error = unknown("enum", &declared.name.text, declared.name.span, self.enum_names.all());
+            let error = self.unknown("enum", &declared.name.text, declared.name.span, self.enum_names.all());
             return self.reject(error);
         };
         let mut odds: Vec<Option<u32>> = vec![None; self.enums[of].variants.len()];
@@ -170,18 +174,28 @@ impl Checker {
         let (names, open) = self.declared("constant", items, ItemKind::as_let);
         // Constants may be declared in any order, so each waits for the constants that it names. If all that
         // are left wait for one another, the first is checked, and it reports an unknown name.
-        let named: Vec<Vec<ast::Name>> = open.iter().map(|(_, declared)| names_in(&declared.value)).collect();
-        let mut waiting: Vec<usize> = (0..open.len()).collect();
-        while !waiting.is_empty() {
-            let waits = |at: usize| {
-                named[at].iter().any(|name| {
-                    names.get(&name.text).is_some_and(|other| other == at || waiting.contains(&other))
-                })
-            };
-            let next = waiting.iter().position(|at| !waits(*at)).unwrap_or(0);
-            let (_, declared) = open[waiting.remove(next)];
+        let named = |(_, declared): &(_, &ast::Let)| -> BTreeSet<usize> {
+            names_in(&declared.value).iter().filter_map(|name| names.get(&name.text)).collect()
+        };
+        let mut waits_for: Vec<BTreeSet<usize>> = open.iter().map(named).collect();
+        let mut waited_for_by: Vec<Vec<usize>> = vec![Vec::new(); open.len()];
+        for (at, others) in waits_for.iter().enumerate() {
+            others.iter().for_each(|other| waited_for_by[*other].push(at));
+        }
+        let mut waiting: BTreeSet<usize> = (0..open.len()).collect();
+        let mut ready: BTreeSet<usize> = (0..open.len()).filter(|at| waits_for[*at].is_empty()).collect();
+        while let Some(next) = ready.pop_first().or_else(|| waiting.first().copied()) {
+            waiting.remove(&next);
+            let (_, declared) = open[next];
             let value = self.constant(declared);
+            self.constant_places.insert(declared.name.text.clone(), self.constants.len());
             self.constants.push((declared.name.text.clone(), value));
+            for at in &waited_for_by[next] {
+                waits_for[*at].remove(&next);
+                if waits_for[*at].is_empty() && waiting.contains(at) {
+                    ready.insert(*at);
+                }
+            }
         }
     }
 
@@ -222,6 +236,9 @@ impl Checker {
     }
 
     pub(super) fn signature(&mut self, function: &ast::Fn) -> Option<Signature> {
+        if !self.has_few_parameters(&function.name, function.params.len()) {
+            return None;
+        }
         let symbol = Symbol::Function(function.name.text.clone());
         self.once("parameter", function.params.iter().map(|parameter| &parameter.name));
         // All types are looked at before one that is broken ends it.
@@ -321,6 +338,13 @@ impl Checker {
             let Some(state) = self.state(item, declared) else { continue };
             let first_cell = cells_so_far;
             cells_so_far += state.cells;
+            if cells_so_far > CELLS_MAX {
+                let message = format!("the states have more than {CELLS_MAX} values together");
+                let error = Diagnostic::error(code::TOO_MUCH, message).at(state.span, "one too many");
+                self.report(error.help("give maps keys with fewer variants, or make fewer states"));
+                return;
+            }
+            self.state_places.insert(state.name.clone(), self.states.len());
             self.states.push(StateDef { first_cell, ..state });
         }
     }
@@ -372,10 +396,10 @@ impl Checker {
     /// Position of the state of that name.
     pub(super) fn state_named(&mut self, name: &ast::Name) -> Option<usize> {
         self.references.uses(name.span, Symbol::State(name.text.clone()));
-        let found = self.states.iter().position(|state| state.name == name.text);
+        let found = self.state_places.get(&name.text).copied();
         found.or_else(|| {
             let states = self.states.iter().map(|state| state.name.as_str());
-            let mut error = unknown("state", &name.text, name.span, states);
+            let mut error = self.unknown("state", &name.text, name.span, states);
             error.code = code::UNKNOWN_STATE;
             let declare = || format!("declare it with `state {}: …`", name.text);
             error.help = error.help.or_else(|| Some(declare()));

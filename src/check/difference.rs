@@ -5,7 +5,7 @@
 //! spaces have, rows by their labels, draws by the ranges that all rules together leave.
 
 use core::fmt;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::check::load::Loaded;
 use crate::model::rules::RowRules;
@@ -57,11 +57,35 @@ pub fn differences(old: &Loaded, new: &Loaded) -> Option<Vec<Difference>> {
     if old.space.meaning.digest() == new.space.meaning.digest() {
         return Some(Vec::new());
     }
-    let mut found = declarations(&old, &new);
+    let pairs = Pairs::of(old.space, new.space);
+    let mut found = declarations(&old, &new, &pairs);
     found.extend(order(&old, &new));
-    found.extend(rows(old.space, new.space));
-    found.extend(reaches(old.space, new.space));
+    found.extend(rows(old.space, new.space, &pairs));
+    found.extend(reaches(old.space, new.space, &pairs));
     Some(found)
+}
+
+/// The rows of two spaces by their labels.
+struct Pairs<'a> {
+    old: BTreeMap<&'a str, &'a Row>,
+    new: BTreeMap<&'a str, &'a Row>,
+}
+
+impl<'a> Pairs<'a> {
+    fn of(old: &'a Space, new: &'a Space) -> Pairs<'a> {
+        // Of rows with the same label the first counts.
+        let by_label =
+            |space: &'a Space| space.rows.iter().rev().map(|row| (row.label.as_str(), row)).collect();
+        Pairs { old: by_label(old), new: by_label(new) }
+    }
+
+    fn now(&self, row: &Row) -> Option<&'a Row> {
+        self.new.get(row.label.as_str()).copied()
+    }
+
+    fn before(&self, row: &Row) -> Option<&'a Row> {
+        self.old.get(row.label.as_str()).copied()
+    }
 }
 
 fn difference(change: Change, subject: impl Into<String>, detail: impl Into<String>) -> Difference {
@@ -96,7 +120,7 @@ impl<'a> Side<'a> {
 
 /// Differences between declarations: of rules by what they forbid where that can be said, of all others by what is
 /// written.
-fn declarations(old: &Side<'_>, new: &Side<'_>) -> Vec<Difference> {
+fn declarations(old: &Side<'_>, new: &Side<'_>, pairs: &Pairs<'_>) -> Vec<Difference> {
     let mut found = Vec::new();
     for (&title, text) in &old.texts {
         let Some(other) = new.texts.get(title) else {
@@ -106,7 +130,7 @@ fn declarations(old: &Side<'_>, new: &Side<'_>) -> Vec<Difference> {
         match (old.rule(title), new.rule(title)) {
             (Some(rule), Some(same)) => {
                 let texts = (text.as_str(), other.as_str());
-                found.extend(of_rule((old.space, rule), (new.space, same), title, texts));
+                found.extend(of_rule((old.space, rule), (new.space, same), title, texts, pairs));
             }
             _ if text != other => found.push(difference(Change::Changed, title, changed_lines(text, other))),
             _ => {}
@@ -156,6 +180,7 @@ fn of_rule(
     new: (&Space, usize),
     title: &str,
     (before, after): (&str, &str),
+    pairs: &Pairs<'_>,
 ) -> Vec<Difference> {
     let mut found = Vec::new();
     let (was_optional, is_optional) = (old.0.rules[old.1].optional, new.0.rules[new.1].optional);
@@ -169,7 +194,7 @@ fn of_rule(
     let mandatory = |text: &str| text.strip_prefix("optional ").unwrap_or(text).to_owned();
     let (before, after) = (mandatory(before), mandatory(after));
     let written = (before != after).then(|| changed_lines(&before, &after));
-    match (compared(old, new), written) {
+    match (compared(old, new, pairs), written) {
         (Some((change, detail)), None) => found.push(difference(change, title, detail)),
         (Some((change, detail)), Some(written)) => {
             found.push(difference(change, title, format!("{detail}; {written}")));
@@ -181,7 +206,11 @@ fn of_rule(
 }
 
 /// Whether a rule forbids more or less than before, by its moves or by what it leaves of each range.
-fn compared(old: (&Space, usize), new: (&Space, usize)) -> Option<(Change, String)> {
+fn compared(
+    old: (&Space, usize),
+    new: (&Space, usize),
+    pairs: &Pairs<'_>,
+) -> Option<(Change, String)> {
     let mut turns = Turns::default();
     if let (
         RuleBody::Moves { state, allowed: before, .. },
@@ -206,9 +235,10 @@ fn compared(old: (&Space, usize), new: (&Space, usize)) -> Option<(Change, Strin
             }
         }
     } else {
-        for row in old.0.rows.iter().filter(|row| row.rules.contains(&old.1)) {
-            let Some(other) = new.0.rows.iter().find(|other| other.label == row.label) else { continue };
-            let unbound = !other.rules.contains(&new.1);
+        let binds = |row: &Row, rule: usize| row.rules.binary_search(&rule).is_ok();
+        for row in old.0.rows.iter().filter(|row| binds(row, old.1)) {
+            let Some(other) = pairs.now(row) else { continue };
+            let unbound = !binds(other, new.1);
             if unbound {
                 turns.looser.push(format!("binds `{}` no longer", row.label));
                 continue;
@@ -218,9 +248,8 @@ fn compared(old: (&Space, usize), new: (&Space, usize)) -> Option<(Change, Strin
                 turns.judge(&before, &after, &road.name);
             }
         }
-        for row in new.0.rows.iter().filter(|row| row.rules.contains(&new.1)) {
-            let known = old.0.rows.iter().find(|other| other.label == row.label);
-            if known.is_some_and(|known| !known.rules.contains(&old.1)) {
+        for row in new.0.rows.iter().filter(|row| binds(row, new.1)) {
+            if pairs.before(row).is_some_and(|known| !binds(known, old.1)) {
                 turns.tighter.push(format!("binds `{}`", row.label));
             }
         }
@@ -254,12 +283,9 @@ impl Turns {
     /// The change as a whole, and its parts in words; `None` if there is no change.
     fn in_words(&self) -> Option<(Change, String)> {
         let shown = |parts: &[String]| {
-            let mut kept: Vec<&str> = Vec::new();
-            for part in parts {
-                if !kept.contains(&part.as_str()) {
-                    kept.push(part);
-                }
-            }
+            let mut seen: BTreeSet<&str> = BTreeSet::new();
+            let kept: Vec<&str> =
+                parts.iter().map(String::as_str).filter(|part| seen.insert(*part)).collect();
             match kept.len() {
                 0..=4 => kept.join("; "),
                 more => format!("{}; and {} more", kept[..4].join("; "), more - 4),
@@ -301,20 +327,18 @@ fn shared_roads<'a>(old: &'a Space, new: &'a Space) -> Vec<(&'a Road, &'a Road)>
     old.roads.iter().filter_map(same).collect()
 }
 
-fn rows(old: &Space, new: &Space) -> Vec<Difference> {
-    let index: BTreeMap<&str, usize> = new.rows.iter().map(|row| (row.label.as_str(), row.index)).collect();
-    let known: BTreeMap<&str, usize> = old.rows.iter().map(|row| (row.label.as_str(), row.index)).collect();
+fn rows(old: &Space, new: &Space, pairs: &Pairs<'_>) -> Vec<Difference> {
     let subject = |row: &Row| format!("row `{}`", row.label);
     let mut found = Vec::new();
     let mut moved = 0;
     for row in &old.rows {
-        match index.get(row.label.as_str()) {
+        match pairs.now(row) {
             None => found.push(difference(Change::Removed, subject(row), format!("it was {}", row.index))),
-            Some(now) if *now != row.index => moved += 1,
+            Some(now) if now.index != row.index => moved += 1,
             Some(_) => {}
         }
     }
-    let added = new.rows.iter().filter(|row| !known.contains_key(row.label.as_str()));
+    let added = new.rows.iter().filter(|row| pairs.before(row).is_none());
     found.extend(added.map(|row| difference(Change::Added, subject(row), format!("it is {}", row.index))));
     if moved > 0 {
         let detail = "a policy learned on the old table does not fit the new one";
@@ -324,12 +348,20 @@ fn rows(old: &Space, new: &Space) -> Vec<Difference> {
 }
 
 /// Differences in what all rules together leave of the ranges.
-fn reaches(old: &Space, new: &Space) -> Vec<Difference> {
+fn reaches(old: &Space, new: &Space, pairs: &Pairs<'_>) -> Vec<Difference> {
     let mut found: Vec<Difference> = Vec::new();
+    let mut told: BTreeSet<(Change, usize, String)> = BTreeSet::new();
+    let shared: Vec<(usize, usize, &Road)> = old
+        .roads
+        .iter()
+        .enumerate()
+        .filter_map(|(index, road)| {
+            Some((index, new.roads.iter().position(|known| known.name == road.name)?, road))
+        })
+        .collect();
     for row in &old.rows {
-        let Some(other) = new.rows.iter().find(|other| other.label == row.label) else { continue };
-        for (index, road) in old.roads.iter().enumerate() {
-            let Some(same) = new.roads.iter().position(|known| known.name == road.name) else { continue };
+        let Some(other) = pairs.now(row) else { continue };
+        for &(index, same, road) in &shared {
             let action = &old.actions[row.action].name;
             let mut turns = Turns::default();
             let ranges = |reach: &Reach| match reach {
@@ -338,9 +370,8 @@ fn reaches(old: &Space, new: &Space) -> Vec<Difference> {
             };
             turns.judge(&ranges(&row.roads[index]), &ranges(&other.roads[same]), &road.name);
             let Some((change, detail)) = turns.in_words() else { continue };
-            let difference = difference(change, format!("draws of `{action}`"), detail);
-            if !found.contains(&difference) {
-                found.push(difference);
+            if told.insert((change, row.action, detail.clone())) {
+                found.push(difference(change, format!("draws of `{action}`"), detail));
             }
         }
     }

@@ -1,12 +1,15 @@
 //! Expressions: every name found, every type and unit fitted. Operators are in `operator`.
 
+use std::collections::BTreeSet;
+
 use crate::check::checker::Checker;
+use crate::check::declaration::HEIGHT_MAX;
 use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::vocabulary::{Fact, Known, ROAD_LANES, Site, Word, WordFact, parts_of, thing_of, things};
-use crate::model::{EnumIndex, Type, code};
+use crate::model::{EnumIndex, StateDef, Type, code};
 use crate::syntax::ast::{Span, UnaryOp};
 use crate::syntax::{Diagnostic, ast, listed, nearest, one_of};
 use crate::units;
@@ -37,6 +40,9 @@ impl Place<'_> {
     }
 }
 
+/// Most enums that an error names where a variant may be meant of any of them.
+const OWNERS_NAMED_MAX: usize = 12;
+
 /// What a bare name stands for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Named {
@@ -53,8 +59,8 @@ impl Checker {
     /// What a bare name means: whichever of these comes first.
     fn named(&self, name: &str, place: &Place<'_>) -> Named {
         let local = || place.locals.iter().position(|(local, _)| local == name).map(Named::Local);
-        let constant = || self.constants.iter().position(|(known, _)| known == name).map(Named::Constant);
-        let state = || self.states.iter().position(|state| state.name == name && place.states);
+        let constant = || self.constant_places.get(name).copied().map(Named::Constant);
+        let state = || self.state_places.get(name).copied().filter(|_| place.states);
         let fact = || place.fact(name).map(Named::Fact);
         let found = local().or_else(constant).or_else(|| state().map(Named::State)).or_else(fact);
         found.unwrap_or(Named::Variant)
@@ -226,9 +232,7 @@ impl Checker {
         place: &Place<'_>,
         hint: Option<Type>,
     ) -> Option<Expr> {
-        let owners: Vec<usize> = (0..self.enums.len())
-            .filter(|of| self.enums[*of].variants.iter().any(|variant| variant == name))
-            .collect();
+        let owners = self.references.owners(name).to_vec();
         let wanted = match hint {
             Some(Type::Enum(of)) => Some(of.0),
             _ => None,
@@ -238,33 +242,25 @@ impl Checker {
             (_, [of]) => *of,
             (_, []) => {
                 self.note_broken(name, span, place);
-                let mut candidates: Vec<&str> = place.locals.iter().map(|(name, _)| name.as_str()).collect();
-                match wanted {
-                    Some(of) => candidates.extend(self.enums[of].variants.iter().map(String::as_str)),
-                    None => candidates
-                        .extend(self.enums.iter().flat_map(|e| e.variants.iter().map(String::as_str))),
-                }
-                candidates.extend(self.constants.iter().map(|(name, _)| name.as_str()));
-                if place.states {
-                    candidates.extend(self.states.iter().map(|state| state.name.as_str()));
-                }
-                let facts = place.site.facts().map(|fact| fact.name());
-                let words = place.site.word_facts().map(|fact| fact.name());
-                candidates.extend(facts.chain(words).filter(|name| !name.contains('.')));
                 let error = match self.lacking(name, place) {
                     Some(note) => {
                         let message = format!("`{name}` cannot be used here");
                         Diagnostic::error(code::NOT_HERE, message).at(span, "not in this place").note(note)
                     }
-                    None => unknown("name", name, span, candidates),
+                    None => self.unknown_name(name, span, place, wanted),
                 };
                 return self.reject(error);
             }
             (_, owners) => {
-                let enums: Vec<&str> = owners.iter().map(|of| self.enums[*of].name.as_str()).collect();
+                let named = owners.iter().take(OWNERS_NAMED_MAX);
+                let enums: Vec<&str> = named.map(|of| self.enums[*of].name.as_str()).collect();
+                let others = match owners.len() - enums.len() {
+                    0 => String::new(),
+                    others => format!(" and of {others} other enums"),
+                };
                 let error = Diagnostic::error(
                     code::AMBIGUOUS,
-                    format!("`{name}` is a variant of {}", listed(&enums)),
+                    format!("`{name}` is a variant of {}{others}", listed(&enums)),
                 );
                 let error = error.at(span, "which one is meant does not follow from here");
                 return self.reject(
@@ -275,6 +271,23 @@ impl Checker {
         let index = self.enums[of].variants.iter().position(|variant| variant == name)?;
         self.references.variant(&ast::Name::new(name, span), Some(of));
         Some(Expr { kind: ExprKind::Variant(EnumIndex(of), index), ty: Type::Enum(EnumIndex(of)), span })
+    }
+
+    /// The diagnostic for a bare name that stands for nothing; `wanted` is the enum of which a variant was wanted.
+    fn unknown_name(&self, name: &str, span: Span, place: &Place<'_>, wanted: Option<usize>) -> Diagnostic {
+        let locals = place.locals.iter().map(|(name, _)| name.as_str());
+        let enums = match wanted {
+            Some(of) => core::slice::from_ref(&self.enums[of]),
+            None => self.enums.as_slice(),
+        };
+        let variants = enums.iter().flat_map(|of| &of.variants).map(String::as_str);
+        let constants = self.constants.iter().map(|(name, _)| name.as_str());
+        let states = self.states.iter().filter(|_| place.states).map(|state| state.name.as_str());
+        let facts = place.site.facts().map(|fact| fact.name());
+        let words = place.site.word_facts().map(|fact| fact.name());
+        let of_engine = facts.chain(words).filter(|name| !name.contains('.'));
+        let candidates = locals.chain(variants).chain(constants).chain(states).chain(of_engine);
+        self.unknown("name", name, span, candidates)
     }
 
     /// Notes the name of a declaration that is itself broken, or that is not known in this place.
@@ -304,7 +317,7 @@ impl Checker {
         if Fact::from_name(name).is_some() && place.fact(name).is_none() {
             return Some(format!("`{name}` is known to the engine, but not in this place"));
         }
-        if place.states || !self.states.iter().any(|state| state.name == name) {
+        if place.states || !self.state_places.contains_key(name) {
             return None;
         }
         Some(match place.site {
@@ -391,7 +404,7 @@ impl Checker {
         let state = match &base.kind {
             ast::ExprKind::Name(name) => {
                 self.references.uses(base.span, Symbol::State(name.clone()));
-                self.states.iter().find(|state| place.states && state.name == *name).cloned()
+                self.state_places.get(name).copied().filter(|_| place.states)
             }
             _ => {
                 self.look_at(base, place, None);
@@ -409,7 +422,7 @@ impl Checker {
                             .at(base.span, "not in this place")
                             .note(note)
                     }
-                    None => unknown("map", name, base.span, maps()),
+                    None => self.unknown("map", name, base.span, maps()),
                 },
                 _ => Diagnostic::error(code::TYPE_MISMATCH, "only a state can have a key")
                     .at(base.span, "not a state"),
@@ -417,17 +430,19 @@ impl Checker {
             self.look_at(index, place, None);
             return self.reject(error);
         };
-        let Some(key_of) = state.key else {
+        let StateDef { ref name, key, ty, first_cell, span: declared_at, .. } = self.states[state];
+        let Some(key_of) = key else {
+            let message = format!("`{name}` is not a map");
             self.look_at(index, place, None);
-            let error = Diagnostic::error(code::TYPE_MISMATCH, format!("`{}` is not a map", state.name));
-            return self.reject(error.at(span, "takes no key").beside(state.span, "declared here"));
+            let error = Diagnostic::error(code::TYPE_MISMATCH, message);
+            return self.reject(error.at(span, "takes no key").beside(declared_at, "declared here"));
         };
         let key = self.typed(index, place, Type::Enum(key_of))?;
         let kind = match key.kind {
-            ExprKind::Variant(_, key) => ExprKind::Cell(state.first_cell + key),
-            _ => ExprKind::CellAt(state.first_cell, Box::new(key)),
+            ExprKind::Variant(_, key) => ExprKind::Cell(first_cell + key),
+            _ => ExprKind::CellAt(first_cell, Box::new(key)),
         };
-        Some(Expr { kind, ty: state.ty, span })
+        Some(Expr { kind, ty, span })
     }
 
     fn call(&mut self, call: &ast::Call, place: &Place<'_>) -> Option<Expr> {
@@ -444,7 +459,8 @@ impl Checker {
                 return self
                     .reject(error.at(call.span, "called here").help("make it a `fn` without parameters"));
             }
-            let error = unknown("function", &call.name.text, call.name.span, self.function_names.all());
+            let names = self.function_names.all();
+            let error = self.unknown("function", &call.name.text, call.name.span, names);
             return self.reject(error);
         };
         // A function whose own header is broken was reported there.
@@ -555,7 +571,7 @@ impl Checker {
         hint: Option<Type>,
         span: Span,
     ) -> Option<Expr> {
-        let mut taken: Vec<i64> = Vec::new();
+        let (mut taken, mut seen): (Vec<i64>, BTreeSet<i64>) = (Vec::new(), BTreeSet::new());
         let mut ty = hint;
         let mut sound = true;
         let mut chosen: Vec<(Vec<Expr>, Expr)> = Vec::new();
@@ -564,7 +580,7 @@ impl Checker {
             let before = taken.len();
             for pattern in &arm.patterns {
                 match pattern.text.parse::<i64>() {
-                    Ok(number) if !taken.contains(&number) => taken.push(number),
+                    Ok(number) if seen.insert(number) => taken.push(number),
                     Ok(_) => {}
                     Err(_) => {
                         sound = false;
@@ -607,12 +623,24 @@ impl Checker {
             let error = error.at(span, "missing: all other numbers");
             return self.reject(error.help("add `_ => …` for the rest"));
         };
-        Some(chosen.into_iter().rev().fold(rest, |rest, (numbers, body)| {
+        let too_large = || {
+            let error = Diagnostic::error(code::TOO_LARGE, "this `match` has too many arms")
+                .at(span, "each arm asks for the number again, after all arms before it");
+            error.help("pass the number to a function as a parameter, or make several functions of it")
+        };
+        if chosen.len().saturating_mul(subject.operations()) > HEIGHT_MAX as usize {
+            return self.reject(too_large());
+        }
+        let chain = chosen.into_iter().rev().fold(rest, |rest, (numbers, body)| {
             let ty = rest.ty;
             let is_one = ExprKind::InList(Box::new(subject.clone()), numbers);
             let subject = Box::new(Expr { kind: is_one, ty: Type::Bool, span: subject.span });
             Expr { kind: ExprKind::Match { subject, arm_of: vec![1, 0], arms: vec![body, rest] }, ty, span }
-        }))
+        });
+        if chain.height() > HEIGHT_MAX {
+            return self.reject(too_large());
+        }
+        Some(chain)
     }
 
     /// Notes which variants an arm takes, and reports the arm if it takes none.

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-use crate::check::checker::{Checked, Root, Runs};
+use crate::check::checker::{Checked, DIAGNOSTICS_MAX, Root, Runs};
 use crate::check::meaning::meaning;
 use crate::check::references::References;
 use crate::check::road::Maps;
@@ -141,7 +141,7 @@ pub fn load_with(root: &Path, read: &ReadFile<'_>, cache: &mut MapCache) -> Resu
     if has_scenario || has_policy || diagnostics.iter().any(Diagnostic::is_error) {
         remarks.clear();
     }
-    let (diagnostics, remarks) = (merged(diagnostics), merged(remarks));
+    let (diagnostics, remarks) = (as_many_as_help(merged(diagnostics)), as_many_as_help(merged(remarks)));
     let space = space.map(Arc::new);
     let runs = if has_scenario || has_policy { Runs::default() } else { runs };
     Ok(Loaded { sources, diagnostics, remarks, files, references, space, scenario, policy, runs })
@@ -166,6 +166,17 @@ fn merged(diagnostics: Vec<Diagnostic>) -> Vec<Diagnostic> {
         }
     }
     merged
+}
+
+/// The first diagnostics, and how many more there are.
+fn as_many_as_help(mut found: Vec<Diagnostic>) -> Vec<Diagnostic> {
+    if found.len() > DIAGNOSTICS_MAX {
+        let left = found.split_off(DIAGNOSTICS_MAX);
+        let message = format!("{} further mistakes are not listed", left.len());
+        let worst = left.iter().find(|one| one.is_error()).unwrap_or(&left[0]);
+        found.push(Diagnostic { severity: worst.severity, ..Diagnostic::error(worst.code, message) });
+    }
+    found
 }
 
 /// The files that a file uses, itself included, however far away. Nothing is checked.

@@ -11,6 +11,8 @@ use crate::syntax::{Diagnostic, listed, nearest};
 pub(super) struct Names {
     /// For each name its index among the declarations of the kind, and the span of the name.
     found: BTreeMap<String, (usize, Span)>,
+    /// The names as they were declared, which is the order of the indices of a kind.
+    by_index: Vec<String>,
 }
 
 impl Names {
@@ -33,6 +35,7 @@ impl Names {
             .help(help));
         }
         self.found.insert(name.text.clone(), (index, name.span));
+        self.by_index.push(name.text.clone());
         Ok(())
     }
 
@@ -42,7 +45,7 @@ impl Names {
 
     /// The name with that index.
     pub fn name(&self, index: usize) -> Option<&str> {
-        self.found.iter().find(|(_, (at, _))| *at == index).map(|(name, _)| name.as_str())
+        self.by_index.get(index).map(String::as_str)
     }
 
     pub fn all(&self) -> impl Iterator<Item = &str> {

@@ -81,7 +81,11 @@ pub struct References {
     notes: BTreeMap<Span, Occurrence>,
     /// The same once the checker is done, by the spans of names, in the order of files and texts.
     occurrences: Vec<Occurrence>,
-    pub(super) enums: Vec<EnumDef>,
+    enums: Vec<EnumDef>,
+    /// Positions in `enums`, by name.
+    enum_places: BTreeMap<String, usize>,
+    /// For each variant the enums that have it.
+    owners: BTreeMap<String, Vec<usize>>,
 }
 
 impl References {
@@ -168,14 +172,34 @@ impl References {
 
     /// The enum of that name.
     pub fn enum_named(&self, name: &str) -> Option<&EnumDef> {
-        self.enums.iter().find(|of| of.name == name)
+        self.enum_places.get(name).map(|of| &self.enums[*of])
+    }
+
+    /// The enums that have a variant, by index.
+    pub(super) fn owners(&self, variant: &str) -> &[usize] {
+        self.owners.get(variant).map(Vec::as_slice).unwrap_or_default()
+    }
+
+    /// Sets the enums of which types and variants are asked.
+    pub(super) fn set_enums(&mut self, enums: Vec<EnumDef>) {
+        self.enum_places.clear();
+        self.owners.clear();
+        for (of, declared) in enums.iter().enumerate() {
+            self.enum_places.entry(declared.name.clone()).or_insert(of);
+            for variant in &declared.variants {
+                let owners = self.owners.entry(variant.clone()).or_default();
+                if owners.last() != Some(&of) {
+                    owners.push(of);
+                }
+            }
+        }
+        self.enums = enums;
     }
 
     /// The type of that name.
     pub fn type_named(&self, name: &str) -> Option<Type> {
-        let index = || self.enums.iter().position(|of| of.name == name);
         let built_in = TYPES.iter().find(|(word, ..)| *word == name).map(|(_, ty, _)| *ty);
-        built_in.or_else(|| index().map(|index| Type::Enum(EnumIndex(index))))
+        built_in.or_else(|| self.enum_places.get(name).map(|index| Type::Enum(EnumIndex(*index))))
     }
 
     /// A type as an author writes it.
@@ -321,14 +345,13 @@ impl References {
 
     /// Notes a variant of an enum; without an enum, of the only one that has it.
     pub(super) fn variant(&mut self, name: &Name, of: Option<usize>) {
-        let enums = &self.enums;
-        let has = |of: &usize| enums[*of].variants.contains(&name.text);
-        let of = of.filter(has).or_else(|| {
-            let mut owners = (0..enums.len()).filter(has);
-            owners.next().filter(|_| owners.next().is_none())
+        let owners = self.owners(&name.text);
+        let of = of.filter(|of| owners.binary_search(of).is_ok()).or(match owners {
+            [only] => Some(*only),
+            _ => None,
         });
         if let Some(of) = of {
-            let symbol = Symbol::Variant(enums[of].name.clone(), name.text.clone());
+            let symbol = Symbol::Variant(self.enums[of].name.clone(), name.text.clone());
             self.uses(name.span, symbol);
         }
     }

@@ -1,17 +1,23 @@
 //! Rules: the actions that each rule binds, and its condition compiled for each of these actions.
 
+use std::collections::BTreeSet;
+
 use crate::check::checker::{Checker, docs};
 use crate::check::expression::Place;
 use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind};
+use crate::model::rules::states_read;
 use crate::model::vocabulary::{CHANGE, Known, Site, Then, Verb};
 use crate::model::{
     ActionDef, EffectDef, EnumIndex, Initial, RuleBinding, RuleBody, RuleDef, SetDef, Type, WordExpr, code,
 };
 use crate::syntax::ast::ItemKind;
 use crate::syntax::{Diagnostic, ast, listed};
+
+/// What a condition with a mistake counts as, operations: it costs time, too, for each action.
+const OPERATIONS_BROKEN: usize = 8;
 
 impl Checker {
     pub(super) fn rules(&mut self, items: &[&ast::Item]) -> Vec<RuleDef> {
@@ -62,17 +68,9 @@ impl Checker {
             site: during.map_or(Site::Rule, |_| Site::Change),
             ..Place::RULE
         };
-        let mut targets: Vec<usize> = Vec::new();
-        for name in on {
-            let found = self.targets(name);
-            if found.is_empty() {
-                self.look_at_condition(condition, &name.text);
-            }
-            for action in found {
-                if !targets.contains(&action) {
-                    targets.push(action);
-                }
-            }
+        let mut targets = self.all_targets(on);
+        for name in on.iter().filter(|name| !self.is_target(&name.text)).collect::<Vec<_>>() {
+            self.look_at_condition(condition, &name.text);
         }
         if on.is_empty() {
             targets = match during {
@@ -85,36 +83,24 @@ impl Checker {
         let lacking = self.lacking_parameters(&rule.name, &targets, condition);
         let mut bindings = Vec::new();
         for action in targets {
-            // A broken action was reported where it is declared.
-            let definition = self.actions[action].clone().filter(|_| !lacking.contains(&action));
+            // A broken action was reported where it is declared. A sound one is put back below.
+            let definition = match lacking.contains(&action) {
+                true => None,
+                false => self.actions[action].take(),
+            };
             let Some(definition) = definition else {
                 let name = self.action_names.name(action).unwrap_or_default().to_owned();
                 self.look_at_condition(condition, &name);
                 continue;
             };
-            let locals = locals(&definition);
-            let owner = Symbol::Action(definition.name.clone());
-            let spawns = definition.effects.iter().any(|effect| matches!(effect, EffectDef::Spawn(_)));
-            let place = Place { locals: &locals, owner: Some(&owner), ..site };
-            let Some(condition) = self.typed(condition, &place, Type::Bool) else { continue };
-            if during.is_some() && !self.changers().contains(&action) && !self.half_broken.contains(&action) {
-                let message = format!("no road user of `{}` changes lanes", definition.name);
-                let error = Diagnostic::error(code::NO_SPAWN, message).at(rule.name.span, "never asked");
-                let help = "bind actions whose spawn has `then` or overtakes in its own lane";
-                self.report(error.beside(definition.span, "changes no lanes").help(help));
-                continue;
+            let is_whole = !self.half_broken.contains(&action);
+            let found = self.binding((rule, during), condition, (&definition, is_whole), site);
+            self.actions[action] = Some(definition);
+            self.compiled += found.as_ref().map_or(OPERATIONS_BROKEN, Expr::operations);
+            bindings.extend(found.map(|condition| RuleBinding { action, condition }));
+            if self.has_compiled_too_much(rule.name.span) {
+                return None;
             }
-            self.warn_of_later(rule, &definition, &condition, during);
-            if condition.known() == Known::Spawn && !spawns && !self.half_broken.contains(&action) {
-                let message =
-                    format!("`{}` asks about a spawn, and `{}` has none", rule.name.text, definition.name);
-                let error = Diagnostic::error(code::NO_SPAWN, message).at(condition.span, "needs a spawn");
-                self.report(
-                    error.beside(definition.span, "spawns nothing").help("name other actions after `on`"),
-                );
-                continue;
-            }
-            bindings.push(RuleBinding { action, condition });
         }
         if bindings.is_empty() && self.start_condition(&rule.body).is_none() {
             let help = "a rule without `on` binds the actions that spawn, or that set a state it names";
@@ -123,24 +109,41 @@ impl Checker {
         Some(if during.is_some() { RuleBody::During(bindings) } else { RuleBody::Holds(bindings) })
     }
 
+    /// The condition of a rule, compiled for one of its actions; `None` if it cannot bind that.
+    fn binding(
+        &mut self,
+        (rule, during): (&ast::Rule, Option<&ast::Name>),
+        condition: &ast::Expr,
+        (definition, is_whole): (&ActionDef, bool),
+        site: Place<'_>,
+    ) -> Option<Expr> {
+        let locals = locals(definition);
+        let owner = Symbol::Action(definition.name.clone());
+        let spawns = definition.effects.iter().any(|effect| matches!(effect, EffectDef::Spawn(_)));
+        let place = Place { locals: &locals, owner: Some(&owner), ..site };
+        let condition = self.typed(condition, &place, Type::Bool)?;
+        if during.is_some() && !changes_lanes(definition) && is_whole {
+            let message = format!("no road user of `{}` changes lanes", definition.name);
+            let error = Diagnostic::error(code::NO_SPAWN, message).at(rule.name.span, "never asked");
+            let help = "bind actions whose spawn has `then` or overtakes in its own lane";
+            return self.reject(error.beside(definition.span, "changes no lanes").help(help));
+        }
+        self.warn_of_later(rule, definition, &condition, during);
+        if condition.known() == Known::Spawn && !spawns && is_whole {
+            let message =
+                format!("`{}` asks about a spawn, and `{}` has none", rule.name.text, definition.name);
+            let error = Diagnostic::error(code::NO_SPAWN, message).at(condition.span, "needs a spawn");
+            return self.reject(
+                error.beside(definition.span, "spawns nothing").help("name other actions after `on`"),
+            );
+        }
+        Some(condition)
+    }
+
     /// The actions whose road users may be told to change lanes.
     fn changers(&self) -> Vec<usize> {
-        let may_be = |then: &WordExpr<Then>| match then {
-            WordExpr::Fixed(word) => *word == Then::Change,
-            WordExpr::Of(_, words) => words.contains(&Then::Change),
-        };
-        let overtakes = |verb: &WordExpr<Verb>| match verb {
-            WordExpr::Fixed(word) => *word == Verb::Overtake,
-            WordExpr::Of(_, words) => words.contains(&Verb::Overtake),
-        };
-        let changes = |action: &ActionDef| {
-            action.effects.iter().any(|effect| match effect {
-                EffectDef::Spawn(spawn) => may_be(&spawn.then) || overtakes(&spawn.verb),
-                EffectDef::Set(_) => false,
-            })
-        };
         let all = self.actions.iter().enumerate();
-        all.filter(|(_, action)| action.as_ref().is_some_and(changes)).map(|(index, _)| index).collect()
+        all.filter(|(_, action)| action.as_ref().is_some_and(changes_lanes)).map(|(index, _)| index).collect()
     }
 
     /// Warns of a rule that ties a later lane change to the moment of the draw.
@@ -206,11 +209,12 @@ impl Checker {
     /// the time, binds all actions.
     fn targets_of_global(&mut self, rule: &ast::Rule, condition: &ast::Expr) -> Option<Vec<usize>> {
         let named = names_in(condition);
-        let parameter = self.actions.iter().flatten().find_map(|action| {
+        let names_some = named.iter().any(|name| self.parameter_names.contains(&name.text));
+        let parameter = self.actions.iter().flatten().filter(|_| names_some).find_map(|action| {
             let found = action.parameters.iter().find(|p| named.iter().any(|name| name.text == *p.name))?;
             Some((found.name.clone(), action.name.clone()))
         });
-        let is_state = |name: &str| self.states.iter().any(|state| state.name == name);
+        let is_state = |name: &str| self.state_places.contains_key(name);
         if let Some((parameter, action)) = parameter.filter(|(name, _)| !is_state(name)) {
             self.look_at(condition, &Place::RULE, Some(Type::Bool));
             let named_at = named.iter().find(|name| name.text == *parameter).map(|name| name.span)?;
@@ -220,20 +224,19 @@ impl Checker {
             return self.reject(error.help(format!("write `rule {} on {action}: …`", rule.name.text)));
         }
         let compiled = self.typed(condition, &Place::RULE, Type::Bool)?;
+        let read: BTreeSet<usize> = states_read(&compiled, &self.states).into_iter().collect();
+        let (known, reads_memory) = (compiled.known(), compiled.reads_memory());
         let binds = |action: &ActionDef| {
             action.effects.iter().any(|effect| match effect {
-                EffectDef::Spawn(_) => compiled.known() == Known::Spawn,
+                EffectDef::Spawn(_) => known == Known::Spawn,
                 // Where nothing spawns, nothing asks about a spawn.
-                EffectDef::Set(set) => {
-                    compiled.known() != Known::Spawn && reads_state(&compiled, &self.states[set.state])
-                }
+                EffectDef::Set(set) => known != Known::Spawn && read.contains(&set.state),
             })
         };
-        let each_step = compiled.known() != Known::Spawn
-            && self.each_step.iter().any(|set| reads_state(&compiled, &self.states[set.state]));
+        let each_step = known != Known::Spawn && self.each_step.iter().any(|set| read.contains(&set.state));
         // What time may break has to be kept by every action.
         let timed = compiled.is_known_at_start() && compiled.asks_the_world();
-        let open = each_step || timed || compiled.known() != Known::Spawn && !compiled.reads_memory();
+        let open = each_step || timed || known != Known::Spawn && !reads_memory;
         let all = self.actions.iter().enumerate();
         let bound = all.filter(|(index, a)| {
             a.as_ref().is_some_and(|a| open || binds(a) || self.half_broken.contains(index))
@@ -248,15 +251,15 @@ impl Checker {
         rule: &ast::Name,
         targets: &[usize],
         condition: &ast::Expr,
-    ) -> Vec<usize> {
-        let mut lacking = Vec::new();
+    ) -> BTreeSet<usize> {
+        let mut lacking = BTreeSet::new();
         for name in names_in(condition) {
             let is_parameter =
                 |action: &ActionDef| action.parameters.iter().any(|parameter| *parameter.name == *name.text);
-            let known_elsewhere = self.states.iter().any(|state| state.name == name.text)
-                || self.constants.iter().any(|(constant, _)| *constant == name.text)
-                || self.enums.iter().any(|e| e.variants.contains(&name.text));
-            if known_elsewhere || !self.actions.iter().flatten().any(is_parameter) {
+            let known_elsewhere = self.state_places.contains_key(&name.text)
+                || self.constant_places.contains_key(&name.text)
+                || !self.references.owners(&name.text).is_empty();
+            if known_elsewhere || !self.parameter_names.contains(&name.text) {
                 continue;
             }
             let without: Vec<usize> = targets
@@ -402,6 +405,22 @@ impl Checker {
     }
 }
 
+/// Whether a road user of an action may be told to change lanes.
+fn changes_lanes(action: &ActionDef) -> bool {
+    let may_be = |then: &WordExpr<Then>| match then {
+        WordExpr::Fixed(word) => *word == Then::Change,
+        WordExpr::Of(_, words) => words.contains(&Then::Change),
+    };
+    let overtakes = |verb: &WordExpr<Verb>| match verb {
+        WordExpr::Fixed(word) => *word == Verb::Overtake,
+        WordExpr::Of(_, words) => words.contains(&Verb::Overtake),
+    };
+    action.effects.iter().any(|effect| match effect {
+        EffectDef::Spawn(spawn) => may_be(&spawn.then) || overtakes(&spawn.verb),
+        EffectDef::Set(_) => false,
+    })
+}
+
 /// Another variant than `value`, if there is one.
 fn first_other<'a>(variants: &'a [String], value: &'a str) -> &'a str {
     variants.iter().map(String::as_str).find(|other| *other != value).unwrap_or(value)
@@ -410,14 +429,6 @@ fn first_other<'a>(variants: &'a [String], value: &'a str) -> &'a str {
 /// The parameters of an action, as an expression sees them.
 pub(super) fn locals(action: &ActionDef) -> Vec<(String, Type)> {
     action.parameters.iter().map(|parameter| (parameter.name.to_string(), parameter.ty)).collect()
-}
-
-fn reads_state(condition: &Expr, state: &crate::model::StateDef) -> bool {
-    condition.any(|kind| match kind {
-        ExprKind::Cell(cell) => (state.first_cell..state.first_cell + state.cells).contains(cell),
-        ExprKind::CellAt(first, _) => *first == state.first_cell,
-        _ => false,
-    })
 }
 
 /// Every bare name in an expression, in order.

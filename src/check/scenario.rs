@@ -445,17 +445,15 @@ impl<'a> Reader<'a> {
             return self.reject(error.beside(axis.span, "declared here"));
         }
         let values: Vec<Value> = values.into_iter().collect::<Option<_>>()?;
-        let same = |row: &&Row| {
-            row.action == action && row.axes.iter().zip(&values).all(|((_, axis), value)| axis == value)
-        };
-        let row = space.rows.iter().find(same);
+        let same =
+            |row: &&Row| row.axes.iter().zip(&values).all(|((_, axis), value)| axis == value);
+        let row = space.rows_of(action).iter().find(same);
         if row.is_none() {
             let message = format!("`{}` has no such row", call.name.text);
             let error = Diagnostic::error(code::NO_SUCH_ROW, message)
                 .at(call.span, "excluded by a `where` or an `in`");
             let error = error.beside(space.actions[action].span, "declared here");
-            let labels: Vec<&str> =
-                space.rows.iter().filter(|row| row.action == action).map(|row| row.label.as_str()).collect();
+            let labels: Vec<&str> = space.rows_of(action).iter().map(|row| row.label.as_str()).collect();
             self.report(match labels.len() {
                 1..=6 => error.help(format!("there is {}", listed(&labels))),
                 _ => error.help("`avastra table FILE` lists the rows"),

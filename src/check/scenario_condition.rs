@@ -30,7 +30,9 @@ pub(super) fn condition(space: &Space, written: &ast::Expr) -> Result<Expr, Vec<
         functions: space.functions.clone(),
         ..Checker::default()
     };
-    checker.references.enums = space.enums.clone();
+    let states = space.states.iter().enumerate();
+    checker.state_places = states.map(|(index, state)| (state.name.clone(), index)).collect();
+    checker.references.set_enums(space.enums.clone());
     let place = Place { states: true, site: Site::Trigger, ..Place::default() };
     checker.typed(written, &place, Type::Bool).ok_or(checker.diagnostics)
 }

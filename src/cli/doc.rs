@@ -1,6 +1,7 @@
 //! `avastra doc`: a space as Markdown, from its documentation comments and from what was proved about it.
 
 use core::fmt::Write;
+use std::collections::BTreeSet;
 
 use crate::model::{
     ActionDef, Domain, Initial, Interval, Parameter, Reach, RuleBody, RuleDef, Space, StateDef, Type, Value,
@@ -101,11 +102,10 @@ fn begins(space: &Space, state: &StateDef) -> String {
 }
 
 fn action_section(text: &mut String, space: &Space, index: usize, action: &ActionDef) {
-    let rows: Vec<usize> = space.rows.iter().filter(|row| row.action == index).map(|row| row.index).collect();
-    let numbers = match rows.as_slice() {
+    let numbers = match space.rows_of(index) {
         [] => "no rows".to_owned(),
-        [only] => format!("row {only}"),
-        [first, .., last] => format!("rows {first} to {last}"),
+        [only] => format!("row {}", only.index),
+        [first, .., last] => format!("rows {} to {}", first.index, last.index),
     };
     let _ = write!(text, "### `{}` ({numbers})\n\n{}", action.name, paragraph(&action.docs));
     if action.parameters.is_empty() {
@@ -160,7 +160,7 @@ fn ranges(space: &Space, action: usize, parameter: &Parameter) -> String {
 /// What the rules leave of a parameter's range on a road, over all rows of its action that can run
 /// there; `None` if none can, or the parameter has no range.
 pub fn range_on(space: &Space, action: usize, parameter: &Parameter, road: usize) -> Option<Interval> {
-    let reaches = space.rows.iter().filter(|row| row.action == action).map(|row| &row.roads[road]);
+    let reaches = space.rows_of(action).iter().map(|row| &row.roads[road]);
     let kept = reaches.filter_map(|reach| match reach {
         Reach::Open(ranges) => {
             ranges.iter().find(|(name, _)| *name == parameter.name).map(|(_, interval)| *interval)
@@ -174,14 +174,20 @@ pub fn range_on(space: &Space, action: usize, parameter: &Parameter, road: usize
 fn occurring(space: &Space, action: usize, parameter: &Parameter) -> Domain {
     match &parameter.domain {
         Domain::Values(values) if parameter.axis => {
-            let rows = || space.rows.iter().filter(|row| row.action == action);
-            let has_row = |value: &&Value| {
-                let mut axes = rows().flat_map(|row| &row.axes);
-                axes.any(|(name, found)| *name == parameter.name && found == *value)
-            };
-            Domain::Values(values.iter().filter(has_row).copied().collect())
+            let axes = space.rows_of(action).iter().flat_map(|row| &row.axes);
+            let of_parameter = axes.filter(|(name, _)| *name == parameter.name);
+            let found: BTreeSet<u64> = of_parameter.map(|(_, value)| sign_of(*value)).collect();
+            Domain::Values(values.iter().filter(|value| found.contains(&sign_of(**value))).copied().collect())
         }
         domain => domain.clone(),
+    }
+}
+
+/// A number that tells the values of one parameter apart.
+fn sign_of(value: Value) -> u64 {
+    match value {
+        Value::Number(number) => number.to_bits(),
+        Value::Bool(_) | Value::Variant(..) => value.variant() as u64,
     }
 }
 

@@ -26,6 +26,8 @@ pub const DIGEST: &str = "AV0110";
 pub const UNUSED: &str = "AV0111";
 /// An `override` of nothing.
 pub const OVERRIDE: &str = "AV0112";
+/// A space that is too large to be checked.
+pub const TOO_MUCH: &str = "AV0113";
 
 // Types and units.
 

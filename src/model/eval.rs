@@ -3,6 +3,7 @@
 //! Evaluation cannot fail: the checker has resolved names and types, functions cannot recurse, and what has no
 //! value (a division by 0, a number too large) is NaN, which satisfies no comparison but `!=`.
 
+use crate::model::effort;
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::space::{BodyWord, COUNTED, FnDef, RoadFacts, Space, WordExpr};
 use crate::model::value::{Memory, Value};
@@ -126,6 +127,7 @@ impl<'a> Facts<'a> {
 
 /// The value of an expression.
 pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
+    effort::spend(1);
     let value = |expr: &Expr| evaluate(expr, functions, facts);
     match &expr.kind {
         ExprKind::Bool(truth) => Value::Bool(*truth),

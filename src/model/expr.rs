@@ -108,6 +108,13 @@ impl Expr {
         }
     }
 
+    /// How many operations, names and literals it is made of; those of called functions do not count.
+    pub fn operations(&self) -> usize {
+        let mut count = 0;
+        self.walk(&mut |_| count += 1);
+        count
+    }
+
     /// How deep its parts stand in one another.
     pub fn height(&self) -> u32 {
         let mut deepest = 0;

@@ -1,5 +1,6 @@
 //! How the memory begins and how actions change it.
 
+use crate::model::effort;
 use crate::model::eval::{Facts, evaluate};
 use crate::model::expr::ExprKind;
 use crate::model::rules::RulesInForce;
@@ -37,20 +38,35 @@ impl Space {
         count_max: usize,
     ) -> (Vec<Memory>, bool) {
         let begun = self.initial_memory(0);
-        let (mut memories, mut are_all) = (vec![begun], true);
-        for cell in self.open_cells() {
-            let values = self.drawn_values(self.state_of(cell).ty);
-            let with = |memory: &Memory| values.iter().map(|(_, value)| memory.with(cell, *value)).collect();
-            let mut longer: Vec<Memory> = memories.iter().flat_map::<Vec<Memory>, _>(with).collect();
-            are_all &= longer.len() <= count_max;
-            longer.truncate(count_max);
-            memories = longer;
-        }
+        let open: Vec<(usize, Vec<(u32, Value)>)> =
+            self.open_cells().into_iter().map(|cell| (cell, self.drawn_values(self.state_of(cell).ty))).collect();
+        // The memories are numbered, the last cell varying fastest: none is made beyond those that are asked for.
+        let all = self.start_count();
+        let are_all = all <= count_max;
+        let numbered = |number: usize| {
+            effort::spend(begun.cells.len());
+            let (mut left, mut memory) = (number, begun.clone());
+            for (cell, values) in open.iter().rev() {
+                memory.cells[*cell] = values[left % values.len()].1;
+                left /= values.len();
+            }
+            memory
+        };
+        let mut memories: Vec<Memory> = (0..all.min(count_max)).map(numbered).collect();
         memories.retain(|memory| self.broken_start(memory, &road.facts, rules).is_none());
         if memories.is_empty() {
             memories.extend(self.memory_at_start(road, rules, 0));
         }
         (memories, are_all)
+    }
+
+    /// The number of memories with which an episode may begin, before any rule; as many as can be counted, if there are
+    /// more.
+    pub(crate) fn start_count(&self) -> usize {
+        let open = self.open_cells();
+        effort::spend(open.len());
+        let counts = open.into_iter().map(|cell| self.drawn_values(self.state_of(cell).ty).len());
+        counts.fold(1, usize::saturating_mul)
     }
 
     /// A state by name.
@@ -97,6 +113,7 @@ impl Space {
 
     /// The memory after a step with this action and these parameter values.
     pub(crate) fn memory_after(&self, action: usize, locals: &[Value], before: &Memory) -> Memory {
+        effort::spend(before.cells.len());
         let mut after = before.clone();
         self.sets(Some(action)).for_each(|set| self.change(&mut after, set, locals));
         after
@@ -114,6 +131,7 @@ impl Space {
         if self.each_step.is_empty() {
             return before.clone();
         }
+        effort::spend(before.cells.len());
         let mut after = before.clone();
         self.sets(None).for_each(|set| self.change(&mut after, set, &[]));
         let is_broken = |rule: usize| {
@@ -129,6 +147,7 @@ impl Space {
 
     /// Whether the effects of every step may set a cell.
     pub(crate) fn may_set_each_step(&self, cell: usize) -> bool {
+        effort::spend(self.each_step.len());
         self.sets(None).any(|set| self.sets_cell(set, cell))
     }
 
@@ -146,6 +165,7 @@ impl Space {
         let value = evaluate(&set.value, &self.functions, &facts);
         let key = set.key.as_ref().map(|key| evaluate(key, &self.functions, &facts).variant());
         let state = &self.states[set.state];
+        effort::spend(key.map_or(state.cells, |_| 1));
         match key {
             Some(key) => memory.cells[state.first_cell + key] = value,
             None => memory.cells[state.first_cell..][..state.cells].fill(value),

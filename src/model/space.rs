@@ -411,10 +411,17 @@ impl Space {
         of_action.chain(&self.each_step)
     }
 
+    /// The rows of an action: rows are numbered in the order of the actions.
+    pub fn rows_of(&self, action: usize) -> &[Row] {
+        let first = self.rows.partition_point(|row| row.action < action);
+        let end = self.rows.partition_point(|row| row.action <= action);
+        &self.rows[first..end]
+    }
+
     /// A cell of the memory as the language spells it: `time`, `sky[Rain]`.
     pub fn cell_name(&self, cell: usize) -> String {
-        let found = self.states.iter().find_map(|state| Some((state, state.position_of(cell)?)));
-        let (state, position) = found.expect("every cell belongs to a state");
+        let state = self.state_of(cell);
+        let position = cell - state.first_cell;
         match state.key {
             None => state.name.clone(),
             Some(of) => format!("{}[{}]", state.name, self.enums[of.0].variants[position]),

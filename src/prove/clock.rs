@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use crate::model::{Reach, Row, RuleBody, RuleDef, RulesInForce, Space, Type, Value, code};
+use crate::model::{Reach, Row, RuleBody, RuleDef, RulesInForce, Space, Type, Value, code, effort};
 use crate::prove::enclose::Values;
 use crate::prove::reach::{declared, numbers};
 use crate::syntax::{Diagnostic, listed};
@@ -25,8 +25,12 @@ struct Graph<'a> {
 /// no move enables.
 pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
-    for rule in &space.rules {
-        let Some(graph) = graph(space, rule) else { continue };
+    let begins = begins(space);
+    for (index, rule) in space.rules.iter().enumerate() {
+        if effort::is_spent() {
+            break;
+        }
+        let Some(graph) = graph(space, index, &begins) else { continue };
         let RuleBody::Moves { state, cell, .. } = &rule.body else { continue };
         let moved = space.cell_name(*cell);
         let state = &space.states[*state];
@@ -73,13 +77,13 @@ pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
 /// The shortest sequence of rows that brings a state from one value to another under a transition rule;
 /// empty if there is none, or if both values are the same.
 pub(crate) fn shortest_way<'a>(space: &'a Space, rule: &'a RuleDef, from: Value, to: Value) -> Vec<&'a Row> {
-    let Some(graph) = graph(space, rule) else { return Vec::new() };
+    let Some(graph) = graph_of(space, rule) else { return Vec::new() };
     graph.way(from.variant(), to.variant()).into_iter().map(|index| graph.rows[index].0).collect()
 }
 
 /// The rows that a transition rule allows from that value. Only rows that always set the same value count.
 pub(crate) fn next_rows<'a>(space: &'a Space, rule: &'a RuleDef, from: Value) -> Vec<&'a Row> {
-    let Some(graph) = graph(space, rule) else { return Vec::new() };
+    let Some(graph) = graph_of(space, rule) else { return Vec::new() };
     let allowed =
         |sets: u128| sets.is_power_of_two() && graph.allowed[from.variant()][sets.trailing_zeros() as usize];
     graph.rows.iter().filter(|(_, sets)| allowed(*sets)).map(|(row, _)| *row).collect()
@@ -87,48 +91,69 @@ pub(crate) fn next_rows<'a>(space: &'a Space, rule: &'a RuleDef, from: Value) ->
 
 /// Whether a transition rule forbids a row wherever the state has one of these values (bits).
 pub(crate) fn forbids(space: &Space, rule: &RuleDef, row: &Row, from: u128) -> bool {
-    let Some(graph) = graph(space, rule) else { return false };
+    let Some(graph) = graph_of(space, rule) else { return false };
     let sets = graph.rows.iter().find(|(other, _)| other.index == row.index).map_or(0, |(_, sets)| *sets);
     sets != 0 && !bits(from).any(|from| bits(sets).any(|to| graph.allowed[from][to]))
 }
 
-fn graph<'a>(space: &'a Space, rule: &'a RuleDef) -> Option<Graph<'a>> {
-    let RuleBody::Moves { cell, allowed, .. } = &rule.body else { return None };
+/// The graph of a rule that is looked at alone.
+fn graph_of<'a>(space: &'a Space, rule: &'a RuleDef) -> Option<Graph<'a>> {
     let index = space.rules.iter().position(|known| known.name == rule.name)?;
-    let begin = begin(space, *cell).unwrap_or(u128::MAX >> (128 - allowed.len()));
-    let rows = space.rows.iter().filter(|row| row.rules.contains(&index)).map(|row| {
-        let after = space.cells_after(row.action, &declared(space, row), &space.cells_unknown());
+    graph(space, index, &begins(space))
+}
+
+fn graph<'a>(space: &'a Space, index: usize, begins: &[Option<u128>]) -> Option<Graph<'a>> {
+    let RuleBody::Moves { cell, allowed, actions, .. } = &space.rules[index].body else { return None };
+    let begin = begins[*cell].unwrap_or(u128::MAX >> (128 - allowed.len()));
+    let bound = actions.iter().flat_map(|action| space.rows_of(*action));
+    let rows = bound.filter(|row| row.rules.binary_search(&index).is_ok()).take_while(|_| !effort::is_spent());
+    let unknown = space.cells_unknown();
+    let rows = rows.map(|row| {
+        let after = space.cells_after(row.action, &declared(space, row), &unknown);
         match after[*cell] {
             Values::Variants(set) => (row, set),
             Values::Truth { .. } | Values::Number(_) => (row, 0),
         }
     });
-    let waits = match space.cells_after_wait(&space.cells_unknown())[*cell] {
+    let rows = rows.collect();
+    let waits = match space.cells_after_wait(&unknown)[*cell] {
         Values::Variants(set) if space.may_set_each_step(*cell) => set,
         Values::Variants(_) | Values::Truth { .. } | Values::Number(_) => 0,
     };
-    Some(Graph { allowed, rows: rows.collect(), waits, begin })
+    Some(Graph { allowed, rows, waits, begin })
 }
 
-/// The values with which a cell may begin on some road, as bits; `None` if there are too many starts to look at.
-fn begin(space: &Space, cell: usize) -> Option<u128> {
-    let in_force = RulesInForce::by_default(space);
-    let is_drawn = space.open_cells().contains(&cell);
-    let mut begin = 0;
-    for road in &space.roads {
-        let (memories, are_all) = space.initial_memories(road, &in_force, STARTS_MAX);
-        // A fixed cell has one value, however many the others have.
-        if !are_all && is_drawn {
-            return None;
-        }
-        begin |= memories.iter().fold(0, |all, memory| all | 1 << memory.cells()[cell].variant());
+/// For each cell the values with which it may begin on some road, as bits; `None` if there are too many starts to look
+/// at.
+fn begins(space: &Space) -> Vec<Option<u128>> {
+    let mut begins: Vec<Option<u128>> = vec![None; space.states.iter().map(|state| state.cells).sum()];
+    // Only transition rules ask for them.
+    if !space.rules.iter().any(|rule| matches!(rule.body, RuleBody::Moves { .. })) {
+        return begins;
     }
-    (begin != 0).then_some(begin)
+    let in_force = RulesInForce::by_default(space);
+    let is_few = space.start_count() <= STARTS_MAX;
+    // A fixed cell has one value, however many the others have.
+    let count_max = if is_few { STARTS_MAX } else { 1 };
+    for road in &space.roads {
+        for memory in space.initial_memories(road, &in_force, count_max).0 {
+            effort::spend(begins.len());
+            for (begin, value) in begins.iter_mut().zip(memory.cells()) {
+                *begin = Some(begin.unwrap_or(0) | 1 << value.variant());
+            }
+        }
+    }
+    if !is_few {
+        space.open_cells().into_iter().for_each(|cell| begins[cell] = None);
+    }
+    begins
 }
 
 /// The rows, by number, that a transition rule allows in no state which it lets an episode come to.
 pub(super) fn never_enabled(space: &Space) -> Vec<usize> {
-    let graphs = space.rules.iter().filter_map(|rule| graph(space, rule));
+    let begins = begins(space);
+    let rules = (0..space.rules.len()).take_while(|_| !effort::is_spent());
+    let graphs = rules.filter_map(|rule| graph(space, rule, &begins));
     graphs.flat_map(|graph| graph.never_enabled()).map(|row| row.index).collect()
 }
 
@@ -149,6 +174,7 @@ impl<'a> Graph<'a> {
         let mut reached = self.begin;
         loop {
             let sets = self.rows.iter().fold(self.waits, |all, (_, sets)| all | sets);
+            effort::spend(self.rows.len() + (reached.count_ones() * sets.count_ones()) as usize);
             let next = bits(reached)
                 .flat_map(|from| bits(sets).filter(move |to| self.allowed[from][*to]))
                 .fold(reached, |all, to| all | 1 << to);

@@ -2,7 +2,7 @@
 
 use crate::model::expr::Comparison;
 use crate::model::rules::RowRules;
-use crate::model::{Domain, End, Interval, Parameter, Reach, RulesInForce, Space, Type, code};
+use crate::model::{Domain, End, Interval, Parameter, Reach, RulesInForce, Space, Type, code, effort};
 use crate::syntax::{Diagnostic, listed};
 use crate::units::Rational;
 
@@ -13,7 +13,11 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut found: Vec<Cut<'_>> = Vec::new();
     for row in &space.rows {
         for (road, reach) in space.roads.iter().zip(&row.roads) {
+            if effort::is_spent() {
+                break;
+            }
             let Reach::Open(ranges) = reach else { continue };
+            effort::spend(ranges.len() * (1 + found.len()));
             for (name, kept) in ranges {
                 let action = &space.actions[row.action];
                 let parameter = action.parameters.iter().find(|parameter| parameter.name == *name);
@@ -84,6 +88,7 @@ fn kept_percent(domain: &Domain, kept: &Interval) -> Option<f64> {
 
 /// The rules in force that bound the parameter; none if any rule sets it by an equality.
 fn cutting_rules(space: &Space, in_force: &RulesInForce, action: usize, parameter: &Parameter) -> Vec<usize> {
+    effort::spend(space.bounds[action].len());
     let local = space.actions[action].parameters.iter().position(|known| known.name == parameter.name);
     let on_it = || space.bounds[action].iter().filter(|bound| Some(bound.local) == local);
     if on_it().any(|bound| bound.op == Comparison::Equal) {

@@ -3,6 +3,7 @@
 //! The static counterpart of `eval`, over exact numbers. It over-approximates, so "never true" is a
 //! proof and "may be true" is not.
 
+use crate::model::effort;
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::vocabulary::Fact;
 use crate::model::{
@@ -97,6 +98,7 @@ impl Values {
 
 /// All values that the expression may have.
 pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
+    effort::spend(1);
     let values = |expr: &Expr| enclose(expr, known);
     match &expr.kind {
         ExprKind::Bool(truth) => Values::truth(*truth),
@@ -105,7 +107,9 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
         ExprKind::Local(index) => known.locals[*index],
         ExprKind::Cell(cell) => known.cells[*cell],
         ExprKind::CellAt(first, key) => {
-            let chosen = positions(values(key).variants()).map(|key| known.cells[first + key]);
+            let keys = values(key).variants();
+            effort::spend(keys.count_ones() as usize);
+            let chosen = positions(keys).map(|key| known.cells[first + key]);
             chosen.reduce(Values::union).unwrap_or(Values::Variants(0))
         }
         ExprKind::Fact(fact) => match known.case.and_then(|case| case.number(*fact)) {
@@ -162,7 +166,16 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
         },
         ExprKind::IsBody(..) => Values::UNKNOWN_TRUTH,
         ExprKind::Match { subject, arm_of, arms } => {
-            let chosen = positions(values(subject).variants()).map(|variant| values(&arms[arm_of[variant]]));
+            // Each arm once, however many variants take it: `match`es in one another would multiply.
+            let mut taken: u128 = 0;
+            let is_first = |arm: &usize| {
+                let bit = 1_u128.checked_shl(u32::try_from(*arm).unwrap_or(u32::MAX)).unwrap_or(0);
+                let is_first = bit == 0 || taken & bit == 0;
+                taken |= bit;
+                is_first
+            };
+            let arms_taken = positions(values(subject).variants()).map(|variant| arm_of[variant]);
+            let chosen = arms_taken.filter(is_first).map(|arm| values(&arms[arm]));
             chosen.reduce(Values::union).unwrap_or_else(|| values(&arms[0]))
         }
     }

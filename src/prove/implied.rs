@@ -2,7 +2,7 @@
 
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Demand, RowRules};
-use crate::model::{Road, RoadFacts, Row, RuleBody, RulesInForce, Space, code};
+use crate::model::{Road, RoadFacts, Row, RuleBody, RulesInForce, Space, code, effort};
 use crate::prove::enclose::{Known, VARIANTS_MAX, Values, enclose};
 use crate::prove::moment::always_holds;
 use crate::syntax::{Diagnostic, listed};
@@ -24,6 +24,9 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut work = WORK_MAX;
     let mut kept = RulesInForce::by_default(space);
     for rule in (0..space.rules.len()).rev() {
+        if effort::is_spent() {
+            break;
+        }
         let others = kept.except(rule);
         if !follows(space, rule, &others, &mut work) {
             if is_idle_on_the_roads(space, rule, &mut work) {
@@ -33,6 +36,9 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
         }
         let mut reasons = others.clone();
         for other in others.all() {
+            if effort::is_spent() {
+                break;
+            }
             let fewer = reasons.except(other);
             if follows(space, rule, &fewer, &mut work) {
                 reasons = fewer;
@@ -96,7 +102,11 @@ fn is_idle_on_the_roads(space: &Space, rule: usize, work: &mut usize) -> bool {
 /// Whether the rule holds for every row that it binds and every value that `others` leave; also `false` if
 /// the work left does not suffice.
 fn follows(space: &Space, rule: usize, others: &RulesInForce, work: &mut usize) -> bool {
-    let bound = || space.rows.iter().filter(|row| row.rules.contains(&rule));
+    let actions = space.rules[rule].body.actions();
+    let bound_rows = || actions.iter().flat_map(|action| space.rows_of(*action));
+    // A row that sets another key than the rule is about is not bound.
+    let bound = || bound_rows().filter(|row| row.rules.binary_search(&rule).is_ok());
+    effort::spend(bound_rows().count());
     let count = bound().count();
     let Some(left) = work.checked_sub(count * (1 + others.all().count())) else { return false };
     *work = left;
@@ -124,6 +134,9 @@ fn follows(space: &Space, rule: usize, others: &RulesInForce, work: &mut usize) 
 fn start_holds(space: &Space, rule: usize, others: &RulesInForce) -> bool {
     if space.rules[rule].start.is_none() {
         return true;
+    }
+    if space.start_count() > STARTS_MAX {
+        return false;
     }
     let alone = RulesInForce::only(space, rule);
     space.roads.iter().all(|road| {

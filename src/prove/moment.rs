@@ -14,6 +14,7 @@ use crate::model::vocabulary::{Fact, Known as From, Light, RoadKind, Verb, Word,
 use crate::model::{
     ActionDef, EffectDef, End, EpisodeDef, Interval, LIMIT_PART_MAX, NEAR_JUNCTION_M, RoadFacts, Row,
     RuleBody, RulesInForce, SPAWN_SPEED_MPS, SPEED_MPS_MAX, Space, SpawnDef, Stretch, Type, WordExpr, code,
+    effort,
 };
 use crate::prove::enclose::{Known, enclose, fact_range};
 use crate::prove::sums::oppose;
@@ -208,11 +209,12 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let in_force = RulesInForce::by_default(space);
     let mut diagnostics = Vec::new();
     for (rule, definition) in space.rules.iter().enumerate() {
-        let mut bound = space.rows.iter().filter(|row| row.rules.contains(&rule)).peekable();
-        if !in_force.contains(rule)
-            || !matches!(definition.body, RuleBody::During(_))
-            || bound.peek().is_none()
-        {
+        if !in_force.contains(rule) || !matches!(definition.body, RuleBody::During(_)) {
+            continue;
+        }
+        let mut bound =
+            definition.body.actions().into_iter().flat_map(|action| space.rows_of(action)).peekable();
+        if effort::is_spent() || bound.peek().is_none() {
             continue;
         }
         let never = |row: &Row| {
@@ -298,6 +300,7 @@ fn cases(conditions: &[&Expr], known: &Known<'_>, episode: &EpisodeDef, newcomer
         };
         cases = cases.iter().flat_map(with).collect();
     }
+    effort::spend(cases.len() * (8 + conditions.len()));
     cases.retain(|case| case.is_possible(episode));
     cases
 }

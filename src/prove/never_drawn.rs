@@ -33,7 +33,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     };
     let mut remarks = Vec::new();
     for (index, action) in space.actions.iter().enumerate() {
-        let rows = space.rows.iter().filter(|row| row.action == index);
+        let rows = space.rows_of(index).iter();
         let places = rows.flat_map(|row| space.roads.iter().zip(&row.roads).map(move |on| (row, on)));
         let open: Vec<Place<'_>> = places
             .filter_map(|(row, (road, reach))| match reach {

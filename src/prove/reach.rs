@@ -5,8 +5,9 @@
 
 use std::sync::Arc;
 
+use crate::model::effort;
 use crate::model::expr::Expr;
-use crate::model::rules::{Bound, Demand, RowRules, allowed};
+use crate::model::rules::{Bound, Demand, RowRules, allowed, rules_by_action};
 use crate::model::vocabulary::Word;
 use crate::model::{
     ActionDef, Domain, Facts, Interval, Memory, Parameter, Reach, Road, Row, RuleBody, RulesInForce, Space,
@@ -32,13 +33,16 @@ pub(crate) fn product_size(action: &ActionDef) -> u64 {
 /// All rows, in order.
 pub(crate) fn rows(space: &Space) -> Vec<Row> {
     let in_force = RulesInForce::by_default(space);
+    let binding = rules_by_action(&space.rules, space.actions.len());
     let mut rows = Vec::new();
-    for (index, action) in space.actions.iter().enumerate() {
-        let bound: Arc<[usize]> =
-            (0..space.rules.len()).filter(|rule| space.rules[*rule].body.binds(index)).collect();
+    for ((index, action), bound) in space.actions.iter().enumerate().zip(binding) {
+        let bound: Arc<[usize]> = bound.into();
         let units: Vec<Option<&Unit>> =
             action.parameters.iter().filter(|parameter| parameter.axis).map(Parameter::unit).collect();
         for values in products(space, action) {
+            if effort::is_spent() {
+                return rows;
+            }
             let axes: Vec<(Arc<str>, Value)> = action
                 .parameters
                 .iter()
@@ -76,11 +80,17 @@ pub(crate) fn spawn_figures(space: &Space, row: &Row, expr: &Expr) -> Option<Int
 
 /// The rules that bind the row, without those about a key that the row does not set; `None` if it loses none.
 fn without_other_keys(space: &Space, row: &Row) -> Option<Arc<[usize]>> {
+    let is_of_key = |rule: &usize| match &space.rules[*rule].body {
+        RuleBody::Moves { state, .. } => space.states[*state].key.is_some(),
+        RuleBody::Holds(_) | RuleBody::During(_) => false,
+    };
+    if !row.rules.iter().any(is_of_key) {
+        return None;
+    }
+    let set = space.cells_set(row.action, &declared(space, row));
     let is_other = |rule: &usize| match &space.rules[*rule].body {
-        RuleBody::Moves { state, cell, .. } if space.states[*state].key.is_some() => {
-            !space.may_set(row.action, &declared(space, row), *cell)
-        }
-        RuleBody::Moves { .. } | RuleBody::Holds(_) | RuleBody::During(_) => false,
+        RuleBody::Moves { cell, .. } => is_of_key(rule) && !set.contains(cell),
+        RuleBody::Holds(_) | RuleBody::During(_) => false,
     };
     let kept: Arc<[usize]> = row.rules.iter().filter(|rule| !is_other(rule)).copied().collect();
     (kept.len() < row.rules.len()).then_some(kept)
@@ -90,6 +100,10 @@ fn without_other_keys(space: &Space, row: &Row) -> Option<Arc<[usize]>> {
 fn products(space: &Space, action: &ActionDef) -> Vec<Vec<Value>> {
     let mut rows: Vec<Vec<Value>> = vec![Vec::new()];
     for parameter in &action.parameters {
+        effort::spend(rows.len());
+        if effort::is_spent() {
+            return Vec::new();
+        }
         let values = match (&parameter.domain, parameter.axis) {
             (Domain::Values(values), true) => values.as_slice(),
             _ => &[Value::Bool(false)],
@@ -135,6 +149,9 @@ impl<'a> RowRules<'a> {
     pub fn conflict(self, forbid: &dyn Fn(RowRules<'_>) -> bool) -> Vec<usize> {
         let mut conflict = self.in_force.clone();
         for rule in self.in_force.on_row(self.row) {
+            if effort::is_spent() {
+                break;
+            }
             let fewer = conflict.except(rule);
             if forbid(RowRules { in_force: &fewer, ..self }) {
                 conflict = fewer;
@@ -156,6 +173,9 @@ impl<'a> RowRules<'a> {
         before: &[Values],
         moment: Option<&Case>,
     ) -> Option<Vec<Values>> {
+        if effort::is_spent() {
+            return None;
+        }
         for _ in 0..ROUNDS {
             let was = locals.clone();
             let after = self.space.cells_after(self.row.action, &locals, before);
@@ -181,6 +201,7 @@ impl<'a> RowRules<'a> {
             Demand::Holds(_) => true,
             Demand::Moves { cell, allowed, .. } => match after[cell] {
                 Values::Variants(set) => {
+                    effort::spend(allowed.len());
                     (0..allowed.len()).any(|to| set >> to & 1 == 1 && allowed.iter().any(|from| from[to]))
                 }
                 Values::Truth { .. } | Values::Number(_) => true,
@@ -278,10 +299,12 @@ fn in_si(ty: Type) -> String {
 /// What the parameters of a row may be before any rule.
 pub(crate) fn declared(space: &Space, row: &Row) -> Vec<Values> {
     let action = &space.actions[row.action];
+    effort::spend(action.parameters.len());
     let all = |(parameter, value): (&Parameter, Value)| match &parameter.domain {
         _ if parameter.axis => Values::point(value),
         Domain::Range(low, high) => Values::Number(Interval::closed(*low, *high)),
         Domain::Values(values) => {
+            effort::spend(values.len());
             let points = values.iter().map(|value| Values::point(*value));
             points.reduce(Values::union).unwrap_or(Values::UNKNOWN_TRUTH)
         }
@@ -295,7 +318,7 @@ pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut gone: Vec<Gone<'_>> = Vec::new();
     let mut masked = Vec::new();
     for (index, action) in space.actions.iter().enumerate() {
-        let rows: Vec<&Row> = space.rows.iter().filter(|row| row.action == index).collect();
+        let rows: Vec<&Row> = space.rows_of(index).iter().collect();
         if rows.is_empty() {
             let conditions = action.parameters.iter().filter(|p| p.axis && p.condition.is_some());
             let error = Diagnostic::error(code::EMPTY, format!("`{}` has no rows", action.name))

@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use crate::model::expr::ExprKind;
 use crate::model::rules::RowRules;
 use crate::model::vocabulary::Fact;
-use crate::model::{Memory, Reach, Road, Row, RulesInForce, Space};
+use crate::model::{Memory, Reach, Road, Row, RulesInForce, Space, effort};
 use crate::prove::moment::Case;
 use crate::prove::witness::{Found, Left, Search};
 use crate::syntax::listed;
@@ -96,6 +96,9 @@ pub(crate) fn with_dead(space: &Space, realisable: &Realisable) -> Vec<Row> {
 fn dead(space: &Space, row: &Row, road: &Road, in_force: &RulesInForce, left: &Left) -> Reach {
     let mut conflict = in_force.clone();
     for rule in in_force.on_row(row) {
+        if effort::is_spent() {
+            break;
+        }
         let fewer = conflict.except(rule);
         let rules = RowRules { space, row, road: Some(&road.facts), in_force: &fewer };
         let search = Search { rules, left, moment: None };
@@ -170,6 +173,9 @@ impl<'a> OnRoad<'a> {
         for step in 0..u64::from(self.space.episode.step_limit) {
             let moment = Case::of_steps(&self.space.episode, step..=step, false);
             pending.retain_mut(|asked| {
+                if effort::is_spent() {
+                    return true;
+                }
                 let state = way.runs(self, asked, step, &moment);
                 if state.is_some() {
                     found[asked.row.index] = Realised::Runs;
@@ -177,7 +183,9 @@ impl<'a> OnRoad<'a> {
                 }
                 state.is_none()
             });
-            if self.left.is_spent() || !pending.iter().any(|asked| asked.about_states || asked.about_time) {
+            if effort::is_spent()
+                || self.left.is_spent()
+                || !pending.iter().any(|asked| asked.about_states || asked.about_time) {
                 break;
             }
             let is_at_rest = !way.go_on(self, &movers, step, &moment);
@@ -193,6 +201,9 @@ impl<'a> OnRoad<'a> {
 
     /// What there is of a row that did not run in any state that was followed.
     fn elsewhere(&self, asked: &Asked<'a>, is_way_complete: bool) -> Realised {
+        if effort::is_spent() {
+            return Realised::NotSearched;
+        }
         let search = self.search(asked.row, None);
         let (memories, are_all) = match asked.about_states {
             true => search.memories(),
@@ -201,7 +212,7 @@ impl<'a> OnRoad<'a> {
         let is_complete = !asked.is_undecided && (is_way_complete || !asked.about_states);
         let mut is_proved = are_all || is_complete;
         for memory in &memories {
-            if self.left.is_spent() {
+            if effort::is_spent() || self.left.is_spent() {
                 return Realised::NotSearched;
             }
             match search.at(memory) {
@@ -276,6 +287,7 @@ impl Way {
         is_waited_for: bool,
         movers: &[Asked<'_>],
     ) -> Option<usize> {
+        effort::spend(self.states.len() + memory.cells().len());
         if let Some(known) = self.states.iter().position(|known| known.memory == memory) {
             self.states[known].is_waited_for |= is_waited_for;
             return Some(known);
@@ -284,6 +296,7 @@ impl Way {
             self.is_complete = false;
             return None;
         }
+        effort::spend(movers.len());
         let open = (0..movers.len()).collect();
         self.states.push(Met { memory, since, is_waited_for, led_to: BTreeSet::new(), open });
         Some(self.states.len() - 1)
@@ -295,6 +308,7 @@ impl Way {
             return None;
         }
         let search = on_road.search(asked.row, asked.about_time.then_some(moment));
+        effort::spend(self.now.len());
         for (nth, number) in self.now.iter().enumerate() {
             let state = &self.states[*number];
             let is_due = match (asked.about_states, asked.about_time) {
@@ -321,6 +335,7 @@ impl Way {
     /// Goes on to the states in which the next step begins. Gives whether they are others, or may be later.
     fn go_on(&mut self, on_road: &OnRoad<'_>, movers: &[Asked<'_>], step: u64, moment: &Case) -> bool {
         let OnRoad { space, road, in_force, .. } = *on_road;
+        effort::spend(movers.len());
         let in_time: Vec<bool> = movers.iter().map(|mover| on_road.is_in_time(mover, moment)).collect();
         let now = core::mem::take(&mut self.now);
         for state in &now {
@@ -330,6 +345,9 @@ impl Way {
             let waited = self.number(waited, step + 1, is_waited_for, movers);
             self.now.extend(waited);
             for position in core::mem::take(&mut self.states[*state].open) {
+                if effort::is_spent() {
+                    return false;
+                }
                 let mover = &movers[position];
                 if mover.about_time {
                     self.states[*state].open.push(position);

@@ -1,17 +1,29 @@
 //! Expressions computed as far as possible beforehand: calls are replaced by bodies, constants are folded.
 
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::{FnDef, Type};
+use crate::model::{FnDef, Type, effort};
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::syntax::ast::Span;
+
+/// What the copy of one operation costs, in steps: it is kept and written as text, so that memory is bounded with the
+/// steps.
+const COPIED_STEPS: usize = 32;
 
 /// The expression with its locals replaced, its calls opened and its spans removed, so that two expressions
 /// of the same form are equal.
 pub(super) fn reduce(expr: &Expr, functions: &[FnDef], locals: &[Expr]) -> Expr {
+    effort::spend(COPIED_STEPS);
+    // Arguments are copied wherever they are named: calls in calls may double what they are given each time.
+    if effort::is_spent() {
+        return Expr { kind: ExprKind::Bool(false), ty: Type::Bool, span: Span::NONE };
+    }
     let inner = |expr: &Expr| Box::new(reduce(expr, functions, locals));
     let all = |exprs: &[Expr]| exprs.iter().map(|expr| reduce(expr, functions, locals)).collect::<Vec<_>>();
     let kind = match &expr.kind {
-        ExprKind::Local(index) => return locals[*index].clone(),
+        ExprKind::Local(index) => {
+            effort::spend(COPIED_STEPS * locals[*index].operations());
+            return locals[*index].clone();
+        }
         ExprKind::Call(function, arguments) => {
             return reduce(&functions[*function].body, functions, &all(arguments));
         }

@@ -3,7 +3,7 @@
 use core::ops::RangeInclusive;
 
 use crate::model::expr::Expr;
-use crate::model::{EffectDef, Interval, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, code};
+use crate::model::{EffectDef, Interval, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, code, effort};
 use crate::prove::reach::spawn_figures;
 use crate::syntax::Diagnostic;
 use crate::units::Rational;
@@ -20,7 +20,7 @@ pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
                 ("distance", "m", &spawn.distance, &SPAWN_DISTANCE_M),
             ];
             for (what, unit, expr, range) in figures {
-                let mut rows = space.rows.iter().filter(|row| row.action == index);
+                let mut rows = space.rows_of(index).iter().take_while(|_| !effort::is_spent());
                 let found = rows.find_map(|row| {
                     let found = spawn_figures(space, row, expr)?;
                     (!lies_in(&found, range)).then_some((row, found))

@@ -1,6 +1,6 @@
 //! Rules under which no episode can begin.
 
-use crate::model::{Initial, NoStart, RulesInForce, Space, code};
+use crate::model::{Initial, NoStart, RulesInForce, Space, code, effort};
 use crate::syntax::ast::Span;
 use crate::syntax::{Diagnostic, listed};
 
@@ -15,7 +15,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
         let rule = &space.rules[*rule];
         found.is_empty() && rule.optional && rule.binds_start()
     };
-    for rule in (0..space.rules.len()).filter(is_open) {
+    for rule in (0..space.rules.len()).filter(is_open).take_while(|_| !effort::is_spent()) {
         let Some((no_start, roads)) = without_start(space, &by_default.with(rule)).pop() else { continue };
         let error = error(space, &no_start, &roads);
         let message = format!("with optional rule `{}`: {}", space.rules[rule].name, error.message);

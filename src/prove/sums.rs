@@ -1,7 +1,7 @@
 //! Comparisons as sums: what two sides share is cancelled, and comparisons of the same facts are held against each other.
 
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
-use crate::model::{End, Interval, Type};
+use crate::model::{End, Interval, Type, effort};
 use crate::prove::enclose::{Known, enclose};
 use crate::units::Rational;
 
@@ -111,6 +111,7 @@ pub(super) fn oppose(conditions: &[&Expr], known: &Known<'_>, are_apart: bool) -
     conditions.iter().for_each(|condition| conjuncts(condition, &mut comparisons));
     let mut bounded: Vec<(Sum<'_>, Interval)> = Vec::new();
     for (op, left, right) in comparisons.into_iter().take(COMPARED_MAX) {
+        effort::spend(1 + 4 * bounded.len());
         let mut sum = Sum { terms: Vec::new(), constant: Rational::ZERO, are_shared: false };
         let added =
             sum.add(left, Rational::ONE, known).and_then(|()| sum.add(right, Rational::integer(-1), known));

@@ -7,12 +7,13 @@
 //! pass that would not.
 
 use core::ops::RangeInclusive;
+use std::collections::BTreeSet;
 
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::Demand;
 use crate::model::{
     Initial, Interval, Reach, Road, Row, RuleBody, RuleDef, RulesInForce, STATE_MAX, SetDef, Space, Type,
-    code,
+    code, effort,
 };
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::prove::moment::Case;
@@ -72,12 +73,18 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     for road in &space.roads {
         let mut in_force = RulesInForce::by_default(space);
         while let Err(broken) = lasts(space, road, &in_force) {
+            if effort::is_spent() {
+                break;
+            }
             in_force = in_force.except(broken.index);
             if !found.iter().any(|known| known.index == broken.index) {
                 found.push(broken);
             }
         }
         for rule in (0..space.rules.len()).filter(|rule| space.rules[*rule].optional) {
+            if effort::is_spent() {
+                break;
+            }
             let is_open =
                 space.rules[rule].binds_start() && !with_optional.iter().any(|(known, _)| *known == rule);
             let broken = if is_open { lasts(space, road, &in_force.with(rule)).err() } else { None };
@@ -186,6 +193,8 @@ struct States<'a> {
     in_force: &'a RulesInForce,
     /// The cells on which timed rules depend.
     followed: Vec<usize>,
+    /// For each cell whether it is one of them.
+    is_followed: Vec<bool>,
     met: Vec<Cells>,
     /// By state: what rows make of it, and what every step makes of it.
     moves: Vec<Option<(Vec<Move>, Vec<usize>)>>,
@@ -195,11 +204,13 @@ struct States<'a> {
 impl<'a> States<'a> {
     fn new(space: &'a Space, road: &'a Road, in_force: &'a RulesInForce, timed: &[usize]) -> States<'a> {
         let followed = followed(space, in_force, timed);
-        States { space, road, in_force, followed, met: Vec::new(), moves: Vec::new(), work: 0 }
+        let mut is_followed = vec![false; space.states.iter().map(|state| state.cells).sum()];
+        followed.iter().for_each(|cell| is_followed[*cell] = true);
+        States { space, road, in_force, followed, is_followed, met: Vec::new(), moves: Vec::new(), work: 0 }
     }
 
     fn is_too_large(&self) -> bool {
-        self.met.len() > STATES_MAX || self.work > WORK_MAX
+        self.met.len() > STATES_MAX || self.work > WORK_MAX || effort::is_spent()
     }
 
     /// The states with which an episode may begin.
@@ -270,6 +281,7 @@ impl<'a> States<'a> {
                 note(next, *to);
             }
         }
+        effort::spend((moves.len() + waits.len()) * (1 + next.len()));
         self.work += (moves.len() + waits.len()) * self.space.rules.len().max(1);
         self.moves[state] = Some((moves, waits));
         broken.map_or(Ok(()), Err)
@@ -328,16 +340,23 @@ impl<'a> States<'a> {
     /// What the rows make of a state that set a followed cell; the others make of it what a wait does.
     fn moves_of(&mut self, state: usize) -> Vec<Move> {
         let mut moves = Vec::new();
+        // Other rules than those by default may enable rows that are dead by default.
+        let is_by_default = *self.in_force == RulesInForce::by_default(self.space);
         for row in &self.space.rows {
+            effort::spend(self.space.roads.len());
+            if effort::is_spent() {
+                break;
+            }
             let is_open = row
                 .roads
                 .iter()
                 .zip(&self.space.roads)
                 .any(|(reach, road)| road.name == self.road.name && matches!(reach, Reach::Open(_)));
-            // Other rules than those by default may enable rows that are dead by default.
-            let may_run = is_open || *self.in_force != RulesInForce::by_default(self.space);
-            let sets = |cell: &usize| self.space.may_set(row.action, &declared(self.space, row), *cell);
-            if !may_run || !self.followed.iter().any(sets) {
+            if !is_open && is_by_default {
+                continue;
+            }
+            let set = self.space.cells_set(row.action, &declared(self.space, row));
+            if !set.iter().any(|cell| self.is_followed[*cell]) {
                 continue;
             }
             for locals in self.choices(row) {
@@ -388,7 +407,7 @@ impl<'a> States<'a> {
     fn of_followed(&self, mut cells: Cells) -> Cells {
         let unknown = self.space.cells_unknown();
         for (cell, values) in cells.iter_mut().enumerate() {
-            if !self.followed.contains(&cell) {
+            if !self.is_followed[cell] {
                 *values = unknown[cell];
             }
         }
@@ -400,9 +419,11 @@ impl<'a> States<'a> {
         let mut parts = vec![cells.clone()];
         for cell in &self.followed {
             let values = points(cells[*cell]);
-            if parts.len() * values.len() > PARTS_MAX {
+            // One value is there already.
+            if values.len() == 1 || parts.len() * values.len() > PARTS_MAX {
                 continue;
             }
+            effort::spend(parts.len() * values.len() * cells.len());
             let with = |part: &Cells| {
                 let part = part.clone();
                 let one = |value: &Values| {
@@ -418,6 +439,7 @@ impl<'a> States<'a> {
     }
 
     fn number(&mut self, cells: Cells) -> usize {
+        effort::spend(self.met.len() + cells.len());
         if let Some(known) = self.met.iter().position(|known| *known == cells) {
             return known;
         }
@@ -509,22 +531,25 @@ fn followed(space: &Space, in_force: &RulesInForce, timed: &[usize]) -> Vec<usiz
             (None, _) => {}
         }
     }
+    effort::spend(found.len());
     let has_number = |cell: &usize| !matches!(space.state_of(*cell).ty, Type::Bool | Type::Enum(_));
     let cells = 0..space.states.iter().map(|state| state.cells).sum();
     found.extend(cells.filter(|cell| has_number(cell) && space.may_set_each_step(*cell)));
     let mut next = 0;
     found.sort_unstable();
     found.dedup();
+    let mut seen: BTreeSet<usize> = found.iter().copied().collect();
+    let sets: Vec<&SetDef> =
+        space.actions.iter().flat_map(|action| action.sets()).chain(&space.each_step).collect();
     while let Some(cell) = found.get(next).copied() {
         next += 1;
-        let sets = space.actions.iter().flat_map(|action| action.sets()).chain(&space.each_step);
-        for set in sets.filter(|set| space.sets_cell(set, cell)) {
+        effort::spend(sets.len());
+        if effort::is_spent() {
+            break;
+        }
+        for set in sets.iter().filter(|set| space.sets_cell(set, cell)) {
             for part in set.key.iter().chain([&set.value]) {
-                for read in cells_read(space, part) {
-                    if !found.contains(&read) {
-                        found.push(read);
-                    }
-                }
+                found.extend(cells_read(space, part).into_iter().filter(|read| seen.insert(*read)));
             }
         }
     }

@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::{EffectDef, Row, RuleBody, Space, SpawnDef, Value, WordExpr, code};
+use crate::model::{Domain, EffectDef, Row, RuleBody, Space, SpawnDef, Value, WordExpr, code, effort};
 use crate::prove::reduce::reduce;
 use crate::syntax::Diagnostic;
 use crate::syntax::ast::Span;
@@ -15,6 +15,9 @@ use crate::units::Rational;
 
 /// Tables with more rows than this are not searched for equal rows.
 const ROWS_MAX: usize = 10_000;
+
+/// What a listed value costs as text, in steps.
+const VALUE_STEPS: usize = 16;
 
 /// Pairs listed for two actions, at most.
 const PAIRS_SHOWN: usize = 6;
@@ -26,13 +29,13 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     }
     // Conditions are long to write down: only rows that do the same are compared by them.
     let mut alike: BTreeMap<String, Vec<usize>> = BTreeMap::new();
-    for row in &space.rows {
+    for row in space.rows.iter().take_while(|_| !effort::is_spent()) {
         alike.entry(RowText::of(space, row).effects()).or_default().push(row.index);
     }
     let mut pairs: BTreeMap<(usize, usize), Vec<(usize, usize)>> = BTreeMap::new();
     for rows in alike.into_values().filter(|rows| rows.len() > 1) {
         let mut first_of: BTreeMap<String, usize> = BTreeMap::new();
-        for again in rows {
+        for again in rows.into_iter().take_while(|_| !effort::is_spent()) {
             let first = *first_of.entry(RowText::of(space, &space.rows[again]).conditions()).or_insert(again);
             if first != again {
                 let actions = (space.rows[first].action, space.rows[again].action);
@@ -117,17 +120,19 @@ impl<'a> RowText<'a> {
         let mut parts: Vec<String> = Vec::new();
         for parameter in self.space.actions[self.row.action].drawn() {
             let condition = parameter.condition.as_ref().map(|condition| self.reduced(condition));
+            if let Domain::Values(values) = &parameter.domain {
+                effort::spend(VALUE_STEPS * values.len());
+            }
             parts.push(format!("any {:?} {:?} {condition:?}", parameter.ty, parameter.domain));
         }
         for rule in self.row.rules.iter() {
             match &self.space.rules[*rule].body {
                 RuleBody::Moves { .. } => parts.push(format!("rule {rule}")),
                 RuleBody::Holds(bindings) | RuleBody::During(bindings) => {
-                    for binding in bindings.iter().filter(|binding| binding.action == self.row.action) {
-                        let condition = self.reduced(&binding.condition);
-                        if condition.kind != ExprKind::Bool(true) {
-                            parts.push(format!("rule {rule} {:?}", condition.kind));
-                        }
+                    let found = bindings.binary_search_by_key(&self.row.action, |binding| binding.action);
+                    let condition = found.ok().map(|binding| self.reduced(&bindings[binding].condition));
+                    if let Some(condition) = condition.filter(|one| one.kind != ExprKind::Bool(true)) {
+                        parts.push(format!("rule {rule} {:?}", condition.kind));
                     }
                 }
             }

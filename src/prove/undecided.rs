@@ -1,10 +1,12 @@
 //! Rows that were not found to run: those of which nothing is known, and those that would run only in states to
 //! which no episode comes.
 
+use std::collections::BTreeSet;
+
 use crate::model::expr::{Arithmetic, Expr, ExprKind};
 use crate::model::rules::RowRules;
 use crate::model::vocabulary::Known;
-use crate::model::{ActionDef, Road, Row, RuleBody, RuleDef, RulesInForce, Space, code};
+use crate::model::{ActionDef, Road, Row, RuleBody, RuleDef, RulesInForce, Space, code, effort};
 use crate::prove::clock::never_enabled;
 use crate::prove::reach::numbers;
 use crate::prove::realise::{Realisable, Realised, is_about_time};
@@ -19,14 +21,14 @@ const BOXES_MAX: usize = 2_000;
 pub(super) fn report(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> {
     let mut diagnostics = report_unknown(space, realisable);
     diagnostics.extend(report_optional(space, realisable));
-    let told = never_enabled(space);
+    let told: BTreeSet<usize> = never_enabled(space).into_iter().collect();
     let in_force = RulesInForce::by_default(space);
     // Where no episode begins, no state is reached.
     if space.roads.iter().any(|road| space.memory_at_start(road, &in_force, 0).is_err()) {
         return diagnostics;
     }
     for (action, definition) in space.actions.iter().enumerate() {
-        let rows = || space.rows.iter().filter(move |row| row.action == action);
+        let rows = || space.rows_of(action).iter();
         let is_unreached = |row: &&Row| {
             let found = &realisable[row.index];
             found.contains(&Realised::Unreached)
@@ -59,10 +61,14 @@ pub(super) fn report(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> 
 fn report_optional(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     for (rule, definition) in space.rules.iter().enumerate().filter(|(_, rule)| rule.optional) {
+        effort::spend(space.rows.len());
+        if effort::is_spent() {
+            break;
+        }
         let (in_force, left) = (RulesInForce::by_default(space).with(rule), Left::new(BOXES_MAX));
         let is_unknown = |row: &&Row| {
             let mut roads = space.roads.iter().zip(&realisable[row.index]);
-            row.rules.contains(&rule)
+            row.rules.binary_search(&rule).is_ok()
                 && roads.any(|(road, found)| {
                     *found == Realised::Runs
                         && is_unknown(
@@ -107,9 +113,8 @@ fn report_unknown(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> {
     for (index, action) in space.actions.iter().enumerate() {
         let mut of_action: Vec<Unknown<'_>> = Vec::new();
         for (number, road) in space.roads.iter().enumerate() {
-            let is_unknown =
-                |row: &&Row| row.action == index && realisable[row.index][number] == Realised::Unknown;
-            let rows: Vec<&Row> = space.rows.iter().filter(is_unknown).collect();
+            let is_unknown = |row: &&Row| realisable[row.index][number] == Realised::Unknown;
+            let rows: Vec<&Row> = space.rows_of(index).iter().filter(is_unknown).collect();
             match of_action.iter_mut().find(|known| known.rows == rows) {
                 _ if rows.is_empty() => {}
                 Some(known) => known.roads.push(&road.name),
@@ -206,6 +211,9 @@ fn to_blame(space: &Space, row: &Row, road: &Road) -> Vec<usize> {
     let left = Left::new(BOXES_MAX);
     let mut in_force = RulesInForce::by_default(space);
     for rule in in_force.clone().on_row(row) {
+        if effort::is_spent() {
+            break;
+        }
         let fewer = in_force.except(rule);
         let rules = RowRules { space, row, road: Some(&road.facts), in_force: &fewer };
         if is_unknown(rules, &left) {

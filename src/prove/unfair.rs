@@ -8,7 +8,8 @@ use crate::kinematics::{CAREFUL_BRAKING_MPS2, CAREFUL_PERCEPTION_S, CAREFUL_REAC
 use crate::model::rules::{Demand, RowRules};
 use crate::model::vocabulary::{Known, Verb, Word};
 use crate::model::{
-    EffectDef, Facts, Memory, Reach, Road, Row, RulesInForce, Space, SpawnDef, Value, code, evaluate, locals,
+    EffectDef, Facts, Memory, Reach, Road, Row, RulesInForce, Space, SpawnDef, Value, code, effort, evaluate,
+    locals,
 };
 use crate::prove::witness::{Left, Search, Witness};
 use crate::syntax::Diagnostic;
@@ -29,7 +30,8 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
         let left = Left::new(BOXES_MAX / space.actions.len());
         for effect in &action.effects {
             let EffectDef::Spawn(spawn) = effect else { continue };
-            let found = space.rows.iter().filter(|row| row.action == index).find_map(|row| {
+            let mut rows = space.rows_of(index).iter().take_while(|_| !effort::is_spent());
+            let found = rows.find_map(|row| {
                 let roads = space.roads.iter().zip(&row.roads);
                 let open = roads.filter(|(_, reach)| matches!(reach, Reach::Open(_)));
                 open.map(|(road, _)| road)

@@ -9,14 +9,14 @@
 //! that this search does not find may still exist.
 
 use std::cell::Cell;
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::rules::{Before, Candidate, Choose, Demand, Nearest, Room, RowRules};
+use crate::model::rules::{Before, Candidate, Choose, Demand, Nearest, Room, RowRules, cells_read};
 use crate::model::{
     ActionDef, Domain, EffectDef, End, Facts, Initial, Interval, Memory, Parameter, Road, Row, RulesInForce,
-    SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, SetDef, Space, SpawnFacts, StateDef, Type, Value, WorldFacts,
+    SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, SetDef, Space, SpawnFacts, StateDef, Type, Value, WorldFacts, effort,
     evaluate, locals, rounded_into, spawn_out_of_bounds,
 };
 use crate::prove::enclose::{Known, Values};
@@ -137,7 +137,7 @@ impl Search<'_> {
         let choices = choices(action, &locals(action, self.rules.row, &[]));
         for memory in self.memories().0 {
             for chosen in &choices {
-                if self.left.is_spent() {
+                if self.left.is_spent() || effort::is_spent() {
                     return None;
                 }
                 if let Some(values) = self.numbers(chosen, &memory, wish) {
@@ -161,7 +161,7 @@ impl Search<'_> {
         if let Some(found) = found {
             return found;
         }
-        if self.left.is_spent() || tries.get() == 0 {
+        if self.left.is_spent() || tries.get() == 0 || effort::is_spent() {
             return Found::Unknown;
         }
         // What is left to try are rules about the gap of the spawn, and its bounds.
@@ -323,6 +323,9 @@ impl Search<'_> {
         let chosen = choices(action, &locals(action, self.rules.row, &[]));
         is_complete &= chosen.len() < CHOICES_MAX;
         for chosen in chosen {
+            if effort::is_spent() {
+                break;
+            }
             let before = Before { memory, world: None, tries: &self.left.tries };
             match self.rules.solve(chosen, &open, before, &mut Share(SHARES[0])) {
                 Ok(values) => {
@@ -359,58 +362,58 @@ impl Search<'_> {
     /// row read. Gives also whether there can be no other.
     pub fn memories(&self) -> (Vec<Memory>, bool) {
         let space = self.rules.space;
+        let begun =
+            space.states.iter().flat_map(|state| (0..state.cells).map(move |cell| initial(space, state, cell)));
         let mut is_complete = true;
-        let mut memories = vec![Memory::default()];
-        for state in &space.states {
-            for cell in 0..state.cells {
-                let initial = initial(space, state, cell);
-                let values = match self.reads(state, cell) {
-                    true => all_values(space, state.ty, initial),
-                    false => vec![initial],
-                };
-                let room = MEMORIES_MAX / memories.len();
-                is_complete &= values.len() <= room.max(1);
-                is_complete &= !self.reads(state, cell) || !matches!(state.ty, Type::Int | Type::Quantity(_));
-                let longer = memories.iter().flat_map(|memory| {
-                    values.iter().take(room.max(1)).map(|value| {
-                        let mut memory = memory.clone();
-                        memory.cells.push(*value);
-                        memory
-                    })
-                });
-                memories = longer.collect();
+        let mut memories = vec![Memory { cells: begun.collect() }];
+        for cell in self.read() {
+            let state = space.state_of(cell);
+            let values = all_values(space, state.ty, memories[0].cells[cell]);
+            let room = (MEMORIES_MAX / memories.len()).max(1);
+            is_complete &= values.len() <= room;
+            is_complete &= !matches!(state.ty, Type::Int | Type::Quantity(_));
+            if values.len().min(room) == 1 {
+                continue;
             }
+            effort::spend(memories.len() * values.len().min(room) * memories[0].cells.len());
+            let longer = memories
+                .iter()
+                .flat_map(|memory| values.iter().take(room).map(move |value| memory.with(cell, *value)));
+            memories = longer.collect();
         }
         (memories, is_complete)
     }
 
     /// Whether a rule or an effect of the row depends on what any state was before.
     pub fn reads_any(&self) -> bool {
-        let reads = |state: &StateDef| (0..state.cells).any(|cell| self.reads(state, cell));
-        self.rules.space.states.iter().any(reads)
+        !self.read().is_empty()
     }
 
-    /// Whether a rule or an effect of the row depends on what the cell was before.
-    fn reads(&self, state: &StateDef, cell: usize) -> bool {
-        let named = |expr: &Expr| {
-            expr.any(|kind| match kind {
-                ExprKind::Cell(named) => *named == state.first_cell + cell,
-                ExprKind::CellAt(first, _) => *first == state.first_cell,
-                _ => false,
-            })
-        };
-        let by_rule = |demand| match demand {
-            Demand::Holds(condition) => named(condition),
-            Demand::Moves { cell: moved, .. } => moved == state.first_cell + cell,
-        };
-        let by_set = |set: &SetDef| named(&set.value) || set.key.as_ref().is_some_and(named);
-        let by_spawn = |effect: &EffectDef| match effect {
-            EffectDef::Set(_) => false,
-            EffectDef::Spawn(spawn) => named(&spawn.speed) || named(&spawn.distance),
-        };
-        self.rules.demands().any(|(_, demand)| by_rule(demand))
-            || self.rules.space.sets(Some(self.rules.row.action)).any(by_set)
-            || self.action().effects.iter().any(by_spawn)
+    /// The cells on which a rule or an effect of the row depends, as they were before.
+    fn read(&self) -> BTreeSet<usize> {
+        let states = &self.rules.space.states;
+        let mut found = BTreeSet::new();
+        let mut named = |expr: &Expr| found.extend(cells_read(expr, states));
+        for set in self.rules.space.sets(Some(self.rules.row.action)) {
+            set.key.iter().chain([&set.value]).for_each(&mut named);
+        }
+        for effect in &self.action().effects {
+            if let EffectDef::Spawn(spawn) = effect {
+                [&spawn.speed, &spawn.distance].into_iter().for_each(&mut named);
+            }
+        }
+        for (_, demand) in self.rules.demands() {
+            match demand {
+                Demand::Holds(condition) => named(condition),
+                Demand::Moves { .. } => {}
+            }
+        }
+        let moved = self.rules.demands().filter_map(|(_, demand)| match demand {
+            Demand::Moves { cell, .. } => Some(cell),
+            Demand::Holds(_) => None,
+        });
+        found.extend(moved);
+        found
     }
 }
 

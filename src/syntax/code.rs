@@ -24,3 +24,5 @@ pub const CHAIN: &str = "AV0010";
 pub const COMMENT: &str = "AV0012";
 /// A rule with transitions that is not on exactly one state.
 pub const MOVES: &str = "AV0011";
+/// A file with too many words and signs.
+pub const LENGTH: &str = "AV0013";

@@ -136,7 +136,15 @@ impl Diagnostic {
 /// The texts that spans point into.
 #[derive(Debug, Clone, Default)]
 pub struct Sources {
-    files: Vec<(String, String)>,
+    files: Vec<Source>,
+}
+
+#[derive(Debug, Clone)]
+struct Source {
+    name: String,
+    text: String,
+    /// First byte of each line: a long file with many mistakes is not counted through for each of them.
+    line_starts: Vec<usize>,
 }
 
 impl Sources {
@@ -147,27 +155,29 @@ impl Sources {
     /// Adds a text, under the name that diagnostics show.
     pub fn add(&mut self, name: impl Into<String>, text: impl Into<String>) -> FileId {
         let id = u32::try_from(self.files.len()).expect("fewer than four thousand million files");
-        self.files.push((name.into(), text.into()));
+        let (name, text): (String, String) = (name.into(), text.into());
+        let breaks = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(at, _)| at + 1);
+        let line_starts = core::iter::once(0).chain(breaks).collect();
+        self.files.push(Source { name, text, line_starts });
         FileId(id)
     }
 
     /// The name under which the file was added; empty for an unknown file.
     pub fn name(&self, file: FileId) -> &str {
-        self.files.get(file.0 as usize).map_or("", |(name, _)| name)
+        self.files.get(file.0 as usize).map_or("", |source| &source.name)
     }
 
     /// The text of the file; empty for an unknown file.
     pub fn text(&self, file: FileId) -> &str {
-        self.files.get(file.0 as usize).map_or("", |(_, text)| text)
+        self.files.get(file.0 as usize).map_or("", |source| &source.text)
     }
 
     /// Line and column of a byte, both from 1; columns count characters.
     pub fn line_column(&self, file: FileId, offset: usize) -> (usize, usize) {
-        let text = self.text(file);
-        let before = &text[..floor_boundary(text, offset)];
-        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
-        let line = before.bytes().filter(|byte| *byte == b'\n').count() + 1;
-        (line, before[line_start..].chars().count() + 1)
+        let Some(source) = self.files.get(file.0 as usize) else { return (1, 1) };
+        let offset = floor_boundary(&source.text, offset);
+        let line = source.line_starts.partition_point(|start| *start <= offset);
+        (line, source.text[source.line_starts[line - 1]..offset].chars().count() + 1)
     }
 }
 
@@ -217,10 +227,12 @@ pub fn render(diagnostic: &Diagnostic, sources: &Sources, style: Style) -> Strin
     let title = level.primary_title(visible(&diagnostic.message)).id(diagnostic.code);
     let mut group = Group::with_title(title);
     for file in files_in_order(diagnostic) {
-        group = match snippet(diagnostic, sources, file) {
-            Some(snippet) => group.element(snippet),
-            None => group.element(Origin::path(visible(sources.name(file)))),
-        };
+        for labels in pieces(diagnostic, file) {
+            group = match snippet(&labels, sources, file) {
+                Some(snippet) => group.element(snippet),
+                None => group.element(origin(&labels, sources, file)),
+            };
+        }
     }
     for note in &diagnostic.notes {
         group = group.element(Level::NOTE.no_name().message(visible(note)));
@@ -248,9 +260,53 @@ fn files_in_order(diagnostic: &Diagnostic) -> Vec<FileId> {
     files
 }
 
-/// The lines of one file that its labels touch; `None` where there is no text to show.
+/// Longer pieces of a text are not drawn, bytes: drawing takes time in proportion to them, for each diagnostic.
+const DRAWN_MAX: usize = 20_000;
+
+/// Most labels that are drawn of one diagnostic in one file.
+const LABELS_MAX: usize = 40;
+
+/// The labels of a diagnostic in one file, those together that are near one another: with the mistake first, then in
+/// the order of the text.
+fn pieces(diagnostic: &Diagnostic, file: FileId) -> Vec<Vec<&Label>> {
+    let of_file = diagnostic.labels.iter().filter(|label| label.span.file == file);
+    let mut labels: Vec<&Label> = of_file.take(LABELS_MAX).collect();
+    let (Some(first), Some(last)) =
+        (labels.iter().map(|label| label.span.start).min(), labels.iter().map(|label| label.span.end).max())
+    else {
+        return Vec::new();
+    };
+    // Nearly always all are near, and are drawn in the order in which they were given.
+    if last.saturating_sub(first) <= DRAWN_MAX {
+        return vec![labels];
+    }
+    labels.sort_by_key(|label| label.span);
+    let mut pieces: Vec<Vec<&Label>> = Vec::new();
+    for label in labels {
+        match pieces.last_mut() {
+            Some(piece) if label.span.end.saturating_sub(piece[0].span.start) <= DRAWN_MAX => piece.push(label),
+            _ => pieces.push(vec![label]),
+        }
+    }
+    pieces.sort_by_key(|piece| !piece.iter().any(|label| label.primary));
+    pieces
+}
+
+/// A file, with the place in it that is not drawn.
+fn origin<'a>(labels: &[&Label], sources: &'a Sources, file: FileId) -> Origin<'a> {
+    let origin = Origin::path(visible(sources.name(file)));
+    match labels.first() {
+        Some(label) if !sources.text(file).is_empty() => {
+            let (line, column) = sources.line_column(file, label.span.start);
+            origin.line(line).char_column(column)
+        }
+        _ => origin,
+    }
+}
+
+/// The lines of one file that some labels touch; `None` where there is no text to draw, or too much.
 fn snippet<'a>(
-    diagnostic: &'a Diagnostic,
+    labels: &[&'a Label],
     sources: &'a Sources,
     file: FileId,
 ) -> Option<Snippet<'a, Annotation<'a>>> {
@@ -258,14 +314,16 @@ fn snippet<'a>(
     if text.is_empty() {
         return None;
     }
-    let labels = || diagnostic.labels.iter().filter(|label| label.span.file == file);
-    let first = floor_boundary(text, labels().map(|label| label.span.start).min()?);
-    let last = floor_boundary(text, labels().map(|label| label.span.end).max()?).max(first);
+    let first = floor_boundary(text, labels.iter().map(|label| label.span.start).min()?);
+    let last = floor_boundary(text, labels.iter().map(|label| label.span.end).max()?).max(first);
     // The renderer gets these lines alone, so that a mistake costs no more in a long file.
     let start = text[..first].rfind('\n').map_or(0, |newline| newline + 1);
     let end = text[last..].find('\n').map_or(text.len(), |newline| last + newline);
-    let line = text[..start].bytes().filter(|byte| *byte == b'\n').count() + 1;
-    let annotations = labels().map(|label| {
+    if end - start > DRAWN_MAX {
+        return None;
+    }
+    let line = sources.line_column(file, start).0;
+    let annotations = labels.iter().map(|label| {
         let from = floor_boundary(text, label.span.start);
         let to = floor_boundary(text, label.span.end).max(from);
         let kind = if label.primary { AnnotationKind::Primary } else { AnnotationKind::Context };
@@ -284,13 +342,22 @@ fn floor_boundary(text: &str, offset: usize) -> usize {
 /// Most names that are compared with a misspelt one: a file may have thousands of both.
 const CANDIDATES_MAX: usize = 1000;
 
+/// Most characters of a word that is compared: two words cost their lengths multiplied.
+const COMPARED_MAX: usize = 64;
+
 /// The candidate that the author may have meant by `word`, if one is near enough.
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let length = word.chars().count();
+    if length > COMPARED_MAX {
+        return None;
+    }
     // At most a third of the word may be wrong; beyond that the guess is noise.
-    let distance_max = (word.chars().count() / 3).max(1);
+    let distance_max = (length / 3).max(1);
     candidates
         .into_iter()
         .take(CANDIDATES_MAX)
+        // Words are at least as far apart as their lengths.
+        .filter(|candidate| candidate.chars().count().abs_diff(length) <= distance_max)
         .map(|candidate| (strsim::damerau_levenshtein(word, candidate), candidate))
         .filter(|(distance, candidate)| *distance <= distance_max && *candidate != word)
         .min_by_key(|(distance, _)| *distance)

@@ -31,7 +31,7 @@ pub use diagnostic::{
 };
 pub(crate) use diagnostic::{enumerated, one_of};
 pub use format::{FormatError, format, same_meaning};
-pub use parse::{DEPTH_MAX, LANGUAGE, OPERATORS_MAX, parse, parse_fields};
+pub use parse::{DEPTH_MAX, LANGUAGE, OPERATORS_MAX, TOKENS_MAX, parse, parse_fields};
 pub use print::{print, print_expr, print_item};
 pub use record::{
     DiagnosticRecord, EditRecord, FixRecord, LabelRecord, PlaceRecord, SCHEMA, apply_fixes, record,

@@ -22,6 +22,9 @@ pub const DEPTH_MAX: usize = 64;
 /// Most operators in one another, those around brackets included. Trees are walked by recursion.
 pub const OPERATORS_MAX: usize = 128;
 
+/// Most words and signs of a file. The grammar needs some 250 bytes for each.
+pub const TOKENS_MAX: usize = 400_000;
+
 /// The version of the language that this compiler reads.
 pub const LANGUAGE: u64 = 1;
 
@@ -47,7 +50,7 @@ fn words_inside() -> impl Iterator<Item = &'static str> {
 /// Never panics, whatever the text, and takes time in proportion to its length.
 pub fn parse(file: FileId, text: &str) -> (File, Vec<Diagnostic>) {
     let scanned = scan(file, text);
-    if scanned.too_deep {
+    if scanned.is_too_large {
         return (File { span: Span::new(file, 0, text.len()), ..File::default() }, sorted(scanned.problems));
     }
     let reader = Reader { file, text, scan: &scanned };

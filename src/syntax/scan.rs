@@ -1,11 +1,12 @@
 //! One pass over a text before the grammar sees it: comments, brackets, and characters that the
 //! language does not have.
 //!
-//! The grammar recurses only through brackets, so their depth, which is measured here, bounds its
-//! stack whatever the input. Texts and comments are skipped by the same rules as in `ava.pest`.
+//! The grammar recurses only through brackets and through what stands between `match` and its `{`. The depth of
+//! both, which is measured here, bounds its stack whatever the input; the number of words and signs, which is
+//! counted here, bounds its memory. Texts and comments are skipped by the same rules as in `ava.pest`.
 
 use crate::syntax::ast::{FileId, Span};
-use crate::syntax::{DEPTH_MAX, Diagnostic, code};
+use crate::syntax::{DEPTH_MAX, Diagnostic, TOKENS_MAX, code};
 
 /// A `//` comment, markers included, up to but without the line break.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,17 +39,28 @@ pub struct Scan {
     pub unclosed: Vec<Span>,
     /// Mistakes that are certain without a grammar, in the order of the text.
     pub problems: Vec<Diagnostic>,
-    /// Whether some bracket is deeper than [`DEPTH_MAX`]: the grammar must not see the text.
-    pub too_deep: bool,
+    /// Whether something is deeper than [`DEPTH_MAX`], or the text is longer than [`TOKENS_MAX`]: the grammar must not
+    /// see it.
+    pub is_too_large: bool,
 }
 
-/// Scans a whole text. Linear in its length.
+/// Scans a whole text, or as much of it as has [`TOKENS_MAX`] words and signs. Linear in its length.
 pub fn scan(file: FileId, text: &str) -> Scan {
-    let mut scanner =
-        Scanner { file, text, at: 0, line_blank: true, open: Vec::new(), found: Scan::default() };
-    while scanner.at < text.len() {
+    let mut scanner = Scanner {
+        file,
+        text,
+        at: 0,
+        line_blank: true,
+        open: Vec::new(),
+        tokens: 0,
+        open_matches: 0,
+        after_operand: false,
+        found: Scan::default(),
+    };
+    while scanner.at < text.len() && scanner.tokens <= TOKENS_MAX {
         scanner.step();
     }
+    scanner.check_length();
     let Scanner { open, mut found, .. } = scanner;
     found.unclosed.extend(open.into_iter().map(|(_, span)| span));
     found.unclosed.sort_unstable();
@@ -62,6 +74,12 @@ struct Scanner<'a> {
     /// Whether the line has held nothing but blanks so far.
     line_blank: bool,
     open: Vec<(char, Span)>,
+    /// Words and signs so far.
+    tokens: usize,
+    /// `match`es whose `{` is still to come.
+    open_matches: usize,
+    /// Whether an expression may end with the last word or sign.
+    after_operand: bool,
     found: Scan,
 }
 
@@ -93,19 +111,74 @@ impl Scanner<'_> {
                 self.foreign_comment();
                 return;
             }
-            '"' => self.quoted(),
+            '"' => {
+                self.quoted();
+                self.after_operand = true;
+            }
             '(' | '[' | '{' => {
                 self.at += 1;
+                // After an operand this is the `{` of a `match`; elsewhere it begins a record.
+                if next == '{' && self.after_operand {
+                    self.open_matches = self.open_matches.saturating_sub(1);
+                }
                 self.opens(next, self.span(start));
+                self.after_operand = false;
             }
             ')' | ']' | '}' => {
                 self.at += 1;
                 self.closes(next);
+                self.after_operand = true;
             }
-            _ if next.is_ascii() && !next.is_ascii_control() => self.at += 1,
+            _ if next.is_ascii_alphanumeric() || next == '_' => self.word(),
+            _ if next.is_ascii() && !next.is_ascii_control() => {
+                self.at += 1;
+                self.after_operand = next == '%';
+            }
             _ => self.invalid(),
         }
+        self.tokens += 1;
         self.line_blank = false;
+    }
+
+    /// Passes a word or a number.
+    fn word(&mut self) {
+        let start = self.at;
+        let rest = &self.text[start..];
+        let end = rest.find(|next: char| !(next.is_ascii_alphanumeric() || next == '_'));
+        self.at = end.map_or(self.text.len(), |end| start + end);
+        let word = &self.text[start..self.at];
+        self.after_operand = !matches!(word, "and" | "or" | "not" | "in" | "implies" | "match" | "where");
+        match word {
+            "match" => self.opens_match(self.span(start)),
+            // No expression goes on behind a word that begins a declaration.
+            "language" | "use" | "enum" | "odds" | "state" | "let" | "fn" | "action" | "group" | "optional"
+            | "rule" | "verdict" | "scenario" | "policy" | "override" => self.open_matches = 0,
+            _ => {}
+        }
+    }
+
+    /// Counts a `match`: the next one may stand in its subject, where nothing needs a bracket.
+    fn opens_match(&mut self, span: Span) {
+        self.open_matches += 1;
+        if self.open_matches > DEPTH_MAX && !self.found.is_too_large {
+            self.found.is_too_large = true;
+            let message = format!("more than {DEPTH_MAX} `match`es in one another");
+            let error = Diagnostic::error(code::DEPTH, message).at(span, "one too many");
+            self.found.problems.push(error.help("give a part of it a name, with `let` or `fn`"));
+        }
+    }
+
+    /// Reports a text that is too long to be read.
+    fn check_length(&mut self) {
+        if self.tokens <= TOKENS_MAX || self.found.is_too_large {
+            return;
+        }
+        self.found.is_too_large = true;
+        let message = format!("the file has more than {TOKENS_MAX} words and signs");
+        let error = Diagnostic::error(code::LENGTH, message).at(self.span(self.at), "the limit is passed here");
+        let help = "make it shorter: `each` parameters make many rows of one action, `fn` says once what comes often, and \
+                    a part may be a file of its own, which this one takes in by `use`";
+        self.found.problems.push(error.help(help));
     }
 
     fn span(&self, start: usize) -> Span {
@@ -173,8 +246,8 @@ impl Scanner<'_> {
 
     fn opens(&mut self, bracket: char, span: Span) {
         self.open.push((bracket, span));
-        if self.open.len() > DEPTH_MAX && !self.found.too_deep {
-            self.found.too_deep = true;
+        if self.open.len() > DEPTH_MAX && !self.found.is_too_large {
+            self.found.is_too_large = true;
             self.found.problems.push(
                 Diagnostic::error(code::DEPTH, format!("nested deeper than {DEPTH_MAX} brackets"))
                     .at(span, "one too many")

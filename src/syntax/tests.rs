@@ -8,7 +8,7 @@ use crate::syntax::ast::{
     Odds, Scenario, Span, Step, Text, UnaryOp, Use, Verdict,
 };
 use crate::syntax::{
-    DEPTH_MAX, FormatError, OPERATORS_MAX, Sources, Style, format, parse, print, render, same_meaning,
+    DEPTH_MAX, FormatError, OPERATORS_MAX, Sources, Style, TOKENS_MAX, format, parse, print, render, same_meaning,
 };
 
 const AVASTRA: &str = include_str!("../../scenarios/avastra45.ava");
@@ -123,6 +123,32 @@ fn depth_is_bounded_alike_everywhere() {
     assert!(format(FileId(0), &mixed).is_ok());
 }
 
+/// The subject of a `match` needs no bracket.
+#[test]
+fn the_depth_of_matches_is_bounded() {
+    let matches = |depth: usize| {
+        let arms = " { true => false, false => true }".repeat(depth);
+        format!("language 1\nfn f(x: Bool) -> Bool = {}x{arms}\n", "match ".repeat(depth))
+    };
+    assert!(codes(&matches(DEPTH_MAX)).is_empty());
+    for depth in [DEPTH_MAX + 1, 10_000] {
+        assert_eq!(codes(&matches(depth)), ["AV0003:2"]);
+    }
+    // One after the other, or in an arm, is not one in the subject of another.
+    let apart = "let a = match true { true => 1, false => 2 }\n".repeat(2 * DEPTH_MAX);
+    assert!(codes(&format!("language 1\n{apart}")).is_empty());
+    // What begins a record is no `{` of a `match`.
+    let records = format!("language 1\nlet a = {}1\n", "match {} + ".repeat(10_000));
+    assert_eq!(codes(&records), ["AV0003:2"]);
+}
+
+#[test]
+fn a_file_has_a_length() {
+    let lines = |count: usize| format!("language 1\n{}", "let a = 1\n".repeat(count));
+    assert!(codes(&lines(TOKENS_MAX / 4 - 1)).is_empty());
+    assert_eq!(codes(&lines(TOKENS_MAX / 4)), [format!("AV0013:{}", TOKENS_MAX / 4 + 1)]);
+}
+
 #[test]
 fn long_lines_and_many_mistakes_are_no_trouble() {
     let long = format!("language 1\nlet x = \"{}\"\n", "x".repeat(1 << 20));
@@ -131,7 +157,7 @@ fn long_lines_and_many_mistakes_are_no_trouble() {
     let endless = format!("language 1\nlet x = \"{}\n", "x".repeat(1 << 21));
     assert_eq!(codes(&endless), ["AV0009:2"]);
     assert!(rendered(&endless).len() < 10_000);
-    let wrong = format!("language 1\nlet x = {}\n", "x ".repeat(1 << 19));
+    let wrong = format!("language 1\nlet x = {}\n", "x ".repeat(1 << 18));
     assert_eq!(codes(&wrong), ["AV0001:2"]);
     assert!(!rendered(&wrong).is_empty());
     let odd = format!("language 1\n{}", "let ( = } \u{e9}\nlet x = (\n".repeat(20_000));

@@ -60,9 +60,17 @@ impl Scenes {
 
 /// Adds an error for each claim that a row runs for which no place is found; then the space is not sound.
 pub fn judge_claims(loaded: &mut Loaded, scenes: &mut Scenes) {
-    let Some(space) = loaded.space.clone() else { return };
+    let Some(space) = loaded.space.clone().filter(|_| !loaded.runs.claims.is_empty()) else { return };
+    // One search for all claims: there may be many about the same rows.
+    let claimed: BTreeSet<usize> = loaded.runs.claims.iter().flat_map(|claim| &claim.rows).copied().collect();
+    let claimed: Vec<usize> = claimed.into_iter().collect();
+    let all = without_place(&space, &loaded.runs, &claimed, scenes);
+    if all.is_empty() {
+        return;
+    }
     for Claim { span, rows } in loaded.runs.claims.clone() {
-        let lost = without_place(&space, &loaded.runs, &rows, scenes);
+        let lost: Vec<&Lost<'_>> =
+            all.iter().filter(|lost| rows.binary_search(&lost.row.index).is_ok()).collect();
         if lost.is_empty() {
             continue;
         }
@@ -74,7 +82,7 @@ pub fn judge_claims(loaded: &mut Loaded, scenes: &mut Scenes) {
                 format!("{} was given up: the searches for other rows came to their limit", lost.row.label)
             }
         };
-        let error = lost.iter().take(ROWS_SHOWN).fold(error, |error, lost| error.note(note(lost)));
+        let error = lost.iter().copied().take(ROWS_SHOWN).fold(error, |error, lost| error.note(note(lost)));
         loaded.diagnostics.push(error);
         loaded.space = None;
     }
@@ -240,9 +248,8 @@ fn without_place<'a>(
 fn about_places(space: &Space) -> RulesInForce {
     let asks = |rule: &usize| {
         let rule = &space.rules[*rule];
-        (0..space.actions.len())
-            .filter_map(|action| rule.body.demand(action)?.condition())
-            .any(|condition| condition.asks_the_world())
+        let mut conditions = rule.body.actions().into_iter().filter_map(|action| rule.body.demand(action)?.condition());
+        conditions.any(|condition| condition.asks_the_world())
     };
     let all = RulesInForce::by_default(space);
     (0..space.rules.len()).filter(asks).fold(all, |rules, rule| rules.except(rule))

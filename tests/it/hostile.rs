@@ -3,8 +3,13 @@
 
 #[path = "../../fuzz/examine.rs"]
 mod examine;
+#[path = "../../fuzz/scale.rs"]
+mod scale;
 
-use std::process::Command;
+use std::fs::File;
+use std::os::unix::process::CommandExt;
+use std::path::Path;
+use std::process::{Command, Stdio};
 
 use avastra::rng;
 use avastra::rng::{Rng, Stream};
@@ -134,6 +139,253 @@ fn texts_made_to_be_slow_are_not() {
         }
     }
     assert!(dear.is_empty(), "{}", dear.join("\n"));
+}
+
+/// What must become of a text.
+enum Fate {
+    Sound,
+    /// It is refused with that code.
+    Refused(&'static str),
+    /// One or the other, as the limits are.
+    Either,
+}
+
+/// Texts that once took minutes or gigabytes, most of them small: each is refused with a code or read, soon.
+#[test]
+fn texts_that_cost_much_are_refused_or_read() {
+    use Fate::{Either, Refused, Sound};
+    let texts = [
+        ("groups that double", 100, Sound),
+        ("maps of a drawn start", 128, Either),
+        ("maps beside many rows", 75, Refused("AV0113")),
+        ("states with rules", 200, Either),
+        ("states with rules about time", 100, Either),
+        ("states with transitions", 100, Either),
+        ("actions", 32_000, Sound),
+        ("actions", 99_000, Refused("AV0013")),
+        ("constants in a chain, the last first", 50_000, Sound),
+        ("rows", 100_000, Sound),
+        ("a sum", 2_000_000, Refused("AV0013")),
+        ("matches in the subject", 10_000, Refused("AV0003")),
+        ("matches in arms for all variants", 12, Either),
+        ("numbers matched in the subject", 40, Refused("AV0107")),
+        ("cases of a number in a rule", 60_000, Refused("AV0107")),
+        ("unknown names", 20_000, Refused("AV0101")),
+        ("functions in rules", 100, Either),
+        ("a function of itself", 60, Either),
+        ("drawn truths that nothing fits", 40, Either),
+        ("more effects of all actions", 2_000, Refused("AV0113")),
+    ];
+    let scratch = Scratch::new();
+    let mut wrong = Vec::new();
+    for (name, size, fate) in texts {
+        let construct = scale::GRAMMAR.iter().find(|construct| construct.name == name);
+        let came = scratch.run("check", &(construct.expect("it is in the list").text)(size), CPU_S_MAX);
+        let is_right = match fate {
+            Sound => came.exit == Some(0),
+            Refused(code) => came.exit == Some(2) && came.output.contains(code),
+            Either => matches!(came.exit, Some(0 | 2)),
+        };
+        if !is_right || came.cpu_s > CPU_S_MAX || came.peak_mb > SCALED_MB_MAX {
+            wrong.push(format!("{name}, {size}: {}", came.words()));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// `diff` matches rows by their labels, not each with each.
+#[test]
+fn long_tables_are_compared_soon() {
+    let scratch = Scratch::new();
+    let text = |rule: &str| {
+        format!("language 1\nuse \"roads.ava\"\nstate c: Int = 0\naction a(each x: Int in 1 .. 30000) {{ set c = x }}\nrule r on a: {rule}\n")
+    };
+    let other = scratch.folder.path().join("other.ava");
+    std::fs::write(&other, text("x <= 30000 and c <= 30000")).expect("it is writable");
+    let came = scratch.run("diff", &text("x <= 30000"), 2.0 * CPU_S_MAX);
+    assert!(came.exit == Some(0) && came.output.contains("rule `r`"), "{}", came.words());
+}
+
+/// Most memory for a text that is large in one construct, MB.
+const SCALED_MB_MAX: f64 = 500.0;
+
+/// Sizes of each construct, as long as its text is smaller than this, bytes.
+const SIZES: [usize; 5] = [10, 100, 1_000, 10_000, 100_000];
+const SCALED_BYTES_MAX: usize = 4_000_000;
+
+/// What the program is asked to do with a text.
+const VERBS: [&str; 4] = ["check", "doc", "compile", "lsp"];
+
+/// Every construct of the grammar ten, a hundred, … times, and then as often as chance says: which of them take over a
+/// second of a processor or over 500 MB. Meant for an optimised build; each run of the program has a limit of ten seconds.
+///
+/// `FUZZ_S=1800 FUZZ_SEED=1 cargo test --release --test it -- --ignored --nocapture each_construct_scales`
+#[test]
+#[ignore = "runs for as long as it is told to"]
+#[expect(clippy::disallowed_methods, reason = "how long and with which seed is said in the environment")]
+fn each_construct_scales() {
+    let number = |name: &str, default: u64| {
+        std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
+    };
+    let (seconds, seed) = (number("FUZZ_S", 60) as f64, number("FUZZ_SEED", 1));
+    let of_grammar =
+        scale::GRAMMAR.iter().flat_map(|construct| VERBS.into_iter().map(move |verb| (construct, verb)));
+    let of_maps = scale::MAPS.iter().map(|construct| (construct, "road"));
+    let all: Vec<(&scale::Construct, &str)> = of_grammar.chain(of_maps).collect();
+    let mut measured = Measured { scratch: Scratch::new(), runs: 0, spent_s: 0.0, dear: Vec::new() };
+    for (construct, verb) in &all {
+        for size in SIZES {
+            // What is dear at one size is dearer at the next.
+            if measured.spent_s > seconds || !measured.is_cheap(construct, verb, size) {
+                break;
+            }
+        }
+    }
+    for nth in 0.. {
+        if measured.spent_s > seconds {
+            break;
+        }
+        let mut random = rng::stream(seed, Stream::Exploration, nth);
+        let (construct, verb) = all[rng::below(&mut random, all.len() as u32) as usize];
+        let size = 10_usize.pow(rng::below(&mut random, 6)) * (1 + rng::below(&mut random, 9) as usize);
+        measured.is_cheap(construct, verb, size);
+    }
+    let Measured { runs, spent_s, dear, .. } = measured;
+    println!("{runs} runs, {spent_s:.0} s");
+    assert!(dear.is_empty(), "{}", dear.join("\n"));
+}
+
+/// What runs of the program took.
+struct Measured {
+    scratch: Scratch,
+    runs: usize,
+    spent_s: f64,
+    /// Those over the limits, in words.
+    dear: Vec<String>,
+}
+
+impl Measured {
+    /// Whether a construct of that size is within the limits, or too long to be looked at.
+    fn is_cheap(&mut self, construct: &scale::Construct, verb: &str, size: usize) -> bool {
+        let text = (construct.text)(size);
+        if text.len() > SCALED_BYTES_MAX {
+            self.spent_s += 1e-3;
+            return true;
+        }
+        let came = self.scratch.run(verb, &text, CPU_S_MAX);
+        self.runs += 1;
+        self.spent_s += came.cpu_s;
+        let ends_well = matches!(came.exit, Some(0..100));
+        let is_cheap = ends_well && came.cpu_s <= 1.0 && came.peak_mb <= SCALED_MB_MAX;
+        if !is_cheap {
+            let words =
+                format!("{verb} {}, {size}, {} bytes: {}", construct.name, text.len(), came.words());
+            println!("{words}");
+            self.dear.push(words);
+        }
+        is_cheap
+    }
+}
+
+/// A folder with the files that texts may use.
+struct Scratch {
+    folder: tempfile::TempDir,
+}
+
+/// What became of a run of the program.
+struct Came {
+    cpu_s: f64,
+    peak_mb: f64,
+    /// `None`: a signal ended it.
+    exit: Option<i32>,
+    /// All that it printed.
+    output: String,
+}
+
+impl Came {
+    fn words(&self) -> String {
+        let exit = self.exit.map_or_else(|| "a signal".to_owned(), |exit| format!("exit {exit}"));
+        let mut lines = self.output.lines();
+        let said = lines.find(|line| line.starts_with("error")).unwrap_or_default();
+        let said: String = said.chars().take(100).collect();
+        format!("{:.2} s, {:.0} MB, {exit} {said}", self.cpu_s, self.peak_mb)
+    }
+}
+
+impl Scratch {
+    fn new() -> Scratch {
+        let folder = tempfile::tempdir().expect("a scratch directory");
+        for (name, text) in [("roads.ava", examine::ROADS), ("straight.xodr", examine::STRAIGHT)] {
+            std::fs::write(folder.path().join(name), text).expect("it is writable");
+        }
+        Scratch { folder }
+    }
+
+    /// Runs the program on a text, for so many seconds of a processor and in 4 GB at most.
+    fn run(&self, verb: &str, text: &str, cpu_s_max: f64) -> Came {
+        let in_folder = |name: &str| self.folder.path().join(name);
+        let path = in_folder(if verb == "road" { "large.xodr" } else { "large.ava" });
+        std::fs::write(&path, text).expect("it is writable");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_avastra"));
+        command.arg(verb);
+        match verb {
+            "lsp" => {
+                std::fs::write(in_folder("messages"), messages(&path, text)).expect("it is writable");
+                command.stdin(File::open(in_folder("messages")).expect("it was written"));
+            }
+            "compile" => {
+                command.arg(&path).arg("--out").arg(in_folder("table.yaml"));
+            }
+            "diff" => {
+                command.arg(&path).arg(in_folder("other.ava"));
+            }
+            _ => {
+                command.arg(&path);
+            }
+        }
+        let output = File::create(in_folder("output")).expect("it is writable");
+        command.stderr(output.try_clone().expect("a file has handles")).stdout(output);
+        let seconds = cpu_s_max.ceil() as libc::rlim_t;
+        let limited = move || {
+            let limit = |most: libc::rlim_t| libc::rlimit { rlim_cur: most, rlim_max: most };
+            // SAFETY: both are plain data, and `setrlimit` may be called between fork and exec.
+            unsafe {
+                libc::setrlimit(libc::RLIMIT_CPU, &limit(seconds + 1));
+                libc::setrlimit(libc::RLIMIT_AS, &limit(4 << 30));
+            }
+            Ok(())
+        };
+        // SAFETY: it only sets limits of the child.
+        unsafe {
+            command.pre_exec(limited);
+        }
+        let (status, usage) = waited(&mut command);
+        let exit = libc::WIFEXITED(status).then(|| libc::WEXITSTATUS(status));
+        let printed = std::fs::read(in_folder("output")).expect("it was written");
+        let (cpu_s, peak_mb) = taken(&usage);
+        Came { cpu_s, peak_mb, exit, output: String::from_utf8_lossy(&printed).into_owned() }
+    }
+}
+
+/// What an editor says that opens a text, asks for completions at its end, and leaves.
+fn messages(path: &Path, text: &str) -> Vec<u8> {
+    let uri = format!("file://{}", path.display());
+    let document = serde_json::json!({ "uri": uri, "languageId": "avastra", "version": 1, "text": text });
+    let end = serde_json::json!({ "line": text.lines().count(), "character": 0 });
+    let place = serde_json::json!({ "textDocument": { "uri": uri }, "position": end });
+    let messages = [
+        serde_json::json!({ "jsonrpc": "2.0", "id": 1, "method": "initialize", "params": { "capabilities": {} } }),
+        serde_json::json!({ "jsonrpc": "2.0", "method": "initialized", "params": {} }),
+        serde_json::json!({ "jsonrpc": "2.0", "method": "textDocument/didOpen", "params": { "textDocument": document } }),
+        serde_json::json!({ "jsonrpc": "2.0", "id": 2, "method": "textDocument/completion", "params": place }),
+        serde_json::json!({ "jsonrpc": "2.0", "id": 3, "method": "shutdown" }),
+        serde_json::json!({ "jsonrpc": "2.0", "method": "exit" }),
+    ];
+    let framed = messages.iter().map(|message| {
+        let body = message.to_string();
+        format!("Content-Length: {}\r\n\r\n{body}", body.len())
+    });
+    framed.collect::<String>().into_bytes()
 }
 
 /// Texts of up to 64 KB, made of the kept texts, the cases and the shipped files: cut, doubled, mixed and with other
@@ -396,22 +648,29 @@ fn own_usage() -> libc::rusage {
 
 /// Processor time (s) and peak memory (MB) of a command; it must end by itself.
 fn cost(command: &mut Command) -> (f64, f64) {
+    command.stdout(Stdio::null()).stderr(Stdio::null());
+    let (status, usage) = waited(command);
+    assert!(libc::WIFEXITED(status), "a signal ended it");
+    assert!(libc::WEXITSTATUS(status) < 100, "it panicked");
+    taken(&usage)
+}
+
+/// Runs a command to its end: how it ended, and what it took.
+fn waited(command: &mut Command) -> (i32, libc::rusage) {
     #[expect(clippy::zombie_processes, reason = "`wait4` waits for it, and tells what it took")]
-    let child = command
-        .stdout(std::process::Stdio::null())
-        .stderr(std::process::Stdio::null())
-        .spawn()
-        .expect("it starts");
+    let child = command.spawn().expect("it starts");
     // SAFETY: both are plain data that the kernel fills in, and the child is waited for only here.
-    let (status, usage) = unsafe {
+    unsafe {
         let mut status = 0;
         let mut usage: libc::rusage = std::mem::zeroed();
         let pid = child.id() as libc::pid_t;
         assert_eq!(libc::wait4(pid, &mut status, 0, &mut usage), pid);
         (status, usage)
-    };
-    assert!(libc::WIFEXITED(status), "a signal ended it");
-    assert!(libc::WEXITSTATUS(status) < 100, "it panicked");
+    }
+}
+
+/// Processor time (s) and peak memory (MB).
+fn taken(usage: &libc::rusage) -> (f64, f64) {
     let seconds = |time: libc::timeval| time.tv_sec as f64 + time.tv_usec as f64 * 1e-6;
     (seconds(usage.ru_utime) + seconds(usage.ru_stime), usage.ru_maxrss as f64 / 1024.0)
 }

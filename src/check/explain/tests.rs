@@ -61,7 +61,9 @@ fn wrong_examples_are_wrong_and_right_ones_right() {
     for page in PAGES {
         assert!(page.text.starts_with(&format!("# {}: ", page.code)), "{}", page.code);
         assert!(!page.title().is_empty() && page.summary().ends_with('.'), "{}", page.code);
-        let wrong = compiled(page.example("## Wrong"));
+        // What is too long is not printed.
+        let lines = if page.code == "AV0013" { 110_000 } else { 0 };
+        let wrong = compiled(&(page.example("## Wrong").to_owned() + &"let a = 1\n".repeat(lines)));
         if !codes(&wrong).contains(&page.code) {
             untrue.push(format!("{} wrong:\n{}", page.code, shown(&wrong)));
         }

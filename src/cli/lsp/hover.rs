@@ -2,6 +2,7 @@
 //! documentation.
 
 use core::fmt::Write;
+use std::collections::BTreeSet;
 
 use crate::check::{Declaration, Symbol};
 use crate::cli::doc::{range_on, unit};
@@ -102,10 +103,10 @@ pub fn describe(analysis: &Analysis, symbol: &Symbol) -> Option<String> {
         Symbol::Group(name) => {
             let members = references.actions(name);
             let rows = space.map(|space| {
-                let names = members.iter().filter_map(Symbol::word);
-                let actions: Vec<usize> =
-                    names.filter_map(|name| Some(find_action(space, name)?.0)).collect();
-                let count = space.rows.iter().filter(|row| actions.contains(&row.action)).count();
+                let names: BTreeSet<&str> = members.iter().filter_map(Symbol::word).collect();
+                let actions = space.actions.iter().enumerate();
+                let of_group = actions.filter(|(_, action)| names.contains(action.name.as_str()));
+                let count: usize = of_group.map(|(action, _)| space.rows_of(action).len()).sum();
                 format!("\n\n{}", plural(count, "row"))
             });
             text + &rows.unwrap_or_default()
@@ -165,12 +166,12 @@ pub fn find_action<'a>(space: &'a Space, name: &str) -> Option<(usize, &'a Actio
 
 /// `12 rows, 15 to 26`.
 pub fn row_numbers(space: &Space, action: usize) -> String {
-    let rows: Vec<usize> =
-        space.rows.iter().filter(|row| row.action == action).map(|row| row.index).collect();
-    match rows.as_slice() {
+    match space.rows_of(action) {
         [] => "no rows".to_owned(),
-        [only] => format!("row {only}"),
-        [first, .., last] => format!("{}, {first} to {last}", plural(rows.len(), "row")),
+        [only] => format!("row {}", only.index),
+        rows @ [first, .., last] => {
+            format!("{}, {} to {}", plural(rows.len(), "row"), first.index, last.index)
+        }
     }
 }
 
@@ -178,7 +179,7 @@ fn rows_of(space: &Space, name: &str, when: &str) -> Option<String> {
     let (index, _) = find_action(space, name)?;
     let mut text = format!("\n\n{}{when}", row_numbers(space, index));
     for (road, known) in space.roads.iter().enumerate() {
-        let rows = space.rows.iter().filter(|row| row.action == index);
+        let rows = space.rows_of(index).iter();
         let dead: Vec<String> = rows
             .filter(|row| matches!(row.roads[road], Reach::Dead { .. }))
             .map(|row| row.index.to_string())

@@ -1,11 +1,15 @@
 //! What the conditions of rules and `where`s say about single numbers: `speed <= road.limit`.
 
+use crate::model::effort;
 use crate::model::expr::{Comparison, Expr, ExprKind};
 use crate::model::interval::{End, Interval};
-use crate::model::rules::Demand;
+use crate::model::rules::{Demand, rules_by_action};
 use crate::model::space::{ActionDef, RuleDef};
 use crate::model::value::Type;
 use crate::model::vocabulary::Known;
+
+/// What the copy of one operation costs, in steps: it is kept, so that memory is bounded with the steps.
+const COPIED_STEPS: usize = 16;
 
 /// `local op limit`, wherever all guards hold.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,13 +36,17 @@ impl Bound {
 /// By action: every bound on its numeric parameters, first by their `where`s, then by the rules in the
 /// order of their declarations.
 pub(crate) fn bounds(actions: &[ActionDef], rules: &[RuleDef]) -> Vec<Vec<Bound>> {
+    let binding = rules_by_action(rules, actions.len());
     let of_action = |(index, action): (usize, &ActionDef)| {
         let mut found = Vec::new();
         for condition in action.parameters.iter().filter_map(|parameter| parameter.condition.as_ref()) {
             collect(condition, None, &mut Vec::new(), &mut found);
         }
-        for (rule, definition) in rules.iter().enumerate() {
-            if let Some(Demand::Holds(condition)) = definition.body.demand(index) {
+        for &rule in &binding[index] {
+            if effort::is_spent() {
+                break;
+            }
+            if let Some(Demand::Holds(condition)) = rules[rule].body.demand(index) {
                 collect(condition, Some(rule), &mut Vec::new(), &mut found);
             }
         }
@@ -74,6 +82,8 @@ fn collect(condition: &Expr, rule: Option<usize>, guards: &mut Vec<Expr>, into: 
             let needs = parts.clone().flat_map(locals).collect();
             let is_drawn_within = parts.all(|expr| expr.known() < Known::Spawn);
             let (limit, guards) = (limit.clone(), guards.clone());
+            let copied: usize = guards.iter().chain([&limit]).map(Expr::operations).sum();
+            effort::spend(COPIED_STEPS * copied);
             into.push(Bound { rule, local: *local, op, limit, guards, is_drawn_within, needs });
         }
     };

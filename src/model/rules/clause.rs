@@ -1,8 +1,11 @@
 //! What a row's values must satisfy, piece by piece: each `where`, and each rule that binds the action, with the
 //! parameters that decide it.
 
+use std::collections::BTreeSet;
+
+use crate::model::effort;
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::rules::{Demand, locals};
+use crate::model::rules::{Demand, locals, rules_by_action, state_at};
 use crate::model::space::{ActionDef, SetDef, Space, StateDef};
 
 /// One `where` or one rule of an action.
@@ -45,6 +48,7 @@ impl Clause {
 /// By action: its `where`s, then the rules that bind it, in the order of their declarations.
 pub(crate) fn clauses(space: &Space) -> Vec<Vec<Clause>> {
     let Space { actions, rules, states, .. } = space;
+    let binding = rules_by_action(rules, actions.len());
     let of_action = |(index, action): (usize, &ActionDef)| {
         let sets: Vec<&SetDef> = space.sets(Some(index)).collect();
         let mut found = Vec::new();
@@ -56,8 +60,12 @@ pub(crate) fn clauses(space: &Space) -> Vec<Vec<Clause>> {
                 found.push(Clause { source, needs, reads_effects });
             }
         }
-        for (rule, definition) in rules.iter().enumerate() {
-            let (mut needs, read) = match definition.body.demand(index) {
+        for &rule in &binding[index] {
+            effort::spend(sets.len());
+            if effort::is_spent() {
+                break;
+            }
+            let (mut needs, read) = match rules[rule].body.demand(index) {
                 Some(Demand::Holds(condition)) => (locals(condition), states_read(condition, states)),
                 Some(Demand::Moves { state, .. }) => (Vec::new(), vec![state]),
                 None => continue,
@@ -71,8 +79,9 @@ pub(crate) fn clauses(space: &Space) -> Vec<Vec<Clause>> {
 }
 
 /// Adds the parameters that decide these states after the step; whether the step sets any of them.
-fn add_effects(sets: &[&SetDef], states: &[StateDef], mut read: Vec<usize>, needs: &mut Vec<usize>) -> bool {
+fn add_effects(sets: &[&SetDef], states: &[StateDef], read: Vec<usize>, needs: &mut Vec<usize>) -> bool {
     let mut is_set = false;
+    let mut read: BTreeSet<usize> = read.into_iter().collect();
     // Backwards, because an effect reads what the effects before it have set.
     for SetDef { state, key, value, .. } in sets.iter().rev() {
         if !read.contains(state) {
@@ -81,6 +90,8 @@ fn add_effects(sets: &[&SetDef], states: &[StateDef], mut read: Vec<usize>, need
         is_set = true;
         for part in key.iter().chain([value]) {
             needs.extend(locals(part));
+            needs.sort_unstable();
+            needs.dedup();
             read.extend(states_read(part, states));
         }
     }
@@ -88,12 +99,11 @@ fn add_effects(sets: &[&SetDef], states: &[StateDef], mut read: Vec<usize>, need
 }
 
 /// The states that an expression names, by index.
-fn states_read(expr: &Expr, states: &[StateDef]) -> Vec<usize> {
+pub(crate) fn states_read(expr: &Expr, states: &[StateDef]) -> Vec<usize> {
     let mut found = Vec::new();
     expr.walk(&mut |part| {
         let (ExprKind::Cell(cell) | ExprKind::CellAt(cell, _)) = part.kind else { return };
-        let holds = |state: &StateDef| (state.first_cell..state.first_cell + state.cells).contains(&cell);
-        found.extend(states.iter().position(holds));
+        found.push(state_at(cell, states));
     });
     found
 }

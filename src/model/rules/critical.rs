@@ -5,10 +5,11 @@
 //! computed with the open numbers as unknowns. A `match` on something open has every arm, so that too many
 //! polynomials may be found, never too few.
 
+use crate::model::effort;
 use crate::model::eval::{Facts, arithmetic, compare, evaluate};
 use crate::model::expr::{Arithmetic, Expr, ExprKind};
 use crate::model::rules::polynomial::Polynomial;
-use crate::model::rules::{Clause, Demand, RowRules, Source};
+use crate::model::rules::{Clause, Demand, RowRules, Source, state_at};
 use crate::model::space::{FnDef, SetDef, StateDef};
 use crate::model::value::Value;
 use crate::model::vocabulary::Known;
@@ -47,6 +48,7 @@ pub(super) fn polynomials<'c>(
     clauses: impl Iterator<Item = &'c Clause>,
 ) -> Option<Vec<Polynomial>> {
     let space = unknowns.rules.space;
+    effort::spend(unknowns.facts.locals.len() + unknowns.facts.memory.cells().len());
     let locals: Vec<Form> = unknowns
         .facts
         .locals
@@ -68,6 +70,9 @@ pub(super) fn polynomials<'c>(
     let action = unknowns.rules.row.action;
     let mut after_effects = None;
     for clause in clauses {
+        if effort::is_spent() {
+            return None;
+        }
         if clause.reads_effects && after_effects.is_none() {
             for set in space.sets(Some(action)) {
                 reader.apply(set, &locals)?;
@@ -126,6 +131,7 @@ impl Reader<'_> {
     }
 
     fn read(&mut self, expr: &Expr, locals: &[Form]) -> Option<Form> {
+        effort::spend(1);
         Some(match &expr.kind {
             ExprKind::Bool(_)
             | ExprKind::Number(_)
@@ -140,7 +146,7 @@ impl Reader<'_> {
             ExprKind::CellAt(first, key) => match self.read(key, locals)? {
                 Form::Known(key) => self.cells[first + key.variant()].clone(),
                 _ => {
-                    let state = self.states.iter().find(|state| state.first_cell == *first)?;
+                    let state = &self.states[state_at(*first, self.states)];
                     join(self.cells[*first..][..state.cells].iter().cloned())?
                 }
             },
@@ -245,6 +251,7 @@ impl Reader<'_> {
         if let (Some(left), Some(right)) = (left.quotients(), right.quotients()) {
             for a in &left {
                 for b in &right {
+                    effort::spend(1 + self.found.len());
                     let difference = a.above.times(&b.below)?.minus(&b.above.times(&a.below)?)?;
                     for polynomial in [&difference, &a.below, &b.below] {
                         let is_new = !polynomial.is_constant() && !self.found.contains(polynomial);

@@ -1,8 +1,12 @@
 //! Which rules are in force: all that are not optional, changed by `--with` and `--without`.
 
+use crate::model::effort;
 use crate::model::row::Row;
 use crate::model::space::{RuleDef, Space};
 use crate::syntax::{listed, nearest};
+
+/// So many rules are copied or passed over in one step of a proof.
+const RULES_A_STEP: usize = 16;
 
 /// The rules in force, by index in `Space::rules`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -54,6 +58,7 @@ impl RulesInForce {
 
     /// These rules without one of them.
     pub(crate) fn except(&self, rule: usize) -> RulesInForce {
+        effort::spend(1 + self.in_force.len() / RULES_A_STEP);
         let mut rules = self.clone();
         rules.in_force[rule] = false;
         rules
@@ -61,6 +66,7 @@ impl RulesInForce {
 
     /// These rules and one more.
     pub(crate) fn with(&self, rule: usize) -> RulesInForce {
+        effort::spend(1 + self.in_force.len() / RULES_A_STEP);
         let mut rules = self.clone();
         rules.in_force[rule] = true;
         rules
@@ -73,6 +79,7 @@ impl RulesInForce {
 
     /// The rules in force, in the order of their declarations.
     pub(crate) fn all(&self) -> impl Iterator<Item = usize> {
+        effort::spend(1 + self.in_force.len() / RULES_A_STEP);
         (0..self.in_force.len()).filter(|rule| self.in_force[*rule])
     }
 

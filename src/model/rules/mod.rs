@@ -31,20 +31,21 @@ mod solve;
 mod start;
 
 pub(crate) use bound::{Bound, allowed, bounds};
-pub(crate) use clause::{Clause, Source, clauses};
+pub(crate) use clause::{Clause, Source, clauses, states_read};
 pub use in_force::{RulesInForce, UnknownRule};
 pub(crate) use judge::{Breach, Candidate};
 pub(crate) use room::Room;
 pub(crate) use solve::{Before, Choose, Nearest, TRIES_MAX, Unsolved};
 
 pub use start::NoStart;
-pub(crate) use start::cells_read;
+pub(crate) use start::{cells_read, state_at};
 
 use bound::locals;
 
+use crate::model::effort;
 use crate::model::expr::Expr;
 use crate::model::row::Row;
-use crate::model::space::{RoadFacts, RuleBody, Space};
+use crate::model::space::{RoadFacts, RuleBinding, RuleBody, RuleDef, Space};
 
 /// One row on one road, under the rules in force.
 #[derive(Clone, Copy)]
@@ -84,22 +85,45 @@ impl RuleBody {
     /// What must hold when a road user of the action changes lanes.
     pub(crate) fn during(&self, action: usize) -> Option<&Expr> {
         let RuleBody::During(bindings) = self else { return None };
-        bindings.iter().find(|binding| binding.action == action).map(|binding| &binding.condition)
+        bound(bindings, action)
+    }
+
+    /// The actions that the rule binds, in the order of their declarations.
+    pub(crate) fn actions(&self) -> Vec<usize> {
+        match self {
+            RuleBody::Holds(bindings) | RuleBody::During(bindings) => {
+                bindings.iter().map(|binding| binding.action).collect()
+            }
+            RuleBody::Moves { actions, .. } => actions.clone(),
+        }
     }
 
     /// What the rule demands of an action when it is chosen; `None` if it demands nothing then.
     pub(crate) fn demand(&self, action: usize) -> Option<Demand<'_>> {
         match self {
-            RuleBody::Holds(bindings) => {
-                let binding = bindings.iter().find(|binding| binding.action == action)?;
-                Some(Demand::Holds(&binding.condition))
-            }
+            RuleBody::Holds(bindings) => bound(bindings, action).map(Demand::Holds),
             RuleBody::During(_) => None,
             RuleBody::Moves { state, cell, allowed, actions } => {
-                actions.contains(&action).then_some(Demand::Moves { state: *state, cell: *cell, allowed })
+                let is_bound = actions.binary_search(&action).is_ok();
+                is_bound.then_some(Demand::Moves { state: *state, cell: *cell, allowed })
             }
         }
     }
+}
+
+/// The condition for an action; bindings are sorted by their actions.
+fn bound(bindings: &[RuleBinding], action: usize) -> Option<&Expr> {
+    let found = bindings.binary_search_by_key(&action, |binding| binding.action);
+    found.ok().map(|index| &bindings[index].condition)
+}
+
+/// For each action the rules that bind it, in the order of their declarations.
+pub(crate) fn rules_by_action(rules: &[RuleDef], actions: usize) -> Vec<Vec<usize>> {
+    let mut found = vec![Vec::new(); actions];
+    for (rule, definition) in rules.iter().enumerate() {
+        definition.body.actions().into_iter().for_each(|action| found[action].push(rule));
+    }
+    found
 }
 
 impl<'a> RowRules<'a> {
@@ -117,6 +141,7 @@ impl<'a> RowRules<'a> {
 
     /// The bounds on the numbers of the row: those of `where`s, and those of rules in force.
     pub fn bounds(self) -> impl Iterator<Item = &'a Bound> {
+        effort::spend(self.space.bounds[self.row.action].len());
         let is_in_force = move |bound: &&Bound| bound.rule.is_none_or(|rule| self.in_force.contains(rule));
         self.space.bounds[self.row.action].iter().filter(is_in_force)
     }

@@ -3,6 +3,8 @@
 //! Plain arithmetic over `f64`: a root is found to the last digits, not exactly. What it decides is only where
 //! conditions are tried; the conditions themselves are judged by evaluation.
 
+use crate::model::effort;
+
 /// The most numbers of an action that can be solved together.
 pub(super) const NUMBERS_MAX: usize = 6;
 /// Limits of one polynomial: its degree, and its terms.
@@ -71,6 +73,7 @@ impl Polynomial {
     }
 
     pub fn times(&self, other: &Polynomial) -> Option<Polynomial> {
+        effort::spend(1 + self.terms.len() * other.terms.len());
         let mut product = Polynomial { terms: Vec::new() };
         for (powers, factor) in &self.terms {
             let row = other.terms.iter().map(|(more, other)| {
@@ -179,6 +182,10 @@ fn turns(coefficients: &[f64], low: f64, high: f64) -> Vec<f64> {
 pub(super) fn project(polynomials: &[Polynomial], number: usize) -> Option<Vec<Polynomial>> {
     let mut projected: Vec<Polynomial> = Vec::new();
     let mut add = |found: Polynomial| -> Option<()> {
+        effort::spend(1 + projected.len());
+        if effort::is_spent() {
+            return None;
+        }
         if !found.is_constant() && !projected.contains(&found) {
             projected.push(found);
         }

@@ -18,6 +18,7 @@ use std::borrow::Cow;
 use std::cell::Cell;
 use std::rc::Rc;
 
+use crate::model::effort;
 use crate::model::eval::{Facts, WorldFacts, evaluate};
 use crate::model::expr::{Comparison, ExprKind};
 use crate::model::rules::critical::{Unknowns, polynomials};
@@ -138,7 +139,10 @@ impl<'a> RowRules<'a> {
     /// The clauses of the row under the rules in force, as indices in `Space::clauses` of its action.
     fn clauses(self) -> impl Iterator<Item = usize> {
         let all = self.space.clauses[self.row.action].iter().enumerate();
-        let is_in_force = move |rule| self.in_force.contains(rule) && self.row.rules.contains(&rule);
+        effort::spend(self.space.clauses[self.row.action].len());
+        // The rules of a row are sorted.
+        let is_in_force =
+            move |rule| self.in_force.contains(rule) && self.row.rules.binary_search(&rule).is_ok();
         let applies = move |clause: &Clause| clause.rule().is_none_or(is_in_force);
         all.filter(move |(_, clause)| applies(clause)).map(|(index, _)| index)
     }
@@ -432,6 +436,10 @@ impl<'a> Solver<'a> {
 
     /// Whether this value of the parameter at the place, after the values before it, can be completed.
     fn leads_on(&mut self, place: usize, value: Value) -> bool {
+        // Without a try left nothing is found, however many choices no clause has judged yet.
+        if self.before.tries.get() == 0 || effort::is_spent() {
+            return false;
+        }
         self.values[self.order[place]] = value;
         let is_broken = self.decided_by(place).any(|clause| self.breaks(self.clause(clause)));
         !is_broken && self.can_go_on(place + 1)

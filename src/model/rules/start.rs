@@ -4,6 +4,9 @@
 //! the actions that set such a state keep it, and no other action can break it. A rule with `on` is about the actions
 //! that it names, and says nothing about the start.
 
+use std::collections::BTreeSet;
+
+use crate::model::effort;
 use crate::model::eval::{Facts, MomentFacts, WorldFacts, evaluate};
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::RulesInForce;
@@ -101,9 +104,9 @@ impl Space {
         self.states.iter().flat_map(of_state).collect()
     }
 
+    /// The state to which a cell belongs.
     pub(crate) fn state_of(&self, cell: usize) -> &StateDef {
-        let found = self.states.iter().find(|state| state.position_of(cell).is_some());
-        found.expect("every cell belongs to a state")
+        &self.states[state_at(cell, &self.states)]
     }
 
     /// The rules about the start that are in force, those that share states together.
@@ -111,10 +114,11 @@ impl Space {
         let mut groups: Vec<Group> = Vec::new();
         for rule in rules.all() {
             let Some(condition) = &self.rules[rule].start else { continue };
+            effort::spend(groups.iter().map(|group| group.cells.len()).sum());
             let mut group = Group { rules: vec![rule], cells: cells_read(condition, &self.states) };
-            let (near, apart): (Vec<Group>, Vec<Group>) = groups
-                .into_iter()
-                .partition(|other| other.cells.iter().any(|cell| group.cells.contains(cell)));
+            let read: BTreeSet<usize> = group.cells.iter().copied().collect();
+            let (near, apart): (Vec<Group>, Vec<Group>) =
+                groups.into_iter().partition(|other| other.cells.iter().any(|cell| read.contains(cell)));
             for other in near {
                 group.rules.extend(other.rules);
                 group.cells.extend(other.cells);
@@ -171,6 +175,7 @@ impl<'a> Starts<'a> {
             NoStart { road, rule, index, cells: cells.collect(), is_too_large }
         };
         let mut cells = Vec::new();
+        let open: BTreeSet<usize> = open.iter().copied().collect();
         for cell in group.cells.iter().filter(|cell| open.contains(cell)) {
             cells.push((*cell, space.drawn_values(space.state_of(*cell).ty)));
         }
@@ -184,7 +189,8 @@ impl<'a> Starts<'a> {
         for rule in &group.rules {
             let mut legal = core::mem::take(&mut starts.legal);
             legal.retain(|number| {
-                space.stands(*rule, &starts.combination(*number).1, Some(&road.facts), Some(0))
+                !effort::is_spent()
+                    && space.stands(*rule, &starts.combination(*number).1, Some(&road.facts), Some(0))
             });
             if legal.is_empty() {
                 return Err(no_start(*rule, false));
@@ -196,6 +202,7 @@ impl<'a> Starts<'a> {
 
     /// The odds of a combination, relative to the others, and the memory with it.
     fn combination(&self, mut number: usize) -> (f64, Memory) {
+        effort::spend(self.memory.cells.len());
         let (mut odds, mut memory) = (1.0, self.memory.clone());
         for (cell, values) in &self.cells {
             let (of_value, value) = values[number % values.len()];
@@ -221,16 +228,22 @@ impl<'a> Starts<'a> {
 
 /// The cells that an expression reads.
 pub(crate) fn cells_read(expr: &Expr, states: &[StateDef]) -> Vec<usize> {
-    let mut found = Vec::new();
-    expr.walk(&mut |part| match part.kind {
-        ExprKind::Cell(cell) => found.push(cell),
-        ExprKind::CellAt(first, _) => {
-            let state = states.iter().find(|state| state.first_cell == first);
-            found.extend(state.into_iter().flat_map(|state| first..first + state.cells));
+    let (mut found, mut passed) = (Vec::new(), 0);
+    expr.walk(&mut |part| {
+        passed += 1;
+        match part.kind {
+            ExprKind::Cell(cell) => found.push(cell),
+            ExprKind::CellAt(first, _) => found.extend(first..first + states[state_at(first, states)].cells),
+            _ => {}
         }
-        _ => {}
     });
+    effort::spend(passed + found.len());
     found
+}
+
+/// The index of the state to which a cell belongs. The cells of the states follow one another, and each state has some.
+pub(crate) fn state_at(cell: usize, states: &[StateDef]) -> usize {
+    states.partition_point(|state| state.first_cell <= cell) - 1
 }
 
 impl RuleDef {
