@@ -91,12 +91,12 @@ fn a_scenario_keeps_the_profile_that_it_was_found_with() {
     let (status, stdout, stderr) = told_by("fsm");
     assert!(status == 3 && stdout.contains("claimed avoidable by [cc"), "{stdout}{stderr}");
 
-    // A digest that does not fit the settings is refused, with a remedy.
+    // A digest that does not fit the settings is refused where claims are verified, with a remedy.
     let digest = profile(FAULT).digest();
     assert!(text.contains(&digest));
     std::fs::write(&other, text.replace(&digest, &ModularConfig::default().digest()))
         .expect("it is writable");
-    let (status, _, stderr) = outcome(&mut avastra(&["replay", &other.display().to_string()]));
+    let (status, _, stderr) = outcome(&mut avastra(&["verify", &other.display().to_string()]));
     assert!(status == 1 && stderr.contains("--ads-config FILE"), "{stderr}");
 }
 
