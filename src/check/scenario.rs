@@ -181,7 +181,7 @@ impl<'a> Reader<'a> {
                     None => {
                         let states = space.states.iter().map(|state| state.name.as_str());
                         let names = states.chain(StartField::names());
-                        self.report(unknown("field", &field.name.text, field.name.span, names));
+                        self.report(unknown("state or field", &field.name.text, field.name.span, names));
                     }
                 },
             }

@@ -15,6 +15,7 @@ mod build;
 pub mod code;
 mod diagnostic;
 mod expression;
+mod foreign;
 mod format;
 mod grammar;
 pub mod keyword;
