@@ -20,7 +20,7 @@ use crate::model::{
     SPEED_MPS_MAX, START_MPS, Space, StateDef, TICK_MS, Value, code, locals,
 };
 use crate::syntax::{Diagnostic, ast, listed, print_expr};
-use crate::units::{Dimension, Rational};
+use crate::units::Dimension;
 
 /// Step numbers must be below this.
 const STEPS_MAX: u64 = 100_000;
@@ -492,8 +492,8 @@ impl<'a> Reader<'a> {
                     Diagnostic::error(code::OUT_OF_RANGE, format!("`{}` cannot be {shown}", parameter.name));
                 let label = match &parameter.domain {
                     Domain::Range(low, high) => {
-                        let end = |end: &Rational| self.space.show(Value::Number(end.to_f64()), parameter.ty);
-                        format!("must lie within {} .. {}", end(low), end(high))
+                        let ends = [low, high].map(|end| Value::Number(end.to_f64()));
+                        format!("must lie within {}", self.space.show_all(&ends, parameter.ty).join(" .. "))
                     }
                     Domain::Values(_) => "is not among its values".to_owned(),
                 };
