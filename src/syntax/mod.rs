@@ -37,7 +37,7 @@ pub use record::{
 };
 pub(crate) use scan::is_bidi;
 
-pub use yaml::yaml_mistake;
+pub use yaml::{settings_mistake, yaml_mistake};
 
 #[cfg(test)]
 mod tests;
