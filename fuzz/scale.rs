@@ -38,7 +38,10 @@ pub const GRAMMAR: &[Construct] = &[
     Construct { name: "signs without a meaning", text: |n| HEAD.to_owned() + &"§ x y\n".repeat(n) },
     Construct { name: "one long line", text: |n| HEAD.to_owned() + &"let a = 1 ".repeat(n) + "\n" },
     Construct { name: "open texts", text: |n| HEAD.to_owned() + &"let a = \"".repeat(n) + "\n" },
-    Construct { name: "uses of no file", text: |n| HEAD.to_owned() + &each(n, |i| format!("use \"{i}.ava\"\n")) },
+    Construct {
+        name: "uses of no file",
+        text: |n| HEAD.to_owned() + &each(n, |i| format!("use \"{i}.ava\"\n")),
+    },
     Construct { name: "uses of one file", text: |n| HEAD.to_owned() + &"use \"roads.ava\"\n".repeat(n) },
     Construct {
         name: "names left out",
@@ -53,7 +56,10 @@ pub const GRAMMAR: &[Construct] = &[
     Construct { name: "a sum", text: |n| format!("{HEAD}let a = 1{}\n", "+1".repeat(n)) },
     Construct { name: "signs before", text: |n| format!("{HEAD}let a = {}1\n", "-".repeat(n)) },
     Construct { name: "brackets", text: |n| format!("{HEAD}let a = {}1{}\n", "(".repeat(n), ")".repeat(n)) },
-    Construct { name: "a list", text: |n| format!("{HEAD}let a = [{}]\n", listed(n, ", ", |i| i.to_string())) },
+    Construct {
+        name: "a list",
+        text: |n| format!("{HEAD}let a = [{}]\n", listed(n, ", ", |i| i.to_string())),
+    },
     Construct {
         name: "unknown names",
         text: |n| HEAD.to_owned() + &each(n, |i| format!("let a{i} = b{i}\n")),
@@ -97,7 +103,10 @@ pub const GRAMMAR: &[Construct] = &[
     Construct {
         name: "cases of a number",
         text: |n| {
-            format!("{HEAD}fn f(x: Int) -> Int = match x {{ {}_ => 0 }}\n", each(n, |i| format!("{i} => 1\n")))
+            format!(
+                "{HEAD}fn f(x: Int) -> Int = match x {{ {}_ => 0 }}\n",
+                each(n, |i| format!("{i} => 1\n"))
+            )
         },
     },
     Construct {
@@ -146,7 +155,9 @@ pub const GRAMMAR: &[Construct] = &[
             let called = format!("{}d{}", "f(".repeat(depth), ")".repeat(depth));
             let action = "action a(any d: Length in 1 m .. 2 m) { set b = d > 1 m }\n\
                           action z(any d: Length in 1 m .. 2 m) { set b = d > 1 m }\n";
-            format!("{ROADS}{BOOL}fn f(x: Length) -> Length = x + x - x\n{action}rule r on a, z: {called} <= 3 m\n")
+            format!(
+                "{ROADS}{BOOL}fn f(x: Length) -> Length = x + x - x\n{action}rule r on a, z: {called} <= 3 m\n"
+            )
         },
     },
     Construct {
@@ -162,14 +173,21 @@ pub const GRAMMAR: &[Construct] = &[
     },
     Construct {
         name: "states",
-        text: |n| format!("{ROADS}{}action a() {{ set s0 = false }}\n", each(n, |i| format!("state s{i}: Bool = true\n"))),
+        text: |n| {
+            format!(
+                "{ROADS}{}action a() {{ set s0 = false }}\n",
+                each(n, |i| format!("state s{i}: Bool = true\n"))
+            )
+        },
     },
     Construct {
         name: "states with rules",
         text: |n| {
             let one = |i: usize| {
                 let next = (i + 1) % n;
-                format!("state s{i}: Bool = true\naction a{i}() {{ set s{i} = false }}\nrule r{i}: s{i} or s{next}\n")
+                format!(
+                    "state s{i}: Bool = true\naction a{i}() {{ set s{i} = false }}\nrule r{i}: s{i} or s{next}\n"
+                )
             };
             ROADS.to_owned() + &each(n, one)
         },
@@ -179,7 +197,9 @@ pub const GRAMMAR: &[Construct] = &[
         text: |n| {
             let one = |i: usize| {
                 let next = (i + 1) % n;
-                format!("state s{i}: Bool = any\naction a{i}() {{ set s{i} = false }}\nrule r{i}: s{i} or s{next}\n")
+                format!(
+                    "state s{i}: Bool = any\naction a{i}() {{ set s{i} = false }}\nrule r{i}: s{i} or s{next}\n"
+                )
             };
             ROADS.to_owned() + &each(n, one)
         },
@@ -188,7 +208,9 @@ pub const GRAMMAR: &[Construct] = &[
         name: "states with rules about time",
         text: |n| {
             let one = |i: usize| {
-                format!("state s{i}: Bool = true\naction a{i}() {{ set s{i} = false }}\nrule r{i}: s{i} or step >= 0\n")
+                format!(
+                    "state s{i}: Bool = true\naction a{i}() {{ set s{i} = false }}\nrule r{i}: s{i} or step >= 0\n"
+                )
             };
             ROADS.to_owned() + &each(n, one)
         },
@@ -198,7 +220,9 @@ pub const GRAMMAR: &[Construct] = &[
         text: |n| {
             let one = |i: usize| {
                 let moves = "{ A -> A | B, B -> B | C, C -> C | A }";
-                format!("state s{i}: T = any\naction a{i}(each e: T) {{ set s{i} = e }}\nrule r{i} on s{i} {moves}\n")
+                format!(
+                    "state s{i}: T = any\naction a{i}(each e: T) {{ set s{i} = e }}\nrule r{i} on s{i} {moves}\n"
+                )
             };
             format!("{ROADS}enum T = A | B | C\n{}", each(n, one))
         },
@@ -259,12 +283,19 @@ pub const GRAMMAR: &[Construct] = &[
     },
     Construct {
         name: "fields of a spawn",
-        text: |n| format!("{HEAD}action a() {{ spawn Sedan ahead 30 m {{ {} }} }}\n", each(n, |i| format!("x{i}: 1\n"))),
+        text: |n| {
+            format!(
+                "{HEAD}action a() {{ spawn Sedan ahead 30 m {{ {} }} }}\n",
+                each(n, |i| format!("x{i}: 1\n"))
+            )
+        },
     },
     Construct {
         name: "rows",
         text: |n| {
-            format!("{ROADS}{COUNT}action a(each x: Int in 1 .. {n}) {{ set c = x }}\nrule r on a: x <= {n}\n")
+            format!(
+                "{ROADS}{COUNT}action a(each x: Int in 1 .. {n}) {{ set c = x }}\nrule r on a: x <= {n}\n"
+            )
         },
     },
     Construct {
@@ -272,7 +303,9 @@ pub const GRAMMAR: &[Construct] = &[
         text: |n| {
             let spawn = "spawn Sedan ahead 50 m { lane: Current, speed: v, does: DriveAhead }";
             let drawn = "any v: Speed in 5 m/s .. 20 m/s";
-            format!("{ROADS}action a(each x: Int in 1 .. {n}, {drawn}) {{ {spawn} }}\nrule r on a: v <= road.limit\n")
+            format!(
+                "{ROADS}action a(each x: Int in 1 .. {n}, {drawn}) {{ {spawn} }}\nrule r on a: v <= road.limit\n"
+            )
         },
     },
     Construct {
@@ -286,7 +319,12 @@ pub const GRAMMAR: &[Construct] = &[
     },
     Construct {
         name: "axes of two values",
-        text: |n| format!("{ROADS}{BOOL}action a({}) {{ set b = true }}\n", listed(n, ", ", |i| format!("each p{i}: Bool"))),
+        text: |n| {
+            format!(
+                "{ROADS}{BOOL}action a({}) {{ set b = true }}\n",
+                listed(n, ", ", |i| format!("each p{i}: Bool"))
+            )
+        },
     },
     Construct {
         name: "axes of one value",
@@ -299,7 +337,9 @@ pub const GRAMMAR: &[Construct] = &[
         name: "drawn lists",
         text: |n| {
             let drawn = format!("any x: Int in 1 .. {n}, any y: Int in 1 .. {n}");
-            format!("{ROADS}{COUNT}action a({drawn}) {{ set c = x + y }}\nrule r on a: x * y == 7919 * 7907\n")
+            format!(
+                "{ROADS}{COUNT}action a({drawn}) {{ set c = x + y }}\nrule r on a: x * y == 7919 * 7907\n"
+            )
         },
     },
     Construct {
@@ -308,7 +348,9 @@ pub const GRAMMAR: &[Construct] = &[
             let n = n.clamp(2, 60);
             let drawn = listed(n, ", ", |i| format!("any x{i}: Bool"));
             let all = format!("{}x0{}", "(".repeat(n - 1), each(n - 1, |i| format!(" == x{})", i + 1)));
-            format!("{ROADS}{BOOL}action a({drawn}) {{ set b = x0 }}\nrule r on a: {all} == true\nrule s on a: {all} == false\n")
+            format!(
+                "{ROADS}{BOOL}action a({drawn}) {{ set b = x0 }}\nrule r on a: {all} == true\nrule s on a: {all} == false\n"
+            )
         },
     },
     Construct {
@@ -321,7 +363,12 @@ pub const GRAMMAR: &[Construct] = &[
     },
     Construct {
         name: "groups that double",
-        text: |n| format!("{HEAD}{BOOL}{ACTION}group g0 = a, a\n{}", each(n, |i| format!("group g{} = g{i}, g{i}\n", i + 1))),
+        text: |n| {
+            format!(
+                "{HEAD}{BOOL}{ACTION}group g0 = a, a\n{}",
+                each(n, |i| format!("group g{} = g{i}, g{i}\n", i + 1))
+            )
+        },
     },
     Construct {
         name: "groups of all actions",
@@ -345,7 +392,10 @@ pub const GRAMMAR: &[Construct] = &[
         name: "rules on all actions",
         text: |n| {
             let actions = each(n, |i| format!("action a{i}() {{ set b = true }}\n"));
-            format!("{ROADS}{BOOL}{actions}{}", each(n, |i| format!("rule r{i} on actions: b or step >= {i}\n")))
+            format!(
+                "{ROADS}{BOOL}{actions}{}",
+                each(n, |i| format!("rule r{i} on actions: b or step >= {i}\n"))
+            )
         },
     },
     Construct {
@@ -379,13 +429,18 @@ pub const GRAMMAR: &[Construct] = &[
     },
     Construct {
         name: "optional rules",
-        text: |n| format!("{ROADS}{BOOL}{ACTION}{}", each(n, |i| format!("optional rule r{i}: b or not b\n"))),
+        text: |n| {
+            format!("{ROADS}{BOOL}{ACTION}{}", each(n, |i| format!("optional rule r{i}: b or not b\n")))
+        },
     },
     Construct {
         name: "transitions",
         text: |n| {
             let moves = each(n, |i| format!("V{} -> V{}\n", i % 128, (i * 7 + i / 128) % 128));
-            format!("{ROADS}{}state s: E = any\naction a(each e: E) {{ set s = e }}\nrule r on s {{ {moves} }}\n", largest_enum())
+            format!(
+                "{ROADS}{}state s: E = any\naction a(each e: E) {{ set s = e }}\nrule r on s {{ {moves} }}\n",
+                largest_enum()
+            )
         },
     },
     Construct {
@@ -423,19 +478,31 @@ pub const GRAMMAR: &[Construct] = &[
     },
     Construct {
         name: "roads of an episode",
-        text: |n| format!("{ROADS}{BOOL}{ACTION}episode {{ roads: [{}] }}\n", listed(n, ", ", |_| "corner".to_owned())),
+        text: |n| {
+            format!(
+                "{ROADS}{BOOL}{ACTION}episode {{ roads: [{}] }}\n",
+                listed(n, ", ", |_| "corner".to_owned())
+            )
+        },
     },
     Construct {
         name: "steps of an episode",
         text: |n| {
             let rule = "rule r: elapsed >= 1 s implies c <= 100000000\n";
             let step = "each step { set c = c + 1 }\n";
-            format!("{ROADS}{COUNT}action a() {{ set c = c + 1 }}\n{step}{rule}episode {{ limit: {n} steps }}\n")
+            format!(
+                "{ROADS}{COUNT}action a() {{ set c = c + 1 }}\n{step}{rule}episode {{ limit: {n} steps }}\n"
+            )
         },
     },
     Construct {
         name: "cases of the reward",
-        text: |n| format!("{ROADS}{BOOL}{ACTION}reward {{ {}_ => 0 }}\n", each(n, |i| format!("proc > {i} % => {i}\n"))),
+        text: |n| {
+            format!(
+                "{ROADS}{BOOL}{ACTION}reward {{ {}_ => 0 }}\n",
+                each(n, |i| format!("proc > {i} % => {i}\n"))
+            )
+        },
     },
     Construct {
         name: "verdicts",
@@ -455,9 +522,14 @@ pub const GRAMMAR: &[Construct] = &[
     Construct { name: "steps of a scenario", text: |n| scenario(&each(n, |i| format!("{i}: wait()\n")), "") },
     Construct {
         name: "conditions of a scenario",
-        text: |n| scenario(&each(n, |i| format!("{i}: a() once npc#{}.gap <= 30 m after 0.5 s\n", i + 1)), ""),
+        text: |n| {
+            scenario(&each(n, |i| format!("{i}: a() once npc#{}.gap <= 30 m after 0.5 s\n", i + 1)), "")
+        },
     },
-    Construct { name: "claims of a scenario", text: |n| scenario("0: wait()\n", &"expect end == arrived\n".repeat(n)) },
+    Construct {
+        name: "claims of a scenario",
+        text: |n| scenario("0: wait()\n", &"expect end == arrived\n".repeat(n)),
+    },
     Construct {
         name: "fields of a scenario",
         text: |n| scenario(&format!("0: a() with {{ {} }}\n", "mode: Far, ".repeat(n)), ""),

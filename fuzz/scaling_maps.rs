@@ -307,7 +307,8 @@ fn spirals(size: usize) -> String {
 }
 
 fn cubics(size: usize) -> String {
-    let shape = r#"<paramPoly3 pRange="normalized" aU="0" bU="100" cU="0" dU="0" aV="0" bV="0" cV="3" dV="-2"/>"#;
+    let shape =
+        r#"<paramPoly3 pRange="normalized" aU="0" bU="100" cU="0" dU="0" aV="0" bV="0" cV="3" dV="-2"/>"#;
     shapes(size, shape)
 }
 
@@ -333,7 +334,8 @@ fn widths(size: usize) -> String {
 fn lanes_with_widths(size: usize) -> String {
     let each = |id: usize| {
         let shift_m = id as f64 * 1e-3;
-        let widths = along(size / 100 + 1, |at_m| format!(r#"<width sOffset="{}" a="0.1"/>"#, at_m + shift_m));
+        let widths =
+            along(size / 100 + 1, |at_m| format!(r#"<width sOffset="{}" a="0.1"/>"#, at_m + shift_m));
         lane(-(id as i32) - 1, &widths)
     };
     straight(&all(100, each), "")
@@ -341,9 +343,7 @@ fn lanes_with_widths(size: usize) -> String {
 
 fn lanes(size: usize) -> String {
     let inner = section(0.0, &all(100, |id| lane(-(id as i32) - 1, WIDTH)));
-    map(&all(size / 100 + 1, |n| {
-        road(n, 100.0, &line(0.0, 400.0 * n as f64, 0.0, 100.0), &inner, &NONE)
-    }))
+    map(&all(size / 100 + 1, |n| road(n, 100.0, &line(0.0, 400.0 * n as f64, 0.0, 100.0), &inner, &NONE)))
 }
 
 fn markings(size: usize) -> String {
@@ -424,7 +424,8 @@ fn priority_roads(size: usize) -> String {
 }
 
 fn controllers(size: usize) -> String {
-    let lights = |n: usize| signal(format!("a{n}"), 1.0, LIGHT, "") + &signal(format!("b{n}"), 3.0, LIGHT, "");
+    let lights =
+        |n: usize| signal(format!("a{n}"), 1.0, LIGHT, "") + &signal(format!("b{n}"), 3.0, LIGHT, "");
     let roads = all(size, |n| inside(n, n, &format!("J{n}"), &lights(n)));
     let switch = |n: usize| ["a", "b"].map(|side| controller(&format!("{side}{n}"))).concat();
     let junctions = all(size, |n| {
@@ -505,8 +506,9 @@ fn objects(objects: &str, length_m: f64) -> String {
 }
 
 fn crosswalks(size: usize) -> String {
-    let one =
-        |at_m: f64| format!(r#"<object type="crosswalk" id="{at_m}" s="{at_m}" t="0" length="3" width="7" hdg="0"/>"#);
+    let one = |at_m: f64| {
+        format!(r#"<object type="crosswalk" id="{at_m}" s="{at_m}" t="0" length="3" width="7" hdg="0"/>"#)
+    };
     objects(&along(size, one), 100.0)
 }
 
@@ -522,8 +524,9 @@ fn copies(size: usize) -> String {
         let corner = unit_vector(2.0 * PI * n as f64 / size.max(3) as f64);
         format!(r#"<cornerLocal u="{}" v="{}"/>"#, corner.x, corner.y)
     });
-    let building =
-        format!(r#"<object type="building" id="b" s="0" t="9">{repeat}<outline>{corners}</outline></object>"#);
+    let building = format!(
+        r#"<object type="building" id="b" s="0" t="9">{repeat}<outline>{corners}</outline></object>"#
+    );
     objects(&building, 2000.0)
 }
 

@@ -277,12 +277,12 @@ impl<'a> Judge<'a> {
 
     /// The values of a list or the ends of a range, in words.
     fn values_of(&self, domain: &Domain, ty: Type) -> String {
-        let shown = |value: Value| self.row.space.show(value, ty);
+        let space = self.row.space;
         match domain {
             Domain::Values(values) => {
                 // A value that is likelier stands in the list more than once.
                 let mut words: Vec<String> = Vec::new();
-                for word in values.iter().map(|value| shown(*value)) {
+                for word in space.show_all(values, ty) {
                     if !words.contains(&word) {
                         words.push(word);
                     }
@@ -290,7 +290,8 @@ impl<'a> Judge<'a> {
                 words.join(" | ")
             }
             Domain::Range(low, high) => {
-                format!("{} .. {}", shown(Value::Number(low.to_f64())), shown(Value::Number(high.to_f64())))
+                let ends = [low, high].map(|end| Value::Number(end.to_f64()));
+                space.show_all(&ends, ty).join(" .. ")
             }
         }
     }

@@ -150,7 +150,7 @@ impl ActionTable {
             axes: axes
                 .map(|(parameter, (name, value))| AxisRecord {
                     name: name.to_string(),
-                    value: space.show(*value, parameter.ty),
+                    value: space.show_in_si(*value, parameter.ty),
                 })
                 .collect(),
             rules: row.rules.iter().map(|rule| space.rules[*rule].name.clone()).collect(),
@@ -190,7 +190,8 @@ impl ActionTable {
         let name = parameter.name.to_string();
         match (&parameter.domain, range) {
             (Domain::Values(values), _) => {
-                let values = values.iter().map(|value| self.space().show(*value, parameter.ty)).collect();
+                let space = self.space();
+                let values = values.iter().map(|value| space.show_in_si(*value, parameter.ty)).collect();
                 DrawRecord { name, unit: String::new(), low: None, high: None, values }
             }
             (Domain::Range(low, high), range) => {

@@ -9,7 +9,7 @@ use core::ops::RangeInclusive;
 use serde_json::Value;
 
 use crate::mdp::{ProcKind, RewardSettings};
-use crate::syntax::{listed, nearest, yaml_mistake};
+use crate::syntax::{listed, nearest, settings_mistake, yaml_mistake};
 
 use super::network::Initialization;
 use super::presets;
@@ -330,11 +330,12 @@ impl Hyperparameters {
             let mut alone = self.record();
             alone.insert(name.clone(), value.clone());
             serde_json::from_value::<Hyperparameters>(Value::Object(alone))
-                .map_err(|error| SettingsError::Text(format!("`{name}`: {error}")))?;
+                .map_err(|error| format!("`{name}`: {}", settings_mistake(&error.to_string(), None)))
+                .map_err(SettingsError::Text)?;
             record.insert(name, value);
         }
         let settings: Hyperparameters = serde_json::from_value(Value::Object(record))
-            .map_err(|error| SettingsError::Text(error.to_string()))?;
+            .map_err(|error| SettingsError::Text(settings_mistake(&error.to_string(), None)))?;
         settings.check()?;
         Ok(settings)
     }

@@ -185,7 +185,8 @@ impl Checker {
             self.listed += values.len();
             if self.listed > LISTED_MAX {
                 let message = format!("the parameters list more than {LISTED_MAX} values together");
-                let error = Diagnostic::error(code::TOO_MUCH, message).at(declared.span, "here the limit is passed");
+                let error =
+                    Diagnostic::error(code::TOO_MUCH, message).at(declared.span, "here the limit is passed");
                 let help = "list fewer values, give them smaller odds, or draw a quantity from a range";
                 return self.reject(error.help(help));
             }

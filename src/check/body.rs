@@ -10,7 +10,7 @@ use crate::model::vocabulary::{Body, BodyField, Word};
 use crate::model::{BodyDef, BodyWord, Type, WordExpr, code};
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast, nearest};
-use crate::units::{Dimension, quantity};
+use crate::units::{Dimension, quantity_short};
 
 /// Kilograms in a tonne.
 const KG_PER_T: f64 = 1000.0;
@@ -74,7 +74,7 @@ impl Checker {
             self.report(match like.is_vehicle() {
                 false => error.at(wheelbase.span, format!("a `{}` has no axles", like.name())),
                 true => {
-                    let length = quantity(shape.length_m, Dimension::LENGTH);
+                    let length = quantity_short(shape.length_m, Dimension::LENGTH);
                     error.at(wheelbase.span, format!("the whole body is {length} long"))
                 }
             });
@@ -103,7 +103,7 @@ impl Checker {
         if (low..=high).contains(&number) {
             return Some(number);
         }
-        let shown = |number: f64| quantity(number, dimension);
+        let shown = |number: f64| quantity_short(number, dimension);
         let message = format!("a {} of {} is not possible", wanted.name(), shown(number));
         let error = Diagnostic::error(code::SETTING, message);
         self.reject(error.at(value.span, format!("must lie within {} .. {}", shown(low), shown(high))))

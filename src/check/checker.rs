@@ -210,7 +210,9 @@ fn too_much(space: &Space) -> Diagnostic {
     let bound =
         |action: &usize| product_size(&actions[*action]).saturating_mul(1 + binding[*action].len() as u64);
     let error = match (0..actions.len()).max_by_key(bound) {
-        Some(action) => error.at(actions[action].span, "most of them are for the rows and rules of this action"),
+        Some(action) => {
+            error.at(actions[action].span, "most of them are for the rows and rules of this action")
+        }
         None => error,
     };
     let rows = rows.len();

@@ -206,11 +206,7 @@ fn of_rule(
 }
 
 /// Whether a rule forbids more or less than before, by its moves or by what it leaves of each range.
-fn compared(
-    old: (&Space, usize),
-    new: (&Space, usize),
-    pairs: &Pairs<'_>,
-) -> Option<(Change, String)> {
+fn compared(old: (&Space, usize), new: (&Space, usize), pairs: &Pairs<'_>) -> Option<(Change, String)> {
     let mut turns = Turns::default();
     if let (
         RuleBody::Moves { state, allowed: before, .. },

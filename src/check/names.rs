@@ -62,6 +62,13 @@ pub(crate) fn unknown<'a>(
 ) -> Diagnostic {
     let candidates: Vec<&str> = candidates.into_iter().collect();
     let error = Diagnostic::error(code::UNKNOWN, format!("unknown {kind} `{name}`")).at(span, "not declared");
+    if let Some((help, instead)) = foreign(name).filter(|_| matches!(kind, "name" | "variant" | "function")) {
+        let error = error.help(help);
+        return match instead {
+            Some(instead) => error.fix(format!("write `{instead}`"), span, instead),
+            None => error,
+        };
+    }
     match nearest(name, candidates.iter().copied()) {
         Some(near) => error.meant(span, near),
         None if !candidates.is_empty() && candidates.len() <= 12 => {
@@ -69,4 +76,18 @@ pub(crate) fn unknown<'a>(
         }
         None => error,
     }
+}
+
+/// What stands in place of a name that other languages have, and what to write there if that is enough.
+fn foreign(name: &str) -> Option<(&'static str, Option<&'static str>)> {
+    Some(match name {
+        "True" | "TRUE" => ("write `true`", Some("true")),
+        "False" | "FALSE" => ("write `false`", Some("false")),
+        "else" | "default" | "otherwise" => ("the rest is written `_`", Some("_")),
+        "null" | "NULL" | "nil" | "undefined" => {
+            ("everything has a value: an enum may have a variant for nothing, like `None`", None)
+        }
+        "if" => ("`match` chooses a value: `match near { true => 3 m, false => 9 m }`", None),
+        _ => return None,
+    })
 }

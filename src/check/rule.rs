@@ -391,7 +391,15 @@ impl Checker {
             let message = format!("rule `{}` says nothing of {}", rule.name.text, listed(&stuck));
             let error = Diagnostic::error(code::DEADLOCK, message)
                 .at(rule.name.span, "from there no move is allowed, not even to stay");
-            self.report(error.help(format!("add `{0} -> {0}` or another move", stuck[0])));
+            let (from, to) = (stuck[0], first_other(variants, stuck[0]));
+            self.report(error.help(match from == to {
+                true => format!("add `{from} -> {from}`"),
+                // The value itself is named last: the author of `Free -> Braked` hardly wants braking without end.
+                false => format!(
+                    "add a move to go on with, for example `{from} -> {to}`; `{from} -> {from}` would let what sets \
+                     it happen again and again"
+                ),
+            }));
         }
         let is_led_to = |to: usize| (0..variants.len()).any(|from| from != to && allowed[from][to]);
         let unreachable = rows(&|to| !is_led_to(to) && !begins(to));

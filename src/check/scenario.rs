@@ -20,7 +20,7 @@ use crate::model::{
     SPEED_MPS_MAX, START_MPS, Space, StateDef, TICK_MS, Value, code, locals,
 };
 use crate::syntax::{Diagnostic, ast, listed, print_expr};
-use crate::units::{Dimension, Rational};
+use crate::units::Dimension;
 
 /// Step numbers must be below this.
 const STEPS_MAX: u64 = 100_000;
@@ -181,7 +181,7 @@ impl<'a> Reader<'a> {
                     None => {
                         let states = space.states.iter().map(|state| state.name.as_str());
                         let names = states.chain(StartField::names());
-                        self.report(unknown("field", &field.name.text, field.name.span, names));
+                        self.report(unknown("state or field", &field.name.text, field.name.span, names));
                     }
                 },
             }
@@ -445,8 +445,7 @@ impl<'a> Reader<'a> {
             return self.reject(error.beside(axis.span, "declared here"));
         }
         let values: Vec<Value> = values.into_iter().collect::<Option<_>>()?;
-        let same =
-            |row: &&Row| row.axes.iter().zip(&values).all(|((_, axis), value)| axis == value);
+        let same = |row: &&Row| row.axes.iter().zip(&values).all(|((_, axis), value)| axis == value);
         let row = space.rows_of(action).iter().find(same);
         if row.is_none() {
             let message = format!("`{}` has no such row", call.name.text);
@@ -490,8 +489,8 @@ impl<'a> Reader<'a> {
                     Diagnostic::error(code::OUT_OF_RANGE, format!("`{}` cannot be {shown}", parameter.name));
                 let label = match &parameter.domain {
                     Domain::Range(low, high) => {
-                        let end = |end: &Rational| self.space.show(Value::Number(end.to_f64()), parameter.ty);
-                        format!("must lie within {} .. {}", end(low), end(high))
+                        let ends = [low, high].map(|end| Value::Number(end.to_f64()));
+                        format!("must lie within {}", self.space.show_all(&ends, parameter.ty).join(" .. "))
                     }
                     Domain::Values(_) => "is not among its values".to_owned(),
                 };

@@ -26,7 +26,8 @@ pub fn suggest_uses(loaded: &mut Loaded, nearby: &[(String, String)]) {
             continue;
         }
         let is_root = |path: &str| root.path.file_name() == Path::new(path).file_name();
-        let declaring = trees.iter().find(|(path, tree)| !is_root(path) && declares(tree, &name));
+        let meant = meant_by(&diagnostic.message);
+        let declaring = trees.iter().find(|(path, tree)| !is_root(path) && declares_as(tree, &name, meant));
         if let Some((path, _)) = declaring {
             suggest(diagnostic, &name, path, place);
         }
@@ -49,9 +50,41 @@ fn insertion(tree: &File) -> Span {
     Span::new(FileId(0), end, end)
 }
 
+/// What stands in [`meant_by`] for the variants of an enum, which no keyword declares.
+const VARIANT: &str = "variant";
+
+/// The keywords of the declarations that the author of a message's unknown name can have meant. An action is nothing
+/// for a name in an expression, and no declaration gives a spawn another field.
+fn meant_by(message: &str) -> &'static [&'static str] {
+    let kind = message.strip_prefix("unknown ").and_then(|rest| rest.split_once(" `")).map(|(kind, _)| kind);
+    match kind {
+        Some("name") => &["let", "state", "body", VARIANT],
+        Some("action") => &["action", "group"],
+        Some("action, group or rule") => &["action", "group", "rule"],
+        Some("state" | "map" | "state or field") => &["state"],
+        Some("type" | "enum") => &["enum"],
+        Some("variant" | "key") => &[VARIANT],
+        Some("function") => &["fn"],
+        Some("rule") => &["rule"],
+        Some("road") => &["road"],
+        Some("body") => &["body"],
+        _ => &[],
+    }
+}
+
 fn declares(tree: &File, name: &str) -> bool {
     tree.items.iter().any(|item| {
         let variants = item.kind.as_enum().map_or(&[][..], |declared| &declared.variants);
         item.kind.name().into_iter().chain(variants).any(|declared| declared.text == name)
+    })
+}
+
+/// Whether a file declares the name by one of these keywords.
+fn declares_as(tree: &File, name: &str, keywords: &[&str]) -> bool {
+    tree.items.iter().any(|item| {
+        let kind = item.kind.plain();
+        let variants = kind.as_enum().map_or(&[][..], |declared| &declared.variants);
+        keywords.contains(&kind.keyword()) && kind.name().is_some_and(|declared| declared.text == name)
+            || keywords.contains(&VARIANT) && variants.iter().any(|variant| variant.text == name)
     })
 }

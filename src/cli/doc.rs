@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 use crate::model::{
     ActionDef, Domain, Initial, Interval, Parameter, Reach, RuleBody, RuleDef, Space, StateDef, Type, Value,
 };
+use crate::units::{Dimension, quantity_short};
 
 use super::arguments::DocArguments;
 use super::error::Failure;
@@ -72,8 +73,8 @@ fn page(space: &Space) -> String {
     text.push_str("## Roads\n\n| road | limit | map | meaning |\n|---|---|---|---|\n");
     for road in &space.roads {
         let map = cell(&road.map_path.file_name().unwrap_or_default().to_string_lossy());
-        let limit = crate::units::decimal((road.facts.limit_mps * 1000.0).round() / 1000.0, false);
-        let _ = writeln!(text, "| `{}` | {limit} m/s | {map} | {} |", road.name, inline(&road.docs));
+        let limit = quantity_short(road.facts.limit_mps, Dimension::SPEED);
+        let _ = writeln!(text, "| `{}` | {limit} | {map} | {} |", road.name, inline(&road.docs));
     }
     text.push_str("\n## Verdicts\n\n");
     for verdict in &space.verdicts {
@@ -149,11 +150,12 @@ fn rule_section(text: &mut String, space: &Space, index: usize, rule: &RuleDef) 
 fn ranges(space: &Space, action: usize, parameter: &Parameter) -> String {
     let Domain::Range(low, high) = &parameter.domain else { return String::new() };
     let declared = Interval::closed(*low, *high);
-    let unit = unit(parameter.ty);
+    let unit = parameter.unit();
     let roads = space.roads.iter().enumerate();
     let left = roads.filter_map(|(road, of)| Some((of, range_on(space, action, parameter, road)?)));
     let shown = left.filter(|(_, kept)| *kept != declared);
-    let shown: Vec<String> = shown.map(|(road, kept)| format!("{kept} {unit} on {}", road.name)).collect();
+    let shown: Vec<String> =
+        shown.map(|(road, kept)| format!("{} on {}", kept.shown(parameter.ty, unit), road.name)).collect();
     shown.join("; ")
 }
 
@@ -194,16 +196,14 @@ fn sign_of(value: Value) -> u64 {
 fn values(space: &Space, domain: &Domain, ty: Type) -> String {
     match domain {
         Domain::Range(low, high) => {
-            let shown = |end: f64| space.show(Value::Number(end), ty);
-            format!("{} .. {}", shown(low.to_f64()), shown(high.to_f64()))
+            let ends = [low, high].map(|end| Value::Number(end.to_f64()));
+            space.show_all(&ends, ty).join(" .. ")
         }
         Domain::Values(values) if values.len() > 12 => {
-            let ends = [values[0], values[values.len() - 1]].map(|value| space.show(value, ty));
+            let ends = space.show_all(&[values[0], values[values.len() - 1]], ty);
             format!("{} … {} ({} values)", ends[0], ends[1], values.len())
         }
-        Domain::Values(values) => {
-            values.iter().map(|value| space.show(*value, ty)).collect::<Vec<_>>().join(", ")
-        }
+        Domain::Values(values) => space.show_all(values, ty).join(", "),
     }
 }
 
@@ -213,14 +213,6 @@ fn type_name(space: &Space, ty: Type) -> String {
         Type::Int => "Int".to_owned(),
         Type::Quantity(dimension) => dimension.to_string(),
         Type::Enum(of) => space.enums[of.0].name.clone(),
-    }
-}
-
-/// The SI unit of a type; empty for what has none.
-pub fn unit(ty: Type) -> String {
-    match ty {
-        Type::Quantity(dimension) => dimension.si_unit(),
-        Type::Int | Type::Bool | Type::Enum(_) => String::new(),
     }
 }
 

@@ -57,10 +57,30 @@ mod why;
 use std::process::ExitCode;
 
 use clap::FromArgMatches;
+use clap::error::{ContextKind, ContextValue};
+
+use crate::syntax::nearest;
 
 use arguments::{Arguments, Command, Format};
 use error::Failure;
 use output::Output;
+
+/// An unknown command's error with the command that differs least: clap's own measure prefers `render` to `run` for `rn`.
+fn with_nearest_command(mut error: clap::Error) -> clap::Error {
+    let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidSubcommand).cloned() else {
+        return error;
+    };
+    // Words of `ads` have other neighbours.
+    if std::env::args().skip(1).find(|argument| !argument.starts_with('-')).as_ref() != Some(&word) {
+        return error;
+    }
+    let command = help::command();
+    let commands = command.get_subcommands().filter(|command| !command.is_hide_set());
+    if let Some(near) = nearest(&word, commands.map(clap::Command::get_name)) {
+        error.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(vec![near.to_owned()]));
+    }
+    error
+}
 
 /// Runs the command that the process was started with.
 pub fn main() -> ExitCode {
@@ -76,6 +96,7 @@ pub fn main() -> ExitCode {
     let found = match help::command().try_get_matches() {
         Ok(found) => found,
         Err(error) => {
+            let error = with_nearest_command(error);
             // Help and version are not failures; every other message of clap's is a usage error.
             if error.use_stderr() && output::asks_for_json() {
                 let failure = Failure::usage(error.to_string().trim_end().trim_start_matches("error: "));

@@ -1,13 +1,14 @@
 //! What the replay of an emitted scenario looked like, and what its file says of it.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::action::ActionTable;
 use crate::ads::Selected;
-use crate::episode::{Actor, Recorder};
+use crate::episode::{Actor, EpisodeLog, Outcome, Recorder};
 use crate::model::vocabulary::Word;
-use crate::model::{Claim, Scenario};
+use crate::model::{Claim, Scenario, Space};
 use crate::oracle::ClaimResult;
 use crate::road::{LaneIndex, LanePlace, RoadMap};
 use crate::run::{RunError, Stage};
@@ -33,6 +34,8 @@ pub struct Recording {
     /// The lanes of its route, in order.
     pub route: Vec<LaneIndex>,
     pub seen: Recorder,
+    /// What the author calls the bodies of the author's own, by number of the road user.
+    pub own_bodies: BTreeMap<u32, String>,
     /// Where the scenario comes from, what it claims, and the scenario as text of the language: name and value.
     pub facts: Vec<(String, String)>,
 }
@@ -88,8 +91,26 @@ pub fn record(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Resul
         goal: road.goal,
         route: road.route.lanes.iter().map(|part| part.lane).collect(),
         seen,
+        own_bodies: own_bodies(table.space(), &log),
         facts,
     })
+}
+
+fn own_bodies(space: &Space, log: &EpisodeLog) -> BTreeMap<u32, String> {
+    let mut found = BTreeMap::new();
+    for step in &log.steps {
+        let Outcome::Done { draw, spawned, .. } = &step.outcome else { continue };
+        let mut ids = spawned.as_slice();
+        for effect in &draw.effects {
+            let (of_effect, rest) = ids.split_at((effect.newcomers() as usize).min(ids.len()));
+            if let Some(first) = of_effect.first() {
+                let named = effect.own_bodies(*first).map(|(id, own)| (id, space.bodies[own].name.clone()));
+                found.extend(named);
+            }
+            ids = rest;
+        }
+    }
+    found
 }
 
 /// Where a scenario comes from and what it claims.

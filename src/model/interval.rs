@@ -6,7 +6,8 @@
 use core::cmp::Ordering;
 use core::fmt;
 
-use crate::units::Rational;
+use crate::model::value::Type;
+use crate::units::{Rational, Unit, decimal, unit_of_all};
 
 /// One end of an interval.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -170,6 +171,46 @@ impl Interval {
         self.contains(low.floor()) || next.is_none_or(|next| self.contains(next))
     }
 
+    /// The unit in which people read its ends, if it is not SI's: see [`unit_of_all`].
+    pub fn unit(&self, ty: Type) -> Option<&'static Unit> {
+        let Type::Quantity(dimension) = ty else { return None };
+        let ends = [self.low, self.high].into_iter().filter_map(|end| match end {
+            End::At(value, _) => Some(value.to_f64()),
+            End::Unbounded => None,
+        });
+        unit_of_all(&ends.collect::<Vec<_>>(), dimension)
+    }
+
+    /// The interval in a unit, in that of SI without one, rounded to three decimals: `20 .. 50 km/h`.
+    pub fn shown(&self, ty: Type, unit: Option<&Unit>) -> String {
+        match (unit, ty) {
+            (Some(unit), _) => {
+                let factor = unit.factor().to_f64();
+                let number =
+                    |value: Rational| decimal((value.to_f64() / factor * 1000.0).round() / 1000.0, false);
+                format!("{} {}", self.written(number), unit.word)
+            }
+            (None, Type::Quantity(dimension)) => {
+                format!("{self} {}", dimension.si_unit()).trim_end().to_owned()
+            }
+            (None, Type::Int | Type::Bool | Type::Enum(_)) => self.to_string(),
+        }
+    }
+
+    fn written(&self, number: impl Fn(Rational) -> String) -> String {
+        match (self.low, self.high) {
+            (End::Unbounded, End::Unbounded) => "any number".to_owned(),
+            (End::At(low, closed), End::Unbounded) => {
+                format!("{} {}", if closed { ">=" } else { ">" }, number(low))
+            }
+            (End::Unbounded, End::At(high, closed)) => {
+                format!("{} {}", if closed { "<=" } else { "<" }, number(high))
+            }
+            (End::At(low, true), End::At(high, true)) if low == high => number(low),
+            (End::At(low, _), End::At(high, _)) => format!("{} .. {}", number(low), number(high)),
+        }
+    }
+
     /// Whether every number of `self` is less than every number of `other`.
     pub fn is_below(&self, other: &Interval) -> bool {
         match (self.high, other.low) {
@@ -201,25 +242,15 @@ fn add_ends(a: End, b: End) -> End {
 impl fmt::Display for Interval {
     /// `10 .. 13.889`, rounded to three decimals; `> 10` and the like where an end is missing.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let short =
-            |value: Rational| crate::units::decimal((value.to_f64() * 1000.0).round() / 1000.0, false);
-        match (self.low, self.high) {
-            (End::Unbounded, End::Unbounded) => f.write_str("any number"),
-            (End::At(low, closed), End::Unbounded) => {
-                write!(f, "{} {}", if closed { ">=" } else { ">" }, short(low))
-            }
-            (End::Unbounded, End::At(high, closed)) => {
-                write!(f, "{} {}", if closed { "<=" } else { "<" }, short(high))
-            }
-            (End::At(low, true), End::At(high, true)) if low == high => f.write_str(&short(low)),
-            (End::At(low, _), End::At(high, _)) => write!(f, "{} .. {}", short(low), short(high)),
-        }
+        let rounded = |value: Rational| decimal((value.to_f64() * 1000.0).round() / 1000.0, false);
+        f.write_str(&self.written(rounded))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::units::Dimension;
     use proptest::prelude::*;
 
     fn fraction(n: i32, d: i32) -> Rational {
@@ -232,6 +263,20 @@ mod tests {
         let from = Interval { low: End::At(Rational::ONE, true), high: End::Unbounded };
         assert!(below.intersect(&from).is_empty() && below.is_below(&from));
         assert!(!from.intersect(&Interval::point(Rational::ONE)).is_empty());
+    }
+
+    #[test]
+    fn quantities_are_shown_in_a_unit_in_which_both_ends_are_short() {
+        let kmh = |number: i32| fraction(number * 5, 18);
+        let speed = Type::Quantity(Dimension::SPEED);
+        let shown = |interval: Interval, ty: Type| interval.shown(ty, interval.unit(ty));
+        assert_eq!(shown(Interval::closed(kmh(20), kmh(50)), speed), "20 .. 50 km/h");
+        assert_eq!(shown(Interval::closed(kmh(18), kmh(36)), speed), "5 .. 10 m/s");
+        let from = Interval { low: End::At(kmh(50), true), high: End::Unbounded };
+        assert_eq!(shown(from, speed), ">= 50 km/h");
+        assert_eq!(from.shown(speed, None), ">= 13.889 m/s");
+        assert_eq!(shown(Interval::point(fraction(1, 3)), Type::Quantity(Dimension::RATIO)), "0.333");
+        assert_eq!(shown(Interval::ALL, Type::Int), "any number");
     }
 
     #[test]

@@ -38,8 +38,11 @@ impl Space {
         count_max: usize,
     ) -> (Vec<Memory>, bool) {
         let begun = self.initial_memory(0);
-        let open: Vec<(usize, Vec<(u32, Value)>)> =
-            self.open_cells().into_iter().map(|cell| (cell, self.drawn_values(self.state_of(cell).ty))).collect();
+        let open: Vec<(usize, Vec<(u32, Value)>)> = self
+            .open_cells()
+            .into_iter()
+            .map(|cell| (cell, self.drawn_values(self.state_of(cell).ty)))
+            .collect();
         // The memories are numbered, the last cell varying fastest: none is made beyond those that are asked for.
         let all = self.start_count();
         let are_all = all <= count_max;

@@ -16,7 +16,7 @@ use crate::model::vocabulary::{
 };
 use crate::road::{LanePlace, RoadMap, Route};
 use crate::syntax::ast::Span;
-use crate::units::{Rational, Unit, decimal, quantity, quantity_in, unit_of_all};
+use crate::units::{Rational, Unit, decimal, quantity, quantity_in, quantity_short, unit_of_all};
 
 /// Name of the verdict that decides which collisions count. Every space has it: the checker adds the
 /// paper's where the author declares none.
@@ -173,12 +173,13 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// The unit in which people read its listed values, if it is not SI's.
+    /// The unit in which people read its listed values or the ends of its range, if it is not SI's.
     pub fn unit(&self) -> Option<&'static Unit> {
-        let (Type::Quantity(dimension), Domain::Values(values)) = (self.ty, &self.domain) else {
-            return None;
+        let Type::Quantity(dimension) = self.ty else { return None };
+        let numbers: Vec<f64> = match &self.domain {
+            Domain::Values(values) => values.iter().map(|value| value.number()).collect(),
+            Domain::Range(low, high) => vec![low.to_f64(), high.to_f64()],
         };
-        let numbers: Vec<f64> = values.iter().map(|value| value.number()).collect();
         unit_of_all(&numbers, dimension)
     }
 }
@@ -441,8 +442,26 @@ impl Space {
         }
     }
 
-    /// A value as the language spells it, in SI.
+    /// Values of a type as people read them, quantities all in one unit.
+    pub fn show_all(&self, values: &[Value], ty: Type) -> Vec<String> {
+        let Type::Quantity(dimension) = ty else {
+            return values.iter().map(|value| self.show(*value, ty)).collect();
+        };
+        let numbers: Vec<f64> = values.iter().map(|value| value.number()).collect();
+        let unit = unit_of_all(&numbers, dimension);
+        numbers.into_iter().map(|number| quantity_in(number, dimension, unit)).collect()
+    }
+
+    /// A value as the language spells it, a quantity in a unit in which it is short.
     pub fn show(&self, value: Value, ty: Type) -> String {
+        match (value, ty) {
+            (Value::Number(number), Type::Quantity(dimension)) => quantity_short(number, dimension),
+            _ => self.show_in_si(value, ty),
+        }
+    }
+
+    /// A value as the language spells it, in SI: for programs that read it.
+    pub fn show_in_si(&self, value: Value, ty: Type) -> String {
         match (value, ty) {
             (Value::Bool(truth), _) => truth.to_string(),
             (Value::Variant(of, variant), _) => self.enums[of.0].variants[variant].clone(),

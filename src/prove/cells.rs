@@ -55,7 +55,9 @@ impl Space {
                 Some(Values::Variants(keys)) => keys,
                 Some(Values::Truth { .. } | Values::Number(_)) | None => u128::MAX,
             };
-            found.extend((0..state.cells).filter(|key| keys >> key & 1 == 1).map(|key| state.first_cell + key));
+            found.extend(
+                (0..state.cells).filter(|key| keys >> key & 1 == 1).map(|key| state.first_cell + key),
+            );
         }
         found
     }

@@ -106,7 +106,8 @@ fn graph<'a>(space: &'a Space, index: usize, begins: &[Option<u128>]) -> Option<
     let RuleBody::Moves { cell, allowed, actions, .. } = &space.rules[index].body else { return None };
     let begin = begins[*cell].unwrap_or(u128::MAX >> (128 - allowed.len()));
     let bound = actions.iter().flat_map(|action| space.rows_of(*action));
-    let rows = bound.filter(|row| row.rules.binary_search(&index).is_ok()).take_while(|_| !effort::is_spent());
+    let rows =
+        bound.filter(|row| row.rules.binary_search(&index).is_ok()).take_while(|_| !effort::is_spent());
     let unknown = space.cells_unknown();
     let rows = rows.map(|row| {
         let after = space.cells_after(row.action, &declared(space, row), &unknown);

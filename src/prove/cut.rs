@@ -2,7 +2,7 @@
 
 use crate::model::expr::Comparison;
 use crate::model::rules::RowRules;
-use crate::model::{Domain, End, Interval, Parameter, Reach, RulesInForce, Space, Type, code, effort};
+use crate::model::{Domain, End, Interval, Parameter, Reach, RulesInForce, Space, code, effort};
 use crate::syntax::{Diagnostic, listed};
 use crate::units::Rational;
 
@@ -53,9 +53,6 @@ struct Cut<'a> {
 
 impl Cut<'_> {
     fn remark(self, space: &Space) -> Diagnostic {
-        let Type::Quantity(dimension) = self.parameter.ty else {
-            unreachable!("whole numbers are lists of values")
-        };
         let names: Vec<&str> = self.rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
         let message = format!(
             "{} {} {:.0} % of the range of `{}` on `{}`",
@@ -65,8 +62,10 @@ impl Cut<'_> {
             self.parameter.name,
             self.road,
         );
-        let remark = Diagnostic::remark(code::CUT, message)
-            .at(self.parameter.span, format!("{} {} is left", self.kept, dimension.si_unit()));
+        let remark = Diagnostic::remark(code::CUT, message).at(
+            self.parameter.span,
+            format!("{} is left", self.kept.shown(self.parameter.ty, self.parameter.unit())),
+        );
         self.rules
             .iter()
             .fold(remark, |remark, rule| remark.beside(space.rules[*rule].span, "by this rule"))

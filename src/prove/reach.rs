@@ -11,7 +11,7 @@ use crate::model::rules::{Bound, Demand, RowRules, allowed, rules_by_action};
 use crate::model::vocabulary::Word;
 use crate::model::{
     ActionDef, Domain, Facts, Interval, Memory, Parameter, Reach, Road, Row, RuleBody, RulesInForce, Space,
-    Type, Value, code, evaluate, locals,
+    Value, code, evaluate, locals,
 };
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::prove::moment::{Case, may_hold_together, newcomers, ranges_named};
@@ -242,10 +242,11 @@ impl<'a> RowRules<'a> {
             for bound in self.bounds().filter(|bound| bound.rule == Some(*rule)) {
                 let parameter = &parameters[bound.local];
                 let limit = allowed(bound.op, &enclose(&bound.limit, &known).interval());
-                let unit = in_si(parameter.ty);
                 let declared = locals[bound.local].interval();
                 let is = if declared.single().is_some() { "it is" } else { "its range is" };
-                figures.push(format!("`{}` wants {limit}{unit}, {is} {declared}{unit}", parameter.name));
+                let unit = parameter.unit();
+                let [limit, declared] = [limit, declared].map(|interval| interval.shown(parameter.ty, unit));
+                figures.push(format!("`{}` wants {limit}, {is} {declared}", parameter.name));
             }
             match figures.as_slice() {
                 [] => without_figures.push(name.as_str()),
@@ -267,7 +268,11 @@ impl<'a> RowRules<'a> {
             .collect();
         let newcomers = newcomers(&self.space.actions[self.row.action], &known, false);
         for (fact, range) in ranges_named(&conditions, &known, &self.space.episode, &newcomers) {
-            parts.push(format!("`{}` is within {range}{}", fact.name(), in_si(fact.ty())));
+            parts.push(format!(
+                "`{}` is within {}",
+                fact.name(),
+                range.shown(fact.ty(), range.unit(fact.ty()))
+            ));
         }
         match parts.as_slice() {
             [] => "its own ranges and conditions leave no value".to_owned(),
@@ -285,14 +290,6 @@ impl<'a> RowRules<'a> {
             // Other rows of the action may obey the rule.
             false => format!("rule `{name}` cannot hold in `{}`", self.row.label),
         }
-    }
-}
-
-/// What follows a number of a type: a blank and its unit, or nothing.
-fn in_si(ty: Type) -> String {
-    match ty {
-        Type::Quantity(dimension) if !dimension.si_unit().is_empty() => format!(" {}", dimension.si_unit()),
-        _ => String::new(),
     }
 }
 
@@ -389,9 +386,9 @@ impl<'a> Gone<'a> {
         let ranges = action.parameters.iter().enumerate().filter(|(local, _)| is_bounded(*local));
         ranges.fold(error, |error, (_, parameter)| match &parameter.domain {
             Domain::Range(low, high) => {
-                let [low, high] =
-                    [low, high].map(|end| space.show(Value::Number(end.to_f64()), parameter.ty));
-                error.beside(parameter.span, format!("`{}` is {low} .. {high}", parameter.name))
+                let ends = [low, high].map(|end| Value::Number(end.to_f64()));
+                let range = space.show_all(&ends, parameter.ty).join(" .. ");
+                error.beside(parameter.span, format!("`{}` is {range}", parameter.name))
             }
             Domain::Values(_) => error,
         })

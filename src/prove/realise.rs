@@ -185,7 +185,8 @@ impl<'a> OnRoad<'a> {
             });
             if effort::is_spent()
                 || self.left.is_spent()
-                || !pending.iter().any(|asked| asked.about_states || asked.about_time) {
+                || !pending.iter().any(|asked| asked.about_states || asked.about_time)
+            {
                 break;
             }
             let is_at_rest = !way.go_on(self, &movers, step, &moment);

@@ -44,10 +44,9 @@ fn error(space: &Space, no_start: &NoStart, roads: &[&str]) -> Diagnostic {
         true => String::new(),
         false => format!(" on {}", listed(roads)),
     };
-    let error =
-        Diagnostic::error(code::NO_START, format!("no episode can begin under rule `{}`{place}", rule.name));
+    let error = Diagnostic::error(code::NO_START, format!("{}{place}", no_start.words()));
     let error = match no_start.is_too_large {
-        true => error.at(rule.span, "it shares states with too many combinations of values"),
+        true => error.at(rule.span, "the states that it shares with other rules have too many combinations"),
         false => error.at(rule.span, "holds from the start on"),
     };
     let initial = |cell: usize| {
@@ -68,8 +67,17 @@ fn error(space: &Space, no_start: &NoStart, roads: &[&str]) -> Diagnostic {
     let error = begun.into_iter().fold(error, |error, (span, how)| error.beside(span, how));
     let mut names: Vec<String> = no_start.cells.iter().map(|cell| space.cell_name(*cell)).collect();
     names.dedup();
-    error.help(format!(
-        "let {} begin as the rule allows, for example as `any`; or bind the rule to actions by `on`",
-        listed(&names)
-    ))
+    let names = match names.len() {
+        // A long list hides what to do.
+        many @ 7.. => format!("the {many} states that it reads"),
+        _ => listed(&names),
+    };
+    error.help(match no_start.is_too_large {
+        true => {
+            format!("let {names} begin with fixed values or have fewer; or bind the rule to actions by `on`")
+        }
+        false => format!(
+            "let {names} begin as the rule allows, for example as `any`; or bind the rule to actions by `on`"
+        ),
+    })
 }

@@ -475,7 +475,7 @@ impl<'a> States<'a> {
             }
             (Values::Truth { may_hold: true, may_fail: false }, _) => "true".to_owned(),
             (Values::Truth { may_hold: false, .. }, _) => "false".to_owned(),
-            (Values::Number(interval), _) => interval.to_string(),
+            (Values::Number(interval), ty) => interval.shown(ty, interval.unit(ty)),
             (Values::Truth { .. } | Values::Variants(_), _) => "unknown".to_owned(),
         }
     }

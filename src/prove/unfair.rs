@@ -13,7 +13,7 @@ use crate::model::{
 };
 use crate::prove::witness::{Left, Search, Witness};
 use crate::syntax::Diagnostic;
-use crate::units::decimal;
+use crate::units::{Dimension, quantity, quantity_in, unit_of_all};
 
 /// The most boxes of ranges looked at for all actions together; each action has an equal share.
 const BOXES_MAX: usize = 50_000;
@@ -101,17 +101,23 @@ fn remark(space: &Space, row: &Row, road: &Road, spawn: &SpawnDef, found: &Witne
     let figures = figures(space, road, spawn, &values, &after);
     let facts = Facts { road: Some(&road.facts), ..Facts::new(&values, &after) };
     let verb = spawn.verb.word(&space.functions, &facts);
-    let rounded = |value: f64| decimal((value * 100.0).round() / 100.0, false);
+    let shown = |value: f64, dimension: Dimension| match unit_of_all(&[value], dimension) {
+        Some(unit) => quantity_in(value, dimension, Some(unit)),
+        None => quantity((value * 100.0).round() / 100.0, dimension),
+    };
     let message = format!("`{}` can appear where a careful driver could not avoid it", action.name);
     Diagnostic::remark(code::UNFAIR, message)
-        .at(spawn.distance.span, format!("{} m in `{}`", rounded(figures.distance_m), row.label))
+        .at(
+            spawn.distance.span,
+            format!("{} in `{}`", shown(figures.distance_m, Dimension::LENGTH), row.label),
+        )
         .note(format!(
-            "a careful driver at {} m/s, the limit of `{}`, needs {} m for a `{}` at {} m/s",
-            rounded(road.facts.limit_mps),
+            "a careful driver at {}, the limit of `{}`, needs {} for a `{}` at {}",
+            shown(road.facts.limit_mps, Dimension::SPEED),
             road.name,
-            rounded(figures.needed_m),
+            shown(figures.needed_m, Dimension::LENGTH),
             verb.name(),
-            rounded(figures.speed_mps),
+            shown(figures.speed_mps, Dimension::SPEED),
         ))
         .help("forbid it with `rule no_teleport: spawn_gap >= safety_gap`, or begin farther away")
 }

@@ -362,8 +362,10 @@ impl Search<'_> {
     /// row read. Gives also whether there can be no other.
     pub fn memories(&self) -> (Vec<Memory>, bool) {
         let space = self.rules.space;
-        let begun =
-            space.states.iter().flat_map(|state| (0..state.cells).map(move |cell| initial(space, state, cell)));
+        let begun = space
+            .states
+            .iter()
+            .flat_map(|state| (0..state.cells).map(move |cell| initial(space, state, cell)));
         let mut is_complete = true;
         let mut memories = vec![Memory { cells: begun.collect() }];
         for cell in self.read() {

@@ -495,8 +495,7 @@ impl<'a> Builder<'a> {
         };
         // A thousand lanes may lead into one: the shorter list tells as well.
         let (ahead, behind) = (&self.map.lanes[from.0].successors, &self.map.lanes[to.0].predecessors);
-        let is_known =
-            if ahead.len() < behind.len() { ahead.contains(&to) } else { behind.contains(&from) };
+        let is_known = if ahead.len() < behind.len() { ahead.contains(&to) } else { behind.contains(&from) };
         if !is_known {
             self.map.lanes[from.0].successors.push(to);
             self.map.lanes[to.0].predecessors.push(from);

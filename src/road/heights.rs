@@ -106,9 +106,9 @@ impl RoadMap {
             // Where roads are joined, their lanes may overlap a little.
             let is_inside =
                 |lane: &Lane, at_m: f64| (JOINED_M..lane.centre.length_m() - JOINED_M).contains(&at_m);
-            let crosses = crossings_within(&a.centre, &b.centre, &mut steps).into_iter().find(|(a_m, b_m)| {
-                is_inside(a, *a_m) && is_inside(b, *b_m) && !a.is_apart_at(*a_m, b, *b_m)
-            });
+            let crosses = crossings_within(&a.centre, &b.centre, &mut steps)
+                .into_iter()
+                .find(|(a_m, b_m)| is_inside(a, *a_m) && is_inside(b, *b_m) && !a.is_apart_at(*a_m, b, *b_m));
             if steps == 0 || (crosses.is_some() && warnings.len() == CROSSINGS_MAX) {
                 is_whole = false;
                 break;

@@ -61,11 +61,7 @@ pub fn share_phases(map: &mut RoadMap) {
 }
 
 /// The ways through a junction that each group of its lights holds. `groups` are those with a stop line on some lane.
-fn ways_by_group(
-    map: &RoadMap,
-    junction: usize,
-    groups: BTreeSet<usize>,
-) -> BTreeMap<usize, Vec<LaneIndex>> {
+fn ways_by_group(map: &RoadMap, junction: usize, groups: BTreeSet<usize>) -> BTreeMap<usize, Vec<LaneIndex>> {
     let mut ways: BTreeMap<usize, Vec<LaneIndex>> =
         groups.into_iter().map(|group| (group, Vec::new())).collect();
     let here = |line: &StopLine| {

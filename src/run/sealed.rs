@@ -476,7 +476,8 @@ mod tests {
 
     #[test]
     fn only_tables_that_avastra_makes_are_read() {
-        let endless = "WITH RECURSIVE n(reason, text) AS (SELECT 1, 'a' UNION ALL SELECT reason + 1, 'a' FROM n)";
+        let endless =
+            "WITH RECURSIVE n(reason, text) AS (SELECT 1, 'a' UNION ALL SELECT reason + 1, 'a' FROM n)";
         let view = format!(
             "ALTER TABLE reason RENAME TO other; CREATE VIEW reason AS {endless} SELECT reason, text FROM n"
         );

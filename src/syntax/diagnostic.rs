@@ -284,7 +284,9 @@ fn pieces(diagnostic: &Diagnostic, file: FileId) -> Vec<Vec<&Label>> {
     let mut pieces: Vec<Vec<&Label>> = Vec::new();
     for label in labels {
         match pieces.last_mut() {
-            Some(piece) if label.span.end.saturating_sub(piece[0].span.start) <= DRAWN_MAX => piece.push(label),
+            Some(piece) if label.span.end.saturating_sub(piece[0].span.start) <= DRAWN_MAX => {
+                piece.push(label)
+            }
             _ => pieces.push(vec![label]),
         }
     }

@@ -15,6 +15,7 @@ mod build;
 pub mod code;
 mod diagnostic;
 mod expression;
+mod foreign;
 mod format;
 mod grammar;
 pub mod keyword;
@@ -38,7 +39,7 @@ pub use record::{
 };
 pub(crate) use scan::is_bidi;
 
-pub use yaml::yaml_mistake;
+pub use yaml::{settings_mistake, yaml_mistake};
 
 #[cfg(test)]
 mod tests;

@@ -11,6 +11,7 @@ use pest::iterators::Pair;
 use crate::syntax::ast::{Doc, Field, File, FileId, Item, Span};
 use crate::syntax::build::{Builder, end_of};
 use crate::syntax::diagnostic::{enumerated, one_of};
+use crate::syntax::foreign::{Failure, foreign, foreign_declaration};
 use crate::syntax::grammar::{AvaParser, NAME, Rule, VARIANT, continues_expression, words};
 use crate::syntax::keyword::{CLAUSES, DECLARATIONS, OPERATORS};
 use crate::syntax::scan::{Comment, Scan, scan};
@@ -155,61 +156,89 @@ impl Reader<'_> {
         }
         // More effects and those of every step begin with a word of another clause.
         if declarations().chain(["on", "each"]).any(|word| word == found) {
-            let (at, expected) = self.failure(start, end);
-            return Some(self.expected(at, expected, (start, end)));
+            return Some(self.expected(&self.failure(start, end), (start, end)));
         }
         // The previous declaration may have ended too early: `f(1 2)` is read as far as `f`.
-        let (at, expected) = self.failure(previous.0, end);
-        if at > start {
-            return Some(self.expected(at, expected, (previous.0, end)));
+        let failure = self.failure(previous.0, end);
+        if failure.at > start {
+            return Some(self.expected(&failure, (previous.0, end)));
         }
-        let expected = if at == start { expected } else { vec![DECLARATION] };
+        let failure = match failure.at == start {
+            true => failure,
+            false => Failure { at: start, expected: vec![DECLARATION], continues: false },
+        };
         let span = Span::new(self.file, start, start + found.len());
-        Some(self.not_a_declaration(found, span, previous.1, &expected))
+        Some(self.not_a_declaration(found, span, previous.1, &failure))
     }
 
     /// Where the reading of one declaration fails, and what was expected there, in the author's words.
-    fn failure(&self, start: usize, end: usize) -> (usize, Vec<&'static str>) {
+    fn failure(&self, start: usize, end: usize) -> Failure {
+        let beyond = |at| Failure { at, expected: vec![DECLARATION], continues: false };
         match AvaParser::parse(Rule::lone_item, &self.text[start..end]) {
             // The slice can be read alone, so the mistake comes after it: point at its end.
-            Ok(_) => (end, vec![DECLARATION]),
+            Ok(_) => beyond(end),
             Err(error) => {
                 let (InputLocation::Pos(at) | InputLocation::Span((at, _))) = error.location;
-                let expected = match error.variant {
-                    ErrorVariant::ParsingError { positives, .. } => in_words(&positives),
-                    ErrorVariant::CustomError { .. } => vec![DECLARATION],
-                };
-                (start + at, expected)
+                match error.variant {
+                    ErrorVariant::ParsingError { positives, .. } => Failure {
+                        at: start + at,
+                        expected: in_words(&positives),
+                        continues: positives.iter().any(|rule| continues_expression(*rule)),
+                    },
+                    ErrorVariant::CustomError { .. } => beyond(start + at),
+                }
             }
         }
     }
 
+    /// The mistake where a mark or word of another language stands at the token at which the reading failed.
+    fn foreign(&self, token: usize, found: &str, failure: &Failure) -> Option<Diagnostic> {
+        let same_line = !self.text[self.end_of_token_before(token)..token].contains('\n');
+        let foreign = foreign(self.text, token, same_line, failure)?;
+        let message = foreign.message;
+        let message = message
+            .unwrap_or_else(|| format!("expected {}, found `{found}`", enumerated(&failure.expected, "or")));
+        let mistake = Diagnostic::error(code::SYNTAX, message)
+            .at(Span::new(self.file, foreign.start, foreign.end), "unexpected")
+            .help(foreign.help);
+        Some(match foreign.fix {
+            Some((from, to, text)) => {
+                let title = match text.trim() {
+                    "" => "delete it".to_owned(),
+                    text => format!("write `{text}`"),
+                };
+                mistake.fix(title, Span::new(self.file, from, to), text)
+            }
+            None => mistake,
+        })
+    }
+
     /// Reports a word or mark that begins no declaration. On the line where the previous declaration ended
-    /// (at `previous_end`), it could also have been what was `expected` there.
+    /// (at `previous_end`), it could also have been what the grammar expected there.
     fn not_a_declaration(
         &self,
         found: &str,
         span: Span,
         previous_end: usize,
-        expected: &[&str],
+        failure: &Failure,
     ) -> Diagnostic {
         let is_word = found.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_');
         let continues_line = !self.text[previous_end..span.start].contains('\n') && previous_end > 0;
+        if let Some(mistake) = self.foreign(span.start, found, failure).filter(|_| continues_line || !is_word)
+        {
+            return mistake;
+        }
         if continues_line {
-            let message = format!("expected {} or the next line, found `{found}`", expected.join(", "));
+            let expected = failure.expected.join(", ");
+            let message = format!("expected {expected} or the next line, found `{found}`");
             return Diagnostic::error(code::SYNTAX, message).at(span, "unexpected");
         }
         if !is_word {
-            let unexpected =
-                Diagnostic::error(code::SYNTAX, format!("expected a declaration, found `{found}`"))
-                    .at(span, "unexpected");
-            return match found {
-                "#" => unexpected.help("a comment begins with `//`").fix("write `//`", span, "//"),
-                _ => unexpected,
-            };
+            return Diagnostic::error(code::SYNTAX, format!("expected a declaration, found `{found}`"))
+                .at(span, "unexpected");
         }
         let unknown = Diagnostic::error(code::DECLARATION, format!("no declaration begins with `{found}`"));
-        match nearest(found, declarations()) {
+        match foreign_declaration(found).or_else(|| nearest(found, declarations())) {
             Some(meant) => unknown.at(span, "unknown declaration").meant(span, meant),
             None => unknown
                 .at(span, "unknown declaration")
@@ -218,9 +247,10 @@ impl Reader<'_> {
     }
 
     /// Reports that something else was expected at a byte of a slice.
-    fn expected(&self, at: usize, words: Vec<&str>, (start, end): (usize, usize)) -> Diagnostic {
-        let expected = enumerated(&words, "or");
-        let (token_start, found) = self.token_after(at);
+    fn expected(&self, failure: &Failure, (start, end): (usize, usize)) -> Diagnostic {
+        let words = &failure.expected;
+        let expected = enumerated(words, "or");
+        let (token_start, found) = self.token_after(failure.at);
         let at_end = token_start >= end;
         let before_end = self.scan.unclosed.partition_point(|opener| opener.start < end);
         let opener = self.scan.unclosed[..before_end].last().filter(|opener| opener.start >= start);
@@ -235,6 +265,9 @@ impl Reader<'_> {
             return Diagnostic::error(code::SYNTAX, "a transition names its values, found `_`")
                 .at(Span::new(self.file, token_start, token_start + 1), "stands for no value here")
                 .help("write a line for each value that the state may change from");
+        }
+        if let Some(mistake) = (!at_end).then(|| self.foreign(token_start, found, failure)).flatten() {
+            return mistake;
         }
         let before = self.end_of_token_before(token_start);
         if at_end || self.text[before..token_start].contains('\n') {

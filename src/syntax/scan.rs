@@ -151,8 +151,8 @@ impl Scanner<'_> {
         match word {
             "match" => self.opens_match(self.span(start)),
             // No expression goes on behind a word that begins a declaration.
-            "language" | "use" | "enum" | "odds" | "state" | "let" | "fn" | "action" | "group" | "optional"
-            | "rule" | "verdict" | "scenario" | "policy" | "override" => self.open_matches = 0,
+            "language" | "use" | "enum" | "odds" | "state" | "let" | "fn" | "action" | "group"
+            | "optional" | "rule" | "verdict" | "scenario" | "policy" | "override" => self.open_matches = 0,
             _ => {}
         }
     }
@@ -175,7 +175,8 @@ impl Scanner<'_> {
         }
         self.found.is_too_large = true;
         let message = format!("the file has more than {TOKENS_MAX} words and signs");
-        let error = Diagnostic::error(code::LENGTH, message).at(self.span(self.at), "the limit is passed here");
+        let error =
+            Diagnostic::error(code::LENGTH, message).at(self.span(self.at), "the limit is passed here");
         let help = "make it shorter: `each` parameters make many rows of one action, `fn` says once what comes often, and \
                     a part may be a file of its own, which this one takes in by `use`";
         self.found.problems.push(error.help(help));

@@ -8,7 +8,8 @@ use crate::syntax::ast::{
     Odds, Scenario, Span, Step, Text, UnaryOp, Use, Verdict,
 };
 use crate::syntax::{
-    DEPTH_MAX, FormatError, OPERATORS_MAX, Sources, Style, TOKENS_MAX, format, parse, print, render, same_meaning,
+    DEPTH_MAX, FormatError, OPERATORS_MAX, Sources, Style, TOKENS_MAX, format, parse, print, render,
+    same_meaning,
 };
 
 const AVASTRA: &str = include_str!("../../scenarios/avastra45.ava");

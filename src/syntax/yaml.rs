@@ -2,7 +2,7 @@
 
 use super::diagnostic::{listed, nearest};
 
-/// The message for an error of the YAML reader, whose own words speak of Rust.
+/// The message for an error of the YAML reader, whose own words speak of Rust and of YAML's grammar.
 pub fn yaml_mistake(error: &serde_yaml::Error, text: &str) -> String {
     let said = error.to_string();
     let first = said.trim().lines().next().unwrap_or_default();
@@ -11,34 +11,142 @@ pub fn yaml_mistake(error: &serde_yaml::Error, text: &str) -> String {
     let placed = first.strip_prefix("line ").and_then(|rest| rest.split_once(' '));
     let placed =
         placed.and_then(|(line, rest)| Some((line.parse::<usize>().ok()?, rest.split_once(": ")?.1)));
-    let Some((line, what)) = placed else { return first.to_owned() };
+    let Some((line, what)) = placed else { return settings_mistake(first, None) };
     let written = text.lines().nth(line.saturating_sub(1)).unwrap_or_default();
     let field = written.split_once(':').map(|(field, _)| field.trim().trim_start_matches("- "));
-    let of = |field: Option<&str>| field.map_or(String::new(), |field| format!("`{field}`: "));
+    let is_word = |field: &&str| field.chars().all(|c| c.is_ascii_alphanumeric() || "_-.".contains(c));
+    format!("line {line}: {}", settings_mistake(what, field.filter(is_word)))
+}
+
+/// What is wrong with settings, in words for their author, where a reader said so in words of its own; `field` is the key
+/// of the line. What is none of a reader's sentences is a sentence of ours and stays.
+pub fn settings_mistake(what: &str, field: Option<&str>) -> String {
+    let of_field = |text: String| field.map_or(text.clone(), |field| format!("`{field}`: {text}"));
     let unknown = what.strip_prefix("unknown field `").or(what.strip_prefix("unknown variant `"));
-    let what = match unknown.and_then(|rest| rest.split_once("`, expected ")) {
-        Some((name, known)) => {
-            let known: Vec<&str> = known.trim_start_matches("one of ").split([',', ' ']).collect();
-            let known: Vec<&str> = known
-                .into_iter()
-                .map(|name| name.trim_matches('`'))
-                .filter(|name| !name.is_empty())
-                .collect();
-            match nearest(name, known.iter().copied()) {
-                Some(near) => format!("there is no `{name}`; did you mean `{near}`?"),
-                None => format!("there is no `{name}`; there are {}", listed(&known)),
-            }
-        }
-        None if what.starts_with("invalid floating point") || what.starts_with("non-finite float") => {
-            format!("{}write a number", of(field))
-        }
-        None if what.starts_with("invalid u") || what.starts_with("invalid i") => {
-            format!("{}write a whole number", of(field))
-        }
-        None if what.starts_with("invalid bool") => format!("{}write `true` or `false`", of(field)),
-        None => what.to_owned(),
+    if let Some((name, known)) = unknown.and_then(|rest| rest.split_once("`, expected ")) {
+        return no_such(name, known);
+    }
+    if let Some(name) = what.strip_prefix("missing field `").and_then(|rest| rest.split('`').next()) {
+        return format!("`{name}: …` is missing");
+    }
+    if let Some(rest) =
+        what.strip_prefix("duplicate mapping key: ").or(what.strip_prefix("duplicate field `"))
+    {
+        let name = rest.split([',', '`']).next().unwrap_or(rest);
+        return format!("`{name}` stands twice");
+    }
+    let mismatch = what.strip_prefix("invalid type: ").or(what.strip_prefix("invalid value: "));
+    if let Some((found, expected)) = mismatch.and_then(|rest| rest.split_once(", expected ")) {
+        return of_field(format!("write {}, not {}", wanted(expected), found_in_words(found)));
+    }
+    if let Some((_, expected)) =
+        what.strip_prefix("invalid length ").and_then(|rest| rest.split_once(", expected "))
+    {
+        return of_field(format!("write {}", wanted(expected)));
+    }
+    // What is wrong with the layout comes first: `invalid indentation` begins as `invalid i64` does.
+    said(LAYOUT, |part| what.contains(part))
+        .or_else(|| said(VALUES, |begin| what.starts_with(begin)).map(of_field))
+        .unwrap_or_else(|| what.to_owned())
+}
+
+fn said(table: &[Said], fits: impl Fn(&str) -> bool) -> Option<String> {
+    let found = table.iter().find(|(parts, _)| parts.iter().any(|part| fits(part)));
+    found.map(|(_, said)| (*said).to_owned())
+}
+
+/// Parts of a reader's sentences, and what to say in their place.
+type Said = (&'static [&'static str], &'static str);
+
+/// Values of the wrong kind, by the beginning of the reader's sentence.
+const VALUES: &[Said] = &[
+    (&["invalid floating point", "non-finite float"], "write a number"),
+    (&["invalid boolean"], "write `true` or `false`"),
+    (&["invalid u", "invalid i"], "write a whole number"),
+    (&["cannot deserialize null"], "it is empty; write a text"),
+    (&["expected sequence start"], "write a list: `[…]`"),
+    (&["expected mapping start", "expected empty mapping"], "write `key: value` lines"),
+    (&["expected scalar", "expected string scalar"], "write one value"),
+];
+
+/// Brackets, quotes, indentation, and what else of YAML settings do without.
+const LAYOUT: &[Said] = &[
+    (&["tabs disallowed", "found a tab", "with a tab", "tab cannot"], "indent with blanks, not with tabs"),
+    (&["unclosed bracket '['"], "`[` is never closed"),
+    (&["unclosed bracket '{'"], "`{` is never closed"),
+    (&["mismatched bracket", "misplaced bracket"], "a bracket closes what it has not opened"),
+    (&["unclosed quote"], "a text in quotes never ends"),
+    (&["unexpected character"], "a text that begins with such a mark stands in quotes"),
+    (&["trailing content after"], "something stands behind the closing quote"),
+    (&["unknown anchor"], "`*` stands for nothing: no `&` gives it a meaning"),
+    (&["multiple YAML documents", "multiple documents"], "`---` begins a second document; write one"),
+    (
+        &["mapping values are not allowed"],
+        "`key: value` does not fit here: look at the indentation, and put a text with `: ` in quotes",
+    ),
+    (&["simple key"], "`:` and a blank are missing behind the key"),
+    (&["expected ',' or", "expected '}'"], "`,` or a closing bracket is missing"),
+    (
+        &["indentation", "indented", "expected key", "'-' ", "block sequence entries"],
+        "the indentation does not fit that of the lines before",
+    ),
+    (&["comments must be separated"], "a comment begins with a blank and `#`"),
+    (&["unexpected EOF", "unexpected eof", "unexpected end of input"], "the text ends too early"),
+    (
+        &["alias replay", "alias expansion", "budget breached", "recursion limit"],
+        "this unfolds to too much: nest less, and write out what `*` stands for",
+    ),
+    (
+        &["unsupported tag", "a tag", "TAG", "tagged", "!include", "!!binary", "directive"],
+        "marks like `!…` and `%…` mean nothing here",
+    ),
+];
+
+/// The message for a word that is not among those that are known.
+fn no_such(name: &str, known: &str) -> String {
+    let known = known.trim_start_matches("one of ").split([',', ' ']).map(|name| name.trim_matches('`'));
+    let known: Vec<&str> = known.filter(|name| !name.is_empty()).collect();
+    match nearest(name, known.iter().copied()) {
+        Some(near) => format!("there is no `{name}`; did you mean `{near}`?"),
+        None => format!("there is no `{name}`; there are {}", listed(&known)),
+    }
+}
+
+/// What a reader expects, in the author's words. Our own types say themselves what they are.
+fn wanted(expected: &str) -> &str {
+    let is_sized = |kind: char| {
+        expected.strip_prefix(kind).is_some_and(|rest| rest == "size" || rest.parse::<u8>().is_ok())
     };
-    format!("line {line}: {what}")
+    match expected {
+        "f64" | "f32" | "floating point" => "a number",
+        "a boolean" | "bool" => "`true` or `false`",
+        "a string" | "string" | "str" => "a text",
+        "integer" | "an integer" => "a whole number",
+        _ if is_sized('u') || is_sized('i') || expected.starts_with("a nonzero ") => "a whole number",
+        _ if ["a sequence", "a tuple", "an array", "tuple "]
+            .iter()
+            .any(|list| expected.starts_with(list)) =>
+        {
+            "a list"
+        }
+        _ if expected.starts_with("struct ") || expected == "a map" => "`key: value` lines",
+        _ => expected,
+    }
+}
+
+/// What a reader found, in the author's words: `` the text `fast` ``.
+fn found_in_words(found: &str) -> String {
+    match found {
+        "sequence" => "a list".to_owned(),
+        "map" => "`key: value` lines".to_owned(),
+        "unit value" | "null" => "nothing".to_owned(),
+        _ => match found.split_once(' ') {
+            Some(("string", text)) => format!("the text `{}`", text.trim_matches('"')),
+            Some((_, value)) if value.starts_with('`') => value.to_owned(),
+            Some((_, value)) => value.trim_start_matches("point ").to_owned(),
+            None => found.to_owned(),
+        },
+    }
 }
 
 #[cfg(test)]
@@ -68,6 +176,36 @@ mod tests {
         let error = serde_yaml::from_str::<serde_json::Value>(infinite).expect_err("it is wrong");
         assert_eq!(yaml_mistake(&error, infinite), "line 2: `pace_mps`: write a number");
         assert_eq!(said("seed: 1\nyields: maybe\n"), "line 2: `yields`: write `true` or `false`");
-        assert_eq!(said("a: [\n").lines().count(), 1);
+        assert_eq!(said("a: [\n"), "line 1: `[` is never closed");
+        assert_eq!(said("seed: 3\nseed: 4\n"), "line 2: `seed` stands twice");
+        for (text, wrong) in [
+            ("seed: 3\n\tpace_mps: 4\n", "indent with blanks, not with tabs"),
+            ("seed: \"3\n", "a text in quotes never ends"),
+            ("seed: 1\n---\nseed: 2\n", "`---` begins a second document; write one"),
+            ("seed: *other\n", "`*` stands for nothing: no `&` gives it a meaning"),
+        ] {
+            assert!(said(text).ends_with(wrong), "{text:?}: {}", said(text));
+        }
+    }
+
+    #[test]
+    fn the_words_of_readers_become_ours() {
+        for (said, ours) in [
+            ("missing field `agents`", "`agents: …` is missing"),
+            ("invalid type: string \"fast\", expected f64", "`speed`: write a number, not the text `fast`"),
+            (
+                "invalid type: sequence, expected struct Timeouts",
+                "`speed`: write `key: value` lines, not a list",
+            ),
+            ("invalid type: floating point `3.5`, expected u64", "`speed`: write a whole number, not `3.5`"),
+            ("invalid length 3, expected an array of length 2", "`speed`: write a list"),
+            ("expected sequence start", "`speed`: write a list: `[…]`"),
+            ("expected mapping start", "`speed`: write `key: value` lines"),
+            ("cannot deserialize null into string; use Option<String>", "`speed`: it is empty; write a text"),
+            ("alias references unknown anchor", "`*` stands for nothing: no `&` gives it a meaning"),
+            ("a step is from 1 to 9", "a step is from 1 to 9"),
+        ] {
+            assert_eq!(settings_mistake(said, Some("speed")), ours);
+        }
     }
 }

@@ -248,7 +248,8 @@ fn without_place<'a>(
 fn about_places(space: &Space) -> RulesInForce {
     let asks = |rule: &usize| {
         let rule = &space.rules[*rule];
-        let mut conditions = rule.body.actions().into_iter().filter_map(|action| rule.body.demand(action)?.condition());
+        let mut conditions =
+            rule.body.actions().into_iter().filter_map(|action| rule.body.demand(action)?.condition());
         conditions.any(|condition| condition.asks_the_world())
     };
     let all = RulesInForce::by_default(space);

@@ -20,6 +20,12 @@ pub fn quantity(value: f64, dimension: Dimension) -> String {
     with_unit(decimal(value, false), &dimension.si_unit())
 }
 
+/// A quantity as people read it: in SI where it is short there, else in the first unit in which it is; in SI where it is
+/// short in none.
+pub fn quantity_short(value: f64, dimension: Dimension) -> String {
+    quantity_in(value, dimension, unit_of_all(&[value], dimension))
+}
+
 /// The unit in which people read such quantities, if it is not SI's: where one is long in SI, the first in which each is
 /// short and reads back to the same f64 (`50 km/h` in place of `13.88888888888889 m/s`).
 pub fn unit_of_all(values: &[f64], dimension: Dimension) -> Option<&'static Unit> {
@@ -82,6 +88,8 @@ mod tests {
         assert_eq!(shown("mph", &["33.33"]), "33.33 mph");
         assert_eq!(shown("deg", &["0", "90"]), "0 deg, 90 deg");
         assert_eq!(shown("km/h", &["36", "-18"]), "10 m/s, -5 m/s", "short in SI");
+        assert_eq!(quantity_short(50.0 / 9.0, Dimension::SPEED), "20 km/h");
+        assert_eq!(quantity_short(8.0, Dimension::SPEED), "8 m/s");
         assert!(unit_of_all(&[1.0 / 3.0, 2.0], Dimension::LENGTH).is_none());
         assert!(unit_of_all(&[], Dimension::LENGTH).is_none());
     }

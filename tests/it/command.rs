@@ -35,6 +35,15 @@ pub fn outcome(command: &mut Command) -> (i32, String, String) {
 }
 
 #[test]
+fn a_misspelt_command_is_told_the_nearest() {
+    for (word, meant) in [("rn", "run"), ("chek", "check"), ("tran", "train")] {
+        let (status, _, stderr) = outcome(&mut avastra(&[word]));
+        assert_eq!(status, 1, "{stderr}");
+        assert!(stderr.contains(&format!("exists: '{meant}'")), "{stderr}");
+    }
+}
+
+#[test]
 fn every_broken_file_has_its_diagnostics() {
     each_case("diagnostics", |path| {
         let path = path.strip_prefix(root()).expect("it is a case");

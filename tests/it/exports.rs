@@ -1,7 +1,7 @@
 //! What `avastra export` writes: its shape, that it depends on the scenario alone, and what is refused. Whether other
 //! tools understand it is the question of `tests/interop/export.sh`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use avastra::geometry::{Pose, Vec2, wrap_angle};
@@ -107,6 +107,30 @@ fn a_recording_is_complete_and_at_its_times() {
     assert!(!of_ego(&["--ego", "none"]).contains("ego_follows"));
     assert!(of_ego(&["--ego", "controller"]).contains("<Controller name=\"ads\">"));
     assert!(of_ego(&["--osc-version", "1.3"]).contains("revMinor=\"3\""));
+}
+
+/// A table calls a body of the author's own by its name, and says beside it which of the engine's it is like.
+#[test]
+fn an_own_body_keeps_its_name() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let roads = root().join("scenarios/roads.ava").display().to_string();
+    let text = format!(
+        "language 1\nuse \"{roads}\"\nbody Cart {{ like: Sedan, length: 3 m }}\n\
+         action cart() {{ spawn Cart ahead 40 m {{ lane: Current, speed: 5 m/s, does: DriveAhead }} }}\n\
+         scenario cart_ahead {{\n  road: corner\n  steps {{ 0: cart() }}\n}}\n"
+    );
+    let file = scratch.path().join("cart.ava");
+    std::fs::write(&file, text).expect("it is writable");
+    let (status, _, stderr) = export("csv", &file.display().to_string(), &scratch.path().join("out"), &[]);
+    assert_eq!(status, 0, "{stderr}");
+    let table = texts(&scratch.path().join("out"))["cart.csv"].clone();
+    let bodies: BTreeSet<(&str, &str)> = table
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').collect::<Vec<_>>())
+        .map(|row| (row[2], row[row.len() - 1]))
+        .collect();
+    assert_eq!(bodies, BTreeSet::from([("Cart", "Sedan"), ("ego", "ego")]));
 }
 
 /// Others of a natural version drive by actions: each where and as fast as the recording has it at first, and nothing is

@@ -198,7 +198,9 @@ fn texts_that_cost_much_are_refused_or_read() {
 fn long_tables_are_compared_soon() {
     let scratch = Scratch::new();
     let text = |rule: &str| {
-        format!("language 1\nuse \"roads.ava\"\nstate c: Int = 0\naction a(each x: Int in 1 .. 30000) {{ set c = x }}\nrule r on a: {rule}\n")
+        format!(
+            "language 1\nuse \"roads.ava\"\nstate c: Int = 0\naction a(each x: Int in 1 .. 30000) {{ set c = x }}\nrule r on a: {rule}\n"
+        )
     };
     let other = scratch.folder.path().join("other.ava");
     std::fs::write(&other, text("x <= 30000 and c <= 30000")).expect("it is writable");
@@ -278,8 +280,7 @@ impl Measured {
         let ends_well = matches!(came.exit, Some(0..100));
         let is_cheap = ends_well && came.cpu_s <= 1.0 && came.peak_mb <= SCALED_MB_MAX;
         if !is_cheap {
-            let words =
-                format!("{verb} {}, {size}, {} bytes: {}", construct.name, text.len(), came.words());
+            let words = format!("{verb} {}, {size}, {} bytes: {}", construct.name, text.len(), came.words());
             println!("{words}");
             self.dear.push(words);
         }

@@ -164,8 +164,8 @@ fn an_episode_that_no_goal_ends_ends_where_the_map_does() {
 
 #[test]
 fn lanes_of_our_maps_meet_those_that_follow() {
-    let shipped =
-        ["boulevard", "corner", "crossroad", "residential"].map(|name| format!("scenarios/roads/{name}.xodr"));
+    let shipped = ["boulevard", "corner", "crossroad", "residential"]
+        .map(|name| format!("scenarios/roads/{name}.xodr"));
     let made = PLACES.map(|place| path(&format!("{place}.xodr")));
     for file in shipped.into_iter().chain(made) {
         let text = std::fs::read_to_string(root().join(&file)).expect("it is there");

@@ -115,6 +115,9 @@ fn a_profile_with_a_mistake_is_refused_by_name_line_and_remedy() {
             "line 3: `planning.cruise_mps` is 80; write a value from 1 to 40",
         ),
         ("tracking: [1]\n", "line 1: `tracking` is a list; write a section"),
+        ("planning:\n  cruise_mps: 8\n  cruise_mps: 9\n", "line 3: `cruise_mps` stands twice"),
+        ("planning: [1,\n", "line 1: `[` is never closed"),
+        ("planning:\n\tcruise_mps: 8\n", "line 2: indent with blanks, not with tabs"),
         ("", "the profile is empty; write what differs"),
         ("null\n", "the profile is empty; write what differs"),
     ];

@@ -42,7 +42,9 @@ fn a_few_of_each_construct_are_read() {
     for (name, map, comes) in CONSTRUCTS {
         match (RoadMap::from_opendrive("scaled", &map(5)), comes) {
             (Ok(_), _) => {}
-            (Err(error), Comes::Refused(part)) => assert!(error.to_string().contains(part), "{name}: {error}"),
+            (Err(error), Comes::Refused(part)) => {
+                assert!(error.to_string().contains(part), "{name}: {error}")
+            }
             (Err(error), Comes::Read) => panic!("{name}: {error}"),
         }
     }
@@ -51,7 +53,8 @@ fn a_few_of_each_construct_are_read() {
 #[test]
 fn what_is_too_much_is_refused_in_words_that_name_it() {
     for (name, size) in REFUSED_FROM {
-        let (_, _, comes) = CONSTRUCTS.iter().find(|(construct, ..)| *construct == name).expect("it is there");
+        let (_, _, comes) =
+            CONSTRUCTS.iter().find(|(construct, ..)| *construct == name).expect("it is there");
         let Comes::Refused(part) = comes else { panic!("{name} is read, however many") };
         let error = read(name, size).expect_err(name).to_string();
         assert!(error.starts_with("line ") && error.contains(part), "{name}: {error}");

@@ -322,6 +322,10 @@ fn what_no_study_can_be_is_said_so() {
     let cases = [
         ("agents: [{ name: random, repats: 3 }]", "line 2: there is no `repats`; did you mean `repeats`?"),
         ("agents: [{ name: random }]\nseed: 3", "line 3: there is no `seed`"),
+        ("agents: random", "line 2: `agents`: write a list"),
+        ("agents: [random]", "line 2: `agents`: write `key: value` lines"),
+        ("roads: [corner]", "`agents: …` is missing"),
+        ("agents: [{ name: random }]\nagents: []", "line 3: `agents` stands twice"),
         ("agents: []", "no agent is named"),
         ("agents: [{ name: rnadom }]", "agent `rnadom`: no agent `rnadom`"),
         ("agents: [{ name: random }, { name: random }]", "two agents are called `random`"),

@@ -50,9 +50,11 @@ def moving_object(row):
         velocity=osi.Vector3d(x=number("vx_mps"), y=number("vy_mps"), z=0.0),
     )
     identifier = osi.Identifier(value=HOST if user == 0 else OBJECTS + user)
-    if row["body"] == "Pedestrian":
+    # A body of the author's own has a name that only the author knows.
+    body = row.get("like") or row["body"]
+    if body == "Pedestrian":
         return osi.MovingObject(id=identifier, base=base, type=osi.MovingObject.Type.PEDESTRIAN)
-    kind = osi.MovingObject.VehicleClassification(type=VEHICLES.get(row["body"], Kind.CAR))
+    kind = osi.MovingObject.VehicleClassification(type=VEHICLES.get(body, Kind.CAR))
     return osi.MovingObject(id=identifier, base=base, type=osi.MovingObject.Type.VEHICLE, vehicle_classification=kind)
 
 

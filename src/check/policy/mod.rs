@@ -13,7 +13,7 @@ use crate::check::policy::lines::rules;
 use crate::model::policy::{Net, Policy, PolicyClaims, PolicyOrigin, record, seal, weights_from_lines};
 use crate::model::{Space, code};
 use crate::syntax::ast::{Field, Span};
-use crate::syntax::{Diagnostic, ast};
+use crate::syntax::{Diagnostic, ast, settings_mistake};
 
 /// Most episodes on each road that a policy may claim; `avastra train` claims 15.
 const EPISODES_MAX: u64 = 10_000;
@@ -82,7 +82,8 @@ fn block<T: DeserializeOwned>(fields: &[Field], name: &str, whole: Span) -> Resu
     };
     let span = fields.first().map_or(whole, |field| field.name.span);
     let record = record(fields).map_err(|(span, label)| error(span, label.to_owned()))?;
-    serde_json::from_value(Value::Object(record)).map_err(|reason| error(span, reason.to_string()))
+    serde_json::from_value(Value::Object(record))
+        .map_err(|reason| error(span, settings_mistake(&reason.to_string(), None)))
 }
 
 /// The weights of the network. Their number must fit its layers, and the last layer the table of the space.

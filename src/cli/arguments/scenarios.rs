@@ -217,7 +217,7 @@ pub struct ReportArguments {
 pub struct RenderArguments {
     /// The scenario.
     pub file: PathBuf,
-    /// Moments to draw, in s since the start; several make a strip.
+    /// Moments to draw, in s since the start; several make a strip: `--at 2,9.5`.
     #[arg(long, value_delimiter = ',', value_name = "T", allow_negative_numbers = true)]
     pub at: Vec<f64>,
     /// A strip of five moments, the last at the first collision.

@@ -5,7 +5,6 @@
 
 use serde_json::{Value, json};
 
-use crate::cli::doc::unit;
 use crate::model::{Domain, Interval, Space};
 use crate::syntax::ast::{Action, ActionParam, ItemKind, ParamMode};
 
@@ -39,14 +38,14 @@ pub fn hints(analysis: &Analysis, from: usize, to: usize) -> Vec<Value> {
 fn range(analysis: &Analysis, space: &Space, action: &Action, param: &ActionParam) -> Option<Value> {
     let (of, left) = ranges_left(space, &action.name.text, &param.name.text)?;
     let Domain::Range(low, high) = &of.domain else { return None };
-    let unit = unit(of.ty);
+    let shown = |interval: &Interval| interval.shown(of.ty, of.unit());
     let all = left.iter().map(|(_, interval)| *interval).reduce(|all, interval| all.hull(&interval))?;
     if left.iter().all(|(_, interval)| *interval == Interval::closed(*low, *high)) {
         return None;
     }
-    let tooltip: Vec<String> = left.iter().map(|(road, left)| format!("{road}: {left} {unit}")).collect();
+    let tooltip: Vec<String> = left.iter().map(|(road, left)| format!("{road}: {}", shown(left))).collect();
     let tooltip = format!("after the rules\n{}", tooltip.join("\n"));
-    Some(hint(analysis, param.span.end, &format!("{all} {unit}"), &tooltip))
+    Some(hint(analysis, param.span.end, &shown(&all), &tooltip))
 }
 
 fn hint(analysis: &Analysis, byte: usize, label: &str, tooltip: &str) -> Value {

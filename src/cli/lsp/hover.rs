@@ -5,7 +5,7 @@ use core::fmt::Write;
 use std::collections::BTreeSet;
 
 use crate::check::{Declaration, Symbol};
-use crate::cli::doc::{range_on, unit};
+use crate::cli::doc::range_on;
 use crate::cli::output::plural;
 use crate::model::vocabulary::{Word, WorldState};
 use crate::model::{ActionDef, Interval, Parameter, Reach, RuleBody, Space};
@@ -142,8 +142,8 @@ fn when(analysis: &Analysis) -> &'static str {
 fn ranges(analysis: &Analysis, action: &str, name: &str) -> String {
     let known = analysis.space().and_then(|space| ranges_left(space, action, name));
     let Some((of, left)) = known.filter(|(_, left)| !left.is_empty()) else { return String::new() };
-    let unit = unit(of.ty);
-    let lines: String = left.iter().map(|(road, left)| format!("\n- `{road}`: {left} {unit}")).collect();
+    let shown = |left: &Interval| left.shown(of.ty, of.unit());
+    let lines: String = left.iter().map(|(road, left)| format!("\n- `{road}`: {}", shown(left))).collect();
     format!("\n\nAfter the rules{}:\n{lines}", when(analysis))
 }
 

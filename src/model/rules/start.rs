@@ -20,7 +20,7 @@ const COMBINATIONS_MAX: usize = 100_000;
 
 /// No episode can begin so.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("on `{road}` no episode can begin under rule `{rule}`")]
+#[error("on `{road}` {}", self.words())]
 pub struct NoStart {
     pub road: String,
     pub rule: String,
@@ -30,6 +30,16 @@ pub struct NoStart {
     pub(crate) cells: Vec<usize>,
     /// Whether states were left untried, because there are too many.
     pub(crate) is_too_large: bool,
+}
+
+impl NoStart {
+    /// What is wrong, without the road.
+    pub(crate) fn words(&self) -> String {
+        match self.is_too_large {
+            true => format!("whether an episode can begin under rule `{}` is not known", self.rule),
+            false => format!("no episode can begin under rule `{}`", self.rule),
+        }
+    }
 }
 
 impl Space {

@@ -134,8 +134,7 @@ impl ReferenceLine {
         let first = self.pieces.partition_point(|piece| piece.begin_m <= from_m).max(1) - 1;
         let pieces = self.pieces[first..].iter().take_while(|piece| piece.begin_m < to_m);
         let bent = pieces.filter(|piece| !matches!(piece.shape, Shape::Line));
-        let within_m =
-            |piece: &Piece| (piece.begin_m + piece.length_m).min(to_m) - piece.begin_m.max(from_m);
+        let within_m = |piece: &Piece| (piece.begin_m + piece.length_m).min(to_m) - piece.begin_m.max(from_m);
         bent.map(|piece| within_m(piece).max(0.0)).sum()
     }
 

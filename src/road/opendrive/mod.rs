@@ -10,8 +10,8 @@ mod read;
 mod xml;
 
 pub use elements::{
-    Across, Contact, ControllerElement, Document, JunctionElement, LaneElement, MarkRule, Meaning, ObjectKind,
-    Orientation, Outline, RoadElement, RoadLink, SectionElement, SignalElement,
+    Across, Contact, ControllerElement, Document, JunctionElement, LaneElement, MarkRule, Meaning,
+    ObjectKind, Orientation, Outline, RoadElement, RoadLink, SectionElement, SignalElement,
 };
 pub use read::{read, well_formed};
 pub use xml::wrong;
