@@ -1,6 +1,7 @@
 //! Could a careful driver have avoided this collision?
 //!
-//! The world is taken back to the onset of the hazard (see `hazard`), but no further than 8 s. All other
+//! The world is taken back to the onset of the hazard (see `hazard`), or to the last moment at which an ego vehicle that
+//! had to give way could still stop, if that is earlier, but no further than 8 s. All other
 //! road users then move as recorded until the recorded contact, and after it as they themselves decide.
 //! The ego vehicle, the same car on the same road, is driven by each reference driver in turn; a driver
 //! watches for some time before it takes over. If none of the careful drivers avoids the collision,
@@ -24,8 +25,11 @@ use crate::ads::{Ads, Careful, Evasion};
 use crate::episode;
 use crate::episode::{Choice, EpisodeLog, Moment, Script, Setup};
 use crate::geometry::{OrientedBox, Pose, wrap_angle};
-use crate::kinematics::GRAVITY_MPS2;
+use crate::kinematics::{
+    CAREFUL_BRAKING_MPS2, CAREFUL_PERCEPTION_S, CAREFUL_REACTION_S, GRAVITY_MPS2, stopping_m,
+};
 use crate::model::Avoidability;
+use crate::model::vocabulary::Priority;
 use crate::sim::{Contact, DT_S, EgoMotion, FRAME_TICKS, VehicleParameters, World};
 use crate::syntax::listed;
 
@@ -223,7 +227,7 @@ pub fn judge_one(
     // No driver can react to what was never in sight: the takeover is then at the last moment.
     let onset = onset(recording, contact.obstacle, met).unwrap_or(Onset { first: last, conflict: last });
     let earliest = (last + 1).saturating_sub(ticks(settings.rewind_s));
-    let from = onset.first.max(earliest);
+    let from = onset.first.min(last_chance(recording, contact, met).unwrap_or(last)).max(earliest);
     let case = Case { recording, from, obstacle: contact.obstacle, settings };
     let to_the_letter = Case { from: onset.conflict.max(earliest), ..case };
     let avoids = |name: &&String| {
@@ -247,6 +251,23 @@ pub fn judge_one(
     };
     let onset_s = recording[from].time_s();
     Judgement { class, onset_s, avoided_by: [careful, reported].concat(), r157_letter, evasion }
+}
+
+/// Index of the last moment at which the ego vehicle could still stop before the place of a collision in which it had to
+/// give way: by then its violation has begun, though it may not have entered the junction yet. `None` if it had not to.
+fn last_chance(recording: &[World], contact: &Contact, met: OrientedBox) -> Option<usize> {
+    if contact.priority != Priority::Other {
+        return None;
+    }
+    let delay_s = CAREFUL_PERCEPTION_S + CAREFUL_REACTION_S;
+    let (mut way_m, mut next) = (0.0, met.pose.position);
+    recording.iter().rposition(|world| {
+        let here = world.ego_outline().pose.position;
+        way_m += (next - here).norm();
+        next = here;
+        let braking_mps2 = CAREFUL_BRAKING_MPS2.min(world.conditions().friction * GRAVITY_MPS2);
+        stopping_m(world.ego().speed_mps, delay_s, braking_mps2) <= way_m
+    })
 }
 
 /// A collision that is to be driven again.

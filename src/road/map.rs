@@ -357,11 +357,20 @@ impl RoadMap {
         self.nearest(point, heading_rad, 0.0).is_some_and(|place| !fits(place))
     }
 
-    /// Whether any corner of a body is beyond the middle of the road, seen along its heading.
+    /// Whether any corner of a body is beyond the middle of the road, seen along its heading, by more than
+    /// [`BEYOND_M`].
     pub fn is_beyond_middle(&self, outline: &OrientedBox) -> bool {
-        outline.corners().iter().any(|corner| self.runs_against(*corner, outline.pose.heading_rad))
+        let within = OrientedBox {
+            half_length_m: outline.half_length_m - BEYOND_M,
+            half_width_m: outline.half_width_m - BEYOND_M,
+            ..*outline
+        };
+        within.corners().iter().any(|corner| self.runs_against(*corner, outline.pose.heading_rad))
     }
 }
+
+/// A body that is beyond the middle of the road by less touches the line, m. Ours: lanes are kept no better.
+const BEYOND_M: f64 = 0.1;
 
 /// How far before a junction its lights and signs may stand, m. Ours.
 const APPROACH_M: f64 = 40.0;

@@ -16,6 +16,9 @@
 //! UN R79 says for lane changes: more than 3 m/s² after 0.4 s, to stay the way of a second behind. So a vehicle that
 //! cuts in and stops before the one behind it has its distance back has not given way.
 //!
+//! The ego vehicle has no priority over a vehicle that it has seen standing while it could brake gently for it, wherever
+//! that vehicle stands (13.1).
+//!
 //! A vehicle that has crashed is an obstacle: whoever drives must be able to stop for what can be foreseen (13.1).
 //! It has priority, unless it came to lie in the ego vehicle's way too late to brake gently for it; then neither has.
 //!
@@ -27,12 +30,12 @@
 //! has none at walking pace: who drives so slowly can stop for anybody.
 //!
 //! Of two that come towards each other outside junctions, the one that is beyond the middle of the road has to give
-//! way (articles 10.3 and 12), with whatever part of its body: a bus whose rear swings over the line, too.
+//! way (articles 10.3 and 12), with whatever part of its body: a bus whose rear swings over the line, too. If both are, neither has priority.
 //!
 //! The state is kept for each road user ([`Rights`]), looked at ten times a second, and read at a contact.
 
 use crate::geometry::{OrientedBox, Vec2};
-use crate::kinematics::{CAREFUL_BRAKING_MPS2, WALKING_MPS, stopping_m};
+use crate::kinematics::{CAREFUL_BRAKING_MPS2, STANDING_MPS, WALKING_MPS, stopping_m};
 use crate::model::vocabulary::Priority;
 use crate::road::{LaneIndex, RoadMap, Route, RouteLane, RouteStopLine};
 
@@ -182,6 +185,8 @@ pub(super) struct Rights {
     meeting: Option<Meeting>,
     /// Who has priority, it as a wreck in the ego vehicle's way or the ego vehicle; `None` as long as it is neither.
     wreck: Option<Priority>,
+    /// Whether it has stood in the ego vehicle's view while that could brake gently for it, and stands since.
+    is_foreseen: bool,
     /// Where a pedestrian was last looked for on the carriageway, and whether it was there: most stand and wait.
     on_road: Option<(Vec2, bool)>,
 }
@@ -227,6 +232,9 @@ impl Rights {
     ) {
         match motion {
             Motion::Drive(driver) if this.distance_m <= APPROACH_M => {
+                let stands = this.velocity_mps.norm() < STANDING_MPS;
+                let has_time = || in_sight && can_stop(around.ego.speed_mps, this.distance_m, ABRUPT_MPS2);
+                self.is_foreseen = stands && (self.is_foreseen || has_time());
                 self.watch_driver(this, driver, ego_passed, around);
             }
             Motion::Walk(_) | Motion::Stand if this.distance_m <= APPROACH_M => {
@@ -256,25 +264,30 @@ impl Rights {
     /// Who had priority, now that the two touch at `point`.
     pub fn at_contact(&self, this: &Obstacle, motion: &Motion, point: Vec2, around: &Around) -> Priority {
         let holds = |meeting: &&Meeting| (around.tick - meeting.tick) as f64 * DT_S <= HOLDS_S;
-        let is_creeping = around.ego.speed_mps <= WALKING_MPS;
-        match (self.meeting.as_ref().filter(holds), motion) {
-            (Some(meeting), Motion::Drive(_)) => meeting.priority,
-            (None, Motion::Drive(driver)) => Side::of(this, driver, around).map_or(Priority::None, |side| {
-                let changes = driver.is_changing_lanes();
-                side.at_contact(changes, || beyond_middle(this, around, Some(point)))
-            }),
-            (found, Motion::Walk(_) | Motion::Stand) => {
-                let priority =
-                    found.map_or_else(|| on_foot(&Strip::of(this, around), around), |found| found.priority);
-                if is_creeping && priority == Priority::Ego { Priority::None } else { priority }
+        let found = self.meeting.as_ref().filter(holds).map(|meeting| meeting.priority);
+        let (priority, could_stop) = match motion {
+            Motion::Drive(driver) => {
+                let by_lane = || {
+                    let side = Side::of(this, driver, around)?;
+                    let beyond = || beyond_middle(this, around, Some(point));
+                    Some(side.at_contact(driver.is_changing_lanes(), beyond))
+                };
+                (found.or_else(by_lane).unwrap_or(Priority::None), self.is_foreseen)
             }
-        }
+            Motion::Walk(_) | Motion::Stand => {
+                let by_time = || on_foot(&Strip::of(this, around), around);
+                (found.unwrap_or_else(by_time), around.ego.speed_mps <= WALKING_MPS)
+            }
+        };
+        // Whoever drives must be able to stop for what can be foreseen (13.1), so the other need not have priority.
+        if could_stop && priority == Priority::Ego { Priority::None } else { priority }
     }
 
     pub fn trace(&self, trace: &mut Trace) {
         PassedLight::trace(self.passed.as_ref(), trace);
         trace.word(self.shares.map_or(2, u64::from));
         trace.word(self.wreck.map_or(u64::MAX, |priority| priority as u64));
+        trace.word(u64::from(self.is_foreseen));
         if let Some(Meeting { place, priority, tick }) = self.meeting {
             let (ego, other) = match place {
                 Place::Area(ego, other) => (ego.0 as u64, other.0 as u64),
@@ -584,19 +597,23 @@ impl Side {
     }
 }
 
-/// Who has priority because the other is beyond the middle of the road, where lanes run against its heading alone: at
-/// a point `at` where the two touch, or else with any corner. `None` if both are, or neither.
+/// Who has priority because the other is beyond the middle of the road, where lanes run against its heading alone: with a
+/// corner, or else `at` the point where the two touch. Neither has if both are there; `None` if none of them is.
 fn beyond_middle(this: &Obstacle, around: &Around, at: Option<Vec2>) -> Option<Priority> {
     let map = &around.scene.map;
-    let is_beyond = |outline: &OrientedBox| match at {
-        Some(point) => map.runs_against(point, outline.pose.heading_rad),
-        None => map.is_beyond_middle(outline),
-    };
-    match (is_beyond(around.ego_outline), is_beyond(&this.outline)) {
+    let told = |ego: bool, other: bool| match (ego, other) {
+        (true, true) => Some(Priority::None),
         (true, false) => Some(Priority::Other),
         (false, true) => Some(Priority::Ego),
-        (true, true) | (false, false) => None,
-    }
+        (false, false) => None,
+    };
+    let by_corners = || told(map.is_beyond_middle(around.ego_outline), map.is_beyond_middle(&this.outline));
+    // The middle of a long body may cut a bend whose line its corners keep.
+    let by_point = |point: Vec2| {
+        let is_beyond = |outline: &OrientedBox| map.runs_against(point, outline.pose.heading_rad);
+        told(is_beyond(around.ego_outline), is_beyond(&this.outline))
+    };
+    by_corners().or_else(|| at.and_then(by_point))
 }
 
 /// Way of the ego vehicle's front to an obstacle that lies across the strip that it drives on, m; `None` if the

@@ -45,7 +45,7 @@ const PLANTED: [Planted; 17] = [
     planted("planning_tailgates", "tests/cases/faults/leader.ava", 0),
     planted("prediction_frozen", SHIPPED, 50),
     planted("prediction_one_hypothesis", "tests/cases/faults/step_out.ava", 0),
-    planted("tracking_late", SHIPPED, 50),
+    planted("tracking_late", SHIPPED, 0),
     planted("tracking_merges", SHIPPED, 0),
     planted("tracking_no_velocity", SHIPPED, 50),
 ];
@@ -68,6 +68,9 @@ planning: { acceleration_mps2_max: 1.8, lateral_buffer_m: 0.45 }
 control: { actuators: { brake_mps2_max: 8.0 } }
 ";
 
+/// Crashes of a profile that are looked at, at most.
+const CRASHES: usize = 3;
+
 #[test]
 fn the_module_at_fault_is_named() {
     let decoys = ModularConfig::from_yaml(DECOYS).expect("they are settings");
@@ -78,22 +81,19 @@ fn the_module_at_fault_is_named() {
         let planted = decoys.with_module_of(module, &fault(name));
         let settings = RunSettings { profile: Some(Profile::new(&planted)), ..usual.settings().clone() };
         let run = Run::new(usual.table().clone(), settings).expect("the settings name what exists");
-        let found = (begin..run.episodes()).find_map(|number| crash(&run, number, module));
-        let Some((number, log, index)) = found else {
-            wrong.push(format!("{name}: no crash"));
-            continue;
-        };
-        let cause = oracle::diagnose(&run.setup(number), &log, index, &ModularConfig::default());
-        let cause = cause.expect("it has modules").cause;
-        if cause != [module] {
-            wrong.push(format!("{name}, episode {number}: {cause:?}"));
+        let crashes = (begin..run.episodes()).filter_map(|number| crash(&run, number, module));
+        let mut named = crashes.take(CRASHES).map(|(number, log, index)| {
+            let found = oracle::diagnose(&run.setup(number), &log, index, &ModularConfig::default());
+            (number, found.expect("it has modules").cause)
+        });
+        // What is not told apart from chance names no module, which is no mistake; but one of the crashes must be told.
+        match named.find(|(_, cause)| !cause.is_empty()) {
+            Some((_, cause)) if cause == [module] => {}
+            found => wrong.push(format!("{name}: {found:?}")),
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
-
-/// Crashes of a profile of which localisation, perception, latency and control differ from the default.
-const CRASHES: usize = 3;
 
 /// A module that is as in the baseline is not blamed for what differs from it; and if nothing differs, the verdict
 /// still follows from the table.
