@@ -42,5 +42,6 @@ mod tour;
 mod training;
 mod traffic;
 mod trials;
+mod verdicts;
 mod wishes;
 mod world;
