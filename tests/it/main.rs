@@ -44,5 +44,6 @@ mod tour;
 mod training;
 mod traffic;
 mod trials;
+mod verdicts;
 mod wishes;
 mod world;
