@@ -211,7 +211,8 @@ export function showSteps(place, recording, seek) {
       el("td", { class: "number" }, figure(step.proc, "", 3)),
     );
   });
-  refill(place, table("Actions, step by step", ["Step", "Chosen", "Offered and masked", el("abbr", { title: PROC }, "ProC")], shown));
+  const heads = ["Step", "Chosen", "Offered and masked", el("abbr", { title: PROC }, "ProC")];
+  refill(place, table("Actions, step by step", heads, shown));
   return (step) => shown.forEach((row) => row.classList.toggle("marked", Number(row.dataset.step) === step));
 }
 
