@@ -93,6 +93,9 @@ impl Never {
                 false => lines.push(reasons),
             }
         }
+        if lines.iter().any(|line| line.contains('…')) {
+            lines.push("  `…` stands for figures that differ from step to step".to_owned());
+        }
         if !all {
             lines.push("  `--verbose` lists every row".to_owned());
         }

@@ -4,8 +4,8 @@
 
 use std::fmt::Write;
 
-use crate::geometry::Vec2;
-use crate::road::Lane;
+use crate::geometry::{Pose, Vec2};
+use crate::road::{Lane, Strip};
 
 /// Distance of the samples along a curved outline, m.
 const STEP_M: f64 = 2.0;
@@ -68,6 +68,17 @@ pub fn lane_outline(lane: &Lane) -> Vec<Vec2> {
     let mut outline = lane_edge(lane, 1.0);
     outline.extend(lane_edge(lane, -1.0).iter().rev());
     outline
+}
+
+/// The surface of a walkway or of another lane that cars do not drive on.
+pub fn strip_outline(strip: &Strip) -> Vec<Vec2> {
+    let edge = |side: f64| {
+        strip.centre.points().iter().zip(&strip.widths_m).map(move |(point, width_m)| {
+            let pose = Pose { position: point.position, heading_rad: point.heading_rad };
+            pose.offset(0.0, side * width_m / 2.0).position
+        })
+    };
+    edge(1.0).chain(edge(-1.0).collect::<Vec<_>>().into_iter().rev()).collect()
 }
 
 /// A line without the points that lie on it anyway, to 2 cm.

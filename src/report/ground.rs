@@ -1,10 +1,10 @@
 //! The shape of a road for the page: what lies around the route, in columns of centimetres.
 
-use crate::geometry::{Bounds, Pose, Vec2};
+use crate::geometry::{Bounds, Vec2};
 use crate::road::{Lane, Neighbour, Strip, StripKind};
 use crate::sim::Scene;
 
-use super::canvas::lane_edge;
+use super::canvas::{lane_edge, strip_outline};
 use super::columns::Columns;
 
 /// Lines are kept to this, m.
@@ -136,14 +136,7 @@ impl Drawer {
     }
 
     fn strip(&mut self, strip: &Strip) -> StripShape {
-        let edge = |side: f64| {
-            strip.centre.points().iter().zip(&strip.widths_m).map(move |(point, width_m)| {
-                let pose = Pose { position: point.position, heading_rad: point.heading_rad };
-                pose.offset(0.0, side * width_m / 2.0).position
-            })
-        };
-        let outline: Vec<Vec2> = edge(1.0).chain(edge(-1.0).collect::<Vec<_>>().into_iter().rev()).collect();
-        StripShape { outline: self.line(&outline), is_walkway: strip.kind == StripKind::Walkway }
+        StripShape { outline: self.line(&strip_outline(strip)), is_walkway: strip.kind == StripKind::Walkway }
     }
 }
 

@@ -41,6 +41,9 @@ pub fn of_estimate(results: &Value, settings: &str) -> Value {
     json!({ "kind": "estimate", "settings": settings, "conditions": conditions(settings), "estimate": results })
 }
 
+/// The traffic profile of runs that ask for none.
+const CAREFUL: &str = "careful";
+
 /// What was played against what, by the settings of a run, a training, a study or an estimate: name and text of each.
 /// Nothing if they are of a version that wrote them otherwise.
 fn conditions(settings: &str) -> Vec<(&'static str, String)> {
@@ -68,16 +71,20 @@ fn conditions(settings: &str) -> Vec<(&'static str, String)> {
             line => format!("{} {line}", of.ads),
         },
     };
-    let manners = of.traffic.map(|traffic| traffic.settings.shipped_as().unwrap_or("of its own"));
+    // A profile of the author's own is told by what it changes.
+    let manners = of.traffic.map(|TrafficRecord { settings, .. }| {
+        settings.shipped_as().map_or_else(|| settings.to_line(), str::to_owned)
+    });
     let traffic = match (of.ambient, manners) {
-        (0, None) => None,
-        (0, Some(manners)) => Some(manners.to_owned()),
-        (ambient, manners) => Some(format!("{}, {ambient} ambient", manners.unwrap_or("careful"))),
+        (0, manners) => manners.unwrap_or_else(|| CAREFUL.to_owned()),
+        (ambient, manners) => {
+            format!("{}, {ambient} ambient", manners.unwrap_or_else(|| CAREFUL.to_owned()))
+        }
     };
     let known = [
         ("Space", Some(of.space)),
         ("Driving system", Some(driver)),
-        ("Traffic", traffic),
+        ("Traffic", Some(traffic)),
         ("Agent", of.agent),
         ("Roads", Some(of.roads.join(", "))),
         ("Seed", of.seed.or(of.first_seed).map(|seed| seed.to_string())),
@@ -100,6 +107,8 @@ mod tests {
         assert_eq!(text("Roads"), Some("corner, boulevard"));
         assert_eq!(text("Seed"), Some("7"));
         assert_eq!(text("Traffic"), Some("careful, 5 ambient"));
+        let calm = conditions("space: s.ava\nroads: [corner]\nads: modular");
+        assert!(calm.contains(&("Traffic", "careful".to_owned())), "{calm:?}");
         assert!(conditions("seed: 7").is_empty());
     }
 }

@@ -12,10 +12,10 @@ use crate::ads::{PerceivedObject, Status};
 use crate::geometry::{Bounds, OrientedBox, Vec2};
 use crate::kinematics::STANDING_MPS;
 use crate::model::vocabulary::{Body, Word};
-use crate::road::Lane;
+use crate::road::{Lane, StripKind};
 use crate::sim::{Contact, Obstacle, SignalColour, World};
 
-use super::canvas::{Canvas, escape, lane_edge, lane_outline, thinned};
+use super::canvas::{Canvas, escape, lane_edge, lane_outline, strip_outline, thinned};
 use super::labels::Labels;
 use super::words;
 
@@ -118,6 +118,13 @@ impl Panel<'_> {
         let map = &world.scene().map;
         let lanes: Vec<&Lane> =
             map.lanes.iter().filter(|lane| lane.centre.bounds().grown(4.0).meets(&self.view)).collect();
+        for strip in map.strips.iter().filter(|strip| strip.bounds.grown(4.0).meets(&self.view)) {
+            let fill = match strip.kind {
+                StripKind::Walkway => r##"fill="#dcd7cf""##,
+                StripKind::Paved => r##"fill="#ced2d8""##,
+            };
+            self.canvas.polygon(&thinned(&strip_outline(strip)), fill);
+        }
         for in_junction in [true, false] {
             lanes
                 .iter()

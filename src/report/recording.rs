@@ -113,7 +113,9 @@ pub fn record_another(
                 }
                 Regression::Fixed => json!({ "kind": "gone" }),
                 Regression::OtherCrash => json!({ "kind": "other_crash" }),
-                Regression::NeverMet => json!({ "kind": "never_met" }),
+                Regression::NeverMet => {
+                    json!({ "kind": "never_met", "why": refused_there(&first.log, index, &recording.log) })
+                }
                 Regression::AdsFailed(_) | Regression::FailsAgain(_) => json!({ "kind": "failed" }),
             }
         }
@@ -122,6 +124,22 @@ pub fn record_another(
         (None, None, _) => json!({ "kind": "none" }),
     };
     Ok((recording, change))
+}
+
+/// What kept the obstacle of a collision from appearing in another drive: mostly a rule that its author wrote and that refuses
+/// the spawn at the other speed. `None` if that drive was over before.
+fn refused_there(log: &EpisodeLog, index: usize, other: &EpisodeLog) -> Option<String> {
+    let obstacle = log.collisions[index].contact.obstacle;
+    let appears =
+        |outcome: &Outcome| matches!(outcome, Outcome::Done { spawned, .. } if spawned.contains(&obstacle));
+    let step = log.steps.iter().position(|step| appears(&step.outcome))?;
+    match &other.steps.get(step)?.outcome {
+        Outcome::Refused { rule: Some(rule), reason, .. } => {
+            Some(format!("rule `{rule}` refuses it there: {reason}"))
+        }
+        Outcome::Refused { rule: None, reason, .. } => Some(format!("it is refused there: {reason}")),
+        Outcome::Done { .. } | Outcome::Passed => None,
+    }
 }
 
 fn played(

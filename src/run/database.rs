@@ -559,5 +559,8 @@ mod tests {
         let reason = "no_teleport: the gap would be 12.5 m, a fair one is 17 m";
         assert_eq!(without_figures(reason), "no_teleport: the gap would be … m, a fair one is … m");
         assert_eq!(without_figures("cannot spawn: no lane on the left"), "cannot spawn: no lane on the left");
+        let median = "cannot spawn: a median of 3.2 m lies before the opposing lane";
+        assert_eq!(without_figures(median), "cannot spawn: a median lies before the opposing lane");
+        assert_eq!(without_figures("no crossing leg within 60 m"), "no crossing leg");
     }
 }

@@ -3,9 +3,11 @@
 //! An episode notes every offer of every step ([`Offered`]), `run.db` adds episodes up, and [`RowCount`] is what comes
 //! out for a row. A run says at its end which rows never happened.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use crate::action::{Offer, Refusal};
+use crate::units::unit;
 
 use crate::run::database::RefusalCount;
 
@@ -69,14 +71,26 @@ pub(crate) fn in_words(rule: Option<&str>, reason: &str) -> String {
     rule.map_or(reason.clone(), |rule| format!("{rule}: {reason}"))
 }
 
-/// A reason with `…` for each number.
+/// A reason with `…` for each number. A quantity that only says more (`of 3.2 m`, `within 60 m`) is left out with its
+/// preposition: the rest is a sentence without it.
 pub(super) fn without_figures(reason: &str) -> String {
     // Nearly all words are none, and telling so by their first letter is cheaper than reading them as numbers.
     let may_be = |letter: char| letter.is_ascii_digit() || "+-.iInN".contains(letter);
     let is_figure = |word: &str| word.starts_with(may_be) && word.parse::<f64>().is_ok();
-    let shown = reason.split(' ').map(|word| {
+    let words: Vec<&str> = reason.split(' ').collect();
+    let mut shown: Vec<Cow<'_, str>> = Vec::with_capacity(words.len());
+    let mut at = 0;
+    while let Some(word) = words.get(at) {
+        if let ["of" | "within", figure, quantity, ..] = &words[at..]
+            && is_figure(figure)
+            && unit(quantity).is_some()
+        {
+            at += 3;
+            continue;
+        }
         let bare = word.trim_end_matches([',', ';']);
-        if is_figure(bare) { word.replace(bare, "…") } else { word.to_owned() }
-    });
-    shown.collect::<Vec<_>>().join(" ")
+        shown.push(if is_figure(bare) { word.replace(bare, "…").into() } else { (*word).into() });
+        at += 1;
+    }
+    shown.join(" ")
 }

@@ -43,6 +43,23 @@ fn a_misspelt_command_is_told_the_nearest() {
     }
 }
 
+/// The footways of a map are drawn beside its lanes.
+#[test]
+fn a_picture_shows_sidewalks() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let space = root().join("scenarios/examples/own_road.ava").display().to_string();
+    let scenario = format!(
+        "language 1\nuse \"{space}\"\nscenario street {{\n  road: high_street\n  \
+         start {{ time: Noon, sky: None }}\n  steps {{ 0: wait() }}\n}}\n"
+    );
+    let file = scratch.path().join("street.ava");
+    std::fs::write(&file, scenario).expect("it is writable");
+    let (status, svg, stderr) =
+        outcome(&mut avastra(&["render", &file.display().to_string(), "--at", "1", "--out", "-"]));
+    assert_eq!(status, 0, "{stderr}");
+    assert_eq!(svg.matches("fill=\"#dcd7cf\"").count(), 2, "one on each side");
+}
+
 #[test]
 fn every_broken_file_has_its_diagnostics() {
     each_case("diagnostics", |path| {

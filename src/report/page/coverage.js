@@ -26,9 +26,9 @@ export function coverage(overview) {
       "p",
       { class: "legend" },
       isOffered
-        ? "● carried out so often · ◐ legal, and never chosen · " +
+        ? "● steps in which it was carried out, of those in which it was legal · ◐ legal, and never chosen · " +
             "○ never legal, with what refused it most often · – not offered"
-        : "● carried out so often · – never chosen",
+        : "● steps in which it was carried out · – never chosen",
     ),
     el(
       "div",

@@ -4,6 +4,7 @@ import { linkOf, nameOf } from "./link.js";
 import {
   ENDS,
   PRIORITIES,
+  PROC,
   VERDICTS,
   atTime,
   causeInWords,
@@ -122,7 +123,7 @@ export function showMoment(place) {
   const cells = names.map(() => el("dd", {}, ""));
   refill(
     place,
-    names.map((name, i) => el("div", {}, el("dt", {}, name), cells[i])),
+    names.map((name, i) => el("div", {}, el("dt", { title: name === "ProC" ? PROC : null }, name), cells[i])),
   );
   return (recording, timeS) => {
     const ego = recording.ego(timeS);
@@ -210,7 +211,8 @@ export function showSteps(place, recording, seek) {
       el("td", { class: "number" }, figure(step.proc, "", 3)),
     );
   });
-  refill(place, table("Actions, step by step", ["Step", "Chosen", "Offered and masked", "ProC"], shown));
+  const heads = ["Step", "Chosen", "Offered and masked", el("abbr", { title: PROC }, "ProC")];
+  refill(place, table("Actions, step by step", heads, shown));
   return (step) => shown.forEach((row) => row.classList.toggle("marked", Number(row.dataset.step) === step));
 }
 

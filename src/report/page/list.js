@@ -110,12 +110,14 @@ export function showList(place, data) {
   update();
 }
 
-const REACHES = { avoidable: "avoidable", beyond_reference: "beyond reference", unavoidable: "unavoidable" };
+const REACHES = { avoidable: "avoidable", beyond_reference: "only without delay", unavoidable: "unavoidable" };
 
 /** Columns of the list: heading, what a scenario has there, and whether it is a number. */
 const COLUMNS = [
   ["Counts", counts],
   ["Road", ({ summary }) => summary.road],
+  // Early, so that a narrow window cuts off other columns.
+  ["Compared", ({ change }) => change && el("span", { title: change.why }, changeInWords(change))],
   ["Obstacle", (entry, hit) => hit && `${hit.body}, ${hit.approach}`],
   ["Side", (entry, hit) => hit?.side],
   ["Closing", (entry, hit) => hit && kmh(hit.closing_mps), "number"],
@@ -124,7 +126,6 @@ const COLUMNS = [
   ["Priority", (entry, hit) => hit?.priority],
   ["Cause", (entry, hit) => hit && causeInWords(hit.cause)],
   ["At", ({ summary }, hit) => atTime(hit ? hit.at_s : summary.duration_s), "number"],
-  ["Compared", ({ change }) => change && changeInWords(change)],
 ];
 
 /** Whether it counts, by a sign and in words; how it ended, if nothing was hit; and whether the replay is another. */

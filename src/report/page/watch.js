@@ -164,7 +164,7 @@ class Watch {
       "p",
       { id: "change" },
       el("strong", {}, `With ${driverInWords(this.data.compared_with)}: `),
-      `${changeInWords(change)}.`,
+      `${changeInWords(change)}${change.why ? `: ${change.why}` : ""}.`,
     );
   }
 

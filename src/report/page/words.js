@@ -84,6 +84,9 @@ export const CHANGES = {
   none: "no crash in either",
 };
 
+/** What ProC means, for those who do not know the word. */
+export const PROC = "collision probability: how near the ego vehicle is to a crash, from 0 to 1";
+
 /** The result of a comparison, with how far the time of the crash has moved. */
 export function changeInWords({ kind, later_s: laterS }) {
   if (kind !== "other_time") return CHANGES[kind] ?? kind;
