@@ -539,7 +539,7 @@ mod tests {
             "no preset `papre` for this agent: it has `avastra`, `paper` and `released`"
         );
         assert!(
-            message("loss: cubed").starts_with("`loss`: unknown variant `cubed`"),
+            message("loss: cubed").ends_with("there is no `cubed`; there are `squared` and `huber`"),
             "{}",
             message("loss: cubed")
         );

@@ -25,15 +25,12 @@ use crate::ads::{Ads, Careful, Evasion};
 use crate::episode;
 use crate::episode::{Choice, EpisodeLog, Moment, Script, Setup};
 use crate::geometry::{OrientedBox, Pose, wrap_angle};
-use crate::kinematics::{
-    CAREFUL_BRAKING_MPS2, CAREFUL_PERCEPTION_S, CAREFUL_REACTION_S, GRAVITY_MPS2, stopping_m,
-};
+use crate::kinematics::GRAVITY_MPS2;
 use crate::model::Avoidability;
-use crate::model::vocabulary::Priority;
 use crate::sim::{Contact, DT_S, EgoMotion, FRAME_TICKS, VehicleParameters, World};
 use crate::syntax::listed;
 
-use super::hazard::{Onset, onset};
+use super::hazard::{Onset, last_chance, onset};
 use crate::episode::struck;
 
 /// Settings of the verdict. Every run records them.
@@ -251,23 +248,6 @@ pub fn judge_one(
     };
     let onset_s = recording[from].time_s();
     Judgement { class, onset_s, avoided_by: [careful, reported].concat(), r157_letter, evasion }
-}
-
-/// Index of the last moment at which the ego vehicle could still stop before the place of a collision in which it had to
-/// give way: by then its violation has begun, though it may not have entered the junction yet. `None` if it had not to.
-fn last_chance(recording: &[World], contact: &Contact, met: OrientedBox) -> Option<usize> {
-    if contact.priority != Priority::Other {
-        return None;
-    }
-    let delay_s = CAREFUL_PERCEPTION_S + CAREFUL_REACTION_S;
-    let (mut way_m, mut next) = (0.0, met.pose.position);
-    recording.iter().rposition(|world| {
-        let here = world.ego_outline().pose.position;
-        way_m += (next - here).norm();
-        next = here;
-        let braking_mps2 = CAREFUL_BRAKING_MPS2.min(world.conditions().friction * GRAVITY_MPS2);
-        stopping_m(world.ego().speed_mps, delay_s, braking_mps2) <= way_m
-    })
 }
 
 /// A collision that is to be driven again.

@@ -13,7 +13,11 @@
 
 use crate::ads::in_sight;
 use crate::geometry::{OrientedBox, Pose, distance_m};
-use crate::sim::{DT_S, FRAME_TICKS, Obstacle, World};
+use crate::kinematics::{
+    CAREFUL_BRAKING_MPS2, CAREFUL_PERCEPTION_S, CAREFUL_REACTION_S, GRAVITY_MPS2, stopping_m,
+};
+use crate::model::vocabulary::Priority;
+use crate::sim::{Contact, DT_S, FRAME_TICKS, Obstacle, World};
 
 /// By how much drivers wander in their lane, m.
 const WANDER_M: f64 = 0.375;
@@ -75,6 +79,38 @@ pub fn onset(recording: &[World], obstacle: u32, met: OrientedBox) -> Option<Ons
     let first = first?;
     // Without a conflict that was seen, a driver that knows no rules takes over at the last moment.
     Some(Onset { first, conflict: conflict.unwrap_or(recording.len() - 1) })
+}
+
+/// Index of the last moment at which a careful driver could still stop before the place of a collision in which the ego
+/// vehicle had to give way, or of the first at which the obstacle was in sight: by then the ego vehicle's violation has
+/// begun, though it may not be in the junction yet. `None` if it had not to give way, or the obstacle was not in sight.
+pub fn last_chance(recording: &[World], contact: &Contact, met: OrientedBox) -> Option<usize> {
+    if contact.priority != Priority::Other {
+        return None;
+    }
+    let delay_s = CAREFUL_PERCEPTION_S + CAREFUL_REACTION_S;
+    let mut sensed = recording.last()?.sensed();
+    let (mut way_m, mut next) = (0.0, met.pose.position);
+    let mut found = None;
+    for (index, world) in recording.iter().enumerate().rev() {
+        let here = world.ego_outline().pose.position;
+        way_m += (next - here).norm();
+        next = here;
+        if !(recording.len() - index).is_multiple_of(FRAME_TICKS as usize) {
+            continue;
+        }
+        world.sense(&mut sensed);
+        let seen = sensed.objects.iter().find(|object| object.id == contact.obstacle);
+        if !seen.is_some_and(|object| in_sight(object, &sensed.conditions)) {
+            break;
+        }
+        found = Some(index);
+        let braking_mps2 = CAREFUL_BRAKING_MPS2.min(world.conditions().friction * GRAVITY_MPS2);
+        if stopping_m(world.ego().speed_mps, delay_s, braking_mps2) <= way_m {
+            break;
+        }
+    }
+    found
 }
 
 /// Whether the ego vehicle or an obstacle visibly does what the other need not expect.

@@ -105,7 +105,8 @@ const LAYOUT: &[Said] = &[
 /// The message for a word that is not among those that are known.
 fn no_such(name: &str, known: &str) -> String {
     let known = known.trim_start_matches("one of ").split([',', ' ']).map(|name| name.trim_matches('`'));
-    let known: Vec<&str> = known.filter(|name| !name.is_empty()).collect();
+    // Of two names, the reader says "`a` or `b`".
+    let known: Vec<&str> = known.filter(|name| !matches!(*name, "" | "or")).collect();
     match nearest(name, known.iter().copied()) {
         Some(near) => format!("there is no `{name}`; did you mean `{near}`?"),
         None => format!("there is no `{name}`; there are {}", listed(&known)),
@@ -176,7 +177,7 @@ mod tests {
         let error = serde_yaml::from_str::<serde_json::Value>(infinite).expect_err("it is wrong");
         assert_eq!(yaml_mistake(&error, infinite), "line 2: `pace_mps`: write a number");
         assert_eq!(said("seed: 1\nyields: maybe\n"), "line 2: `yields`: write `true` or `false`");
-        assert_eq!(said("a: [\n"), "line 1: `[` is never closed");
+        assert_eq!(said("seed: [\n"), "line 1: `[` is never closed");
         assert_eq!(said("seed: 3\nseed: 4\n"), "line 2: `seed` stands twice");
         for (text, wrong) in [
             ("seed: 3\n\tpace_mps: 4\n", "indent with blanks, not with tabs"),
