@@ -10,6 +10,7 @@ use annotate_snippets::{Annotation, AnnotationKind, Group, Level, Origin, Render
 use serde::Serialize;
 
 use crate::syntax::ast::{FileId, Span};
+use crate::syntax::scan::is_bidi;
 
 /// How severe a diagnostic is. Errors stop a compilation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -193,24 +194,24 @@ pub enum Style {
 /// Width at which long source lines are cut, in characters.
 const WIDTH: usize = 140;
 
-/// A text as a terminal may be given it: a control character that a file, a name or a driving system brought is written as its
-/// number (`\u{1b}`), and so are the signs that turn the direction of writing. Ends of lines and tabs stay.
+/// Whether a terminal may obey a character: a control character other than a line feed or a tab, or a sign that turns the
+/// direction of writing.
+pub fn acts_on_terminal(character: char) -> bool {
+    !matches!(character, '\n' | '\t') && (character.is_control() || is_bidi(character))
+}
+
+/// A text as it may be written to a terminal: characters that would act on it are written as their numbers (`\u{1b}`).
 pub fn visible(text: &str) -> Cow<'_, str> {
-    let acts = |c: char| match c {
-        '\n' | '\t' => false,
-        '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => true,
-        c => c.is_control(),
-    };
-    if !text.contains(acts) {
+    if !text.contains(acts_on_terminal) {
         return Cow::Borrowed(text);
     }
     let mut shown = String::with_capacity(text.len() + 16);
     let mut rest = text.chars().peekable();
     while let Some(c) = rest.next() {
         match c {
-            // The end of a line as Windows has it.
+            // Windows ends lines so.
             '\r' if rest.peek() == Some(&'\n') => shown.push(c),
-            c if acts(c) => shown.extend(c.escape_unicode()),
+            c if acts_on_terminal(c) => shown.extend(c.escape_unicode()),
             c => shown.push(c),
         }
     }
