@@ -196,7 +196,7 @@ const WIDTH: usize = 140;
 
 /// Whether a terminal may obey a character: a control character other than a line feed or a tab, or a sign that turns the
 /// direction of writing.
-pub fn acts_on_terminal(character: char) -> bool {
+pub(crate) fn acts_on_terminal(character: char) -> bool {
     !matches!(character, '\n' | '\t') && (character.is_control() || is_bidi(character))
 }
 
