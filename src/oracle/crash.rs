@@ -69,7 +69,7 @@ impl Regression {
 }
 
 /// Plays what led to the nth collision of a log with another driving system; `setup` is what the log was
-/// played from. Which collisions count is for the space's verdict to say; `settings` are those of its avoidability.
+/// played from. The space's verdict says which collisions count; `settings` are those of avoidability.
 pub fn regression(
     setup: &Setup,
     log: &EpisodeLog,
