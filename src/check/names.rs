@@ -11,7 +11,7 @@ use crate::syntax::{Diagnostic, listed, nearest};
 pub(super) struct Names {
     /// For each name its index among the declarations of the kind, and the span of the name.
     found: BTreeMap<String, (usize, Span)>,
-    /// The names as they were declared, which is the order of the indices of a kind.
+    /// The names in the order of their indices.
     by_index: Vec<String>,
 }
 

@@ -144,7 +144,7 @@ pub struct Sources {
 struct Source {
     name: String,
     text: String,
-    /// First byte of each line: a long file with many mistakes is not counted through for each of them.
+    /// First byte of each line, so that lines need not be counted anew for each of many mistakes.
     line_starts: Vec<usize>,
 }
 
@@ -246,7 +246,7 @@ pub fn render(diagnostic: &Diagnostic, sources: &Sources, style: Style) -> Strin
         Style::Plain => Renderer::plain(),
     };
     let drawn = renderer.term_width(WIDTH).render(&[group]);
-    // In source lines the renderer leaves the control characters of Latin-1, which some terminals obey.
+    // The renderer does not replace the control characters of Latin-1 in source lines, and some terminals obey them.
     drawn.replace(|c: char| ('\u{80}'..='\u{9f}').contains(&c), "\u{fffd}")
 }
 
@@ -261,14 +261,14 @@ fn files_in_order(diagnostic: &Diagnostic) -> Vec<FileId> {
     files
 }
 
-/// Longer pieces of a text are not drawn, bytes: drawing takes time in proportion to them, for each diagnostic.
+/// Longest piece of a text that is drawn, bytes: drawing takes time in proportion to it, for each diagnostic.
 const DRAWN_MAX: usize = 20_000;
 
 /// Most labels that are drawn of one diagnostic in one file.
 const LABELS_MAX: usize = 40;
 
-/// The labels of a diagnostic in one file, those together that are near one another: with the mistake first, then in
-/// the order of the text.
+/// The labels of a diagnostic in one file, grouped by nearness. The group of the mistake comes first, the others in the order
+/// of the text.
 fn pieces(diagnostic: &Diagnostic, file: FileId) -> Vec<Vec<&Label>> {
     let of_file = diagnostic.labels.iter().filter(|label| label.span.file == file);
     let mut labels: Vec<&Label> = of_file.take(LABELS_MAX).collect();
@@ -277,7 +277,7 @@ fn pieces(diagnostic: &Diagnostic, file: FileId) -> Vec<Vec<&Label>> {
     else {
         return Vec::new();
     };
-    // Nearly always all are near, and are drawn in the order in which they were given.
+    // Nearly always all are near each other. They are drawn in the order in which they were given.
     if last.saturating_sub(first) <= DRAWN_MAX {
         return vec![labels];
     }
@@ -295,7 +295,7 @@ fn pieces(diagnostic: &Diagnostic, file: FileId) -> Vec<Vec<&Label>> {
     pieces
 }
 
-/// A file, with the place in it that is not drawn.
+/// The name of a file with the line and column of a place that is not drawn.
 fn origin<'a>(labels: &[&Label], sources: &'a Sources, file: FileId) -> Origin<'a> {
     let origin = Origin::path(visible(sources.name(file)));
     match labels.first() {
