@@ -95,8 +95,7 @@ fn the_module_at_fault_is_named() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// A module that is as in the baseline is not blamed for what differs from it; and if nothing differs, the verdict
-/// still follows from the table.
+/// A module that is as in the baseline is never blamed, and the verdict follows from the table, also if no module differs.
 #[test]
 fn what_is_as_in_the_baseline_is_not_blamed() {
     let degraded = profile("scenarios/ads/degraded.yaml");

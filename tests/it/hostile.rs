@@ -216,7 +216,7 @@ const SCALED_MB_MAX: f64 = 500.0;
 const SIZES: [usize; 5] = [10, 100, 1_000, 10_000, 100_000];
 const SCALED_BYTES_MAX: usize = 4_000_000;
 
-/// What the program is asked to do with a text.
+/// The commands that are run on a text.
 const VERBS: [&str; 4] = ["check", "doc", "compile", "lsp"];
 
 /// Every construct of the grammar and of maps ten, a hundred, … times, and then as often as chance says: which of them take
@@ -268,7 +268,7 @@ struct Large {
     verb: &'static str,
 }
 
-/// What runs of the program took.
+/// The cost of the runs so far.
 struct Measured {
     scratch: Scratch,
     runs: usize,
@@ -306,11 +306,11 @@ struct Scratch {
     folder: tempfile::TempDir,
 }
 
-/// What became of a run of the program.
+/// The end and the cost of a run of the program.
 struct Came {
     cpu_s: f64,
     peak_mb: f64,
-    /// `None`: a signal ended it.
+    /// `None` if a signal ended it.
     exit: Option<i32>,
     /// All that it printed.
     output: String,

@@ -100,7 +100,7 @@ fn what_another_study_has_played_is_taken_over() {
         let bytes = |of: &Path| std::fs::read(of.join(name)).expect("every study writes it");
         assert!(bytes(&alone) == bytes(&with), "{name} differs");
     }
-    // The page follows from the cells. One that was changed counts for nothing there, is not taken over, and is played again.
+    // The page follows from the cells. A changed cell is left out of it, is not taken over, and is played again.
     let sound = std::fs::read(alone.join("study.db")).expect("it is readable");
     let whole = results(&alone);
     std::fs::write(alone.join("results.json"), "{}").expect("it is writable");
