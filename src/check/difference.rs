@@ -1,4 +1,4 @@
-//! What differs between two spaces: declarations, rules, rows and ranges.
+//! The differences between two spaces: declarations, rules, rows and ranges.
 //!
 //! Declarations are compared by exactly the texts that the digest covers (`meaning`), so a difference is told if and only if
 //! the digests differ. Besides, rules are compared by what they leave of the ranges that both spaces have, rows by their
@@ -157,7 +157,7 @@ fn flat(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// What differs between two texts of a declaration: the lines from the first to the last that differ.
+/// The part of a declaration's text that changed: the lines from the first to the last that differ.
 fn changed_lines(old: &str, new: &str) -> String {
     let (old, new): (Vec<&str>, Vec<&str>) = (old.lines().collect(), new.lines().collect());
     let begin = old.iter().zip(&new).take_while(|(one, other)| one == other).count();

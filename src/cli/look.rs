@@ -29,7 +29,7 @@ const BRING_ALONG: &str = "`avastra test --review` says what the change means fo
 pub struct Looked {
     pub table: ActionTable,
     pub scenario: Scenario,
-    /// What has changed since it was written; `None` if nothing has.
+    /// The changes since it was written; `None` if there are none.
     pub changed: Option<Changed>,
 }
 

@@ -1,8 +1,8 @@
 //! `avastra merge`: the shards of a run, a study or an estimate as the directory that one machine would have made.
 //!
 //! The units of all shards are taken over into one database, whichever shard has them, with the scenarios that were written
-//! of them. The database has their texts, so it does not matter what became of their files. What comes out is a directory in
-//! which all is played. It is ended by the command itself, which settles the database and writes the results: there is no
+//! of them. Their texts are in the database, so their files may be edited or gone. The result is a directory in which all is
+//! played. It is ended by the command itself, which settles the database and writes the results: there is no
 //! second writer, and the bytes are those of the unsharded directory.
 //!
 //! Shards may have been copied from where they were played. What their settings name outside them, the space above all, is

@@ -171,7 +171,7 @@ type Told = (Sources, Vec<Diagnostic>);
 #[derive(Default)]
 struct Notes {
     told: Vec<Told>,
-    /// What a review says, line by line, and the same for JSON.
+    /// The lines of a review, and its result for JSON.
     said: Vec<String>,
     reviewed: Option<serde_json::Value>,
     /// The mistakes of a scenario that uses a space which means something else now.

@@ -2,7 +2,7 @@
 //!
 //! The ego vehicle drives as it did until the obstacle appears. From then on the same system drives with one
 //! module changed (`ads::Module`), which has watched from the start, so that the hazard is the same to the bit;
-//! other road users decide for themselves. What is changed:
+//! other road users decide for themselves. The changes are:
 //!
 //! - each module alone is made as in the baseline, and made free of errors; and all of them together are;
 //! - each documented weakness alone is switched off;

@@ -41,8 +41,8 @@ impl Fate {
     }
 }
 
-/// What became of a scenario that was found with a collision, played by another driving system. The space's verdict
-/// says which collisions count.
+/// The outcome of a scenario that was found with a collision, played by another driving system. The space's verdict says
+/// which collisions count.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Regression {
     /// A collision with the same obstacle counts.

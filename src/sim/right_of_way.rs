@@ -29,8 +29,9 @@
 //! neither has. It loses that priority once it sees the pedestrian and could still stop, and it
 //! has none at walking pace, from which a driver can stop for any pedestrian.
 //!
-//! Of two that come towards each other outside junctions, the one that is beyond the middle of the road has to give
-//! way (articles 10.3 and 12), with whatever part of its body: a bus whose rear swings over the line, too. If both are, neither has priority.
+//! If two vehicles come towards each other outside junctions, the one beyond the middle of the road has to give way
+//! (articles 10.3 and 12). Any part of its body counts, such as the rear of a bus that swings over the line. If both are
+//! beyond it, neither has priority.
 //!
 //! The state is kept for each road user ([`Rights`]), looked at ten times a second, and read at a contact.
 

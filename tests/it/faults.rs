@@ -9,7 +9,7 @@ use avastra::oracle;
 use avastra::oracle::{Diagnosis, Fate, Verdict};
 use avastra::run::{Profile, Run, RunSettings};
 
-use crate::cases::root;
+use crate::profiles::profile;
 use crate::world::{read, run_of};
 
 /// Episodes on each road.
@@ -170,12 +170,6 @@ fn crash(run: &Run, number: usize, module: Module) -> Option<(usize, EpisodeLog,
 /// A shipped fault.
 fn fault(name: &str) -> ModularConfig {
     profile(&format!("scenarios/ads/faults/{name}.yaml"))
-}
-
-/// A shipped profile.
-fn profile(name: &str) -> ModularConfig {
-    let text = std::fs::read_to_string(root().join(name)).expect("it is shipped");
-    ModularConfig::from_yaml(&text).expect("it is a profile")
 }
 
 /// The module that the name of a fault begins with.

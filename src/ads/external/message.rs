@@ -541,7 +541,7 @@ message! {
 message! {
     /// The driving system cannot go on.
     pub struct ErrorMessage {
-        /// What lies beyond 2,000 characters is cut off.
+        /// Cut off after 2,000 characters.
         message: String => length 0..=2000;
     }
 }

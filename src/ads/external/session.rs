@@ -378,7 +378,7 @@ mod tests {
             point(2_000_000)
         );
         assert!(read(fine.as_bytes(), "trajectory").and_then(|answer| judged(answer, 1_000_000)).is_ok());
-        // What no vehicle can do is cut off, as the wheel is.
+        // An acceleration that no vehicle has is cut off, and no finding.
         let braking = br#"{"type":"control","seq":1,"steer":0,"accel":-1257.3}"#;
         let answer = read(braking, "control").and_then(|answer| judged(answer, 0)).expect("it is obeyed");
         assert!(answer.is_extreme());
