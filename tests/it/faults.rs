@@ -9,6 +9,7 @@ use avastra::oracle;
 use avastra::oracle::{Diagnosis, Fate, Verdict};
 use avastra::run::{Profile, Run, RunSettings};
 
+use crate::cases::root;
 use crate::profiles::profile;
 use crate::world::{read, run_of};
 
