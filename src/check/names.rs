@@ -78,7 +78,7 @@ pub(crate) fn unknown<'a>(
     }
 }
 
-/// What stands in place of a name that other languages have, and what to write there if that is enough.
+/// Help for a name that is a word of other languages, and the text to write in its place if there is one.
 fn foreign(name: &str) -> Option<(&'static str, Option<&'static str>)> {
     Some(match name {
         "True" | "TRUE" => ("write `true`", Some("true")),

@@ -394,7 +394,7 @@ impl Checker {
             let (from, to) = (stuck[0], first_other(variants, stuck[0]));
             self.report(error.help(match from == to {
                 true => format!("add `{from} -> {from}`"),
-                // The value itself is named last: the author of `Free -> Braked` hardly wants braking without end.
+                // Staying is named last, because the author of `Free -> Braked` hardly wants braking without end.
                 false => format!(
                     "add a move to go on with, for example `{from} -> {to}`; `{from} -> {from}` would let what sets \
                      it happen again and again"

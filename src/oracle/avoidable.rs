@@ -254,7 +254,7 @@ pub fn judge_one(
 }
 
 /// Index of the last moment at which the ego vehicle could still stop before the place of a collision in which it had to
-/// give way: by then its violation has begun, though it may not have entered the junction yet. `None` if it had not to.
+/// give way: its violation begins there, though it may not have entered the junction yet. `None` if it did not have to.
 fn last_chance(recording: &[World], contact: &Contact, met: OrientedBox) -> Option<usize> {
     if contact.priority != Priority::Other {
         return None;

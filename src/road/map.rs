@@ -368,7 +368,7 @@ impl RoadMap {
     }
 }
 
-/// A body that is beyond the middle of the road by less touches the line, m. Ours: lanes are kept no better.
+/// A body that is beyond the middle of the road by less than this only touches the line, m. Ours: drivers keep lanes no better.
 const BEYOND_M: f64 = 0.1;
 
 /// How far before a junction its lights and signs may stand, m. Ours.

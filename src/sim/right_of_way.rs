@@ -186,7 +186,7 @@ pub(super) struct Rights {
     meeting: Option<Meeting>,
     /// Who has priority, it as a wreck in the ego vehicle's way or the ego vehicle; `None` as long as it is neither.
     wreck: Option<Priority>,
-    /// Whether it has stood in the ego vehicle's view while that could brake gently for it, and stands since.
+    /// Whether it has stood since a moment at which the ego vehicle saw it and could brake gently for it.
     is_foreseen: bool,
     /// Where a pedestrian was last looked for on the carriageway, and whether it was there: most stand and wait.
     on_road: Option<(Vec2, bool)>,
@@ -280,7 +280,7 @@ impl Rights {
                 (found.unwrap_or_else(by_time), around.ego.speed_mps <= WALKING_MPS)
             }
         };
-        // Whoever drives must be able to stop for what can be foreseen (13.1), so the other need not have priority.
+        // A driver must be able to stop for anything that can be foreseen (13.1), so then neither has priority.
         if could_stop && priority == Priority::Ego { Priority::None } else { priority }
     }
 
