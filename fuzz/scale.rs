@@ -1,8 +1,8 @@
 //! Texts that are large in one construct: each maker takes a size and gives a text in which that construct occurs so many
-//! times, or is so deep or so long. What costs more than in proportion to its size is found here.
+//! times, or is so deep or so long. They find work that grows faster than the text.
 //!
 //! Shared by the fuzz target `scale`, and by `tests/it/hostile.rs`, which runs the program on them and measures. A text
-//! may use `roads.ava`; maps have a list of their own. Add a maker for each new rule of `grammar/ava.pest`.
+//! may use `roads.ava`; maps are made in `scaling_maps.rs`. Add a maker for each new rule of `grammar/ava.pest`.
 
 /// A construct, and the text that has it `size` times.
 pub struct Construct {
@@ -546,9 +546,6 @@ pub const GRAMMAR: &[Construct] = &[
         text: |n| format!("{ROADS}{BOOL}{ACTION}policy p {{ rules {{ _ => a(){} }} }}\n", " | a()".repeat(n)),
     },
 ];
-
-/// Makers for maps, by construct, in OpenDRIVE.
-pub const MAPS: &[Construct] = &[];
 
 fn scenario(steps: &str, claims: &str) -> String {
     format!("{ROADS}{BOOL}{ACTION}scenario s {{\nroad: corner\nsteps {{\n{steps}}}\n{claims}}}\n")

@@ -1,21 +1,22 @@
-//! Maps that scale one construct of OpenDRIVE each: the cost of reading must grow as the text does, or the map must be
-//! refused in words. Shared by the fuzz target that measures, and by `tests/it/scaling_maps.rs`, which asks for the outcome.
+//! Maps that are large in one construct of OpenDRIVE each: the cost of reading must grow as the text does, or the map must be
+//! refused in words. Shared by `tests/it/hostile.rs`, which runs the program on them and measures, and by
+//! `tests/it/scaling_maps.rs`, which looks at the outcome.
 
 use core::f64::consts::{FRAC_PI_2, PI};
 use core::fmt::{Display, Write as _};
 
 use avastra::geometry::unit_vector;
 
-/// What a map of some size comes to.
+/// What becomes of a large map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Comes {
     /// It is read, however large.
     Read,
-    /// It is refused from some size on; a part of what is said then.
+    /// It is refused from some size on, with a message that has these words.
     Refused(&'static str),
 }
 
-/// A construct: its name, the text of a map with so many of it, and what a large one comes to.
+/// A construct: its name, the text of a map that has it so many times, and what becomes of a large one.
 pub type Construct = (&'static str, fn(usize) -> String, Comes);
 
 pub const CONSTRUCTS: &[Construct] = &[
@@ -536,5 +537,6 @@ fn nested(size: usize) -> String {
 
 fn namespaces(size: usize) -> String {
     let open = all(size, |n| format!(r#"<a xmlns:n{n}="u{n}">"#));
-    format!("<OpenDRIVE>{open}{}</OpenDRIVE>", "</a>".repeat(size))
+    let street = road(1, 100.0, &line(0.0, 0.0, 0.0, 100.0), &single(), &NONE);
+    map(&format!("{open}{}{street}", "</a>".repeat(size)))
 }

@@ -1,13 +1,15 @@
 //! The one place where files and folders are made, replaced, renamed and removed; `tests/it/layers.rs` keeps it so.
 //!
-//! A directory may come from somebody else: a repository that was cloned, a shard, a run that was sent. What lies in it is
-//! not trusted, so three rules hold here. A file is written under a name that nothing had before, and takes its place by a
-//! rename, which replaces a symbolic link and never follows it. A folder of ours inside of a directory is used only if it is
-//! a folder and no link. A name that a database or a file gives is a [`PlainName`], or what gives it is refused.
+//! A directory may be hostile: a cloned repository, a shard or a run from another machine. So three rules hold here:
+//!
+//! - A file is written under a new name and takes its place by a rename, which replaces a symbolic link and never follows it.
+//! - A folder of ours inside a directory is used only if it is a folder and no link.
+//! - A name that a database or a file gives must be a [`PlainName`]; otherwise the database or the file is refused.
+//!
 //! Only a path that the user wrote in the command is followed wherever it leads ([`write_named`], [`make`]).
 //!
-//! Nothing protects against a process that changes the directory at the same moment: it has the user's rights already.
-//! Reading is the business of `cli::load`.
+//! A process that changes the directory at the same moment is not guarded against: it has the user's rights already.
+//! Files are read in `cli::load`.
 
 use std::fs::{File, Metadata};
 use std::io::{Error, ErrorKind, Result, Write};
@@ -23,7 +25,7 @@ use nix::unistd::Pid;
 /// Longest name of a file that common file systems take, in bytes.
 const NAME_BYTES_MAX: usize = 255;
 
-/// The names of files that are not whole yet end so.
+/// Ending of the names of files that are not whole yet.
 const ENDING: &str = ".partial";
 
 /// Why a link is not used.
@@ -36,9 +38,9 @@ static NEXT: AtomicU64 = AtomicU64::new(0);
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct PlainName(String);
 
-/// A text that would lead out of its folder, or nowhere.
+/// A text that is no plain name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{}` is no plain name: it would lead out of its folder, or has signs that no name of a file needs", name.escape_debug())]
+#[error("`{}` is no plain name: a name here has no `/`, `\\` or control character, and is not `.` or `..`", name.escape_debug())]
 pub struct NotPlain {
     name: String,
 }
@@ -49,7 +51,7 @@ impl PlainName {
     pub fn new(name: impl Into<String>) -> std::result::Result<PlainName, NotPlain> {
         let name = name.into();
         let mut parts = Path::new(&name).components();
-        // `a/` has one part, too, but that part is `a`.
+        // `a/` also has one part, but that part is `a`, which differs from the name.
         let is_one = parts.next() == Some(Component::Normal(name.as_ref())) && parts.next().is_none();
         let is_plain = is_one && !name.contains('\\') && !name.contains(char::is_control);
         if is_plain { Ok(PlainName(name)) } else { Err(NotPlain { name }) }
@@ -70,15 +72,14 @@ impl AsRef<Path> for PlainName {
     }
 }
 
-/// A new file beside the one whose place it is to take. Unless it takes it, dropping this removes the file.
+/// A new file beside its destination. Dropping this removes the file unless it was moved to the destination.
 pub struct Temporary {
     path: PathBuf,
     is_placed: bool,
 }
 
 impl Temporary {
-    /// Makes the file, under a name that nothing has: what others write at the same time, and links that lie about, do not
-    /// matter.
+    /// Makes the file under a name that nothing has, so that neither links nor files that other processes write are touched.
     ///
     /// # Errors
     /// If it cannot be made.
@@ -105,7 +106,7 @@ impl Temporary {
         &self.path
     }
 
-    /// Gives the file the name of the destination, in place of whatever has it; of a link, the link is replaced.
+    /// Gives the file the name of the destination and replaces what has that name; if that is a link, the link itself.
     ///
     /// # Errors
     /// If that is not possible, because a folder has the name for example.
@@ -121,14 +122,14 @@ impl Temporary {
 impl Drop for Temporary {
     fn drop(&mut self) {
         if !self.is_placed {
-            // What made the file useless is told; that it is left as well says nothing more.
+            // The failure before this is reported; that the file could not be removed would add nothing.
             let _ = std::fs::remove_file(&self.path);
         }
     }
 }
 
-/// Writes a file of a folder that is there, completely or not at all: after a kill or a loss of power the old one or the new
-/// one is there. Whatever has its name is replaced; a link is not followed.
+/// Writes a file in an existing folder, completely or not at all: after a kill or a loss of power either the old or the new
+/// file is there. A file or a link of that name is replaced; a link is not followed.
 ///
 /// # Errors
 /// If it cannot be written; then nothing of it is left.
@@ -141,8 +142,8 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     temporary.take_place_of(path)
 }
 
-/// Writes a file that the user named. Its folders are made, a symbolic link is followed, and what is no regular file (a pipe,
-/// a terminal, the null device) is written to and not replaced.
+/// Writes a file that the user named. Its folders are made, and a symbolic link is followed. A pipe, a terminal or the null
+/// device is written to and not replaced.
 ///
 /// # Errors
 /// As [`write`].
@@ -159,7 +160,7 @@ pub fn write_named(path: &Path, bytes: &[u8]) -> Result<()> {
     write(followed.as_deref().unwrap_or(path), bytes)
 }
 
-/// Writes a file where nothing is: what is there, links included, or what others put there meanwhile, stays.
+/// Writes a new file. A file or a link that is there already stays as it is.
 ///
 /// # Errors
 /// If something is there, or the file cannot be written; then nothing of it is left.
@@ -169,12 +170,12 @@ pub fn write_new(path: &Path, bytes: &[u8]) -> Result<()> {
         _ => error,
     })?;
     file.write_all(bytes).and_then(|()| file.sync_all()).inspect_err(|_| {
-        // A part of it would be in the way of the whole.
+        // A partial file would make the next attempt fail.
         let _ = std::fs::remove_file(path);
     })
 }
 
-/// Removes a file, if it is there; of a link, the link.
+/// Removes a file if it is there; if it is a link, the link itself.
 ///
 /// # Errors
 /// If it is there and cannot be removed.
@@ -202,7 +203,7 @@ pub fn remove_empty(folder: &Path) -> Result<()> {
     std::fs::remove_dir(folder)
 }
 
-/// Gives a folder another name, under which nothing or an empty folder is.
+/// Gives a folder another name, which nothing has, or an empty folder.
 ///
 /// # Errors
 /// If that is not possible.
@@ -218,7 +219,7 @@ pub fn make(folder: &Path) -> Result<()> {
     std::fs::create_dir_all(folder)
 }
 
-/// Makes a folder where nothing is.
+/// Makes a new folder.
 ///
 /// # Errors
 /// If something is there (`AlreadyExists`), or it cannot be made.
@@ -226,7 +227,7 @@ pub fn make_new(folder: &Path) -> Result<()> {
     std::fs::create_dir(folder)
 }
 
-/// A folder inside of a directory, by one name or several; what is missing of it is made. None of its parts may be a link.
+/// Makes the missing parts of a path of folders inside a directory, and returns the whole path. No part may be a link.
 ///
 /// # Errors
 /// If a part is no folder, or cannot be made.
@@ -255,7 +256,7 @@ pub fn make_way(directory: &Path, file: &Path) -> Result<()> {
     folder(directory, inside.parent().unwrap_or(Path::new(""))).map(drop)
 }
 
-/// Refuses what is in the place of a regular file of ours and is none: a link, above all.
+/// Refuses a path of ours at which something else than a regular file is, above all a link. Nothing there is fine.
 ///
 /// # Errors
 /// Why it is refused.
@@ -263,7 +264,7 @@ pub fn own_file(path: &Path) -> Result<()> {
     own(path, Metadata::is_file, "it is no regular file")
 }
 
-/// Refuses what is in the place of a folder of ours and is none: a link, above all.
+/// Refuses a path of ours at which something else than a folder is, above all a link. Nothing there is fine.
 ///
 /// # Errors
 /// Why it is refused.
@@ -281,12 +282,12 @@ fn own(path: &Path, fits: fn(&Metadata) -> bool, otherwise: &'static str) -> Res
     }
 }
 
-/// Whether a name is one under which a file of another name was written, before it was whole.
+/// Whether this is the name of a temporary file for a file named `of`.
 pub fn is_partial(name: &str, of: &str) -> bool {
     name.strip_prefix(of).is_some_and(|rest| rest.starts_with('.') && rest.ends_with(ENDING))
 }
 
-/// Removes what killed processes left of writing into a folder. What a process that runs is writing stays.
+/// Removes the temporary files that killed processes left in a folder. Those of running processes stay.
 ///
 /// # Errors
 /// If the folder cannot be read, or a file cannot be removed.
@@ -302,9 +303,9 @@ pub fn sweep(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The process that writes, or wrote, a temporary file, by the file's name.
+/// The number of the process that made a temporary file, from the file's name.
 fn writer_of(name: &str) -> Option<i32> {
-    // A database that is written anew has a journal beside it.
+    // SQLite keeps a journal beside a database while it is written.
     let name = name.strip_suffix("-journal").unwrap_or(name);
     let (_, numbers) = name.strip_suffix(ENDING)?.rsplit_once('.')?;
     let (process, number) = numbers.split_once('-')?;
@@ -313,7 +314,7 @@ fn writer_of(name: &str) -> Option<i32> {
 }
 
 fn runs(process: i32) -> bool {
-    // No signal is sent: this only asks.
+    // Without a signal, `kill` only tells whether the process exists.
     kill(Pid::from_raw(process), None::<Signal>) != Err(Errno::ESRCH)
 }
 
@@ -322,8 +323,8 @@ fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Asks whether somebody reads from a named pipe: to open one that nobody reads would wait without end. As long as the
-/// result lives, the pipe has a writer.
+/// Refuses a named pipe without a reader, because opening it would wait without end. As long as the result lives, the pipe
+/// has a writer.
 fn is_read(path: &Path) -> Result<Option<File>> {
     if !std::fs::metadata(path)?.file_type().is_fifo() {
         return Ok(None);

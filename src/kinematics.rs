@@ -1,17 +1,17 @@
 //! The few laws and figures of motion that several modules need, each with its source.
 //!
-//! The world, the proofs, the reference drivers and the verdicts must mean the same by "gravity", "standing" and
-//! "careful braking", or one of them contradicts another. This module knows no roads and no vehicles.
+//! They stand here once, because the world, the proofs, the reference drivers and the verdicts would contradict one another
+//! with different figures for gravity, standing or careful braking. This module knows no roads and no vehicles.
 
 /// Standard gravity (3rd CGPM, 1901), m/s².
 pub const GRAVITY_MPS2: f64 = 9.80665;
 
-/// What moves slower than this stands, m/s. Ours: slower than any car creeps, and faster than rounding.
+/// A road user slower than this stands, m/s. Ours: slower than any car creeps, and faster than rounding.
 ///
-/// What stands runs into nobody, and has no direction of motion.
+/// A road user that stands runs into nothing, and has no direction of motion.
 pub const STANDING_MPS: f64 = 0.1;
 
-/// A person's walking pace, m/s (5 km/h, Euro NCAP's adult who walks).
+/// A person's walking pace, m/s (5 km/h, Euro NCAP's walking adult).
 pub const WALKING_MPS: f64 = 5.0 / 3.6;
 
 /// Hardest braking of the careful driver, m/s² (UN R157, Annex 4, Appendix 3: 0.774 g).
@@ -20,10 +20,10 @@ pub const CAREFUL_BRAKING_MPS2: f64 = 0.774 * GRAVITY_MPS2;
 /// Time in which the careful driver perceives a risk, s (UN R157, Annex 4, Appendix 3).
 pub const CAREFUL_PERCEPTION_S: f64 = 0.4;
 
-/// Time from there until it brakes, s (UN R157, Annex 4, Appendix 3).
+/// Time from the perception until it brakes, s (UN R157, Annex 4, Appendix 3).
 pub const CAREFUL_REACTION_S: f64 = 0.75;
 
-/// Way to rest from a speed (m/s), braking evenly (m/s², a magnitude) after a reaction (s), m.
+/// Distance to rest, m: from a speed (m/s), with even braking (m/s², a magnitude) after a reaction time (s).
 pub fn stopping_m(speed_mps: f64, reaction_s: f64, braking_mps2: f64) -> f64 {
     speed_mps * reaction_s + speed_mps * speed_mps / (2.0 * braking_mps2)
 }

@@ -10,8 +10,8 @@ from typing import List, NamedTuple, Sequence, Tuple
 # A projection first looks at every so many vertices, then at all around the nearest of them.
 _STRIDE = 8
 
-# Lanes that follow each other may miss each other by this much, m: what maps are rounded to. A point nearer than this to the
-# one before it says nothing of where the path leads.
+# Gap between lanes that follow each other, m, as maps are rounded. A point nearer than this to the one before it has no
+# direction of its own.
 _SEAM_M = 0.01
 
 
@@ -37,8 +37,8 @@ class Beside(NamedTuple):
 class Path:
     """A polyline of at least two different points, measured from its first point.
 
-    Points within a centimetre of the one before are left out: lanes of a map may miss those that follow by millimetres,
-    and the way across such a seam, which may even lead backwards, is no heading of the road. The last point stays.
+    Points within a centimetre of the one before are left out, because lanes of a map may miss those that follow by
+    millimetres, and the step across such a seam, which may even lead backwards, is no heading of the road. The last point stays.
     """
 
     def __init__(self, points: Sequence[Sequence[float]]):
@@ -48,7 +48,7 @@ class Path:
             if not kept or math.dist(here, kept[-1]) > _SEAM_M:
                 kept.append(here)
         if kept and kept[-1] != here:
-            # The path ends where it is said to end: its last point takes the place of those that are as near as a seam.
+            # The path keeps its last point, which replaces kept points within a seam of it.
             while len(kept) > 1 and math.dist(here, kept[-1]) <= _SEAM_M:
                 kept.pop()
             if math.dist(here, kept[-1]) > 1e-6:

@@ -37,7 +37,7 @@ ENDED = (0, 4, 5)
 #: The file that says what the shards of a folder are of.
 RECORD = "command.json"
 
-#: What the shards of a folder are of, and how they are played.
+#: The command whose shards lie in a folder, and how they are played.
 Work = Dict[str, Any]
 
 

@@ -30,7 +30,7 @@ const PROOFS_MAX: u64 = 2_000_000;
 /// Largest number of values in an `Int` range.
 const VALUES_MAX: i64 = 100_000;
 
-/// Largest number of values that the parameters of all actions list together; a value counts as often as its odds say.
+/// Largest number of values that the parameters of all actions list together. A value counts once for each of its odds.
 const LISTED_MAX: usize = 2_000_000;
 
 /// Largest number of parameters of an action or a function.
@@ -39,8 +39,7 @@ const PARAMETERS_MAX: usize = 100;
 /// Largest number of actions that all groups name together.
 const MEMBERS_MAX: usize = 1_000_000;
 
-/// Largest number of operations that are compiled for single actions, in conditions and effects that are written for
-/// many.
+/// Largest number of operations in conditions and effects that are written for many actions, counted once for each action.
 const COMPILED_MAX: usize = 500_000;
 
 impl Checker {
@@ -58,7 +57,7 @@ impl Checker {
         }
     }
 
-    /// Whether something has no more parameters than can be checked; reports it if it has.
+    /// Whether an action or a function has few enough parameters; reports it if not.
     pub(super) fn has_few_parameters(&mut self, name: &ast::Name, count: usize) -> bool {
         if count > PARAMETERS_MAX {
             let message = format!("`{}` has {count} parameters", name.text);
@@ -529,11 +528,11 @@ impl Checker {
         sets.collect()
     }
 
-    /// Whether more was compiled for single actions than can be checked; reports that once.
+    /// Whether more than [`COMPILED_MAX`] operations were compiled for single actions; reports that once.
     pub(super) fn has_compiled_too_much(&mut self, span: Span) -> bool {
         let is_passed = self.compiled > COMPILED_MAX;
         if is_passed && !self.diagnostics.iter().any(|one| one.code == code::TOO_MUCH) {
-            let message = "what rules and `on … also` say of many actions is too much to check";
+            let message = "the rules and `on … also` of many actions are too much to check";
             let error = Diagnostic::error(code::TOO_MUCH, message).at(span, "here the limit is passed");
             self.report(error.note(format!("written out for each action, it has more than {COMPILED_MAX} operations")).help(
                 "let rules bind fewer actions by `on`, make one action with an `each` parameter of several, or shorten conditions",
@@ -547,7 +546,7 @@ impl Checker {
         let (mut found, mut asked) = (Vec::new(), BTreeSet::new());
         let mut seen = vec![false; self.actions.len()];
         for name in names {
-            // The actions of a name that was met before are there already.
+            // This name was met before, so its actions are in the list.
             if asked.contains(name.text.as_str()) {
                 self.references.uses_target(name.span, &name.text);
                 continue;
@@ -638,7 +637,7 @@ impl Checker {
     }
 }
 
-/// The operations of an effect; spawns count little beside what rules say of them.
+/// The operations of an effect. A spawn counts as one, because the rules about it cost far more.
 fn operations_of(effect: &EffectDef) -> usize {
     match effect {
         EffectDef::Set(set) => 1 + set.key.iter().chain([&set.value]).map(Expr::operations).sum::<usize>(),

@@ -30,8 +30,8 @@ pub(super) const DIAGNOSTICS_MAX: usize = 1_000;
 /// The most steps of all proofs about a space: about a second of an optimised build.
 const STEPS_MAX: u64 = 40_000_000;
 
-/// Steps beside these for each row on each road, for at most so many: the longest table on four roads is promised, and a
-/// row on a road takes some 80 steps.
+/// Further steps for each row on each road, up to the longest table on four roads, which must be checked: a row on a road
+/// takes some 80 steps.
 const STEPS_A_ROW: u64 = 100;
 const ROWS_ON_ROADS_MAX: u64 = 400_000;
 
@@ -85,7 +85,7 @@ pub(super) struct Checker {
     pub(super) claims: Vec<Claim>,
     /// Declarations that are not checked, because another has their name.
     pub(super) doubles: BTreeSet<Span>,
-    /// Whether what is reported now is dropped.
+    /// Whether diagnostics are dropped for now.
     pub(super) is_quiet: bool,
 }
 
@@ -191,7 +191,7 @@ pub(super) fn space(
     let steps_max = STEPS_MAX + STEPS_A_ROW * on_roads;
     let ((space, runs_in), sufficed) = effort::within(steps_max, || checker.proved(space, &own, items));
     if !sufficed {
-        // What was found until then says nothing of the rest.
+        // Findings of proofs that were cut short would mislead.
         checker.diagnostics.truncate(is_told);
         checker.claims.clear();
         checker.report(too_much(&space));
@@ -236,7 +236,7 @@ impl Report for Checker {
 }
 
 impl Checker {
-    /// The space with its rows, and what is reported of a space whose names and types are right.
+    /// The space with its rows. Proves and reports everything about a space whose names and types are right.
     fn proved(&mut self, mut space: Space, own: &[&ast::Item], items: &[&ast::Item]) -> (Space, RunsIn) {
         space.bounds = bounds(&space.actions, &space.rules);
         space.clauses = clauses(&space);
@@ -282,8 +282,8 @@ impl Checker {
         found
     }
 
-    /// The diagnostic for a name that is not declared. Candidates are looked at only where somebody will read of them:
-    /// there may be as many as there are such names.
+    /// The diagnostic for a name that is not declared. Candidates are looked at only if the diagnostic will be printed,
+    /// because there may be as many candidates as unknown names.
     pub(super) fn unknown<'a>(
         &self,
         kind: &str,

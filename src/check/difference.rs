@@ -1,8 +1,8 @@
-//! What differs between two spaces: declarations, rules, rows and ranges.
+//! The differences between two spaces: declarations, rules, rows and ranges.
 //!
-//! Declarations are compared by the texts that the digest covers (`meaning`), so that a change of the digest is always
-//! told, and by nothing that it does not cover. Rules are also compared by what they leave of each range that both
-//! spaces have, rows by their labels, draws by the ranges that all rules together leave.
+//! Declarations are compared by exactly the texts that the digest covers (`meaning`), so a difference is told if and only if
+//! the digests differ. Besides, rules are compared by what they leave of the ranges that both spaces have, rows by their
+//! labels, and draws by the ranges that all rules together leave.
 
 use core::fmt;
 use std::collections::{BTreeMap, BTreeSet};
@@ -73,7 +73,7 @@ struct Pairs<'a> {
 
 impl<'a> Pairs<'a> {
     fn of(old: &'a Space, new: &'a Space) -> Pairs<'a> {
-        // Of rows with the same label the first counts.
+        // If several rows have one label, the first counts.
         let by_label =
             |space: &'a Space| space.rows.iter().rev().map(|row| (row.label.as_str(), row)).collect();
         Pairs { old: by_label(old), new: by_label(new) }
@@ -95,8 +95,8 @@ fn difference(change: Change, subject: impl Into<String>, detail: impl Into<Stri
 /// One of the two spaces.
 struct Side<'a> {
     space: &'a Space,
-    /// What the digest covers of each declaration, by its title. Effects of every step, and more effects of an action,
-    /// may stand in several places: these are one text.
+    /// The text of each declaration that the digest covers, by its title. Effects of every step, and further effects of an
+    /// action, may stand in several places: they are joined into one text.
     texts: BTreeMap<&'a str, String>,
 }
 
@@ -118,8 +118,7 @@ impl<'a> Side<'a> {
     }
 }
 
-/// Differences between declarations: of rules by what they forbid where that can be said, of all others by what is
-/// written.
+/// Differences between declarations: rules are compared by what they forbid where that is known, all others by their text.
 fn declarations(old: &Side<'_>, new: &Side<'_>, pairs: &Pairs<'_>) -> Vec<Difference> {
     let mut found = Vec::new();
     for (&title, text) in &old.texts {
@@ -141,8 +140,8 @@ fn declarations(old: &Side<'_>, new: &Side<'_>, pairs: &Pairs<'_>) -> Vec<Differ
     found
 }
 
-/// The first declaration that comes before another one than it did. The order of those that may stand in any order
-/// is the same in both.
+/// The first declaration whose successor is another one than before. Declarations that may stand in any order are sorted in
+/// both spaces.
 fn order(old: &Side<'_>, new: &Side<'_>) -> Option<Difference> {
     let shared = |of: &Side<'_>, other: &Side<'_>| -> Vec<String> {
         let titles = of.space.meaning.declarations().map(|(title, _)| title);
@@ -158,7 +157,7 @@ fn flat(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// What differs between two texts of a declaration: the lines from the first to the last that differ.
+/// The part of a declaration's text that changed: the lines from the first to the last that differ.
 fn changed_lines(old: &str, new: &str) -> String {
     let (old, new): (Vec<&str>, Vec<&str>) = (old.lines().collect(), new.lines().collect());
     let begin = old.iter().zip(&new).take_while(|(one, other)| one == other).count();
@@ -173,8 +172,8 @@ fn changed_lines(old: &str, new: &str) -> String {
     }
 }
 
-/// What has changed about a rule that both spaces have: whether it is optional, and what it forbids. Another text is
-/// always told; a rule whose text is the same may forbid something else because of a function or a constant.
+/// Changes of a rule that both spaces have: whether it is optional, and what it forbids. Another text is always told. A rule
+/// with the same text may forbid something else because of a function or a constant.
 fn of_rule(
     old: (&Space, usize),
     new: (&Space, usize),

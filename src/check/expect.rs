@@ -67,7 +67,7 @@ impl Checker {
                     .collect();
                 if idle.is_empty() {
                     let rows: Vec<usize> = rows.iter().map(|row| row.index).collect();
-                    // What is said twice of the same rows is judged once.
+                    // Several claims about the same rows are judged once.
                     if !self.claims.iter().any(|known| known.rows == rows) {
                         effort::spend(rows.len());
                         self.claims.push(Claim { span, rows });

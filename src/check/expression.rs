@@ -40,7 +40,7 @@ impl Place<'_> {
     }
 }
 
-/// Most enums that an error names where a variant may be meant of any of them.
+/// Most enums that the error about an ambiguous variant names.
 const OWNERS_NAMED_MAX: usize = 12;
 
 /// What a bare name stands for.
@@ -273,7 +273,7 @@ impl Checker {
         Some(Expr { kind: ExprKind::Variant(EnumIndex(of), index), ty: Type::Enum(EnumIndex(of)), span })
     }
 
-    /// The diagnostic for a bare name that stands for nothing; `wanted` is the enum of which a variant was wanted.
+    /// The diagnostic for a bare name that stands for nothing; `wanted` is the enum that the place asks for.
     fn unknown_name(&self, name: &str, span: Span, place: &Place<'_>, wanted: Option<usize>) -> Diagnostic {
         let locals = place.locals.iter().map(|(name, _)| name.as_str());
         let enums = match wanted {

@@ -168,7 +168,7 @@ fn merged(diagnostics: Vec<Diagnostic>) -> Vec<Diagnostic> {
     merged
 }
 
-/// The first diagnostics, and how many more there are.
+/// The first [`DIAGNOSTICS_MAX`] diagnostics, and one that gives the number of the others.
 fn as_many_as_help(mut found: Vec<Diagnostic>) -> Vec<Diagnostic> {
     if found.len() > DIAGNOSTICS_MAX {
         let left = found.split_off(DIAGNOSTICS_MAX);
@@ -193,7 +193,7 @@ fn check_space(files: &[LoadedFile], order: &[usize], maps: &mut MapReader<'_>, 
             ItemKind::Use(used) => !used.without.is_empty(),
             _ => true,
         };
-        // What several files declare together is the space of none of them.
+        // A file that uses several others is a space of its own, which none of them is.
         uses(file).count() > 1 || file.tree.items.iter().any(declares)
     };
     // A scenario file declares no space: its space is the first file that declares something.

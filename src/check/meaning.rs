@@ -53,7 +53,7 @@ pub(super) fn meaning(
     Some(Meaning::new(declarations))
 }
 
-/// What a declaration is called in messages: ``rule `npc_gap` ``, `` `on vehicles also` ``.
+/// The name of a declaration in messages: ``rule `npc_gap` ``, `` `on vehicles also` ``.
 fn title(kind: &ItemKind) -> String {
     let keyword = kind.keyword();
     match (kind, kind.name()) {

@@ -11,7 +11,7 @@ use crate::syntax::{Diagnostic, listed, nearest};
 pub(super) struct Names {
     /// For each name its index among the declarations of the kind, and the span of the name.
     found: BTreeMap<String, (usize, Span)>,
-    /// The names as they were declared, which is the order of the indices of a kind.
+    /// The names in the order of their indices.
     by_index: Vec<String>,
 }
 
@@ -78,7 +78,7 @@ pub(crate) fn unknown<'a>(
     }
 }
 
-/// What stands in place of a name that other languages have, and what to write there if that is enough.
+/// Help for a name that is a word of other languages, and the text to write in its place if there is one.
 fn foreign(name: &str) -> Option<(&'static str, Option<&'static str>)> {
     Some(match name {
         "True" | "TRUE" => ("write `true`", Some("true")),

@@ -180,7 +180,7 @@ impl References {
         self.owners.get(variant).map(Vec::as_slice).unwrap_or_default()
     }
 
-    /// Sets the enums of which types and variants are asked.
+    /// Sets the enums in which types and variants are looked up.
     pub(super) fn set_enums(&mut self, enums: Vec<EnumDef>) {
         self.enum_places.clear();
         self.owners.clear();

@@ -16,7 +16,7 @@ use crate::model::{
 use crate::syntax::ast::ItemKind;
 use crate::syntax::{Diagnostic, ast, listed};
 
-/// What a condition with a mistake counts as, operations: it costs time, too, for each action.
+/// Operations that a condition with a mistake counts as, because checking it takes time for each action, too.
 const OPERATIONS_BROKEN: usize = 8;
 
 impl Checker {
@@ -109,7 +109,7 @@ impl Checker {
         Some(if during.is_some() { RuleBody::During(bindings) } else { RuleBody::Holds(bindings) })
     }
 
-    /// The condition of a rule, compiled for one of its actions; `None` if it cannot bind that.
+    /// The condition of a rule, compiled for one of its actions; `None` if the rule cannot bind this action.
     fn binding(
         &mut self,
         (rule, during): (&ast::Rule, Option<&ast::Name>),
@@ -394,7 +394,7 @@ impl Checker {
             let (from, to) = (stuck[0], first_other(variants, stuck[0]));
             self.report(error.help(match from == to {
                 true => format!("add `{from} -> {from}`"),
-                // The value itself is named last: the author of `Free -> Braked` hardly wants braking without end.
+                // Staying is named last, because the author of `Free -> Braked` hardly wants braking without end.
                 false => format!(
                     "add a move to go on with, for example `{from} -> {to}`; `{from} -> {from}` would let what sets \
                      it happen again and again"

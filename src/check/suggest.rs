@@ -50,11 +50,11 @@ fn insertion(tree: &File) -> Span {
     Span::new(FileId(0), end, end)
 }
 
-/// What stands in [`meant_by`] for the variants of an enum, which no keyword declares.
+/// Stands in [`meant_by`] for the variants of an enum, which no keyword declares.
 const VARIANT: &str = "variant";
 
-/// The keywords of the declarations that the author of a message's unknown name can have meant. An action is nothing
-/// for a name in an expression, and no declaration gives a spawn another field.
+/// The keywords of the declarations that an author can have meant by the unknown name in a message. For example, a name in an
+/// expression cannot be an action, and no declaration adds a field to a spawn.
 fn meant_by(message: &str) -> &'static [&'static str] {
     let kind = message.strip_prefix("unknown ").and_then(|rest| rest.split_once(" `")).map(|(kind, _)| kind);
     match kind {

@@ -588,7 +588,7 @@ rule far on ahead: long(distance) >= distance + {}
     assert_eq!(value, Value::Number(64.5));
 }
 
-/// Files that only use others are a space together: their claims, digest and differences are those of all of them.
+/// A file that only uses several others is a space: its claims, digest and differences are those of all of them.
 #[test]
 fn a_file_that_uses_several_is_a_space_of_its_own() {
     let with = |more: &str| {
@@ -604,7 +604,7 @@ fn a_file_that_uses_several_is_a_space_of_its_own() {
     assert_eq!(differences(&other, &one).map(|found| found.len()), Some(2), "the action and its row");
 }
 
-/// What the digest sees, `diff` tells: also what changes neither a row nor a range.
+/// `diff` tells every change of the digest, also one that changes neither a row nor a range.
 #[test]
 fn every_declaration_that_differs_is_told() {
     let more = "state calm: Bool = false

@@ -14,7 +14,7 @@ use super::output::Output;
 use super::output::plural;
 use super::{load, trials};
 
-/// The folder of tables that nobody gave another place.
+/// The folder for tables without `--out`.
 const FOLDER: &str = "build";
 
 /// The file that names the table for `avastra run` without a space.

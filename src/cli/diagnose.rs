@@ -242,12 +242,12 @@ fn table_text(evidence: &Evidence) -> String {
     text
 }
 
-/// How the modules were changed that are asked about.
+/// How modules are changed to see whether that prevents the collision.
 fn changed_text(evidence: &Evidence) -> &'static str {
     if evidence.differs() { "as in the baseline" } else { "without errors" }
 }
 
-/// What a change does in replays with other noise.
+/// The result of a change in replays with other noise.
 fn noise_text(noise: Comparison) -> String {
     let percent = |share: f64| share * 100.0;
     format!(
@@ -280,7 +280,7 @@ fn measured_text(measured: &[Measure]) -> String {
     text
 }
 
-/// The verdict in a sentence. It says what the evidence says, and nothing else.
+/// The verdict in a sentence that follows from the evidence alone.
 fn sentence(diagnosis: &Diagnosis) -> String {
     let Diagnosis { cause, verdict, weakness, evidence } = diagnosis;
     let name = cause.iter().map(|module| module.name()).collect::<Vec<_>>().join(" and ");
@@ -344,7 +344,7 @@ fn sentence(diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// That replays do not tell, and how often chance alone prevents the collision.
+/// Says that the change is not told apart from chance, and how often chance alone prevents the collision.
 fn chance_text(evidence: &Evidence) -> String {
     let alone = evidence.chance.map_or(String::new(), |chance| {
         format!(": other sensor noise alone prevents it in {} of {} replays", chance.vanished, chance.replays)
@@ -352,7 +352,7 @@ fn chance_text(evidence: &Evidence) -> String {
     format!("not told apart from chance{alone}")
 }
 
-/// The changes that prevent the collision with the noise that it had.
+/// The changes that prevent the collision with the noise that it was recorded with.
 fn preventing(evidence: &Evidence) -> Vec<String> {
     let (differs, changed) = (evidence.differs(), changed_text(evidence));
     let modules = evidence.modules.iter().filter(|found| found.vanishes(differs));

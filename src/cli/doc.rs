@@ -229,7 +229,7 @@ fn cell(text: &str) -> String {
     tagless(text).replace('|', "\\|")
 }
 
-/// A text in which no tag of HTML begins. Markdown hands tags on, and whoever reads the page need not trust its space.
+/// A text in which no tag of HTML begins: Markdown passes tags through, and a space may come from elsewhere.
 fn tagless(text: &str) -> String {
     let begins_tag = |next: char| next.is_ascii_alphabetic() || matches!(next, '/' | '!' | '?');
     let mut safe = String::with_capacity(text.len());

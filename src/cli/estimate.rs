@@ -15,7 +15,7 @@ use crate::run::{DatabaseError, Numbered, Run, RunSettings, Shard, Units};
 use crate::statistics::Interval;
 use crate::syntax::yaml_mistake;
 
-use super::arguments::{CompareArguments, EstimateArguments, EventArgument, Format, MethodArgument};
+use super::arguments::{CompareArguments, EstimateArguments, EventArgument, MethodArgument};
 use super::error::Failure;
 use super::files::{remove, write};
 use super::findings::doubts;
@@ -152,7 +152,7 @@ fn play_all(
     Ok(())
 }
 
-/// What an estimate has found up to a look.
+/// An estimate's results up to a look.
 struct Looked {
     results: EstimateResults,
     /// The parts that it is made of.
@@ -161,7 +161,8 @@ struct Looked {
     is_enough: bool,
 }
 
-/// What a database says up to a look. What was played beyond it, before a kill, with other rules or in shards, does not count.
+/// The results of the parts up to a look. Parts beyond it may have been played before a kill, with other stopping rules or in
+/// shards; they do not count.
 fn at_look(
     settings: &EstimateSettings,
     database: &EstimateDatabase,
@@ -186,13 +187,13 @@ fn at_look(
     Ok(Looked { results, parts: records.iter().map(|record| record.part).collect(), is_enough })
 }
 
-/// What a directory of an estimate holds, finished or not.
+/// The contents of an estimate's directory, finished or not.
 pub struct Contents {
     /// The text of its settings.
     pub settings: String,
     /// `None` before the first part is played.
     pub results: Option<EstimateResults>,
-    /// What else is to be known of it.
+    /// Remarks for its page: files and rows that were changed.
     pub remarks: Vec<String>,
 }
 
@@ -209,8 +210,7 @@ pub fn read(directory: &Path) -> Result<Contents, Failure> {
     let (database, damaged) = run_directory::open_to_read::<EstimateDatabase>(&file, &text)?;
     let mut remarks: Vec<String> = damaged.into_iter().collect();
     remarks.extend(run_directory::remarks_on(&files_of(directory, database.scenarios().map_err(unread)?)));
-    // In this form what is wrong with a file is only collected.
-    let table = load::table(&Output::of(Format::Sarif), &directory.join(&settings.run.space)).ok();
+    let table = load::table(&Output::silent(), &directory.join(&settings.run.space)).ok();
     let is_it = |table: &ActionTable| table.space().meaning.is_sealed_by(&settings.run.space_digest);
     let labels: Vec<String> = match table.filter(is_it) {
         Some(table) => table.rows().iter().map(|row| row.label.clone()).collect(),
@@ -229,7 +229,7 @@ pub fn read(directory: &Path) -> Result<Contents, Failure> {
     for look in settings.looks() {
         let looked = at_look(&settings, &database, &pilot, &labels, look).map_err(unread)?;
         let is_whole = looked.parts.len() == look as usize * settings.run.roads.len();
-        // A look that lacks parts, because they are damaged or another shard's, does not end it: more was played than that.
+        // A look may lack parts, because they are damaged or another shard's. Then later parts were played, too, so go on.
         let is_last = looked.parts.len() == all || (is_whole && looked.is_enough);
         results = Some(looked.results);
         if is_last {
@@ -239,7 +239,7 @@ pub fn read(directory: &Path) -> Result<Contents, Failure> {
     Ok(Contents { settings: text, results: results.filter(|_| all > 0), remarks })
 }
 
-/// More rows than this no table has.
+/// No table has more rows than this.
 const ROWS_MAX: usize = 1_000_000;
 
 /// The files of scenarios in a directory.

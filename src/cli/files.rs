@@ -34,7 +34,7 @@ pub fn write_named(path: &Path, text: &(impl AsRef<[u8]> + ?Sized)) -> Result<()
     files::write_named(path, text.as_ref()).map_err(|error| Failure::file("write", path, error))
 }
 
-/// Writes what a command makes: to the path that the user named, or else to one of our own naming.
+/// Writes the result of a command to the path that the user named, or else to one of our own naming.
 pub fn write_result(
     named: Option<&PathBuf>,
     own: &Path,
@@ -43,7 +43,7 @@ pub fn write_result(
     named.map_or_else(|| write(own, text), |path| write_named(path, text))
 }
 
-/// Writes a file where nothing is, as [`files::write_new`].
+/// Writes a new file, as [`files::write_new`].
 pub fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
     files::write_new(path, text.as_bytes()).map_err(|error| Failure::file("write", path, error))
 }
@@ -61,7 +61,7 @@ impl Scratch {
         let folder = std::env::temp_dir();
         for number in 0.. {
             let path = folder.join(format!("avastra-{purpose}-{}-{number}", std::process::id()));
-            // It fails where anything has the name, a link included, so nothing is written through what others put there.
+            // It fails if anything has the name, a link included, so nothing is written through a link.
             match files::make_new(&path) {
                 Ok(()) => return Ok(Scratch { path }),
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
@@ -74,7 +74,7 @@ impl Scratch {
 
 impl Drop for Scratch {
     fn drop(&mut self) {
-        // What cannot be removed is left to whoever clears the folder for temporary files.
+        // If it cannot be removed, the system clears it with the other temporary files.
         let _ = files::remove_all(&self.path);
     }
 }
@@ -89,7 +89,7 @@ pub fn make(folder: &Path) -> Result<(), Failure> {
     files::make(folder).map_err(|error| Failure::file("create", folder, error))
 }
 
-/// A folder inside of a directory, as [`files::folder`].
+/// Makes a folder inside a directory, as [`files::folder`].
 pub fn folder(directory: &Path, inside: impl AsRef<Path>) -> Result<PathBuf, Failure> {
     let inside = inside.as_ref();
     files::folder(directory, inside).map_err(|error| Failure::file("use", &directory.join(inside), error))

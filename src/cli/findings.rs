@@ -9,13 +9,12 @@ use crate::ads::external::message::EXTREME_MPS2;
 use crate::ads::external::{FailureKind, Program};
 use crate::run::{FailureCount, Stage};
 
-use super::arguments::Format;
 use super::error::Failure;
 use super::load;
 use super::output::{Output, plural};
 use super::run::cut_short;
 
-/// So many scenarios are tried for a spot check: in some the driving system may fail.
+/// Most scenarios that are tried for a spot check, because the driving system may fail in some.
 const SPOT_CHECKS_MAX: usize = 3;
 
 /// Why the same command need not lead to the same run, if an external driving system gives a reason.
@@ -47,7 +46,7 @@ pub fn doubts(program: Option<&Arc<Program>>) -> Vec<String> {
     loose.into_iter().chain(otherwise).chain(missed).collect()
 }
 
-/// That answers asked for more than any vehicle can do, if some did.
+/// A note on answers that asked for more than any vehicle can do, if there were any.
 pub fn cut_off(program: Option<&Arc<Program>>) -> Option<String> {
     let answers = program?.extreme_answers() as usize;
     (answers > 0).then(|| {
@@ -58,17 +57,17 @@ pub fn cut_off(program: Option<&Arc<Program>>) -> Option<String> {
     })
 }
 
-/// Asks a driving system that says it is deterministic one of these scenarios again; what differs is among its
-/// [`doubts`] then.
+/// Plays one of these scenarios a second time with a driving system that says it is deterministic. Other answers become one
+/// of its [`doubts`].
 pub fn spot_check<'a>(program: Option<&Arc<Program>>, files: impl Iterator<Item = &'a Path>) {
     let Some(program) = program else { return };
     let ads = Selected::external(Arc::clone(program));
-    // What there is to say of a file was said when it was read the first time.
-    let silent = Output::of(Format::Sarif);
+    // The diagnostics of these files were printed when they were read first.
+    let silent = Output::silent();
     for file in files.take(SPOT_CHECKS_MAX) {
         let Ok((table, scenario)) = load::scenario(&silent, file) else { continue };
         let Ok(stage) = Stage::new(&table, &scenario) else { continue };
-        // Its answers are known by now.
+        // The program has answered all of this already, so it is not asked.
         let Some(first) = stage.play(&ads, &mut |_, _, _| {}).conversation else { continue };
         if program.spot_check(&first, || stage.play(&ads, &mut |_, _, _| {}).conversation) {
             return;
@@ -76,7 +75,7 @@ pub fn spot_check<'a>(program: Option<&Arc<Program>>, files: impl Iterator<Item 
     }
 }
 
-/// Why a command ends before its end: Ctrl-C, or a driving system that was given up.
+/// Why a command stops before all is played: Ctrl-C, or a driving system that was given up.
 pub fn unfinished(command: &'static str, directory: PathBuf, program: Option<&Arc<Program>>) -> Failure {
     match program.and_then(|program| program.given_up()) {
         Some(last) => Failure::Unreached { command, directory, reason: last.in_words() },

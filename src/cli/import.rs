@@ -80,7 +80,7 @@ fn one(
         Err(refusals) => return Ok(Err(refusals)),
     };
     let source = beside.join(slashed(&imported.map));
-    // The file names its map: the copy has that name, and must lie beside the scenario.
+    // The name of the copy comes from the file, and the copy must lie beside the scenario.
     let name = source.file_name().unwrap_or_default().to_string_lossy();
     let name = PlainName::new(name).map_err(|error| Failure::file("import", file, error))?;
     let map = target.with_file_name(&*name);

@@ -60,7 +60,7 @@ fn sound(output: &Output, loaded: Loaded) -> Result<Loaded, Failure> {
     without_mistakes(loaded)
 }
 
-/// A file whose diagnostics are not printed here.
+/// Passes a file on if it has no mistakes. Its diagnostics are not printed here.
 ///
 /// # Errors
 /// If the source has mistakes.
@@ -348,7 +348,7 @@ pub fn emitted(output: &Output, path: &Path) -> Result<Emitted, Failure> {
     emitted_in(path, sound(output, read_and_check(path)?)?)
 }
 
-/// What a file without mistakes holds.
+/// The scenario or policy of a file without mistakes.
 ///
 /// # Errors
 /// If it has neither a scenario nor a policy.

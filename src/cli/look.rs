@@ -1,9 +1,9 @@
-//! Scenarios to look at: `render`, `report` and `replay` show them also when what they were made with has changed.
+//! Scenarios to look at: `render`, `report` and `replay` show them even if their space, engine or settings have changed.
 //!
-//! A run keeps a copy of its space. A scenario whose space has changed is played in that copy, as it was recorded.
-//! Where there is none, it is played as things are now, and the digest of its trace tells whether that is what was
-//! recorded. Either way a banner says what has changed, and how the scenario can be brought along. `test`, `verify`,
-//! `shrink`, `diagnose` and `export` judge by the space, so they ask for one that has not changed.
+//! A run keeps a copy of its space. A scenario whose space has changed is played in that copy, as it was recorded. Without a
+//! copy it is played in the present space, and the digest of its trace tells whether that is the recorded episode. Either way
+//! a banner says what has changed, and how the scenario can be brought along. `test`, `verify`, `shrink`, `diagnose` and
+//! `export` judge by the space, so they refuse one that has changed.
 
 use std::path::{Path, PathBuf};
 
@@ -21,7 +21,7 @@ use super::output::{Output, plural};
 use super::pack::SPACE;
 use super::review::as_now;
 
-/// How a scenario is brought along.
+/// Advice on how a scenario is brought along.
 const BRING_ALONG: &str = "`avastra test --review` says what the change means for it, and `--accept` takes it over; \
                            `avastra run --self-contained` and `avastra pack` keep scenarios and their space together";
 
@@ -29,11 +29,11 @@ const BRING_ALONG: &str = "`avastra test --review` says what the change means fo
 pub struct Looked {
     pub table: ActionTable,
     pub scenario: Scenario,
-    /// What has changed since it was written; `None` if nothing has.
+    /// The changes since it was written; `None` if there are none.
     pub changed: Option<Changed>,
 }
 
-/// What has changed since a scenario was written, and how it is shown all the same.
+/// The changes since a scenario was written, and how it is shown.
 pub struct Changed {
     what: Vec<String>,
     /// The copy of its space in which it is played as it was recorded.
@@ -55,7 +55,7 @@ impl Changed {
     }
 }
 
-/// Banners of files, one for all files of which the same is to be said.
+/// Banners of files; files with the same banner share one.
 pub fn together(banners: impl IntoIterator<Item = (String, String)>) -> Vec<String> {
     let mut told: Vec<(String, String, usize)> = Vec::new();
     for (file, banner) in banners {
@@ -99,7 +99,7 @@ pub fn scenario(output: &Output, path: &Path) -> Result<Looked, Failure> {
         beside.push("the settings of its driving system mean something else by now".to_owned());
     }
     if !beside.is_empty() {
-        // In its own space it plays otherwise, too.
+        // Even in the copy of its space it may play otherwise.
         changed.copy = None;
     }
     changed.what.extend(beside);
@@ -115,7 +115,7 @@ pub fn first_mistake(path: &Path) -> Option<String> {
     Some(format!("{}{note}", first.message))
 }
 
-/// The file in the space as it is now: with the digest that the space has.
+/// The file with the digest of the present space, and checked in it.
 fn as_it_is_now(path: &Path, loaded: &Loaded) -> Result<Loaded, Failure> {
     let root = FileId::default();
     let (text, _) = apply_fixes(root, loaded.sources.text(root), &loaded.diagnostics);
@@ -126,8 +126,8 @@ fn as_it_is_now(path: &Path, loaded: &Loaded) -> Result<Loaded, Failure> {
     Ok(checked)
 }
 
-/// The file in a copy of its space as that was when the scenario was written, and the path of the copy. A run keeps one
-/// in its folder `space`, `--self-contained` and `pack` put one beside the scenarios.
+/// The path of a copy of the scenario's space as it was when the scenario was written, and the file checked in it. A run keeps
+/// such a copy in its folder `space`; `--self-contained` and `pack` put one beside the scenarios.
 fn kept(path: &Path, loaded: &Loaded) -> Option<(PathBuf, Loaded)> {
     let root = FileId::default();
     let written: Vec<_> = loaded.written_paths().into_iter().filter(|used| used.span.file == root).collect();
@@ -146,19 +146,19 @@ fn kept(path: &Path, loaded: &Loaded) -> Option<(PathBuf, Loaded)> {
     })
 }
 
-/// Whether the file says which space it means, by a digest: nothing else tells a copy from another space.
+/// Whether the file has the digest of its space. Without a digest a copy cannot be told from another space.
 fn is_sealed(loaded: &Loaded) -> bool {
     let mut used = loaded.files[0].tree.items.iter().filter_map(|item| item.kind.as_use());
     used.all(|used| used.digest.is_some())
 }
 
-/// Whether the only mistakes of a scenario are digests, which it may accept.
+/// Whether the only mistakes of a scenario are digests, which `--accept` can renew.
 pub fn is_outdated(loaded: &Loaded) -> bool {
     let mut errors = loaded.diagnostics.iter().filter(|found| found.is_error()).peekable();
     errors.peek().is_some() && errors.all(|found| found.code == code::DIGEST && !found.fixes.is_empty())
 }
 
-/// What of the space means something else, in words: the first note of the diagnostic, unless that gives the digest alone.
+/// The change of the space in words: the first note of the diagnostic, unless that only gives the digest.
 pub fn meaning_text(loaded: &Loaded) -> String {
     let mut errors = loaded.diagnostics.iter().filter(|found| found.is_error());
     if errors.any(|found| found.code != code::DIGEST) {

@@ -1,8 +1,8 @@
 //! `avastra merge`: the shards of a run, a study or an estimate as the directory that one machine would have made.
 //!
 //! The units of all shards are taken over into one database, whichever shard has them, with the scenarios that were written
-//! of them. The database has their texts, so it does not matter what became of their files. What comes out is a directory in
-//! which all is played. It is ended by the command itself, which settles the database and writes the results: there is no
+//! of them. Their texts are in the database, so their files may be edited or gone. The result is a directory in which all is
+//! played. It is ended by the command itself, which settles the database and writes the results: there is no
 //! second writer, and the bytes are those of the unsharded directory.
 //!
 //! Shards may have been copied from where they were played. What their settings name outside them, the space above all, is
@@ -337,7 +337,7 @@ fn bring_together<C: Cut>(
     Ok(())
 }
 
-/// Gives the merged directory its name, unless it stands there already, to the byte. `text` are its settings.
+/// Gives the merged directory its name, unless the same directory stands there already. `text` is the text of its settings.
 fn publish<C: Cut>(
     output: &Output,
     out: &Path,
@@ -346,7 +346,7 @@ fn publish<C: Cut>(
 ) -> Result<(), Failure> {
     // Its warnings are told when the directory is ended; why it cannot be is told here.
     let resumed = |output| run_directory::resume::<C>(output, partial, C::KIND, C::KIND).map(drop);
-    resumed(&Output::of(Format::Sarif)).or_else(|_| resumed(output))?;
+    resumed(&Output::silent()).or_else(|_| resumed(output))?;
     if !out.exists() || std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_none()) {
         // In this order: a kill in between leaves a whole directory, and not a partial one that nobody would take up.
         files::rename(partial, out).map_err(|error| Failure::file("write", out, error))?;
@@ -355,7 +355,7 @@ fn publish<C: Cut>(
     // In JSON, a command prints at its end, which this has not.
     let silent = Output::of(Format::Json);
     C::conclude(&silent, partial)?;
-    // A merge that was killed after it had named the directory has left one in which all is played, and which is not ended.
+    // A merge that was killed after the rename left a directory in which all is played, but whose results are missing.
     if holds_all::<C>(out, (partial, outside), text).unwrap_or(false) {
         C::conclude(&silent, out)?;
     }
@@ -369,7 +369,7 @@ fn publish<C: Cut>(
         known.get(name).map_or(Ok(false), |known| Ok(read(known)? == read(path)?))
     };
     let equal: Vec<bool> = merged.iter().map(is_equal).collect::<Result<_, _>>()?;
-    // What else is there, a page for example, does not make it another.
+    // Further files, a page for example, do not make it another directory.
     let is_it = equal.into_iter().all(|is_equal| is_equal);
     discard(partial)?;
     match is_it {
@@ -414,8 +414,7 @@ impl Outside {
     /// What the settings of a directory name, where they say or elsewhere, if it means what it meant.
     fn of<C: Cut>(directory: &Path) -> Result<Outside, Failure> {
         let (settings, _) = run_directory::settings_of::<C>(directory, C::KIND, C::KIND)?;
-        // In this form what is wrong with a file is only collected.
-        let silent = Output::of(Format::Sarif);
+        let silent = Output::silent();
         let (path, seal) = settings.space();
         let is_sealed = |file: &PathBuf| {
             load::table(&silent, file).is_ok_and(|table| table.space().meaning.is_sealed_by(seal))
@@ -488,7 +487,7 @@ impl Way<'_> {
         self.moved(path, &self.outside.space)
     }
 
-    /// The driving system is not started here, so the folder that it is started in need not be on this machine.
+    /// The driving system is not started here, so its working directory need not exist on this machine.
     fn external(&self, external: Option<Attached>) -> Result<Option<Attached>, Failure> {
         let moved = |external| {
             let attached = run_directory::from_record(self.from, external);
@@ -514,7 +513,7 @@ impl Way<'_> {
         })
     }
 
-    /// The same way, in folders of the two directories. That of the first may be missing, and must be no link.
+    /// Folders of this name in both directories. The first may be missing, and must be no link.
     fn within(&self, folder: &str) -> Result<[PathBuf; 2], Failure> {
         let [from, to] = [self.from, self.to].map(|directory| directory.join(folder));
         files::own_folder(&from).map_err(|error| Failure::file("merge", &from, error))?;
@@ -522,8 +521,8 @@ impl Way<'_> {
     }
 }
 
-/// Writes a scenario of another directory, with what lies beside it there, and gives its text. What it uses is named by a path
-/// from the file.
+/// Writes a scenario of a shard, with the recorded answers that lie beside it there, and returns its text, in which paths lead
+/// from the new file.
 fn copy_scenario(name: &PlainName, text: &str, way: &Way) -> Result<String, Failure> {
     let text = moved_scenario(text, way)?;
     copy_text(&way.to.join(name), &text)?;
@@ -534,7 +533,7 @@ fn copy_scenario(name: &PlainName, text: &str, way: &Way) -> Result<String, Fail
     Ok(text)
 }
 
-/// As [`copy_scenario`], of a scenario whose text stands in the database; says so if its file was edited.
+/// As [`copy_scenario`], for a scenario whose text is in the database; warns if its file was edited.
 fn copy_written(output: &Output, name: &PlainName, text: &str, way: &Way) -> Result<String, Failure> {
     let file = (way.from.join(name), text.to_owned());
     if run_directory::is_edited(&file) {
@@ -544,7 +543,7 @@ fn copy_written(output: &Output, name: &PlainName, text: &str, way: &Way) -> Res
     copy_scenario(name, text, way)
 }
 
-/// The text of a file that lies in a shard and is no link to one outside.
+/// The text of a file in a shard, which must be no link.
 fn own_text(file: &Path) -> Result<String, Failure> {
     files::own_file(file).map_err(|error| Failure::file("merge", file, error))?;
     load::text(file)
@@ -574,7 +573,7 @@ fn moved_scenario(text: &str, way: &Way) -> Result<String, Failure> {
     Ok(moved)
 }
 
-/// Copies the folder of a name with all that is in it.
+/// Copies the folder `name` of one directory into another, with all that is in it.
 fn copy_folder(name: &OsStr, [from, to]: [&Path; 2]) -> Result<(), Failure> {
     let (from, to) = (from.join(name), folder(to, name)?);
     let failed = |error| Failure::file("merge", &from, error);

@@ -79,6 +79,11 @@ impl Output {
         }
     }
 
+    /// One for reading files about which nothing is to be told: their diagnostics are collected and never printed.
+    pub fn silent() -> Output {
+        Output::of(Format::Sarif)
+    }
+
     pub fn is_json(&self) -> bool {
         self.format == Format::Json
     }
@@ -242,8 +247,8 @@ pub fn remark(text: &str) {
     drawn(&visible(text));
 }
 
-/// A line on stderr in which nothing acts on a terminal that is not meant to. If it is lost, there is no place left to say so;
-/// the exit status says what is wrong.
+/// A line on stderr whose colours, if any, are ours. If it is lost, there is no place left to say so; the exit status says
+/// what is wrong.
 fn drawn(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }

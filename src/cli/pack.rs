@@ -48,8 +48,8 @@ pub fn pack(output: &Output, arguments: &PackArguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Copies a space with all that it uses into a folder, and returns the path of its copy. The space was read before, so
-/// what is to be said of it has been said.
+/// Copies a space with all that it uses into a folder, and returns the path of its copy. Its diagnostics are not printed,
+/// because it was read before.
 pub fn pack_space(space: &Path, folder: &Path) -> Result<PathBuf, Failure> {
     let loaded = load::without_mistakes(load::read_and_check(space)?)?;
     let space = absolute(space)?;
@@ -115,8 +115,7 @@ impl Plan {
         Ok(())
     }
 
-    /// Writes what is not there yet below the folder that can be moved. If that fails, or the check of it afterwards, what
-    /// was written is removed.
+    /// Writes the files that do not exist yet below the folder. If that or the check afterwards fails, it removes them.
     fn carry_out(&self, folder: &Path, check: &dyn Fn() -> Result<(), Failure>) -> Result<(), Failure> {
         let (mut written, mut folders) = (Vec::new(), Vec::new());
         let done = self.texts.iter().filter(|(path, _)| !path.exists()).try_for_each(|(path, text)| {

@@ -105,7 +105,7 @@ pub struct Played {
     name: String,
     /// Its claims, if it was played as it was recorded.
     claims: Option<Vec<oracle::ClaimResult>>,
-    /// What has changed since the file was written, if anything has.
+    /// The banner about changes since the file was written, if there are any.
     banner: Option<String>,
     /// What happened, in words.
     told: String,
@@ -139,7 +139,7 @@ pub fn play_recorded(
 }
 
 /// Plays a scenario. With a name for the driving system it is another one than the recorded: no claim is checked. `changed`
-/// is what has changed since the file was written.
+/// are the changes since the file was written.
 fn play(
     table: &ActionTable,
     scenario: &Scenario,

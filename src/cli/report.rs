@@ -70,7 +70,7 @@ pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failur
     }
     if found.overview.is_null() && played.as_ref().is_none_or(|played| played.done.is_empty()) {
         match played {
-            // The page of a folder then lists what could not be played, and why.
+            // The page of a folder then lists the files that could not be played, and why.
             Some(_) if is_folder => {}
             Some(played) => return played.complete("played"),
             None => return Err(Failure::usage(format!("`{}` holds nothing to report", found.title))),
@@ -177,7 +177,7 @@ fn of_directory(output: &Output, directory: &Path) -> Result<Found, Failure> {
     Ok(found)
 }
 
-/// There is nothing yet to make a page of.
+/// The failure of a directory without results.
 fn unfinished(directory: &Path, command: &str) -> Failure {
     let directory = directory.display();
     Failure::usage(format!(
@@ -189,7 +189,7 @@ fn in_json(results: &impl serde::Serialize) -> Value {
     serde_json::to_value(results).expect("results have string keys only")
 }
 
-/// Adds what the database of a run or training says, and gives what else is to be known of it. `settings` is the text of its
+/// Adds the results in the database of a run or training, and returns remarks for the page. `settings` is the text of its
 /// `run.yaml`.
 fn of_run(
     output: &Output,

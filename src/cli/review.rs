@@ -143,7 +143,7 @@ pub fn review(
     Ok(Review { change, differences, illegal, now: Some((now, log)) })
 }
 
-/// Has a scenario say that it was made in the world and with the traffic of now, and says what of these has changed.
+/// Gives a scenario the present engine and traffic as its origin, and returns what has changed, in words.
 pub fn as_now(scenario: &mut Scenario) -> Vec<String> {
     let mut differences = Vec::new();
     let origin = &mut scenario.origin;

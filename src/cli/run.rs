@@ -54,7 +54,7 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     if arguments.fail_on_collision && found.counted > 0 {
         return Err(Failure::Collision { collisions: found.counted as usize });
     }
-    // Where no episode was driven to its end, nothing was tested, whatever was asked for.
+    // If no episode was driven to its end, nothing was tested, so the command fails without `--fail-on-collision`, too.
     if found.failed > 0 && (arguments.fail_on_collision || found.failed == found.episodes) {
         return Err(Failure::Ads { findings: found.failed as usize });
     }
@@ -92,7 +92,7 @@ fn play_all(
     let mut progress = Progress::new(output, "counted", own.len() as u64, (own.len() - todo.len()) as u64);
     let mut driven: Option<(usize, Arc<Conversation>)> = None;
     play(&run, &todo, jobs, &stop, &mut |summary, log| {
-        // An episode that nothing drove is not kept: it is left for `--resume`.
+        // An episode that was not driven is not kept, so that `--resume` plays it.
         if log.failure.as_ref().is_some_and(|failure| failure.problem == Problem::GivenUp) {
             stop.store(true, Ordering::Relaxed);
             return Ok(());
@@ -193,7 +193,7 @@ fn begun(output: &Output, arguments: &RunArguments, wanted: Wanted) -> Result<(R
     let held = run_directory::create(arguments.out.as_deref())?;
     let path = &held.path;
     shard::keep(path, shard)?;
-    // Whatever becomes of the author's file: in its copy, scenarios can be looked at as they were recorded.
+    // In this copy, scenarios can be looked at as they were recorded, even if the author changes the space.
     let folder = if arguments.self_contained { path.join("critical") } else { path.clone() };
     let copy = pack_space(&run.space().path, &folder)?;
     let run = if arguments.self_contained {
@@ -307,7 +307,7 @@ fn write_scenario(
     directory.write_critical("run", run.table(), (log, summary), &settings.agent, rules)
 }
 
-/// Writes the scenarios again that are gone, with the answers of an external driving system; names those that were edited.
+/// Writes missing scenarios again, with the answers of an external driving system, and names those that were edited.
 fn restore(output: &Output, run: &Run, directory: &RunDirectory) -> Result<(), Failure> {
     let (episodes, files): (Vec<usize>, Vec<WrittenFile>) = directory.written()?.into_iter().unzip();
     let restored = run_directory::restore(output, "run", &files)?;

@@ -3,8 +3,8 @@
 //! A directory is begun when its settings stand in it. What a kill leaves before that counts as empty, so the
 //! directory can be begun again; what it leaves after that can be resumed. One process at a time works in it.
 //!
-//! The truth of a directory is its database. It has the text of each scenario too: one that is gone is written again, one
-//! that was edited is told.
+//! The truth of a directory is its database, which has the text of each scenario, too: a missing scenario is written again,
+//! and an edited one is named.
 
 use std::ffi::OsStr;
 use std::fs::{File, TryLockError};
@@ -97,7 +97,7 @@ pub fn to_record(directory: &Path, attached: Attached) -> Result<Attached, Failu
     Ok(Attached { settings: ExternalSettings { working_directory, ..attached.settings }, ..attached })
 }
 
-/// The same where the working directory is missing: the paths are compared by their names alone.
+/// The same if the working directory is missing: the relative path follows from the names alone.
 ///
 /// # Errors
 /// If this process has no folder that it works in.
@@ -194,8 +194,7 @@ pub fn resume<S: serde::de::DeserializeOwned>(
     Ok(Resumed { settings, text, table, held })
 }
 
-/// Makes sure that nothing is written through a link when a directory is gone on with, and removes what a kill left half
-/// written.
+/// Makes a directory ready to be resumed: refuses folders that are links, and removes partial files that a kill left.
 fn tidy(directory: &Path) -> Result<(), Failure> {
     let swept = |folder: &Path| files::sweep(folder).map_err(|error| Failure::file("tidy", folder, error));
     swept(directory)?;
@@ -209,7 +208,7 @@ fn tidy(directory: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Refuses to play the rest of a directory with a driving system that was not started, because all was said to be played.
+/// Refuses to play the rest of a directory whose driving system was not started because nothing seemed to be left to play.
 pub fn refuse_to_play(directory: &Path, command: &str, is_started: bool) -> Result<(), Failure> {
     match is_started {
         true => Ok(()),
@@ -258,10 +257,10 @@ pub fn what_was_begun(directory: &Path) -> Option<&'static str> {
     Some(if settings.contains_key("hyperparameters") { "training" } else { "run" })
 }
 
-/// A scenario that a directory has written: its file, and its text by the database.
+/// A scenario of a directory: its file, and its text from the database.
 pub type WrittenFile = (PathBuf, String);
 
-/// Whether the file of a scenario has something else than what was written; one that is gone has not.
+/// Whether the file of a scenario exists and differs from the text in the database.
 pub fn is_edited((path, text): &WrittenFile) -> bool {
     match load::read(path) {
         Ok(found) => found != *text,
@@ -274,8 +273,8 @@ fn is_gone(path: &Path) -> bool {
     std::fs::symlink_metadata(path).is_err_and(|error| error.kind() == ErrorKind::NotFound)
 }
 
-/// Writes the scenarios again whose files are gone, and names those that were edited. `what` was begun, in a word. Gives the
-/// files that were written.
+/// Writes missing scenarios again, and names those that were edited. `what` is the kind of the directory, in a word. Returns
+/// the files that were written.
 pub fn restore(output: &Output, what: &str, written: &[WrittenFile]) -> Result<Vec<PathBuf>, Failure> {
     let mut restored = Vec::new();
     for (path, text) in written.iter().filter(|(path, _)| is_gone(path)) {
@@ -295,7 +294,7 @@ pub fn restore(output: &Output, what: &str, written: &[WrittenFile]) -> Result<V
     Ok(restored)
 }
 
-/// What a page says of scenarios that are not as they were written.
+/// Remarks for a page about scenarios that were edited or are missing.
 pub fn remarks_on(written: &[WrittenFile]) -> Vec<String> {
     let edited = written.iter().filter(|file| is_edited(file));
     let edited = edited.map(|(path, _)| format!("{} was edited since it was written", path.display()));
@@ -306,14 +305,14 @@ pub fn remarks_on(written: &[WrittenFile]) -> Vec<String> {
     edited.chain(gone).collect()
 }
 
-/// Opens the database of a directory that is gone on with. Units whose rows were changed behind its back are told and
-/// dropped, so that they are played again.
+/// Opens the database of a directory that is resumed. Units whose rows were changed are named and dropped, so that they are
+/// played again.
 pub fn open_to_go_on<D: Units>(output: &Output, file: &Path, settings: &str) -> Result<D, Failure> {
     let (database, damaged) =
         D::open_and_drop(file, settings).map_err(|error| Failure::file("open", file, error))?;
     if !damaged.is_empty() {
         let changed = changed::<D>(file, &damaged);
-        output.warn(&format!("{changed}: what they were of is played again"));
+        output.warn(&format!("{changed}: each such {} is played again", D::layout().unit));
     }
     Ok(database)
 }
@@ -327,13 +326,13 @@ pub fn open_to_read<D: Units>(file: &Path, settings: &str) -> Result<(D, Option<
     Ok((database, remark))
 }
 
-/// Units that are named as changed.
+/// Most changed units that a message names.
 const NAMED_MAX: usize = 8;
 
 /// Says that rows of units were changed.
 fn changed<D: Units>(file: &Path, damaged: &[i64]) -> String {
     let unit = D::layout().unit;
-    // What a pilot saw is a part with a number that no part has.
+    // The pilot is stored as a part with a number of its own.
     let name = |&number: &i64| match number {
         PILOT => "the pilot".to_owned(),
         number => format!("{unit} {number}"),
@@ -354,7 +353,7 @@ impl RunDirectory {
         Ok(RunDirectory { path: held.path.clone(), database, _held: held })
     }
 
-    /// The directory of a run that is gone on with, whose damaged episodes can be played again.
+    /// The directory of a run that is resumed. Damaged episodes are dropped, so that they are played again.
     pub fn open_to_go_on(output: &Output, held: Held, settings: &str) -> Result<RunDirectory, Failure> {
         let database = open_to_go_on(output, &held.path.join("run.db"), settings)?;
         Ok(RunDirectory { path: held.path.clone(), database, _held: held })
@@ -476,7 +475,7 @@ pub fn is_unbegun(path: &Path) -> std::io::Result<bool> {
         let is_left = match name.to_str() {
             Some(shard::FILE) => true,
             Some(name) if settings.iter().any(|of| files::is_partial(name, of)) => true,
-            // Of a link, these are not true.
+            // A link is no directory here, so it counts as begun.
             Some(pack::SPACE) if entry.file_type()?.is_dir() => true,
             Some("critical") if entry.file_type()?.is_dir() => {
                 let inside: Vec<_> = std::fs::read_dir(path.join(&name))?.collect::<Result<_, _>>()?;

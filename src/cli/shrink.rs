@@ -114,8 +114,8 @@ impl Small {
     }
 }
 
-/// Where the shrunk scenario of a file goes: into the folder `shrunk`, which is made, and lies in a run directory and not in
-/// its `critical`.
+/// The path of the shrunk scenario of a file, in the folder `shrunk`, which is made: beside the file, or beside the folder
+/// `critical` of a run.
 fn apart(file: &Path) -> Result<PathBuf, Failure> {
     let beside = file.parent().unwrap_or(Path::new(""));
     let beside = if beside.ends_with("critical") { beside.parent().unwrap_or(beside) } else { beside };

@@ -138,7 +138,7 @@ fn suite_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut files: Vec<PathBuf> = Vec::new();
     for path in paths {
         let of_run = ["critical", "failures"].map(|folder| path.join(folder));
-        // What is accepted is written there.
+        // `--accept` writes into these folders.
         for folder in &of_run {
             files::own_folder(folder).map_err(|error| Failure::file("use", folder, error))?;
         }
@@ -167,11 +167,11 @@ struct Suite<'a> {
 /// Diagnostics, and the texts that they point into.
 type Told = (Sources, Vec<Diagnostic>);
 
-/// What there is to say of a file beside its result. Files are played on threads; it is said in the order of the files.
+/// What is to be printed about a file besides its result. Files are played on threads, and printed in their order.
 #[derive(Default)]
 struct Notes {
     told: Vec<Told>,
-    /// What a review says, line by line, and the same for JSON.
+    /// The lines of a review, and its result for JSON.
     said: Vec<String>,
     reviewed: Option<serde_json::Value>,
     /// The mistakes of a scenario that uses a space which means something else now.
@@ -181,7 +181,7 @@ struct Notes {
 }
 
 impl Notes {
-    /// What a file holds. Its diagnostics are noted.
+    /// The scenario or policy of a file. Its diagnostics are noted.
     fn emitted(&mut self, file: &Path, loaded: Loaded) -> Result<Emitted, Failure> {
         if !loaded.diagnostics.is_empty() {
             self.told.push((loaded.sources.clone(), loaded.diagnostics.clone()));
@@ -302,7 +302,7 @@ impl Suite<'_> {
         }
         let is_own = |index: &usize| scenario.crashes_with(log.collisions[*index].contact.obstacle);
         let found = match counted.into_iter().find(is_own) {
-            // Played again it would be the same, to the bit.
+            // A second play with the same driving system would be the same, to the bit.
             Some(index) if self.asked.is_nothing() => {
                 Regression::StillFails { time_s: log.collisions[index].contact.time_s }
             }
@@ -321,7 +321,7 @@ impl Suite<'_> {
     }
 }
 
-/// One diagnostic for all scenarios of which the same is to be said.
+/// Prints each diagnostic once, however many scenarios have it.
 fn tell_outdated(output: &Output, outdated: &[Told]) {
     let mut told: Vec<(&Sources, &Diagnostic, usize)> = Vec::new();
     for (sources, diagnostics) in outdated {

@@ -48,7 +48,7 @@ pub fn train(output: &Output, arguments: &TrainArguments) -> Result<(), Failure>
     let mut progress = TrainingProgress::new(output, settings.episodes as u64, training.episodes() as u64);
     while !training.is_done() && !stop.load(Ordering::Relaxed) {
         let trained = training.episode();
-        // The rest would be episodes that nothing drives. This one is kept with a checkpoint.
+        // No driving system is left to drive the other episodes. This one is kept with a checkpoint.
         if training.arena().program().is_some_and(|program| program.given_up().is_some()) {
             stop.store(true, Ordering::Relaxed);
         }
@@ -130,7 +130,7 @@ fn resumed(output: &Output, path: &Path) -> Result<(Training, RunDirectory), Fai
         None => Training::new(table, settings)?,
         Some(checkpoint) => Training::resumed(table, settings, checkpoint.episodes, &checkpoint.learner)?,
     };
-    // What was written after the checkpoint comes again.
+    // Only scenarios up to the checkpoint are restored; later episodes are played again.
     let written: Vec<WrittenFile> = directory.written()?.into_iter().map(|(_, file)| file).collect();
     run_directory::restore(output, "training", &written)?;
     Ok((training, directory))
@@ -254,7 +254,7 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
         "directory": directory.path, "totals": totals, "groups": groups, "policy": kept.as_ref().map(|(path, _)| path),
         "rules": rules, "simulated_h": simulated_h, "failures": failures, "evaluation": evaluation,
     }));
-    // What was learned of a driving system that drove no episode to its end is worth nothing.
+    // If no episode was driven to its end, nothing was learned, so the command fails.
     if failed > 0 && failed == all { Err(Failure::Ads { findings: failed }) } else { Ok(()) }
 }
 

@@ -62,8 +62,8 @@ pub fn retold(table: &ActionTable, log: &EpisodeLog, summary: &EpisodeSummary, s
     file(table, log, source, origin, [&emitted, &headline], steps, expects)
 }
 
-/// An episode that an external driving system failed in, as a scenario that ends so. It may have failed before the first
-/// step, which leaves a scenario without any.
+/// An episode in which an external driving system failed, as a scenario that ends so. If it failed before the first step, the
+/// scenario has no step.
 pub fn failure(table: &ActionTable, log: &EpisodeLog, headline: &str, source: &Provenance) -> File {
     let emitted = format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command);
     let origin = origin(log, source, &AvoidabilitySettings::default());

@@ -44,7 +44,7 @@ const CORNER_M: f64 = 1e-3;
 
 /// Whether the obstacle ran into the ego vehicle rather than the other way round, whoever had to give way.
 ///
-/// What stands runs into nothing, so this is false for an obstacle that stood. Otherwise it is true if the ego
+/// An obstacle that stands runs into nothing, so this is false for one. Otherwise it is true if the ego
 /// vehicle stood; if it was hit at the rear; if it was hit at the side behind its front axle, or before it by an
 /// obstacle moving towards that side; and at a front corner if the obstacle moved sideways onto it faster than the
 /// ego vehicle drove.
@@ -52,7 +52,7 @@ pub fn struck(contact: &Contact, ego: &VehicleParameters) -> bool {
     if contact.obstacle_velocity_mps.norm() < STANDING_MPS {
         return false;
     }
-    // The published package takes 1 m/s, which is a car that creeps into somebody.
+    // The published package takes 1 m/s, at which a car creeps into a person.
     if contact.ego_speed_mps < STANDING_MPS {
         return true;
     }

@@ -201,7 +201,7 @@ impl EstimateDatabase {
     /// The files that were written, in the order of their events.
     ///
     /// # Errors
-    /// If the file cannot be read, or gives a scenario the name of a file elsewhere.
+    /// If the file cannot be read, or the name of a scenario is not plain.
     pub fn scenarios(&self) -> Result<Vec<WrittenScenario>, DatabaseError> {
         let mut query =
             self.connection.prepare("SELECT part, event, name, text FROM scenario ORDER BY part, event")?;

@@ -1,7 +1,7 @@
 //! Crashes for other tools: an emitted scenario, played again, as a file that simulators and planners of others read.
 //!
-//! [`Recording`] is what a replay looked like, free of any format: what [`Recorder`](crate::episode::Recorder) saw, and claims. Each format is a pure function from it to text. Of these
-//! texts `import` reads one fact alone: the scenario itself (`standalone`).
+//! [`Recording`] is what a replay looked like, free of any format: what [`Recorder`](crate::episode::Recorder) saw, and claims. Each format is a pure function from it to text. `import`
+//! reads one thing back: the scenario itself (`standalone`).
 
 mod commonroad;
 mod csv;

@@ -34,7 +34,7 @@ pub struct Recording {
     /// The lanes of its route, in order.
     pub route: Vec<LaneIndex>,
     pub seen: Recorder,
-    /// What the author calls the bodies of the author's own, by number of the road user.
+    /// Names of the author's own bodies, by number of the road user.
     pub own_bodies: BTreeMap<u32, String>,
     /// Where the scenario comes from, what it claims, and the scenario as text of the language: name and value.
     pub facts: Vec<(String, String)>,

@@ -1,5 +1,5 @@
-//! A recording as text of the language that needs no space: each step's action with the values that it had. An exported
-//! file carries it, so that `avastra import` has the scenario back, and not only what it looked like.
+//! A scenario as text that needs no space: each step's action with the values that it had. An exported file carries it, so
+//! that `avastra import` gets the scenario back and not only the ways of the road users.
 //!
 //! Left out: rules, what an external driving system answered, and claims, which are facts of the file already.
 
@@ -14,12 +14,12 @@ use crate::model::vocabulary::{Body, Phenomenon, Verb, Word};
 use crate::model::{BodyDef, Memory, Road, SPAWN_SPEED_MPS, Scenario, Space, ticks_s};
 use crate::units::decimal;
 
-/// What an exported file carries of a scenario.
+/// The scenario in an exported file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Standalone {
     /// On one line, from the road to the end of the scenario; without the version of the language.
     pub text: String,
-    /// What its episode may need and the text cannot say; without any, the episode is that of the recording, to the bit.
+    /// Parts of the episode that the text cannot express. If there are none, the episode is the recorded one, to the bit.
     pub lacks: Vec<&'static str>,
 }
 
@@ -37,7 +37,7 @@ pub fn standalone(space: &Space, scenario: &Scenario, log: &EpisodeLog) -> Optio
                 is_bound |= draw.lane_changes.is_some();
                 (draw.effects.clone(), *delay_ticks)
             }
-            // What happens in every step happens in one without an action, too.
+            // `each step` also acts in a step without an action.
             Outcome::Passed | Outcome::Refused { .. } => (of_the_sky(space, before, &step.memory), 0),
         };
         before = &step.memory;
@@ -155,7 +155,7 @@ fn action_name(index: usize) -> String {
     format!("action_{}", index + 1)
 }
 
-/// What a step without an action changed of time of day and weather.
+/// The changes of time of day and weather in a step without an action.
 fn of_the_sky(space: &Space, before: &Memory, after: &Memory) -> Vec<Effect> {
     let ((time_before, sky_before), (time, sky)) = (space.weather(before), space.weather(after));
     let levels = Phenomenon::ALL.iter().zip(sky_before.iter().zip(sky));

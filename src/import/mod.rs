@@ -86,7 +86,7 @@ pub fn openscenario(
         vec![Refusal { line, element: "OpenSCENARIO".to_owned(), reason }]
     })?;
     let mut source = Source::new(text, parameters);
-    // Another ego vehicle, or other values, are read from the file as it stands.
+    // With another ego vehicle or other values, the file is read like those of other tools.
     let is_as_written = ego.is_none() && parameters.is_empty();
     if let Some(own) = is_as_written.then(|| own::read(&mut source, &document)).flatten() {
         return Ok(write::own(&own, name, source.notes()));

@@ -1,7 +1,7 @@
-//! Files that `avastra export` wrote. They carry the scenario that they show, with the seeds and the moments of its actions;
-//! it is taken over in place of the ways of the road users, which say less.
+//! Files that `avastra export` wrote. They carry their scenario, with its seeds and the moments of its actions, which is taken
+//! over in place of the ways of the road users.
 //!
-//! Its text is judged as any other when the file that it becomes is checked and played.
+//! The text is not trusted: the imported file is checked and played like any other.
 
 use core::fmt::Write;
 
@@ -23,7 +23,7 @@ pub struct Own {
     pub description: String,
 }
 
-/// The scenario that a file of avastra's carries; `None` if it is a file of another's.
+/// The scenario in a file that avastra exported; `None` for other files.
 pub fn read(source: &mut Source, document: &Document) -> Option<Own> {
     let root = document.root_element();
     let header =

@@ -1,10 +1,10 @@
-//! How many steps the proofs about a space may take: a count, kept by the thread that proves.
+//! A budget of steps for the proofs about a space. Each thread has a count of its own.
 //!
-//! What a text asks of the proofs multiplies: rows, roads, rules, states, and the operations of each condition. So
-//! whatever a proof does costs steps ([`spend`]), and the checker sets a limit for all proofs together ([`within`]).
-//! Once the steps are spent, the loops end early ([`is_spent`]). What they found then counts for nothing: the checker
-//! says that the space is too large, and makes none of it. A count is the same on every machine, and a clock is not.
-//! Where no limit was set, as in an episode, there is none.
+//! Rows, roads, rules, states and the operations of conditions multiply, so a short text can ask for endless proofs. Each
+//! proof counts its steps ([`spend`]), and the checker limits all proofs together ([`within`]). Once the steps are spent,
+//! loops end early ([`is_spent`]); the checker then drops what they found and says that the space is too large. Steps are
+//! counted because a count is the same on every machine and a clock is not. Outside `within`, as in an episode, there is
+//! no limit.
 
 use core::cell::Cell;
 
@@ -13,24 +13,24 @@ thread_local! {
     static LIMIT: Cell<u64> = const { Cell::new(u64::MAX) };
 }
 
-/// Counts steps. One is about the evaluation of one operation, or the copy of one value.
+/// Counts steps. One step is about the evaluation of one operation, or the copy of one value.
 pub(crate) fn spend(steps: usize) {
     SPENT.set(SPENT.get().wrapping_add(steps as u64));
 }
 
-/// Whether the steps of the work around are spent.
+/// Whether the steps of the innermost [`within`] are spent.
 pub(crate) fn is_spent() -> bool {
     SPENT.get() > LIMIT.get()
 }
 
-/// Does some work with at most so many steps. Gives what it gives, and whether the steps sufficed.
+/// Does some work with a limit of steps. Returns its result, and whether the steps sufficed.
 pub(crate) fn within<T>(steps: u64, work: impl FnOnce() -> T) -> (T, bool) {
     let _restore = Restore(LIMIT.replace(SPENT.get().saturating_add(steps)));
     let done = work();
     (done, !is_spent())
 }
 
-/// Sets the limit back, also where the work panics: the editor's server goes on after that.
+/// Restores the limit, even if the work panics, because the language server goes on after a panic.
 struct Restore(u64);
 
 impl Drop for Restore {

@@ -108,7 +108,7 @@ impl Expr {
         }
     }
 
-    /// How many operations, names and literals it is made of; those of called functions do not count.
+    /// Number of its operations, names and literals; those of called functions do not count.
     pub fn operations(&self) -> usize {
         let mut count = 0;
         self.walk(&mut |_| count += 1);

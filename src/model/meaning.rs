@@ -27,7 +27,7 @@ pub struct Meaning {
 struct Declaration {
     /// For example ``rule `npc_gap` ``.
     title: String,
-    /// What the digest covers of it.
+    /// Its canonical text, which the digest covers.
     text: String,
     mark: String,
 }

@@ -43,7 +43,7 @@ impl Space {
             .into_iter()
             .map(|cell| (cell, self.drawn_values(self.state_of(cell).ty)))
             .collect();
-        // The memories are numbered, the last cell varying fastest: none is made beyond those that are asked for.
+        // Memories are numbered, the last cell varying fastest, so that none is made beyond `count_max`.
         let all = self.start_count();
         let are_all = all <= count_max;
         let numbered = |number: usize| {
@@ -63,8 +63,7 @@ impl Space {
         (memories, are_all)
     }
 
-    /// The number of memories with which an episode may begin, before any rule; as many as can be counted, if there are
-    /// more.
+    /// The number of memories with which an episode may begin, before any rule; at most `usize::MAX`.
     pub(crate) fn start_count(&self) -> usize {
         let open = self.open_cells();
         effort::spend(open.len());

@@ -205,7 +205,7 @@ facts! {
     Collision "collision" Type::Bool, Step = "A `Bool`: the ego vehicle collided.";
     Repeated "repeated" Type::Bool, Step = "A `Bool`: with an obstacle that it has hit before.";
     Sudden "sudden" Type::Bool, Step = "A `Bool`: with an obstacle that appeared a moment ago.";
-    Struck "struck" Type::Bool, Step = "A `Bool`: the obstacle moved, and ran into the side or the rear of an ego vehicle, or into one that stood, that did not have to give way.";
+    Struck "struck" Type::Bool, Step = "A `Bool`: the ego vehicle did not have to give way, and the obstacle ran into its side or rear, or into any part of it while it stood.";
     Avoidable "avoidable" Type::Bool, Judgement = "A `Bool`: a careful reference driver avoids it. Verdicts only.";
 }
 

@@ -2,15 +2,15 @@
 //!
 //! The ego vehicle drives as it did until the obstacle appears. From then on the same system drives with one
 //! module changed (`ads::Module`), which has watched from the start, so that the hazard is the same to the bit;
-//! other road users decide for themselves. What is changed:
+//! other road users decide for themselves. The changes are:
 //!
 //! - each module alone is made as in the baseline, and made free of errors; and all of them together are;
 //! - each documented weakness alone is switched off;
 //! - the module's errors are left alone: all others are as in the baseline, or free of errors;
 //! - two modules together, if no change alone prevents the collision, told apart from chance.
 //!
-//! What prevents the collision is played again with other sensor noise, beside the same noise alone, to tell it
-//! from chance. What follows from all this is decided in `evidence`.
+//! A change that prevents the collision is played again with other sensor noise, and so is the noise alone, to tell the
+//! change apart from chance. `evidence` draws the conclusions.
 //!
 //! Left out: errors from before the obstacle appeared.
 
@@ -25,12 +25,12 @@ use super::evidence::{
 };
 use super::measured::measure;
 
-/// The collision is played with other noise until it has happened so many times again: enough for each of several
-/// changes to be told apart from chance.
+/// The collision is played with other noise until it has happened again this many times: enough to tell each of several
+/// changes apart from chance.
 const AGAIN: usize = 12;
 /// Most replays with other noise: a collision that happens in a tenth of them can be explained.
 const REPLAYS_MAX: u32 = 100;
-/// If it happens in fewer of them, no change can be told apart from chance, and none is tried.
+/// If it happens again fewer times than this, no change can be told apart from chance, and none is tried.
 const AGAIN_MIN: usize = 6;
 
 /// The takeover is at most this long before the collision, s: longer than any reaction or braking, because
@@ -100,7 +100,7 @@ impl<'a> Inquiry<'a> {
         self.play(profile, None)
     }
 
-    /// Whether the collision vanishes if a profile takes over that has other sensor noise: a number for each.
+    /// Whether the collision vanishes if a profile takes over with other sensor noise, which a number selects.
     pub fn vanishes(&self, profile: &ModularConfig, noise: u32) -> bool {
         self.play(profile, Some(noise)) == Fate::Vanished
     }
@@ -194,9 +194,9 @@ impl<'a> Inquiry<'a> {
         .collect()
     }
 
-    /// Pairs of modules that prevent the collision together; first those each of which alone leads to it, and only
-    /// these if a module alone prevents it, though not told apart from chance: with it every pair may do so. If some
-    /// modules differ from the baseline, only these are asked.
+    /// Pairs of modules that prevent the collision together; pairs in which the errors of each module alone lead to it
+    /// come first. If one module prevents it, though not told apart from chance, only such pairs are looked at, because
+    /// any pair with that module may prevent it. If some modules differ from the baseline, only these are paired.
     fn pairs(&self, evidence: &Evidence, baseline: &ModularConfig) -> Vec<PairFinding> {
         if evidence.baseline.is_some_and(|fate| fate != Fate::Vanished) {
             return Vec::new();
@@ -222,7 +222,7 @@ impl<'a> Inquiry<'a> {
         found.into_iter().map(|(_, pair)| pair).collect()
     }
 
-    /// Plays the collision again with other noise and what prevents it beside, each module or weakness alone.
+    /// Plays the collision again with other noise and with each single change that prevents it.
     fn tell_apart(&self, evidence: &mut Evidence, baseline: &ModularConfig, unchanged: &[bool]) {
         let (own, differs) = (self.profile, evidence.differs());
         if !differs {
@@ -252,7 +252,7 @@ impl<'a> Inquiry<'a> {
         }
     }
 
-    /// Replays with a change, beside the same noise alone; `tries` is the number of changes that are compared.
+    /// Compares replays with a change to those with the same noise alone; `tries` is the number of changes that are compared.
     fn compared(&self, changed: &ModularConfig, unchanged: &[bool], tries: usize) -> Comparison {
         let replays = unchanged.iter().zip(1_u32..);
         let both = replays.map(|(vanished, noise)| (*vanished, self.vanishes(changed, noise)));

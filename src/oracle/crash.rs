@@ -41,8 +41,8 @@ impl Fate {
     }
 }
 
-/// What became of a scenario that was found with a collision, played by another driving system. The space's verdict
-/// says which collisions count.
+/// The outcome of a scenario that was found with a collision, played by another driving system. The space's verdict says
+/// which collisions count.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Regression {
     /// A collision with the same obstacle counts.
@@ -69,7 +69,7 @@ impl Regression {
 }
 
 /// Plays what led to the nth collision of a log with another driving system; `setup` is what the log was
-/// played from. Which collisions count is for the space's verdict to say; `settings` are those of its avoidability.
+/// played from. The space's verdict says which collisions count; `settings` are those of avoidability.
 pub fn regression(
     setup: &Setup,
     log: &EpisodeLog,

@@ -1,29 +1,31 @@
-//! What replays of a collision show, and the cause that follows from it. Pure: nothing is played here.
+//! The evidence about the cause of a collision, collected by replays, and the verdict that follows from it. Pure: nothing
+//! is played here.
 //!
-//! [`Evidence`] is the table that `diagnose` prints. Verdict and cause follow from it alone, and the sentence below
-//! the table puts the verdict into words: none of the three can contradict another.
+//! [`Evidence`] is the table that `diagnose` prints. Verdict and cause follow from it alone, and the sentence below the
+//! table puts the verdict into words, so none of the three can contradict another.
 //!
-//! **Suspects.** A *baseline* says how good each module should be. If some modules of the driving system differ from
-//! it, only they are suspects, because what is the same explains no difference. If none differs, the driving system
-//! is the baseline, and its own weaknesses are to be named.
+//! **Suspects.** A *baseline* says how good each module should be. If some modules of the driving system differ from it,
+//! only these are suspects, because a module that is the same explains no difference. If none differs, the driving system
+//! is the baseline, and its own weaknesses are looked for.
 //!
-//! **Chance.** Any change of a near crash may save it. So the collision is played again with other sensor noise, once
-//! with nothing else changed and once with the change, the same noise for both. Only the replays in which the two end
-//! differently count: if the change did no more than chance, it would prevent the collision in as many as it brings it
-//! about in. A change is *told apart from chance* if the 95 % interval of the share that it prevents lies above one
-//! half; the interval is exact (Clopper and Pearson), and wider if several changes are tried (Bonferroni).
+//! **Chance.** Any change of a near crash may save it. So the collision is played again with other sensor noise: once with
+//! the noise alone, and once with the same noise and the change. Only the pairs of replays that end differently count. A
+//! change that does no more than chance would prevent the collision as often as it brings it about. A change is *told apart
+//! from chance* if the 95 % interval of the share of pairs in which it prevents the collision lies above one half. The
+//! interval is exact (Clopper and Pearson), and wider if several changes are tried (Bonferroni).
 //!
 //! **Verdict.** The first of these that holds, see [`Verdict`]:
 //!
-//! 1. The modules differ from the baseline: one prevents the collision if it is as there, told apart from chance. Of
-//!    several the one whose errors alone also lead to the collision most often.
-//! 2. They do not: a documented weakness, switched off, prevents the collision, told apart from chance.
+//! 1. Some modules differ from the baseline, and one of them, made as in the baseline, prevents the collision, told apart
+//!    from chance. If several do, the one whose errors alone lead to the collision most often is named.
+//! 2. None differs, and a documented weakness, switched off, prevents the collision, told apart from chance.
 //! 3. No change alone is told apart from chance, and two modules together prevent the collision, told apart from it.
-//! 4. A module whose output was beyond its specification in the seconds before (see `measured`), and without whose
-//!    errors, or as in the baseline, there is no collision with the same noise. What chance has made is seen there.
-//! 5. The driving system is the baseline, and a module that decides (planning, control, emergency braking) prevents
-//!    the collision without its errors, told apart from chance.
-//! 6. As 5, of a module that gives planning its picture: its errors are those that it may have, so planning is brittle.
+//! 4. A module's output was beyond its specification in the seconds before (see `measured`), and with the same noise the
+//!    collision vanishes if the module is changed. A rare draw of its errors is found so.
+//! 5. None differs, and a module that decides (planning, control, emergency braking) prevents the collision without its
+//!    errors, told apart from chance.
+//! 6. None differs, and a module that gives planning its picture prevents the collision without its errors, told apart from
+//!    chance. These errors are within its specification, so planning is brittle.
 //!
 //! Otherwise no module is named, and the verdict says why.
 
@@ -35,10 +37,10 @@ use crate::statistics::binomial_missing;
 use super::crash::Fate;
 use super::measured::Measure;
 
-/// Share of changes without effect that are told apart from chance all the same.
+/// Share of changes without effect that are wrongly told apart from chance: an interval of 95 %.
 const MISSING: f64 = 0.05;
 
-/// The cause of a collision, and what it was found by.
+/// The cause of a collision, with the evidence for it.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Diagnosis {
     /// The module at fault; two if only both together prevent the collision; none where the verdict says why.
@@ -66,7 +68,7 @@ pub enum Verdict {
     Brittle,
     /// Two modules prevent the collision together.
     Together,
-    /// None: what differs from the baseline does not explain the collision, which the baseline has as well.
+    /// None: the baseline has the collision as well, so the difference from it does not explain the collision.
     Baseline,
     /// None: no change is told apart from chance.
     Chance,
@@ -74,7 +76,7 @@ pub enum Verdict {
     Unexplained,
 }
 
-/// What replays of a collision show.
+/// The results of all replays of a collision.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Evidence {
     pub modules: Vec<ModuleFinding>,
@@ -84,8 +86,7 @@ pub struct Evidence {
     pub ideal: Fate,
     /// The collision without each documented weakness that is switched on.
     pub weaknesses: Vec<WeaknessFinding>,
-    /// Pairs that prevent the collision together, looked for if no module and no weakness alone does, told apart from
-    /// chance.
+    /// Pairs that prevent the collision together. They are looked for if no single change is told apart from chance.
     pub pairs: Vec<PairFinding>,
     /// The collision with other sensor noise and nothing else changed; `None` if no change prevents it.
     pub chance: Option<Chance>,
@@ -95,7 +96,7 @@ pub struct Evidence {
     pub from_s: f64,
 }
 
-/// What one module has to do with a collision.
+/// The results of the replays that change one module.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct ModuleFinding {
     pub module: Module,
@@ -106,11 +107,11 @@ pub struct ModuleFinding {
     /// The collision with the errors of this module alone: all others are as in the baseline, if this one
     /// differs from it, or else without errors.
     pub alone: Fate,
-    /// Replays with other sensor noise and this module as in the baseline, if any module differs from it, or else
-    /// without errors. Played only if that prevents the collision.
+    /// Replays with other sensor noise and this module changed: made as in the baseline if any module differs from it,
+    /// otherwise without errors. Played only if the change prevents the collision.
     pub noise: Option<Comparison>,
-    /// Of these replays, those without the collision if the errors of this module are alone. Played only to tell
-    /// several modules apart.
+    /// Number of these replays in which the errors of this module alone do not lead to the collision. Played only to
+    /// tell several modules apart.
     pub noise_alone: Option<u32>,
 }
 
@@ -129,7 +130,7 @@ pub struct WeaknessFinding {
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct PairFinding {
     pub modules: [Module; 2],
-    /// As of a module; played for the first pair only.
+    /// As for a module; played for the first pair only.
     pub noise: Option<Comparison>,
 }
 
@@ -137,7 +138,7 @@ pub struct PairFinding {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub struct Chance {
     pub replays: u32,
-    /// Those in which the collision vanishes.
+    /// Replays in which the collision vanishes.
     pub vanished: u32,
 }
 
@@ -150,13 +151,13 @@ pub struct Comparison {
     pub prevents: u32,
     /// Replays that have the collision only with the change.
     pub brings: u32,
-    /// Interval of the share that it prevents, of the replays that it changes.
+    /// Interval of `prevents / (prevents + brings)`.
     pub low: f64,
     pub high: f64,
 }
 
 impl Chance {
-    /// Of replays in which the collision vanishes or not.
+    /// Counts replays, each with whether the collision vanishes in it.
     pub(super) fn of(vanished: &[bool]) -> Chance {
         let gone = vanished.iter().filter(|vanished| **vanished).count();
         Chance { replays: vanished.len() as u32, vanished: gone as u32 }
@@ -164,8 +165,8 @@ impl Chance {
 }
 
 impl Comparison {
-    /// Of replays in which the collision vanishes or not, first by the noise alone and then with the change; `tries`
-    /// is the number of changes that are compared.
+    /// Counts pairs of replays, each with whether the collision vanishes with the noise alone, and with the change.
+    /// `tries` is the number of changes that are compared.
     pub(super) fn of(replays: impl Iterator<Item = (bool, bool)>, tries: usize) -> Comparison {
         let (mut vanished, mut prevents, mut brings) = (0_u32, 0_u32, 0_u32);
         for (unchanged, changed) in replays {
@@ -184,7 +185,7 @@ impl Comparison {
     }
 }
 
-/// Whether replays were played, and tell a change from chance.
+/// Whether replays were played, and the change does more than chance in them.
 pub(super) fn is_told_apart(noise: Option<Comparison>) -> bool {
     noise.is_some_and(|noise| noise.is_told_apart())
 }
@@ -273,20 +274,20 @@ impl ModuleFinding {
         fate == Some(Fate::Vanished)
     }
 
-    /// How much it explains: replays without the collision if it is changed, less those if it alone is not.
+    /// How much it explains: the replays that its change saves, less those that its errors alone do not crash.
     fn weight(&self) -> i64 {
         let vanished = self.noise.map_or(0, |noise| i64::from(noise.vanished));
         vanished - self.noise_alone.map_or(0, i64::from)
     }
 }
 
-/// The module that explains most; of equals the first on the data's way.
+/// The module that explains most; among equals the one that comes first in the flow of data.
 fn foremost<'a>(found: impl Iterator<Item = &'a ModuleFinding>) -> Option<&'a ModuleFinding> {
     found.min_by_key(|found| Reverse(found.weight()))
 }
 
-/// Whether a module decides what the vehicle does, with what others tell it. Prediction is not among them: it is
-/// judged by its forecasts, because one without errors knows the future, which none can.
+/// Whether a module decides what the vehicle does. Prediction does not count as one: without errors it would know the
+/// future, which no prediction can, so it is judged by its forecasts.
 fn decides(module: Module) -> bool {
     match module {
         Module::Planning | Module::Control | Module::Emergency => true,
@@ -304,7 +305,7 @@ mod tests {
     use crate::rng;
     use crate::rng::{Rng, Stream};
 
-    /// Replays of which the change prevents some and brings others.
+    /// A comparison in which the change prevents so many collisions and brings so many.
     fn compared(prevents: usize, brings: usize, tries: usize) -> Comparison {
         let replays = (0..prevents).map(|_| (false, true)).chain((0..brings).map(|_| (true, false)));
         Comparison::of(replays.chain([(true, true), (false, false)]), tries)

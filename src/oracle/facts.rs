@@ -29,7 +29,7 @@ pub fn counted(space: &Space, log: &EpisodeLog, judgements: &[Judgement]) -> Vec
     (0..log.collisions.len()).filter(is_counted).collect()
 }
 
-/// As [`counted`]. Judgements cost many replays, so `judge` is asked for them only where avoidability decides.
+/// As [`counted`]. Judgements take many replays, so `judge` is called only if avoidability decides.
 pub fn counted_at_need(
     space: &Space,
     log: &EpisodeLog,

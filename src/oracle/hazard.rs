@@ -1,14 +1,14 @@
 //! The onset of a hazard: when a collision began to take shape.
 //!
 //! A moment belongs to the hazard if the obstacle was on the ego vehicle's way or heading for it, or if one of the two
-//! visibly did what the other need not expect: it was beyond the middle of the road or beside its lane, came out of its
+//! visibly did something that the other need not expect: it was beyond the middle of the road or beside its lane, came out of its
 //! lane sideways, was in a junction that it had entered at a red light, or was on foot on the carriageway. The onset is
 //! the first such moment, of the last uninterrupted time of them before the contact, at which the obstacle could be
 //! seen. So the judgement begins with the first violation or visible intention, whichever of the two shows it.
 //!
 //! The way is the one that the ego vehicle took, as wide as the vehicle and the 0.375 m by which careful drivers
-//! wander (UN R157, Annex 4, Appendix 3); heading is to go on at constant velocity until the time of
-//! the contact. Both compare places alone, not times: a driver may see that two ways cross before it is
+//! wander (UN R157, Annex 4, Appendix 3); heading for it means to meet it at constant velocity before the
+//! contact. Both compare places alone, not times: a driver may see that two ways cross before it is
 //! clear which vehicle will be there first.
 
 use crate::ads::in_sight;
@@ -29,7 +29,7 @@ const STRIDE: usize = 2 * FRAME_TICKS as usize;
 pub struct Onset {
     /// The first violation, visible intention or conflict of ways.
     pub first: usize,
-    /// The first conflict of ways: what a driver sees that knows no rules. UN R157's models begin here.
+    /// The first conflict of ways. UN R157's models, which know no rules of the road, begin here.
     pub conflict: usize,
 }
 
@@ -77,13 +77,13 @@ pub fn onset(recording: &[World], obstacle: u32, met: OrientedBox) -> Option<Ons
         }
     }
     let first = first?;
-    // Without a conflict that was seen, a driver that knows no rules takes over at the last moment.
+    // If no conflict of ways was seen, UN R157's models begin at the last moment.
     Some(Onset { first, conflict: conflict.unwrap_or(recording.len() - 1) })
 }
 
 /// Index of the last moment at which a careful driver could still stop before the place of a collision in which the ego
-/// vehicle had to give way, or of the first at which the obstacle was in sight: by then the ego vehicle's violation has
-/// begun, though it may not be in the junction yet. `None` if it had not to give way, or the obstacle was not in sight.
+/// vehicle had to give way; if the obstacle came into sight later, index of that moment. The ego vehicle's violation begins
+/// there, though it may not be in the junction yet. `None` if it did not have to give way, or the obstacle was not in sight.
 pub fn last_chance(recording: &[World], contact: &Contact, met: OrientedBox) -> Option<usize> {
     if contact.priority != Priority::Other {
         return None;
@@ -113,7 +113,7 @@ pub fn last_chance(recording: &[World], contact: &Contact, met: OrientedBox) -> 
     found
 }
 
-/// Whether the ego vehicle or an obstacle visibly does what the other need not expect.
+/// Whether the ego vehicle or the obstacle visibly does something that the other need not expect.
 fn is_out_of_order(world: &World, obstacle: &Obstacle) -> bool {
     let map = &world.scene().map;
     if world.is_astray() || world.ego_runs_red() || map.is_beyond_middle(&world.ego_outline()) {

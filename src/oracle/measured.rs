@@ -1,9 +1,8 @@
 //! Errors of the modules that give planning its picture, measured in the seconds before a collision.
 //!
-//! The scenario is played once more by its own driving system. Ten times a second what a module gave is held against
-//! what it was given itself, so that the errors of one module are not booked to the next, and the worst of it is
-//! compared with what the module's specification leaves room for: the baseline's settings, or a bound that is ours
-//! where there is none.
+//! The scenario is played once more by its own driving system. Ten times a second a module's output is compared with its
+//! own input, so that the errors of one module do not count for the next. The worst error is compared with a bound that
+//! follows from the module's specification: the baseline's settings, or a figure of ours where there are none.
 //!
 //! | module | measured | held against | bound |
 //! |---|---|---|---|
@@ -97,20 +96,20 @@ struct Forecast {
     velocity_mps: Vec2,
     /// The velocity that prediction was given, less the true one.
     velocity_error_mps: Vec2,
-    /// The acceleration that only the change of this error makes believe, magnitude, m/s².
+    /// The acceleration that a change of this error suggests, magnitude, m/s².
     change_mps2: f64,
 }
 
 impl Forecast {
-    /// How far it is from what the obstacle's motion makes of what prediction was given, m; the obstacle is now at
-    /// `position`.
+    /// Error of the forecast, m, for which its input is no excuse; the obstacle is now at `position`.
     ///
-    /// - Where the obstacle was taken to be does not matter: ways are compared, not places.
+    /// - The place at which the obstacle was believed to be does not matter: ways are compared, not places.
     /// - The way may contain the error of the given velocity, or any part of it along some direction, because
-    ///   prediction may take it at its word or know better, as from the lane: all such ways end on a sphere whose
-    ///   poles are the way without that error and with all of it, and what lies inside counts as right, too. The
-    ///   same holds for an acceleration that only a change of that error makes believe.
-    /// - What the obstacle decides later none can know, so its way at constant velocity is as good as its true one.
+    ///   prediction may believe its input or know better, for example from the lane. All such ways end on a sphere whose
+    ///   poles are the way without that error and the way with all of it; ways that end inside count as right, too. An
+    ///   acceleration that only a change of that error suggests is excused in the same way.
+    /// - No prediction can know later decisions of the obstacle, so its way at constant velocity is as good as its true
+    ///   one.
     fn error_m(&self, position: Vec2) -> f64 {
         let excused = self.velocity_error_mps * (AHEAD_S / 2.0);
         let change_m = self.change_mps2 * AHEAD_S * AHEAD_S / 2.0;
@@ -219,7 +218,7 @@ impl Gauge {
         let ModularConfig { localization, perception, tracking, .. } = baseline;
         // Both axes, in streets; 20 m/s is faster than any road of a town allows.
         let sigma_m = localization.position_sigma_m * localization.street_factor * core::f64::consts::SQRT_2;
-        // Tracking is given looks that are as old as the driving system's own latency makes them.
+        // The driving system's own latency makes the looks old that tracking is given, which is no fault of tracking.
         let latency_frames = own.perception.latency_frames as usize + own.latency.load_frames(self.objects);
         let publication_s = (tracking.frames_to_publish as usize + latency_frames) as f64 * FRAME_S;
         let of = |module, what, worst, bound| Measure { module, what, worst, bound };
@@ -287,7 +286,7 @@ mod tests {
     fn a_wreck_that_was_taken_to_move_is_no_error_of_prediction() {
         let (still, given_mps) = (Vec2::zeros(), Vec2::new(3.77, 0.0));
         let there = Vec2::new(100.0, 50.0);
-        // It went by the velocity that it was given, or believed none of it, or only the part along a lane.
+        // Prediction believed the velocity that it was given, none of it, or only its part along a lane.
         for way in [given_mps, still, Vec2::new(3.77 / 2.0, 3.77 / 2.0)] {
             assert!(forecast(way, still, given_mps).error_m(there) < 1e-9, "{way}");
         }
@@ -308,7 +307,7 @@ mod tests {
             forecast(Vec2::zeros(), moves_mps, Vec2::zeros()).error_m(there) < 1e-9,
             "tracking gave none"
         );
-        // It brakes as nobody could know.
+        // It brakes, which no prediction could know.
         let braked = Vec2::new(105.0, 50.0);
         assert!(forecast(moves_mps, moves_mps, moves_mps).error_m(braked) < 1e-9);
         assert!(

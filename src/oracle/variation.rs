@@ -51,7 +51,7 @@ pub fn likelihood(setup: &Setup, log: &EpisodeLog, index: usize, variations: u32
     Likelihood { variations, crashes, share, low, high }
 }
 
-/// Plays a scenario with small changes; the same number makes the same changes.
+/// Plays a scenario with small changes. A number selects the changes.
 fn varied(crash: &Crash, number: u32) -> EpisodeLog {
     let seed = rng::child_seed(crash.setup.seed, Stream::Variation, u64::from(number));
     let mut rng = rng::stream(seed, Stream::Variation, 0);

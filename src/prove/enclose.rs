@@ -166,7 +166,7 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
         },
         ExprKind::IsBody(..) => Values::UNKNOWN_TRUTH,
         ExprKind::Match { subject, arm_of, arms } => {
-            // Each arm once, however many variants take it: `match`es in one another would multiply.
+            // Each arm is looked at once, however many variants take it, because nested `match`es would multiply.
             let mut taken: u128 = 0;
             let is_first = |arm: &usize| {
                 let bit = 1_u128.checked_shl(u32::try_from(*arm).unwrap_or(u32::MAX)).unwrap_or(0);

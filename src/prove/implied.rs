@@ -78,23 +78,32 @@ fn remark(space: &Space, rule: usize) -> Diagnostic {
     Diagnostic::remark(code::NEVER_ACTS, message)
         .at(definition.span, "holds there for every value that its actions can have")
         .help(
-            "if it is meant for other roads, all is well; else look at its bound: `80 * x` is not `80 % * x`",
+            "if it is meant for other roads, change nothing; otherwise look at its bound: `80 * x` is not `80 % * x`",
         )
+}
+
+/// The rows that a rule binds.
+fn bound_rows(space: &Space, rule: usize) -> Vec<&Row> {
+    let actions = space.rules[rule].body.actions();
+    let of_actions: Vec<&Row> = actions.into_iter().flat_map(|action| space.rows_of(action)).collect();
+    effort::spend(of_actions.len());
+    // A rule about one key does not bind the rows that set another.
+    of_actions.into_iter().filter(|row| row.rules.binary_search(&rule).is_ok()).collect()
 }
 
 /// Whether the rule by itself holds on each road of the space, for every row that it binds and every value; also `false`
 /// if the work left does not suffice.
 fn is_idle_on_the_roads(space: &Space, rule: usize, work: &mut usize) -> bool {
-    let bound = || space.rows.iter().filter(|row| row.rules.contains(&rule));
-    let (count, none) = (bound().count(), RulesInForce::none(space));
-    let Some(left) = work.checked_sub(count * space.roads.len()) else { return false };
+    let (bound, none) = (bound_rows(space, rule), RulesInForce::none(space));
+    let Some(left) = work.checked_sub(bound.len() * space.roads.len()) else { return false };
     *work = left;
-    if count == 0 || space.roads.is_empty() || matches!(space.rules[rule].body, RuleBody::Moves { .. }) {
+    if bound.is_empty() || space.roads.is_empty() || matches!(space.rules[rule].body, RuleBody::Moves { .. })
+    {
         return false;
     }
     let holds_on = |road: &Road| {
         let facts = Some(&road.facts);
-        bound().all(|row| holds(space, row, rule, &none, facts, work))
+        bound.iter().all(|row| holds(space, row, rule, &none, facts, work))
     };
     space.roads.iter().all(holds_on) && start_holds(space, rule, &none)
 }
@@ -102,15 +111,10 @@ fn is_idle_on_the_roads(space: &Space, rule: usize, work: &mut usize) -> bool {
 /// Whether the rule holds for every row that it binds and every value that `others` leave; also `false` if
 /// the work left does not suffice.
 fn follows(space: &Space, rule: usize, others: &RulesInForce, work: &mut usize) -> bool {
-    let actions = space.rules[rule].body.actions();
-    let bound_rows = || actions.iter().flat_map(|action| space.rows_of(*action));
-    // A row that sets another key than the rule is about is not bound.
-    let bound = || bound_rows().filter(|row| row.rules.binary_search(&rule).is_ok());
-    effort::spend(bound_rows().count());
-    let count = bound().count();
-    let Some(left) = work.checked_sub(count * (1 + others.all().count())) else { return false };
+    let bound = bound_rows(space, rule);
+    let Some(left) = work.checked_sub(bound.len() * (1 + others.all().count())) else { return false };
     *work = left;
-    if count == 0 && space.rules[rule].start.is_none() {
+    if bound.is_empty() && space.rules[rule].start.is_none() {
         return false;
     }
     match &space.rules[rule].body {
@@ -125,7 +129,8 @@ fn follows(space: &Space, rule: usize, others: &RulesInForce, work: &mut usize) 
             })
         }
         RuleBody::During(_) | RuleBody::Holds(_) => {
-            bound().all(|row| holds(space, row, rule, others, None, work)) && start_holds(space, rule, others)
+            bound.iter().all(|row| holds(space, row, rule, others, None, work))
+                && start_holds(space, rule, others)
         }
     }
 }
@@ -165,9 +170,9 @@ fn holds(
     always_holds(condition, &known, &space.episode) || always_holds_split(condition, &known, work)
 }
 
-/// Whether the condition holds in each combination of the words and truths that it names: of all their values at once it
-/// cannot be seen that `time == Night or time != Night` always holds. Also `false` if there are too many combinations, or
-/// the work left does not suffice.
+/// Whether the condition holds in each combination of the words and truths that it names. With all their values at once,
+/// interval analysis does not see that `time == Night or time != Night` always holds. Also `false` if there are too many
+/// combinations, or the work left does not suffice.
 fn always_holds_split(condition: &Expr, known: &Known<'_>, work: &mut usize) -> bool {
     let mut named: Vec<Named> = Vec::new();
     condition.walk(&mut |part| {

@@ -52,6 +52,6 @@ pub(crate) fn report(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> 
         &|| moment::report(space),
         &|| clock::report(space),
     ];
-    // Once the steps are spent, what is found counts for nothing.
+    // Once the steps are spent, the checker drops all findings.
     proofs.into_iter().take_while(|_| !effort::is_spent()).flat_map(|report| report()).collect()
 }

@@ -5,15 +5,14 @@ use crate::model::{FnDef, Type, effort};
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::syntax::ast::Span;
 
-/// What the copy of one operation costs, in steps: it is kept and written as text, so that memory is bounded with the
-/// steps.
+/// Steps for the copy of one operation. Copies are kept and written as text, so the limit of steps also bounds memory.
 const COPIED_STEPS: usize = 32;
 
 /// The expression with its locals replaced, its calls opened and its spans removed, so that two expressions
 /// of the same form are equal.
 pub(super) fn reduce(expr: &Expr, functions: &[FnDef], locals: &[Expr]) -> Expr {
     effort::spend(COPIED_STEPS);
-    // Arguments are copied wherever they are named: calls in calls may double what they are given each time.
+    // Arguments are copied wherever they are named, so nested calls may double them each time.
     if effort::is_spent() {
         return Expr { kind: ExprKind::Bool(false), ty: Type::Bool, span: Span::NONE };
     }

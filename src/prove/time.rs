@@ -419,7 +419,7 @@ impl<'a> States<'a> {
         let mut parts = vec![cells.clone()];
         for cell in &self.followed {
             let values = points(cells[*cell]);
-            // One value is there already.
+            // A single value splits nothing.
             if values.len() == 1 || parts.len() * values.len() > PARTS_MAX {
                 continue;
             }

@@ -16,7 +16,7 @@ use crate::units::Rational;
 /// Tables with more rows than this are not searched for equal rows.
 const ROWS_MAX: usize = 10_000;
 
-/// What a listed value costs as text, in steps.
+/// Steps for the text of a listed value.
 const VALUE_STEPS: usize = 16;
 
 /// Pairs listed for two actions, at most.

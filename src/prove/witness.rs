@@ -391,7 +391,7 @@ impl Search<'_> {
         !self.read().is_empty()
     }
 
-    /// The cells on which a rule or an effect of the row depends, as they were before.
+    /// The cells whose values before the step decide a rule or an effect of the row.
     fn read(&self) -> BTreeSet<usize> {
         let states = &self.rules.space.states;
         let mut found = BTreeSet::new();

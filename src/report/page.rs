@@ -54,7 +54,7 @@ pub struct Scene {
     pub compared: Option<(Recording, Value)>,
     /// Name of the scenario of which this is the shrunk one.
     pub shrunk_from: Option<String>,
-    /// What has changed since its file was written, and whether it is shown as it was recorded.
+    /// The banner about changes since its file was written, if there are any.
     pub changed: Option<String>,
 }
 

@@ -157,7 +157,7 @@ impl RoadMap {
         self.ways_through(junction).expect("a map in which they are too many is refused")
     }
 
-    /// As [`RoadMap::connections`]; `None` if they are too many, which takes lanes inside that lead into each other.
+    /// As [`RoadMap::connections`]; `None` if there are too many, which is possible only if lanes inside lead into each other.
     pub(super) fn ways_through(&self, junction: usize) -> Option<Vec<Connection>> {
         let inside = |lane: LaneIndex| self.lane(lane).junction == Some(junction);
         let mut lanes_left = WAY_LANES_MAX;

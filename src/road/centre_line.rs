@@ -96,8 +96,8 @@ pub enum NoCentreLine {
     Broken,
 }
 
-/// Samples the centre of a lane of a section, and adds the steps of work to those in `steps`, also where it fails: for each
-/// place those of the reference line, and one for each lane between.
+/// Samples the centre of a lane of a section. Adds its steps of work to `steps`, even if it fails: for each place the steps of
+/// the reference line, and one step for each lane between.
 ///
 /// # Errors
 /// If the lane is too short, too large, or narrower than zero.

@@ -93,8 +93,8 @@ pub fn crossings(a: &Path, b: &Path) -> Vec<(f64, f64)> {
     crossings_within(a, b, &mut steps)
 }
 
-/// As [`crossings`], as long as there are steps of work left: one for each segment of the first path, and one for each
-/// that is held against it. What it takes is subtracted.
+/// As [`crossings`], with a limit of work: one step for each segment of the first path, and one for each comparison with a
+/// segment of the second. Subtracts them from `steps`, and ends early when none are left.
 pub fn crossings_within(a: &Path, b: &Path, steps: &mut u64) -> Vec<(f64, f64)> {
     let mut found: Vec<(f64, f64)> = Vec::new();
     // A little larger because of rounding.

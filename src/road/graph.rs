@@ -1,7 +1,7 @@
 //! From OpenDRIVE elements to the lane graph: lanes, their links, neighbours and limits.
 //!
-//! The cost of a map grows with its text, and where it could grow faster there is a limit: a file past it is refused in
-//! words that say what to make smaller. A whole city, 50,000 roads with 100,000 lane sections, is well within all limits.
+//! The cost of a map grows with its text. Where it could grow faster there is a limit, and a file past it is refused with a
+//! message that says what to make smaller. A whole city, 50,000 roads with 100,000 lane sections, is well within all limits.
 
 use core::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -44,15 +44,15 @@ const LINK_RAD_MAX: f64 = 60.0 * core::f64::consts::PI / 180.0;
 const VERTICES_MAX: usize = 2_000_000;
 const VERTICES_A_ROAD: usize = 100;
 
-/// Limit on the work for all centre lines in the steps of `centre_line`, likewise. A map within the limit on vertices needs as
-/// much only if it curls, or if tens of lanes beside each other change their widths all the time.
+/// Limit on the steps of `centre_line` for all centre lines, also with more for each road. A map within the limit on vertices
+/// exceeds it only if it curls, or if tens of lanes beside each other change their widths all the time.
 const STEPS_MAX: u64 = 80_000_000;
 const STEPS_A_ROAD: u64 = 5_000;
 
 /// Limit on the length of all lanes of a map together, m.
 const LANES_M_MAX: f64 = 5e7;
 
-/// Limits on the lanes inside one junction, and on their vertices: each is held against each other one.
+/// Limits on the lanes inside one junction, and on their vertices, because each lane is compared with every other.
 const JUNCTION_LANES_MAX: usize = 1000;
 const JUNCTION_VERTICES_MAX: usize = 50_000;
 
@@ -131,7 +131,7 @@ fn too_large(road: &RoadElement, what: &str) -> RoadError {
     wrong(road.line, message)
 }
 
-/// What the lanes of a map have needed so far, and what they may need.
+/// The work and size of the lanes so far, and their limits.
 struct Spent {
     steps: Cell<u64>,
     steps_max: u64,
@@ -151,7 +151,7 @@ impl Spent {
         }
     }
 
-    /// The centre line of a lane, counted, or why the lane has none.
+    /// The centre line of a lane, or why the lane has none. Counts its work and size.
     ///
     /// # Errors
     /// If the map is past a limit.
@@ -493,7 +493,7 @@ impl<'a> Builder<'a> {
                 return;
             }
         };
-        // A thousand lanes may lead into one: the shorter list tells as well.
+        // A thousand lanes may lead into one, so the shorter of the two lists is searched.
         let (ahead, behind) = (&self.map.lanes[from.0].successors, &self.map.lanes[to.0].predecessors);
         let is_known = if ahead.len() < behind.len() { ahead.contains(&to) } else { behind.contains(&from) };
         if !is_known {
@@ -682,7 +682,7 @@ fn turn(path: &Path) -> Turn {
     }
 }
 
-/// The error for a junction with more lanes than can be held against each other.
+/// The error for a junction with more lanes than can be compared with each other.
 fn crowded(junction: &JunctionElement) -> RoadError {
     let message = format!(
         "junction `{}` is too large: more than {JUNCTION_LANES_MAX} lanes, or {JUNCTION_VERTICES_MAX} m of curved ones, \

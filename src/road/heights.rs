@@ -13,8 +13,8 @@ const LEVEL_M: f64 = 3.5;
 /// Crossings nearer than this to the end of a lane are joints, m. Ours.
 const JOINED_M: f64 = 3.0;
 
-/// Limits on the search for crossings outside junctions: on those that are told, on the pairs of lanes that are looked at,
-/// and on the segments that are held against each other. A city in which streets end at junctions is far within them.
+/// Limits on the search for crossings outside junctions: on the warnings, on the pairs of lanes that are compared, and on the
+/// comparisons of segments. A city in which streets end at junctions is far within them.
 const CROSSINGS_MAX: usize = 1000;
 const PAIRS_MAX: usize = 5_000_000;
 const CROSSING_STEPS_MAX: u64 = 50_000_000;
@@ -124,14 +124,14 @@ impl RoadMap {
         }
         if !is_whole {
             warnings.push(
-                "so many roads lie over each other that not all were looked at: more may cross without a junction"
+                "so many roads lie over each other that not all were compared: more may cross without a junction"
                     .to_owned(),
             );
         }
         warnings
     }
 
-    /// For each lane a number that it shares with the lanes of its road alone; it rises with the index of the lane.
+    /// For each lane the number of its road. Roads are numbered in the order of their first lanes.
     fn road_numbers(&self) -> Vec<usize> {
         let mut numbers: BTreeMap<&str, usize> = BTreeMap::new();
         let number = |road| {

@@ -7,8 +7,8 @@ use crate::geometry::{Bounds, Path, Pose, Projection, Vec2, wrap_angle};
 
 use super::map::{Lane, LaneIndex};
 
-/// Side of a cell, m; larger where lanes would lie in more cells than [`CELLS_WANTED`]: the grid of a country must not
-/// need more memory than its lanes.
+/// Side of a cell, m. It is doubled as long as lanes would lie in more than [`CELLS_WANTED`] cells, so that the grid of a
+/// country needs no more memory than its lanes.
 const CELL_M: f64 = 8.0;
 const CELLS_WANTED: f64 = 500_000.0;
 
@@ -21,7 +21,8 @@ const SLACK_M: f64 = 1e-3;
 /// Added to angles because of rounding, rad.
 const SLACK_RAD: f64 = 1e-6;
 
-/// Of so few lanes it is quicker to try each than to look into cells, and so it is where a box has more columns of cells.
+/// Up to this number of lanes, and beyond this number of columns of cells in a box, every lane is tried, which is quicker than
+/// to look into the cells.
 const LANES_FEW: usize = 500;
 const COLUMNS_MAX: i64 = 64;
 
@@ -159,8 +160,8 @@ impl LaneGrid {
         candidates.map(LaneIndex)
     }
 
-    /// The indices of all lanes with a place in a box; others near it may be among them. `None` if the box has so many
-    /// columns of cells that to try every lane is quicker.
+    /// The indices of all lanes with a place in a box, and perhaps of some near it. `None` if the box has more than
+    /// [`COLUMNS_MAX`] columns of cells.
     fn lanes_in(&self, around: &Bounds) -> Option<BTreeSet<usize>> {
         let (low, high) = (self.cell(around.least), self.cell(around.most));
         if high.0.saturating_sub(low.0) > COLUMNS_MAX {
@@ -171,9 +172,9 @@ impl LaneGrid {
         Some(stretches.map(|stretch| stretch.lane.0).collect())
     }
 
-    /// Pairs of lanes of different groups that have a cell in common, the lower index first, in order; and whether these
-    /// are all, because at most so many are looked at. A lane without a group is left out. The numbers of the groups rise
-    /// with the indices of the lanes.
+    /// Pairs of lanes of different groups that have a cell in common, in order, the lower index first in each; at most `most`
+    /// of them, and whether these are all. A lane without a group is left out. The numbers of the groups must rise with the
+    /// indices of the lanes.
     pub fn sharing_cells(
         &self,
         most: usize,

@@ -313,7 +313,7 @@ impl RoadMap {
         Ok(LanePlace { lane: LaneIndex(index), station_m: candidate.station_of(s_m), offset_m: 0.0 })
     }
 
-    /// What the map has in place of a driving lane, to be appended to a message; empty if it has nothing.
+    /// Says of a lane that is no driving lane what it is, to be appended to a message; empty if the map has no such lane.
     fn left_out_text(&self, road: &str, lane: i32) -> String {
         let Some(LeftOut { what, .. }) = self.left_out.get(&(road.to_owned(), lane)) else {
             return String::new();
@@ -348,7 +348,7 @@ impl RoadMap {
         best.map(|(_, _, place)| place)
     }
 
-    /// Whether a point lies on lanes that all run against a heading: beyond the middle of the road.
+    /// Whether a point lies beyond the middle of the road: on lanes that all run against a heading.
     pub fn runs_against(&self, point: Vec2, heading_rad: f64) -> bool {
         let fits = |place: LanePlace| {
             let lane_rad = self.lane(place.lane).centre.heading_at(place.station_m);
@@ -357,8 +357,7 @@ impl RoadMap {
         self.nearest(point, heading_rad, 0.0).is_some_and(|place| !fits(place))
     }
 
-    /// Whether any corner of a body is beyond the middle of the road, seen along its heading, by more than
-    /// [`BEYOND_M`].
+    /// Whether any corner of a body lies, by more than [`BEYOND_M`], on lanes that all run against its heading.
     pub fn is_beyond_middle(&self, outline: &OrientedBox) -> bool {
         let within = OrientedBox {
             half_length_m: outline.half_length_m - BEYOND_M,
@@ -369,7 +368,7 @@ impl RoadMap {
     }
 }
 
-/// A body that is beyond the middle of the road by less touches the line, m. Ours: lanes are kept no better.
+/// A body that is beyond the middle of the road by less than this only touches the line, m. Ours: drivers keep lanes no better.
 const BEYOND_M: f64 = 0.1;
 
 /// How far before a junction its lights and signs may stand, m. Ours.
@@ -446,7 +445,7 @@ impl Lane {
     }
 }
 
-/// Names that a message lists at most: a city has as many roads as a book has words.
+/// Most names that a message lists: a city has thousands of roads.
 const LISTED_MAX: usize = 40;
 
 fn listed(items: impl IntoIterator<Item = impl ToString>) -> String {

@@ -21,7 +21,7 @@ const SHARED_LINE_M: f64 = 1.0;
 /// A light so near to the beginning of a lane that leaves a junction stops no traffic of that lane, m.
 const AT_THE_MOUTH_M: f64 = 1.0;
 
-/// Limit on the lanes that all signals hold for, each counted for every signal: a thousand lanes may meet at one light.
+/// Limit on the lanes that signals hold for, counted once for each signal: a thousand lanes may meet at one light.
 const HELD_MAX: usize = 1_000_000;
 
 /// Adds all lights and signs: lights with a stop line on each lane they hold for.
@@ -274,8 +274,8 @@ fn warn_of_idle_lights(builder: &mut Builder, placed: &Placed, held: &[Vec<(Lane
     }
 }
 
-/// The stations of the stop lines of each lane, junction and group, as bits: those of numbers of 0 and more are in the order
-/// of the numbers.
+/// The stations of the stop lines of each lane, junction and group, as the bits of numbers from 0, which sort as the numbers
+/// do.
 type GroupLines = BTreeMap<(LaneIndex, usize, usize), BTreeSet<u64>>;
 
 fn add_stop_lines(

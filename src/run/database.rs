@@ -33,8 +33,8 @@ pub(crate) const LAYOUT: Layout = Layout {
     local: &["scenario"],
 };
 
-/// `held` says what held the speed of the ego vehicle back, from a time until that of the next row. `offer` says for each row in how many steps of an episode it was legal (reason 0) or was refused for a reason; a
-/// training leaves it empty. `scenario` has the text of the file that was written of an episode. `learning`, `checkpoint` and `result` belong to a training (`train::record`) and stay empty in a run.
+/// `held` says what held the speed of the ego vehicle back, from a time until that of the next row. `offer` counts, per episode and row, the steps in which the row was legal (reason 0) or refused (other reasons);
+/// training writes nothing there. `scenario` has the text of the file that was written of an episode. `learning`, `checkpoint` and `result` belong to a training (`train::record`) and stay empty in a run.
 const SCHEMA: &str = "
 CREATE TABLE episode (
   episode INTEGER PRIMARY KEY, road TEXT NOT NULL, seed TEXT NOT NULL, ended TEXT NOT NULL,
@@ -226,8 +226,8 @@ impl Database {
     /// # Errors
     /// If the file cannot be read.
     pub fn failures(&self) -> Result<Vec<FailureCount>, DatabaseError> {
-        // The bare columns of an aggregate query with `min` are those of the row that has the minimum. Steps are one stage:
-        // the limits of `init`, `map`, `reset` and `step` are others, and the text of one must not stand for another.
+        // The bare columns of an aggregate query with `min` are those of the row that has the minimum. All steps are one stage.
+        // Other stages are counted apart, because each has its own time limit and message.
         let mut statement = self.connection.prepare(
             "SELECT kind, problem, count(*), min(failure.episode), stage, detail, exit, road,
                     CASE WHEN stage LIKE 'step %' THEN 'step' ELSE stage END AS when_failed

@@ -93,7 +93,7 @@ pub fn recorded_traffic(scenario: &Scenario) -> Result<TrafficProfile, RunError>
 }
 
 /// The driving system that the settings of a run or a training name, with their profile if they have one. An external
-/// one is started once, to see that it can be and is still the same, unless it is known by its record alone.
+/// one is started once, to see that it can be and is still the same, unless it is only known from its record.
 ///
 /// # Errors
 /// If there is none of that name, it has no settings, or they mean something else in this version; if an external one

@@ -3,9 +3,9 @@
 //!
 //! The settings stand in the database as they were when it was begun. Every episode (or cell) has a seal: a digest of
 //! all its rows, written in the same transaction. SQLite's own check finds torn pages, a seal finds values that were
-//! changed. Neither is a protection against somebody who writes seals of their own. A file from elsewhere may hold what runs
-//! for ever when it is read, such as a view in the place of a table: before anything is read, its tables must be those that
-//! this version makes.
+//! changed. Neither protects against a forger who writes seals, too. A file from elsewhere may hold a view in place of a
+//! table, which could run for ever when it is read. So its tables are compared with those of this version before anything
+//! is read.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -115,7 +115,7 @@ impl Layout {
         tables: &str,
         settings: &str,
     ) -> Result<(Connection, Vec<i64>), DatabaseError> {
-        // What SQLite writes goes where a link leads.
+        // SQLite would follow a link and write where it leads.
         files::own_file(path)?;
         let mut connection = Connection::open(path)?;
         let found: i64 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
@@ -136,7 +136,7 @@ impl Layout {
         Ok((connection, damaged))
     }
 
-    /// Whether its pages are sound and its settings the ones that it was begun with.
+    /// Checks that its pages are sound and its settings those that it was begun with.
     fn check(&self, connection: &Connection, settings: &str) -> Result<(), DatabaseError> {
         let state: String = connection.pragma_query_value(None, "quick_check", |row| row.get(0))?;
         if state != "ok" {
@@ -149,7 +149,7 @@ impl Layout {
         Ok(())
     }
 
-    /// The units whose rows are not as they were written, rising; one that has rows in any table and no seal is among them.
+    /// The numbers of the units whose rows were changed, rising. A unit that has rows in any table and no seal counts as changed.
     fn damaged(&self, connection: &Connection) -> Result<Vec<i64>, DatabaseError> {
         let unit = self.unit;
         let of_tables: String =
@@ -167,8 +167,8 @@ impl Layout {
         Ok(damaged)
     }
 
-    /// Hides units from all that is asked over this connection from now on. The file stays as it is: a name without the name
-    /// of a file stands for the temporary view, and not for the table.
+    /// Hides units from all later queries over this connection. The file stays as it is: SQLite takes a plain table name for the
+    /// temporary view.
     pub(super) fn hide(&self, connection: &Connection, numbers: &[i64]) -> Result<(), rusqlite::Error> {
         connection.execute_batch("CREATE TEMP TABLE hidden (unit INTEGER PRIMARY KEY) STRICT")?;
         let mut insert = connection.prepare("INSERT INTO temp.hidden VALUES (?)")?;
@@ -225,7 +225,7 @@ impl Layout {
     }
 }
 
-/// The columns of a table: the name, the type and the place in the table's key of each; the place is 0 if it is in none.
+/// The columns of a table: name, type, and position in the key, which is 0 for a column outside the key.
 type Columns = Vec<(String, String, i64)>;
 
 /// Refuses a file unless its tables are those that `tables` makes, see [`check_plain`].
@@ -236,7 +236,7 @@ pub(super) fn check_tables(connection: &Connection, tables: &str) -> Result<(), 
     check_plain(connection, "main", &plain_tables(&pattern, "main")?)
 }
 
-/// Refuses an attached file unless it holds nothing but plain tables, and those wanted with their columns and keys. Keys
+/// Refuses an attached file unless it holds only plain tables, among them the wanted ones with their columns and keys. Keys
 /// matter, because without them every search for a unit would go through all rows.
 pub(super) fn check_plain(
     connection: &Connection,
@@ -258,8 +258,8 @@ pub(super) fn check_plain(
 /// The tables of an attached file.
 ///
 /// # Errors
-/// If it holds anything else: a view, a trigger, a virtual table, an index of its own, or a column that is computed. To read
-/// them would run what somebody wrote into the file.
+/// If it holds anything else: a view, a trigger, a virtual table, a further index or a computed column. Reading these would run
+/// code from the file.
 pub(super) fn plain_tables(
     connection: &Connection,
     file: &str,
@@ -274,9 +274,9 @@ pub(super) fn plain_tables(
     for row in rows {
         let (kind, name, sql) = row?;
         match (kind.as_str(), sql) {
-            // SQLite itself writes these words at the beginning, whatever stood there.
+            // SQLite normalises the beginning of the stored text to these words.
             ("table", Some(sql)) if sql.starts_with("CREATE TABLE ") => {}
-            // What a key needs has no text.
+            // The index of a key has no text.
             ("index", None) => continue,
             _ => return Err(strange(&name)),
         }
@@ -466,7 +466,7 @@ mod tests {
         assert_eq!(rows(&hiding), [3, 4, 3]);
         LAYOUT.hide(&hiding, &damaged).unwrap();
         assert_eq!(rows(&hiding), [2, 2, 2]);
-        // Nobody else sees it so.
+        // Other connections see all rows.
         let (deleting, damaged) = LAYOUT.open_damaged(&path, OWN, SETTINGS).unwrap();
         assert_eq!(rows(&deleting), [3, 4, 3]);
         damaged.iter().for_each(|&number| LAYOUT.delete(&deleting, number).unwrap());

@@ -86,7 +86,7 @@ impl RunSettings {
         }
     }
 
-    /// The same, with an external driving system that is not started, because nothing is to be played.
+    /// These settings with an external driving system that is not started, because nothing is to be played.
     pub fn unstarted(mut self) -> RunSettings {
         self.external.iter_mut().for_each(|attached| attached.is_recorded = true);
         self

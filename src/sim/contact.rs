@@ -1,9 +1,8 @@
 //! Contacts of the ego vehicle with obstacles, and what they do to it.
 //!
 //! Outlines are swept from tick to tick, so nothing passes through anything. The impact is plastic and acts across
-//! the gap that closed, as among obstacles (`incident`): what `oracle::severity` says of a contact is what the
-//! bodies then do, as far as a car can do it. Neither is pushed backwards or sideways or turned, and a person who was
-//! hit stays where it was.
+//! the gap that closed, as among obstacles (`incident`), so the bodies change their velocities as `oracle::severity` says,
+//! as far as a car can: no body is pushed backwards or sideways or turned, and a person that was hit stays in place.
 
 use crate::geometry::{Sweep, Vec2, first_contact};
 use crate::model::vocabulary::Priority;

@@ -90,7 +90,7 @@ pub(super) fn impact(normal: Vec2, first: (f64, Vec2), second: (f64, Vec2)) -> (
     exchange(normal, closing_mps, first, second)
 }
 
-/// As [`impact`], where the gap closes at a given speed: that of the points that meet, if bodies turn.
+/// As [`impact`], with the speed at which the gap closes. If bodies turn, that is the speed of the points that meet.
 pub(super) fn exchange(
     normal: Vec2,
     closing_mps: f64,

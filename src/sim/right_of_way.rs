@@ -26,11 +26,12 @@
 //! pedestrian may not step onto the road without regard to distance and speed of what comes (20.6), and a
 //! driver must not endanger pedestrians and be able to stop for what can be foreseen (21.1, 13.1). So the ego
 //! vehicle has priority only over one that steps onto the carriageway too late for its brakes, and otherwise
-//! neither has. It loses that priority once it could have stopped for the pedestrian in its view after all, and it
-//! has none at walking pace: who drives so slowly can stop for anybody.
+//! neither has. It loses that priority once it sees the pedestrian and could still stop, and it
+//! has none at walking pace, from which a driver can stop for any pedestrian.
 //!
-//! Of two that come towards each other outside junctions, the one that is beyond the middle of the road has to give
-//! way (articles 10.3 and 12), with whatever part of its body: a bus whose rear swings over the line, too. If both are, neither has priority.
+//! If two vehicles come towards each other outside junctions, the one beyond the middle of the road has to give way
+//! (articles 10.3 and 12). Any part of its body counts, such as the rear of a bus that swings over the line. If both are
+//! beyond it, neither has priority.
 //!
 //! The state is kept for each road user ([`Rights`]), looked at ten times a second, and read at a contact.
 
@@ -185,7 +186,7 @@ pub(super) struct Rights {
     meeting: Option<Meeting>,
     /// Who has priority, it as a wreck in the ego vehicle's way or the ego vehicle; `None` as long as it is neither.
     wreck: Option<Priority>,
-    /// Whether it has stood in the ego vehicle's view while that could brake gently for it, and stands since.
+    /// Whether it has stood since a moment at which the ego vehicle saw it and could brake gently for it.
     is_foreseen: bool,
     /// Where a pedestrian was last looked for on the carriageway, and whether it was there: most stand and wait.
     on_road: Option<(Vec2, bool)>,
@@ -220,7 +221,7 @@ impl Rights {
         self.passed = PassedLight::between(&way.stop_lines, from_m, to_m, colour).or(self.passed);
     }
 
-    /// Looks whether one of the two came into the other's way; ten times a second. `in_sight` says whether the ego
+    /// Notes if one of the two came into the other's way; called ten times a second. `in_sight` says whether the ego
     /// vehicle sees the road user.
     pub fn watch(
         &mut self,
@@ -261,7 +262,7 @@ impl Rights {
         self.wreck.unwrap_or(if stands { Priority::Other } else { Priority::None })
     }
 
-    /// Who had priority, now that the two touch at `point`.
+    /// Which of the two had priority, when they touch at `point`.
     pub fn at_contact(&self, this: &Obstacle, motion: &Motion, point: Vec2, around: &Around) -> Priority {
         let holds = |meeting: &&Meeting| (around.tick - meeting.tick) as f64 * DT_S <= HOLDS_S;
         let found = self.meeting.as_ref().filter(holds).map(|meeting| meeting.priority);
@@ -279,7 +280,7 @@ impl Rights {
                 (found.unwrap_or_else(by_time), around.ego.speed_mps <= WALKING_MPS)
             }
         };
-        // Whoever drives must be able to stop for what can be foreseen (13.1), so the other need not have priority.
+        // A driver must be able to stop for anything that can be foreseen (13.1), so then neither has priority.
         if could_stop && priority == Priority::Ego { Priority::None } else { priority }
     }
 
@@ -354,7 +355,7 @@ impl Rights {
         if shares {
             let known = self.meeting.filter(|_| self.shares == Some(true)).map(|meeting| meeting.priority);
             let priority = match known {
-                // It came too late, and yet the ego vehicle can now stop for it: it is no surprise any more.
+                // The pedestrian came too late, but now the ego vehicle sees it and can stop, so it is no surprise any more.
                 Some(Priority::Ego) if in_sight && strip.leaves_room(around) => Priority::None,
                 Some(known) => known,
                 None => on_foot(&strip, around),
@@ -585,7 +586,7 @@ impl Side {
         // Half of the smallest body's width.
         let is_in_line = self.aside_m < -0.5;
         if self.is_oncoming() {
-            // Where no side of the road tells, as in a junction, the other keeps to its way unless it changes lanes.
+            // Where the middle of the road does not decide, as in a junction, the other has priority unless it changes lanes.
             let by_lane = || if other_changes { Priority::Ego } else { Priority::Other };
             return beyond_middle().unwrap_or_else(by_lane);
         }
@@ -597,8 +598,8 @@ impl Side {
     }
 }
 
-/// Who has priority because the other is beyond the middle of the road, where lanes run against its heading alone: with a
-/// corner, or else `at` the point where the two touch. Neither has if both are there; `None` if none of them is.
+/// Which of the two has priority because the other is beyond the middle of the road: with any corner, or otherwise at the
+/// point `at` where they touch. Neither has if both are beyond it; `None` if neither of them is.
 fn beyond_middle(this: &Obstacle, around: &Around, at: Option<Vec2>) -> Option<Priority> {
     let map = &around.scene.map;
     let told = |ego: bool, other: bool| match (ego, other) {

@@ -236,10 +236,10 @@ impl Mover {
         }
     }
 
-    /// Its motion of a tick, as far as it can hit anything.
+    /// The area that it sweeps within a tick.
     pub fn sweep(&self, mut start: OrientedBox, end: Pose) -> Sweep {
         if let Motion::Walk(_) = self.motion {
-            // A person who turns round does so on the spot: no elbow sweeps half a circle within a tick.
+            // A person turns round on the spot, so the corners of its box must not sweep half a circle within a tick.
             start.pose.heading_rad = end.heading_rad;
         }
         Sweep { start, end }

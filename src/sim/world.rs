@@ -62,8 +62,8 @@ const QUEUE_M: f64 = 40.0;
 /// A queue before a light is at most this long, m: seven cars.
 const LIGHT_QUEUE_M: f64 = 50.0;
 
-/// An ego vehicle this far from its way is looked for on all lanes of the map, and has left the map if it is as far from
-/// each of them, m. What went astray beside a street is nearer.
+/// An ego vehicle farther than this from its way and from every lane of the map has left the map, m. One that went astray beside
+/// a street is nearer.
 const OFF_MAP_M: f64 = 20.0;
 
 /// Added to the way of two bodies before they are taken to be too far apart to touch, m: far more than rounding.
@@ -578,7 +578,7 @@ impl World {
             } else {
                 mover.rights.at_contact(obstacle, &mover.motion, contact.point, &around)
             };
-            // Impacts chain: of two in a tick, the second acts on the speed that the first left.
+            // If two impacts happen in one tick, the second acts on the speed that is left after the first.
             let now_mps = self.ego.velocity_mps();
             let lost_mps = (ego.velocity_mps - now_mps).dot(&normal);
             let closing_mps = (contact.closing_speed_mps - lost_mps).max(0.0);

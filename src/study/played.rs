@@ -1,8 +1,8 @@
 //! A study as it was played, in short: its settings, and of each cell the measures. A study's directory holds every
 //! episode; this is what is kept of it beside the study's file, as text that can be committed.
 //!
-//! The text is JSON Lines: what it is, and then a cell a line, so that a study that is played on adds lines. The last line is
-//! the seal, a digest of all lines before it, by which an edited figure is noticed.
+//! The text is JSON Lines: a line about the study, and then one for each cell, so that a study that is played on adds lines.
+//! The last line is the seal, a digest of all lines before it, by which an edited figure is noticed.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -64,11 +64,11 @@ struct Seal {
     seal: String,
 }
 
-/// What to do about a text whose seal does not fit.
+/// Advice for a text whose seal does not fit.
 const UNSEALED: &str =
     "get it back as it was, or remove it and add its study again with `avastra results --add DIR`";
 
-/// The lines before the seal, if it is theirs.
+/// The lines before the seal, if the seal fits them.
 fn unsealed(text: &str) -> Result<&str, String> {
     let last = text.strip_suffix('\n').unwrap_or(text).rfind('\n').map_or(0, |end| end + 1);
     let (lines, last) = text.split_at(last);

@@ -36,7 +36,7 @@ impl Study {
                 attached = run.attached();
             }
         }
-        // The jobs, and whoever goes on with the study, must meet the same one. One that was not started says nothing new.
+        // The jobs, and a later `--resume`, must meet the same driving system. One that was not started has no identity to add.
         if study.settings.external.as_ref().is_none_or(|external| !external.is_recorded) {
             study.settings.external = attached;
         }

@@ -234,7 +234,7 @@ impl StudySettings {
         self
     }
 
-    /// The same, with an external driving system that is not started, because nothing is to be played.
+    /// These settings with an external driving system that is not started, because nothing is to be played.
     pub fn unstarted(mut self) -> StudySettings {
         self.external.iter_mut().for_each(|attached| attached.is_recorded = true);
         self

@@ -10,6 +10,7 @@ use annotate_snippets::{Annotation, AnnotationKind, Group, Level, Origin, Render
 use serde::Serialize;
 
 use crate::syntax::ast::{FileId, Span};
+use crate::syntax::scan::is_bidi;
 
 /// How severe a diagnostic is. Errors stop a compilation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -143,7 +144,7 @@ pub struct Sources {
 struct Source {
     name: String,
     text: String,
-    /// First byte of each line: a long file with many mistakes is not counted through for each of them.
+    /// First byte of each line, so that lines need not be counted anew for each of many mistakes.
     line_starts: Vec<usize>,
 }
 
@@ -193,24 +194,24 @@ pub enum Style {
 /// Width at which long source lines are cut, in characters.
 const WIDTH: usize = 140;
 
-/// A text as a terminal may be given it: a control character that a file, a name or a driving system brought is written as its
-/// number (`\u{1b}`), and so are the signs that turn the direction of writing. Ends of lines and tabs stay.
+/// Whether a terminal may obey a character: a control character other than a line feed or a tab, or a sign that turns the
+/// direction of writing.
+pub(crate) fn acts_on_terminal(character: char) -> bool {
+    !matches!(character, '\n' | '\t') && (character.is_control() || is_bidi(character))
+}
+
+/// A text as it may be written to a terminal: characters that would act on it are written as their numbers (`\u{1b}`).
 pub fn visible(text: &str) -> Cow<'_, str> {
-    let acts = |c: char| match c {
-        '\n' | '\t' => false,
-        '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => true,
-        c => c.is_control(),
-    };
-    if !text.contains(acts) {
+    if !text.contains(acts_on_terminal) {
         return Cow::Borrowed(text);
     }
     let mut shown = String::with_capacity(text.len() + 16);
     let mut rest = text.chars().peekable();
     while let Some(c) = rest.next() {
         match c {
-            // The end of a line as Windows has it.
+            // Windows ends lines so.
             '\r' if rest.peek() == Some(&'\n') => shown.push(c),
-            c if acts(c) => shown.extend(c.escape_unicode()),
+            c if acts_on_terminal(c) => shown.extend(c.escape_unicode()),
             c => shown.push(c),
         }
     }
@@ -245,7 +246,7 @@ pub fn render(diagnostic: &Diagnostic, sources: &Sources, style: Style) -> Strin
         Style::Plain => Renderer::plain(),
     };
     let drawn = renderer.term_width(WIDTH).render(&[group]);
-    // In source lines the renderer leaves the control characters of Latin-1, which some terminals obey.
+    // The renderer does not replace the control characters of Latin-1 in source lines, and some terminals obey them.
     drawn.replace(|c: char| ('\u{80}'..='\u{9f}').contains(&c), "\u{fffd}")
 }
 
@@ -260,14 +261,14 @@ fn files_in_order(diagnostic: &Diagnostic) -> Vec<FileId> {
     files
 }
 
-/// Longer pieces of a text are not drawn, bytes: drawing takes time in proportion to them, for each diagnostic.
+/// Longest piece of a text that is drawn, bytes: drawing takes time in proportion to it, for each diagnostic.
 const DRAWN_MAX: usize = 20_000;
 
 /// Most labels that are drawn of one diagnostic in one file.
 const LABELS_MAX: usize = 40;
 
-/// The labels of a diagnostic in one file, those together that are near one another: with the mistake first, then in
-/// the order of the text.
+/// The labels of a diagnostic in one file, grouped by nearness. The group of the mistake comes first, the others in the order
+/// of the text.
 fn pieces(diagnostic: &Diagnostic, file: FileId) -> Vec<Vec<&Label>> {
     let of_file = diagnostic.labels.iter().filter(|label| label.span.file == file);
     let mut labels: Vec<&Label> = of_file.take(LABELS_MAX).collect();
@@ -276,7 +277,7 @@ fn pieces(diagnostic: &Diagnostic, file: FileId) -> Vec<Vec<&Label>> {
     else {
         return Vec::new();
     };
-    // Nearly always all are near, and are drawn in the order in which they were given.
+    // Nearly always all are near each other. They are drawn in the order in which they were given.
     if last.saturating_sub(first) <= DRAWN_MAX {
         return vec![labels];
     }
@@ -294,7 +295,7 @@ fn pieces(diagnostic: &Diagnostic, file: FileId) -> Vec<Vec<&Label>> {
     pieces
 }
 
-/// A file, with the place in it that is not drawn.
+/// The name of a file with the line and column of a place that is not drawn.
 fn origin<'a>(labels: &[&Label], sources: &'a Sources, file: FileId) -> Origin<'a> {
     let origin = Origin::path(visible(sources.name(file)));
     match labels.first() {

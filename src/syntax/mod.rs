@@ -30,14 +30,13 @@ mod yaml;
 pub use diagnostic::{
     Diagnostic, Edit, Fix, Label, Severity, Sources, Style, listed, nearest, render, visible,
 };
-pub(crate) use diagnostic::{enumerated, one_of};
+pub(crate) use diagnostic::{acts_on_terminal, enumerated, one_of};
 pub use format::{FormatError, format, same_meaning};
 pub use parse::{DEPTH_MAX, LANGUAGE, OPERATORS_MAX, TOKENS_MAX, parse, parse_fields};
 pub use print::{print, print_expr, print_item};
 pub use record::{
     DiagnosticRecord, EditRecord, FixRecord, LabelRecord, PlaceRecord, SCHEMA, apply_fixes, record,
 };
-pub(crate) use scan::is_bidi;
 
 pub use yaml::{settings_mistake, yaml_mistake};
 

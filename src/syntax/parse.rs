@@ -23,7 +23,7 @@ pub const DEPTH_MAX: usize = 64;
 /// Most operators in one another, those around brackets included. Trees are walked by recursion.
 pub const OPERATORS_MAX: usize = 128;
 
-/// Most words and signs of a file. The grammar needs some 250 bytes for each.
+/// Most words and signs of a file. The parser needs some 250 bytes of memory for each.
 pub const TOKENS_MAX: usize = 400_000;
 
 /// The version of the language that this compiler reads.

@@ -1,9 +1,9 @@
 //! One pass over a text before the grammar sees it: comments, brackets, and characters that the
 //! language does not have.
 //!
-//! The grammar recurses only through brackets and through what stands between `match` and its `{`. The depth of
-//! both, which is measured here, bounds its stack whatever the input; the number of words and signs, which is
-//! counted here, bounds its memory. Texts and comments are skipped by the same rules as in `ava.pest`.
+//! The grammar recurses only through brackets and through the subject between `match` and its `{`. The depth of
+//! both is measured here, and bounds its stack whatever the input; the number of words and signs is counted here,
+//! and bounds its memory. Texts and comments are skipped by the same rules as in `ava.pest`.
 
 use crate::syntax::ast::{FileId, Span};
 use crate::syntax::{DEPTH_MAX, Diagnostic, TOKENS_MAX, code};
@@ -78,7 +78,7 @@ struct Scanner<'a> {
     tokens: usize,
     /// `match`es whose `{` is still to come.
     open_matches: usize,
-    /// Whether an expression may end with the last word or sign.
+    /// Whether the last word or sign may end an expression.
     after_operand: bool,
     found: Scan,
 }
@@ -117,7 +117,7 @@ impl Scanner<'_> {
             }
             '(' | '[' | '{' => {
                 self.at += 1;
-                // After an operand this is the `{` of a `match`; elsewhere it begins a record.
+                // After an operand, `{` belongs to a `match`; elsewhere it begins a record.
                 if next == '{' && self.after_operand {
                     self.open_matches = self.open_matches.saturating_sub(1);
                 }
@@ -150,14 +150,14 @@ impl Scanner<'_> {
         self.after_operand = !matches!(word, "and" | "or" | "not" | "in" | "implies" | "match" | "where");
         match word {
             "match" => self.opens_match(self.span(start)),
-            // No expression goes on behind a word that begins a declaration.
+            // A word that begins a declaration ends every expression.
             "language" | "use" | "enum" | "odds" | "state" | "let" | "fn" | "action" | "group"
             | "optional" | "rule" | "verdict" | "scenario" | "policy" | "override" => self.open_matches = 0,
             _ => {}
         }
     }
 
-    /// Counts a `match`: the next one may stand in its subject, where nothing needs a bracket.
+    /// Counts a `match`. Its subject may hold the next `match` without any bracket.
     fn opens_match(&mut self, span: Span) {
         self.open_matches += 1;
         if self.open_matches > DEPTH_MAX && !self.found.is_too_large {

@@ -138,7 +138,7 @@ fn the_depth_of_matches_is_bounded() {
     // One after the other, or in an arm, is not one in the subject of another.
     let apart = "let a = match true { true => 1, false => 2 }\n".repeat(2 * DEPTH_MAX);
     assert!(codes(&format!("language 1\n{apart}")).is_empty());
-    // What begins a record is no `{` of a `match`.
+    // A `{` that begins a record does not belong to a `match`.
     let records = format!("language 1\nlet a = {}1\n", "match {} + ".repeat(10_000));
     assert_eq!(codes(&records), ["AV0003:2"]);
 }

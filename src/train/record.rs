@@ -1,4 +1,4 @@
-//! A training in the run database: learning curves, checkpoints to go on from, and what came of it.
+//! A training in the run database: learning curves, checkpoints to resume from, and its results.
 //!
 //! A checkpoint and the episodes up to it are committed together. Episodes after the last checkpoint are deleted
 //! when a training is resumed, and played again to the same bytes.
@@ -57,7 +57,7 @@ impl Database {
         Ok(())
     }
 
-    /// Keeps what came of a finished training, as JSON, in place of what was kept before.
+    /// Keeps the results of a finished training, as JSON, in place of earlier ones.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -67,7 +67,7 @@ impl Database {
         Ok(())
     }
 
-    /// What came of a training, as JSON, if it is finished.
+    /// The results of a training, as JSON, if it is finished.
     ///
     /// # Errors
     /// If the file cannot be read, or the results were changed.

@@ -60,7 +60,7 @@ pub(super) fn verdict(scene: &Scene, request: &SpawnRequest, seen: &Sighting) ->
             if request.speed_mps == 0.0 && way_m > 0.0 && seen.ending != Ending::TouchedEgo {
                 return Err("it does not stand".to_owned());
             }
-            // What crawls has done enough after half of its way.
+            // A vehicle that crawls need only do half of the way that its speed allows.
             if way_m < MOVES_M.min(request.speed_mps * HORIZON_S / 2.0) {
                 return Err(ended(seen, "it had moved"));
             }
@@ -212,8 +212,8 @@ fn stands(seen: &Sighting) -> Result<(), String> {
     if stands && on_route { Ok(()) } else { Err("it does not stand on the route".to_owned()) }
 }
 
-/// Whether it changed its lane as often as asked, the last time after frame `after`; one that keeps its lane, no more
-/// often than it may.
+/// Checks that it changed its lane at least as often as asked, the last time after frame `after`, and at most `at_most` times
+/// if it is to keep its lane.
 fn changes(
     map: &RoadMap,
     request: &SpawnRequest,

@@ -61,7 +61,7 @@ impl Scenes {
 /// Adds an error for each claim that a row runs for which no place is found; then the space is not sound.
 pub fn judge_claims(loaded: &mut Loaded, scenes: &mut Scenes) {
     let Some(space) = loaded.space.clone().filter(|_| !loaded.runs.claims.is_empty()) else { return };
-    // One search for all claims: there may be many about the same rows.
+    // One search serves all claims, because many may be about the same rows.
     let claimed: BTreeSet<usize> = loaded.runs.claims.iter().flat_map(|claim| &claim.rows).copied().collect();
     let claimed: Vec<usize> = claimed.into_iter().collect();
     let all = without_place(&space, &loaded.runs, &claimed, scenes);
@@ -154,7 +154,7 @@ impl Lost<'_> {
         false
     }
 
-    /// Lanes of the map beside the route that are left out, if the row asks for a lane that is not there.
+    /// The lanes beside the route that the map has and no car drives on, in words, if the row asks for a lane that is missing.
     fn left_out(&self) -> Option<String> {
         let mut found = BTreeSet::new();
         for (road, counts) in &self.refusals {

@@ -7,8 +7,9 @@ looked at, not only over those that vanish when the planted module is mended.
 - Each fault of `scenarios/ads/faults/`, and each pair of faults of two modules, among decoys: small changes in all other
   modules, so that the cause is not simply what differs from the default. Right is a planted module.
 
-Played are the shipped space and those of `tests/cases/faults`, in which crashes count whether they can be avoided or not. Of a
-fault SINGLE crashes are looked at, of a pair PAIRED. Takes some 20 minutes of processor time; ends with status 1 if a mark is missed.
+The shipped space is played, and those of `tests/cases/faults`, in which crashes count whether they can be avoided or not. SINGLE
+crashes of each fault are diagnosed, and PAIRED of each pair. Takes some 20 minutes of processor time; ends with status 1 if a mark
+is missed.
 """
 
 import itertools
@@ -27,7 +28,7 @@ SEED = sys.argv[3] if len(sys.argv) > 3 else "1"
 MODULES = ["localization", "perception", "tracking", "prediction", "planning", "latency", "control", "emergency"]
 SHIPPED = "scenarios/avastra45.ava"
 OWN = [f"tests/cases/faults/{name}.ava" for name in ("leader", "oncoming", "step_out")]
-# Crashes that are looked at, and episodes on each road of the shipped space and of the others.
+# Crashes that are diagnosed, and episodes on each road: of the shipped space, and of the others.
 SINGLE, SINGLE_EPISODES = 6, (10, 20)
 PAIRED, PAIRED_EPISODES = 1, (2, 4)
 # The marks: the share that is right where a module is named, and how many modules are blamed that are as in the default.
@@ -45,7 +46,7 @@ DECOYS = {
 
 
 def settings(path):
-    """What a fault's file sets: nested keys, each with a value or with keys of its own, as indented."""
+    """The settings in a fault's file: nested keys by indentation, each with a value or with keys of its own."""
     found, open_keys = {}, []
     for line in path.read_text().splitlines():
         if not line.strip() or line.strip().startswith("#"):
@@ -116,7 +117,7 @@ def as_default(diagnosis):
 
 
 def planted(faults, counts, looked_at):
-    """Diagnoses the first crashes of a profile with these faults: of each space in turn."""
+    """Diagnoses the first crashes of a profile with these faults, one of each space in turn."""
     name = "+".join(faults)
     config = profile(name, faults)
     spaces = [(SHIPPED, counts[0]), *((space, counts[1]) for space in OWN)]
@@ -136,7 +137,7 @@ def share_text(right, named):
 
 
 def verdicts_text(found):
-    counts = Counter(diagnosis.get("verdict", "?") for diagnosis in found)
+    counts = Counter(diagnosis["verdict"] for diagnosis in found)
     return ", ".join(f"{verdict} {count}" for verdict, count in counts.most_common())
 
 
@@ -149,7 +150,7 @@ found = diagnoses(crashes(ROOT / "scenarios/ads/degraded.yaml", "degraded", SHIP
 causes = Counter(" and ".join(diagnosis["cause"]) or "none" for diagnosis in found)
 for cause, count in causes.most_common():
     print(f"{count:6}  {cause}")
-blamed += [(f"degraded.yaml: {module}") for diagnosis in found for module in as_default(diagnosis)]
+blamed += [f"degraded.yaml: {module}" for diagnosis in found for module in as_default(diagnosis)]
 own = [diagnosis for diagnosis in found if diagnosis["cause"]]
 own_right = sum(not as_default(diagnosis) for diagnosis in own)
 right, named = right + own_right, named + len(own)
@@ -163,7 +164,7 @@ for fault in FAULTS:
         cause = " and ".join(diagnosis["cause"])
         matrix[module_of(fault), cause if cause in MODULES else "pair" if cause else "none"] += 1
         if cause and diagnosis["cause"] != [module_of(fault)]:
-            wrong.append(f"{fault}: {cause} ({diagnosis.get('verdict', '?')})")
+            wrong.append(f"{fault}: {cause} ({diagnosis['verdict']})")
         blamed += [f"{fault}: {module}" for module in as_default(diagnosis)]
     singles += found
 columns = [*MODULES, "pair", "none"]
@@ -189,7 +190,7 @@ for first, second in itertools.combinations(FAULTS, 2):
             kind = "none"
         elif not set(cause) <= set(both):
             kind = "another"
-            wrong.append(f"{first}+{second}: {' and '.join(cause)} ({diagnosis.get('verdict', '?')})")
+            wrong.append(f"{first}+{second}: {' and '.join(cause)} ({diagnosis['verdict']})")
         else:
             kind = "both" if len(cause) == 2 else "one"
         # Data flows in the order of the modules.

@@ -41,7 +41,9 @@ fn every_code_is_provoked_and_every_error_twice() {
         }
     }
     let mut missing = Vec::new();
-    for page in PAGES {
+    // What is too long or too much would make long cases: `hostile` has them.
+    let of_size = ["AV0013", "AV0113"];
+    for page in PAGES.iter().filter(|page| !of_size.contains(&page.code)) {
         let wanted = match severities.get(page.code) {
             Some(Severity::Error) | None => 2,
             Some(Severity::Warning | Severity::Note) => 1,

@@ -151,7 +151,7 @@ fn a_run_that_was_edited_is_not_gone_on_with() {
     let (status, stderr) = resume("study", &out);
     assert!(status == 1 && stderr.contains("holds a run"), "{stderr}");
 
-    // What was changed in an episode is told, counts for nothing, and is played again.
+    // An episode whose rows were changed is named, counts for nothing, and is played again.
     let bytes = std::fs::read(scratch.path("run/run.db")).expect("it is readable");
     let database = rusqlite::Connection::open(scratch.path("run/run.db")).expect("it is a database");
     let change = "UPDATE step SET proc = 0.5 WHERE episode = 1 AND step = 0;
@@ -171,7 +171,7 @@ fn a_run_that_was_edited_is_not_gone_on_with() {
     let (status, _, stderr) = outcome(&mut avastra(&["merge", &out, "--missing"]));
     assert!(status == 0 && stderr.contains("its rows of episode 1 were changed"), "{stderr}");
     let (status, stderr) = resume("run", &out);
-    let again = format!("{changed}: what they were of is played again");
+    let again = format!("{changed}: each such episode is played again");
     assert!(status == 0 && stderr.contains(&again), "{stderr}");
     assert!(std::fs::read(scratch.path("run/run.db")).expect("it is readable") == bytes);
     let (status, stderr) = resume("run", &out);

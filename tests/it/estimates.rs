@@ -73,7 +73,7 @@ fn an_estimate_depends_on_its_settings_alone() {
     only_its_database_counts(scratch.path(), &files);
 }
 
-/// The pages, the merges and the scenarios of an estimate follow from its database, whatever became of its other files.
+/// The pages, merges and scenarios of an estimate follow from its database, even if its other files are edited or gone.
 fn only_its_database_counts(scratch: &Path, files: &[PathBuf]) {
     let directory = scratch.join("probe");
     let text = |path: &Path| std::fs::read_to_string(path).expect("it is readable");

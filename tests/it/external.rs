@@ -95,7 +95,7 @@ fn every_misbehaviour_is_a_finding_and_leaves_nothing_behind() {
         let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &scenario]));
         assert_eq!(status, 0, "{how}: {stdout}{stderr}");
         if how == "crash-at-reset" {
-            // Before the first step there is a scenario, too, for the day on which the crash is gone.
+            // A failure before the first step leaves a scenario, too, which passes once the crash is mended.
             let well = profile(&folder, &[], "1", "");
             let (status, stdout, stderr) = outcome(&mut avastra(&["test", &scenario, "--ads-config", &well]));
             assert!(status == 0 && stdout.contains("1 fixed"), "{stdout}{stderr}");
@@ -114,7 +114,7 @@ fn what_cannot_be_reached_any_more_is_given_up() {
     let more = ["--episodes", "8", "--jobs", "1", "--format", "json"];
     let (status, stdout, stderr) = outcome(&mut avastra(&[&begin[..], &more].concat()));
     let result = last_line(&stdout);
-    // One crash on the way, and three starts in vain: the rest is left for the day on which it starts again.
+    // One crash on the way and three failed starts: the other episodes are left for `--resume`.
     assert_eq!((status, &result["totals"]["episodes"]), (5, &4.into()), "{stderr}{result}");
     assert!(result["error"].as_str().is_some_and(|error| error.contains("--resume")), "{result}");
     let failures = result["failures"].as_array().expect("a list");

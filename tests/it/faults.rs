@@ -10,6 +10,7 @@ use avastra::oracle::{Diagnosis, Fate, Verdict};
 use avastra::run::{Profile, Run, RunSettings};
 
 use crate::cases::root;
+use crate::profiles::profile;
 use crate::world::{read, run_of};
 
 /// Episodes on each road.
@@ -95,8 +96,7 @@ fn the_module_at_fault_is_named() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// A module that is as in the baseline is not blamed for what differs from it; and if nothing differs, the verdict
-/// still follows from the table.
+/// A module that is as in the baseline is never blamed, and the verdict follows from the table, also if no module differs.
 #[test]
 fn what_is_as_in_the_baseline_is_not_blamed() {
     let degraded = profile("scenarios/ads/degraded.yaml");
@@ -171,12 +171,6 @@ fn crash(run: &Run, number: usize, module: Module) -> Option<(usize, EpisodeLog,
 /// A shipped fault.
 fn fault(name: &str) -> ModularConfig {
     profile(&format!("scenarios/ads/faults/{name}.yaml"))
-}
-
-/// A shipped profile.
-fn profile(name: &str) -> ModularConfig {
-    let text = std::fs::read_to_string(root().join(name)).expect("it is shipped");
-    ModularConfig::from_yaml(&text).expect("it is a profile")
 }
 
 /// The module that the name of a fault begins with.

@@ -16,6 +16,7 @@ use avastra::rng::{Rng, Stream};
 use avastra::road::RoadMap;
 
 use crate::cases::{cases, root};
+use crate::scaling_maps::constructs::CONSTRUCTS;
 
 /// Limits on processor time (s) and memory (MB) for a text of 64 KB. The aim is 1 s, which `fuzz/run.sh` checks
 /// with an optimised build. The limit here only catches what grows without bound, on any build and a busy
@@ -150,7 +151,7 @@ enum Fate {
     Either,
 }
 
-/// Texts that once took minutes or gigabytes, most of them small: each is refused with a code or read, soon.
+/// Texts that once took minutes or gigabytes, most of them small: each is soon read, or refused with a code.
 #[test]
 fn texts_that_cost_much_are_refused_or_read() {
     use Fate::{Either, Refused, Sound};
@@ -215,11 +216,11 @@ const SCALED_MB_MAX: f64 = 500.0;
 const SIZES: [usize; 5] = [10, 100, 1_000, 10_000, 100_000];
 const SCALED_BYTES_MAX: usize = 4_000_000;
 
-/// What the program is asked to do with a text.
+/// The commands that are run on a text.
 const VERBS: [&str; 4] = ["check", "doc", "compile", "lsp"];
 
-/// Every construct of the grammar ten, a hundred, … times, and then as often as chance says: which of them take over a
-/// second of a processor or over 500 MB. Meant for an optimised build; each run of the program has a limit of ten seconds.
+/// Every construct of the grammar and of maps ten, a hundred, … times, and then as often as chance says: which of them take
+/// over a second of a processor or over 500 MB. Meant for an optimised build; each run of the program has a limit of time.
 ///
 /// `FUZZ_S=1800 FUZZ_SEED=1 cargo test --release --test it -- --ignored --nocapture each_construct_scales`
 #[test]
@@ -230,15 +231,16 @@ fn each_construct_scales() {
         std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
     };
     let (seconds, seed) = (number("FUZZ_S", 60) as f64, number("FUZZ_SEED", 1));
-    let of_grammar =
-        scale::GRAMMAR.iter().flat_map(|construct| VERBS.into_iter().map(move |verb| (construct, verb)));
-    let of_maps = scale::MAPS.iter().map(|construct| (construct, "road"));
-    let all: Vec<(&scale::Construct, &str)> = of_grammar.chain(of_maps).collect();
+    let of_grammar = scale::GRAMMAR.iter().flat_map(|&scale::Construct { name, text }| {
+        VERBS.into_iter().map(move |verb| Large { name, text, verb })
+    });
+    let of_maps = CONSTRUCTS.iter().map(|&(name, text, _)| Large { name, text, verb: "road" });
+    let all: Vec<Large> = of_grammar.chain(of_maps).collect();
     let mut measured = Measured { scratch: Scratch::new(), runs: 0, spent_s: 0.0, dear: Vec::new() };
-    for (construct, verb) in &all {
+    for large in &all {
         for size in SIZES {
-            // What is dear at one size is dearer at the next.
-            if measured.spent_s > seconds || !measured.is_cheap(construct, verb, size) {
+            // At the next size it would be dearer still, or longer.
+            if measured.spent_s > seconds || !measured.may_be_larger(large, size) {
                 break;
             }
         }
@@ -248,16 +250,25 @@ fn each_construct_scales() {
             break;
         }
         let mut random = rng::stream(seed, Stream::Exploration, nth);
-        let (construct, verb) = all[rng::below(&mut random, all.len() as u32) as usize];
-        let size = 10_usize.pow(rng::below(&mut random, 6)) * (1 + rng::below(&mut random, 9) as usize);
-        measured.is_cheap(construct, verb, size);
+        let large = &all[rng::below(&mut random, all.len() as u32) as usize];
+        // An element of a map has a hundred times the bytes of a word.
+        let powers = if large.verb == "road" { 4 } else { 6 };
+        let size = 10_usize.pow(rng::below(&mut random, powers)) * (1 + rng::below(&mut random, 9) as usize);
+        measured.may_be_larger(large, size);
     }
     let Measured { runs, spent_s, dear, .. } = measured;
     println!("{runs} runs, {spent_s:.0} s");
     assert!(dear.is_empty(), "{}", dear.join("\n"));
 }
 
-/// What runs of the program took.
+/// A construct, and what the program is asked to do with texts that are large in it.
+struct Large {
+    name: &'static str,
+    text: fn(usize) -> String,
+    verb: &'static str,
+}
+
+/// The cost of the runs so far.
 struct Measured {
     scratch: Scratch,
     runs: usize,
@@ -267,12 +278,14 @@ struct Measured {
 }
 
 impl Measured {
-    /// Whether a construct of that size is within the limits, or too long to be looked at.
-    fn is_cheap(&mut self, construct: &scale::Construct, verb: &str, size: usize) -> bool {
-        let text = (construct.text)(size);
+    /// Runs the program on a construct of that size; whether it was within the limits, and the text was not too long.
+    fn may_be_larger(&mut self, large: &Large, size: usize) -> bool {
+        let Large { name, text, verb } = large;
+        let text = text(size);
         if text.len() > SCALED_BYTES_MAX {
+            // To make it took time, too.
             self.spent_s += 1e-3;
-            return true;
+            return false;
         }
         let came = self.scratch.run(verb, &text, CPU_S_MAX);
         self.runs += 1;
@@ -280,7 +293,7 @@ impl Measured {
         let ends_well = matches!(came.exit, Some(0..100));
         let is_cheap = ends_well && came.cpu_s <= 1.0 && came.peak_mb <= SCALED_MB_MAX;
         if !is_cheap {
-            let words = format!("{verb} {}, {size}, {} bytes: {}", construct.name, text.len(), came.words());
+            let words = format!("{verb} {name}, {size}, {} bytes: {}", text.len(), came.words());
             println!("{words}");
             self.dear.push(words);
         }
@@ -293,11 +306,11 @@ struct Scratch {
     folder: tempfile::TempDir,
 }
 
-/// What became of a run of the program.
+/// The end and the cost of a run of the program.
 struct Came {
     cpu_s: f64,
     peak_mb: f64,
-    /// `None`: a signal ended it.
+    /// `None` if a signal ended it.
     exit: Option<i32>,
     /// All that it printed.
     output: String,
@@ -368,7 +381,7 @@ impl Scratch {
     }
 }
 
-/// What an editor says that opens a text, asks for completions at its end, and leaves.
+/// The messages of an editor that opens a text, asks for completions at its end, and leaves.
 fn messages(path: &Path, text: &str) -> Vec<u8> {
     let uri = format!("file://{}", path.display());
     let document = serde_json::json!({ "uri": uri, "languageId": "avastra", "version": 1, "text": text });

@@ -57,7 +57,7 @@ fn every_file_becomes_a_scenario_or_is_refused_with_its_lines() {
     }
 }
 
-/// Whatever the kind of the export, it carries the scenario: with the trace of every bit, if the drive is claimed.
+/// Exports of every kind carry the scenario, and its claims if it has some.
 #[test]
 fn an_export_of_ours_comes_back_and_replays() {
     let crash = crash().display().to_string();
@@ -85,7 +85,7 @@ fn an_export_of_ours_comes_back_and_replays() {
     }
 }
 
-/// What a file says of its scenario is text from somewhere else: it reads no file but its map.
+/// The scenario in an exported file is not trusted: it cannot use another file than its map.
 #[test]
 fn an_export_that_was_tampered_with_uses_no_other_file() {
     let scratch = tempfile::tempdir().expect("a scratch directory");

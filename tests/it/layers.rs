@@ -87,7 +87,7 @@ fn cli_alone_touches_files_and_the_environment() {
         let is_test = path.components().any(|part| part.as_os_str().to_string_lossy().contains("test"));
         // Time limits of an external driving system are by the wall clock; in one place.
         let may_wait = path.ends_with("ads/external/link.rs") && text.matches("Instant::now").count() == 1;
-        // What is written, by `cli` and by databases, is written there.
+        // `cli` and databases write through this file.
         let may_write = path.ends_with("src/files.rs");
         for word in ["std::fs", "std::env::var", "Instant::now", "SystemTime"] {
             let may = (may_wait && word == "Instant::now") || (may_write && word == "std::fs");
@@ -96,7 +96,7 @@ fn cli_alone_touches_files_and_the_environment() {
     }
 }
 
-/// What makes, replaces, renames or removes files and folders.
+/// Calls that make, replace, rename or remove files and folders.
 const WRITING: [&str; 13] = [
     "File::create",
     "File::options",
@@ -113,7 +113,7 @@ const WRITING: [&str; 13] = [
     "Connection::open(",
 ];
 
-/// SQLite writes by itself. These look at the path first, or have it from `files`.
+/// SQLite writes by itself. These files check the path first, or have it from `files`.
 const WRITING_DATABASES: [&str; 2] = ["src/run/sealed.rs", "src/run/settled.rs"];
 
 #[test]

@@ -1,8 +1,8 @@
-//! Directories of others: whatever links and names they carry, no command touches what lies outside of them, and what is only
-//! looked at, planned or merged starts no program.
+//! Hostile directories: whatever links and names they hold, no command touches anything outside them, and no command that only
+//! looks, plans or merges starts a program.
 //!
-//! A home holds files of the user and the folder `clone`, which came from somebody else and is worked in. Each attack
-//! plants something in the clone, runs one command there, and compares all that lies beside the clone with what it was.
+//! A home holds files of the user and the folder `clone`, which came from elsewhere and in which commands run. Each attack
+//! plants something in the clone, runs one command there, and compares everything beside the clone with what it was.
 
 use std::collections::BTreeMap;
 use std::os::unix::fs::{PermissionsExt, symlink};
@@ -19,7 +19,7 @@ use crate::world::FLICKER;
 /// How a command must end.
 #[derive(Clone, Copy)]
 enum End {
-    /// With what it was asked for: a link is replaced, or does not matter.
+    /// With success: a link is replaced, or does not matter.
     Done,
     /// With an error that has these words.
     Refused(&'static str),
@@ -32,9 +32,9 @@ use End::{Any, Done, Refused};
 const LINK: &str = "it is a symbolic link";
 
 struct Attack {
-    /// Links in the clone, each with what it leads to in the home.
+    /// Links in the clone, each with its target in the home.
     links: &'static [(&'static str, &'static str)],
-    /// What else is changed before, in the clone.
+    /// A further change of the clone before the command.
     change: Option<fn(&Path)>,
     command: &'static [&'static str],
     end: End,
@@ -51,10 +51,10 @@ const fn linked(
 /// The scenario that the run of the fixture found first.
 const FOUND: &str = "run/critical/corner_0000.ava";
 
-/// In commands, `SPACE` and the like stand for files of the repository, `FOUND` for [`FOUND`], and `QUICK` for what makes a run
-/// quick, with a number of episodes after it.
+/// In commands, `SPACE` and the like stand for files of the repository, `FOUND` for [`FOUND`], and `QUICK` for options of a short
+/// run; the number of episodes follows.
 const ATTACKS: &[Attack] = &[
-    // Names of temporary files that lie about as links.
+    // Links with the names that temporary files once had.
     linked(&[("x.ava.partial", "mine.txt")], &["fmt", "x.ava"], Done),
     linked(&[("run/report.html.partial", "mine.txt")], &["report", "run"], Done),
     linked(&[("d.md.partial", "mine.txt")], &["doc", "SPACE", "-o", "d.md"], Done),
@@ -127,7 +127,7 @@ const ATTACKS: &[Attack] = &[
         &["run", "SPACE", "QUICK", "2", "--shard", "1/2", "--out", "begun"],
         Done,
     ),
-    // Databases that are links: to one of the user's, and to a place where one would be made.
+    // Databases that are links: to a database of the user, and to a place where one would be made.
     Attack {
         links: &[("run/run.db", "mine.db")],
         change: Some(own_database),
@@ -141,6 +141,8 @@ const ATTACKS: &[Attack] = &[
         end: Refused(LINK),
     },
     linked(&[("run/run.db", "nowhere")], &["run", "--resume", "run"], Any),
+    linked(&[("run/run.db-journal", "mine.txt")], &["run", "--resume", "run"], Any),
+    linked(&[("run/run.db-journal", "nowhere")], &["run", "--resume", "run"], Any),
     linked(&[("e1/estimate.db", "nowhere")], &["estimate", "--resume", "e1"], Refused(LINK)),
     // Folders that are links.
     linked(&[("runs", "folder")], &["run", "SPACE", "QUICK", "1"], Refused(LINK)),
@@ -192,7 +194,8 @@ const ATTACKS: &[Attack] = &[
         links: &[(FOUND, "mine.ava")],
         change: Some(moved_away),
         command: &["merge", "run", "--out", "m"],
-        end: Refused(LINK),
+        // The text comes from the sealed database.
+        end: Done,
     },
     Attack {
         links: &[],
@@ -315,7 +318,7 @@ fn make_home(home: &Path) {
     write("mine.txt", "mine\n");
     write("folder/keep.txt", "kept\n");
     write("clone/x.ava", "language 1\nlet   a = 3 m\n");
-    // What starts this driving system finds it out. It works in the clone.
+    // This driving system leaves a file beside the clone when it is started.
     let driver = clone.join("driver.sh");
     let toy = cargo_bin("avastra").display().to_string();
     write("clone/driver.sh", &format!("#!/bin/sh\ntouch ../started\nexec '{toy}' ads toy\n"));
@@ -357,7 +360,7 @@ fn beside(clone: &Path, name: &str) -> String {
     clone.with_file_name(name).display().to_string()
 }
 
-/// Everything that lies in a home outside of the clone: files with their bytes, links with what they say.
+/// Everything in a home outside the clone: files with their bytes, folders and links by their kind.
 fn outside(home: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut open = vec![home.to_owned()];
@@ -394,7 +397,7 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// Makes a database of the user's that SQLite takes for a new one of ours.
+/// Makes a database of the user that SQLite takes for a new one of ours.
 fn own_database(clone: &Path) {
     let database = rusqlite::Connection::open(clone.with_file_name("mine.db")).expect("it is new");
     database.execute_batch("CREATE TABLE mine (x); INSERT INTO mine VALUES (1)").expect("it is writable");
@@ -417,13 +420,13 @@ fn edited(clone: &Path) {
     std::fs::write(clone.join(FOUND), other).expect("it is writable");
 }
 
-/// The same in a file of the user's.
+/// As [`edited`], and moves the scenario to a file of the user.
 fn edited_elsewhere(clone: &Path) {
     edited(clone);
     moved_away(clone);
 }
 
-/// Moves the scenario to a file of the user's.
+/// Moves the scenario to a file of the user.
 fn moved_away(clone: &Path) {
     std::fs::rename(clone.join(FOUND), clone.with_file_name("mine.ava")).expect("it is there");
 }
@@ -436,7 +439,7 @@ fn forge<D: Units>(file: &Path, unit: i64, change: &str) {
     D::layout().seal(&database, unit).expect("it is writable");
 }
 
-/// Adds a part that no estimate keeps to one, with an event of which a file of that name was written.
+/// Adds a part to an estimate that it does not keep, with an event whose scenario has this file name.
 fn name_in_estimate(directory: &Path, name: &str) {
     let change = format!(
         "INSERT INTO part SELECT 77, road, 77, probability, episodes, driven_m, duration_s, events, squares, largest,

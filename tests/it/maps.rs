@@ -156,7 +156,7 @@ fn an_episode_that_no_goal_ends_ends_where_the_map_does() {
         let run = Run::new(ActionTable::new(space.clone()), settings).expect("the settings are sound");
         let log = run.episode(0);
         assert_eq!(log.end, End::LeftMap, "{entry}");
-        // The front bumper is 3.7 m ahead of the rear axle, which the way is measured at. Bends are cut a little.
+        // The way is measured at the rear axle, 3.7 m behind the front bumper. Bends are cut a little.
         let driven_m = log.distance_m + 3.705;
         assert!((way_m - 5.0..=way_m + 1.0).contains(&driven_m), "{entry}: {driven_m} m of {way_m} m");
     }

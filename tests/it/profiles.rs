@@ -12,7 +12,8 @@ use crate::world::SMALL;
 
 const FAULT: &str = "scenarios/ads/faults/planning_never_yields.yaml";
 
-fn profile(name: &str) -> ModularConfig {
+/// A shipped profile.
+pub fn profile(name: &str) -> ModularConfig {
     let path = root().join(name);
     let text = std::fs::read_to_string(&path).expect("it is shipped");
     ModularConfig::from_yaml(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()))

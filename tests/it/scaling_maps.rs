@@ -1,8 +1,8 @@
-//! Maps that scale one construct each (`fuzz/scaling_maps.rs`): what they come to, and not how long it takes. The fuzz target
-//! measures.
+//! Maps that are large in one construct each (`fuzz/scaling_maps.rs`): what becomes of them. How long it takes is measured in
+//! `hostile`.
 
 #[path = "../../fuzz/scaling_maps.rs"]
-mod constructs;
+pub mod constructs;
 
 use std::collections::BTreeSet;
 
@@ -10,8 +10,8 @@ use avastra::road::{RoadError, RoadMap};
 
 use constructs::{CONSTRUCTS, Comes};
 
-/// Sizes from which on a construct is refused, and at which its text is still small. Where the limit is on the work itself,
-/// the size is left to the fuzz target.
+/// Sizes from which on a construct is refused, and at which its text is still small. Constructs whose limit is on the work
+/// itself are not here: `hostile` measures them.
 const REFUSED_FROM: [(&str, usize); 13] = [
     ("spirals that curl", 1),
     ("long straight roads", 300),

@@ -100,7 +100,7 @@ fn what_another_study_has_played_is_taken_over() {
         let bytes = |of: &Path| std::fs::read(of.join(name)).expect("every study writes it");
         assert!(bytes(&alone) == bytes(&with), "{name} differs");
     }
-    // The page follows from the cells. One that was changed counts for nothing there, is not taken over, and is played again.
+    // The page follows from the cells. A changed cell is left out of it, is not taken over, and is played again.
     let sound = std::fs::read(alone.join("study.db")).expect("it is readable");
     let whole = results(&alone);
     std::fs::write(alone.join("results.json"), "{}").expect("it is writable");
@@ -221,14 +221,14 @@ fn kept_and_written_again(scratch: &Path, played: &Path) {
     assert_ne!(more, last, "the last cell is the first of its agent");
     refused(&sealed(&format!("{lines}{more}\n")), "`avastra merge` brings shards together");
     refused(&sealed(&format!("{lines}{last}\n")), "this cell is there already");
-    // Nor is one that somebody has changed since.
+    // Figures that were changed are refused, too.
     let edited = lines.replacen("\"values\":[", "\"values\":[1", 1);
     assert_ne!(edited, lines);
     refused(&text.replacen(lines, &edited, 1), "it was changed since it was written");
     refused(lines, "its last line is not the seal of those before");
 
-    // Another world is told, but not one with the same episodes.
-    for (world, is_told) in [("plane/5", true), ("plane/6", false)] {
+    // Another world is told. No other one has the episodes of this one.
+    for (world, is_told) in [("plane/7", true), (ENGINE, false)] {
         let other = lines.replace(&format!("\"{ENGINE}\""), &format!("\"{world}\""));
         std::fs::write(&kept, sealed(&other)).expect("it is writable");
         let written = write(&[]);

@@ -111,8 +111,8 @@ fn a_suite_outlives_changes_of_its_space() {
     assert_eq!(unchanged as u64, kept);
 }
 
-/// Whatever becomes of its space, a scenario is shown: as it was recorded where the run's copy of the space is, else as it
-/// plays now, and the banner says which of the two.
+/// A scenario is shown whatever happens to its space: as it was recorded if the run's copy of the space is there, otherwise as
+/// it plays now. The banner says which.
 #[test]
 fn findings_can_always_be_looked_at() {
     let found = Found::new(&[]);
@@ -137,7 +137,7 @@ fn findings_can_always_be_looked_at() {
     told(&[0, 3], "what is shown is what plays now, not what was recorded");
     let page = std::fs::read_to_string(found.path("run/report.html")).expect("it is written");
     assert!(page.contains("--self-contained"), "the banner stands on the page");
-    // Without its space a scenario means nothing, but for the copy.
+    // Without its space and the copy a scenario has no meaning.
     std::fs::remove_file(found.path(space)).expect("it is there");
     let (status, _, stderr) = outcome(&mut avastra(looks[0]));
     assert!(status == 2 && stderr.contains("cannot read"), "{status} {stderr}");
@@ -145,7 +145,7 @@ fn findings_can_always_be_looked_at() {
     told(&[0], "its space cannot be read any more, or has mistakes; shown as it was recorded");
 }
 
-/// What cannot be played is listed on the page of its folder, with the reason.
+/// The page of a folder lists the files that cannot be played, with the reason.
 #[test]
 fn the_page_of_a_folder_lists_what_cannot_be_played() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
@@ -312,8 +312,8 @@ impl Found {
     }
 }
 
-/// What counts is for the space to say, also if there the other one runs into the ego vehicle; and however many threads
-/// play a suite, it tells the same in the same order.
+/// The space's own verdict says which crashes count, even those in which the obstacle ran into the ego vehicle. The output does
+/// not depend on the number of threads.
 #[test]
 fn a_suite_is_judged_by_the_verdict_of_its_space() {
     let scratch = tempfile::tempdir().expect("a scratch directory");

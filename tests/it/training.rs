@@ -159,7 +159,7 @@ fn scenarios_of_a_training_that_are_gone_or_edited_are_noticed() {
     assert!(stdout.contains("edited since the training wrote it"), "{stdout}");
     assert_eq!(read(gone), written);
 
-    // Each episode depends on those before, so one that was changed cannot be played again alone; a page goes without it.
+    // Each episode depends on those before, so a changed one cannot be played again alone. A page leaves it out.
     let database = rusqlite::Connection::open(out.join("run.db")).expect("it is a database");
     let change = "UPDATE learning SET return = 9 WHERE episode = 3; UPDATE result SET text = '{}'";
     database.execute_batch(change).expect("it can be changed");

@@ -5,8 +5,8 @@ what is in the way of the real one is put before it at the same gap: other road 
 sweeps along the route, and the line of a light or stop sign that holds. SUMO does one step of 0.1 s; the change of speed is the answer, and
 avastra steers. Limits and bends are the lane's speed limit.
 
-So SUMO's following is under test, and neither its lane changes nor its junction logic, which is never asked: another vehicle that crosses is
-seen only on the strip itself. A crash with a crossing or an oncoming vehicle is one of this adapter, and none of SUMO.
+So SUMO's following is under test, and neither its lane changes nor its junction logic, which is never asked: a crossing vehicle is
+seen only on the strip itself. Crashes with crossing or oncoming vehicles are due to this adapter and not to SUMO.
 Parameters are SUMO's defaults, except the vehicle's own length and brakes, and `sigma` 0: the driver is not meant to dawdle.
 """
 

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::syntax::is_bidi;
+use crate::syntax::acts_on_terminal;
 
 /// The kinds of findings; PROTOCOL.md, "What goes wrong".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -234,11 +234,10 @@ impl Failure {
     }
 }
 
-/// Text of a program as it may stand on a terminal. Characters that would move the cursor, colour what stands there or
-/// turn it around become U+FFFD; line feeds and tabs stay, and a carriage return before a line feed goes.
+/// Text of a program as it is kept in logs, databases and files, which may be printed by other programs, too: characters
+/// that would act on a terminal become U+FFFD, and a carriage return before a line feed is left out.
 pub(super) fn harmless(text: &str) -> String {
-    let is_kept = |c: char| matches!(c, '\n' | '\t') || !(c.is_control() || is_bidi(c));
-    text.replace("\r\n", "\n").chars().map(|c| if is_kept(c) { c } else { '\u{fffd}' }).collect()
+    text.replace("\r\n", "\n").replace(acts_on_terminal, "\u{fffd}")
 }
 
 #[cfg(test)]

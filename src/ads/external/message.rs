@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 use super::link::Broken;
 use super::schema::{Bounds, InRange, Schema, fields_schema, inside, length_beyond, value_beyond};
 
-/// An acceleration beyond this, m/s², is a formula gone astray: of a textbook's car-following model at a small gap, for
-/// example.
+/// An acceleration beyond this, m/s², is no plan but the output of a formula, for example of a car-following model at a small
+/// gap.
 pub const EXTREME_MPS2: f64 = 100.0;
 
 /// The name and version of the protocol.
@@ -471,7 +471,7 @@ message! {
         seq: u64;
         /// Wanted angle of the road wheels, rad.
         steer: f64, -3.2..=3.2;
-        ? /// m/s²; negative brakes. The vehicle does what it can of it.
+        ? /// m/s²; negative brakes. The vehicle does as much of it as it can.
         accel: f64;
         ? /// Position of the pedal.
         throttle: f64, 0..=1;
@@ -503,7 +503,7 @@ message! {
         heading: f64, -1000..=1000;
         /// Along the vehicle, m/s.
         v: f64, 0..=100;
-        ? /// m/s²; by default from the speeds. The vehicle does what it can of it.
+        ? /// m/s²; by default from the speeds. The vehicle does as much of it as it can.
         a: f64;
     }
 }
@@ -512,7 +512,7 @@ message! {
     /// A wanted acceleration; avastra steers along the route.
     pub struct AccelerationMessage {
         seq: u64;
-        /// m/s²; negative brakes. The vehicle does what it can of it.
+        /// m/s²; negative brakes. The vehicle does as much of it as it can.
         accel: f64;
         ? /// What it believes and wants.
         internal: Internal;
@@ -541,7 +541,7 @@ message! {
 message! {
     /// The driving system cannot go on.
     pub struct ErrorMessage {
-        /// What lies beyond 2,000 characters is cut off.
+        /// Cut off after 2,000 characters.
         message: String => length 0..=2000;
     }
 }
@@ -589,7 +589,7 @@ impl Answer {
         }
     }
 
-    /// Whether it asks for an acceleration that no vehicle has, which is cut off at what ours can do.
+    /// Whether it asks for an acceleration beyond [`EXTREME_MPS2`]. The vehicle then does as much of it as it can.
     pub fn is_extreme(&self) -> bool {
         let is_beyond = |accel: f64| accel.abs() > EXTREME_MPS2;
         match self {

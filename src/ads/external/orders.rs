@@ -12,8 +12,8 @@ use super::program::Program;
 use super::question;
 use super::session::Session;
 
-/// Tries each order with the first moment of an episode; the first that fails ends it. Gives what was tried, in words. No
-/// process may be waiting for an episode: the first order is for one that has seen none.
+/// Tries each order with the first moment of an episode, until one fails. Returns what was tried, in words. No process may be
+/// waiting for an episode, because the first order needs one that has seen none.
 ///
 /// # Errors
 /// The order that failed, and how.
@@ -45,7 +45,7 @@ pub fn odd_orders(
 /// An order in words, and how it goes.
 type Order = (&'static str, fn(&Lines, &mut Session) -> Result<(), Failure>);
 
-/// The first is for a process that was never reset; the others may share one.
+/// The first needs a process that was never reset; the others may share one.
 const ORDERS: [Order; 7] = [
     ("a step before the first reset", |lines, session| {
         session.pass(&lines.step);

@@ -18,8 +18,8 @@ use super::settings::ExternalSettings;
 const KNOWN_BYTES_MAX: usize = 128 << 20;
 /// Most maps whose message is kept.
 const MAPS_MAX: usize = 16;
-/// After so many failures in a row to start it, or to connect to it, it is given up: each may take as long as the limit of
-/// `init`.
+/// A program is given up after this many failures in a row to start it or to connect to it, because each may take as long as
+/// the limit of `init`.
 const ATTEMPTS_MAX: u32 = 3;
 
 /// An external driving system.
@@ -35,7 +35,7 @@ pub struct Program {
     missed: AtomicU64,
     cut_off: AtomicU64,
     unreached: Mutex<Unreached>,
-    /// How it answered otherwise when it was asked the same again, if it ever did.
+    /// How its answers differed when it was asked the same again, if they ever did.
     otherwise: OnceLock<String>,
 }
 
@@ -147,15 +147,15 @@ impl Program {
         self.cut_off.load(Ordering::Relaxed)
     }
 
-    /// Why it is not tried any more: the last of several failures in a row to start it, or to connect to it.
+    /// If it was given up, the last of the failures in a row to start it or to connect to it.
     pub fn given_up(&self) -> Option<Failure> {
         let unreached = locked(&self.unreached);
         unreached.last.clone().filter(|_| unreached.times >= ATTEMPTS_MAX)
     }
 
-    /// Plays an episode `again`, without what is known of it, and notes if the answers are others than the `first` ones:
-    /// the test of a program that says it is deterministic. Gives whether there was such a test. An episode in which it
-    /// failed is none, nor one with answers that came too late.
+    /// Tests a program that says it is deterministic: plays an episode `again` without the recorded answers, and notes if the
+    /// answers differ from the `first` ones. Returns whether the test was made: it is not if the program failed in the
+    /// episode or ever answered too late.
     pub fn spot_check(
         &self,
         first: &Conversation,
@@ -179,12 +179,12 @@ impl Program {
         true
     }
 
-    /// Whether it says that it answers alike to the like, and was never found to do otherwise.
+    /// Whether it says that it is deterministic, and was never found to be otherwise.
     pub fn is_deterministic(&self) -> bool {
         self.attached().is_deterministic() && self.otherwise().is_none()
     }
 
-    /// How it answered otherwise when it was asked the same again, though it says that it is deterministic.
+    /// How its answers differed when it was asked the same again, though it says that it is deterministic.
     pub fn otherwise(&self) -> Option<&str> {
         self.otherwise.get().map(String::as_str)
     }
@@ -242,7 +242,7 @@ impl Program {
         locked(&self.idle).push(session);
     }
 
-    /// Ends all processes that no episode uses. What was given up may be tried again.
+    /// Ends all processes that no episode uses. A program that was given up may be tried again.
     ///
     /// # Errors
     /// How the first that did not end by itself with status 0 ended.

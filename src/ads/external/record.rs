@@ -126,8 +126,8 @@ pub struct Attached {
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub identity: Option<Identity>,
     pub settings: ExternalSettings,
-    /// An order to whatever makes a driving system of this: start nothing, what was recorded is all there is. It is no part of
-    /// what identifies the driving system, and is never written.
+    /// Whether the driving system must not be started, because nothing is left to play. It does not identify the driving
+    /// system, and is never written.
     #[serde(skip)]
     pub is_recorded: bool,
 }
@@ -178,7 +178,7 @@ pub struct Conversation {
 }
 
 impl Conversation {
-    /// The first step from which on the same episode was answered otherwise, and how.
+    /// The first step at which the same episode got another answer, and both answers in words.
     pub fn difference(&self, again: &Conversation) -> Option<(usize, String)> {
         let mut pairs = self.exchanges.iter().zip(&again.exchanges);
         let index = pairs.position(|((_, first), (_, second))| !first.means(second))?;

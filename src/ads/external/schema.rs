@@ -17,13 +17,13 @@ pub trait Schema {
 
 /// A value that may be out of its range, or too long.
 pub trait InRange {
-    /// What is out of its range or too long; `at` is the path to the value.
+    /// The first part that is out of its range or too long; `at` is the path to the value.
     fn out_of_range(&self, at: &str) -> Option<Broken>;
 }
 
 /// A text or a list.
 pub trait Long {
-    /// Characters or items, and their name.
+    /// The number of characters or items, and which of the two they are.
     fn length(&self) -> (usize, &'static str);
 }
 
@@ -39,25 +39,25 @@ impl<T> Long for Vec<T> {
     }
 }
 
-/// What bounds a field.
+/// Bounds of a field.
 #[derive(Debug, Clone, Copy)]
 pub enum Bounds {
     Value(f64, f64),
     Length(usize, usize),
 }
 
-/// The path to a field of what lies at `at`; nothing is the message itself.
+/// The path to a field of the value at `at`; an empty path is the message itself.
 pub fn inside(at: &str, field: &str) -> String {
     if at.is_empty() { field.to_owned() } else { format!("{at}.{field}") }
 }
 
-/// What is wrong with a number that is beyond its range.
+/// The finding about a number that is beyond its range; `None` if it is within.
 pub fn value_beyond(found: f64, at: &str, low: f64, high: f64) -> Option<Broken> {
     let detail = || format!("`{at}` is {found}; it must be from {low} to {high}");
     (!(low..=high).contains(&found)).then(|| Broken { problem: Problem::OutOfRange, detail: detail() })
 }
 
-/// What is wrong with a text or a list that is too short or too long.
+/// The finding about a text or a list that is too short or too long; `None` if it is neither.
 pub fn length_beyond(value: &impl Long, at: &str, least: usize, most: usize) -> Option<Broken> {
     let (found, what) = value.length();
     let detail = || format!("`{at}` has {found} {what}; it must have from {least} to {most}");

@@ -201,7 +201,7 @@ impl Checks<'_> {
         ) {
             return Ok(());
         }
-        // What comes first is for a process that has seen nothing yet.
+        // The first order needs a process that has seen nothing yet.
         let ended = program.close().and(ended);
         let setup = arena.setup(0, self.seed);
         let sensed = World::new(Arc::clone(&setup.scene), &setup.start).sensed();

@@ -8,7 +8,7 @@ use crate::model::space::{ActionDef, RuleDef};
 use crate::model::value::Type;
 use crate::model::vocabulary::Known;
 
-/// What the copy of one operation costs, in steps: it is kept, so that memory is bounded with the steps.
+/// Steps for the copy of one operation. Copies are kept, so the limit of steps also bounds memory.
 const COPIED_STEPS: usize = 16;
 
 /// `local op limit`, wherever all guards hold.

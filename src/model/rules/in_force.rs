@@ -5,7 +5,7 @@ use crate::model::row::Row;
 use crate::model::space::{RuleDef, Space};
 use crate::syntax::{listed, nearest};
 
-/// So many rules are copied or passed over in one step of a proof.
+/// Number of rules that are copied or passed over in one step of a proof.
 const RULES_A_STEP: usize = 16;
 
 /// The rules in force, by index in `Space::rules`.

@@ -436,7 +436,7 @@ impl<'a> Solver<'a> {
 
     /// Whether this value of the parameter at the place, after the values before it, can be completed.
     fn leads_on(&mut self, place: usize, value: Value) -> bool {
-        // Without a try left nothing is found, however many choices no clause has judged yet.
+        // Without a try left nothing will be found, so the choices that no clause has judged yet are not gone through.
         if self.before.tries.get() == 0 || effort::is_spent() {
             return false;
         }

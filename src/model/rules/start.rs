@@ -251,7 +251,7 @@ pub(crate) fn cells_read(expr: &Expr, states: &[StateDef]) -> Vec<usize> {
     found
 }
 
-/// The index of the state to which a cell belongs. The cells of the states follow one another, and each state has some.
+/// The index of the state to which a cell belongs. States have consecutive cells, and each state has at least one.
 pub(crate) fn state_at(cell: usize, states: &[StateDef]) -> usize {
     states.partition_point(|state| state.first_cell <= cell) - 1
 }

@@ -68,7 +68,7 @@ pub struct LaneElement {
     pub line: u32,
     /// Whether cars may drive on it, in one direction.
     pub driving: bool,
-    /// What it is if it is no driving lane.
+    /// Why no car drives on it; `None` for a driving lane.
     pub undriven: Option<LeftOut>,
     /// What a lane that is no driving lane is to people on foot.
     pub beside: Option<StripKind>,

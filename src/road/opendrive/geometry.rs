@@ -68,8 +68,8 @@ pub enum Shape {
     Spiral {
         begin_per_m: f64,
         rate_per_m2: f64,
-        /// Places at equal steps of the station, in the frame of the piece's beginning, and the last of them at its end:
-        /// a place between two of them needs one step of quadrature and not all before it.
+        /// Places at equal steps of the station up to the end, in the frame of the piece's beginning. A place between two
+        /// of them needs one step of quadrature from the one before it.
         nodes: Vec<Vec2>,
         step_m: f64,
     },
@@ -106,13 +106,13 @@ impl ReferenceLine {
         Some(ReferenceLine { pieces, roundings: Vec::new(), breaks_m: Vec::new(), place_steps })
     }
 
-    /// Steps of work for a place on the line, where its curves are dearest.
+    /// Most steps of work for a place on the line.
     pub fn place_steps(&self) -> u64 {
         self.place_steps
     }
 
-    /// The stations between two others from which another curve holds, m. A road may have as many curves as lane
-    /// sections, so only those between are looked at.
+    /// The stations between two others at which another curve begins, m. The search is quick, because a road may have as
+    /// many curves as lane sections.
     pub fn beginnings_between(&self, from_m: f64, to_m: f64) -> impl Iterator<Item = f64> {
         let first = self.pieces.partition_point(|piece| piece.begin_m <= from_m);
         let pieces = self.pieces[first..].iter().map(|piece| piece.begin_m);
@@ -129,7 +129,7 @@ impl ReferenceLine {
         self.breaks_m.get(first).is_some_and(|at_m| *at_m < to_m)
     }
 
-    /// Length of all that is not straight between two stations, m.
+    /// Length of all curves between two stations, m.
     pub fn bent_m(&self, from_m: f64, to_m: f64) -> f64 {
         let first = self.pieces.partition_point(|piece| piece.begin_m <= from_m).max(1) - 1;
         let pieces = self.pieces[first..].iter().take_while(|piece| piece.begin_m < to_m);

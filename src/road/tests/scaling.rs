@@ -1,4 +1,4 @@
-//! Work that grows with the map: counted, as time would depend on the machine.
+//! Work that grows with the map. It is counted, because time would depend on the machine.
 
 use std::fmt::Write as _;
 
@@ -30,7 +30,7 @@ fn lanes_are_held_against_those_nearby_alone() {
     assert!(pairs(80) <= 2 * pairs(40) + 16, "{} and {}", pairs(40), pairs(80));
 }
 
-/// On a large map the lanes beside a place are looked for in cells; the answer is that of trying every lane.
+/// On a large map the lanes beside a place are looked up in cells; the result is the same as if every lane was tried.
 #[test]
 fn a_large_map_has_the_same_lanes_abreast() {
     let (large, small) = (row(400), row(40));

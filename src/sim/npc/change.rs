@@ -70,7 +70,7 @@ pub(super) struct Change {
 }
 
 impl Change {
-    /// The part of the change that a metre of the way does at a speed.
+    /// The part of the change that is done on each metre of the way, at a speed.
     pub fn progress_per_m(&self, speed_mps: f64) -> f64 {
         1.0 / (speed_mps.max(CHANGE_FULL_MPS) * self.duration_s)
     }

@@ -35,8 +35,8 @@ pub(super) const GAP_M_MIN: f64 = 2.0;
 pub(super) const LOOK_AHEAD_M: f64 = 25.0;
 /// Room that drivers want free beside the outline, m.
 pub(super) const SIDE_ROOM_M: f64 = 0.2;
-/// A wish below this is met exactly, m/s: the model's acceleration would swing about so low a speed. What shall stand
-/// has a wish of 0.
+/// A wished speed below this is reached exactly, m/s, because the model's acceleration would oscillate around it. A vehicle
+/// that is asked to stand has a wish of 0.
 const CRAWL_MPS: f64 = 0.1;
 /// A driver slower than this when a wait ends sets out anew, m/s.
 const SETS_OUT_MPS: f64 = 1.0;
@@ -194,7 +194,7 @@ impl Driver {
         if self.is_beyond_map() && !in_sight {
             return None;
         }
-        // What stands is where it was, to the bit, also if a look has laid its way anew.
+        // A vehicle that stands keeps its place to the bit, even if its way was laid anew.
         if way_m == 0.0 && self.change.is_none() {
             return Some(Moved::at_rest(this));
         }

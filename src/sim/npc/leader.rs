@@ -81,8 +81,8 @@ impl Driver {
         nearest
     }
 
-    /// Whether a lane change under way leads past what stands in the lane that it leaves: where the front comes to it, the
-    /// vehicle is already beside it. What moves is a leader up to the end of the change.
+    /// Whether a lane change under way leads past a road user that stands in the lane that it leaves: when the front reaches
+    /// it, the vehicle is already beside it. A road user that moves is a leader until the end of the change.
     fn evades(&self, leader: &Leader, size: &BodyParameters, other: Other) -> bool {
         let Some(change) = self.change.as_ref().filter(|_| other.velocity_mps.norm() < STANDS_MPS) else {
             return false;

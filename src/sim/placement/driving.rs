@@ -19,7 +19,7 @@ use super::{ahead_m, commanded};
 const CHANGE_AFTER_S: f64 = 1.0;
 /// How far in front of the ego vehicle an overtaker cuts in, m.
 const CUT_IN_M: f64 = 5.0;
-/// How far in front of the ego vehicle an overtaker is back in its lane that only wants to pass, m: two seconds in town.
+/// How far in front of the ego vehicle an overtaker that only wants to pass comes back to its lane, m: two seconds in town.
 /// Ours.
 const RETURN_M: f64 = 20.0;
 

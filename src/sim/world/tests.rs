@@ -54,7 +54,7 @@ fn of_two_contacts_in_a_tick_neither_sees_the_other() {
     let expected_mps = first.ego_speed_mps * left * left;
     assert!(
         (world.ego().speed_mps - expected_mps).abs() < 1e-9,
-        "each person takes its share of what is left"
+        "the second impact acts on the speed that the first left"
     );
 }
 

@@ -35,7 +35,7 @@ section! {
 pub const LOAD_FRAMES_MAX: usize = 5;
 
 impl LatencyConfig {
-    /// How many frames later perception is with so many objects within reach.
+    /// By how many frames perception is late with this number of objects within reach.
     pub fn load_frames(&self, objects: usize) -> usize {
         let excess = objects.saturating_sub(self.budget_objects as usize) as f64;
         ((excess * self.per_object_s / FRAME_S + 0.5) as usize).min(LOAD_FRAMES_MAX)

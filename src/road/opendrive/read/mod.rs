@@ -47,8 +47,8 @@ const ATTRIBUTES_MAX: usize = 256;
 /// for each further one, and compares each with every other.
 const NAMESPACES_MAX: usize = 32;
 
-/// Refuses what makes the XML reader slow and no real file has, in one pass over the text: elements with too many
-/// attributes, and too many namespaces within each other.
+/// Refuses elements with too many attributes, and too many namespaces within each other, in one pass over the text. They make
+/// the XML reader slow, and no real file has them.
 fn refuse_costly_tags(text: &str) -> Result<(), RoadError> {
     let mut at = 0;
     // For each open element, whether it declares a namespace, and how many of them do.

@@ -122,8 +122,7 @@ fn cubic_shape(
 /// Rounds in which the last parameter of a `poly3` is found; each comes nearer by a factor of about 64.
 const POLY3_ROUNDS: usize = 6;
 
-/// A curve `v(u)`. The file does not state the last `u`, but the length of the curve. It is at most that length, because
-/// the curve is nowhere shorter than its `u`.
+/// A curve `v(u)`. The file states the length of the curve and not its last `u`, which is at most that length.
 fn poly3(shape: Element, v: [f64; 4], length_m: f64) -> Result<Shape, RoadError> {
     let u = [0.0, 1.0, 0.0, 0.0];
     let mut last = length_m;
