@@ -177,7 +177,9 @@ mod tests {
         let error = serde_yaml::from_str::<serde_json::Value>(infinite).expect_err("it is wrong");
         assert_eq!(yaml_mistake(&error, infinite), "line 2: `pace_mps`: write a number");
         assert_eq!(said("seed: 1\nyields: maybe\n"), "line 2: `yields`: write `true` or `false`");
-        assert_eq!(said("seed: [\n"), "line 1: `[` is never closed");
+        let open = "a: [\n";
+        let error = serde_yaml::from_str::<serde_json::Value>(open).expect_err("it never ends");
+        assert!(yaml_mistake(&error, open).ends_with("`[` is never closed"), "{error}");
         assert_eq!(said("seed: 3\nseed: 4\n"), "line 2: `seed` stands twice");
         for (text, wrong) in [
             ("seed: 3\n\tpace_mps: 4\n", "indent with blanks, not with tabs"),
