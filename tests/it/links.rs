@@ -444,7 +444,8 @@ fn name_in_estimate(directory: &Path, name: &str) {
     let change = format!(
         "INSERT INTO part SELECT 77, road, 77, probability, episodes, driven_m, duration_s, events, squares, largest,
            simulated_s, levels FROM part LIMIT 1;
-         INSERT INTO event VALUES (77, 0, 0, 0, NULL, 1.0, '{name}');"
+         INSERT INTO event VALUES (77, 0, 0, 0, NULL, 1.0);
+         INSERT INTO scenario VALUES (77, 0, '{name}', 'language 1');"
     );
     forge::<EstimateDatabase>(&directory.join("estimate.db"), 77, &change);
 }
