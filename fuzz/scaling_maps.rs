@@ -156,6 +156,9 @@ fn broken_links(size: usize) -> String {
     }))
 }
 
+/// An arm of a junction: the street, the end that it touches with, and the direction in which it leaves.
+type Arm = (String, &'static str, (i32, i32));
+
 /// Blocks of 100 m: streets of two lane sections with a lane each way, and junctions with all turns. About `size` streets.
 fn city(size: usize) -> String {
     const BLOCK_M: f64 = 100.0;
@@ -163,8 +166,7 @@ fn city(size: usize) -> String {
     let side = ((size as f64 / 2.0).sqrt() as i32).max(2);
     let street_m = BLOCK_M - 2.0 * CORNER_M;
     let mut text = String::new();
-    // Of each junction its arms: the street, the end that it touches with, and the direction in which it leaves.
-    let mut arms: Vec<Vec<(String, &str, (i32, i32))>> = vec![Vec::new(); (side * side) as usize];
+    let mut arms: Vec<Vec<Arm>> = vec![Vec::new(); (side * side) as usize];
     let place = |x: i32, y: i32| (y * side + x) as usize;
     let both = |from: &str, to: &str| {
         let link = |id: i32| {
