@@ -4,6 +4,8 @@
 mod playback;
 mod survey;
 #[cfg(test)]
+mod testing;
+#[cfg(test)]
 mod tests;
 
 use std::sync::Arc;

@@ -16,7 +16,7 @@ use crate::road::{Lane, LaneIndex, Neighbour, is_apart};
 
 use crate::sim::around::{Around, Other};
 use crate::sim::body::BodyParameters;
-use crate::sim::moment::driver_facts;
+use crate::sim::moment::{driver_facts, with_itself};
 use crate::sim::road_user::{Moved, Obstacle};
 use crate::sim::traffic::TrafficProfile;
 use crate::sim::way::Way;
@@ -95,7 +95,7 @@ impl Driver {
             }
         };
         let allowed = |rules: &Arc<LaneChangeRules>| {
-            rules.allow(around.moment_facts().with(this), driver_facts(around, this, self))
+            rules.allow(with_itself(around.moment_facts(), this), driver_facts(around, this, self))
         };
         if !due || !self.lane_changes.as_ref().is_none_or(allowed) {
             return;
