@@ -33,9 +33,6 @@ impl Estimate {
     pub fn new(table: ActionTable, settings: EstimateSettings) -> Result<Estimate, EstimateError> {
         settings.check()?;
         let run = Run::new(table, settings.run.clone())?;
-        if settings.method == Method::Split && run.agent().looks_ahead() {
-            return Err(EstimateError::Ahead { agent: settings.run.agent.clone() });
-        }
         let rows = run.table().rows().len();
         if settings.method == Method::Probe
             && run.agent().chances(Array1::from_elem(rows, true).view()).is_none()

@@ -121,7 +121,6 @@ impl Arena {
             start: Start { traffic: self.traffic, ..episode::start(space, &memory, seed) },
             memory,
             period_shifts: Vec::new(),
-            forks: Vec::new(),
             proc: ProcKind::default(),
         }
     }

@@ -70,7 +70,6 @@ impl<'a> Stage<'a> {
             },
             memory,
             period_shifts: Vec::new(),
-            forks: Vec::new(),
             proc: ProcKind::default(),
         }
     }

@@ -151,7 +151,7 @@ impl Stepped {
     fn look(&mut self) {
         let run = Arc::clone(&self.run);
         let setup = run.setup_of(self.road, self.seed);
-        match self.end.map_or_else(|| self.play.look(&setup), Err) {
+        match self.end.map_or_else(|| self.play.look(), Err) {
             Ok(observation) => self.observation = observation,
             Err(end) => {
                 self.end = Some(end);
