@@ -699,9 +699,9 @@ impl Cut for StudySettings {
         shard: &Played<StudySettings>,
         way: &Way,
     ) -> Result<(), Failure> {
-        let mut times = Times::read(way.to, into)?;
-        if let Some(database) = &shard.database {
-            times.extend(Times::read(&shard.path, database)?);
+        let mut times = Times::read(way.to)?;
+        if shard.database.is_some() {
+            times.extend(Times::read(&shard.path)?);
         }
         times.write(way.to)?;
         let taken = into.take(&shard.file(), &shard.units, &|_| Ok(()));

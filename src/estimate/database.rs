@@ -14,7 +14,6 @@ use crate::estimate::ready::Estimate;
 /// Versions begin at 2001, so that it is never taken for another database.
 const LAYOUT: Layout = Layout {
     version: 2003,
-    older: &[],
     unit: "part",
     tables: &["part", "event", "scenario", "pilot", "seen"],
     naming: None,
