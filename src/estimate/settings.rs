@@ -18,21 +18,21 @@ pub enum EventKind {
 }
 
 impl EventKind {
-    /// The first collision of an episode that is the event, judged by the settings of a run.
-    pub(super) fn first(self, setup: &Setup, log: &EpisodeLog, run: &RunSettings) -> Option<usize> {
+    /// The first collision of an episode that is the event.
+    pub(super) fn first(self, setup: &Setup, log: &EpisodeLog) -> Option<usize> {
         match self {
             _ if log.collisions.is_empty() => None,
             EventKind::Collision => Some(0),
             EventKind::Counted => {
-                let summary = EpisodeSummary::judged(setup, 0, log, &run.avoidability);
+                let summary = EpisodeSummary::judged(setup, 0, log);
                 summary.collisions.iter().position(|finding| finding.counted)
             }
         }
     }
 
     /// Whether it is in an episode.
-    pub(super) fn happened(self, setup: &Setup, log: &EpisodeLog, run: &RunSettings) -> bool {
-        self.first(setup, log, run).is_some()
+    pub(super) fn happened(self, setup: &Setup, log: &EpisodeLog) -> bool {
+        self.first(setup, log).is_some()
     }
 
     /// What so many of them are called, after their number.

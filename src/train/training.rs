@@ -19,7 +19,6 @@ use crate::mdp::{Closeness, Observation, ProcKind, StepOutcome};
 use crate::model::Space;
 use crate::model::vocabulary::Word;
 use crate::oracle;
-use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
 use crate::run::{
@@ -200,7 +199,7 @@ impl Training {
         let log = played.log;
         let summary = EpisodeSummary {
             branched_s: self.agent.branched_s(),
-            ..EpisodeSummary::judged(&setup, number, &log, &AvoidabilitySettings::default())
+            ..EpisodeSummary::judged(&setup, number, &log)
         };
         let (last, last_legal) = played.last.expect("every episode has a last moment");
         let trajectory = Trajectory {
