@@ -30,7 +30,7 @@ use crate::study::{StudyDatabase, StudySettings};
 use crate::syntax::ast::{Expr, ExprKind, FileId, ItemKind};
 use crate::syntax::{parse, print_expr};
 
-use super::arguments::{Format, MergeArguments};
+use super::arguments::MergeArguments;
 use super::error::Failure;
 use super::files::{folder, make, remove, write};
 use super::output::{Output, plural};
@@ -352,8 +352,7 @@ fn publish<C: Cut>(
         files::rename(partial, out).map_err(|error| Failure::file("write", out, error))?;
         return remove(&out.join(MARK));
     }
-    // In JSON, a command prints at its end, which this has not.
-    let silent = Output::of(Format::Json);
+    let silent = Output::silent();
     C::conclude(&silent, partial)?;
     // A merge that was killed after the rename left a directory in which all is played, but whose results are missing.
     if holds_all::<C>(out, (partial, outside), text).unwrap_or(false) {
