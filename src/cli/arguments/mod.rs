@@ -23,8 +23,8 @@ pub use learn::{
 };
 pub use scenarios::{
     AgainstArguments, DiagnoseArguments, ExportArguments, ExportEgo, ExportFormat, ExportProfile,
-    ExportVersion, FilesArguments, ImportArguments, PackArguments, RenderArguments, ReplayArguments,
-    ReportArguments, RoadArguments, ShrinkArguments, TestArguments, VerifyArguments,
+    FilesArguments, ImportArguments, PackArguments, RenderArguments, ReplayArguments, ReportArguments,
+    RoadArguments, ShrinkArguments, TestArguments, VerifyArguments,
 };
 
 /// Finds out which of the things that may happen around a self-driving car make it crash.
