@@ -1,15 +1,18 @@
-//! What could be written at a place, told from the words before it: the declaration there is unfinished and
-//! has no tree. Why the grammar is not asked instead is said in docs/decisions.md, 34.
+//! What could be written at a place: the kinds of names that fit where `syntax::unfinished` puts its own name into the
+//! tree, or the keywords that the grammar expects if no name fits.
 
 use crate::check::{Declaration, References, Symbol};
 use crate::model::Type;
 use crate::model::vocabulary::{
     CHANGE, EpisodeField, RoadField, ScenarioClaim, Site, SpaceClaim, SpawnField, StartField, StopReason,
-    WAIT, Word as _, parts_of, things,
+    WAIT, Word, parts_of, things,
 };
-use crate::syntax::keyword;
+use crate::syntax::ast::{
+    Action, ActionParam, Arm, BinaryOp, Call, Effect, EffectKind, Expr, ExprKind, Field, Initial, ItemKind,
+    Name, Policy, Rule, RuleBody, Scenario, State, Step, Type as WrittenType, TypeKind,
+};
+use crate::syntax::{HERE, Unfinished, unfinished};
 
-use super::tokens::{Ending, Token, tokens};
 use super::words;
 use super::words::Entry;
 
@@ -48,534 +51,501 @@ pub enum Kind {
 
 /// The kinds that fit at a byte, and the start of the word that a proposal would replace.
 pub fn wanted(references: &References, text: &str, byte: usize) -> (Vec<Kind>, usize) {
-    let byte = text.floor_char_boundary(byte.min(text.len()));
-    let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    let start = text[..byte].trim_end_matches(is_word).len();
-    let item = item_start(text, start);
-    match tokens(&text[item..byte]).1 {
-        Ending::Comment => return (Vec::new(), start),
-        Ending::Text(from) => return path(&text[item..byte], from, item),
-        Ending::Code => {}
-    }
-    let (tokens, _) = tokens(&text[item..start]);
+    let found = unfinished(text, byte);
+    let start = found.start;
     let line_start = text[..start].rfind('\n').map_or(0, |newline| newline + 1);
     let fresh_line = text[line_start..start].trim().is_empty();
-    let place = Place::new(references, tokens, fresh_line);
-    let mut found = place.kinds();
-    if start == line_start || (place.open.is_empty() && fresh_line && !place.wants_operand()) {
-        found.insert(0, Kind::Declarations);
-    }
-    (found, start)
-}
-
-/// Where the declaration around a byte begins: at the last line before it that starts with a keyword.
-pub fn item_start(text: &str, byte: usize) -> usize {
-    let mut at = byte;
-    loop {
-        let start = text[..at].rfind('\n').map_or(0, |newline| newline + 1);
-        let word: &str = text[start..].split(|c: char| !c.is_ascii_alphabetic()).next().unwrap_or_default();
-        let is_keyword = words::meaning(keyword::DECLARATIONS, word).is_some();
-        if start == 0 || is_keyword && start + word.len() <= byte {
-            return start;
+    let mut kinds = match &found.tree {
+        Some(tree) => {
+            let written = text.get(start..byte).unwrap_or_default();
+            Place::new(references, tree, written).kinds(tree).unwrap_or_default()
         }
-        at = start - 1;
+        None => keywords(&found, fresh_line),
+    };
+    // A declaration may begin on every line without indentation, whatever the author has left open above it.
+    if start == line_start || found.begins_declaration && fresh_line {
+        kinds.insert(0, Kind::Declarations);
     }
+    (kinds, start)
 }
 
-/// The kinds that fit within a text literal: files, if the text is a path.
-fn path(text: &str, from: usize, item: usize) -> (Vec<Kind>, usize) {
-    let written = text[from..].to_owned();
-    let before = tokens(&text[..from - 1]).0;
-    let before: Vec<&str> = before.iter().map(|token| token.text).collect();
-    let kinds = match before.as_slice() {
-        [.., "use"] => vec![Kind::Files("ava", written)],
-        [.., "map", ":"] => vec![Kind::Files("xodr", written)],
-        _ => Vec::new(),
-    };
-    (kinds, item + from)
+/// What may come where no name may stand.
+fn keywords(found: &Unfinished, fresh_line: bool) -> Vec<Kind> {
+    let mut kinds: Vec<Kind> = found.keywords.iter().map(|word| Kind::Keyword(word)).collect();
+    // A scenario's first part is `road`. Its other parts are shown too, so that an author sees what there is.
+    if found.keywords.contains(&"origin") && found.keywords.contains(&"road") {
+        kinds.extend(["start", "steps", "expect"].map(Kind::Keyword));
+    }
+    if found.continues_expression && !(fresh_line && !kinds.is_empty()) {
+        kinds.push(Kind::Operators);
+    }
+    kinds
 }
 
 /// What the declaration after `override` and a keyword may replace.
-fn replaceable(keyword: &str) -> Vec<Kind> {
-    match keyword {
-        "enum" | "odds" => vec![Kind::Enums],
-        "state" => vec![Kind::States],
-        "let" => vec![Kind::Constants],
-        "fn" => vec![Kind::Functions],
-        "action" => vec![Kind::Actions],
-        "group" => vec![Kind::Groups],
-        "rule" => vec![Kind::Rules],
-        "road" => vec![Kind::Roads],
-        "verdict" => vec![Kind::Verdicts],
+fn replaceable(item: &ItemKind) -> Vec<Kind> {
+    match item {
+        ItemKind::Enum(_) | ItemKind::Odds(_) => vec![Kind::Enums],
+        ItemKind::State(_) => vec![Kind::States],
+        ItemKind::Let(_) => vec![Kind::Constants],
+        ItemKind::Fn(_) => vec![Kind::Functions],
+        ItemKind::Action(_) => vec![Kind::Actions],
+        ItemKind::Group(_) => vec![Kind::Groups],
+        ItemKind::Rule(_) => vec![Kind::Rules],
+        ItemKind::Road(_) => vec![Kind::Roads],
+        ItemKind::Verdict(_) => vec![Kind::Verdicts],
         _ => Vec::new(),
     }
 }
 
-/// The tokens of a declaration up to the place.
+fn is_here(name: &Name) -> bool {
+    name.text == HERE
+}
+
+fn is_named_here(expr: &Expr) -> bool {
+    matches!(&expr.kind, ExprKind::Name(name) if name == HERE)
+}
+
+fn any_here(names: &[Name]) -> bool {
+    names.iter().any(is_here)
+}
+
+/// The name that an expression is.
+fn name_of(expr: &Expr) -> Option<&str> {
+    match &expr.kind {
+        ExprKind::Name(name) => Some(name),
+        _ => None,
+    }
+}
+
+/// The fields that a block does not have yet.
+fn unused<W: Word>(fields: &[Field]) -> Vec<Kind> {
+    let has = |word: &str| fields.iter().any(|field| field.name.text == word);
+    vec![Kind::Words(words::of::<W>().into_iter().filter(|(word, _)| !has(word)).collect())]
+}
+
+/// What the expressions of a declaration are about.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum About {
+    Value,
+    Rule,
+    /// A reward or a verdict.
+    Outcome(Site),
+    /// A claim about the space.
+    Space,
+    /// A claim about a scenario.
+    Scenario,
+}
+
+/// A declaration with [`HERE`] in it.
 struct Place<'a> {
     references: &'a References,
-    tokens: Vec<Token<'a>>,
-    /// Positions of the open brackets among the tokens.
-    open: Vec<usize>,
-    /// Whether the place is the first on its line.
-    fresh_line: bool,
-    /// Whether the declaration replaces another.
-    overrides: bool,
+    /// What is written of the text literal at the place.
+    written: &'a str,
+    about: About,
+    /// The parameters that an expression can name.
     locals: Vec<(String, Option<Type>)>,
 }
 
 impl<'a> Place<'a> {
-    fn new(references: &'a References, mut tokens: Vec<Token<'a>>, fresh_line: bool) -> Place<'a> {
-        let overrides = tokens.len() > 1 && tokens[0].text == "override";
-        if overrides {
-            tokens.remove(0);
-        }
-        let mut open = Vec::new();
-        for (index, token) in tokens.iter().enumerate() {
-            match token.text {
-                "(" | "[" | "{" => open.push(index),
-                ")" | "]" | "}" => {
-                    open.pop();
-                }
-                _ => {}
-            }
-        }
-        let mut place = Place { references, tokens, open, fresh_line, overrides, locals: Vec::new() };
-        place.locals = place.find_locals();
+    fn new(references: &'a References, item: &ItemKind, written: &'a str) -> Place<'a> {
+        let about = match item.plain() {
+            ItemKind::Rule(_) => About::Rule,
+            ItemKind::Reward(_) => About::Outcome(Site::Reward),
+            ItemKind::Verdict(_) => About::Outcome(Site::Verdict),
+            ItemKind::Expect(_) => About::Space,
+            ItemKind::Scenario(_) => About::Scenario,
+            _ => About::Value,
+        };
+        let mut place = Place { references, written, about, locals: Vec::new() };
+        place.locals = place.locals_of(item.plain());
         place
     }
 
-    fn text(&self, index: usize) -> &'a str {
-        self.tokens.get(index).map_or("", |token| token.text)
-    }
-
-    /// The token before the place; `back` of 1 is the one before that.
-    fn last(&self, back: usize) -> &'a str {
-        self.tokens.len().checked_sub(back + 1).map_or("", |index| self.text(index))
-    }
-
-    fn keyword(&self) -> &'a str {
-        if self.text(0) == "optional" { self.text(1) } else { self.text(0) }
-    }
-
-    /// What stands before the innermost open bracket, and the bracket.
-    fn inside(&self) -> (&'a str, &'a str) {
-        match self.open.last() {
-            Some(&index) => (index.checked_sub(1).map_or("", |before| self.text(before)), self.text(index)),
-            None => ("", ""),
-        }
-    }
-
-    /// Whether a value must come next, and not an operator or the next entry.
-    fn wants_operand(&self) -> bool {
-        let last = self.last(0);
-        let words =
-            ["and", "or", "not", "in", "implies", "where", "match", "spawn", "ahead", "behind", "when"];
-        let marks = [
-            "=", ":", "(", "[", "{", ",", "+", "-", "*", "/", "<", ">", "<=", ">=", "==", "!=", "=>", "|",
-            "..",
-        ];
-        words.contains(&last) || marks.contains(&last)
-    }
-
-    /// Whether the next entry of a block could begin here.
-    fn begins_entry(&self) -> bool {
-        matches!(self.last(0), "{" | ",") || self.fresh_line && !self.wants_operand()
-    }
-
-    fn kinds(&self) -> Vec<Kind> {
-        match (self.last(0), self.last(1)) {
-            ("", _) => return vec![Kind::Declarations],
-            ("override", _) => {
-                let fixed = ["language", "use", "expect", "scenario", "policy", "override"];
-                let declarations = keyword::DECLARATIONS.iter().copied();
-                let open = declarations.filter(|(word, _)| !fixed.contains(word));
-                return vec![Kind::Words(open.collect())];
+    /// The kinds that fit; `None` if nothing is known of the place.
+    fn kinds(&self, item: &ItemKind) -> Option<Vec<Kind>> {
+        let bool = Some(Type::Bool);
+        match item {
+            ItemKind::Override(inner) if inner.name().is_some_and(is_here) => Some(replaceable(inner)),
+            ItemKind::Override(inner) => self.kinds(inner),
+            ItemKind::Use(of) if of.path.value == HERE => {
+                Some(vec![Kind::Files("ava", self.written.to_owned())])
             }
-            (keyword, _) if self.overrides && self.tokens.len() == 1 && keyword != "optional" => {
-                return replaceable(keyword);
+            ItemKind::Use(of) => {
+                any_here(&of.without).then(|| vec![Kind::Actions, Kind::Groups, Kind::Rules])
             }
-            ("optional", _) => return vec![Kind::Keyword("rule")],
-            (".", thing) if things().contains(&thing) => return vec![Kind::Words(parts_of(thing))],
-            _ => {}
-        }
-        if self.tokens.last().is_some_and(Token::is_number)
-            && !self.fresh_line
-            && self.keyword() != "language"
-        {
-            return vec![Kind::Units, Kind::Operators];
-        }
-        match self.keyword() {
-            "use" => match self.has("without") {
-                true => vec![Kind::Actions, Kind::Groups, Kind::Rules],
-                false => vec![Kind::Keyword("digest"), Kind::Keyword("without")],
-            },
-            "odds" => match self.begins_entry() || self.last(0) == "|" {
-                true if self.text(1) == SpaceClaim::Actions.name() => {
-                    vec![Kind::Actions, Kind::Groups, Kind::Keyword("_")]
-                }
-                true => vec![Kind::Variants(self.text(1).to_owned()), Kind::Keyword("_")],
-                false if self.last(0) == "odds" => vec![Kind::Enums],
-                false => Vec::new(),
-            },
-            "state" => self.in_state(),
-            "let" if self.tokens.iter().any(|token| token.text == "=") => self.value(None),
-            "fn" => self.in_function(),
-            "action" | "each" => self.in_action(),
-            "on" if self.open.is_empty() => match self.last(0) {
-                "on" | "," => vec![Kind::Actions, Kind::Groups],
-                "also" => Vec::new(),
-                _ => vec![Kind::Keyword("also")],
-            },
-            "on" => self.in_action(),
-            "group" if matches!(self.last(0), "=" | ",") => vec![Kind::Actions, Kind::Groups],
-            "rule" => self.in_rule(),
-            "road" => self.in_road(),
-            "episode" => self.in_episode(),
-            "reward" | "verdict" if self.tokens.len() > 1 => self.in_outcome(),
-            "expect" => self.in_expect(),
-            "scenario" => self.in_scenario(),
-            "policy" => self.in_policy(),
-            _ => Vec::new(),
+            ItemKind::Odds(of) if is_here(&of.name) => Some(vec![Kind::Enums]),
+            ItemKind::Odds(of) => {
+                let rows = of.name.text == SpaceClaim::Actions.name();
+                let actions = || vec![Kind::Actions, Kind::Groups];
+                let variants = || vec![Kind::Variants(of.name.text.clone())];
+                self.arms(&of.arms, || if rows { actions() } else { variants() }, None)
+            }
+            ItemKind::State(of) => self.in_state(of),
+            ItemKind::Let(of) => self.within(&of.value, None, None),
+            ItemKind::Fn(of) => {
+                let types = of.params.iter().map(|param| &param.ty).chain([&of.result]);
+                let result = self.written_type(&of.result);
+                types
+                    .into_iter()
+                    .find_map(|ty| self.in_type(ty))
+                    .or_else(|| self.within(&of.body, result, result))
+            }
+            ItemKind::Action(of) => self.in_action(of),
+            ItemKind::Group(of) => any_here(&of.members).then(|| vec![Kind::Actions, Kind::Groups]),
+            ItemKind::Also(of) if any_here(&of.on) => Some(vec![Kind::Actions, Kind::Groups]),
+            ItemKind::Also(of) => self.in_effects(&of.effects),
+            ItemKind::EachStep(effects) => self.in_effects(effects),
+            ItemKind::Rule(of) => self.in_rule(of),
+            ItemKind::Body(of) => self.units(&of.fields),
+            ItemKind::Road(of) => self.in_road(&of.fields),
+            ItemKind::Episode(fields) => self.in_episode(fields),
+            ItemKind::Reward(cases) => cases.iter().find_map(|case| {
+                let condition = case.condition.as_ref().and_then(|when| self.within(when, None, None));
+                condition.or_else(|| self.within(&case.value, None, None))
+            }),
+            ItemKind::Verdict(of) => self.within(&of.condition, None, None),
+            ItemKind::Expect(of) => self.within(&of.claim, bool, bool),
+            ItemKind::Scenario(of) => self.in_scenario(of),
+            ItemKind::Policy(of) => self.in_policy(of),
+            ItemKind::Language(_) | ItemKind::Enum(_) => None,
         }
     }
 
-    fn in_state(&self) -> Vec<Kind> {
-        let equals = self.tokens.iter().position(|token| token.text == "=");
-        match (self.last(0), equals) {
-            (":", _) => vec![Kind::Types],
-            ("->", _) => vec![Kind::Enums],
-            ("=", Some(equals)) => {
-                let mut kinds = vec![Kind::Keyword("any")];
-                kinds.extend(self.value(self.references.type_named(self.text(equals - 1))));
-                kinds
-            }
-            (_, Some(_)) => self.value(None),
-            _ => Vec::new(),
+    fn in_type(&self, ty: &WrittenType) -> Option<Vec<Kind>> {
+        match &ty.kind {
+            TypeKind::Named(name) => is_here(name).then(|| vec![Kind::Types]),
+            TypeKind::Map { value, .. } => is_here(value).then(|| vec![Kind::Enums]),
         }
     }
 
-    fn in_function(&self) -> Vec<Kind> {
-        let equals = self.tokens.iter().position(|token| token.text == "=");
-        match (self.last(0), equals) {
-            (":", None) => vec![Kind::Types],
-            ("->", None) => vec![Kind::Types],
-            (_, Some(equals)) => self.value(self.references.type_named(self.text(equals - 1))),
-            _ => Vec::new(),
-        }
-    }
-
-    fn in_action(&self) -> Vec<Kind> {
-        let is_header = self.open.first().is_some_and(|first| self.text(*first) == "(");
-        if is_header {
-            let each_or_any = vec![Kind::Keyword("each"), Kind::Keyword("any")];
-            return match self.last(0) {
-                "(" | "," if self.open.len() == 1 => each_or_any,
-                ":" if self.open.len() == 1 => vec![Kind::Types],
-                "each" | "any" => Vec::new(),
-                _ if self.open.len() == 1 && !self.wants_operand() => {
-                    let colon = self.tokens.iter().rposition(|token| token.text == ":").unwrap_or(0);
-                    let has = |word: &str| self.tokens[colon..].iter().any(|token| token.text == word);
-                    let mut kinds: Vec<Kind> =
-                        ["in", "where"].into_iter().filter(|word| !has(word)).map(Kind::Keyword).collect();
-                    kinds.extend((has("in") || has("where")).then_some(Kind::Operators));
-                    kinds.extend(if self.fresh_line { each_or_any } else { Vec::new() });
-                    kinds
-                }
-                _ => self.value(self.declared_type()),
-            };
-        }
-        let effects = vec![Kind::Keyword("set"), Kind::Keyword("spawn")];
-        match (self.open.len(), self.last(0)) {
-            (0, _) => Vec::new(),
-            (_, "set") => vec![Kind::States],
-            (_, "spawn") => {
-                let mut kinds = vec![Kind::Bodies];
-                kinds.extend(self.value(None));
-                kinds
-            }
-            (1, "behind") if self.last(1) == "from" => {
-                let mut kinds = vec![Kind::Bodies];
-                kinds.extend(self.value(None));
-                kinds
-            }
-            (1, _) if self.begins_entry() => effects,
-            (1, "=") => self.value(self.set_type()),
-            (1, _) if self.wants_operand() => self.value(None),
-            (1, _) => {
-                let places = ["ahead", "behind", "from"].map(Kind::Keyword);
-                let mut kinds: Vec<Kind> = places.into_iter().chain([Kind::Operators]).collect();
-                kinds.extend(effects);
-                kinds
-            }
-            (2, ":") => {
-                let mut kinds = vec![Kind::Words(words::engine_words(self.last(1)))];
-                kinds.extend(self.value(None));
-                kinds
-            }
-            (2, _) if self.begins_entry() && self.inside().1 == "{" => {
-                vec![Kind::Words(self.unused(&words::of::<SpawnField>()))]
-            }
-            _ => self.value(None),
-        }
-    }
-
-    fn in_rule(&self) -> Vec<Kind> {
-        let colon = self.tokens.iter().position(|token| token.text == ":");
-        let on = self.tokens.iter().position(|token| token.text == "on");
-        let moves = self.open.first().is_some_and(|first| self.text(*first) == "{") && colon.is_none();
-        match (self.last(0), colon, on) {
-            _ if moves => {
-                let state = self.open[0].checked_sub(1).map_or("", |before| self.text(before));
-                self.plain_state(state).and_then(|ty| self.variants(ty)).into_iter().collect()
-            }
-            (_, Some(_), _) if self.asks_for_road() => vec![Kind::Roads],
-            (_, Some(_), _) => {
-                let mut kinds = self.value(Some(Type::Bool));
-                if self.wants_operand() {
-                    kinds.push(Kind::Words(words::facts(Site::Rule)));
-                    kinds.extend(things().into_iter().map(Kind::Keyword));
-                }
-                kinds
-            }
-            ("during", ..) => vec![Kind::Words(vec![CHANGE])],
-            ("on" | ",", None, Some(_)) => vec![Kind::Actions, Kind::Groups, Kind::States],
-            (_, None, None) if self.tokens.len() > 1 && self.last(0) != "rule" => {
-                ["on", "during"].map(Kind::Keyword).to_vec()
-            }
-            _ => Vec::new(),
-        }
-    }
-
-    /// Behind `road ==` or within `road in [`.
-    fn asks_for_road(&self) -> bool {
-        let open = self.open.last().copied().filter(|open| self.text(*open) == "[");
-        let of_list = open.and_then(|open| open.checked_sub(2)).map_or("", |index| self.text(index));
-        matches!(self.last(0), "==" | "!=") && self.last(1) == "road" || of_list == "road"
-    }
-
-    fn in_road(&self) -> Vec<Kind> {
-        match self.last(0) {
-            ":" if matches!(self.last(1), "start" | "goal") => vec![Kind::Keyword("lane")],
-            _ if self.open.len() == 1 && self.begins_entry() => {
-                vec![Kind::Words(self.unused(&words::of::<RoadField>()))]
-            }
-            _ => Vec::new(),
-        }
-    }
-
-    fn in_episode(&self) -> Vec<Kind> {
-        if self.inside().1 == "[" {
-            return vec![Kind::Roads];
-        }
-        if self.begins_entry() {
-            return vec![Kind::Words(self.unused(&words::of::<EpisodeField>()))];
-        }
-        let field = self.tokens.iter().rposition(|token| token.text == ":").map_or(0, |colon| colon - 1);
-        match (self.text(field), self.wants_operand()) {
-            ("stop", true) => vec![Kind::Words(words::of::<StopReason>())],
-            ("stop", false) => vec![Kind::Keyword("or")],
-            _ => Vec::new(),
-        }
-    }
-
-    fn in_outcome(&self) -> Vec<Kind> {
-        if !self.wants_operand() && !self.begins_entry() {
-            return vec![Kind::Operators];
-        }
-        let open = self.open.last().copied().filter(|open| self.text(*open) == "[");
-        let compared = match (self.last(0), open) {
-            ("==" | "!=", _) => self.last(1),
-            ("[" | ",", Some(open)) if open >= 2 && self.text(open - 1) == "in" => self.text(open - 2),
-            _ => "",
+    fn in_state(&self, state: &State) -> Option<Vec<Kind>> {
+        let ty = self.written_type(&state.ty);
+        let any = Kind::Keyword("any");
+        let initial = |value: &Expr| {
+            let kinds = self.within(value, ty, ty)?;
+            Some(if is_named_here(value) { [vec![any.clone()], kinds].concat() } else { kinds })
         };
-        if matches!(compared, "hit" | "near") {
-            return vec![Kind::Bodies];
-        }
-        let site = if self.keyword() == "reward" { Site::Reward } else { Site::Verdict };
-        let mut kinds = vec![Kind::Words(words::facts(site))];
-        kinds.extend(self.value(None));
-        kinds
+        self.in_type(&state.ty).or_else(|| match &state.initial {
+            Initial::Any => None,
+            Initial::Value(value) => initial(value),
+            Initial::Keys(keys) => keys.iter().find_map(|key| match (&key.key, &state.ty.kind) {
+                (Some(name), TypeKind::Map { key: of, .. }) if is_here(name) => {
+                    Some(vec![Kind::Variants(of.text.clone()), Kind::Keyword("_")])
+                }
+                _ => key.value.as_ref().and_then(initial),
+            }),
+        })
     }
 
-    fn in_expect(&self) -> Vec<Kind> {
-        match self.inside().1 {
-            "(" => vec![Kind::Words(words::of::<SpaceClaim>()), Kind::Actions, Kind::Groups],
-            _ => vec![Kind::Words(words::of::<SpaceClaim>())],
-        }
+    fn in_action(&self, action: &Action) -> Option<Vec<Kind>> {
+        let parameter = |param: &ActionParam| {
+            let ty = self.written_type(&param.ty);
+            let mut values = param.within.iter().chain(&param.condition);
+            self.in_type(&param.ty).or_else(|| values.find_map(|value| self.within(value, ty, ty)))
+        };
+        action.params.iter().find_map(parameter).or_else(|| self.in_effects(&action.effects))
     }
 
-    fn in_scenario(&self) -> Vec<Kind> {
-        let parts = ["origin", "road", "start", "steps", "expect"];
-        let block = self.open.get(1).map_or("", |open| self.text(open - 1));
-        match (self.open.len(), block) {
-            (1, _) if self.last(0) == ":" && self.last(1) == "road" => vec![Kind::Roads],
-            (1, _) if self.begins_entry() => {
-                let lacking = parts.into_iter().filter(|part| *part == "expect" || !self.has(part));
-                lacking.map(Kind::Keyword).collect()
+    fn in_effects(&self, effects: &[Effect]) -> Option<Vec<Kind>> {
+        effects.iter().find_map(|effect| match &effect.kind {
+            EffectKind::Set { state, .. } if is_here(state) => Some(vec![Kind::States]),
+            EffectKind::Set { state, key, value } => {
+                let known = self.state(&state.text);
+                let of_key = known.and_then(|state| state.key).map(Type::Enum);
+                let key = key.as_ref().and_then(|key| self.within(key, of_key, None));
+                key.or_else(|| self.within(value, known.and_then(|state| state.ty), None))
             }
-            (1, _) => self.in_claim(),
-            (_, "start") => self.in_start(),
-            (_, "steps") => self.in_steps(),
-            _ => Vec::new(),
+            EffectKind::Spawn { body, distance, cover, fields, .. } => {
+                let mut bodies = [Some(body), cover.as_ref()].into_iter().flatten();
+                bodies
+                    .find_map(|body| {
+                        let kinds = self.within(body, None, None)?;
+                        Some(if is_named_here(body) { [vec![Kind::Bodies], kinds].concat() } else { kinds })
+                    })
+                    .or_else(|| self.within(distance, None, None))
+                    .or_else(|| self.in_spawn(fields))
+            }
+        })
+    }
+
+    fn in_spawn(&self, fields: &[Field]) -> Option<Vec<Kind>> {
+        fields.iter().find_map(|field| {
+            if is_here(&field.name) {
+                return Some(unused::<SpawnField>(fields));
+            }
+            let kinds = self.within(&field.value, None, None)?;
+            let words = Kind::Words(words::engine_words(&field.name.text));
+            Some(if is_named_here(&field.value) { [vec![words], kinds].concat() } else { kinds })
+        })
+    }
+
+    fn in_rule(&self, rule: &Rule) -> Option<Vec<Kind>> {
+        match &rule.body {
+            RuleBody::Holds { on, .. } if any_here(on) => {
+                Some(vec![Kind::Actions, Kind::Groups, Kind::States])
+            }
+            RuleBody::Holds { during: Some(during), .. } if is_here(during) => {
+                Some(vec![Kind::Words(vec![CHANGE])])
+            }
+            RuleBody::Holds { condition, .. } => self.within(condition, Some(Type::Bool), Some(Type::Bool)),
+            RuleBody::Moves { state, key, moves } => {
+                let state = self.state(&state.text)?;
+                if key.as_ref().is_some_and(is_here) {
+                    return self.variants(Type::Enum(state.key?)).map(|kind| vec![kind]);
+                }
+                let is_moved = moves.iter().any(|step| is_here(&step.from) || any_here(&step.to));
+                let ty = state.ty.filter(|_| is_moved && state.key.is_some() == key.is_some())?;
+                self.variants(ty).map(|kind| vec![kind])
+            }
         }
     }
 
-    fn in_claim(&self) -> Vec<Kind> {
-        let from =
-            self.tokens.iter().rposition(|token| token.text == "expect").map_or(0, |expect| expect + 1);
-        match (self.last(0), self.text(from)) {
-            ("expect", _) => {
-                let facts = [words::facts(Site::Verdict), words::of::<ScenarioClaim>()].concat();
-                vec![Kind::Words(facts), Kind::Verdicts]
+    fn in_road(&self, fields: &[Field]) -> Option<Vec<Kind>> {
+        fields
+            .iter()
+            .find_map(|field| match (field.name.text.as_str(), &field.value.kind) {
+                (HERE, _) => Some(unused::<RoadField>(fields)),
+                ("map", ExprKind::Text(path)) if path == HERE => {
+                    Some(vec![Kind::Files("xodr", self.written.to_owned())])
+                }
+                ("start" | "goal", ExprKind::Name(name)) if name == HERE => Some(vec![Kind::Keyword("lane")]),
+                _ => None,
+            })
+            .or_else(|| self.units(fields))
+    }
+
+    fn in_episode(&self, fields: &[Field]) -> Option<Vec<Kind>> {
+        let of_field = |field: &Field| match (field.name.text.as_str(), &field.value.kind) {
+            (HERE, _) => Some(unused::<EpisodeField>(fields)),
+            (_, ExprKind::List(items)) if items.iter().any(is_named_here) => Some(vec![Kind::Roads]),
+            ("stop", _) if self.holds_here(&field.value) => {
+                Some(vec![Kind::Words(words::of::<StopReason>())])
             }
-            ("==" | "[" | ",", claim) => {
+            _ => None,
+        };
+        self.units(fields).or_else(|| fields.iter().find_map(of_field))
+    }
+
+    fn in_scenario(&self, scenario: &Scenario) -> Option<Vec<Kind>> {
+        if is_here(&scenario.road) {
+            return Some(vec![Kind::Roads]);
+        }
+        let claim = || scenario.expects.iter().find_map(|expect| self.within(&expect.claim, None, None));
+        scenario
+            .start
+            .iter()
+            .find_map(|field| self.in_start(field))
+            .or_else(|| scenario.steps.iter().find_map(|step| self.in_step(step)))
+            .or_else(claim)
+    }
+
+    fn in_start(&self, field: &Field) -> Option<Vec<Kind>> {
+        if is_here(&field.name) {
+            return Some(vec![Kind::States, Kind::Words(words::of::<StartField>())]);
+        }
+        let state = self.state(&field.name.text);
+        let ty = state.and_then(|state| state.ty);
+        let ExprKind::Record(keys) = &field.value.kind else { return self.plain_value(&field.value, ty) };
+        keys.iter().find_map(|entry| match is_here(&entry.name) {
+            true => Some(self.variants(Type::Enum(state?.key?)).into_iter().collect()),
+            false => self.plain_value(&entry.value, ty),
+        })
+    }
+
+    fn in_step(&self, step: &Step) -> Option<Vec<Kind>> {
+        if is_here(&step.action.name) {
+            return Some(vec![Kind::Actions, Kind::Words(vec![WAIT])]);
+        }
+        let called = &step.action.name.text;
+        let drawn = |field: &Field| match is_here(&field.name) {
+            true => Some(vec![Kind::Parameters(called.clone(), false)]),
+            false => self.plain_value(&field.value, self.parameter_type(called, &field.name.text)),
+        };
+        self.in_row(&step.action).or_else(|| step.drawn.iter().find_map(drawn))
+    }
+
+    /// Within the arguments of an action: `drive_ahead(lane: Left)`.
+    fn in_row(&self, call: &Call) -> Option<Vec<Kind>> {
+        call.args.iter().find_map(|arg| match &arg.name {
+            Some(name) => self.plain_value(&arg.value, self.parameter_type(&call.name.text, &name.text)),
+            None => is_named_here(&arg.value).then(|| vec![Kind::Parameters(call.name.text.clone(), true)]),
+        })
+    }
+
+    fn in_policy(&self, policy: &Policy) -> Option<Vec<Kind>> {
+        let bool = Some(Type::Bool);
+        policy.rules.iter().find_map(|line| {
+            let condition = line.condition.as_ref().and_then(|when| self.within(when, bool, bool));
+            condition.or_else(|| {
+                line.actions.iter().find_map(|call| match is_here(&call.name) {
+                    true => Some(vec![Kind::Actions]),
+                    false => self.in_row(call),
+                })
+            })
+        })
+    }
+
+    /// Within a value that is about nothing else, as in a start.
+    fn plain_value(&self, expr: &Expr, ty: Option<Type>) -> Option<Vec<Kind>> {
+        let plain = Place { about: About::Value, locals: Vec::new(), ..*self };
+        plain.within(expr, ty, ty)
+    }
+
+    /// The units, if the place is behind a number of a block.
+    fn units(&self, fields: &[Field]) -> Option<Vec<Kind>> {
+        let mut open: Vec<&Expr> = fields.iter().map(|field| &field.value).collect();
+        while let Some(expr) = open.pop() {
+            if matches!(&expr.kind, ExprKind::Number(number) if number.unit.as_ref().is_some_and(is_here)) {
+                return Some(vec![Kind::Units, Kind::Operators]);
+            }
+            open.extend(expr.parts());
+        }
+        None
+    }
+
+    fn holds_here(&self, expr: &Expr) -> bool {
+        is_named_here(expr) || expr.parts().into_iter().any(|part| self.holds_here(part))
+    }
+
+    /// Within an expression; `None` if the place is elsewhere. `whole` is the type that the expression should have,
+    /// `part` the one that is assumed of its operands where nothing better is known.
+    fn within(&self, expr: &Expr, whole: Option<Type>, part: Option<Type>) -> Option<Vec<Kind>> {
+        match &expr.kind {
+            ExprKind::Name(name) => (name == HERE).then(|| self.value(whole)),
+            ExprKind::Number(number) => {
+                number.unit.as_ref().is_some_and(is_here).then(|| vec![Kind::Units, Kind::Operators])
+            }
+            ExprKind::Field { base, field } if is_here(field) => {
+                let thing = name_of(base).filter(|thing| things().contains(thing));
+                Some(thing.map(|thing| Kind::Words(parts_of(thing))).into_iter().collect())
+            }
+            ExprKind::Unary { operand, .. } => self.within(operand, whole, part),
+            ExprKind::Binary { op, left, right, .. } => self
+                .within(left, part, part)
+                .or_else(|| self.compared(*op, left, right))
+                .or_else(|| self.within(right, self.compared_type(*op, left, right).or(part), part)),
+            ExprKind::Index { base, index } => {
+                let key = name_of(base).and_then(|state| self.state(state)?.key).map(Type::Enum);
+                self.within(base, part, part).or_else(|| self.within(index, key.or(part), part))
+            }
+            ExprKind::Call(call) => self.in_call(call, part),
+            ExprKind::List(items) => items.iter().find_map(|item| self.within(item, whole, part)),
+            ExprKind::Match { subject, arms } => {
+                let variants = || self.type_of(subject).and_then(|ty| self.variants(ty));
+                self.within(subject, None, None)
+                    .or_else(|| self.arms(arms, || variants().into_iter().collect(), whole))
+            }
+            ExprKind::Range { .. } | ExprKind::Field { .. } | ExprKind::Record(_) => {
+                expr.parts().into_iter().find_map(|inner| self.within(inner, whole, part))
+            }
+            ExprKind::Text(_)
+            | ExprKind::Bool(_)
+            | ExprKind::LanePoint { .. }
+            | ExprKind::Numbered { .. } => None,
+        }
+    }
+
+    /// The names that alone fit beside what stands left of a comparison, or in the list behind `in`.
+    fn compared(&self, op: BinaryOp, left: &Expr, right: &Expr) -> Option<Vec<Kind>> {
+        let is_compared = match (op, &right.kind) {
+            (BinaryOp::In, ExprKind::List(items)) => items.iter().any(is_named_here),
+            (BinaryOp::Compare(comparison), _) => !comparison.orders() && is_named_here(right),
+            _ => false,
+        };
+        match (self.about, name_of(left).filter(|_| is_compared)?) {
+            (About::Rule, "road") => Some(vec![Kind::Roads]),
+            (About::Outcome(_), "hit" | "near") => Some(vec![Kind::Bodies]),
+            (About::Scenario, claim) => {
                 let words = words::claim_words(claim).iter().map(|word| (*word, ""));
-                vec![Kind::Words(words.collect())]
+                Some(vec![Kind::Words(words.collect())])
             }
-            _ => ["with", "at", "by"].map(Kind::Keyword).to_vec(),
+            _ => None,
         }
     }
 
-    fn in_start(&self) -> Vec<Kind> {
-        let field = self.open.get(2).map_or_else(|| self.last(1), |open| self.text(open.saturating_sub(2)));
-        let state = self.state(field);
-        let key = state.and_then(|state| state.key);
-        match (self.last(0), self.open.len(), key) {
-            (":", _, _) => self.value(state.and_then(|state| state.ty)),
-            (_, 3, Some(key)) => self.variants(Type::Enum(key)).into_iter().collect(),
-            _ => vec![Kind::States, Kind::Words(words::of::<StartField>())],
-        }
-    }
-
-    /// Within `steps { 2: drive_ahead(lane: Left) with { speed: 5 m/s } }`.
-    fn in_steps(&self) -> Vec<Kind> {
-        let (before, bracket) = self.inside();
-        match (self.last(0), bracket) {
-            (":", "{") if before == "steps" => vec![Kind::Actions, Kind::Words(vec![WAIT])],
-            (":", "(") => self.value(self.parameter_type(before)),
-            (":", "{") if before == "with" => self.value(self.parameter_type(&self.called())),
-            ("(" | ",", "(") => vec![Kind::Parameters(before.to_owned(), true)],
-            (_, "{") if before == "with" => vec![Kind::Parameters(self.called(), false)],
-            (")", _) => ["with", "once", "after"].map(Kind::Keyword).to_vec(),
-            _ => Vec::new(),
-        }
-    }
-
-    fn in_policy(&self) -> Vec<Kind> {
-        let (before, bracket) = self.inside();
-        match (self.open.len(), self.last(0), bracket) {
-            (1, _, _) => ["origin", "net", "claims", "rules"].map(Kind::Keyword).to_vec(),
-            (_, "=>", _) => vec![Kind::Actions],
-            (_, "(" | ",", "(") => match self.declared(Symbol::Action, before) {
-                Some(_) => vec![Kind::Parameters(before.to_owned(), true)],
-                None => self.value(None),
-            },
-            (_, ":", "(") => self.value(self.parameter_type(before)),
-            (2, _, _) if before == "rules" && self.begins_entry() => vec![Kind::Keyword("when")],
-            (2, _, _) if before == "rules" => self.value(Some(Type::Bool)),
-            _ => Vec::new(),
-        }
-    }
-
-    /// The action that the unfinished step calls.
-    fn called(&self) -> String {
-        let with = self.tokens.iter().rposition(|token| token.text == "with").unwrap_or(0);
-        let open = self.tokens[..with].iter().rposition(|token| token.text == "(").unwrap_or(0);
-        open.checked_sub(1).map_or("", |before| self.text(before)).to_owned()
-    }
-
-    /// Type of the parameter whose name stands before the colon.
-    fn parameter_type(&self, action: &str) -> Option<Type> {
-        let symbol = Symbol::Parameter(action.to_owned(), self.last(1).to_owned());
-        self.references.declaration(&symbol)?.ty
-    }
-
-    fn has(&self, word: &str) -> bool {
-        self.tokens.iter().any(|token| token.text == word)
-    }
-
-    /// The fields that the innermost block does not have yet.
-    fn unused(&self, fields: &[Entry]) -> Vec<Entry> {
-        let from = self.open.last().copied().unwrap_or(0);
-        let has = |field: &str| {
-            let mut pairs = self.tokens[from..].windows(2);
-            pairs.any(|pair| pair[0].text == field && pair[1].text == ":")
+    /// The type that a comparison or a list behind `in` asks for.
+    fn compared_type(&self, op: BinaryOp, left: &Expr, right: &Expr) -> Option<Type> {
+        let compares = match op {
+            BinaryOp::Compare(_) => is_named_here(right),
+            BinaryOp::In => matches!(right.kind, ExprKind::List(_)),
+            BinaryOp::Implies | BinaryOp::Or | BinaryOp::And | BinaryOp::Arithmetic(_) => false,
         };
-        fields.iter().copied().filter(|(field, _)| !has(field)).collect()
+        self.type_of(left).filter(|_| compares)
     }
 
-    /// The kinds that fit in an expression: the parts of a value, or what can follow one.
-    fn value(&self, ty: Option<Type>) -> Vec<Kind> {
-        if let Some(kinds) = self.arm() {
-            return kinds;
+    fn in_call(&self, call: &Call, part: Option<Type>) -> Option<Vec<Kind>> {
+        if self.about == About::Space {
+            let is_about = call.args.iter().any(|arg| is_named_here(&arg.value));
+            let claims = || Kind::Words(words::of::<SpaceClaim>());
+            return is_about.then(|| vec![claims(), Kind::Actions, Kind::Groups]);
         }
-        if !self.wants_operand() {
-            return vec![Kind::Operators];
-        }
-        let wanted = self.hint().or(ty);
+        let function = self.declared(Symbol::Function, &call.name.text);
+        call.args.iter().enumerate().find_map(|(index, arg)| {
+            let parts = function.map_or(&[][..], |function| &function.parts);
+            let symbol = match &arg.name {
+                Some(name) => parts.iter().find(|part| part.word() == Some(&name.text)),
+                None => parts.get(index),
+            };
+            let ty = symbol.and_then(|symbol| self.references.declaration(symbol)?.ty);
+            self.within(&arg.value, ty.or(part), part)
+        })
+    }
+
+    /// Within the arms of a `match` or of odds, whose patterns are of these kinds.
+    fn arms(&self, arms: &[Arm], patterns: impl Fn() -> Vec<Kind>, whole: Option<Type>) -> Option<Vec<Kind>> {
+        arms.iter().find_map(|arm| match any_here(&arm.patterns) {
+            true => Some([patterns(), vec![Kind::Keyword("_")]].concat()),
+            false => self.within(&arm.value, whole, whole),
+        })
+    }
+
+    /// The kinds that make a value, first those of the wanted type.
+    fn value(&self, wanted: Option<Type>) -> Vec<Kind> {
         // A condition may begin with a value of any type.
         let is_open = wanted.is_none_or(|wanted| wanted == Type::Bool);
         let local =
             |(name, ty): &(String, Option<Type>)| Kind::Local(name.clone(), *ty, is_open || *ty == wanted);
         let mut kinds: Vec<Kind> = self.locals.iter().map(local).collect();
         kinds.push(Kind::Value(wanted));
-        kinds
-    }
-
-    /// The variants for the start of an arm of `match`; `None` elsewhere.
-    fn arm(&self) -> Option<Vec<Kind>> {
-        let open = *self.open.last()?;
-        let from = self.tokens[..open].iter().rposition(|token| token.text == "match")?;
-        if self.text(open) != "{" || from + 2 != open || !(self.begins_entry() || self.last(0) == "|") {
-            return None;
+        match self.about {
+            About::Value => kinds,
+            About::Rule => {
+                kinds.push(Kind::Words(words::facts(Site::Rule)));
+                kinds.extend(things().into_iter().map(Kind::Keyword));
+                kinds
+            }
+            About::Outcome(site) => [vec![Kind::Words(words::facts(site))], kinds].concat(),
+            About::Space => vec![Kind::Words(words::of::<SpaceClaim>())],
+            About::Scenario => {
+                let facts = [words::facts(Site::Verdict), words::of::<ScenarioClaim>()].concat();
+                vec![Kind::Words(facts), Kind::Verdicts]
+            }
         }
-        let variants = self.variants(self.type_of(self.text(from + 1))?)?;
-        Some(vec![variants, Kind::Keyword("_")])
     }
 
-    /// The type that the tokens before the place ask for.
-    fn hint(&self) -> Option<Type> {
-        let end = self.tokens.len();
-        match self.last(0) {
-            "==" | "!=" | "<" | "<=" | ">" | ">=" => self.type_before(end - 1),
-            "[" | "," if self.inside().1 == "[" => {
-                let open = *self.open.last()?;
-                match self.text(open.checked_sub(1)?) {
-                    "in" => self.type_before(open - 1),
-                    state => self.state(state)?.key.map(Type::Enum),
-                }
+    fn type_of(&self, expr: &Expr) -> Option<Type> {
+        match &expr.kind {
+            ExprKind::Name(name) => {
+                let local = self.locals.iter().find(|(local, _)| local == name);
+                let constant = || self.declared(Symbol::Constant, name).and_then(|constant| constant.ty);
+                let state = || self.state(name).filter(|state| state.key.is_none())?.ty;
+                local.and_then(|(_, ty)| *ty).or_else(constant).or_else(state)
             }
-            "(" | "," if self.inside().1 == "(" => {
-                let open = *self.open.last()?;
-                let function = self.declared(Symbol::Function, self.text(open.checked_sub(1)?))?;
-                let commas = self.tokens[open..].iter().filter(|token| token.text == ",").count();
-                self.references.declaration(function.parts.get(commas)?)?.ty
-            }
+            ExprKind::Index { base, .. } => self.state(name_of(base)?)?.ty,
+            ExprKind::Call(call) => self.declared(Symbol::Function, &call.name.text)?.ty,
+            ExprKind::Binary { op: BinaryOp::Arithmetic(_), right, .. } => self.type_of(right),
             _ => None,
         }
     }
 
-    /// Type of the value that ends before a token: a name, `state[key]` or `function(…)`.
-    fn type_before(&self, end: usize) -> Option<Type> {
-        let last = end.checked_sub(1)?;
-        let back_to = |bracket: &str| self.tokens[..last].iter().rposition(|token| token.text == bracket);
-        match self.text(last) {
-            "]" => self.state(self.text(back_to("[")?.checked_sub(1)?))?.ty,
-            ")" => self.declared(Symbol::Function, self.text(back_to("(")?.checked_sub(1)?))?.ty,
-            name => self.type_of(name),
+    /// The type that is written; of a map, the type of its values.
+    fn written_type(&self, ty: &WrittenType) -> Option<Type> {
+        match &ty.kind {
+            TypeKind::Named(name) | TypeKind::Map { value: name, .. } => {
+                self.references.type_named(&name.text)
+            }
         }
-    }
-
-    fn type_of(&self, name: &str) -> Option<Type> {
-        let local = self.locals.iter().find(|(local, _)| local == name);
-        let constant = || self.declared(Symbol::Constant, name).and_then(|constant| constant.ty);
-        local.and_then(|(_, ty)| *ty).or_else(constant).or_else(|| self.plain_state(name))
-    }
-
-    /// Type of a state that is no map.
-    fn plain_state(&self, name: &str) -> Option<Type> {
-        self.state(name).filter(|state| state.key.is_none())?.ty
     }
 
     fn state(&self, name: &str) -> Option<&'a Declaration> {
@@ -586,46 +556,27 @@ impl<'a> Place<'a> {
         self.references.declaration(&symbol(name.to_owned()))
     }
 
+    fn parameter_type(&self, action: &str, name: &str) -> Option<Type> {
+        self.references.declaration(&Symbol::Parameter(action.to_owned(), name.to_owned()))?.ty
+    }
+
     /// The variants of an enum.
     fn variants(&self, ty: Type) -> Option<Kind> {
         self.references.enum_of(ty).map(|of| Kind::Variants(of.name.clone()))
     }
 
-    /// Type of the parameter of an action that is being declared.
-    fn declared_type(&self) -> Option<Type> {
-        let colon = self.tokens.iter().rposition(|token| token.text == ":")?;
-        self.references.type_named(self.text(colon + 1))
-    }
-
-    /// Type of what `set` sets.
-    fn set_type(&self) -> Option<Type> {
-        let set = self.tokens.iter().rposition(|token| token.text == "set")?;
-        self.state(self.text(set + 1))?.ty
-    }
-
-    /// The parameters that an expression at the place can name.
-    fn find_locals(&self) -> Vec<(String, Option<Type>)> {
+    fn locals_of(&self, item: &ItemKind) -> Vec<(String, Option<Type>)> {
         let mut found: Vec<(String, Option<Type>)> = Vec::new();
-        match self.keyword() {
-            "rule" => {
-                let from = self.tokens.iter().position(|token| token.text == "on");
-                let names = self.tokens.iter().skip(from.map_or(usize::MAX, |on| on + 1));
-                let names = names.take_while(|token| token.text != ":").filter(|token| token.is_word());
-                for (name, ty) in names.flat_map(|name| self.parameters_of(name.text)) {
+        let written = |name: &Name, ty: &WrittenType| (name.text.clone(), self.written_type(ty));
+        match item {
+            ItemKind::Fn(of) => found.extend(of.params.iter().map(|param| written(&param.name, &param.ty))),
+            ItemKind::Action(of) => {
+                found.extend(of.params.iter().map(|param| written(&param.name, &param.ty)))
+            }
+            ItemKind::Rule(Rule { body: RuleBody::Holds { on, .. }, .. }) => {
+                for (name, ty) in on.iter().flat_map(|target| self.parameters_of(&target.text)) {
                     if !found.iter().any(|(known, _)| *known == name) {
                         found.push((name, ty));
-                    }
-                }
-            }
-            keyword @ ("fn" | "action") => {
-                for at in 1..self.tokens.len() {
-                    let is_parameter = self.text(at + 1) == ":"
-                        && match keyword {
-                            "fn" => matches!(self.text(at - 1), "(" | ","),
-                            _ => matches!(self.text(at - 1), "each" | "any"),
-                        };
-                    if is_parameter && self.tokens[at].is_word() {
-                        found.push((self.text(at).to_owned(), self.references.type_named(self.text(at + 2))));
                     }
                 }
             }

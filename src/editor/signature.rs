@@ -1,10 +1,11 @@
 //! Signature help: the parameters of the function or action whose arguments are being written.
 
 use crate::check::Symbol;
+use crate::syntax::declaration_start;
 
+use super::hover;
 use super::tokens::{Token, tokens};
 use super::workspace::Analysis;
-use super::{context, hover};
 
 /// How a function or an action is called.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -21,8 +22,8 @@ pub struct Signature {
 /// The signature of the innermost call around a byte of the document.
 pub fn help(analysis: &Analysis, byte: usize) -> Option<Signature> {
     let text = analysis.text(Analysis::ROOT);
-    let item = context::item_start(text, byte);
-    let (tokens, _) = tokens(text.get(item..byte)?);
+    let item = declaration_start(text, byte);
+    let tokens = tokens(text.get(item..byte)?);
     let (name, written) = call(&tokens)?;
     let references = analysis.references();
     let of = [Symbol::Function(name.to_owned()), Symbol::Action(name.to_owned())];

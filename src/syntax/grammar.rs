@@ -3,6 +3,7 @@
 //! `parse`, `build` and `expression` use `Rule`; nothing outside `syntax` does.
 
 use crate::syntax::ast::{Arithmetic, BinaryOp, Comparison, UnaryOp};
+use crate::syntax::keyword::keywords;
 use crate::syntax::operator::Operator;
 
 /// Generated from the grammar.
@@ -203,6 +204,25 @@ pub fn words(rule: Rule) -> Option<&'static str> {
 pub fn continues_expression(rule: Rule) -> bool {
     let continues = [Rule::infix, Rule::unit, Rule::index, Rule::field_access, Rule::arguments];
     continues.contains(&rule) || matches!(role(rule), Role::Operator(operator) if operator.is_infix())
+}
+
+/// The keywords with which a text of the rule may begin. pest names a keyword where only one fits, and the rule around
+/// it where several do.
+pub fn opening_words(rule: Rule) -> Vec<&'static str> {
+    match rule {
+        Rule::action_param => vec!["each", "any"],
+        Rule::effect => vec!["set", "spawn"],
+        Rule::clause => vec!["with", "at", "by"],
+        Rule::named_rule => vec!["optional", "rule"],
+        Rule::policy_line => vec!["when"],
+        Rule::drawn_initially => vec!["any"],
+        // The rule of a keyword is `kw_` and the word.
+        _ => {
+            let name = format!("{rule:?}");
+            let word = name.strip_prefix("kw_").and_then(|word| keywords().find(|(known, _)| *known == word));
+            word.map(|(word, _)| *word).into_iter().collect()
+        }
+    }
 }
 
 /// Whether the rule is a mark or keyword that the tree does not keep, because the rule around it tells
