@@ -184,12 +184,9 @@ impl<'a> Place<'a> {
             ItemKind::State(of) => self.in_state(of),
             ItemKind::Let(of) => self.within(&of.value, None, None),
             ItemKind::Fn(of) => {
-                let types = of.params.iter().map(|param| &param.ty).chain([&of.result]);
+                let mut types = of.params.iter().map(|param| &param.ty).chain([&of.result]);
                 let result = self.written_type(&of.result);
-                types
-                    .into_iter()
-                    .find_map(|ty| self.in_type(ty))
-                    .or_else(|| self.within(&of.body, result, result))
+                types.find_map(|ty| self.in_type(ty)).or_else(|| self.within(&of.body, result, result))
             }
             ItemKind::Action(of) => self.in_action(of),
             ItemKind::Group(of) => any_here(&of.members).then(|| vec![Kind::Actions, Kind::Groups]),

@@ -93,7 +93,7 @@ pub fn unfinished(text: &str, byte: usize) -> Unfinished {
     let before = &text[begin..word];
     // No declaration has a control character, so the reading fails at the place if not before it.
     let expected = match read(&format!("{before} \u{1}")) {
-        Err((at, expected)) if at + 1 == before.len() + " \u{1}".len() => expected,
+        Err((at, expected)) if at == before.len() + " ".len() => expected,
         _ => Vec::new(),
     };
     let expects = |rules: &[Rule]| expected.iter().any(|rule| rules.contains(rule));
