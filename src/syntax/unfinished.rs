@@ -19,6 +19,9 @@ pub const HERE: &str = "written_here";
 /// Most tokens that are added to end a declaration: enough for any that nests as deep as the language does.
 const ADDED_MAX: usize = 96;
 
+/// A longer declaration was written by a program. Completion would read it several times, so nothing is said of it.
+const BYTES_MAX: usize = 200_000;
+
 /// What ends a declaration soonest, by the rule that is expected: the first that fits is added.
 const ENDINGS: &[(Rule, &str)] = &[
     (Rule::close_brace, "}"),
@@ -78,6 +81,9 @@ pub fn unfinished(text: &str, byte: usize) -> Unfinished {
     let word = text[..byte].trim_end_matches(is_word).len();
     let begin = declaration_start(text, word);
     let before = &text[begin..byte];
+    if before.len() > BYTES_MAX {
+        return Unfinished { start: word, ..Unfinished::default() };
+    }
     let scanned = scan(FileId::default(), before);
     let is_open = |start: usize| !before[start..].contains('\n');
     if scanned.is_too_large || scanned.comments.last().is_some_and(|comment| is_open(comment.start)) {
@@ -117,13 +123,22 @@ pub fn declaration_start(text: &str, byte: usize) -> usize {
     let mut at = byte;
     loop {
         let start = text[..at].rfind('\n').map_or(0, |newline| newline + 1);
-        let keyword = AvaParser::parse(Rule::declaration_keyword, &text[start..]);
-        let end = keyword.ok().and_then(|mut pairs| Some(start + pairs.next()?.as_span().end()));
-        if start == 0 || end.is_some_and(|end| end <= byte) {
+        let line = text[start..].lines().next().unwrap_or_default();
+        let end = keyword_end(line).map(|end| start + end);
+        if start == 0 || end.is_some_and(|end| end <= byte) || byte - start > BYTES_MAX {
             return start;
         }
         at = start - 1;
     }
+}
+
+/// The end of the keyword of a declaration at the start of a line.
+fn keyword_end(line: &str) -> Option<usize> {
+    if !line.starts_with(|first: char| first.is_ascii_lowercase()) {
+        return None;
+    }
+    let keyword = AvaParser::parse(Rule::declaration_keyword, line).ok()?.next()?;
+    Some(keyword.as_span().end())
 }
 
 /// The tree of a declaration that breaks off, ended in the shortest way. `None` if it fails before its end.
