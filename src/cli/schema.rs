@@ -1,6 +1,7 @@
 //! What `--format json` prints: the fields of every command's result, for `avastra explain json`.
 //!
-//! `tests/it/json.rs` holds this table against what the commands print.
+//! A table and no derived schema, because most of it is what a field means: a result is made by `json!` where it arises, and
+//! has no type that could be asked. `tests/it/json.rs` compares the table with what the commands print, both ways.
 
 use super::output::folded;
 

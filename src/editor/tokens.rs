@@ -1,4 +1,4 @@
-//! A text cut into words and marks. Completion needs it: unfinished text has no tree.
+//! A text cut into words and marks: what an editor asks about a call that is being written, or about a word.
 //!
 //! Text literals and comments end as the grammar says. A unit is not put together: `m/s` is three tokens.
 
@@ -14,30 +14,26 @@ impl Token<'_> {
         self.text.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_')
     }
 
-    pub fn is_number(&self) -> bool {
-        self.text.starts_with(|first: char| first.is_ascii_digit())
-    }
-
     pub fn end(&self) -> usize {
         self.start + self.text.len()
     }
 }
 
-/// The tokens of a text, and whether it ends in code, a comment or a text literal.
-pub fn tokens(text: &str) -> (Vec<Token<'_>>, Ending) {
+/// The tokens of a text.
+pub fn tokens(text: &str) -> Vec<Token<'_>> {
     let mut found = Vec::new();
     let mut at = 0;
     while let Some(first) = text[at..].chars().next() {
         let rest = &text[at..];
         let len = if rest.starts_with("//") {
-            let Some(newline) = rest.find('\n') else { return (found, Ending::Comment) };
+            let Some(newline) = rest.find('\n') else { return found };
             at += newline;
             continue;
         } else if first == '"' {
             match end_of_text(rest) {
                 Some(len) => len,
                 None if rest.contains('\n') => 1,
-                None => return (found, Ending::Text(at + 1)),
+                None => return found,
             }
         } else if is_word(first) {
             rest.find(|next: char| !is_word(next)).unwrap_or(rest.len())
@@ -51,23 +47,14 @@ pub fn tokens(text: &str) -> (Vec<Token<'_>>, Ending) {
         found.push(Token { start: at, text: &rest[..len] });
         at += len;
     }
-    (found, Ending::Code)
-}
-
-/// Where a text breaks off.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ending {
-    Code,
-    Comment,
-    /// Within a text literal, which begins at this byte.
-    Text(usize),
+    found
 }
 
 /// The word at a byte, or that ends there, and its start; `None` in a comment.
 pub fn word_at(text: &str, byte: usize) -> Option<(usize, &str)> {
     let line_start = text[..byte.min(text.len())].rfind('\n').map_or(0, |newline| newline + 1);
     let line_end = text[line_start..].find('\n').map_or(text.len(), |newline| line_start + newline);
-    let (tokens, _) = tokens(&text[line_start..line_end]);
+    let tokens = tokens(&text[line_start..line_end]);
     let around = |token: &&Token<'_>| line_start + token.start <= byte && byte <= line_start + token.end();
     let token = tokens.iter().filter(|token| token.is_word()).find(around)?;
     Some((line_start + token.start, token.text))
@@ -97,14 +84,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_marks_and_endings() {
-        let words = |text| tokens(text).0.iter().map(|token| token.text).collect::<Vec<_>>();
+    fn words_and_marks() {
+        let words = |text| tokens(text).iter().map(|token| token.text).collect::<Vec<_>>();
         assert_eq!(
             words("a->b // c\n\"x \\\" y\"<=12 m/s"),
             ["a", "->", "b", "\"x \\\" y\"", "<=", "12", "m", "/", "s"]
         );
-        assert_eq!(tokens("use \"ro").1, Ending::Text(5));
-        assert_eq!(tokens("a // b").1, Ending::Comment);
+        assert_eq!(words("use \"ro"), ["use"]);
         assert_eq!(word_at("set time = to", 5), Some((4, "time")));
         assert_eq!(word_at("// set", 4), None);
     }
