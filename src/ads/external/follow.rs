@@ -3,11 +3,10 @@
 
 use std::sync::Arc;
 
-use crate::ads::guide::{Guide, SpeedRules};
-use crate::ads::modular::{ModularConfig, Pedals, Target};
-use crate::ads::steering::{Steering, SteeringConfig};
+use crate::ads::kit::{Guide, Helm, Pedals, PedalsConfig, SpeedRules, Steering, Target};
+use crate::ads::status::Status;
 use crate::geometry::{Pose, Vec2, wrap_angle};
-use crate::sim::{Control, EgoMotion, Scene, pedals_for};
+use crate::sim::{Control, EgoMotion, Scene};
 
 use super::message::{Answer, ControlMessage, EXTREME_MPS2, TrajectoryMessage};
 
@@ -15,12 +14,6 @@ use super::message::{Answer, ControlMessage, EXTREME_MPS2, TrajectoryMessage};
 const AFTER_MPS2: f64 = 3.0;
 /// The brake while no answer comes, %: Apollo's, where the planner is late.
 const LOST_BRAKE_PCT: f64 = 50.0;
-/// The route is only steered along here, so nothing bounds the speed.
-const RULES: SpeedRules = SpeedRules {
-    cruise_mps: f64::INFINITY,
-    lateral_acceleration_mps2_max: f64::INFINITY,
-    slowdown_mps2: f64::INFINITY,
-};
 
 /// Obeys answers.
 #[derive(Debug, Clone)]
@@ -28,8 +21,8 @@ pub struct Follower {
     route: Arc<Guide>,
     steering: Arc<Steering>,
     pedals: Pedals,
-    /// Place on the route, m; `None` before the first tick.
-    station_m: Option<f64>,
+    /// On the route.
+    helm: Helm,
     course: Option<Course>,
 }
 
@@ -38,8 +31,7 @@ pub struct Follower {
 struct Course {
     guide: Guide,
     points: Vec<CoursePoint>,
-    /// Place of the vehicle on the guide, m.
-    station_m: Option<f64>,
+    helm: Helm,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -53,18 +45,17 @@ struct CoursePoint {
 impl Follower {
     pub fn new(scene: &Scene) -> Follower {
         Follower {
-            route: Arc::new(Guide::new(scene, &RULES)),
-            steering: Steering::shared(&SteeringConfig::default()),
-            pedals: Pedals::new(&ModularConfig::default().control.pedals),
-            station_m: None,
+            route: Arc::new(Guide::new(scene, &SpeedRules::NONE)),
+            steering: Steering::usual(),
+            pedals: Pedals::new(&PedalsConfig::default()),
+            helm: Helm::default(),
             course: None,
         }
     }
 
     /// Place on the route and offset from it, m, of a vehicle at a pose; to be called every tick.
     pub fn locate(&mut self, pose: &Pose) -> (f64, f64) {
-        let beside = self.route.locate(pose.position, self.station_m);
-        self.station_m = Some(beside.station_m);
+        let beside = self.helm.locate(&self.route, pose.position);
         (beside.station_m, beside.offset_m)
     }
 
@@ -81,26 +72,23 @@ impl Follower {
         match answer {
             Answer::Control(control) => controls(control),
             Answer::Acceleration(wanted) => {
-                let (throttle_pct, brake_pct) = pedals_for(wanted.accel);
-                Control { throttle_pct, brake_pct, steer_rad: self.along_route_rad(pose, motion) }
+                Control::towards(wanted.accel, self.along_route_rad(pose, motion))
             }
             Answer::Trajectory(_) => {
                 let course = self.course.as_mut().expect("a trajectory was begun");
-                let near_m = course.guide.locate(pose.position, course.station_m).station_m;
-                course.station_m = Some(near_m);
+                let near_m = course.helm.locate(&course.guide, pose.position).station_m;
                 let steer_rad = self.steering.steer_rad(&course.guide, pose, near_m, motion);
-                let (now, soon) = (course.at(time_s), course.at(time_s + self.pedals.preview_s()));
-                let target = Target {
-                    station_m: now.station_m,
-                    speed_mps: now.speed_mps,
-                    soon_mps2: soon.acceleration_mps2,
-                };
+                let target = course.target(time_s, self.pedals.preview_s());
                 let wanted_mps2 = self.pedals.acceleration_mps2(&target, near_m, motion.speed_mps);
-                let (throttle_pct, brake_pct) = pedals_for(wanted_mps2);
-                Control { throttle_pct, brake_pct, steer_rad }
+                Control::towards(wanted_mps2, steer_rad)
             }
             Answer::Ready(_) | Answer::Error(_) => unreachable!("no step is answered by these"),
         }
+    }
+
+    /// Ends the tick with the command that is given.
+    pub fn command(&mut self, control: Control, motion: &EgoMotion, status: &mut Status) -> Control {
+        self.helm.command(control, motion, status)
     }
 
     /// Pedals and wheel while no answer comes: it brakes along the route.
@@ -110,16 +98,19 @@ impl Follower {
     }
 
     fn along_route_rad(&self, pose: &Pose, motion: &EgoMotion) -> f64 {
-        self.steering.steer_rad(&self.route, pose, self.station_m.unwrap_or(0.0), motion)
+        self.steering.steer_rad(&self.route, pose, self.helm.station_m(), motion)
     }
 }
 
 fn controls(control: &ControlMessage) -> Control {
-    let (throttle_pct, brake_pct) = match control.accel {
-        Some(accel_mps2) => pedals_for(accel_mps2),
-        None => (100.0 * control.throttle.unwrap_or(0.0), 100.0 * control.brake.unwrap_or(0.0)),
-    };
-    Control { throttle_pct, brake_pct, steer_rad: control.steer }
+    match control.accel {
+        Some(accel_mps2) => Control::towards(accel_mps2, control.steer),
+        None => Control {
+            throttle_pct: 100.0 * control.throttle.unwrap_or(0.0),
+            brake_pct: 100.0 * control.brake.unwrap_or(0.0),
+            steer_rad: control.steer,
+        },
+    }
 }
 
 impl Course {
@@ -146,7 +137,13 @@ impl Course {
             speed_mps: given[index].v,
             acceleration_mps2: acceleration_mps2(index),
         });
-        Course { guide, points: points.collect(), station_m: None }
+        Course { guide, points: points.collect(), helm: Helm::default() }
+    }
+
+    /// What is wanted at a time, and of the acceleration `preview_s` later.
+    fn target(&self, time_s: f64, preview_s: f64) -> Target {
+        let CoursePoint { station_m, speed_mps, .. } = self.at(time_s);
+        Target { station_m, speed_mps, soon_mps2: self.at(time_s + preview_s).acceleration_mps2 }
     }
 
     /// The point at a time; after the last it brakes to rest, and stands. What stands is held by the brake (see
@@ -179,6 +176,7 @@ impl Course {
 mod tests {
     use super::*;
     use crate::ads::external::message::TrajectoryPoint;
+    use crate::sim::pedals_for;
 
     #[test]
     fn a_trajectory_that_ends_at_rest_is_held_there() {
@@ -189,15 +187,10 @@ mod tests {
             vec![point(0, 0.0, 2.0), point(1_000_000, 2.0, 2.0)],
         ] {
             let course = Course::new(&TrajectoryMessage { seq: 0, points, internal: None });
-            let mut pedals = Pedals::new(&ModularConfig::default().control.pedals);
-            let (now, soon) = (course.at(5.0), course.at(5.0 + pedals.preview_s()));
-            let target = Target {
-                station_m: now.station_m,
-                speed_mps: now.speed_mps,
-                soon_mps2: soon.acceleration_mps2,
-            };
+            let mut pedals = Pedals::new(&PedalsConfig::default());
+            let target = course.target(5.0, pedals.preview_s());
             // It has stopped half a metre short: there is no creeping on.
-            let wanted_mps2 = pedals.acceleration_mps2(&target, now.station_m - 0.5, 0.0);
+            let wanted_mps2 = pedals.acceleration_mps2(&target, target.station_m - 0.5, 0.0);
             assert!(pedals_for(wanted_mps2).1 > 0.0, "the brake is on: {wanted_mps2}");
         }
     }

@@ -8,8 +8,8 @@
 //! junction assistance that guesses at turns of others, and braking for what will strike from the side or
 //! from behind.
 
-use crate::ads::guide::Guide;
-use crate::geometry::Vec2;
+use crate::ads::kit::Guide;
+use crate::geometry::extent_m;
 use crate::sim::{Control, DT_S, EgoMotion, FRAME_S, VehicleParameters, pedal_acceleration_mps2, pedals_for};
 
 use super::config::EmergencyConfig;
@@ -174,12 +174,9 @@ fn threat(
         return None;
     }
     let along = beside.forward;
-    let across = Vec2::new(-along.y, along.x);
-    let (along_mps, across_mps) = (track.velocity_mps.dot(&along), track.velocity_mps.dot(&across));
-    let forward = track.forward();
-    let (cosine, sine) = (forward.dot(&along).abs(), forward.dot(&across).abs());
-    let half_along_m = (cosine * track.length_m + sine * track.width_m) / 2.0;
-    let half_across_m = (sine * track.length_m + cosine * track.width_m) / 2.0;
+    let (along_mps, across_mps) = (track.velocity_mps.dot(&along), along.perp(&track.velocity_mps));
+    let half_m = (track.length_m / 2.0, track.width_m / 2.0);
+    let (half_along_m, half_across_m) = extent_m(track.forward(), along, half_m);
     let overlap_m = if track.body.is_vehicle() { OVERLAP_M } else { 0.0 };
     let half_way_m = vehicle.width_m / 2.0 + half_across_m - overlap_m;
     // When both are at one place across the path, and when along it.
@@ -215,9 +212,9 @@ fn within(at: f64, rate: f64, half: f64) -> Option<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ads::guide::SpeedRules;
+    use crate::ads::kit::SpeedRules;
     use crate::ads::testing::{straight, winding};
-    use crate::geometry::Pose;
+    use crate::geometry::{Pose, Vec2};
     use crate::model::vocabulary::Body;
     use crate::sim::Scene;
 

@@ -11,7 +11,7 @@
 
 use std::sync::Arc;
 
-use crate::ads::guide::Guide;
+use crate::ads::kit::Guide;
 use crate::ads::status::{Manoeuvre, Reason};
 use crate::geometry::Pose;
 use crate::sim::{Conditions, Scene, SignalColour, VehicleParameters};
