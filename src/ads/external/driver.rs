@@ -312,7 +312,7 @@ impl Ads for External {
         }
         self.note(sensed, &pose, is_asked);
         let control = self.control(sensed, tick, &pose);
-        self.follower.command(control, &sensed.ego, &mut self.status)
+        self.follower.helm.command(control, &sensed.ego, &mut self.status)
     }
 
     fn status(&self) -> &Status {

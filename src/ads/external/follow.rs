@@ -3,8 +3,7 @@
 
 use std::sync::Arc;
 
-use crate::ads::kit::{Guide, Helm, Pedals, PedalsConfig, SpeedRules, Steering, Target};
-use crate::ads::status::Status;
+use crate::ads::kit::{Guide, Helm, Pedals, PedalsConfig, Point, SpeedRules, Steering};
 use crate::geometry::{Pose, Vec2, wrap_angle};
 use crate::sim::{Control, EgoMotion, Scene};
 
@@ -21,8 +20,8 @@ pub struct Follower {
     route: Arc<Guide>,
     steering: Arc<Steering>,
     pedals: Pedals,
-    /// On the route.
-    helm: Helm,
+    /// Its station is on the route.
+    pub helm: Helm,
     course: Option<Course>,
 }
 
@@ -30,16 +29,9 @@ pub struct Follower {
 #[derive(Debug, Clone)]
 struct Course {
     guide: Guide,
-    points: Vec<CoursePoint>,
+    /// When, s, and what.
+    points: Vec<(f64, Point)>,
     helm: Helm,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct CoursePoint {
-    time_s: f64,
-    station_m: f64,
-    speed_mps: f64,
-    acceleration_mps2: f64,
 }
 
 impl Follower {
@@ -78,17 +70,12 @@ impl Follower {
                 let course = self.course.as_mut().expect("a trajectory was begun");
                 let near_m = course.helm.locate(&course.guide, pose.position).station_m;
                 let steer_rad = self.steering.steer_rad(&course.guide, pose, near_m, motion);
-                let target = course.target(time_s, self.pedals.preview_s());
-                let wanted_mps2 = self.pedals.acceleration_mps2(&target, near_m, motion.speed_mps);
+                let plan = [time_s, time_s + self.pedals.preview_s()].map(|at_s| course.at(at_s));
+                let wanted_mps2 = self.pedals.acceleration_mps2(plan, near_m, motion.speed_mps);
                 Control::towards(wanted_mps2, steer_rad)
             }
             Answer::Ready(_) | Answer::Error(_) => unreachable!("no step is answered by these"),
         }
-    }
-
-    /// Ends the tick with the command that is given.
-    pub fn command(&mut self, control: Control, motion: &EgoMotion, status: &mut Status) -> Control {
-        self.helm.command(control, motion, status)
     }
 
     /// Pedals and wheel while no answer comes: it brakes along the route.
@@ -131,44 +118,29 @@ impl Course {
                 (given[from + 1].v - given[from].v) / duration_s
             })
         };
-        let points = (0..given.len()).map(|index| CoursePoint {
-            time_s: given[index].t_us as f64 * 1e-6,
-            station_m: stations_m[index],
-            speed_mps: given[index].v,
-            acceleration_mps2: acceleration_mps2(index),
+        let points = (0..given.len()).map(|index| {
+            let (station_m, speed_mps) = (stations_m[index], given[index].v);
+            let acceleration_mps2 = acceleration_mps2(index);
+            (given[index].t_us as f64 * 1e-6, Point { station_m, speed_mps, acceleration_mps2 })
         });
         Course { guide, points: points.collect(), helm: Helm::default() }
     }
 
-    /// What is wanted at a time, and of the acceleration `preview_s` later.
-    fn target(&self, time_s: f64, preview_s: f64) -> Target {
-        let CoursePoint { station_m, speed_mps, .. } = self.at(time_s);
-        Target { station_m, speed_mps, soon_mps2: self.at(time_s + preview_s).acceleration_mps2 }
-    }
-
     /// The point at a time; after the last it brakes to rest, and stands. What stands is held by the brake (see
     /// `Pedals::acceleration_mps2`).
-    fn at(&self, time_s: f64) -> CoursePoint {
-        let last = self.points[self.points.len() - 1];
-        let beyond_s = time_s - last.time_s;
+    fn at(&self, time_s: f64) -> Point {
+        let (last_s, last) = self.points[self.points.len() - 1];
+        let beyond_s = time_s - last_s;
         if beyond_s >= 0.0 {
             let stop_s = (last.speed_mps / AFTER_MPS2).min(beyond_s);
             let way_m = last.speed_mps * stop_s - AFTER_MPS2 * stop_s * stop_s / 2.0;
             let speed_mps = last.speed_mps - AFTER_MPS2 * stop_s;
             let acceleration_mps2 = if speed_mps > 0.0 { -AFTER_MPS2 } else { 0.0 };
-            return CoursePoint { time_s, station_m: last.station_m + way_m, speed_mps, acceleration_mps2 };
+            return Point { station_m: last.station_m + way_m, speed_mps, acceleration_mps2 };
         }
-        let after =
-            self.points.partition_point(|point| point.time_s <= time_s).clamp(1, self.points.len() - 1);
-        let (a, b) = (self.points[after - 1], self.points[after]);
-        let fraction = ((time_s - a.time_s) / (b.time_s - a.time_s)).clamp(0.0, 1.0);
-        let mix = |a: f64, b: f64| a + (b - a) * fraction;
-        CoursePoint {
-            time_s,
-            station_m: mix(a.station_m, b.station_m),
-            speed_mps: mix(a.speed_mps, b.speed_mps),
-            acceleration_mps2: mix(a.acceleration_mps2, b.acceleration_mps2),
-        }
+        let after = self.points.partition_point(|(at_s, _)| *at_s <= time_s).clamp(1, self.points.len() - 1);
+        let ((from_s, from), (to_s, to)) = (self.points[after - 1], self.points[after]);
+        from.mixed(&to, ((time_s - from_s) / (to_s - from_s)).clamp(0.0, 1.0))
     }
 }
 
@@ -188,9 +160,9 @@ mod tests {
         ] {
             let course = Course::new(&TrajectoryMessage { seq: 0, points, internal: None });
             let mut pedals = Pedals::new(&PedalsConfig::default());
-            let target = course.target(5.0, pedals.preview_s());
+            let plan = [5.0, 5.0 + pedals.preview_s()].map(|at_s| course.at(at_s));
             // It has stopped half a metre short: there is no creeping on.
-            let wanted_mps2 = pedals.acceleration_mps2(&target, target.station_m - 0.5, 0.0);
+            let wanted_mps2 = pedals.acceleration_mps2(plan, plan[0].station_m - 0.5, 0.0);
             assert!(pedals_for(wanted_mps2).1 > 0.0, "the brake is on: {wanted_mps2}");
         }
     }

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use crate::ads::driver::Ads;
-use crate::ads::kit::{HOLD_MPS2, Helm, Sight, Signs, Steering, Stop, crosswalks, lights};
+use crate::ads::kit::{HOLD_MPS2, Helm, Point, Sight, Signs, Steering, Stop, crosswalks, lights};
 use crate::ads::status::{Manoeuvre, Reason, Status};
 use crate::sim::{Control, DT_S, Scene, Sensed, VehicleParameters};
 
 use super::lateral::{Lanes, Lateral};
-use super::proposal::{MODEL, Outlook, Point, Proposal, SPEED_PARTS, STEP_S, STEPS};
+use super::proposal::{MODEL, Outlook, Proposal, SPEED_PARTS, STEP_S, STEPS};
 use super::traffic::Other;
 
 /// A collision sooner than this is braked for as hard as possible, s (PDM-Closed). There only below 5 m/s and
@@ -81,7 +81,7 @@ impl Frenet {
         self.stops.extend(self.signs.next_stop(&self.scene, front_m, start.speed_mps));
         self.stops.extend(crosswalks(&self.scene, &guide, self.sight.known(), front_m, start.speed_mps));
         // The model stops a gap before such a place, so it is put a gap beyond the place to wait at.
-        let wait = self.lanes.wait_m().map(|wait_m| wait_m + MODEL.gap_m_min);
+        let wait = self.lanes.changes().wait_m().map(|wait_m| wait_m + MODEL.gap_m_min);
         self.stops.extend(wait.map(|station_m| Stop { station_m, reason: Reason::LaneChange }));
 
         self.lanes.sample(&now, station_m, start.speed_mps, &self.others, &mut self.sampled);
@@ -117,7 +117,7 @@ impl Frenet {
 
     fn report(&mut self, sensed: &Sensed, plan: &Proposal, station_m: f64) {
         let changing = plan.lateral.changes_lane() || self.lanes.is_arriving(&plan.lateral, station_m);
-        self.status.manoeuvre = match (changing, self.lanes.is_due(station_m)) {
+        self.status.manoeuvre = match (changing, self.lanes.changes().due(station_m).is_some()) {
             (true, _) => Manoeuvre::LaneChange,
             (false, true) => Manoeuvre::AwaitGap,
             (false, false) => Manoeuvre::LaneFollow,
@@ -166,13 +166,7 @@ fn chosen(outlook: &Outlook, proposals: &[Proposal], now: Lateral) -> Proposal {
 fn planned_at(plan: &Proposal, time_s: f64) -> Point {
     let place = (time_s / STEP_S).clamp(0.0, STEPS as f64);
     let index = (place as usize).min(STEPS - 1);
-    let (from, to, part) = (plan.points[index], plan.points[index + 1], place - index as f64);
-    let between = |a: f64, b: f64| a + (b - a) * part;
-    Point {
-        station_m: between(from.station_m, to.station_m),
-        speed_mps: between(from.speed_mps, to.speed_mps),
-        acceleration_mps2: between(from.acceleration_mps2, to.acceleration_mps2),
-    }
+    plan.points[index].mixed(&plan.points[index + 1], place - index as f64)
 }
 
 impl Ads for Frenet {

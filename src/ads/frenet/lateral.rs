@@ -108,19 +108,14 @@ impl Lanes {
         self.scene.map.lane(lane).speed_limit_mps.min(SpeedRules::TOWN.cruise_mps)
     }
 
-    /// Whether the next change may be made at a station.
-    pub fn is_due(&self, station_m: f64) -> bool {
-        self.changes.due(station_m).is_some()
+    /// The lane changes of the route.
+    pub fn changes(&self) -> &RouteChanges {
+        &self.changes
     }
 
     /// Whether a curve still comes over from another lane at a station.
     pub fn is_arriving(&self, lateral: &Lateral, station_m: f64) -> bool {
         lateral.aside(station_m).offset_m.abs() > OFFSET_M
-    }
-
-    /// Where the front of the vehicle must wait for the next change, m.
-    pub fn wait_m(&self) -> Option<f64> {
-        self.changes.wait_m()
     }
 
     /// Passes on to the target lane if the vehicle has crossed the line: returns the curve beside the new guide.

@@ -11,7 +11,7 @@
 //! hold by construction: `lateral` samples no offset outside the lanes of the own direction. Werling's costs
 //! decide between proposals that score alike.
 
-use crate::ads::kit::{BESIDE_M, FOLLOWED_MPS, Guide, HARDEST_MPS2, Stop, speed_mps2};
+use crate::ads::kit::{BESIDE_M, FOLLOWED_MPS, Guide, HARDEST_MPS2, Point, Stop, speed_mps2};
 use crate::ads::status::Reason;
 use crate::kinematics::{Following, STANDING_MPS, braking_m};
 use crate::sim::VehicleParameters;
@@ -54,15 +54,6 @@ const COST_TIME: f64 = 0.3;
 const COST_DEVIATION: f64 = 1.0;
 /// What a unit of Werling's cost is worth in points of the score. Ours: less than any metric.
 const SCORE_PER_COST: f64 = 0.02;
-
-/// A place of a rollout.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Point {
-    /// Of the rear axle, m.
-    pub station_m: f64,
-    pub speed_mps: f64,
-    pub acceleration_mps2: f64,
-}
 
 /// The situation in which proposals are rolled out.
 #[derive(Debug)]

@@ -9,7 +9,7 @@
 //! | `stops` | where lights, stop signs and crosswalks make it stop |
 //! | `lane_changes` | the route's lane changes: the next one, when it is due, where to wait for it |
 //! | `speed` | towards an allowed speed, at rest, and at the limit of the brakes |
-//! | `pedals` | Apollo's cascade from a planned place and speed to an acceleration |
+//! | `point`, `pedals` | a point of a plan, and Apollo's cascade from it to an acceleration |
 //! | `steering` | a steering controller (LQR) along a guide or beside it |
 //!
 //! Laws that the world shares, such as the driver model of others (`Following`) and stopping distances, are `kinematics`';
@@ -22,6 +22,7 @@ mod guide;
 mod helm;
 mod lane_changes;
 mod pedals;
+mod point;
 mod sight;
 mod speed;
 mod steering;
@@ -31,7 +32,8 @@ pub use corridor::{BESIDE_M, FOLLOWED_MPS, HALF_WAY_M, in_lane};
 pub use guide::{Guide, SpeedRules};
 pub use helm::Helm;
 pub use lane_changes::RouteChanges;
-pub use pedals::{Pedals, PedalsConfig, Target};
+pub use pedals::{Pedals, PedalsConfig};
+pub use point::Point;
 pub use sight::{RANGE_M, Sight};
 pub use speed::{HARDEST_MPS2, HOLD_MPS2, PREVIEW_S, held_mps2, speed_mps2};
 pub use steering::{Aside, Steering, SteeringConfig};

@@ -6,6 +6,7 @@
 use crate::ads::settings::section;
 use crate::sim::DT_S;
 
+use super::point::Point;
 use super::speed::HOLD_MPS2;
 
 section! {
@@ -36,15 +37,6 @@ section! {
     }
 }
 
-/// What a plan wants now, and of the acceleration a little later.
-#[derive(Debug, Clone, Copy)]
-pub struct Target {
-    pub station_m: f64,
-    pub speed_mps: f64,
-    /// [`Pedals::preview_s`] from now.
-    pub soon_mps2: f64,
-}
-
 /// The cascade of station and speed.
 #[derive(Debug, Clone)]
 pub struct Pedals {
@@ -62,10 +54,11 @@ impl Pedals {
         self.config.preview_s
     }
 
-    /// The acceleration for this tick, m/s², of a vehicle at a station; to be called every tick.
-    pub fn acceleration_mps2(&mut self, target: &Target, station_m: f64, speed_mps: f64) -> f64 {
+    /// The acceleration for this tick, m/s², of a vehicle at a station; to be called every tick with the points of the
+    /// plan for now and for [`Pedals::preview_s`] later.
+    pub fn acceleration_mps2(&mut self, plan: [Point; 2], station_m: f64, speed_mps: f64) -> f64 {
         let config = &self.config;
-        let planned_mps2 = target.soon_mps2;
+        let [target, Point { acceleration_mps2: planned_mps2, .. }] = plan;
         if target.speed_mps <= config.stopped_mps && planned_mps2.abs() <= 0.01 {
             // Apollo's full stop is the lesser of -3 m/s² and the command. With its bounds the command is
             // never below -2.3 where nothing is planned, so that is the same; the integral begins anew.

@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use crate::ads::kit::{Pedals, Steering, Target};
+use crate::ads::kit::{Pedals, Steering};
 use crate::geometry::Pose;
 use crate::sim::{Control, DT_S, EgoMotion};
 
@@ -40,16 +40,10 @@ impl Controller {
         let actuators = &self.config.actuators;
         let (brake_mps2_max, throttle_mps2_max) = (actuators.brake_mps2_max, actuators.throttle_mps2_max);
         let lag_s = actuators.steer_lag_s;
-        let trajectory = planner.trajectory();
-        let now = trajectory.at(since_s);
-        let target = Target {
-            station_m: now.station_m,
-            speed_mps: now.speed_mps,
-            soon_mps2: trajectory.at(since_s + self.pedals.preview_s()).acceleration_mps2,
-        };
+        let plan = [since_s, since_s + self.pedals.preview_s()].map(|time_s| planner.trajectory().at(time_s));
         let acceleration_mps2 = self
             .pedals
-            .acceleration_mps2(&target, station_m, motion.speed_mps)
+            .acceleration_mps2(plan, station_m, motion.speed_mps)
             .clamp(-brake_mps2_max, throttle_mps2_max);
         let aside = |at_m: f64| planner.lateral().aside(at_m);
         let wanted_rad = self.steering.steer_aside_rad(planner.guide(), &aside, localized, station_m, motion);

@@ -218,9 +218,6 @@ mod tests {
     use crate::model::vocabulary::Body;
     use crate::sim::Scene;
 
-    const RULES: SpeedRules =
-        SpeedRules { cruise_mps: 11.0, lateral_acceleration_mps2_max: 2.0, slowdown_mps2: 1.5 };
-
     /// Speed and gap at the end of a drive at `speed_mps` along a road, from `station_m` on, towards an
     /// object with a velocity, with nothing but emergency braking. The gap is along x.
     fn drive(
@@ -230,7 +227,7 @@ mod tests {
         at: Pose,
         velocity_mps: Vec2,
     ) -> (f64, f64) {
-        let guide = Guide::new(&straight(), &RULES);
+        let guide = Guide::new(&straight(), &SpeedRules::TOWN);
         let mut emergency = Emergency::new(config);
         let mut motion = EgoMotion::straight(Pose::new(20.0, -1.75, 0.0), speed_mps);
         let mut object = at;
@@ -301,7 +298,7 @@ mod tests {
         at: Pose,
         velocity_mps: Vec2,
     ) -> bool {
-        let guide = Guide::new(scene, &RULES);
+        let guide = Guide::new(scene, &SpeedRules::TOWN);
         let mut emergency = Emergency::new(&EmergencyConfig { confirm_s: 0.0, ..EmergencyConfig::default() });
         let motion = EgoMotion::straight(scene.route.path.pose_at(station_m), speed_mps);
         let track = Track::for_tests(1, body, at, velocity_mps);

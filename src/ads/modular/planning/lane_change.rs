@@ -32,29 +32,14 @@ const LONG_AGO_M: f64 = -1e6;
 
 #[derive(Debug, Clone)]
 pub struct LaneChanges {
-    changes: RouteChanges,
+    pub route: RouteChanges,
     /// For how long the target lane of the next change has been clear, s.
     clear_s: f64,
 }
 
 impl LaneChanges {
     pub fn new(scene: &Arc<Scene>) -> LaneChanges {
-        LaneChanges { changes: RouteChanges::new(scene), clear_s: 0.0 }
-    }
-
-    /// The guide along the lanes that are to be driven now.
-    pub fn guide(&self, config: &PlanningConfig) -> Guide {
-        self.changes.guide(&config.speed_rules())
-    }
-
-    /// Whether a change is under way at a station.
-    pub fn under_way(&self, station_m: f64) -> bool {
-        self.changes.is_under_way(station_m)
-    }
-
-    /// The change that is due but has not begun, if there is one.
-    pub fn due(&self, station_m: f64) -> Option<&RouteLaneChange> {
-        self.changes.due(station_m)
+        LaneChanges { route: RouteChanges::new(scene), clear_s: 0.0 }
     }
 
     /// Begins the next change if it is due and its lane is clear; `true` if that changes the guide.
@@ -66,17 +51,17 @@ impl LaneChanges {
         speed_mps: f64,
         forecasts: &[Forecast],
     ) -> bool {
-        let Some(change) = self.changes.next() else { return false };
-        let soon = station_m >= change.begin_m - speed_mps * CLEAR_S && !self.under_way(station_m);
+        let Some(change) = self.route.next() else { return false };
+        let soon = station_m >= change.begin_m - speed_mps * CLEAR_S && !self.route.is_under_way(station_m);
         let lateral_m = |_| change.lateral_m;
         if !soon || !is_clear(config, guide, &lateral_m, station_m, speed_mps, forecasts) {
             self.clear_s = 0.0;
             return false;
         }
-        let begins = self.due(station_m).is_some() && self.clear_s >= CLEAR_S;
+        let begins = self.route.due(station_m).is_some() && self.clear_s >= CLEAR_S;
         self.clear_s += FRAME_S;
         if begins {
-            self.changes.begin(station_m);
+            self.route.begin(station_m);
             self.clear_s = 0.0;
         }
         begins
@@ -96,7 +81,7 @@ impl LaneChanges {
             let part = (station_m - begin_m) / change.length_from_m(begin_m);
             begin_m <= station_m && smooth_step(part).value < BREAK_OFF_PART
         };
-        let (index, change, begin_m) = self.changes.begun().find(is_early)?;
+        let (index, change, begin_m) = self.route.begun().find(is_early)?;
         let gaps = PlanningConfig {
             change_gap_m: BREAK_OFF_GAPS * config.change_gap_m,
             change_time_s: BREAK_OFF_GAPS * config.change_time_s,
@@ -113,14 +98,14 @@ impl LaneChanges {
         }
         let done_m = |at_m: f64| change.postponed_offset_m(at_m, begin_m) - change.source_offset_m(at_m);
         let found = (done_m(station_m), done_m(station_m + 0.5) - done_m(station_m - 0.5));
-        self.changes.take_back(index);
+        self.route.take_back(index);
         self.clear_s = 0.0;
         Some(found)
     }
 
     /// A stop where the next change is just possible.
     pub fn constrain(&self, constraints: &mut Vec<Constraint>) {
-        constraints.extend(self.changes.wait_m().map(|stop_m| Constraint::line(Reason::LaneChange, stop_m)));
+        constraints.extend(self.route.wait_m().map(|stop_m| Constraint::line(Reason::LaneChange, stop_m)));
     }
 }
 
@@ -168,7 +153,7 @@ mod tests {
     fn clear(gap_ahead_m: Option<f64>, gap_behind_m: Option<f64>, other_mps: f64) -> bool {
         let scene = two_lanes(300.0);
         let config = PlanningConfig::default();
-        let guide = LaneChanges::new(&scene).guide(&config);
+        let guide = RouteChanges::new(&scene).guide(&config.speed_rules());
         let half_m = 4.7 / 2.0;
         let front = gap_ahead_m.map(|gap_m| VehicleParameters::MKZ.front_m(100.0) + gap_m + half_m);
         let rear = gap_behind_m.map(|gap_m| VehicleParameters::MKZ.rear_m(100.0) - gap_m - half_m);
