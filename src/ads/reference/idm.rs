@@ -17,8 +17,8 @@ use crate::ads::kit::{
     Steering, held_mps2, in_lane, speed_mps2,
 };
 use crate::ads::status::{PerceivedObject, Reason, Status};
-use crate::geometry::{Beside, Vec2, unit_vector};
-use crate::kinematics::{Following, needed_mps2};
+use crate::geometry::{Beside, Pose, Vec2, unit_vector};
+use crate::kinematics::{Following, WANDER_M, needed_mps2};
 use crate::sim::{Control, DT_S, Scene, Sensed, SensedObject, SignalColour, VehicleParameters};
 
 use super::giving_way::goes_before;
@@ -46,6 +46,8 @@ pub struct Idm {
     scene: Arc<Scene>,
     guide: Arc<Guide>,
     changes: RouteChanges,
+    /// A glance aside, newer than what it is shown, left no gap: no lane change begins.
+    is_beset: bool,
     steering: Arc<Steering>,
     helm: Helm,
     /// What it keeps away from, looked for every fifth tick.
@@ -110,6 +112,7 @@ impl Idm {
             scene: Arc::clone(scene),
             guide: Arc::new(changes.guide(&SpeedRules::TOWN)),
             changes,
+            is_beset: false,
             steering: Steering::usual(),
             helm: Helm::default(),
             ahead: Vec::new(),
@@ -159,7 +162,8 @@ impl Idm {
     fn seek_gap(&mut self, sensed: &Sensed, station_m: f64) {
         let Some(change) = self.changes.next() else { return };
         let is_over = self.changes.last_end_m().is_none_or(|end_m| station_m >= end_m);
-        if is_over && station_m >= change.begin_m && self.has_gap(sensed, station_m, change.lateral_m) {
+        let has_gap = || self.has_gap(&sensed.objects, sensed.ego.speed_mps, station_m, change.lateral_m);
+        if is_over && station_m >= change.begin_m && !self.is_beset && has_gap() {
             self.changes.begin(station_m);
             self.guide = Arc::new(self.changes.guide(&SpeedRules::TOWN));
         }
@@ -167,11 +171,10 @@ impl Idm {
 
     /// Whether gentle braking would do for every vehicle in the lane `lateral_m` to the left, and for the
     /// ego vehicle, if the ego vehicle were in that lane now.
-    fn has_gap(&self, sensed: &Sensed, station_m: f64, lateral_m: f64) -> bool {
+    fn has_gap(&self, objects: &[SensedObject], ego_mps: f64, station_m: f64, lateral_m: f64) -> bool {
         let front_m = VehicleParameters::MKZ.front_m(station_m);
         let rear_m = front_m - VehicleParameters::MKZ.length_m;
-        let ego_mps = sensed.ego.speed_mps;
-        sensed.objects.iter().all(|object| {
+        objects.iter().all(|object| {
             let Some((span, along_mps)) = in_lane(&self.guide, object, lateral_m, front_m) else {
                 return true;
             };
@@ -285,6 +288,23 @@ impl Idm {
         self.helm.command(Control::towards(acceleration_mps2, steer_rad), &sensed.ego, &mut self.status)
     }
 
+    /// Looks aside at what is seen at this moment: unless that leaves a gap, no lane change begins in the next look.
+    pub(super) fn glance(&mut self, seen: &[SensedObject], ego_mps: f64, station_m: f64) {
+        let next = self.changes.next();
+        self.is_beset = next.is_some_and(|change| !self.has_gap(seen, ego_mps, station_m, change.lateral_m));
+    }
+
+    /// Gives up a lane change that was begun in thought alone, because the vehicle is still in the source lane.
+    fn stay(&mut self, rear_axle: &Pose) {
+        let Some((last, ..)) = self.changes.begun().last() else { return };
+        let (mut changes, mut helm) = (self.changes.clone(), self.helm);
+        changes.take_back(last);
+        let guide = changes.guide(&SpeedRules::TOWN);
+        if helm.locate(&guide, rear_axle.position).offset_m.abs() <= WANDER_M {
+            (self.changes, self.guide) = (changes, Arc::new(guide));
+        }
+    }
+
     /// The route that it drives on.
     pub(super) fn guide(&self) -> &Guide {
         &self.guide
@@ -298,6 +318,10 @@ impl Ads for Idm {
 
     fn status(&self) -> &Status {
         &self.status
+    }
+
+    fn take_over(&mut self, sensed: &Sensed) {
+        self.stay(&sensed.ego.rear_axle);
     }
 }
 
@@ -317,7 +341,6 @@ fn model_mps2(speed_mps: f64, allowed_mps: f64, ahead: Option<(f64, f64)>) -> f6
 mod tests {
     use super::*;
     use crate::ads::testing::{Rig, object, two_lanes};
-    use crate::geometry::Pose;
     use crate::model::vocabulary::Body;
     use crate::road::RouteLaneChange;
 
