@@ -1,10 +1,10 @@
 //! From tick to tick: where the vehicle is, when it is time to look, and what was commanded.
 
+use crate::ads::status::Status;
 use crate::geometry::{Beside, Vec2};
 use crate::sim::{Control, DT_S, EgoMotion, FRAME_TICKS};
 
 use super::guide::Guide;
-use crate::ads::status::Status;
 
 /// What a driver keeps from tick to tick.
 #[derive(Debug, Clone, Copy, Default)]

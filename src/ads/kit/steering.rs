@@ -8,11 +8,11 @@ use std::sync::{Arc, LazyLock};
 
 use nalgebra::{Matrix4, Vector4};
 
+use crate::ads::settings::section;
 use crate::geometry::{Pose, wrap_angle};
 use crate::sim::{DT_S, EgoMotion, VehicleParameters};
 
 use super::guide::Guide;
-use crate::ads::settings::section;
 
 /// Number of speeds in the table: 1 to 30 m/s.
 const SPEEDS: usize = 30;

@@ -42,8 +42,8 @@ const EMERGENCY_VEHICLE_MPS: f64 = 10.0 / 3.6;
 const EMERGENCY_PEDESTRIAN_MPS: f64 = 20.0 / 3.6;
 /// And up to which, m/s: UN R152, 60 km/h.
 const EMERGENCY_MPS_MAX: f64 = 60.0 / 3.6;
-/// Its braking is the vehicle's limit; UN R152 asks for 5 m/s². It begins this long before the last moment at which that braking suffices, s: the brakes build up for 0.15 s,
-/// and a look is up to 0.1 s old. Ours.
+/// It brakes as hard as the vehicle can (UN R152 asks for 5 m/s²), and begins this long before the last moment at which
+/// that suffices, s: the brakes build up for 0.15 s, and a look is up to 0.1 s old. Ours.
 const BUILD_UP_S: f64 = 0.3;
 
 /// A road user that enters the corridor within this time counts as in it, s. Ours.

@@ -89,7 +89,7 @@ impl Model for FuzzySafety {
             reaction_s: self.reaction_s,
             release_mps2: 0.0,
             jerk_mps3: CAREFUL_JERK_MPS3,
-            // 0.774 g with the published code's g of 9.81; no demand comes near it.
+            // 0.774 g as published, with g = 9.81 m/s². No demand is above 6 m/s².
             deceleration_mps2_max: 7.593,
         }
     }

@@ -111,12 +111,8 @@ impl Driver {
     /// Acceleration behind a leader, m/s²: IDM's, or the braking that still avoids the leader if that is harder.
     pub(super) fn follow_mps2(&self, size: &BodyParameters, leader: &Leader, free_mps2: f64) -> f64 {
         let closing_mps = self.speed_mps - leader.speed_mps;
-        let idm_mps2 = free_mps2
-            - following(size.acceleration_mps2_max).interaction_mps2(
-                self.speed_mps,
-                leader.speed_mps,
-                leader.gap_m,
-            );
+        let model = following(size.acceleration_mps2_max);
+        let idm_mps2 = free_mps2 - model.interaction_mps2(self.speed_mps, leader.speed_mps, leader.gap_m);
         if closing_mps <= 0.0 {
             return idm_mps2;
         }

@@ -32,6 +32,7 @@ const LONG_AGO_M: f64 = -1e6;
 
 #[derive(Debug, Clone)]
 pub struct LaneChanges {
+    /// Which changes have begun.
     pub route: RouteChanges,
     /// For how long the target lane of the next change has been clear, s.
     clear_s: f64,
