@@ -13,14 +13,10 @@
 
 use crate::ads::in_sight;
 use crate::geometry::{OrientedBox, Pose, distance_m};
-use crate::kinematics::{
-    CAREFUL_BRAKING_MPS2, CAREFUL_PERCEPTION_S, CAREFUL_REACTION_S, GRAVITY_MPS2, stopping_m,
-};
+use crate::kinematics::{CAREFUL_BRAKING_MPS2, CAREFUL_DELAY_S, GRAVITY_MPS2, WANDER_M, stopping_m};
 use crate::model::vocabulary::Priority;
 use crate::sim::{Contact, DT_S, FRAME_TICKS, Obstacle, World};
 
-/// By how much drivers wander in their lane, m.
-const WANDER_M: f64 = 0.375;
 /// Places of a prediction and of the ego vehicle's way are compared at this many ticks, 0.2 s.
 const STRIDE: usize = 2 * FRAME_TICKS as usize;
 
@@ -88,7 +84,6 @@ pub fn last_chance(recording: &[World], contact: &Contact, met: OrientedBox) -> 
     if contact.priority != Priority::Other {
         return None;
     }
-    let delay_s = CAREFUL_PERCEPTION_S + CAREFUL_REACTION_S;
     let mut sensed = recording.last()?.sensed();
     let (mut way_m, mut next) = (0.0, met.pose.position);
     let mut found = None;
@@ -106,7 +101,7 @@ pub fn last_chance(recording: &[World], contact: &Contact, met: OrientedBox) -> 
         }
         found = Some(index);
         let braking_mps2 = CAREFUL_BRAKING_MPS2.min(world.conditions().friction * GRAVITY_MPS2);
-        if stopping_m(world.ego().speed_mps, delay_s, braking_mps2) <= way_m {
+        if stopping_m(world.ego().speed_mps, CAREFUL_DELAY_S, braking_mps2) <= way_m {
             break;
         }
     }

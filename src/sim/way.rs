@@ -289,7 +289,7 @@ fn lane_bit(lane: LaneIndex) -> u64 {
 
 /// The speed of the bend at each vertex, lowered so that braking for the next ones stays gentle.
 ///
-/// `ads::guide` has a pass of its own over even samples of the route, with a driving system's limits.
+/// `ads::kit::Guide` has a pass of its own over even samples of the route, with a driving system's limits.
 /// The two are not one function because their vertices lie elsewhere, so results would change.
 fn bend_speeds_mps(path: &Path) -> Vec<f64> {
     let points = path.points();

@@ -3,11 +3,14 @@
 //! For driving systems that take such a place as something that stands there. Right of way between vehicles
 //! is no business of this file.
 
+use crate::ads::status::Reason;
+use crate::kinematics::STANDING_MPS;
 use crate::road::SignKind;
 use crate::sim::{Scene, Sensed, SensedObject, SignalColour};
 
 use super::guide::Guide;
-use super::status::Reason;
+use super::sight::RANGE_M;
+use super::speed::HARDEST_MPS2;
 
 /// A place that the front of the vehicle must not pass now.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,12 +20,8 @@ pub struct Stop {
     pub reason: Reason,
 }
 
-/// Lights are read up to this distance, m: the camera's range.
-const LIGHT_RANGE_M: f64 = 120.0;
 /// A yellow light that needs harder braking is passed, m/s²: usual limits lie at 3 to 4.
-const YELLOW_MPS2: f64 = 4.0;
-/// A red light, or a pedestrian on a crosswalk, that needs harder braking comes too late, m/s²: the brakes.
-const HARDEST_MPS2: f64 = 6.0;
+pub const LIGHT_MPS2: f64 = 4.0;
 /// A vehicle that has passed a line by no more than this still waits at it, m.
 const OVER_M: f64 = 1.0;
 /// A pedestrian this near to a crosswalk, along the road, is on it, m (Apollo expands it by as much).
@@ -36,8 +35,6 @@ const ACROSS_MPS: f64 = 0.2;
 
 /// A vehicle this near to the line of a stop sign has stopped at it, m. Ours: drivers keep up to 2 m.
 const AT_SIGN_M: f64 = 3.0;
-/// Slower than this a vehicle stands, m/s.
-const STANDS_MPS: f64 = 0.1;
 
 /// The signs of the route that are behind a driver, or have been obeyed.
 #[derive(Debug, Clone, Copy, Default)]
@@ -51,22 +48,22 @@ impl Signs {
     pub fn next_stop(&mut self, scene: &Scene, front_m: f64, speed_mps: f64) -> Option<Stop> {
         let line = scene.route.sign_lines.get(self.done)?;
         let distance_m = line.station_m - front_m;
-        let has_stopped = distance_m < AT_SIGN_M && speed_mps < STANDS_MPS;
+        let has_stopped = distance_m < AT_SIGN_M && speed_mps < STANDING_MPS;
         if line.kind == SignKind::Yield || has_stopped || distance_m < -OVER_M {
             self.done += 1;
             return None;
         }
-        (distance_m < LIGHT_RANGE_M).then_some(Stop { station_m: line.station_m, reason: Reason::StopSign })
+        (distance_m < RANGE_M).then_some(Stop { station_m: line.station_m, reason: Reason::StopSign })
     }
 }
 
 /// The lights ahead that the vehicle stops for.
 pub fn lights<'a>(scene: &'a Scene, sensed: &'a Sensed, front_m: f64) -> impl Iterator<Item = Stop> + 'a {
-    let range_m = LIGHT_RANGE_M.min(sensed.conditions.visibility_m);
+    let range_m = RANGE_M.min(sensed.conditions.visibility_m);
     scene.route.stop_lines.iter().filter_map(move |line| {
         let stoppable_mps2 = match sensed.signals[line.signal] {
             SignalColour::Green => return None,
-            SignalColour::Yellow => YELLOW_MPS2,
+            SignalColour::Yellow => LIGHT_MPS2,
             SignalColour::Red => HARDEST_MPS2,
         };
         let is_read = line.station_m - front_m < range_m;
@@ -92,7 +89,7 @@ pub fn crosswalks<'a>(
             let reach_m = if comes { CROSSWALK_SIDE_M } else { ON_THE_WAY_M };
             along.contains(&beside.station_m) && beside.offset_m.abs() <= reach_m
         };
-        let ahead = (0.0..LIGHT_RANGE_M).contains(&(from_m - front_m))
+        let ahead = (0.0..RANGE_M).contains(&(from_m - front_m))
             && can_stop(from_m - front_m, speed_mps, HARDEST_MPS2);
         (ahead && known.iter().any(|object| !object.body.is_vehicle() && uses(object)))
             .then_some(Stop { station_m: from_m, reason: Reason::Crosswalk })
@@ -106,7 +103,7 @@ fn can_stop(distance_m: f64, speed_mps: f64, deceleration_mps2: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ads::guide::SpeedRules;
+    use crate::ads::kit::SpeedRules;
     use crate::ads::testing::{CLEAR_DAY, object, straight};
     use crate::geometry::Pose;
     use crate::model::vocabulary::Body;
@@ -148,8 +145,7 @@ mod tests {
         let mut route = straight().route.clone();
         route.crosswalks_m.push((80.0, 84.0));
         let scene = Arc::new(Scene::new(straight().map.clone(), route));
-        let rules = SpeedRules { cruise_mps: 11.0, lateral_acceleration_mps2_max: 2.0, slowdown_mps2: 1.5 };
-        let guide = Guide::new(&scene, &rules);
+        let guide = Guide::new(&scene, &SpeedRules::TOWN);
         let stops = |offset_m: f64, left_mps: f64| {
             let walker = object(1, Body::Pedestrian, Pose::new(82.0, offset_m - 1.75, FRAC_PI_2), left_mps);
             crosswalks(&scene, &guide, &[walker], 40.0, 8.0).count() == 1

@@ -6,10 +6,10 @@
 
 use crate::sim::{Conditions, FRAME_S, Sensed, SensedObject};
 
-use super::status::PerceivedObject;
+use crate::ads::status::PerceivedObject;
 
-/// How far vehicles are seen, m. Ours, as in `scenarios/ads/default.yaml`.
-const VEHICLE_M: f64 = 120.0;
+/// How far vehicles and lights are seen, m. Ours, as in `scenarios/ads/default.yaml`.
+pub const RANGE_M: f64 = 120.0;
 /// How far pedestrians are seen by day, m. Ours, likewise.
 const PEDESTRIAN_M: f64 = 60.0;
 /// An object of which less is in sight is not seen. Ours, likewise.
@@ -78,7 +78,7 @@ impl Sight {
 /// How far an object of its kind is seen, m: no farther than the fog allows.
 fn range_m(object: &SensedObject, conditions: &Conditions, night_factor: f64) -> f64 {
     let clear_m = if object.body.is_vehicle() {
-        VEHICLE_M
+        RANGE_M
     } else {
         PEDESTRIAN_M * (night_factor + (1.0 - night_factor) * conditions.light)
     };

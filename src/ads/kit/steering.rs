@@ -1,4 +1,4 @@
-//! Lateral control: a linear-quadratic regulator over a table of speeds, with feed-forward.
+//! Steering: a linear-quadratic regulator over a table of speeds, with feed-forward.
 //!
 //! Apollo 7.0's `LatController`: dynamic bicycle model, state `[e_y, e_y', e_ψ, e_ψ']` at the centre
 //! of mass, bilinear discretisation, Riccati iteration, weights scheduled over speed. Apollo solves
@@ -8,11 +8,11 @@ use std::sync::{Arc, LazyLock};
 
 use nalgebra::{Matrix4, Vector4};
 
+use crate::ads::settings::section;
 use crate::geometry::{Pose, wrap_angle};
 use crate::sim::{DT_S, EgoMotion, VehicleParameters};
 
 use super::guide::Guide;
-use super::settings::section;
 
 /// Number of speeds in the table: 1 to 30 m/s.
 const SPEEDS: usize = 30;
@@ -65,16 +65,17 @@ pub struct Steering {
 }
 
 impl Steering {
-    /// A controller with these settings. That of the default settings is solved once and shared: a solution
-    /// takes as long as a few hundred ticks of driving.
-    pub fn shared(config: &SteeringConfig) -> Arc<Steering> {
+    /// The controller with the default settings, which is solved once and shared: a solution takes as long as a few
+    /// hundred ticks of driving.
+    pub fn usual() -> Arc<Steering> {
         static USUAL: LazyLock<Arc<Steering>> =
             LazyLock::new(|| Arc::new(Steering::new(&SteeringConfig::default())));
-        if *config == SteeringConfig::default() {
-            Arc::clone(&USUAL)
-        } else {
-            Arc::new(Steering::new(config))
-        }
+        Arc::clone(&USUAL)
+    }
+
+    /// A controller with these settings.
+    pub fn shared(config: &SteeringConfig) -> Arc<Steering> {
+        if *config == SteeringConfig::default() { Steering::usual() } else { Arc::new(Steering::new(config)) }
     }
 
     fn new(config: &SteeringConfig) -> Steering {

@@ -11,8 +11,10 @@
 //!
 //! There are no signals and no obstacles here.
 
-use crate::geometry::{Beside, Pose, Vec2, unit_vector, wrap_angle};
+use crate::geometry::{Beside, Pose, Vec2, smaller, unit_vector, wrap_angle};
 use crate::sim::Scene;
+
+use super::speed::PREVIEW_S;
 
 /// Distance between samples, m. On the tightest bend a car can drive (5 m) the chord is 6 mm off.
 const SPACING_M: f64 = 0.5;
@@ -41,6 +43,21 @@ pub struct SpeedRules {
     pub lateral_acceleration_mps2_max: f64,
     /// Deceleration for a curve or a lower limit ahead, magnitude, m/s².
     pub slowdown_mps2: f64,
+}
+
+impl SpeedRules {
+    /// How our drivers drive in towns, all alike, so that they can be compared. The speed is that of Apollo's upstream
+    /// `planning.conf`, `default_cruise_speed` (25 mph), the curves are its speed bounds' `max_centric_acceleration_limit`;
+    /// the slowing down is ours.
+    pub const TOWN: SpeedRules =
+        SpeedRules { cruise_mps: 11.18, lateral_acceleration_mps2_max: 2.0, slowdown_mps2: 1.5 };
+
+    /// For a guide that is only steered along: nothing bounds the speed but the limits of the road.
+    pub const NONE: SpeedRules = SpeedRules {
+        cruise_mps: f64::INFINITY,
+        lateral_acceleration_mps2_max: f64::INFINITY,
+        slowdown_mps2: f64::INFINITY,
+    };
 }
 
 /// The route, or a path beside it, in even samples.
@@ -183,6 +200,11 @@ impl Guide {
         let (index, fraction) = self.segment(station_m);
         let (a, b) = (&self.samples[index], &self.samples[index + 1]);
         a.speed_mps_max + (b.speed_mps_max - a.speed_mps_max) * fraction.clamp(0.0, 1.0)
+    }
+
+    /// The lower of the speeds that are allowed at a station and soon after it, m/s, for a vehicle at a speed.
+    pub fn allowed_mps(&self, station_m: f64, speed_mps: f64) -> f64 {
+        smaller(self.speed_mps_max(station_m), self.speed_mps_max(station_m + speed_mps * PREVIEW_S))
     }
 
     /// The place of a vehicle that was lately at station `near_m`; with `None` the whole route is searched.
