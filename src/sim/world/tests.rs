@@ -1,8 +1,7 @@
 //! Tests of a tick of the world, beside those of `sim::tests`: they reach into its state.
 
 use super::*;
-use crate::model::vocabulary::{Body, Colour, Priority, Verb};
-use crate::sim::road_user::{Motion, Mover};
+use crate::model::vocabulary::{Priority, Verb};
 use crate::sim::testing;
 
 #[test]
