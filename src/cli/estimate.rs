@@ -20,7 +20,6 @@ use super::error::Failure;
 use super::files::{remove, write};
 use super::findings::doubts;
 use super::interrupt::stop_on_interrupt;
-use super::load::UnderTest;
 use super::output::{Output, plural};
 use super::parallel::jobs;
 use super::progress::{Progress, Working};
@@ -335,7 +334,7 @@ fn wanted(output: &Output, arguments: &EstimateArguments) -> Result<(Estimate, S
     let file = arguments.file.as_ref().expect("clap asks for it where there is no `--resume`");
     let table = load::table(output, file)?;
     let shard = shard::asked(output, arguments.shard.shard)?;
-    let under_test = conditions::named(&arguments.under_test)?;
+    let under_test = load::named(&arguments.under_test.ads)?;
     let (conditions, episodes) = (&arguments.conditions, arguments.episodes);
     let settings = EstimateSettings {
         event: event(arguments.event),
@@ -389,7 +388,7 @@ fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Estimate, H
 pub fn compare(output: &Output, arguments: &CompareArguments) -> Result<(), Failure> {
     let table = load::table(output, &arguments.file)?;
     let side = |named: &str| {
-        let (conditions, under_test) = (&arguments.conditions, side_of(named)?);
+        let (conditions, under_test) = (&arguments.conditions, load::named(named)?);
         let episodes = arguments.episodes;
         let settings =
             conditions::settings(table.space(), conditions, &conditions.agent, under_test, episodes)?;
@@ -433,12 +432,6 @@ pub fn compare(output: &Output, arguments: &CompareArguments) -> Result<(), Fail
     output
         .result(serde_json::json!({ "sides": sides, "results": results, "reproducible": doubts.is_empty() }));
     Ok(())
-}
-
-/// The driving system of a side.
-fn side_of(named: &str) -> Result<UnderTest, Failure> {
-    let (name, profile) = load::profile_or_name(named);
-    load::under_test(name.unwrap_or(crate::run::DEFAULT_ADS), profile, None)
 }
 
 fn event(argument: EventArgument) -> EventKind {

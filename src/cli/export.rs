@@ -22,7 +22,7 @@ const FOLDER: &str = "exported";
 pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failure> {
     refuse_senseless(arguments)?;
     let targets = targets(arguments)?;
-    let asked = load::asked(None, None, None)?;
+    let asked = load::asked(None)?;
     let maps = Mutex::new(());
     let exported = each_file(output, &arguments.many, None, |file| {
         let (table, scenario) = load::scenario(output, file)?;

@@ -101,11 +101,11 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         "run",
         &[
             ("run scenarios/avastra45.ava --episodes 20", "20 episodes on each road"),
-            ("run scenarios/avastra45.ava --ads-config scenarios/ads/degraded.yaml", "dirty sensors"),
+            ("run scenarios/avastra45.ava --ads scenarios/ads/degraded.yaml", "dirty sensors"),
             ("run scenarios/avastra45.ava --ads reactive --traffic released", ""),
             ("run scenarios/avastra45.ava --road corner --without npc_gap", "with one rule switched off"),
             ("run --policy policies/corner.ava", "let a learned policy choose"),
-            ("run scenarios/avastra45.ava --ads-cmd './my_planner --fast'", "a driving system of your own"),
+            ("run scenarios/avastra45.ava --ads './my_planner --fast'", "a driving system of your own"),
             ("run --resume runs/0001", "go on after Ctrl-C"),
             ("run scenarios/avastra45.ava --shard 3/8 --out shards/3", "an eighth of it, for `merge`"),
         ],
@@ -146,7 +146,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
     (
         "estimate",
         &[
-            ("estimate scenarios/avastra45.ava --ads-config scenarios/ads/degraded.yaml", "by counting"),
+            ("estimate scenarios/avastra45.ava --ads scenarios/ads/degraded.yaml", "by counting"),
             (
                 "estimate scenarios/avastra45.ava --road corner --method probe",
                 "rare crashes: try dangerous rows out",
@@ -198,7 +198,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         "test",
         &[
             ("test runs/0001", "do its scenarios still crash?"),
-            ("test runs/0001 --ads-config scenarios/ads/cautious.yaml --junit out.xml", ""),
+            ("test runs/0001 --ads scenarios/ads/cautious.yaml --junit out.xml", ""),
             ("test runs/0001 --review", "what has changed for each of them, in meaning"),
             ("test runs/0001 --accept", "and take it over"),
         ],
@@ -230,8 +230,8 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         &[
             ("report runs/0001", "write runs/0001/report.html"),
             ("report runs/0001/critical/corner_0004.ava -o crash.html", "one scenario"),
-            ("report runs/0001 --compare scenarios/ads/default.yaml", "two driving systems on one clock"),
-            ("report runs/0001 --compare cc", "beside UN R157's careful driver"),
+            ("report runs/0001 --ads scenarios/ads/default.yaml", "two driving systems on one clock"),
+            ("report runs/0001 --ads cc", "beside UN R157's careful driver"),
         ],
     ),
     (
@@ -244,10 +244,10 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
     (
         "ads",
         &[
-            ("ads check -- ./my_planner --fast", "does it follow PROTOCOL.md?"),
-            ("ads check -- tcp:127.0.0.1:5555", "one that listens on a socket"),
+            ("ads check --ads './my_planner --fast'", "does it follow PROTOCOL.md?"),
+            ("ads check --ads tcp:127.0.0.1:5555", "one that listens on a socket"),
             ("ads schema", "JSON Schema of every message"),
-            ("ads check -- avastra ads toy --misbehave nan", "what a finding looks like"),
+            ("ads check --ads 'avastra ads toy --misbehave nan'", "what a finding looks like"),
         ],
     ),
     (

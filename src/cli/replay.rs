@@ -21,14 +21,15 @@ use super::parallel::each_file;
 
 /// Replays the scenario of every file; with `--ads` or another profile only tells what happens.
 pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failure> {
-    let asked = load::against(&arguments.against)?;
+    let asked = load::asked(arguments.against.ads.as_deref())?;
     let played = each_file(output, &arguments.many, asked.external.as_ref(), |path| {
         let Looked { table, scenario, changed } = look::scenario(output, path)?;
         let (ads, is_recorded) = asked.selected_for(&scenario)?;
         if is_recorded {
             return play(&table, &scenario, path, (&ads, None), changed.as_ref());
         }
-        let name = match (&arguments.against.ads_config, ads.program()) {
+        let profile = arguments.against.ads.as_deref().and_then(load::profile_path);
+        let name = match (profile, ads.program()) {
             (_, Some(program)) => program.attached().name(),
             (Some(path), None) => format!("{} with {}", ads.name(), path.display()),
             (None, None) => ads.name().to_owned(),
@@ -130,7 +131,7 @@ pub fn play_recorded(
     if !is_recorded {
         return Err(Failure::usage(format!(
             "`{}` claims what happens with {}, and that is not what was given: `avastra replay` plays it with another one; \
-             without `--ads-cmd` and `--ads-config` recorded answers are verified",
+             without `--ads` recorded answers are verified",
             scenario.name,
             run::recorded_name(scenario)
         )));

@@ -425,7 +425,7 @@ pub const SHAPES: &[Shape] = &[
             f(
                 "compared",
                 "object?",
-                "with `--compare`: how many crashes are the `same`, at an `other_time`, `gone`, `new` and so on",
+                "with `--ads`: how many crashes are the `same`, at an `other_time`, `gone`, `new` and so on",
             ),
             FAILED,
         ],

@@ -15,7 +15,6 @@ use crate::syntax::listed;
 use crate::train::{Evaluation, TrainSettings, TrainedEpisode, Training, evaluate, rounded};
 
 use super::arguments::TrainArguments;
-use super::conditions;
 use super::conditions::roads_or_all;
 use super::distill::rules_text;
 use super::error::Failure;
@@ -68,13 +67,13 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
     let table = load::table(output, file)?;
     let hyperparameters = settings(arguments)?;
     let space = table.space();
-    let UnderTest { ads, profile, external } = conditions::named(&arguments.under_test)?;
+    let UnderTest { ads, profile, external } = load::named(&arguments.under_test.ads)?;
     let traffic = arguments.traffic.as_deref().map(load::traffic).transpose()?;
     let conditions = RunSettings {
         roads: roads_or_all(&arguments.road, space),
         ads,
         // Without a file nothing is recorded.
-        profile: profile.filter(|_| arguments.under_test.ads_config.is_some()),
+        profile: profile.filter(|_| load::profile_path(&arguments.under_test.ads).is_some()),
         external,
         traffic: traffic.as_ref().and_then(TrafficRecord::new),
         without: arguments.rules.without.clone(),

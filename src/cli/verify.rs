@@ -28,7 +28,7 @@ enum Verified {
 
 /// Replays scenarios, and plays the evaluations of policies again.
 pub fn verify(output: &Output, arguments: &VerifyArguments) -> Result<(), Failure> {
-    let asked = load::asked(None, arguments.own.ads_config.as_deref(), arguments.own.ads_cmd.as_deref())?;
+    let asked = load::asked(arguments.against.ads.as_deref())?;
     let verified =
         each_file(output, &arguments.many, asked.external.as_ref(), |path| {
             match load::emitted(output, path)? {

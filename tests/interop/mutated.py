@@ -106,7 +106,7 @@ def examine(kind, originals, count):
 EXPECTED = {}
 FOLDER.mkdir(parents=True, exist_ok=True)
 if not (FOLDER / "run").exists():
-    run("run", SPACE, "--episodes", "60", "--seed", "5", "--ads-config", FAULT, "--out", FOLDER / "run")
+    run("run", SPACE, "--episodes", "60", "--seed", "5", "--ads", FAULT, "--out", FOLDER / "run")
 scenarios = sorted((FOLDER / "run/critical").glob("*.ava"))
 if POLICIES and not (FOLDER / "trained").exists():
     small = FOLDER / "small.yaml"

@@ -157,7 +157,7 @@ fn compile_and_run_write_the_same_files_twice() {
     };
     in_scratch(&["compile", &space]);
     let profile = root().join(FLICKER).display().to_string();
-    let settings = ["--seed", "7", "--episodes", "10", "--ads-config", &profile];
+    let settings = ["--seed", "7", "--episodes", "10", "--ads", &profile];
     in_scratch(&[&["run", "--jobs", "1"], &settings[..]].concat());
     in_scratch(&[&["run", "--jobs", "2"], &settings[..]].concat());
     let critical = |run: &str| -> Vec<(String, String)> {

@@ -283,8 +283,7 @@ fn a_link_to_nothing_is_not_replaced() {
 fn scenarios_that_are_gone_or_edited_are_noticed() {
     let scratch = Scratch::new();
     let out = scratch.text("run");
-    let settings =
-        ["--ads-config", FLICKER, "--road", "corner", "--episodes", "12", "--seed", "5", "--out", &out];
+    let settings = ["--ads", FLICKER, "--road", "corner", "--episodes", "12", "--seed", "5", "--out", &out];
     let (status, _, stderr) = outcome(&mut avastra(&[&["run", SPACE], &settings[..]].concat()));
     assert_eq!(status, 0, "{stderr}");
     let critical = std::fs::read_dir(scratch.path("run/critical")).expect("it is there").flatten();

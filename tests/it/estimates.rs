@@ -156,9 +156,9 @@ fn requests_that_cannot_be_met_are_refused() {
     let cases: [(&[&str], &str); 9] = [
         (&["estimate", SPACE, "--parts", "1"], "from 2 to"),
         (&["estimate", SPACE, "--method", "split", "--episodes", "3"], "at least 10"),
-        (&["estimate", SPACE, "--method", "split", "--ads-cmd", "true"], "--method count"),
+        (&["estimate", SPACE, "--method", "split", "--ads", "true ."], "--method count"),
         (&["estimate", SPACE, "--method", "split", "--agent", "greedy"], "has looked at what comes after"),
-        (&["estimate", SPACE, "--method", "probe", "--ads-cmd", "true"], "--method count"),
+        (&["estimate", SPACE, "--method", "probe", "--ads", "true ."], "--method count"),
         (&["estimate", SPACE, "--method", "probe", "--agent", "greedy"], "no weight"),
         (&["estimate", SPACE, "--precision", "2"], "a share of the probability"),
         (&["estimate", SPACE, "--agent", "ddqn"], "has to be trained first"),

@@ -12,19 +12,8 @@ fn found_scenarios_are_explained_shrunk_and_tested_again() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let path = |name: &str| scratch.path().join(name).display().to_string();
     let out = path("run");
-    let settings = [
-        "--road",
-        "corner",
-        "--episodes",
-        "20",
-        "--seed",
-        "5",
-        "--ads-config",
-        FLICKER,
-        "--causes",
-        "--out",
-        &out,
-    ];
+    let settings =
+        ["--road", "corner", "--episodes", "20", "--seed", "5", "--ads", FLICKER, "--causes", "--out", &out];
     let (status, stdout, stderr) =
         outcome(&mut avastra(&[&["run", "scenarios/avastra45.ava"], &settings[..]].concat()));
     assert_eq!(status, 0, "{stderr}");

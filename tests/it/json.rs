@@ -118,7 +118,7 @@ fn results_of_drives_are_as_explain_describes_them() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let at = |name: &str| scratch.path().join(name).display().to_string();
     let run = at("run");
-    let settings = ["--episodes", "3", "--seed", "1", "--ads-config", FLICKER];
+    let settings = ["--episodes", "3", "--seed", "1", "--ads", FLICKER];
     let found =
         is_as_described(&[&["run", "scenarios/avastra45.ava", "--out", &run], &settings[..]].concat());
     let critical: Vec<&str> =

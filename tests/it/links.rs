@@ -235,8 +235,8 @@ const ATTACKS: &[Attack] = &[
     },
     // Programs that files name: the fixture's leaves a file beside the clone when it is started.
     linked(&[], &["study", "theirs.yaml", "--dry-run"], Done),
-    linked(&[], &["run", "SPACE", "--ads-config", "profile.yaml", "--dry-run"], Done),
-    linked(&[], &["estimate", "SPACE", "--ads-config", "profile.yaml", "--dry-run"], Done),
+    linked(&[], &["run", "SPACE", "--ads", "profile.yaml", "--dry-run"], Done),
+    linked(&[], &["estimate", "SPACE", "--ads", "profile.yaml", "--dry-run"], Done),
     linked(&[], &["merge", "p1", "p2", "--out", "m"], Done),
     linked(&[], &["merge", "p1", "p2", "--missing"], Done),
     linked(&[], &["report", "p1"], Done),
@@ -334,15 +334,14 @@ fn make_home(home: &Path) {
         assert_eq!(status, 0, "{arguments:?}: {stderr}");
     };
     let corner = ["--road", "corner"];
-    let found =
-        ["--self-contained", "--episodes", "8", "--seed", "5", "--ads-config", &flicker, "--out", "run"];
+    let found = ["--self-contained", "--episodes", "8", "--seed", "5", "--ads", &flicker, "--out", "run"];
     played(&[&["run", &space][..], &corner, &found].concat());
     assert!(clone.join(FOUND).is_file(), "the run finds a crash: choose another seed");
     for (shard, parts, external) in [("1/2", "e1", "p1"), ("2/2", "e2", "p2")] {
         let shard = ["--shard", shard];
         let estimate = ["--ads", "cc", "--parts", "2", "--episodes", "1", "--out", parts];
         played(&[&["estimate", &space][..], &corner, &shard, &estimate].concat());
-        let run = ["--ads-config", "profile.yaml", "--episodes", "2", "--out", external];
+        let run = ["--ads", "profile.yaml", "--episodes", "2", "--out", external];
         played(&[&["run", &space][..], &corner, &shard, &run].concat());
     }
     let train = ["--agent", "av-fuzzer", "--ads", "cc", "--episodes", "1", "--out", "searched"];
@@ -510,7 +509,7 @@ fn nothing_that_a_file_or_a_program_brings_acts_on_the_terminal() {
     std::fs::write(&named, "language 1\nlet a = \u{1b}]0;title\u{7} 3 m + 1 s // \u{9b}31m\n")
         .expect("it is writable");
     let named = named.display().to_string();
-    let shouting = ["ads", "check", "--", "sh", "-c", r"printf '\033[2Jgone\n' >&2; exit 3"];
+    let shouting = ["ads", "check", "--ads", r#"sh -c "printf '\033[2Jgone\n' >&2; exit 3""#];
     let commands: [&[&str]; 5] = [
         &["check", &named],
         &["check", &named, "--format", "plain"],

@@ -264,7 +264,7 @@ fn a_comparison_says_what_becomes_of_each_crash() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let file = written(scratch.path(), "walk.ava", "");
     let change = |other: &str| {
-        let (status, stderr, index) = reported(scratch.path(), &[&file, "--compare", other]);
+        let (status, stderr, index) = reported(scratch.path(), &[&file, "--ads", other]);
         assert_eq!(status, 0, "{stderr}");
         index["scenarios"][0]["change"]["kind"].as_str().expect("it is compared").to_owned()
     };

@@ -285,7 +285,7 @@ fn cells_are_runs(whole: &Value) {
         let out = scratch.path().join(number.to_string()).display().to_string();
         let run =
             ["run", "scenarios/avastra45.ava", "--road", "corner", "--episodes", "3", "--format", "json"];
-        let run = [&run[..], &["--ads-config", FLICKER]].concat();
+        let run = [&run[..], &["--ads", FLICKER]].concat();
         let seed = seed.as_str().expect("a text");
         let (status, stdout, stderr) =
             outcome(&mut avastra(&[&run[..], &["--seed", seed, "--out", &out]].concat()));

@@ -27,7 +27,7 @@ impl Found {
         let mut found = Found { scratch, scenarios: 0 };
         let (file, run) = (found.path("space/avastra45.ava"), found.path("run"));
         let settings =
-            ["--road", "corner", "--episodes", "12", "--seed", "5", "--ads-config", FLICKER, "--out", &run];
+            ["--road", "corner", "--episodes", "12", "--seed", "5", "--ads", FLICKER, "--out", &run];
         let (status, _, stderr) = outcome(&mut avastra(&[&["run", &file], &settings[..], flags].concat()));
         assert_eq!(status, 0, "{stderr}");
         found.scenarios = found.files("run/critical").len();
@@ -281,7 +281,7 @@ fn a_review_tells_what_is_gone() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let run = scratch.path().join("run").display().to_string();
     let fault = "scenarios/ads/faults/planning_never_yields.yaml";
-    let place = ["--road", "residential", "--episodes", "9", "--seed", "1", "--ads-config", fault];
+    let place = ["--road", "residential", "--episodes", "9", "--seed", "1", "--ads", fault];
     let space = "scenarios/avastra45.ava";
     avastra(&[&["run", space, "--out", &run][..], &place].concat()).assert().success();
     let review = ["test", "--format", "json", "--accept", "--ads", "idm", &run];
@@ -324,7 +324,7 @@ fn a_suite_is_judged_by_the_verdict_of_its_space() {
         format!("language 1\nuse \"{}\"\noverride verdict counted: collision and struck\n", used.display());
     std::fs::write(&space, text).expect("it is writable");
     let settings = ["--road", "crossroad", "--episodes", "40", "--seed", "5", "--traffic", "released"];
-    let begin = ["run", &space, "--ads-config", profile, "--out", &run];
+    let begin = ["run", &space, "--ads", profile, "--out", &run];
     avastra(&[&begin[..], &settings[..]].concat()).assert().success();
     let test = |more: &[&str]| {
         let (status, stdout, stderr) = outcome(&mut avastra(&[&["test", &run][..], more].concat()));
@@ -339,7 +339,7 @@ fn a_suite_is_judged_by_the_verdict_of_its_space() {
     );
     assert_eq!(test(&["--jobs", "3"]), told);
     // The same profile by its file: now each is played a second time.
-    assert_eq!(test(&["--ads-config", profile]), told);
+    assert_eq!(test(&["--ads", profile]), told);
 }
 
 #[test]

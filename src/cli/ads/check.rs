@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::action::ActionTable;
 use crate::ads::Selected;
-use crate::ads::external::{ExternalSettings, Failure as Finding, Problem, Program, Target, odd_orders};
+use crate::ads::external::{ExternalSettings, Failure as Finding, Problem, Program, odd_orders};
 use crate::agent;
 use crate::agent::Kind;
 use crate::cli::arguments::AdsCheckArguments;
@@ -18,6 +18,7 @@ use crate::cli::error::Failure;
 use crate::cli::files::{Scratch, make_way, write_new};
 use crate::cli::findings::cut_off;
 use crate::cli::load;
+use crate::cli::load::Driver;
 use crate::cli::new::shipped;
 use crate::cli::output::Output;
 use crate::episode;
@@ -55,22 +56,14 @@ struct Speed {
 
 /// Runs all checks; the first that fails ends them.
 pub fn check(output: &Output, arguments: &AdsCheckArguments) -> Result<(), Failure> {
-    let command = match arguments.program.as_slice() {
-        [] => None,
-        [one] if one.starts_with("tcp:") || one.starts_with("unix:") => {
-            Some(Target::from_text(one).map_err(Failure::usage)?)
-        }
-        words => Some(Target::Program(words.to_vec())),
+    let settings = match load::driver(&arguments.ads)? {
+        Driver::Profile(path) => load::external(Some(path), None)?,
+        Driver::Command(command) => load::external(None, Some(command))?,
+        Driver::Name(_) => None,
     };
-    let of_profile = load::external(arguments.ads_config.as_deref(), None)?;
-    let settings = match (of_profile, command) {
-        (Some(settings), Some(command)) => ExternalSettings { command, ..settings },
-        (Some(settings), None) => settings,
-        (None, Some(command)) => ExternalSettings::of(command),
-        (None, None) => {
-            return Err(Failure::usage("the profile has no `ads` block, and there is no command after `--`"));
-        }
-    };
+    let settings = settings.ok_or_else(|| {
+        Failure::usage(format!("`{}` is a driving system of avastra: check one of your own", arguments.ads))
+    })?;
     let (table, _scratch) = match &arguments.space {
         Some(path) => (load::table(output, path)?, None),
         None => {

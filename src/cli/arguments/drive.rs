@@ -11,16 +11,10 @@ use crate::run::Shard;
 /// The driving system under test.
 #[derive(Debug, Args)]
 pub struct UnderTestArguments {
-    /// Driving system under test.
-    #[arg(long, default_value = crate::run::DEFAULT_ADS, value_parser = Named::ADS)]
+    /// Driving system under test: a name; a profile of `modular` or of one of your own (PROTOCOL.md), a YAML file; a command
+    /// that starts your own, `tcp:HOST:PORT` or `unix:PATH`.
+    #[arg(long, value_name = "NAME|FILE|COMMAND", default_value = crate::run::DEFAULT_ADS, value_parser = Named::ADS)]
     pub ads: String,
-    /// Profile of the `modular` driving system, for example scenarios/ads/cautious.yaml, or of one of your own, with an
-    /// `ads` block [default: as it comes].
-    #[arg(long, value_name = "FILE")]
-    pub ads_config: Option<PathBuf>,
-    /// Driving system of your own: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
-    #[arg(long, value_name = "COMMAND", conflicts_with = "ads")]
-    pub ads_cmd: Option<String>,
 }
 
 /// Which piece of a run, a study or an estimate is played.
@@ -90,7 +84,7 @@ pub struct RunArguments {
     #[command(flatten)]
     pub shard: ShardArguments,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "ads_cmd", "agent", "policy", "face", "episodes", "seed", "ambient", "traffic", "causes", "out", "self_contained", "shard", "dry_run", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "policy", "face", "episodes", "seed", "ambient", "traffic", "causes", "out", "self_contained", "shard", "dry_run", "without", "with"])]
     pub resume: Option<PathBuf>,
     /// Exit with status 4 if a counted collision was found.
     #[arg(long)]
@@ -143,7 +137,7 @@ pub struct EstimateArguments {
     #[command(flatten)]
     pub shard: ShardArguments,
     /// Go on with an interrupted estimate; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "event", "method", "parts", "precision", "hours", "episodes", "ads", "ads_config", "ads_cmd", "road", "agent", "seed", "ambient", "traffic", "out", "shard", "dry_run", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "event", "method", "parts", "precision", "hours", "episodes", "ads", "road", "agent", "seed", "ambient", "traffic", "out", "shard", "dry_run", "without", "with"])]
     pub resume: Option<PathBuf>,
 }
 

@@ -45,7 +45,7 @@ pub struct TrainArguments {
     #[arg(long)]
     pub self_contained: bool,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "ads_cmd", "agent", "preset", "config", "episodes", "seed", "traffic", "out", "self_contained", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "preset", "config", "episodes", "seed", "traffic", "out", "self_contained", "without", "with"])]
     pub resume: Option<PathBuf>,
 }
 
@@ -105,9 +105,9 @@ pub struct StudyArguments {
     /// The study, for example scenarios/studies/rq1.yaml.
     #[arg(required_unless_present = "resume")]
     pub file: Option<PathBuf>,
-    /// Driving system of your own in place of the study's: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
-    #[arg(long, value_name = "COMMAND")]
-    pub ads_cmd: Option<String>,
+    /// Driving system in place of the study's: a name, a profile, or a command as `avastra run --ads` takes it.
+    #[arg(long, value_name = "NAME|FILE|COMMAND", value_parser = Named::ADS)]
+    pub ads: Option<String>,
     /// Directory of the study, new or empty [default: the next free runs/NNNN].
     #[arg(long)]
     pub out: Option<PathBuf>,
@@ -117,7 +117,7 @@ pub struct StudyArguments {
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub jobs: Option<u32>,
     /// Go on with an interrupted study; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "ads_cmd", "out", "shard", "dry_run", "quick"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "ads", "out", "shard", "dry_run", "quick"])]
     pub resume: Option<PathBuf>,
     /// Take over the cells that another study has played already: those of agents with the same settings, on the same
     /// roads, with the same seeds. The result is the same as without.

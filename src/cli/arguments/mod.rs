@@ -10,7 +10,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub use drive::{
     CompareArguments, ConditionArguments, EstimateArguments, EventArgument, FaceArgument, MergeArguments,
-    MethodArgument, RunArguments, UnderTestArguments,
+    MethodArgument, RunArguments,
 };
 pub use external::{AdsArguments, AdsCheckArguments, AdsCommand, Misbehaviour, ToyAnswer, ToyArguments};
 pub use language::{
@@ -22,9 +22,9 @@ pub use learn::{
     TrainArguments,
 };
 pub use scenarios::{
-    AgainstArguments, DiagnoseArguments, ExportArguments, ExportEgo, ExportFormat, ExportProfile,
-    ExportVersion, FilesArguments, ImportArguments, PackArguments, RenderArguments, ReplayArguments,
-    ReportArguments, RoadArguments, ShrinkArguments, TestArguments, VerifyArguments,
+    DiagnoseArguments, ExportArguments, ExportEgo, ExportFormat, ExportProfile, ExportVersion,
+    FilesArguments, ImportArguments, PackArguments, RenderArguments, ReplayArguments, ReportArguments,
+    RoadArguments, ShrinkArguments, TestArguments, VerifyArguments,
 };
 
 /// Finds out which of the things that may happen around a self-driving car make it crash.
