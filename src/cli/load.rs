@@ -394,14 +394,6 @@ pub enum Emitted {
     Policy(ActionTable, Box<Policy>),
 }
 
-/// A scenario or policy file.
-///
-/// # Errors
-/// As [`load`], and if the file has neither.
-pub fn emitted(output: &Output, path: &Path) -> Result<Emitted, Failure> {
-    emitted_in(path, sound(output, read_and_check(path)?)?)
-}
-
 /// The scenario or policy of a file without mistakes.
 ///
 /// # Errors
@@ -422,10 +414,23 @@ pub fn emitted_in(path: &Path, mut loaded: Loaded) -> Result<Emitted, Failure> {
 /// # Errors
 /// As [`load`], and if the file has no policy.
 pub fn policy(output: &Output, path: &Path) -> Result<(ActionTable, Policy), Failure> {
-    match emitted(output, path)? {
+    policy_in(output, path, read_and_check(path)?)
+}
+
+/// The table and the policy of a file that was read and checked.
+///
+/// # Errors
+/// As [`policy`].
+pub fn policy_in(output: &Output, path: &Path, loaded: Loaded) -> Result<(ActionTable, Policy), Failure> {
+    match emitted_in(path, sound(output, loaded)?)? {
         Emitted::Policy(table, policy) => Ok((table, *policy)),
         Emitted::Scenario(..) => Err(Failure::usage(format!("`{}` is no policy", path.display()))),
     }
+}
+
+/// Whether a file declares a policy, with mistakes or without.
+pub fn is_policy(loaded: &Loaded) -> bool {
+    loaded.files[0].tree.items.iter().any(|item| item.kind.as_policy().is_some())
 }
 
 fn space(loaded: Loaded, path: &Path) -> Result<Arc<Space>, Failure> {
@@ -524,7 +529,9 @@ mod tests {
 
     #[test]
     fn a_driver_is_a_name_a_profile_or_a_command() {
-        let is = |text: &str| driver(text).map_err(|error| error.to_string());
+        fn is(text: &str) -> Result<Driver<'_>, String> {
+            driver(text).map_err(|error| error.to_string())
+        }
         for entry in REGISTRY {
             assert_eq!(is(entry.name).unwrap(), Driver::Name(entry.name));
         }

@@ -25,9 +25,9 @@ use super::output::Output;
 use super::output::plural;
 use super::pack::pack_space;
 use super::parallel::jobs;
+use super::policy::acting;
 use super::progress::Progress;
 use super::run_directory::{Resumed, RunDirectory, WrittenFile};
-use super::verify::acting;
 use super::{compile, conditions, load, run_directory, shard};
 
 /// Largest number of critical scenarios, groups and refusal reasons that the summary lists.

@@ -15,7 +15,7 @@ pub struct Field {
     pub meaning: &'static str,
 }
 
-/// A command and the fields of its result.
+/// A command, with the option that leads to another result, and the fields of its result.
 #[derive(Debug, serde::Serialize)]
 pub struct Shape {
     pub command: &'static str,
@@ -102,8 +102,9 @@ pub const SHAPES: &[Shape] = &[
             f("cells[]", "object?", "with `--try`: a row on a road, with its tries and why any failed"),
         ],
     },
+    Shape { command: "table --markdown", fields: &[f("text", "text", "Markdown")] },
     Shape {
-        command: "why",
+        command: "table --row",
         fields: &[
             f("row", "number", ""),
             f("label", "text", "the row in words"),
@@ -139,7 +140,6 @@ pub const SHAPES: &[Shape] = &[
             f("differences[].detail", "text", "may be empty"),
         ],
     },
-    Shape { command: "doc", fields: &[f("text", "text", "Markdown")] },
     Shape { command: "new", fields: &[f("files[]", "text", "paths of the files written")] },
     Shape {
         command: "completions",
@@ -172,21 +172,17 @@ pub const SHAPES: &[Shape] = &[
         ],
     },
     Shape {
-        command: "ads",
+        command: "ads check",
         fields: &[
             f(
                 "checks[]",
                 "object",
-                "`ads check`: `stage`, `passed`, what was `found`, the `failure` if it is one of PROTOCOL.md",
+                "`stage`, `passed`, what was `found`, the `failure` if it is one of PROTOCOL.md",
             ),
-            f(
-                "speed",
-                "object?",
-                "`ads check`: `questions`, `round_trips_per_s` and `share` of the episode's time",
-            ),
-            f("protocol", "object?", "`ads schema`: the JSON Schema of every message"),
+            f("speed", "object?", "`questions`, `round_trips_per_s` and `share` of the episode's time"),
         ],
     },
+    Shape { command: "ads schema", fields: &[f("protocol", "object", "the JSON Schema of every message")] },
     Shape {
         command: "train",
         fields: &[
@@ -202,7 +198,7 @@ pub const SHAPES: &[Shape] = &[
         ],
     },
     Shape {
-        command: "distill",
+        command: "policy distil",
         fields: &[
             f("policy", "text", "path of the written policy"),
             f("lines", "number", "rules"),
@@ -210,7 +206,7 @@ pub const SHAPES: &[Shape] = &[
         ],
     },
     Shape {
-        command: "explain-policy",
+        command: "policy explain",
         fields: &[
             f("policy", "text", "its name"),
             f("roads[]", "text", ""),
@@ -218,7 +214,7 @@ pub const SHAPES: &[Shape] = &[
         ],
     },
     Shape {
-        command: "export-weights",
+        command: "policy weights",
         fields: &[
             f("file", "text", "the safetensors file"),
             f("layers[]", "number", "widths of the network"),
@@ -280,7 +276,7 @@ pub const SHAPES: &[Shape] = &[
         ],
     },
     Shape {
-        command: "compare",
+        command: "estimate --than",
         fields: &[
             f("sides[]", "text", "the two driving systems"),
             f("results.schema", "number", "of `results`"),
@@ -315,7 +311,7 @@ pub const SHAPES: &[Shape] = &[
         ],
     },
     Shape {
-        command: "results",
+        command: "study results",
         fields: &[
             f("output", "text", "where the results were written"),
             f(
@@ -331,22 +327,13 @@ pub const SHAPES: &[Shape] = &[
             f("confirmed", "number", "claims that hold"),
             f("refuted", "number", "claims that do not"),
             f("untried", "number", "claims that only the driving system itself can show"),
+            f("policies[]", "object", "`file`, `policy` and the claims `refuted`, in words"),
             f(
                 "scenarios[]",
                 "object",
                 "`file`, `scenario`, what has `changed` since it was written, `ads`, `claims`, `end`, the `failure` of a \
                  driving system of your own, whether it is `reproducible`; what its speed was `held` by, from when on; collisions and how hard they were",
             ),
-            FAILED,
-        ],
-    },
-    Shape {
-        command: "verify",
-        fields: &[
-            f("refuted", "number", "claims that do not hold"),
-            f("untried", "number", "as in `replay`"),
-            f("scenarios[]", "object", "as in `replay`"),
-            f("policies[]", "object", "`file`, `policy` and the claims `refuted`, in words"),
             FAILED,
         ],
     },
@@ -409,10 +396,6 @@ pub const SHAPES: &[Shape] = &[
             ),
             f("scenarios[].reason", "text", "may be empty"),
         ],
-    },
-    Shape {
-        command: "pack",
-        fields: &[f("directory", "text", "the folder"), f("files[]", "text", "paths of the files in it")],
     },
     Shape {
         command: "report",

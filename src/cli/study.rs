@@ -13,7 +13,7 @@ use crate::study::{
 };
 use crate::syntax::{listed, yaml_mistake};
 
-use super::arguments::StudyArguments;
+use super::arguments::{StudyArguments, StudyCommand};
 use super::error::Failure;
 use super::files::{remove, write};
 use super::findings::kinds_text;
@@ -24,10 +24,13 @@ use super::parallel::jobs;
 use super::progress::Progress;
 use super::run_directory::{Held, Resumed};
 use super::timing::Times;
-use super::{load, run_directory, shard};
+use super::{load, results, run_directory, shard};
 
-/// Plays what a study still lacks and prints its result.
+/// Plays what a study still lacks and prints its result, or writes the results of a folder of studies.
 pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure> {
+    if let Some(StudyCommand::Results(arguments)) = &arguments.command {
+        return results::results(output, arguments);
+    }
     let (begun, reused) = match &arguments.resume {
         Some(path) => {
             let resumed = resumed(output, path, false)?;

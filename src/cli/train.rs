@@ -16,7 +16,6 @@ use crate::train::{Evaluation, TrainSettings, TrainedEpisode, Training, evaluate
 
 use super::arguments::TrainArguments;
 use super::conditions::roads_or_all;
-use super::distill::rules_text;
 use super::error::Failure;
 use super::files::{folder, write};
 use super::findings::{cut_off, doubts, failures_text, kinds_text, unfinished};
@@ -25,10 +24,12 @@ use super::load::UnderTest;
 use super::output::Output;
 use super::output::plural;
 use super::pack::pack_space;
+use super::policy::distil;
+use super::policy::distil::rules_text;
 use super::progress::{TrainingProgress, Working};
 use super::run::groups_text;
 use super::run_directory::{Resumed, RunDirectory, WrittenFile};
-use super::{distill, load, run_directory};
+use super::{load, run_directory};
 
 /// Episodes between two checkpoints: at most so many are played again after a kill.
 const CHECKPOINT_EPISODES: usize = 25;
@@ -331,7 +332,7 @@ fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Pol
         rules: Vec::new(),
         digest: String::new(),
     };
-    distill::with_rules(training.arena(), acting, policy)
+    distil::with_rules(training.arena(), acting, policy)
 }
 
 /// Writes `policy/NAME.ava`.

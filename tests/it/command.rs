@@ -43,6 +43,18 @@ fn a_misspelt_command_is_told_the_nearest() {
     }
 }
 
+#[test]
+fn a_command_or_an_option_that_was_is_told_its_new_name() {
+    for (words, now) in [
+        (&["verify", "a.ava"][..], "`verify` is now `replay`"),
+        (&["explain-policy", "a.ava"], "`explain-policy` is now `policy explain`"),
+        (&["run", "a.ava", "--ads-config", "car.yaml"], "`--ads-config` is now `--ads FILE`"),
+    ] {
+        let (status, _, stderr) = outcome(&mut avastra(words));
+        assert!(status == 1 && stderr.contains(now), "{stderr}");
+    }
+}
+
 /// The footways of a map are drawn beside its lanes.
 #[test]
 fn a_picture_shows_sidewalks() {
@@ -134,9 +146,9 @@ fn what_does_not_exist_is_named_with_what_does() {
         (&["run", space, "--agent", "rndom"], "`random`"),
         (&["run", space, "--without", "npc_gpa"], "npc_gap"),
         (&["run", "--resume", "scenarios"], "no run.yaml"),
-        (&["why", space, "--row", "45"], "rows 0 to 44"),
-        (&["why", space, "--row", "0", "--state", "tiem: Night"], "time"),
-        (&["why", space, "--row", "0", "--state", "time: Noon, time: Night"], "`time` is given twice"),
+        (&["table", space, "--row", "45"], "rows 0 to 44"),
+        (&["table", space, "--row", "0", "--state", "tiem: Night"], "time"),
+        (&["table", space, "--row", "0", "--state", "time: Noon, time: Night"], "`time` is given twice"),
         (&["render", space, "--at", "1"], "no scenario"),
     ];
     for (arguments, hint) in cases {

@@ -57,17 +57,20 @@ const ATTACKS: &[Attack] = &[
     // Links with the names that temporary files once had.
     linked(&[("x.ava.partial", "mine.txt")], &["fmt", "x.ava"], Done),
     linked(&[("run/report.html.partial", "mine.txt")], &["report", "run"], Done),
-    linked(&[("d.md.partial", "mine.txt")], &["doc", "SPACE", "-o", "d.md"], Done),
     linked(&[("r.svg.partial", "mine.txt")], &["render", "FOUND", "--at", "1", "-o", "r.svg"], Done),
     linked(&[("m.svg.partial", "mine.txt")], &["road", "SPACE", "--road", "corner", "--svg", "m.svg"], Done),
     linked(
         &[("w.safetensors.partial", "mine.txt")],
-        &["export-weights", "POLICY", "-o", "w.safetensors"],
+        &["policy", "weights", "POLICY", "-o", "w.safetensors"],
         Done,
     ),
     linked(&[("s.ava.partial", "mine.txt")], &["shrink", "FOUND", "-o", "s.ava"], Done),
     linked(&[("j.xml.partial", "mine.txt")], &["test", "run", "--junit", "j.xml"], Any),
-    linked(&[("out/corner_0000.ava.partial", "mine.txt")], &["pack", "FOUND", "--out", "out"], Done),
+    linked(
+        &[("out/corner_0000.ava.partial", "mine.txt")],
+        &["export", "--to", "ava", "FOUND", "--out", "out"],
+        Done,
+    ),
     linked(
         &[("run/run.db.partial", "mine.txt"), ("run/run.db.partial-journal", "mine.txt")],
         &["run", "--resume", "run"],
@@ -92,7 +95,7 @@ const ATTACKS: &[Attack] = &[
         &["compile", "SPACE"],
         Done,
     ),
-    linked(&[("out/corner_0000.ava", "nowhere")], &["pack", "FOUND", "--out", "out"], Done),
+    linked(&[("out/corner_0000.ava", "nowhere")], &["export", "--to", "ava", "FOUND", "--out", "out"], Done),
     linked(
         &[("run/critical/exported/corner_0000.csv", "mine.txt")],
         &["export", "--to", "csv", "FOUND"],
@@ -162,7 +165,7 @@ const ATTACKS: &[Attack] = &[
     linked(&[("run/critical", "folder")], &["test", "--accept", "run"], Refused(LINK)),
     linked(&[("run/shrunk", "folder")], &["shrink", "FOUND"], Refused(LINK)),
     linked(&[("run/critical/exported", "folder")], &["export", "--to", "csv", "FOUND"], Refused(LINK)),
-    linked(&[("out/space", "folder")], &["pack", "FOUND", "--out", "out"], Refused(LINK)),
+    linked(&[("out/space", "folder")], &["export", "--to", "ava", "FOUND", "--out", "out"], Refused(LINK)),
     linked(&[("build", "folder")], &["compile", "SPACE"], Refused(LINK)),
     linked(&[("fresh/roads", "folder")], &["new", "fresh"], Refused(LINK)),
     linked(&[("ed/syntaxes", "folder")], &["editor-files", "ed"], Refused(LINK)),

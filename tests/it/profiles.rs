@@ -92,12 +92,12 @@ fn a_scenario_keeps_the_profile_that_it_was_found_with() {
     let (status, stdout, stderr) = told_by("fsm");
     assert!(status == 3 && stdout.contains("claimed avoidable by [cc"), "{stdout}{stderr}");
 
-    // A digest that does not fit the settings is refused where claims are verified, with a remedy.
+    // A digest that does not fit the settings is refused where a new file would be made of it, with a remedy.
     let digest = profile(FAULT).digest();
     assert!(text.contains(&digest));
     std::fs::write(&other, text.replace(&digest, &ModularConfig::default().digest()))
         .expect("it is writable");
-    let (status, _, stderr) = outcome(&mut avastra(&["verify", &other.display().to_string()]));
+    let (status, _, stderr) = outcome(&mut avastra(&["shrink", &other.display().to_string()]));
     assert!(status == 1 && stderr.contains("--ads FILE"), "{stderr}");
 }
 
@@ -145,6 +145,6 @@ fn a_policy_is_verified_against_the_profile_that_it_was_trained_against() {
     let file = scratch.path().join("run/policy/corner_ddqn_5.ava");
     let text = std::fs::read_to_string(&file).expect("it was written");
     assert!(text.contains("never_yields: true") && text.contains(&profile(FAULT).digest()), "{text}");
-    let (status, stdout, stderr) = outcome(&mut avastra(&["verify", &file.display().to_string()]));
+    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &file.display().to_string()]));
     assert_eq!(status, 0, "{stdout}{stderr}");
 }

@@ -240,7 +240,7 @@ fn a_review_says_what_differs_in_meaning() {
         assert_eq!((*then == now, now.contains("ads: \"reactive\"")), (is_kept, !is_kept), "{now}{stderr}");
         if !is_kept {
             assert!(!now.contains("profile"), "{now}");
-            let (status, stdout, stderr) = outcome(&mut avastra(&["verify", &file]));
+            let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &file]));
             assert_eq!(status, 0, "{stdout}{stderr}");
         }
     }
@@ -364,7 +364,7 @@ fn packed_scenarios_are_a_folder_that_moves() {
     // Twice: what is there with the same content is no obstacle.
     for _ in 0..2 {
         let (status, _, stderr) =
-            outcome(&mut avastra(&[&["pack"], &files[..], &["--out", &suite]].concat()));
+            outcome(&mut avastra(&[&["export", "--to", "ava"], &files[..], &["--out", &suite]].concat()));
         assert_eq!(status, 0, "{stderr}");
     }
     std::fs::remove_dir_all(found.scratch.path().join("space")).expect("it is there");
@@ -409,7 +409,14 @@ fn what_is_packed_keeps_away_from_what_is_there() {
     }
     let pack = |name: &str| {
         let file = path(name).join(format!("{name}.ava")).display().to_string();
-        outcome(&mut avastra(&["pack", &file, "--out", &path("packed").display().to_string()]))
+        outcome(&mut avastra(&[
+            "export",
+            "--to",
+            "ava",
+            &file,
+            "--out",
+            &path("packed").display().to_string(),
+        ]))
     };
     let (status, _, stderr) = pack("one");
     assert_eq!(status, 0, "{stderr}");
@@ -426,9 +433,10 @@ fn what_is_packed_keeps_away_from_what_is_there() {
     // What fails leaves nothing behind, and a file that is named twice is one.
     let [one, two] = ["one/one.ava", "two/two.ava"].map(|name| path(name).display().to_string());
     let out = path("both/deep").display().to_string();
-    let (status, _, stderr) = outcome(&mut avastra(&["pack", &one, &two, "--out", &out]));
+    let (status, _, stderr) = outcome(&mut avastra(&["export", "--to", "ava", &one, &two, "--out", &out]));
     assert!(status == 1 && !path("both").exists(), "{stderr}");
-    let (status, stdout, stderr) = outcome(&mut avastra(&["pack", &one, &one, "--out", &out]));
+    let (status, stdout, stderr) =
+        outcome(&mut avastra(&["export", "--to", "ava", &one, &one, "--out", &out]));
     assert!(status == 0 && stdout.contains("1 file with all that they use"), "{stdout}{stderr}");
 }
 

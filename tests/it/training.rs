@@ -183,7 +183,7 @@ fn a_policy_is_verified_played_and_refused_when_damaged() {
     let out = scratch.path().join("run");
     let text = trained(&out);
     let file = out.join("policy/corner_ddqn_5.ava").display().to_string();
-    avastra(&["verify", &file]).assert().success();
+    avastra(&["replay", &file]).assert().success();
     avastra(&[
         "run",
         "--policy",

@@ -91,7 +91,7 @@ pub fn check(output: &Output, arguments: &AdsCheckArguments) -> Result<(), Failu
         0 => "\nit can be put under test",
         _ => "\nit cannot be put under test as it is",
     });
-    output.result(serde_json::json!({ "checks": parts, "speed": speed, "protocol": null }));
+    output.result(serde_json::json!({ "checks": parts, "speed": speed }));
     if failed > 0 { Err(Failure::Ads { findings: failed }) } else { Ok(()) }
 }
 

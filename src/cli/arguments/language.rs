@@ -47,11 +47,16 @@ pub struct TableArguments {
     /// Only what this road allows, with the reason where it does not.
     #[arg(long)]
     pub road: Option<String>,
+    /// Print the whole space as Markdown instead: actions, rules, states, with their documentation and what was proved of them.
+    #[arg(long, conflicts_with_all = ["road", "try", "row"])]
+    pub markdown: bool,
     /// Carry every row out on the road, or on all of them, without other traffic, and judge whether it does what it says.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "row")]
     pub r#try: bool,
     #[command(flatten)]
     pub trials: TrialArguments,
+    #[command(flatten)]
+    pub why: WhyArguments,
 }
 
 #[derive(Debug, Args)]
@@ -73,21 +78,22 @@ pub struct TrialArguments {
     pub out: Option<PathBuf>,
 }
 
+/// A question about one row.
 #[derive(Debug, Args)]
 pub struct WhyArguments {
-    /// The space.
-    pub file: PathBuf,
-    /// Number of the row in the table.
+    /// Only the row of this number: whether it is legal at the start of the road (the first of the space if none is named), and
+    /// which rule says no.
     #[arg(long)]
-    pub row: usize,
-    /// Road of the question [default: the first of the space].
-    #[arg(long)]
-    pub road: Option<String>,
+    pub row: Option<usize>,
     /// States at that moment, for example `time: Night, sky: { Rain: High }`.
-    #[arg(long)]
+    #[arg(long, requires = "row")]
     pub state: Option<String>,
-    #[command(flatten)]
-    pub rules: RuleArguments,
+    /// Switch a rule off at that moment; may be given several times.
+    #[arg(long, requires = "row", value_name = "RULE")]
+    pub without: Vec<String>,
+    /// Switch an optional rule on.
+    #[arg(long, requires = "row", value_name = "RULE")]
+    pub with: Vec<String>,
 }
 
 #[derive(Debug, Args)]
@@ -122,15 +128,6 @@ pub struct DiffArguments {
     pub old: PathBuf,
     /// The space that it became.
     pub new: PathBuf,
-}
-
-#[derive(Debug, Args)]
-pub struct DocArguments {
-    /// The space.
-    pub file: PathBuf,
-    /// Where to write [default: stdout].
-    #[arg(long = "out", short = 'o')]
-    pub output: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

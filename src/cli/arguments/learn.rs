@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, Subcommand};
 
 use super::drive::{ShardArguments, UnderTestArguments};
 use super::language::RuleArguments;
@@ -50,7 +50,23 @@ pub struct TrainArguments {
 }
 
 #[derive(Debug, Args)]
-pub struct DistillArguments {
+pub struct PolicyArguments {
+    #[command(subcommand)]
+    pub command: PolicyCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum PolicyCommand {
+    /// Say which rows it favours and when, what it expects of them, and which variables matter to it.
+    Explain(ExplainPolicyArguments),
+    /// Distil readable rules from its network once more, with other settings.
+    Distil(DistilArguments),
+    /// Write the weights of its network as safetensors, for other tools.
+    Weights(WeightsArguments),
+}
+
+#[derive(Debug, Args)]
+pub struct DistilArguments {
     /// The policy.
     pub file: PathBuf,
     /// Lines, at most [default: as the policy was trained with, like the others].
@@ -92,7 +108,7 @@ pub struct ExplainPolicyArguments {
 }
 
 #[derive(Debug, Args)]
-pub struct ExportWeightsArguments {
+pub struct WeightsArguments {
     /// The policy.
     pub file: PathBuf,
     /// Where to write [default: STEM.safetensors beside the file].
@@ -101,7 +117,10 @@ pub struct ExportWeightsArguments {
 }
 
 #[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub struct StudyArguments {
+    #[command(subcommand)]
+    pub command: Option<StudyCommand>,
     /// The study, for example scenarios/studies/rq1.yaml.
     #[arg(required_unless_present = "resume")]
     pub file: Option<PathBuf>,
@@ -126,6 +145,12 @@ pub struct StudyArguments {
     /// Cut it down to see that it works: two short trainings, few episodes. No result.
     #[arg(long)]
     pub quick: bool,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum StudyCommand {
+    /// Write what a folder of studies found as one Markdown file, beside published figures.
+    Results(ResultsArguments),
 }
 
 #[derive(Debug, Args)]

@@ -8,7 +8,7 @@ use crate::cli::help::Named;
 
 #[derive(Debug, Clone, Args)]
 pub struct FilesArguments {
-    /// Scenarios, as `avastra run` writes them; `verify` takes policies, too.
+    /// Scenarios, as `avastra run` writes them; `replay` and `export --to ava` take policies, too.
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
     /// Worker threads over files [default: one for each core].
@@ -23,14 +23,6 @@ pub struct AgainstArguments {
     /// that each scenario was found with; one of your own by its recorded answers].
     #[arg(long, value_name = "NAME|FILE|COMMAND", value_parser = Named::ADS)]
     pub ads: Option<String>,
-}
-
-#[derive(Debug, Args)]
-pub struct VerifyArguments {
-    #[command(flatten)]
-    pub against: AgainstArguments,
-    #[command(flatten)]
-    pub many: FilesArguments,
 }
 
 #[derive(Debug, Args)]
@@ -72,19 +64,9 @@ pub struct ShrinkArguments {
 }
 
 #[derive(Debug, Args)]
-pub struct PackArguments {
-    /// Scenarios and policies.
-    #[arg(required = true, value_name = "FILE")]
-    pub files: Vec<PathBuf>,
-    /// The folder that they are copied to.
-    #[arg(long, value_name = "DIR")]
-    pub out: PathBuf,
-}
-
-#[derive(Debug, Args)]
 pub struct ExportArguments {
-    /// What to write: `openscenario` (`.xosc`, with its map beside it), `commonroad` (XML 2020a) or `csv` (a row for each
-    /// road user and tick).
+    /// What to write: `openscenario` (`.xosc`, with its map beside it), `commonroad` (XML 2020a), `csv` (a row for each
+    /// road user and tick), or `ava`: copies of scenarios and policies with all that they use, in a folder that can be moved.
     #[arg(long, value_enum, value_name = "FORMAT")]
     pub to: ExportFormat,
     /// The folder to write to [default: a folder `exported` beside the scenarios].
@@ -130,6 +112,7 @@ pub enum ExportFormat {
     Openscenario,
     Commonroad,
     Csv,
+    Ava,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
