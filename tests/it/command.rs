@@ -140,8 +140,10 @@ fn what_cannot_be_read_is_said_so() {
 #[test]
 fn what_does_not_exist_is_named_with_what_does() {
     let space = "scenarios/avastra45.ava";
-    let cases: [(&[&str], &str); 9] = [
+    let cases: [(&[&str], &str); 11] = [
         (&["run", space, "--road", "nowhere"], "`corner`"),
+        (&["run", space, "--ads", "modualr"], "did you mean `modular`?"),
+        (&["export", "--to", "ava", space], "`--out DIR`"),
         (&["run", space, "--ads", "apolo"], "`modular`, `frenet`, `reactive`, `idm`, `cc`"),
         (&["run", space, "--agent", "rndom"], "`random`"),
         (&["run", space, "--without", "npc_gpa"], "npc_gap"),

@@ -82,6 +82,8 @@ fn both_faces_are_played_and_what_they_claim_is_checked() {
     let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &file]));
     assert_eq!(status, 0, "{stderr}");
     assert!(stdout.contains("played again by each of its faces"), "{stdout}");
+    let (status, _, stderr) = outcome(&mut avastra(&["replay", &file, "--ads", "idm"]));
+    assert!(status == 1 && stderr.contains("that it was trained against"), "{stderr}");
 
     let traces = ["network", "rules"].map(|face| {
         let out = trained().with_file_name(format!("played_{face}"));

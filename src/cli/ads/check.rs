@@ -28,6 +28,8 @@ use crate::sim::World;
 
 /// The space that is driven if none is named, and its name.
 const SPACE: &str = "avastra45.ava";
+/// Length of each of the four episodes, in steps of an agent (6 s), at most.
+const STEPS: usize = 5;
 /// Steps of the episode that is broken off for a reset.
 const BROKEN_OFF_STEPS: usize = 2;
 /// Lines of standard error that are shown.
@@ -75,15 +77,8 @@ pub fn check(output: &Output, arguments: &AdsCheckArguments) -> Result<(), Failu
         Some(road) => road.clone(),
         None => table.space().roads[0].name.clone(),
     };
-    let steps = arguments.steps as usize;
-    let mut checks = Checks {
-        output,
-        seed: arguments.seed,
-        steps,
-        parts: Vec::new(),
-        speed: None,
-        is_deterministic: true,
-    };
+    let mut checks =
+        Checks { output, seed: arguments.seed, parts: Vec::new(), speed: None, is_deterministic: true };
     checks.all(table, &road, settings)?;
     let Checks { parts, speed, .. } = checks;
     let failed = parts.iter().filter(|part| !part.passed).count();
@@ -111,7 +106,6 @@ struct Checks<'a> {
     output: &'a Output,
     seed: u64,
     /// Length of an episode.
-    steps: usize,
     parts: Vec<Part>,
     speed: Option<Speed>,
     /// Whether it says that it answers alike to the like.
@@ -146,7 +140,7 @@ impl Checks<'_> {
             Arena::new(table, &[road.to_owned()], Selected::external(Arc::clone(&program)), &[], &[])?;
         #[allow(clippy::disallowed_methods, reason = "this is cli, and the time is what is asked for")]
         let began = Instant::now();
-        let first = self.drive(&arena, 0, self.steps);
+        let first = self.drive(&arena, 0, STEPS);
         let asked_s = began.elapsed().as_secs_f64();
         if let Some(failure) = &first.failure {
             self.fail("episode", "it fails in an episode", failure.clone());
@@ -155,7 +149,7 @@ impl Checks<'_> {
         // Now all answers are known: the same again is what avastra itself takes.
         #[allow(clippy::disallowed_methods, reason = "this is cli, and the time is what is asked for")]
         let began = Instant::now();
-        self.drive(&arena, 0, self.steps);
+        self.drive(&arena, 0, STEPS);
         let own_s = began.elapsed().as_secs_f64();
         let questions = first.conversation.as_ref().map_or(0, |conversation| conversation.exchanges.len());
         let taken_s = (asked_s - own_s).max(1e-9);
@@ -177,14 +171,14 @@ impl Checks<'_> {
         // Another episode is broken off, and then the first one comes again, in the same process.
         program.forget();
         let between = self.drive(&arena, 1, BROKEN_OFF_STEPS);
-        let again = self.drive(&arena, 0, self.steps);
+        let again = self.drive(&arena, 0, STEPS);
         let failure = between.failure.as_ref().or(again.failure.as_ref());
         if !self.same("reset", "after a reset, the same episode", &first, &again, failure) {
             return Ok(());
         }
         program.forget();
         let ended = program.close();
-        let fresh = self.drive(&arena, 0, self.steps);
+        let fresh = self.drive(&arena, 0, STEPS);
         if !self.same(
             "process",
             "in a fresh process, the same episode",

@@ -35,9 +35,6 @@ pub struct AdsCheckArguments {
     /// Seed of the episodes.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Length of each of the four episodes, in steps of an agent (6 s), at most.
-    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub steps: u32,
 }
 
 #[derive(Debug, Args)]

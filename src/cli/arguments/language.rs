@@ -64,9 +64,6 @@ pub struct TrialArguments {
     /// Tries of each row on each road, at most.
     #[arg(long, requires = "try", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub tries: u32,
-    /// Undisturbed drives of each road, from whose steps the tries set out.
-    #[arg(long, requires = "try", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub drives: u32,
     /// Driving system of the ego vehicle: a name, or a profile of `modular`.
     #[arg(long, requires = "try", value_name = "NAME|FILE", default_value = crate::run::DEFAULT_ADS, value_parser = Named::ADS)]
     pub ads: String,

@@ -72,12 +72,6 @@ pub struct DistilArguments {
     /// Lines, at most [default: as the policy was trained with, like the others].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=256))]
     pub leaves: Option<u32>,
-    /// Tests that a line may take, at most.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=32))]
-    pub depth: Option<u32>,
-    /// Rounds; the rules of each drive the next.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub rounds: Option<u32>,
     /// Episodes of a round, on each road.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub episodes: Option<u32>,

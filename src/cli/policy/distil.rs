@@ -22,12 +22,7 @@ use super::{acting, same_world};
 pub fn distil(output: &Output, arguments: &DistilArguments) -> Result<(), Failure> {
     let (table, mut policy) = load::policy(output, &arguments.file)?;
     same_world(&policy)?;
-    for (name, value) in [
-        ("rules_leaves", arguments.leaves),
-        ("rules_depth", arguments.depth),
-        ("rules_rounds", arguments.rounds),
-        ("rules_episodes", arguments.episodes),
-    ] {
+    for (name, value) in [("rules_leaves", arguments.leaves), ("rules_episodes", arguments.episodes)] {
         if let Some(value) = value {
             policy.hyperparameters.insert(name.to_owned(), value.into());
         }
