@@ -15,12 +15,14 @@ use std::fs::{File, Metadata};
 use std::io::{Error, ErrorKind, Result, Write};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::{Component, Path, PathBuf};
+use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use nix::errno::Errno;
 use nix::fcntl::OFlag;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
+use sha2::{Digest, Sha256};
 
 /// Longest name of a file that common file systems take, in bytes.
 const NAME_BYTES_MAX: usize = 255;
@@ -30,6 +32,18 @@ const ENDING: &str = ".partial";
 
 /// Why a link is not used.
 const LINK: &str = "it is a symbolic link, which may lead anywhere: put what it leads to in its place";
+
+/// Eight digits for this machine, because the process numbers of another one say nothing here, and a disk may be shared. Its
+/// name tells containers apart, its identity tells machines of one name apart. Where a system has neither, all are one.
+static MACHINE: LazyLock<String> = LazyLock::new(|| {
+    let mut digest = Sha256::new();
+    for file in ["/proc/sys/kernel/hostname", "/etc/machine-id"] {
+        let found = std::fs::read(file).unwrap_or_default();
+        digest.update(found.len().to_le_bytes());
+        digest.update(found);
+    }
+    digest.finalize().iter().take(4).map(|byte| format!("{byte:02x}")).collect()
+});
 
 /// Number of the next temporary file of this process.
 static NEXT: AtomicU64 = AtomicU64::new(0);
@@ -88,7 +102,7 @@ impl Temporary {
         let name = name.to_string_lossy();
         loop {
             let number = NEXT.fetch_add(1, Ordering::Relaxed);
-            let ending = format!(".{}-{number}{ENDING}", std::process::id());
+            let ending = format!(".{}-{}-{number}{ENDING}", *MACHINE, std::process::id());
             let kept = name.floor_char_boundary(NAME_BYTES_MAX - ending.len());
             let path = destination.with_file_name(format!("{}{ending}", &name[..kept]));
             match File::create_new(&path) {
@@ -287,7 +301,8 @@ pub fn is_partial(name: &str, of: &str) -> bool {
     name.strip_prefix(of).is_some_and(|rest| rest.starts_with('.') && rest.ends_with(ENDING))
 }
 
-/// Removes the temporary files that killed processes left in a folder. Those of running processes stay.
+/// Removes the temporary files that killed processes of this machine left in a folder. Those of running processes stay, and
+/// those of other machines, of which it is not known whether they run.
 ///
 /// # Errors
 /// If the folder cannot be read, or a file cannot be removed.
@@ -303,12 +318,12 @@ pub fn sweep(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The number of the process that made a temporary file, from the file's name.
+/// The number of the process of this machine that made a temporary file, from the file's name.
 fn writer_of(name: &str) -> Option<i32> {
     // SQLite keeps a journal beside a database while it is written.
     let name = name.strip_suffix("-journal").unwrap_or(name);
     let (_, numbers) = name.strip_suffix(ENDING)?.rsplit_once('.')?;
-    let (process, number) = numbers.split_once('-')?;
+    let (process, number) = numbers.strip_prefix(MACHINE.as_str())?.strip_prefix('-')?.split_once('-')?;
     number.parse::<u64>().ok()?;
     process.parse().ok()
 }
@@ -401,16 +416,19 @@ mod tests {
     #[test]
     fn what_the_dead_left_is_swept_away() {
         let scratch = tempfile::tempdir().unwrap();
-        let own = format!("run.db.{}-7.partial", std::process::id());
+        let own = format!("run.db.{}-{}-7.partial", *MACHINE, std::process::id());
         // No process has so high a number.
-        let left = ["run.db.2147483647-0.partial", "run.db.2147483647-0.partial-journal"];
-        for name in [own.as_str(), "notes.partial", "x.2147483647.partial"].iter().chain(&left) {
+        let left = ["", "-journal"].map(|more| format!("run.db.{}-2147483647-0.partial{more}", *MACHINE));
+        // The first is of another machine, the others only look like one.
+        let others = ["run.db.0-2147483647-0.partial", "notes.partial", "x.2147483647.partial"];
+        let others = others.map(str::to_owned);
+        for name in [&own].into_iter().chain(&others).chain(&left) {
             std::fs::write(scratch.path().join(name), "").unwrap();
         }
         sweep(scratch.path()).unwrap();
         let kept: Vec<_> =
             std::fs::read_dir(scratch.path()).unwrap().flatten().map(|entry| entry.file_name()).collect();
-        assert_eq!(kept.len(), 3, "{kept:?}");
+        assert_eq!(kept.len(), 4, "{kept:?}");
         assert!(is_partial(&own, "run.db") && is_partial("run.yaml.partial", "run.yaml"));
         assert!(!is_partial("run.yaml", "run.yaml") && !is_partial("other.partial", "run.yaml"));
     }

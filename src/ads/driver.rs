@@ -13,6 +13,12 @@ pub trait Ads: CloneAds + Send {
     /// What it believes, wants and commands at the moment.
     fn status(&self) -> &Status;
 
+    /// From now on it drives where up to now another one drove and it watched. A reference driver then begins no lane
+    /// change that the other has not begun either, before it has looked for a gap itself.
+    fn take_over(&mut self, sensed: &Sensed) {
+        let _ = sensed;
+    }
+
     /// From now on its sensor errors come from another seed. Most drivers have none.
     fn reseed(&mut self, seed: u64) {
         let _ = seed;

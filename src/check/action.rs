@@ -34,7 +34,13 @@ const VALUES_MAX: i64 = 100_000;
 const LISTED_MAX: usize = 2_000_000;
 
 /// Largest number of parameters of an action or a function.
-const PARAMETERS_MAX: usize = 100;
+pub(super) const PARAMETERS_MAX: usize = 100;
+
+/// Largest number of road users that one action spawns.
+const SPAWNS_MAX: usize = 100;
+
+/// Largest number of rules that bind one action. Some proofs hold each of them against each other.
+const RULES_MAX: usize = 1_000;
 
 /// Largest number of actions that all groups name together.
 const MEMBERS_MAX: usize = 1_000_000;
@@ -73,6 +79,17 @@ impl Checker {
     pub(super) fn action(&mut self, item: &ast::Item, declared: &ast::Action) -> Option<(ActionDef, bool)> {
         if !self.has_few_parameters(&declared.name, declared.params.len()) {
             return None;
+        }
+        let spawns =
+            declared.effects.iter().filter(|effect| matches!(effect.kind, ast::EffectKind::Spawn { .. }));
+        let spawns = spawns.count();
+        if spawns > SPAWNS_MAX {
+            let error = Diagnostic::error(
+                code::TOO_MUCH,
+                format!("`{}` spawns {spawns} road users", declared.name.text),
+            )
+            .at(declared.name.span, format!("at most {SPAWNS_MAX} are possible"));
+            return self.reject(error.help("make several actions of it"));
         }
         let owner = Symbol::Action(declared.name.text.clone());
         let mut locals: Vec<(String, Type)> = Vec::new();
@@ -623,6 +640,15 @@ impl Checker {
         }
         // Each row is proved on each road under each rule that binds it.
         let binding = rules_by_action(rules, self.actions.len());
+        for (action, bound) in self.actions.iter().zip(&binding) {
+            let Some(action) = action.as_ref().filter(|_| bound.len() > RULES_MAX) else { continue };
+            let message = format!("{} rules bind `{}`", bound.len(), action.name);
+            let error = Diagnostic::error(code::TOO_MUCH, message)
+                .at(action.span, format!("at most {RULES_MAX} may bind an action"))
+                .help("join rules by `and`, say them by `match` or a state, or make several actions of it");
+            self.report(error);
+            return;
+        }
         let counts = self.row_counts.iter().zip(&binding);
         let work: u64 = counts
             .map(|(count, rules)| count.unwrap_or(0) * (1 + rules.len() as u64) * roads.max(1) as u64)

@@ -27,8 +27,8 @@ use crate::units::Rational;
 /// The most diagnostics of a file: more are of no use, and each is found in the text by its place.
 pub(super) const DIAGNOSTICS_MAX: usize = 1_000;
 
-/// The most steps of all proofs about a space: about a second of an optimised build.
-const STEPS_MAX: u64 = 40_000_000;
+/// The most steps of all proofs about a space: about half a second of an optimised build.
+const STEPS_MAX: u64 = 20_000_000;
 
 /// Further steps for each row on each road, up to the longest table on four roads, which must be checked: a row on a road
 /// takes some 80 steps.
@@ -66,6 +66,10 @@ pub(super) struct Checker {
     pub(super) parameter_names: BTreeSet<String>,
     /// Indices of actions with a broken effect: no rule reports that such an action lacks an effect.
     pub(super) half_broken: BTreeSet<usize>,
+    /// By state: the actions that set it. Empty until rules are checked.
+    pub(super) setters: Vec<Vec<usize>>,
+    /// The actions that spawn. Empty until rules are checked.
+    pub(super) spawners: Vec<usize>,
     pub(super) groups: Vec<GroupDef>,
     /// Positions in `groups`, by name.
     pub(super) group_places: BTreeMap<String, usize>,

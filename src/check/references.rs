@@ -8,6 +8,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
+use crate::check::action::PARAMETERS_MAX;
 use crate::check::checker::docs;
 use crate::check::load::{LoadedFile, maps_named, path_from, used_path, uses};
 use crate::model::vocabulary::{TYPES, Word};
@@ -340,7 +341,12 @@ impl References {
     pub(super) fn locals(&self, owner: &Symbol) -> Vec<(String, Type)> {
         let parts = self.declaration(owner).map(|known| known.parts.as_slice()).unwrap_or_default();
         let ty = |part| self.declaration(part).and_then(|known| known.ty).unwrap_or(Type::Bool);
-        parts.iter().filter_map(|part| Some((part.word()?.to_owned(), ty(part)))).collect()
+        // An action with more is refused; what is said of it beside that need not be whole.
+        parts
+            .iter()
+            .take(PARAMETERS_MAX)
+            .filter_map(|part| Some((part.word()?.to_owned(), ty(part))))
+            .collect()
     }
 
     /// Notes a variant of an enum; without an enum, of the only one that has it.

@@ -21,6 +21,15 @@ const OPERATIONS_BROKEN: usize = 8;
 
 impl Checker {
     pub(super) fn rules(&mut self, items: &[&ast::Item]) -> Vec<RuleDef> {
+        self.setters = vec![Vec::new(); self.states.len()];
+        for (index, action) in self.actions.iter().enumerate() {
+            for effect in action.iter().flat_map(|action| &action.effects) {
+                match effect {
+                    EffectDef::Set(set) => self.setters[set.state].push(index),
+                    EffectDef::Spawn(_) => self.spawners.push(index),
+                }
+            }
+        }
         let mut rules = Vec::new();
         for (item, declared) in self.declared("rule", items, ItemKind::as_rule).1 {
             if let Some(body) = self.rule(declared) {
@@ -57,6 +66,9 @@ impl Checker {
         condition: &ast::Expr,
     ) -> Option<RuleBody> {
         let change = during.filter(|during| during.text == CHANGE.0);
+        if self.has_compiled_too_much(rule.name.span) {
+            return None;
+        }
         if let Some(during) = during {
             match change {
                 Some(_) => self.references.note(during.span, Symbol::Engine(CHANGE.0, CHANGE.1), false),
@@ -226,22 +238,20 @@ impl Checker {
         let compiled = self.typed(condition, &Place::RULE, Type::Bool)?;
         let read: BTreeSet<usize> = states_read(&compiled, &self.states).into_iter().collect();
         let (known, reads_memory) = (compiled.known(), compiled.reads_memory());
-        let binds = |action: &ActionDef| {
-            action.effects.iter().any(|effect| match effect {
-                EffectDef::Spawn(_) => known == Known::Spawn,
-                // Where nothing spawns, nothing asks about a spawn.
-                EffectDef::Set(set) => known != Known::Spawn && read.contains(&set.state),
-            })
-        };
         let each_step = known != Known::Spawn && self.each_step.iter().any(|set| read.contains(&set.state));
         // What time may break has to be kept by every action.
         let timed = compiled.is_known_at_start() && compiled.asks_the_world();
         let open = each_step || timed || known != Known::Spawn && !reads_memory;
-        let all = self.actions.iter().enumerate();
-        let bound = all.filter(|(index, a)| {
-            a.as_ref().is_some_and(|a| open || binds(a) || self.half_broken.contains(index))
-        });
-        Some(bound.map(|(index, _)| index).collect())
+        let mut bound: BTreeSet<usize> = match open {
+            true => (0..self.actions.len()).collect(),
+            false => self.half_broken.clone(),
+        };
+        match known {
+            Known::Spawn => bound.extend(&self.spawners),
+            // Where nothing spawns, nothing asks about a spawn.
+            _ => bound.extend(read.iter().flat_map(|state| &self.setters[*state])),
+        }
+        Some(bound.into_iter().filter(|index| self.actions[*index].is_some()).collect())
     }
 
     /// Reports a name that is a parameter of some actions but not of every bound action. Gives the bound actions

@@ -21,6 +21,7 @@ use super::files::{remove, write};
 use super::findings::doubts;
 use super::interrupt::stop_on_interrupt;
 use super::output::{Output, plural};
+use super::pack::pack_space;
 use super::parallel::jobs;
 use super::progress::{Progress, Working};
 use super::run::{critical_text, cut_short};
@@ -371,6 +372,8 @@ fn begun(
 ) -> Result<(Estimate, Held, String), Failure> {
     let held = run_directory::create(arguments.out.as_deref())?;
     shard::keep(&held.path, shard)?;
+    // As in a run: its scenarios can be looked at even if the author changes the space.
+    pack_space(&estimate.run().space().path, &held.path)?;
     let space = load::relative(&held.path, &estimate.run().space().path)?;
     let attached = estimate.run().attached();
     let external = attached.map(|attached| run_directory::to_record(&held.path, attached)).transpose()?;

@@ -1,9 +1,9 @@
 //! Scenarios to look at: `render`, `report` and `replay` show them even if their space, engine or settings have changed.
 //!
-//! A run keeps a copy of its space. A scenario whose space has changed is played in that copy, as it was recorded. Without a
-//! copy it is played in the present space, and the digest of its trace tells whether that is the recorded episode. Either way
-//! a banner says what has changed, and how the scenario can be brought along. `test`, `shrink`, `diagnose` and
-//! `export` judge by the space, so they refuse one that has changed.
+//! A run, a training and an estimate keep a copy of their space. A scenario whose space has changed is played in that copy,
+//! as it was recorded. Without a copy it is played in the present space, and the digest of its trace tells whether that is the
+//! recorded episode. Either way a banner says what has changed, and how the scenario can be brought along. `test`, `shrink`,
+//! `diagnose` and `export` judge by the space, so they refuse one that has changed.
 
 use std::path::{Path, PathBuf};
 
@@ -133,8 +133,8 @@ fn as_it_is_now(path: &Path, loaded: &Loaded) -> Result<Loaded, Failure> {
     Ok(checked)
 }
 
-/// The path of a copy of the scenario's space as it was when the scenario was written, and the file checked in it. A run keeps
-/// such a copy in its folder `space`; `--self-contained` and `export --to ava` put one beside the scenarios.
+/// The path of a copy of the scenario's space as it was when the scenario was written, and the file checked in it. A run or an estimate
+/// keeps such a copy in its folder `space`; `--self-contained` and `export --to ava` put one beside the scenarios.
 fn kept(path: &Path, loaded: &Loaded) -> Option<(PathBuf, Loaded)> {
     let root = FileId::default();
     let written: Vec<_> = loaded.written_paths().into_iter().filter(|used| used.span.file == root).collect();

@@ -477,6 +477,13 @@ fn elsewhere(path: &str, directory: &Path) -> Vec<PathBuf> {
 }
 
 impl Way<'_> {
+    /// Takes over the copy of the space that a directory keeps. Copies of one meaning may differ in comments: that of the first
+    /// directory is kept.
+    fn copy_space(&self) -> Result<(), Failure> {
+        let is_new = self.from.join(pack::SPACE).is_dir() && !self.to.join(pack::SPACE).exists();
+        if is_new { copy_folder(OsStr::new(pack::SPACE), [self.from, self.to]) } else { Ok(()) }
+    }
+
     /// A path in the settings of one directory as it stands in those of another. What is inside the directory stays there.
     fn moved(&self, path: &str, target: &Path) -> Result<String, Failure> {
         let is_inside = Path::new(path).is_relative() && !Path::new(path).starts_with("..");
@@ -626,10 +633,7 @@ impl Cut for RunSettings {
         if from.join(pack::SPACE).is_dir() {
             copy_folder(OsStr::new(pack::SPACE), [&from, &to])?;
         }
-        // Copies of one meaning may differ in comments: that of the first directory is kept.
-        if way.from.join(pack::SPACE).is_dir() && !way.to.join(pack::SPACE).exists() {
-            copy_folder(OsStr::new(pack::SPACE), [way.from, way.to])?;
-        }
+        way.copy_space()?;
         let database = shard.database.iter().map(Database::scenarios).next();
         let written = database.transpose().map_err(|error| Failure::file("read", &shard.file(), error))?;
         let mut scenarios = Vec::new();
@@ -746,6 +750,7 @@ impl Cut for EstimateSettings {
         let [from, to] = way.within("critical")?;
         folder(way.to, "critical")?;
         let critical = Way { from: &from, to: &to, ..*way };
+        way.copy_space()?;
         let written = shard.database.iter().map(EstimateDatabase::scenarios).next();
         let written = written.transpose().map_err(|error| Failure::file("read", &shard.file(), error))?;
         let mut scenarios = Vec::new();

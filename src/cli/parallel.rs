@@ -66,6 +66,19 @@ impl<T> PerFile<T> {
     }
 }
 
+/// Hands on what came of the files from `next` on, up to the first that is not done; returns that one.
+fn hand_on<T>(
+    mut next: usize,
+    results: &BTreeMap<usize, Result<T, Failure>>,
+    tell: &mut dyn FnMut(&T),
+) -> usize {
+    while let Some(found) = results.get(&next) {
+        found.iter().for_each(&mut *tell);
+        next += 1;
+    }
+    next
+}
+
 /// Does `work` for every file on as many threads as [`jobs`] says, for `program` if one is to drive. Of several files, it
 /// says which failed; after Ctrl-C those under way are ended, and it says which are not done.
 ///
@@ -77,9 +90,23 @@ pub fn each_file<T: Send>(
     program: Option<&Arc<Program>>,
     work: impl Fn(&PathBuf) -> Result<T, Failure> + Sync,
 ) -> Result<PerFile<T>, Failure> {
+    each_file_in_turn(output, many, program, work, &mut |_| {})
+}
+
+/// As [`each_file`], and hands on what came of each file as soon as it and all before it are done.
+///
+/// # Errors
+/// As [`jobs`].
+pub fn each_file_in_turn<T: Send>(
+    output: &Output,
+    many: &FilesArguments,
+    program: Option<&Arc<Program>>,
+    work: impl Fn(&PathBuf) -> Result<T, Failure> + Sync,
+    tell: &mut dyn FnMut(&T),
+) -> Result<PerFile<T>, Failure> {
     let jobs = jobs(many.jobs, program)?;
     let numbered: Vec<(usize, &PathBuf)> = many.files.iter().enumerate().collect();
-    let mut results = Vec::new();
+    let (mut results, mut next) = (BTreeMap::new(), 0);
     let (single, several) = match many.files.as_slice() {
         [file] => (Some(Working::new(output, file.display().to_string())), None),
         files => (None, Some(Pieces::new(output, "files", files.len()))),
@@ -89,13 +116,16 @@ pub fn each_file<T: Send>(
     };
     // One file has nothing to be ended in good order.
     let stop = if several.is_some() { interrupt::stop_on_interrupt() } else { Arc::default() };
-    let Ok(()) = on_threads(&numbered, jobs, &stop, work, &mut |result| {
-        results.push(result);
-        several.iter().for_each(Pieces::one);
+    let Ok(()) = on_threads(&numbered, jobs, &stop, work, &mut |(number, found)| {
+        results.insert(number, found);
+        if let Some(pieces) = &several {
+            pieces.one();
+            pieces.aside(|| next = hand_on(next, &results, tell));
+        }
         Ok::<_, Infallible>(())
     });
     drop((single, several));
-    let mut results: BTreeMap<usize, Result<T, Failure>> = results.into_iter().collect();
+    hand_on(next, &results, tell);
     let mut all = PerFile { done: Vec::new(), failed: Vec::new(), files: many.files.len() };
     for (number, file) in numbered {
         match results.remove(&number).unwrap_or(Err(Failure::Stopped)) {
@@ -121,14 +151,16 @@ mod tests {
         let output = Output::of(Format::Json);
         let files = (0..50).map(|number| PathBuf::from(number.to_string())).collect();
         let many = FilesArguments { files, jobs: Some(3) };
-        let names = each_file(&output, &many, None, |file| match file.display().to_string() {
+        let mut told = Vec::new();
+        let work = |file: &PathBuf| match file.display().to_string() {
             name if name == "7" => Err(Failure::usage("not this one")),
             name => Ok(name),
-        })
-        .unwrap();
+        };
+        let mut tell = |name: &String| told.push(name.clone());
+        let names = each_file_in_turn(&output, &many, None, work, &mut tell).unwrap();
         let wanted: Vec<String> =
             (0..50).filter(|&number| number != 7).map(|number| number.to_string()).collect();
-        assert_eq!(names.done, wanted);
+        assert_eq!((&names.done, &told), (&wanted, &wanted));
         assert_eq!(names.failed_in_json(), [serde_json::json!({ "file": "7", "error": "not this one" })]);
         assert_eq!(names.complete("read").unwrap_err().to_string(), "1 file could not be read");
     }

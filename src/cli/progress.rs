@@ -80,6 +80,14 @@ impl Pieces {
     pub fn one(&self) {
         self.0.lock().expect("no thread panics while counting").up(String::new());
     }
+
+    /// Prints something while the bar is out of the way.
+    pub fn aside(&self, print: impl FnOnce()) {
+        match &self.0.lock().expect("no thread panics while counting").bar {
+            Some(bar) => bar.suspend(print),
+            None => print(),
+        }
+    }
 }
 
 /// Work that does not know how far it is: the time spent runs on a terminal. Dropping it clears the line.

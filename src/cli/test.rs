@@ -25,7 +25,7 @@ use super::load::Emitted;
 use super::look::{is_outdated, meaning_text};
 use super::output::Output;
 use super::output::plural;
-use super::parallel::each_file;
+use super::parallel::each_file_in_turn;
 use super::review::{Change, Review, review};
 
 /// The result for one scenario.
@@ -56,15 +56,11 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
     let suite = Suite { arguments, asked };
     let many = FilesArguments { files: suite_files(&arguments.paths)?, jobs: arguments.jobs };
     let program = suite.asked.external.as_ref();
-    let mut played = each_file(output, &many, program, |file| Ok(suite.play(file)))?;
+    let mut tell = |found: &Option<(Case, Notes)>| found.iter().for_each(|found| tell(output, found));
+    let mut played = each_file_in_turn(output, &many, program, |file| Ok(suite.play(file)), &mut tell)?;
     let (mut cases, mut outdated, mut reviewed) = (Vec::new(), Vec::new(), Vec::new());
     let mut accepted = 0;
     for (case, notes) in std::mem::take(&mut played.done).into_iter().flatten() {
-        notes.told.iter().for_each(|(sources, diagnostics)| output.diagnostics(sources, diagnostics));
-        notes.said.iter().for_each(|line| output.say(line));
-        let (word, reason) = case.outcome.in_words();
-        let reason = if reason.is_empty() { String::new() } else { format!(": {reason}") };
-        output.tell(&format!("{word:<12}{}{reason}", case.file.display()));
         cases.push(case);
         outdated.extend(notes.outdated);
         reviewed.extend(notes.reviewed);
@@ -128,6 +124,15 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
         return Err(Failure::NotPlayed { scenarios: errors, in_source: in_source > 0 });
     }
     if failing > 0 { Err(Failure::Failing { scenarios: failing }) } else { Ok(()) }
+}
+
+/// Prints what came of a file.
+fn tell(output: &Output, (case, notes): &(Case, Notes)) {
+    notes.told.iter().for_each(|(sources, diagnostics)| output.diagnostics(sources, diagnostics));
+    notes.said.iter().for_each(|line| output.say(line));
+    let (word, reason) = case.outcome.in_words();
+    let reason = if reason.is_empty() { String::new() } else { format!(": {reason}") };
+    output.tell(&format!("{word:<12}{}{reason}", case.file.display()));
 }
 
 /// The files of a suite, each once: files as named, those of directories, and those that a run found.

@@ -67,6 +67,15 @@ pub fn struck(contact: &Contact, ego: &VehicleParameters) -> bool {
     }
 }
 
+/// Whether another vehicle came from behind and ran into the rear of an ego vehicle that had priority.
+pub fn run_into_from_behind(contact: &Contact, ego: &VehicleParameters) -> bool {
+    let other = contact.obstacle_velocity_on_ego_mps;
+    contact.priority == Priority::Ego
+        && matches!(face(contact.on_ego, ego), Face::Rear)
+        && other.x > contact.ego_speed_mps
+        && other.x > other.y.abs()
+}
+
 /// Whether the ego vehicle is at fault in a contact: it had to give way, or where neither had, it ran into the
 /// obstacle.
 pub fn at_fault(contact: &Contact) -> bool {
@@ -177,5 +186,19 @@ mod tests {
         for (name, collision, expected) in cases {
             assert_eq!(struck(&collision.contact, &mkz), expected, "{name}");
         }
+    }
+
+    #[test]
+    fn one_that_comes_from_behind_is_faster_and_meets_the_rear() {
+        let mkz = VehicleParameters::MKZ;
+        let is_so = |x_m: f64, velocity_mps: (f64, f64), priority: Priority| {
+            let contact = Contact { priority, ..collision(x_m, 0.0, 8.0, velocity_mps).contact };
+            run_into_from_behind(&contact, &mkz)
+        };
+        assert!(is_so(-2.35, (12.0, 0.0), Priority::Ego));
+        assert!(!is_so(-2.35, (12.0, 0.0), Priority::Other), "the ego vehicle cut in");
+        assert!(!is_so(-2.35, (5.0, 0.0), Priority::Ego), "it is slower");
+        assert!(!is_so(-2.35, (9.0, -11.0), Priority::Ego), "it crosses");
+        assert!(!is_so(2.35, (12.0, 0.0), Priority::Ego), "it meets the front");
     }
 }

@@ -11,7 +11,7 @@ mod run;
 mod script;
 mod setup;
 
-pub use facts::{at_fault, collision_facts, side, struck};
+pub use facts::{at_fault, collision_facts, run_into_from_behind, side, struck};
 pub use log::{Collision, End, EpisodeLog, Held, Outcome, StepLog};
 pub use recorder::{Actor, Lights, Recorder, Sample, Sky, Touch};
 pub use run::{Choice, Moment, Play, Watch, run, run_from};

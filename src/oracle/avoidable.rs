@@ -7,6 +7,11 @@
 //! watches for some time before it takes over. If none of the careful drivers avoids the collision,
 //! evasive manoeuvres that begin at the onset without any delay are tried.
 //!
+//! Where the ego vehicle had to give way, a driver that takes over before the ego vehicle has begun a lane change begins
+//! none without a look aside: the question is whether staying in the lane would have avoided the collision. Where another
+//! vehicle ran into the rear of an ego vehicle that had priority, no driver goes faster than the ego vehicle did: a
+//! vehicle that keeps its lane need not flee from one behind it, which keeps the distance.
+//!
 //! Beside that, each careful driver is asked to the letter of UN R157 (`r157_letter`): from the first conflict of ways
 //! on, the ego vehicle drives along its recorded path at its recorded speed until the model reacts, and then only
 //! brakes. The regulation speaks of a
@@ -27,11 +32,12 @@ use crate::episode::{Choice, EpisodeLog, Moment, Script, Setup};
 use crate::geometry::{OrientedBox, Pose, wrap_angle};
 use crate::kinematics::GRAVITY_MPS2;
 use crate::model::Avoidability;
-use crate::sim::{Contact, DT_S, EgoMotion, FRAME_TICKS, VehicleParameters, World};
+use crate::model::vocabulary::Priority;
+use crate::sim::{Contact, Control, DT_S, EgoMotion, FRAME_TICKS, VehicleParameters, World, pedals_for};
 use crate::syntax::listed;
 
 use super::hazard::{Onset, last_chance, onset};
-use crate::episode::struck;
+use crate::episode::{run_into_from_behind, struck};
 
 /// Settings of the verdict. Every run records them.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -66,6 +72,9 @@ impl Default for AvoidabilitySettings {
 
 /// Longest time in the settings of the verdict, s: the worlds of so many ticks are kept.
 const SECONDS_MAX: f64 = 60.0;
+
+/// A driver that is held to a speed comes near to it in about this time, s. Ours: longer than the pedal's lag.
+const CATCH_UP_S: f64 = 0.6;
 
 /// Why settings of the verdict cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -152,7 +161,7 @@ pub fn judge_with_drives(
     before_each(setup, script, log, settings, &mut |recording, contact, met| {
         let judgement = judge_one(recording, contact, met, settings);
         let from = recording.partition_point(|world| world.time_s() < judgement.onset_s);
-        let case = Case { recording, from, obstacle: contact.obstacle, settings };
+        let case = Case::new(recording, from, contact, settings);
         found.push((judgement, case.drives()));
     });
     found
@@ -225,8 +234,10 @@ pub fn judge_one(
     let onset = onset(recording, contact.obstacle, met).unwrap_or(Onset { first: last, conflict: last });
     let earliest = (last + 1).saturating_sub(ticks(settings.rewind_s));
     let from = onset.first.min(last_chance(recording, contact, met).unwrap_or(last)).max(earliest);
-    let case = Case { recording, from, obstacle: contact.obstacle, settings };
-    let to_the_letter = Case { from: onset.conflict.max(earliest), ..case };
+    let case = Case::new(recording, from, contact, settings);
+    // The letter keeps the recorded path and speed, whoever had to give way.
+    let to_the_letter =
+        Case { from: onset.conflict.max(earliest), speed_mps_max: f64::INFINITY, looks_anew: false, ..case };
     let avoids = |name: &&String| {
         let entry = ads::by_name(name).expect("settings name drivers that exist");
         case.avoids((entry.build)(recording[from].scene(), 0).as_mut())
@@ -258,9 +269,27 @@ struct Case<'a> {
     from: usize,
     obstacle: u32,
     settings: &'a AvoidabilitySettings,
+    /// Whether a driver that takes over decides anew about a lane change that has not begun: the ego vehicle had to give way.
+    looks_anew: bool,
+    /// No reference driver goes faster, m/s; infinite unless the ego vehicle was run into from behind.
+    speed_mps_max: f64,
 }
 
-impl Case<'_> {
+impl<'a> Case<'a> {
+    fn new(
+        recording: &'a [World],
+        from: usize,
+        contact: &Contact,
+        settings: &'a AvoidabilitySettings,
+    ) -> Case<'a> {
+        let speed_mps_max = match run_into_from_behind(contact, &VehicleParameters::MKZ) {
+            true => recording[from..].iter().map(|world| world.ego().speed_mps).fold(0.0, f64::max),
+            false => f64::INFINITY,
+        };
+        let looks_anew = contact.priority == Priority::Other;
+        Case { recording, from, obstacle: contact.obstacle, settings, looks_anew, speed_mps_max }
+    }
+
     /// Whether a driver that watches first avoids the collision.
     fn avoids(&self, driver: &mut dyn Ads) -> bool {
         self.show(driver);
@@ -320,9 +349,10 @@ impl Case<'_> {
         let start = &self.recording[self.from];
         let mut manoeuvres = Evasion::all(start.scene());
         let starts_on_road = is_on_road(start);
+        let free = Case { speed_mps_max: f64::INFINITY, ..*self };
         let found = manoeuvres.find(|manoeuvre| {
             let mut driver = manoeuvre.clone();
-            self.drive(&mut driver, &mut |world| !starts_on_road || is_on_road(world))
+            free.drive(&mut driver, &mut |world| !starts_on_road || is_on_road(world))
         })?;
         Some(found.describe())
     }
@@ -331,9 +361,12 @@ impl Case<'_> {
     fn drive(&self, driver: &mut dyn Ads, allowed: &mut dyn FnMut(&World) -> bool) -> bool {
         let mut world = self.recording[self.from].clone();
         let mut sensed = world.sensed();
+        if self.looks_anew {
+            driver.take_over(&sensed);
+        }
         for recorded in &self.recording[self.from + 1..] {
             world.sense(&mut sensed);
-            let control = driver.drive(&sensed);
+            let control = self.held(driver.drive(&sensed), &world);
             if self.is_hit(world.tick_recorded(&control, recorded)) || !self.is_fine(&world, allowed) {
                 return false;
             }
@@ -351,12 +384,21 @@ impl Case<'_> {
         let mut sensed = world.sensed();
         for _ in 0..ticks(self.settings.after_s) {
             world.sense(&mut sensed);
-            let control = driver.drive(&sensed);
+            let control = self.held(driver.drive(&sensed), &world);
             if self.is_hit(world.tick(&control)) || !self.is_fine(world, allowed) {
                 return false;
             }
         }
         true
+    }
+
+    /// A command with no more throttle than the highest speed allows.
+    fn held(&self, control: Control, world: &World) -> Control {
+        if self.speed_mps_max.is_infinite() {
+            return control;
+        }
+        let (throttle_pct, _) = pedals_for((self.speed_mps_max - world.ego().speed_mps) / CATCH_UP_S);
+        Control { throttle_pct: control.throttle_pct.min(throttle_pct), ..control }
     }
 
     fn is_hit(&self, contacts: &[Contact]) -> bool {

@@ -145,7 +145,8 @@ fn error(space: &Space, many: &[Unknown<'_>]) -> Diagnostic {
     let others = many[1..].iter();
     let error = others.fold(error, |error, one| error.beside(one.action.span, numbers(&one.rows)));
     let rules: Vec<&RuleDef> = first.rules.iter().map(|rule| &space.rules[*rule]).collect();
-    let error = rules.iter().fold(error, |error, rule| error.beside(rule.span, why(&rules)));
+    let why = why(&rules);
+    let error = rules.iter().fold(error, |error, rule| error.beside(rule.span, why));
     let obeyed = match rule_names(space, &first.rules).as_str() {
         "" => String::new(),
         names => format!(" that obey {names}"),

@@ -7,7 +7,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::model::digest;
-use crate::sim::first_with_episodes_of;
 use crate::study::measures::{MEASURES, MeasuredCell};
 use crate::study::record::{CellRecord, Spent};
 use crate::study::settings::{AgentSettings, StudySettings};
@@ -246,8 +245,7 @@ impl Played {
                 found.push(what.to_owned());
             }
         };
-        let plays_otherwise = first_with_episodes_of(&own.engine) != first_with_episodes_of(&wanted.engine);
-        differs(plays_otherwise, &format!("the world is `{}` by now", wanted.engine));
+        differs(own.engine != wanted.engine, &format!("the world is `{}` by now", wanted.engine));
         differs(own.space_digest != wanted.space_digest, "the space means something else by now");
         let ads = |settings: &StudySettings| {
             (settings.ads.clone(), settings.profile.clone(), settings.external.as_ref().map(|one| one.name()))

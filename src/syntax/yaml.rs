@@ -12,6 +12,7 @@ pub fn yaml_mistake(error: &serde_yaml::Error, text: &str) -> String {
     let placed =
         placed.and_then(|(line, rest)| Some((line.parse::<usize>().ok()?, rest.split_once(": ")?.1)));
     let Some((line, what)) = placed else { return settings_mistake(first, None) };
+    let line = if what.contains(GOES_ON) { opening_line(text, line) } else { line };
     let written = text.lines().nth(line.saturating_sub(1)).unwrap_or_default();
     let field = written.split_once(':').map(|(field, _)| field.trim().trim_start_matches("- "));
     let is_word = |field: &&str| field.chars().all(|c| c.is_ascii_alphanumeric() || "_-.".contains(c));
@@ -50,6 +51,15 @@ pub fn settings_mistake(what: &str, field: Option<&str>) -> String {
         .unwrap_or_else(|| what.to_owned())
 }
 
+/// The reader notices an unclosed quote in the first line below it that is not indented, or at the end.
+const GOES_ON: &str = "multiline quoted scalar";
+
+/// The line in which the text in quotes begins that goes on in a line, both from 1.
+fn opening_line(text: &str, line: usize) -> usize {
+    let above = text.lines().take(line.saturating_sub(1)).enumerate();
+    above.filter(|(_, written)| written.contains(['"', '\''])).last().map_or(line, |(index, _)| index + 1)
+}
+
 fn said(table: &[Said], fits: impl Fn(&str) -> bool) -> Option<String> {
     let found = table.iter().find(|(parts, _)| parts.iter().any(|part| fits(part)));
     found.map(|(_, said)| (*said).to_owned())
@@ -75,7 +85,12 @@ const LAYOUT: &[Said] = &[
     (&["unclosed bracket '['"], "`[` is never closed"),
     (&["unclosed bracket '{'"], "`{` is never closed"),
     (&["mismatched bracket", "misplaced bracket"], "a bracket closes what it has not opened"),
-    (&["unclosed quote"], "a text in quotes never ends"),
+    // These come before what is said of an indentation: it is most often the quote that is missing.
+    (&["unclosed quote", GOES_ON, "unexpected document indicator"], "a text in quotes never ends"),
+    (
+        &["quoted scalar, found", "quoted scalar, did not"],
+        "`\\` in double quotes is not followed by what it may; write `\\\\`",
+    ),
     (&["unexpected character"], "a text that begins with such a mark stands in quotes"),
     (&["trailing content after"], "something stands behind the closing quote"),
     (&["unknown anchor"], "`*` stands for nothing: no `&` gives it a meaning"),
@@ -85,7 +100,7 @@ const LAYOUT: &[Said] = &[
         "`key: value` does not fit here: look at the indentation, and put a text with `: ` in quotes",
     ),
     (&["simple key"], "`:` and a blank are missing behind the key"),
-    (&["expected ',' or", "expected '}'"], "`,` or a closing bracket is missing"),
+    (&["expected ',' or", "expected '}'", "placement of ':'"], "`,` or a closing bracket is missing"),
     (
         &["indentation", "indented", "expected key", "'-' ", "block sequence entries"],
         "the indentation does not fit that of the lines before",
@@ -177,10 +192,40 @@ mod tests {
         let error = serde_yaml::from_str::<serde_json::Value>(infinite).expect_err("it is wrong");
         assert_eq!(yaml_mistake(&error, infinite), "line 2: `pace_mps`: write a number");
         assert_eq!(said("seed: 1\nyields: maybe\n"), "line 2: `yields`: write `true` or `false`");
-        let open = "a: [\n";
-        let error = serde_yaml::from_str::<serde_json::Value>(open).expect_err("it never ends");
-        assert!(yaml_mistake(&error, open).ends_with("`[` is never closed"), "{error}");
         assert_eq!(said("seed: 3\nseed: 4\n"), "line 2: `seed` stands twice");
+    }
+
+    #[test]
+    fn mistakes_of_layout_are_told_as_what_they_are() {
+        let quote = "a text in quotes never ends";
+        let tab = "indent with blanks, not with tabs";
+        let comma = "`,` or a closing bracket is missing";
+        let bracket = "a bracket closes what it has not opened";
+        for (text, line, ours) in [
+            ("a:\n\tb: 3\n", 2, tab),
+            ("a: 1\n\tb: 3\n", 1, tab),
+            ("a:\n  b: 3\n\tc: 4\n", 2, tab),
+            ("seed: \"abc", 1, quote),
+            ("seed: \"abc\n", 1, quote),
+            ("seed: \"abc\npace: 3\n", 1, quote),
+            ("seed: 'abc\npace: 3\n", 1, quote),
+            ("a:\n  b: \"abc\n\n  c: 3\n", 2, quote),
+            ("a: [1, \"b, 2]\nc: 3\n", 1, quote),
+            ("a: \"one\n---\nb: 2\n", 1, quote),
+            ("a: \"b\" c\n", 1, "something stands behind the closing quote"),
+            ("a: \"b\\q\"\n", 1, "`\\` in double quotes is not followed by what it may; write `\\\\`"),
+            ("a: 1\n---\nb: 2\n", 3, "`---` begins a second document; write one"),
+            ("a: *other\n", 1, "`*` stands for nothing: no `&` gives it a meaning"),
+            ("a: [1, 2", 1, "`[` is never closed"),
+            ("a: {b: 1\n", 1, "`{` is never closed"),
+            ("a: [1, 2\nb: 3\n", 2, comma),
+            ("a: {b: 3\nc: {}\n", 2, comma),
+            ("a: [1}\n", 1, bracket),
+            ("a: ]\n", 1, bracket),
+        ] {
+            let error = serde_yaml::from_str::<serde_json::Value>(text).expect_err("it is wrong");
+            assert_eq!(yaml_mistake(&error, text), format!("line {line}: {ours}"), "{text:?}: {error}");
+        }
     }
 
     #[test]

@@ -33,16 +33,6 @@ SINGLE, SINGLE_EPISODES = 6, (10, 20)
 PAIRED, PAIRED_EPISODES = 1, (2, 4)
 # The marks: the share that is right where a module is named, and how many modules are blamed that are as in the default.
 RIGHT_MIN, AS_DEFAULT_MAX = 0.85, 0
-# As in tests/it/faults.rs.
-DECOYS = {
-    "localization": {"localization": {"position_sigma_m": 0.06}},
-    "perception": {"perception": {"range_factor": 0.95}},
-    "tracking": {"tracking": {"velocity_factor": 0.98}},
-    "prediction": {"prediction": {"lateral_speed_mps": 0.5}},
-    "planning": {"planning": {"acceleration_mps2_max": 1.8, "lateral_buffer_m": 0.45}},
-    "latency": {"perception": {"latency_frames": 2}},
-    "control": {"control": {"actuators": {"brake_mps2_max": 8.0}}},
-}
 
 
 def settings(path):
@@ -59,6 +49,13 @@ def settings(path):
         open_keys[depth:] = [key]
         place[key] = json.loads(value) if value.strip() else {}
     return found
+
+
+def decoys():
+    """The decoys of tests/it/faults.rs, by module. Latency is a module of its own, whose setting stands under perception."""
+    found = {module: {module: own} for module, own in settings(ROOT / "tests/cases/faults/decoys.yaml").items()}
+    late = found["perception"]["perception"].pop("latency_frames")
+    return {**found, "latency": {"perception": {"latency_frames": late}}}
 
 
 def merge(into, other):
@@ -78,7 +75,7 @@ def profile(name, faults):
     """Writes a profile with these faults, and decoys in all other modules."""
     planted = {module_of(fault) for fault in faults}
     merged = {}
-    for module, decoy in DECOYS.items():
+    for module, decoy in decoys().items():
         if module not in planted:
             merge(merged, decoy)
     for fault in faults:

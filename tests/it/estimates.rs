@@ -53,6 +53,10 @@ fn an_estimate_depends_on_its_settings_alone() {
         let text = serde_json::to_string_pretty(together).expect("it is JSON");
         expect_snapshot("estimates", method, &text);
         let whole = kept(&directory);
+        assert!(
+            directory.join("space/avastra45.ava").is_file(),
+            "its crashes can be looked at if the space changes"
+        );
 
         // Gone on with, on two threads.
         cut(&directory);
@@ -95,6 +99,7 @@ fn only_its_database_counts(scratch: &Path, files: &[PathBuf]) {
     let (status, _, stderr) = outcome(&mut avastra(&["merge", &out, "--out", &merged]));
     assert!(status == 0 && stderr.contains("was edited since it was written"), "{stderr}");
     assert_eq!(kept(Path::new(&merged)), results);
+    assert!(Path::new(&merged).join("space/avastra45.ava").is_file());
     for (file, written) in [(gone, &gone_text), (edited, &edited_text)] {
         let name = file.file_name().expect("it has a name");
         assert_eq!(text(&scratch.join("merged/critical").join(name)), *written);

@@ -60,21 +60,14 @@ const fn planted(name: &'static str, space: &'static str, begin: usize) -> Plant
 const VARIATIONS: u32 = 6;
 
 /// Small changes in every module, so that the cause is not simply the one module that differs from the default.
-const DECOYS: &str = "
-localization: { position_sigma_m: 0.06 }
-perception: { range_factor: 0.95, latency_frames: 2 }
-tracking: { velocity_factor: 0.98 }
-prediction: { lateral_speed_mps: 0.5 }
-planning: { acceleration_mps2_max: 1.8, lateral_buffer_m: 0.45 }
-control: { actuators: { brake_mps2_max: 8.0 } }
-";
+const DECOYS: &str = "tests/cases/faults/decoys.yaml";
 
 /// Crashes of a profile that are looked at, at most.
 const CRASHES: usize = 3;
 
 #[test]
 fn the_module_at_fault_is_named() {
-    let decoys = ModularConfig::from_yaml(DECOYS).expect("they are settings");
+    let decoys = profile(DECOYS);
     let mut wrong = Vec::new();
     for Planted { name, space, begin } in PLANTED {
         let module = module_of(name);

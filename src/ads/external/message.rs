@@ -9,6 +9,9 @@ use super::schema::{Bounds, InRange, Schema, fields_schema, inside, length_beyon
 /// gap.
 pub const EXTREME_MPS2: f64 = 100.0;
 
+/// The message of an `error` is cut off here, characters.
+pub const ERROR_CHARS_MAX: usize = 2000;
+
 /// The name and version of the protocol.
 pub const PROTOCOL: &str = "avastra-ads/1";
 
@@ -20,11 +23,11 @@ macro_rules! message {
         pub struct $name:ident {
             $(
                 $(#[doc = $doc:literal])* $field:ident: $type:ty $(, $low:literal ..= $high:literal)?
-                $(=> length $least:literal ..= $most:literal)?;
+                $(=> length $least:literal ..= $most:expr)?;
             )*
             $(
                 ? $(#[doc = $more:literal])* $option:ident: $inner:ty $(, $from:literal ..= $to:literal)?
-                $(=> length $fewest:literal ..= $longest:literal)?;
+                $(=> length $fewest:literal ..= $longest:expr)?;
             )*
         }
     ) => {
@@ -66,7 +69,7 @@ macro_rules! bounds {
     ($low:literal, $high:literal) => {
         Some(Bounds::Value($low as f64, $high as f64))
     };
-    (=> $least:literal, $most:literal) => {
+    (=> $least:literal, $most:expr) => {
         Some(Bounds::Length($least, $most))
     };
 }
@@ -78,7 +81,7 @@ macro_rules! checked {
     ($value:expr, $at:expr, $low:literal, $high:literal) => {
         value_beyond(*$value, $at, $low as f64, $high as f64)
     };
-    ($value:expr, $at:expr => $least:literal, $most:literal) => {
+    ($value:expr, $at:expr => $least:literal, $most:expr) => {
         length_beyond($value, $at, $least, $most).or_else(|| InRange::out_of_range($value, $at))
     };
 }
@@ -542,7 +545,7 @@ message! {
     /// The driving system cannot go on.
     pub struct ErrorMessage {
         /// Cut off after 2,000 characters.
-        message: String => length 0..=2000;
+        message: String => length 0..=ERROR_CHARS_MAX;
     }
 }
 

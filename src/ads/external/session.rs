@@ -4,12 +4,10 @@ use serde_json::Value;
 
 use super::finding::{Failure, Problem, harmless};
 use super::link::{Broken, Deadline, Link};
-use super::message::{Answer, AnswerKind, Close, Init, PROTOCOL, Question, Ready};
+use super::message::{Answer, AnswerKind, Close, ERROR_CHARS_MAX, Init, PROTOCOL, Question, Ready};
 use super::schema::InRange;
 use super::settings::ExternalSettings;
 
-/// An `error` is cut off here, characters.
-const ERROR_CHARS_MAX: usize = 2000;
 /// A trajectory reaches at least this far beyond its step, µs.
 const REACH_US_MIN: u64 = 1_000_000;
 

@@ -22,7 +22,7 @@ const CRITICAL_S: f64 = 2.0;
 /// A deceleration of the vehicle ahead beyond this is seen as hard braking, m/s² (esmini).
 const LEADER_MPS2: f64 = 5.0;
 /// A vehicle within this distance of its course merely wanders, m.
-const WANDER_M: f64 = 0.375;
+pub(super) const WANDER_M: f64 = 0.375;
 
 /// The driver: notices a cut-in when it has left its course by more than drivers wander, and has been evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -54,6 +54,9 @@ pub struct Reference<M> {
     station_m: Option<f64>,
     /// What the model gave in the last tick, m/s².
     braking_mps2: f64,
+    /// Whether it looks aside before a lane change. What it sees a reaction time late is enough to drive by, but not where
+    /// it has just taken over, has seen nothing yet, and would change lanes blindly.
+    looks_aside: bool,
 }
 
 /// What is remembered of a road user from look to look.
@@ -77,6 +80,7 @@ impl<M: Model> Reference<M> {
             ticks: 0,
             station_m: None,
             braking_mps2: 0.0,
+            looks_aside: false,
         }
     }
 
@@ -162,6 +166,9 @@ impl<M: Model> Ads for Reference<M> {
         self.station_m = Some(station_m);
         if self.ticks.is_multiple_of(FRAME_TICKS) {
             self.look(sensed, station_m);
+            if let Some(seen) = self.looks.back().filter(|_| self.looks_aside) {
+                self.route.glance(seen, sensed.ego.speed_mps, station_m);
+            }
         }
         let shown = self.shown.take().unwrap_or_else(|| sensed.clone());
         let shown = self.delayed(sensed, shown);
@@ -187,5 +194,43 @@ impl<M: Model> Ads for Reference<M> {
 
     fn status(&self) -> &Status {
         self.route.status()
+    }
+
+    fn take_over(&mut self, sensed: &Sensed) {
+        self.looks_aside = true;
+        self.route.take_over(sensed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ads::CarefulHuman;
+    use crate::ads::testing::{Rig, object, two_lanes};
+    use crate::geometry::Pose;
+    use crate::model::vocabulary::Body;
+
+    const SOURCE_Y_M: f64 = -5.25;
+    const TARGET_Y_M: f64 = -1.75;
+
+    /// How far a careful human has moved to its side after 2 s, while a faster vehicle comes from behind, m.
+    fn moved_aside_m(takes_over: bool) -> f64 {
+        let scene = two_lanes(300.0);
+        let mut rig = Rig::new(&scene, Box::new(Reference::new(&scene, CarefulHuman)), 8.0);
+        rig.sensed.objects = vec![object(1, Body::Sedan, Pose::new(-15.0, TARGET_Y_M, 0.0), 13.0)];
+        if takes_over {
+            // Its first thought is to change lanes, because it has seen nothing yet.
+            rig.ads.drive(&rig.sensed);
+            rig.ads.take_over(&rig.sensed);
+        }
+        rig.run(2.0);
+        rig.sensed.ego.rear_axle.position.y - SOURCE_Y_M
+    }
+
+    #[test]
+    fn one_that_takes_over_looks_aside_before_it_changes_lanes() {
+        let (blindly_m, carefully_m) = (moved_aside_m(false), moved_aside_m(true));
+        assert!(blindly_m > 0.1, "{blindly_m}");
+        assert!(carefully_m.abs() < 0.05, "{carefully_m}");
     }
 }

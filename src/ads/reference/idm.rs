@@ -16,13 +16,14 @@ use crate::ads::guide::{Guide, SpeedRules};
 use crate::ads::status::{PerceivedObject, Reason, Status};
 use crate::ads::steering::{Steering, SteeringConfig};
 use crate::ads::stops::Signs;
-use crate::geometry::{Beside, Vec2, unit_vector};
+use crate::geometry::{Beside, Pose, Vec2, unit_vector};
 use crate::road::RouteLaneChange;
 use crate::sim::{
     Control, DT_S, FRAME_TICKS, Following, Scene, Sensed, SensedObject, SignalColour, VehicleParameters,
     pedals_for,
 };
 
+use super::cc::WANDER_M;
 use super::giving_way::goes_before;
 
 /// The model's parameters, for towns. Ours.
@@ -61,6 +62,8 @@ pub struct Idm {
     guide: Arc<Guide>,
     /// Where each lane change of the route begins, m; infinite while no gap was found.
     begins_m: Vec<f64>,
+    /// A glance aside, newer than what it is shown, left no gap: no lane change begins.
+    is_beset: bool,
     steering: Arc<Steering>,
     /// Station on the route, m; `None` before the first tick.
     station_m: Option<f64>,
@@ -123,6 +126,7 @@ impl Idm {
             scene: Arc::clone(scene),
             guide: Arc::new(Guide::with_changes(scene, &RULES, &begins_m)),
             begins_m,
+            is_beset: false,
             steering: Steering::shared(&SteeringConfig::default()),
             station_m: None,
             steer_rad: 0.0,
@@ -185,7 +189,8 @@ impl Idm {
     fn seek_gap(&mut self, sensed: &Sensed, station_m: f64) {
         let Some((index, true)) = self.pending_change(station_m) else { return };
         let change = &self.scene.route.changes[index];
-        if station_m < change.begin_m || !self.has_gap(sensed, station_m, change.lateral_m) {
+        let has_gap = || self.has_gap(&sensed.objects, sensed.ego.speed_mps, station_m, change.lateral_m);
+        if station_m < change.begin_m || self.is_beset || !has_gap() {
             return;
         }
         self.begins_m[index] = station_m;
@@ -194,12 +199,11 @@ impl Idm {
 
     /// Whether gentle braking would do for every vehicle in the lane `lateral_m` to the left, and for the
     /// ego vehicle, if the ego vehicle were in that lane now.
-    fn has_gap(&self, sensed: &Sensed, station_m: f64, lateral_m: f64) -> bool {
+    fn has_gap(&self, objects: &[SensedObject], ego_mps: f64, station_m: f64, lateral_m: f64) -> bool {
         let half_way_m = VehicleParameters::MKZ.width_m / 2.0 + SIDE_M;
         let front_m = VehicleParameters::MKZ.front_m(station_m);
         let rear_m = front_m - VehicleParameters::MKZ.length_m;
-        let ego_mps = sensed.ego.speed_mps;
-        sensed.objects.iter().all(|object| {
+        objects.iter().all(|object| {
             let at = self.guide.project(object.pose.position, rear_m - SIGHT_M, front_m + SIGHT_M);
             let in_target = Beside { offset_m: at.offset_m - lateral_m, ..at };
             let forward = unit_vector(object.pose.heading_rad);
@@ -346,6 +350,26 @@ impl Idm {
         control
     }
 
+    /// Looks aside at what is seen at this moment: unless that leaves a gap, no lane change begins in the next look.
+    pub(super) fn glance(&mut self, seen: &[SensedObject], ego_mps: f64, station_m: f64) {
+        let pending = self.pending_change(station_m);
+        self.is_beset = pending.is_some_and(|(index, _)| {
+            let lateral_m = self.scene.route.changes[index].lateral_m;
+            !self.has_gap(seen, ego_mps, station_m, lateral_m)
+        });
+    }
+
+    /// Gives up a lane change that was begun in thought alone, because the vehicle is still in the source lane.
+    fn stay(&mut self, rear_axle: &Pose) {
+        let Some(last) = self.begins_m.iter().rposition(|begin_m| begin_m.is_finite()) else { return };
+        let mut begins_m = self.begins_m.clone();
+        begins_m[last] = f64::INFINITY;
+        let guide = Guide::with_changes(&self.scene, &RULES, &begins_m);
+        if guide.locate(rear_axle.position, self.station_m).offset_m.abs() <= WANDER_M {
+            (self.begins_m, self.guide) = (begins_m, Arc::new(guide));
+        }
+    }
+
     /// The route that it drives on.
     pub(super) fn guide(&self) -> &Guide {
         &self.guide
@@ -359,6 +383,10 @@ impl Ads for Idm {
 
     fn status(&self) -> &Status {
         &self.status
+    }
+
+    fn take_over(&mut self, sensed: &Sensed) {
+        self.stay(&sensed.ego.rear_axle);
     }
 }
 
@@ -380,7 +408,6 @@ fn model_mps2(speed_mps: f64, allowed_mps: f64, ahead: Option<(f64, f64)>) -> f6
 mod tests {
     use super::*;
     use crate::ads::testing::{Rig, object, two_lanes};
-    use crate::geometry::Pose;
     use crate::model::vocabulary::Body;
 
     const SOURCE_Y_M: f64 = -5.25;

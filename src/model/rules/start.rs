@@ -4,7 +4,7 @@
 //! the actions that set such a state keep it, and no other action can break it. A rule with `on` is about the actions
 //! that it names, and says nothing about the start.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::model::effort;
 use crate::model::eval::{Facts, MomentFacts, WorldFacts, evaluate};
@@ -121,25 +121,29 @@ impl Space {
 
     /// The rules about the start that are in force, those that share states together.
     fn groups(&self, rules: &RulesInForce) -> Vec<Group> {
-        let mut groups: Vec<Group> = Vec::new();
+        let mut groups: Vec<Option<Group>> = Vec::new();
+        // By cell: the group that it is in. A joined group leaves its number to none, and the joint one is the last.
+        let mut group_of: BTreeMap<usize, usize> = BTreeMap::new();
         for rule in rules.all() {
             let Some(condition) = &self.rules[rule].start else { continue };
-            effort::spend(groups.iter().map(|group| group.cells.len()).sum());
             let mut group = Group { rules: vec![rule], cells: cells_read(condition, &self.states) };
-            let read: BTreeSet<usize> = group.cells.iter().copied().collect();
-            let (near, apart): (Vec<Group>, Vec<Group>) =
-                groups.into_iter().partition(|other| other.cells.iter().any(|cell| read.contains(cell)));
-            for other in near {
+            let near: BTreeSet<usize> =
+                group.cells.iter().filter_map(|cell| group_of.get(cell).copied()).collect();
+            for other in near.into_iter().filter_map(|number| groups[number].take()) {
                 group.rules.extend(other.rules);
                 group.cells.extend(other.cells);
             }
             group.rules.sort_unstable();
             group.cells.sort_unstable();
             group.cells.dedup();
-            groups = apart;
-            groups.push(group);
+            effort::spend(group.rules.len() + group.cells.len());
+            if effort::is_spent() {
+                break;
+            }
+            group_of.extend(group.cells.iter().map(|cell| (*cell, groups.len())));
+            groups.push(Some(group));
         }
-        groups
+        groups.into_iter().flatten().collect()
     }
 
     /// The values of a cell's type that are drawn, each with its odds.
