@@ -1,4 +1,4 @@
-//! `avastra doc`: a space as Markdown, from its documentation comments and from what was proved about it.
+//! `avastra table --markdown`: a space as Markdown, from its documentation comments and from what was proved about it.
 
 use core::fmt::Write;
 use std::collections::BTreeSet;
@@ -8,26 +8,14 @@ use crate::model::{
 };
 use crate::units::{Dimension, quantity_short};
 
-use super::arguments::DocArguments;
-use super::error::Failure;
-use super::files::write_named;
-use super::load;
 use super::output::Output;
 use super::output::plural;
 
-/// Prints the page, or writes it.
-pub fn doc(output: &Output, arguments: &DocArguments) -> Result<(), Failure> {
-    let table = load::table(output, &arguments.file)?;
-    let text = page(table.space());
-    match &arguments.output {
-        Some(path) => {
-            write_named(path, &text)?;
-            output.tell(&path.display().to_string());
-        }
-        None => output.say(text.trim_end()),
-    }
+/// Prints the page.
+pub fn doc(output: &Output, space: &Space) {
+    let text = page(space);
+    output.say(text.trim_end());
     output.result(serde_json::json!({ "text": text }));
-    Ok(())
 }
 
 fn page(space: &Space) -> String {

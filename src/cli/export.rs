@@ -10,10 +10,10 @@ use crate::export::{ExportError, Recording, record};
 use super::arguments::{ExportArguments, ExportEgo, ExportFormat, ExportProfile};
 use super::error::Failure;
 use super::files::{copy_map, folder, make, write};
-use super::load;
 use super::output::{Output, plural};
 use super::parallel::each_file;
 use super::replay::refutation;
+use super::{load, pack};
 
 /// The folder of what is written, beside the scenarios, unless another one is named.
 const FOLDER: &str = "exported";
@@ -21,8 +21,14 @@ const FOLDER: &str = "exported";
 /// Writes every file's scenario, played again, in another tool's format. A scenario that does not replay is refused.
 pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failure> {
     refuse_senseless(arguments)?;
+    if arguments.to == ExportFormat::Ava {
+        let Some(folder) = &arguments.out else {
+            return Err(Failure::usage("`--to ava` needs `--out DIR`, the folder that can be moved"));
+        };
+        return pack::pack(output, &arguments.many.files, folder);
+    }
     let targets = targets(arguments)?;
-    let asked = load::asked(None, None, None)?;
+    let asked = load::asked(None)?;
     let maps = Mutex::new(());
     let exported = each_file(output, &arguments.many, None, |file| {
         let (table, scenario) = load::scenario(output, file)?;
@@ -95,6 +101,9 @@ fn refuse_senseless(arguments: &ExportArguments) -> Result<(), Failure> {
         (ExportFormat::Csv, Some(_)) => {
             Err(Failure::usage("`--ego` is not for `--to csv`: the ego vehicle is number 0"))
         }
+        (ExportFormat::Ava, Some(_)) => {
+            Err(Failure::usage("`--ego` is not for `--to ava`: the files stay as they are"))
+        }
         _ => Ok(()),
     }
 }
@@ -129,6 +138,7 @@ fn extension(format: ExportFormat) -> &'static str {
         ExportFormat::Openscenario => "xosc",
         ExportFormat::Commonroad => "xml",
         ExportFormat::Csv => "csv",
+        ExportFormat::Ava => "ava",
     }
 }
 
@@ -166,6 +176,7 @@ fn write_all(
             write(target, &export::csv(recording))?;
             Ok((vec![target.to_owned()], Vec::new()))
         }
+        ExportFormat::Ava => unreachable!("files of our own are copied before anything is played"),
     }
 }
 

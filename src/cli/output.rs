@@ -27,7 +27,7 @@ pub struct Output {
 type Fields = serde_json::Map<String, serde_json::Value>;
 
 /// Raised whenever a field of a command's result changes its meaning or goes away.
-const SCHEMA: u32 = 2;
+const SCHEMA: u32 = 3;
 
 /// The end of a command in JSON: its last line on stdout, whether it failed or not. `avastra explain json` says which
 /// fields a result has (`schema`).
@@ -240,9 +240,15 @@ pub fn asks_for_json() -> bool {
 
 /// Ends a command line that could not be parsed, and asks for JSON.
 pub fn usage_in_json(failure: &Failure) {
-    let (known, arguments) = (help::command(), command_line());
-    let name = arguments.iter().find(|argument| known.find_subcommand(argument).is_some());
-    Output::of(Format::Json).finish(name.map_or("avastra", String::as_str), Some(failure));
+    let (mut known, mut words) = (help::command(), Vec::new());
+    for word in command_line() {
+        if let Some(found) = known.find_subcommand(&word).cloned() {
+            known = found;
+            words.push(word);
+        }
+    }
+    let name = if words.is_empty() { "avastra".to_owned() } else { words.join(" ") };
+    Output::of(Format::Json).finish(&name, Some(failure));
 }
 
 /// A pipe that its reader has closed is no error.

@@ -39,7 +39,7 @@ pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failur
             "`--out {path}` is for one file: of several, each is written to a folder `{FOLDER}`"
         )));
     }
-    let asked = load::asked(None, arguments.own.ads_config.as_deref(), arguments.own.ads_cmd.as_deref())?;
+    let asked = load::asked(arguments.against.ads.as_deref())?;
     let shrunk = each_file(output, &arguments.many, asked.external.as_ref(), |file| {
         smaller(output, file, arguments.output.as_ref(), &asked)
     })?;
@@ -128,8 +128,7 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
     let (ads, _) = asked.selected_for(&scenario)?;
     if ads.program().is_some_and(|program| !program.can_start()) {
         return Err(Failure::usage(format!(
-            "`{}` was made against an external driving system, which must drive each try: give it with `--ads-cmd` or \
-             `--ads-config`",
+            "`{}` was made against an external driving system, which must drive each try: give it with `--ads`",
             scenario.name
         )));
     }

@@ -52,10 +52,7 @@ enum Outcome {
 
 /// Plays every scenario of a suite against a driving system.
 pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
-    let asked = load::against(&arguments.against)?;
-    if let Some(name) = &arguments.against.ads {
-        run::driving_system(name)?;
-    }
+    let asked = load::asked(arguments.against.ads.as_deref())?;
     let suite = Suite { arguments, asked };
     let many = FilesArguments { files: suite_files(&arguments.paths)?, jobs: arguments.jobs };
     let program = suite.asked.external.as_ref();

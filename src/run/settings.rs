@@ -143,7 +143,7 @@ pub enum RunError {
     Profile { name: String, error: ads::ConfigError },
     #[error(
         "{what} was made with settings of `{ads}` that mean something else in this version: nothing need \
-         happen alike; name a profile with `--ads-config FILE` to see what happens with that"
+         happen alike; name a profile with `--ads FILE` to see what happens with that"
     )]
     ProfileDigest { what: String, ads: String },
     #[error("the traffic of `{name}`: {error}")]
@@ -156,13 +156,11 @@ pub enum RunError {
     External(Box<Failure>),
     #[error("it was begun against {begun}, and the same command now starts {found}: begin a new one")]
     OtherProgram { begun: String, found: String },
-    #[error(
-        "an external driving system has no name here: give it with `--ads-cmd 'COMMAND'` or `--ads-config FILE`"
-    )]
+    #[error("an external driving system has no name here: give it with `--ads 'COMMAND'` or `--ads FILE`")]
     ExternalUnnamed,
     #[error(
         "`{name}` was made against {ads}, and its recorded answers are not beside it: give the driving system with \
-         `--ads-cmd` or `--ads-config`"
+         `--ads`"
     )]
     NoAnswers { name: String, ads: String },
     #[error(

@@ -66,7 +66,7 @@ struct Seal {
 
 /// Advice for a text whose seal does not fit.
 const UNSEALED: &str =
-    "get it back as it was, or remove it and add its study again with `avastra results --add DIR`";
+    "get it back as it was, or remove it and add its study again with `avastra study results --add DIR`";
 
 /// The lines before the seal, if the seal fits them.
 fn unsealed(text: &str) -> Result<&str, String> {

@@ -175,7 +175,7 @@ fn a_new_space_is_ready_to_use() {
     in_scratch(&["check", "--strict", "mine/space.ava"]);
     in_scratch(&["fmt", "--check", "mine/space.ava", "mine/roads.ava"]);
     in_scratch(&["run", "mine/space.ava", "--episodes", "1", "--quiet"]);
-    let page = in_scratch(&["doc", "mine/space.ava"]);
+    let page = in_scratch(&["table", "mine/space.ava", "--markdown"]);
     for words in
         ["# space", "### `pedestrian` (rows 4 to 5)", "The clock only moves forward.", "| `time` from | to |"]
     {

@@ -142,7 +142,7 @@ fn scenarios_of_a_training_that_are_gone_or_edited_are_noticed() {
     let out = scratch.path().join("training");
     let at = out.display().to_string();
     let train = ["train", "scenarios/avastra45.ava", "--road", "corner", "--agent", "constant"];
-    let how = ["--seed", "5", "--episodes", "12", "--ads-config", FLICKER, "--out", &at];
+    let how = ["--seed", "5", "--episodes", "12", "--ads", FLICKER, "--out", &at];
     let (status, _, stderr) = outcome(&mut avastra(&[&train[..], &how].concat()));
     assert_eq!(status, 0, "{stderr}");
     let critical = std::fs::read_dir(out.join("critical")).expect("it is there").flatten();
@@ -183,7 +183,7 @@ fn a_policy_is_verified_played_and_refused_when_damaged() {
     let out = scratch.path().join("run");
     let text = trained(&out);
     let file = out.join("policy/corner_ddqn_5.ava").display().to_string();
-    avastra(&["verify", &file]).assert().success();
+    avastra(&["replay", &file]).assert().success();
     avastra(&[
         "run",
         "--policy",

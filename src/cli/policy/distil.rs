@@ -1,33 +1,28 @@
-//! `avastra distill`: readable rules for a trained policy, beside its network.
+//! `avastra policy distil`: readable rules for a trained policy, beside its network.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::agent::{Face, QPolicy};
+use crate::cli::arguments::DistilArguments;
+use crate::cli::error::Failure;
+use crate::cli::files::write_result;
+use crate::cli::load;
+use crate::cli::output::{Output, plural};
+use crate::cli::progress::Working;
 use crate::emit;
 use crate::model::Policy;
 use crate::model::policy::RulesClaims;
 use crate::run::Arena;
 use crate::train;
 
-use super::arguments::DistillArguments;
-use super::error::Failure;
-use super::files::write_result;
-use super::load;
-use super::output::{Output, plural};
-use super::progress::Working;
-use super::verify::{acting, same_world};
+use super::{acting, same_world};
 
 /// Distils rules anew, with other settings than those of the training, and writes the policy with them.
-pub fn distill(output: &Output, arguments: &DistillArguments) -> Result<(), Failure> {
+pub fn distil(output: &Output, arguments: &DistilArguments) -> Result<(), Failure> {
     let (table, mut policy) = load::policy(output, &arguments.file)?;
     same_world(&policy)?;
-    for (name, value) in [
-        ("rules_leaves", arguments.leaves),
-        ("rules_depth", arguments.depth),
-        ("rules_rounds", arguments.rounds),
-        ("rules_episodes", arguments.episodes),
-    ] {
+    for (name, value) in [("rules_leaves", arguments.leaves), ("rules_episodes", arguments.episodes)] {
         if let Some(value) = value {
             policy.hyperparameters.insert(name.to_owned(), value.into());
         }

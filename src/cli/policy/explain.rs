@@ -1,22 +1,22 @@
-//! `avastra explain-policy`: what a policy favours, expects and looks at.
+//! `avastra policy explain`: what a policy favours, expects and looks at.
 
 use crate::agent::Face;
 use crate::check::state_argument::values_from;
+use crate::cli::arguments::ExplainPolicyArguments;
+use crate::cli::error::Failure;
+use crate::cli::load;
+use crate::cli::output::Output;
+use crate::cli::output::plural;
+use crate::cli::progress::Working;
 use crate::train::{Insight, insight, training_arena};
 
-use super::arguments::ExplainPolicyArguments;
-use super::error::Failure;
-use super::load;
-use super::output::Output;
-use super::output::plural;
-use super::progress::Working;
-use super::verify::acting;
+use super::acting;
 
 /// Rows and variables that are listed; JSON has them all.
 const LISTED_MAX: usize = 12;
 
 /// Lets the policy drive, and prints which rows it chose and why.
-pub fn explain_policy(output: &Output, arguments: &ExplainPolicyArguments) -> Result<(), Failure> {
+pub fn explain(output: &Output, arguments: &ExplainPolicyArguments) -> Result<(), Failure> {
     let (table, policy) = load::policy(output, &arguments.file)?;
     let acting = acting(&table, &policy, Face::Network)?;
     let given = arguments.state.as_deref().map_or(Ok(Vec::new()), values_from).map_err(Failure::usage)?;

@@ -1,17 +1,17 @@
-//! `avastra export-weights`: a policy's network for other tools.
+//! `avastra policy weights`: a policy's network for other tools.
 
 use crate::agent::Face;
+use crate::cli::arguments::WeightsArguments;
+use crate::cli::error::Failure;
+use crate::cli::files::write_result;
+use crate::cli::load;
+use crate::cli::output::Output;
 use crate::emit;
 
-use super::arguments::ExportWeightsArguments;
-use super::error::Failure;
-use super::files::write_result;
-use super::load;
-use super::output::Output;
-use super::verify::acting;
+use super::acting;
 
 /// Writes the weights as safetensors.
-pub fn export_weights(output: &Output, arguments: &ExportWeightsArguments) -> Result<(), Failure> {
+pub fn weights(output: &Output, arguments: &WeightsArguments) -> Result<(), Failure> {
     let (table, policy) = load::policy(output, &arguments.file)?;
     let acting = acting(&table, &policy, Face::Network)?;
     let path = arguments.output.clone().unwrap_or_else(|| arguments.file.with_extension("safetensors"));
