@@ -154,10 +154,10 @@ pub enum End {
     Arrived,
     /// No progress for several steps: truncated.
     Stalled,
-    /// The same, because something stood in the way that would not go: wrecks, or vehicles that wait for each
-    /// other. It says nothing about the driving system.
+    /// No progress, because something stood in the way that would not go: wrecks, or vehicles that wait for each other.
+    /// It says nothing about the driving system.
     Blocked,
-    /// The same, because the ego vehicle has left its lane and does not find back.
+    /// No progress, because the ego vehicle has left its lane and does not find back.
     Astray,
     /// It drove beyond the end of its way, or away from every road: there is nothing to drive on. The way up to there
     /// counts.

@@ -118,8 +118,9 @@ impl<'a> Stage<'a> {
         oracle::verify(self.table.space(), self.scenario, log, &judgements, &replays)
     }
 
-    /// The claims that a log of it refutes, among those that `asked` names: only such as need no further play, so neither
-    /// causes nor minimality. `judgements` has one for each collision, if one of these claims is about verdicts.
+    /// The claims that a log of it refutes, among those that `asked` selects. Claims that need further plays (causes,
+    /// minimality) count as not tried. `judgements` has one for each collision, if one of these claims is about
+    /// verdicts.
     pub fn refuted(
         &self,
         ads: &Selected,

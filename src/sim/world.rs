@@ -39,8 +39,8 @@ use super::traffic::TrafficProfile;
 /// old scenario is told apart from a refuted one.
 pub const ENGINE: &str = "plane/8";
 
-/// The first world whose episodes were those of this one, whatever their traces: results that hold no trace are good in
-/// both.
+/// The oldest world that plays the same episodes as this one. Traces may differ, so only results without traces stay
+/// valid.
 pub fn first_with_episodes_of(engine: &str) -> &str {
     match engine {
         // A trace no longer tells zeros of different signs apart.
@@ -519,7 +519,7 @@ impl World {
         self.ambient = ambient;
     }
 
-    /// Looks who came into whose way, the ego vehicle or a road user.
+    /// Notes for each road user whether it came into the ego vehicle's way or the ego vehicle into its way.
     fn watch_rights(&mut self) {
         let mut users = core::mem::take(&mut self.users);
         let around = self.around([&[], &[]]);

@@ -29,7 +29,7 @@ pub enum Event {
     Done(Vec<CellRecord>),
 }
 
-/// Plays jobs on so many threads and hands what happens to `on`, on this one. Stops early when `stop` is set or
+/// Plays jobs on several threads, and calls `on` on this thread with what happens. Stops early when `stop` is set or
 /// `on` fails; a job that is not finished then is lost. `clock` says what the calling thread has spent so far.
 ///
 /// # Errors

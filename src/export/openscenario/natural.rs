@@ -31,8 +31,8 @@ const LINE_M: f64 = 0.05;
 const ONWARD_M: f64 = 10.0;
 /// A change of speed within so many ticks happens at once.
 const ONCE_TICKS: usize = 10;
-/// A loss of speed so many times what its brakes can do is a contact's doing. A piece of a pace may be a little steeper than
-/// what was recorded, and full braking is none.
+/// If the speed falls more than this many times faster than full braking allows, a contact caused it. The margin is
+/// there because a fitted piece may be a little steeper than the recording.
 const IMPACT_TIMES: f64 = 1.5;
 /// Where the ego vehicle's distance says when a pedestrian sets out, it came nearer by so much within so many ticks, m.
 const COMES_M: f64 = 0.25;
@@ -315,8 +315,8 @@ fn way_m(poses: &[Pose], begin: usize, length: usize) -> f64 {
     (seen_m * length as f64 / (seen.len() - 1).max(1) as f64).max(1.0)
 }
 
-/// Whether a loss of speed within a time is a contact's doing. It is to happen at once, as a player else keeps to what the
-/// vehicle's brakes can do.
+/// Whether a contact caused a loss of speed within a time. The export writes such a loss as instantaneous, because a
+/// player otherwise brakes only as hard as the vehicle's brakes allow.
 fn is_impact(actor: &Actor, lost_mps: f64, time_s: f64) -> bool {
     lost_mps > IMPACT_TIMES * actor.shape.deceleration_mps2_max * time_s
 }
