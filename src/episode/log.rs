@@ -91,7 +91,8 @@ pub struct StepLog {
 /// What became of the agent's choice.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
-    /// Carried out as drawn, so many ticks after the step began; the ids of the road users it made appear.
+    /// Carried out as drawn, `delay_ticks` after the step began; `spawned` has the ids of the road users that it made
+    /// appear.
     Done { draw: Draw, spawned: Vec<u32>, delay_ticks: u32 },
     /// No action was chosen: no row was legal, or the script has none here.
     Passed,

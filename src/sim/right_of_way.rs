@@ -184,7 +184,7 @@ pub(super) struct Rights {
     /// the first look.
     shares: Option<bool>,
     meeting: Option<Meeting>,
-    /// Who has priority, it as a wreck in the ego vehicle's way or the ego vehicle; `None` as long as it is neither.
+    /// Who has priority if it is a wreck in the ego vehicle's way; `None` if it is not.
     wreck: Option<Priority>,
     /// Whether it has stood since a moment at which the ego vehicle saw it and could brake gently for it.
     is_foreseen: bool,

@@ -449,7 +449,7 @@ impl World {
         VehicleParameters::MKZ.front_m(self.ego_station_m)
     }
 
-    /// The world as nobody in it looks around.
+    /// The world to look around in, without leaving out a road user as the one that looks.
     pub(super) fn alone(&self) -> Around<'_> {
         self.around([&self.users, &[]])
     }

@@ -23,7 +23,7 @@ pub struct Job {
 
 /// What happens while jobs are played.
 pub enum Event {
-    /// An episode is over, with so many counted collisions.
+    /// An episode is over; the number of its counted collisions.
     Episode { counted: usize },
     /// A job is done: a cell for each of its roads.
     Done(Vec<CellRecord>),

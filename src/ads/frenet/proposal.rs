@@ -64,7 +64,7 @@ const SCORE_PER_COST: f64 = 0.02;
 /// A place of a rollout.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Point {
-    /// Of the rear axle, m.
+    /// Station of the rear axle, m.
     pub station_m: f64,
     pub speed_mps: f64,
     pub acceleration_mps2: f64,

@@ -29,12 +29,13 @@ const STANDS_M: f64 = 0.1;
 const LINE_M: f64 = 0.05;
 /// A way on foot that a contact cut short goes on straight for so long, m: in the player it may come a little later.
 const ONWARD_M: f64 = 10.0;
-/// A change of speed within so many ticks happens at once.
+/// A change of speed within this many ticks is written as instantaneous.
 const ONCE_TICKS: usize = 10;
 /// If the speed falls more than this many times faster than full braking allows, a contact caused it. The margin is
 /// there because a fitted piece may be a little steeper than the recording.
 const IMPACT_TIMES: f64 = 1.5;
-/// Where the ego vehicle's distance says when a pedestrian sets out, it came nearer by so much within so many ticks, m.
+/// The ego vehicle's distance decides when a pedestrian sets out if it came nearer by this much, m, within
+/// [`COMES_TICKS`].
 const COMES_M: f64 = 0.25;
 const COMES_TICKS: usize = 25;
 /// A route ends this far before the end of its last lane, m.
@@ -308,7 +309,8 @@ fn seconds(actor: &Actor, sample: usize) -> f64 {
     (actor.first_tick() as f64 + sample as f64) * DT_S
 }
 
-/// How far it comes within so many samples, m: at least one; beyond the last pose as fast as before.
+/// How far it comes within `length` samples from `begin`, m, at least 1 m. Beyond the last pose it goes on as fast as
+/// before.
 fn way_m(poses: &[Pose], begin: usize, length: usize) -> f64 {
     let seen = &poses[begin.min(poses.len() - 1)..(begin + length + 1).min(poses.len())];
     let seen_m: f64 = seen.windows(2).map(|pair| (pair[1].position - pair[0].position).norm()).sum();
