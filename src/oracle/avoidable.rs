@@ -6,12 +6,13 @@
 //! The ego vehicle, the same car on the same road, is driven by each reference driver in turn; a driver
 //! watches for some time before it takes over. If none of the careful drivers avoids the collision,
 //! evasive manoeuvres that begin at the onset without any delay are tried.
-//! In a second replay each careful driver is held to the letter of UN R157 (`r157_letter`): from the first conflict of
-//! ways on, the ego vehicle drives along its recorded path at its recorded speed until the model reacts, and then only
-//! brakes. The regulation speaks of a vehicle that keeps its lane and speed on a motorway. A careful driver in a town
-//! does more: it slows down for bends, and for road users with priority, before there is a risk. So the first replay
-//! decides, and the second is reported: if only the first avoids a collision, foresight was missing rather than a
-//! reaction.
+//!
+//! Beside that, each careful driver is asked to the letter of UN R157 (`r157_letter`): from the first conflict of ways
+//! on, the ego vehicle drives along its recorded path at its recorded speed until the model reacts, and then only
+//! brakes. The regulation speaks of a
+//! vehicle that keeps its lane and speed on a motorway. A careful driver in a town does more: it slows down for
+//! bends and for those that have priority before there is a risk. So the first replay counts, and the letter is
+//! reported: where only the first avoids a collision, foresight was missing rather than a reaction.
 //!
 //! A driver avoids the collision if until 4 s after the recorded contact it does not touch the obstacle,
 //! and does not run into any other road user. A contact in which another road user runs into the ego
@@ -63,7 +64,7 @@ impl Default for AvoidabilitySettings {
     }
 }
 
-/// Longest time in the settings of the verdict, s. The worlds of all its ticks are kept in memory.
+/// Longest time in the settings of the verdict, s: the worlds of so many ticks are kept.
 const SECONDS_MAX: f64 = 60.0;
 
 /// Why settings of the verdict cannot be used.
@@ -175,8 +176,8 @@ pub struct DrivenPlace {
     pub speed_mps: f64,
 }
 
-/// Plays an episode again up to its last collision. For each collision, hands on the worlds before it, the contact, and
-/// the ego vehicle's outline at the contact.
+/// Plays an episode again up to its last collision, and hands on the worlds before each, its contact, and the outline of
+/// the ego vehicle there.
 fn before_each(
     setup: &Setup,
     script: &Script,

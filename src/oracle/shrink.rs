@@ -73,8 +73,8 @@ pub fn shrink(
     }
 }
 
-/// Steps that are not needed for the nth collision of a log: each alone could be removed, or replaced by waiting, and
-/// the collision stays the same. Empty if the scenario is 1-minimal.
+/// Steps that could each be removed, or replaced by waiting, with the nth collision of a log staying the same:
+/// none if the scenario is 1-minimal.
 pub fn spare_steps(
     setup: &Setup,
     log: &EpisodeLog,

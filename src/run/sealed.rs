@@ -58,7 +58,7 @@ pub enum DatabaseError {
 }
 
 impl DatabaseError {
-    /// Whether the file was damaged or changed, so that its episodes must be played again. Other errors lose nothing.
+    /// Whether the file was damaged or changed, so that what it is of must be played again. Anything else is no loss.
     pub fn is_torn(&self) -> bool {
         matches!(self, DatabaseError::Damaged { .. } | DatabaseError::Rows { .. })
     }
@@ -78,10 +78,10 @@ impl From<rusqlite::Error> for DatabaseError {
 pub struct Layout {
     /// Raised whenever a column changes.
     pub version: i64,
-    /// Older versions whose files can still be read and resumed. Their tables have every column of today.
+    /// Versions before whose files can be read and gone on with; in them every table has at least the columns of today.
     pub older: &'static [i64],
-    /// Name of the unit that is added as a whole, which is also the name of its key column: `episode`, `cell`. The
-    /// first of the tables has one row for each unit.
+    /// What is added as a whole, in a word, which is also its key: `episode`, `cell`. The first of the tables has
+    /// one row for each.
     pub unit: &'static str,
     /// The tables with its rows.
     pub tables: &'static [&'static str],

@@ -39,8 +39,8 @@ use super::traffic::TrafficProfile;
 /// old scenario is told apart from a refuted one.
 pub const ENGINE: &str = "plane/8";
 
-/// The oldest world that plays the same episodes as this one. Traces may differ, so only results without traces stay
-/// valid.
+/// The first world whose episodes were those of this one, whatever their traces: results that hold no trace are good in
+/// both.
 pub fn first_with_episodes_of(engine: &str) -> &str {
     match engine {
         // A trace no longer tells zeros of different signs apart.
@@ -449,7 +449,7 @@ impl World {
         VehicleParameters::MKZ.front_m(self.ego_station_m)
     }
 
-    /// The world to look around in, without leaving out a road user as the one that looks.
+    /// The world as nobody in it looks around.
     pub(super) fn alone(&self) -> Around<'_> {
         self.around([&self.users, &[]])
     }
@@ -519,7 +519,7 @@ impl World {
         self.ambient = ambient;
     }
 
-    /// Notes for each road user whether it came into the ego vehicle's way or the ego vehicle into its way.
+    /// Looks who came into whose way, the ego vehicle or a road user.
     fn watch_rights(&mut self) {
         let mut users = core::mem::take(&mut self.users);
         let around = self.around([&[], &[]]);
