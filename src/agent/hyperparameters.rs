@@ -149,9 +149,6 @@ pub struct Hyperparameters {
     pub rules_episodes: u32,
 }
 
-/// Settings that came after the first policies: a policy without one was trained with the setting off.
-const LATER: [&str; 3] = ["pays_maker", "average_decay", "exploration_share"];
-
 /// Sets of state variables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -254,13 +251,10 @@ impl Hyperparameters {
     /// Settings as a policy file records them.
     ///
     /// # Errors
-    /// As [`Hyperparameters::from_yaml`], and if one is missing that the first policies had.
+    /// As [`Hyperparameters::from_yaml`], and if one is missing.
     pub fn from_record(record: &serde_json::Map<String, Value>) -> Result<Hyperparameters, SettingsError> {
-        // In the published presets, what came later is off.
         let base = presets::paper();
-        let required = |name: &&String| !LATER.contains(&name.as_str());
-        if let Some(missing) = base.record().keys().filter(required).find(|name| !record.contains_key(*name))
-        {
+        if let Some(missing) = base.record().keys().find(|name| !record.contains_key(*name)) {
             return Err(SettingsError::Text(format!("the setting `{missing}` is missing")));
         }
         base.changed(record.clone())
@@ -510,21 +504,10 @@ mod tests {
     }
 
     #[test]
-    fn a_policy_of_before_a_setting_came_was_trained_without_it() {
-        let now = Hyperparameters {
-            pays_maker: true,
-            average_decay: 0.99,
-            exploration_share: Some(0.5),
-            ..presets::avastra()
-        };
+    fn a_record_has_every_setting() {
+        let now = Hyperparameters { exploration_share: None, ..presets::avastra() };
         let mut record = now.record();
         assert_eq!(Hyperparameters::from_record(&record).unwrap(), now);
-        for name in LATER {
-            record.remove(name).expect("it is a setting");
-        }
-        let before =
-            Hyperparameters { pays_maker: false, average_decay: 0.0, exploration_share: None, ..now };
-        assert_eq!(Hyperparameters::from_record(&record).unwrap(), before);
         record.remove("discount");
         assert!(Hyperparameters::from_record(&record).unwrap_err().to_string().contains("`discount`"));
     }

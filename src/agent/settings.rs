@@ -12,8 +12,8 @@ use super::learner::Learner;
 use super::q_policy::Rows;
 use super::registry::{Entry, Kind};
 use super::search::{
-    AvFuzzer, AvFuzzerSettings, Bandit, BanditSettings, Constant, ConstantSettings, GoExplore,
-    GoExploreSettings, MapElites, MapElitesSettings,
+    AvFuzzer, AvFuzzerSettings, Bandit, BanditSettings, Constant, ConstantSettings, MapElites,
+    MapElitesSettings,
 };
 use super::trainable::Trainable;
 
@@ -25,7 +25,6 @@ pub enum Settings {
     AvFuzzer(AvFuzzerSettings),
     Constant(ConstantSettings),
     Bandit(BanditSettings),
-    GoExplore(GoExploreSettings),
     MapElites(MapElitesSettings),
 }
 
@@ -78,7 +77,6 @@ impl Settings {
             Settings::AvFuzzer(settings) => Box::new(AvFuzzer::new(settings, rows.allowed.len())),
             Settings::Constant(settings) => Box::new(Constant::new(settings, rows.allowed.len())),
             Settings::Bandit(settings) => Box::new(Bandit::new(settings, rows.allowed.len())),
-            Settings::GoExplore(settings) => Box::new(GoExplore::new(settings, rows.allowed.len())),
             Settings::MapElites(settings) => Box::new(MapElites::new(settings, rows.allowed.len())),
         }
     }
@@ -92,9 +90,6 @@ impl Settings {
             Settings::AvFuzzer(settings) => Box::new(AvFuzzer::restore(settings, rows.allowed.len(), bytes)?),
             Settings::Constant(settings) => Box::new(Constant::restore(settings, rows.allowed.len(), bytes)?),
             Settings::Bandit(settings) => Box::new(Bandit::restore(settings, rows.allowed.len(), bytes)?),
-            Settings::GoExplore(settings) => {
-                Box::new(GoExplore::restore(settings, rows.allowed.len(), bytes)?)
-            }
             Settings::MapElites(settings) => {
                 Box::new(MapElites::restore(settings, rows.allowed.len(), bytes)?)
             }
@@ -105,11 +100,9 @@ impl Settings {
     pub fn hyperparameters(&self) -> Option<&Hyperparameters> {
         match self {
             Settings::Learning(settings) => Some(settings.as_ref()),
-            Settings::AvFuzzer(_)
-            | Settings::Constant(_)
-            | Settings::Bandit(_)
-            | Settings::GoExplore(_)
-            | Settings::MapElites(_) => None,
+            Settings::AvFuzzer(_) | Settings::Constant(_) | Settings::Bandit(_) | Settings::MapElites(_) => {
+                None
+            }
         }
     }
 

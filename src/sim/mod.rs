@@ -60,4 +60,4 @@ pub use scene::Scene;
 pub use sense::{Conditions, EgoMotion, FRAME_S, FRAME_TICKS, Sensed, SensedObject, SignalColour};
 pub use trace::Trace;
 pub use traffic::{TrafficError, TrafficProfile};
-pub use world::{DT_S, ENGINE, Start, World, first_with_episodes_of};
+pub use world::{DT_S, ENGINE, Start, World};

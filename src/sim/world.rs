@@ -39,16 +39,6 @@ use super::traffic::TrafficProfile;
 /// old scenario is told apart from a refuted one.
 pub const ENGINE: &str = "plane/8";
 
-/// The first world whose episodes were those of this one, whatever their traces: results that hold no trace are good in
-/// both.
-pub fn first_with_episodes_of(engine: &str) -> &str {
-    match engine {
-        // A trace no longer tells zeros of different signs apart.
-        "plane/7" => "plane/6",
-        engine => engine,
-    }
-}
-
 /// One physics step, s: 50 Hz.
 pub const DT_S: f64 = TICK_MS as f64 / 1000.0;
 
@@ -124,11 +114,6 @@ pub struct World {
 }
 
 impl World {
-    /// From now on others' choices come from another seed.
-    pub fn reseed(&mut self, seed: u64) {
-        self.seed = seed;
-    }
-
     /// The beginning of an episode: the ego vehicle rolls with its rear axle on the start of
     /// the route; beside ambient traffic, if asked for, nothing else is there.
     pub fn new(scene: Arc<Scene>, start: &Start) -> World {

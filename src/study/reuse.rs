@@ -1,7 +1,6 @@
 //! Cells that another study has played already. A cell depends on its agent's settings, its road, its number and what
 //! all agents of a study share. It does not depend on the agent's label or on the other agents of the study.
 
-use crate::sim::first_with_episodes_of;
 use crate::study::job::Job;
 use crate::study::record::CellRecord;
 use crate::study::settings::{AgentSettings, StudySettings};
@@ -64,7 +63,7 @@ impl StudySettings {
         } = self;
         let same = [
             ("avastra", *avastra == other.avastra),
-            ("engine", first_with_episodes_of(engine) == first_with_episodes_of(&other.engine)),
+            ("engine", *engine == other.engine),
             ("space", *space_digest == other.space_digest),
             // A program that is attached need not do the same twice.
             ("ads", *ads == other.ads && external.is_none() && other.external.is_none()),

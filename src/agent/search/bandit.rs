@@ -6,7 +6,7 @@ use ndarray::ArrayView1;
 use crate::agent::hyperparameters::{Requirement, SettingsError, require, within};
 use crate::agent::random::any;
 use crate::agent::registry::Agent;
-use crate::agent::trainable::{Beginning, Trainable};
+use crate::agent::trainable::Trainable;
 use crate::agent::trajectory::{Lesson, Trajectory};
 use crate::mdp::Observation;
 use crate::rng;
@@ -63,7 +63,7 @@ impl BanditSettings {
     }
 
     /// A choice of the search: by the record for its share of the choices, else any legal row.
-    pub(super) fn explore(
+    fn explore(
         &self,
         worth: &Worth,
         situation: u32,
@@ -78,12 +78,7 @@ impl BanditSettings {
     }
 
     /// Enters an episode into the record; `made` has the situation and the row of each of its choices.
-    pub(super) fn note(
-        &self,
-        worth: &mut Worth,
-        made: impl Iterator<Item = (u32, usize)>,
-        episode: &Trajectory,
-    ) {
+    fn note(&self, worth: &mut Worth, made: impl Iterator<Item = (u32, usize)>, episode: &Trajectory) {
         for ((situation, row), value) in made.zip(worths(episode, self.credit_discount)) {
             worth.note(situation, row, value);
         }
@@ -144,9 +139,9 @@ impl Agent for Bandit {
 }
 
 impl Trainable for Bandit {
-    fn beginning(&mut self, _: usize, fresh: u64) -> Beginning {
+    fn start_seed(&mut self, _: usize, fresh: u64) -> u64 {
         self.fresh = fresh;
-        Beginning { seed: fresh, from: None }
+        fresh
     }
 
     fn learn(&mut self, episode: &Trajectory, _: &mut Rng) -> Lesson {
@@ -173,7 +168,7 @@ impl Trainable for Bandit {
 }
 
 /// Acts by the record alone.
-pub(super) struct Recorded {
+struct Recorded {
     pub settings: BanditSettings,
     pub worth: Worth,
 }

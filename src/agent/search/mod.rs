@@ -6,7 +6,6 @@
 mod av_fuzzer;
 mod bandit;
 mod constant;
-mod go_explore;
 mod map_elites;
 mod played;
 mod population;
@@ -17,5 +16,4 @@ mod worth;
 pub use av_fuzzer::{AvFuzzer, AvFuzzerSettings};
 pub use bandit::{Bandit, BanditSettings};
 pub use constant::{Constant, ConstantSettings};
-pub use go_explore::{GoExplore, GoExploreSettings};
 pub use map_elites::{MapElites, MapElitesSettings};
