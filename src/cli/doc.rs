@@ -4,7 +4,7 @@ use core::fmt::Write;
 use std::collections::BTreeSet;
 
 use crate::model::{
-    ActionDef, Domain, Initial, Interval, Parameter, Reach, RuleBody, RuleDef, Space, StateDef, Type, Value,
+    ActionDef, Domain, Initial, Interval, Parameter, RuleBody, RuleDef, Space, StateDef, Type, Value,
 };
 use crate::units::{Dimension, quantity_short};
 
@@ -152,24 +152,11 @@ fn ranges(space: &Space, action: usize, parameter: &Parameter) -> String {
     let declared = Interval::closed(*low, *high);
     let unit = parameter.unit();
     let roads = space.roads.iter().enumerate();
-    let left = roads.filter_map(|(road, of)| Some((of, range_on(space, action, parameter, road)?)));
+    let left = roads.filter_map(|(road, of)| Some((of, space.range_on(action, parameter, road)?)));
     let shown = left.filter(|(_, kept)| *kept != declared);
     let shown: Vec<String> =
         shown.map(|(road, kept)| format!("{} on {}", kept.shown(parameter.ty, unit), road.name)).collect();
     shown.join("; ")
-}
-
-/// What the rules leave of a parameter's range on a road, over all rows of its action that can run
-/// there; `None` if none can, or the parameter has no range.
-pub fn range_on(space: &Space, action: usize, parameter: &Parameter, road: usize) -> Option<Interval> {
-    let reaches = space.rows_of(action).iter().map(|row| &row.roads[road]);
-    let kept = reaches.filter_map(|reach| match reach {
-        Reach::Open(ranges) => {
-            ranges.iter().find(|(name, _)| *name == parameter.name).map(|(_, interval)| *interval)
-        }
-        Reach::Dead { .. } => None,
-    });
-    kept.reduce(|all, interval| all.hull(&interval))
 }
 
 /// The values of a parameter; of an `each` parameter those that have rows, because a `where` may leave others out.

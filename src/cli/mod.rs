@@ -26,7 +26,7 @@ mod import;
 mod interrupt;
 mod load;
 mod look;
-pub mod lsp;
+mod lsp;
 mod merge;
 mod never;
 mod new;

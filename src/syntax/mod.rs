@@ -20,6 +20,7 @@ mod format;
 mod grammar;
 pub mod keyword;
 mod layout;
+mod operator;
 mod parse;
 mod print;
 mod print_expression;

@@ -1,15 +1,25 @@
 //! Signature help: the parameters of the function or action whose arguments are being written.
 
-use serde_json::{Value, json};
-
 use crate::check::Symbol;
 
 use super::tokens::{Token, tokens};
 use super::workspace::Analysis;
 use super::{context, hover};
 
-/// The signature of the innermost call around a byte of the document, and which of its parameters is due.
-pub fn help(analysis: &Analysis, byte: usize) -> Option<Value> {
+/// How a function or an action is called.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Signature {
+    pub label: String,
+    /// Each a part of the label.
+    pub parameters: Vec<String>,
+    /// Position of the parameter that is being written.
+    pub due: usize,
+    /// In Markdown.
+    pub text: String,
+}
+
+/// The signature of the innermost call around a byte of the document.
+pub fn help(analysis: &Analysis, byte: usize) -> Option<Signature> {
     let text = analysis.text(Analysis::ROOT);
     let item = context::item_start(text, byte);
     let (tokens, _) = tokens(text.get(item..byte)?);
@@ -39,16 +49,8 @@ pub fn help(analysis: &Analysis, byte: usize) -> Option<Value> {
     let result = declared.type_name(references).filter(|_| is_function);
     let result = result.map_or(String::new(), |ty| format!(" -> {ty}"));
     let label = format!("{name}({}){result}", labels.join(", "));
-    let parameters: Vec<Value> = labels.iter().map(|label| json!({ "label": label })).collect();
-    let documentation = hover::describe(analysis, symbol).unwrap_or_default();
-    Some(json!({
-        "signatures": [{
-            "label": label, "parameters": parameters,
-            "documentation": { "kind": "markdown", "value": documentation },
-        }],
-        "activeSignature": 0,
-        "activeParameter": due,
-    }))
+    let text = hover::describe(analysis, symbol).unwrap_or_default();
+    Some(Signature { label, parameters: labels, due, text })
 }
 
 /// The name before the innermost open `(`, and what is written behind it so far, without what nested brackets hold.

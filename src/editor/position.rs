@@ -1,8 +1,29 @@
 //! Places in a text: bytes here, lines and UTF-16 code units in an editor.
 
-use serde_json::{Value, json};
+use std::path::PathBuf;
 
 use crate::syntax::ast::Span;
+
+/// A place in a text, as editors count: line and UTF-16 column, both from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub struct Point {
+    pub line: usize,
+    pub column: usize,
+}
+
+/// A part of a text.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub struct Range {
+    pub start: Point,
+    pub end: Point,
+}
+
+/// A part of a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Place {
+    pub path: PathBuf,
+    pub range: Range,
+}
 
 /// The lines of a text.
 #[derive(Debug, Clone)]
@@ -23,12 +44,12 @@ impl Lines {
         Lines { starts: std::iter::once(0).chain(bytes.iter().enumerate().filter_map(ends)).collect() }
     }
 
-    /// Line and UTF-16 column of a byte, both from 0. A byte within a character counts as its first.
-    pub fn position(&self, text: &str, byte: usize) -> (usize, usize) {
+    /// The place of a byte. A byte within a character counts as its first.
+    pub fn point(&self, text: &str, byte: usize) -> Point {
         let byte = text.floor_char_boundary(byte.min(text.len()));
         let line = self.starts.partition_point(|start| *start <= byte) - 1;
         let column = text[self.starts[line]..byte].chars().map(char::len_utf16).sum();
-        (line, column)
+        Point { line, column }
     }
 
     /// The byte at a line and UTF-16 column. A column beyond the end of its line means that end, a line beyond
@@ -47,15 +68,8 @@ impl Lines {
         start + content.len()
     }
 
-    /// The place of a byte, in JSON.
-    pub fn to_json(&self, text: &str, byte: usize) -> Value {
-        let (line, character) = self.position(text, byte);
-        json!({ "line": line, "character": character })
-    }
-
-    /// The range of a span, in JSON.
-    pub fn range(&self, text: &str, span: Span) -> Value {
-        json!({ "start": self.to_json(text, span.start), "end": self.to_json(text, span.end.max(span.start)) })
+    pub fn range(&self, text: &str, span: Span) -> Range {
+        Range { start: self.point(text, span.start), end: self.point(text, span.end.max(span.start)) }
     }
 }
 
@@ -69,8 +83,8 @@ mod tests {
         let text = "a\u{e4}\u{1f697}b\r\nc\rd";
         let lines = Lines::new(text);
         // `ä` takes two bytes and one unit, the car takes four bytes and two units.
-        assert_eq!(lines.position(text, 3), (0, 2));
-        assert_eq!(lines.position(text, 7), (0, 4));
+        assert_eq!(lines.point(text, 3), Point { line: 0, column: 2 });
+        assert_eq!(lines.point(text, 7), Point { line: 0, column: 4 });
         assert_eq!(lines.byte(text, 0, 4), 7);
         assert_eq!(lines.byte(text, 0, 3), 3, "within the car");
         assert_eq!(lines.byte(text, 0, 99), 8, "behind the line's end");
@@ -85,7 +99,7 @@ mod tests {
         fn places_read_back(text in "[a\u{e4}\u{1f697}\r\n ]{0,40}", at in 0..80_usize) {
             let lines = Lines::new(&text);
             let byte = text.floor_char_boundary(at.min(text.len()));
-            let (line, column) = lines.position(&text, byte);
+            let Point { line, column } = lines.point(&text, byte);
             let back = lines.byte(&text, line, column);
             // The two may differ only within the `\r\n` that ends a line.
             prop_assert!(back == byte || text[back..byte].chars().all(|c| c == '\r' || c == '\n'));

@@ -5,8 +5,6 @@ use core::fmt::Write;
 use std::collections::BTreeSet;
 
 use crate::check::{Declaration, Symbol};
-use crate::cli::doc::range_on;
-use crate::cli::output::plural;
 use crate::model::vocabulary::{Word, WorldState};
 use crate::model::{ActionDef, Interval, Parameter, Reach, RuleBody, Space};
 use crate::syntax::ast::Span;
@@ -14,14 +12,23 @@ use crate::syntax::{keyword, listed};
 use crate::units;
 use crate::units::Rational;
 
+use super::position::Range;
 use super::workspace::Analysis;
 use super::{tokens, words};
 
 /// Lines of a declaration that are shown, at most.
 const LINES_MAX: usize = 12;
 
-/// The span of the name or keyword at a byte of the document, and Markdown about it.
-pub fn hover(analysis: &Analysis, byte: usize) -> Option<(Span, String)> {
+/// What is known of a name or a keyword.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Hover {
+    pub range: Range,
+    /// In Markdown.
+    pub text: String,
+}
+
+/// What is known of the name or keyword at a byte of the document.
+pub fn hover(analysis: &Analysis, byte: usize) -> Option<Hover> {
     if let Some(occurrence) = analysis.references().at(Analysis::ROOT, byte) {
         let mut texts: Vec<String> = Vec::new();
         for symbol in &occurrence.symbols {
@@ -36,14 +43,14 @@ pub fn hover(analysis: &Analysis, byte: usize) -> Option<(Span, String)> {
         if !owners.is_empty() {
             let _ = write!(text, "\n\nParameter of {}", listed(&owners));
         }
-        return Some((occurrence.span, text));
+        return Some(Hover { range: analysis.range(occurrence.span), text });
     }
     let text = analysis.text(Analysis::ROOT);
     let (start, word) = tokens::word_at(text, byte)?;
     let field = || text[start + word.len()..].trim_start().starts_with(':').then(|| words::field(word))?;
     let meaning = keyword::meaning(word).or_else(field)?;
     let span = Span::new(Analysis::ROOT, start, start + word.len());
-    Some((span, format!("**{word}**\n\n{meaning}")))
+    Some(Hover { range: analysis.range(span), text: format!("**{word}**\n\n{meaning}") })
 }
 
 /// The action or function that has the parameter.
@@ -107,7 +114,7 @@ pub fn describe(analysis: &Analysis, symbol: &Symbol) -> Option<String> {
                 let actions = space.actions.iter().enumerate();
                 let of_group = actions.filter(|(_, action)| names.contains(action.name.as_str()));
                 let count: usize = of_group.map(|(action, _)| space.rows_of(action).len()).sum();
-                format!("\n\n{}", plural(count, "row"))
+                format!("\n\n{}", counted(count))
             });
             text + &rows.unwrap_or_default()
         }
@@ -156,12 +163,17 @@ pub fn ranges_left<'a>(
     let (index, action) = find_action(space, action)?;
     let of = action.parameters.iter().find(|parameter| *parameter.name == *name)?;
     let roads = space.roads.iter().enumerate();
-    let left = roads.filter_map(|(road, known)| Some((&*known.name, range_on(space, index, of, road)?)));
+    let left = roads.filter_map(|(road, known)| Some((&*known.name, space.range_on(index, of, road)?)));
     Some((of, left.collect()))
 }
 
 pub fn find_action<'a>(space: &'a Space, name: &str) -> Option<(usize, &'a ActionDef)> {
     space.actions.iter().enumerate().find(|(_, action)| action.name == name)
+}
+
+/// `1 row`, `12 rows`.
+fn counted(rows: usize) -> String {
+    if rows == 1 { "1 row".to_owned() } else { format!("{rows} rows") }
 }
 
 /// `12 rows, 15 to 26`.
@@ -170,7 +182,7 @@ pub fn row_numbers(space: &Space, action: usize) -> String {
         [] => "no rows".to_owned(),
         [only] => format!("row {}", only.index),
         rows @ [first, .., last] => {
-            format!("{}, {} to {}", plural(rows.len(), "row"), first.index, last.index)
+            format!("{}, {} to {}", counted(rows.len()), first.index, last.index)
         }
     }
 }
@@ -204,7 +216,7 @@ fn bound_by(space: &Space, name: &str) -> Option<String> {
         RuleBody::Moves { .. } => "Orders the changes made by",
     };
     let optional = if rule.optional { "\n\nOff unless asked for: `--with`." } else { "" };
-    Some(format!("\n\n{kind} {} of {}{optional}", plural(rows, "row"), actions.join(", ")))
+    Some(format!("\n\n{kind} {} of {}{optional}", counted(rows), actions.join(", ")))
 }
 
 fn facts_of(space: &Space, name: &str) -> Option<String> {

@@ -6,22 +6,26 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use serde_json::{Value, json};
-
 use crate::check::{Loaded, Symbol};
 use crate::model::COUNTED;
 use crate::model::vocabulary::{Word, WorldState};
 use crate::syntax::ast::Span;
 use crate::syntax::{Diagnostic, keyword};
 
+use super::diagnostics::{Change, Changes};
+use super::position::Range;
 use super::workspace::{Analysis, Workspace};
 use super::{diagnostics, tokens};
 
-/// The span of the name that a rename at this byte would change.
+/// The name that a rename at this byte would change.
 ///
 /// # Errors
 /// Why the author cannot rename it, as a sentence for the author.
-pub fn prepare(analysis: &Analysis, byte: usize) -> Result<Span, String> {
+pub fn prepare(analysis: &Analysis, byte: usize) -> Result<Range, String> {
+    nameable(analysis, byte).map(|span| analysis.range(span))
+}
+
+fn nameable(analysis: &Analysis, byte: usize) -> Result<Span, String> {
     let Some(occurrence) = analysis.references().at(Analysis::ROOT, byte) else {
         let word = tokens::word_at(analysis.text(Analysis::ROOT), byte).map(|(_, word)| word);
         return Err(match word {
@@ -60,13 +64,13 @@ fn fixed(symbol: &Symbol) -> Option<String> {
 ///
 /// # Errors
 /// Why the rename is not possible, as a sentence for the author.
-pub fn rename(workspace: &mut Workspace, path: &Path, byte: usize, name: &str) -> Result<Value, String> {
+pub fn rename(workspace: &mut Workspace, path: &Path, byte: usize, name: &str) -> Result<Changes, String> {
     let paths = workspace.paths();
     for path in &paths {
         workspace.analysis(path);
     }
     let analysis = workspace.known(path).ok_or("the document is not open")?;
-    let span = prepare(analysis, byte)?;
+    let span = nameable(analysis, byte)?;
     let old = analysis.slice(span).to_owned();
     check_name(name)?;
     let occurrence = analysis.references().at(Analysis::ROOT, byte).ok_or("there is no name here")?;
@@ -86,7 +90,7 @@ pub fn rename(workspace: &mut Workspace, path: &Path, byte: usize, name: &str) -
     if touched.iter().any(|known| is_taken(known, &symbols, name)) {
         return Err(format!("`{old}` cannot be called `{name}`: that name is taken"));
     }
-    let (texts, changes) = renamed(workspace, &touched, &symbols, name);
+    let (texts, changes) = renamed(&touched, &symbols, name);
     let touched: Vec<PathBuf> =
         touched.iter().filter_map(|known| known.path(Analysis::ROOT)).map(Path::to_owned).collect();
     for path in &touched {
@@ -103,7 +107,7 @@ pub fn rename(workspace: &mut Workspace, path: &Path, byte: usize, name: &str) -
             return Err(format!("`{old}` cannot be called `{name}`: {reason}"));
         }
     }
-    Ok(json!({ "changes": changes }))
+    Ok(changes)
 }
 
 /// Whether something of the kind of one of the symbols has that name already, at the same place.
@@ -127,11 +131,10 @@ fn broken(known: &Analysis) -> Option<String> {
 
 /// The files with the symbols under another name: their texts, and the changes for the editor.
 fn renamed(
-    workspace: &Workspace,
     touched: &[&Analysis],
     symbols: &BTreeSet<Symbol>,
     name: &str,
-) -> (BTreeMap<PathBuf, String>, serde_json::Map<String, Value>) {
+) -> (BTreeMap<PathBuf, String>, Changes) {
     // A file that several documents use may have names that only one of them resolves.
     let mut places: BTreeMap<PathBuf, BTreeSet<Span>> = BTreeMap::new();
     for known in touched {
@@ -141,14 +144,15 @@ fn renamed(
             places.entry(file.to_owned()).or_default().insert(span);
         }
     }
-    let (mut texts, mut changes) = (BTreeMap::new(), serde_json::Map::new());
+    let (mut texts, mut changes) = (BTreeMap::new(), Changes::new());
     for (file, spans) in places {
         let mut found = touched.iter().filter_map(|known| Some((known, diagnostics::file_of(known, &file)?)));
         let Some((known, id)) = found.next() else { continue };
         let mut text = known.text(id).to_owned();
         spans.iter().rev().for_each(|span| text.replace_range(span.start..span.end, name));
-        let edit = |span: &Span| json!({ "range": known.range(Span { file: id, ..*span }), "newText": name });
-        changes.insert(workspace.uri(&file), spans.iter().map(edit).collect());
+        let change =
+            |span: &Span| Change { range: known.range(Span { file: id, ..*span }), text: name.to_owned() };
+        changes.insert(file.clone(), spans.iter().map(change).collect());
         texts.insert(file, text);
     }
     (texts, changes)

@@ -11,23 +11,28 @@ use std::sync::Arc;
 
 use crate::check;
 use crate::check::{Loaded, MapCache, ReadError, References};
-use crate::cli::load;
 use crate::model;
 use crate::model::Space;
 use crate::syntax::Diagnostic;
 use crate::syntax::ast::{FileId, Span};
 use crate::trial::places::{self, Scenes};
 
-use super::position::Lines;
-use super::uri;
+use super::position::{Lines, Place, Range};
 
-/// A text in the editor.
-#[derive(Debug, Clone)]
-pub struct Document {
-    /// As the editor spells it.
-    pub uri: String,
-    pub version: i64,
-    pub text: String,
+/// Files that the editor does not have open. The caller reads them: nothing here touches a file.
+pub trait Files {
+    /// The text of a file.
+    ///
+    /// # Errors
+    /// Why it cannot be read.
+    fn read(&self, path: &Path) -> Result<String, ReadError>;
+    /// Every source below a folder.
+    fn below(&self, folder: &Path) -> Vec<PathBuf>;
+    /// The sources near a file that may declare what it lacks: each one's path, as the file would write it, and its
+    /// text.
+    fn nearby(&self, path: &Path) -> Vec<(String, String)>;
+    /// What a folder holds: each name, and whether it is a folder. Empty if the folder cannot be read.
+    fn entries(&self, folder: &Path) -> Vec<(String, bool)>;
 }
 
 /// A document with all that it uses.
@@ -44,20 +49,35 @@ pub struct Analysis {
     stale: bool,
 }
 
-#[derive(Debug, Default)]
+/// What the editor has open.
 pub struct Workspace {
     /// The folders that the editor has open.
     pub folders: Vec<PathBuf>,
-    documents: BTreeMap<PathBuf, Document>,
+    files: Box<dyn Files>,
+    /// The text of each open document.
+    documents: BTreeMap<PathBuf, String>,
     analyses: BTreeMap<PathBuf, Analysis>,
     maps: MapCache,
     scenes: Scenes,
 }
 
 impl Workspace {
-    pub fn open(&mut self, path: PathBuf, document: Document) {
+    /// A workspace with nothing open.
+    pub fn new(files: impl Files + 'static) -> Workspace {
+        Workspace {
+            folders: Vec::new(),
+            files: Box::new(files),
+            documents: BTreeMap::new(),
+            analyses: BTreeMap::new(),
+            maps: MapCache::default(),
+            scenes: Scenes::default(),
+        }
+    }
+
+    /// Opens a document, or gives an open one another text.
+    pub fn open(&mut self, path: PathBuf, text: String) {
         self.changed(&path);
-        self.documents.insert(path, document);
+        self.documents.insert(path, text);
     }
 
     pub fn close(&mut self, path: &Path) {
@@ -73,8 +93,8 @@ impl Workspace {
         }
     }
 
-    pub fn document(&self, path: &Path) -> Option<&Document> {
-        self.documents.get(path)
+    pub fn is_open(&self, path: &Path) -> bool {
+        self.documents.contains_key(path)
     }
 
     /// Every open document.
@@ -82,9 +102,25 @@ impl Workspace {
         self.documents.keys().cloned().collect()
     }
 
-    /// The URI by which the editor knows a file.
-    pub fn uri(&self, path: &Path) -> String {
-        self.documents.get(path).map_or_else(|| uri::from_path(path), |document| document.uri.clone())
+    /// The text of a file: from the editor if it is open there, else from the caller.
+    ///
+    /// # Errors
+    /// Why it cannot be read.
+    pub fn text(&self, path: &Path) -> Result<String, ReadError> {
+        match self.documents.get(path) {
+            Some(text) => Ok(text.clone()),
+            None => self.files.read(path),
+        }
+    }
+
+    /// Every source below the editor's folders.
+    pub fn below(&self) -> BTreeSet<PathBuf> {
+        self.folders.iter().flat_map(|folder| self.files.below(folder)).collect()
+    }
+
+    /// What a folder holds: each name, and whether it is a folder.
+    pub fn entries(&self, folder: &Path) -> Vec<(String, bool)> {
+        self.files.entries(folder)
     }
 
     /// The analysis of an open document, brought up to date.
@@ -105,17 +141,17 @@ impl Workspace {
     }
 
     fn analyse(&mut self, path: &Path) -> Option<Analysis> {
-        let documents = &self.documents;
+        let (documents, files) = (&self.documents, &self.files);
         let inputs = RefCell::new(BTreeSet::new());
         let read = |path: &Path| {
             inputs.borrow_mut().insert(path.to_owned());
-            read(documents, path)
+            documents.get(path).map_or_else(|| files.read(path), |text| Ok(text.clone()))
         };
         let mut loaded = check::load_with(path, &read, &mut self.maps).ok()?;
         places::judge_claims(&mut loaded, &mut self.scenes);
         let is_unknown = |found: &Diagnostic| found.is_error() && found.code == model::code::UNKNOWN;
         if loaded.diagnostics.iter().any(is_unknown) {
-            check::suggest_uses(&mut loaded, &load::nearby(path));
+            check::suggest_uses(&mut loaded, &self.files.nearby(path));
         }
         let ids = 0..u32::try_from(loaded.files.len()).expect("a file's id is its position");
         let lines = ids.map(|id| Lines::new(loaded.sources.text(FileId(id)))).collect();
@@ -125,32 +161,21 @@ impl Workspace {
 
     /// The files of the open folders that are not open themselves and use one of these files.
     pub fn closed_users(&mut self, used: &BTreeSet<PathBuf>) -> Vec<Analysis> {
-        let files: BTreeSet<PathBuf> = self.folders.iter().flat_map(|folder| load::below(folder)).collect();
-        let uses = |workspace: &Workspace, file: &Path| {
-            let read = |path: &Path| read(&workspace.documents, path);
-            check::files_used(file, &read).iter().any(|file| used.contains(file))
-        };
+        let read = |path: &Path| self.text(path);
+        let uses = |file: &Path| check::files_used(file, &read).iter().any(|file| used.contains(file));
         let closed: Vec<PathBuf> =
-            files.into_iter().filter(|file| !self.documents.contains_key(file) && uses(self, file)).collect();
+            self.below().into_iter().filter(|file| !self.is_open(file) && uses(file)).collect();
         closed.iter().filter_map(|file| self.analyse(file)).collect()
     }
 
     /// Checks a document with other texts for some files, and keeps nothing of it.
     pub fn trial(&mut self, path: &Path, texts: &BTreeMap<PathBuf, String>) -> Option<Loaded> {
-        let documents = &self.documents;
-        let read = |path: &Path| match texts.get(path) {
+        let (documents, files) = (&self.documents, &self.files);
+        let read = |path: &Path| match texts.get(path).or_else(|| documents.get(path)) {
             Some(text) => Ok(text.clone()),
-            None => read(documents, path),
+            None => files.read(path),
         };
         check::load_with(path, &read, &mut self.maps).ok()
-    }
-}
-
-/// The text of a file: from the editor if it is open there, else from the disk.
-fn read(documents: &BTreeMap<PathBuf, Document>, path: &Path) -> Result<String, ReadError> {
-    match documents.get(path) {
-        Some(document) => Ok(document.text.clone()),
-        None => load::read_used(path),
     }
 }
 
@@ -180,12 +205,14 @@ impl Analysis {
         self.lines.get(file.0 as usize)
     }
 
-    /// The range of a span, in JSON.
-    pub fn range(&self, span: Span) -> serde_json::Value {
-        match self.lines(span.file) {
-            Some(lines) => lines.range(self.text(span.file), span),
-            None => Lines::new("").range("", Span::NONE),
-        }
+    /// The range of a span; empty and at the start if the span is in no file.
+    pub fn range(&self, span: Span) -> Range {
+        self.lines(span.file).map(|lines| lines.range(self.text(span.file), span)).unwrap_or_default()
+    }
+
+    /// The file and the range of a span; `None` if the span is in no file.
+    pub fn place(&self, span: Span) -> Option<Place> {
+        Some(Place { path: self.path(span.file)?.to_owned(), range: self.range(span) })
     }
 
     /// The byte of the document at a place in the editor.

@@ -3,16 +3,23 @@
 //!
 //! Hints are shown only while the space is sound: row numbers from an earlier state could be wrong.
 
-use serde_json::{Value, json};
-
 use crate::model::{Domain, Interval, Space};
-use crate::syntax::ast::{Action, ActionParam, ItemKind, ParamMode};
+use crate::syntax::ast::{Action, ActionParam, ItemKind, ParamMode, Span};
 
 use super::hover::{find_action, ranges_left, row_numbers};
+use super::position::Point;
 use super::workspace::Analysis;
 
+/// A remark that an editor shows within a line.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Hint {
+    pub at: Point,
+    pub label: String,
+    pub tooltip: String,
+}
+
 /// The hints between two bytes of the document.
-pub fn hints(analysis: &Analysis, from: usize, to: usize) -> Vec<Value> {
+pub fn hints(analysis: &Analysis, from: usize, to: usize) -> Vec<Hint> {
     let Some(space) = analysis.space().filter(|_| analysis.is_sound()) else { return Vec::new() };
     let mut found = Vec::new();
     for item in &analysis.loaded.files[0].tree.items {
@@ -35,7 +42,7 @@ pub fn hints(analysis: &Analysis, from: usize, to: usize) -> Vec<Value> {
 
 /// The range that the rules leave on any road, if it is smaller than the written one. The tooltip lists it
 /// road by road.
-fn range(analysis: &Analysis, space: &Space, action: &Action, param: &ActionParam) -> Option<Value> {
+fn range(analysis: &Analysis, space: &Space, action: &Action, param: &ActionParam) -> Option<Hint> {
     let (of, left) = ranges_left(space, &action.name.text, &param.name.text)?;
     let Domain::Range(low, high) = &of.domain else { return None };
     let shown = |interval: &Interval| interval.shown(of.ty, of.unit());
@@ -48,8 +55,7 @@ fn range(analysis: &Analysis, space: &Space, action: &Action, param: &ActionPara
     Some(hint(analysis, param.span.end, &shown(&all), &tooltip))
 }
 
-fn hint(analysis: &Analysis, byte: usize, label: &str, tooltip: &str) -> Value {
-    let text = analysis.text(Analysis::ROOT);
-    let place = analysis.lines(Analysis::ROOT).map(|lines| lines.to_json(text, byte));
-    json!({ "position": place, "label": label, "tooltip": tooltip, "paddingLeft": true })
+fn hint(analysis: &Analysis, byte: usize, label: &str, tooltip: &str) -> Hint {
+    let at = analysis.range(Span::new(Analysis::ROOT, byte, byte)).start;
+    Hint { at, label: label.to_owned(), tooltip: tooltip.to_owned() }
 }
