@@ -85,8 +85,8 @@ impl Database {
         Ok(groups)
     }
 
-    /// Road and number of each episode with a collision, the worst first: those that count, then by the larger change of
-    /// velocity of the two.
+    /// Road and number of each episode with a collision, the worst first: episodes with a counted collision, then by
+    /// the larger delta-v of the two bodies.
     ///
     /// # Errors
     /// If the database cannot be read.

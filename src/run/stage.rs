@@ -79,7 +79,7 @@ impl<'a> Stage<'a> {
         (log, judgements, first)
     }
 
-    /// Indices of the collisions of a log of it that the space's verdict counts.
+    /// Indices of the collisions that the space's verdict counts, in a log of this scenario.
     pub fn counted(&self, ads: &Selected, log: &EpisodeLog) -> Vec<usize> {
         oracle::counted_at_need(self.table.space(), log, || self.judge(ads, log))
     }
