@@ -87,7 +87,7 @@ pub struct QPolicy {
 }
 
 impl QPolicy {
-    /// Shape of the network that such settings need for so many rows.
+    /// Shape of the network that these settings need for a table of `rows` rows.
     pub fn shape(settings: &Hyperparameters, rows: usize) -> Shape {
         let inputs = Features::new(settings.state, settings.encoding).len();
         let hidden = settings.hidden_units.iter().copied();

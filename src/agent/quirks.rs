@@ -32,7 +32,7 @@ pub(super) struct Quirks {
 }
 
 impl Quirks {
-    /// The quirks that the settings turn on, for an agent with so many rows.
+    /// The quirks that the settings turn on, for an agent with `rows` rows.
     pub fn new(settings: &Hyperparameters, rows: usize) -> Quirks {
         Quirks {
             environment_gate_steps: settings.environment_gate_steps,

@@ -49,7 +49,8 @@ pub fn scenario(
     file(table, log, source, origin, [&emitted, &headline], steps, expects(log, summary, steps))
 }
 
-/// The same of an emitted scenario that was played again: with all its steps, because they are the scenario, and its end.
+/// The scenario of an episode that played an emitted scenario again. It keeps all steps, because they are the scenario,
+/// and says how the episode ended.
 pub fn retold(table: &ActionTable, log: &EpisodeLog, summary: &EpisodeSummary, source: &Provenance) -> File {
     let emitted = format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command);
     let counted = summary.collisions.iter().find(|finding| finding.counted);

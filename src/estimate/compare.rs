@@ -75,7 +75,7 @@ impl Comparison {
     }
 }
 
-/// Plays the pairs of these numbers on so many threads and hands each to `on`, on this one.
+/// Plays the pairs of these numbers on `threads` threads, and calls `on` on this thread with each.
 ///
 /// # Errors
 /// The first error of `on`.

@@ -31,8 +31,8 @@ pub struct PartRecord {
     pub duration_s: f64,
     /// Episodes and trials with the event.
     pub events: u32,
-    /// The sum of the squares of the weights with which each episode counts; and the largest that any could have had, as far
-    /// as the part came.
+    /// Sum of the squared weights of the episodes; and the largest weight that any episode could have had, as far as
+    /// the part came.
     pub weight_squares: f64,
     pub weight_max: f64,
     /// Everything that was simulated, branches and the ticks that lead up to them included, s. The replays of

@@ -19,8 +19,8 @@ pub struct EstimateResults {
     /// Number of parts that are there, and of all parts, if no rule stops the estimate before.
     pub parts: usize,
     pub parts_wanted: usize,
-    /// Share of estimates like this whose interval misses the truth, at most, with all looks that its stopping rules take; and
-    /// the share that this interval alone may miss it in.
+    /// Largest share of estimates like this whose interval misses the truth, over all looks that the stopping rules
+    /// take; and the share for the look that this interval belongs to.
     pub missing: f64,
     pub missing_at_look: f64,
     pub roads: Vec<RoadEstimate>,
@@ -73,7 +73,8 @@ pub struct Probability {
     /// The simulated hours that counting would need for an interval as narrow, over those that were needed. A rough
     /// figure: `None` for counting, and where too few events were met.
     pub gain: Option<f64>,
-    /// As many events of one weight would say as much (Kish); `None` where there are no weights.
+    /// Effective number of events (Kish): this many events of equal weight would say as much. `None` if there are no
+    /// weights.
     pub effective_events: Option<f64>,
     /// Parts whose estimate is 0.
     pub parts_without: usize,

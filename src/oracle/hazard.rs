@@ -1,10 +1,9 @@
 //! The onset of a hazard: when a collision began to take shape.
-//!
 //! A moment belongs to the hazard if the obstacle was on the ego vehicle's way or heading for it, or if one of the two
-//! visibly did something that the other need not expect: it was beyond the middle of the road or beside its lane, came out of its
-//! lane sideways, was in a junction that it had entered at a red light, or was on foot on the carriageway. The onset is
-//! the first such moment, of the last uninterrupted time of them before the contact, at which the obstacle could be
-//! seen. So the judgement begins with the first violation or visible intention, whichever of the two shows it.
+//! visibly did something that the other need not expect: it was beyond the middle of the road or beside its lane, came
+//! out of its lane sideways, was in a junction that it had entered at a red light, or was on foot on the carriageway.
+//! Take the last uninterrupted series of such moments before the contact: the onset is its first moment at which the
+//! obstacle could be seen. So the judgement begins with the first violation or visible intention of either.
 //!
 //! The way is the one that the ego vehicle took, as wide as the vehicle and the 0.375 m by which careful drivers
 //! wander (UN R157, Annex 4, Appendix 3); heading for it means to meet it at constant velocity before the
@@ -29,8 +28,8 @@ pub struct Onset {
     pub conflict: usize,
 }
 
-/// The onset in a recording of the worlds up to the contact with `obstacle`; `None` if that was never in sight. `met` is
-/// the ego vehicle's outline at the contact.
+/// Finds the onset in a recording of the worlds up to the contact with `obstacle`; `None` if the obstacle was never in
+/// sight. `met` is the ego vehicle's outline at the contact.
 pub fn onset(recording: &[World], obstacle: u32, met: OrientedBox) -> Option<Onset> {
     let mut way: Vec<OrientedBox> = vec![met];
     let mut sensed = recording.last()?.sensed();

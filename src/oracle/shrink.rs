@@ -67,8 +67,8 @@ pub fn shrink(setup: &Setup, log: &EpisodeLog, index: usize, judgements: &[Judge
     }
 }
 
-/// Steps that could each be removed, or replaced by waiting, with the nth collision of a log staying the same:
-/// none if the scenario is 1-minimal.
+/// Steps that are not needed for the nth collision of a log: each alone could be removed, or replaced by waiting, and
+/// the collision stays the same. Empty if the scenario is 1-minimal.
 pub fn spare_steps(setup: &Setup, log: &EpisodeLog, index: usize, judgements: &[Judgement]) -> Vec<usize> {
     let mut search = Search::new(setup, log, index, judgements);
     let whole = Candidate::of(setup, log, index);

@@ -31,7 +31,7 @@ impl ClaimResult {
 #[error("not tried (needs the driving system: `--ads`)")]
 pub struct NoTries;
 
-/// Findings that take many replays, each about the nth collision of the log; asked for only by some claims.
+/// Findings that take many replays. Only some claims ask for them. Each is about the nth collision of the log.
 pub struct Replays<'a> {
     /// The modules at fault.
     pub cause: &'a dyn Fn(usize) -> Result<Vec<Module>, NoModules>,

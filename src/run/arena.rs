@@ -64,7 +64,7 @@ impl Arena {
         Ok(Arena { table, rules, ads, traffic: TrafficProfile::default(), roads })
     }
 
-    /// The same with other manners of other vehicles.
+    /// The same arena, in which other vehicles drive by another profile.
     pub fn with_traffic(self, traffic: TrafficProfile) -> Arena {
         Arena { traffic, ..self }
     }
@@ -136,8 +136,8 @@ pub fn road_named(space: &Space, name: &str) -> Result<usize, RunError> {
     })
 }
 
-/// Lets an agent choose among the offers of the moment. With nothing legal, the step passes. Beside the choice come the
-/// legal rows, shape `(rows,)`: all of them for an agent that does not look at them.
+/// Lets an agent choose among the offers of the moment. If no row is legal, the step passes. Returns the choice, and
+/// which rows are legal, shape `(rows,)`: all of them for an agent that does not look at the mask.
 pub(crate) fn choose(agent: &mut dyn Agent, moment: &Moment) -> (Choice, Array1<bool>) {
     if agent.looks_at_mask() {
         let offers = offers(agent, moment);

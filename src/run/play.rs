@@ -111,7 +111,8 @@ impl Run {
         self.played(&self.setup(number)).0
     }
 
-    /// Plays an episode of a setup by a fresh agent. Beside the log comes the time that the agent simulated in branches, s.
+    /// Plays an episode of a setup with a fresh agent. Returns the log, and the time that the agent simulated in
+    /// branches, s.
     pub fn played(&self, setup: &episode::Setup) -> (EpisodeLog, f64) {
         let mut agent = self.agent();
         agent.begin();

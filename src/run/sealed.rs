@@ -58,7 +58,7 @@ pub enum DatabaseError {
 }
 
 impl DatabaseError {
-    /// Whether the file was damaged or changed, so that what it is of must be played again. Anything else is no loss.
+    /// Whether the file was damaged or changed, so that its episodes must be played again. Other errors lose nothing.
     pub fn is_torn(&self) -> bool {
         matches!(self, DatabaseError::Damaged { .. } | DatabaseError::Rows { .. })
     }
@@ -78,8 +78,8 @@ impl From<rusqlite::Error> for DatabaseError {
 pub struct Layout {
     /// Raised whenever a column changes.
     pub version: i64,
-    /// What is added as a whole, in a word, which is also its key: `episode`, `cell`. The first of the tables has
-    /// one row for each.
+    /// Name of the unit that is added as a whole, which is also the name of its key column: `episode`, `cell`. The
+    /// first of the tables has one row for each unit.
     pub unit: &'static str,
     /// The tables with its rows.
     pub tables: &'static [&'static str],

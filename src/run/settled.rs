@@ -14,7 +14,7 @@ use sha2::{Digest, Sha256};
 use crate::files::Temporary;
 use crate::run::sealed::{DatabaseError, Layout, add_rows, check_plain, plain_tables};
 
-/// A unit to take over: its number in the other file, and the one that it gets.
+/// A unit to take over: its number in the other file, and the number that it gets here.
 pub type Numbered = (i64, i64);
 
 /// A database of units that know nothing of each other.
@@ -76,11 +76,11 @@ pub trait Units: Sized {
         Ok(numbers.collect::<Result<_, _>>()?)
     }
 
-    /// Takes units over from another file of the kind, all or none; those that are here already must be alike. `adjust` is
-    /// called before they are sealed.
+    /// Takes units over from another file of this kind, all or none. A unit that is here already must be equal.
+    /// `adjust` is called before they are sealed.
     ///
     /// # Errors
-    /// If one of the files cannot be used, or both have a unit, and in one of them it is another.
+    /// If one of the files cannot be used, or a unit that both have differs.
     fn take(
         &mut self,
         other: &Path,

@@ -79,7 +79,7 @@ impl<'a> Stage<'a> {
         (log, judgements, first)
     }
 
-    /// Indices of the collisions of a log of it that the space's verdict counts.
+    /// Indices of the collisions that the space's verdict counts, in a log of this scenario.
     pub fn counted(&self, ads: &Selected, log: &EpisodeLog) -> Vec<usize> {
         oracle::counted_at_need(self.table.space(), log, || self.judge(ads, log))
     }
@@ -108,8 +108,9 @@ impl<'a> Stage<'a> {
         oracle::verify(self.table.space(), self.scenario, log, &judgements, &replays)
     }
 
-    /// The claims that a log of it refutes, among those that `asked` names: only such as need no further play, so neither
-    /// causes nor minimality. `judgements` has one for each collision, if one of these claims is about verdicts.
+    /// The claims that a log of it refutes, among those that `asked` selects. Claims that need further plays (causes,
+    /// minimality) count as not tried. `judgements` has one for each collision, if one of these claims is about
+    /// verdicts.
     pub fn refuted(
         &self,
         ads: &Selected,

@@ -25,7 +25,7 @@ pub struct EpisodeSummary {
     pub manners: Manners,
     /// Time that an agent with lookahead simulated in branches, outside the episode, s.
     pub branched_s: f64,
-    /// What every row was offered as; empty if the episode is not a run's.
+    /// The offers of every row; empty if the episode is not a run's.
     pub offered: Offered,
 }
 

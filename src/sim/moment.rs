@@ -31,7 +31,7 @@ impl World {
 }
 
 impl Around<'_> {
-    /// The facts of this moment. Where one road user looks around, it does not count itself: see [`MomentFacts::with`].
+    /// The facts of this moment. A road user that looks around does not count itself: see [`MomentFacts::with`].
     pub fn moment_facts(&self) -> MomentFacts {
         let OnRoute { limit_mps, junction_ahead_m, route_left_m, signal, road } = self.on_route();
         let gaps =

@@ -178,11 +178,11 @@ impl PassedLight {
 pub(super) struct Rights {
     /// The light that the road user passed last.
     passed: Option<PassedLight>,
-    /// Whether it and the ego vehicle are in one lane, or it on foot in the ego vehicle's way; `None` before the
-    /// first look.
+    /// Whether it and the ego vehicle are in one lane, or it is a pedestrian in the ego vehicle's way; `None` before
+    /// the first look.
     shares: Option<bool>,
     meeting: Option<Meeting>,
-    /// Who has priority, it as a wreck in the ego vehicle's way or the ego vehicle; `None` as long as it is neither.
+    /// Who has priority if it is a wreck in the ego vehicle's way; `None` if it is not.
     wreck: Option<Priority>,
     /// Whether it has stood since a moment at which the ego vehicle saw it and could brake gently for it.
     is_foreseen: bool,

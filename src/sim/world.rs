@@ -506,7 +506,7 @@ impl World {
         self.ambient = ambient;
     }
 
-    /// Looks who came into whose way, the ego vehicle or a road user.
+    /// Notes for each road user whether it came into the ego vehicle's way or the ego vehicle into its way.
     fn watch_rights(&mut self) {
         let mut users = core::mem::take(&mut self.users);
         let around = self.around([&[], &[]]);

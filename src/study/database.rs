@@ -109,7 +109,7 @@ impl StudyDatabase {
         Ok(())
     }
 
-    /// Those of some jobs that are not done yet.
+    /// The jobs among these that are not done yet.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -131,7 +131,7 @@ impl StudyDatabase {
         Ok(missing)
     }
 
-    /// The numbers of all cells, each with the one that it has in a settled file: its place in the study.
+    /// The numbers of all cells, each with its number in a settled file, which is its place in the study.
     ///
     /// # Errors
     /// If the file cannot be read, or has a cell that is none of the study's.

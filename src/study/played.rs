@@ -18,7 +18,7 @@ const SCHEMA: u32 = 1;
 /// A study as it was played.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Played {
-    /// What the avastra that played it was built from, if somebody said so.
+    /// The commit that avastra was built from when it played the study, if it was given.
     pub commit: Option<String>,
     pub settings: StudySettings,
     pub cells: Vec<MeasuredCell>,

@@ -20,7 +20,7 @@ pub struct CellRecord {
     pub trained: Vec<TrainedRecord>,
     /// All evaluated episodes, seed by seed.
     pub episodes: Vec<EpisodeRecord>,
-    /// Zero where nothing says it: `study.db` does not.
+    /// Zero if unknown; `study.db` does not keep it.
     pub spent: Spent,
 }
 

@@ -33,7 +33,7 @@ pub struct Evaluation {
     pub failures: BTreeMap<FailureKind, u64>,
 }
 
-/// Plays so many episodes on each road; `make` gives a fresh agent for each.
+/// Plays a number of episodes on each road; `make` gives a fresh agent for each.
 pub fn evaluate(
     arena: &Arena,
     make: &dyn Fn() -> Box<dyn Agent>,

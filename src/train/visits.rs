@@ -70,7 +70,7 @@ pub fn training_arena(
     Arena::new(table, roads, trained_against(policy)?, &origin.with, &origin.without)
 }
 
-/// The visits of so many episodes on each road; their seeds come from a stream, numbered from `first`.
+/// The visits of `episodes` episodes on each road; their seeds come from a stream, numbered from `first`.
 pub(super) fn visits(
     arena: &Arena,
     policy: &QPolicy,

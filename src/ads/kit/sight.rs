@@ -1,8 +1,6 @@
 //! A simple perception: what is in range and in sight, ten times a second, and a little late.
-//!
-//! It is for driving systems that are about planning or control. Ranges and delays are those of `modular`;
-//! what is seen is seen as it is. Noise, missed frames, ghosts and wrong classes are left out: `modular` has
-//! them.
+//! It is for driving systems that are about planning or control. Ranges and delays are those of `modular`. An object
+//! that is seen is seen as it is: noise, missed frames, ghosts and wrong classes are left out; `modular` has them.
 
 use crate::sim::{Conditions, FRAME_S, Sensed, SensedObject};
 
@@ -10,9 +8,9 @@ use crate::ads::status::PerceivedObject;
 
 /// How far vehicles and lights are seen, m. Ours, as in `scenarios/ads/default.yaml`.
 pub const RANGE_M: f64 = 120.0;
-/// How far pedestrians are seen by day, m. Ours, likewise.
+/// How far pedestrians are seen by day, m. Ours, as in `scenarios/ads/default.yaml`.
 const PEDESTRIAN_M: f64 = 60.0;
-/// An object of which less is in sight is not seen. Ours, likewise.
+/// An object is not seen if less than this share of it is in sight. Ours, as in `scenarios/ads/default.yaml`.
 const VISIBLE_FRACTION_MIN: f64 = 0.2;
 
 /// What a driver has seen.

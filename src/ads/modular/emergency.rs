@@ -21,7 +21,8 @@ const HORIZON_S: f64 = 3.0;
 /// Part of the vehicle's half width that a contact must reach into, m: what is only grazed is left to the
 /// planner, which passes standing vehicles at 0.4 m. Ours; tests begin at an overlap of a quarter.
 const OVERLAP_M: f64 = 0.25;
-/// Of what enters the path from the side only that is braked for which would be hit by the front, m behind it.
+/// A road user that enters the path from the side is braked for only if the vehicle's front would hit it: at most this
+/// far behind the front, m.
 const FLANK_M: f64 = 1.5;
 /// Time until a command has become braking: the next frame and the brake's own lag, s.
 const RESPONSE_S: f64 = 0.25;

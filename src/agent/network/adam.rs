@@ -17,7 +17,7 @@ const SQUARE_DECAY: f64 = 0.999;
 const FLOOR: f32 = 1e-8;
 
 impl Adam {
-    /// For so many parameters.
+    /// For a network with `parameters` parameters.
     pub fn new(parameters: usize) -> Adam {
         Adam {
             mean: vec![0.0; parameters],

@@ -27,7 +27,7 @@ pub struct Priorities {
     pub exponent: f64,
     /// Added to every TD error, so that none is never drawn.
     pub floor: f64,
-    /// Of the first transition, before there is any TD error.
+    /// Priority of the first transition, before there is any TD error.
     pub first: f64,
 }
 
@@ -91,7 +91,7 @@ impl Replay {
         self.transitions.len()
     }
 
-    /// The last transitions, at most so many, the newest first.
+    /// The last transitions, at most `count`, the newest first.
     pub fn latest(&self, count: usize) -> impl Iterator<Item = &Transition> {
         let newest = self.next + self.capacity - 1;
         (0..count.min(self.len())).map(move |back| &self.transitions[(newest - back) % self.capacity])

@@ -185,7 +185,7 @@ pub fn speed_within(speed_mps: f64, time_s: f64) -> Element {
     private(Element::new("LongitudinalAction").holding(action))
 }
 
-/// Over to a lane so many to the left of the own one, within a way.
+/// A change to the lane that lies `lanes_left` to the left of the own one, within `metres` of way.
 pub fn change_lane(version: Version, name: &str, lanes_left: i32, metres: f64) -> Element {
     let dynamics = Element::new("LaneChangeActionDynamics")
         .with("dynamicsShape", if version == Version::Carla { "linear" } else { "sinusoidal" })

@@ -29,7 +29,7 @@ const LIMIT_MPS: f64 = 11.176;
 /// From this distance to a line on, the wanted speed falls to 0 at 1 m before it, m. LGSVL.
 const LINE_M: f64 = 15.0;
 const LINE_M_MIN: f64 = 1.0;
-/// So near before a junction the longer stop distance holds, m. LGSVL.
+/// Within this distance before a junction the longer stop distance holds, m. LGSVL.
 const BEFORE_JUNCTION_M: f64 = 10.0;
 /// The stream of the draw of the aggression: no driver draws so often where to go.
 const AGGRESSION_DRAW: u32 = u32::MAX;

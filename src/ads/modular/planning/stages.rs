@@ -186,8 +186,8 @@ mod tests {
         }
     }
 
-    /// The stage of a vehicle whose front comes to a place at a speed, and stays there with somebody entering
-    /// or not, after so long.
+    /// The stage of a vehicle whose front comes to a place at a speed and stays there for some time, with or without a
+    /// vehicle that enters.
     fn stage(
         passage: &mut Passage,
         weak: bool,
