@@ -7,12 +7,11 @@ use crate::mdp::Observation;
 use crate::rng::Rng;
 
 use super::branch::Branch;
-use super::hyperparameters::SettingsError;
 use super::presets::Preset;
 use super::search::{
     AvFuzzerSettings, BanditSettings, ConstantSettings, GoExploreSettings, MapElitesSettings,
 };
-use super::settings::Settings;
+use super::settings::{Settings, SettingsError, changed};
 use super::{greedy, presets, random, space_filling};
 
 /// Chooses rows of the action table.
@@ -79,15 +78,18 @@ pub struct Entry {
     pub kind: Kind,
 }
 
+/// Settings of an agent that a file changes, by name.
+type Changes = serde_json::Map<String, serde_json::Value>;
+
 /// How an agent is made.
 pub enum Kind {
     /// It can act at once: a fresh one for each episode, under the odds of the rows.
     Ready(fn(&[u32]) -> Box<dyn Agent>),
     /// It must be trained: its presets, the default first. See [`super::Learner`].
     Learning(&'static [Preset]),
-    /// It searches over many episodes, and what it found can act: how its settings are read from the changes
-    /// of a YAML text. See [`super::Trainable`].
-    Searching(fn(&str) -> Result<Settings, SettingsError>),
+    /// It searches over many episodes, and what it found can act: how its settings are made from changes by name.
+    /// See [`super::Trainable`].
+    Searching(fn(Changes) -> Result<Settings, SettingsError>),
 }
 
 /// Every agent of avastra.
@@ -130,28 +132,34 @@ pub const REGISTRY: &[Entry] = &[
     Entry {
         name: "av-fuzzer",
         summary: "AV-Fuzzer's genetic search over scripts of rows",
-        kind: Kind::Searching(|text| Settings::of_search(text, AvFuzzerSettings::check, Settings::AvFuzzer)),
+        kind: Kind::Searching(|changes| {
+            changed(&AvFuzzerSettings::default(), changes).map(Settings::AvFuzzer)
+        }),
     },
     Entry {
         name: "map-elites",
         summary: "the best script of every kind of collision, and new ones by changing those",
-        kind: Kind::Searching(MapElitesSettings::read),
+        kind: Kind::Searching(|changes| {
+            changed(&MapElitesSettings::default(), changes).map(Settings::MapElites)
+        }),
     },
     Entry {
         name: "constant",
         summary: "a fixed list of rows, those first that crashed most in training: the first legal one acts",
-        kind: Kind::Searching(|text| Settings::of_search(text, ConstantSettings::check, Settings::Constant)),
+        kind: Kind::Searching(|changes| {
+            changed(&ConstantSettings::default(), changes).map(Settings::Constant)
+        }),
     },
     Entry {
         name: "bandit",
         summary: "the row after which most crashes came in such a situation; it plans nothing",
-        kind: Kind::Searching(|text| Settings::of_search(text, BanditSettings::check, Settings::Bandit)),
+        kind: Kind::Searching(|changes| changed(&BanditSettings::default(), changes).map(Settings::Bandit)),
     },
     Entry {
         name: "go-explore",
         summary: "returns to promising moments by snapshots and explores from there",
-        kind: Kind::Searching(|text| {
-            Settings::of_search(text, GoExploreSettings::check, Settings::GoExplore)
+        kind: Kind::Searching(|changes| {
+            changed(&GoExploreSettings::default(), changes).map(Settings::GoExplore)
         }),
     },
 ];
@@ -179,7 +187,8 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::agent::{Collided, Experience, Learner, Rows, Trainable, Trajectory};
+    use crate::agent::settings::Configured;
+    use crate::agent::{Collided, Experience, Rows, Trainable, Trajectory};
     use crate::mdp::Closeness;
     use crate::rng::{Stream, child_seed, stream};
 
@@ -193,13 +202,13 @@ mod tests {
             Kind::Learning(presets) => {
                 let learner = |preset: &Preset| -> (Box<dyn Agent>, bool) {
                     let settings = (preset.settings)();
-                    let obeys = settings.masks_choice;
-                    (Box::new(Learner::new(Arc::new(settings), rows(), seed)), obeys)
+                    let obeys = settings.choice.masks_choice;
+                    (Box::new(settings.build(rows(), seed)), obeys)
                 };
                 presets.iter().map(learner).collect()
             }
             Kind::Searching(read) => {
-                let mut search = read("").unwrap().build(rows(), seed);
+                let mut search = read(Changes::new()).unwrap().build(rows(), seed);
                 let beginning = search.beginning(0, seed);
                 assert_eq!((beginning.seed, beginning.from), (seed, None), "it knows no other start yet");
                 vec![(search, true)]

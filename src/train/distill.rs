@@ -17,7 +17,7 @@ use crate::train::visits::{Record, visits};
 
 /// Rules that imitate a policy, with the limits that its settings give; empty if the policy never made a choice.
 pub fn distill(arena: &Arena, policy: &QPolicy, seed: u64) -> Vec<PolicyRule> {
-    let settings = policy.settings();
+    let settings = &policy.settings().rules;
     let episodes = u64::from(settings.rules_episodes);
     let mut lessons: Vec<Visit> = Vec::new();
     let mut student = policy.clone();

@@ -267,7 +267,7 @@ fn play(
     moments: &BTreeMap<usize, Play>,
     settings: &TrainSettings,
 ) -> Played {
-    let searches = settings.hyperparameters.hyperparameters().is_none();
+    let searches = settings.hyperparameters.learner().is_none();
     let first_new = beginning.from.map_or(0, |(_, step)| step);
     let from = beginning.from.and_then(|(key, _)| moments.get(&key));
     let mut choices = Vec::new();

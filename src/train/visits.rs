@@ -65,7 +65,7 @@ pub fn training_arena(
     acting: &QPolicy,
     roads: &[String],
 ) -> Result<Arena, RunError> {
-    let table = with_period(table.clone(), acting.settings().observation_period_s);
+    let table = with_period(table.clone(), acting.settings().payment.observation_period_s);
     let origin = &policy.origin;
     Arena::new(table, roads, trained_against(policy)?, &origin.with, &origin.without)
 }

@@ -7,11 +7,13 @@
 //! policy by imitation at this point. So the bandit alone is its baseline: returning has to add something.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use ndarray::ArrayView1;
 
-use crate::agent::hyperparameters::{SettingsError, require, within};
+use crate::agent::q_policy::Rows;
 use crate::agent::registry::Agent;
+use crate::agent::settings::{Configured, SettingsError, require, unit, within};
 use crate::agent::trainable::{Beginning, Trainable};
 use crate::agent::trajectory::{Lesson, Trajectory};
 use crate::mdp::Observation;
@@ -41,22 +43,34 @@ impl Default for GoExploreSettings {
     }
 }
 
-impl GoExploreSettings {
-    /// # Errors
-    /// If a value is out of range.
-    pub fn check(&self) -> Result<(), SettingsError> {
+impl Configured for GoExploreSettings {
+    type Agent = GoExplore;
+
+    fn check(&self) -> Result<(), SettingsError> {
         require([
-            within("fresh_share", self.fresh_share, 0.0..=1.0, "from 0 to 1"),
+            unit("fresh_share", self.fresh_share),
             within("cells_max", self.cells_max, 0..=100_000, "up to 100000"),
         ])?;
         self.choices.check()
+    }
+
+    fn build(&self, rows: Arc<Rows>, _: u64) -> GoExplore {
+        GoExplore::new(self, rows.allowed.len())
+    }
+
+    fn restore(&self, rows: Arc<Rows>, bytes: &[u8]) -> Option<GoExplore> {
+        let rows = rows.allowed.len();
+        let saved: SavedGoExplore = serde_json::from_slice(bytes).ok()?;
+        let genes = || saved.cells.iter().flat_map(|cell| &cell.genes).flatten();
+        let fits = saved.worth.is_of(rows) && genes().all(|gene| (gene.row as usize) < rows);
+        fits.then(|| GoExplore { saved, ..GoExplore::new(self, rows) })
     }
 }
 
 /// The search.
 pub struct GoExplore {
     settings: GoExploreSettings,
-    memory: Memory,
+    saved: SavedGoExplore,
     // The episode under way.
     road: usize,
     /// A seed that no episode had before.
@@ -80,7 +94,7 @@ struct Made {
 
 /// What the search keeps from episode to episode.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-struct Memory {
+struct SavedGoExplore {
     steps: u64,
     cells: Vec<Cell>,
     worth: Worth,
@@ -113,7 +127,7 @@ impl GoExplore {
     pub fn new(settings: &GoExploreSettings, rows: usize) -> GoExplore {
         GoExplore {
             settings: settings.clone(),
-            memory: Memory { steps: 0, cells: Vec::new(), worth: Worth::new(rows) },
+            saved: SavedGoExplore { steps: 0, cells: Vec::new(), worth: Worth::new(rows) },
             road: 0,
             fresh: 0,
             beginning: Beginning { seed: 0, from: None },
@@ -124,14 +138,6 @@ impl GoExplore {
         }
     }
 
-    /// The search that was saved; `None` if the bytes are not those of one over so many rows.
-    pub fn restore(settings: &GoExploreSettings, rows: usize, bytes: &[u8]) -> Option<GoExplore> {
-        let memory: Memory = serde_json::from_slice(bytes).ok()?;
-        let genes = || memory.cells.iter().flat_map(|cell| &cell.genes).flatten();
-        let fits = memory.worth.is_of(rows) && genes().all(|gene| (gene.row as usize) < rows);
-        fits.then(|| GoExplore { memory, ..GoExplore::new(settings, rows) })
-    }
-
     /// The number of first steps whose choices are repeated.
     fn depth(&self) -> usize {
         self.beginning.from.map_or(0, |(_, step)| step)
@@ -139,7 +145,7 @@ impl GoExplore {
 
     /// A random cell of the road, drawn in proportion to its promise.
     fn promising(&self, rng: &mut Rng) -> Option<usize> {
-        let here = || self.memory.cells.iter().enumerate().filter(|(_, cell)| cell.road == self.road);
+        let here = || self.saved.cells.iter().enumerate().filter(|(_, cell)| cell.road == self.road);
         let total: f64 = here().map(|(_, cell)| cell.promise()).sum();
         let mut mass = rng::unit(rng) * total;
         for (index, cell) in here() {
@@ -154,12 +160,12 @@ impl GoExplore {
     /// Keeps the moments of the episode that are of a new kind, up to the first collision: an episode that
     /// went on from a later moment would count that collision again.
     fn remember(&mut self, episode: &Trajectory) {
-        let here = self.memory.cells.iter().filter(|cell| cell.road == self.road);
+        let here = self.saved.cells.iter().filter(|cell| cell.road == self.road);
         let mut known: BTreeSet<u32> = here.map(|cell| cell.cell).collect();
         for (made, experience) in self.made.iter().zip(&episode.steps) {
             if made.step > 0 && known.len() < self.settings.cells_max && known.insert(made.cell) {
-                self.keepsakes.push((self.memory.cells.len(), made.step));
-                self.memory.cells.push(Cell {
+                self.keepsakes.push((self.saved.cells.len(), made.step));
+                self.saved.cells.push(Cell {
                     road: self.road,
                     cell: made.cell,
                     seed: self.beginning.seed,
@@ -195,8 +201,8 @@ impl Agent for GoExplore {
         // Each step has its own stream, so that it does not matter whether earlier steps were played again.
         let mut rng = rng::stream(self.fresh, Stream::Search, 1 + self.step as u64);
         let here = situation(observation);
-        let row = self.settings.choices.explore(&self.memory.worth, here, legal, &mut rng)?;
-        self.memory.steps += 1;
+        let row = self.settings.choices.explore(&self.saved.worth, here, legal, &mut rng)?;
+        self.saved.steps += 1;
         if self.genes.len() <= self.step {
             self.genes.resize(self.step + 1, None);
         }
@@ -216,7 +222,7 @@ impl Trainable for GoExplore {
         self.beginning = match cell {
             None => Beginning { seed: fresh, from: None },
             Some(index) => {
-                let cell = &self.memory.cells[index];
+                let cell = &self.saved.cells[index];
                 self.genes.clone_from(&cell.genes);
                 Beginning { seed: cell.seed, from: Some((index, cell.genes.len())) }
             }
@@ -227,9 +233,9 @@ impl Trainable for GoExplore {
     fn learn(&mut self, episode: &Trajectory, _: &mut Rng) -> Lesson {
         assert_eq!(self.made.len(), episode.steps.len(), "each new choice is an experience");
         let made = self.made.iter().map(|made| (made.situation, made.row as usize));
-        self.settings.choices.note(&mut self.memory.worth, made, episode);
+        self.settings.choices.note(&mut self.saved.worth, made, episode);
         if let Some((index, _)) = self.beginning.from {
-            let cell = &mut self.memory.cells[index];
+            let cell = &mut self.saved.cells[index];
             cell.visits += 1;
             cell.crashes += u32::from(episode.steps.iter().any(|step| !step.crashes.is_empty()));
         }
@@ -243,7 +249,7 @@ impl Trainable for GoExplore {
     }
 
     fn steps(&self) -> u64 {
-        self.memory.steps
+        self.saved.steps
     }
 
     fn exploration_epsilon(&self) -> f64 {
@@ -251,10 +257,10 @@ impl Trainable for GoExplore {
     }
 
     fn actor(&self) -> Box<dyn Agent> {
-        Box::new(Recorded { settings: self.settings.choices.clone(), worth: self.memory.worth.clone() })
+        Box::new(Recorded { settings: self.settings.choices.clone(), worth: self.saved.worth.clone() })
     }
 
     fn save(&self) -> Vec<u8> {
-        serde_json::to_vec(&self.memory).expect("a search is plain data")
+        serde_json::to_vec(&self.saved).expect("a search is plain data")
     }
 }

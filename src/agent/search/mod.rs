@@ -14,8 +14,8 @@ mod scripts;
 mod situation;
 mod worth;
 
-pub use av_fuzzer::{AvFuzzer, AvFuzzerSettings};
-pub use bandit::{Bandit, BanditSettings};
-pub use constant::{Constant, ConstantSettings};
-pub use go_explore::{GoExplore, GoExploreSettings};
-pub use map_elites::{MapElites, MapElitesSettings};
+pub use av_fuzzer::AvFuzzerSettings;
+pub use bandit::BanditSettings;
+pub use constant::ConstantSettings;
+pub use go_explore::GoExploreSettings;
+pub use map_elites::MapElitesSettings;
