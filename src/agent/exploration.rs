@@ -3,7 +3,7 @@
 use super::settings::{Requirement, SettingsError, count, require, unit, within};
 
 /// How ε falls in a training, and what it is afterwards.
-#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ExplorationSettings {
     /// How ε falls with the steps.
     pub exploration: Exploration,

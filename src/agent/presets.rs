@@ -102,130 +102,88 @@ pub(super) fn paper() -> LearnerSettings {
 /// weather and time, and pays for a collision at the step that made the obstacle appear. The package has a
 /// second table of weights for the traffic rows; here there is one table for all rows.
 pub(super) fn released() -> LearnerSettings {
-    let paper = paper();
-    LearnerSettings {
-        preset: "released".to_owned(),
-        choice: ChoiceSettings {
-            masks_choice: false,
-            masks_target: false,
-            environment_gate_steps: 5,
-            ..paper.choice
-        },
-        payment: PaymentSettings {
-            proc: ProcKind::Released,
-            bound_is_safe: false,
-            delayed_credit: true,
-            ..paper.payment
-        },
-        arrival_is_terminal: false,
-        exploration: ExplorationSettings {
-            exploration: Exploration::ExponentialThenEnd,
-            exploration_steps: 8500,
-            random_steps: 3000,
-            random_decay: 0.05,
-            evaluation_epsilon: 0.2,
-            ..paper.exploration
-        },
-        ..paper
-    }
+    let mut settings = LearnerSettings { preset: "released".to_owned(), ..paper() };
+    settings.choice.masks_choice = false;
+    settings.choice.masks_target = false;
+    settings.choice.environment_gate_steps = 5;
+    settings.payment.proc = ProcKind::Released;
+    settings.payment.bound_is_safe = false;
+    settings.payment.delayed_credit = true;
+    settings.arrival_is_terminal = false;
+    settings.exploration.exploration = Exploration::ExponentialThenEnd;
+    settings.exploration.exploration_steps = 8500;
+    settings.exploration.random_steps = 3000;
+    settings.exploration.random_decay = 0.05;
+    settings.exploration.evaluation_epsilon = 0.2;
+    settings
 }
 
 /// Ours: scaled variables, learning from the first few hundred transitions, a dueling head, and R_col only for
 /// collisions that count, paid where their obstacles were made. R_col, discount, averaging and how ε falls were chosen
 /// by trainings on the crossroad against `planning_never_yields` (`learner_choice.yaml`), with seeds that no other study uses.
 pub(super) fn avastra() -> LearnerSettings {
-    let paper = paper();
-    LearnerSettings {
-        preset: "avastra".to_owned(),
-        choice: ChoiceSettings { state: StateSet::Extended, encoding: Encoding::Scaled, ..paper.choice },
-        payment: PaymentSettings {
-            proc: ProcKind::Avastra,
-            collision_reward: 20.0,
-            uncounted_reward: 0.0,
-            pays_maker: true,
-            ..paper.payment
-        },
-        network: NetworkSettings {
-            hidden_units: vec![64, 64],
-            dueling: true,
-            initialization: Initialization::He,
-        },
-        learning_rate: 5e-4,
-        gradient_norm_max: Some(10.0),
-        learning_starts: 300,
-        target_period_updates: 200,
-        average_decay: 0.998,
-        discount: 0.3,
-        replay: ReplaySettings {
-            replay_capacity: 20_000,
-            priority_exponent: 0.6,
-            priority_floor: 1e-3,
-            priority_first: 1.0,
-            importance_end: 1.0,
-            importance_updates: 30_000,
-            ..paper.replay
-        },
-        exploration: ExplorationSettings {
-            exploration_end: 0.05,
-            exploration_steps: 3000,
-            exploration_share: Some(0.5),
-            evaluation_epsilon: 0.05,
-            ..paper.exploration
-        },
-        ..paper
-    }
+    let mut settings = LearnerSettings { preset: "avastra".to_owned(), ..paper() };
+    settings.choice.state = StateSet::Extended;
+    settings.choice.encoding = Encoding::Scaled;
+    settings.payment.proc = ProcKind::Avastra;
+    settings.payment.collision_reward = 20.0;
+    settings.payment.uncounted_reward = 0.0;
+    settings.payment.pays_maker = true;
+    settings.network.hidden_units = vec![64, 64];
+    settings.network.dueling = true;
+    settings.network.initialization = Initialization::He;
+    settings.learning_rate = 5e-4;
+    settings.gradient_norm_max = Some(10.0);
+    settings.learning_starts = 300;
+    settings.target_period_updates = 200;
+    settings.average_decay = 0.998;
+    settings.discount = 0.3;
+    settings.replay.replay_capacity = 20_000;
+    settings.replay.priority_exponent = 0.6;
+    settings.replay.priority_floor = 1e-3;
+    settings.replay.priority_first = 1.0;
+    settings.replay.importance_end = 1.0;
+    settings.replay.importance_updates = 30_000;
+    settings.exploration.exploration_end = 0.05;
+    settings.exploration.exploration_steps = 3000;
+    settings.exploration.exploration_share = Some(0.5);
+    settings.exploration.evaluation_epsilon = 0.05;
+    settings
 }
 
 /// DeepCollision as described: plain DQN over 12 raw variables, evenly drawn replay.
 fn deep_collision() -> LearnerSettings {
-    let paper = paper();
-    LearnerSettings {
-        preset: "paper".to_owned(),
-        choice: ChoiceSettings { state: StateSet::DeepCollision, ..paper.choice },
-        payment: PaymentSettings {
-            // Its lateral safety distance has a margin, as ours has; the later paper left it out.
-            proc: ProcKind::Avastra,
-            collision_reward: 1.0,
-            uncounted_reward: 1.0,
-            bound_is_safe: false,
-            ..paper.payment
-        },
-        network: NetworkSettings {
-            hidden_units: vec![200, 200],
-            initialization: Initialization::Normal(0.1),
-            ..paper.network
-        },
-        learning_rate: 0.01,
-        batch_len: 32,
-        learning_starts: 2000,
-        double: false,
-        replay: ReplaySettings {
-            replay_capacity: 2000,
-            priority_exponent: 0.0,
-            priority_first: 1.0,
-            importance_begin: 0.0,
-            importance_end: 0.0,
-            ..paper.replay
-        },
-        ..paper
-    }
+    let mut settings = paper();
+    // Its lateral safety distance has a margin, as ours has; the later paper left it out.
+    settings.payment.proc = ProcKind::Avastra;
+    settings.choice.state = StateSet::DeepCollision;
+    settings.payment.collision_reward = 1.0;
+    settings.payment.uncounted_reward = 1.0;
+    settings.payment.bound_is_safe = false;
+    settings.network.hidden_units = vec![200, 200];
+    settings.network.initialization = Initialization::Normal(0.1);
+    settings.learning_rate = 0.01;
+    settings.batch_len = 32;
+    settings.learning_starts = 2000;
+    settings.double = false;
+    settings.replay.replay_capacity = 2000;
+    settings.replay.priority_exponent = 0.0;
+    settings.replay.priority_first = 1.0;
+    settings.replay.importance_begin = 0.0;
+    settings.replay.importance_end = 0.0;
+    settings
 }
 
 /// DeepCollision's published code: ε is the share of greedy choices, and falls; no rule is known, and
 /// arrival ends nothing.
 fn deep_collision_released() -> LearnerSettings {
-    let paper = deep_collision();
-    LearnerSettings {
-        preset: "released".to_owned(),
-        choice: ChoiceSettings { masks_choice: false, masks_target: false, ..paper.choice },
-        payment: PaymentSettings { proc: ProcKind::Released, ..paper.payment },
-        arrival_is_terminal: false,
-        exploration: ExplorationSettings {
-            exploration: Exploration::Exponential,
-            exploration_inverted: true,
-            evaluation_epsilon: 0.2,
-            ..paper.exploration
-        },
-        ..paper
-    }
+    let mut settings = LearnerSettings { preset: "released".to_owned(), ..deep_collision() };
+    settings.payment.proc = ProcKind::Released;
+    settings.choice.masks_choice = false;
+    settings.choice.masks_target = false;
+    settings.arrival_is_terminal = false;
+    settings.exploration.exploration = Exploration::Exponential;
+    settings.exploration.exploration_inverted = true;
+    settings.exploration.evaluation_epsilon = 0.2;
+    settings
 }

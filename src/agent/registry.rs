@@ -255,24 +255,16 @@ mod tests {
     /// An episode in which the first choice makes an obstacle appear that is hit for good in the last.
     fn episode(rows: &[usize]) -> Trajectory {
         let experience = |(at, &row): (usize, &usize)| {
-            let is_last = at + 1 == rows.len();
-            Experience {
-                observation: Observation::zeros(),
-                legal: Array1::from_elem(ROWS, true),
-                row,
-                reward: if is_last { 7.5 } else { -1.0 },
-                hits: if is_last { vec![0] } else { Vec::new() },
-                collided: is_last,
-                crashes: if is_last { vec![Some(0)] } else { Vec::new() },
+            if at + 1 < rows.len() {
+                return Experience::plain(row, -1.0, ROWS);
             }
+            let (hits, crashes) = (vec![0], vec![Some(0)]);
+            Experience { hits, collided: true, crashes, ..Experience::plain(row, 7.5, ROWS) }
         };
         Trajectory {
-            steps: rows.iter().enumerate().map(experience).collect(),
-            last: Observation::zeros(),
-            last_legal: Array1::from_elem(ROWS, true),
-            terminal: true,
             closeness: Closeness { distance_m: 5.0 + rows[0] as f64, margin_m: 0.0 },
             collisions: vec![Collided { kind: format!("walk {}", rows[0]), counted: true }],
+            ..Trajectory::plain(rows.iter().enumerate().map(experience).collect(), ROWS)
         }
     }
 

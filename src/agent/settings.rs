@@ -112,11 +112,6 @@ impl Settings {
         each!(self, own => Some(Box::new(own.restore(rows, bytes)?)))
     }
 
-    /// Every setting by name.
-    fn record(&self) -> Map<String, Value> {
-        record(self)
-    }
-
     /// The settings, if they are those of a learner.
     pub fn learner(&self) -> Option<&LearnerSettings> {
         match self {
@@ -207,7 +202,7 @@ pub(super) fn record(settings: &impl Serialize) -> Map<String, Value> {
 /// A name that is not among the settings of an agent: those agents that have it, or else a name that is like it.
 fn no_setting(name: String, own: &Map<String, Value>) -> SettingsError {
     let default = |entry: &Entry| Settings::from_yaml(entry, None, "").and_then(Result::ok);
-    let has_it = |entry: &&Entry| default(entry).is_some_and(|other| other.record().contains_key(&name));
+    let has_it = |entry: &&Entry| default(entry).is_some_and(|other| record(&other).contains_key(&name));
     let owners: Vec<&str> = REGISTRY.iter().filter(has_it).map(|entry| entry.name).collect();
     if !owners.is_empty() {
         return SettingsError::Elsewhere { name, owners: listed(&owners) };

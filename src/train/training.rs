@@ -249,7 +249,7 @@ impl Training {
 }
 
 /// An episode of a training, before it is judged.
-struct Played {
+struct Unjudged {
     log: EpisodeLog,
     /// The choices that were made anew.
     choices: Vec<Chosen>,
@@ -266,7 +266,7 @@ fn play(
     beginning: Beginning,
     moments: &BTreeMap<usize, Play>,
     settings: &TrainSettings,
-) -> Played {
+) -> Unjudged {
     let searches = settings.hyperparameters.learner().is_none();
     let first_new = beginning.from.map_or(0, |(_, step)| step);
     let from = beginning.from.and_then(|(key, _)| moments.get(&key));
@@ -305,7 +305,7 @@ fn play(
         last = Some((moment.observation.clone(), legal));
     };
     let log = episode::run_from(setup, from.cloned(), &mut make_choice, &mut watch, &mut at_last);
-    Played { log, choices, last, snapshots, closeness }
+    Unjudged { log, choices, last, snapshots, closeness }
 }
 
 /// A choice of the agent, with the observation and the legal rows that it was made on.

@@ -136,7 +136,7 @@ impl Configured for LearnerSettings {
         let network = Network::new(shape, self.network.initialization, &mut rng);
         let adam = Adam::new(network.parameters().len(), self.learning_rate);
         let policy = QPolicy::new(Arc::new(self.clone()), rows, network);
-        Learner::new(policy, Replay::new(self.replay), adam, self.exploration.clone())
+        Learner::new(policy, Replay::new(self.replay), adam, self.exploration)
     }
 
     fn restore(&self, rows: Arc<Rows>, bytes: &[u8]) -> Option<Learner> {

@@ -7,7 +7,6 @@ use std::sync::Arc;
 use crate::agent::settings::Configured;
 use crate::agent::trajectory::Experience;
 use crate::agent::{Rows, Settings, by_name};
-use crate::mdp::Closeness;
 use crate::rng::{Stream, stream};
 
 use super::update::{loss, targets};
@@ -61,15 +60,7 @@ fn all(rows: usize) -> Array1<bool> {
 }
 
 fn experience(state: usize, row: usize, reward: f64, rows: usize) -> Experience {
-    Experience {
-        observation: sight(state),
-        legal: all(rows),
-        row,
-        reward,
-        hits: Vec::new(),
-        collided: false,
-        crashes: Vec::new(),
-    }
+    Experience { observation: sight(state), ..Experience::plain(row, reward, rows) }
 }
 
 /// An episode with a step for each reward; its rows and states count up from 0.
@@ -80,14 +71,7 @@ pub fn episode(rewards: &[f64]) -> Trajectory {
 
 /// An episode that ended of its own in a state.
 fn ended(steps: Vec<Experience>, last: usize, rows: usize) -> Trajectory {
-    Trajectory {
-        steps,
-        last: sight(last),
-        last_legal: all(rows),
-        terminal: true,
-        closeness: Closeness::default(),
-        collisions: Vec::new(),
-    }
+    Trajectory { last: sight(last), ..Trajectory::plain(steps, rows) }
 }
 
 #[test]

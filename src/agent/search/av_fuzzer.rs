@@ -22,7 +22,7 @@ use crate::mdp::Observation;
 use crate::rng;
 use crate::rng::{Rng, Stream};
 
-use super::played::{Gene, seed, start_of};
+use super::genes::{Gene, seed, start_of};
 use super::population::{Individual, Population};
 use super::scripts::{Found, Scripts, keep};
 

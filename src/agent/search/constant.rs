@@ -159,28 +159,13 @@ impl Agent for List {
 mod tests {
     use super::*;
     use crate::agent::Experience;
-    use crate::mdp::Closeness;
     use ndarray::Array1;
 
     /// An episode of two steps with so many counted collisions.
     fn episode(counted: usize) -> Trajectory {
-        let step = |crashes: usize| Experience {
-            observation: Observation::zeros(),
-            legal: Array1::from_elem(4, true),
-            row: 0,
-            reward: 0.0,
-            hits: Vec::new(),
-            collided: crashes > 0,
-            crashes: vec![None; crashes],
-        };
-        Trajectory {
-            steps: vec![step(0), step(counted)],
-            last: Observation::zeros(),
-            last_legal: Array1::from_elem(4, true),
-            terminal: true,
-            closeness: Closeness::default(),
-            collisions: Vec::new(),
-        }
+        let quiet = Experience::plain(0, 0.0, 4);
+        let crashed = Experience { collided: counted > 0, crashes: vec![None; counted], ..quiet.clone() };
+        Trajectory::plain(vec![quiet, crashed], 4)
     }
 
     #[test]

@@ -21,7 +21,7 @@ use crate::rng;
 use crate::rng::{Rng, Stream};
 
 use super::bandit::{BanditSettings, Recorded};
-use super::played::{Gene, Genes};
+use super::genes::{Gene, Genes};
 use super::situation::{cell, situation};
 use super::worth::Worth;
 

@@ -21,7 +21,7 @@ use crate::mdp::Observation;
 use crate::rng;
 use crate::rng::{Rng, Stream};
 
-use super::played::start_of;
+use super::genes::start_of;
 use super::population::Individual;
 use super::scripts::{Found, Scripts};
 
@@ -219,18 +219,14 @@ mod tests {
     use super::*;
     use crate::agent::trajectory::Collided;
     use crate::mdp::Closeness;
-    use ndarray::Array1;
 
     /// An episode with these collisions, and an obstacle that came this close.
     fn episode(collisions: &[(&str, bool)], distance_m: f64) -> Trajectory {
         let collided = |&(kind, counted): &(&str, bool)| Collided { kind: kind.to_owned(), counted };
         Trajectory {
-            steps: Vec::new(),
-            last: Observation::zeros(),
-            last_legal: Array1::from_elem(4, true),
-            terminal: true,
             closeness: Closeness { distance_m, margin_m: 0.0 },
             collisions: collisions.iter().map(collided).collect(),
+            ..Trajectory::plain(Vec::new(), 4)
         }
     }
 

@@ -6,9 +6,9 @@
 mod av_fuzzer;
 mod bandit;
 mod constant;
+mod genes;
 mod go_explore;
 mod map_elites;
-mod played;
 mod population;
 mod scripts;
 mod situation;
