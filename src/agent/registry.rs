@@ -2,6 +2,7 @@
 //! tests run through all of them.
 
 use ndarray::{Array1, ArrayView1};
+use serde_json::{Map, Value};
 
 use crate::mdp::Observation;
 use crate::rng::Rng;
@@ -78,9 +79,6 @@ pub struct Entry {
     pub kind: Kind,
 }
 
-/// Settings of an agent that a file changes, by name.
-type Changes = serde_json::Map<String, serde_json::Value>;
-
 /// How an agent is made.
 pub enum Kind {
     /// It can act at once: a fresh one for each episode, under the odds of the rows.
@@ -89,7 +87,7 @@ pub enum Kind {
     Learning(&'static [Preset]),
     /// It searches over many episodes, and what it found can act: how its settings are made from changes by name.
     /// See [`super::Trainable`].
-    Searching(fn(Changes) -> Result<Settings, SettingsError>),
+    Searching(fn(Map<String, Value>) -> Result<Settings, SettingsError>),
 }
 
 /// Every agent of avastra.
@@ -208,7 +206,7 @@ mod tests {
                 presets.iter().map(learner).collect()
             }
             Kind::Searching(read) => {
-                let mut search = read(Changes::new()).unwrap().build(rows(), seed);
+                let mut search = read(Map::new()).unwrap().build(rows(), seed);
                 let beginning = search.beginning(0, seed);
                 assert_eq!((beginning.seed, beginning.from), (seed, None), "it knows no other start yet");
                 vec![(search, true)]

@@ -34,17 +34,17 @@ pub enum Settings {
 
 /// What the settings of every agent can do.
 pub(super) trait Configured: Serialize + DeserializeOwned {
-    type Agent: Trainable;
+    type Trained: Trainable;
 
     /// # Errors
     /// If a value is out of range.
     fn check(&self) -> Result<(), SettingsError>;
 
     /// An agent that knows nothing yet.
-    fn build(&self, rows: Arc<Rows>, seed: u64) -> Self::Agent;
+    fn build(&self, rows: Arc<Rows>, seed: u64) -> Self::Trained;
 
     /// The agent that was saved; `None` if the bytes are not those of an agent with such settings and rows.
-    fn restore(&self, rows: Arc<Rows>, bytes: &[u8]) -> Option<Self::Agent>;
+    fn restore(&self, rows: Arc<Rows>, bytes: &[u8]) -> Option<Self::Trained>;
 }
 
 /// Why settings are refused.

@@ -100,7 +100,7 @@ impl LearnerSettings {
 }
 
 impl Configured for LearnerSettings {
-    type Agent = Learner;
+    type Trained = Learner;
 
     fn check(&self) -> Result<(), SettingsError> {
         self.payment.check()?;

@@ -64,7 +64,7 @@ impl ReplaySettings {
 
 /// A transition that was drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample {
+pub struct SampledTransition {
     pub index: usize,
     /// Importance weight, in `(0, 1]`, the largest of its batch being 1.
     pub weight: f32,
@@ -150,7 +150,7 @@ impl Replay {
     ///
     /// β, which depends on the updates so far, makes up for the uneven draw: 0 not at all, 1 in full. The buffer must
     /// not be empty.
-    pub fn sample(&self, count: usize, updates: u64, rng: &mut Rng) -> Vec<Sample> {
+    pub fn sample(&self, count: usize, updates: u64, rng: &mut Rng) -> Vec<SampledTransition> {
         let importance_exponent = self.settings.importance_exponent(updates);
         let part = self.tree.total() / count as f64;
         let mut samples = Vec::with_capacity(count);
@@ -163,7 +163,9 @@ impl Replay {
         }
         let weight_max = weights.iter().copied().fold(0.0, f64::max);
         let drawn = samples.into_iter().zip(weights);
-        drawn.map(|(index, weight)| Sample { index, weight: (weight / weight_max) as f32 }).collect()
+        drawn
+            .map(|(index, weight)| SampledTransition { index, weight: (weight / weight_max) as f32 })
+            .collect()
     }
 
     /// Sets a priority by a new TD error.

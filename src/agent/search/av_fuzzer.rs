@@ -72,7 +72,7 @@ impl Default for AvFuzzerSettings {
 }
 
 impl Configured for AvFuzzerSettings {
-    type Agent = AvFuzzer;
+    type Trained = AvFuzzer;
 
     fn check(&self) -> Result<(), SettingsError> {
         require([

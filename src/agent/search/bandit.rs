@@ -49,7 +49,7 @@ impl Default for BanditSettings {
 }
 
 impl Configured for BanditSettings {
-    type Agent = Bandit;
+    type Trained = Bandit;
 
     fn check(&self) -> Result<(), SettingsError> {
         require([

@@ -38,7 +38,7 @@ impl Default for ConstantSettings {
 }
 
 impl Configured for ConstantSettings {
-    type Agent = Constant;
+    type Trained = Constant;
 
     fn check(&self) -> Result<(), SettingsError> {
         require([

@@ -44,7 +44,7 @@ impl Default for GoExploreSettings {
 }
 
 impl Configured for GoExploreSettings {
-    type Agent = GoExplore;
+    type Trained = GoExplore;
 
     fn check(&self) -> Result<(), SettingsError> {
         require([

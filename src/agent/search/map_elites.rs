@@ -45,7 +45,7 @@ impl Default for MapElitesSettings {
 }
 
 impl Configured for MapElitesSettings {
-    type Agent = MapElites;
+    type Trained = MapElites;
 
     fn check(&self) -> Result<(), SettingsError> {
         require([
