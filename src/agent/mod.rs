@@ -12,7 +12,7 @@
 //! - `shuffled` shows a policy states of other episodes, to tell whether it has learned when.
 //! - A [`QPolicy`] acts by a trained network, or by the rules that `decision` distils from it; `features`
 //!   says what a network sees.
-//! - `search` has the searches: AV-Fuzzer and Go-Explore.
+//! - `search` has the searches: AV-Fuzzer, MAP-Elites, constant rows and a bandit.
 //! - [`Settings`] are those of any trainable agent; each agent's own stand beside it. [`LearnerSettings`] are those of
 //!   a learner, the settings of its parts included, and `presets` their values, by source.
 
@@ -48,5 +48,5 @@ pub use q_policy::{Face, QPolicy, Rows};
 pub use registry::{Agent, Entry, Kind, REGISTRY, by_name};
 pub use replay::Transition;
 pub use settings::{Settings, SettingsError};
-pub use trainable::{Beginning, Trainable};
+pub use trainable::Trainable;
 pub use trajectory::{Collided, Experience, Lesson, Trajectory};

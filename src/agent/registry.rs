@@ -9,9 +9,7 @@ use crate::rng::Rng;
 
 use super::branch::Branch;
 use super::presets::Preset;
-use super::search::{
-    AvFuzzerSettings, BanditSettings, ConstantSettings, GoExploreSettings, MapElitesSettings,
-};
+use super::search::{AvFuzzerSettings, BanditSettings, ConstantSettings, MapElitesSettings};
 use super::settings::{Settings, SettingsError, changed};
 use super::{greedy, presets, random, space_filling};
 
@@ -153,13 +151,6 @@ pub const REGISTRY: &[Entry] = &[
         summary: "the row after which most crashes came in such a situation; it plans nothing",
         kind: Kind::Searching(|changes| changed(&BanditSettings::default(), changes).map(Settings::Bandit)),
     },
-    Entry {
-        name: "go-explore",
-        summary: "returns to promising moments by snapshots and explores from there",
-        kind: Kind::Searching(|changes| {
-            changed(&GoExploreSettings::default(), changes).map(Settings::GoExplore)
-        }),
-    },
 ];
 
 /// Never chooses anything.
@@ -207,8 +198,7 @@ mod tests {
             }
             Kind::Searching(read) => {
                 let mut search = read(Map::new()).unwrap().build(rows(), seed);
-                let beginning = search.beginning(0, seed);
-                assert_eq!((beginning.seed, beginning.from), (seed, None), "it knows no other start yet");
+                assert_eq!(search.start_seed(0, seed), seed, "it knows no other start yet");
                 vec![(search, true)]
             }
         }
@@ -280,21 +270,17 @@ mod tests {
             let Some(settings) = Settings::from_yaml(entry, None, text) else { continue };
             let settings = settings.unwrap();
             let play = |agent: &mut Box<dyn Trainable>, number: u64| {
-                let beginning =
-                    agent.beginning((number % 2) as usize, child_seed(9, Stream::Episode, number));
+                let seed = agent.start_seed((number % 2) as usize, child_seed(9, Stream::Episode, number));
                 agent.begin();
-                // A moment that has not been kept is played up to, and that is no new choice.
-                let new_from = beginning.from.map_or(0, |(_, step)| step);
                 let mut chosen = Vec::new();
                 for step in 0..6 {
                     agent.draw_seed(step);
-                    let mut rng = stream(beginning.seed, Stream::Exploration, step as u64);
+                    let mut rng = stream(seed, Stream::Exploration, step as u64);
                     let legal = Array1::from_elem(ROWS, true);
                     chosen.push(agent.choose(&Observation::zeros(), legal.view(), &mut rng).unwrap());
                 }
                 let mut rng = stream(9, Stream::Replay, number);
-                agent.learn(&episode(&chosen[new_from..]), &mut rng);
-                agent.keepsakes();
+                agent.learn(&episode(&chosen), &mut rng);
             };
             let mut whole = settings.build(rows(), 9);
             for number in 0..40 {

@@ -15,9 +15,7 @@ use super::learner::LearnerSettings;
 use super::presets::Preset;
 use super::q_policy::Rows;
 use super::registry::{Entry, Kind, REGISTRY};
-use super::search::{
-    AvFuzzerSettings, BanditSettings, ConstantSettings, GoExploreSettings, MapElitesSettings,
-};
+use super::search::{AvFuzzerSettings, BanditSettings, ConstantSettings, MapElitesSettings};
 use super::trainable::Trainable;
 
 /// All settings of one agent. In a file, the names of the settings tell which kind of agent it is.
@@ -28,7 +26,6 @@ pub enum Settings {
     AvFuzzer(AvFuzzerSettings),
     Constant(ConstantSettings),
     Bandit(BanditSettings),
-    GoExplore(GoExploreSettings),
     MapElites(MapElitesSettings),
 }
 
@@ -74,7 +71,6 @@ macro_rules! each {
             Settings::AvFuzzer($own) => $done,
             Settings::Constant($own) => $done,
             Settings::Bandit($own) => $done,
-            Settings::GoExplore($own) => $done,
             Settings::MapElites($own) => $done,
         }
     };
@@ -286,6 +282,5 @@ mod tests {
             "this agent has no setting `discount`: it is one of `ddqn` and `deep_collision`"
         );
         assert_eq!(message("bandit", "record_share: 2"), "`record_share` is 2, but must be from 0 to 1");
-        assert!(message("go-explore", "choices: { duobt: 1 }").starts_with("`choices`: "));
     }
 }

@@ -135,10 +135,7 @@ fn play_all(
     write(&path.join("results.json"), &format!("{text}\n"))?;
     output.say(&estimate_text(&results, is_unfinished, shard));
     let critical = load::sources_in(&path.join("critical"))?;
-    output.say(&match results.method {
-        Method::Split => "no scenarios: a branch of `split` has no file of its own".to_owned(),
-        Method::Count | Method::Probe => critical_text(&path, &critical),
-    });
+    output.say(&critical_text(&path, &critical));
     let doubts = doubts(estimate.run().program());
     doubts.iter().for_each(|doubt| output.warn(doubt));
     output.result(serde_json::json!({
@@ -343,7 +340,6 @@ fn wanted(output: &Output, arguments: &EstimateArguments) -> Result<(Estimate, S
         method: match arguments.method {
             MethodArgument::Count => Method::Count,
             MethodArgument::Probe => Method::Probe,
-            MethodArgument::Split => Method::Split,
         },
         parts: arguments.parts,
         stopping: Stopping { precision: arguments.precision, hours: arguments.hours },
@@ -456,7 +452,6 @@ fn heading(estimate: &Estimate) -> String {
     let method = match settings.method {
         Method::Count => "by counting",
         Method::Probe => "by trying rows out",
-        Method::Split => "by splitting",
     };
     format!(
         "{}: how often {} under {} against {}, {method}, {} of {} on {}, seed {}",

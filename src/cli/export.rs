@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use crate::export;
 use crate::export::{ExportError, Recording, record};
 
-use super::arguments::{ExportArguments, ExportEgo, ExportFormat, ExportProfile, ExportVersion};
+use super::arguments::{ExportArguments, ExportEgo, ExportFormat, ExportProfile};
 use super::error::Failure;
 use super::files::{copy_map, folder, make, write};
 use super::load;
@@ -82,9 +82,6 @@ struct Exported {
 /// Options that mean nothing for a format are mistakes.
 fn refuse_senseless(arguments: &ExportArguments) -> Result<(), Failure> {
     let is_openscenario = arguments.to == ExportFormat::Openscenario;
-    if arguments.osc_version.is_some() && !is_openscenario {
-        return Err(Failure::usage("`--osc-version` is for `--to openscenario`"));
-    }
     if arguments.natural && !is_openscenario {
         return Err(Failure::usage("`--natural` is for `--to openscenario`"));
     }
@@ -174,10 +171,9 @@ fn write_all(
 
 /// How an OpenSCENARIO file is to be.
 fn style(arguments: &ExportArguments) -> export::Style {
-    let version = match (arguments.profile, arguments.osc_version) {
-        (Some(ExportProfile::Carla), _) => export::Version::Carla,
-        (None, None | Some(ExportVersion::V1_2)) => export::Version::V1_2,
-        (None, Some(ExportVersion::V1_3)) => export::Version::V1_3,
+    let version = match arguments.profile {
+        Some(ExportProfile::Carla) => export::Version::Carla,
+        None => export::Version::V1_2,
     };
     let ego = match arguments.ego {
         None | Some(ExportEgo::Trajectory) => export::Ego::Trajectory,

@@ -114,7 +114,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         "train",
         &[
             ("train scenarios/avastra45.ava --road corner --episodes 750", ""),
-            ("train scenarios/avastra45.ava --agent go-explore", "a search in place of a learner"),
+            ("train scenarios/avastra45.ava --agent map-elites", "a search in place of a learner"),
             ("train --resume runs/0001", "go on after Ctrl-C"),
         ],
     ),

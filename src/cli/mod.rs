@@ -113,6 +113,14 @@ pub fn main() -> ExitCode {
     };
     let arguments = Arguments::from_arg_matches(&found).expect("clap has parsed them");
     let name = found.subcommand_name().expect("clap asks for a command");
+    let has_diagnostics = matches!(arguments.command, Command::Check(_) | Command::Compile(_));
+    if arguments.output.format == Format::Sarif && !has_diagnostics {
+        let failure = Failure::usage(format!(
+            "`--format sarif` is for diagnostics, which `check` and `compile` print: use `--format json` with `{name}`"
+        ));
+        output::remark(&format!("error: {failure}"));
+        return ExitCode::from(failure.status());
+    }
     // An editor's server speaks its protocol on stdout, whatever is asked for.
     let output = match arguments.command {
         Command::Lsp => Output::of(Format::Plain),

@@ -232,7 +232,7 @@ pub const SHAPES: &[Shape] = &[
             f("directory", "text", "where the estimate stands"),
             f("results.schema", "number", "of `results`, as in results.json"),
             f("results.event", "text", "`counted` or `collision`"),
-            f("results.method", "text", "`count`, `probe` or `split`"),
+            f("results.method", "text", "`count` or `probe`"),
             f("results.parts", "number", "parts that are done"),
             f("results.parts_wanted", "number", "all parts, if it does not stop before"),
             f("results.missing", "number", "share of such estimates whose intervals miss the truth, at most"),

@@ -139,7 +139,7 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
         let name = &scenario.name;
         return Err(Failure::usage(format!("`{name}` has no counted collision that could be kept")));
     };
-    let shrunk = oracle::shrink(&stage.setup(&ads), &log, index, &judgements, stage.avoidability());
+    let shrunk = oracle::shrink(&stage.setup(&ads), &log, index, &judgements);
 
     let path = named.map_or_else(|| apart(file), |path| Ok(path.clone()))?;
     let path = path.as_path();
@@ -157,10 +157,8 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
         with: &origin.with,
     };
     let setup = Setup { start: shrunk.start, memory: shrunk.memory, ..stage.setup(&ads) };
-    let spare =
-        oracle::spare_steps(&setup, &shrunk.log, shrunk.index, &shrunk.judgements, stage.avoidability());
+    let spare = oracle::spare_steps(&setup, &shrunk.log, shrunk.index, &shrunk.judgements);
     let mut summary = EpisodeSummary::new(table.space(), source.episode, &shrunk.log, shrunk.judgements);
-    summary.avoidability = stage.avoidability().clone();
     summary.collisions[shrunk.index].minimal = spare.is_empty();
     if scenario.claims.iter().any(|claim| matches!(claim, Claim::Cause { .. })) {
         summary.find_causes(&setup, &shrunk.log).map_err(Failure::usage)?;

@@ -86,7 +86,7 @@ fn play_all(
     let own: Vec<_> = shard.share(&costs).into_iter().map(|job| all[job].clone()).collect();
     let missing = |database: &StudyDatabase| database.missing(study.settings(), own.clone());
     output.tell(&format!("{}, into {}", heading(&study), path.display()));
-    let mut times = Times::read(&path, &database)?;
+    let mut times = Times::read(&path)?;
     for Reused { directory, played } in reused {
         let lacking = missing(&database).map_err(unread)?;
         let new: Vec<_> = played.iter().filter(|(job, _)| lacking.contains(job)).collect();
@@ -208,7 +208,7 @@ pub fn read_sound(directory: &Path) -> Result<(StudySettings, Vec<CellRecord>, O
         .map_err(|error| Failure::file("read", &path, yaml_mistake(&error, &text)))?;
     let unread = |error| Failure::file("read", &file, error);
     let (database, remark) = run_directory::open_to_read::<StudyDatabase>(&file, &text)?;
-    let cells = Times::read(directory, &database)?.on(database.cells().map_err(unread)?);
+    let cells = Times::read(directory)?.on(database.cells().map_err(unread)?);
     if !FailedCell::among(&cells).is_empty() {
         return Err(Failure::file("use", &file, "the driving system failed in it, so there are no results"));
     }

@@ -311,9 +311,7 @@ impl Suite<'_> {
             Some(index) if self.asked.is_nothing() => {
                 Regression::StillFails { time_s: log.collisions[index].contact.time_s }
             }
-            Some(index) => {
-                oracle::regression(&stage.setup(&recorded), &log, index, &ads, stage.avoidability())
-            }
+            Some(index) => oracle::regression(&stage.setup(&recorded), &log, index, &ads),
             // Already with the driving system that it was found with.
             None => Regression::OtherCrash,
         };

@@ -110,7 +110,7 @@ pub fn run_from(
     let mut play = from.unwrap_or_else(|| Play::new(setup));
     watch(&play.world, play.ads.as_ref(), &[]);
     let end = loop {
-        let observation = match play.look(setup) {
+        let observation = match play.look() {
             Ok(observation) => observation,
             Err(end) => break end,
         };
@@ -217,11 +217,10 @@ impl Play {
     ///
     /// # Errors
     /// The end of the episode, if its driving system cannot drive any more.
-    pub fn look(&mut self, setup: &Setup) -> Result<Observation, End> {
+    pub fn look(&self) -> Result<Observation, End> {
         if let Some(end) = self.failed() {
             return Err(end);
         }
-        self.fork(setup);
         Ok(self.observation())
     }
 
@@ -273,16 +272,6 @@ impl Play {
             surroundings: &self.world,
             seed: self.seed,
             step: self.steps.len() as u64,
-        }
-    }
-
-    /// Lets chance fall otherwise, if the setup says so of this moment. A second time it changes nothing.
-    fn fork(&mut self, setup: &Setup) {
-        let now = self.world.ticks();
-        for fork in setup.forks.iter().filter(|fork| fork.tick == now) {
-            self.seed = fork.seed;
-            self.world.reseed(fork.seed);
-            self.ads.reseed(setup.ads.seed_of_errors(fork.seed));
         }
     }
 
@@ -392,7 +381,6 @@ impl Play {
     /// nothing moved. It is 1 at the tick of a contact. After that
     /// the obstacle is ignored: it stands against the ego vehicle for a while and is no danger any more.
     fn tick(&mut self, setup: &Setup, watch: &mut Watch) -> Option<Near> {
-        self.fork(setup);
         self.world.sense(&mut self.sensed);
         let control = self.ads.drive(&self.sensed);
         if self.ads.failure().is_some() {

@@ -41,9 +41,6 @@ pub struct Origin {
     /// The traffic profile as one line of YAML, and its digest; the default if not given.
     pub traffic: Option<String>,
     pub traffic_digest: Option<String>,
-    /// Settings of the verdict whether collisions were avoidable, as one line of YAML; the defaults if not
-    /// given.
-    pub avoidability: Option<String>,
     /// Rules that were asked for (`--with`) and switched off (`--without`).
     pub with: Vec<String>,
     pub without: Vec<String>,

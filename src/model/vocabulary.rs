@@ -322,7 +322,6 @@ words! {
     Engine "engine" = "The version of the world's physics.",
     Traffic "traffic" = "How other vehicles drove, if not as they usually do.",
     TrafficDigest "traffic_digest" = "The digest of all settings of the traffic.",
-    Avoidability "avoidability" = "The reference drivers, if they are not the usual ones.",
     With "with" = "The optional rules that were on.",
     Without "without" = "The rules that were off.",
 }

@@ -13,7 +13,6 @@ use crate::episode;
 use crate::episode::{Choice, Moment};
 use crate::mdp::ProcKind;
 use crate::model::{Road, RulesInForce, Space};
-use crate::oracle::AvoidabilitySettings;
 use crate::prove;
 use crate::rng;
 use crate::rng::{Rng, Stream};
@@ -121,7 +120,6 @@ impl Arena {
             start: Start { traffic: self.traffic, ..episode::start(space, &memory, seed) },
             memory,
             period_shifts: Vec::new(),
-            forks: Vec::new(),
             proc: ProcKind::default(),
         }
     }
@@ -217,8 +215,7 @@ impl Branch for Lookahead<'_> {
         let step = self.moment.step;
         let collided = log.collisions.iter().any(|collision| collision.step == step);
         let counts = || {
-            let settings = AvoidabilitySettings::default();
-            let summary = EpisodeSummary::judged(self.moment.setup(), 0, &log, &settings);
+            let summary = EpisodeSummary::judged(self.moment.setup(), 0, &log);
             summary.collisions.iter().any(|finding| finding.counted && finding.collision.step == step)
         };
         Trial {

@@ -25,7 +25,6 @@ use crate::run::summary::{EpisodeSummary, Finding};
 
 pub(crate) const LAYOUT: Layout = Layout {
     version: 10,
-    older: &[],
     unit: "episode",
     tables: &["episode", "step", "held", "offer", "collision", "failure", "learning", "scenario"],
     naming: Some(("offer", "reason")),

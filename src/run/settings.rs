@@ -55,7 +55,7 @@ pub struct RunSettings {
     pub without: Vec<String>,
     /// Optional rules switched on.
     pub with: Vec<String>,
-    /// How the avoidability of collisions is judged.
+    /// How the avoidability of collisions is judged: in one way, of which this is the record.
     #[serde(default)]
     pub avoidability: AvoidabilitySettings,
 }
@@ -131,8 +131,10 @@ pub enum RunError {
     Twice { name: String },
     #[error("{found} episodes a road: from 1 to {EPISODES_MAX} are possible")]
     Episodes { found: u32 },
-    #[error(transparent)]
-    Avoidability(#[from] oracle::AvoidabilityError),
+    #[error(
+        "its settings say that avoidability was judged in another way (`avoidability`), which is not possible here: begin a new one"
+    )]
+    Avoidability,
     #[error(transparent)]
     NoModules(#[from] oracle::NoModules),
     #[error(transparent)]

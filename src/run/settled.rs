@@ -184,7 +184,7 @@ impl Layout {
             keys.sort_by_key(|column| column.key);
             let rest = keys.iter().filter(|column| column.name != self.unit);
             let order: Vec<String> = rest.map(|column| format!(", there.{}", column.name)).collect();
-            // The columns are those of today's layout: one that an older layout had besides is left out.
+            // The columns by name: two files of one layout need not have them in one order.
             transaction.execute_batch(&format!(
                 "INSERT INTO main.{table} ({}) SELECT {} FROM taking JOIN other.{table} AS there ON there.{} = taking.old
                  ORDER BY taking.number{}",
@@ -220,7 +220,7 @@ impl Layout {
     }
 }
 
-/// The columns of a table in today's layout.
+/// The columns of a table.
 fn columns(connection: &Connection, table: &str) -> Result<Vec<Column>, rusqlite::Error> {
     let mut query = connection.prepare_cached("SELECT name, pk FROM pragma_table_info(?, 'main')")?;
     let columns = query.query_map([table], |row| Ok(Column { name: row.get(0)?, key: row.get(1)? }))?;

@@ -49,11 +49,6 @@ impl Shard {
         self.of == 1
     }
 
-    /// Its number, from 1.
-    pub fn number(self) -> u32 {
-        self.shard
-    }
-
     /// The number of all pieces.
     pub fn count(self) -> u32 {
         self.of

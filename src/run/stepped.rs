@@ -125,7 +125,7 @@ impl Stepped {
         if self.findings.len() < self.play.collisions().len() {
             let setup = self.run.setup_of(self.road, self.seed);
             let log = self.play.clone().into_log(&setup, self.end.unwrap_or(End::Script));
-            let judged = EpisodeSummary::judged(&setup, 0, &log, &self.run.settings().avoidability);
+            let judged = EpisodeSummary::judged(&setup, 0, &log);
             self.findings = judged.collisions;
         }
         &self.findings
@@ -151,7 +151,7 @@ impl Stepped {
     fn look(&mut self) {
         let run = Arc::clone(&self.run);
         let setup = run.setup_of(self.road, self.seed);
-        match self.end.map_or_else(|| self.play.look(&setup), Err) {
+        match self.end.map_or_else(|| self.play.look(), Err) {
             Ok(observation) => self.observation = observation,
             Err(end) => {
                 self.end = Some(end);

@@ -114,11 +114,6 @@ pub struct World {
 }
 
 impl World {
-    /// From now on others' choices come from another seed.
-    pub fn reseed(&mut self, seed: u64) {
-        self.seed = seed;
-    }
-
     /// The beginning of an episode: the ego vehicle rolls with its rear axle on the start of
     /// the route; beside ambient traffic, if asked for, nothing else is there.
     pub fn new(scene: Arc<Scene>, start: &Start) -> World {

@@ -6,6 +6,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::agent::by_name;
 use crate::model::digest;
 use crate::study::measures::{MEASURES, MeasuredCell};
 use crate::study::record::{CellRecord, Spent};
@@ -78,6 +79,20 @@ fn unsealed(text: &str) -> Result<&str, String> {
     }
 }
 
+/// Reads the first line. An agent that was played may be gone since: what it found stays, and of its settings, which nothing
+/// can read any more, only the episodes.
+fn read_head(line: &str) -> Result<Head, serde_json::Error> {
+    let mut head: serde_json::Value = serde_json::from_str(line)?;
+    let agents = head.pointer_mut("/settings/agents").and_then(serde_json::Value::as_array_mut);
+    for agent in agents.into_iter().flatten() {
+        let is_gone = agent["name"].as_str().is_some_and(|name| by_name(name).is_none());
+        if let Some(settings) = agent.pointer_mut("/training/hyperparameters").filter(|_| is_gone) {
+            *settings = serde_json::json!({});
+        }
+    }
+    serde_json::from_value(head)
+}
+
 impl Played {
     /// What is kept of a study's cells, in the order of agents, roads and numbers.
     pub fn new(settings: StudySettings, cells: &[CellRecord], commit: Option<String>) -> Played {
@@ -124,7 +139,7 @@ impl Played {
         let at = |index: usize| move |reason: serde_json::Error| format!("line {}: {reason}", index + 1);
         let mut lines = unsealed(text)?.lines().enumerate();
         let (_, head) = lines.next().ok_or("it is empty")?;
-        let head: Head = serde_json::from_str(head).map_err(at(0))?;
+        let head = read_head(head).map_err(at(0))?;
         if head.schema != SCHEMA {
             return Err(format!("it has schema {}, this version of avastra reads {SCHEMA}", head.schema));
         }

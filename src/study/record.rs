@@ -43,7 +43,7 @@ pub struct TrainedRecord {
     pub counted: u32,
     pub exploration_epsilon: f64,
     pub loss: Option<f64>,
-    /// Time simulated for it, s: branches included, the part that a snapshot saved left out.
+    /// Time simulated for it, s: branches included.
     pub simulated_s: f64,
 }
 

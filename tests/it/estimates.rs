@@ -43,7 +43,7 @@ fn cut(directory: &Path) {
 #[test]
 fn an_estimate_depends_on_its_settings_alone() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
-    for (method, episodes, parts) in [("count", "20", "4"), ("split", "20", "4"), ("probe", "10", "3")] {
+    for (method, episodes, parts) in [("count", "20", "4"), ("probe", "10", "3")] {
         let directory = scratch.path().join(method);
         let out = directory.display().to_string();
         let (status, stdout, stderr) =
@@ -158,11 +158,8 @@ fn two_driving_systems_are_told_apart_in_the_same_episodes() {
 
 #[test]
 fn requests_that_cannot_be_met_are_refused() {
-    let cases: [(&[&str], &str); 9] = [
+    let cases: [(&[&str], &str); 6] = [
         (&["estimate", SPACE, "--parts", "1"], "from 2 to"),
-        (&["estimate", SPACE, "--method", "split", "--episodes", "3"], "at least 10"),
-        (&["estimate", SPACE, "--method", "split", "--ads-cmd", "true"], "--method count"),
-        (&["estimate", SPACE, "--method", "split", "--agent", "greedy"], "has looked at what comes after"),
         (&["estimate", SPACE, "--method", "probe", "--ads-cmd", "true"], "--method count"),
         (&["estimate", SPACE, "--method", "probe", "--agent", "greedy"], "no weight"),
         (&["estimate", SPACE, "--precision", "2"], "a share of the probability"),

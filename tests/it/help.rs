@@ -68,7 +68,7 @@ fn completions_offer_the_values_of_closed_sets() {
     for shell in ["bash", "zsh", "fish"] {
         let (status, script, _) = outcome(&mut avastra(&["completions", shell]));
         assert_eq!(status, 0);
-        for value in ["random-raw", "frenet", "go-explore", "released", "sarif", "network"] {
+        for value in ["random-raw", "frenet", "map-elites", "released", "sarif", "network"] {
             assert!(script.contains(value), "{shell}: {value}");
         }
     }

@@ -429,5 +429,5 @@ fn a_database_of_another_kind_is_refused_by_its_layout() {
     let path = scratch.path().join("run.db");
     Database::open(&path, "").expect("it is new");
     let refused = StudyDatabase::open(&path, "").err().expect("it is not a study's").to_string();
-    assert!(refused.ends_with("this version of avastra reads 1005"), "{refused}");
+    assert!(refused.ends_with("this version of avastra reads 1005: begin a new one"), "{refused}");
 }

@@ -167,11 +167,6 @@ impl Modular {
 }
 
 impl Ads for Modular {
-    fn reseed(&mut self, seed: u64) {
-        self.localization.reseed(seed);
-        self.perception.reseed(seed);
-    }
-
     fn drive(&mut self, sensed: &Sensed) -> Control {
         let localizes = self.watchdog.localizes(sensed.time_s);
         let localized = match self.status.localized {

@@ -73,21 +73,14 @@ pub struct LearnerSettings {
     pub rules: RulesSettings,
 }
 
-/// Settings that came after the first policies: a policy without one was trained with the setting off.
-const LATER: [&str; 3] = ["pays_maker", "average_decay", "exploration_share"];
-
 impl LearnerSettings {
     /// Settings as a policy file records them.
     ///
     /// # Errors
-    /// An unknown setting, a value of the wrong kind or out of range, and if one is missing that the first policies had.
+    /// An unknown setting, a value of the wrong kind or out of range, and if one is missing.
     pub fn from_record(recorded: &Map<String, Value>) -> Result<LearnerSettings, SettingsError> {
-        // In the published presets, what came later is off.
         let base = presets::paper();
-        let required = |name: &&String| !LATER.contains(&name.as_str());
-        if let Some(missing) =
-            base.record().keys().filter(required).find(|name| !recorded.contains_key(*name))
-        {
+        if let Some(missing) = base.record().keys().find(|name| !recorded.contains_key(*name)) {
             return Err(SettingsError::Text(format!("the setting `{missing}` is missing")));
         }
         changed(&base, recorded.clone())
@@ -181,15 +174,10 @@ mod tests {
     }
 
     #[test]
-    fn a_policy_of_before_a_setting_came_was_trained_without_it() {
-        let now = ddqn(None, "pays_maker: true\naverage_decay: 0.99\nexploration_share: 0.5");
+    fn a_record_has_every_setting() {
+        let now = ddqn(None, "exploration_share: null");
         let mut record = now.record();
         assert_eq!(LearnerSettings::from_record(&record).unwrap(), now);
-        for name in LATER {
-            record.remove(name).expect("it is a setting");
-        }
-        let before = ddqn(None, "pays_maker: false\naverage_decay: 0\nexploration_share: null");
-        assert_eq!(LearnerSettings::from_record(&record).unwrap(), before);
         record.remove("discount");
         assert!(LearnerSettings::from_record(&record).unwrap_err().to_string().contains("`discount`"));
     }

@@ -16,7 +16,7 @@ use crate::agent::q_policy::Rows;
 use crate::agent::random::any;
 use crate::agent::registry::Agent;
 use crate::agent::settings::{Configured, SettingsError, require, unit, within};
-use crate::agent::trainable::{Beginning, Trainable};
+use crate::agent::trainable::Trainable;
 use crate::agent::trajectory::{Lesson, Trajectory};
 use crate::mdp::Observation;
 use crate::rng;
@@ -295,14 +295,14 @@ impl Agent for AvFuzzer {
 }
 
 impl Trainable for AvFuzzer {
-    fn beginning(&mut self, road: usize, fresh: u64) -> Beginning {
+    fn start_seed(&mut self, road: usize, fresh: u64) -> u64 {
         self.road = road;
         if self.saved.hunts.len() <= road {
             self.saved.hunts.resize(road + 1, None);
         }
         let (settings, rows) = (&self.settings, self.rows);
         let hunt = self.saved.hunts[road].get_or_insert_with(|| Hunt::new(settings, rows, fresh));
-        Beginning { seed: hunt.start_seed, from: None }
+        hunt.start_seed
     }
 
     fn learn(&mut self, episode: &Trajectory, rng: &mut Rng) -> Lesson {

@@ -9,7 +9,7 @@ use crate::agent::q_policy::Rows;
 use crate::agent::random::any;
 use crate::agent::registry::Agent;
 use crate::agent::settings::{Configured, SettingsError, positive, require, unit, within};
-use crate::agent::trainable::{Beginning, Trainable};
+use crate::agent::trainable::Trainable;
 use crate::agent::trajectory::{Lesson, Trajectory};
 use crate::mdp::Observation;
 use crate::rng;
@@ -74,7 +74,7 @@ impl Configured for BanditSettings {
 
 impl BanditSettings {
     /// A choice of the search: by the record for its share of the choices, else any legal row.
-    pub(super) fn explore(
+    fn explore(
         &self,
         worth: &Worth,
         situation: u32,
@@ -89,12 +89,7 @@ impl BanditSettings {
     }
 
     /// Enters an episode into the record; `made` has the situation and the row of each of its choices.
-    pub(super) fn note(
-        &self,
-        worth: &mut Worth,
-        made: impl Iterator<Item = (u32, usize)>,
-        episode: &Trajectory,
-    ) {
+    fn note(&self, worth: &mut Worth, made: impl Iterator<Item = (u32, usize)>, episode: &Trajectory) {
         for ((situation, row), value) in made.zip(worths(episode, self.credit_discount)) {
             worth.note(situation, row, value);
         }
@@ -149,9 +144,9 @@ impl Agent for Bandit {
 }
 
 impl Trainable for Bandit {
-    fn beginning(&mut self, _: usize, fresh: u64) -> Beginning {
+    fn start_seed(&mut self, _: usize, fresh: u64) -> u64 {
         self.fresh = fresh;
-        Beginning { seed: fresh, from: None }
+        fresh
     }
 
     fn learn(&mut self, episode: &Trajectory, _: &mut Rng) -> Lesson {
@@ -178,7 +173,7 @@ impl Trainable for Bandit {
 }
 
 /// Acts by the record alone.
-pub(super) struct Recorded {
+struct Recorded {
     pub settings: BanditSettings,
     pub worth: Worth,
 }

@@ -12,7 +12,7 @@ use ndarray::ArrayView1;
 use crate::agent::q_policy::Rows;
 use crate::agent::registry::Agent;
 use crate::agent::settings::{Configured, SettingsError, positive, require, within};
-use crate::agent::trainable::{Beginning, Trainable};
+use crate::agent::trainable::Trainable;
 use crate::agent::trajectory::{Lesson, Trajectory};
 use crate::mdp::Observation;
 use crate::rng;
@@ -111,11 +111,11 @@ impl Agent for Constant {
 }
 
 impl Trainable for Constant {
-    fn beginning(&mut self, _: usize, fresh: u64) -> Beginning {
+    fn start_seed(&mut self, _: usize, fresh: u64) -> u64 {
         let mut rng = rng::stream(fresh, Stream::Search, 0);
         self.order = self.ordered(Doubt::Try(self.settings.doubt), &mut rng);
         self.has_led = false;
-        Beginning { seed: fresh, from: None }
+        fresh
     }
 
     fn learn(&mut self, episode: &Trajectory, _: &mut Rng) -> Lesson {
@@ -175,7 +175,7 @@ mod tests {
         let all = Array1::from_elem(4, true);
         let mut led = [0; 4];
         for number in 0..200 {
-            search.beginning(0, number);
+            search.start_seed(0, number);
             let leader = search.choose(&Observation::zeros(), all.view(), &mut rng).unwrap();
             led[leader] += 1;
             // Row 2 crashes in every second episode, row 0 in every fourth, the others never.

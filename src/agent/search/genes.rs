@@ -38,9 +38,6 @@ pub fn seed(rng: &mut Rng) -> u64 {
     rng.next_u64()
 }
 
-/// The choices of an episode by step; `None` where nothing could be chosen, or has not been yet.
-pub type Genes = Vec<Option<Gene>>;
-
 /// Position of the ego vehicle at the start of an episode, m: enough to tell roads apart.
 pub fn start_of(observation: &Observation) -> [f32; 2] {
     ["egoX", "egoY"].map(|name| observation.get(variable(name).expect("it is a variable")))

@@ -15,7 +15,7 @@ use crate::agent::q_policy::Rows;
 use crate::agent::random::any;
 use crate::agent::registry::Agent;
 use crate::agent::settings::{Configured, SettingsError, require, unit, within};
-use crate::agent::trainable::{Beginning, Trainable};
+use crate::agent::trainable::Trainable;
 use crate::agent::trajectory::{Lesson, Trajectory};
 use crate::mdp::Observation;
 use crate::rng;
@@ -145,7 +145,7 @@ impl Agent for MapElites {
 }
 
 impl Trainable for MapElites {
-    fn beginning(&mut self, road: usize, fresh: u64) -> Beginning {
+    fn start_seed(&mut self, road: usize, fresh: u64) -> u64 {
         self.road = road;
         if self.saved.elites.len() <= road {
             self.saved.elites.resize(road + 1, BTreeMap::new());
@@ -168,7 +168,7 @@ impl Trainable for MapElites {
                 (elite.seed, script)
             }
         };
-        Beginning { seed: self.seed, from: None }
+        self.seed
     }
 
     fn learn(&mut self, episode: &Trajectory, _: &mut Rng) -> Lesson {
@@ -236,7 +236,7 @@ mod tests {
         let mut search = MapElites::new(&settings, 4);
         let mut rng = rng::stream(1, Stream::Replay, 0);
         let mut play = |search: &mut MapElites, fresh, played: &Trajectory| {
-            let seed = search.beginning(0, fresh).seed;
+            let seed = search.start_seed(0, fresh);
             search.learn(played, &mut rng);
             (seed, search.script.rows())
         };
@@ -261,11 +261,11 @@ mod tests {
         let settings = MapElitesSettings { fresh_share: 0.0, ..MapElitesSettings::default() };
         let mut search = MapElites::new(&settings, 45);
         let mut rng = rng::stream(1, Stream::Replay, 0);
-        search.beginning(0, 1);
+        search.start_seed(0, 1);
         search.learn(&episode(&[], 9.0), &mut rng);
         let elite = search.script.clone();
         for fresh in 2..50 {
-            assert_eq!(search.beginning(0, fresh).seed, 1);
+            assert_eq!(search.start_seed(0, fresh), 1);
             let differ = search.script.genes.iter().zip(&elite.genes).filter(|(new, old)| new != old).count();
             assert!((1..=2).contains(&differ), "{differ} steps");
         }

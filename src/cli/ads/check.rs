@@ -290,11 +290,10 @@ impl Checks<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::arguments::Format;
 
     #[test]
     fn the_maps_that_a_planner_is_told_of_exist_as_long_as_it_is_checked() {
-        let (table, scratch) = own_space(&Output::of(Format::Json)).expect("our own space is sound");
+        let (table, scratch) = own_space(&Output::silent()).expect("our own space is sound");
         for road in &table.space().roads {
             let file = road.map.file.as_ref().expect("the map was read from a file");
             assert!(file.is_file(), "{}", file.display());

@@ -112,12 +112,11 @@ pub struct EstimateArguments {
     #[arg(long, value_enum, default_value_t = EventArgument::Counted)]
     pub event: EventArgument,
     /// How: `count` plays every episode from its start; `probe` tries dangerous rows out beside those that chance chooses, each
-    /// with its weight, which pays where a crash comes in fewer than one of a hundred episodes or so;
-    /// `split` goes on from dangerous moments, and writes no scenarios. All are unbiased with a fixed number of parts, and say
-    /// what they gained or lost.
+    /// with its weight, which pays where a crash comes in fewer than one of a hundred episodes or so, and says what it
+    /// gained or lost. Both are unbiased with a fixed number of parts.
     #[arg(long, value_enum, default_value_t = MethodArgument::Count)]
     pub method: MethodArgument,
-    /// Independent parts on each road, at most; the interval of `split` comes from their spread, so give it twenty or more.
+    /// Independent parts on each road, at most.
     #[arg(long, default_value_t = 20)]
     pub parts: u32,
     /// Episodes of a part.
@@ -157,7 +156,6 @@ pub enum EventArgument {
 pub enum MethodArgument {
     Count,
     Probe,
-    Split,
 }
 
 #[derive(Debug, Args)]

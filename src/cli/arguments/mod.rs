@@ -23,8 +23,8 @@ pub use learn::{
 };
 pub use scenarios::{
     AgainstArguments, DiagnoseArguments, ExportArguments, ExportEgo, ExportFormat, ExportProfile,
-    ExportVersion, FilesArguments, ImportArguments, PackArguments, RenderArguments, ReplayArguments,
-    ReportArguments, RoadArguments, ShrinkArguments, TestArguments, VerifyArguments,
+    FilesArguments, ImportArguments, PackArguments, RenderArguments, ReplayArguments, ReportArguments,
+    RoadArguments, ShrinkArguments, TestArguments, VerifyArguments,
 };
 
 /// Finds out which of the things that may happen around a self-driving car make it crash.
@@ -41,7 +41,7 @@ pub struct Arguments {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Every command")]
 pub struct OutputArguments {
-    /// How to print.
+    /// How to print; `sarif` is for diagnostics, of `check` and `compile`.
     #[arg(long, global = true, value_enum, default_value_t = Format::Human)]
     pub format: Format,
     /// When to use colour.
@@ -61,6 +61,9 @@ pub enum Format {
     Plain,
     Json,
     Sarif,
+    /// Not at all; no command line asks for it.
+    #[value(skip)]
+    Silent,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -112,16 +112,13 @@ pub struct ExportArguments {
     /// CommonRoad as a planning problem, which is there in any case [default: `trajectory`, `none` for `commonroad`].
     #[arg(long, value_enum)]
     pub ego: Option<ExportEgo>,
-    /// Version of OpenSCENARIO [default: 1.2].
-    #[arg(long, value_enum, value_name = "VERSION")]
-    pub osc_version: Option<ExportVersion>,
     /// Other road users as actions that a person would write (speeds, lane changes, routes, triggers), which come near to
     /// the recording, instead of exact trajectories (OpenSCENARIO).
     #[arg(long)]
     pub natural: bool,
     /// The player that is to read it: `carla` is OpenSCENARIO 1.0 as CARLA's ScenarioRunner reads it, always natural; what it
     /// cannot say is told.
-    #[arg(long, value_enum, value_name = "PLAYER", conflicts_with = "osc_version")]
+    #[arg(long, value_enum, value_name = "PLAYER")]
     pub profile: Option<ExportProfile>,
     #[command(flatten)]
     pub many: FilesArguments,
@@ -155,14 +152,6 @@ pub enum ExportEgo {
     Trajectory,
     Controller,
     None,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ExportVersion {
-    #[value(name = "1.2")]
-    V1_2,
-    #[value(name = "1.3")]
-    V1_3,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

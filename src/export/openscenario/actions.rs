@@ -59,7 +59,7 @@ pub fn after_event(name: &str, event: &str) -> Element {
 pub fn within(version: Version, name: &str, (of, to): (&str, &str), metres: f64) -> Element {
     let (kind, rule) = match version {
         Version::Carla => ("cartesianDistance", "lessThan"),
-        Version::V1_2 | Version::V1_3 => ("euclidianDistance", "lessOrEqual"),
+        Version::V1_2 => ("euclidianDistance", "lessOrEqual"),
     };
     let distance = Element::new("RelativeDistanceCondition")
         .with("entityRef", to)

@@ -129,9 +129,7 @@ impl Natural {
             let name = actor.name();
             let added = match self.version {
                 Version::Carla => teleport(self.place),
-                Version::V1_2 | Version::V1_3 => {
-                    of_entity(&name, Element::new("AddEntityAction").holding(self.place))
-                }
+                Version::V1_2 => of_entity(&name, Element::new("AddEntityAction").holding(self.place)),
             };
             let numbered = self.from_the_first.into_iter().enumerate();
             let actions = core::iter::once(action(&format!("{name}_added"), added))
