@@ -2,15 +2,15 @@
 //! tests run through all of them.
 
 use ndarray::{Array1, ArrayView1};
+use serde_json::{Map, Value};
 
 use crate::mdp::Observation;
 use crate::rng::Rng;
 
 use super::branch::Branch;
-use super::hyperparameters::SettingsError;
 use super::presets::Preset;
 use super::search::{AvFuzzerSettings, BanditSettings, ConstantSettings, MapElitesSettings};
-use super::settings::Settings;
+use super::settings::{Settings, SettingsError, changed};
 use super::{greedy, presets, random, space_filling};
 
 /// Chooses rows of the action table.
@@ -83,9 +83,9 @@ pub enum Kind {
     Ready(fn(&[u32]) -> Box<dyn Agent>),
     /// It must be trained: its presets, the default first. See [`super::Learner`].
     Learning(&'static [Preset]),
-    /// It searches over many episodes, and what it found can act: how its settings are read from the changes
-    /// of a YAML text. See [`super::Trainable`].
-    Searching(fn(&str) -> Result<Settings, SettingsError>),
+    /// It searches over many episodes, and what it found can act: how its settings are made from changes by name.
+    /// See [`super::Trainable`].
+    Searching(fn(Map<String, Value>) -> Result<Settings, SettingsError>),
 }
 
 /// Every agent of avastra.
@@ -128,22 +128,28 @@ pub const REGISTRY: &[Entry] = &[
     Entry {
         name: "av-fuzzer",
         summary: "AV-Fuzzer's genetic search over scripts of rows",
-        kind: Kind::Searching(|text| Settings::of_search(text, AvFuzzerSettings::check, Settings::AvFuzzer)),
+        kind: Kind::Searching(|changes| {
+            changed(&AvFuzzerSettings::default(), changes).map(Settings::AvFuzzer)
+        }),
     },
     Entry {
         name: "map-elites",
         summary: "the best script of every kind of collision, and new ones by changing those",
-        kind: Kind::Searching(MapElitesSettings::read),
+        kind: Kind::Searching(|changes| {
+            changed(&MapElitesSettings::default(), changes).map(Settings::MapElites)
+        }),
     },
     Entry {
         name: "constant",
         summary: "a fixed list of rows, those first that crashed most in training: the first legal one acts",
-        kind: Kind::Searching(|text| Settings::of_search(text, ConstantSettings::check, Settings::Constant)),
+        kind: Kind::Searching(|changes| {
+            changed(&ConstantSettings::default(), changes).map(Settings::Constant)
+        }),
     },
     Entry {
         name: "bandit",
         summary: "the row after which most crashes came in such a situation; it plans nothing",
-        kind: Kind::Searching(|text| Settings::of_search(text, BanditSettings::check, Settings::Bandit)),
+        kind: Kind::Searching(|changes| changed(&BanditSettings::default(), changes).map(Settings::Bandit)),
     },
 ];
 
@@ -170,7 +176,8 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::agent::{Collided, Experience, Learner, Rows, Trainable, Trajectory};
+    use crate::agent::settings::Configured;
+    use crate::agent::{Collided, Experience, Rows, Trainable, Trajectory};
     use crate::mdp::Closeness;
     use crate::rng::{Stream, child_seed, stream};
 
@@ -184,13 +191,13 @@ mod tests {
             Kind::Learning(presets) => {
                 let learner = |preset: &Preset| -> (Box<dyn Agent>, bool) {
                     let settings = (preset.settings)();
-                    let obeys = settings.masks_choice;
-                    (Box::new(Learner::new(Arc::new(settings), rows(), seed)), obeys)
+                    let obeys = settings.choice.masks_choice;
+                    (Box::new(settings.build(rows(), seed)), obeys)
                 };
                 presets.iter().map(learner).collect()
             }
             Kind::Searching(read) => {
-                let mut search = read("").unwrap().build(rows(), seed);
+                let mut search = read(Map::new()).unwrap().build(rows(), seed);
                 assert_eq!(search.start_seed(0, seed), seed, "it knows no other start yet");
                 vec![(search, true)]
             }
@@ -236,24 +243,16 @@ mod tests {
     /// An episode in which the first choice makes an obstacle appear that is hit for good in the last.
     fn episode(rows: &[usize]) -> Trajectory {
         let experience = |(at, &row): (usize, &usize)| {
-            let is_last = at + 1 == rows.len();
-            Experience {
-                observation: Observation::zeros(),
-                legal: Array1::from_elem(ROWS, true),
-                row,
-                reward: if is_last { 7.5 } else { -1.0 },
-                hits: if is_last { vec![0] } else { Vec::new() },
-                collided: is_last,
-                crashes: if is_last { vec![Some(0)] } else { Vec::new() },
+            if at + 1 < rows.len() {
+                return Experience::plain(row, -1.0, ROWS);
             }
+            let (hits, crashes) = (vec![0], vec![Some(0)]);
+            Experience { hits, collided: true, crashes, ..Experience::plain(row, 7.5, ROWS) }
         };
         Trajectory {
-            steps: rows.iter().enumerate().map(experience).collect(),
-            last: Observation::zeros(),
-            last_legal: Array1::from_elem(ROWS, true),
-            terminal: true,
             closeness: Closeness { distance_m: 5.0 + rows[0] as f64, margin_m: 0.0 },
             collisions: vec![Collided { kind: format!("walk {}", rows[0]), counted: true }],
+            ..Trajectory::plain(rows.iter().enumerate().map(experience).collect(), ROWS)
         }
     }
 

@@ -263,7 +263,7 @@ fn ready(
         )));
     }
     let acting = acting(&table, policy, face)?;
-    let (period_s, step_s) = (acting.settings().observation_period_s, table.space().episode.step_s);
+    let (period_s, step_s) = (acting.settings().payment.observation_period_s, table.space().episode.step_s);
     if let Some(period_s) = period_s.filter(|&period_s| period_s != step_s) {
         return Err(Failure::usage(format!(
             "`{}` was trained with steps of {period_s} s, the space has {step_s} s: write `step: {period_s} s` there",

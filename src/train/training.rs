@@ -240,7 +240,7 @@ impl Training {
 }
 
 /// An episode of a training, before it is judged.
-struct Played {
+struct Unjudged {
     log: EpisodeLog,
     choices: Vec<Chosen>,
     /// The observation after the last step, and the rows that were legal then, shape `(rows,)`.
@@ -248,8 +248,8 @@ struct Played {
     closeness: Closeness,
 }
 
-fn play(setup: &Setup, agent: &mut dyn Trainable, settings: &TrainSettings) -> Played {
-    let searches = settings.hyperparameters.hyperparameters().is_none();
+fn play(setup: &Setup, agent: &mut dyn Trainable, settings: &TrainSettings) -> Unjudged {
+    let searches = settings.hyperparameters.learner().is_none();
     let mut choices = Vec::new();
     let mut last = None;
     let mut closeness = Closeness::default();
@@ -280,7 +280,7 @@ fn play(setup: &Setup, agent: &mut dyn Trainable, settings: &TrainSettings) -> P
         last = Some((moment.observation.clone(), legal));
     };
     let log = episode::run_from(setup, None, &mut make_choice, &mut watch, &mut at_last);
-    Played { log, choices, last, closeness }
+    Unjudged { log, choices, last, closeness }
 }
 
 /// A choice of the agent, with the observation and the legal rows that it was made on.

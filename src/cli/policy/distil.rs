@@ -32,7 +32,7 @@ pub fn distil(output: &Output, arguments: &DistilArguments) -> Result<(), Failur
         return Err(Failure::usage(format!("`{path}` makes no claims: train it with `avastra train`")));
     }
     let acting = acting(&table, &policy, Face::Network)?;
-    if acting.settings().rules_leaves == 0 {
+    if acting.settings().rules.rules_leaves == 0 {
         let message = "the policy was trained with `rules_leaves: 0`: say how many with `--leaves N`";
         return Err(Failure::usage(message));
     }
@@ -60,7 +60,7 @@ pub fn with_rules(arena: &Arena, acting: &QPolicy, policy: Policy) -> Policy {
     let mut policy = Policy { rules: Vec::new(), ..policy };
     let Some(claims) = &mut policy.claims else { return policy };
     claims.rules = None;
-    if acting.settings().rules_leaves == 0 {
+    if acting.settings().rules.rules_leaves == 0 {
         return policy;
     }
     let rules = Arc::new(train::distill(arena, acting, policy.origin.seed));
