@@ -51,9 +51,6 @@ const WATCH_S: f64 = 2.0;
 /// How long after the recorded contact nothing must happen, s. Ours.
 const AFTER_S: f64 = 4.0;
 
-/// A driver that is held to a speed comes near to it in about this time, s. Ours: longer than the pedal's lag.
-const CATCH_UP_S: f64 = 0.6;
-
 /// How verdicts are reached. Every run and study records it, so that one that was judged otherwise can be told apart;
 /// nothing else is possible.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
