@@ -9,7 +9,7 @@ use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::vocabulary::{Fact, Known, ROAD_LANES, Site, Word, WordFact, parts_of, thing_of, things};
-use crate::model::{EnumIndex, StateDef, Type, code};
+use crate::model::{EnumIndex, STATE_MAX, StateDef, Type, code};
 use crate::syntax::ast::{Span, UnaryOp};
 use crate::syntax::{Diagnostic, ast, listed, nearest, one_of};
 use crate::units;
@@ -184,6 +184,10 @@ impl Checker {
         };
         let value = self.exact(value, number.span)?;
         Some(Expr { kind: ExprKind::Number(value), ty, span: number.span })
+                if is_beyond_states(value) {
+                    let error = Diagnostic::error(code::NUMBER, "no `Int` is so large");
+                    return self.reject(error.at(number.span, NUMBER_MAX));
+                }
     }
 
     fn exact(&mut self, value: Option<Rational>, span: Span) -> Option<Rational> {
@@ -739,6 +743,16 @@ pub(super) fn fits(found: Type, wanted: Type) -> bool {
 }
 
 pub(super) fn article(name: &str) -> String {
+/// What is said of a number beyond those of states.
+pub(super) const NUMBER_MAX: &str = "the largest is 2^53 - 1, either side of 0";
+
+/// Whether no state may have a number. Compared exactly, because 2^53 + 1 would be rounded.
+pub(super) fn is_beyond_states(number: Rational) -> bool {
+    let is_within =
+        |number: Option<Rational>| number.is_some_and(|number| Rational::from_f64(STATE_MAX) >= Some(number));
+    !(is_within(Some(number)) && is_within(number.checked_neg()))
+}
+
     let vowel = name.starts_with(['A', 'E', 'I', 'O', 'U']);
     format!("{} `{name}`", if vowel { "an" } else { "a" })
 }
