@@ -19,6 +19,7 @@ const LAYOUT: Layout = Layout {
     naming: None,
     // A scenario names its space by a path from the file.
     local: &["scenario"],
+    apart: &[],
 };
 
 /// What a pilot saw stands under a part that no estimate has.

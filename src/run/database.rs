@@ -30,6 +30,7 @@ pub(crate) const LAYOUT: Layout = Layout {
     naming: Some(("offer", "reason")),
     // A scenario names its space by a path from the file.
     local: &["scenario"],
+    apart: &["checkpoint", "result"],
 };
 
 /// `held` says what held the speed of the ego vehicle back, from the row's time to that of the next row. `offer`

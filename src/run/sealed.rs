@@ -87,6 +87,8 @@ pub struct Layout {
     pub naming: Option<(&'static str, &'static str)>,
     /// Those of the tables whose rows depend on where the directory is.
     pub local: &'static [&'static str],
+    /// Tables whose rows belong to no unit. They are kept when the database is settled, and no merge takes them.
+    pub apart: &'static [&'static str],
 }
 
 impl Layout {
@@ -401,6 +403,7 @@ mod tests {
         tables: &["episode", "step"],
         naming: Some(("step", "reason")),
         local: &[],
+        apart: &[],
     };
     const OWN: &str = "CREATE TABLE episode (episode INTEGER PRIMARY KEY, name TEXT) STRICT;
                        CREATE TABLE reason (reason INTEGER PRIMARY KEY, text TEXT) STRICT;

@@ -19,6 +19,7 @@ const LAYOUT: Layout = Layout {
     tables: &["cell", "trained", "evaluated", "collision"],
     naming: None,
     local: &[],
+    apart: &[],
 };
 
 /// Seeds are text: SQLite's integers have a sign.
