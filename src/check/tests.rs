@@ -164,6 +164,27 @@ fn whole_numbers_beyond_those_of_states_are_refused() {
 }
 
 #[test]
+fn words_of_other_places_get_the_one_that_is_meant() {
+    let told = |more: &str| shown(&load_files(&[("a.ava", &format!("{BASE}{more}"))]));
+    for (more, hint) in [
+        ("let far = 5 kph", "did you mean `km/h`?"),
+        ("let far = 5 h", "the units are"),
+        ("rule late on set_time: time == \"Noon\"", "write `Noon`: words stand without quotes"),
+        ("verdict counted: crash", "write `collision`"),
+    ] {
+        let told = told(more);
+        assert!(told.contains(hint), "{told}");
+    }
+}
+
+#[test]
+fn a_spawn_out_of_bounds_is_told_once() {
+    let fly = "action fly() { spawn Jeep ahead 40 m { lane: Current, speed: 300 km/h, does: DriveAhead } }";
+    let found = codes(&load_files(&[("a.ava", &format!("{BASE}{fly}"))]));
+    assert!(found.contains(&code::OUT_OF_BOUNDS) && !found.contains(&code::UNDECIDED), "{found:?}");
+}
+
+#[test]
 fn states_can_be_given_as_text() {
     let loaded = load_files(&[("a.ava", BASE)]);
     let space = loaded.space.unwrap();
