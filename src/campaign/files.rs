@@ -52,11 +52,19 @@ static NEXT: AtomicU64 = AtomicU64::new(0);
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct PlainName(String);
 
-/// A text that is no plain name.
+/// A text that is no plain name, or none of a scenario.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{}` is no plain name: a name here has no `/`, `\\` or control character, and is not `.` or `..`", name.escape_debug())]
-pub struct NotPlain {
-    name: String,
+pub enum NotPlain {
+    #[error(
+        "`{}` is no plain name: a name here has no `/`, `\\` or control character, and is not `.` or `..`",
+        name.escape_debug()
+    )]
+    Anywhere { name: String },
+    #[error(
+        "`{}` is no name of a scenario: such a name ends in `.ava` and does not begin with `.` or `-`",
+        name.escape_debug()
+    )]
+    Scenario { name: String },
 }
 
 impl PlainName {
@@ -68,7 +76,18 @@ impl PlainName {
         // `a/` also has one part, but that part is `a`, which differs from the name.
         let is_one = parts.next() == Some(Component::Normal(name.as_ref())) && parts.next().is_none();
         let is_plain = is_one && !name.contains('\\') && !name.contains(char::is_control);
-        if is_plain { Ok(PlainName(name)) } else { Err(NotPlain { name }) }
+        if is_plain { Ok(PlainName(name)) } else { Err(NotPlain::Anywhere { name }) }
+    }
+
+    /// The name of a file with a scenario. A database from elsewhere could otherwise name a file that a shell or a program
+    /// reads, or that a command takes for an option.
+    ///
+    /// # Errors
+    /// If the text is no plain name, does not end in `.ava`, or begins with `.` or `-`.
+    pub fn scenario(name: impl Into<String>) -> std::result::Result<PlainName, NotPlain> {
+        let name = PlainName::new(name)?;
+        let is_scenario = name.ends_with(".ava") && !name.starts_with(['.', '-']);
+        if is_scenario { Ok(name) } else { Err(NotPlain::Scenario { name: name.0 }) }
     }
 }
 
@@ -366,6 +385,14 @@ mod tests {
             ["", ".", "..", "/", "/a", "a/", "a/b", "../a", "./a", "a\\b", "a\nb", "a\0", "\u{1b}[2J"]
         {
             assert!(PlainName::new(other).is_err(), "{other:?}");
+        }
+    }
+
+    #[test]
+    fn scenarios_have_names_that_only_scenarios_have() {
+        assert_eq!(&*PlainName::scenario("corner_0004.ava").unwrap(), "corner_0004.ava");
+        for other in [".bashrc", "x.sh", "estimate.yaml", "-rf.ava", ".ava", "a/b.ava", "x.AVA", ""] {
+            assert!(PlainName::scenario(other).is_err(), "{other:?}");
         }
     }
 

@@ -204,23 +204,52 @@ fn cell(text: &str) -> String {
     tagless(text).replace('|', "\\|")
 }
 
-/// A text in which no tag of HTML begins: Markdown passes tags through, and a space may come from elsewhere.
+/// A text in which no tag of HTML begins and no link leads to a program: Markdown passes both through, and a space may come
+/// from elsewhere.
 fn tagless(text: &str) -> String {
     let begins_tag = |next: char| next.is_ascii_alphabetic() || matches!(next, '/' | '!' | '?');
     let mut safe = String::with_capacity(text.len());
-    let mut rest = text.chars().peekable();
-    while let Some(c) = rest.next() {
+    let mut rest = text.char_indices().peekable();
+    while let Some((at, c)) = rest.next() {
+        let next = rest.peek().map(|&(_, next)| next);
         match c {
-            '<' if rest.peek().is_some_and(|&next| begins_tag(next)) => safe.push_str("&lt;"),
+            '<' if next.is_some_and(begins_tag) => safe.push_str("&lt;"),
+            // Behind `\`, a bracket or a colon makes no link.
+            ']' if matches!(next, Some('(' | ':')) && !is_harmless(&text[at + 2..]) => safe.push_str("]\\"),
             c => safe.push(c),
         }
     }
     safe
 }
 
+/// Whether the target of a link, with which the text begins, is relative or a page of the web.
+fn is_harmless(text: &str) -> bool {
+    let target = text.trim_start();
+    // Blanks end a target, but not in `<…>`, where browsers leave them out.
+    let is_end = |c: char| "/#?)>".contains(c) || c.is_whitespace() && !target.starts_with('<');
+    let begin = &target[..target.find(is_end).unwrap_or(target.len())];
+    let begin = begin.trim_start_matches('<').to_ascii_lowercase();
+    // `&` and `\` may write a colon in other words.
+    matches!(begin.as_str(), "http:" | "https:") || !begin.contains([':', '&', '\\'])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_link_leads_to_a_program() {
+        for kept in ["[x](https://a.b/c:d)", "[x](HTTP://a)", "[x](a/b.md#c)", "[x](#c)", "sky[Rain]: wet"] {
+            assert_eq!(tagless(kept), kept);
+        }
+        let to = |target: &str| tagless(&format!("[x]({target})"));
+        for hostile in ["javascript:a", " JaVaScRiPt:a", "data:text/html,a", "javascript&colon;a", "java\\:a"]
+        {
+            assert_eq!(to(hostile), format!("[x]\\({hostile})"));
+        }
+        assert_eq!(to("< java\tscript:a>"), "[x]\\(< java\tscript:a>)");
+        assert_eq!(tagless("[x]: vbscript:a"), "[x]\\: vbscript:a");
+    }
 
     #[test]
     fn no_tag_begins_in_a_page() {

@@ -637,7 +637,7 @@ impl Cut for RunSettings {
         let written = database.transpose().map_err(|error| Failure::file("read", &shard.file(), error))?;
         let mut scenarios = Vec::new();
         for (episode, road, text) in written.unwrap_or_default() {
-            let name = PlainName::new(format!("{}.ava", run_directory::scenario_name(&road, episode)));
+            let name = PlainName::scenario(format!("{}.ava", run_directory::scenario_name(&road, episode)));
             let name = name.map_err(|error| Failure::file("merge", &shard.file(), error))?;
             scenarios.push((episode, copy_written(output, &name, &text, &critical)?));
         }

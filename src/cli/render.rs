@@ -26,6 +26,13 @@ const ACTION_STRIDE_S: f64 = 2.0;
 
 /// Draws the file's scenario.
 pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failure> {
+    if let Some(extra) = arguments.rest.first() {
+        let hint = match arguments.at.is_empty() {
+            true => "",
+            false => ": moments are separated by commas, as in `--at 2,9.5`",
+        };
+        return Err(Failure::usage(format!("unexpected argument `{extra}`{hint}")));
+    }
     let stem = arguments.file.file_stem().unwrap_or_default().to_string_lossy();
     let path = arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{stem}.svg")));
     let on_stdout = path == Path::new("-");

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use avastra_campaign::emit;
-use avastra_campaign::run::{RunSettings, TrafficRecord};
+use avastra_campaign::run::{RunSettings, TrafficRecord, Units};
 use avastra_campaign::train::{Evaluation, TrainSettings, TrainedEpisode, Training, evaluate, rounded};
 use avastra_drivers::external::Attached;
 use avastra_lang::model::policy::{PolicyClaims, PolicyOrigin};
@@ -59,7 +59,7 @@ pub fn train(output: &Output, arguments: &TrainArguments) -> Result<(), Failure>
     if !training.is_done() {
         return Err(unfinished("train", directory.path, training.arena().program()));
     }
-    finish(output, &training, &directory)
+    finish(output, &training, directory)
 }
 
 /// A new training, from the command line.
@@ -172,7 +172,7 @@ fn keep(
 }
 
 /// Evaluates the policy, writes it, and prints the result of the training.
-fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Result<(), Failure> {
+fn finish(output: &Output, training: &Training, mut directory: RunDirectory) -> Result<(), Failure> {
     let settings = training.settings();
     let test = (EVALUATION_EPISODES, settings.seed);
     let working = Working::new(output, "playing what it learned");
@@ -246,8 +246,13 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
     });
     let results = serde_json::json!({ "simulated_h": simulated_h, "rules": rules, "evaluation": evaluation });
     let text = serde_json::to_string_pretty(&results).expect("results have string keys only");
-    let unwritten = |error| Failure::file("write", &directory.path.join("run.db"), error);
+    let file = directory.path.join("run.db");
+    let unwritten = |error| Failure::file("write", &file, error);
     directory.database.keep_results(&text).map_err(unwritten)?;
+    // A kill leaves free pages behind where episodes are played again, so the bytes would tell of it.
+    let numbers = directory.database.numbers().map_err(unwritten)?;
+    let units: Vec<_> = numbers.into_iter().map(|number| (number, number)).collect();
+    directory.database = directory.database.settle(&file, &units).map_err(unwritten)?;
     write(&directory.path.join("results.json"), &format!("{text}\n"))?;
     output.result(serde_json::json!({
         "reproducible": doubts.is_empty(),

@@ -140,7 +140,7 @@ fn what_cannot_be_read_is_said_so() {
 #[test]
 fn what_does_not_exist_is_named_with_what_does() {
     let space = "scenarios/avastra45.ava";
-    let cases: [(&[&str], &str); 11] = [
+    let cases: [(&[&str], &str); 12] = [
         (&["run", space, "--road", "nowhere"], "`corner`"),
         (&["run", space, "--ads", "modualr"], "did you mean `modular`?"),
         (&["export", "--to", "ava", space], "`--out DIR`"),
@@ -152,6 +152,7 @@ fn what_does_not_exist_is_named_with_what_does() {
         (&["table", space, "--row", "0", "--state", "tiem: Night"], "time"),
         (&["table", space, "--row", "0", "--state", "time: Noon, time: Night"], "`time` is given twice"),
         (&["render", space, "--at", "1"], "no scenario"),
+        (&["render", space, "--at", "2", "9.5"], "separated by commas, as in `--at 2,9.5`"),
     ];
     for (arguments, hint) in cases {
         let (status, _, stderr) = outcome(&mut avastra(arguments));

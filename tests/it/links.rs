@@ -226,6 +226,30 @@ const ATTACKS: &[Attack] = &[
     },
     Attack {
         links: &[],
+        change: Some(|clone| name_in_estimate(&clone.join("e2"), ".bashrc")),
+        command: &["merge", "e1", "e2", "--out", "m"],
+        end: Refused("is no name of a scenario"),
+    },
+    Attack {
+        links: &[],
+        change: Some(|clone| name_in_estimate(&clone.join("e2"), "-rf.ava")),
+        command: &["merge", "e1", "e2", "--out", "m"],
+        end: Refused("is no name of a scenario"),
+    },
+    Attack {
+        links: &[],
+        change: Some(|clone| name_in_estimate(&clone.join("e1"), "x.sh")),
+        command: &["estimate", "--resume", "e1"],
+        end: Refused("is no name of a scenario"),
+    },
+    Attack {
+        links: &[],
+        change: Some(|clone| name_in_estimate(&clone.join("e1"), "estimate.yaml")),
+        command: &["estimate", "--resume", "e1"],
+        end: Refused("is no name of a scenario"),
+    },
+    Attack {
+        links: &[],
         change: Some(road_in_run),
         command: &["merge", "run", "--out", "m"],
         end: Refused("is no plain name"),

@@ -19,6 +19,17 @@ const LAYOUT: Layout = Layout {
     naming: None,
     // A scenario names its space by a path from the file.
     local: &["scenario"],
+    apart: &[],
+    sound: &[
+        (
+            "part",
+            "min(probability, episodes, driven_m, duration_s, events, squares, largest, simulated_s) >= 0
+           AND max(episodes, driven_m, duration_s, events, simulated_s) <= 1e9
+           AND max(probability, squares, largest) <= 1e300",
+        ),
+        ("event", "weight BETWEEN 0 AND 1e300"),
+        ("pilot", "min(whole_s, tried_s, tried) >= 0 AND max(whole_s, tried_s, tried) <= 1e9"),
+    ],
 };
 
 /// What a pilot saw stands under a part that no estimate has.
@@ -200,7 +211,7 @@ impl EstimateDatabase {
     /// The files that were written, in the order of their events.
     ///
     /// # Errors
-    /// If the file cannot be read, or the name of a scenario is not plain.
+    /// If the file cannot be read, or the name of a scenario is none.
     pub fn scenarios(&self) -> Result<Vec<WrittenScenario>, DatabaseError> {
         let mut query =
             self.connection.prepare("SELECT part, event, name, text FROM scenario ORDER BY part, event")?;
@@ -208,7 +219,7 @@ impl EstimateDatabase {
             .query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get::<_, String>(2)?, row.get(3)?)))?;
         rows.map(|row| {
             let (part, event, name, text) = row?;
-            Ok(WrittenScenario { part, event, name: PlainName::new(name)?, text })
+            Ok(WrittenScenario { part, event, name: PlainName::scenario(name)?, text })
         })
         .collect()
     }

@@ -30,6 +30,17 @@ pub const LAYOUT: Layout = Layout {
     naming: Some(("offer", "reason")),
     // A scenario names its space by a path from the file.
     local: &["scenario"],
+    apart: &["checkpoint", "result"],
+    sound: &[
+        (
+            "episode",
+            "min(duration_s, distance_m, steps, red_runs, collisions, counted, branched_s) >= 0
+           AND max(duration_s, distance_m, steps, red_runs, collisions, counted, branched_s) <= 1e9
+           AND coalesce(first_counted_s, 0) BETWEEN 0 AND 1e9",
+        ),
+        ("collision", "time_s BETWEEN 0 AND 1e9 AND max(abs(ego_speed_mps), abs(delta_v_mps)) <= 1e9"),
+        ("learning", "simulated_s BETWEEN 0 AND 1e9 AND abs(return) <= 1e9"),
+    ],
 };
 
 /// `held` says what held the speed of the ego vehicle back, from the row's time to that of the next row. `offer`
@@ -148,7 +159,10 @@ impl Database {
         rows.map(|row| {
             let (found, road, text) = row?;
             let episode = usize::try_from(found).map_err(|_| DatabaseError::Episode { found })?;
-            Ok((episode, PlainName::new(road)?, text))
+            let road = PlainName::new(road)?;
+            // Names of files begin with that of the road.
+            PlainName::scenario(format!("{}.ava", &*road))?;
+            Ok((episode, road, text))
         })
         .collect()
     }

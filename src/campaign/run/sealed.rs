@@ -7,7 +7,7 @@
 //! table, which could run for ever when it is read. So its tables are compared with those of this version before anything
 //! is read.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use rusqlite::types::ValueRef;
@@ -87,6 +87,11 @@ pub struct Layout {
     pub naming: Option<(&'static str, &'static str)>,
     /// Those of the tables whose rows depend on where the directory is.
     pub local: &'static [&'static str],
+    /// Tables whose rows belong to no unit. They are kept when the database is settled, and no merge takes them.
+    pub apart: &'static [&'static str],
+    /// Conditions on the numbers of each row, by table. A unit that breaks one counts as changed: seals need no key, and
+    /// such a number would spoil every sum.
+    pub sound: &'static [(&'static str, &'static str)],
 }
 
 impl Layout {
@@ -147,9 +152,18 @@ impl Layout {
         Ok(())
     }
 
-    /// The numbers of the units whose rows were changed, rising. A unit that has rows in any table and no seal counts as changed.
+    /// The numbers of the units whose rows were changed, rising. A unit that has rows in any table and no seal counts as
+    /// changed, and so does one with a number that no play gives.
     fn damaged(&self, connection: &Connection) -> Result<Vec<i64>, DatabaseError> {
         let unit = self.unit;
+        let mut unsound = BTreeSet::new();
+        for (table, condition) in self.sound {
+            // A missing number makes the condition neither true nor false.
+            let query = format!("SELECT {unit} FROM {table} WHERE ({condition}) IS NOT TRUE");
+            let mut rows = connection.prepare(&query)?;
+            let numbers = rows.query_map([], |row| row.get::<_, i64>(0))?;
+            unsound.extend(numbers.collect::<Result<Vec<_>, _>>()?);
+        }
         let of_tables: String =
             self.tables.iter().map(|table| format!("SELECT {unit} FROM {table} UNION ")).collect();
         let mut numbers = connection.prepare(&format!("{of_tables}SELECT unit FROM seal ORDER BY 1"))?;
@@ -158,7 +172,7 @@ impl Layout {
             let number = number?;
             let mut seal = connection.prepare_cached("SELECT digest FROM seal WHERE unit = ?")?;
             let seal: Option<String> = seal.query_row([number], |row| row.get(0)).optional()?;
-            if seal != Some(self.rows_digest(connection, number)?) {
+            if unsound.contains(&number) || seal != Some(self.rows_digest(connection, number)?) {
                 damaged.push(number);
             }
         }
@@ -401,6 +415,8 @@ mod tests {
         tables: &["episode", "step"],
         naming: Some(("step", "reason")),
         local: &[],
+        apart: &[],
+        sound: &[("step", "x BETWEEN 0 AND 1e9")],
     };
     const OWN: &str = "CREATE TABLE episode (episode INTEGER PRIMARY KEY, name TEXT) STRICT;
                        CREATE TABLE reason (reason INTEGER PRIMARY KEY, text TEXT) STRICT;
@@ -498,6 +514,23 @@ mod tests {
             begun(&path).execute_batch(change).unwrap();
             let refused = LAYOUT.open(&path, OWN, SETTINGS).unwrap_err();
             assert!(refused.is_torn() && refused.to_string().contains(what), "{change}: {refused}");
+        }
+    }
+
+    #[test]
+    fn numbers_that_no_play_gives_count_as_changed_rows() {
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("run.db");
+        drop(begun(&path));
+        for number in ["-5", "1e12", "9e999", "NULL"] {
+            let connection = Connection::open(&path).unwrap();
+            let forged =
+                format!("UPDATE step SET x = {number} WHERE episode = 1; DELETE FROM seal WHERE unit = 1");
+            connection.execute_batch(&forged).unwrap();
+            LAYOUT.seal(&connection, 1).unwrap();
+            drop(connection);
+            let refused = LAYOUT.open(&path, OWN, SETTINGS).unwrap_err();
+            assert!(matches!(refused, DatabaseError::Rows { number: 1, .. }), "{number}: {refused}");
         }
     }
 

@@ -3,7 +3,7 @@
 //! SQLite puts a row where there is room when it arrives. So the same rows make other bytes when threads end in another
 //! order, when a kill came between, or when they were played as shards. When all is played, a database is *settled*: its
 //! units are written into a new file in the order of their numbers, which takes the place of the old one. A merge of shards
-//! takes over units from other files in the same way. Training is one thread that writes in order, and is not settled.
+//! takes over units from other files in the same way.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -90,7 +90,8 @@ pub trait Units: Sized {
         Self::layout().take(self.connection(), other, units, adjust)
     }
 
-    /// Writes the file, which is at `path`, anew with these units, in the order of their new numbers.
+    /// Writes the file, which is at `path`, anew with these units, in the order of their new numbers, and with what belongs
+    /// to no unit.
     ///
     /// # Errors
     /// If a file cannot be written.
@@ -103,10 +104,24 @@ pub trait Units: Sized {
         // SQLite opens it by its name, and takes an empty file for a new database.
         drop(file);
         let mut settled = Self::open(temporary.path(), &settings)?;
-        settled.take(path, units, &|_| Ok(()))?;
+        settled.take(path, units, &take_apart(Self::layout()))?;
         drop(settled);
         temporary.take_place_of(path)?;
         Ok(Self::from_connection(Connection::open(path)?))
+    }
+}
+
+/// Takes the rows over that belong to no unit, while the other file is attached.
+fn take_apart(layout: &'static Layout) -> impl Fn(&Connection) -> Result<(), rusqlite::Error> {
+    move |connection| {
+        for table in layout.apart {
+            let columns = columns(connection, table)?;
+            let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
+            let names = names.join(", ");
+            let rows = format!("INSERT INTO main.{table} ({names}) SELECT {names} FROM other.{table}");
+            connection.execute(&rows, [])?;
+        }
+        Ok(())
     }
 }
 

@@ -19,6 +19,16 @@ const LAYOUT: Layout = Layout {
     tables: &["cell", "trained", "evaluated", "collision"],
     naming: None,
     local: &[],
+    apart: &[],
+    sound: &[
+        ("trained", "simulated_s BETWEEN 0 AND 1e9 AND abs(return) <= 1e9"),
+        (
+            "evaluated",
+            "min(duration_s, distance_m, red_runs, speeding_s, astray_s, branched_s) >= 0
+           AND max(duration_s, distance_m, red_runs, speeding_s, astray_s, branched_s) <= 1e9",
+        ),
+        ("collision", "time_s BETWEEN 0 AND 1e9"),
+    ],
 };
 
 /// Seeds are text: SQLite's integers have a sign.

@@ -174,6 +174,9 @@ pub struct RenderArguments {
     /// Moments to draw, in s since the start; several make a strip: `--at 2,9.5`.
     #[arg(long, value_delimiter = ',', value_name = "T", allow_negative_numbers = true)]
     pub at: Vec<f64>,
+    /// What stands behind moments that a blank separates; it is refused with a hint.
+    #[arg(hide = true)]
+    pub rest: Vec<String>,
     /// A strip of five moments, the last at the first collision.
     #[arg(long, conflicts_with = "at")]
     pub strip: bool,

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::check::checker::{Checker, docs, each, literal};
 use crate::check::declaration::unknown_word;
-use crate::check::expression::{Place, is_number};
+use crate::check::expression::{NUMBER_MAX, Place, is_beyond_states, is_number};
 use crate::check::references::Symbol;
 use crate::check::report::{Report, field};
 use crate::check::rule::locals;
@@ -285,6 +285,10 @@ impl Checker {
     }
 
     fn whole_values(&mut self, low: Rational, high: Rational, span: Span) -> Option<Domain> {
+        if is_beyond_states(low) || is_beyond_states(high) {
+            let error = Diagnostic::error(code::NUMBER, "no `Int` is so large");
+            return self.reject(error.at(span, NUMBER_MAX));
+        }
         match (low.to_i64(), high.to_i64()) {
             (Some(low), Some(high)) if high.checked_sub(low).is_some_and(|count| count < VALUES_MAX) => {
                 Some(Domain::Values((low..=high).map(|value| Value::Number(value as f64)).collect()))

@@ -3,13 +3,13 @@
 use std::collections::BTreeSet;
 
 use crate::check::checker::{Checker, Signature, docs, each};
-use crate::check::expression::Place;
+use crate::check::expression::{NUMBER_MAX, Place, is_beyond_states};
 use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::check::rule::names_in;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::vocabulary::{Level, Phenomenon, SpaceClaim, TimeOfDay, Word, WorldState};
-use crate::model::{EnumDef, EnumIndex, FnDef, Initial, STATE_MAX, StateDef, StateMeaning, Type, code};
+use crate::model::{EnumDef, EnumIndex, FnDef, Initial, StateDef, StateMeaning, Type, code};
 use crate::prove::VARIANTS_MAX;
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast, listed, nearest};
@@ -468,10 +468,10 @@ impl Checker {
                 let value = self.typed(value, &Place::default(), ty)?;
                 let kind = self.fold(&value)?;
                 if let ExprKind::Number(number) = kind
-                    && number.to_f64().abs() > STATE_MAX
+                    && is_beyond_states(number)
                 {
                     let error = Diagnostic::error(code::NUMBER, "no state holds such a number");
-                    return self.reject(error.at(value.span, "the largest is 2^53, either side of 0"));
+                    return self.reject(error.at(value.span, NUMBER_MAX));
                 }
                 Some(Initial::Value(Expr { kind, ..value }))
             }

@@ -9,7 +9,7 @@ use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::vocabulary::{Fact, Known, ROAD_LANES, Site, Word, WordFact, parts_of, thing_of, things};
-use crate::model::{EnumIndex, StateDef, Type, code};
+use crate::model::{EnumIndex, STATE_MAX, StateDef, Type, code};
 use crate::syntax::ast::{Span, UnaryOp};
 use crate::syntax::{Diagnostic, ast, listed, nearest, one_of};
 use avastra_base::units;
@@ -128,7 +128,7 @@ impl Checker {
             ast::ExprKind::Index { base, index } => self.index(base, index, place, span),
             ast::ExprKind::Call(call) => self.call(call, place),
             ast::ExprKind::Match { subject, arms } => self.matching(subject, arms, place, hint, span),
-            ast::ExprKind::Text(_) => self.misplaced("a text", span),
+            ast::ExprKind::Text(text) => self.misplaced_text(text, span),
             ast::ExprKind::List(items) => {
                 items.iter().for_each(|item| self.look_at(item, place, hint));
                 self.misplaced("a list", span)
@@ -161,6 +161,18 @@ impl Checker {
         }
     }
 
+    /// A text in an expression; most often a word of an enum, as other languages write it.
+    fn misplaced_text(&mut self, text: &str, span: Span) -> Option<Expr> {
+        let message = "a text cannot be computed with";
+        let error = Diagnostic::error(code::TYPE_MISMATCH, message).at(span, "not a value of an expression");
+        let is_word = text.starts_with(|first: char| first.is_ascii_alphabetic())
+            && text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+        self.reject(match is_word {
+            true => error.help(format!("write `{text}`: words stand without quotes")),
+            false => error,
+        })
+    }
+
     fn misplaced(&mut self, what: &str, span: Span) -> Option<Expr> {
         let error = Diagnostic::error(code::TYPE_MISMATCH, format!("{what} cannot be computed with"));
         self.reject(error.at(span, "not a value of an expression"))
@@ -172,6 +184,10 @@ impl Checker {
         let value = self.exact(Rational::from_literal(&number.digits), number.span)?;
         let (value, ty) = match &number.unit {
             None if value.is_integer() && !number.digits.contains(['.', 'e', 'E']) => {
+                if is_beyond_states(value) {
+                    let error = Diagnostic::error(code::NUMBER, "no `Int` is so large");
+                    return self.reject(error.at(number.span, NUMBER_MAX));
+                }
                 (Some(value), Type::Int)
             }
             None => (Some(value), Type::Quantity(Dimension::RATIO)),
@@ -713,13 +729,28 @@ pub(crate) fn unknown_unit(word: &ast::Name) -> Diagnostic {
     let words = || units::UNITS.iter().map(|unit| unit.word);
     let letters = |word: &str| word.chars().filter(|c| c.is_alphanumeric()).collect::<String>();
     // `kmh` means `km/h` rather than `km`.
-    let meant = words().find(|unit| letters(unit) == letters(&word.text) && !letters(unit).is_empty());
+    let meant = match word.text.to_ascii_lowercase().as_str() {
+        "kph" | "kmph" | "kmh" => Some("km/h"),
+        _ => words().find(|unit| letters(unit) == letters(&word.text) && !letters(unit).is_empty()),
+    };
     let error = Diagnostic::error(code::UNKNOWN_UNIT, format!("unknown unit `{}`", word.text))
         .at(word.span, "not a unit");
-    match meant.or(nearest(&word.text, words())) {
+    // Any unit of one letter is near another of one letter, whatever it measures.
+    let near = || nearest(&word.text, words()).filter(|_| word.text.chars().count() > 1);
+    match meant.or_else(near) {
         Some(near) => error.meant(word.span, near),
         None => error.help(format!("the units are {}", words().collect::<Vec<_>>().join(", "))),
     }
+}
+
+/// What is said of a number beyond those of states.
+pub(super) const NUMBER_MAX: &str = "the largest is 2^53 - 1, either side of 0";
+
+/// Whether no state may have a number. Compared exactly, because 2^53 + 1 would be rounded.
+pub(super) fn is_beyond_states(number: Rational) -> bool {
+    let is_within =
+        |number: Option<Rational>| number.is_some_and(|number| Rational::from_f64(STATE_MAX) >= Some(number));
+    !(is_within(Some(number)) && is_within(number.checked_neg()))
 }
 
 pub(super) fn is_number(ty: Type) -> bool {

@@ -87,6 +87,7 @@ fn foreign(name: &str) -> Option<(&'static str, Option<&'static str>)> {
         "null" | "NULL" | "nil" | "undefined" => {
             ("everything has a value: an enum may have a variant for nothing, like `None`", None)
         }
+        "crash" | "crashed" | "collided" => ("write `collision`", Some("collision")),
         "if" => ("`match` chooses a value: `match near { true => 3 m, false => 9 m }`", None),
         _ => return None,
     })

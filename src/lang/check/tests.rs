@@ -145,6 +145,46 @@ fn times_may_have_any_unit() {
 }
 
 #[test]
+fn whole_numbers_beyond_those_of_states_are_refused() {
+    let is_refused =
+        |more: &str| codes(&load_files(&[("a.ava", &format!("{BASE}{more}"))])).contains(&code::NUMBER);
+    let most = "9007199254740991";
+    assert!(!is_refused(&format!("state far: Int = {most}\nstate near: Int = -{most}")));
+    assert!(!is_refused(&format!("let far = {most}")));
+    // 2^53 + 1 is no f64: rounded, it would pass for 2^53.
+    for beyond in ["9007199254740992", "9007199254740993", "-9007199254740992"] {
+        assert!(is_refused(&format!("state far: Int = {beyond}")), "{beyond}");
+        assert!(is_refused(&format!("let far = {beyond}")), "{beyond}");
+    }
+    assert!(is_refused(&format!("let far = {most}\nstate sum: Int = far + 1")));
+    assert!(is_refused("state far: Ratio = 9007199254740993.0"));
+    let range = format!("let far = {most}\naction add(each n: Int in far .. far + 1) {{ set time = Noon }}");
+    assert!(is_refused(&range));
+    assert!(is_refused("action add(each n: Int in 1 .. 9007199254740993) { set time = Noon }"));
+}
+
+#[test]
+fn words_of_other_places_get_the_one_that_is_meant() {
+    let told = |more: &str| shown(&load_files(&[("a.ava", &format!("{BASE}{more}"))]));
+    for (more, hint) in [
+        ("let far = 5 kph", "did you mean `km/h`?"),
+        ("let far = 5 h", "the units are"),
+        ("rule late on set_time: time == \"Noon\"", "write `Noon`: words stand without quotes"),
+        ("verdict counted: crash", "write `collision`"),
+    ] {
+        let told = told(more);
+        assert!(told.contains(hint), "{told}");
+    }
+}
+
+#[test]
+fn a_spawn_out_of_bounds_is_told_once() {
+    let fly = "action fly() { spawn Jeep ahead 40 m { lane: Current, speed: 300 km/h, does: DriveAhead } }";
+    let found = codes(&load_files(&[("a.ava", &format!("{BASE}{fly}"))]));
+    assert!(found.contains(&code::OUT_OF_BOUNDS) && !found.contains(&code::UNDECIDED), "{found:?}");
+}
+
+#[test]
 fn states_can_be_given_as_text() {
     let loaded = load_files(&[("a.ava", BASE)]);
     let space = loaded.space.unwrap();

@@ -183,18 +183,44 @@ impl Interval {
 
     /// The interval in a unit, in that of SI without one, rounded to three decimals: `20 .. 50 km/h`.
     pub fn shown(&self, ty: Type, unit: Option<&Unit>) -> String {
+        self.shown_to(DECIMALS, ty, unit)
+    }
+
+    /// As [`Interval::shown`], rounded to so many decimals.
+    pub fn shown_to(&self, decimals: u32, ty: Type, unit: Option<&Unit>) -> String {
         match (unit, ty) {
             (Some(unit), _) => {
                 let factor = unit.factor().to_f64();
-                let number =
-                    |value: Rational| decimal((value.to_f64() / factor * 1000.0).round() / 1000.0, false);
+                let number = |value: Rational| rounded(value.to_f64() / factor, decimals);
                 format!("{} {}", self.written(number), unit.word)
             }
             (None, Type::Quantity(dimension)) => {
-                format!("{self} {}", dimension.si_unit()).trim_end().to_owned()
+                let number = self.written(|value| rounded(value.to_f64(), decimals));
+                format!("{number} {}", dimension.si_unit()).trim_end().to_owned()
             }
-            (None, Type::Int | Type::Bool | Type::Enum(_)) => self.to_string(),
+            (None, Type::Int | Type::Bool | Type::Enum(_)) => {
+                self.written(|value| rounded(value.to_f64(), decimals))
+            }
         }
+    }
+
+    /// The fewest decimals, at least three, that tell the different ends of intervals apart.
+    pub fn decimals_of(intervals: &[Interval]) -> u32 {
+        let ends = intervals.iter().flat_map(|interval| [interval.low, interval.high]);
+        let mut ends: Vec<f64> = ends
+            .filter_map(|end| match end {
+                End::At(value, _) => Some(value.to_f64()),
+                End::Unbounded => None,
+            })
+            .collect();
+        ends.sort_by(f64::total_cmp);
+        let decimals = |decimals: &u32| {
+            let shown = |pair: &[f64]| {
+                pair[0] == pair[1] || rounded(pair[0], *decimals) != rounded(pair[1], *decimals)
+            };
+            ends.windows(2).all(shown)
+        };
+        (DECIMALS..DECIMALS_MAX).find(decimals).unwrap_or(DECIMALS_MAX)
     }
 
     fn written(&self, number: impl Fn(Rational) -> String) -> String {
@@ -242,9 +268,19 @@ fn add_ends(a: End, b: End) -> End {
 impl fmt::Display for Interval {
     /// `10 .. 13.889`, rounded to three decimals; `> 10` and the like where an end is missing.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let rounded = |value: Rational| decimal((value.to_f64() * 1000.0).round() / 1000.0, false);
-        f.write_str(&self.written(rounded))
+        f.write_str(&self.written(|value| rounded(value.to_f64(), DECIMALS)))
     }
+}
+
+/// Decimals that a message shows where no two numbers need more.
+const DECIMALS: u32 = 3;
+
+/// Most decimals that a message shows.
+const DECIMALS_MAX: u32 = 12;
+
+fn rounded(value: f64, decimals: u32) -> String {
+    let ten = 10_u64.pow(decimals) as f64;
+    decimal((value * ten).round() / ten, false)
 }
 
 #[cfg(test)]
@@ -255,6 +291,17 @@ mod tests {
 
     fn fraction(n: i32, d: i32) -> Rational {
         Rational::new(i128::from(n), i128::from(d)).unwrap()
+    }
+
+    #[test]
+    fn ends_are_told_apart() {
+        let at = |digits: i32| Interval::closed(fraction(digits, 100_000), fraction(digits, 100_000));
+        let close = [at(5_555_551), at(5_555_552)];
+        let decimals = Interval::decimals_of(&close);
+        let shown =
+            close.map(|interval| interval.shown_to(decimals, Type::Quantity(Dimension::LENGTH), None));
+        assert_eq!(shown, ["55.55551 m", "55.55552 m"]);
+        assert_eq!(Interval::decimals_of(&[at(5_555_551), at(5_655_551), at(5_555_551)]), 3);
     }
 
     #[test]

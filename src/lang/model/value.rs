@@ -17,8 +17,8 @@ pub enum Type {
     Enum(EnumIndex),
 }
 
-/// The largest number of a state, either side of 0: 2^53.
-pub(crate) const STATE_MAX: f64 = 9_007_199_254_740_992.0;
+/// The largest number of a state, either side of 0: 2^53 - 1. At 2^53 itself adding 1 would change nothing.
+pub(crate) const STATE_MAX: f64 = 9_007_199_254_740_991.0;
 
 /// A value at run time.
 #[derive(Debug, Clone, Copy, PartialEq)]

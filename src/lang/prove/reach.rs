@@ -238,16 +238,21 @@ impl<'a> RowRules<'a> {
         let mut without_figures = Vec::new();
         for rule in rules {
             let name = &self.space.rules[*rule].name;
-            let mut figures = Vec::new();
+            let mut wanted = Vec::new();
             for bound in self.bounds().filter(|bound| bound.rule == Some(*rule)) {
                 let parameter = &parameters[bound.local];
                 let limit = allowed(bound.op, &enclose(&bound.limit, &known).interval());
-                let declared = locals[bound.local].interval();
-                let is = if declared.single().is_some() { "it is" } else { "its range is" };
-                let unit = parameter.unit();
-                let [limit, declared] = [limit, declared].map(|interval| interval.shown(parameter.ty, unit));
-                figures.push(format!("`{}` wants {limit}, {is} {declared}", parameter.name));
+                wanted.push((parameter, limit, locals[bound.local].interval()));
             }
+            // Two limits that look alike would make no conflict.
+            let ends: Vec<_> = wanted.iter().flat_map(|(_, limit, declared)| [*limit, *declared]).collect();
+            let decimals = Interval::decimals_of(&ends);
+            let figure = |(parameter, limit, declared): &(&Parameter, Interval, Interval)| {
+                let is = if declared.single().is_some() { "it is" } else { "its range is" };
+                let shown = |interval: &Interval| interval.shown_to(decimals, parameter.ty, parameter.unit());
+                format!("`{}` wants {}, {is} {}", parameter.name, shown(limit), shown(declared))
+            };
+            let figures: Vec<String> = wanted.iter().map(figure).collect();
             match figures.as_slice() {
                 [] => without_figures.push(name.as_str()),
                 figures => parts.push(format!("rule `{name}`: {}", figures.join("; "))),

@@ -42,6 +42,20 @@ pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
     diagnostics
 }
 
+/// Whether [`report`] has an error about a spawn of an action.
+pub(crate) fn is_out(space: &Space, action: usize) -> bool {
+    let spawns = space.actions[action].effects.iter().filter_map(|effect| match effect {
+        EffectDef::Spawn(spawn) => Some(spawn),
+        EffectDef::Set(_) => None,
+    });
+    let figures =
+        spawns.flat_map(|spawn| [(&spawn.speed, &SPAWN_SPEED_MPS), (&spawn.distance, &SPAWN_DISTANCE_M)]);
+    figures.into_iter().any(|(expr, range)| {
+        let mut rows = space.rows_of(action).iter().take_while(|_| !effort::is_spent());
+        rows.any(|row| spawn_figures(space, row, expr).is_some_and(|found| !lies_in(&found, range)))
+    })
+}
+
 fn lies_in(interval: &Interval, range: &RangeInclusive<f64>) -> bool {
     let end = |value: f64| Rational::from_f64(value).expect("the bounds are small whole numbers");
     let bounds = Interval::closed(end(*range.start()), end(*range.end()));

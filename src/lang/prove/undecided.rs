@@ -10,6 +10,7 @@ use crate::model::{ActionDef, Road, Row, RuleBody, RuleDef, RulesInForce, Space,
 use crate::prove::clock::never_enabled;
 use crate::prove::reach::numbers;
 use crate::prove::realise::{Realisable, Realised, is_about_time};
+use crate::prove::spawn_bounds;
 use crate::prove::witness::{Found, Left, Search};
 use crate::syntax::{Diagnostic, listed};
 
@@ -123,6 +124,10 @@ fn report_unknown(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> {
                     of_action.push(Unknown { action, rows, roads: vec![&road.name], rules });
                 }
             }
+        }
+        // No search finds a place for a newcomer that is faster or farther away than any: that is told elsewhere.
+        if !of_action.is_empty() && spawn_bounds::is_out(space, index) {
+            continue;
         }
         for one in of_action {
             let alike = |many: &&mut Vec<Unknown<'_>>| {

@@ -55,6 +55,9 @@ pub fn foreign(text: &str, token: usize, same_line: bool, failure: &Failure) -> 
             return found;
         }
     }
+    if let Some(found) = mark_at_number(text, token, same_line, failure) {
+        return Some(found);
+    }
     let word = word_at(text, token);
     if !word.is_empty() {
         let meant = if same_line { infix_word(word, failure)? } else { return None };
@@ -199,6 +202,54 @@ fn unit_of_next_entry(
     })
 }
 
+/// `3,5`, `.5`, `speed % 2` and `80 road.limit`: marks at which numbers or products end too early.
+fn mark_at_number(text: &str, token: usize, same_line: bool, failure: &Failure) -> Option<Foreign> {
+    let is_digit = |letter: char| letter.is_ascii_digit();
+    let (before, after) = (&text[..token], &text[token..]);
+    let mark = after.chars().next().filter(|mark| matches!(mark, ',' | '.' | '%'))?;
+    let next = &after[1..];
+    let told = |(start, end): (usize, usize), message: String, help: String, fix| {
+        Some(Foreign { start, end, message: Some(message), help, fix })
+    };
+    match mark {
+        ',' if failure.continues && before.ends_with(is_digit) && next.starts_with(is_digit) => {
+            let whole = before.len() - before.trim_end_matches(|c: char| is_digit(c) || c == '.').len();
+            let part = next.len() - next.trim_start_matches(is_digit).len();
+            let (start, end) = (token - whole, token + 1 + part);
+            let help = format!("write `{}.{}`", &text[start..token], &text[token + 1..end]);
+            let fix = Some((token, token + 1, ".".to_owned()));
+            told((start, end), "a number has a decimal point, and no comma".to_owned(), help, fix)
+        }
+        '.' if !failure.continues && next.starts_with(is_digit) && !before.ends_with('.') => {
+            let part = next.len() - next.trim_start_matches(is_digit).len();
+            let end = token + 1 + part;
+            let help = format!("write `0{}`", &text[token..end]);
+            let fix = Some((token, token, "0".to_owned()));
+            told((token, end), "a number begins with a digit".to_owned(), help, fix)
+        }
+        '%' if failure.continues => {
+            let message = "`%` after a number means percent".to_owned();
+            told((token, token + 1), message, "there is no remainder".to_owned(), None)
+        }
+        '.' if same_line && next.starts_with(|next: char| next.is_ascii_alphabetic()) => {
+            let (word_start, word_end) = word_before(text, token);
+            let number = text[..word_start].trim_end_matches([' ', '\t']);
+            let digits = number.len() - number.trim_end_matches(|c: char| is_digit(c) || c == '.').len();
+            let start = number.len() - digits;
+            let is_number = number.ends_with(is_digit) && !number[..start].ends_with(is_in_word);
+            if !is_number || word_start == word_end || word_end != token {
+                return None;
+            }
+            let end = token + 1 + next.find(|next| !is_in_word(next)).unwrap_or(next.len());
+            let (figure, factor) = (&text[start..number.len()], &text[word_start..end]);
+            let help = format!("write `{figure} * {factor}`");
+            let fix = Some((number.len(), number.len(), " *".to_owned()));
+            told((start, end), "between a number and what it multiplies stands `*`".to_owned(), help, fix)
+        }
+        _ => None,
+    }
+}
+
 /// `7 % 2`: the mark makes percents of the number before it.
 fn percent_of_nothing(text: &str, token: usize, failure: &Failure) -> Option<Foreign> {
     let end = text[..token].trim_end_matches([' ', '\t']).len();
@@ -275,6 +326,23 @@ mod tests {
         assert_eq!(said("enum A = B < C | D", 15, &["`<`"], false), None);
         assert_eq!(said("let far != 3", 8, &["`=`"], false), None);
         assert_eq!(said("gap speed", 4, &["an operator"], true), None);
+    }
+
+    #[test]
+    fn numbers_of_other_places_are_found() {
+        let (help, mended) = said("let k = 3,5", 9, &["an operator"], true).unwrap();
+        assert_eq!((help.as_str(), mended.as_deref()), ("write `3.5`", Some("let k = 3.5")));
+        assert_eq!(said("[3, 5 }", 2, &["an operator"], true), None, "a list");
+        let (help, mended) = said("let k = .5 m", 8, &["an expression"], false).unwrap();
+        assert_eq!((help.as_str(), mended.as_deref()), ("write `0.5`", Some("let k = 0.5 m")));
+        let (help, mended) = said("speed % 2 == 0", 6, &["an operator"], true).unwrap();
+        assert_eq!((help.as_str(), mended), ("there is no remainder", None));
+        let (help, mended) = said("v <= 80 road.limit", 12, &["a name"], false).unwrap();
+        assert_eq!(
+            (help.as_str(), mended.as_deref()),
+            ("write `80 * road.limit`", Some("v <= 80 * road.limit"))
+        );
+        assert_eq!(said("road.limit.x", 10, &["an operator"], true), None);
     }
 
     #[test]

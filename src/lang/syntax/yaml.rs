@@ -9,12 +9,24 @@ pub fn yaml_mistake(error: &serde_yaml::Error, text: &str) -> String {
     let first = first.strip_prefix("error: ").unwrap_or(first);
     // `line 3 column 5: what is wrong`
     let placed = first.strip_prefix("line ").and_then(|rest| rest.split_once(' '));
-    let placed =
-        placed.and_then(|(line, rest)| Some((line.parse::<usize>().ok()?, rest.split_once(": ")?.1)));
-    let Some((line, what)) = placed else { return settings_mistake(first, None) };
-    let line = if what.contains(GOES_ON) { opening_line(text, line) } else { line };
+    let placed = placed.and_then(|(line, rest)| {
+        let (column, what) = rest.split_once(": ")?;
+        let column = column.strip_prefix("column ").and_then(|column| column.parse::<usize>().ok());
+        Some((line.parse::<usize>().ok()?, column, what))
+    });
+    let Some((line, column, what)) = placed else { return settings_mistake(first, None) };
+    let (line, column) =
+        if what.contains(GOES_ON) { (opening_line(text, line), None) } else { (line, column) };
     let written = text.lines().nth(line.saturating_sub(1)).unwrap_or_default();
-    let field = written.split_once(':').map(|(field, _)| field.trim().trim_start_matches("- "));
+    // One line may hold several keys: `agents: [{ name: random, repeats: 2 }]`.
+    let before: Option<String> =
+        column.map(|column| written.chars().take(column.saturating_sub(1)).collect());
+    let nearest_key = before.as_deref().and_then(|before| before.rsplit_once(':')).map(|(before, _)| {
+        let is_in_key = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
+        before.trim_end().rsplit(|c: char| !is_in_key(c)).next().unwrap_or_default()
+    });
+    let first_key = written.split_once(':').map(|(field, _)| field.trim().trim_start_matches("- "));
+    let field = nearest_key.filter(|key| !key.is_empty()).or(first_key);
     let is_word = |field: &&str| field.chars().all(|c| c.is_ascii_alphanumeric() || "_-.".contains(c));
     format!("line {line}: {}", settings_mistake(what, field.filter(is_word)))
 }
@@ -193,6 +205,7 @@ mod tests {
         assert_eq!(yaml_mistake(&error, infinite), "line 2: `pace_mps`: write a number");
         assert_eq!(said("seed: 1\nyields: maybe\n"), "line 2: `yields`: write `true` or `false`");
         assert_eq!(said("seed: 3\nseed: 4\n"), "line 2: `seed` stands twice");
+        assert_eq!(said("{ pace_mps: 4, seed: abc }\n"), "line 1: `seed`: write a whole number");
     }
 
     #[test]

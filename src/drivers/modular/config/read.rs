@@ -23,7 +23,7 @@ pub enum ConfigError {
     Empty,
     #[error("{}`{key}` is no setting{hint}", at(*line))]
     Unknown { line: Option<usize>, key: String, hint: String },
-    #[error("{}`{key}` is {found}; write {wanted}", at(*line))]
+    #[error("{}{key} is {found}; write {wanted}", at(*line))]
     Type { line: Option<usize>, key: String, found: String, wanted: &'static str },
     #[error("{}`{key}` is {value}; write a value from {low} to {high}", at(*line))]
     Range { line: Option<usize>, key: String, value: f64, low: f64, high: f64 },
@@ -92,7 +92,7 @@ impl ModularConfig {
 fn overlay(text: &str, path: &str, file: &Value, whole: &mut Value) -> Result<(), ConfigError> {
     let mistake = |wanted| ConfigError::Type {
         line: line_of(text, path),
-        key: if path.is_empty() { "the profile".to_owned() } else { path.to_owned() },
+        key: if path.is_empty() { "the profile".to_owned() } else { format!("`{path}`") },
         found: kind(file),
         wanted,
     };
@@ -262,7 +262,7 @@ mod tests {
                 "perception:\n  latency_frames: 1.5\n",
                 "line 2: `perception.latency_frames` is `1.5`; write a whole number",
             ),
-            ("- 1\n", "`the profile` is a list; write a section of `key: value` lines"),
+            ("- 1\n", "the profile is a list; write a section of `key: value` lines"),
         ];
         for (text, message) in cases {
             assert_eq!(told(text), message);

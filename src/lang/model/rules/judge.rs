@@ -141,7 +141,7 @@ impl<'a> RowRules<'a> {
                     .unwrap_or_else(|| self.figures(Some(rule), decisive, candidate, Some(spawn)))
             }
             Breach::Number { cell } => format!(
-                "`{}` would have no value: a division by 0, or a number beyond 2^53",
+                "`{}` would have no value: a division by 0, or a number of 2^53 or more",
                 self.space.cell_name(cell)
             ),
             Breach::Move { state, cell, from, to, .. } => {
