@@ -329,6 +329,7 @@ impl Idm {
         let pose = &sensed.ego.rear_axle;
         if self.station_m.is_none() {
             self.steer_rad = sensed.ego.steer_rad;
+            self.find_place(pose);
         }
         let station_m = self.guide.locate(pose.position, self.station_m).station_m;
         self.station_m = Some(station_m);
@@ -357,6 +358,25 @@ impl Idm {
             let lateral_m = self.scene.route.changes[index].lateral_m;
             !self.has_gap(seen, ego_mps, station_m, lateral_m)
         });
+    }
+
+    /// Learns from the vehicle's place which lane changes of the route are begun or over, before its first look. A driver
+    /// that does not drive from the start, but goes on where another one was, would otherwise take itself to be in the
+    /// source lane: it would steer back to it, and what stands ahead of it would stand beside its way.
+    pub(super) fn find_place(&mut self, rear_axle: &Pose) {
+        for index in 0..self.begins_m.len() {
+            if self.begins_m[index].is_finite() {
+                continue;
+            }
+            let change = &self.scene.route.changes[index];
+            let beside = self.guide.locate(rear_axle.position, None);
+            let is_aside = beside.offset_m * change.lateral_m.signum() > WANDER_M;
+            if beside.station_m < change.begin_m || !is_aside {
+                return;
+            }
+            self.begins_m[index] = change.begun_m(beside.station_m, beside.offset_m);
+            self.guide = Arc::new(Guide::with_changes(&self.scene, &RULES, &self.begins_m));
+        }
     }
 
     /// Gives up a lane change that was begun in thought alone, because the vehicle is still in the source lane.
@@ -429,6 +449,19 @@ mod tests {
         rig.run(30.0);
         assert!((place(&rig).y - TARGET_Y_M).abs() < 0.1, "{:?}", place(&rig));
         assert!(rig.offset_m_max < 0.3, "{} m off the path", rig.offset_m_max);
+    }
+
+    #[test]
+    fn it_goes_on_with_a_change_that_another_driver_has_begun() {
+        let mut rig = rig(300.0);
+        rig.sensed.ego.rear_axle = Pose::new(40.0, -4.0, 0.0);
+        let mut lowest_m = f64::INFINITY;
+        for _ in 0..400 {
+            rig.tick();
+            lowest_m = lowest_m.min(place(&rig).y);
+        }
+        assert!(lowest_m > -4.05, "back towards the source lane: {lowest_m}");
+        assert!((place(&rig).y - TARGET_Y_M).abs() < 0.1, "{:?}", place(&rig));
     }
 
     #[test]
