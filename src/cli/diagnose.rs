@@ -313,12 +313,7 @@ fn sentence(diagnosis: &Diagnosis) -> String {
             let error = evidence.beyond_specification().map_or(String::new(), |found| {
                 format!("{} was {:.2}, and {:.2} is specified", found.what, found.worst, found.bound)
             });
-            let is_told_apart = evidence.told_apart().any(|found| cause.contains(&found.module));
-            let chance =
-                if is_told_apart { String::new() } else { format!(", which is {}", chance_text(evidence)) };
-            format!(
-                "{name} is at fault by what it gave this time: {error}; {changed}, there is no crash{chance}"
-            )
+            format!("{name} is at fault by what it gave this time: {error}; {changed}, there is no crash")
         }
         Verdict::Deciding => format!("{name} is at fault: {changed}, there is no crash{others}"),
         Verdict::Brittle => format!(
@@ -336,7 +331,7 @@ fn sentence(diagnosis: &Diagnosis) -> String {
             )
         }
         Verdict::Chance => format!(
-            "no module is named: what prevents the crash with its own noise ({}) is {}",
+            "no module is named: what prevents the crash with its own noise ({}) is not told apart from chance{}",
             preventing(evidence).join(", "),
             chance_text(evidence)
         ),
@@ -344,12 +339,11 @@ fn sentence(diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// Says that the change is not told apart from chance, and how often chance alone prevents the collision.
+/// How often chance alone prevents the collision.
 fn chance_text(evidence: &Evidence) -> String {
-    let alone = evidence.chance.map_or(String::new(), |chance| {
+    evidence.chance.map_or(String::new(), |chance| {
         format!(": other sensor noise alone prevents it in {} of {} replays", chance.vanished, chance.replays)
-    });
-    format!("not told apart from chance{alone}")
+    })
 }
 
 /// The changes that prevent the collision with the noise that it was recorded with.
