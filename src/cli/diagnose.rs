@@ -19,6 +19,7 @@ use crate::statistics::Estimate;
 use super::arguments::DiagnoseArguments;
 use super::error::Failure;
 use super::load;
+use super::look;
 use super::output::Output;
 use super::output::plural;
 use super::parallel::each_file;
@@ -136,7 +137,7 @@ fn explain(
     baseline: &ModularConfig,
     file: &Path,
 ) -> Result<Explained, Failure> {
-    let (table, scenario) = load::scenario(output, file)?;
+    let (table, scenario) = look::unchanged(output, file)?;
     let Case { stage, ads, log, index } = Case::of(&table, &scenario, asked)?;
     let setup = stage.setup(&ads);
     let diagnosis = oracle::diagnose(&setup, &log, index, baseline).map_err(Failure::usage)?;
@@ -150,7 +151,7 @@ fn explain(
 /// The share of all files' crashes that vanish without each documented weakness, and by chance.
 fn mechanisms(output: &Output, arguments: &DiagnoseArguments, asked: &Asked) -> Result<(), Failure> {
     let found = each_file(output, &arguments.many, None, |file| {
-        let (table, scenario) = load::scenario(output, file)?;
+        let (table, scenario) = look::unchanged(output, file)?;
         let Case { stage, ads, log, index } = Case::of(&table, &scenario, asked)?;
         let found = oracle::mechanisms(&stage.setup(&ads), &log, index).map_err(Failure::usage)?;
         Ok((file.clone(), scenario.name.clone(), found))

@@ -11,6 +11,7 @@ use super::arguments::{ExportArguments, ExportEgo, ExportFormat, ExportProfile, 
 use super::error::Failure;
 use super::files::{copy_map, folder, make, write};
 use super::load;
+use super::look;
 use super::output::{Output, plural};
 use super::parallel::each_file;
 use super::replay::refutation;
@@ -25,7 +26,7 @@ pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failur
     let asked = load::asked(None, None, None)?;
     let maps = Mutex::new(());
     let exported = each_file(output, &arguments.many, None, |file| {
-        let (table, scenario) = load::scenario(output, file)?;
+        let (table, scenario) = look::unchanged(output, file)?;
         let (ads, _) = asked.selected_for(&scenario)?;
         let recording = match record(&table, &scenario, &ads) {
             Ok(recording) => recording,
