@@ -9,7 +9,7 @@ mod clock;
 use std::hint::black_box;
 use std::sync::Arc;
 
-use avastra::agent::{Agent, Experience, Hyperparameters, Kind, Learner, Rows, Trainable, Trajectory};
+use avastra::agent::{Experience, Rows, Settings, Trajectory};
 use avastra::mdp::{Closeness, Observation, STATE_LEN};
 use avastra::rng::Stream;
 use avastra::{agent, rng};
@@ -42,13 +42,11 @@ fn main() {
 
 /// Updates a second, and the time of a greedy choice, us.
 fn measured(text: &str) -> (f64, f64) {
-    let Kind::Learning(presets) = agent::by_name("ddqn").expect("it is registered").kind else {
-        panic!("it learns")
-    };
+    let entry = agent::by_name("ddqn").expect("it is registered");
     let text = format!("{text}learning_starts: 1\nexploration_begin: 0\nexploration_end: 0\n");
-    let settings = Hyperparameters::from_yaml(presets, Some("paper"), &text).expect("the settings are sound");
+    let settings = Settings::from_yaml(entry, Some("paper"), &text).expect("it is trained");
     let rows = Rows { allowed: vec![true; ROWS], environment: vec![false; ROWS] };
-    let mut learner = Learner::new(Arc::new(settings), Arc::new(rows), 1);
+    let mut learner = settings.expect("the settings are sound").build(Arc::new(rows), 1);
     let mut rng = rng::stream(1, Stream::Traffic, 0);
     // Fills the replay memory and warms up the caches.
     (0..20).for_each(|_| {

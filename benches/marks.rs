@@ -23,7 +23,7 @@ mod clock;
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::hint::black_box;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
@@ -31,7 +31,7 @@ use std::time::Instant;
 use avastra::action::{ActionTable, Effect, SpawnRequest};
 use avastra::ads::external::{ExternalSettings, Observation, Program, Target};
 use avastra::check::ReadError;
-use avastra::cli::lsp::Server;
+use avastra::editor::{Files, Workspace, diagnostics};
 use avastra::mdp::{ProcSettings, collision_probability};
 use avastra::model::Space;
 use avastra::model::vocabulary::{Body, Colour, LaneChoice, Level, Side, Then, TimeOfDay, Verb};
@@ -144,10 +144,31 @@ fn crowded(scene: &Arc<Scene>) -> World {
     world
 }
 
-/// Edits of the 45-action space, whose four maps the server has read already.
+/// The shipped files, for an editor that has one of them open.
+struct Shipped;
+
+impl Files for Shipped {
+    fn read(&self, path: &Path) -> Result<String, ReadError> {
+        std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()))
+    }
+
+    fn below(&self, _: &Path) -> Vec<PathBuf> {
+        Vec::new()
+    }
+
+    fn nearby(&self, _: &Path) -> Vec<(String, String)> {
+        Vec::new()
+    }
+
+    fn entries(&self, _: &Path) -> Vec<(String, bool)> {
+        Vec::new()
+    }
+}
+
+/// Edits of the 45-action space, whose four maps the workspace has read already.
 struct Editing {
-    server: Server,
-    uri: String,
+    workspace: Workspace,
+    path: PathBuf,
     text: String,
     keystrokes: u64,
 }
@@ -156,27 +177,21 @@ impl Editing {
     fn new() -> Editing {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/avastra45.ava");
         let text = std::fs::read_to_string(&path).expect("it is shipped");
-        let uri = format!("file://{}", path.display());
-        let mut editing = Editing { server: Server::default(), uri, text, keystrokes: 0 };
-        editing.server.receive(&serde_json::json!({ "id": 0, "method": "initialize", "params": {} }));
-        let document = serde_json::json!({ "uri": editing.uri, "version": 0, "text": editing.text });
-        let open = serde_json::json!({ "textDocument": document });
-        editing.server.receive(&serde_json::json!({ "method": "textDocument/didOpen", "params": open }));
-        black_box(editing.server.publish());
+        let mut editing = Editing { workspace: Workspace::new(Shipped), path, text, keystrokes: 0 };
+        editing.workspace.open(editing.path.clone(), editing.text.clone());
+        black_box(diagnostics::all(&mut editing.workspace));
         editing
     }
 
-    /// Changes a digit in the range of a parameter, from the message to the answer. Never inlined, so that a
+    /// Changes a digit in the range of a parameter, from the text to its mistakes. Never inlined, so that a
     /// profiler can be told to count this and nothing else.
     #[inline(never)]
     fn keystroke(&mut self) {
         self.keystrokes += 1;
         let text = self.text.replacen("1 m .. 120 m", &format!("1 m .. {} m", 120 + self.keystrokes), 1);
-        let document = serde_json::json!({ "uri": self.uri, "version": self.keystrokes });
-        let change = serde_json::json!({ "textDocument": document, "contentChanges": [{ "text": text }] });
-        self.server.receive(&serde_json::json!({ "method": "textDocument/didChange", "params": change }));
-        let said = self.server.publish();
-        assert_eq!(said.len(), 1, "the document has its list");
+        self.workspace.open(self.path.clone(), text);
+        let found = black_box(diagnostics::all(&mut self.workspace));
+        assert!(found.contains_key(&self.path), "the document has its list");
     }
 }
 

@@ -1,8 +1,8 @@
 // A planner under test in C++, with nothing but the standard library: it keeps to its lane and keeps its distance.
 //
 //   c++ -O2 -std=c++17 -o planner examples/planner.cpp
-//   avastra ads check -- ./planner
-//   avastra run scenarios/avastra45.ava --ads-cmd ./planner
+//   avastra ads check --ads ./planner
+//   avastra run scenarios/avastra45.ava --ads ./planner
 //
 // PROTOCOL.md describes the messages. This program answers with accelerations, so avastra steers along the route. It
 // reads numbers out of the text of a message by the names of their fields; a real planner would use a JSON library.

@@ -3,7 +3,7 @@
 //!
 //! ```sh
 //! cargo build --example planner
-//! avastra ads check -- target/debug/examples/planner
+//! avastra ads check --ads target/debug/examples/planner
 //! ```
 //!
 //! PROTOCOL.md describes the messages. It needs serde_json, and nothing of avastra.

@@ -15,7 +15,7 @@ rm -rf "$work"
 mkdir -p "$work"
 
 for road in residential corner crossroad boulevard; do
-    "$avastra" train "$space" --road "$road" --ads-config scenarios/ads/degraded.yaml --episodes 750 --seed 1 --out "$work/$road"
+    "$avastra" train "$space" --road "$road" --ads scenarios/ads/degraded.yaml --episodes 750 --seed 1 --out "$work/$road"
     # A policy may move: its seal covers everything but the path of its `use`.
     sed 's|^use "[^"]*"|use "../scenarios/avastra45.ava"|' \
         "$work/$road/policy/${road}_ddqn_1.ava" > "policies/$road.ava.new"

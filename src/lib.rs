@@ -54,4 +54,5 @@ pub mod emit;
 pub mod export;
 pub mod import;
 pub mod report;
+pub mod editor;
 pub mod cli;

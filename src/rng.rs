@@ -53,7 +53,7 @@ pub enum Stream {
     Distillation = 41,
     /// The order into which the values of a variable are shuffled; one index for each variable and repeat.
     Permutation = 42,
-    /// Seeds of the parts of an estimate, and what splitting draws in one.
+    /// Seeds of the parts of an estimate.
     Estimate = 51,
 }
 

@@ -2,7 +2,7 @@
 # Runs a driving system that others wrote: `sh python/adapters/run.sh sumo:EIDM scenarios/avastra45.ava --episodes 20`.
 #
 # NAME is a folder beside this file; what follows a colon is an option of the adapter. The rest are the arguments of `avastra run`; without
-# them only the profile is written, for other commands: `avastra replay FILES --ads-config target/adapters/sumo.yaml`.
+# them only the profile is written, for other commands: `avastra replay FILES --ads target/adapters/sumo.yaml`.
 # The packages are installed once, under target/adapters/NAME. The driver gets the truth instead of what `modular`
 # perceives, so that its mistakes are its own; OBSERVATION=perceived changes that. PYTHON is a Python 3.11, AVASTRA the command.
 set -eu
@@ -40,4 +40,4 @@ if [ -z "${AVASTRA:-}" ]; then
     AVASTRA=$root/target/release/avastra
     (cd "$root" && cargo build --release --quiet)
 fi
-exec "$AVASTRA" run "$@" --ads-config "$profile"
+exec "$AVASTRA" run "$@" --ads "$profile"

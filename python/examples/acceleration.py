@@ -1,6 +1,6 @@
 """The smallest driver: an acceleration alone, from IDM on the nearest object ahead on the route; avastra steers.
 
-    avastra run scenarios/avastra45.ava --ads-cmd 'python3 python/examples/acceleration.py'
+    avastra run scenarios/avastra45.ava --ads 'python3 python/examples/acceleration.py'
 """
 
 import pathlib

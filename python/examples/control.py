@@ -1,6 +1,6 @@
 """Acceleration and steering: follows the route by pure pursuit and stands still while anything is close ahead of it.
 
-    avastra run scenarios/avastra45.ava --ads-cmd 'python3 python/examples/control.py'
+    avastra run scenarios/avastra45.ava --ads 'python3 python/examples/control.py'
 """
 
 import math

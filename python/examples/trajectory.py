@@ -1,6 +1,6 @@
 """A trajectory: 5 s along the route, braked evenly before whatever is ahead; avastra's controller follows it.
 
-    avastra run scenarios/avastra45.ava --ads-cmd 'python3 python/examples/trajectory.py'
+    avastra run scenarios/avastra45.ava --ads 'python3 python/examples/trajectory.py'
 """
 
 import math

@@ -136,10 +136,10 @@ class OnRay(unittest.TestCase):
         return str(self.folder / "out.shards" / str(number))
 
     def test_shards_are_played_and_merged_in_order(self):
-        status, told = self.called("study", "s.yaml", "--shards", "2", "--ads-cmd", "x --y", "--format", "json", "--jobs", "2")
+        status, told = self.called("study", "s.yaml", "--shards", "2", "--ads", "x --y", "--format", "json", "--jobs", "2")
         self.assertEqual(status, 0, told)
         played = {tuple(asked) for asked in self.asked()[:-1]}
-        self.assertEqual(played, {("study", "s.yaml", "--ads-cmd", "x --y", "--shard", f"{number}/2", "--out", self.shard(number),
+        self.assertEqual(played, {("study", "s.yaml", "--ads", "x --y", "--shard", f"{number}/2", "--out", self.shard(number),
                                    "--jobs", "2") for number in (1, 2)})
         merge = ["merge", self.shard(1), self.shard(2), "--out", str(self.out), "--format", "json"]
         self.assertEqual(self.asked()[-1], merge)

@@ -11,7 +11,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
 cd "$root/scenarios/found"
-"$binary" run ../avastra45.ava --ads-config ../ads/degraded.yaml --out "$work/run" --quiet
+"$binary" run ../avastra45.ava --ads ../ads/degraded.yaml --out "$work/run" --quiet
 # The space lies beside this folder, wherever the run was.
 sed 's|^use "[^"]*avastra45.ava"|use "../avastra45.ava"|' "$work/run/critical/$found.ava" > "$found.ava"
 "$binary" render "$found.ava" --strip --out "$found.svg"

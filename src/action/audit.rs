@@ -19,14 +19,14 @@ pub struct RuleAudit {
     pub optional: bool,
     /// Rows that it binds.
     pub rows: Vec<usize>,
-    /// Rows that are masked on some road and have this rule in their conflict.
+    /// Rows that this rule helps to mask on some road, alone or in conflict with other rules.
     pub masks: Vec<usize>,
     /// Numeric parameters whose range it cuts before they are drawn.
     pub cuts: Vec<String>,
     /// How much of their ranges it takes away by itself, on each road.
     pub removes: Vec<Removal>,
     pub enforced: Enforcement,
-    /// Whether also the states with which an episode begins obey it.
+    /// Whether the states with which an episode begins obey it, too.
     pub from_the_start: bool,
 }
 

@@ -44,7 +44,8 @@ impl<'a> Judge<'a> {
         Judge { row, action, situation, moment }
     }
 
-    /// Draws until all rules hold; the first time at these shares of the ranges, by parameter, as far as they go.
+    /// Draws until all rules hold. `shares` places the values of the first try: for each parameter, where in its range
+    /// its value lies, in `[0, 1)`. Parameters without a share, and every further try, are drawn by chance.
     ///
     /// # Errors
     /// The most frequent refusal; the earliest, if several are equally frequent.
@@ -127,7 +128,7 @@ impl<'a> Judge<'a> {
     /// Asks the world about every spawn, then applies every rule in force to a complete set of values.
     ///
     /// # Errors
-    /// The first refusals, at most so many.
+    /// The first refusals, at most `refusals_max`.
     fn judge(&self, values: &[Value], refusals_max: usize) -> Result<Draw, Vec<Refusal>> {
         let before = self.situation.memory;
         let after = self.row.space.memory_after(self.row.row.action, values, before);
@@ -306,8 +307,8 @@ impl<'a> Judge<'a> {
 /// Draws every value with equal chances, but for the shares that are given.
 struct Chance<'a> {
     rng: &'a mut Rng,
-    /// By parameter: where in its range the value shall lie, in `[0, 1)`. Each holds once, because a solver that asks
-    /// again could not use what it got.
+    /// By parameter: where in its range the value is to lie, in `[0, 1)`. A share is used once: a solver that asks
+    /// again could not use the same value.
     shares: Vec<Option<f64>>,
 }
 

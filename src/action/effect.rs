@@ -61,7 +61,8 @@ impl Effect {
         changed.filter_map(|(state, cell)| Effect::of_cell(state, cell, after)).collect()
     }
 
-    /// The author's own bodies among them, as indices in the space, where the first has this id.
+    /// The author's own bodies among the newcomers: id of the road user, and index of the body in the space. `first` is
+    /// the id of the first newcomer.
     pub fn own_bodies(&self, first: u32) -> impl Iterator<Item = (u32, usize)> {
         let own = match self {
             Effect::Spawn(request) => [request.own, request.cover_own],
@@ -119,8 +120,8 @@ pub trait Surroundings {
     /// What can be asked about the ego vehicle and its surroundings now.
     fn moment(&self) -> MomentFacts;
 
-    /// The same surroundings for many questions about this moment: what those have in common is found once. `None`
-    /// where nothing is gained.
+    /// Surroundings for many questions about this moment, which find once what the questions have in common; `None` if
+    /// nothing is gained by that.
     fn for_many(&self) -> Option<Box<dyn Surroundings + '_>> {
         None
     }

@@ -86,8 +86,8 @@ impl ActionTable {
         self.offers_at(situation, &[])
     }
 
-    /// The offers whose first try draws values at these shares of their ranges, each in `[0, 1)`, by parameter of the
-    /// row; what is left out is drawn by chance, and so is every further try.
+    /// As [`ActionTable::offers`], but the first try of each row takes its values at `shares` of their ranges, each in
+    /// `[0, 1)`, by parameter of the row. Parameters without a share, and every further try, are drawn by chance.
     pub fn offers_at(&self, situation: &Situation<'_>, shares: &[f64]) -> Vec<Offer> {
         let kept = situation.surroundings.for_many();
         let surroundings = kept.as_deref().unwrap_or(situation.surroundings);

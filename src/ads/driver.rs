@@ -19,11 +19,6 @@ pub trait Ads: CloneAds + Send {
         let _ = sensed;
     }
 
-    /// From now on its sensor errors come from another seed. Most drivers have none.
-    fn reseed(&mut self, seed: u64) {
-        let _ = seed;
-    }
-
     /// Why it cannot drive any more. Only an external one fails; the episode ends there.
     fn failure(&self) -> Option<&Failure> {
         None

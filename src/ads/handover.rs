@@ -38,11 +38,6 @@ impl Ads for Handover {
         if self.is_over { self.second.status() } else { self.first.status() }
     }
 
-    fn reseed(&mut self, seed: u64) {
-        self.first.reseed(seed);
-        self.second.reseed(seed);
-    }
-
     fn failure(&self) -> Option<&Failure> {
         if self.is_over { self.second.failure() } else { self.first.failure() }
     }

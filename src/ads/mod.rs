@@ -1,23 +1,20 @@
 //! Driving systems: what drives the ego vehicle. They see `Sensed` and the HD map, never the `World`.
 //!
 //! `modular` is the system under test; `frenet` and `reactive` are two more of other kinds, `external` is any program
-//! outside, `reference` holds drivers to judge by. `guide` and `steering` serve all, `sight` and `stops` the two others.
+//! outside, `reference` holds drivers to judge by. `kit` is what they share: read it before writing another.
 
 mod driver;
 pub mod external;
 mod frenet;
-mod guide;
 mod handover;
+mod kit;
 mod modular;
 mod reactive;
 mod reference;
 mod registry;
 mod selected;
 mod settings;
-mod sight;
 mod status;
-mod steering;
-mod stops;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]

@@ -104,14 +104,11 @@ impl Selected {
         self.profile.as_ref()
     }
 
-    /// The seed of its sensor errors in an episode of a seed.
-    pub fn seed_of_errors(&self, seed: u64) -> u64 {
-        self.noise.map_or(seed, |number| rng::child_seed(seed, Stream::Noise, u64::from(number)))
-    }
-
     /// A fresh driver for one episode.
     pub fn build(&self, scene: &Arc<Scene>, seed: u64) -> Box<dyn Ads> {
-        let own_seed = self.seed_of_errors(seed);
+        // The seed of its sensor errors.
+        let own_seed =
+            self.noise.map_or(seed, |number| rng::child_seed(seed, Stream::Noise, u64::from(number)));
         let first: Box<dyn Ads> = match (&self.kind, &self.profile) {
             (_, Some(profile)) => {
                 Box::new(Modular::with_foresight(scene, profile, own_seed, self.foresight.clone()))

@@ -2,12 +2,7 @@
 //!
 //! Settings are not among them: a checkpoint belongs to a run, and the run knows them.
 
-use std::sync::Arc;
-
-use super::hyperparameters::Hyperparameters;
 use super::learner::Learner;
-use super::network::Adam;
-use super::q_policy::Rows;
 use super::replay::{Replay, Transition};
 
 /// The first bytes of every checkpoint; the number rises when the layout changes.
@@ -43,23 +38,24 @@ impl Learner {
         bytes.0
     }
 
-    /// The learner that was saved; `None` if the bytes are not those of a learner with such settings
+    /// A new learner as the one that was saved; `None` if the bytes are not those of a learner with such settings
     /// and rows.
-    pub fn restore(settings: Arc<Hyperparameters>, rows: Arc<Rows>, bytes: &[u8]) -> Option<Learner> {
-        let mut learner = Learner::new(settings.clone(), rows.clone(), 0);
+    pub(super) fn restored(self, bytes: &[u8]) -> Option<Learner> {
+        let mut learner = self;
         let (parameters, inputs) = (learner.target.parameters().len(), learner.policy.features.len());
+        let rows = learner.policy.rows.allowed.len();
         let mut bytes = Reader(bytes.strip_prefix(MAGIC)?);
         learner.steps = bytes.u64()?;
         learner.updates = bytes.u64()?;
-        learner.policy.quirks.random_weights = bytes.f64s(rows.allowed.len())?;
+        learner.policy.quirks.random_weights = bytes.f64s(rows)?;
         learner.policy.network.parameters_mut().copy_from_slice(&bytes.f32s(parameters)?);
         learner.target.parameters_mut().copy_from_slice(&bytes.f32s(parameters)?);
         if let Some(average) = &mut learner.average {
             average.network.parameters_mut().copy_from_slice(&bytes.f32s(parameters)?);
         }
-        let (mean, square) = (bytes.f32s(parameters)?, bytes.f32s(parameters)?);
+        (learner.adam.mean, learner.adam.square) = (bytes.f32s(parameters)?, bytes.f32s(parameters)?);
         let powers = bytes.f64s(2)?;
-        learner.adam = Adam { mean, square, mean_power: powers[0], square_power: powers[1] };
+        (learner.adam.mean_power, learner.adam.square_power) = (powers[0], powers[1]);
         let (count, next) = (bytes.u64()?, bytes.u64()?);
         let priority_max = bytes.f64s(1)?[0];
         let mut items = Vec::new();
@@ -69,19 +65,14 @@ impl Learner {
             let row = u32::try_from(bytes.u64()?).ok()?;
             let figures = bytes.f32s(2)?;
             let next_inputs = bytes.f32s(inputs)?;
-            let next_legal = bytes.flags(rows.allowed.len())?;
+            let next_legal = bytes.flags(rows)?;
             let (reward, discount) = (figures[0], figures[1]);
             let transition = Transition { inputs: sight, row, reward, discount, next_inputs, next_legal };
             items.push((transition, priority));
         }
-        let capacity = settings.replay_capacity;
-        let fits = bytes.0.is_empty() && items.len() <= capacity && next < capacity as u64;
-        if !fits {
-            return None;
-        }
-        learner.replay =
-            Replay::restored(capacity, settings.priorities(), items, next as usize, priority_max);
-        Some(learner)
+        let settings = learner.policy.settings().replay;
+        learner.replay = Replay::restored(settings, items, next, priority_max)?;
+        bytes.0.is_empty().then_some(learner)
     }
 }
 

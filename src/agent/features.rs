@@ -6,8 +6,6 @@
 use crate::mdp::{Observation, STATE_LEN, variable};
 use crate::model::policy::{VARIABLES, VariableKind};
 
-use super::hyperparameters::{Encoding, StateSet};
-
 /// How many of the paper's variables are of the surroundings; they come first.
 const EXTERNAL_LEN: usize = 7;
 
@@ -26,6 +24,35 @@ const DEEP_COLLISION: [&str; 12] = [
     "egoPitch",
     "speed",
 ];
+
+/// Sets of state variables.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StateSet {
+    /// The paper's 19.
+    Full,
+    /// The 12 of the driving system (paper, Table 2).
+    Internal,
+    /// The 7 of the surroundings (paper, Table 1).
+    External,
+    /// DeepCollision's 12: pose, weather, clock, signal, speed.
+    DeepCollision,
+    /// The paper's 19 and where the nearest obstacle and the road ahead are: ours.
+    Extended,
+    /// These, and what tells when: how long the light stays, how far the next conflict is, where the second obstacle
+    /// is, and what an action made appear last. Ours.
+    Timed,
+}
+
+/// How a variable goes into the network.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Encoding {
+    /// The variable as it is, as in all published code.
+    Raw,
+    /// Divided by a fixed scale; categories one-hot.
+    Scaled,
+}
 
 /// How one variable is encoded when it is scaled.
 enum Scale {

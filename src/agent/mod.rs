@@ -6,25 +6,26 @@
 //!
 //! - `random`, `space-filling` and `greedy` need no training.
 //! - [`Trainable`] agents take in a [`Trajectory`] when an episode has ended and has been judged.
-//! - The [`Learner`] is deep Q-learning; [`improve`] is one update. `n_step` makes transitions of an
-//!   episode, `replay` keeps them, `network` computes Q-values and gradients, `checkpoint` saves it all.
-//!   `quirks` holds what only the published packages do.
+//! - The [`Learner`] is deep Q-learning; [`improve`] is one update. `exploration` says how often it chooses at random,
+//!   `payment` what a step earns, `n_step` makes transitions of an episode, `replay` keeps them, `network` computes
+//!   Q-values and gradients, `checkpoint` saves it all. `quirks` holds what only the published packages do.
 //! - `shuffled` shows a policy states of other episodes, to tell whether it has learned when.
 //! - A [`QPolicy`] acts by a trained network, or by the rules that `decision` distils from it; `features`
 //!   says what a network sees.
-//! - `search` has the searches: AV-Fuzzer and Go-Explore.
-//! - [`Hyperparameters`] are the settings of a learner and `presets` their values, by source;
-//!   [`Settings`] are those of any trainable agent.
+//! - `search` has the searches: AV-Fuzzer, MAP-Elites, constant rows and a bandit.
+//! - [`Settings`] are those of any trainable agent; each agent's own stand beside it. [`LearnerSettings`] are those of
+//!   a learner, the settings of its parts included, and `presets` their values, by source.
 
 mod branch;
 mod checkpoint;
 mod decision;
+mod exploration;
 mod features;
 mod greedy;
-mod hyperparameters;
 mod learner;
 mod n_step;
 mod network;
+mod payment;
 mod presets;
 mod q_policy;
 mod quirks;
@@ -41,12 +42,11 @@ mod trajectory;
 pub use branch::{Branch, Trial};
 pub use decision::{Visit, chosen_by, distilled};
 pub use features::Features;
-pub use hyperparameters::{Hyperparameters, Loss, SettingsError};
-pub use learner::{Learner, improve};
+pub use learner::{Learner, LearnerSettings, Loss, improve};
 pub use network::{Adam, Network, Shape};
 pub use q_policy::{Face, QPolicy, Rows};
 pub use registry::{Agent, Entry, Kind, REGISTRY, by_name};
 pub use replay::Transition;
-pub use settings::Settings;
-pub use trainable::{Beginning, Trainable};
+pub use settings::{Settings, SettingsError};
+pub use trainable::Trainable;
 pub use trajectory::{Collided, Experience, Lesson, Trajectory};

@@ -16,7 +16,7 @@ pub(super) fn transitions(episode: &Trajectory, rewards: &[f64], policy: &QPolic
     let states: Vec<(Vec<f32>, Vec<bool>)> = moments
         .map(|(observation, legal)| {
             let rows = policy.rows.allowed.iter().zip(legal);
-            let may_choose = |(&allowed, &legal)| allowed && (legal || !settings.masks_target);
+            let may_choose = |(&allowed, &legal)| allowed && (legal || !settings.choice.masks_target);
             (policy.features.encode(observation), rows.map(may_choose).collect())
         })
         .collect();

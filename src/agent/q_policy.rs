@@ -13,12 +13,32 @@ use crate::rng::Rng;
 use crate::syntax::nearest;
 
 use super::decision::chosen_by;
-use super::features::Features;
-use super::hyperparameters::{Hyperparameters, SettingsError};
+use super::features::{Encoding, Features, StateSet};
+use super::learner::LearnerSettings;
 use super::network::{Network, Shape};
 use super::quirks::Quirks;
 use super::random::any;
 use super::registry::Agent;
+use super::settings::SettingsError;
+
+/// What the agent sees and may do.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ChoiceSettings {
+    /// State variables that the agent sees (RQ2).
+    pub state: StateSet,
+    /// How these variables go into the network.
+    pub encoding: Encoding,
+    /// Names of the actions and groups that the agent may choose from (RQ2); empty: all.
+    pub actions: Vec<String>,
+    /// Whether the agent chooses only among rows that the rules allow. If not, a forbidden choice loses
+    /// the step.
+    pub masks_choice: bool,
+    /// Whether the learning target considers only rows that the rules allow.
+    pub masks_target: bool,
+    /// Steps that must pass between two changes of weather or time; 0: no gate. Published package: 5. A
+    /// quirk (see `quirks`).
+    pub environment_gate_steps: u32,
+}
 
 /// What an agent knows about the rows before any episode.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,7 +97,7 @@ pub enum Face {
 /// A Q-network with everything that it takes to act.
 #[derive(Debug, Clone)]
 pub struct QPolicy {
-    pub(super) settings: Arc<Hyperparameters>,
+    pub(super) settings: Arc<LearnerSettings>,
     pub(super) features: Features,
     pub(super) rows: Arc<Rows>,
     pub(super) network: Network,
@@ -87,18 +107,18 @@ pub struct QPolicy {
 }
 
 impl QPolicy {
-    /// Shape of the network that such settings need for so many rows.
-    pub fn shape(settings: &Hyperparameters, rows: usize) -> Shape {
-        let inputs = Features::new(settings.state, settings.encoding).len();
-        let hidden = settings.hidden_units.iter().copied();
+    /// Shape of the network that these settings need for a table of `rows` rows.
+    pub fn shape(settings: &LearnerSettings, rows: usize) -> Shape {
+        let inputs = Features::new(settings.choice.state, settings.choice.encoding).len();
+        let hidden = settings.network.hidden_units.iter().copied();
         let layers = core::iter::once(inputs).chain(hidden).chain([rows]).collect();
-        Shape { layers, dueling: settings.dueling }
+        Shape { layers, dueling: settings.network.dueling }
     }
 
     /// The network must have the [`QPolicy::shape`] of the settings.
-    pub fn new(settings: Arc<Hyperparameters>, rows: Arc<Rows>, network: Network) -> QPolicy {
+    pub fn new(settings: Arc<LearnerSettings>, rows: Arc<Rows>, network: Network) -> QPolicy {
         assert_eq!(*network.shape(), QPolicy::shape(&settings, rows.allowed.len()), "the network fits");
-        let features = Features::new(settings.state, settings.encoding);
+        let features = Features::new(settings.choice.state, settings.choice.encoding);
         let quirks = Quirks::new(&settings, rows.allowed.len());
         QPolicy { settings, features, rows, network, rules: None, quirks }
     }
@@ -108,8 +128,8 @@ impl QPolicy {
     /// # Errors
     /// If its settings cannot be read, or describe another network than it has.
     pub fn read(file: &Policy, table: &ActionTable) -> Result<QPolicy, SettingsError> {
-        let settings = Hyperparameters::from_record(&file.hyperparameters)?;
-        let rows = Rows::new(table, &settings.actions)?;
+        let settings = LearnerSettings::from_record(&file.hyperparameters)?;
+        let rows = Rows::new(table, &settings.choice.actions)?;
         let shape = Shape { layers: file.layers.clone(), dueling: file.dueling };
         if shape != QPolicy::shape(&settings, rows.allowed.len()) {
             let message = "the network is not the one that its settings describe";
@@ -125,7 +145,7 @@ impl QPolicy {
         QPolicy { rules: Some(rules), ..self.clone() }
     }
 
-    pub fn settings(&self) -> &Hyperparameters {
+    pub fn settings(&self) -> &LearnerSettings {
         &self.settings
     }
 
@@ -193,14 +213,14 @@ impl Agent for QPolicy {
 
     fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
         let open = self.open(legal);
-        let explores = rng::unit(rng) < self.settings.evaluation_epsilon;
+        let explores = rng::unit(rng) < self.settings.exploration.evaluation_epsilon;
         let row = if explores { any(&open, rng) } else { self.decide(observation, &open) }?;
         self.chosen(row);
         Some(row)
     }
 
     fn looks_at_mask(&self) -> bool {
-        self.settings.masks_choice || self.rules.is_some()
+        self.settings.choice.masks_choice || self.rules.is_some()
     }
 }
 

@@ -7,7 +7,7 @@
 use crate::rng;
 use crate::rng::Rng;
 
-use super::hyperparameters::Hyperparameters;
+use super::learner::LearnerSettings;
 use super::random::any;
 use super::trajectory::Trajectory;
 
@@ -32,13 +32,13 @@ pub(super) struct Quirks {
 }
 
 impl Quirks {
-    /// The quirks that the settings turn on, for an agent with so many rows.
-    pub fn new(settings: &Hyperparameters, rows: usize) -> Quirks {
+    /// The quirks that the settings turn on, for an agent with `rows` rows.
+    pub fn new(settings: &LearnerSettings, rows: usize) -> Quirks {
         Quirks {
-            environment_gate_steps: settings.environment_gate_steps,
-            delayed_credit: settings.delayed_credit.then_some(settings.collision_reward),
-            exploration_inverted: settings.exploration_inverted,
-            random_decay: settings.random_decay,
+            environment_gate_steps: settings.choice.environment_gate_steps,
+            delayed_credit: settings.payment.delayed_credit.then_some(settings.payment.collision_reward),
+            exploration_inverted: settings.exploration.exploration_inverted,
+            random_decay: settings.exploration.random_decay,
             random_weights: vec![1.0; rows],
             last_environment: None,
         }

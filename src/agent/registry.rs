@@ -2,17 +2,15 @@
 //! tests run through all of them.
 
 use ndarray::{Array1, ArrayView1};
+use serde_json::{Map, Value};
 
 use crate::mdp::Observation;
 use crate::rng::Rng;
 
 use super::branch::Branch;
-use super::hyperparameters::SettingsError;
 use super::presets::Preset;
-use super::search::{
-    AvFuzzerSettings, BanditSettings, ConstantSettings, GoExploreSettings, MapElitesSettings,
-};
-use super::settings::Settings;
+use super::search::{AvFuzzerSettings, BanditSettings, ConstantSettings, MapElitesSettings};
+use super::settings::{Settings, SettingsError, changed};
 use super::{greedy, presets, random, space_filling};
 
 /// Chooses rows of the action table.
@@ -85,9 +83,9 @@ pub enum Kind {
     Ready(fn(&[u32]) -> Box<dyn Agent>),
     /// It must be trained: its presets, the default first. See [`super::Learner`].
     Learning(&'static [Preset]),
-    /// It searches over many episodes, and what it found can act: how its settings are read from the changes
-    /// of a YAML text. See [`super::Trainable`].
-    Searching(fn(&str) -> Result<Settings, SettingsError>),
+    /// It searches over many episodes, and what it found can act: how its settings are made from changes by name.
+    /// See [`super::Trainable`].
+    Searching(fn(Map<String, Value>) -> Result<Settings, SettingsError>),
 }
 
 /// Every agent of avastra.
@@ -130,29 +128,28 @@ pub const REGISTRY: &[Entry] = &[
     Entry {
         name: "av-fuzzer",
         summary: "AV-Fuzzer's genetic search over scripts of rows",
-        kind: Kind::Searching(|text| Settings::of_search(text, AvFuzzerSettings::check, Settings::AvFuzzer)),
+        kind: Kind::Searching(|changes| {
+            changed(&AvFuzzerSettings::default(), changes).map(Settings::AvFuzzer)
+        }),
     },
     Entry {
         name: "map-elites",
         summary: "the best script of every kind of collision, and new ones by changing those",
-        kind: Kind::Searching(MapElitesSettings::read),
+        kind: Kind::Searching(|changes| {
+            changed(&MapElitesSettings::default(), changes).map(Settings::MapElites)
+        }),
     },
     Entry {
         name: "constant",
         summary: "a fixed list of rows, those first that crashed most in training: the first legal one acts",
-        kind: Kind::Searching(|text| Settings::of_search(text, ConstantSettings::check, Settings::Constant)),
+        kind: Kind::Searching(|changes| {
+            changed(&ConstantSettings::default(), changes).map(Settings::Constant)
+        }),
     },
     Entry {
         name: "bandit",
         summary: "the row after which most crashes came in such a situation; it plans nothing",
-        kind: Kind::Searching(|text| Settings::of_search(text, BanditSettings::check, Settings::Bandit)),
-    },
-    Entry {
-        name: "go-explore",
-        summary: "returns to promising moments by snapshots and explores from there",
-        kind: Kind::Searching(|text| {
-            Settings::of_search(text, GoExploreSettings::check, Settings::GoExplore)
-        }),
+        kind: Kind::Searching(|changes| changed(&BanditSettings::default(), changes).map(Settings::Bandit)),
     },
 ];
 
@@ -179,7 +176,8 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::agent::{Collided, Experience, Learner, Rows, Trainable, Trajectory};
+    use crate::agent::settings::Configured;
+    use crate::agent::{Collided, Experience, Rows, Trainable, Trajectory};
     use crate::mdp::Closeness;
     use crate::rng::{Stream, child_seed, stream};
 
@@ -193,15 +191,14 @@ mod tests {
             Kind::Learning(presets) => {
                 let learner = |preset: &Preset| -> (Box<dyn Agent>, bool) {
                     let settings = (preset.settings)();
-                    let obeys = settings.masks_choice;
-                    (Box::new(Learner::new(Arc::new(settings), rows(), seed)), obeys)
+                    let obeys = settings.choice.masks_choice;
+                    (Box::new(settings.build(rows(), seed)), obeys)
                 };
                 presets.iter().map(learner).collect()
             }
             Kind::Searching(read) => {
-                let mut search = read("").unwrap().build(rows(), seed);
-                let beginning = search.beginning(0, seed);
-                assert_eq!((beginning.seed, beginning.from), (seed, None), "it knows no other start yet");
+                let mut search = read(Map::new()).unwrap().build(rows(), seed);
+                assert_eq!(search.start_seed(0, seed), seed, "it knows no other start yet");
                 vec![(search, true)]
             }
         }
@@ -246,24 +243,16 @@ mod tests {
     /// An episode in which the first choice makes an obstacle appear that is hit for good in the last.
     fn episode(rows: &[usize]) -> Trajectory {
         let experience = |(at, &row): (usize, &usize)| {
-            let is_last = at + 1 == rows.len();
-            Experience {
-                observation: Observation::zeros(),
-                legal: Array1::from_elem(ROWS, true),
-                row,
-                reward: if is_last { 7.5 } else { -1.0 },
-                hits: if is_last { vec![0] } else { Vec::new() },
-                collided: is_last,
-                crashes: if is_last { vec![Some(0)] } else { Vec::new() },
+            if at + 1 < rows.len() {
+                return Experience::plain(row, -1.0, ROWS);
             }
+            let (hits, crashes) = (vec![0], vec![Some(0)]);
+            Experience { hits, collided: true, crashes, ..Experience::plain(row, 7.5, ROWS) }
         };
         Trajectory {
-            steps: rows.iter().enumerate().map(experience).collect(),
-            last: Observation::zeros(),
-            last_legal: Array1::from_elem(ROWS, true),
-            terminal: true,
             closeness: Closeness { distance_m: 5.0 + rows[0] as f64, margin_m: 0.0 },
             collisions: vec![Collided { kind: format!("walk {}", rows[0]), counted: true }],
+            ..Trajectory::plain(rows.iter().enumerate().map(experience).collect(), ROWS)
         }
     }
 
@@ -281,21 +270,17 @@ mod tests {
             let Some(settings) = Settings::from_yaml(entry, None, text) else { continue };
             let settings = settings.unwrap();
             let play = |agent: &mut Box<dyn Trainable>, number: u64| {
-                let beginning =
-                    agent.beginning((number % 2) as usize, child_seed(9, Stream::Episode, number));
+                let seed = agent.start_seed((number % 2) as usize, child_seed(9, Stream::Episode, number));
                 agent.begin();
-                // A moment that has not been kept is played up to, and that is no new choice.
-                let new_from = beginning.from.map_or(0, |(_, step)| step);
                 let mut chosen = Vec::new();
                 for step in 0..6 {
                     agent.draw_seed(step);
-                    let mut rng = stream(beginning.seed, Stream::Exploration, step as u64);
+                    let mut rng = stream(seed, Stream::Exploration, step as u64);
                     let legal = Array1::from_elem(ROWS, true);
                     chosen.push(agent.choose(&Observation::zeros(), legal.view(), &mut rng).unwrap());
                 }
                 let mut rng = stream(9, Stream::Replay, number);
-                agent.learn(&episode(&chosen[new_from..]), &mut rng);
-                agent.keepsakes();
+                agent.learn(&episode(&chosen), &mut rng);
             };
             let mut whole = settings.build(rows(), 9);
             for number in 0..40 {

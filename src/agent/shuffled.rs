@@ -30,7 +30,7 @@ impl Agent for Shuffled {
 
     fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
         let open = self.policy.open(legal);
-        let explores = rng::unit(rng) < self.policy.settings.evaluation_epsilon;
+        let explores = rng::unit(rng) < self.policy.settings.exploration.evaluation_epsilon;
         let row = if explores || self.states.is_empty() {
             any(&open, rng)
         } else {

@@ -6,7 +6,7 @@ use super::q_policy::QPolicy;
 use super::registry::Agent;
 use super::trajectory::{Lesson, Trajectory};
 
-/// An agent in training. An episode is: `progress`, `beginning`, [`Agent::begin`], a choice for each
+/// An agent in training. An episode is: `progress`, `start_seed`, [`Agent::begin`], a choice for each
 /// step, `learn`.
 pub trait Trainable: Agent {
     /// The share of the training's episodes that are over, in `[0, 1)`; told before each episode.
@@ -14,21 +14,15 @@ pub trait Trainable: Agent {
         let _ = over;
     }
 
-    /// Where the next episode begins, on the nth of the roads. `fresh` is a seed that no episode had
+    /// The seed of the next episode's start, on the nth of the roads. `fresh` is a seed that no episode had
     /// before; an agent that returns to an old start gives that start's seed instead.
-    fn beginning(&mut self, road: usize, fresh: u64) -> Beginning {
+    fn start_seed(&mut self, road: usize, fresh: u64) -> u64 {
         let _ = road;
-        Beginning { seed: fresh, from: None }
+        fresh
     }
 
     /// Takes in an episode that has been judged.
     fn learn(&mut self, episode: &Trajectory, rng: &mut Rng) -> Lesson;
-
-    /// Moments of the last episode that the agent may return to: the number by which it will ask for each,
-    /// and the step. A number that is given again stands for the new moment.
-    fn keepsakes(&mut self) -> Vec<(usize, usize)> {
-        Vec::new()
-    }
 
     /// Choices made in training.
     fn steps(&self) -> u64;
@@ -52,15 +46,4 @@ pub trait Trainable: Agent {
 
     /// The whole agent as bytes; see [`super::Settings::restore`].
     fn save(&self) -> Vec<u8>;
-}
-
-/// Where an episode of a training begins.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Beginning {
-    /// Seed of the start.
-    pub seed: u64,
-    /// A moment of an earlier episode of that seed to go on from: its number (see
-    /// [`Trainable::keepsakes`]) and its step. If the moment was not kept, the training plays up to it, and
-    /// the agent repeats its choices.
-    pub from: Option<(usize, usize)>,
 }

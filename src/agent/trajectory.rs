@@ -62,3 +62,27 @@ impl Trajectory {
         self.steps.iter().map(|step| step.reward).sum()
     }
 }
+
+/// What the tests of agents are made of: nothing is seen, nothing comes near.
+#[cfg(test)]
+impl Experience {
+    pub fn plain(row: usize, reward: f64, rows: usize) -> Experience {
+        let (observation, legal) = (Observation::zeros(), Array1::from_elem(rows, true));
+        Experience { observation, legal, row, reward, hits: Vec::new(), collided: false, crashes: Vec::new() }
+    }
+}
+
+#[cfg(test)]
+impl Trajectory {
+    /// It ends by arrival.
+    pub fn plain(steps: Vec<Experience>, rows: usize) -> Trajectory {
+        Trajectory {
+            steps,
+            last: Observation::zeros(),
+            last_legal: Array1::from_elem(rows, true),
+            terminal: true,
+            closeness: Closeness::default(),
+            collisions: Vec::new(),
+        }
+    }
+}

@@ -105,7 +105,6 @@ impl<'a> Reader<'a> {
                 OriginField::Engine => origin.engine = self.text(value),
                 OriginField::Traffic => origin.traffic = self.text(value),
                 OriginField::TrafficDigest => origin.traffic_digest = self.text(value),
-                OriginField::Avoidability => origin.avoidability = self.text(value),
                 OriginField::With => origin.with = self.rule_names(value),
                 OriginField::Without => origin.without = self.rule_names(value),
             }

@@ -1,5 +1,5 @@
-//! The parser of `--state`: the states of a space for `avastra why`, the variables of a policy for
-//! `avastra explain-policy`. Mistakes come back as one sentence, because a command line has no place to point at.
+//! The parser of `--state`: the states of a space for `avastra table --row`, the variables of a policy for
+//! `avastra policy explain`. Mistakes come back as one sentence, because a command line has no place to point at.
 
 use std::collections::BTreeSet;
 

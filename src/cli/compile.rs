@@ -12,7 +12,7 @@ use super::error::Failure;
 use super::files::{folder, write, write_result};
 use super::output::Output;
 use super::output::plural;
-use super::{load, trials};
+use super::{doc, load, trials, why};
 
 /// The folder for tables without `--out`.
 const FOLDER: &str = "build";
@@ -65,6 +65,13 @@ pub fn table(output: &Output, arguments: &TableArguments) -> Result<(), Failure>
     let table = load::table(output, &arguments.file)?;
     if let Some(road) = &arguments.road {
         road_named(table.space(), road)?;
+    }
+    if arguments.markdown {
+        doc::doc(output, table.space());
+        return Ok(());
+    }
+    if let Some(row) = arguments.why.row {
+        return why::why(output, arguments, &table, row);
     }
     if arguments.r#try {
         return trials::trials(output, arguments, table);

@@ -3,15 +3,10 @@
 use crate::model::Space;
 use crate::run::{RunSettings, TrafficRecord};
 
-use super::arguments::{ConditionArguments, UnderTestArguments};
+use super::arguments::ConditionArguments;
 use super::error::Failure;
 use super::load;
 use super::load::UnderTest;
-
-/// The driving system that a command line names.
-pub fn named(arguments: &UnderTestArguments) -> Result<UnderTest, Failure> {
-    load::under_test(&arguments.ads, arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())
-}
 
 /// So many episodes of an agent on each road against a driving system.
 pub fn settings(

@@ -28,7 +28,7 @@ use super::replay::priority_text;
 /// Says which module is at fault for every file's first counted collision or, with `--mechanisms`, which share of
 /// all collisions each documented weakness causes.
 pub fn diagnose(output: &Output, arguments: &DiagnoseArguments) -> Result<(), Failure> {
-    let asked = load::asked(None, arguments.ads_config.as_deref(), None)?;
+    let asked = load::asked(arguments.against.ads.as_deref())?;
     if arguments.mechanisms {
         return mechanisms(output, arguments, &asked);
     }

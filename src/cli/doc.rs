@@ -1,33 +1,21 @@
-//! `avastra doc`: a space as Markdown, from its documentation comments and from what was proved about it.
+//! `avastra table --markdown`: a space as Markdown, from its documentation comments and from what was proved about it.
 
 use core::fmt::Write;
 use std::collections::BTreeSet;
 
 use crate::model::{
-    ActionDef, Domain, Initial, Interval, Parameter, Reach, RuleBody, RuleDef, Space, StateDef, Type, Value,
+    ActionDef, Domain, Initial, Interval, Parameter, RuleBody, RuleDef, Space, StateDef, Type, Value,
 };
 use crate::units::{Dimension, quantity_short};
 
-use super::arguments::DocArguments;
-use super::error::Failure;
-use super::files::write_named;
-use super::load;
 use super::output::Output;
 use super::output::plural;
 
-/// Prints the page, or writes it.
-pub fn doc(output: &Output, arguments: &DocArguments) -> Result<(), Failure> {
-    let table = load::table(output, &arguments.file)?;
-    let text = page(table.space());
-    match &arguments.output {
-        Some(path) => {
-            write_named(path, &text)?;
-            output.tell(&path.display().to_string());
-        }
-        None => output.say(text.trim_end()),
-    }
+/// Prints the page.
+pub fn doc(output: &Output, space: &Space) {
+    let text = page(space);
+    output.say(text.trim_end());
     output.result(serde_json::json!({ "text": text }));
-    Ok(())
 }
 
 fn page(space: &Space) -> String {
@@ -152,24 +140,11 @@ fn ranges(space: &Space, action: usize, parameter: &Parameter) -> String {
     let declared = Interval::closed(*low, *high);
     let unit = parameter.unit();
     let roads = space.roads.iter().enumerate();
-    let left = roads.filter_map(|(road, of)| Some((of, range_on(space, action, parameter, road)?)));
+    let left = roads.filter_map(|(road, of)| Some((of, space.range_on(action, parameter, road)?)));
     let shown = left.filter(|(_, kept)| *kept != declared);
     let shown: Vec<String> =
         shown.map(|(road, kept)| format!("{} on {}", kept.shown(parameter.ty, unit), road.name)).collect();
     shown.join("; ")
-}
-
-/// What the rules leave of a parameter's range on a road, over all rows of its action that can run
-/// there; `None` if none can, or the parameter has no range.
-pub fn range_on(space: &Space, action: usize, parameter: &Parameter, road: usize) -> Option<Interval> {
-    let reaches = space.rows_of(action).iter().map(|row| &row.roads[road]);
-    let kept = reaches.filter_map(|reach| match reach {
-        Reach::Open(ranges) => {
-            ranges.iter().find(|(name, _)| *name == parameter.name).map(|(_, interval)| *interval)
-        }
-        Reach::Dead { .. } => None,
-    });
-    kept.reduce(|all, interval| all.hull(&interval))
 }
 
 /// The values of a parameter; of an `each` parameter those that have rows, because a `where` may leave others out.

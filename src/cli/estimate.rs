@@ -1,4 +1,4 @@
-//! `avastra estimate`: how often would it crash; and `avastra compare`: which of two crashes more often.
+//! `avastra estimate`: how often would it crash; with `--than`, which of two crashes more often.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -15,12 +15,11 @@ use crate::run::{DatabaseError, Numbered, Run, RunSettings, Shard, Units};
 use crate::statistics::Interval;
 use crate::syntax::yaml_mistake;
 
-use super::arguments::{CompareArguments, EstimateArguments, EventArgument, MethodArgument};
+use super::arguments::{EstimateArguments, EventArgument, MethodArgument};
 use super::error::Failure;
 use super::files::{remove, write};
 use super::findings::doubts;
 use super::interrupt::stop_on_interrupt;
-use super::load::UnderTest;
 use super::output::{Output, plural};
 use super::pack::pack_space;
 use super::parallel::jobs;
@@ -29,8 +28,17 @@ use super::run::{critical_text, cut_short};
 use super::run_directory::{Held, Resumed, WrittenFile, write_scenario};
 use super::{conditions, load, run_directory, shard};
 
-/// Plays what an estimate still lacks and prints its result.
+/// Episodes of a part, if a command line gives no number.
+const EPISODES: u32 = 50;
+
+/// Episodes on each road in which two driving systems are compared, if a command line gives no number.
+const EPISODES_OF_TWO: u32 = 250;
+
+/// Plays what an estimate still lacks and prints its result, or compares two driving systems.
 pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Failure> {
+    if let (Some(file), Some(than)) = (&arguments.file, &arguments.than) {
+        return compare(output, arguments, file, [&arguments.under_test.ads, than]);
+    }
     let begun = match &arguments.resume {
         Some(path) => resumed(output, path, false)?,
         None => {
@@ -135,10 +143,7 @@ fn play_all(
     write(&path.join("results.json"), &format!("{text}\n"))?;
     output.say(&estimate_text(&results, is_unfinished, shard));
     let critical = load::sources_in(&path.join("critical"))?;
-    output.say(&match results.method {
-        Method::Split => "no scenarios: a branch of `split` has no file of its own".to_owned(),
-        Method::Count | Method::Probe => critical_text(&path, &critical),
-    });
+    output.say(&critical_text(&path, &critical));
     let doubts = doubts(estimate.run().program());
     doubts.iter().for_each(|doubt| output.warn(doubt));
     output.result(serde_json::json!({
@@ -338,14 +343,13 @@ fn wanted(output: &Output, arguments: &EstimateArguments) -> Result<(Estimate, S
     let file = arguments.file.as_ref().expect("clap asks for it where there is no `--resume`");
     let table = load::table(output, file)?;
     let shard = shard::asked(output, arguments.shard.shard)?;
-    let under_test = conditions::named(&arguments.under_test)?;
-    let (conditions, episodes) = (&arguments.conditions, arguments.episodes);
+    let under_test = load::named(&arguments.under_test.ads)?;
+    let (conditions, episodes) = (&arguments.conditions, arguments.episodes.unwrap_or(EPISODES));
     let settings = EstimateSettings {
         event: event(arguments.event),
         method: match arguments.method {
             MethodArgument::Count => Method::Count,
             MethodArgument::Probe => Method::Probe,
-            MethodArgument::Split => Method::Split,
         },
         parts: arguments.parts,
         stopping: Stopping { precision: arguments.precision, hours: arguments.hours },
@@ -391,23 +395,28 @@ fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Estimate, H
 }
 
 /// Plays two driving systems in the same episodes.
-pub fn compare(output: &Output, arguments: &CompareArguments) -> Result<(), Failure> {
-    let table = load::table(output, &arguments.file)?;
+fn compare(
+    output: &Output,
+    arguments: &EstimateArguments,
+    file: &Path,
+    sides: [&String; 2],
+) -> Result<(), Failure> {
+    let table = load::table(output, file)?;
     let side = |named: &str| {
-        let (conditions, under_test) = (&arguments.conditions, side_of(named)?);
-        let episodes = arguments.episodes;
+        let (conditions, under_test) = (&arguments.conditions, load::named(named)?);
+        let episodes = arguments.episodes.unwrap_or(EPISODES_OF_TWO);
         let settings =
             conditions::settings(table.space(), conditions, &conditions.agent, under_test, episodes)?;
         Ok::<_, Failure>(Run::new(table.clone(), settings)?)
     };
-    let (first, second) = (side(&arguments.first)?, side(&arguments.second)?);
+    let (first, second) = (side(sides[0])?, side(sides[1])?);
     let comparison = Comparison { first, second, event: event(arguments.event) };
     let numbers: Vec<usize> = (0..comparison.pairs()).collect();
     output.tell(&format!(
         "{}: {} and {} in the same {}",
-        arguments.file.display(),
-        arguments.first,
-        arguments.second,
+        file.display(),
+        sides[0],
+        sides[1],
         plural(numbers.len(), "episode")
     ));
     // Nothing is kept of a comparison, so Ctrl-C ends it at once.
@@ -430,7 +439,6 @@ pub fn compare(output: &Output, arguments: &CompareArguments) -> Result<(), Fail
         return Err(Failure::Ads { findings: failed });
     }
     let results = ComparisonResults::new(comparison.event, &pairs).expect("there is at least one episode");
-    let sides = [&arguments.first, &arguments.second];
     output.say(&comparison_text(&results, sides));
     let doubts: Vec<String> =
         [&comparison.first, &comparison.second].into_iter().flat_map(|run| doubts(run.program())).collect();
@@ -438,12 +446,6 @@ pub fn compare(output: &Output, arguments: &CompareArguments) -> Result<(), Fail
     output
         .result(serde_json::json!({ "sides": sides, "results": results, "reproducible": doubts.is_empty() }));
     Ok(())
-}
-
-/// The driving system of a side.
-fn side_of(named: &str) -> Result<UnderTest, Failure> {
-    let (name, profile) = load::profile_or_name(named);
-    load::under_test(name.unwrap_or(crate::run::DEFAULT_ADS), profile, None)
 }
 
 fn event(argument: EventArgument) -> EventKind {
@@ -458,7 +460,6 @@ fn heading(estimate: &Estimate) -> String {
     let method = match settings.method {
         Method::Count => "by counting",
         Method::Probe => "by trying rows out",
-        Method::Split => "by splitting",
     };
     format!(
         "{}: how often {} under {} against {}, {method}, {} of {} on {}, seed {}",

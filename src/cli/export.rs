@@ -7,14 +7,13 @@ use std::sync::{Mutex, PoisonError};
 use crate::export;
 use crate::export::{ExportError, Recording, record};
 
-use super::arguments::{ExportArguments, ExportEgo, ExportFormat, ExportProfile, ExportVersion};
+use super::arguments::{ExportArguments, ExportEgo, ExportFormat, ExportProfile};
 use super::error::Failure;
 use super::files::{copy_map, folder, make, write};
-use super::load;
-use super::look;
 use super::output::{Output, plural};
 use super::parallel::each_file;
 use super::replay::refutation;
+use super::{load, look, pack};
 
 /// The folder of what is written, beside the scenarios, unless another one is named.
 const FOLDER: &str = "exported";
@@ -22,8 +21,14 @@ const FOLDER: &str = "exported";
 /// Writes every file's scenario, played again, in another tool's format. A scenario that does not replay is refused.
 pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failure> {
     refuse_senseless(arguments)?;
+    if arguments.to == ExportFormat::Ava {
+        let Some(folder) = &arguments.out else {
+            return Err(Failure::usage("`--to ava` needs `--out DIR`, the folder that can be moved"));
+        };
+        return pack::pack(output, &arguments.many.files, folder);
+    }
     let targets = targets(arguments)?;
-    let asked = load::asked(None, None, None)?;
+    let asked = load::asked(None)?;
     let maps = Mutex::new(());
     let exported = each_file(output, &arguments.many, None, |file| {
         let (table, scenario) = look::unchanged(output, file)?;
@@ -83,9 +88,6 @@ struct Exported {
 /// Options that mean nothing for a format are mistakes.
 fn refuse_senseless(arguments: &ExportArguments) -> Result<(), Failure> {
     let is_openscenario = arguments.to == ExportFormat::Openscenario;
-    if arguments.osc_version.is_some() && !is_openscenario {
-        return Err(Failure::usage("`--osc-version` is for `--to openscenario`"));
-    }
     if arguments.natural && !is_openscenario {
         return Err(Failure::usage("`--natural` is for `--to openscenario`"));
     }
@@ -98,6 +100,9 @@ fn refuse_senseless(arguments: &ExportArguments) -> Result<(), Failure> {
         )),
         (ExportFormat::Csv, Some(_)) => {
             Err(Failure::usage("`--ego` is not for `--to csv`: the ego vehicle is number 0"))
+        }
+        (ExportFormat::Ava, Some(_)) => {
+            Err(Failure::usage("`--ego` is not for `--to ava`: the files stay as they are"))
         }
         _ => Ok(()),
     }
@@ -133,6 +138,7 @@ fn extension(format: ExportFormat) -> &'static str {
         ExportFormat::Openscenario => "xosc",
         ExportFormat::Commonroad => "xml",
         ExportFormat::Csv => "csv",
+        ExportFormat::Ava => "ava",
     }
 }
 
@@ -170,15 +176,15 @@ fn write_all(
             write(target, &export::csv(recording))?;
             Ok((vec![target.to_owned()], Vec::new()))
         }
+        ExportFormat::Ava => unreachable!("files of our own are copied before anything is played"),
     }
 }
 
 /// How an OpenSCENARIO file is to be.
 fn style(arguments: &ExportArguments) -> export::Style {
-    let version = match (arguments.profile, arguments.osc_version) {
-        (Some(ExportProfile::Carla), _) => export::Version::Carla,
-        (None, None | Some(ExportVersion::V1_2)) => export::Version::V1_2,
-        (None, Some(ExportVersion::V1_3)) => export::Version::V1_3,
+    let version = match arguments.profile {
+        Some(ExportProfile::Carla) => export::Version::Carla,
+        None => export::Version::V1_2,
     };
     let ego = match arguments.ego {
         None | Some(ExportEgo::Trajectory) => export::Ego::Trajectory,

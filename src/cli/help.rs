@@ -55,14 +55,10 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         &[
             ("table scenarios/avastra45.ava", "the rows, numbered"),
             ("table scenarios/avastra45.ava --road corner", "what one road allows"),
+            ("table scenarios/avastra45.ava --row 12", "which rule says no?"),
+            ("table scenarios/avastra45.ava --row 0 --state 'time: Night'", ""),
+            ("table scenarios/avastra45.ava --markdown", "the space, to read"),
             ("table scenarios/avastra45.ava --try --tries 2", "drive each row and judge it"),
-        ],
-    ),
-    (
-        "why",
-        &[
-            ("why scenarios/avastra45.ava --row 12", "at the start, on the first road"),
-            ("why scenarios/avastra45.ava --row 0 --road corner --state 'time: Night'", ""),
         ],
     ),
     (
@@ -81,7 +77,6 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             "rows, rules and draws that differ",
         )],
     ),
-    ("doc", &[("doc scenarios/avastra45.ava", ""), ("doc scenarios/avastra45.ava -o avastra45.md", "")]),
     (
         "new",
         &[
@@ -101,11 +96,11 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         "run",
         &[
             ("run scenarios/avastra45.ava --episodes 20", "20 episodes on each road"),
-            ("run scenarios/avastra45.ava --ads-config scenarios/ads/degraded.yaml", "dirty sensors"),
+            ("run scenarios/avastra45.ava --ads scenarios/ads/degraded.yaml", "dirty sensors"),
             ("run scenarios/avastra45.ava --ads reactive --traffic released", ""),
             ("run scenarios/avastra45.ava --road corner --without npc_gap", "with one rule switched off"),
             ("run --policy policies/corner.ava", "let a learned policy choose"),
-            ("run scenarios/avastra45.ava --ads-cmd './my_planner --fast'", "a driving system of your own"),
+            ("run scenarios/avastra45.ava --ads './my_planner --fast'", "a driving system of your own"),
             ("run --resume runs/0001", "go on after Ctrl-C"),
             ("run scenarios/avastra45.ava --shard 3/8 --out shards/3", "an eighth of it, for `merge`"),
         ],
@@ -114,19 +109,19 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         "train",
         &[
             ("train scenarios/avastra45.ava --road corner --episodes 750", ""),
-            ("train scenarios/avastra45.ava --agent go-explore", "a search in place of a learner"),
+            ("train scenarios/avastra45.ava --agent map-elites", "a search in place of a learner"),
             ("train --resume runs/0001", "go on after Ctrl-C"),
         ],
     ),
-    ("distill", &[("distill policies/corner.ava --leaves 8 -o short.ava", "at most 8 readable rules")]),
     (
-        "explain-policy",
+        "policy",
         &[
-            ("explain-policy policies/corner.ava", ""),
-            ("explain-policy policies/corner.ava --state 'ego_speed: 12 m/s, time: Night'", ""),
+            ("policy explain policies/corner.ava", ""),
+            ("policy explain policies/corner.ava --state 'ego_speed: 12 m/s, time: Night'", ""),
+            ("policy distil policies/corner.ava --leaves 8 -o short.ava", "at most 8 readable rules"),
+            ("policy weights policies/corner.ava -o corner.safetensors", ""),
         ],
     ),
-    ("export-weights", &[("export-weights policies/corner.ava -o corner.safetensors", "")]),
     (
         "study",
         &[
@@ -134,24 +129,24 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             ("study scenarios/studies/rq1.yaml --quick", "see that it works"),
             ("study --resume runs/0001", "go on after Ctrl-C"),
             ("study scenarios/studies/rq1.yaml --shard 3/8 --out shards/3", "an eighth of it, for `merge`"),
-        ],
-    ),
-    (
-        "results",
-        &[
-            ("results", "write RESULTS.md from scenarios/studies"),
-            ("results --add runs/0001 --commit 8c11ccf", "keep what a study found, and write it"),
+            ("study results", "write RESULTS.md from scenarios/studies"),
+            ("study results --add runs/0001 --commit 8c11ccf", "keep what a study found, and write it"),
         ],
     ),
     (
         "estimate",
         &[
-            ("estimate scenarios/avastra45.ava --ads-config scenarios/ads/degraded.yaml", "by counting"),
+            ("estimate scenarios/avastra45.ava --ads scenarios/ads/degraded.yaml", "by counting"),
             (
                 "estimate scenarios/avastra45.ava --road corner --method probe",
                 "rare crashes: try dangerous rows out",
             ),
             ("estimate scenarios/avastra45.ava --precision 0.2 --parts 400", "until it is precise enough"),
+            (
+                "estimate scenarios/avastra45.ava --than scenarios/ads/degraded.yaml",
+                "what do dirty sensors cost?",
+            ),
+            ("estimate scenarios/avastra45.ava --ads idm --than cc --event collision", ""),
             ("estimate --resume runs/0001", "go on after Ctrl-C"),
         ],
     ),
@@ -163,27 +158,11 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         ],
     ),
     (
-        "compare",
-        &[
-            (
-                "compare scenarios/avastra45.ava scenarios/ads/default.yaml scenarios/ads/degraded.yaml",
-                "what do dirty sensors cost?",
-            ),
-            ("compare scenarios/avastra45.ava modular idm --event collision", ""),
-        ],
-    ),
-    (
         "replay",
         &[
             ("replay runs/0001/critical/*.ava", "check every claim"),
+            ("replay policies/corner.ava", "play the evaluation of a policy again"),
             ("replay runs/0001/critical/corner_0004.ava --ads idm", "the same scene, another driver"),
-        ],
-    ),
-    (
-        "verify",
-        &[
-            ("verify runs/0001/critical/*.ava", "check every claim of scenarios"),
-            ("verify policies/corner.ava", "play the evaluation of a policy again"),
         ],
     ),
     (
@@ -198,7 +177,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         "test",
         &[
             ("test runs/0001", "do its scenarios still crash?"),
-            ("test runs/0001 --ads-config scenarios/ads/cautious.yaml --junit out.xml", ""),
+            ("test runs/0001 --ads scenarios/ads/cautious.yaml --junit out.xml", ""),
             ("test runs/0001 --review", "what has changed for each of them, in meaning"),
             ("test runs/0001 --accept", "and take it over"),
         ],
@@ -214,6 +193,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             ),
             ("export --to commonroad runs/0001/critical/corner_0004.ava", "with a planning problem"),
             ("export --to csv runs/0001/critical/corner_0004.ava", "where everyone was at every tick"),
+            ("export --to ava runs/0001/critical/*.ava --out suite", "a folder that can be moved"),
         ],
     ),
     (
@@ -224,14 +204,13 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             ("import --ego Host --out catalogue suite/*.xosc", ""),
         ],
     ),
-    ("pack", &[("pack runs/0001/critical/*.ava --out suite", "a folder that can be moved")]),
     (
         "report",
         &[
             ("report runs/0001", "write runs/0001/report.html"),
             ("report runs/0001/critical/corner_0004.ava -o crash.html", "one scenario"),
-            ("report runs/0001 --compare scenarios/ads/default.yaml", "two driving systems on one clock"),
-            ("report runs/0001 --compare cc", "beside UN R157's careful driver"),
+            ("report runs/0001 --ads scenarios/ads/default.yaml", "two driving systems on one clock"),
+            ("report runs/0001 --ads cc", "beside UN R157's careful driver"),
         ],
     ),
     (
@@ -244,10 +223,10 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
     (
         "ads",
         &[
-            ("ads check -- ./my_planner --fast", "does it follow PROTOCOL.md?"),
-            ("ads check -- tcp:127.0.0.1:5555", "one that listens on a socket"),
+            ("ads check --ads './my_planner --fast'", "does it follow PROTOCOL.md?"),
+            ("ads check --ads tcp:127.0.0.1:5555", "one that listens on a socket"),
             ("ads schema", "JSON Schema of every message"),
-            ("ads check -- avastra ads toy --misbehave nan", "what a finding looks like"),
+            ("ads check --ads 'avastra ads toy --misbehave nan'", "what a finding looks like"),
         ],
     ),
     (
@@ -259,9 +238,59 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
     ),
 ];
 
+/// The commands in groups, in the order in which a newcomer meets them.
+const GROUPS: &[(&str, &[&str])] = &[
+    ("Write", &["new", "check", "fmt", "table", "compile", "road", "diff", "explain"]),
+    ("Run", &["run", "train", "policy", "study", "estimate", "merge"]),
+    ("Understand", &["replay", "report", "render", "diagnose", "shrink"]),
+    ("Regress", &["test"]),
+    ("Exchange", &["export", "import", "ads"]),
+    ("Tools", &["lsp", "completions"]),
+];
+
+/// Commands and options that were, and what is typed now.
+const MOVED: &[(&str, &str)] = &[
+    ("verify", "replay"),
+    ("compare", "estimate FILE --ads DRIVER --than DRIVER"),
+    ("results", "study results"),
+    ("distill", "policy distil"),
+    ("explain-policy", "policy explain"),
+    ("export-weights", "policy weights"),
+    ("why", "table FILE --row N"),
+    ("doc", "table FILE --markdown"),
+    ("pack", "export --to ava"),
+    ("--ads-config", "--ads FILE"),
+    ("--ads-cmd", "--ads 'COMMAND'"),
+    ("--compare", "--ads DRIVER"),
+];
+
+/// What is typed now in place of a command or an option that was.
+pub fn moved(word: &str) -> Option<&'static str> {
+    MOVED.iter().find(|(was, _)| *was == word).map(|(_, is)| *is)
+}
+
+/// The groups, with a line for each command.
+fn grouped(command: &Command) -> String {
+    let mut text = String::new();
+    for (heading, names) in GROUPS {
+        text.push_str(&format!("{heading}:\n"));
+        for name in *names {
+            let about = command.find_subcommand(name).and_then(Command::get_about);
+            let about = about.map(ToString::to_string).unwrap_or_default();
+            text.push_str(&format!("  {name:<13}{about}\n"));
+        }
+        text.push('\n');
+    }
+    text
+}
+
 /// The whole command line, with all that `--help` says.
 pub fn command() -> Command {
     let mut command = Arguments::command().after_help(STATUS);
+    let groups = grouped(&command);
+    command = command.help_template(format!(
+        "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{groups}Every command:\n{{options}}{{after-help}}"
+    ));
     for (name, examples) in EXAMPLES {
         let notes = match *name {
             "run" => format!("\n\n{}\n\n{}", agents(is_ready), driving_systems()),
@@ -406,6 +435,18 @@ mod tests {
                 command().try_get_matches_from(all).unwrap_or_else(|error| panic!("{line}: {error}"));
             }
         }
+    }
+
+    #[test]
+    fn every_command_is_in_one_group_and_none_is_one_that_was() {
+        let command = command();
+        let shown = command.get_subcommands().filter(|command| !command.is_hide_set());
+        let mut shown: Vec<&str> = shown.map(Command::get_name).collect();
+        let mut grouped: Vec<&str> = GROUPS.iter().flat_map(|(_, names)| *names).copied().collect();
+        shown.sort_unstable();
+        grouped.sort_unstable();
+        assert_eq!(grouped, shown);
+        assert!(MOVED.iter().all(|(was, _)| !shown.contains(was)));
     }
 
     /// Every line of a script that calls avastra, comments included, parses once its variables have values.

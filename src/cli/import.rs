@@ -121,7 +121,7 @@ fn plays(imported: &Imported, target: &Path, map: &Path, source: &Path) -> Resul
 
 /// Plays the one step of an imported scenario.
 fn first_step(table: &ActionTable, scenario: &Scenario) -> Result<(), String> {
-    let asked = load::asked(None, None, None).map_err(|error| error.to_string())?;
+    let asked = load::asked(None).map_err(|error| error.to_string())?;
     let (ads, _) = asked.selected_for(scenario).map_err(|error| error.to_string())?;
     let stage = Stage::new(table, scenario).map_err(|error| error.to_string())?;
     let log = stage.play(&ads, &mut |_, _, _| {});

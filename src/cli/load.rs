@@ -8,16 +8,16 @@ use std::sync::Arc;
 
 use crate::action::ActionTable;
 use crate::ads::external::{Attached, ExternalSettings, Target};
-use crate::ads::{EXTERNAL, ModularConfig};
+use crate::ads::{EXTERNAL, ModularConfig, REGISTRY};
 use crate::check;
 use crate::check::{Loaded, ReadError};
 use crate::model::{Policy, Scenario, Space};
 use crate::run;
-use crate::run::{Asked, Profile, driving_system};
+use crate::run::{Asked, Profile, RunError, driving_system};
 use crate::sim::TrafficProfile;
+use crate::syntax::nearest;
 use crate::trial::places::{self, Scenes};
 
-use super::arguments::AgainstArguments;
 use super::error::Failure;
 use super::output::Output;
 
@@ -258,40 +258,94 @@ pub fn under_test(ads: &str, config: Option<&Path>, command: Option<&str>) -> Re
     Ok(UnderTest { ads: ads.to_owned(), profile: settings.as_ref().map(Profile::new), external: None })
 }
 
-/// The driving system that scenarios are to be played with, if a command line names one. An external one is started.
+/// What `--ads` gives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Driver<'a> {
+    /// A driving system of avastra.
+    Name(&'a str),
+    /// A profile of `modular`, or of an external one.
+    Profile(&'a Path),
+    /// What starts or reaches an external one.
+    Command(&'a str),
+}
+
+/// What a text after `--ads` gives: an address; a profile, which ends like YAML; a command, which has a blank or a path; else a
+/// name.
 ///
 /// # Errors
-/// As [`under_test`], and if an external one does not start.
-pub fn asked(ads: Option<&str>, config: Option<&Path>, command: Option<&str>) -> Result<Asked, Failure> {
+/// If it is a lone word and no name: a program of the search path that is started by a slip would be none that was meant.
+pub fn driver(text: &str) -> Result<Driver<'_>, Failure> {
+    let is_address = text.starts_with("tcp:") || text.starts_with("unix:");
+    let has_blank = text.contains(char::is_whitespace);
+    // `python3 drive.py --profile fast.yaml` is a command.
+    if !is_address && is_yaml(text) && (!has_blank || Path::new(text).is_file()) {
+        return Ok(Driver::Profile(Path::new(text)));
+    }
+    if is_address || has_blank || text.contains(std::path::is_separator) {
+        return Ok(Driver::Command(text));
+    }
+    match driving_system(text) {
+        Ok(_) => Ok(Driver::Name(text)),
+        Err(RunError::Ads { name, known }) => {
+            let names = REGISTRY.iter().map(|entry| entry.name);
+            let near = nearest(&name, names).map_or(String::new(), |near| format!("did you mean `{near}`? "));
+            Err(Failure::usage(format!(
+                "no driving system `{name}`: {near}there are {known}; a profile ends in `.yaml`, and a command has a path or \
+                 arguments, as `./{name}`"
+            )))
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// The path of the profile that a text after `--ads` gives, if it gives one.
+pub fn profile_path(text: &str) -> Option<&Path> {
+    match driver(text) {
+        Ok(Driver::Profile(path)) => Some(path),
+        _ => None,
+    }
+}
+
+/// The driving system under test that `--ads` gives.
+///
+/// # Errors
+/// As [`driver`] and [`under_test`].
+pub fn named(text: &str) -> Result<UnderTest, Failure> {
+    match driver(text)? {
+        Driver::Name(name) => under_test(name, None, None),
+        Driver::Profile(path) => under_test(run::DEFAULT_ADS, Some(path), None),
+        Driver::Command(command) => under_test(run::DEFAULT_ADS, None, Some(command)),
+    }
+}
+
+/// The driving system that scenarios are to be played with, in place of the recorded one, if `--ads` is given. An external one
+/// is started.
+///
+/// # Errors
+/// As [`named`], and if an external one does not start.
+pub fn asked(text: Option<&str>) -> Result<Asked, Failure> {
+    let Some(text) = text else { return Ok(Asked::default()) };
+    let (config, command) = match driver(text)? {
+        Driver::Name(name) => return Ok(Asked { ads: Some(name.to_owned()), ..Asked::default() }),
+        Driver::Profile(path) => (Some(path), None),
+        Driver::Command(command) => (None, Some(command)),
+    };
     if let Some(settings) = external(config, command)? {
         return Ok(Asked { external: Some(run::started(&settings)?), ..Asked::default() });
     }
-    let profile = config.map(profile).transpose()?;
-    Ok(Asked { ads: ads.map(str::to_owned), profile, external: None })
+    Ok(Asked { profile: config.map(profile).transpose()?, ..Asked::default() })
 }
 
-/// The driving system that a command line names in place of the recorded one.
-///
-/// # Errors
-/// As [`asked`].
-pub fn against(arguments: &AgainstArguments) -> Result<Asked, Failure> {
-    let AgainstArguments { ads, ads_config, ads_cmd } = arguments;
-    asked(ads.as_deref(), ads_config.as_deref(), ads_cmd.as_deref())
-}
-
-/// What a text that is a profile or a name says, as the name and the file that [`under_test`] and [`asked`] take: a profile if
-/// it ends like YAML or has a folder, else a name.
-pub fn profile_or_name(text: &str) -> (Option<&str>, Option<&Path>) {
-    let path = Path::new(text);
-    let is_yaml = path.extension().is_some_and(|extension| extension == "yaml" || extension == "yml");
-    if is_yaml || text.contains(std::path::is_separator) { (None, Some(path)) } else { (Some(text), None) }
+/// Whether a text that may be a name or a file is a file: it ends like YAML.
+pub fn is_yaml(text: &str) -> bool {
+    Path::new(text).extension().is_some_and(|extension| extension == "yaml" || extension == "yml")
 }
 
 /// An external driving system, by a command or by the `ads` block of a profile; with both, the command goes before the
 /// one of the profile.
 pub fn external(config: Option<&Path>, command: Option<&str>) -> Result<Option<ExternalSettings>, Failure> {
     let target = command.map(|text| {
-        Target::from_text(text).map_err(|reason| Failure::usage(format!("`--ads-cmd`: {reason}")))
+        Target::from_text(text).map_err(|reason| Failure::usage(format!("cannot start `{text}`: {reason}")))
     });
     let target = target.transpose()?;
     let Some(path) = config else { return Ok(target.map(ExternalSettings::of)) };
@@ -301,7 +355,7 @@ pub fn external(config: Option<&Path>, command: Option<&str>) -> Result<Option<E
     match (settings, target) {
         (Some(settings), Some(command)) => Ok(Some(ExternalSettings { command, ..settings })),
         (None, Some(_)) => Err(Failure::usage(format!(
-            "`{}` is a profile of `modular`: with `--ads-cmd` it must have an `ads` block",
+            "`{}` is a profile of `modular`: with a command it must have an `ads` block",
             path.display()
         ))),
         (settings, None) => Ok(settings),
@@ -327,7 +381,7 @@ fn with_answers(mut scenario: Scenario, path: &Path) -> Result<Scenario, Failure
 /// # Errors
 /// If there is no such name, or the file cannot be used.
 pub fn traffic(wanted: &str) -> Result<TrafficProfile, Failure> {
-    if [".yaml", ".yml", "/"].iter().any(|part| wanted.contains(part)) {
+    if is_yaml(wanted) {
         let path = Path::new(wanted);
         return TrafficProfile::from_yaml(&text(path)?).map_err(|error| Failure::file("use", path, error));
     }
@@ -338,14 +392,6 @@ pub fn traffic(wanted: &str) -> Result<TrafficProfile, Failure> {
 pub enum Emitted {
     Scenario(ActionTable, Box<Scenario>),
     Policy(ActionTable, Box<Policy>),
-}
-
-/// A scenario or policy file.
-///
-/// # Errors
-/// As [`load`], and if the file has neither.
-pub fn emitted(output: &Output, path: &Path) -> Result<Emitted, Failure> {
-    emitted_in(path, sound(output, read_and_check(path)?)?)
 }
 
 /// The scenario or policy of a file without mistakes.
@@ -368,10 +414,23 @@ pub fn emitted_in(path: &Path, mut loaded: Loaded) -> Result<Emitted, Failure> {
 /// # Errors
 /// As [`load`], and if the file has no policy.
 pub fn policy(output: &Output, path: &Path) -> Result<(ActionTable, Policy), Failure> {
-    match emitted(output, path)? {
+    policy_in(output, path, read_and_check(path)?)
+}
+
+/// The table and the policy of a file that was read and checked.
+///
+/// # Errors
+/// As [`policy`].
+pub fn policy_in(output: &Output, path: &Path, loaded: Loaded) -> Result<(ActionTable, Policy), Failure> {
+    match emitted_in(path, sound(output, loaded)?)? {
         Emitted::Policy(table, policy) => Ok((table, *policy)),
         Emitted::Scenario(..) => Err(Failure::usage(format!("`{}` is no policy", path.display()))),
     }
+}
+
+/// Whether a file declares a policy, with mistakes or without.
+pub fn is_policy(loaded: &Loaded) -> bool {
+    loaded.files[0].tree.items.iter().any(|item| item.kind.as_policy().is_some())
 }
 
 fn space(loaded: Loaded, path: &Path) -> Result<Arc<Space>, Failure> {
@@ -462,4 +521,29 @@ pub fn path_between(directory: &Path, file: &Path) -> Result<String, Failure> {
     let parts: Option<Vec<&str>> = path.components().map(|part| part.as_os_str().to_str()).collect();
     let parts = parts.ok_or_else(|| Failure::file("write", file, NOT_UTF8))?;
     Ok(parts.join("/"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_driver_is_a_name_a_profile_or_a_command() {
+        fn is(text: &str) -> Result<Driver<'_>, String> {
+            driver(text).map_err(|error| error.to_string())
+        }
+        for entry in REGISTRY {
+            assert_eq!(is(entry.name).unwrap(), Driver::Name(entry.name));
+        }
+        for profile in ["car.yaml", "ads/car.yml", "/nowhere/car.yaml"] {
+            assert_eq!(is(profile).unwrap(), Driver::Profile(Path::new(profile)));
+        }
+        for command in ["./planner", "python3 drive.py", "run --with car.yaml", "tcp:a:1", "unix:/tmp/a.yaml"]
+        {
+            assert_eq!(is(command).unwrap(), Driver::Command(command));
+        }
+        let slip = is("modualr").unwrap_err();
+        assert!(slip.contains("did you mean `modular`?") && slip.contains("`./modualr`"), "{slip}");
+        assert!(is("planner").is_err() && is("").is_err() && is(EXTERNAL).is_err());
+    }
 }

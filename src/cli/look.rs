@@ -2,8 +2,8 @@
 //!
 //! A run, a training and an estimate keep a copy of their space. A scenario whose space has changed is played in that copy,
 //! as it was recorded. Without a copy it is played in the present space, and the digest of its trace tells whether that is the
-//! recorded episode. Either way a banner says what has changed, and how the scenario can be brought along. `test`, `verify`, `shrink`, `diagnose` and
-//! `export` judge by the space or hand on what it says, so they refuse one that has changed, and say where its copy is.
+//! recorded episode. Either way a banner says what has changed, and how the scenario can be brought along. `test`, `shrink`,
+//! `diagnose` and `export` judge by the space or hand on what it says, so they refuse one that has changed, and say where its copy is.
 
 use std::path::{Path, PathBuf};
 
@@ -23,7 +23,7 @@ use super::review::as_now;
 
 /// Advice on how a scenario is brought along.
 const BRING_ALONG: &str = "`avastra test --review` says what the change means for it, and `--accept` takes it over; \
-                           `avastra run --self-contained` and `avastra pack` keep scenarios and their space together";
+                           `avastra run --self-contained` and `avastra export --to ava` keep scenarios and their space together";
 
 /// A scenario to look at.
 pub struct Looked {
@@ -76,7 +76,14 @@ pub fn together(banners: impl IntoIterator<Item = (String, String)>) -> Vec<Stri
 /// # Errors
 /// If the file cannot be read, has no scenario, or has no meaning any more.
 pub fn scenario(output: &Output, path: &Path) -> Result<Looked, Failure> {
-    let loaded = load::read_and_check(path)?;
+    scenario_in(output, path, load::read_and_check(path)?)
+}
+
+/// As [`scenario`], of a file that was read and checked.
+///
+/// # Errors
+/// As [`scenario`].
+pub fn scenario_in(output: &Output, path: &Path, loaded: Loaded) -> Result<Looked, Failure> {
     let mut changed = Changed { what: Vec::new(), copy: None };
     let loaded = match loaded.diagnostics.iter().any(Diagnostic::is_error) {
         false => loaded,
@@ -158,7 +165,7 @@ fn as_it_is_now(path: &Path, loaded: &Loaded) -> Result<Loaded, Failure> {
 }
 
 /// The path of a copy of the scenario's space as it was when the scenario was written, and the file checked in it. A run or an estimate
-/// keeps such a copy in its folder `space`; `--self-contained` and `pack` put one beside the scenarios.
+/// keeps such a copy in its folder `space`; `--self-contained` and `export --to ava` put one beside the scenarios.
 fn kept(path: &Path, loaded: &Loaded) -> Option<(PathBuf, Loaded)> {
     let root = FileId::default();
     let written: Vec<_> = loaded.written_paths().into_iter().filter(|used| used.span.file == root).collect();

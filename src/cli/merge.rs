@@ -30,7 +30,7 @@ use crate::study::{StudyDatabase, StudySettings};
 use crate::syntax::ast::{Expr, ExprKind, FileId, ItemKind};
 use crate::syntax::{parse, print_expr};
 
-use super::arguments::{Format, MergeArguments};
+use super::arguments::MergeArguments;
 use super::error::Failure;
 use super::files::{folder, make, remove, write};
 use super::output::{Output, plural};
@@ -352,8 +352,7 @@ fn publish<C: Cut>(
         files::rename(partial, out).map_err(|error| Failure::file("write", out, error))?;
         return remove(&out.join(MARK));
     }
-    // In JSON, a command prints at its end, which this has not.
-    let silent = Output::of(Format::Json);
+    let silent = Output::silent();
     C::conclude(&silent, partial)?;
     // A merge that was killed after the rename left a directory in which all is played, but whose results are missing.
     if holds_all::<C>(out, (partial, outside), text).unwrap_or(false) {
@@ -703,9 +702,9 @@ impl Cut for StudySettings {
         shard: &Played<StudySettings>,
         way: &Way,
     ) -> Result<(), Failure> {
-        let mut times = Times::read(way.to, into)?;
-        if let Some(database) = &shard.database {
-            times.extend(Times::read(&shard.path, database)?);
+        let mut times = Times::read(way.to)?;
+        if shard.database.is_some() {
+            times.extend(Times::read(&shard.path)?);
         }
         times.write(way.to)?;
         let taken = into.take(&shard.file(), &shard.units, &|_| Ok(()));

@@ -8,16 +8,13 @@ mod completions;
 mod conditions;
 mod diagnose;
 mod diff;
-mod distill;
 mod doc;
 mod editor_files;
 pub mod embedded;
 mod error;
 mod estimate;
 mod explain;
-mod explain_policy;
 mod export;
-mod export_weights;
 mod files;
 mod findings;
 mod fmt;
@@ -26,13 +23,14 @@ mod import;
 mod interrupt;
 mod load;
 mod look;
-pub mod lsp;
+mod lsp;
 mod merge;
 mod never;
 mod new;
 mod output;
 mod pack;
 mod parallel;
+mod policy;
 mod progress;
 mod render;
 mod replay;
@@ -51,13 +49,12 @@ mod test;
 mod timing;
 mod train;
 mod trials;
-mod verify;
 mod why;
 
 use std::process::ExitCode;
 
-use clap::FromArgMatches;
 use clap::error::{ContextKind, ContextValue};
+use clap::{ArgMatches, FromArgMatches};
 
 use crate::syntax::nearest;
 
@@ -65,8 +62,15 @@ use arguments::{Arguments, Command, Format};
 use error::Failure;
 use output::Output;
 
-/// An unknown command's error with the command that differs least: clap's own measure prefers `render` to `run` for `rn`.
+/// An unknown command's error with what it is called now, or else with the command that differs least: clap's own measure
+/// prefers `render` to `run` for `rn`.
 fn with_nearest_command(mut error: clap::Error) -> clap::Error {
+    let unknown = error.get(ContextKind::InvalidSubcommand).or(error.get(ContextKind::InvalidArg));
+    if let Some(ContextValue::String(word)) = unknown
+        && let Some(now) = help::moved(word)
+    {
+        return help::command().error(error.kind(), format!("`{word}` is now `{now}`"));
+    }
     let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidSubcommand).cloned() else {
         return error;
     };
@@ -80,6 +84,17 @@ fn with_nearest_command(mut error: clap::Error) -> clap::Error {
         error.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(vec![near.to_owned()]));
     }
     error
+}
+
+/// The words of the command that was asked for: `run`, `policy explain`.
+fn words_of(found: &ArgMatches) -> String {
+    let mut words = Vec::new();
+    let mut next = found.subcommand();
+    while let Some((word, within)) = next {
+        words.push(word);
+        next = within.subcommand();
+    }
+    words.join(" ")
 }
 
 /// Runs the command that the process was started with.
@@ -112,7 +127,15 @@ pub fn main() -> ExitCode {
         }
     };
     let arguments = Arguments::from_arg_matches(&found).expect("clap has parsed them");
-    let name = found.subcommand_name().expect("clap asks for a command");
+    let name = words_of(&found);
+    let has_diagnostics = matches!(arguments.command, Command::Check(_) | Command::Compile(_));
+    if arguments.output.format == Format::Sarif && !has_diagnostics {
+        let failure = Failure::usage(format!(
+            "`--format sarif` is for diagnostics, which `check` and `compile` print: use `--format json` with `{name}`"
+        ));
+        output::remark(&format!("error: {failure}"));
+        return ExitCode::from(failure.status());
+    }
     // An editor's server speaks its protocol on stdout, whatever is asked for.
     let output = match arguments.command {
         Command::Lsp => Output::of(Format::Plain),
@@ -123,30 +146,22 @@ pub fn main() -> ExitCode {
         Command::Check(arguments) => check::check(&output, arguments),
         Command::Compile(arguments) => compile::compile(&output, arguments),
         Command::Table(arguments) => compile::table(&output, arguments),
-        Command::Why(arguments) => why::why(&output, arguments),
         Command::Fmt(arguments) => fmt::fmt(&output, arguments),
         Command::Explain(arguments) => explain::explain(&output, arguments),
         Command::Diff(arguments) => diff::diff(&output, arguments),
-        Command::Doc(arguments) => doc::doc(&output, arguments),
         Command::New(arguments) => new::new(&output, arguments),
         Command::Completions(arguments) => completions::completions(&output, arguments),
         Command::Lsp => lsp::serve(),
         Command::EditorFiles(arguments) => editor_files::editor_files(&output, arguments),
         Command::Run(arguments) => run::run(&output, arguments),
         Command::Train(arguments) => train::train(&output, arguments),
-        Command::Distill(arguments) => distill::distill(&output, arguments),
-        Command::ExplainPolicy(arguments) => explain_policy::explain_policy(&output, arguments),
-        Command::ExportWeights(arguments) => export_weights::export_weights(&output, arguments),
+        Command::Policy(arguments) => policy::policy(&output, arguments),
         Command::Study(arguments) => study::study(&output, arguments),
-        Command::Results(arguments) => results::results(&output, arguments),
         Command::Estimate(arguments) => estimate::estimate(&output, arguments),
         Command::Merge(arguments) => merge::merge(&output, arguments),
-        Command::Compare(arguments) => estimate::compare(&output, arguments),
-        Command::Verify(arguments) => verify::verify(&output, arguments),
         Command::Replay(arguments) => replay::replay(&output, arguments),
         Command::Diagnose(arguments) => diagnose::diagnose(&output, arguments),
         Command::Shrink(arguments) => shrink::shrink(&output, arguments),
-        Command::Pack(arguments) => pack::pack(&output, arguments),
         Command::Export(arguments) => export::export(&output, arguments),
         Command::Import(arguments) => import::import(&output, arguments),
         Command::Test(arguments) => test::test(&output, arguments),
@@ -155,7 +170,7 @@ pub fn main() -> ExitCode {
         Command::Road(arguments) => road::road(&output, arguments),
         Command::Ads(arguments) => ads::ads(&output, arguments),
     };
-    output.finish(name, result.as_ref().err());
+    output.finish(&name, result.as_ref().err());
     let arrived = output.arrived();
     if let Err(lost) = &arrived {
         output::remark(&format!("error: {lost}"));

@@ -27,7 +27,7 @@ pub struct Output {
 type Fields = serde_json::Map<String, serde_json::Value>;
 
 /// Raised whenever a field of a command's result changes its meaning or goes away.
-const SCHEMA: u32 = 2;
+const SCHEMA: u32 = 3;
 
 /// The end of a command in JSON: its last line on stdout, whether it failed or not. `avastra explain json` says which
 /// fields a result has (`schema`).
@@ -79,9 +79,9 @@ impl Output {
         }
     }
 
-    /// One for reading files about which nothing is to be told: their diagnostics are collected and never printed.
+    /// One for reading files about which nothing is to be told.
     pub fn silent() -> Output {
-        Output::of(Format::Sarif)
+        Output::of(Format::Silent)
     }
 
     pub fn is_json(&self) -> bool {
@@ -94,12 +94,17 @@ impl Output {
             _ if self.quiet => Telling::Nothing,
             Format::Human if is_on_screen() => Telling::Bar,
             Format::Human | Format::Plain => Telling::Lines,
-            Format::Json | Format::Sarif => Telling::Nothing,
+            Format::Json | Format::Sarif | Format::Silent => Telling::Nothing,
         }
     }
 
     fn is_sarif(&self) -> bool {
         self.format == Format::Sarif
+    }
+
+    /// Whether a program reads what is printed, or nobody.
+    fn is_for_no_person(&self) -> bool {
+        matches!(self.format, Format::Json | Format::Silent)
     }
 
     /// Ends the command's output: its result, and why it failed if it did.
@@ -131,7 +136,7 @@ impl Output {
     /// A text after a word in a colour, on stderr.
     fn head(&self, word: &str, colour: &str, text: &str) {
         let text = visible(text);
-        match (self.is_json(), self.colour) {
+        match (self.is_for_no_person(), self.colour) {
             (true, _) => {}
             (false, true) => drawn(&format!("\x1b[1;{colour}m{word}\x1b[0m: {text}")),
             (false, false) => drawn(&format!("{word}: {text}")),
@@ -140,7 +145,7 @@ impl Output {
 
     /// What explains what a command does, on stderr.
     pub fn aside(&self, text: &str) {
-        if !self.quiet && !self.is_json() {
+        if !self.quiet && !self.is_for_no_person() {
             remark(text);
         }
     }
@@ -176,7 +181,7 @@ impl Output {
 
     /// A text that a program may read, as it is: a source, a picture or JSON; nothing in JSON, whose result has it.
     pub fn document(&self, text: &str) {
-        if !self.is_json() && !self.is_sarif() {
+        if matches!(self.format, Format::Human | Format::Plain) {
             self.print(text);
         }
     }
@@ -200,15 +205,18 @@ impl Output {
     /// Diagnostics on stderr; in JSON one object a line.
     pub fn diagnostics(&self, sources: &Sources, diagnostics: &[Diagnostic]) {
         for diagnostic in diagnostics {
-            if self.is_sarif() {
-                self.collected().push(crate::syntax::record(diagnostic, sources));
-            } else if self.is_json() {
-                let record = crate::syntax::record(diagnostic, sources);
-                let line = serde_json::to_string(&record).expect("records have string keys only");
-                drawn(&line);
-            } else {
-                let style = if self.colour { Style::Human } else { Style::Plain };
-                drawn(&format!("{}\n", crate::syntax::render(diagnostic, sources, style).trim_end()));
+            match self.format {
+                Format::Silent => {}
+                Format::Sarif => self.collected().push(crate::syntax::record(diagnostic, sources)),
+                Format::Json => {
+                    let record = crate::syntax::record(diagnostic, sources);
+                    let line = serde_json::to_string(&record).expect("records have string keys only");
+                    drawn(&line);
+                }
+                Format::Human | Format::Plain => {
+                    let style = if self.colour { Style::Human } else { Style::Plain };
+                    drawn(&format!("{}\n", crate::syntax::render(diagnostic, sources, style).trim_end()));
+                }
             }
         }
     }
@@ -232,9 +240,15 @@ pub fn asks_for_json() -> bool {
 
 /// Ends a command line that could not be parsed, and asks for JSON.
 pub fn usage_in_json(failure: &Failure) {
-    let (known, arguments) = (help::command(), command_line());
-    let name = arguments.iter().find(|argument| known.find_subcommand(argument).is_some());
-    Output::of(Format::Json).finish(name.map_or("avastra", String::as_str), Some(failure));
+    let (mut known, mut words) = (help::command(), Vec::new());
+    for word in command_line() {
+        if let Some(found) = known.find_subcommand(&word).cloned() {
+            known = found;
+            words.push(word);
+        }
+    }
+    let name = if words.is_empty() { "avastra".to_owned() } else { words.join(" ") };
+    Output::of(Format::Json).finish(&name, Some(failure));
 }
 
 /// A pipe that its reader has closed is no error.

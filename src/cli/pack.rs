@@ -1,4 +1,4 @@
-//! `avastra pack`: scenarios and policies with all that they use, in a folder that can be moved.
+//! `avastra export --to ava`: scenarios and policies with all that they use, in a folder that can be moved.
 //!
 //! Spaces and maps go into its folder `space`, where they lie to each other as before. So a packed file has the
 //! digest that it had.
@@ -11,7 +11,6 @@ use crate::files;
 use crate::syntax::ast::{Expr, ExprKind, FileId};
 use crate::syntax::print_expr;
 
-use super::arguments::PackArguments;
 use super::error::Failure;
 use super::files::{make_way, write};
 use super::load;
@@ -20,12 +19,11 @@ use super::output::{Output, plural};
 /// The folder of spaces and maps, in the one that can be moved.
 pub const SPACE: &str = "space";
 
-/// Copies every file with all that it uses.
-pub fn pack(output: &Output, arguments: &PackArguments) -> Result<(), Failure> {
-    let folder = &arguments.out;
+/// Copies every file with all that it uses into a folder.
+pub fn pack(output: &Output, files: &[PathBuf], folder: &Path) -> Result<(), Failure> {
     let mut plan = Plan::default();
     let mut packed: Vec<PathBuf> = Vec::new();
-    for path in &arguments.files {
+    for path in files {
         let loaded = load::load(output, path)?;
         let name = path.file_name().ok_or_else(|| Failure::usage("a file has a name"))?;
         let target = folder.join(name);
@@ -44,7 +42,7 @@ pub fn pack(output: &Output, arguments: &PackArguments) -> Result<(), Failure> {
     }
     plan.carry_out(folder, &|| packed.iter().try_for_each(|target| load::load(output, target).map(drop)))?;
     output.say(&format!("{}: {} with all that they use", folder.display(), plural(packed.len(), "file")));
-    output.result(serde_json::json!({ "directory": folder, "files": packed }));
+    output.result(serde_json::json!({ "files": packed, "left_out": [], "refuted": 0, "failed": [] }));
     Ok(())
 }
 

@@ -144,11 +144,10 @@ pub fn each_file_in_turn<T: Send>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::arguments::Format;
 
     #[test]
     fn results_keep_the_order_of_the_files() {
-        let output = Output::of(Format::Json);
+        let output = Output::silent();
         let files = (0..50).map(|number| PathBuf::from(number.to_string())).collect();
         let many = FilesArguments { files, jobs: Some(3) };
         let mut told = Vec::new();

@@ -35,7 +35,7 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
     let Looked { table, scenario, changed } = look::scenario(output, &arguments.file)?;
     let scenario = &scenario;
     let times_s = times(arguments, scenario, table.space().episode.step_s)?;
-    let asked = load::against(&arguments.against)?;
+    let asked = load::asked(arguments.against.ads.as_deref())?;
     let (ads, is_recorded) = asked.selected_for(scenario)?;
     let (moments, mut subject, is_same) = moments(&table, scenario, &ads, &times_s)?;
     let is_same = is_same.filter(|_| is_recorded);
@@ -140,10 +140,7 @@ fn moments(
 /// The title of a drive that is not the recorded one: whose it is, and what happens, because what the file says of its crash
 /// may not.
 fn title_of_another(arguments: &RenderArguments, scenario: &Scenario, subject: &Subject) -> String {
-    let against = &arguments.against;
-    let profile = against.ads_config.as_ref().map(|path| path.display().to_string());
-    let driver = against.ads.clone().into_iter().chain(profile).collect::<Vec<_>>().join(" with ");
-    let driver = if driver.is_empty() { "another driving system".to_owned() } else { driver };
+    let driver = arguments.against.ads.as_deref().unwrap_or("another driving system");
     match subject.hit {
         Some((obstacle, at_s)) => {
             format!("{}, driven by {driver}: collision with npc#{obstacle} at {at_s:.2} s", scenario.name)

@@ -1,14 +1,14 @@
-//! `avastra replay`: plays emitted scenarios again and checks every claim.
+//! `avastra replay`: plays emitted scenarios and policies again and checks every claim.
 
 use std::path::{Path, PathBuf};
 
 use crate::action::ActionTable;
 use crate::ads::Selected;
+use crate::check::Loaded;
 use crate::episode::{Collision, EpisodeLog};
 use crate::model::vocabulary::{Priority, Word};
-use crate::model::{Avoidability, Scenario, Space};
+use crate::model::{Avoidability, Policy, Scenario, Space};
 use crate::oracle;
-use crate::run;
 use crate::run::{Asked, Gauges, Stage};
 
 use super::arguments::ReplayArguments;
@@ -18,48 +18,88 @@ use super::look::{self, Changed, Looked};
 use super::output::Output;
 use super::output::plural;
 use super::parallel::each_file;
+use super::policy::claims;
 
-/// Replays the scenario of every file; with `--ads` or another profile only tells what happens.
+/// What was found about a file.
+enum Replayed {
+    Scenario(Box<Played>),
+    /// With the claims that do not hold.
+    Policy(PathBuf, Box<Policy>, Vec<String>),
+}
+
+/// Replays the scenario, or the evaluation of the policy, of every file; of scenarios against another driving system it only
+/// tells what happens.
 pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failure> {
-    let asked = load::against(&arguments.against)?;
+    let asked = load::asked(arguments.against.ads.as_deref())?;
     let played = each_file(output, &arguments.many, asked.external.as_ref(), |path| {
-        let Looked { table, scenario, changed } = look::scenario(output, path)?;
-        let (ads, is_recorded) = asked.selected_for(&scenario)?;
-        if is_recorded {
-            return play(&table, &scenario, path, (&ads, None), changed.as_ref());
+        let loaded = load::read_and_check(path)?;
+        if load::is_policy(&loaded) {
+            return replay_policy(output, path, loaded, &asked);
         }
-        let name = match (&arguments.against.ads_config, ads.program()) {
+        let Looked { table, scenario, changed } = look::scenario_in(output, path, loaded)?;
+        let (ads, is_recorded) = asked.selected_for(&scenario)?;
+        let in_file = |played: Played| Replayed::Scenario(Box::new(played));
+        if is_recorded {
+            return play(&table, &scenario, path, (&ads, None), changed.as_ref()).map(in_file);
+        }
+        let profile = arguments.against.ads.as_deref().and_then(load::profile_path);
+        let name = match (profile, ads.program()) {
             (_, Some(program)) => program.attached().name(),
             (Some(path), None) => format!("{} with {}", ads.name(), path.display()),
             (None, None) => ads.name().to_owned(),
         };
-        play(&table, &scenario, path, (&ads, Some(name)), changed.as_ref())
+        play(&table, &scenario, path, (&ads, Some(name)), changed.as_ref()).map(in_file)
     })?;
-    let tally = tell(output, &played.done);
+    let (mut scenarios, mut policies, mut refuted) = (Vec::new(), Vec::new(), 0);
+    for found in &played.done {
+        match found {
+            Replayed::Scenario(played) => scenarios.push(played.as_ref()),
+            Replayed::Policy(path, policy, wrong) => {
+                refuted += wrong.len();
+                claims::report(output, path, policy, wrong);
+                policies.push(serde_json::json!({ "file": path, "policy": policy.name, "refuted": wrong }));
+            }
+        }
+    }
+    let tally = tell(output, &scenarios);
+    refuted += tally.refuted;
     output.result(serde_json::json!({
-        "confirmed": tally.confirmed, "refuted": tally.refuted, "untried": tally.untried,
-        "scenarios": played.done.iter().map(|played| &played.result).collect::<Vec<_>>(),
+        "confirmed": tally.confirmed, "refuted": refuted, "untried": tally.untried, "policies": policies,
+        "scenarios": scenarios.iter().map(|played| &played.result).collect::<Vec<_>>(),
         "failed": played.failed_in_json(),
     }));
-    let findings = played.done.iter().filter(|played| played.has_ads_failed).count();
+    let findings = scenarios.iter().filter(|played| played.has_ads_failed).count();
     played.complete("replayed")?;
-    refutation(tally.refuted)?;
+    refutation(refuted)?;
     if findings > 0 { Err(Failure::Ads { findings }) } else { Ok(()) }
+}
+
+/// Plays the evaluation of a policy again, against the driving system that it was trained against.
+fn replay_policy(output: &Output, path: &Path, loaded: Loaded, asked: &Asked) -> Result<Replayed, Failure> {
+    let (table, policy) = load::policy_in(output, path, loaded)?;
+    if !asked.is_nothing() {
+        let path = path.display();
+        return Err(Failure::usage(format!(
+            "`{path}` claims what happens with the driving system that it was trained against: `avastra run --policy {path}` \
+             plays it with another one"
+        )));
+    }
+    let wrong = claims::judge(&table, &policy)?;
+    Ok(Replayed::Policy(path.to_owned(), Box::new(policy), wrong))
 }
 
 /// How many claims hold, how many do not, and how many could not be tried.
 #[derive(Default)]
-pub struct Tally {
-    pub confirmed: usize,
-    pub refuted: usize,
-    pub untried: usize,
+struct Tally {
+    confirmed: usize,
+    refuted: usize,
+    untried: usize,
 }
 
 /// Says what came of each replay, and the sums of several.
-pub fn tell<'a>(output: &Output, played: impl IntoIterator<Item = &'a Played>) -> Tally {
+fn tell(output: &Output, played: &[&Played]) -> Tally {
     let mut tally = Tally::default();
     let (mut files, mut refuted_files) = (0, 0);
-    let played: Vec<&Played> = played.into_iter().collect();
     let banner = |played: &&Played| Some((played.path.display().to_string(), played.banner.clone()?));
     look::together(played.iter().filter_map(banner)).iter().for_each(|banner| output.warn(banner));
     for played in played {
@@ -99,7 +139,7 @@ pub fn refutation(refuted: usize) -> Result<(), Failure> {
 }
 
 /// What a replay of one file found.
-pub struct Played {
+struct Played {
     path: PathBuf,
     /// Of the scenario.
     name: String,
@@ -112,30 +152,7 @@ pub struct Played {
     /// Another driving system than the recorded one failed.
     has_ads_failed: bool,
     /// All of it, for JSON.
-    pub result: serde_json::Value,
-}
-
-/// Plays a scenario against the driving system that it was found with, and checks its claims. An external one is the one
-/// that is asked for, or else known by its recorded answers.
-///
-/// # Errors
-/// If that driving system, or the scenario, does not exist any more as it was, or another one is asked for.
-pub fn play_recorded(
-    table: &ActionTable,
-    scenario: &Scenario,
-    path: &Path,
-    asked: &Asked,
-) -> Result<Played, Failure> {
-    let (ads, is_recorded) = asked.selected_for(scenario)?;
-    if !is_recorded {
-        return Err(Failure::usage(format!(
-            "`{}` claims what happens with {}, and that is not what was given: `avastra replay` plays it with another one; \
-             without `--ads-cmd` and `--ads-config` recorded answers are verified",
-            scenario.name,
-            run::recorded_name(scenario)
-        )));
-    }
-    play(table, scenario, path, (&ads, None), None)
+    result: serde_json::Value,
 }
 
 /// Plays a scenario. With a name for the driving system it is another one than the recorded: no claim is checked. `changed`

@@ -93,7 +93,7 @@ pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failur
     }
     let changes = changes(&scenes);
     let (scenarios, title) = (scenes.len(), found.title.clone());
-    let compared_with = arguments.compare.clone();
+    let compared_with = arguments.ads.clone();
     let page = Page { title, overview: found.overview, remarks, scenes, compared_with };
     let html = page.html();
     write_result(arguments.output.as_ref(), &path, &html)?;
@@ -103,14 +103,14 @@ pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failur
         plural(scenarios, "scenario"),
         html.len() as f64 / 1e6
     ));
-    if let Some(other) = &arguments.compare {
+    if let Some(other) = &arguments.ads {
         let told: Vec<String> =
             changes.iter().map(|(kind, count)| format!("{count} {}", kind.replace('_', " "))).collect();
         output.say(&format!("with {other}: {}", told.join(", ")));
     }
     output.result(serde_json::json!({
         "page": path, "scenarios": scenarios, "left_out": left_out, "bytes": html.len(), "refuted": refuted,
-        "compared": arguments.compare.as_ref().map(|_| changes), "failed": failed,
+        "compared": arguments.ads.as_ref().map(|_| changes), "failed": failed,
     }));
     played.map_or(Ok(()), |played| played.complete("played"))?;
     refutation(refuted)
@@ -264,13 +264,7 @@ fn chosen(found: &Found, most: usize) -> (Vec<PathBuf>, usize) {
 
 /// The driving system to compare with, if one is asked for: a profile by its file, or a driver by its name.
 fn compared(arguments: &ReportArguments) -> Result<Option<Asked>, Failure> {
-    let Some(wanted) = arguments.compare.as_deref() else { return Ok(None) };
-    let (name, profile) = load::profile_or_name(wanted);
-    if let Some(name) = name {
-        // Asked for here, so that a name that is none is said once and not for every file.
-        crate::run::driving_system(name)?;
-    }
-    Ok(Some(load::asked(name, profile, None)?))
+    arguments.ads.as_deref().map(|text| load::asked(Some(text))).transpose()
 }
 
 fn scene(output: &Output, file: &Path, compared: Option<&Asked>) -> Result<Scene, Failure> {

@@ -1,4 +1,4 @@
-//! `avastra results`: what a folder of studies found, as one text.
+//! `avastra study results`: what a folder of studies found, as one text.
 
 use std::path::{Path, PathBuf};
 

@@ -105,7 +105,7 @@ pub fn review(
 
     let setup = stage.setup(&ads);
     let episode = scenario.origin.episode.unwrap_or(0) as usize;
-    let mut summary = EpisodeSummary::judged(&setup, episode, &log, stage.avoidability());
+    let mut summary = EpisodeSummary::judged(&setup, episode, &log);
     let change = match &illegal {
         None => change(&scenario, &summary, results),
         // Whatever it crashes with: it is not this scenario that does.
@@ -124,7 +124,7 @@ pub fn review(
     if claims(|claim| matches!(claim, Claim::Minimal { .. })) {
         let judgements: Vec<_> = summary.collisions.iter().map(|found| found.judgement.clone()).collect();
         for found in summary.collisions.iter_mut().filter(|found| found.counted) {
-            let spare = oracle::spare_steps(&setup, &log, found.number, &judgements, stage.avoidability());
+            let spare = oracle::spare_steps(&setup, &log, found.number, &judgements);
             found.minimal = spare.is_empty();
         }
     }

@@ -25,9 +25,9 @@ use super::output::Output;
 use super::output::plural;
 use super::pack::pack_space;
 use super::parallel::jobs;
+use super::policy::acting;
 use super::progress::Progress;
 use super::run_directory::{Resumed, RunDirectory, WrittenFile};
-use super::verify::acting;
 use super::{compile, conditions, load, run_directory, shard};
 
 /// Largest number of critical scenarios, groups and refusal reasons that the summary lists.
@@ -175,7 +175,7 @@ fn wanted(output: &Output, arguments: &RunArguments) -> Result<Wanted, Failure> 
     let space = table.space();
     let shard = shard::asked(output, arguments.shard.shard)?;
     let agent = policy.as_ref().map_or(&arguments.conditions.agent, |(_, policy)| &policy.name);
-    let under_test = conditions::named(&arguments.under_test)?;
+    let under_test = load::named(&arguments.under_test.ads)?;
     let settings = conditions::settings(space, &arguments.conditions, agent, under_test, arguments.episodes)?;
     let settings = RunSettings { causes: arguments.causes, ..settings };
     let settings = if arguments.shard.dry_run { settings.unstarted() } else { settings };
@@ -263,7 +263,7 @@ fn ready(
         )));
     }
     let acting = acting(&table, policy, face)?;
-    let (period_s, step_s) = (acting.settings().observation_period_s, table.space().episode.step_s);
+    let (period_s, step_s) = (acting.settings().payment.observation_period_s, table.space().episode.step_s);
     if let Some(period_s) = period_s.filter(|&period_s| period_s != step_s) {
         return Err(Failure::usage(format!(
             "`{}` was trained with steps of {period_s} s, the space has {step_s} s: write `step: {period_s} s` there",
@@ -333,10 +333,7 @@ fn heading(run: &Run, arguments: &RunArguments) -> String {
         format!(", traffic {}", name.unwrap_or("of a profile of its own"))
     });
     let ads = run.ads_name();
-    let profile = arguments
-        .under_test
-        .ads_config
-        .as_ref()
+    let profile = load::profile_path(&arguments.under_test.ads)
         .map_or(String::new(), |path| format!(" with {}", path.display()));
     format!(
         "{}: {} against {}{profile}, {} on {}{ambient}{traffic}, seed {}",

@@ -1,6 +1,7 @@
 //! What `--format json` prints: the fields of every command's result, for `avastra explain json`.
 //!
-//! `tests/it/json.rs` holds this table against what the commands print.
+//! A table and no derived schema, because most of it is what a field means: a result is made by `json!` where it arises, and
+//! has no type that could be asked. `tests/it/json.rs` compares the table with what the commands print, both ways.
 
 use super::output::folded;
 
@@ -15,7 +16,7 @@ pub struct Field {
     pub meaning: &'static str,
 }
 
-/// A command and the fields of its result.
+/// A command, with the option that leads to another result, and the fields of its result.
 #[derive(Debug, serde::Serialize)]
 pub struct Shape {
     pub command: &'static str,
@@ -102,8 +103,9 @@ pub const SHAPES: &[Shape] = &[
             f("cells[]", "object?", "with `--try`: a row on a road, with its tries and why any failed"),
         ],
     },
+    Shape { command: "table --markdown", fields: &[f("text", "text", "Markdown")] },
     Shape {
-        command: "why",
+        command: "table --row",
         fields: &[
             f("row", "number", ""),
             f("label", "text", "the row in words"),
@@ -139,7 +141,6 @@ pub const SHAPES: &[Shape] = &[
             f("differences[].detail", "text", "may be empty"),
         ],
     },
-    Shape { command: "doc", fields: &[f("text", "text", "Markdown")] },
     Shape { command: "new", fields: &[f("files[]", "text", "paths of the files written")] },
     Shape {
         command: "completions",
@@ -172,21 +173,17 @@ pub const SHAPES: &[Shape] = &[
         ],
     },
     Shape {
-        command: "ads",
+        command: "ads check",
         fields: &[
             f(
                 "checks[]",
                 "object",
-                "`ads check`: `stage`, `passed`, what was `found`, the `failure` if it is one of PROTOCOL.md",
+                "`stage`, `passed`, what was `found`, the `failure` if it is one of PROTOCOL.md",
             ),
-            f(
-                "speed",
-                "object?",
-                "`ads check`: `questions`, `round_trips_per_s` and `share` of the episode's time",
-            ),
-            f("protocol", "object?", "`ads schema`: the JSON Schema of every message"),
+            f("speed", "object?", "`questions`, `round_trips_per_s` and `share` of the episode's time"),
         ],
     },
+    Shape { command: "ads schema", fields: &[f("protocol", "object", "the JSON Schema of every message")] },
     Shape {
         command: "train",
         fields: &[
@@ -202,7 +199,7 @@ pub const SHAPES: &[Shape] = &[
         ],
     },
     Shape {
-        command: "distill",
+        command: "policy distil",
         fields: &[
             f("policy", "text", "path of the written policy"),
             f("lines", "number", "rules"),
@@ -210,7 +207,7 @@ pub const SHAPES: &[Shape] = &[
         ],
     },
     Shape {
-        command: "explain-policy",
+        command: "policy explain",
         fields: &[
             f("policy", "text", "its name"),
             f("roads[]", "text", ""),
@@ -218,7 +215,7 @@ pub const SHAPES: &[Shape] = &[
         ],
     },
     Shape {
-        command: "export-weights",
+        command: "policy weights",
         fields: &[
             f("file", "text", "the safetensors file"),
             f("layers[]", "number", "widths of the network"),
@@ -232,7 +229,7 @@ pub const SHAPES: &[Shape] = &[
             f("directory", "text", "where the estimate stands"),
             f("results.schema", "number", "of `results`, as in results.json"),
             f("results.event", "text", "`counted` or `collision`"),
-            f("results.method", "text", "`count`, `probe` or `split`"),
+            f("results.method", "text", "`count` or `probe`"),
             f("results.parts", "number", "parts that are done"),
             f("results.parts_wanted", "number", "all parts, if it does not stop before"),
             f("results.missing", "number", "share of such estimates whose intervals miss the truth, at most"),
@@ -280,7 +277,7 @@ pub const SHAPES: &[Shape] = &[
         ],
     },
     Shape {
-        command: "compare",
+        command: "estimate --than",
         fields: &[
             f("sides[]", "text", "the two driving systems"),
             f("results.schema", "number", "of `results`"),
@@ -315,7 +312,7 @@ pub const SHAPES: &[Shape] = &[
         ],
     },
     Shape {
-        command: "results",
+        command: "study results",
         fields: &[
             f("output", "text", "where the results were written"),
             f(
@@ -331,22 +328,13 @@ pub const SHAPES: &[Shape] = &[
             f("confirmed", "number", "claims that hold"),
             f("refuted", "number", "claims that do not"),
             f("untried", "number", "claims that only the driving system itself can show"),
+            f("policies[]", "object", "`file`, `policy` and the claims `refuted`, in words"),
             f(
                 "scenarios[]",
                 "object",
                 "`file`, `scenario`, what has `changed` since it was written, `ads`, `claims`, `end`, the `failure` of a \
                  driving system of your own, whether it is `reproducible`; what its speed was `held` by, from when on; collisions and how hard they were",
             ),
-            FAILED,
-        ],
-    },
-    Shape {
-        command: "verify",
-        fields: &[
-            f("refuted", "number", "claims that do not hold"),
-            f("untried", "number", "as in `replay`"),
-            f("scenarios[]", "object", "as in `replay`"),
-            f("policies[]", "object", "`file`, `policy` and the claims `refuted`, in words"),
             FAILED,
         ],
     },
@@ -411,10 +399,6 @@ pub const SHAPES: &[Shape] = &[
         ],
     },
     Shape {
-        command: "pack",
-        fields: &[f("directory", "text", "the folder"), f("files[]", "text", "paths of the files in it")],
-    },
-    Shape {
         command: "report",
         fields: &[
             f("page", "text", "its path"),
@@ -425,7 +409,7 @@ pub const SHAPES: &[Shape] = &[
             f(
                 "compared",
                 "object?",
-                "with `--compare`: how many crashes are the `same`, at an `other_time`, `gone`, `new` and so on",
+                "with `--ads`: how many crashes are the `same`, at an `other_time`, `gone`, `new` and so on",
             ),
             FAILED,
         ],

@@ -40,7 +40,7 @@ pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failur
             "`--out {path}` is for one file: of several, each is written to a folder `{FOLDER}`"
         )));
     }
-    let asked = load::asked(None, arguments.own.ads_config.as_deref(), arguments.own.ads_cmd.as_deref())?;
+    let asked = load::asked(arguments.against.ads.as_deref())?;
     let shrunk = each_file(output, &arguments.many, asked.external.as_ref(), |file| {
         smaller(output, file, arguments.output.as_ref(), &asked)
     })?;
@@ -129,8 +129,7 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
     let (ads, _) = asked.selected_for(&scenario)?;
     if ads.program().is_some_and(|program| !program.can_start()) {
         return Err(Failure::usage(format!(
-            "`{}` was made against an external driving system, which must drive each try: give it with `--ads-cmd` or \
-             `--ads-config`",
+            "`{}` was made against an external driving system, which must drive each try: give it with `--ads`",
             scenario.name
         )));
     }
@@ -140,7 +139,7 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
         let name = &scenario.name;
         return Err(Failure::usage(format!("`{name}` has no counted collision that could be kept")));
     };
-    let shrunk = oracle::shrink(&stage.setup(&ads), &log, index, &judgements, stage.avoidability());
+    let shrunk = oracle::shrink(&stage.setup(&ads), &log, index, &judgements);
 
     let path = named.map_or_else(|| apart(file), |path| Ok(path.clone()))?;
     let path = path.as_path();
@@ -158,10 +157,8 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
         with: &origin.with,
     };
     let setup = Setup { start: shrunk.start, memory: shrunk.memory, ..stage.setup(&ads) };
-    let spare =
-        oracle::spare_steps(&setup, &shrunk.log, shrunk.index, &shrunk.judgements, stage.avoidability());
+    let spare = oracle::spare_steps(&setup, &shrunk.log, shrunk.index, &shrunk.judgements);
     let mut summary = EpisodeSummary::new(table.space(), source.episode, &shrunk.log, shrunk.judgements);
-    summary.avoidability = stage.avoidability().clone();
     summary.collisions[shrunk.index].minimal = spare.is_empty();
     if scenario.claims.iter().any(|claim| matches!(claim, Claim::Cause { .. })) {
         summary.find_causes(&setup, &shrunk.log).map_err(Failure::usage)?;

@@ -13,7 +13,7 @@ use crate::study::{
 };
 use crate::syntax::{listed, yaml_mistake};
 
-use super::arguments::StudyArguments;
+use super::arguments::{StudyArguments, StudyCommand};
 use super::error::Failure;
 use super::files::{remove, write};
 use super::findings::kinds_text;
@@ -24,10 +24,13 @@ use super::parallel::jobs;
 use super::progress::Progress;
 use super::run_directory::{Held, Resumed};
 use super::timing::Times;
-use super::{load, run_directory, shard};
+use super::{load, results, run_directory, shard};
 
-/// Plays what a study still lacks and prints its result.
+/// Plays what a study still lacks and prints its result, or writes the results of a folder of studies.
 pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure> {
+    if let Some(StudyCommand::Results(arguments)) = &arguments.command {
+        return results::results(output, arguments);
+    }
     let (begun, reused) = match &arguments.resume {
         Some(path) => {
             let resumed = resumed(output, path, false)?;
@@ -86,7 +89,7 @@ fn play_all(
     let own: Vec<_> = shard.share(&costs).into_iter().map(|job| all[job].clone()).collect();
     let missing = |database: &StudyDatabase| database.missing(study.settings(), own.clone());
     output.tell(&format!("{}, into {}", heading(&study), path.display()));
-    let mut times = Times::read(&path, &database)?;
+    let mut times = Times::read(&path)?;
     for Reused { directory, played } in reused {
         let lacking = missing(&database).map_err(unread)?;
         let new: Vec<_> = played.iter().filter(|(job, _)| lacking.contains(job)).collect();
@@ -208,7 +211,7 @@ pub fn read_sound(directory: &Path) -> Result<(StudySettings, Vec<CellRecord>, O
         .map_err(|error| Failure::file("read", &path, yaml_mistake(&error, &text)))?;
     let unread = |error| Failure::file("read", &file, error);
     let (database, remark) = run_directory::open_to_read::<StudyDatabase>(&file, &text)?;
-    let cells = Times::read(directory, &database)?.on(database.cells().map_err(unread)?);
+    let cells = Times::read(directory)?.on(database.cells().map_err(unread)?);
     if !FailedCell::among(&cells).is_empty() {
         return Err(Failure::file("use", &file, "the driving system failed in it, so there are no results"));
     }
@@ -237,7 +240,7 @@ fn failed_text(directory: &Path, cells: &[FailedCell]) -> String {
 
 /// A new study, from its file.
 fn begun(output: &Output, path: &Path, arguments: &StudyArguments) -> Result<Study, Failure> {
-    let (_, table, settings) = wanted(output, path, arguments.ads_cmd.as_deref())?;
+    let (_, table, settings) = wanted(output, path, arguments.ads.as_deref())?;
     let settings = if arguments.quick { settings.quick() } else { settings };
     let settings = if arguments.shard.dry_run { settings.unstarted() } else { settings };
     Study::new(table, settings).map_err(|error| Failure::file("use", path, error))
@@ -247,18 +250,24 @@ fn begun(output: &Output, path: &Path, arguments: &StudyArguments) -> Result<Stu
 pub fn wanted(
     output: &Output,
     path: &Path,
-    ads_cmd: Option<&str>,
+    ads: Option<&str>,
 ) -> Result<(StudyFile, ActionTable, StudySettings), Failure> {
     let refuse = |reason: String| Failure::file("use", path, reason);
-    let file = StudyFile::from_yaml(&load::text(path)?).map_err(refuse)?;
+    let mut file = StudyFile::from_yaml(&load::text(path)?).map_err(refuse)?;
     let beside = |name: &str| path.parent().unwrap_or(Path::new("")).join(name);
     let table = load::table(output, &beside(&file.space))?;
-    let config = file.ads_config.as_deref().map(beside);
-    let under_test = load::under_test(&file.ads, config.as_deref(), ads_cmd)?;
+    let under_test = match ads {
+        Some(text) => {
+            let under_test = load::named(text)?;
+            file.ads.clone_from(&under_test.ads);
+            under_test
+        }
+        None => load::under_test(&file.ads, file.ads_config.as_deref().map(beside).as_deref(), None)?,
+    };
     let read = |name: &str| load::read(&beside(name)).map_err(|error| error.to_string());
     let traffic = file.traffic.as_ref().map(|wanted| {
-        // A name is a name; a file lies beside the study's.
-        if wanted.contains('.') { beside(wanted).display().to_string() } else { wanted.clone() }
+        // A file lies beside the study's.
+        if load::is_yaml(wanted) { beside(wanted).display().to_string() } else { wanted.clone() }
     });
     let traffic =
         traffic.as_deref().map(load::traffic).transpose().map_err(|error| refuse(error.to_string()))?;

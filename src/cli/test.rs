@@ -52,10 +52,7 @@ enum Outcome {
 
 /// Plays every scenario of a suite against a driving system.
 pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
-    let asked = load::against(&arguments.against)?;
-    if let Some(name) = &arguments.against.ads {
-        run::driving_system(name)?;
-    }
+    let asked = load::asked(arguments.against.ads.as_deref())?;
     let suite = Suite { arguments, asked };
     let many = FilesArguments { files: suite_files(&arguments.paths)?, jobs: arguments.jobs };
     let program = suite.asked.external.as_ref();
@@ -311,9 +308,7 @@ impl Suite<'_> {
             Some(index) if self.asked.is_nothing() => {
                 Regression::StillFails { time_s: log.collisions[index].contact.time_s }
             }
-            Some(index) => {
-                oracle::regression(&stage.setup(&recorded), &log, index, &ads, stage.avoidability())
-            }
+            Some(index) => oracle::regression(&stage.setup(&recorded), &log, index, &ads),
             // Already with the driving system that it was found with.
             None => Regression::OtherCrash,
         };

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::study::{CellRecord, Spent, StudyDatabase};
+use crate::study::{CellRecord, Spent};
 
 use super::error::Failure;
 use super::files::write;
@@ -29,16 +29,12 @@ struct Line {
 }
 
 impl Times {
-    /// Those that a directory of a study has; a database of the layout before has its own.
+    /// Those that a directory of a study has.
     ///
     /// # Errors
     /// If a file cannot be read.
-    pub fn read(directory: &Path, database: &StudyDatabase) -> Result<Times, Failure> {
-        let unread = |error| Failure::file("read", &directory.join("study.db"), error);
+    pub fn read(directory: &Path) -> Result<Times, Failure> {
         let mut times = Times::default();
-        for (agent, road, number, spent) in database.times().map_err(unread)? {
-            times.of_cells.insert((agent, road, number), spent);
-        }
         let file = directory.join(FILE);
         if file.exists() {
             // A line that cannot be read is a time that is not known.

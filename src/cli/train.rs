@@ -15,9 +15,7 @@ use crate::syntax::listed;
 use crate::train::{Evaluation, TrainSettings, TrainedEpisode, Training, evaluate, rounded};
 
 use super::arguments::TrainArguments;
-use super::conditions;
 use super::conditions::roads_or_all;
-use super::distill::rules_text;
 use super::error::Failure;
 use super::files::{folder, write};
 use super::findings::{cut_off, doubts, failures_text, kinds_text, unfinished};
@@ -26,10 +24,12 @@ use super::load::UnderTest;
 use super::output::Output;
 use super::output::plural;
 use super::pack::pack_space;
+use super::policy::distil;
+use super::policy::distil::rules_text;
 use super::progress::{TrainingProgress, Working};
 use super::run::groups_text;
 use super::run_directory::{Resumed, RunDirectory, WrittenFile};
-use super::{distill, load, run_directory};
+use super::{load, run_directory};
 
 /// Episodes between two checkpoints: at most so many are played again after a kill.
 const CHECKPOINT_EPISODES: usize = 25;
@@ -68,13 +68,13 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
     let table = load::table(output, file)?;
     let hyperparameters = settings(arguments)?;
     let space = table.space();
-    let UnderTest { ads, profile, external } = conditions::named(&arguments.under_test)?;
+    let UnderTest { ads, profile, external } = load::named(&arguments.under_test.ads)?;
     let traffic = arguments.traffic.as_deref().map(load::traffic).transpose()?;
     let conditions = RunSettings {
         roads: roads_or_all(&arguments.road, space),
         ads,
         // Without a file nothing is recorded.
-        profile: profile.filter(|_| arguments.under_test.ads_config.is_some()),
+        profile: profile.filter(|_| load::profile_path(&arguments.under_test.ads).is_some()),
         external,
         traffic: traffic.as_ref().and_then(TrafficRecord::new),
         without: arguments.rules.without.clone(),
@@ -332,7 +332,7 @@ fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Pol
         rules: Vec::new(),
         digest: String::new(),
     };
-    distill::with_rules(training.arena(), acting, policy)
+    distil::with_rules(training.arena(), acting, policy)
 }
 
 /// Writes `policy/NAME.ava`.

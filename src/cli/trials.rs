@@ -6,7 +6,7 @@ use crate::action::ActionTable;
 use crate::emit;
 use crate::emit::Provenance;
 use crate::report;
-use crate::run::{Arena, driving_system};
+use crate::run::{Arena, DEFAULT_ADS, driving_system};
 use crate::syntax;
 use crate::trial::{Cell, TrialSettings, Trials};
 
@@ -16,15 +16,31 @@ use super::conditions::roads_or_all;
 use super::error::Failure;
 use super::files::{make, write};
 use super::load;
+use super::load::Driver;
 use super::output::Output;
 use super::progress::Pieces;
+
+/// Undisturbed drives of each road, from whose steps the tries set out. Ours.
+const DRIVES: u32 = 8;
 
 /// Tries the rows of a table and prints the results.
 pub fn trials(output: &Output, arguments: &TableArguments, table: ActionTable) -> Result<(), Failure> {
     let roads = roads_or_all(arguments.road.as_slice(), table.space());
     let wanted = &arguments.trials;
-    let arena = Arena::new(table, &roads, driving_system(&wanted.ads)?, &[], &[])?;
-    let settings = TrialSettings { drives: wanted.drives, tries: wanted.tries, seed: wanted.seed };
+    let ads = match load::driver(&wanted.ads)? {
+        Driver::Name(name) => driving_system(name)?,
+        Driver::Profile(path) => {
+            let of_modular = driving_system(DEFAULT_ADS)?.with_profile(load::profile(path)?);
+            of_modular.expect("the default driving system has settings")
+        }
+        Driver::Command(command) => {
+            return Err(Failure::usage(format!(
+                "`{command}` cannot try rows: name a driving system of avastra"
+            )));
+        }
+    };
+    let arena = Arena::new(table, &roads, ads, &[], &[])?;
+    let settings = TrialSettings { drives: DRIVES, tries: wanted.tries, seed: wanted.seed };
     let trials = Trials::new(&arena, settings);
     let progress = Pieces::new(output, "rows on roads", arena.roads() * arena.table().rows().len());
     let cells = trials.cells(&|| progress.one());

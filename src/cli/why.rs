@@ -1,9 +1,9 @@
-//! `avastra why`: whether a row is legal here, and which rule refuses it.
+//! `avastra table --row`: whether a row is legal here, and which rule refuses it.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::action::{Offer, Situation};
+use crate::action::{ActionTable, Offer, Situation};
 use crate::check::state_argument::legal_memory_from;
 use crate::emit;
 use crate::episode;
@@ -11,22 +11,25 @@ use crate::model::{Memory, RuleBody, RulesInForce, Space, StateDef};
 use crate::run::road_named;
 use crate::sim::World;
 
-use super::arguments::WhyArguments;
+use super::arguments::TableArguments;
 use super::error::Failure;
-use super::load;
 use super::output::Output;
 
 /// Fixed seed: the question is about the rules, not about drawn values.
 const SEED: u64 = 0;
 
 /// Judges a row at the start of a road, with the states as given.
-pub fn why(output: &Output, arguments: &WhyArguments) -> Result<(), Failure> {
-    let table = load::table(output, &arguments.file)?;
+pub fn why(
+    output: &Output,
+    arguments: &TableArguments,
+    table: &ActionTable,
+    number: usize,
+) -> Result<(), Failure> {
+    let asked = &arguments.why;
     let space = table.space();
-    let Some(row) = table.rows().get(arguments.row) else {
+    let Some(row) = table.rows().get(number) else {
         return Err(Failure::usage(format!(
-            "no row {}: the table has rows 0 to {}",
-            arguments.row,
+            "no row {number}: the table has rows 0 to {}",
             table.rows().len().saturating_sub(1)
         )));
     };
@@ -35,9 +38,8 @@ pub fn why(output: &Output, arguments: &WhyArguments) -> Result<(), Failure> {
         None => 0,
     };
     let road = &space.roads[road];
-    let rules =
-        RulesInForce::new(space, &arguments.rules.with, &arguments.rules.without).map_err(Failure::usage)?;
-    let memory = match &arguments.state {
+    let rules = RulesInForce::new(space, &asked.with, &asked.without).map_err(Failure::usage)?;
+    let memory = match &asked.state {
         None => space.memory_at_start(road, &rules, SEED).map_err(Failure::usage)?,
         Some(text) => legal_memory_from(space, text, road, &rules, SEED).map_err(Failure::usage)?,
     };
@@ -45,7 +47,7 @@ pub fn why(output: &Output, arguments: &WhyArguments) -> Result<(), Failure> {
     let world = World::new(Arc::new(episode::scene(road)), &start);
     let situation =
         Situation { memory: &memory, road, rules: &rules, surroundings: &world, seed: SEED, step: 0 };
-    let offer = table.offer(&situation, arguments.row);
+    let offer = table.offer(&situation, number);
 
     output.say(&format!("row {}: {} on {}", row.index, row.label, road.name));
     let states: Vec<(&str, String)> =
@@ -63,7 +65,7 @@ pub fn why(output: &Output, arguments: &WhyArguments) -> Result<(), Failure> {
         output.say(&format!("  bound by {}{state}", space.rules[rule].name));
     }
     let verdict = match &offer {
-        Offer::Legal(draw) => format!("legal, for example {}", emit::action_text(&table, draw)),
+        Offer::Legal(draw) => format!("legal, for example {}", emit::action_text(table, draw)),
         Offer::Refused(refusal) => match &refusal.rule {
             Some(rule) => format!("not legal: rule `{rule}` says no: {}", refusal.reason),
             None => format!("not legal: {}", refusal.reason),

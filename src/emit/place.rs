@@ -23,7 +23,7 @@ pub fn quoted(text: &str) -> String {
     print_expr(&tree::text(text))
 }
 
-/// Letters, digits and `_`, with a letter in front, and no keyword: the language's names.
+/// A text as a name of the language: letters, digits and `_`, with a letter in front, and no keyword.
 pub fn identifier(text: &str) -> String {
     let kept: String =
         text.chars().map(|letter| if letter.is_ascii_alphanumeric() { letter } else { '_' }).collect();

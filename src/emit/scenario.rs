@@ -9,7 +9,6 @@ use crate::ads::external::Conversation;
 use crate::episode::{Collision, EpisodeLog, Outcome};
 use crate::model::vocabulary::Word;
 use crate::model::{ActionDef, START_MPS, Space, StateDef, Value, digest_text, ticks_s};
-use crate::oracle::AvoidabilitySettings;
 use crate::run::{EpisodeSummary, Finding};
 use crate::sim::{ENGINE, TrafficProfile};
 use crate::syntax::ast::{ClauseKind, Expect, Expr, Field, File, ItemKind, Name, Scenario, Span, Step};
@@ -46,16 +45,17 @@ pub fn scenario(
     let steps = last.collision.step + 1;
     let emitted = format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command);
     let headline = headline(table.space(), log, &counted[0].collision);
-    let origin = origin(log, source, &summary.avoidability);
+    let origin = origin(log, source);
     file(table, log, source, origin, [&emitted, &headline], steps, expects(log, summary, steps))
 }
 
-/// The same of an emitted scenario that was played again: with all its steps, because they are the scenario, and its end.
+/// The scenario of an episode that played an emitted scenario again. It keeps all steps, because they are the scenario,
+/// and says how the episode ended.
 pub fn retold(table: &ActionTable, log: &EpisodeLog, summary: &EpisodeSummary, source: &Provenance) -> File {
     let emitted = format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command);
     let counted = summary.collisions.iter().find(|finding| finding.counted);
     let headline = counted.map_or_else(String::new, |first| headline(table.space(), log, &first.collision));
-    let origin = origin(log, source, &summary.avoidability);
+    let origin = origin(log, source);
     let steps = log.steps.len();
     let mut expects = expects(log, summary, steps);
     expects.push(end(log));
@@ -66,7 +66,7 @@ pub fn retold(table: &ActionTable, log: &EpisodeLog, summary: &EpisodeSummary, s
 /// scenario has no step.
 pub fn failure(table: &ActionTable, log: &EpisodeLog, headline: &str, source: &Provenance) -> File {
     let emitted = format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command);
-    let origin = origin(log, source, &AvoidabilitySettings::default());
+    let origin = origin(log, source);
     let trace = tree::text(digest_text(&log.trace()));
     let trace = tree::expect(tree::equal(tree::name("trace"), trace), Vec::new());
     file(table, log, source, origin, [&emitted, headline], log.steps.len(), vec![end(log), trace])
@@ -76,7 +76,7 @@ pub fn failure(table: &ActionTable, log: &EpisodeLog, headline: &str, source: &P
 pub fn unclaimed(table: &ActionTable, log: &EpisodeLog, headline: &str, source: &Provenance) -> File {
     let emitted =
         format!("Emitted by `avastra {}`; look at it with `avastra render FILE --strip`.", source.command);
-    let origin = origin(log, source, &AvoidabilitySettings::default());
+    let origin = origin(log, source);
     file(table, log, source, origin, [&emitted, headline], log.steps.len(), Vec::new())
 }
 
@@ -115,7 +115,7 @@ pub fn action_text(table: &ActionTable, draw: &Draw) -> String {
     format!("{axes} with {{ {} }}", fields.join(", "))
 }
 
-fn origin(log: &EpisodeLog, source: &Provenance, avoidability: &AvoidabilitySettings) -> Vec<Field> {
+fn origin(log: &EpisodeLog, source: &Provenance) -> Vec<Field> {
     let names = |rules: &[String]| tree::list(rules.iter().map(|rule| tree::name(rule)).collect());
     let mut fields = vec![
         tree::field("seed", tree::whole(log.seed)),
@@ -140,9 +140,6 @@ fn origin(log: &EpisodeLog, source: &Provenance, avoidability: &AvoidabilitySett
     if *traffic != TrafficProfile::default() {
         fields.push(tree::field("traffic", tree::text(traffic.to_line())));
         fields.push(tree::field("traffic_digest", tree::text(traffic.digest())));
-    }
-    if *avoidability != AvoidabilitySettings::default() {
-        fields.push(tree::field("avoidability", tree::text(avoidability.to_line())));
     }
     if !source.without.is_empty() {
         fields.push(tree::field("without", names(source.without)));

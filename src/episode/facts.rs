@@ -56,11 +56,11 @@ pub fn struck(contact: &Contact, ego: &VehicleParameters) -> bool {
     if contact.ego_speed_mps < STANDING_MPS {
         return true;
     }
-    match face(contact.on_ego, ego) {
-        Face::Front => false,
-        Face::Rear => true,
-        Face::FrontCorner { leftward } => towards_mps(contact, leftward) > contact.ego_speed_mps,
-        Face::Side { leftward } => {
+    match outline_side(contact.on_ego, ego) {
+        OutlineSide::Front => false,
+        OutlineSide::Rear => true,
+        OutlineSide::FrontCorner { leftward } => towards_mps(contact, leftward) > contact.ego_speed_mps,
+        OutlineSide::Side { leftward } => {
             let front_axle_m = ego.wheelbase_m + ego.rear_axle_to_back_m - ego.length_m / 2.0;
             contact.on_ego.x < front_axle_m || towards_mps(contact, leftward) > SIDEWAYS_MPS
         }
@@ -71,7 +71,7 @@ pub fn struck(contact: &Contact, ego: &VehicleParameters) -> bool {
 pub fn run_into_from_behind(contact: &Contact, ego: &VehicleParameters) -> bool {
     let other = contact.obstacle_velocity_on_ego_mps;
     contact.priority == Priority::Ego
-        && matches!(face(contact.on_ego, ego), Face::Rear)
+        && matches!(outline_side(contact.on_ego, ego), OutlineSide::Rear)
         && other.x > contact.ego_speed_mps
         && other.x > other.y.abs()
 }
@@ -86,45 +86,45 @@ pub fn at_fault(contact: &Contact) -> bool {
     }
 }
 
-/// Speed of the obstacle towards a side of the ego vehicle, m/s; `leftward` as in [`Face`].
+/// Speed of the obstacle towards a side of the ego vehicle, m/s; `leftward` as in [`OutlineSide`].
 fn towards_mps(contact: &Contact, leftward: f64) -> f64 {
     -leftward * contact.obstacle_velocity_on_ego_mps.y
 }
 
 /// The side of the ego vehicle that a point belongs to, in words.
 pub fn side(on_ego: Vec2, ego: &VehicleParameters) -> &'static str {
-    match face(on_ego, ego) {
-        Face::Front => "front",
-        Face::FrontCorner { leftward } if leftward > 0.0 => "front left",
-        Face::FrontCorner { .. } => "front right",
-        Face::Rear => "rear",
-        Face::Side { leftward } if leftward > 0.0 => "left",
-        Face::Side { .. } => "right",
+    match outline_side(on_ego, ego) {
+        OutlineSide::Front => "front",
+        OutlineSide::FrontCorner { leftward } if leftward > 0.0 => "front left",
+        OutlineSide::FrontCorner { .. } => "front right",
+        OutlineSide::Rear => "rear",
+        OutlineSide::Side { leftward } if leftward > 0.0 => "left",
+        OutlineSide::Side { .. } => "right",
     }
 }
 
 /// `leftward` is 1 on the left and -1 on the right.
-enum Face {
+enum OutlineSide {
     Front,
     FrontCorner { leftward: f64 },
     Rear,
     Side { leftward: f64 },
 }
 
-/// The face of the ego vehicle's outline that a point lies nearest to. `point` is in the frame of
+/// The side of the ego vehicle's outline that a point lies nearest to. `point` is in the frame of
 /// the outline's centre: x ahead, y left, m.
-fn face(point: Vec2, ego: &VehicleParameters) -> Face {
+fn outline_side(point: Vec2, ego: &VehicleParameters) -> OutlineSide {
     let to_end_m = ego.length_m / 2.0 - point.x.abs();
     let to_side_m = ego.width_m / 2.0 - point.y.abs();
     let leftward = if point.y >= 0.0 { 1.0 } else { -1.0 };
     if point.x >= 0.0 && (to_end_m - to_side_m).abs() < CORNER_M && to_end_m.abs() < CORNER_M {
-        Face::FrontCorner { leftward }
+        OutlineSide::FrontCorner { leftward }
     } else if to_end_m > to_side_m {
-        Face::Side { leftward }
+        OutlineSide::Side { leftward }
     } else if point.x >= 0.0 {
-        Face::Front
+        OutlineSide::Front
     } else {
-        Face::Rear
+        OutlineSide::Rear
     }
 }
 

@@ -91,7 +91,8 @@ pub struct StepLog {
 /// What became of the agent's choice.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
-    /// Carried out as drawn, so many ticks after the step began; the ids of the road users it made appear.
+    /// Carried out as drawn, `delay_ticks` after the step began; `spawned` has the ids of the road users that it made
+    /// appear.
     Done { draw: Draw, spawned: Vec<u32>, delay_ticks: u32 },
     /// No action was chosen: no row was legal, or the script has none here.
     Passed,
@@ -154,10 +155,10 @@ pub enum End {
     Arrived,
     /// No progress for several steps: truncated.
     Stalled,
-    /// The same, because something stood in the way that would not go: wrecks, or vehicles that wait for each
-    /// other. It says nothing about the driving system.
+    /// No progress, because something stood in the way that would not go: wrecks, or vehicles that wait for each other.
+    /// It says nothing about the driving system.
     Blocked,
-    /// The same, because the ego vehicle has left its lane and does not find back.
+    /// No progress, because the ego vehicle has left its lane and does not find back.
     Astray,
     /// It drove beyond the end of its way, or away from every road: there is nothing to drive on. The way up to there
     /// counts.

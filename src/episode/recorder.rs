@@ -107,7 +107,8 @@ impl Default for Recorder {
 }
 
 impl Recorder {
-    /// Keeps the present tick. To be called as a [`Watch`](super::Watch) is.
+    /// Records the present tick. Call it as a [`Watch`](super::Watch) is called: before the first tick, and after every
+    /// tick.
     pub fn note(&mut self, world: &World, ads: &dyn Ads, contacts: &[Contact]) {
         let tick = world.ticks();
         self.end_tick = tick;

@@ -98,8 +98,8 @@ pub fn run(setup: &Setup, choose: &mut dyn FnMut(&Moment) -> Choice, watch: &mut
     run_from(setup, None, choose, watch, &mut |_| {})
 }
 
-/// As [`run`], from a kept moment of an episode with this setup, if there is one; the log covers the whole episode.
-/// `last` gets the moment at which the next choice would have been due.
+/// As [`run`], but from `from`, a kept moment of an episode with this setup, or from the start without one. The log
+/// covers the whole episode. `last` gets the moment at which the next choice would have been due.
 pub fn run_from(
     setup: &Setup,
     from: Option<Play>,
@@ -110,7 +110,7 @@ pub fn run_from(
     let mut play = from.unwrap_or_else(|| Play::new(setup));
     watch(&play.world, play.ads.as_ref(), &[]);
     let end = loop {
-        let observation = match play.look(setup) {
+        let observation = match play.look() {
             Ok(observation) => observation,
             Err(end) => break end,
         };
@@ -164,9 +164,9 @@ struct Near {
     body: Option<BodyWord>,
 }
 
-/// An episode under way. [`run`] is a loop over [`Play::look`] and [`Play::step`]; whoever cannot be called from a loop
-/// steps by itself. Each call takes the setup that the episode was begun with. A clone is a snapshot, from which can be played
-/// as often as wanted.
+/// An episode under way. [`run`] is a loop over [`Play::look`] and [`Play::step`]; a caller that cannot be called back
+/// from a loop uses these two itself. Each call takes the setup that the episode was begun with. A clone is a snapshot,
+/// which can be played on as often as wanted.
 #[derive(Clone)]
 pub struct Play {
     world: World,
@@ -217,11 +217,10 @@ impl Play {
     ///
     /// # Errors
     /// The end of the episode, if its driving system cannot drive any more.
-    pub fn look(&mut self, setup: &Setup) -> Result<Observation, End> {
+    pub fn look(&self) -> Result<Observation, End> {
         if let Some(end) = self.failed() {
             return Err(end);
         }
-        self.fork(setup);
         Ok(self.observation())
     }
 
@@ -230,13 +229,14 @@ impl Play {
         Observation::new(&self.world, self.ads.status())
     }
 
-    /// Hands on this moment, in which a choice is due.
+    /// Calls `see` with this moment, in which a choice is due, and returns what it gives.
     pub fn at<T>(&self, setup: &Setup, observation: &Observation, see: impl FnOnce(&Moment) -> T) -> T {
         let situation = self.situation(setup);
         see(&Moment { step: self.steps.len(), observation, situation: &situation, play: self, setup })
     }
 
-    /// Does what was chosen on an observation, and drives for one observation period; the end of the episode, if it ends so.
+    /// Carries out a choice that was made on `observation`, then drives for one observation period. Returns how the
+    /// episode ended, if it ended.
     pub fn step(
         &mut self,
         setup: &Setup,
@@ -273,16 +273,6 @@ impl Play {
             surroundings: &self.world,
             seed: self.seed,
             step: self.steps.len() as u64,
-        }
-    }
-
-    /// Lets chance fall otherwise, if the setup says so of this moment. A second time it changes nothing.
-    fn fork(&mut self, setup: &Setup) {
-        let now = self.world.ticks();
-        for fork in setup.forks.iter().filter(|fork| fork.tick == now) {
-            self.seed = fork.seed;
-            self.world.reseed(fork.seed);
-            self.ads.reseed(setup.ads.seed_of_errors(fork.seed));
         }
     }
 
@@ -354,7 +344,8 @@ impl Play {
             }
         }
         let progress_m = self.world.ego_station_m() - station_m;
-        // Who waits for a light does not stall; neither does that wait end a stall. After a contact nothing waits.
+        // An ego vehicle that waits for a light does not stall, and its wait does not end a stall. After a contact no
+        // wait counts.
         if progress_m.abs() >= PROGRESS_M_MIN {
             self.stalled = 0;
         } else if !self.collisions.is_empty() || !self.world.waits_for_light() {
@@ -388,11 +379,10 @@ impl Play {
         }
     }
 
-    /// One physics step; returns the collision probability after it, or `None` where the driving system failed and
-    /// nothing moved. It is 1 at the tick of a contact. After that
-    /// the obstacle is ignored: it stands against the ego vehicle for a while and is no danger any more.
+    /// One physics step. Returns the collision probability after it, or `None` if the driving system failed and nothing
+    /// moved. The probability is 1 at the tick of a contact. After that the obstacle is ignored: it stands against the
+    /// ego vehicle for a while and is no danger any more.
     fn tick(&mut self, setup: &Setup, watch: &mut Watch) -> Option<Near> {
-        self.fork(setup);
         self.world.sense(&mut self.sensed);
         let control = self.ads.drive(&self.sensed);
         if self.ads.failure().is_some() {

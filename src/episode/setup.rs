@@ -28,20 +28,8 @@ pub struct Setup<'a> {
     /// Ticks by which each observation period is longer than the space says (negative: shorter); steps beyond the
     /// list's end are not shifted. Used to ask what a little more or less time would have changed; otherwise empty.
     pub period_shifts: Vec<i32>,
-    /// Moments from which chance falls otherwise, in order of time: the way by which two episodes have one beginning
-    /// and different ends. Otherwise empty.
-    pub forks: Vec<Fork>,
     /// How collision probabilities are computed.
     pub proc: ProcKind,
-}
-
-/// From a tick on, everything that is drawn comes from another seed: sensor errors, others' choices, actions and their
-/// values. What was drawn before stays.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Fork {
-    /// Ticks since the start of the episode.
-    pub tick: u64,
-    pub seed: u64,
 }
 
 /// The part of the world that all episodes on a road share.

@@ -75,7 +75,7 @@ impl Comparison {
     }
 }
 
-/// Plays the pairs of these numbers on so many threads and hands each to `on`, on this one.
+/// Plays the pairs of these numbers on `threads` threads, and calls `on` on this thread with each.
 ///
 /// # Errors
 /// The first error of `on`.
@@ -91,7 +91,7 @@ pub fn compared<E>(
         let side = |run: &Run| {
             let setup = run.setup(episode);
             let (log, _) = run.played(&setup);
-            let happened = comparison.event.happened(&setup, &log, run.settings());
+            let happened = comparison.event.happened(&setup, &log);
             Side { happened, failed: log.failure.is_some(), driven_m: log.distance_m }
         };
         tell(Pair { number: *number, first: side(&comparison.first), second: side(&comparison.second) });

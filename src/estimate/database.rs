@@ -14,7 +14,6 @@ use crate::estimate::ready::Estimate;
 /// Versions begin at 2001, so that it is never taken for another database.
 const LAYOUT: Layout = Layout {
     version: 2003,
-    older: &[],
     unit: "part",
     tables: &["part", "event", "scenario", "pilot", "seen"],
     naming: None,
@@ -25,6 +24,7 @@ const LAYOUT: Layout = Layout {
 /// What a pilot saw stands under a part that no estimate has.
 pub const PILOT: i64 = -1;
 
+/// `levels` is 0 always: a method that is gone counted them, and a table without the column would have another layout.
 const SCHEMA: &str = "
 CREATE TABLE part (
   part INTEGER PRIMARY KEY, road INTEGER NOT NULL, number INTEGER NOT NULL, probability REAL NOT NULL,
@@ -100,7 +100,7 @@ impl EstimateDatabase {
         let place = estimate.settings().place(record.part);
         let transaction = self.connection.transaction()?;
         transaction.execute(
-            "INSERT INTO part VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            "INSERT INTO part VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 0)",
             params![
                 place,
                 road as i64,
@@ -113,7 +113,6 @@ impl EstimateDatabase {
                 record.weight_squares,
                 record.weight_max,
                 record.simulated_s,
-                record.levels,
             ],
         )?;
         for (index, (met, scenario)) in played.met.iter().zip(scenarios).enumerate() {
@@ -240,7 +239,7 @@ impl EstimateDatabase {
     /// If the file cannot be read.
     pub fn parts(&self) -> Result<Vec<PartRecord>, DatabaseError> {
         let mut query = self.connection.prepare(
-            "SELECT road, number, probability, episodes, driven_m, duration_s, events, squares, largest, simulated_s, levels
+            "SELECT road, number, probability, episodes, driven_m, duration_s, events, squares, largest, simulated_s
              FROM part ORDER BY part",
         )?;
         let records = query.query_map([], |row| {
@@ -254,7 +253,6 @@ impl EstimateDatabase {
                 weight_squares: row.get(7)?,
                 weight_max: row.get(8)?,
                 simulated_s: row.get(9)?,
-                levels: row.get(10)?,
                 failed: 0,
             })
         })?;

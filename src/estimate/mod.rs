@@ -2,9 +2,8 @@
 //! and the rate in 1,000 km, with intervals.
 //!
 //! An [`Estimate`] consists of independent parts, each with seeds of its own, played on any number of threads. A part
-//! counts ([`Method::Count`]: crude Monte Carlo), tries rows out beside those that chance chooses ([`Method::Probe`]: importance
-//! sampling, see `probing` and `plan`) or splits ([`Method::Split`]: adaptive multilevel splitting, see `splitting`). All are
-//! unbiased for agents that do not look ahead, if the number of parts is fixed. Rules that stop early ([`Stopping`]) bias
+//! counts ([`Method::Count`]: crude Monte Carlo) or tries rows out beside those that chance chooses ([`Method::Probe`]: importance
+//! sampling, see `probing` and `plan`). Both are unbiased if the number of parts is fixed. Rules that stop early ([`Stopping`]) bias
 //! the probability a little, since they look at it or at what goes with it; the interval stays valid, because the looks share
 //! what it may miss (Bonferroni). What is gained over counting is printed. [`Comparison`] plays two driving systems in the
 //! same episodes.
@@ -17,7 +16,6 @@ mod probing;
 mod ready;
 mod results;
 mod settings;
-mod splitting;
 
 pub use compare::{Comparison, ComparisonResults, Pair, Side, compared};
 pub use database::{EstimateDatabase, PILOT, WrittenScenario};

@@ -9,7 +9,6 @@ use crate::estimate::plan::Plan;
 use crate::estimate::probing::probe;
 use crate::estimate::ready::Estimate;
 use crate::estimate::settings::Method;
-use crate::estimate::splitting::split;
 
 /// An independent part of an estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -27,21 +26,18 @@ pub struct PartRecord {
     /// Estimate of the probability of the event in an episode.
     pub probability: f64,
     /// Episodes that were played from their start to their end, and, summed over them, how far and how long they went.
-    /// Branches are not among them.
     pub episodes: u32,
     pub driven_m: f64,
     pub duration_s: f64,
-    /// Episodes (and branches that are alive in the end, and trials) with the event.
+    /// Episodes and trials with the event.
     pub events: u32,
-    /// The sum of the squares of the weights with which each episode counts; and the largest that any could have had, as far
-    /// as the part came. Splitting, which gives no weights, leaves them at 0.
+    /// Sum of the squared weights of the episodes; and the largest weight that any episode could have had, as far as
+    /// the part came.
     pub weight_squares: f64,
     pub weight_max: f64,
     /// Everything that was simulated, branches and the ticks that lead up to them included, s. The replays of
     /// verdicts are not in it, with any method.
     pub simulated_s: f64,
-    /// Levels that the method went through; 0 if it does not split.
-    pub levels: u32,
     /// Episodes that an external driving system failed in: such a part says nothing, and is not kept.
     pub failed: u32,
 }
@@ -68,7 +64,6 @@ pub struct Met {
 /// A part that was played.
 pub struct Played {
     pub record: PartRecord,
-    /// What it met. Splitting keeps nothing: its branches have seeds that no scenario can state.
     pub met: Vec<Met>,
 }
 
@@ -88,7 +83,6 @@ pub fn play_parts<E>(
     let work = |part: &Part, tell: &mut dyn FnMut(Played) -> bool| {
         let played = match estimate.settings().method {
             Method::Count => count(estimate, *part, stop),
-            Method::Split => split(estimate, *part, stop),
             Method::Probe => probe(estimate, *part, plan, stop),
         };
         if let Some(played) = played {
@@ -155,7 +149,6 @@ impl PartRecord {
             weight_squares: 0.0,
             weight_max: 0.0,
             simulated_s: 0.0,
-            levels: 0,
             failed: 0,
         }
     }

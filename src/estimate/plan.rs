@@ -13,10 +13,11 @@ use std::collections::BTreeMap;
 use crate::model::MomentFacts;
 use crate::model::vocabulary::RoadKind;
 
-/// Events that the wider class weighs, in as many trials as have so many there: one lucky event tells little, and a row
-/// without any is not safe before its trials exclude one. Ours.
+/// How strongly an estimate for a cell is drawn towards that of its wider class: as if the cell had met this many
+/// events more, in as many trials as the wider class needs for them. One lucky event tells little, and a row without
+/// events is not safe before enough trials. Ours.
 const PRIOR_EVENTS: f64 = 1.0;
-/// Below this the ego vehicle crawls, above the next it drives fast, m/s. Ours.
+/// Below this speed the ego vehicle crawls; above the next one it drives fast, m/s. Ours.
 const CRAWLING_MPS_MAX: f64 = 2.0;
 const SLOW_MPS_MAX: f64 = 8.0;
 
@@ -38,7 +39,7 @@ pub struct Situation(u32);
 pub struct Seen {
     /// Times that the row was carried out.
     pub trials: u32,
-    /// Those of them after which the event came, with what the row made appear.
+    /// Trials after which the event came, with a road user that the row made appear.
     pub events: u32,
     /// Moments at which the row could have been chosen.
     pub moments: u32,
@@ -62,12 +63,13 @@ pub struct Plan {
     risks: Risks,
     /// A row whose risk is higher is tried out; `None`: none is.
     threshold: Option<f64>,
-    /// Trials at each moment, spread over all rows alike, whatever their risk: how a pilot learns.
+    /// Number of trials at each moment that are spread over all rows alike, whatever their risk. A pilot learns from
+    /// these.
     even: f64,
 }
 
-/// The probability of the event after a row, by cell, by row and of all rows: for a cell that a pilot has not seen, that of its
-/// row stands.
+/// Probability of the event after a row: by cell, by row, and over all rows. A cell that a pilot has not seen has the
+/// probability of its row.
 #[derive(Debug, Clone, PartialEq, Default)]
 struct Risks {
     of_cells: BTreeMap<Cell, f64>,
@@ -154,12 +156,13 @@ impl Pilot {
 }
 
 impl Plan {
-    /// Every row alike, so many trials at each moment.
+    /// A plan that tries every row alike, `trials` times at each moment on average.
     pub fn even(trials: f64) -> Plan {
         Plan { even: trials, ..Plan::default() }
     }
 
-    /// The plan with the least variance for its cost, as far as a pilot can tell; and some trials of every row besides.
+    /// The plan with the least variance for its cost, as far as a pilot can tell. `even` trials at each moment are
+    /// spread over all rows besides.
     pub fn of(pilot: &Pilot, even: f64) -> Plan {
         let risks = pilot.risks();
         let trial_s = pilot.tried_s / f64::from(pilot.tried.max(1));
@@ -185,7 +188,8 @@ impl Plan {
         Plan { risks, threshold, even }
     }
 
-    /// The probability with which a row of this chance is tried out, among so many that are legal.
+    /// Probability with which a row is tried out. `chance` is the probability that chance chooses it, `legal` the
+    /// number of legal rows.
     pub fn share(&self, cell: &Cell, chance: f64, legal: usize) -> f64 {
         if chance <= 0.0 {
             return 0.0;

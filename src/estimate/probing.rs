@@ -1,11 +1,10 @@
 //! Importance sampling of rows, by trials beside the episode: what a pilot found dangerous is tried out more often than
 //! chance would choose it, and weighs as much less.
-//!
-//! An episode is played as chance has it. At each step some of the rows that were not chosen are tried out: each in a copy
-//! of the moment, with the values that were drawn for it anyway, and from there on as chance has it. An event belongs
-//! to the step in which what was hit appeared (or was hit, if no action made it appear). A trial asks only for events of its
-//! own step, so each event is sought after in one step alone; over all steps they add up to all of them, without bias and
-//! whatever the plan. A trial ends when the event came, or when nothing is left of what its row made appear.
+//! An episode is played by chance. At each step some of the rows that were not chosen are tried out: each in a copy of
+//! the moment, with the values that were drawn for it anyway, and then played on by chance. An event belongs to the
+//! step in which the road user that was hit appeared (or was hit, if no action made it appear). A trial counts only
+//! events of its own step, so each event is looked for in one step alone, and the steps add up to all events, without
+//! bias, whatever the plan. A trial ends when the event came, or when nothing is left of what its row made appear.
 //!
 //! A trial shares all seeds with its episode, so it is an episode of its own seed with another script: what it finds is written
 //! as a scenario like any other. `plan` says how rows are chosen for trials, and where the weights come from.
@@ -24,7 +23,7 @@ use crate::estimate::part::{Event, Part, PartRecord, Played};
 use crate::estimate::plan::{Cell, Pilot, Plan, Situation, weight};
 use crate::estimate::ready::{Estimate, EventPlace};
 
-/// Rounds of a pilot; the first tries all rows alike, each other one goes by what was found before it. Ours.
+/// Rounds of a pilot. The first tries all rows alike; each later one uses what the rounds before it found. Ours.
 const ROUNDS: u32 = 3;
 /// Trials at each moment of a pilot that are spread over all rows alike: in the first round, and later. Ours.
 const EVEN_FIRST: f64 = 1.0;
@@ -49,7 +48,7 @@ struct Considered {
     weight: f64,
 }
 
-/// The plan that a pilot comes to, with what it saw; `None` if it was stopped.
+/// What a pilot saw, from which a plan follows; `None` if it was stopped.
 pub fn pilot(estimate: &Estimate, threads: usize, stop: &AtomicBool) -> Option<Pilot> {
     let settings = estimate.settings();
     let episodes = f64::from(settings.parts) * f64::from(settings.run.episodes) * ROUND_SHARE;
@@ -227,8 +226,8 @@ fn considered(
     (choice, Step { chosen, trials, moment })
 }
 
-/// Tries a row out in a copy of a moment: the log until nothing can happen any more that belongs to the step, and the time
-/// that it took, s.
+/// Tries a row out in a copy of a moment, until nothing that belongs to the step can happen any more. Returns the log,
+/// and the simulated time, s.
 fn tried(estimate: &Estimate, setup: &Setup, from: Play, step: usize, draw: Draw) -> (EpisodeLog, f64) {
     let mut agent = estimate.run().agent();
     agent.begin();

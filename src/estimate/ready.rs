@@ -33,9 +33,6 @@ impl Estimate {
     pub fn new(table: ActionTable, settings: EstimateSettings) -> Result<Estimate, EstimateError> {
         settings.check()?;
         let run = Run::new(table, settings.run.clone())?;
-        if settings.method == Method::Split && run.agent().looks_ahead() {
-            return Err(EstimateError::Ahead { agent: settings.run.agent.clone() });
-        }
         let rows = run.table().rows().len();
         if settings.method == Method::Probe
             && run.agent().chances(Array1::from_elem(rows, true).view()).is_none()
@@ -66,7 +63,7 @@ impl Estimate {
 
     /// Where the event of an episode is, if it is there.
     pub(super) fn event(&self, setup: &Setup, log: &EpisodeLog) -> Option<EventPlace> {
-        let first = self.settings.event.first(setup, log, &self.settings.run)?;
+        let first = self.settings.event.first(setup, log)?;
         let hit = &log.collisions[first];
         let made_it = |step: &StepLog| match &step.outcome {
             Outcome::Done { spawned, .. } => spawned.contains(&hit.contact.obstacle),
@@ -78,6 +75,6 @@ impl Estimate {
     /// An episode of a part, judged, under a number that no other episode of the estimate on its road has.
     pub(super) fn judged(&self, part: Part, number: u32, log: &EpisodeLog) -> EpisodeSummary {
         let of_estimate = part.number as usize * self.settings.run.episodes as usize + number as usize;
-        EpisodeSummary::judged(&self.setup(part, number), of_estimate, log, &self.settings.run.avoidability)
+        EpisodeSummary::judged(&self.setup(part, number), of_estimate, log)
     }
 }

@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::statistics::{Interval, binomial_missing, bisect, variance_of_mean, weighted};
+use crate::statistics::{Interval, binomial_missing, bisect, weighted};
 
 use crate::estimate::part::{Event, Part, PartRecord};
 use crate::estimate::settings::{EstimateSettings, EventKind, Method};
@@ -19,8 +19,8 @@ pub struct EstimateResults {
     /// Number of parts that are there, and of all parts, if no rule stops the estimate before.
     pub parts: usize,
     pub parts_wanted: usize,
-    /// Share of estimates like this whose interval misses the truth, at most, with all looks that its stopping rules take; and
-    /// the share that this interval alone may miss it in.
+    /// Largest share of estimates like this whose interval misses the truth, over all looks that the stopping rules
+    /// take; and the share for the look that this interval belongs to.
     pub missing: f64,
     pub missing_at_look: f64,
     pub roads: Vec<RoadEstimate>,
@@ -55,9 +55,8 @@ pub struct Mass {
 pub struct Probability {
     /// Probability of the event in an episode.
     pub probability: f64,
-    /// Clopper and Pearson's exact interval where events are counted, else Fay and Feuer's for weighted events: of episodes
-    /// where rows are tried out, of whole parts where episodes split. Its upper end allows for an event as heavy as any could
-    /// have been; of whole parts, as the heaviest that was met.
+    /// Clopper and Pearson's exact interval where events are counted; Fay and Feuer's for weighted events where rows are tried
+    /// out. Its upper end allows for an event as heavy as any could have been.
     pub interval: Interval,
     /// Episodes with the event in 1,000 km, as a ratio of means; `None` if nothing was driven. Its interval is that of the
     /// probability over the mean distance, which it takes as known.
@@ -74,7 +73,8 @@ pub struct Probability {
     /// The simulated hours that counting would need for an interval as narrow, over those that were needed. A rough
     /// figure: `None` for counting, and where too few events were met.
     pub gain: Option<f64>,
-    /// As many events of one weight would say as much (Kish); `None` where there are no weights.
+    /// Effective number of events (Kish): this many events of equal weight would say as much. `None` if there are no
+    /// weights.
     pub effective_events: Option<f64>,
     /// Parts whose estimate is 0.
     pub parts_without: usize,
@@ -177,10 +177,10 @@ impl Sample<'_> {
         let probability = samples.iter().sum::<f64>() / samples.len() as f64;
         let episodes: u64 = all().map(|record| u64::from(record.episodes)).sum();
         let events: u64 = all().map(|record| u64::from(record.events)).sum();
-        let (variance, heaviest) = self.spread(&samples, episodes);
+        let (variance, heaviest) = self.spread();
         let interval = match self.method {
             Method::Count => binomial_missing(events, episodes, self.missing),
-            Method::Split | Method::Probe => {
+            Method::Probe => {
                 let Interval { low, high } = weighted(probability, variance, heaviest, self.missing);
                 Interval { low, high: high.map(|high| high.min(1.0)) }
             }
@@ -201,7 +201,6 @@ impl Sample<'_> {
         let effective_events = self.effective_events();
         let is_telling = match self.method {
             Method::Count => false,
-            Method::Split => (samples.len() - parts_without) as f64 >= GAIN_EVENTS_MIN,
             Method::Probe => effective_events.is_some_and(|events| events >= GAIN_EVENTS_MIN),
         };
         let counting_s =
@@ -224,13 +223,7 @@ impl Sample<'_> {
     }
 
     /// The variance of the mean, and the share of it that the heaviest value has.
-    fn spread(self, samples: &[f64], episodes: u64) -> (f64, f64) {
-        if self.method == Method::Split {
-            let largest = samples.iter().copied().fold(0.0, f64::max);
-            // Before anything was met, an event in a whole episode, which weighs 1.
-            let heaviest = if largest > 0.0 { largest / samples.len() as f64 } else { 1.0 / episodes as f64 };
-            return (variance_of_mean(samples), heaviest);
-        }
+    fn spread(self) -> (f64, f64) {
         let roads = self.by_road.len() as f64;
         self.by_road.iter().fold((0.0, 0.0_f64), |(variance, heaviest), own| {
             let count: f64 = own.iter().map(|record| f64::from(record.episodes)).sum();
@@ -305,10 +298,6 @@ mod tests {
         assert!((both.per_hour_interval.unwrap().low - 90.0 * both.interval.low).abs() < 1e-9);
         assert_eq!((first.episodes, first.parts, first.parts_without, first.gain), (200, 2, 0, None));
         let many: Vec<PartRecord> = (0..20).map(|number| record(0, number, 1 + 2 * (number % 2))).collect();
-        let split = found(Method::Split, &[many.iter().collect()]);
-        // Twenty parts with 1 % and 3 % in turn: a variance of 1e-4 / 19, where that of counting is 0.02 * 0.98 / 2,000.
-        let gain = split.gain.unwrap();
-        assert!((0.8..1.9).contains(&gain), "{gain}");
         // Whole weights are counts: no gain, and nearly the interval of counting.
         let probed = found(Method::Probe, &[many.iter().collect()]);
         assert!((probed.gain.unwrap() - 1.0).abs() < 0.03, "{probed:?}");
@@ -317,7 +306,7 @@ mod tests {
         assert!((probed.interval.low - exact.low).abs() < 3e-4, "{probed:?} {exact:?}");
         assert!((probed.interval.high.unwrap() - exact.high.unwrap()).abs() < 3e-4, "{probed:?} {exact:?}");
         // Nothing in 200 episodes: what counting would say of them.
-        let nothing = found(Method::Split, &by_road[1..]);
+        let nothing = found(Method::Probe, &by_road[1..]);
         assert_eq!((nothing.probability, nothing.interval.low, nothing.gain), (0.0, 0.0, None));
         assert!((nothing.interval.high.unwrap() - 3.6888794541139363 / 200.0).abs() < 1e-9, "{nothing:?}");
     }

@@ -18,21 +18,21 @@ pub enum EventKind {
 }
 
 impl EventKind {
-    /// The first collision of an episode that is the event, judged by the settings of a run.
-    pub(super) fn first(self, setup: &Setup, log: &EpisodeLog, run: &RunSettings) -> Option<usize> {
+    /// The first collision of an episode that is the event.
+    pub(super) fn first(self, setup: &Setup, log: &EpisodeLog) -> Option<usize> {
         match self {
             _ if log.collisions.is_empty() => None,
             EventKind::Collision => Some(0),
             EventKind::Counted => {
-                let summary = EpisodeSummary::judged(setup, 0, log, &run.avoidability);
+                let summary = EpisodeSummary::judged(setup, 0, log);
                 summary.collisions.iter().position(|finding| finding.counted)
             }
         }
     }
 
     /// Whether it is in an episode.
-    pub(super) fn happened(self, setup: &Setup, log: &EpisodeLog, run: &RunSettings) -> bool {
-        self.first(setup, log, run).is_some()
+    pub(super) fn happened(self, setup: &Setup, log: &EpisodeLog) -> bool {
+        self.first(setup, log).is_some()
     }
 
     /// What so many of them are called, after their number.
@@ -59,8 +59,6 @@ pub enum Method {
     /// Crude Monte Carlo.
     #[default]
     Count,
-    /// Adaptive multilevel splitting.
-    Split,
     /// Importance sampling of rows: dangerous ones are tried out beside those that chance chooses.
     Probe,
 }
@@ -100,8 +98,6 @@ const LOOKS: [u32; 3] = [4, 2, 1];
 
 /// Largest number of parts of a road. Ours.
 const PARTS_MAX: u32 = 100_000;
-/// A part that splits needs at least so many episodes. Ours: with fewer, most parts die out.
-const SPLIT_EPISODES_MIN: u32 = 10;
 
 /// Why an estimate cannot begin.
 #[derive(Debug, thiserror::Error)]
@@ -114,18 +110,11 @@ pub enum EstimateError {
     Precision { found: f64 },
     #[error("{found} hours: a limit above 0 is possible")]
     Hours { found: f64 },
-    #[error("{found} episodes a part: splitting needs at least {SPLIT_EPISODES_MIN}")]
-    Episodes { found: u32 },
     #[error(
         "this method goes on from moments in the middle of episodes, which a program of its own cannot do: estimate by \
          counting (`--method count`)"
     )]
     External,
-    #[error(
-        "splitting lets chance fall otherwise after a moment, and `{agent}` has looked at what comes after: estimate by \
-         counting (`--method count`)"
-    )]
-    Ahead { agent: String },
     #[error(
         "`{agent}` does not say how likely it chooses a row, so what is tried out beside it has no weight: estimate by \
          counting (`--method count`), or with `--agent random`"
@@ -181,9 +170,6 @@ impl EstimateSettings {
         }
         if let Some(found) = self.stopping.hours.filter(|hours| !(hours.is_finite() && *hours > 0.0)) {
             return Err(EstimateError::Hours { found });
-        }
-        if self.method == Method::Split && self.run.episodes < SPLIT_EPISODES_MIN {
-            return Err(EstimateError::Episodes { found: self.run.episodes });
         }
         if self.method != Method::Count && self.run.external.is_some() {
             return Err(EstimateError::External);

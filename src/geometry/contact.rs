@@ -5,7 +5,7 @@
 //! `parry2d`, which only they use; `tests/it/contacts.rs` shows that no contact is missed.
 
 use super::extreme::{larger, smaller};
-use super::pose::{OrientedBox, Pose, Vec2, wrap_angle};
+use super::pose::{OrientedBox, Pose, Vec2, extent_m, wrap_angle};
 
 /// Boxes nearer than this count as touching, m. A contact is told at most a millisecond early if the gap
 /// closes with at least a millimetre a second.
@@ -218,10 +218,8 @@ impl Frame {
     /// too little: boxes for which it is false may be farther apart, too.
     pub fn is_apart(&self, other: &Frame, gap_m: f64) -> bool {
         let between = other.centre - self.centre;
-        let cosine = self.forward.dot(&other.forward).abs();
-        let sine = self.forward.perp(&other.forward).abs();
-        let along_m = other.half_length_m * cosine + other.half_width_m * sine;
-        let across_m = other.half_length_m * sine + other.half_width_m * cosine;
+        let half_m = (other.half_length_m, other.half_width_m);
+        let (along_m, across_m) = extent_m(other.forward, self.forward, half_m);
         self.forward.dot(&between).abs() > self.half_length_m + along_m + gap_m
             || self.forward.perp(&between).abs() > self.half_width_m + across_m + gap_m
     }

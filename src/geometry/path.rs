@@ -11,7 +11,7 @@
 //! | [`Path::project`] | the nearest point of all, exact | a point that may be anywhere |
 //! | [`Path::project_near`] | the nearest point of a stretch, exact | a vehicle that was seen there before |
 //! | [`Path::project_from`] | a point at a right angle near a guess, within 2 cm; none far aside | drivers, for every other road user |
-//! | `ads::guide` | the tangent of the nearest even sample | a driving system, for every predicted position |
+//! | `ads::kit` | the tangent of the nearest even sample | a driving system, for every predicted position |
 
 use super::beside::Beside;
 use super::extreme::larger;

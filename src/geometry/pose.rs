@@ -148,10 +148,24 @@ impl OrientedBox {
         [centre + ahead + left, centre - ahead + left, centre - ahead - left, centre + ahead - left]
     }
 
+    /// Half the length along the unit vector `along` and half the width across it, m; `forward` is the unit vector
+    /// along the box.
+    pub fn half_extent_m(&self, forward: Vec2, along: Vec2) -> (f64, f64) {
+        extent_m(forward, along, (self.half_length_m, self.half_width_m))
+    }
+
     /// Radius of the circle around the box, m.
     pub fn radius_m(&self) -> f64 {
         libm::sqrt(self.half_length_m * self.half_length_m + self.half_width_m * self.half_width_m)
     }
+}
+
+/// Length along the unit vector `along` and width across it, m, of a box of a size (length and width, m) that points
+/// along the unit vector `forward`. Of half the size it is half.
+#[inline]
+pub fn extent_m(forward: Vec2, along: Vec2, (length_m, width_m): (f64, f64)) -> (f64, f64) {
+    let (cosine, sine) = (along.dot(&forward).abs(), along.perp(&forward).abs());
+    (length_m * cosine + width_m * sine, length_m * sine + width_m * cosine)
 }
 
 #[cfg(test)]

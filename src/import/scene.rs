@@ -22,7 +22,8 @@ const OFFSET_M_MAX: f64 = 0.3;
 /// A pedestrian walks straight: vertices of its way may lie this far beside that, m.
 const STRAIGHT_M: f64 = 0.5;
 
-/// A pedestrian sets out at most 10 s after it appeared: a farther one appears so many seconds before the ego vehicle arrives.
+/// A pedestrian sets out at most 10 s after it appeared, so one that is farther away appears this long before the ego
+/// vehicle arrives, s.
 const SETS_OUT_S: f64 = 9.0;
 
 pub struct Scene {

@@ -37,13 +37,13 @@ pub struct Condition {
 pub enum When {
     /// It holds from the beginning.
     Always,
-    /// After so many seconds.
+    /// After this time, s.
     After(f64),
-    /// The distance of two entities is less or more than so many seconds of the first one's speed.
+    /// The distance of two entities is less or more than the way that the first one drives in `seconds`.
     Headway { pair: Pair, seconds: f64 },
-    /// It is less or more than so many metres.
+    /// The distance of two entities is less or more than `metres`.
     Distance { pair: Pair, metres: f64 },
-    /// The first would reach the second in less than so many seconds.
+    /// The first would reach the second in less than `seconds`.
     Collides { pair: Pair, seconds: f64 },
     /// An entity is this near to a place, m.
     Reaches { entity: String, position: Position, within_m: f64 },

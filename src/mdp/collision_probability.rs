@@ -6,6 +6,7 @@
 //! ProC is a ratio of distances, not the probability of anything; the name is the paper's.
 
 use crate::geometry::wrap_angle;
+use crate::kinematics::braking_m;
 use crate::model::vocabulary::Body;
 use crate::sim::{Obstacle, World};
 
@@ -118,9 +119,8 @@ pub fn longitudinal_safety_distance_m(
 ) -> f64 {
     // The paper gives the deceleration as -6 m/s². Its magnitude is meant: with the sign, a faster
     // follower would need less room.
-    let follower_m = follower_mps * follower_mps / (2.0 * follower_decel_mps2);
-    let leader_m = leader_mps * leader_mps / (2.0 * leader_decel_mps2);
-    (follower_m - leader_m).max(0.0) + gap_m_min
+    let longer_m = braking_m(follower_mps, follower_decel_mps2) - braking_m(leader_mps, leader_decel_mps2);
+    longer_m.max(0.0) + gap_m_min
 }
 
 /// Safety distance (m) of two vehicles that drive towards each other: both must stop. Ours, after RSS;
@@ -132,7 +132,7 @@ pub fn opposing_safety_distance_m(
     other_decel_mps2: f64,
     gap_m_min: f64,
 ) -> f64 {
-    ego_mps * ego_mps / (2.0 * ego_decel_mps2) + other_mps * other_mps / (2.0 * other_decel_mps2) + gap_m_min
+    braking_m(ego_mps, ego_decel_mps2) + braking_m(other_mps, other_decel_mps2) + gap_m_min
 }
 
 /// Lateral safety distance `LaSD` (m), Eq. 10: `(v sin β)² / (a sin β)`, which is `v² |sin β| / a`

@@ -10,7 +10,7 @@ use crate::kinematics::STANDING_MPS;
 use crate::sim::{FRAME_S, FRAME_TICKS, Obstacle, World};
 
 /// Contacts later than this are not looked for, s.
-pub const TTC_S_MAX: f64 = 8.0;
+const TTC_S_MAX: f64 = 8.0;
 /// Encroachments farther apart in time than this are not looked for, s. Above 2 s is normal traffic.
 const PET_S_MAX: f64 = 5.0;
 /// Places of the ego vehicle that are looked at together, 0.8 s.

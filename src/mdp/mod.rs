@@ -14,7 +14,7 @@ mod state;
 
 pub use closeness::Closeness;
 pub use collision_probability::{Danger, ProcKind, ProcSettings, collision_probability};
-pub use criticality::{Criticality, Encroachment, TTC_S_MAX};
+pub use criticality::{Criticality, Encroachment};
 pub use observation::{Observation, variable};
 pub use reward::{RewardSettings, StepOutcome, reward};
 pub use state::{PerceptionCounts, STATE_LEN, StateVector, perception_counts};

@@ -16,7 +16,7 @@ const EQUAL_PART: f64 = 1e-9;
 /// Below this, an f64 without a fraction was not rounded to be so.
 const EXACT: f64 = (1_u64 << 52) as f64;
 
-/// A call of a function with at most so many parameters allocates nothing.
+/// A call of a function with at most this many parameters allocates nothing.
 const FEW: usize = 4;
 
 /// The facts that an expression may read. Facts that are not known at its place in the file keep their

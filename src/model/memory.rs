@@ -30,7 +30,7 @@ impl Space {
         memory
     }
 
-    /// The memories with which an episode may begin on a road, at most so many, and whether these are all.
+    /// The memories with which an episode may begin on a road, at most `count_max`, and whether these are all.
     pub(crate) fn initial_memories(
         &self,
         road: &Road,

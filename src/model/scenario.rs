@@ -41,9 +41,6 @@ pub struct Origin {
     /// The traffic profile as one line of YAML, and its digest; the default if not given.
     pub traffic: Option<String>,
     pub traffic_digest: Option<String>,
-    /// Settings of the verdict whether collisions were avoidable, as one line of YAML; the defaults if not
-    /// given.
-    pub avoidability: Option<String>,
     /// Rules that were asked for (`--with`) and switched off (`--without`).
     pub with: Vec<String>,
     pub without: Vec<String>,
@@ -153,8 +150,9 @@ impl Claim {
 }
 
 impl Scenario {
-    /// Whether a crash with an obstacle is one that the scenario is about: one that it calls counted, or if it calls none so,
-    /// one that it says is hit. If it names no obstacle, any crash is.
+    /// Whether a crash with an obstacle is one that the scenario is about. If the scenario has claims that name a
+    /// `counted` obstacle, only those obstacles matter; otherwise those that its claims say are hit; with neither, any
+    /// obstacle.
     pub fn crashes_with(&self, number: u32) -> bool {
         let of = |is_meant: fn(&Claim) -> Option<Obstacle>| {
             let numbers = self.claims.iter().filter_map(is_meant).map(|obstacle| obstacle.number);

@@ -1,9 +1,9 @@
 //! The table of the engine's words: facts, fields, claims, and what a `spawn`, a `set time` or a `set sky`
 //! may mean.
-//!
-//! A row holds the spelling of a word and one sentence for people; a fact also has its type and says when it
-//! becomes known, from which follows where it may be read and when a rule that reads it is judged. The checker, the editor's server, the highlighter and the test of LANGUAGE.md read
-//! the rows. Keywords stand in `syntax::keyword`, because the grammar knows them.
+//! A row holds the spelling of a word and one sentence for people. A fact also has its type, and becomes known at a
+//! stated time; that time decides where it may be read and when a rule that reads it is judged. The checker, the
+//! editor's server, the highlighter and the test of LANGUAGE.md read the rows. Keywords stand in `syntax::keyword`,
+//! because the grammar knows them.
 //!
 //! Enums are the author's; the names of their variants must be found here wherever a value reaches
 //! the world.
@@ -322,7 +322,6 @@ words! {
     Engine "engine" = "The version of the world's physics.",
     Traffic "traffic" = "How other vehicles drove, if not as they usually do.",
     TrafficDigest "traffic_digest" = "The digest of all settings of the traffic.",
-    Avoidability "avoidability" = "The reference drivers, if they are not the usual ones.",
     With "with" = "The optional rules that were on.",
     Without "without" = "The rules that were off.",
 }

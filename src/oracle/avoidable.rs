@@ -35,89 +35,44 @@ use crate::kinematics::GRAVITY_MPS2;
 use crate::model::Avoidability;
 use crate::model::vocabulary::Priority;
 use crate::sim::{Contact, Control, DT_S, EgoMotion, FRAME_TICKS, VehicleParameters, World, pedals_for};
-use crate::syntax::listed;
 
 use super::hazard::{Onset, last_chance, onset};
 use crate::episode::{run_into_from_behind, struck};
 
-/// Settings of the verdict. Every run records them.
+/// A driver that is held to a speed comes near to it in about this time, s. Ours: longer than the pedal's lag.
+const CATCH_UP_S: f64 = 0.6;
+/// The careful drivers: a collision that one of them avoids is avoidable. UN R157's two performance models.
+const CAREFUL: [&str; 2] = ["cc", "fsm"];
+/// Other drivers that are tried and reported.
+const REPORTED: [&str; 2] = ["rss", "r157"];
+/// No onset is earlier than this before the contact, s. Ours: from 20 m/s a careful driver is at rest within 5 s.
+const REWIND_S: f64 = 8.0;
+/// Drivers watch for this long before they take over, s. Ours: longer than any reaction time.
+const WATCH_S: f64 = 2.0;
+/// How long after the recorded contact nothing must happen, s. Ours.
+const AFTER_S: f64 = 4.0;
+
+/// How verdicts are reached. Every run and study records it, so that one that was judged otherwise can be told apart;
+/// nothing else is possible.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct AvoidabilitySettings {
-    /// The careful drivers: a collision that one of them avoids is avoidable. UN R157's two
-    /// performance models.
-    pub careful: Vec<String>,
-    /// Other drivers that are tried and reported.
-    pub reported: Vec<String>,
-    /// No onset is earlier than this before the contact, s. Ours: from 20 m/s a careful driver is at
-    /// rest within 5 s.
-    pub rewind_s: f64,
-    /// Drivers watch for this long before they take over, s. Ours: longer than any reaction time.
-    pub watch_s: f64,
-    /// How long after the recorded contact nothing must happen, s. Ours.
-    pub after_s: f64,
+    careful: Vec<String>,
+    reported: Vec<String>,
+    rewind_s: f64,
+    watch_s: f64,
+    after_s: f64,
 }
 
 impl Default for AvoidabilitySettings {
     fn default() -> AvoidabilitySettings {
         let names = |names: [&str; 2]| names.map(str::to_owned).to_vec();
         AvoidabilitySettings {
-            careful: names(["cc", "fsm"]),
-            reported: names(["rss", "r157"]),
-            rewind_s: 8.0,
-            watch_s: 2.0,
-            after_s: 4.0,
-        }
-    }
-}
-
-/// Longest time in the settings of the verdict, s: the worlds of so many ticks are kept.
-const SECONDS_MAX: f64 = 60.0;
-
-/// A driver that is held to a speed comes near to it in about this time, s. Ours: longer than the pedal's lag.
-const CATCH_UP_S: f64 = 0.6;
-
-/// Why settings of the verdict cannot be used.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum AvoidabilityError {
-    #[error("cannot read how avoidability is told: {reason}")]
-    Yaml { reason: String },
-    #[error("`{name}` is {found} s where avoidability is told: from 0 to {SECONDS_MAX} s are possible")]
-    Seconds { name: &'static str, found: f64 },
-    #[error("no reference driver `{name}` to tell avoidability by: there are {known}")]
-    Driver { name: String, known: String },
-}
-
-impl AvoidabilitySettings {
-    /// As one line of YAML, for [`AvoidabilitySettings::from_line`].
-    pub fn to_line(&self) -> String {
-        serde_json::to_string(self).expect("settings are plain data")
-    }
-
-    /// Settings from a line of YAML; what it leaves out has its default.
-    ///
-    /// # Errors
-    /// If the line cannot be read, or names a driver that does not exist.
-    pub fn from_line(line: &str) -> Result<AvoidabilitySettings, AvoidabilityError> {
-        let settings: AvoidabilitySettings = serde_yaml::from_str(line)
-            .map_err(|error| AvoidabilityError::Yaml { reason: error.to_string().trim().to_owned() })?;
-        settings.check()?;
-        Ok(settings)
-    }
-
-    /// # Errors
-    /// If they name a driver that does not exist, or more time than a replay should take.
-    pub fn check(&self) -> Result<(), AvoidabilityError> {
-        let times = [("rewind_s", self.rewind_s), ("watch_s", self.watch_s), ("after_s", self.after_s)];
-        if let Some((name, found)) = times.into_iter().find(|(_, time)| !(0.0..=SECONDS_MAX).contains(time)) {
-            return Err(AvoidabilityError::Seconds { name, found });
-        }
-        match self.careful.iter().chain(&self.reported).find(|name| ads::by_name(name).is_none()) {
-            None => Ok(()),
-            Some(name) => {
-                let known = listed(&ads::REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>());
-                Err(AvoidabilityError::Driver { name: name.clone(), known })
-            }
+            careful: names(CAREFUL),
+            reported: names(REPORTED),
+            rewind_s: REWIND_S,
+            watch_s: WATCH_S,
+            after_s: AFTER_S,
         }
     }
 }
@@ -138,15 +93,10 @@ pub struct Judgement {
 
 /// Judges every collision of a log, in order, by playing its episode again up to the last of them. `setup` and `script`
 /// are what the log was played from.
-pub fn judge(
-    setup: &Setup,
-    script: &Script,
-    log: &EpisodeLog,
-    settings: &AvoidabilitySettings,
-) -> Vec<Judgement> {
+pub fn judge(setup: &Setup, script: &Script, log: &EpisodeLog) -> Vec<Judgement> {
     let mut judgements = Vec::new();
-    before_each(setup, script, log, settings, &mut |recording, contact, met| {
-        judgements.push(judge_one(recording, contact, met, settings));
+    before_each(setup, script, log, &mut |recording, contact, met| {
+        judgements.push(judge_one(recording, contact, met));
     });
     judgements
 }
@@ -156,13 +106,12 @@ pub fn judge_with_drives(
     setup: &Setup,
     script: &Script,
     log: &EpisodeLog,
-    settings: &AvoidabilitySettings,
 ) -> Vec<(Judgement, Vec<ReferenceDrive>)> {
     let mut found = Vec::new();
-    before_each(setup, script, log, settings, &mut |recording, contact, met| {
-        let judgement = judge_one(recording, contact, met, settings);
+    before_each(setup, script, log, &mut |recording, contact, met| {
+        let judgement = judge_one(recording, contact, met);
         let from = recording.partition_point(|world| world.time_s() < judgement.onset_s);
-        let case = Case::new(recording, from, contact, settings);
+        let case = Case::new(recording, from, contact);
         found.push((judgement, case.drives()));
     });
     found
@@ -192,7 +141,6 @@ fn before_each(
     setup: &Setup,
     script: &Script,
     log: &EpisodeLog,
-    settings: &AvoidabilitySettings,
     judge: &mut dyn FnMut(&[World], &Contact, OrientedBox),
 ) {
     let Some(last) = log.collisions.last() else { return };
@@ -201,7 +149,7 @@ fn before_each(
         true => Choice::Stop,
         false => script.choose(setup.table, moment),
     };
-    let kept = ticks(settings.rewind_s) + ticks(settings.watch_s);
+    let kept = ticks(REWIND_S) + ticks(WATCH_S);
     let mut recording: VecDeque<World> = VecDeque::with_capacity(kept);
     episode::run(setup, &mut choose, &mut |world, _, contacts| {
         for contact in contacts {
@@ -224,32 +172,24 @@ fn before_each(
 }
 
 /// Judges one collision by the worlds before it.
-pub fn judge_one(
-    recording: &[World],
-    contact: &Contact,
-    met: OrientedBox,
-    settings: &AvoidabilitySettings,
-) -> Judgement {
+pub fn judge_one(recording: &[World], contact: &Contact, met: OrientedBox) -> Judgement {
     let last = recording.len() - 1;
     // No driver can react to what was never in sight: the takeover is then at the last moment.
     let onset = onset(recording, contact.obstacle, met).unwrap_or(Onset { first: last, conflict: last });
-    let earliest = (last + 1).saturating_sub(ticks(settings.rewind_s));
+    let earliest = (last + 1).saturating_sub(ticks(REWIND_S));
     let from = onset.first.min(last_chance(recording, contact, met).unwrap_or(last)).max(earliest);
-    let case = Case::new(recording, from, contact, settings);
+    let case = Case::new(recording, from, contact);
     // The letter keeps the recorded path and speed, whoever had to give way.
     let to_the_letter =
         Case { from: onset.conflict.max(earliest), speed_mps_max: f64::INFINITY, looks_anew: false, ..case };
-    let avoids = |name: &&String| {
-        let entry = ads::by_name(name).expect("settings name drivers that exist");
-        case.avoids((entry.build)(recording[from].scene(), 0).as_mut())
-    };
-    let careful: Vec<String> = settings.careful.iter().filter(avoids).cloned().collect();
-    let reported: Vec<String> = settings.reported.iter().filter(avoids).cloned().collect();
-    let brakes_in_time = |name: &&String| {
+    let avoids = |name: &&str| case.avoids(reference(name, &recording[from]).as_mut());
+    let careful = names(CAREFUL.into_iter().filter(avoids));
+    let reported = names(REPORTED.into_iter().filter(avoids));
+    let brakes_in_time = |name: &&str| {
         ads::careful(name, recording[from].scene())
             .is_some_and(|mut driver| to_the_letter.brakes(driver.as_mut()))
     };
-    let r157_letter: Vec<String> = settings.careful.iter().filter(brakes_in_time).cloned().collect();
+    let r157_letter = names(CAREFUL.into_iter().filter(brakes_in_time));
     let evasion = if careful.is_empty() { case.evasion() } else { None };
     let class = if !careful.is_empty() {
         Avoidability::Avoidable
@@ -262,6 +202,16 @@ pub fn judge_one(
     Judgement { class, onset_s, avoided_by: [careful, reported].concat(), r157_letter, evasion }
 }
 
+fn names<'a>(drivers: impl Iterator<Item = &'a str>) -> Vec<String> {
+    drivers.map(str::to_owned).collect()
+}
+
+/// A fresh reference driver.
+fn reference(name: &str, world: &World) -> Box<dyn Ads> {
+    let entry = ads::by_name(name).expect("the reference drivers are in the registry");
+    (entry.build)(world.scene(), 0)
+}
+
 /// A collision that is to be driven again.
 #[derive(Clone, Copy)]
 struct Case<'a> {
@@ -269,7 +219,6 @@ struct Case<'a> {
     /// Index of the onset.
     from: usize,
     obstacle: u32,
-    settings: &'a AvoidabilitySettings,
     /// Whether a driver that takes over decides anew about a lane change that has not begun: the ego vehicle had to give way.
     looks_anew: bool,
     /// No reference driver goes faster, m/s; infinite unless the ego vehicle was run into from behind.
@@ -277,18 +226,13 @@ struct Case<'a> {
 }
 
 impl<'a> Case<'a> {
-    fn new(
-        recording: &'a [World],
-        from: usize,
-        contact: &Contact,
-        settings: &'a AvoidabilitySettings,
-    ) -> Case<'a> {
+    fn new(recording: &'a [World], from: usize, contact: &Contact) -> Case<'a> {
         let speed_mps_max = match run_into_from_behind(contact, &VehicleParameters::MKZ) {
             true => recording[from..].iter().map(|world| world.ego().speed_mps).fold(0.0, f64::max),
             false => f64::INFINITY,
         };
         let looks_anew = contact.priority == Priority::Other;
-        Case { recording, from, obstacle: contact.obstacle, settings, looks_anew, speed_mps_max }
+        Case { recording, from, obstacle: contact.obstacle, looks_anew, speed_mps_max }
     }
 
     /// Whether a driver that watches first avoids the collision.
@@ -299,10 +243,8 @@ impl<'a> Case<'a> {
 
     /// The drives of all reference drivers.
     fn drives(&self) -> Vec<ReferenceDrive> {
-        let names = self.settings.careful.iter().chain(&self.settings.reported);
-        let drive = |name: &String| {
-            let entry = ads::by_name(name).expect("settings name drivers that exist");
-            let mut driver = (entry.build)(self.recording[self.from].scene(), 0);
+        let drive = |name: &str| {
+            let mut driver = reference(name, &self.recording[self.from]);
             let mut places = Vec::new();
             self.show(driver.as_mut());
             let avoids = self.drive(driver.as_mut(), &mut |world| {
@@ -310,14 +252,14 @@ impl<'a> Case<'a> {
                 places.push(DrivenPlace { time_s, pose, speed_mps: world.ego().speed_mps });
                 true
             });
-            ReferenceDrive { name: name.clone(), avoids, places }
+            ReferenceDrive { name: name.to_owned(), avoids, places }
         };
-        names.map(drive).collect()
+        CAREFUL.into_iter().chain(REPORTED).map(drive).collect()
     }
 
     /// Shows a driver the time before the onset.
     fn show(&self, driver: &mut dyn Ads) {
-        let watched = self.from - self.from.min(ticks(self.settings.watch_s));
+        let watched = self.from - self.from.min(ticks(WATCH_S));
         let mut sensed = self.recording[watched].sensed();
         for world in &self.recording[watched..self.from] {
             world.sense(&mut sensed);
@@ -383,7 +325,7 @@ impl<'a> Case<'a> {
         allowed: &mut dyn FnMut(&World) -> bool,
     ) -> bool {
         let mut sensed = world.sensed();
-        for _ in 0..ticks(self.settings.after_s) {
+        for _ in 0..ticks(AFTER_S) {
             world.sense(&mut sensed);
             let control = self.held(driver.drive(&sensed), &world);
             if self.is_hit(world.tick(&control)) || !self.is_fine(world, allowed) {
@@ -474,22 +416,4 @@ fn is_on_road(world: &World) -> bool {
 
 fn ticks(duration_s: f64) -> usize {
     (duration_s / DT_S).round() as usize
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn settings_go_through_a_line_and_name_drivers_that_exist() {
-        let strict = AvoidabilitySettings { careful: vec!["rss".to_owned()], ..Default::default() };
-        assert_eq!(AvoidabilitySettings::from_line(&strict.to_line()), Ok(strict));
-        let told = |line: &str| AvoidabilitySettings::from_line(line).unwrap_err().to_string();
-        assert!(
-            told("{careful: [cd]}").starts_with("no reference driver `cd`"),
-            "{}",
-            told("{careful: [cd]}")
-        );
-        assert!(told("{carefull: [cc]}").starts_with("cannot read how avoidability is told"));
-    }
 }

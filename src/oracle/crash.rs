@@ -11,7 +11,7 @@ use crate::ads::{Foresight, Selected};
 use crate::episode;
 use crate::episode::{Choice, Collision, End, EpisodeLog, Moment, Outcome, Script, Setup};
 
-use super::avoidable::{AvoidabilitySettings, judge};
+use super::avoidable::judge;
 use super::facts::counted_at_need;
 use crate::episode::at_fault;
 
@@ -69,18 +69,12 @@ impl Regression {
 }
 
 /// Plays what led to the nth collision of a log with another driving system; `setup` is what the log was
-/// played from. The space's verdict says which collisions count; `settings` are those of avoidability.
-pub fn regression(
-    setup: &Setup,
-    log: &EpisodeLog,
-    index: usize,
-    ads: &Selected,
-    settings: &AvoidabilitySettings,
-) -> Regression {
+/// played from. The space's verdict says which collisions count.
+pub fn regression(setup: &Setup, log: &EpisodeLog, index: usize, ads: &Selected) -> Regression {
     let crash = Crash::new(setup, log, index);
     let again = crash.play(ads);
     let by_other = Setup { ads: ads.clone(), ..setup.clone() };
-    let judge = || judge(&by_other, &crash.script, &again, settings);
+    let judge = || judge(&by_other, &crash.script, &again);
     let counted = counted_at_need(setup.table.space(), &again, judge);
     let obstacle = crash.obstacle(&again);
     let is_own = |collision: &&Collision| obstacle == Some(collision.contact.obstacle);

@@ -1,10 +1,9 @@
 //! The onset of a hazard: when a collision began to take shape.
-//!
 //! A moment belongs to the hazard if the obstacle was on the ego vehicle's way or heading for it, or if one of the two
-//! visibly did something that the other need not expect: it was beyond the middle of the road or beside its lane, came out of its
-//! lane sideways, was in a junction that it had entered at a red light, or was on foot on the carriageway. The onset is
-//! the first such moment, of the last uninterrupted time of them before the contact, at which the obstacle could be
-//! seen. So the judgement begins with the first violation or visible intention, whichever of the two shows it.
+//! visibly did something that the other need not expect: it was beyond the middle of the road or beside its lane, came
+//! out of its lane sideways, was in a junction that it had entered at a red light, or was on foot on the carriageway.
+//! Take the last uninterrupted series of such moments before the contact: the onset is its first moment at which the
+//! obstacle could be seen. So the judgement begins with the first violation or visible intention of either.
 //!
 //! The way is the one that the ego vehicle took, as wide as the vehicle and the 0.375 m by which careful drivers
 //! wander (UN R157, Annex 4, Appendix 3); heading for it means to meet it at constant velocity before the
@@ -13,14 +12,10 @@
 
 use crate::ads::in_sight;
 use crate::geometry::{OrientedBox, Pose, distance_m};
-use crate::kinematics::{
-    CAREFUL_BRAKING_MPS2, CAREFUL_PERCEPTION_S, CAREFUL_REACTION_S, GRAVITY_MPS2, stopping_m,
-};
+use crate::kinematics::{CAREFUL_BRAKING_MPS2, CAREFUL_DELAY_S, GRAVITY_MPS2, WANDER_M, stopping_m};
 use crate::model::vocabulary::Priority;
 use crate::sim::{Contact, DT_S, FRAME_TICKS, Obstacle, World};
 
-/// By how much drivers wander in their lane, m.
-const WANDER_M: f64 = 0.375;
 /// Places of a prediction and of the ego vehicle's way are compared at this many ticks, 0.2 s.
 const STRIDE: usize = 2 * FRAME_TICKS as usize;
 
@@ -33,8 +28,8 @@ pub struct Onset {
     pub conflict: usize,
 }
 
-/// The onset in a recording of the worlds up to the contact with `obstacle`; `None` if that was never in sight. `met` is
-/// the ego vehicle's outline at the contact.
+/// Finds the onset in a recording of the worlds up to the contact with `obstacle`; `None` if the obstacle was never in
+/// sight. `met` is the ego vehicle's outline at the contact.
 pub fn onset(recording: &[World], obstacle: u32, met: OrientedBox) -> Option<Onset> {
     let mut way: Vec<OrientedBox> = vec![met];
     let mut sensed = recording.last()?.sensed();
@@ -88,7 +83,6 @@ pub fn last_chance(recording: &[World], contact: &Contact, met: OrientedBox) -> 
     if contact.priority != Priority::Other {
         return None;
     }
-    let delay_s = CAREFUL_PERCEPTION_S + CAREFUL_REACTION_S;
     let mut sensed = recording.last()?.sensed();
     let (mut way_m, mut next) = (0.0, met.pose.position);
     let mut found = None;
@@ -106,7 +100,7 @@ pub fn last_chance(recording: &[World], contact: &Contact, met: OrientedBox) -> 
         }
         found = Some(index);
         let braking_mps2 = CAREFUL_BRAKING_MPS2.min(world.conditions().friction * GRAVITY_MPS2);
-        if stopping_m(world.ego().speed_mps, delay_s, braking_mps2) <= way_m {
+        if stopping_m(world.ego().speed_mps, CAREFUL_DELAY_S, braking_mps2) <= way_m {
             break;
         }
     }

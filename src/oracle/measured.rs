@@ -22,7 +22,7 @@ use crate::sim::{DT_S, FRAME_S, FRAME_TICKS, Obstacle, Sensed, World};
 
 use super::crash::Crash;
 
-/// Errors are measured in so long before the collision, s: longer than publication and braking to rest.
+/// Errors are measured in this time before the collision, s: longer than publication and braking to rest.
 const WINDOW_S: f64 = 5.0;
 /// Place in a forecast of the position after [`AHEAD_S`]: forecasts have a position every 0.5 s.
 const AHEAD_INDEX: usize = 1;
@@ -96,12 +96,12 @@ struct Forecast {
     velocity_mps: Vec2,
     /// The velocity that prediction was given, less the true one.
     velocity_error_mps: Vec2,
-    /// The acceleration that a change of this error suggests, magnitude, m/s².
+    /// Acceleration that a change of `velocity_error_mps` would look like, magnitude, m/s².
     change_mps2: f64,
 }
 
 impl Forecast {
-    /// Error of the forecast, m, for which its input is no excuse; the obstacle is now at `position`.
+    /// Error of the forecast that its input does not excuse, m; the obstacle is now at `position`.
     ///
     /// - The place at which the obstacle was believed to be does not matter: ways are compared, not places.
     /// - The way may contain the error of the given velocity, or any part of it along some direction, because

@@ -2,12 +2,11 @@
 //!
 //! As for a cause (see `cause`), the mended system takes over when the obstacle appears, so that it meets the same
 //! hazard. If the play ends in another crash, the crash does not count as vanished.
-//!
 //! **Chance.** Any change to a near crash may save it: other sensor noise alone, with nothing mended, makes some
-//! vanish. That is the placebo. So each crash is also played with [`NOISES`] other noises, once with nothing
-//! mended and once without each weakness, and what a weakness does *beyond* the placebo of the same noises is its own.
-//!
-//! Left out: the mended system from the start, which is elsewhere by then, so that the hazard is another or none.
+//! crashes vanish. That is the placebo. So each crash is also played with [`NOISES`] other noises, once with nothing
+//! mended and once without each weakness. A weakness causes only what vanishes *beyond* the placebo of the same noises.
+//! Left out: the mended system from the start. By the time of the hazard it is elsewhere, so it meets another hazard or
+//! none.
 
 use crate::ads::{ModularConfig, Weaknesses};
 use crate::episode::{EpisodeLog, Setup};
@@ -23,7 +22,7 @@ const NOISES: u32 = 8;
 /// What becomes of a crash without each documented weakness that is switched on.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Mechanisms {
-    /// Of the replays with other sensor noise alone, the share that vanishes.
+    /// Share of the replays with other sensor noise alone in which the crash vanishes.
     pub placebo: f64,
     pub without: Vec<WithoutMechanism>,
 }
@@ -33,7 +32,7 @@ pub struct Mechanisms {
 pub struct WithoutMechanism {
     pub mechanism: &'static str,
     pub fate: Fate,
-    /// Of the replays with other sensor noise, the share that vanishes: to compare with the placebo.
+    /// Share of the replays with other sensor noise in which the crash vanishes; to compare with the placebo.
     pub vanished: f64,
 }
 

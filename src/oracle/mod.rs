@@ -17,8 +17,7 @@ mod variation;
 mod verify;
 
 pub use avoidable::{
-    AvoidabilityError, AvoidabilitySettings, DrivenPlace, Judgement, ReferenceDrive, judge, judge_one,
-    judge_with_drives,
+    AvoidabilitySettings, DrivenPlace, Judgement, ReferenceDrive, judge, judge_one, judge_with_drives,
 };
 pub use cause::{NoModules, diagnose, fate};
 pub use crash::{Fate, Regression, regression};

@@ -16,7 +16,7 @@ use crate::model::vocabulary::Verb;
 use crate::model::{Avoidability, BodyWord, Domain, Memory, Value};
 use crate::sim::Start;
 
-use super::avoidable::{AvoidabilitySettings, Judgement, judge};
+use super::avoidable::{Judgement, judge};
 use super::facts::counts;
 
 /// Most rounds of all passes. Each round makes something smaller or plainer; most crashes need two.
@@ -38,15 +38,9 @@ pub struct Shrunk {
     pub plays: u32,
 }
 
-/// Shrinks what led to the nth collision of a log that was played from `setup` and judged by `settings`.
-pub fn shrink(
-    setup: &Setup,
-    log: &EpisodeLog,
-    index: usize,
-    judgements: &[Judgement],
-    settings: &AvoidabilitySettings,
-) -> Shrunk {
-    let mut search = Search::new(setup, log, index, judgements, settings);
+/// Shrinks what led to the nth collision of a log that was played from `setup`.
+pub fn shrink(setup: &Setup, log: &EpisodeLog, index: usize, judgements: &[Judgement]) -> Shrunk {
+    let mut search = Search::new(setup, log, index, judgements);
     let mut best = Candidate::of(setup, log, index);
     for _ in 0..ROUNDS_MAX {
         let before = best.clone();
@@ -73,16 +67,10 @@ pub fn shrink(
     }
 }
 
-/// Steps that could each be removed, or replaced by waiting, with the nth collision of a log staying the same:
-/// none if the scenario is 1-minimal.
-pub fn spare_steps(
-    setup: &Setup,
-    log: &EpisodeLog,
-    index: usize,
-    judgements: &[Judgement],
-    settings: &AvoidabilitySettings,
-) -> Vec<usize> {
-    let mut search = Search::new(setup, log, index, judgements, settings);
+/// Steps that are not needed for the nth collision of a log: each alone could be removed, or replaced by waiting, and
+/// the collision stays the same. Empty if the scenario is 1-minimal.
+pub fn spare_steps(setup: &Setup, log: &EpisodeLog, index: usize, judgements: &[Judgement]) -> Vec<usize> {
+    let mut search = Search::new(setup, log, index, judgements);
     let whole = Candidate::of(setup, log, index);
     let steps = whole.script.steps.len();
     let is_spare = |&step: &usize| {
@@ -124,7 +112,6 @@ struct Kept {
 /// The crash that must stay, and the number of plays so far.
 struct Search<'a> {
     setup: &'a Setup<'a>,
-    settings: &'a AvoidabilitySettings,
     body: BodyWord,
     verb: Verb,
     class: Avoidability,
@@ -136,17 +123,10 @@ struct Search<'a> {
 type Wish<'w> = Option<(usize, &'w ScriptedAction)>;
 
 impl<'a> Search<'a> {
-    fn new(
-        setup: &'a Setup<'a>,
-        log: &EpisodeLog,
-        index: usize,
-        judgements: &[Judgement],
-        settings: &'a AvoidabilitySettings,
-    ) -> Search<'a> {
+    fn new(setup: &'a Setup<'a>, log: &EpisodeLog, index: usize, judgements: &[Judgement]) -> Search<'a> {
         let collision = &log.collisions[index];
         Search {
             setup,
-            settings,
             body: collision.body,
             verb: collision.verb,
             class: judgements[index].class,
@@ -167,7 +147,7 @@ impl<'a> Search<'a> {
             return None;
         }
         let mut script = Script::of_log(&log);
-        let judgements = judge(&self.begin(candidate), &script, &log, self.settings);
+        let judgements = judge(&self.begin(candidate), &script, &log);
         let same = |index: &usize| {
             let counts = counts(self.setup.table.space(), &log, *index, &judgements[*index]);
             alike(&log.collisions[*index]) && judgements[*index].class == self.class && counts == self.counts

@@ -15,7 +15,7 @@ use crate::road::testing::{lanes, street};
 use crate::sim::testing::Heading;
 use crate::sim::{Contact, Control, DT_S, Sensed, Start, VehicleParameters, World, testing};
 
-use super::avoidable::{AvoidabilitySettings, Judgement, judge_one};
+use super::avoidable::{Judgement, judge_one};
 use super::hazard::{Onset, onset};
 use super::severity::severity;
 use crate::episode::{collision_facts, struck};
@@ -61,7 +61,7 @@ const EVENT_S: f64 = 12.0;
 fn judged(brake_pct_max: f64, event: impl Fn(&mut World)) -> Judgement {
     let (recording, contact, met) = crashed(brake_pct_max, event);
     let recent = &recording[recording.len().saturating_sub(500)..];
-    judge_one(recent, &contact, met, &AvoidabilitySettings::default())
+    judge_one(recent, &contact, met)
 }
 
 /// The worlds before the first contact, the contact, and where the ego vehicle was then.
@@ -155,7 +155,7 @@ fn the_hazard_of_a_pedestrian_begins_with_the_first_step() {
     let walks = |world: &&World| world.obstacle(1).is_some_and(|walker| walker.velocity_mps != Vec2::zeros());
     let first_step_s = recording.iter().find(walks).expect("it walked").time_s();
     let recent = &recording[recording.len().saturating_sub(500)..];
-    let judgement = judge_one(recent, &contact, met, &AvoidabilitySettings::default());
+    let judgement = judge_one(recent, &contact, met);
     assert!((judgement.onset_s - first_step_s).abs() < 0.11, "{judgement:?}, {first_step_s}");
     assert_ne!(judgement.class, Avoidability::Unavoidable, "{judgement:?}");
 }
@@ -206,8 +206,7 @@ fn meets(
         world.sense(&mut sensed);
         let control = blind.drive(&sensed);
         if let Some(contact) = world.tick(&control).first().copied() {
-            let judgement =
-                judge_one(&recording, &contact, world.ego_outline(), &AvoidabilitySettings::default());
+            let judgement = judge_one(&recording, &contact, world.ego_outline());
             return Some((contact, judgement));
         }
         recording.push(world.clone());

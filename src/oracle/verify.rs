@@ -28,10 +28,10 @@ impl ClaimResult {
 
 /// An external driving system that is known by its recorded answers alone cannot drive anything else.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("not tried (needs the driving system: `--ads-cmd` or `--ads-config`)")]
+#[error("not tried (needs the driving system: `--ads`)")]
 pub struct NoTries;
 
-/// Findings that take many replays, each about the nth collision of the log; asked for only by some claims.
+/// Findings that take many replays. Only some claims ask for them. Each is about the nth collision of the log.
 pub struct Replays<'a> {
     /// The modules at fault.
     pub cause: &'a dyn Fn(usize) -> Result<Vec<Module>, NoModules>,

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use crate::model::{Reach, Row, RuleBody, RuleDef, RulesInForce, Space, Type, Value, code, effort};
-use crate::prove::enclose::Values;
+use crate::prove::enclose::{Values, bits};
 use crate::prove::reach::{declared, numbers};
 use crate::syntax::{Diagnostic, listed};
 
@@ -220,8 +220,4 @@ impl<'a> Graph<'a> {
         way.reverse();
         way
     }
-}
-
-fn bits(set: u128) -> impl Iterator<Item = usize> {
-    (0..128).filter(move |bit| set >> bit & 1 == 1)
 }

@@ -41,6 +41,11 @@ pub(crate) struct Known<'a> {
     pub case: Option<&'a Case>,
 }
 
+/// The numbers of the bits that are set: the variants of [`Values::Variants`].
+pub(crate) fn bits(set: u128) -> impl Iterator<Item = usize> {
+    (0..VARIANTS_MAX).filter(move |bit| set >> bit & 1 == 1)
+}
+
 impl Values {
     pub const UNKNOWN_TRUTH: Values = Values::Truth { may_hold: true, may_fail: true };
 

@@ -3,7 +3,7 @@
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Demand, RowRules};
 use crate::model::{Road, RoadFacts, Row, RuleBody, RulesInForce, Space, code, effort};
-use crate::prove::enclose::{Known, VARIANTS_MAX, Values, enclose};
+use crate::prove::enclose::{Known, Values, bits, enclose};
 use crate::prove::moment::always_holds;
 use crate::syntax::{Diagnostic, listed};
 
@@ -232,10 +232,7 @@ impl Named {
                     .map(|(truth, _)| Values::truth(truth))
                     .collect()
             }
-            Values::Variants(set) => (0..VARIANTS_MAX)
-                .filter(|at| set >> at & 1 == 1)
-                .map(|at| Values::Variants(1 << at))
-                .collect(),
+            Values::Variants(set) => bits(set).map(|at| Values::Variants(1 << at)).collect(),
         }
     }
 }

@@ -124,7 +124,7 @@ pub(super) fn oppose(conditions: &[&Expr], known: &Known<'_>, are_apart: bool) -
         let is_exact = left.ty == Type::Int && right.ty == Type::Int;
         let Some(range) = leaves(op, limit, is_exact || are_apart) else { continue };
         match bounded.iter_mut().find_map(|(other, known)| Some((sum.times(other)?, known))) {
-            // The sum is so many times the other one, so the other one is the sum divided by it.
+            // The sum is `times` the other one, so the other one is the sum divided by that.
             Some((times, known)) => {
                 let Some(by) = Rational::ONE.checked_div(times) else { continue };
                 *known = known.intersect(&range.mul(&Interval::point(by)));

@@ -15,7 +15,7 @@ use crate::model::{
     Initial, Interval, Reach, Road, Row, RuleBody, RuleDef, RulesInForce, STATE_MAX, SetDef, Space, Type,
     code, effort,
 };
-use crate::prove::enclose::{Known, Values, enclose};
+use crate::prove::enclose::{Known, Values, bits, enclose};
 use crate::prove::moment::Case;
 use crate::prove::reach::declared;
 use crate::syntax::{Diagnostic, listed};
@@ -151,7 +151,7 @@ pub(crate) fn lasts(space: &Space, road: &Road, in_force: &RulesInForce) -> Resu
     let mut now = states.begin();
     let last = u64::from(space.episode.step_limit).saturating_sub(1);
     for step in 0..=last {
-        let mut next: Vec<usize> = Vec::new();
+        let mut next = BTreeSet::new();
         for state in &now {
             if let Err(rule) = states.go_on(*state, step..=step, &timed, &mut next) {
                 return Err(states.broken(rule, step, *state));
@@ -162,7 +162,6 @@ pub(crate) fn lasts(space: &Space, road: &Road, in_force: &RulesInForce) -> Resu
             let (road, rule) = (road.name.clone(), space.rules[*first].name.clone());
             return Err(BrokenByTime { road, rule, index: *first, how });
         }
-        next.sort_unstable();
         if next == now && states.stay_within(&now, step..=last, &timed) {
             break;
         }
@@ -214,7 +213,7 @@ impl<'a> States<'a> {
     }
 
     /// The states with which an episode may begin.
-    fn begin(&mut self) -> Vec<usize> {
+    fn begin(&mut self) -> BTreeSet<usize> {
         let fixed = self.space.initial_memory(0);
         let mut cells = self.space.cells_unknown();
         for cell in &self.followed {
@@ -224,11 +223,10 @@ impl<'a> States<'a> {
             }
         }
         let at_first = Case::of_steps(&self.space.episode, 0..=0, false);
-        let mut begun = Vec::new();
+        let mut begun = BTreeSet::new();
         for start in self.parts(&cells) {
             if self.stands(&start, &at_first).0 {
-                let start = self.number(start);
-                note(&mut begun, start);
+                begun.insert(self.number(start));
             }
         }
         begun
@@ -236,10 +234,10 @@ impl<'a> States<'a> {
 
     /// Whether all these steps lead from these states to these alone, and break no timed rule there: then no episode is
     /// too long to be followed.
-    fn stay_within(&mut self, now: &[usize], steps: RangeInclusive<u64>, timed: &[usize]) -> bool {
-        let mut next = Vec::new();
+    fn stay_within(&mut self, now: &BTreeSet<usize>, steps: RangeInclusive<u64>, timed: &[usize]) -> bool {
+        let mut next = BTreeSet::new();
         let keeps = |state: &usize| self.go_on(*state, steps.clone(), timed, &mut next).is_ok();
-        now.iter().all(keeps) && next.iter().all(|state| now.contains(state)) && !self.is_too_large()
+        now.iter().all(keeps) && next.is_subset(now) && !self.is_too_large()
     }
 
     /// Adds the states that come after one, in any of these steps; the first timed rule that may be broken there.
@@ -248,7 +246,7 @@ impl<'a> States<'a> {
         state: usize,
         steps: RangeInclusive<u64>,
         timed: &[usize],
-        next: &mut Vec<usize>,
+        next: &mut BTreeSet<usize>,
     ) -> Result<(), usize> {
         if self.is_too_large() {
             return Ok(());
@@ -268,17 +266,17 @@ impl<'a> States<'a> {
                 false => self.stands_after(&self.met[state], &self.met[*wait], &at_begin),
             };
             if may_hold {
-                note(next, *wait);
+                next.insert(*wait);
             }
             if may_fail {
                 let fails = |rule: &&usize| self.condition(**rule, &self.met[state], &at_begin).may_fail();
                 broken = broken.or(timed.iter().find(fails).copied());
-                note(next, state);
+                next.insert(state);
             }
         }
         for Move { row, locals, to } in &moves {
             if self.may_obey(*row, locals, state, *to, &of_action) {
-                note(next, *to);
+                next.insert(*to);
             }
         }
         effort::spend((moves.len() + waits.len()) * (1 + next.len()));
@@ -489,12 +487,6 @@ fn state_range() -> Interval {
     }
 }
 
-fn note(into: &mut Vec<usize>, state: usize) {
-    if !into.contains(&state) {
-        into.push(state);
-    }
-}
-
 /// Whether a move between two sets of values may be allowed, and whether it may be forbidden.
 fn may_move(allowed: &[Vec<bool>], from: Values, to: Values) -> (bool, bool) {
     let (Values::Variants(from), Values::Variants(to)) = (from, to) else { return (true, true) };
@@ -509,10 +501,6 @@ fn points(values: Values) -> Vec<Values> {
         Values::Truth { may_hold: true, may_fail: true } => vec![Values::truth(false), Values::truth(true)],
         Values::Truth { .. } | Values::Number(_) => vec![values],
     }
-}
-
-fn bits(set: u128) -> impl Iterator<Item = usize> {
-    (0..128).filter(move |bit| set >> bit & 1 == 1)
 }
 
 /// The cells on which timed rules depend: those that they read; those that decide whether what every step does

@@ -4,7 +4,7 @@
 //! 0.774 g. The time in which the brake builds up is left out: it only adds to the distance, and this proof
 //! needs a lower bound. The world computes the whole distance (`spawn_gap >= safety_gap`).
 
-use crate::kinematics::{CAREFUL_BRAKING_MPS2, CAREFUL_PERCEPTION_S, CAREFUL_REACTION_S, stopping_m};
+use crate::kinematics::{CAREFUL_BRAKING_MPS2, CAREFUL_DELAY_S, stopping_m};
 use crate::model::rules::{Demand, RowRules};
 use crate::model::vocabulary::{Known, Verb, Word};
 use crate::model::{
@@ -18,8 +18,6 @@ use crate::units::{Dimension, quantity, quantity_in, unit_of_all};
 /// The most boxes of ranges looked at for all actions together; each action has an equal share.
 const BOXES_MAX: usize = 50_000;
 
-/// Perception and reaction, s.
-const DELAY_S: f64 = CAREFUL_PERCEPTION_S + CAREFUL_REACTION_S;
 /// A smaller difference between the distances is taken for rounding, m.
 const MARGIN_M: f64 = 0.01;
 
@@ -68,7 +66,7 @@ pub(super) fn unfair(
 
 /// Way from a speed to rest: reaction, then full brakes, m.
 fn braked_m(speed_mps: f64) -> f64 {
-    stopping_m(speed_mps, DELAY_S, CAREFUL_BRAKING_MPS2)
+    stopping_m(speed_mps, CAREFUL_DELAY_S, CAREFUL_BRAKING_MPS2)
 }
 
 /// The spawn, and the gap that a driver at the road's limit needs.
@@ -86,7 +84,9 @@ fn figures(space: &Space, road: &Road, spawn: &SpawnDef, values: &[Value], memor
     let ego_mps = road.facts.limit_mps;
     let needed_m = match spawn.verb.word(&space.functions, &facts) {
         Verb::DriveAhead => braked_m((ego_mps - speed_mps).max(0.0)),
-        Verb::DriveOpposite => braked_m(ego_mps) + speed_mps * (DELAY_S + ego_mps / CAREFUL_BRAKING_MPS2),
+        Verb::DriveOpposite => {
+            braked_m(ego_mps) + speed_mps * (CAREFUL_DELAY_S + ego_mps / CAREFUL_BRAKING_MPS2)
+        }
         Verb::CrossRoad | Verb::Walk | Verb::Stand => braked_m(ego_mps),
         // A vehicle from behind sees the ego vehicle, which need do nothing.
         Verb::Overtake => 0.0,

@@ -102,8 +102,7 @@ pub fn record_another(
     let change = match (first.main, recording.main, recording.log.end) {
         (Some(index), _, _) => {
             let at_s = first.log.collisions[index].contact.time_s;
-            let settings = stage.avoidability();
-            match oracle::regression(&stage.setup(ads), &first.log, index, other, settings) {
+            match oracle::regression(&stage.setup(ads), &first.log, index, other) {
                 Regression::NotCounted { .. } if first.main_counts => json!({ "kind": "not_counted" }),
                 Regression::StillFails { time_s } | Regression::NotCounted { time_s } => {
                     match (time_s - at_s).abs() < SAME_S {
@@ -166,7 +165,7 @@ fn played(
         mind.note(world, ads, contacts);
         gauges.note(world, contacts);
     });
-    let judged = oracle::judge_with_drives(&setup, &script, &log, stage.avoidability());
+    let judged = oracle::judge_with_drives(&setup, &script, &log);
     let judgements: Vec<_> = judged.iter().map(|(judgement, _)| judgement.clone()).collect();
     let counted: BTreeSet<usize> = oracle::counted(table.space(), &log, &judgements).into_iter().collect();
     let mut columns = Columns::default();

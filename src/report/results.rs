@@ -14,7 +14,7 @@ use super::study::estimate;
 const HEAD: &str = "\
 # Results
 
-`avastra results` wrote this file from the studies in `{folder}/*.yaml` and from what was kept of playing them,
+`avastra study results` wrote this file from the studies in `{folder}/*.yaml` and from what was kept of playing them,
 `*.jsonl` beside them; no figure is typed by hand, and a test writes it again. Everything was played against avastra's
 own driving systems in avastra's own world: no figure says anything about Apollo or LGSVL, which the paper used.
 

@@ -17,7 +17,7 @@ const LONGER_PX: f64 = 1600.0;
 const MARGIN_PX: f64 = 50.0;
 /// A gap between opposing lanes is drawn as a median from this width on, m.
 const MEDIAN_M_MIN: f64 = 0.3;
-/// One arrow in so many metres of lane.
+/// Distance between two arrows along a lane, m.
 const ARROW_M: f64 = 40.0;
 /// Colours of the signal groups of a junction, in the order of its cycle.
 const GROUP_PAINTS: [&str; 6] = ["#c2185b", "#1565c0", "#2e7d32", "#ef6c00", "#6a1b9a", "#00838f"];

@@ -1,4 +1,5 @@
-//! Routes worth driving on a map of which nobody has chosen any: through junctions, each with something that the others lack.
+//! Proposes routes on a map for which the author has chosen none: through junctions, each with something that the
+//! others lack.
 
 use std::collections::BTreeSet;
 

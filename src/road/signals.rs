@@ -246,8 +246,8 @@ fn switched<'a>(builder: &mut Builder<'a>) -> BTreeMap<&'a str, (usize, usize)> 
     groups
 }
 
-/// Names the lights that stop nobody, and marks junctions of which no light stops anybody. A light whose lanes are
-/// all for cycles or trams is none for vehicles.
+/// Warns of lights that hold no lane, and marks junctions without a light that holds one. A light whose lanes are all
+/// for cycles or trams counts as none for vehicles.
 fn warn_of_idle_lights(builder: &mut Builder, placed: &Placed, held: &[Vec<(LaneIndex, f64)>]) {
     let mut lit = vec![(0, 0); builder.map.junctions.len()];
     for (index, (road_index, signal)) in placed.lights.iter().enumerate() {

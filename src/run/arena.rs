@@ -13,7 +13,6 @@ use crate::episode;
 use crate::episode::{Choice, Moment};
 use crate::mdp::ProcKind;
 use crate::model::{Road, RulesInForce, Space};
-use crate::oracle::AvoidabilitySettings;
 use crate::prove;
 use crate::rng;
 use crate::rng::{Rng, Stream};
@@ -65,7 +64,7 @@ impl Arena {
         Ok(Arena { table, rules, ads, traffic: TrafficProfile::default(), roads })
     }
 
-    /// The same with other manners of other vehicles.
+    /// The same arena, in which other vehicles drive by another profile.
     pub fn with_traffic(self, traffic: TrafficProfile) -> Arena {
         Arena { traffic, ..self }
     }
@@ -121,7 +120,6 @@ impl Arena {
             start: Start { traffic: self.traffic, ..episode::start(space, &memory, seed) },
             memory,
             period_shifts: Vec::new(),
-            forks: Vec::new(),
             proc: ProcKind::default(),
         }
     }
@@ -138,8 +136,8 @@ pub fn road_named(space: &Space, name: &str) -> Result<usize, RunError> {
     })
 }
 
-/// Lets an agent choose among the offers of the moment. With nothing legal, the step passes. Beside the choice come the
-/// legal rows, shape `(rows,)`: all of them for an agent that does not look at them.
+/// Lets an agent choose among the offers of the moment. If no row is legal, the step passes. Returns the choice, and
+/// which rows are legal, shape `(rows,)`: all of them for an agent that does not look at the mask.
 pub(crate) fn choose(agent: &mut dyn Agent, moment: &Moment) -> (Choice, Array1<bool>) {
     if agent.looks_at_mask() {
         let offers = offers(agent, moment);
@@ -217,8 +215,7 @@ impl Branch for Lookahead<'_> {
         let step = self.moment.step;
         let collided = log.collisions.iter().any(|collision| collision.step == step);
         let counts = || {
-            let settings = AvoidabilitySettings::default();
-            let summary = EpisodeSummary::judged(self.moment.setup(), 0, &log, &settings);
+            let summary = EpisodeSummary::judged(self.moment.setup(), 0, &log);
             summary.collisions.iter().any(|finding| finding.counted && finding.collision.step == step)
         };
         Trial {

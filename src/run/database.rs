@@ -25,7 +25,6 @@ use crate::run::summary::{EpisodeSummary, Finding};
 
 pub(crate) const LAYOUT: Layout = Layout {
     version: 10,
-    older: &[],
     unit: "episode",
     tables: &["episode", "step", "held", "offer", "collision", "failure", "learning", "scenario"],
     naming: Some(("offer", "reason")),
@@ -33,8 +32,10 @@ pub(crate) const LAYOUT: Layout = Layout {
     local: &["scenario"],
 };
 
-/// `held` says what held the speed of the ego vehicle back, from a time until that of the next row. `offer` counts, per episode and row, the steps in which the row was legal (reason 0) or refused (other reasons);
-/// training writes nothing there. `scenario` has the text of the file that was written of an episode. `learning`, `checkpoint` and `result` belong to a training (`train::record`) and stay empty in a run.
+/// `held` says what held the speed of the ego vehicle back, from the row's time to that of the next row. `offer`
+/// counts, per episode and row, the steps in which the row was legal (`reason` 0) or refused (other reasons); training
+/// writes nothing there. `scenario` has the text of the file that was written of an episode. `learning`, `checkpoint`
+/// and `result` belong to a training (`train::record`) and stay empty in a run.
 const SCHEMA: &str = "
 CREATE TABLE episode (
   episode INTEGER PRIMARY KEY, road TEXT NOT NULL, seed TEXT NOT NULL, ended TEXT NOT NULL,

@@ -1,4 +1,4 @@
-//! Groups of like failures: what a run found, by what happened and not by how often.
+//! Groups of similar failures: what a run found, by what happened and not by how often.
 //!
 //! Two counted collisions are alike if these are equal: kind of obstacle, its verb, how it moved, where the ego
 //! vehicle was hit, which of the two had priority, the shape of the ego vehicle's way (see `shape`) and the modules
@@ -85,8 +85,8 @@ impl Database {
         Ok(groups)
     }
 
-    /// Road and number of each episode with a collision, the worst first: those that count, then by the larger change of
-    /// velocity of the two.
+    /// Road and number of each episode with a collision, the worst first: episodes with a counted collision, then by
+    /// the larger delta-v of the two bodies.
     ///
     /// # Errors
     /// If the database cannot be read.

@@ -1,7 +1,6 @@
 //! What became of each row: in how many steps it was legal, and what stood in its way in the others.
-//!
-//! An episode notes every offer of every step ([`Offered`]), `run.db` adds episodes up, and [`RowCount`] is what comes
-//! out for a row. A run says at its end which rows never happened.
+//! An episode notes every offer of every step ([`Offered`]), `run.db` adds the episodes up, and [`RowCount`] is the sum
+//! for one row. From these a run says at its end which rows never happened.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;

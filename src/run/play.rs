@@ -13,6 +13,7 @@ use crate::episode;
 use crate::episode::{Choice, EpisodeLog, Moment, Watch};
 use crate::model::Space;
 use crate::oracle;
+use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
 
@@ -60,7 +61,9 @@ impl Run {
 
     fn with_agent(table: ActionTable, settings: RunSettings, agent: Box<MakeAgent>) -> Result<Run, RunError> {
         check_episodes(settings.episodes)?;
-        settings.avoidability.check()?;
+        if settings.avoidability != AvoidabilitySettings::default() {
+            return Err(RunError::Avoidability);
+        }
         let ads = under_test(&settings.ads, settings.profile.as_ref(), settings.external.as_ref())?;
         let traffic = traffic_of(settings.traffic.as_ref())?;
         let arena =
@@ -108,7 +111,8 @@ impl Run {
         self.played(&self.setup(number)).0
     }
 
-    /// Plays an episode of a setup by a fresh agent. Beside the log comes the time that the agent simulated in branches, s.
+    /// Plays an episode of a setup with a fresh agent. Returns the log, and the time that the agent simulated in
+    /// branches, s.
     pub fn played(&self, setup: &episode::Setup) -> (EpisodeLog, f64) {
         let mut agent = self.agent();
         agent.begin();
@@ -135,7 +139,7 @@ impl Run {
         };
         let log = self.play(number, &mut choose, &mut |world, _, contacts| gauges.note(world, contacts));
         let setup = self.setup(number);
-        let mut summary = EpisodeSummary::judged(&setup, number, &log, &self.settings.avoidability);
+        let mut summary = EpisodeSummary::judged(&setup, number, &log);
         (summary.criticality, summary.pet_s) = gauges.of_steps(&log);
         for (finding, shape) in summary.collisions.iter_mut().zip(gauges.shapes()) {
             finding.shape = *shape;

@@ -185,10 +185,10 @@ impl Asked {
     }
 
     /// The driving system to play a scenario with, and whether it is the one that the scenario records. If nothing is
-    /// asked, it is that one; without a name, its driving system with another profile.
+    /// asked, it is that one; a profile is one of `modular`, whatever drove before.
     ///
     /// # Errors
-    /// If there is no driving system of that name, or it has no profile.
+    /// If there is no driving system of that name.
     pub fn selected_for(&self, scenario: &Scenario) -> Result<(Selected, bool), RunError> {
         let Asked { ads, profile, external } = self;
         if let Some(program) = external {
@@ -197,14 +197,14 @@ impl Asked {
                 && recorded == Some(program.attached().digest().as_str());
             return Ok((Selected::external(Arc::clone(program)), same));
         }
-        if ads.is_none() && profile.is_none() {
-            return Ok((recorded(scenario)?, true));
+        if let Some(profile) = profile {
+            let same = scenario.origin.profile_digest == Some(profile.digest());
+            return Ok((driving_system(DEFAULT_ADS)?.with_profile(*profile)?, same));
         }
-        let recorded = scenario.origin.ads.as_deref().unwrap_or(DEFAULT_ADS);
-        let selected = driving_system(ads.as_deref().unwrap_or(recorded))?;
-        let Some(profile) = profile else { return Ok((selected, false)) };
-        let same = ads.is_none() && scenario.origin.profile_digest == Some(profile.digest());
-        Ok((selected.with_profile(*profile)?, same))
+        match ads {
+            Some(name) => Ok((driving_system(name)?, false)),
+            None => Ok((recorded(scenario)?, true)),
+        }
     }
 }
 

@@ -28,7 +28,7 @@ CREATE TABLE seal (unit INTEGER PRIMARY KEY, digest TEXT NOT NULL) STRICT;
 /// Why a run database cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum DatabaseError {
-    #[error("it has layout {found}, this version of avastra reads {wanted}")]
+    #[error("it has layout {found}, this version of avastra reads {wanted}: begin a new one")]
     Layout { found: i64, wanted: i64 },
     #[error("it names an episode {found}")]
     Episode { found: i64 },
@@ -58,7 +58,7 @@ pub enum DatabaseError {
 }
 
 impl DatabaseError {
-    /// Whether the file was damaged or changed, so that what it is of must be played again. Anything else is no loss.
+    /// Whether the file was damaged or changed, so that its episodes must be played again. Other errors lose nothing.
     pub fn is_torn(&self) -> bool {
         matches!(self, DatabaseError::Damaged { .. } | DatabaseError::Rows { .. })
     }
@@ -78,10 +78,8 @@ impl From<rusqlite::Error> for DatabaseError {
 pub struct Layout {
     /// Raised whenever a column changes.
     pub version: i64,
-    /// Versions before whose files can be read and gone on with; in them every table has at least the columns of today.
-    pub older: &'static [i64],
-    /// What is added as a whole, in a word, which is also its key: `episode`, `cell`. The first of the tables has
-    /// one row for each.
+    /// Name of the unit that is added as a whole, which is also the name of its key column: `episode`, `cell`. The
+    /// first of the tables has one row for each unit.
     pub unit: &'static str,
     /// The tables with its rows.
     pub tables: &'static [&'static str],
@@ -126,7 +124,7 @@ impl Layout {
             transaction.execute("INSERT INTO begun VALUES (1, ?)", [settings])?;
             transaction.pragma_update(None, "user_version", self.version)?;
             transaction.commit()?;
-        } else if found != self.version && !self.older.contains(&found) {
+        } else if found != self.version {
             return Err(DatabaseError::Layout { found, wanted: self.version });
         } else {
             check_tables(&connection, tables)?;
@@ -399,7 +397,6 @@ mod tests {
     const SETTINGS: &str = "seed: 1\nroads: [corner]\n";
     const LAYOUT: Layout = Layout {
         version: 3,
-        older: &[],
         unit: "episode",
         tables: &["episode", "step"],
         naming: Some(("step", "reason")),

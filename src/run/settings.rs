@@ -55,7 +55,7 @@ pub struct RunSettings {
     pub without: Vec<String>,
     /// Optional rules switched on.
     pub with: Vec<String>,
-    /// How the avoidability of collisions is judged.
+    /// How the avoidability of collisions is judged: in one way, of which this is the record.
     #[serde(default)]
     pub avoidability: AvoidabilitySettings,
 }
@@ -131,8 +131,10 @@ pub enum RunError {
     Twice { name: String },
     #[error("{found} episodes a road: from 1 to {EPISODES_MAX} are possible")]
     Episodes { found: u32 },
-    #[error(transparent)]
-    Avoidability(#[from] oracle::AvoidabilityError),
+    #[error(
+        "its settings say that avoidability was judged in another way (`avoidability`), which is not possible here: begin a new one"
+    )]
+    Avoidability,
     #[error(transparent)]
     NoModules(#[from] oracle::NoModules),
     #[error(transparent)]
@@ -141,7 +143,7 @@ pub enum RunError {
     Profile { name: String, error: ads::ConfigError },
     #[error(
         "{what} was made with settings of `{ads}` that mean something else in this version: nothing need \
-         happen alike; name a profile with `--ads-config FILE` to see what happens with that"
+         happen alike; name a profile with `--ads FILE` to see what happens with that"
     )]
     ProfileDigest { what: String, ads: String },
     #[error("the traffic of `{name}`: {error}")]
@@ -154,13 +156,11 @@ pub enum RunError {
     External(Box<Failure>),
     #[error("it was begun against {begun}, and the same command now starts {found}: begin a new one")]
     OtherProgram { begun: String, found: String },
-    #[error(
-        "an external driving system has no name here: give it with `--ads-cmd 'COMMAND'` or `--ads-config FILE`"
-    )]
+    #[error("an external driving system has no name here: give it with `--ads 'COMMAND'` or `--ads FILE`")]
     ExternalUnnamed,
     #[error(
         "`{name}` was made against {ads}, and its recorded answers are not beside it: give the driving system with \
-         `--ads-cmd` or `--ads-config`"
+         `--ads`"
     )]
     NoAnswers { name: String, ads: String },
     #[error(

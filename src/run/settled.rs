@@ -14,7 +14,7 @@ use sha2::{Digest, Sha256};
 use crate::files::Temporary;
 use crate::run::sealed::{DatabaseError, Layout, add_rows, check_plain, plain_tables};
 
-/// A unit to take over: its number in the other file, and the one that it gets.
+/// A unit to take over: its number in the other file, and the number that it gets here.
 pub type Numbered = (i64, i64);
 
 /// A database of units that know nothing of each other.
@@ -76,11 +76,11 @@ pub trait Units: Sized {
         Ok(numbers.collect::<Result<_, _>>()?)
     }
 
-    /// Takes units over from another file of the kind, all or none; those that are here already must be alike. `adjust` is
-    /// called before they are sealed.
+    /// Takes units over from another file of this kind, all or none. A unit that is here already must be equal.
+    /// `adjust` is called before they are sealed.
     ///
     /// # Errors
-    /// If one of the files cannot be used, or both have a unit, and in one of them it is another.
+    /// If one of the files cannot be used, or a unit that both have differs.
     fn take(
         &mut self,
         other: &Path,
@@ -184,7 +184,7 @@ impl Layout {
             keys.sort_by_key(|column| column.key);
             let rest = keys.iter().filter(|column| column.name != self.unit);
             let order: Vec<String> = rest.map(|column| format!(", there.{}", column.name)).collect();
-            // The columns are those of today's layout: one that an older layout had besides is left out.
+            // The columns by name: two files of one layout need not have them in one order.
             transaction.execute_batch(&format!(
                 "INSERT INTO main.{table} ({}) SELECT {} FROM taking JOIN other.{table} AS there ON there.{} = taking.old
                  ORDER BY taking.number{}",
@@ -220,7 +220,7 @@ impl Layout {
     }
 }
 
-/// The columns of a table in today's layout.
+/// The columns of a table.
 fn columns(connection: &Connection, table: &str) -> Result<Vec<Column>, rusqlite::Error> {
     let mut query = connection.prepare_cached("SELECT name, pk FROM pragma_table_info(?, 'main')")?;
     let columns = query.query_map([table], |row| Ok(Column { name: row.get(0)?, key: row.get(1)? }))?;

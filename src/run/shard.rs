@@ -1,13 +1,12 @@
 //! Shards: a run, a study or an estimate cut into pieces that machines without anything in common play.
-//!
-//! What is cut are its units of work, which know nothing of each other: episodes, jobs of a study, parts of an estimate. The
-//! same unit comes to the same rows in every piece, so a merge only has to bring them together.
+//! The units of work are dealt out to the pieces: episodes, jobs of a study, parts of an estimate. Units know nothing
+//! of each other, and a unit gives the same rows in every piece, so a merge only has to bring them together.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::str::FromStr;
 
-/// One of so many pieces.
+/// One of several pieces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, try_from = "Written")]
 pub struct Shard {
@@ -49,24 +48,19 @@ impl Shard {
         self.of == 1
     }
 
-    /// Its number, from 1.
-    pub fn number(self) -> u32 {
-        self.shard
-    }
-
     /// The number of all pieces.
     pub fn count(self) -> u32 {
         self.of
     }
 
-    /// Its items among some whose cost is known, by their positions, in order.
+    /// The positions of its items, rising. `costs` has the cost of every item.
     pub fn share(self, costs: &[u64]) -> Vec<usize> {
         let shards = Shard::of_items(costs, self.of);
         (0..costs.len()).filter(|&item| shards[item] == self.shard).collect()
     }
 
-    /// The number of the piece that each item is in: the most costly items first, each to the piece with least to do so far.
-    /// Items of one cost go round.
+    /// The number of the piece that each item is in. Items are dealt out by falling cost, each to the piece with the
+    /// least to do so far; items of equal cost go round.
     pub fn of_items(costs: &[u64], of: u32) -> Vec<u32> {
         let mut order: Vec<usize> = (0..costs.len()).collect();
         order.sort_by_key(|&item| Reverse(costs[item]));

@@ -9,7 +9,7 @@ use crate::episode::{EpisodeLog, Script, Watch};
 use crate::mdp::ProcKind;
 use crate::model::{Claim, RulesInForce, Scenario, digest_text};
 use crate::oracle;
-use crate::oracle::{AvoidabilitySettings, ClaimResult, Judgement, NoModules, NoTries, Replays};
+use crate::oracle::{ClaimResult, Judgement, NoModules, NoTries, Replays};
 use crate::sim::{ENGINE, Scene, Start, TrafficProfile};
 
 use crate::run::profile::recorded_traffic;
@@ -22,13 +22,11 @@ pub struct Stage<'a> {
     rules: RulesInForce,
     scene: Arc<Scene>,
     traffic: TrafficProfile,
-    avoidability: AvoidabilitySettings,
 }
 
 impl<'a> Stage<'a> {
     /// # Errors
-    /// If the scenario was made in another world, with rules or traffic that do not exist, or names reference drivers that
-    /// do not exist.
+    /// If the scenario was made in another world, or with rules or traffic that do not exist.
     pub fn new(table: &'a ActionTable, scenario: &'a Scenario) -> Result<Stage<'a>, RunError> {
         let origin = &scenario.origin;
         if let Some(engine) = origin.engine.as_ref().filter(|engine| engine.as_str() != ENGINE) {
@@ -36,15 +34,8 @@ impl<'a> Stage<'a> {
         }
         let rules = RulesInForce::new(table.space(), &origin.with, &origin.without)?;
         let scene = Arc::new(episode::scene(&table.space().roads[scenario.road]));
-        let line = origin.avoidability.as_deref();
-        let avoidability = line.map(AvoidabilitySettings::from_line).transpose()?.unwrap_or_default();
         let traffic = recorded_traffic(scenario)?;
-        Ok(Stage { table, scenario, rules, scene, traffic, avoidability })
-    }
-
-    /// How the avoidability of its collisions is judged: as the file records it.
-    pub fn avoidability(&self) -> &AvoidabilitySettings {
-        &self.avoidability
+        Ok(Stage { table, scenario, rules, scene, traffic })
     }
 
     /// The beginning of its episode, with any driving system.
@@ -70,7 +61,6 @@ impl<'a> Stage<'a> {
             },
             memory,
             period_shifts: Vec::new(),
-            forks: Vec::new(),
             proc: ProcKind::default(),
         }
     }
@@ -89,7 +79,7 @@ impl<'a> Stage<'a> {
         (log, judgements, first)
     }
 
-    /// Indices of the collisions of a log of it that the space's verdict counts.
+    /// Indices of the collisions that the space's verdict counts, in a log of this scenario.
     pub fn counted(&self, ads: &Selected, log: &EpisodeLog) -> Vec<usize> {
         oracle::counted_at_need(self.table.space(), log, || self.judge(ads, log))
     }
@@ -112,14 +102,15 @@ impl<'a> Stage<'a> {
                 if ads.program().is_some_and(|program| !program.can_start()) {
                     return Err(NoTries);
                 }
-                Ok(oracle::spare_steps(&setup, log, index, &judgements, &self.avoidability))
+                Ok(oracle::spare_steps(&setup, log, index, &judgements))
             },
         };
         oracle::verify(self.table.space(), self.scenario, log, &judgements, &replays)
     }
 
-    /// The claims that a log of it refutes, among those that `asked` names: only such as need no further play, so neither
-    /// causes nor minimality. `judgements` has one for each collision, if one of these claims is about verdicts.
+    /// The claims that a log of it refutes, among those that `asked` selects. Claims that need further plays (causes,
+    /// minimality) count as not tried. `judgements` has one for each collision, if one of these claims is about
+    /// verdicts.
     pub fn refuted(
         &self,
         ads: &Selected,
@@ -138,6 +129,6 @@ impl<'a> Stage<'a> {
 
     /// Judges the collisions of its log, by playing it again.
     pub fn judge(&self, ads: &Selected, log: &EpisodeLog) -> Vec<Judgement> {
-        oracle::judge(&self.setup(ads), &Script::of_scenario(self.scenario), log, &self.avoidability)
+        oracle::judge(&self.setup(ads), &Script::of_scenario(self.scenario), log)
     }
 }

@@ -1,9 +1,8 @@
 //! An episode that another program steps through, one choice after another: what `python/native` gives to learners that
 //! others wrote.
-//!
-//! The rows of an episode of `avastra run`, chosen again here under the same seed, come to the same bytes if they alone were
-//! the agent's choice. Other bytes come of agents that also choose the values of a row (`space-filling` and the searches),
-//! and of policies with an observation period of their own.
+//! If the rows of an episode of `avastra run` are chosen again here under the same seed, the bytes are the same. This
+//! does not hold for agents that also choose the values of a row (`space-filling` and the searches), nor for policies
+//! with an observation period of their own.
 
 use std::sync::Arc;
 
@@ -43,8 +42,8 @@ pub enum StepError {
 }
 
 impl Stepped {
-    /// An episode of a seed on the nth road of a run, before its first step. The run's agent is not asked. It has ended
-    /// already if an external driving system fails as it begins.
+    /// An episode of a seed on the nth road of a run, before its first step. The run's agent is not asked. If an
+    /// external driving system fails at the beginning, the episode has ended already.
     pub fn new(run: Arc<Run>, road: usize, seed: u64) -> Stepped {
         let play = Play::new(&run.setup_of(road, seed));
         let observation = play.observation();
@@ -125,7 +124,7 @@ impl Stepped {
         if self.findings.len() < self.play.collisions().len() {
             let setup = self.run.setup_of(self.road, self.seed);
             let log = self.play.clone().into_log(&setup, self.end.unwrap_or(End::Script));
-            let judged = EpisodeSummary::judged(&setup, 0, &log, &self.run.settings().avoidability);
+            let judged = EpisodeSummary::judged(&setup, 0, &log);
             self.findings = judged.collisions;
         }
         &self.findings
@@ -151,7 +150,7 @@ impl Stepped {
     fn look(&mut self) {
         let run = Arc::clone(&self.run);
         let setup = run.setup_of(self.road, self.seed);
-        match self.end.map_or_else(|| self.play.look(&setup), Err) {
+        match self.end.map_or_else(|| self.play.look(), Err) {
             Ok(observation) => self.observation = observation,
             Err(end) => {
                 self.end = Some(end);

@@ -5,7 +5,7 @@ use crate::episode::{Collision, EpisodeLog, Script, Setup};
 use crate::mdp::Criticality;
 use crate::model::{OutcomeFacts, Space};
 use crate::oracle;
-use crate::oracle::{AvoidabilitySettings, Judgement, NoModules};
+use crate::oracle::{Judgement, NoModules};
 
 use crate::run::gauges::Manners;
 use crate::run::offered::Offered;
@@ -17,8 +17,6 @@ pub struct EpisodeSummary {
     /// Number of the episode in its run, from 0.
     pub episode: usize,
     pub collisions: Vec<Finding>,
-    /// The settings by which their avoidability was judged.
-    pub avoidability: AvoidabilitySettings,
     /// Measures of danger for each step; empty if the episode was not measured.
     pub criticality: Vec<Criticality>,
     /// Least post-encroachment time over the obstacles that were not hit, s; `None` above 5 s.
@@ -27,7 +25,7 @@ pub struct EpisodeSummary {
     pub manners: Manners,
     /// Time that an agent with lookahead simulated in branches, outside the episode, s.
     pub branched_s: f64,
-    /// What every row was offered as; empty if the episode is not a run's.
+    /// The offers of every row; empty if the episode is not a run's.
     pub offered: Offered,
 }
 
@@ -60,19 +58,12 @@ impl Finding {
 
 impl EpisodeSummary {
     /// Judges every collision of a log by playing it again from its setup, and applies the space's verdict.
-    pub fn judged(
-        setup: &Setup,
-        number: usize,
-        log: &EpisodeLog,
-        settings: &AvoidabilitySettings,
-    ) -> EpisodeSummary {
-        let judgements = oracle::judge(setup, &Script::of_log(log), log, settings);
-        let summary = EpisodeSummary::new(setup.table.space(), number, log, judgements);
-        EpisodeSummary { avoidability: settings.clone(), ..summary }
+    pub fn judged(setup: &Setup, number: usize, log: &EpisodeLog) -> EpisodeSummary {
+        let judgements = oracle::judge(setup, &Script::of_log(log), log);
+        EpisodeSummary::new(setup.table.space(), number, log, judgements)
     }
 
-    /// Applies the space's verdict to every collision of a log. `judgements` has one for each, by the default
-    /// settings of avoidability.
+    /// Applies the space's verdict to every collision of a log. `judgements` has one for each.
     pub fn new(space: &Space, number: usize, log: &EpisodeLog, judgements: Vec<Judgement>) -> EpisodeSummary {
         let find = |(index, judgement)| {
             let facts = oracle::facts(log, index, &judgement);
@@ -94,7 +85,6 @@ impl EpisodeSummary {
         EpisodeSummary {
             episode: number,
             collisions,
-            avoidability: AvoidabilitySettings::default(),
             criticality: Vec::new(),
             pet_s: None,
             manners: Manners::default(),

@@ -50,7 +50,7 @@ pub(super) struct Around<'a> {
     pub seed: u64,
 }
 
-/// Another road user or the ego vehicle, as far as one must not run into it.
+/// What a driver has to know of another road user, or of the ego vehicle, so as not to run into it.
 #[derive(Clone, Copy)]
 pub(super) struct Other<'a> {
     pub outline: &'a OrientedBox,

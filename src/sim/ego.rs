@@ -23,6 +23,14 @@ pub struct Control {
     pub steer_rad: f64,
 }
 
+impl Control {
+    /// The pedals that give an acceleration (see [`pedals_for`]), and an angle of the road wheels, rad.
+    pub fn towards(acceleration_mps2: f64, steer_rad: f64) -> Control {
+        let (throttle_pct, brake_pct) = pedals_for(acceleration_mps2);
+        Control { throttle_pct, brake_pct, steer_rad }
+    }
+}
+
 /// Dimensions and limits (Apollo `vehicle_param.pb.txt` of the LGSVL calibration).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VehicleParameters {

@@ -31,7 +31,7 @@ impl World {
 }
 
 impl Around<'_> {
-    /// The facts of this moment. Where one road user looks around, it does not count itself: see [`MomentFacts::with`].
+    /// The facts of this moment. A road user that looks around does not count itself: see [`MomentFacts::with`].
     pub fn moment_facts(&self) -> MomentFacts {
         let OnRoute { limit_mps, junction_ahead_m, route_left_m, signal, road } = self.on_route();
         let gaps =
@@ -89,19 +89,17 @@ impl Around<'_> {
     }
 }
 
-impl MomentFacts {
-    /// The same moment with one road user more: the one that looked around, and did not count itself.
-    pub(super) fn with(self, this: &Obstacle) -> MomentFacts {
-        if this.is_apart {
-            return self;
-        }
-        let is_nearest = self.road_users == 0 || this.distance_m < self.nearest_gap_m;
-        let (nearest_gap_m, nearest_speed_mps) = match is_nearest {
-            true => (this.distance_m, this.velocity_mps.norm()),
-            false => (self.nearest_gap_m, self.nearest_speed_mps),
-        };
-        MomentFacts { road_users: self.road_users + 1, nearest_gap_m, nearest_speed_mps, ..self }
+/// The same moment with one road user more: the one that looked around, and did not count itself.
+pub(super) fn with_itself(moment: MomentFacts, this: &Obstacle) -> MomentFacts {
+    if this.is_apart {
+        return moment;
     }
+    let is_nearest = moment.road_users == 0 || this.distance_m < moment.nearest_gap_m;
+    let (nearest_gap_m, nearest_speed_mps) = match is_nearest {
+        true => (this.distance_m, this.velocity_mps.norm()),
+        false => (moment.nearest_gap_m, moment.nearest_speed_mps),
+    };
+    MomentFacts { road_users: moment.road_users + 1, nearest_gap_m, nearest_speed_mps, ..moment }
 }
 
 /// The facts of a road user. One on foot has those of the ego vehicle's route beside it.

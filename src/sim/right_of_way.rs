@@ -60,8 +60,6 @@ const ABRUPT_MPS2: f64 = 3.0;
 const REACTION_S: f64 = 0.4;
 /// Way behind another vehicle that may not be cut off, s at its speed (UN R79, 5.6.4.7).
 const HEADWAY_S: f64 = 1.0;
-/// Hardest braking that is expected for a pedestrian, m/s² (UN R157's careful driver, 0.774 g).
-const EMERGENCY_MPS2: f64 = CAREFUL_BRAKING_MPS2;
 /// Vehicles that leave a conflict area this long before the other comes are not in its way, s. Ours.
 const CLEAR_S: f64 = 0.5;
 /// A conflict area farther away than this from either vehicle is not looked at yet, m.
@@ -180,11 +178,11 @@ impl PassedLight {
 pub(super) struct Rights {
     /// The light that the road user passed last.
     passed: Option<PassedLight>,
-    /// Whether it and the ego vehicle are in one lane, or it on foot in the ego vehicle's way; `None` before the
-    /// first look.
+    /// Whether it and the ego vehicle are in one lane, or it is a pedestrian in the ego vehicle's way; `None` before
+    /// the first look.
     shares: Option<bool>,
     meeting: Option<Meeting>,
-    /// Who has priority, it as a wreck in the ego vehicle's way or the ego vehicle; `None` as long as it is neither.
+    /// Who has priority if it is a wreck in the ego vehicle's way; `None` if it is not.
     wreck: Option<Priority>,
     /// Whether it has stood since a moment at which the ego vehicle saw it and could brake gently for it.
     is_foreseen: bool,
@@ -517,8 +515,8 @@ impl Side {
             return None;
         }
         let other = path.project_from(here, driver.station_m())?;
-        let (ego_length_m, ego_width_m) = extent(around.ego_outline, around.ego_forward, ego.forward);
-        let (other_length_m, other_width_m) = extent(&this.outline, this.forward, other.forward);
+        let (ego_length_m, ego_width_m) = around.ego_outline.half_extent_m(around.ego_forward, ego.forward);
+        let (other_length_m, other_width_m) = this.outline.half_extent_m(this.forward, other.forward);
         let across_m = other.offset_m - ego.offset_m;
         let apart_m = (other.station_m - ego.station_m).abs() - ego_length_m - other_length_m;
         if apart_m > LANE_M {
@@ -658,7 +656,7 @@ impl Strip {
 
     /// Whether the ego vehicle can stop before the pedestrian.
     fn leaves_room(&self, around: &Around) -> bool {
-        can_stop(around.ego.speed_mps, self.ahead_m, EMERGENCY_MPS2)
+        can_stop(around.ego.speed_mps, self.ahead_m, CAREFUL_BRAKING_MPS2)
     }
 }
 
@@ -682,13 +680,4 @@ fn on_foot(strip: &Strip, around: &Around) -> Priority {
 /// Whether a vehicle that begins to brake after [`REACTION_S`] is at rest within a distance.
 fn can_stop(speed_mps: f64, room_m: f64, braking_mps2: f64) -> bool {
     stopping_m(speed_mps, REACTION_S, braking_mps2) <= room_m
-}
-
-/// Half of the length and of the width of an outline, seen along a direction, m.
-fn extent(outline: &OrientedBox, heading: Vec2, along: Vec2) -> (f64, f64) {
-    let (cos, sin) = (heading.dot(&along).abs(), heading.perp(&along).abs());
-    (
-        outline.half_length_m * cos + outline.half_width_m * sin,
-        outline.half_length_m * sin + outline.half_width_m * cos,
-    )
 }

@@ -81,7 +81,7 @@ pub(super) struct Mover {
     rest_ticks: u32,
     /// Part of it that the ego vehicle's sensors saw when they last looked.
     pub visible_fraction: f64,
-    /// Who gives way to whom, it or the ego vehicle.
+    /// Which of the two has priority: it or the ego vehicle.
     pub rights: Rights,
 }
 

@@ -11,11 +11,9 @@
 //! only leaders; [`oncoming_m`] and [`from_behind_m`] are ours.
 
 use crate::kinematics::{
-    CAREFUL_BRAKING_MPS2 as BRAKING_MPS2, CAREFUL_PERCEPTION_S as PERCEPTION_S,
-    CAREFUL_REACTION_S as REACTION_S, GRAVITY_MPS2, stopping_m,
+    CAREFUL_BRAKING_MPS2 as BRAKING_MPS2, CAREFUL_DELAY_S as DELAY_S, CAREFUL_JERK_MPS3 as JERK_MPS3,
+    CAREFUL_REACTION_S as REACTION_S, GRAVITY_MPS2, braking_m, stopping_m,
 };
-
-const JERK_MPS3: f64 = 12.65;
 
 /// Gap that closes until a careful driver is no faster than a road user ahead, m; 0 if the gap opens.
 ///
@@ -26,7 +24,7 @@ pub(super) fn behind_leader_m(own_mps: f64, ahead_mps: f64, friction: f64) -> f6
     let braking_mps2 = BRAKING_MPS2.min(friction * GRAVITY_MPS2);
     let build_up_s = braking_mps2 / JERK_MPS3;
     let lost_mps = JERK_MPS3 * build_up_s * build_up_s / 2.0;
-    let reaction_m = closing_mps * (PERCEPTION_S + REACTION_S);
+    let reaction_m = closing_mps * DELAY_S;
     if closing_mps <= lost_mps {
         // Slowed down before the brake is at its full force.
         let braked_s = (2.0 * closing_mps / JERK_MPS3).sqrt();
@@ -34,7 +32,7 @@ pub(super) fn behind_leader_m(own_mps: f64, ahead_mps: f64, friction: f64) -> f6
     }
     let build_up_m = closing_mps * build_up_s - JERK_MPS3 * build_up_s * build_up_s * build_up_s / 6.0;
     let left_mps = closing_mps - lost_mps;
-    reaction_m + build_up_m + left_mps * left_mps / (2.0 * braking_mps2)
+    reaction_m + build_up_m + braking_m(left_mps, braking_mps2)
 }
 
 /// Gap that closes until a careful driver is at rest, while an oncoming vehicle keeps its speed
@@ -48,13 +46,13 @@ pub(super) fn oncoming_m(own_mps: f64, towards_mps: f64, friction: f64) -> f64 {
     } else {
         (2.0 * own_mps.max(0.0) / JERK_MPS3).sqrt()
     };
-    let stopping_s = PERCEPTION_S + REACTION_S + braking_s;
+    let stopping_s = DELAY_S + braking_s;
     behind_leader_m(own_mps, 0.0, friction) + towards_mps.max(0.0) * stopping_s
 }
 
 /// Way that a driver goes while perceiving and reacting to what appears, m.
 pub(super) fn noticing_m(own_mps: f64) -> f64 {
-    own_mps.max(0.0) * (PERCEPTION_S + REACTION_S)
+    own_mps.max(0.0) * DELAY_S
 }
 
 /// Gap that a vehicle from behind needs to slow down to the ego vehicle, m; 0 if it is no faster. Its

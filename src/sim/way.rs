@@ -256,8 +256,9 @@ impl Ways {
     }
 }
 
-/// Where the straight on from a path's end comes too near to a lane, m; `None` if it does not as far as the
-/// sensors reach. The first metres do not count, because lanes side by side end together.
+/// A path is continued straight on beyond its end: this is how far beyond the end it comes too near to a lane, m.
+/// `None` if it does not within the sensors' range. The first metres do not count, because lanes side by side end
+/// together.
 fn free_end_m(map: &RoadMap, path: &Path) -> Option<f64> {
     let beyond = |beyond_m: f64| path.position_at(path.length_m() + beyond_m);
     // Few lanes are near at all. The room is a little larger here, so that rounding leaves none out.
@@ -289,7 +290,7 @@ fn lane_bit(lane: LaneIndex) -> u64 {
 
 /// The speed of the bend at each vertex, lowered so that braking for the next ones stays gentle.
 ///
-/// `ads::guide` has a pass of its own over even samples of the route, with a driving system's limits.
+/// `ads::kit::Guide` has a pass of its own over even samples of the route, with a driving system's limits.
 /// The two are not one function because their vertices lie elsewhere, so results would change.
 fn bend_speeds_mps(path: &Path) -> Vec<f64> {
     let points = path.points();

@@ -4,6 +4,8 @@
 mod playback;
 mod survey;
 #[cfg(test)]
+mod testing;
+#[cfg(test)]
 mod tests;
 
 use std::sync::Arc;
@@ -114,11 +116,6 @@ pub struct World {
 }
 
 impl World {
-    /// From now on others' choices come from another seed.
-    pub fn reseed(&mut self, seed: u64) {
-        self.seed = seed;
-    }
-
     /// The beginning of an episode: the ego vehicle rolls with its rear axle on the start of
     /// the route; beside ambient traffic, if asked for, nothing else is there.
     pub fn new(scene: Arc<Scene>, start: &Start) -> World {
@@ -509,7 +506,7 @@ impl World {
         self.ambient = ambient;
     }
 
-    /// Looks who came into whose way, the ego vehicle or a road user.
+    /// Notes for each road user whether it came into the ego vehicle's way or the ego vehicle into its way.
     fn watch_rights(&mut self) {
         let mut users = core::mem::take(&mut self.users);
         let around = self.around([&[], &[]]);

@@ -120,7 +120,7 @@ fn tie_sizes(values: &[f64]) -> Vec<usize> {
     all.chunk_by(|one, other| one == other).map(<[f64]>::len).filter(|&size| size > 1).collect()
 }
 
-/// In how many ways so many of the ranks, chosen without order, add up to each sum.
+/// For each sum, the number of ways to choose `chosen` of the ranks, without order, that add up to it.
 fn rank_sums(ranks: &[usize], chosen: usize) -> Vec<f64> {
     let most: usize = ranks.iter().sum();
     // ways[c][s]: in how many ways c of the ranks so far add up to s.

@@ -15,7 +15,8 @@ pub const P_MAX: f64 = 0.05;
 pub struct Agreement {
     /// Each figure that our study has a number for, in the order of the study's agents and roads.
     pub figures: Vec<ComparedFigure>,
-    /// Every two figures of a road that differ and that a test can hold against each other: we played both.
+    /// Every pair of differing figures of a road whose two agents the study has played, so that a test can compare
+    /// ours.
     pub pairs: Vec<ComparedPair>,
 }
 

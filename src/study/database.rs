@@ -15,15 +15,11 @@ use crate::study::settings::StudySettings;
 /// Versions begin at 1001, so that a `run.db` is never taken for a `study.db`.
 const LAYOUT: Layout = Layout {
     version: 1005,
-    older: &[TIMED],
     unit: "cell",
     tables: &["cell", "trained", "evaluated", "collision"],
     naming: None,
     local: &[],
 };
-
-/// This layout has the time that a machine took beside each cell (`wall_s`, `cpu_s`), which is no part of the result.
-const TIMED: i64 = 1004;
 
 /// Seeds are text: SQLite's integers have a sign.
 const SCHEMA: &str = "
@@ -79,21 +75,15 @@ impl StudyDatabase {
     /// If the file cannot be written.
     pub fn add(&mut self, cells: &[CellRecord]) -> Result<(), DatabaseError> {
         let transaction = self.connection.transaction()?;
-        let layout: i64 = transaction.pragma_query_value(None, "user_version", |row| row.get(0))?;
         for record in cells {
             let seed = record.training_seed.map(|seed| seed.to_string());
-            let CellRecord { agent, road, number, spent, .. } = record;
+            let CellRecord { agent, road, number, .. } = record;
             let known = "SELECT 1 FROM cell WHERE agent = ? AND road = ? AND number = ?";
             if transaction.prepare_cached(known)?.exists(params![agent, road, number])? {
                 continue;
             }
-            if layout == TIMED {
-                let insert = "INSERT INTO cell (agent, road, number, training_seed, wall_s, cpu_s) VALUES (?, ?, ?, ?, ?, ?)";
-                transaction.execute(insert, params![agent, road, number, seed, spent.wall_s, spent.cpu_s])?;
-            } else {
-                let insert = "INSERT INTO cell (agent, road, number, training_seed) VALUES (?, ?, ?, ?)";
-                transaction.execute(insert, params![agent, road, number, seed])?;
-            }
+            let insert = "INSERT INTO cell (agent, road, number, training_seed) VALUES (?, ?, ?, ?)";
+            transaction.execute(insert, params![agent, road, number, seed])?;
             let cell = transaction.last_insert_rowid();
             let mut insert =
                 transaction.prepare_cached("INSERT INTO trained VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)")?;
@@ -119,24 +109,7 @@ impl StudyDatabase {
         Ok(())
     }
 
-    /// The times of cells, which a file of the layout before has: agent, road, number.
-    ///
-    /// # Errors
-    /// If the file cannot be read.
-    pub fn times(&self) -> Result<Vec<(String, String, u32, Spent)>, DatabaseError> {
-        let layout: i64 = self.connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
-        if layout != TIMED {
-            return Ok(Vec::new());
-        }
-        let mut query = self.connection.prepare("SELECT agent, road, number, wall_s, cpu_s FROM cell")?;
-        let times = query.query_map([], |row| {
-            let spent = Spent { wall_s: row.get(3)?, cpu_s: row.get(4)? };
-            Ok((row.get(0)?, row.get(1)?, row.get(2)?, spent))
-        })?;
-        Ok(times.collect::<Result<_, _>>()?)
-    }
-
-    /// Those of some jobs that are not done yet.
+    /// The jobs among these that are not done yet.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -158,7 +131,7 @@ impl StudyDatabase {
         Ok(missing)
     }
 
-    /// The numbers of all cells, each with the one that it has in a settled file: its place in the study.
+    /// The numbers of all cells, each with its number in a settled file, which is its place in the study.
     ///
     /// # Errors
     /// If the file cannot be read, or has a cell that is none of the study's.

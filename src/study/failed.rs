@@ -1,5 +1,5 @@
-//! Cells that an external driving system failed in. What it did not drive is in no statistics, so a study with such a
-//! cell has none.
+//! Cells in which an external driving system failed. The statistics would lack what it did not drive, so a study with
+//! such a cell has no statistics.
 
 use std::collections::BTreeMap;
 
@@ -20,7 +20,7 @@ pub struct FailedCell {
 }
 
 impl FailedCell {
-    /// Those among the cells, in their order.
+    /// The failed cells among these, in their order.
     pub fn among(cells: &[CellRecord]) -> Vec<FailedCell> {
         let found = cells.iter().map(|cell| FailedCell {
             agent: cell.agent.clone(),

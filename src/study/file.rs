@@ -41,10 +41,10 @@ pub struct StudyFile {
     /// Labels of the agents that each other agent is compared with.
     #[serde(default)]
     pub baselines: Vec<String>,
-    /// Published figures that the result is held against by `avastra results`.
+    /// Published figures that the result is held against by `avastra study results`.
     #[serde(default)]
     pub published: Vec<PublishedTable>,
-    /// What the result means, and why it differs from what is published; printed by `avastra results`.
+    /// What the result means, and why it differs from what is published; printed by `avastra study results`.
     pub remarks: Option<String>,
 }
 

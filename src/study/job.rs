@@ -23,13 +23,13 @@ pub struct Job {
 
 /// What happens while jobs are played.
 pub enum Event {
-    /// An episode is over, with so many counted collisions.
+    /// An episode is over; the number of its counted collisions.
     Episode { counted: usize },
     /// A job is done: a cell for each of its roads.
     Done(Vec<CellRecord>),
 }
 
-/// Plays jobs on so many threads and hands what happens to `on`, on this one. Stops early when `stop` is set or
+/// Plays jobs on several threads, and calls `on` on this thread with what happens. Stops early when `stop` is set or
 /// `on` fails; a job that is not finished then is lost. `clock` says what the calling thread has spent so far.
 ///
 /// # Errors

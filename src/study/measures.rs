@@ -138,8 +138,8 @@ pub(super) fn failures<'a>(
 }
 
 /// How long each episode lasted, or until its first counted collision. An ego vehicle that has arrived cannot fail any
-/// more: it survives the horizon. To take its arrival for the end of watching would say that it might have failed
-/// like the others, though those that are in danger arrive late.
+/// more, so it survives the horizon. To count its arrival as censored would say that it might have failed like the
+/// others, although vehicles in danger arrive late.
 pub(super) fn lifetimes<'a>(
     episodes: impl IntoIterator<Item = &'a EpisodeRecord>,
     horizon_s: f64,

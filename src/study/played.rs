@@ -6,6 +6,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::agent::by_name;
 use crate::model::digest;
 use crate::study::measures::{MEASURES, MeasuredCell};
 use crate::study::record::{CellRecord, Spent};
@@ -17,7 +18,7 @@ const SCHEMA: u32 = 1;
 /// A study as it was played.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Played {
-    /// What the avastra that played it was built from, if somebody said so.
+    /// The commit that avastra was built from when it played the study, if it was given.
     pub commit: Option<String>,
     pub settings: StudySettings,
     pub cells: Vec<MeasuredCell>,
@@ -65,7 +66,7 @@ struct Seal {
 
 /// Advice for a text whose seal does not fit.
 const UNSEALED: &str =
-    "get it back as it was, or remove it and add its study again with `avastra results --add DIR`";
+    "get it back as it was, or remove it and add its study again with `avastra study results --add DIR`";
 
 /// The lines before the seal, if the seal fits them.
 fn unsealed(text: &str) -> Result<&str, String> {
@@ -76,6 +77,20 @@ fn unsealed(text: &str) -> Result<&str, String> {
         Ok(_) => Err(format!("it was changed since it was written: {UNSEALED}")),
         Err(_) => Err(format!("its last line is not the seal of those before: {UNSEALED}")),
     }
+}
+
+/// Reads the first line. An agent that was played may be gone since: what it found stays, and of its settings, which nothing
+/// can read any more, only the episodes.
+fn read_head(line: &str) -> Result<Head, serde_json::Error> {
+    let mut head: serde_json::Value = serde_json::from_str(line)?;
+    let agents = head.pointer_mut("/settings/agents").and_then(serde_json::Value::as_array_mut);
+    for agent in agents.into_iter().flatten() {
+        let is_gone = agent["name"].as_str().is_some_and(|name| by_name(name).is_none());
+        if let Some(settings) = agent.pointer_mut("/training/hyperparameters").filter(|_| is_gone) {
+            *settings = serde_json::json!({});
+        }
+    }
+    serde_json::from_value(head)
 }
 
 impl Played {
@@ -124,7 +139,7 @@ impl Played {
         let at = |index: usize| move |reason: serde_json::Error| format!("line {}: {reason}", index + 1);
         let mut lines = unsealed(text)?.lines().enumerate();
         let (_, head) = lines.next().ok_or("it is empty")?;
-        let head: Head = serde_json::from_str(head).map_err(at(0))?;
+        let head = read_head(head).map_err(at(0))?;
         if head.schema != SCHEMA {
             return Err(format!("it has schema {}, this version of avastra reads {SCHEMA}", head.schema));
         }

@@ -20,7 +20,7 @@ pub struct CellRecord {
     pub trained: Vec<TrainedRecord>,
     /// All evaluated episodes, seed by seed.
     pub episodes: Vec<EpisodeRecord>,
-    /// Zero where nothing says it: `study.db` does not.
+    /// Zero if unknown; `study.db` does not keep it.
     pub spent: Spent,
 }
 
@@ -43,7 +43,7 @@ pub struct TrainedRecord {
     pub counted: u32,
     pub exploration_epsilon: f64,
     pub loss: Option<f64>,
-    /// Time simulated for it, s: branches included, the part that a snapshot saved left out.
+    /// Time simulated for it, s: branches included.
     pub simulated_s: f64,
 }
 

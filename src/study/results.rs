@@ -265,9 +265,9 @@ fn agent_results(measured: MeasuredAgent, cells: &[&CellRecord]) -> AgentResults
     }
 }
 
-/// A measure's mean over cells. None is below 0, so its interval is cut off there. Cells that are all 0 have no spread
-/// for Student's interval; the interval of what they count is then that of Poisson's events, which takes collisions to be
-/// independent and trainings to be alike.
+/// A measure's mean over cells. No measure is below 0, so the interval is cut off there. If all cells are 0, Student's
+/// interval has no spread; a count then gets the interval of Poisson's distribution, which assumes that collisions are
+/// independent and trainings alike.
 pub(super) fn estimate(measure: &str, cells: &[&MeasuredCell]) -> Option<Estimate> {
     let found = mean(&values(measure, cells))?;
     let is_count = MEASURES.iter().any(|one| one.name == measure && one.is_count);

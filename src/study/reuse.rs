@@ -1,5 +1,5 @@
-//! Cells that another study has played already. A cell follows from its agent's settings, its road, its number and what
-//! all agents of a study share; neither from the agent's label nor from who else is in the study.
+//! Cells that another study has played already. A cell depends on its agent's settings, its road, its number and what
+//! all agents of a study share. It does not depend on the agent's label or on the other agents of the study.
 
 use crate::study::job::Job;
 use crate::study::record::CellRecord;
@@ -9,7 +9,7 @@ impl StudySettings {
     /// The jobs of this study that another one has played: the cells of each, under this one's labels.
     ///
     /// # Errors
-    /// If the two play otherwise: the settings in which they differ.
+    /// If the two studies play differently: the settings in which they differ.
     pub fn played_elsewhere(
         &self,
         other: &StudySettings,

@@ -273,7 +273,7 @@ fn agent_settings(
                 .expect("an agent that is trained has settings")
                 .map_err(|error| refuse(error.to_string()))?;
             let shuffled_states = file.shuffled_states;
-            if shuffled_states && hyperparameters.hyperparameters().is_none() {
+            if shuffled_states && hyperparameters.learner().is_none() {
                 return Err(refuse(format!(
                     "`shuffled_states` is for networks, and `{}` has none",
                     file.name

@@ -668,19 +668,6 @@ impl BinaryOp {
             BinaryOp::Arithmetic(Arithmetic::Divide) => "/",
         }
     }
-
-    /// How tightly the operator binds: a larger number binds tighter.
-    pub fn precedence(self) -> u8 {
-        match self {
-            BinaryOp::Implies => 1,
-            BinaryOp::Or => 2,
-            BinaryOp::And => 3,
-            // 4 is `not`.
-            BinaryOp::Compare(_) | BinaryOp::In => 5,
-            BinaryOp::Arithmetic(Arithmetic::Add | Arithmetic::Subtract) => 6,
-            BinaryOp::Arithmetic(Arithmetic::Multiply | Arithmetic::Divide) => 7,
-        }
-    }
 }
 
 impl Comparison {

@@ -1,39 +1,12 @@
-//! Builds trees from pest's flat expressions: precedence, associativity, and how high a tree may grow.
+//! Builds trees from pest's flat expressions by the table of operators, and bounds how high a tree may grow.
 
 use pest::iterators::Pair;
 
-use crate::syntax::ast::{Arg, Arm, BinaryOp, Call, Expr, ExprKind, Span, Text, UnaryOp};
+use crate::syntax::ast::{Arg, Arm, Call, Expr, ExprKind, Span, Text};
 use crate::syntax::build::{Builder, Built, Parts};
-use crate::syntax::grammar::Rule;
+use crate::syntax::grammar::{Role, Rule, role};
+use crate::syntax::operator::{Grouping, Operator};
 use crate::syntax::{Diagnostic, OPERATORS_MAX, code};
-
-/// Binding strength of `not`, on the scale of [`strength`].
-pub const NOT_PRECEDENCE: u8 = 8;
-/// `lo .. hi` binds looser than sums and tighter than comparisons.
-pub const RANGE_PRECEDENCE: u8 = 11;
-/// Unary minus binds tighter than every infix operator.
-pub const NEGATE_PRECEDENCE: u8 = 16;
-
-/// Twice [`BinaryOp::precedence`], which leaves room between the levels for `..`.
-pub fn strength(op: BinaryOp) -> u8 {
-    2 * op.precedence()
-}
-
-/// An infix operator of the grammar.
-#[derive(Clone, Copy)]
-enum Infix {
-    Binary(BinaryOp),
-    Range,
-}
-
-impl Infix {
-    fn strength(self) -> u8 {
-        match self {
-            Infix::Binary(op) => strength(op),
-            Infix::Range => RANGE_PRECEDENCE,
-        }
-    }
-}
 
 /// The flat form of an expression, read from the left.
 type Tokens<'i> = std::iter::Peekable<std::vec::IntoIter<Pair<'i, Rule>>>;
@@ -62,26 +35,25 @@ impl Builder {
         built
     }
 
-    /// Precedence climbing: reads on as long as operators bind at least as tightly as `least`.
+    /// Precedence climbing: reads on as long as operators have at least the level `least`.
     fn climb(&self, tokens: &mut Tokens<'_>, least: u8) -> Built<Expr> {
         let mut left = self.prefixed(tokens)?;
         while let Some(token) = tokens.peek() {
-            let (op_span, op) = (self.span(token), infix(token));
-            if op.strength() < least {
+            let (op_span, op) = (self.span(token), operator(token));
+            if op.level() < least {
                 break;
             }
             tokens.next();
-            // `implies` groups to the right, everything else to the left.
-            let right_groups = matches!(op, Infix::Binary(BinaryOp::Implies));
-            let right = self.climb(tokens, op.strength() + u8::from(!right_groups))?;
-            if matches!(op, Infix::Binary(BinaryOp::Compare(_) | BinaryOp::In) | Infix::Range) {
+            let right = self.climb(tokens, op.right_least())?;
+            if op.grouping() == Grouping::Never {
                 self.refuse_chain(op, tokens.peek())?;
             }
             let span = left.span.to(right.span);
             let (left_box, right_box) = (Box::new(left), Box::new(right));
             let kind = match op {
-                Infix::Range => ExprKind::Range { low: left_box, high: right_box },
-                Infix::Binary(op) => ExprKind::Binary { op, op_span, left: left_box, right: right_box },
+                Operator::Range => ExprKind::Range { low: left_box, high: right_box },
+                Operator::Binary(op) => ExprKind::Binary { op, op_span, left: left_box, right: right_box },
+                Operator::Unary(_) => unreachable!("the grammar puts an infix operator behind an operand"),
             };
             left = Expr { kind, span };
         }
@@ -89,13 +61,15 @@ impl Builder {
     }
 
     /// Refuses `a < b < c`, which the language does not have.
-    fn refuse_chain(&self, op: Infix, next: Option<&Pair<'_, Rule>>) -> Built<()> {
-        let Some(next) = next.filter(|next| infix(next).strength() == op.strength()) else {
+    fn refuse_chain(&self, op: Operator, next: Option<&Pair<'_, Rule>>) -> Built<()> {
+        let Some(next) = next.filter(|next| operator(next).level() == op.level()) else {
             return Ok(());
         };
         let (message, help) = match op {
-            Infix::Range => ("a range has two ends", "write `low .. high`"),
-            Infix::Binary(_) => ("comparisons do not chain", "write `a < b and b < c`"),
+            Operator::Range => ("a range has two ends", "write `low .. high`"),
+            Operator::Binary(_) | Operator::Unary(_) => {
+                ("comparisons do not chain", "write `a < b and b < c`")
+            }
         };
         Err(Box::new(Diagnostic::error(code::CHAIN, message).at(self.span(next), "second one").help(help)))
     }
@@ -105,13 +79,11 @@ impl Builder {
         if token.as_rule() == Rule::operand {
             return self.operand(token);
         }
-        let start = self.span(&token);
-        let (op, least) = if token.as_str() == "-" {
-            (UnaryOp::Negate, NEGATE_PRECEDENCE)
-        } else {
-            (UnaryOp::Not, NOT_PRECEDENCE)
+        let (start, prefix) = (self.span(&token), operator(&token));
+        let Operator::Unary(op) = prefix else {
+            unreachable!("the grammar begins no expression with an infix")
         };
-        let operand = self.climb(tokens, least)?;
+        let operand = self.climb(tokens, prefix.right_least())?;
         let span = start.to(operand.span);
         Ok(Expr { kind: ExprKind::Unary { op, operand: Box::new(operand) }, span })
     }
@@ -209,11 +181,11 @@ impl Builder {
     }
 }
 
-/// The operator of an `infix` pair.
-fn infix(pair: &Pair<'_, Rule>) -> Infix {
-    let symbol = pair.as_str();
-    match BinaryOp::ALL.into_iter().find(|op| op.symbol() == symbol) {
-        Some(op) => Infix::Binary(op),
-        None => Infix::Range,
+/// The operator of a `prefix` or an `infix` pair.
+fn operator(pair: &Pair<'_, Rule>) -> Operator {
+    let token = pair.clone().into_inner().next().expect("the rule is one operator").as_rule();
+    match role(token) {
+        Role::Operator(operator) => operator,
+        Role::Said(_) | Role::Unsaid => unreachable!("`{token:?}` is no operator"),
     }
 }

@@ -20,11 +20,13 @@ mod format;
 mod grammar;
 pub mod keyword;
 mod layout;
+mod operator;
 mod parse;
 mod print;
 mod print_expression;
 mod record;
 mod scan;
+mod unfinished;
 mod yaml;
 
 pub use diagnostic::{
@@ -37,7 +39,7 @@ pub use print::{print, print_expr, print_item};
 pub use record::{
     DiagnosticRecord, EditRecord, FixRecord, LabelRecord, PlaceRecord, SCHEMA, apply_fixes, record,
 };
-
+pub use unfinished::{HERE, Unfinished, declaration_start, unfinished};
 pub use yaml::{settings_mistake, yaml_mistake};
 
 #[cfg(test)]

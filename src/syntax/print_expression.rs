@@ -1,14 +1,9 @@
 //! Expressions as text: parentheses where precedence needs them, and nowhere else.
 
 use crate::syntax::ast::{Arg, Arm, BinaryOp, Call, Expr, ExprKind, Field, Number, UnaryOp};
-use crate::syntax::expression::{NEGATE_PRECEDENCE, NOT_PRECEDENCE, RANGE_PRECEDENCE, strength};
 use crate::syntax::layout::Layout;
+use crate::syntax::operator::{BASE, Grouping, Operator, level};
 use crate::syntax::scan::is_bidi;
-
-/// Binding strength of an expression that needs parentheses before `.` and `[` alone.
-const OPERAND: u8 = u8::MAX - 1;
-/// Binding strength of an expression that never needs parentheses.
-const BASE: u8 = u8::MAX;
 
 /// An expression in a place where any expression may stand.
 pub fn expression(expr: &Expr) -> Layout {
@@ -18,19 +13,7 @@ pub fn expression(expr: &Expr) -> Layout {
 /// An expression, in parentheses unless it binds at least as tightly as `least`.
 fn within(expr: &Expr, least: u8) -> Layout {
     let bare = bare(expr);
-    if binding(expr) < least { Layout::row([Layout::text("("), bare, Layout::text(")")]) } else { bare }
-}
-
-fn binding(expr: &Expr) -> u8 {
-    match &expr.kind {
-        ExprKind::Binary { op, .. } => strength(*op),
-        ExprKind::Range { .. } => RANGE_PRECEDENCE,
-        ExprKind::Unary { op: UnaryOp::Not, .. } => NOT_PRECEDENCE,
-        ExprKind::Unary { op: UnaryOp::Negate, .. } => NEGATE_PRECEDENCE,
-        // `12 m.x` and `lane 1/1 at 2 m[0]` would read as something else.
-        ExprKind::Number(_) | ExprKind::LanePoint { .. } => OPERAND,
-        _ => BASE,
-    }
+    if level(expr) < least { Layout::row([Layout::text("("), bare, Layout::text(")")]) } else { bare }
 }
 
 fn bare(expr: &Expr) -> Layout {
@@ -39,17 +22,18 @@ fn bare(expr: &Expr) -> Layout {
         ExprKind::Text(value) => Layout::text(quoted(value)),
         ExprKind::Bool(value) => Layout::text(value.to_string()),
         ExprKind::Name(name) => Layout::text(name),
-        ExprKind::Unary { op: UnaryOp::Not, operand } => {
-            Layout::row([Layout::text("not "), within(operand, NOT_PRECEDENCE)])
-        }
-        ExprKind::Unary { op: UnaryOp::Negate, operand } => {
-            Layout::row([Layout::text("-"), within(operand, NEGATE_PRECEDENCE)])
+        ExprKind::Unary { op, operand } => {
+            let sign = match op {
+                UnaryOp::Not => "not ",
+                UnaryOp::Negate => "-",
+            };
+            Layout::row([Layout::text(sign), within(operand, Operator::Unary(*op).right_least())])
         }
         ExprKind::Binary { op, left, right, .. } => binary(*op, left, right),
         ExprKind::Range { low, high } => Layout::row([
-            within(low, RANGE_PRECEDENCE + 1),
+            within(low, Operator::Range.left_least()),
             Layout::text(" .. "),
-            within(high, RANGE_PRECEDENCE + 1),
+            within(high, Operator::Range.right_least()),
         ]),
         ExprKind::Field { base, field } => {
             Layout::row([within(base, BASE), Layout::text(format!(".{}", field.text))])
@@ -74,15 +58,11 @@ fn bare(expr: &Expr) -> Layout {
     }
 }
 
-/// A chain of operators of one strength breaks before each of them, or not at all.
+/// A chain of operators of one level breaks before each of them, or not at all.
 fn binary(op: BinaryOp, left: &Expr, right: &Expr) -> Layout {
-    let level = strength(op);
-    let compares = matches!(op, BinaryOp::Compare(_) | BinaryOp::In);
-    // `implies` groups to the right, comparisons not at all, the rest to the left.
-    let groups_right = op == BinaryOp::Implies;
-    let left_least = level + u8::from(groups_right || compares);
-    let right_least = level + u8::from(!groups_right);
-    if compares {
+    let operator = Operator::Binary(op);
+    let (left_least, right_least) = (operator.left_least(), operator.right_least());
+    if operator.grouping() == Grouping::Never {
         return Layout::row([
             within(left, left_least),
             Layout::text(format!(" {} ", op.symbol())),
@@ -92,7 +72,7 @@ fn binary(op: BinaryOp, left: &Expr, right: &Expr) -> Layout {
     let mut rest = vec![Layout::Line, Layout::text(format!("{} ", op.symbol())), within(right, right_least)];
     let mut first = left;
     while let ExprKind::Binary { op: earlier, left, right, .. } = &first.kind {
-        if groups_right || strength(*earlier) != level {
+        if operator.grouping() == Grouping::Right || Operator::Binary(*earlier).level() != operator.level() {
             break;
         }
         let link = [Layout::Line, Layout::text(format!("{} ", earlier.symbol())), within(right, right_least)];
@@ -180,7 +160,9 @@ pub fn quoted(value: &str) -> String {
 pub fn begins_with_minus(expr: &Expr) -> bool {
     match &expr.kind {
         ExprKind::Unary { op: UnaryOp::Negate, .. } => true,
-        ExprKind::Binary { op, left, .. } => binding(left) >= strength(*op) && begins_with_minus(left),
+        ExprKind::Binary { op, left, .. } => {
+            level(left) >= Operator::Binary(*op).level() && begins_with_minus(left)
+        }
         ExprKind::Range { low, .. } => begins_with_minus(low),
         _ => false,
     }

@@ -13,11 +13,11 @@ use crate::rng::Stream;
 use crate::run::Arena;
 
 use crate::train::evaluation::evaluate;
-use crate::train::visits::{Record, visits};
+use crate::train::visits::{Visits, visits};
 
 /// Rules that imitate a policy, with the limits that its settings give; empty if the policy never made a choice.
 pub fn distill(arena: &Arena, policy: &QPolicy, seed: u64) -> Vec<PolicyRule> {
-    let settings = policy.settings();
+    let settings = &policy.settings().rules;
     let episodes = u64::from(settings.rules_episodes);
     let mut lessons: Vec<Visit> = Vec::new();
     let mut student = policy.clone();
@@ -43,10 +43,10 @@ pub fn judge_rules(
     test: (u64, u64),
 ) -> RulesClaims {
     let student = policy.with_rules(rules.clone());
-    let record = Record::default();
-    let evaluation = evaluate(arena, &|| Box::new(record.of(&student)), test);
+    let visited = Visits::default();
+    let evaluation = evaluate(arena, &|| Box::new(visited.of(&student)), test);
     let (mut states, mut same, mut lost) = (0_u64, 0_u64, 0.0);
-    for visit in record.visits() {
+    for visit in visited.visits() {
         let row = chosen_by(rules, &visit.observation, &visit.open);
         states += 1;
         same += u64::from(row == Some(visit.best));

@@ -8,7 +8,6 @@ use crate::ads::external::FailureKind;
 use crate::agent::Agent;
 use crate::episode;
 use crate::episode::End;
-use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
 use crate::run::{Arena, EpisodeSummary, choose};
@@ -34,7 +33,7 @@ pub struct Evaluation {
     pub failures: BTreeMap<FailureKind, u64>,
 }
 
-/// Plays so many episodes on each road; `make` gives a fresh agent for each.
+/// Plays a number of episodes on each road; `make` gives a fresh agent for each.
 pub fn evaluate(
     arena: &Arena,
     make: &dyn Fn() -> Box<dyn Agent>,
@@ -50,8 +49,7 @@ pub fn evaluate(
         agent.begin();
         let mut choose = |moment: &episode::Moment| choose(agent.as_mut(), moment).0;
         let log = episode::run(&setup, &mut choose, &mut |_, _, _| {});
-        let settings = AvoidabilitySettings::default();
-        let counted = EpisodeSummary::judged(&setup, number as usize, &log, &settings).counted() as u64;
+        let counted = EpisodeSummary::judged(&setup, number as usize, &log).counted() as u64;
         sum += log.steps.iter().map(|step| step.reward).sum::<f64>();
         found.collisions += log.collisions.len() as u64;
         found.counted += counted;

@@ -2,7 +2,6 @@
 //!
 //! Single-threaded: every episode depends on all before it. The caller keeps the records.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use ndarray::Array1;
@@ -11,16 +10,15 @@ use crate::action::ActionTable;
 use crate::ads::Ads;
 use crate::ads::external::Attached;
 use crate::agent::{
-    Agent, Beginning, Collided, Experience, Kind, Lesson, QPolicy, Rows, Settings, Trainable, Trajectory,
+    Agent, Collided, Experience, Kind, Lesson, QPolicy, Rows, Settings, Trainable, Trajectory,
 };
 use crate::episode;
-use crate::episode::{Choice, End, EpisodeLog, Moment, Outcome, Play, Script, Setup};
+use crate::episode::{Choice, End, EpisodeLog, Moment, Outcome, Script, Setup};
 use crate::mdp;
 use crate::mdp::{Closeness, Observation, ProcKind, StepOutcome};
 use crate::model::Space;
 use crate::model::vocabulary::Word;
 use crate::oracle;
-use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
 use crate::run::{
@@ -97,9 +95,6 @@ pub struct Training {
     arena: Arena,
     settings: TrainSettings,
     agent: Box<dyn Trainable>,
-    /// Moments that a search may return to, by the numbers that it gave them. A moment that is missing after a kill
-    /// is played again.
-    moments: BTreeMap<usize, Play>,
     /// Number of the next episode.
     next: usize,
 }
@@ -115,7 +110,7 @@ pub struct TrainedEpisode {
     pub lesson: Lesson,
     /// Choices made in the training up to its end.
     pub steps: u64,
-    /// Time simulated for it, s: branches included, the part that a snapshot saved left out.
+    /// Time simulated for it, s: branches included.
     pub simulated_s: f64,
 }
 
@@ -128,7 +123,7 @@ impl Training {
     pub fn new(table: ActionTable, settings: TrainSettings) -> Result<Training, RunError> {
         let (arena, rows) = prepared(table, &settings)?;
         let agent = settings.hyperparameters.build(rows, settings.seed);
-        Ok(Training { arena, settings, agent, moments: BTreeMap::new(), next: 0 })
+        Ok(Training { arena, settings, agent, next: 0 })
     }
 
     /// A training as a checkpoint left it after so many episodes.
@@ -143,7 +138,7 @@ impl Training {
     ) -> Result<Training, RunError> {
         let (arena, rows) = prepared(table, &settings)?;
         let agent = settings.hyperparameters.restore(rows, checkpoint).ok_or(RunError::Checkpoint)?;
-        Ok(Training { arena, settings, agent, moments: BTreeMap::new(), next: episodes })
+        Ok(Training { arena, settings, agent, next: episodes })
     }
 
     pub fn settings(&self) -> &TrainSettings {
@@ -193,18 +188,18 @@ impl Training {
         let road = number % self.arena.roads();
         let fresh = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
         self.agent.progress(number as f64 / f64::from(self.settings.episodes));
-        let beginning = self.agent.beginning(road, fresh);
+        let start_seed = self.agent.start_seed(road, fresh);
         let exploration_epsilon = self.agent.exploration_epsilon();
-        let mut setup = self.arena.setup(road, beginning.seed);
+        let mut setup = self.arena.setup(road, start_seed);
         setup.start.ambient = self.settings.ambient;
         setup.proc = self.settings.hyperparameters.proc();
         self.agent.begin();
-        let played = play(&setup, self.agent.as_mut(), beginning, &self.moments, &self.settings);
+        let played = play(&setup, self.agent.as_mut(), &self.settings);
 
         let log = played.log;
         let summary = EpisodeSummary {
             branched_s: self.agent.branched_s(),
-            ..EpisodeSummary::judged(&setup, number, &log, &AvoidabilitySettings::default())
+            ..EpisodeSummary::judged(&setup, number, &log)
         };
         let (last, last_legal) = played.last.expect("every episode has a last moment");
         let trajectory = Trajectory {
@@ -217,17 +212,13 @@ impl Training {
         };
         let mut rng = rng::stream(self.settings.seed, Stream::Replay, number as u64);
         let lesson = self.agent.learn(&trajectory, &mut rng);
-        for (key, step) in self.agent.keepsakes() {
-            self.moments.extend(played.snapshots.get(&step).map(|snapshot| (key, snapshot.clone())));
-        }
         self.next += 1;
-        let returned_s = beginning.from.map_or(0.0, |(_, step)| log.steps[step].time_s);
         TrainedEpisode {
             sum: trajectory.sum(),
             exploration_epsilon,
             lesson,
             steps: self.agent.steps(),
-            simulated_s: log.duration_s - returned_s + summary.branched_s,
+            simulated_s: log.duration_s + summary.branched_s,
             log,
             summary,
         }
@@ -249,36 +240,21 @@ impl Training {
 }
 
 /// An episode of a training, before it is judged.
-struct Played {
+struct Unjudged {
     log: EpisodeLog,
-    /// The choices that were made anew.
     choices: Vec<Chosen>,
     /// The observation after the last step, and the rows that were legal then, shape `(rows,)`.
     last: Option<(Observation, Array1<bool>)>,
-    /// Snapshots by step, for an agent that returns to moments.
-    snapshots: BTreeMap<usize, Play>,
     closeness: Closeness,
 }
 
-fn play(
-    setup: &Setup,
-    agent: &mut dyn Trainable,
-    beginning: Beginning,
-    moments: &BTreeMap<usize, Play>,
-    settings: &TrainSettings,
-) -> Played {
-    let searches = settings.hyperparameters.hyperparameters().is_none();
-    let first_new = beginning.from.map_or(0, |(_, step)| step);
-    let from = beginning.from.and_then(|(key, _)| moments.get(&key));
+fn play(setup: &Setup, agent: &mut dyn Trainable, settings: &TrainSettings) -> Unjudged {
+    let searches = settings.hyperparameters.learner().is_none();
     let mut choices = Vec::new();
-    let mut snapshots = BTreeMap::new();
     let mut last = None;
     let mut closeness = Closeness::default();
     let looks_at_mask = agent.looks_at_mask();
     let mut make_choice = |moment: &Moment| {
-        if searches {
-            snapshots.insert(moment.step, moment.snapshot());
-        }
         let (choice, legal) = choose(agent, moment);
         let row = match &choice {
             Choice::Act(draw) => Some(draw.row),
@@ -287,7 +263,6 @@ fn play(
             Choice::Pass | Choice::Stop => None,
         };
         let observation = moment.observation.clone();
-        let row = row.filter(|_| moment.step >= first_new);
         choices.extend(row.map(|row| Chosen { step: moment.step, observation, legal, row }));
         choice
     };
@@ -304,8 +279,8 @@ fn play(
         };
         last = Some((moment.observation.clone(), legal));
     };
-    let log = episode::run_from(setup, from.cloned(), &mut make_choice, &mut watch, &mut at_last);
-    Played { log, choices, last, snapshots, closeness }
+    let log = episode::run_from(setup, None, &mut make_choice, &mut watch, &mut at_last);
+    Unjudged { log, choices, last, closeness }
 }
 
 /// A choice of the agent, with the observation and the legal rows that it was made on.

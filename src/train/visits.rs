@@ -18,18 +18,18 @@ use crate::train::training::with_period;
 
 /// A policy that acts as usual and records every state in which it chooses, with the legal rows, even if its
 /// settings ignore what is legal. States without an open row are left out.
-pub(super) struct Recorder {
+pub(super) struct VisitingPolicy {
     policy: QPolicy,
     visits: Arc<Mutex<Vec<Visit>>>,
 }
 
-/// The visits that recorders have in common; each recorder serves one episode, one after another.
+/// The visits that visiting policies have in common; each of them serves one episode, one after another.
 #[derive(Default)]
-pub(super) struct Record(Arc<Mutex<Vec<Visit>>>);
+pub(super) struct Visits(Arc<Mutex<Vec<Visit>>>);
 
-impl Record {
-    pub fn of(&self, policy: &QPolicy) -> Recorder {
-        Recorder { policy: policy.clone(), visits: self.0.clone() }
+impl Visits {
+    pub fn of(&self, policy: &QPolicy) -> VisitingPolicy {
+        VisitingPolicy { policy: policy.clone(), visits: self.0.clone() }
     }
 
     /// All recorded visits.
@@ -38,7 +38,7 @@ impl Record {
     }
 }
 
-impl Agent for Recorder {
+impl Agent for VisitingPolicy {
     fn begin(&mut self) {
         self.policy.begin();
     }
@@ -65,25 +65,25 @@ pub fn training_arena(
     acting: &QPolicy,
     roads: &[String],
 ) -> Result<Arena, RunError> {
-    let table = with_period(table.clone(), acting.settings().observation_period_s);
+    let table = with_period(table.clone(), acting.settings().payment.observation_period_s);
     let origin = &policy.origin;
     Arena::new(table, roads, trained_against(policy)?, &origin.with, &origin.without)
 }
 
-/// The visits of so many episodes on each road; their seeds come from a stream, numbered from `first`.
+/// The visits of `episodes` episodes on each road; their seeds come from a stream, numbered from `first`.
 pub(super) fn visits(
     arena: &Arena,
     policy: &QPolicy,
     episodes: u64,
     (seed, stream, first): (u64, Stream, u64),
 ) -> Vec<Visit> {
-    let record = Record::default();
+    let visited = Visits::default();
     for number in 0..episodes * arena.roads() as u64 {
         let seed = rng::child_seed(seed, stream, first + number);
         let setup = arena.setup((number % arena.roads() as u64) as usize, seed);
-        let mut agent = record.of(policy);
+        let mut agent = visited.of(policy);
         agent.begin();
         episode::run(&setup, &mut |moment: &Moment| choose(&mut agent, moment).0, &mut |_, _, _| {});
     }
-    record.visits()
+    visited.visits()
 }

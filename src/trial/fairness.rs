@@ -6,12 +6,10 @@
 use crate::action::SpawnRequest;
 use crate::geometry::distance_m;
 use crate::kinematics;
-use crate::kinematics::{CAREFUL_BRAKING_MPS2, CAREFUL_PERCEPTION_S, CAREFUL_REACTION_S};
+use crate::kinematics::{CAREFUL_BRAKING_MPS2, CAREFUL_DELAY_S};
 use crate::model::vocabulary::Verb;
 use crate::sim::World;
 
-/// Perception and reaction, s.
-const DELAY_S: f64 = CAREFUL_PERCEPTION_S + CAREFUL_REACTION_S;
 /// Rounding of figures, m.
 const SLACK_M: f64 = 0.1;
 
@@ -28,7 +26,7 @@ pub(super) fn complaint(world: &World, request: &SpawnRequest, id: u32) -> Optio
     let along_mps = world.ego_outline().pose.forward().dot(&newcomer.velocity_mps);
     let stopping_m = |closing_mps: f64| {
         let closing_mps = closing_mps.max(0.0);
-        kinematics::stopping_m(closing_mps, DELAY_S, CAREFUL_BRAKING_MPS2)
+        kinematics::stopping_m(closing_mps, CAREFUL_DELAY_S, CAREFUL_BRAKING_MPS2)
     };
     // An oncoming vehicle passes in a lane of its own, so it needs no stopping zone.
     let zone_m = match request.verb {
@@ -42,7 +40,7 @@ pub(super) fn complaint(world: &World, request: &SpawnRequest, id: u32) -> Optio
             newcomer.distance_m
         ));
     }
-    let notice_m = ego_mps * DELAY_S;
+    let notice_m = ego_mps * CAREFUL_DELAY_S;
     let sensed = world.sensed();
     let in_view = sensed.objects.iter().any(|object| object.id == id && object.visible_fraction > 0.0);
     let sight_m = world.conditions().visibility_m;

@@ -1,9 +1,8 @@
 //! Whether a row finds a place: it is offered, as to an agent, at moments along each road on which it was found to run.
-//!
-//! No road is driven for that. The ego vehicle is put at stations of the route, at low speeds and at the limit, with the lights
-//! at several phases; nobody else is there. So a place that is found is one, and that none is found is no proof: the
-//! stations are some of the many, and traffic may be what a row waits for. What a rule asks of the moment is left to `prove`,
-//! which knows all moments of a route: only the rules about the newcomer are asked here.
+//! No road is driven for that. The ego vehicle is put at stations of the route, at low speeds and at the limit, with
+//! the lights at several phases and no other road user. If a place is found, the row has one. If none is found, that is
+//! no proof: only some stations are tried, and a row may need traffic. What a rule asks of the moment is left to
+//! `prove`, which knows all moments of a route; only rules about the newcomer are asked here.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -25,16 +24,17 @@ const PHASE_S: f64 = 17.0;
 /// The ego vehicle as an episode begins, and in traffic, as a share of the limit.
 const SPEED_MPS: f64 = 3.0;
 const SHARE_OF_LIMIT: f64 = 0.8;
-/// Faster than this it is nowhere, m/s: maps have roads without a limit.
+/// Fastest speed of the ego vehicle at a station, m/s. Maps have roads without a limit.
 const FAST_MPS_MAX: f64 = 30.0;
-/// Offers in one search over all rows; a row that nowhere finds a place needs 128 on each road.
+/// Most offers in one search over all rows. A row that finds a place nowhere needs 128 on each road.
 const OFFERS_MAX: usize = 5_000;
-/// Of a table with more rows beside those that are claimed to run, nothing is warned of: it would take seconds.
+/// If a table has more rows than this beside those that are claimed to run, there are no warnings: the search would
+/// take seconds.
 const ROWS_WARNED_MAX: usize = 1_000;
 /// Rows named in one diagnostic, at most.
 const ROWS_SHOWN: usize = 5;
 
-/// Scenes that are kept: an author who moves a start makes one with each keystroke.
+/// Most scenes that are kept. An author who moves the start of a road makes a new scene with each keystroke.
 const SCENES_MAX: usize = 16;
 
 /// The scenes of roads that were searched before. A caller that searches often, such as the editor's server, then makes
@@ -154,7 +154,8 @@ impl Lost<'_> {
         false
     }
 
-    /// The lanes beside the route that the map has and no car drives on, in words, if the row asks for a lane that is missing.
+    /// If the row asks for a lane that is missing: the lanes beside the route that the map has but that no car drives
+    /// on, in words.
     fn left_out(&self) -> Option<String> {
         let mut found = BTreeSet::new();
         for (road, counts) in &self.refusals {
@@ -190,7 +191,7 @@ impl Lost<'_> {
     }
 }
 
-/// Those of the rows that were found to run on some road, and find no place on any.
+/// The rows among these that were found to run on some road but find no place on any road.
 fn without_place<'a>(
     space: &'a Arc<Space>,
     runs: &Runs,
@@ -266,7 +267,8 @@ struct Moment {
     phase_s: f64,
 }
 
-/// The moments of a road: first its beginning, then the halves, quarters and so on, so that what is long comes soon.
+/// The moments of a road: first its beginning, then the halves, quarters and so on, so that long stretches are tried
+/// early.
 fn moments() -> impl Iterator<Item = Moment> {
     let stations = (0..STATIONS).map(|nth| {
         let bits = STATIONS.trailing_zeros();

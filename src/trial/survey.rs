@@ -1,9 +1,8 @@
 //! Trials: every row on every road, at moments of undisturbed drives at which it is legal.
-//!
-//! On each road some drives go by without an action. At each of their steps every row is offered, as
-//! to an agent: that is how often it is legal, and which reasons refuse it otherwise. From some of the
-//! legal moments, spread over all of them, the row is carried out and what happens is judged. So a row
-//! is realised on a road, or not with the reason, or masked with the reasons; there is no fourth.
+//! On each road some drives go by without an action. At each of their steps every row is offered, as to an agent; this
+//! counts how often the row is legal, and which reasons refuse it otherwise. From some of the legal moments, spread
+//! over all of them, the row is carried out and what happens is judged. So a row on a road is realised, or not realised
+//! (with the reason), or masked (with the reasons).
 
 use std::sync::Arc;
 

@@ -4,7 +4,7 @@ use super::dimension::Dimension;
 use super::rational::Rational;
 use super::unit::{UNITS, Unit};
 
-/// A number of at most so many characters is short.
+/// A number of at most this many characters is short.
 const SHORT: usize = 9;
 
 /// The shortest decimal without an exponent that reads back to the same f64; a whole number keeps

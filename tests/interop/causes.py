@@ -93,7 +93,7 @@ def avastra(*arguments):
 def crashes(config, name, space, episodes):
     """Plays a space, and gives the files of its counted crashes."""
     out = FOLDER / name / Path(space).stem
-    plan = ["--episodes", episodes, "--seed", SEED, "--ads-config", config, "--quiet", "--out", out]
+    plan = ["--episodes", episodes, "--seed", SEED, "--ads", config, "--quiet", "--out", out]
     status, _, told = avastra("run", space, *plan)
     assert status == 0, told
     return sorted((out / "critical").glob("*.ava"))

@@ -1,4 +1,4 @@
-"""Does the interval of an estimate hold what it promises, in the simulator? Does `compare` see weaker brakes, and how soon?
+"""Does the interval of an estimate hold what it promises, in the simulator? Does `estimate --than` see weaker brakes, and how soon?
 What is gained where crashes are rarer still?
 
     python3 tests/interop/coverage.py AVASTRA [FOLDER] [REPEATS] [EPISODES]
@@ -9,7 +9,7 @@ truth is not known; it is taken from all repeats together, whose error is a four
 Between 92 and 98 % of the intervals should have it: with 200 repeats, chance alone takes a right one out of that range once in
 sixteen times.
 
-Brakes: the driving system against itself with brakes that are 10 % weaker, in the same episodes (`compare`) and by counting
+Brakes: the driving system against itself with brakes that are 10 % weaker, in the same episodes (`estimate --than`) and by counting
 each on its own. What is printed is how many kilometres each needs to tell them apart.
 
 Rarer: the same crash where chance does nothing 10 and 250 times as often, and how much longer counting would take for an
@@ -98,7 +98,7 @@ def coverage():
 def brakes():
     profile = FOLDER / "weaker_brakes.yaml"
     profile.write_text(WEAKER)
-    found = avastra("compare", ROOT / "scenarios/avastra45.ava", ROOT / "scenarios/ads/default.yaml", profile, *COMPARED)
+    found = avastra("estimate", ROOT / "scenarios/avastra45.ava", "--ads", ROOT / "scenarios/ads/default.yaml", "--than", profile, *COMPARED)
     results = found["results"]
     probabilities, kilometres = results["probability"], results["driven_km"]
     print(f"{results['episodes']} pairs of episodes: {probabilities} of them with a collision over {kilometres} km")

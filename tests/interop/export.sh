@@ -19,7 +19,7 @@ fi
 avastra=${AVASTRA:-target/release/avastra}
 [ -x "$avastra" ] || cargo build --release
 rm -rf "$work/run" "$work/out" "$work/natural" "$work/carla"
-"$avastra" run scenarios/avastra45.ava --ads-config scenarios/ads/faults/planning_never_yields.yaml \
+"$avastra" run scenarios/avastra45.ava --ads scenarios/ads/faults/planning_never_yields.yaml \
     --episodes "$episodes" --seed 1 --out "$work/run" --quiet "$@"
 for arguments in "openscenario" "commonroad --ego trajectory" "csv"; do
     # shellcheck disable=SC2086

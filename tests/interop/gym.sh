@@ -1,7 +1,6 @@
 #!/bin/sh
 # Lets learners that others wrote train on avastra, unmodified, and counts what they find beside `avastra train` at equal
-# simulated time: gym.sh [SEEDS]. Then steps per second from Python, beside highway-env in the same process and MetaDrive in one of its
-# own. Run wheel.sh first: it builds the wheel. PROFILE=dev takes a faster build. Needs Python 3.11 with venv, and PyPI for the first run.
+# simulated time: gym.sh [SEEDS]. Run wheel.sh first: it builds the wheel. PROFILE=dev takes a faster build. Needs Python 3.11 with venv, and PyPI for the first run.
 set -eu
 cd "$(dirname "$0")/../.."
 profile=${PROFILE:-release}
@@ -11,16 +10,9 @@ if [ ! -e "$venv/ready" ]; then
     python3 -m venv "$venv"
     "$venv/bin/pip" install --quiet torch --index-url https://download.pytorch.org/whl/cpu || "$venv/bin/pip" install --quiet torch
     # RLlib pins Gymnasium.
-    "$venv/bin/pip" install --quiet 'ray[rllib]==2.60.0' 'gymnasium==1.2.2' 'stable-baselines3==2.9.2' 'sb3-contrib==2.9.2' 'highway-env==1.12.1'
+    "$venv/bin/pip" install --quiet 'ray[rllib]==2.60.0' 'gymnasium==1.2.2' 'stable-baselines3==2.9.2' 'sb3-contrib==2.9.2'
     touch "$venv/ready"
-fi
-metadrive=target/interop/metadrive
-if [ ! -e "$metadrive/ready" ]; then
-    python3 -m venv "$metadrive"
-    "$metadrive/bin/pip" install --quiet -r python/adapters/metadrive/requirements.txt
-    touch "$metadrive/ready"
 fi
 "$venv/bin/pip" install --quiet --force-reinstall --no-deps target/interop/wheel/dist/*.whl
 cargo build --quiet --profile "$profile"
 "$venv/bin/python" tests/interop/gym_train.py "target/$folder/avastra" "${1:-1}"
-"$venv/bin/python" tests/interop/gym_speed.py "$metadrive/bin/python"

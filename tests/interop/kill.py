@@ -105,7 +105,7 @@ with tempfile.TemporaryDirectory() as scratch:
     settings = folder / "small.yaml"
     settings.write_text(SMALL)
     space = "scenarios/avastra45.ava"
-    common = ["--road", "corner", "--seed", "5", "--ads-config", FAULT]
+    common = ["--road", "corner", "--seed", "5", "--ads", FAULT]
     run = ["run", space, *common, "--episodes", "6", "--jobs", "1"]
     train = ["train", space, *common, "--episodes", "6", "--config", str(settings)]
     every = ["kill", "torn", "full"]

@@ -18,7 +18,7 @@ def measured(avastra, episodes, folder, program):
     out = Path(folder, str(episodes))
     command = [avastra, "run", "scenarios/avastra45.ava", "--jobs", "1", "--quiet", "--out", str(out)]
     if program:
-        command += ["--ads-cmd", program, "--road", "corner", "--agent", "none", "--episodes", str(episodes)]
+        command += ["--ads", program, "--road", "corner", "--agent", "none", "--episodes", str(episodes)]
     else:
         command += ["--traffic", "released", "--episodes", str(episodes // ROADS)]
     run = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL)

@@ -85,8 +85,8 @@ def examine(kind, originals, count):
         where = original.parent / f"mutant_{kind}.ava"
         where.write_text(changed)
         # What only replays is no hang: it takes as long as the original does.
-        usual_s = EXPECTED.setdefault(original, run("verify", original)[2])
-        status, said, took_s = run("verify", where)
+        usual_s = EXPECTED.setdefault(original, run("replay", original)[2])
+        status, said, took_s = run("replay", where)
         statuses[status] = statuses.get(status, 0) + 1
         slow = max(slow, took_s - usual_s)
         if status not in (0, 1, 2, 3) or took_s - usual_s > HANG_S:
@@ -106,7 +106,7 @@ def examine(kind, originals, count):
 EXPECTED = {}
 FOLDER.mkdir(parents=True, exist_ok=True)
 if not (FOLDER / "run").exists():
-    run("run", SPACE, "--episodes", "60", "--seed", "5", "--ads-config", FAULT, "--out", FOLDER / "run")
+    run("run", SPACE, "--episodes", "60", "--seed", "5", "--ads", FAULT, "--out", FOLDER / "run")
 scenarios = sorted((FOLDER / "run/critical").glob("*.ava"))
 if POLICIES and not (FOLDER / "trained").exists():
     small = FOLDER / "small.yaml"

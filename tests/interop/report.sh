@@ -33,12 +33,12 @@ echo "the linter finds nothing"
 if [ -z "${RUN:-}" ]; then
   RUN=$work/run
   rm -rf "$RUN"
-  "$binary" run "$root/scenarios/avastra45.ava" --ads-config "$root/scenarios/ads/faults/planning_never_yields.yaml" \
+  "$binary" run "$root/scenarios/avastra45.ava" --ads "$root/scenarios/ads/faults/planning_never_yields.yaml" \
     --causes --episodes 30 --seed 3 --out "$RUN" --quiet > /dev/null
   "$binary" shrink "$RUN"/critical/*.ava --quiet > /dev/null
 fi
 page=$work/page.html
-"$binary" report "$RUN" --compare cc --out "$page"
+"$binary" report "$RUN" --ads cc --out "$page"
 
 # Pages of what has no crash to watch: a training's and an estimate's; STUDY=DIR adds a study's.
 short="--road corner --seed 5 --quiet"

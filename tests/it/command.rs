@@ -43,6 +43,18 @@ fn a_misspelt_command_is_told_the_nearest() {
     }
 }
 
+#[test]
+fn a_command_or_an_option_that_was_is_told_its_new_name() {
+    for (words, now) in [
+        (&["verify", "a.ava"][..], "`verify` is now `replay`"),
+        (&["explain-policy", "a.ava"], "`explain-policy` is now `policy explain`"),
+        (&["run", "a.ava", "--ads-config", "car.yaml"], "`--ads-config` is now `--ads FILE`"),
+    ] {
+        let (status, _, stderr) = outcome(&mut avastra(words));
+        assert!(status == 1 && stderr.contains(now), "{stderr}");
+    }
+}
+
 /// The footways of a map are drawn beside its lanes.
 #[test]
 fn a_picture_shows_sidewalks() {
@@ -128,15 +140,17 @@ fn what_cannot_be_read_is_said_so() {
 #[test]
 fn what_does_not_exist_is_named_with_what_does() {
     let space = "scenarios/avastra45.ava";
-    let cases: [(&[&str], &str); 9] = [
+    let cases: [(&[&str], &str); 11] = [
         (&["run", space, "--road", "nowhere"], "`corner`"),
+        (&["run", space, "--ads", "modualr"], "did you mean `modular`?"),
+        (&["export", "--to", "ava", space], "`--out DIR`"),
         (&["run", space, "--ads", "apolo"], "`modular`, `frenet`, `reactive`, `idm`, `cc`"),
         (&["run", space, "--agent", "rndom"], "`random`"),
         (&["run", space, "--without", "npc_gpa"], "npc_gap"),
         (&["run", "--resume", "scenarios"], "no run.yaml"),
-        (&["why", space, "--row", "45"], "rows 0 to 44"),
-        (&["why", space, "--row", "0", "--state", "tiem: Night"], "time"),
-        (&["why", space, "--row", "0", "--state", "time: Noon, time: Night"], "`time` is given twice"),
+        (&["table", space, "--row", "45"], "rows 0 to 44"),
+        (&["table", space, "--row", "0", "--state", "tiem: Night"], "time"),
+        (&["table", space, "--row", "0", "--state", "time: Noon, time: Night"], "`time` is given twice"),
         (&["render", space, "--at", "1"], "no scenario"),
     ];
     for (arguments, hint) in cases {
@@ -157,7 +171,7 @@ fn compile_and_run_write_the_same_files_twice() {
     };
     in_scratch(&["compile", &space]);
     let profile = root().join(FLICKER).display().to_string();
-    let settings = ["--seed", "7", "--episodes", "10", "--ads-config", &profile];
+    let settings = ["--seed", "7", "--episodes", "10", "--ads", &profile];
     in_scratch(&[&["run", "--jobs", "1"], &settings[..]].concat());
     in_scratch(&[&["run", "--jobs", "2"], &settings[..]].concat());
     let critical = |run: &str| -> Vec<(String, String)> {

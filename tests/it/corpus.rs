@@ -96,6 +96,12 @@ fn every_offered_change_is_a_cure() {
     assert!(tried >= 20, "{tried} changes are offered");
 }
 
+#[test]
+fn only_commands_with_diagnostics_print_sarif() {
+    let (status, stdout, stderr) = outcome(&mut avastra(&["explain", "A101", "--format", "sarif"]));
+    assert!(status == 1 && stdout.is_empty() && stderr.contains("`check` and `compile`"), "{stdout}{stderr}");
+}
+
 /// The parts of SARIF 2.1.0 that its schema requires of a log, a run, a result and a fix.
 #[test]
 fn sarif_has_the_structure_of_the_standard() {
@@ -169,7 +175,7 @@ fn a_new_space_is_ready_to_use() {
     in_scratch(&["check", "--strict", "mine/space.ava"]);
     in_scratch(&["fmt", "--check", "mine/space.ava", "mine/roads.ava"]);
     in_scratch(&["run", "mine/space.ava", "--episodes", "1", "--quiet"]);
-    let page = in_scratch(&["doc", "mine/space.ava"]);
+    let page = in_scratch(&["table", "mine/space.ava", "--markdown"]);
     for words in
         ["# space", "### `pedestrian` (rows 4 to 5)", "The clock only moves forward.", "| `time` from | to |"]
     {

@@ -56,9 +56,7 @@ fn names_that_are_no_text_are_refused_before_anything_is_played() {
     let scratch = Scratch::new();
     let odd = scratch.0.path().join(OsStr::from_bytes(b"odd\xff.ava"));
     std::fs::copy(root().join("scenarios/roads.ava"), &odd).expect("it is writable");
-    for command in
-        ["check", "compile", "run", "replay", "shrink", "diagnose", "test", "train", "road", "verify"]
-    {
+    for command in ["check", "compile", "run", "replay", "shrink", "diagnose", "test", "train", "road"] {
         let (status, stdout, stderr) = outcome(avastra(&[command, "--format", "json"]).arg(&odd));
         assert_eq!(status, 1, "{command}: {stderr}");
         assert!(stdout.contains("is not UTF-8: rename the file"), "{command}: {stdout}");
@@ -219,7 +217,7 @@ fn every_file_is_verified() {
     let engine = text.lines().find(|line| line.contains("engine: ")).expect("it has one");
     let foreign = sealed(&text.replace(engine, "    engine: \"plane/0\""), "foreign.ava");
     let liar = sealed(&text.replacen("episodes: 15", "episodes: 4000000000", 1), "liar.ava");
-    let (status, stdout, stderr) = outcome(&mut avastra(&["verify", &liar, &foreign, &foreign]));
+    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &liar, &foreign, &foreign]));
     assert_eq!(status, 1, "{stdout}{stderr}");
     assert!(stderr.contains("claims more episodes than can be played again"), "{stderr}");
     assert_eq!(stdout.matches("was trained in world `plane/0`").count(), 2, "each file is judged: {stdout}");
@@ -283,8 +281,7 @@ fn a_link_to_nothing_is_not_replaced() {
 fn scenarios_that_are_gone_or_edited_are_noticed() {
     let scratch = Scratch::new();
     let out = scratch.text("run");
-    let settings =
-        ["--ads-config", FLICKER, "--road", "corner", "--episodes", "12", "--seed", "5", "--out", &out];
+    let settings = ["--ads", FLICKER, "--road", "corner", "--episodes", "12", "--seed", "5", "--out", &out];
     let (status, _, stderr) = outcome(&mut avastra(&[&["run", SPACE], &settings[..]].concat()));
     assert_eq!(status, 0, "{stderr}");
     let critical = std::fs::read_dir(scratch.path("run/critical")).expect("it is there").flatten();
@@ -312,10 +309,10 @@ fn one_file_that_cannot_be_read_costs_no_other() {
     assert!(status == 1 && stdout.contains("no mistakes"), "{stdout}{stderr}");
     assert!(stderr.contains("nowhere.ava") && stderr.contains("neither.ava"), "{stderr}");
     // Mistakes of usage are objects, too.
-    let (status, stdout, stderr) = outcome(&mut avastra(&["why", "--format", "json"]));
+    let (status, stdout, stderr) = outcome(&mut avastra(&["diff", "--format", "json"]));
     let told: serde_json::Value = serde_json::from_str(stdout.trim_end()).expect("it is JSON");
     assert!(
-        status == 1 && stderr.is_empty() && told["error"].as_str().is_some_and(|why| why.contains("--row"))
+        status == 1 && stderr.is_empty() && told["error"].as_str().is_some_and(|why| why.contains("<OLD>"))
     );
 }
 

@@ -43,7 +43,7 @@ fn cut(directory: &Path) {
 #[test]
 fn an_estimate_depends_on_its_settings_alone() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
-    for (method, episodes, parts) in [("count", "20", "4"), ("split", "20", "4"), ("probe", "10", "3")] {
+    for (method, episodes, parts) in [("count", "20", "4"), ("probe", "10", "3")] {
         let directory = scratch.path().join(method);
         let out = directory.display().to_string();
         let (status, stdout, stderr) =
@@ -72,7 +72,7 @@ fn an_estimate_depends_on_its_settings_alone() {
         .collect();
     files.sort();
     assert!(!files.is_empty(), "a trial found something");
-    let verified = outcome(avastra(&["verify"]).args(files.iter().take(3)));
+    let verified = outcome(avastra(&["replay"]).args(files.iter().take(3)));
     assert_eq!(verified.0, 0, "{verified:?}");
     only_its_database_counts(scratch.path(), &files);
 }
@@ -152,8 +152,12 @@ fn an_estimate_stops_at_a_look_and_stays_stopped() {
 fn two_driving_systems_are_told_apart_in_the_same_episodes() {
     let compare = |sides: [&str; 2], jobs: &str| {
         let how = ["--traffic", "released", "--event", "collision", "--episodes", "40", "--road", "corner"];
-        let arguments =
-            [&["compare", SPACE][..], &sides, &how, &["--jobs", jobs, "--format", "json"]].concat();
+        let arguments = [
+            &["estimate", SPACE, "--ads", sides[0], "--than", sides[1]][..],
+            &how,
+            &["--jobs", jobs, "--format", "json"],
+        ]
+        .concat();
         let (status, stdout, stderr) = outcome(&mut avastra(&arguments));
         assert_eq!(status, 0, "{stderr}");
         result(&stdout)["results"].clone()
@@ -168,16 +172,13 @@ fn two_driving_systems_are_told_apart_in_the_same_episodes() {
 
 #[test]
 fn requests_that_cannot_be_met_are_refused() {
-    let cases: [(&[&str], &str); 9] = [
+    let cases: [(&[&str], &str); 6] = [
         (&["estimate", SPACE, "--parts", "1"], "from 2 to"),
-        (&["estimate", SPACE, "--method", "split", "--episodes", "3"], "at least 10"),
-        (&["estimate", SPACE, "--method", "split", "--ads-cmd", "true"], "--method count"),
-        (&["estimate", SPACE, "--method", "split", "--agent", "greedy"], "has looked at what comes after"),
-        (&["estimate", SPACE, "--method", "probe", "--ads-cmd", "true"], "--method count"),
+        (&["estimate", SPACE, "--method", "probe", "--ads", "true ."], "--method count"),
         (&["estimate", SPACE, "--method", "probe", "--agent", "greedy"], "no weight"),
         (&["estimate", SPACE, "--precision", "2"], "a share of the probability"),
         (&["estimate", SPACE, "--agent", "ddqn"], "has to be trained first"),
-        (&["compare", SPACE, "modular", "nobody"], "no driving system `nobody`"),
+        (&["estimate", SPACE, "--than", "nobody"], "no driving system `nobody`"),
     ];
     for (arguments, reason) in cases {
         let (status, _, stderr) = outcome(&mut avastra(arguments));

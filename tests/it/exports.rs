@@ -106,7 +106,6 @@ fn a_recording_is_complete_and_at_its_times() {
     assert!(of_ego(&[]).contains("ego_follows"));
     assert!(!of_ego(&["--ego", "none"]).contains("ego_follows"));
     assert!(of_ego(&["--ego", "controller"]).contains("<Controller name=\"ads\">"));
-    assert!(of_ego(&["--osc-version", "1.3"]).contains("revMinor=\"3\""));
 }
 
 /// A table calls a body of the author's own by its name, and says beside it which of the engine's it is like.
@@ -370,8 +369,6 @@ fn what_is_no_scenario_or_does_not_replay_is_refused() {
         let (status, _, stderr) = export(format, SCENARIO, scratch.path(), &[option, "controller"]);
         assert_eq!((status, stderr.contains("--ego")), (1, true), "{stderr}");
     }
-    let (status, _, stderr) = export("csv", SCENARIO, scratch.path(), &["--osc-version", "1.3"]);
-    assert_eq!((status, stderr.contains("--osc-version")), (1, true), "{stderr}");
     for option in [&["--natural"][..], &["--profile", "carla"]] {
         let (status, _, stderr) = export("csv", SCENARIO, scratch.path(), option);
         assert_eq!((status, stderr.contains(option[0])), (1, true), "{stderr}");

@@ -46,7 +46,7 @@ fn last_line(stdout: &str) -> Value {
 /// A run of some episodes on one road: its status, its result and what it wrote on standard error.
 fn run(config: &str, out: &Path, more: &[&str]) -> (i32, Value, String) {
     let out = out.display().to_string();
-    let begin = ["run", SPACE, "--road", "corner", "--ads-config", config, "--out", &out, "--format", "json"];
+    let begin = ["run", SPACE, "--road", "corner", "--ads", config, "--out", &out, "--format", "json"];
     let (status, stdout, stderr) = outcome(&mut avastra(&[&begin[..], more].concat()));
     (status, last_line(&stdout), stderr)
 }
@@ -97,7 +97,7 @@ fn every_misbehaviour_is_a_finding_and_leaves_nothing_behind() {
         if how == "crash-at-reset" {
             // A failure before the first step leaves a scenario, too, which passes once the crash is mended.
             let well = profile(&folder, &[], "1", "");
-            let (status, stdout, stderr) = outcome(&mut avastra(&["test", &scenario, "--ads-config", &well]));
+            let (status, stdout, stderr) = outcome(&mut avastra(&["test", &scenario, "--ads", &well]));
             assert!(status == 0 && stdout.contains("1 fixed"), "{stdout}{stderr}");
         }
     }
@@ -110,7 +110,7 @@ fn what_cannot_be_reached_any_more_is_given_up() {
     let once = format!("if [ -e {0} ]; then exit 9; fi; touch {0}", mark.display());
     let planner = script(scratch.path(), &once, "--misbehave crash-in-episode");
     let out = scratch.path().join("run").display().to_string();
-    let begin = ["run", SPACE, "--road", "corner", "--ads-cmd", &planner, "--out", &out];
+    let begin = ["run", SPACE, "--road", "corner", "--ads", &planner, "--out", &out];
     let more = ["--episodes", "8", "--jobs", "1", "--format", "json"];
     let (status, stdout, stderr) = outcome(&mut avastra(&[&begin[..], &more].concat()));
     let result = last_line(&stdout);
@@ -146,7 +146,7 @@ fn a_false_claim_to_be_deterministic_is_noticed() {
     let well = tempfile::tempdir().expect("a scratch directory");
     let well = profile(well.path(), &[], "1", "");
     for (program, is_said) in [(&config, true), (&well, false)] {
-        let (status, stdout, stderr) = outcome(&mut avastra(&["test", &failed, "--ads-config", program]));
+        let (status, stdout, stderr) = outcome(&mut avastra(&["test", &failed, "--ads", program]));
         assert_eq!(status, 0, "{stdout}{stderr}");
         assert_eq!(stderr.contains("says that it is deterministic and is not"), is_said, "{stderr}");
     }
@@ -166,7 +166,7 @@ fn a_training_and_a_study_say_that_the_driving_system_failed() {
         "corner",
         "--episodes",
         "2",
-        "--ads-config",
+        "--ads",
         &config,
         "--out",
         &out,
@@ -216,9 +216,9 @@ fn what_cannot_be_started_is_an_error_with_its_reason() {
         ("/no/such/program", "not_started"),
         ("tcp:127.0.0.1:1", "not_reached"),
         ("unix:/no/such/socket", "not_reached"),
-        ("'unclosed", "not closed"),
+        ("./planner 'unclosed", "not closed"),
     ] {
-        let all = ["run", SPACE, "--ads-cmd", command, "--episodes", "1"];
+        let all = ["run", SPACE, "--ads", command, "--episodes", "1"];
         let (status, _, stderr) = outcome(&mut avastra(&all));
         assert_eq!(status, 1, "{command}");
         assert!(stderr.contains(word), "{command}: {stderr}");
@@ -260,7 +260,7 @@ fn threads_and_processes_change_nothing_and_crashes_replay_with_and_without_the_
     let scenarios: Vec<String> = emitted(&one).into_keys().filter(|name| name.ends_with(".ava")).collect();
     assert!(!scenarios.is_empty(), "who drives on whatever is in the way collides");
     let path = one.join("critical").join(&scenarios[0]).display().to_string();
-    for more in [&[][..], &["--ads-config", &config]] {
+    for more in [&[][..], &["--ads", &config]] {
         let (status, stdout, stderr) = outcome(&mut avastra(&[&["replay", &path][..], more].concat()));
         assert_eq!(status, 0, "{more:?}: {stdout}{stderr}");
         assert!(stdout.contains("confirmed"), "{more:?}: {stdout}");
@@ -268,18 +268,18 @@ fn threads_and_processes_change_nothing_and_crashes_replay_with_and_without_the_
     // Who dies on the way has not been cured of the crash.
     let dies = tempfile::tempdir().expect("a scratch directory");
     let dies = profile(dies.path(), &["--misbehave", "crash-in-episode"], "1", "");
-    let (status, stdout, stderr) = outcome(&mut avastra(&["test", &path, "--ads-config", &dies]));
+    let (status, stdout, stderr) = outcome(&mut avastra(&["test", &path, "--ads", &dies]));
     assert!(status == 4 && stdout.contains("ads failed"), "{status}: {stdout}{stderr}");
-    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &path, "--ads-config", &dies]));
+    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &path, "--ads", &dies]));
     assert!(status == 5 && stdout.contains("it failed at step"), "{status}: {stdout}{stderr}");
     // It is made small with the program; what only the program can show is not tried without it.
     let small = scratch.path().join("small.ava").display().to_string();
     let (status, stdout, stderr) =
-        outcome(&mut avastra(&["shrink", &path, "--ads-config", &config, "--out", &small]));
+        outcome(&mut avastra(&["shrink", &path, "--ads", &config, "--out", &small]));
     assert_eq!(status, 0, "{stdout}{stderr}");
     let claims_minimal = std::fs::read_to_string(&small).unwrap().contains("expect minimal");
-    for (more, is_tried) in [(&[][..], false), (&["--ads-config", &config], true)] {
-        let (status, stdout, stderr) = outcome(&mut avastra(&[&["verify", &small][..], more].concat()));
+    for (more, is_tried) in [(&[][..], false), (&["--ads", &config], true)] {
+        let (status, stdout, stderr) = outcome(&mut avastra(&[&["replay", &small][..], more].concat()));
         assert_eq!(status, 0, "{more:?}: {stdout}{stderr}");
         assert_eq!(stdout.contains("not tried"), claims_minimal && !is_tried, "{more:?}: {stdout}");
     }
@@ -291,15 +291,16 @@ fn threads_and_processes_change_nothing_and_crashes_replay_with_and_without_the_
     assert!(status == 1 && stderr.contains("changed"), "{stderr}");
     std::fs::remove_file(&answers).unwrap();
     let (status, _, stderr) = outcome(&mut avastra(&["replay", &path]));
-    assert!(status == 1 && stderr.contains("--ads-cmd"), "{stderr}");
+    assert!(status == 1 && stderr.contains("--ads"), "{stderr}");
 }
 
 #[test]
 fn a_check_passes_for_every_kind_of_answer_and_finds_what_remembers() {
     let program = cargo_bin("avastra").display().to_string();
     let check = |toy: &[&str]| {
-        let begin = ["ads", "check", "--format", "json", "--road", "corner", "--", &program, "ads", "toy"];
-        let (status, stdout, stderr) = outcome(&mut avastra(&[&begin[..], toy].concat()));
+        let command = format!("'{program}' ads toy {}", toy.join(" "));
+        let all = ["ads", "check", "--format", "json", "--road", "corner", "--ads", &command];
+        let (status, stdout, stderr) = outcome(&mut avastra(&all));
         (status, last_line(&stdout), stderr)
     };
     for answer in ["control", "pedals", "trajectory", "acceleration"] {
@@ -332,7 +333,7 @@ fn a_missed_step_is_held_on_demand() {
     let config = profile(scratch.path(), &["--misbehave", "late"], "0.05", more);
     let out = scratch.path().join("run");
     let out = out.display().to_string();
-    let all = ["run", SPACE, "--road", "corner", "--ads-config", &config, "--out", &out, "--episodes", "1"];
+    let all = ["run", SPACE, "--road", "corner", "--ads", &config, "--out", &out, "--episodes", "1"];
     let (status, stdout, stderr) = outcome(&mut avastra(&all));
     assert!(status == 0 && !stdout.contains("failed"), "{stdout}{stderr}");
     assert!(stderr.contains("were not answered in time"), "{stderr}");
@@ -368,20 +369,8 @@ fn a_socket_is_as_good_as_a_pipe() {
     });
     let target = format!("unix:{}", socket.display());
     let out = scratch.path().join("run").display().to_string();
-    let all = [
-        "run",
-        SPACE,
-        "--road",
-        "corner",
-        "--ads-cmd",
-        &target,
-        "--episodes",
-        "2",
-        "--jobs",
-        "1",
-        "--out",
-        &out,
-    ];
+    let all =
+        ["run", SPACE, "--road", "corner", "--ads", &target, "--episodes", "2", "--jobs", "1", "--out", &out];
     let (status, stdout, stderr) = outcome(&mut avastra(&all));
     assert_eq!(status, 0, "{stdout}{stderr}");
     assert!(stderr.contains("cruise 1") || stdout.contains("cruise 1"), "{stdout}{stderr}");
@@ -444,7 +433,7 @@ fn what_was_begun_against_one_program_is_not_gone_on_with_against_another() {
     let (runs, train, cell) = (out("run"), out("train"), out("study"));
     let planner = scratch.path().join("planner").display().to_string();
     let begun = [
-        vec!["run", SPACE, "--road", "corner", "--episodes", "1", "--ads-config", &config, "--out", &runs],
+        vec!["run", SPACE, "--road", "corner", "--episodes", "1", "--ads", &config, "--out", &runs],
         vec![
             "train",
             SPACE,
@@ -454,12 +443,12 @@ fn what_was_begun_against_one_program_is_not_gone_on_with_against_another() {
             "corner",
             "--episodes",
             "1",
-            "--ads-config",
+            "--ads",
             &config,
             "--out",
             &train,
         ],
-        vec!["study", &file, "--ads-cmd", &planner, "--out", &cell],
+        vec!["study", &file, "--ads", &planner, "--out", &cell],
     ];
     for arguments in &begun {
         let (status, stdout, stderr) = outcome(&mut avastra(arguments));
@@ -499,21 +488,19 @@ fn a_failure_is_a_regression_test_until_it_is_gone() {
     let whole = out.display().to_string();
     for (what, more, wanted, word) in [
         (&file, &[][..], 4, "still fails"),
-        (&file, &["--ads-config", &dies], 4, "ads_crash again"),
-        (&file, &["--ads-config", &well], 0, "1 fixed"),
+        (&file, &["--ads", &dies], 4, "ads_crash again"),
+        (&file, &["--ads", &well], 0, "1 fixed"),
         (&file, &["--ads", "idm"], 0, "1 fixed"),
-        (&whole, &["--ads-config", &well], 0, "1 fixed"),
+        (&whole, &["--ads", &well], 0, "1 fixed"),
     ] {
         let (status, stdout, stderr) = outcome(&mut avastra(&[&["test", what][..], more].concat()));
         assert!(status == wanted && stdout.contains(word), "{more:?}: {status}: {stdout}{stderr}");
     }
-    // `verify` asks what it is given, and does not fall back to recorded answers.
-    let (status, stdout, _) = outcome(&mut avastra(&["verify", &file]));
-    assert_eq!(status, 0, "{stdout}");
+    // `replay` asks what it is given, and does not fall back to recorded answers.
     let other = tempfile::tempdir().expect("a scratch directory");
     let other = profile(other.path(), &["--as-version", "2"], "1", "");
-    let (status, _, stderr) = outcome(&mut avastra(&["verify", &file, "--ads-config", &other]));
-    assert!(status == 1 && stderr.contains("what happens with toy 1"), "{status}: {stderr}");
+    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &file, "--ads", &other]));
+    assert!(status == 0 && stdout.contains("against toy 2: "), "{status}: {stdout}{stderr}");
 }
 
 #[test]
@@ -527,8 +514,9 @@ fn what_is_not_deterministic_is_said_to_be_so_and_is_no_fault() {
     assert_eq!((status, &result["totals"]["failed"]), (0, &0.into()), "{stderr}\n{result}");
     assert_eq!(result["reproducible"], false, "{result}");
     let program = cargo_bin("avastra").display().to_string();
-    let check = [&["ads", "check", "--road", "corner", "--", &program, "ads", "toy"], &toy[..]].concat();
-    let (status, stdout, stderr) = outcome(&mut avastra(&check));
+    let command = format!("'{program}' ads toy {}", toy.join(" "));
+    let (status, stdout, stderr) =
+        outcome(&mut avastra(&["ads", "check", "--road", "corner", "--ads", &command]));
     assert!(status == 0 && stdout.contains("as it says it may"), "{stdout}{stderr}");
 }
 
@@ -537,7 +525,7 @@ fn a_dead_program_whose_child_holds_its_output_has_crashed() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let planner = script(scratch.path(), "sleep 97 &", "--misbehave crash-in-episode");
     let out = scratch.path().join("run").display().to_string();
-    let all = ["run", SPACE, "--road", "corner", "--episodes", "1", "--ads-cmd", &planner, "--out", &out];
+    let all = ["run", SPACE, "--road", "corner", "--episodes", "1", "--ads", &planner, "--out", &out];
     let (status, stdout, stderr) = outcome(&mut avastra(&all));
     assert_eq!(status, 5, "no episode was driven to its end: {stdout}{stderr}");
     assert!(stdout.contains("ads_crash (exited)") && stdout.contains("exit status 1"), "{stdout}{stderr}");
@@ -581,9 +569,7 @@ fn mistakes_in_a_profile_are_told_where_they_are() {
         ("ads:\n  command: a\n  speed: 1\n", "speed"),
     ] {
         std::fs::write(&file, text).unwrap();
-        for arguments in
-            [&["ads", "check", "--ads-config", &config][..], &["run", SPACE, "--ads-config", &config]]
-        {
+        for arguments in [&["ads", "check", "--ads", &config][..], &["run", SPACE, "--ads", &config]] {
             let (status, _, stderr) = outcome(&mut avastra(arguments));
             assert!(status == 1 && stderr.contains(word), "{text}: {status}: {stderr}");
         }
@@ -595,7 +581,7 @@ fn mistakes_in_a_profile_are_told_where_they_are() {
     std::fs::write(&file, study.to_string()).unwrap();
     let (status, _, stderr) = outcome(&mut avastra(&["study", &file.display().to_string()]));
     assert!(status == 1 && stderr.contains("`ads_config` of the study"), "{status}: {stderr}");
-    let causes = ["run", SPACE, "--causes", "--ads-config", &config];
+    let causes = ["run", SPACE, "--causes", "--ads", &config];
     let (status, _, stderr) = outcome(&mut avastra(&causes));
     assert!(status == 1 && stderr.contains("`toy 1` is not made of modules"), "{status}: {stderr}");
 }

@@ -12,19 +12,8 @@ fn found_scenarios_are_explained_shrunk_and_tested_again() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let path = |name: &str| scratch.path().join(name).display().to_string();
     let out = path("run");
-    let settings = [
-        "--road",
-        "corner",
-        "--episodes",
-        "20",
-        "--seed",
-        "5",
-        "--ads-config",
-        FLICKER,
-        "--causes",
-        "--out",
-        &out,
-    ];
+    let settings =
+        ["--road", "corner", "--episodes", "20", "--seed", "5", "--ads", FLICKER, "--causes", "--out", &out];
     let (status, stdout, stderr) =
         outcome(&mut avastra(&[&["run", "scenarios/avastra45.ava"], &settings[..]].concat()));
     assert_eq!(status, 0, "{stderr}");
@@ -50,7 +39,7 @@ fn found_scenarios_are_explained_shrunk_and_tested_again() {
     let (before, after) = claim.split_once("== ").expect("it is an equation");
     let (_, with) = after.split_once(" with").expect("it names the obstacle");
     std::fs::write(&lie, text.replace(&claim, &format!("{before}== control with{with}"))).expect("writable");
-    let (status, stdout, _) = outcome(&mut avastra(&["verify", &lie]));
+    let (status, stdout, _) = outcome(&mut avastra(&["replay", &lie]));
     assert!(status == 3 && stdout.contains("claimed cause [control]"), "{stdout}");
     std::fs::remove_file(&lie).expect("it is there");
 
@@ -101,7 +90,7 @@ fn found_scenarios_are_explained_shrunk_and_tested_again() {
     assert!(shrunk["actions"].as_u64() < shrunk["actions_before"].as_u64(), "{shrunk}");
     let claim = format!("{}\n  expect trace", claim.split(" with").next().expect("a first part"));
     std::fs::write(&lie, text.replace("  expect trace", &claim)).expect("it is writable");
-    let (status, stdout, _) = outcome(&mut avastra(&["verify", &lie]));
+    let (status, stdout, _) = outcome(&mut avastra(&["replay", &lie]));
     assert!(status == 3 && stdout.contains("claimed minimal") && stdout.contains("without step"), "{stdout}");
     std::fs::remove_file(&lie).expect("it is there");
     // A scenario that is minimal stays as it is, and several files are shrunk in one go.

@@ -220,7 +220,7 @@ const SIZES: [usize; 5] = [10, 100, 1_000, 10_000, 100_000];
 const SCALED_BYTES_MAX: usize = 4_000_000;
 
 /// The commands that are run on a text.
-const VERBS: [&str; 4] = ["check", "doc", "compile", "lsp"];
+const VERBS: [&str; 4] = ["check", "table", "compile", "lsp"];
 
 /// Every construct of the grammar and of maps ten, a hundred, … times, and then as often as chance says: which of them take
 /// over [`SOUND_CPU_S_MAX`], over a second where the text is wrong, or over 500 MB. Meant for an optimised build; each run of the program has a limit of time.
@@ -358,6 +358,9 @@ impl Scratch {
             }
             "diff" => {
                 command.arg(&path).arg(in_folder("other.ava"));
+            }
+            "table" => {
+                command.arg(&path).arg("--markdown");
             }
             _ => {
                 command.arg(&path);

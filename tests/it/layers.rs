@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::cases::root;
 
 /// From left to right, as in `src/lib.rs` and ARCHITECTURE.md.
-const ORDER: [&str; 28] = [
+const ORDER: [&str; 29] = [
     "units",
     "rng",
     "statistics",
@@ -33,6 +33,7 @@ const ORDER: [&str; 28] = [
     "export",
     "import",
     "report",
+    "editor",
     "cli",
 ];
 

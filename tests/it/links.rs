@@ -57,17 +57,20 @@ const ATTACKS: &[Attack] = &[
     // Links with the names that temporary files once had.
     linked(&[("x.ava.partial", "mine.txt")], &["fmt", "x.ava"], Done),
     linked(&[("run/report.html.partial", "mine.txt")], &["report", "run"], Done),
-    linked(&[("d.md.partial", "mine.txt")], &["doc", "SPACE", "-o", "d.md"], Done),
     linked(&[("r.svg.partial", "mine.txt")], &["render", "FOUND", "--at", "1", "-o", "r.svg"], Done),
     linked(&[("m.svg.partial", "mine.txt")], &["road", "SPACE", "--road", "corner", "--svg", "m.svg"], Done),
     linked(
         &[("w.safetensors.partial", "mine.txt")],
-        &["export-weights", "POLICY", "-o", "w.safetensors"],
+        &["policy", "weights", "POLICY", "-o", "w.safetensors"],
         Done,
     ),
     linked(&[("s.ava.partial", "mine.txt")], &["shrink", "FOUND", "-o", "s.ava"], Done),
     linked(&[("j.xml.partial", "mine.txt")], &["test", "run", "--junit", "j.xml"], Any),
-    linked(&[("out/corner_0000.ava.partial", "mine.txt")], &["pack", "FOUND", "--out", "out"], Done),
+    linked(
+        &[("out/corner_0000.ava.partial", "mine.txt")],
+        &["export", "--to", "ava", "FOUND", "--out", "out"],
+        Done,
+    ),
     linked(
         &[("run/run.db.partial", "mine.txt"), ("run/run.db.partial-journal", "mine.txt")],
         &["run", "--resume", "run"],
@@ -92,7 +95,7 @@ const ATTACKS: &[Attack] = &[
         &["compile", "SPACE"],
         Done,
     ),
-    linked(&[("out/corner_0000.ava", "nowhere")], &["pack", "FOUND", "--out", "out"], Done),
+    linked(&[("out/corner_0000.ava", "nowhere")], &["export", "--to", "ava", "FOUND", "--out", "out"], Done),
     linked(
         &[("run/critical/exported/corner_0000.csv", "mine.txt")],
         &["export", "--to", "csv", "FOUND"],
@@ -162,7 +165,7 @@ const ATTACKS: &[Attack] = &[
     linked(&[("run/critical", "folder")], &["test", "--accept", "run"], Refused(LINK)),
     linked(&[("run/shrunk", "folder")], &["shrink", "FOUND"], Refused(LINK)),
     linked(&[("run/critical/exported", "folder")], &["export", "--to", "csv", "FOUND"], Refused(LINK)),
-    linked(&[("out/space", "folder")], &["pack", "FOUND", "--out", "out"], Refused(LINK)),
+    linked(&[("out/space", "folder")], &["export", "--to", "ava", "FOUND", "--out", "out"], Refused(LINK)),
     linked(&[("build", "folder")], &["compile", "SPACE"], Refused(LINK)),
     linked(&[("fresh/roads", "folder")], &["new", "fresh"], Refused(LINK)),
     linked(&[("ed/syntaxes", "folder")], &["editor-files", "ed"], Refused(LINK)),
@@ -235,8 +238,8 @@ const ATTACKS: &[Attack] = &[
     },
     // Programs that files name: the fixture's leaves a file beside the clone when it is started.
     linked(&[], &["study", "theirs.yaml", "--dry-run"], Done),
-    linked(&[], &["run", "SPACE", "--ads-config", "profile.yaml", "--dry-run"], Done),
-    linked(&[], &["estimate", "SPACE", "--ads-config", "profile.yaml", "--dry-run"], Done),
+    linked(&[], &["run", "SPACE", "--ads", "profile.yaml", "--dry-run"], Done),
+    linked(&[], &["estimate", "SPACE", "--ads", "profile.yaml", "--dry-run"], Done),
     linked(&[], &["merge", "p1", "p2", "--out", "m"], Done),
     linked(&[], &["merge", "p1", "p2", "--missing"], Done),
     linked(&[], &["report", "p1"], Done),
@@ -334,15 +337,14 @@ fn make_home(home: &Path) {
         assert_eq!(status, 0, "{arguments:?}: {stderr}");
     };
     let corner = ["--road", "corner"];
-    let found =
-        ["--self-contained", "--episodes", "8", "--seed", "5", "--ads-config", &flicker, "--out", "run"];
+    let found = ["--self-contained", "--episodes", "8", "--seed", "5", "--ads", &flicker, "--out", "run"];
     played(&[&["run", &space][..], &corner, &found].concat());
     assert!(clone.join(FOUND).is_file(), "the run finds a crash: choose another seed");
     for (shard, parts, external) in [("1/2", "e1", "p1"), ("2/2", "e2", "p2")] {
         let shard = ["--shard", shard];
         let estimate = ["--ads", "cc", "--parts", "2", "--episodes", "1", "--out", parts];
         played(&[&["estimate", &space][..], &corner, &shard, &estimate].concat());
-        let run = ["--ads-config", "profile.yaml", "--episodes", "2", "--out", external];
+        let run = ["--ads", "profile.yaml", "--episodes", "2", "--out", external];
         played(&[&["run", &space][..], &corner, &shard, &run].concat());
     }
     let train = ["--agent", "av-fuzzer", "--ads", "cc", "--episodes", "1", "--out", "searched"];
@@ -510,7 +512,7 @@ fn nothing_that_a_file_or_a_program_brings_acts_on_the_terminal() {
     std::fs::write(&named, "language 1\nlet a = \u{1b}]0;title\u{7} 3 m + 1 s // \u{9b}31m\n")
         .expect("it is writable");
     let named = named.display().to_string();
-    let shouting = ["ads", "check", "--", "sh", "-c", r"printf '\033[2Jgone\n' >&2; exit 3"];
+    let shouting = ["ads", "check", "--ads", r#"sh -c "printf '\033[2Jgone\n' >&2; exit 3""#];
     let commands: [&[&str]; 5] = [
         &["check", &named],
         &["check", &named, "--format", "plain"],

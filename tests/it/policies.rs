@@ -79,9 +79,11 @@ fn sealed(text: &str) -> String {
 #[test]
 fn both_faces_are_played_and_what_they_claim_is_checked() {
     let file = trained().display().to_string();
-    let (status, stdout, stderr) = outcome(&mut avastra(&["verify", &file]));
+    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &file]));
     assert_eq!(status, 0, "{stderr}");
     assert!(stdout.contains("played again by each of its faces"), "{stdout}");
+    let (status, _, stderr) = outcome(&mut avastra(&["replay", &file, "--ads", "idm"]));
+    assert!(status == 1 && stderr.contains("that it was trained against"), "{stderr}");
 
     let traces = ["network", "rules"].map(|face| {
         let out = trained().with_file_name(format!("played_{face}"));
@@ -102,7 +104,7 @@ fn both_faces_are_played_and_what_they_claim_is_checked() {
     let fidelity = text.find("fidelity: ").expect("it is claimed") + 10;
     let end = fidelity + text[fidelity..].find('\n').expect("the line ends");
     let lie = beside("lie.ava", sealed(&format!("{}0.9999{}", &text[..fidelity], &text[end..])).as_bytes());
-    let (status, stdout, _) = outcome(&mut avastra(&["verify", &lie]));
+    let (status, stdout, _) = outcome(&mut avastra(&["replay", &lie]));
     assert_eq!(status, 3, "{stdout}");
     assert!(stdout.contains("rules: fidelity: claimed 0.9999, found "), "{stdout}");
 }
@@ -111,14 +113,16 @@ fn both_faces_are_played_and_what_they_claim_is_checked() {
 fn rules_are_distilled_anew_and_hold() {
     let file = trained().display().to_string();
     let fewer = trained().with_file_name("fewer.ava").display().to_string();
-    avastra(&["distill", &file, "--leaves", "2", "--episodes", "2", "--out", &fewer]).assert().success();
+    avastra(&["policy", "distil", &file, "--leaves", "2", "--episodes", "2", "--out", &fewer])
+        .assert()
+        .success();
     let policy = load(&moved(&std::fs::read_to_string(&fewer).expect("it is written"))).expect("it is sound");
     assert!((1..=2).contains(&policy.rules.len()));
     assert!(
         policy.rules.last().is_some_and(|rule| rule.conditions.is_empty()),
         "the last line takes the rest"
     );
-    avastra(&["verify", &fewer]).assert().success();
+    avastra(&["replay", &fewer]).assert().success();
     let (first, second) = (load(&moved(&trained_text())).expect("sound"), policy);
     assert_eq!(first.parameters, second.parameters, "the network stays as it is");
 }
@@ -150,7 +154,7 @@ fn a_flipped_bit_anywhere_in_a_small_policy_is_noticed() {
     assert_eq!(noticed + not_text, 8 * sound.len());
     let mut bytes = sound.into_bytes();
     bytes[40] ^= 0x80;
-    let (status, _, stderr) = outcome(&mut avastra(&["verify", &beside("not_text.ava", &bytes)]));
+    let (status, _, stderr) = outcome(&mut avastra(&["replay", &beside("not_text.ava", &bytes)]));
     assert_eq!(status, 1);
     assert!(stderr.contains("not text: byte 40 is not UTF-8"), "{stderr}");
 }
@@ -159,7 +163,7 @@ fn a_flipped_bit_anywhere_in_a_small_policy_is_noticed() {
 fn weights_come_back_from_safetensors_bit_by_bit() {
     let file = trained().display().to_string();
     let out = trained().with_extension("safetensors");
-    avastra(&["export-weights", &file]).assert().success();
+    avastra(&["policy", "weights", &file]).assert().success();
     let bytes = std::fs::read(&out).expect("it is written");
     let tensors = SafeTensors::deserialize(&bytes).expect("it is safetensors");
     let policy = load(&moved(&trained_text())).expect("it is sound");
@@ -186,7 +190,7 @@ fn weights_come_back_from_safetensors_bit_by_bit() {
 #[test]
 fn a_policy_is_explained() {
     let file = trained().display().to_string();
-    let words = ["explain-policy", &file, "--episodes", "3", "--repeats", "3"];
+    let words = ["policy", "explain", &file, "--episodes", "3", "--repeats", "3"];
     let (status, stdout, stderr) = outcome(&mut avastra(&[&words[..], &["--format", "json"]].concat()));
     assert_eq!(status, 0, "{stderr}");
     let result: serde_json::Value =

@@ -172,7 +172,7 @@ fn a_page_holds_everything_and_repeats_itself() {
 #[test]
 fn the_picture_of_the_readme_is_of_its_scenario() {
     let found = "scenarios/found/boulevard_0383";
-    let (status, _, stderr) = outcome(&mut avastra(&["verify", &format!("{found}.ava")]));
+    let (status, _, stderr) = outcome(&mut avastra(&["replay", &format!("{found}.ava")]));
     assert_eq!(status, 0, "{stderr}");
     let (status, drawn, stderr) =
         outcome(&mut avastra(&["render", &format!("{found}.ava"), "--strip", "--out", "-"]));
@@ -264,7 +264,7 @@ fn a_comparison_says_what_becomes_of_each_crash() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let file = written(scratch.path(), "walk.ava", "");
     let change = |other: &str| {
-        let (status, stderr, index) = reported(scratch.path(), &[&file, "--compare", other]);
+        let (status, stderr, index) = reported(scratch.path(), &[&file, "--ads", other]);
         assert_eq!(status, 0, "{stderr}");
         index["scenarios"][0]["change"]["kind"].as_str().expect("it is compared").to_owned()
     };

@@ -33,7 +33,7 @@ fn a_map_in_json_holds_every_lane_with_its_poses() {
     let (status, stdout, _) = road(&[CORNER, "--format", "json"]);
     assert_eq!(status, 0);
     let map: Value = serde_json::from_str(stdout.lines().last().expect("one line")).expect("it is JSON");
-    assert_eq!((map["schema"].as_u64(), map["command"].as_str()), (Some(2), Some("road")));
+    assert_eq!((map["schema"].as_u64(), map["command"].as_str()), (Some(3), Some("road")));
     let lanes = map["lanes"].as_array().expect("lanes");
     assert_eq!(lanes.len(), 39);
     for lane in lanes {

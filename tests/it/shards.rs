@@ -111,14 +111,13 @@ fn merged(command: &[&str], kind: &str, order: &[u32]) -> tempfile::TempDir {
 
 #[test]
 fn eight_shards_of_a_run_make_the_run() {
-    let command =
-        ["run", SPACE, "--road", "corner", "--episodes", "21", "--seed", "5", "--ads-config", FLICKER];
+    let command = ["run", SPACE, "--road", "corner", "--episodes", "21", "--seed", "5", "--ads", FLICKER];
     let scratch = merged(&command, "run", &[3, 8, 1, 6, 2, 5, 7, 4]);
     let critical = scratch.path().join("merged/critical");
     let scenarios: Vec<PathBuf> =
         std::fs::read_dir(critical).expect("it is there").flatten().map(|entry| entry.path()).collect();
     assert!(!scenarios.is_empty(), "without a scenario this says little");
-    scenarios.iter().for_each(|file| drop(done(&["verify", text(file)])));
+    scenarios.iter().for_each(|file| drop(done(&["replay", text(file)])));
 
     // Copied to another depth, they are what they were; a torn one is to be played again.
     for (name, bytes) in files(&scratch.path().join("shards")) {
@@ -156,7 +155,7 @@ fn eight_shards_of_a_run_make_the_run() {
     };
     // Another seed, another version, another world, another cut, another kind.
     let other = scratch.path().join("other");
-    done(&[&command[..7], &["6", "--shard", "2/8", "--ads-config", FLICKER, "--out", text(&other)]].concat());
+    done(&[&command[..7], &["6", "--shard", "2/8", "--ads", FLICKER, "--out", text(&other)]].concat());
     let told = merge(&other);
     assert!(told.contains("is no shard of the run in") && told.contains("`seed` was 5"), "{told}");
     let edited = scratch.path().join("shards/2/run.yaml");

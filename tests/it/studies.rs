@@ -190,7 +190,8 @@ fn kept_and_written_again(scratch: &Path, played: &Path) {
 
     let out = scratch.join("RESULTS.md").display().to_string();
     let write = |more: &[&str]| {
-        let mut command = avastra(&[&["results", "scenarios/studies", "--out", &out], more].concat());
+        let mut command =
+            avastra(&[&["study", "results", "scenarios/studies", "--out", &out], more].concat());
         let (status, _, stderr) = outcome(command.current_dir(scratch));
         assert_eq!(status, 0, "{stderr}");
         std::fs::read_to_string(&out).expect("it was written")
@@ -211,7 +212,7 @@ fn kept_and_written_again(scratch: &Path, played: &Path) {
     assert_eq!(sealed(lines), text);
     let refused = |text: &str, reason: &str| {
         std::fs::write(&kept, text).expect("it is writable");
-        let mut command = avastra(&["results", "scenarios/studies", "--out", &out, "--add"]);
+        let mut command = avastra(&["study", "results", "scenarios/studies", "--out", &out, "--add"]);
         let (status, _, stderr) = outcome(command.arg(played).current_dir(scratch));
         assert!(status == 1 && stderr.contains(reason), "{stderr}");
         assert_eq!(std::fs::read_to_string(&kept).expect("it is readable"), text, "it is left as it was");
@@ -238,7 +239,8 @@ fn kept_and_written_again(scratch: &Path, played: &Path) {
     std::fs::write(&kept, text).expect("it is writable");
 
     std::fs::write(&file, format!("{study}{}", published.replace("tiny", "tinny"))).expect("it is writable");
-    let refused = outcome(avastra(&["results", "scenarios/studies", "--out", &out]).current_dir(scratch));
+    let refused =
+        outcome(avastra(&["study", "results", "scenarios/studies", "--out", &out]).current_dir(scratch));
     assert!(refused.0 == 1 && refused.2.contains("names the agent `tinny`"), "{}", refused.2);
 }
 
@@ -285,7 +287,7 @@ fn cells_are_runs(whole: &Value) {
         let out = scratch.path().join(number.to_string()).display().to_string();
         let run =
             ["run", "scenarios/avastra45.ava", "--road", "corner", "--episodes", "3", "--format", "json"];
-        let run = [&run[..], &["--ads-config", FLICKER]].concat();
+        let run = [&run[..], &["--ads", FLICKER]].concat();
         let seed = seed.as_str().expect("a text");
         let (status, stdout, stderr) =
             outcome(&mut avastra(&[&run[..], &["--seed", seed, "--out", &out]].concat()));
@@ -304,7 +306,7 @@ fn a_quick_study_says_that_it_is_none() {
     let (status, stdout, stderr) = outcome(&mut avastra(&study));
     assert_eq!(status, 0, "{stderr}");
     let line = stdout.lines().last().expect("a result");
-    assert!(line.starts_with("{\"schema\":2,\"command\":\"study\""), "{line}");
+    assert!(line.starts_with("{\"schema\":3,\"command\":\"study\""), "{line}");
     let result: Value = serde_json::from_str(line).expect("JSON");
     let results = &result["results"];
     assert_eq!((&results["quick"], &results["cells"]), (&true.into(), &8.into()));
@@ -371,11 +373,11 @@ fn what_no_study_can_be_is_said_so() {
 fn the_results_are_what_the_kept_studies_say() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let out = scratch.path().join("RESULTS.md");
-    let written = ["results", "scenarios/studies", "--out", &out.display().to_string()];
+    let written = ["study", "results", "scenarios/studies", "--out", &out.display().to_string()];
     let (status, _, stderr) = outcome(avastra(&written).current_dir(root()));
     assert_eq!(status, 0, "{stderr}");
     let read = |path: &Path| std::fs::read_to_string(path).expect("it is readable");
-    assert!(read(&out) == read(&root().join("RESULTS.md")), "write it again with `avastra results`");
+    assert!(read(&out) == read(&root().join("RESULTS.md")), "write it again with `avastra study results`");
 }
 
 #[test]
@@ -429,5 +431,5 @@ fn a_database_of_another_kind_is_refused_by_its_layout() {
     let path = scratch.path().join("run.db");
     Database::open(&path, "").expect("it is new");
     let refused = StudyDatabase::open(&path, "").err().expect("it is not a study's").to_string();
-    assert!(refused.ends_with("this version of avastra reads 1005"), "{refused}");
+    assert!(refused.ends_with("this version of avastra reads 1005: begin a new one"), "{refused}");
 }

@@ -27,7 +27,7 @@ impl Found {
         let mut found = Found { scratch, scenarios: 0 };
         let (file, run) = (found.path("space/avastra45.ava"), found.path("run"));
         let settings =
-            ["--road", "corner", "--episodes", "12", "--seed", "5", "--ads-config", FLICKER, "--out", &run];
+            ["--road", "corner", "--episodes", "12", "--seed", "5", "--ads", FLICKER, "--out", &run];
         let (status, _, stderr) = outcome(&mut avastra(&[&["run", &file], &settings[..], flags].concat()));
         assert_eq!(status, 0, "{stderr}");
         found.scenarios = found.files("run/critical").len();
@@ -147,8 +147,8 @@ fn findings_can_always_be_looked_at() {
     let moved = text.replace(line, &format!("use \"../space/avastra45.ava\" digest{digest}"));
     let in_copy = found.path("run/critical/in_the_copy.ava");
     std::fs::write(&in_copy, moved).expect("it is writable");
-    let (status, stdout, stderr) = outcome(&mut avastra(&["verify", &in_copy]));
-    assert_eq!(status, 0, "{stdout}{stderr}");
+    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &in_copy]));
+    assert!(status == 0 && !stderr.contains("odds `Side`"), "{stdout}{stderr}");
     std::fs::remove_file(&in_copy).expect("it is there");
     std::fs::rename(found.path("run/space"), found.path("away")).expect("the run keeps a copy");
     told(&[0], "odds `Side`; it still plays as it was recorded, to the bit");
@@ -261,7 +261,7 @@ fn a_review_says_what_differs_in_meaning() {
         assert_eq!((*then == now, now.contains("ads: \"reactive\"")), (is_kept, !is_kept), "{now}{stderr}");
         if !is_kept {
             assert!(!now.contains("profile"), "{now}");
-            let (status, stdout, stderr) = outcome(&mut avastra(&["verify", &file]));
+            let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &file]));
             assert_eq!(status, 0, "{stdout}{stderr}");
         }
     }
@@ -302,7 +302,7 @@ fn a_review_tells_what_is_gone() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let run = scratch.path().join("run").display().to_string();
     let fault = "scenarios/ads/faults/planning_never_yields.yaml";
-    let place = ["--road", "residential", "--episodes", "9", "--seed", "1", "--ads-config", fault];
+    let place = ["--road", "residential", "--episodes", "9", "--seed", "1", "--ads", fault];
     let space = "scenarios/avastra45.ava";
     avastra(&[&["run", space, "--out", &run][..], &place].concat()).assert().success();
     let review = ["test", "--format", "json", "--accept", "--ads", "idm", &run];
@@ -345,7 +345,7 @@ fn a_suite_is_judged_by_the_verdict_of_its_space() {
         format!("language 1\nuse \"{}\"\noverride verdict counted: collision and struck\n", used.display());
     std::fs::write(&space, text).expect("it is writable");
     let settings = ["--road", "crossroad", "--episodes", "40", "--seed", "5", "--traffic", "released"];
-    let begin = ["run", &space, "--ads-config", profile, "--out", &run];
+    let begin = ["run", &space, "--ads", profile, "--out", &run];
     avastra(&[&begin[..], &settings[..]].concat()).assert().success();
     let test = |more: &[&str]| {
         let (status, stdout, stderr) = outcome(&mut avastra(&[&["test", &run][..], more].concat()));
@@ -360,7 +360,7 @@ fn a_suite_is_judged_by_the_verdict_of_its_space() {
     );
     assert_eq!(test(&["--jobs", "3"]), told);
     // The same profile by its file: now each is played a second time.
-    assert_eq!(test(&["--ads-config", profile]), told);
+    assert_eq!(test(&["--ads", profile]), told);
 }
 
 #[test]
@@ -385,7 +385,7 @@ fn packed_scenarios_are_a_folder_that_moves() {
     // Twice: what is there with the same content is no obstacle.
     for _ in 0..2 {
         let (status, _, stderr) =
-            outcome(&mut avastra(&[&["pack"], &files[..], &["--out", &suite]].concat()));
+            outcome(&mut avastra(&[&["export", "--to", "ava"], &files[..], &["--out", &suite]].concat()));
         assert_eq!(status, 0, "{stderr}");
     }
     std::fs::remove_dir_all(found.scratch.path().join("space")).expect("it is there");
@@ -430,7 +430,14 @@ fn what_is_packed_keeps_away_from_what_is_there() {
     }
     let pack = |name: &str| {
         let file = path(name).join(format!("{name}.ava")).display().to_string();
-        outcome(&mut avastra(&["pack", &file, "--out", &path("packed").display().to_string()]))
+        outcome(&mut avastra(&[
+            "export",
+            "--to",
+            "ava",
+            &file,
+            "--out",
+            &path("packed").display().to_string(),
+        ]))
     };
     let (status, _, stderr) = pack("one");
     assert_eq!(status, 0, "{stderr}");
@@ -447,9 +454,10 @@ fn what_is_packed_keeps_away_from_what_is_there() {
     // What fails leaves nothing behind, and a file that is named twice is one.
     let [one, two] = ["one/one.ava", "two/two.ava"].map(|name| path(name).display().to_string());
     let out = path("both/deep").display().to_string();
-    let (status, _, stderr) = outcome(&mut avastra(&["pack", &one, &two, "--out", &out]));
+    let (status, _, stderr) = outcome(&mut avastra(&["export", "--to", "ava", &one, &two, "--out", &out]));
     assert!(status == 1 && !path("both").exists(), "{stderr}");
-    let (status, stdout, stderr) = outcome(&mut avastra(&["pack", &one, &one, "--out", &out]));
+    let (status, stdout, stderr) =
+        outcome(&mut avastra(&["export", "--to", "ava", &one, &one, "--out", &out]));
     assert!(status == 0 && stdout.contains("1 file with all that they use"), "{stdout}{stderr}");
 }
 

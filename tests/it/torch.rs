@@ -1,7 +1,7 @@
 //! Writes updates of the learner on made-up transitions. `tests/interop/torch.sh` lets PyTorch compute them
 //! again.
 
-use avastra::agent::{Adam, Hyperparameters, Kind, Network, Shape, Transition};
+use avastra::agent::{Adam, Network, Settings, Shape, Transition};
 use avastra::rng::Stream;
 use avastra::{agent, rng};
 use serde_json::json;
@@ -29,15 +29,16 @@ fn torch_reference() {
 }
 
 fn case(preset: &str, text: &str) -> serde_json::Value {
-    let Kind::Learning(presets) = agent::by_name("ddqn").expect("it is registered").kind else {
-        panic!("it learns")
-    };
-    let settings = Hyperparameters::from_yaml(presets, Some(preset), text).expect("the settings are sound");
-    let layers = [INPUTS].into_iter().chain(settings.hidden_units.clone()).chain([ROWS]).collect();
-    let shape = Shape { layers, dueling: settings.dueling };
+    let entry = agent::by_name("ddqn").expect("it is registered");
+    let read = Settings::from_yaml(entry, Some(preset), text).expect("it is trained");
+    let read = read.expect("the settings are sound");
+    let settings = read.learner().expect("it learns");
+    let network = &settings.network;
+    let layers = [INPUTS].into_iter().chain(network.hidden_units.clone()).chain([ROWS]).collect();
+    let shape = Shape { layers, dueling: network.dueling };
     let mut rng = rng::stream(7, Stream::Initialization, 0);
-    let mut online = Network::new(shape.clone(), settings.initialization, &mut rng);
-    let mut adam = Adam::new(online.parameters().len());
+    let mut online = Network::new(shape.clone(), network.initialization, &mut rng);
+    let mut adam = Adam::new(online.parameters().len(), settings.learning_rate);
     let mut target = online.clone();
     let first = online.parameters().to_vec();
     let transitions: Vec<Transition> = (0..TRANSITIONS).map(|_| transition(&mut rng)).collect();
@@ -47,7 +48,7 @@ fn case(preset: &str, text: &str) -> serde_json::Value {
         let chosen = (0..settings.batch_len).map(|at| (update * 37 + at * 11) % TRANSITIONS);
         let batch: Vec<&Transition> = chosen.map(|index| &transitions[index]).collect();
         let weights: Vec<f32> = (0..settings.batch_len).map(|at| 1.0 / (1.0 + (at % 4) as f32)).collect();
-        let (loss, _) = agent::improve(&mut online, &target, &mut adam, &settings, &batch, &weights);
+        let (loss, _) = agent::improve(&mut online, &target, &mut adam, settings, &batch, &weights);
         losses.push(loss);
         if (update + 1) % TARGET_PERIOD == 0 {
             target.copy_from(&online);

@@ -27,7 +27,7 @@ fn a_run_under_released_traffic_is_recorded_and_its_scenarios_replay() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let directory = scratch.path().join("released");
     let (status, _, stderr) =
-        run(&directory, &["--episodes", "20", "--traffic", "released", "--ads-config", FLICKER]);
+        run(&directory, &["--episodes", "20", "--traffic", "released", "--ads", FLICKER]);
     assert_eq!(status, 0, "{stderr}");
     let released = TrafficProfile::shipped("released").expect("it is sound");
     let record = settings(&directory).1.traffic.expect("it is not the default");
@@ -50,7 +50,7 @@ fn a_run_under_released_traffic_is_recorded_and_its_scenarios_replay() {
     let careful = TrafficProfile::default();
     let other = file.with_file_name("other.ava");
     std::fs::write(&other, text.replace(&released.digest(), &careful.digest())).expect("it is writable");
-    let (status, _, stderr) = outcome(&mut avastra(&["verify", &other.display().to_string()]));
+    let (status, _, stderr) = outcome(&mut avastra(&["shrink", &other.display().to_string()]));
     assert!(status == 1 && stderr.contains("traffic profile"), "{status} {stderr}");
 }
 

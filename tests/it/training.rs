@@ -92,7 +92,7 @@ fn a_killed_training_resumes_to_the_same_bytes() {
 #[test]
 #[ignore = "takes minutes"]
 fn twenty_kills_change_nothing() {
-    for agent in ["ddqn", "constant", "bandit", "go-explore", "av-fuzzer", "map-elites"] {
+    for agent in ["ddqn", "constant", "bandit", "av-fuzzer", "map-elites"] {
         let scratch = tempfile::tempdir().expect("a scratch directory");
         let begun = |name: &str| {
             let out = scratch.path().join(name);
@@ -142,7 +142,7 @@ fn scenarios_of_a_training_that_are_gone_or_edited_are_noticed() {
     let out = scratch.path().join("training");
     let at = out.display().to_string();
     let train = ["train", "scenarios/avastra45.ava", "--road", "corner", "--agent", "constant"];
-    let how = ["--seed", "5", "--episodes", "12", "--ads-config", FLICKER, "--out", &at];
+    let how = ["--seed", "5", "--episodes", "12", "--ads", FLICKER, "--out", &at];
     let (status, _, stderr) = outcome(&mut avastra(&[&train[..], &how].concat()));
     assert_eq!(status, 0, "{stderr}");
     let critical = std::fs::read_dir(out.join("critical")).expect("it is there").flatten();
@@ -183,7 +183,7 @@ fn a_policy_is_verified_played_and_refused_when_damaged() {
     let out = scratch.path().join("run");
     let text = trained(&out);
     let file = out.join("policy/corner_ddqn_5.ava").display().to_string();
-    avastra(&["verify", &file]).assert().success();
+    avastra(&["replay", &file]).assert().success();
     avastra(&[
         "run",
         "--policy",
@@ -249,12 +249,12 @@ fn what_cannot_be_trained_is_said_so() {
     let space = "scenarios/avastra45.ava";
     let cases: [(&[&str], &str); 10] = [
         (&["train", space, "--agent", "greedy"], "nothing to learn"),
-        (&["train", space, "--agent", "go-explore", "--preset", "paper"], "`go-explore` has none"),
+        (&["train", space, "--agent", "bandit", "--preset", "paper"], "`bandit` has none"),
         (&["run", space, "--agent", "av-fuzzer"], "has to be trained first"),
         (&["train", space, "--agent", "random"], "nothing to learn"),
         (
             &["train", space, "--agent", "dqn"],
-            "`ddqn`, `deep_collision`, `av-fuzzer`, `map-elites`, `constant`, `bandit` and `go-explore`",
+            "`ddqn`, `deep_collision`, `av-fuzzer`, `map-elites`, `constant` and `bandit`",
         ),
         (&["train", space, "--preset", "realesed"], "`avastra`, `paper` and `released`"),
         (&["train", space, "--config", &config], "did you mean `discount`?"),

@@ -362,7 +362,7 @@ fn a_moment_that_does_not_come_is_said() {
     let text = text.replace("../../../scenarios/avastra45.ava", &space.display().to_string());
     let file = folder.path().join("late.ava");
     std::fs::write(&file, text).expect("it can be written");
-    let (status, stdout, _) = outcome(&mut avastra(&["verify", &file.display().to_string()]));
+    let (status, stdout, _) = outcome(&mut avastra(&["replay", &file.display().to_string()]));
     let reason = "`once ego.junction_ahead <= 30 m and npc#7.gap < 5 m` did not come within the step";
     assert!(status != 0 && stdout.contains(reason), "{stdout}");
 }
@@ -371,7 +371,7 @@ fn a_moment_that_does_not_come_is_said() {
 fn what_the_world_refuses_is_said_with_its_speed() {
     let space = "tests/cases/wishes/only_while_driving.ava";
     let reason = "rule `only_while_driving` says no: ego.speed = 3 m/s, wanted >= 8 m/s";
-    let (_, stdout, _) = outcome(&mut avastra(&["why", space, "--row", "13"]));
+    let (_, stdout, _) = outcome(&mut avastra(&["table", space, "--row", "13"]));
     assert!(stdout.contains(reason), "{stdout}");
     let scenario = "tests/cases/diagnostics/ego_speed_is_left_to_the_replay.ava";
     let (status, stdout, _) = outcome(&mut avastra(&["replay", scenario]));
@@ -381,7 +381,7 @@ fn what_the_world_refuses_is_said_with_its_speed() {
 #[test]
 fn a_scenario_by_hand_holds_what_it_claims() {
     let path = root().join("tests/cases/wishes/by_hand.ava").display().to_string();
-    let (status, stdout, stderr) = outcome(&mut avastra(&["verify", &path]));
+    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &path]));
     assert_eq!(status, 0, "{stdout}{stderr}");
 }
 
@@ -428,6 +428,6 @@ rule own_lane on ahead: speed <= npc.limit
     let (status, stdout, stderr) = outcome(&mut avastra(&["road", &file]));
     assert_eq!(status, 0, "{stderr}");
     assert!(stdout.contains("road.limit is 33 km/h: lane 803/-1 from"), "{stdout}");
-    let (_, stdout, _) = outcome(&mut avastra(&["why", &file, "--row", "0"]));
+    let (_, stdout, _) = outcome(&mut avastra(&["table", &file, "--row", "0"]));
     assert!(stdout.contains("legal, for example ahead() with { speed: 10"), "{stdout}");
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use avastra::agent::{Features, Hyperparameters, Kind, Settings, by_name};
+use avastra::agent::{Features, LearnerSettings, Settings, by_name};
 use avastra::cli::embedded::{Conditions, run};
 use avastra::episode::{Collision, EpisodeLog, Outcome};
 use avastra::mdp::{Observation, RewardSettings};
@@ -109,14 +109,14 @@ impl Episodes {
         let preset = preset();
         let features = match observation {
             "raw" => None,
-            "scaled" => Some(Arc::new(Features::new(preset.state, preset.encoding))),
+            "scaled" => Some(Arc::new(Features::new(preset.choice.state, preset.choice.encoding))),
             other => {
                 return Err(PyValueError::new_err(format!("no observation `{other}`: `raw` or `scaled`")));
             }
         };
         let reward = match reward {
             "space" => None,
-            "judged" => Some(preset.reward_settings()),
+            "judged" => Some(preset.payment.constants()),
             other => return Err(PyValueError::new_err(format!("no reward `{other}`: `space` or `judged`"))),
         };
         let conditions = Conditions {
@@ -338,9 +338,8 @@ impl View {
 }
 
 /// The settings that `avastra train` has by default.
-fn preset() -> Hyperparameters {
-    let entry = by_name("ddqn").filter(|entry| matches!(entry.kind, Kind::Learning(_)));
-    match entry.and_then(|entry| Settings::from_yaml(entry, None, "")) {
+fn preset() -> LearnerSettings {
+    match by_name("ddqn").and_then(|entry| Settings::from_yaml(entry, None, "")) {
         Some(Ok(Settings::Learning(settings))) => *settings,
         _ => unreachable!("ddqn learns, and its preset is sound"),
     }

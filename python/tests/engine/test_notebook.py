@@ -36,7 +36,7 @@ class Runs(unittest.TestCase):
         cls.folder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(cls.folder.cleanup)
         cls.out = Path(cls.folder.name) / "run"
-        asked = ["run", SPACE, "--road", "crossroad", "--episodes", "40", "--ads-config", FAULT, "--out", cls.out, "--quiet"]
+        asked = ["run", SPACE, "--road", "crossroad", "--episodes", "40", "--ads", FAULT, "--out", cls.out, "--quiet"]
         subprocess.run([PROGRAM, *map(str, asked)], check=True, stdout=subprocess.DEVNULL)
 
     def test_frames_have_what_the_database_has(self):

@@ -46,7 +46,6 @@ pub struct External {
     answered_tick: u64,
     touched: bool,
     failure: Option<Arc<Failure>>,
-    steer_rad: f64,
     status: Status,
 }
 
@@ -74,7 +73,6 @@ impl Clone for External {
             answered_tick: self.answered_tick,
             touched: self.touched,
             failure: self.failure.clone(),
-            steer_rad: self.steer_rad,
             status: self.status.clone(),
         }
     }
@@ -98,7 +96,6 @@ impl External {
             answered_tick: 0,
             touched: false,
             failure: None,
-            steer_rad: 0.0,
             status: Status::default(),
         }
     }
@@ -310,18 +307,12 @@ impl Ads for External {
         let (period, _) = self.program.settings().ticks();
         let is_asked = tick.is_multiple_of(period) && self.asked_tick != Some(tick);
         if is_asked {
-            if self.asked_tick.is_none() {
-                self.steer_rad = sensed.ego.steer_rad;
-            }
             self.asked_tick = Some(tick);
             self.ask(sensed, tick, route_m);
         }
         self.note(sensed, &pose, is_asked);
         let control = self.control(sensed, tick, &pose);
-        self.status.control = control;
-        self.status.steer_rate_radps = (sensed.ego.steer_rad - self.steer_rad) / DT_S;
-        self.steer_rad = sensed.ego.steer_rad;
-        control
+        self.follower.helm.command(control, &sensed.ego, &mut self.status)
     }
 
     fn status(&self) -> &Status {

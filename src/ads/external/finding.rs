@@ -175,9 +175,7 @@ impl Problem {
             Problem::OtherAnswer => {
                 "forget everything at `reset`, seed all that is random from it, and use no clock"
             }
-            Problem::NoProcess => {
-                "answers are recorded for one way only: give the program with `--ads-cmd` or `--ads-config`"
-            }
+            Problem::NoProcess => "answers are recorded for one way only: give the program with `--ads`",
             Problem::GivenUp => "see that the program runs and answers `init`, then play what is left",
         }
     }

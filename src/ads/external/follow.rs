@@ -3,11 +3,9 @@
 
 use std::sync::Arc;
 
-use crate::ads::guide::{Guide, SpeedRules};
-use crate::ads::modular::{ModularConfig, Pedals, Target};
-use crate::ads::steering::{Steering, SteeringConfig};
+use crate::ads::kit::{Guide, Helm, Pedals, PedalsConfig, Point, SpeedRules, Steering};
 use crate::geometry::{Pose, Vec2, wrap_angle};
-use crate::sim::{Control, EgoMotion, Scene, pedals_for};
+use crate::sim::{Control, EgoMotion, Scene};
 
 use super::message::{Answer, ControlMessage, EXTREME_MPS2, TrajectoryMessage};
 
@@ -15,12 +13,6 @@ use super::message::{Answer, ControlMessage, EXTREME_MPS2, TrajectoryMessage};
 const AFTER_MPS2: f64 = 3.0;
 /// The brake while no answer comes, %: Apollo's, where the planner is late.
 const LOST_BRAKE_PCT: f64 = 50.0;
-/// The route is only steered along here, so nothing bounds the speed.
-const RULES: SpeedRules = SpeedRules {
-    cruise_mps: f64::INFINITY,
-    lateral_acceleration_mps2_max: f64::INFINITY,
-    slowdown_mps2: f64::INFINITY,
-};
 
 /// Obeys answers.
 #[derive(Debug, Clone)]
@@ -28,8 +20,8 @@ pub struct Follower {
     route: Arc<Guide>,
     steering: Arc<Steering>,
     pedals: Pedals,
-    /// Place on the route, m; `None` before the first tick.
-    station_m: Option<f64>,
+    /// Its station is on the route.
+    pub helm: Helm,
     course: Option<Course>,
 }
 
@@ -37,34 +29,25 @@ pub struct Follower {
 #[derive(Debug, Clone)]
 struct Course {
     guide: Guide,
-    points: Vec<CoursePoint>,
-    /// Place of the vehicle on the guide, m.
-    station_m: Option<f64>,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct CoursePoint {
-    time_s: f64,
-    station_m: f64,
-    speed_mps: f64,
-    acceleration_mps2: f64,
+    /// When, s, and what.
+    points: Vec<(f64, Point)>,
+    helm: Helm,
 }
 
 impl Follower {
     pub fn new(scene: &Scene) -> Follower {
         Follower {
-            route: Arc::new(Guide::new(scene, &RULES)),
-            steering: Steering::shared(&SteeringConfig::default()),
-            pedals: Pedals::new(&ModularConfig::default().control.pedals),
-            station_m: None,
+            route: Arc::new(Guide::new(scene, &SpeedRules::NONE)),
+            steering: Steering::usual(),
+            pedals: Pedals::new(&PedalsConfig::default()),
+            helm: Helm::default(),
             course: None,
         }
     }
 
     /// Place on the route and offset from it, m, of a vehicle at a pose; to be called every tick.
     pub fn locate(&mut self, pose: &Pose) -> (f64, f64) {
-        let beside = self.route.locate(pose.position, self.station_m);
-        self.station_m = Some(beside.station_m);
+        let beside = self.helm.locate(&self.route, pose.position);
         (beside.station_m, beside.offset_m)
     }
 
@@ -81,23 +64,15 @@ impl Follower {
         match answer {
             Answer::Control(control) => controls(control),
             Answer::Acceleration(wanted) => {
-                let (throttle_pct, brake_pct) = pedals_for(wanted.accel);
-                Control { throttle_pct, brake_pct, steer_rad: self.along_route_rad(pose, motion) }
+                Control::towards(wanted.accel, self.along_route_rad(pose, motion))
             }
             Answer::Trajectory(_) => {
                 let course = self.course.as_mut().expect("a trajectory was begun");
-                let near_m = course.guide.locate(pose.position, course.station_m).station_m;
-                course.station_m = Some(near_m);
+                let near_m = course.helm.locate(&course.guide, pose.position).station_m;
                 let steer_rad = self.steering.steer_rad(&course.guide, pose, near_m, motion);
-                let (now, soon) = (course.at(time_s), course.at(time_s + self.pedals.preview_s()));
-                let target = Target {
-                    station_m: now.station_m,
-                    speed_mps: now.speed_mps,
-                    soon_mps2: soon.acceleration_mps2,
-                };
-                let wanted_mps2 = self.pedals.acceleration_mps2(&target, near_m, motion.speed_mps);
-                let (throttle_pct, brake_pct) = pedals_for(wanted_mps2);
-                Control { throttle_pct, brake_pct, steer_rad }
+                let plan = [time_s, time_s + self.pedals.preview_s()].map(|at_s| course.at(at_s));
+                let wanted_mps2 = self.pedals.acceleration_mps2(plan, near_m, motion.speed_mps);
+                Control::towards(wanted_mps2, steer_rad)
             }
             Answer::Ready(_) | Answer::Error(_) => unreachable!("no step is answered by these"),
         }
@@ -110,16 +85,19 @@ impl Follower {
     }
 
     fn along_route_rad(&self, pose: &Pose, motion: &EgoMotion) -> f64 {
-        self.steering.steer_rad(&self.route, pose, self.station_m.unwrap_or(0.0), motion)
+        self.steering.steer_rad(&self.route, pose, self.helm.station_m(), motion)
     }
 }
 
 fn controls(control: &ControlMessage) -> Control {
-    let (throttle_pct, brake_pct) = match control.accel {
-        Some(accel_mps2) => pedals_for(accel_mps2),
-        None => (100.0 * control.throttle.unwrap_or(0.0), 100.0 * control.brake.unwrap_or(0.0)),
-    };
-    Control { throttle_pct, brake_pct, steer_rad: control.steer }
+    match control.accel {
+        Some(accel_mps2) => Control::towards(accel_mps2, control.steer),
+        None => Control {
+            throttle_pct: 100.0 * control.throttle.unwrap_or(0.0),
+            brake_pct: 100.0 * control.brake.unwrap_or(0.0),
+            steer_rad: control.steer,
+        },
+    }
 }
 
 impl Course {
@@ -140,38 +118,29 @@ impl Course {
                 (given[from + 1].v - given[from].v) / duration_s
             })
         };
-        let points = (0..given.len()).map(|index| CoursePoint {
-            time_s: given[index].t_us as f64 * 1e-6,
-            station_m: stations_m[index],
-            speed_mps: given[index].v,
-            acceleration_mps2: acceleration_mps2(index),
+        let points = (0..given.len()).map(|index| {
+            let (station_m, speed_mps) = (stations_m[index], given[index].v);
+            let acceleration_mps2 = acceleration_mps2(index);
+            (given[index].t_us as f64 * 1e-6, Point { station_m, speed_mps, acceleration_mps2 })
         });
-        Course { guide, points: points.collect(), station_m: None }
+        Course { guide, points: points.collect(), helm: Helm::default() }
     }
 
     /// The point at a time; after the last it brakes to rest, and stands. What stands is held by the brake (see
     /// `Pedals::acceleration_mps2`).
-    fn at(&self, time_s: f64) -> CoursePoint {
-        let last = self.points[self.points.len() - 1];
-        let beyond_s = time_s - last.time_s;
+    fn at(&self, time_s: f64) -> Point {
+        let (last_s, last) = self.points[self.points.len() - 1];
+        let beyond_s = time_s - last_s;
         if beyond_s >= 0.0 {
             let stop_s = (last.speed_mps / AFTER_MPS2).min(beyond_s);
             let way_m = last.speed_mps * stop_s - AFTER_MPS2 * stop_s * stop_s / 2.0;
             let speed_mps = last.speed_mps - AFTER_MPS2 * stop_s;
             let acceleration_mps2 = if speed_mps > 0.0 { -AFTER_MPS2 } else { 0.0 };
-            return CoursePoint { time_s, station_m: last.station_m + way_m, speed_mps, acceleration_mps2 };
+            return Point { station_m: last.station_m + way_m, speed_mps, acceleration_mps2 };
         }
-        let after =
-            self.points.partition_point(|point| point.time_s <= time_s).clamp(1, self.points.len() - 1);
-        let (a, b) = (self.points[after - 1], self.points[after]);
-        let fraction = ((time_s - a.time_s) / (b.time_s - a.time_s)).clamp(0.0, 1.0);
-        let mix = |a: f64, b: f64| a + (b - a) * fraction;
-        CoursePoint {
-            time_s,
-            station_m: mix(a.station_m, b.station_m),
-            speed_mps: mix(a.speed_mps, b.speed_mps),
-            acceleration_mps2: mix(a.acceleration_mps2, b.acceleration_mps2),
-        }
+        let after = self.points.partition_point(|(at_s, _)| *at_s <= time_s).clamp(1, self.points.len() - 1);
+        let ((from_s, from), (to_s, to)) = (self.points[after - 1], self.points[after]);
+        from.mixed(&to, ((time_s - from_s) / (to_s - from_s)).clamp(0.0, 1.0))
     }
 }
 
@@ -179,6 +148,7 @@ impl Course {
 mod tests {
     use super::*;
     use crate::ads::external::message::TrajectoryPoint;
+    use crate::sim::pedals_for;
 
     #[test]
     fn a_trajectory_that_ends_at_rest_is_held_there() {
@@ -189,15 +159,10 @@ mod tests {
             vec![point(0, 0.0, 2.0), point(1_000_000, 2.0, 2.0)],
         ] {
             let course = Course::new(&TrajectoryMessage { seq: 0, points, internal: None });
-            let mut pedals = Pedals::new(&ModularConfig::default().control.pedals);
-            let (now, soon) = (course.at(5.0), course.at(5.0 + pedals.preview_s()));
-            let target = Target {
-                station_m: now.station_m,
-                speed_mps: now.speed_mps,
-                soon_mps2: soon.acceleration_mps2,
-            };
+            let mut pedals = Pedals::new(&PedalsConfig::default());
+            let plan = [5.0, 5.0 + pedals.preview_s()].map(|at_s| course.at(at_s));
             // It has stopped half a metre short: there is no creeping on.
-            let wanted_mps2 = pedals.acceleration_mps2(&target, now.station_m - 0.5, 0.0);
+            let wanted_mps2 = pedals.acceleration_mps2(plan, plan[0].station_m - 0.5, 0.0);
             assert!(pedals_for(wanted_mps2).1 > 0.0, "the brake is on: {wanted_mps2}");
         }
     }

@@ -3,14 +3,12 @@
 use std::sync::Arc;
 
 use crate::ads::driver::Ads;
-use crate::ads::sight::Sight;
+use crate::ads::kit::{HOLD_MPS2, Helm, Point, Sight, Signs, Steering, Stop, crosswalks, lights};
 use crate::ads::status::{Manoeuvre, Reason, Status};
-use crate::ads::steering::{Steering, SteeringConfig};
-use crate::ads::stops::{Signs, Stop, crosswalks, lights};
-use crate::sim::{Control, DT_S, FRAME_TICKS, Scene, Sensed, VehicleParameters, pedals_for};
+use crate::sim::{Control, DT_S, Scene, Sensed, VehicleParameters};
 
 use super::lateral::{Lanes, Lateral};
-use super::proposal::{MODEL, Outlook, Point, Proposal, SPEED_PARTS, STEP_S, STEPS};
+use super::proposal::{MODEL, Outlook, Proposal, SPEED_PARTS, STEP_S, STEPS};
 use super::traffic::Other;
 
 /// A collision sooner than this is braked for as hard as possible, s (PDM-Closed). There only below 5 m/s and
@@ -23,8 +21,6 @@ const SPEED_GAIN: f64 = 1.0;
 /// A vehicle farther beside its plan, or of another speed, begins anew from where it is, m and m/s. Ours.
 const LOST_M: f64 = 0.5;
 const LOST_MPS: f64 = 1.0;
-/// Acceleration that holds the vehicle at rest, m/s². Ours.
-const HOLD_MPS2: f64 = -3.0;
 /// So slow a vehicle rests, m/s, if its plan leads no farther than this, m: the driver model creeps. Ours.
 const REST_MPS: f64 = 0.3;
 const CREEP_M: f64 = 1.0;
@@ -40,9 +36,7 @@ pub struct Frenet {
     /// The plan that is driven, and for how many ticks it has been; `None` before the first look.
     plan: Option<Proposal>,
     since_ticks: u64,
-    ticks: u64,
-    station_m: Option<f64>,
-    steer_rad: f64,
+    helm: Helm,
     others: Vec<Other>,
     stops: Vec<Stop>,
     sampled: Vec<Lateral>,
@@ -55,15 +49,13 @@ impl Frenet {
         Frenet {
             scene: Arc::clone(scene),
             lanes: Lanes::new(scene),
-            steering: Steering::shared(&SteeringConfig::default()),
+            steering: Steering::usual(),
             // A LiDAR sees by night as by day.
             sight: Sight::new(1.0),
             signs: Signs::default(),
             plan: None,
             since_ticks: 0,
-            ticks: 0,
-            station_m: None,
-            steer_rad: 0.0,
+            helm: Helm::default(),
             others: Vec::new(),
             stops: Vec::new(),
             sampled: Vec::new(),
@@ -89,7 +81,7 @@ impl Frenet {
         self.stops.extend(self.signs.next_stop(&self.scene, front_m, start.speed_mps));
         self.stops.extend(crosswalks(&self.scene, &guide, self.sight.known(), front_m, start.speed_mps));
         // The model stops a gap before such a place, so it is put a gap beyond the place to wait at.
-        let wait = self.lanes.wait_m().map(|wait_m| wait_m + MODEL.gap_m_min);
+        let wait = self.lanes.changes().wait_m().map(|wait_m| wait_m + MODEL.gap_m_min);
         self.stops.extend(wait.map(|station_m| Stop { station_m, reason: Reason::LaneChange }));
 
         self.lanes.sample(&now, station_m, start.speed_mps, &self.others, &mut self.sampled);
@@ -125,7 +117,7 @@ impl Frenet {
 
     fn report(&mut self, sensed: &Sensed, plan: &Proposal, station_m: f64) {
         let changing = plan.lateral.changes_lane() || self.lanes.is_arriving(&plan.lateral, station_m);
-        self.status.manoeuvre = match (changing, self.lanes.is_due(station_m)) {
+        self.status.manoeuvre = match (changing, self.lanes.changes().due(station_m).is_some()) {
             (true, _) => Manoeuvre::LaneChange,
             (false, true) => Manoeuvre::AwaitGap,
             (false, false) => Manoeuvre::LaneFollow,
@@ -174,25 +166,15 @@ fn chosen(outlook: &Outlook, proposals: &[Proposal], now: Lateral) -> Proposal {
 fn planned_at(plan: &Proposal, time_s: f64) -> Point {
     let place = (time_s / STEP_S).clamp(0.0, STEPS as f64);
     let index = (place as usize).min(STEPS - 1);
-    let (from, to, part) = (plan.points[index], plan.points[index + 1], place - index as f64);
-    let between = |a: f64, b: f64| a + (b - a) * part;
-    Point {
-        station_m: between(from.station_m, to.station_m),
-        speed_mps: between(from.speed_mps, to.speed_mps),
-        acceleration_mps2: between(from.acceleration_mps2, to.acceleration_mps2),
-    }
+    plan.points[index].mixed(&plan.points[index + 1], place - index as f64)
 }
 
 impl Ads for Frenet {
     fn drive(&mut self, sensed: &Sensed) -> Control {
         let ego = &sensed.ego;
-        if self.station_m.is_none() {
-            self.steer_rad = ego.steer_rad;
-        }
-        let beside = self.lanes.guide().locate(ego.rear_axle.position, self.station_m);
+        let beside = self.helm.locate(self.lanes.guide(), ego.rear_axle.position);
         let station_m = beside.station_m;
-        self.station_m = Some(station_m);
-        if self.ticks.is_multiple_of(FRAME_TICKS) {
+        if self.helm.looks() {
             self.cycle(sensed, station_m, beside.offset_m);
         }
         let plan = self.plan.as_ref().expect("the first tick plans");
@@ -200,19 +182,13 @@ impl Ads for Frenet {
         let (here, ahead) = (planned_at(plan, since_s), planned_at(plan, since_s + PREVIEW_S));
         let mut acceleration_mps2 = ahead.acceleration_mps2 + SPEED_GAIN * (here.speed_mps - ego.speed_mps);
         if ego.speed_mps < REST_MPS && plan.progress_m() < CREEP_M {
-            acceleration_mps2 = HOLD_MPS2;
+            acceleration_mps2 = -HOLD_MPS2;
         }
-        let (throttle_pct, brake_pct) = pedals_for(acceleration_mps2);
         let aside = |at_m: f64| plan.lateral.aside(at_m);
         let steer_rad =
             self.steering.steer_aside_rad(self.lanes.guide(), &aside, &ego.rear_axle, station_m, ego);
-        let control = Control { throttle_pct, brake_pct, steer_rad };
-        self.status.control = control;
-        self.status.steer_rate_radps = (ego.steer_rad - self.steer_rad) / DT_S;
-        self.steer_rad = ego.steer_rad;
-        self.ticks += 1;
         self.since_ticks += 1;
-        control
+        self.helm.command(Control::towards(acceleration_mps2, steer_rad), ego, &mut self.status)
     }
 
     fn status(&self) -> &Status {

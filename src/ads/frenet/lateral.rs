@@ -7,8 +7,7 @@
 
 use std::sync::Arc;
 
-use crate::ads::guide::{Guide, SpeedRules};
-use crate::ads::steering::Aside;
+use crate::ads::kit::{Aside, Guide, RouteChanges, SpeedRules};
 use crate::road::{RouteLaneChange, Side};
 use crate::sim::{Scene, VehicleParameters};
 
@@ -16,9 +15,6 @@ use super::polynomial::Quintic;
 use super::proposal::{HALF_WAY_M, MODEL, lateral_cost};
 use super::traffic::Other;
 
-/// Speed on a free road and in bends: those of the other drivers here, so that all can be compared.
-const RULES: SpeedRules =
-    SpeedRules { cruise_mps: 11.18, lateral_acceleration_mps2_max: 2.0, slowdown_mps2: 1.5 };
 /// Offsets that are sampled to each side, m (PDM-Closed); less where the lane ends.
 const OFFSET_M: f64 = 1.0;
 /// Times in which a goal is reached, s. Ours; Werling samples a range that is not given.
@@ -91,13 +87,14 @@ impl Lateral {
 pub struct Lanes {
     scene: Arc<Scene>,
     guide: Arc<Guide>,
-    /// Number of lane changes of the route that are behind the vehicle.
-    changed: usize,
+    /// Those that have begun are behind the vehicle.
+    changes: RouteChanges,
 }
 
 impl Lanes {
     pub fn new(scene: &Arc<Scene>) -> Lanes {
-        Lanes { scene: Arc::clone(scene), guide: Arc::new(guide(scene, 0)), changed: 0 }
+        let changes = RouteChanges::new(scene);
+        Lanes { scene: Arc::clone(scene), guide: Arc::new(changes.guide(&SpeedRules::TOWN)), changes }
     }
 
     /// Along the lane that the vehicle is in.
@@ -108,16 +105,12 @@ impl Lanes {
     /// The speed limit at a station, or the cruising speed if it is lower, m/s.
     pub fn limit_mps(&self, station_m: f64) -> f64 {
         let lane = self.scene.route.lane_at(station_m).lane;
-        self.scene.map.lane(lane).speed_limit_mps.min(RULES.cruise_mps)
+        self.scene.map.lane(lane).speed_limit_mps.min(SpeedRules::TOWN.cruise_mps)
     }
 
-    fn next_change(&self) -> Option<&RouteLaneChange> {
-        self.scene.route.changes.get(self.changed)
-    }
-
-    /// Whether the next change may be made at a station.
-    pub fn is_due(&self, station_m: f64) -> bool {
-        self.next_change().is_some_and(|change| station_m >= change.begin_m)
+    /// The lane changes of the route.
+    pub fn changes(&self) -> &RouteChanges {
+        &self.changes
     }
 
     /// Whether a curve still comes over from another lane at a station.
@@ -125,21 +118,15 @@ impl Lanes {
         lateral.aside(station_m).offset_m.abs() > OFFSET_M
     }
 
-    /// Where the front of the vehicle must wait for the next change: a short one is still possible there, m.
-    pub fn wait_m(&self) -> Option<f64> {
-        let change = self.next_change()?;
-        Some(VehicleParameters::MKZ.front_m(change.latest_m - RouteLaneChange::LENGTH_M_MIN))
-    }
-
     /// Passes on to the target lane if the vehicle has crossed the line: returns the curve beside the new guide.
     pub fn cross(&mut self, lateral: Lateral, station_m: f64, offset_m: f64) -> Lateral {
-        let Some(lateral_m) = self.next_change().map(|change| change.lateral_m) else { return lateral };
+        let Some(lateral_m) = self.changes.next().map(|change| change.lateral_m) else { return lateral };
         if !lateral.changes_lane() || offset_m / lateral_m < 0.5 {
             return lateral;
         }
-        self.changed += 1;
+        self.changes.begin(f64::NEG_INFINITY);
         let before = self.guide.pose_at(station_m).position;
-        self.guide = Arc::new(guide(&self.scene, self.changed));
+        self.guide = Arc::new(self.changes.guide(&SpeedRules::TOWN));
         let left_m = -self.guide.project(before, station_m - 5.0, station_m + 5.0).offset_m;
         let curve = lateral.curve.beside(left_m);
         Lateral { goal: Goal::Middle, goal_m: 0.0, curve, deviation_m: 0.0, ..lateral }
@@ -166,7 +153,7 @@ impl Lanes {
             }
         };
         let lengths_m = TIMES_S.map(|time_s| (speed_mps * time_s).max(LENGTH_M_MIN));
-        if let Some(change) = self.next_change().filter(|change| station_m >= change.begin_m) {
+        if let Some(change) = self.changes.due(station_m) {
             add(Goal::Middle, 0.0, WRONG_LANE_M, lengths_m);
             let length_m = change.length_from_m(station_m);
             let fits = station_m <= change.latest_m - RouteLaneChange::LENGTH_M_MIN + LATE_M;
@@ -216,15 +203,7 @@ fn is_clear(others: &[Other], lateral_m: f64, station_m: f64, speed_mps: f64) ->
             return span.from_m - front_m
                 > MODEL.gap_m_min + (speed_mps - behind_mps).max(0.0) * MODEL.time_gap_s;
         }
-        let ratio = MODEL.wanted_gap_m(behind_mps, speed_mps) / (rear_m - span.to_m).max(0.1);
+        let ratio = MODEL.crowding(behind_mps, speed_mps, rear_m - span.to_m);
         span.to_m < rear_m && MODEL.acceleration_mps2 * (ratio * ratio - 1.0).max(0.0) < SAFE_MPS2
     })
-}
-
-/// The guide along the lane after so many changes of the route.
-fn guide(scene: &Scene, changed: usize) -> Guide {
-    let begins_m: Vec<f64> = (0..scene.route.changes.len())
-        .map(|index| if index < changed { f64::NEG_INFINITY } else { f64::INFINITY })
-        .collect();
-    Guide::with_changes(scene, &RULES, &begins_m)
 }

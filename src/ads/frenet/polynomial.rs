@@ -3,7 +3,7 @@
 //! Werling, Ziegler, Kammel and Thrun 2010, section IV: a quintic goes from a state to a state, a quartic from
 //! a state to a speed, wherever that is reached.
 
-use crate::ads::steering::Aside;
+use crate::ads::kit::Aside;
 
 /// A shift to a constant offset: the quintic of least jerk over a length.
 ///

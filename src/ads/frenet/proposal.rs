@@ -11,10 +11,10 @@
 //! hold by construction: `lateral` samples no offset outside the lanes of the own direction. Werling's costs
 //! decide between proposals that score alike.
 
-use crate::ads::guide::Guide;
+use crate::ads::kit::{BESIDE_M, FOLLOWED_MPS, Guide, HARDEST_MPS2, Point, Stop, speed_mps2};
 use crate::ads::status::Reason;
-use crate::ads::stops::Stop;
-use crate::sim::{Following, VehicleParameters};
+use crate::kinematics::{Following, STANDING_MPS, braking_m};
+use crate::sim::VehicleParameters;
 
 use super::lateral::Lateral;
 use super::polynomial::Quartic;
@@ -29,15 +29,9 @@ pub const SPEED_PARTS: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
 /// PDM-Closed's driver model.
 pub const MODEL: Following =
     Following { gap_m_min: 1.0, time_gap_s: 1.5, acceleration_mps2: 1.5, comfortable_mps2: 3.0 };
-/// Hardest braking, m/s²: the vehicle's limit.
-pub const HARDEST_MPS2: f64 = 6.0;
 
 /// Room kept free on each side, m: Apollo's `static_obstacle_nudge_l_buffer`. PDM-Closed keeps none.
 pub const SIDE_M: f64 = 0.3;
-/// Slower than this the ego vehicle stands, m/s: a contact is then the fault of the other. Ours (nuPlan: 0.005).
-const STANDS_MPS: f64 = 0.1;
-/// The reason for keeping away from a slower road user ahead is called a stop, not following, m/s. Ours.
-const FOLLOWED_MPS: f64 = 0.5;
 
 /// Weights of nuPlan's metrics in PDM-Closed.
 const WEIGHT_PROGRESS: f64 = 5.0;
@@ -60,15 +54,6 @@ const COST_TIME: f64 = 0.3;
 const COST_DEVIATION: f64 = 1.0;
 /// What a unit of Werling's cost is worth in points of the score. Ours: less than any metric.
 const SCORE_PER_COST: f64 = 0.02;
-
-/// A place of a rollout.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Point {
-    /// Of the rear axle, m.
-    pub station_m: f64,
-    pub speed_mps: f64,
-    pub acceleration_mps2: f64,
-}
 
 /// The situation in which proposals are rolled out.
 #[derive(Debug)]
@@ -120,13 +105,11 @@ impl Outlook<'_> {
         let mut reason = (f64::INFINITY, Reason::Cruise);
         for step in 0..=STEPS {
             let Point { station_m, speed_mps, .. } = points[step];
-            let (here_mps, soon_mps) =
-                (self.guide.speed_mps_max(station_m), self.guide.speed_mps_max(station_m + 0.6 * speed_mps));
-            let allowed_mps = part * here_mps.min(soon_mps);
+            let allowed_mps = part * self.guide.allowed_mps(station_m, speed_mps);
             let free_mps2 = profile
                 .acceleration_mps2(step as f64 * STEP_S)
                 .min(MODEL.acceleration_mps2)
-                .min((allowed_mps - speed_mps) / 0.6);
+                .min(speed_mps2(speed_mps, allowed_mps));
             let (held_mps2, held_by) = self.interaction(&lateral, step, station_m, speed_mps);
             let acceleration_mps2 = (free_mps2 - held_mps2).max(-HARDEST_MPS2);
             let holds = held_mps2 > HELD_MPS2 && acceleration_mps2 < reason.0;
@@ -174,8 +157,7 @@ impl Outlook<'_> {
         let offset_m = lateral.aside(station_m).offset_m;
         let mut most = (0.0, Reason::Cruise);
         let mut hold = |gap_m: f64, ahead_mps: f64, reason: Reason| {
-            let ratio = MODEL.wanted_gap_m(speed_mps, ahead_mps) / gap_m.max(0.1);
-            let held_mps2 = MODEL.acceleration_mps2 * ratio * ratio;
+            let held_mps2 = MODEL.interaction_mps2(speed_mps, ahead_mps, gap_m);
             if held_mps2 > most.0 {
                 most = (held_mps2, reason);
             }
@@ -210,7 +192,8 @@ impl Outlook<'_> {
         };
         for step in 1..=STEPS {
             let point = proposal.points[step];
-            if point.speed_mps < STANDS_MPS {
+            // A contact with a vehicle that stands is the fault of the other (nuPlan: below 0.005 m/s).
+            if point.speed_mps < STANDING_MPS {
                 break;
             }
             let offset_m = proposal.lateral.aside(point.station_m).offset_m;
@@ -267,8 +250,6 @@ impl Outlook<'_> {
 
 /// Half the width of the way that the vehicle takes, with the room on each side, m.
 pub const HALF_WAY_M: f64 = VehicleParameters::MKZ.width_m / 2.0 + SIDE_M;
-/// A road user whose middle is farther behind the front bumper has been passed, m.
-const BESIDE_M: f64 = 1.0;
 /// A smaller interaction is no reason, m/s².
 const HELD_MPS2: f64 = 0.3;
 
@@ -298,7 +279,7 @@ fn next(point: &Point) -> Point {
     let (speed_mps, way_m) = if faster_mps > 0.0 {
         (faster_mps, (point.speed_mps + faster_mps) / 2.0 * STEP_S)
     } else {
-        (0.0, point.speed_mps * point.speed_mps / (2.0 * point.acceleration_mps2.abs().max(1e-9)))
+        (0.0, braking_m(point.speed_mps, point.acceleration_mps2.abs().max(1e-9)))
     };
     Point { station_m: point.station_m + way_m, speed_mps, ..*point }
 }

@@ -4,8 +4,8 @@
 //! that moves across its lane, and every pedestrian, keeps its velocity (PDM-Closed: constant velocity for all).
 //! In these forecasts no road user obeys a signal or gives way.
 
-use crate::ads::guide::Guide;
-use crate::geometry::{Beside, Pose, Span, Vec2, unit_vector, wrap_angle};
+use crate::ads::kit::{Guide, RANGE_M};
+use crate::geometry::{Beside, Pose, Span, Vec2, extent_m, unit_vector, wrap_angle};
 use crate::road::{LanePlace, RoadMap, Turn};
 use crate::sim::SensedObject;
 
@@ -20,9 +20,8 @@ const STRIDES: usize = FORECAST_STEPS / STRIDE + 1;
 
 /// Road users farther from the guide than this are not on it whatever lane is driven, m.
 const SIDE_M: f64 = 7.0;
-/// Stations from the ego vehicle that are looked at, m.
+/// How far behind the ego vehicle is looked, m.
 const BEHIND_M: f64 = 60.0;
-const AHEAD_M: f64 = 120.0;
 /// A vehicle turned farther than this from its lane is not following it, rad. Ours.
 const OFF_LANE_RAD: f64 = 0.5;
 /// Nor is one that moves sideways faster, m/s: drivers wander at up to 0.3. Ours.
@@ -65,7 +64,7 @@ impl Other {
     pub fn seen(map: &RoadMap, guide: &Guide, object: &SensedObject, station_m: f64) -> Option<Other> {
         let poses = forecast(map, object);
         let reach_m = SIDE_M + (object.length_m + object.width_m) / 2.0;
-        let (from_m, to_m) = (station_m - BEHIND_M, station_m + AHEAD_M);
+        let (from_m, to_m) = (station_m - BEHIND_M, station_m + RANGE_M);
         let (first, mut tracer) = guide.trace(object.pose.position, from_m, to_m, reach_m);
         let mut places = [None; FORECAST_STEPS];
         for (step, place) in places.iter_mut().enumerate() {
@@ -107,13 +106,14 @@ impl Place {
     fn of(beside: &Beside, pose: &Pose, velocity_mps: Vec2, object: &SensedObject) -> Place {
         let forward = unit_vector(pose.heading_rad);
         let local = Vec2::new(beside.forward.dot(&forward), beside.forward.perp(&forward));
-        let (cosine, sine) = (local.x.abs(), local.y.abs());
+        let half_m = (object.length_m / 2.0, object.width_m / 2.0);
+        let (half_along_m, half_across_m) = extent_m(forward, beside.forward, half_m);
         Place {
             station_m: beside.station_m,
             offset_m: beside.offset_m,
             forward: local,
-            half_along_m: (cosine * object.length_m + sine * object.width_m) / 2.0,
-            half_across_m: (sine * object.length_m + cosine * object.width_m) / 2.0,
+            half_along_m,
+            half_across_m,
             along_mps: beside.forward.dot(&velocity_mps),
             speed_mps: velocity_mps.norm(),
         }
@@ -178,17 +178,14 @@ fn bend(turn: Turn) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ads::guide::SpeedRules;
+    use crate::ads::kit::SpeedRules;
     use crate::ads::testing::{object, winding};
     use crate::model::vocabulary::Body;
-
-    const RULES: SpeedRules =
-        SpeedRules { cruise_mps: 11.0, lateral_acceleration_mps2_max: 2.0, slowdown_mps2: 1.5 };
 
     #[test]
     fn a_vehicle_follows_its_lane_and_a_pedestrian_goes_straight_on() {
         let scene = winding();
-        let guide = Guide::new(&scene, &RULES);
+        let guide = Guide::new(&scene, &SpeedRules::TOWN);
         let at = |station_m: f64| scene.route.path.pose_at(station_m).offset(0.0, 0.5);
         let leader = object(1, Body::Sedan, at(115.0), 6.0);
         let seen = Other::seen(&scene.map, &guide, &leader, 90.0).expect("it is ahead");

@@ -8,8 +8,8 @@
 //! junction assistance that guesses at turns of others, and braking for what will strike from the side or
 //! from behind.
 
-use crate::ads::guide::Guide;
-use crate::geometry::Vec2;
+use crate::ads::kit::Guide;
+use crate::geometry::extent_m;
 use crate::sim::{Control, DT_S, EgoMotion, FRAME_S, VehicleParameters, pedal_acceleration_mps2, pedals_for};
 
 use super::config::EmergencyConfig;
@@ -21,7 +21,8 @@ const HORIZON_S: f64 = 3.0;
 /// Part of the vehicle's half width that a contact must reach into, m: what is only grazed is left to the
 /// planner, which passes standing vehicles at 0.4 m. Ours; tests begin at an overlap of a quarter.
 const OVERLAP_M: f64 = 0.25;
-/// Of what enters the path from the side only that is braked for which would be hit by the front, m behind it.
+/// A road user that enters the path from the side is braked for only if the vehicle's front would hit it: at most this
+/// far behind the front, m.
 const FLANK_M: f64 = 1.5;
 /// Time until a command has become braking: the next frame and the brake's own lag, s.
 const RESPONSE_S: f64 = 0.25;
@@ -174,12 +175,9 @@ fn threat(
         return None;
     }
     let along = beside.forward;
-    let across = Vec2::new(-along.y, along.x);
-    let (along_mps, across_mps) = (track.velocity_mps.dot(&along), track.velocity_mps.dot(&across));
-    let forward = track.forward();
-    let (cosine, sine) = (forward.dot(&along).abs(), forward.dot(&across).abs());
-    let half_along_m = (cosine * track.length_m + sine * track.width_m) / 2.0;
-    let half_across_m = (sine * track.length_m + cosine * track.width_m) / 2.0;
+    let (along_mps, across_mps) = (track.velocity_mps.dot(&along), along.perp(&track.velocity_mps));
+    let half_m = (track.length_m / 2.0, track.width_m / 2.0);
+    let (half_along_m, half_across_m) = extent_m(track.forward(), along, half_m);
     let overlap_m = if track.body.is_vehicle() { OVERLAP_M } else { 0.0 };
     let half_way_m = vehicle.width_m / 2.0 + half_across_m - overlap_m;
     // When both are at one place across the path, and when along it.
@@ -215,14 +213,11 @@ fn within(at: f64, rate: f64, half: f64) -> Option<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ads::guide::SpeedRules;
+    use crate::ads::kit::SpeedRules;
     use crate::ads::testing::{straight, winding};
-    use crate::geometry::Pose;
+    use crate::geometry::{Pose, Vec2};
     use crate::model::vocabulary::Body;
     use crate::sim::Scene;
-
-    const RULES: SpeedRules =
-        SpeedRules { cruise_mps: 11.0, lateral_acceleration_mps2_max: 2.0, slowdown_mps2: 1.5 };
 
     /// Speed and gap at the end of a drive at `speed_mps` along a road, from `station_m` on, towards an
     /// object with a velocity, with nothing but emergency braking. The gap is along x.
@@ -233,7 +228,7 @@ mod tests {
         at: Pose,
         velocity_mps: Vec2,
     ) -> (f64, f64) {
-        let guide = Guide::new(&straight(), &RULES);
+        let guide = Guide::new(&straight(), &SpeedRules::TOWN);
         let mut emergency = Emergency::new(config);
         let mut motion = EgoMotion::straight(Pose::new(20.0, -1.75, 0.0), speed_mps);
         let mut object = at;
@@ -304,7 +299,7 @@ mod tests {
         at: Pose,
         velocity_mps: Vec2,
     ) -> bool {
-        let guide = Guide::new(scene, &RULES);
+        let guide = Guide::new(scene, &SpeedRules::TOWN);
         let mut emergency = Emergency::new(&EmergencyConfig { confirm_s: 0.0, ..EmergencyConfig::default() });
         let motion = EgoMotion::straight(scene.route.path.pose_at(station_m), speed_mps);
         let track = Track::for_tests(1, body, at, velocity_mps);

@@ -42,11 +42,6 @@ impl Localization {
         Localization { config: *config, rng, errors, keep, renew: (1.0 - keep * keep).sqrt(), spread: None }
     }
 
-    /// From now on errors come from another seed; what they are now stays.
-    pub fn reseed(&mut self, seed: u64) {
-        self.rng = draws(seed);
-    }
-
     /// Pose of the rear axle as believed now. `in_street` says that the sky is not open.
     pub fn locate(&mut self, sensed: &Sensed, in_street: bool) -> Pose {
         for error in &mut self.errors {

@@ -21,6 +21,5 @@ mod tracking;
 mod watchdog;
 
 pub use config::{ConfigError, ModularConfig, Module, Weaknesses};
-pub use control::{Pedals, Target};
 pub use foresight::Foresight;
 pub use stack::Modular;

@@ -6,9 +6,10 @@
 use std::sync::Arc;
 
 use crate::ads::driver::Ads;
+use crate::ads::kit::Helm;
 use crate::ads::status::{GHOST_ID_MIN, PerceivedObject, Reason, Status};
 use crate::geometry::{Pose, Vec2};
-use crate::sim::{Control, DT_S, FRAME_TICKS, Scene, Sensed};
+use crate::sim::{Control, Scene, Sensed};
 
 use super::config::ModularConfig;
 use super::control::Controller;
@@ -37,10 +38,8 @@ pub struct Modular {
     watchdog: Watchdog,
     /// Hardest braking that the brakes give, m/s².
     brake_mps2_max: f64,
-    ticks: u64,
-    /// Where it believes it is on the route, m.
-    station_m: f64,
-    steer_rad: f64,
+    /// Its station is where it believes it is on the route.
+    helm: Helm,
     status: Status,
 }
 
@@ -72,15 +71,14 @@ impl Modular {
             watchdog: Watchdog::new(&config.latency),
             brake_mps2_max: config.control.actuators.brake_mps2_max,
             junctions,
-            ticks: 0,
-            station_m: 0.0,
-            steer_rad: 0.0,
+            helm: Helm::default(),
             status: Status::default(),
         }
     }
 
     /// Perception, tracking, prediction and planning.
     fn cycle(&mut self, sensed: &Sensed, localized: &Pose) {
+        let station_m = self.helm.station_m();
         if let Some(since_s) = self.watchdog.looks(sensed.time_s) {
             self.tracking.resume(since_s);
             self.tracking.delay(self.watchdog.load_frames(sensed.objects.len()));
@@ -93,7 +91,7 @@ impl Modular {
             self.status.detected.extend(detections.iter().map(|detection| detection.truth));
             self.tracking.update(detections, may_be_taken);
         }
-        let lights = self.lights.look(sensed, self.station_m);
+        let lights = self.lights.look(sensed, station_m);
         let (tracks, age_s) =
             (self.tracking.published(), self.tracking.age_s() + self.watchdog.perception_s());
         self.prediction.see_lights(lights);
@@ -101,16 +99,16 @@ impl Modular {
         if let Some(since_s) = self.watchdog.plans(sensed.time_s) {
             self.planner.plan(&Outlook {
                 localized,
-                station_m: self.station_m,
+                station_m,
                 speed_mps: sensed.ego.speed_mps,
-                since_s: if self.ticks == 0 { 0.0 } else { since_s },
+                since_s: if self.helm.is_first() { 0.0 } else { since_s },
                 forecasts: self.prediction.forecasts(),
                 lights,
                 conditions: &sensed.conditions,
             });
         }
         let (guide, lateral) = (self.planner.guide(), self.planner.lateral());
-        self.emergency.look(tracks, age_s, guide, lateral, self.station_m, &sensed.ego);
+        self.emergency.look(tracks, age_s, guide, lateral, station_m, &sensed.ego);
         self.report();
     }
 
@@ -167,30 +165,18 @@ impl Modular {
 }
 
 impl Ads for Modular {
-    fn reseed(&mut self, seed: u64) {
-        self.localization.reseed(seed);
-        self.perception.reseed(seed);
-    }
-
     fn drive(&mut self, sensed: &Sensed) -> Control {
         let localizes = self.watchdog.localizes(sensed.time_s);
         let localized = match self.status.localized {
             Some(last) if !localizes => last,
-            _ => self.localization.locate(sensed, !self.junctions.inside(self.station_m)),
+            _ => self.localization.locate(sensed, !self.junctions.inside(self.helm.station_m())),
         };
-        let near_m = (self.ticks > 0).then_some(self.station_m);
-        self.station_m = self.planner.guide().locate(localized.position, near_m).station_m;
-        let in_cycle = self.ticks % FRAME_TICKS;
-        if in_cycle == 0 {
+        let station_m = self.helm.locate(self.planner.guide(), localized.position).station_m;
+        if self.helm.looks() {
             self.cycle(sensed, &localized);
         }
-        let control = self.controller.follow(
-            &self.planner,
-            self.watchdog.trajectory_s(),
-            &localized,
-            self.station_m,
-            &sensed.ego,
-        );
+        let since_s = self.watchdog.trajectory_s();
+        let control = self.controller.follow(&self.planner, since_s, &localized, station_m, &sensed.ego);
         let control = self.emergency.brake(control, sensed.ego.speed_mps, self.brake_mps2_max);
         if let Some(id) = self.emergency.braking_for() {
             self.status.reason = Reason::Emergency(self.truth_of(id));
@@ -205,12 +191,7 @@ impl Ads for Modular {
             control
         };
         self.status.localized = Some(localized);
-        self.status.control = control;
-        self.status.steer_rate_radps =
-            if self.ticks == 0 { 0.0 } else { (sensed.ego.steer_rad - self.steer_rad) / DT_S };
-        self.steer_rad = sensed.ego.steer_rad;
-        self.ticks += 1;
-        control
+        self.helm.command(control, &sensed.ego, &mut self.status)
     }
 
     fn status(&self) -> &Status {

@@ -10,9 +10,12 @@
 //! The standards state what a system must reach at least; this one reaches that and no more. Left out: warnings
 //! and the override by a driver. Unlike many sold systems it reacts to vehicles, too, that it never saw move.
 
-use crate::ads::guide::Guide;
+use crate::ads::kit::{
+    BESIDE_M, FOLLOWED_MPS, Guide, HALF_WAY_M, HARDEST_MPS2, RANGE_M, in_lane, speed_mps2,
+};
 use crate::ads::status::Reason;
-use crate::geometry::{Beside, unit_vector};
+use crate::geometry::{Beside, extent_m, unit_vector};
+use crate::kinematics::needed_mps2;
 use crate::sim::{DT_S, EgoMotion, SensedObject, VehicleParameters};
 
 /// Time gap, s: ISO 15622 asks for one setting of 1.5 to 2.2.
@@ -39,29 +42,18 @@ const EMERGENCY_VEHICLE_MPS: f64 = 10.0 / 3.6;
 const EMERGENCY_PEDESTRIAN_MPS: f64 = 20.0 / 3.6;
 /// And up to which, m/s: UN R152, 60 km/h.
 const EMERGENCY_MPS_MAX: f64 = 60.0 / 3.6;
-/// Its braking, m/s²: the vehicle's limit. UN R152 asks for 5.
-const EMERGENCY_MPS2: f64 = 6.0;
-/// It begins this long before the last moment at which that braking suffices, s: the brakes build up for 0.15 s,
-/// and a look is up to 0.1 s old. Ours.
+/// It brakes as hard as the vehicle can (UN R152 asks for 5 m/s²), and begins this long before the last moment at which
+/// that suffices, s: the brakes build up for 0.15 s, and a look is up to 0.1 s old. Ours.
 const BUILD_UP_S: f64 = 0.3;
 
-/// The corridor is the vehicle's width and this much on each side, m. Ours: a vehicle that enters a lane of 3.5 m
-/// by 0.3 m, which UN R157 calls a cut-in, is in it.
-const SIDE_M: f64 = 0.4;
-/// A road user that enters it within this time counts as in it, s. Ours.
+/// A road user that enters the corridor within this time counts as in it, s. Ours.
 const ENTER_S: f64 = 1.0;
 /// Slower sideways than this, nothing enters, m/s. Ours: drivers wander at up to 0.3.
 const SIDEWAYS_MPS: f64 = 0.4;
-/// Range along the road, m: long-range radar.
-const RANGE_M: f64 = 120.0;
 /// Half the field of view of the front camera: 50°, a usual figure of data sheets, as cosine.
 const FIELD_COSINE: f64 = 0.642_787_609_686_539_4;
 /// The camera looks through the windscreen, this far behind the front bumper, m. Ours.
 const CAMERA_M: f64 = 1.8;
-/// A road user whose middle is farther behind the front bumper is beside the vehicle, m.
-const BESIDE_M: f64 = 1.0;
-/// The reason for keeping away from a slower road user ahead is called a stop, not following, m/s. Ours.
-const FOLLOWED_MPS: f64 = 0.5;
 
 /// Zone behind the rear bumper in which no vehicle may be in the lane to change to, m (ISO 17387).
 const ZONE_M: f64 = 3.0;
@@ -94,18 +86,16 @@ impl Target {
         if eye.forward().dot(&towards) < FIELD_COSINE * towards.norm() - object.length_m / 2.0 {
             return None;
         }
-        let half_m = car.width_m / 2.0 + SIDE_M;
+        let size = (object.length_m, object.width_m);
         let beside = guide.project(object.pose.position, front_m - BESIDE_M, front_m + RANGE_M);
         let forward = unit_vector(object.pose.heading_rad);
-        let taken = |beside: &Beside| beside.taken(forward, object.length_m, object.width_m, half_m);
+        let taken = |beside: &Beside| beside.taken(forward, size.0, size.1, HALF_WAY_M);
         let (enters_s, span) = match taken(&beside) {
             Some(span) => (0.0, span),
             None => {
                 let sideways_mps = -beside.forward.perp(&object.velocity_mps) * beside.offset_m.signum();
-                let across_m = (beside.forward.perp(&forward).abs() * object.length_m
-                    + beside.forward.dot(&forward).abs() * object.width_m)
-                    / 2.0;
-                let enters_s = (beside.offset_m.abs() - across_m - half_m) / sideways_mps;
+                let (_, across_m) = extent_m(forward, beside.forward, size);
+                let enters_s = (beside.offset_m.abs() - across_m / 2.0 - HALF_WAY_M) / sideways_mps;
                 if sideways_mps < SIDEWAYS_MPS || enters_s > ENTER_S {
                     return None;
                 }
@@ -132,7 +122,7 @@ impl Target {
         let collision_s = self.gap_m.max(0.0) / closing_mps;
         (from_mps..=EMERGENCY_MPS_MAX).contains(&speed_mps)
             && closing_mps > 0.0
-            && collision_s <= closing_mps / (2.0 * EMERGENCY_MPS2) + BUILD_UP_S
+            && collision_s <= closing_mps / (2.0 * HARDEST_MPS2) + BUILD_UP_S
             && self.enters_s <= collision_s
     }
 }
@@ -166,15 +156,18 @@ impl Pedals {
             target.is_urgent(speed_mps) || self.emergency == Some(target.id) && closes
         });
         self.emergency = urgent.map(|target| target.id);
-        self.emergency.map_or(wanted, |id| (-EMERGENCY_MPS2, Reason::Emergency(id)))
+        self.emergency.map_or(wanted, |id| (-HARDEST_MPS2, Reason::Emergency(id)))
     }
 }
 
 /// The acceleration towards an allowed speed, m/s².
 fn cruise_mps2(speed_mps: f64, allowed_mps: f64) -> f64 {
     let gain_mps = allowed_mps - speed_mps;
-    // A falling limit is followed as closely as it falls.
-    if gain_mps < 0.0 { gain_mps / 0.6 } else { (CRUISE_GAIN_PER_S * gain_mps).min(ACCELERATION_MPS2) }
+    if gain_mps < 0.0 {
+        speed_mps2(speed_mps, allowed_mps)
+    } else {
+        (CRUISE_GAIN_PER_S * gain_mps).min(ACCELERATION_MPS2)
+    }
 }
 
 /// The acceleration that keeps the gap, m/s².
@@ -185,7 +178,7 @@ fn gap_mps2(speed_mps: f64, target: &Target) -> f64 {
 
 /// The braking that stops at a line, m/s²; none while a gentler one will do.
 pub fn line_mps2(speed_mps: f64, distance_m: f64) -> Option<f64> {
-    let needed_mps2 = speed_mps * speed_mps / (2.0 * (distance_m - LINE_GAP_M).max(0.05));
+    let needed_mps2 = needed_mps2(speed_mps, (distance_m - LINE_GAP_M).max(0.05));
     (needed_mps2 >= LINE_MPS2 || distance_m < LINE_GAP_M).then_some(-needed_mps2)
 }
 
@@ -198,17 +191,9 @@ fn by_speed((slow, fast): (f64, f64), speed_mps: f64) -> f64 {
 /// Whether the lane `lateral_m` to the left is free for a change: no vehicle beside, none too fast from behind,
 /// and a time gap to the one ahead.
 pub fn is_free(guide: &Guide, known: &[SensedObject], lateral_m: f64, front_m: f64, speed_mps: f64) -> bool {
-    let car = VehicleParameters::MKZ;
-    let rear_m = front_m - car.length_m;
+    let rear_m = front_m - VehicleParameters::MKZ.length_m;
     known.iter().all(|object| {
-        let at = guide.project(object.pose.position, rear_m - RANGE_M, front_m + RANGE_M);
-        let forward = unit_vector(object.pose.heading_rad);
-        let in_lane = Beside { offset_m: at.offset_m - lateral_m, ..at };
-        let Some(span) = in_lane.taken(forward, object.length_m, object.width_m, car.width_m / 2.0 + SIDE_M)
-        else {
-            return true;
-        };
-        let along_mps = object.velocity_mps.dot(&at.forward);
+        let Some((span, along_mps)) = in_lane(guide, object, lateral_m, front_m) else { return true };
         if span.from_m > front_m {
             let closing_mps = (speed_mps - along_mps).max(0.0);
             return span.from_m - front_m > GAP_M_MIN + TIME_GAP_S_MIN * speed_mps.max(closing_mps);

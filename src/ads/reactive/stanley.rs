@@ -3,7 +3,7 @@
 //! The wheels point along the path at the front axle, and further towards it the farther it is away. Left out
 //! are the terms for slip and for the yaw of soft tyres, which the ego vehicle's model does not have.
 
-use crate::ads::guide::Guide;
+use crate::ads::kit::Guide;
 use crate::geometry::wrap_angle;
 use crate::sim::{EgoMotion, VehicleParameters};
 

@@ -11,7 +11,10 @@
 //! the way when the ego vehicle comes there is critical at 2 s, too, from whatever side it comes. Left out
 //! is the automatic emergency brake (0.85 g within 0.6 s) that the table adds once the two overlap in full.
 
-use crate::kinematics::CAREFUL_BRAKING_MPS2;
+use crate::kinematics::{
+    CAREFUL_BRAKING_MPS2, CAREFUL_JERK_MPS3, CAREFUL_PERCEPTION_S, CAREFUL_REACTION_S, CAREFUL_RELEASE_MPS2,
+    WANDER_M,
+};
 
 use super::encounter::Encounter;
 use super::model::Model;
@@ -21,8 +24,6 @@ use super::reflex::Braking;
 const CRITICAL_S: f64 = 2.0;
 /// A deceleration of the vehicle ahead beyond this is seen as hard braking, m/s² (esmini).
 const LEADER_MPS2: f64 = 5.0;
-/// A vehicle within this distance of its course merely wanders, m.
-pub(super) const WANDER_M: f64 = 0.375;
 
 /// The driver: notices a cut-in when it has left its course by more than drivers wander, and has been evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,10 +32,10 @@ pub struct CarefulHuman;
 impl Model for CarefulHuman {
     fn braking(&self) -> Braking {
         Braking {
-            evaluation_s: 0.4,
-            reaction_s: 0.75,
-            release_mps2: 0.4,
-            jerk_mps3: 12.65,
+            evaluation_s: CAREFUL_PERCEPTION_S,
+            reaction_s: CAREFUL_REACTION_S,
+            release_mps2: CAREFUL_RELEASE_MPS2,
+            jerk_mps3: CAREFUL_JERK_MPS3,
             deceleration_mps2_max: CAREFUL_BRAKING_MPS2,
         }
     }

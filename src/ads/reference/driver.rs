@@ -12,11 +12,9 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
 use crate::ads::driver::Ads;
-use crate::ads::guide::Guide;
+use crate::ads::kit::{Guide, Helm};
 use crate::ads::status::{Reason, Status};
-use crate::sim::{
-    Conditions, Control, DT_S, FRAME_S, FRAME_TICKS, Scene, Sensed, SensedObject, VehicleParameters,
-};
+use crate::sim::{Conditions, Control, DT_S, FRAME_S, Scene, Sensed, SensedObject, VehicleParameters};
 
 use super::encounter::Encounter;
 use super::idm::Idm;
@@ -50,8 +48,7 @@ pub struct Reference<M> {
     /// What the route's driver is shown; kept for its buffers.
     shown: Option<Sensed>,
     watched: BTreeMap<u32, Watched>,
-    ticks: u64,
-    station_m: Option<f64>,
+    helm: Helm,
     /// What the model gave in the last tick, m/s².
     braking_mps2: f64,
     /// Whether it looks aside before a lane change. What it sees a reaction time late is enough to drive by, but not where
@@ -77,8 +74,7 @@ impl<M: Model> Reference<M> {
             looks: VecDeque::new(),
             shown: None,
             watched: BTreeMap::new(),
-            ticks: 0,
-            station_m: None,
+            helm: Helm::default(),
             braking_mps2: 0.0,
             looks_aside: false,
         }
@@ -124,7 +120,7 @@ impl<M: Model> Reference<M> {
         if self.looks.len() <= self.delay_frames() {
             return shown;
         }
-        let age_s = (self.looks.len() - 1) as f64 * FRAME_S + (self.ticks % FRAME_TICKS) as f64 * DT_S;
+        let age_s = (self.looks.len() - 1) as f64 * FRAME_S + self.helm.since_look_s();
         let objects = self.looks.front().into_iter().flatten();
         shown.objects.extend(objects.map(|object| {
             let mut object = *object;
@@ -161,13 +157,11 @@ impl<M: Model> Careful for Reference<M> {
 
 impl<M: Model> Ads for Reference<M> {
     fn drive(&mut self, sensed: &Sensed) -> Control {
-        let position = sensed.ego.rear_axle.position;
-        if self.station_m.is_none() {
+        if self.helm.is_first() {
             self.route.find_place(&sensed.ego.rear_axle);
         }
-        let station_m = self.route.guide().locate(position, self.station_m).station_m;
-        self.station_m = Some(station_m);
-        if self.ticks.is_multiple_of(FRAME_TICKS) {
+        let station_m = self.helm.locate(self.route.guide(), sensed.ego.rear_axle.position).station_m;
+        if self.helm.looks() {
             self.look(sensed, station_m);
             if let Some(seen) = self.looks.back().filter(|_| self.looks_aside) {
                 self.route.glance(seen, sensed.ego.speed_mps, station_m);
@@ -175,7 +169,7 @@ impl<M: Model> Ads for Reference<M> {
         }
         let shown = self.shown.take().unwrap_or_else(|| sensed.clone());
         let shown = self.delayed(sensed, shown);
-        self.ticks += 1;
+        self.helm.tick();
         let (demand_mps2, because_of) = self.demand.unwrap_or((0.0, 0));
         let now_mps2 = self.reflex.step(demand_mps2, DT_S);
         self.braking_mps2 = now_mps2;

@@ -6,8 +6,8 @@
 //! constant speed. `meeting_s` is ours: it extends the models' time to collision to road users that cross
 //! or come towards the ego vehicle.
 
-use crate::ads::guide::Guide;
-use crate::geometry::{Vec2, unit_vector};
+use crate::ads::kit::Guide;
+use crate::geometry::{extent_m, unit_vector};
 use crate::sim::{SensedObject, VehicleParameters};
 
 /// Meetings are looked for this far ahead, in steps, s. Longer than any model's threshold.
@@ -56,9 +56,10 @@ impl Encounter {
         let reach_m = 10.0 + HORIZON_S * (own_mps + object.velocity_mps.norm());
         let (from_m, to_m) = (front_m - car.length_m - 10.0, front_m + 130.0);
         let forward = unit_vector(object.pose.heading_rad);
+        let size = (object.length_m, object.width_m);
         let beside_m = (object.length_m + object.width_m + car.width_m) / 2.0;
         let (beside, mut tracer) = guide.trace(object.pose.position, from_m, to_m, beside_m);
-        let (along_m, across_m) = extent(&beside.forward, &forward, object);
+        let (along_m, across_m) = extent_m(forward, beside.forward, size);
         if beside.station_m + along_m / 2.0 < front_m - car.length_m {
             return None;
         }
@@ -70,7 +71,7 @@ impl Encounter {
             (0..=(HORIZON_S / STEP_S) as usize).map(|step| step as f64 * STEP_S).find(|&time_s| {
                 let position = object.pose.position + object.velocity_mps * time_s;
                 let Some(then) = tracer.next(position) else { return false };
-                let (along_m, across_m) = extent(&then.forward, &forward, object);
+                let (along_m, across_m) = extent_m(forward, then.forward, size);
                 let ego_front_m = front_m + own_mps * time_s;
                 then.offset_m.abs() <= (across_m + car.width_m) / 2.0
                     && then.station_m - along_m / 2.0 <= ego_front_m
@@ -111,11 +112,4 @@ impl Encounter {
     pub fn is_beside(&self) -> bool {
         self.gap_m + self.lengths_m / 2.0 < 0.0
     }
-}
-
-/// Length along and width across a direction of an outline, m.
-fn extent(along: &Vec2, forward: &Vec2, object: &SensedObject) -> (f64, f64) {
-    let cosine = along.dot(forward).abs();
-    let sine = (along.x * forward.y - along.y * forward.x).abs();
-    (cosine * object.length_m + sine * object.width_m, sine * object.length_m + cosine * object.width_m)
 }

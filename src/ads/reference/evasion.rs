@@ -8,14 +8,9 @@
 use std::sync::Arc;
 
 use crate::ads::driver::Ads;
-use crate::ads::guide::{Guide, SpeedRules};
+use crate::ads::kit::{Guide, Helm, SpeedRules, Steering};
 use crate::ads::status::{Reason, Status};
-use crate::ads::steering::{Steering, SteeringConfig};
-use crate::sim::{Control, Scene, Sensed, pedals_for};
-
-/// The guide's speeds are not used: a manoeuvre has its pedal.
-const RULES: SpeedRules =
-    SpeedRules { cruise_mps: f64::INFINITY, lateral_acceleration_mps2_max: 5.0, slowdown_mps2: 6.0 };
+use crate::sim::{Control, Scene, Sensed};
 
 /// Pedals of the manoeuvres: full brake, half of it, none, full throttle.
 const PEDALS: [Pedal; 4] = [Pedal::FullBrake, Pedal::Gentle(-3.0), Pedal::Gentle(0.0), Pedal::Gentle(2.0)];
@@ -36,15 +31,14 @@ pub struct Evasion {
     steering: Arc<Steering>,
     pedal: Pedal,
     offset_m: f64,
-    station_m: Option<f64>,
+    helm: Helm,
     status: Status,
 }
 
 impl Evasion {
     /// Every manoeuvre on a route, full braking in the lane first.
     pub fn all(scene: &Scene) -> impl Iterator<Item = Evasion> {
-        let guide = Arc::new(Guide::new(scene, &RULES));
-        let steering = Steering::shared(&SteeringConfig::default());
+        let (guide, steering) = (Arc::new(Guide::new(scene, &SpeedRules::NONE)), Steering::usual());
         OFFSETS_M.into_iter().flat_map(move |offset_m| {
             let (guide, steering) = (Arc::clone(&guide), Arc::clone(&steering));
             PEDALS.into_iter().map(move |pedal| Evasion {
@@ -52,7 +46,7 @@ impl Evasion {
                 steering: Arc::clone(&steering),
                 pedal,
                 offset_m,
-                station_m: None,
+                helm: Helm::default(),
                 status: Status { reason: Reason::Fallback, ..Status::default() },
             })
         })
@@ -71,16 +65,14 @@ impl Evasion {
 impl Ads for Evasion {
     fn drive(&mut self, sensed: &Sensed) -> Control {
         let rear_axle = &sensed.ego.rear_axle;
-        let station_m = self.guide.locate(rear_axle.position, self.station_m).station_m;
-        self.station_m = Some(station_m);
+        let station_m = self.helm.locate(&self.guide, rear_axle.position).station_m;
         // To steer for a place beside the route is to steer for the route from the other side of it.
         let as_if = rear_axle.offset(0.0, -self.offset_m);
         let steer_rad = self.steering.steer_rad(&self.guide, &as_if, station_m, &sensed.ego);
-        let (throttle_pct, brake_pct) = match self.pedal {
-            Pedal::FullBrake => (0.0, 100.0),
-            Pedal::Gentle(acceleration_mps2) => pedals_for(acceleration_mps2),
+        let control = match self.pedal {
+            Pedal::FullBrake => Control { throttle_pct: 0.0, brake_pct: 100.0, steer_rad },
+            Pedal::Gentle(acceleration_mps2) => Control::towards(acceleration_mps2, steer_rad),
         };
-        let control = Control { throttle_pct, brake_pct, steer_rad };
         self.status.localized = Some(*rear_axle);
         self.status.control = control;
         control

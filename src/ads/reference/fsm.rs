@@ -6,6 +6,8 @@
 //! crossing road user counts by its speed along the way, and an oncoming one as standing where both would
 //! meet after the time that stopping takes.
 
+use crate::kinematics::{CAREFUL_JERK_MPS3, CAREFUL_REACTION_S, braking_m};
+
 use super::encounter::Encounter;
 use super::model::Model;
 use super::reflex::Braking;
@@ -28,7 +30,7 @@ pub struct FuzzySafety {
 impl Default for FuzzySafety {
     fn default() -> FuzzySafety {
         FuzzySafety {
-            reaction_s: 0.75,
+            reaction_s: CAREFUL_REACTION_S,
             braking_mps2_min: 4.0,
             braking_mps2_max: 6.0,
             leader_mps2: 7.0,
@@ -41,10 +43,9 @@ impl Default for FuzzySafety {
 impl FuzzySafety {
     /// Proactive fuzzy surrogate in `[0, 1]`: what if the leader brakes hard?
     fn proactive(&self, gap_m: f64, rear_mps: f64, leader_mps: f64) -> f64 {
-        let common_m = rear_mps * self.reaction_s - leader_mps * leader_mps / (2.0 * self.leader_mps2);
-        let braked_m = |braking_mps2: f64| rear_mps * rear_mps / (2.0 * braking_mps2);
-        let safe_m = common_m + braked_m(self.braking_mps2_min) + self.safe_margin_m;
-        let unsafe_m = common_m + braked_m(self.braking_mps2_max);
+        let common_m = rear_mps * self.reaction_s - braking_m(leader_mps, self.leader_mps2);
+        let safe_m = common_m + braking_m(rear_mps, self.braking_mps2_min) + self.safe_margin_m;
+        let unsafe_m = common_m + braking_m(rear_mps, self.braking_mps2_max);
         between(gap_m - self.margin_m, safe_m, unsafe_m)
     }
 
@@ -58,15 +59,14 @@ impl FuzzySafety {
         let after_mps = closing_mps + rear_mps2 * self.reaction_s;
         if after_mps < 0.0 {
             // It is slower than the leader before the reaction is over, because it brakes already.
-            let closed_m = closing_mps * closing_mps / (2.0 * rear_mps2.abs());
+            let closed_m = braking_m(closing_mps, rear_mps2.abs());
             return if gap_m < closed_m { 1.0 } else { 0.0 };
         }
         let reaction_m = (closing_mps + rear_mps2 * self.reaction_s / 2.0) * self.reaction_s;
-        let braked_m = |braking_mps2: f64| after_mps * after_mps / (2.0 * braking_mps2);
         between(
             gap_m,
-            reaction_m + braked_m(self.braking_mps2_min),
-            reaction_m + braked_m(self.braking_mps2_max),
+            reaction_m + braking_m(after_mps, self.braking_mps2_min),
+            reaction_m + braking_m(after_mps, self.braking_mps2_max),
         )
     }
 }
@@ -88,7 +88,8 @@ impl Model for FuzzySafety {
             evaluation_s: 0.0,
             reaction_s: self.reaction_s,
             release_mps2: 0.0,
-            jerk_mps3: 12.65,
+            jerk_mps3: CAREFUL_JERK_MPS3,
+            // 0.774 g as published, with g = 9.81 m/s². No demand is above 6 m/s².
             deceleration_mps2_max: 7.593,
         }
     }

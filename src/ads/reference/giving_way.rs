@@ -1,5 +1,4 @@
-//! At a junction a careful driver gives way to those that have priority, and to nobody else until it is seen that
-//! they take it.
+//! At a junction a careful driver gives way to road users that have priority, and to others once they visibly take it.
 
 use crate::model::vocabulary::Priority;
 use crate::road::{Conflict, LaneIndex, LanePlace, RoadMap};

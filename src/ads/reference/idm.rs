@@ -12,33 +12,20 @@
 use std::sync::Arc;
 
 use crate::ads::driver::Ads;
-use crate::ads::guide::{Guide, SpeedRules};
-use crate::ads::status::{PerceivedObject, Reason, Status};
-use crate::ads::steering::{Steering, SteeringConfig};
-use crate::ads::stops::Signs;
-use crate::geometry::{Beside, Pose, Vec2, unit_vector};
-use crate::road::RouteLaneChange;
-use crate::sim::{
-    Control, DT_S, FRAME_TICKS, Following, Scene, Sensed, SensedObject, SignalColour, VehicleParameters,
-    pedals_for,
+use crate::ads::kit::{
+    BESIDE_M, Guide, HALF_WAY_M, HARDEST_MPS2, Helm, LIGHT_MPS2, RANGE_M, RouteChanges, Signs, SpeedRules,
+    Steering, held_mps2, in_lane, speed_mps2,
 };
+use crate::ads::status::{PerceivedObject, Reason, Status};
+use crate::geometry::{Beside, Pose, Vec2, unit_vector};
+use crate::kinematics::{Following, WANDER_M, needed_mps2};
+use crate::sim::{Control, DT_S, Scene, Sensed, SensedObject, SignalColour, VehicleParameters};
 
-use super::cc::WANDER_M;
 use super::giving_way::goes_before;
 
 /// The model's parameters, for towns. Ours.
 const MODEL: Following =
     Following { gap_m_min: 3.0, time_gap_s: 1.5, acceleration_mps2: 2.0, comfortable_mps2: 3.0 };
-/// Hardest braking, m/s²: the vehicle's limit.
-const HARDEST_MPS2: f64 = 6.0;
-/// A light that needs harder braking is passed, m/s².
-const LIGHT_MPS2: f64 = 4.0;
-const RULES: SpeedRules =
-    SpeedRules { cruise_mps: 11.18, lateral_acceleration_mps2_max: 2.0, slowdown_mps2: 1.5 };
-/// Range of its knowledge, m.
-const SIGHT_M: f64 = 120.0;
-/// Room kept free beside the vehicle, m.
-const SIDE_M: f64 = 0.4;
 /// Crossings are looked for this far ahead, in steps, s.
 const LOOK_AHEAD_S: f64 = 6.0;
 const LOOK_STEP_S: f64 = 0.25;
@@ -50,8 +37,6 @@ const CROSSING_GAP_M: f64 = 3.0;
 /// Greatest ratio of a guide's length to the difference of its stations: it is longer outside a bend, and
 /// where it changes lanes.
 const GUIDE_STRETCH_MAX: f64 = 1.5;
-/// Acceleration that holds the vehicle at rest, m/s².
-const HOLD_MPS2: f64 = -3.0;
 
 /// Braking that a lane change may ask of any vehicle, magnitude, m/s².
 const SAFE_MPS2: f64 = 2.0;
@@ -60,18 +45,14 @@ const SAFE_MPS2: f64 = 2.0;
 pub struct Idm {
     scene: Arc<Scene>,
     guide: Arc<Guide>,
-    /// Where each lane change of the route begins, m; infinite while no gap was found.
-    begins_m: Vec<f64>,
+    changes: RouteChanges,
     /// A glance aside, newer than what it is shown, left no gap: no lane change begins.
     is_beset: bool,
     steering: Arc<Steering>,
-    /// Station on the route, m; `None` before the first tick.
-    station_m: Option<f64>,
-    steer_rad: f64,
+    helm: Helm,
     /// What it keeps away from, looked for every fifth tick.
     ahead: Vec<Ahead>,
     signs: Signs,
-    ticks: u64,
     status: Status,
 }
 
@@ -106,7 +87,7 @@ impl Reach {
             let time_s = (index + 1) as f64 * LOOK_STEP_S;
             // A slow ego vehicle may speed up meanwhile.
             let reach_s = time_s + CONFLICT_S;
-            let way_m = (speed_mps * reach_s + reach_s * reach_s).min(RULES.cruise_mps * reach_s);
+            let way_m = (speed_mps * reach_s + reach_s * reach_s).min(SpeedRules::TOWN.cruise_mps * reach_s);
             let from_m = rear_m + speed_mps * (time_s - CONFLICT_S).max(0.0);
             Reach { time_s, from_m, to_m: front_m + way_m }
         })
@@ -114,6 +95,11 @@ impl Reach {
 }
 
 impl Ahead {
+    /// Something that stands, as seen now.
+    fn standing(near_m: f64, reason: Reason) -> Ahead {
+        Ahead { near_m, age_s: 0.0, speed_mps: 0.0, reason }
+    }
+
     fn gap_m(&self, front_m: f64) -> f64 {
         self.near_m + self.speed_mps * self.age_s - front_m
     }
@@ -121,18 +107,16 @@ impl Ahead {
 
 impl Idm {
     pub fn new(scene: &Arc<Scene>) -> Idm {
-        let begins_m = vec![f64::INFINITY; scene.route.changes.len()];
+        let changes = RouteChanges::new(scene);
         Idm {
             scene: Arc::clone(scene),
-            guide: Arc::new(Guide::with_changes(scene, &RULES, &begins_m)),
-            begins_m,
+            guide: Arc::new(changes.guide(&SpeedRules::TOWN)),
+            changes,
             is_beset: false,
-            steering: Steering::shared(&SteeringConfig::default()),
-            station_m: None,
-            steer_rad: 0.0,
+            steering: Steering::usual(),
+            helm: Helm::default(),
             ahead: Vec::new(),
             signs: Signs::default(),
-            ticks: 0,
             status: Status::default(),
         }
     }
@@ -140,8 +124,7 @@ impl Idm {
     fn acceleration_mps2(&self, sensed: &Sensed, station_m: f64) -> (f64, Reason) {
         let speed_mps = sensed.ego.speed_mps;
         let front_m = VehicleParameters::MKZ.front_m(station_m);
-        let allowed_mps =
-            self.guide.speed_mps_max(station_m).min(self.guide.speed_mps_max(station_m + speed_mps * 0.6));
+        let allowed_mps = self.guide.allowed_mps(station_m, speed_mps);
         let mut wanted = (model_mps2(speed_mps, allowed_mps, None), Reason::Cruise);
         for ahead in &self.ahead {
             let gap = Some((ahead.gap_m(front_m), ahead.speed_mps));
@@ -158,7 +141,7 @@ impl Idm {
         for ahead in &mut self.ahead {
             ahead.age_s += DT_S;
         }
-        if !self.ticks.is_multiple_of(FRAME_TICKS) {
+        if !self.helm.looks() {
             return;
         }
         let front_m = VehicleParameters::MKZ.front_m(station_m);
@@ -167,7 +150,7 @@ impl Idm {
         ahead.clear();
         ahead.extend(self.lights(sensed, front_m));
         ahead.extend(self.sign(sensed, front_m));
-        let objects = sensed.objects.iter().filter(|object| object.distance_m < SIGHT_M);
+        let objects = sensed.objects.iter().filter(|object| object.distance_m < RANGE_M);
         let reaches = Reach::of_moments(sensed.ego.speed_mps, front_m);
         ahead.extend(objects.filter_map(|object| self.ahead(sensed, object, front_m, &reaches)));
         ahead.extend(self.last_chance());
@@ -175,42 +158,27 @@ impl Idm {
         self.report(sensed);
     }
 
-    /// The lane change that has not begun yet, and whether those before it are over.
-    fn pending_change(&self, station_m: f64) -> Option<(usize, bool)> {
-        let index = self.begins_m.iter().position(|begin_m| begin_m.is_infinite())?;
-        let before = index.checked_sub(1).map(|before| {
-            let change = &self.scene.route.changes[before];
-            self.begins_m[before] + change.length_from_m(self.begins_m[before])
-        });
-        Some((index, before.is_none_or(|over_m| station_m >= over_m)))
-    }
-
     /// Begins the next lane change if it is time and there is a gap.
     fn seek_gap(&mut self, sensed: &Sensed, station_m: f64) {
-        let Some((index, true)) = self.pending_change(station_m) else { return };
-        let change = &self.scene.route.changes[index];
+        let Some(change) = self.changes.next() else { return };
+        let is_over = self.changes.last_end_m().is_none_or(|end_m| station_m >= end_m);
         let has_gap = || self.has_gap(&sensed.objects, sensed.ego.speed_mps, station_m, change.lateral_m);
-        if station_m < change.begin_m || self.is_beset || !has_gap() {
-            return;
+        if is_over && station_m >= change.begin_m && !self.is_beset && has_gap() {
+            self.changes.begin(station_m);
+            self.guide = Arc::new(self.changes.guide(&SpeedRules::TOWN));
         }
-        self.begins_m[index] = station_m;
-        self.guide = Arc::new(Guide::with_changes(&self.scene, &RULES, &self.begins_m));
     }
 
     /// Whether gentle braking would do for every vehicle in the lane `lateral_m` to the left, and for the
     /// ego vehicle, if the ego vehicle were in that lane now.
     fn has_gap(&self, objects: &[SensedObject], ego_mps: f64, station_m: f64, lateral_m: f64) -> bool {
-        let half_way_m = VehicleParameters::MKZ.width_m / 2.0 + SIDE_M;
         let front_m = VehicleParameters::MKZ.front_m(station_m);
         let rear_m = front_m - VehicleParameters::MKZ.length_m;
         objects.iter().all(|object| {
-            let at = self.guide.project(object.pose.position, rear_m - SIGHT_M, front_m + SIGHT_M);
-            let in_target = Beside { offset_m: at.offset_m - lateral_m, ..at };
-            let forward = unit_vector(object.pose.heading_rad);
-            let Some(span) = in_target.taken(forward, object.length_m, object.width_m, half_way_m) else {
+            let Some((span, along_mps)) = in_lane(&self.guide, object, lateral_m, front_m) else {
                 return true;
             };
-            let along_mps = object.velocity_mps.dot(&at.forward).max(0.0);
+            let along_mps = along_mps.max(0.0);
             let needed_mps2 = if span.from_m > front_m {
                 model_mps2(ego_mps, ego_mps.max(1.0), Some((span.from_m - front_m, along_mps)))
             } else if span.to_m < rear_m {
@@ -224,14 +192,7 @@ impl Idm {
 
     /// Where it must wait for a gap, as something that stands there.
     fn last_chance(&self) -> Option<Ahead> {
-        let (index, _) = self.pending_change(0.0)?;
-        let wait_m = self.scene.route.changes[index].latest_m - RouteLaneChange::LENGTH_M_MIN;
-        Some(Ahead {
-            near_m: VehicleParameters::MKZ.front_m(wait_m) + MODEL.gap_m_min,
-            age_s: 0.0,
-            speed_mps: 0.0,
-            reason: Reason::LaneChange,
-        })
+        Some(Ahead::standing(self.changes.wait_m()? + MODEL.gap_m_min, Reason::LaneChange))
     }
 
     /// Lights that it stops for, as things that stand a little behind their line.
@@ -239,28 +200,18 @@ impl Idm {
         let speed_mps = sensed.ego.speed_mps;
         self.scene.route.stop_lines.iter().filter_map(move |line| {
             let distance_m = line.station_m - front_m;
-            let needed_mps2 = speed_mps * speed_mps / (2.0 * distance_m.max(0.1));
             let stops = sensed.signals[line.signal] != SignalColour::Green
-                && (-LINE_GAP_M..SIGHT_M).contains(&distance_m)
-                && needed_mps2 <= LIGHT_MPS2;
-            stops.then_some(Ahead {
-                near_m: line.station_m - LINE_GAP_M + MODEL.gap_m_min,
-                age_s: 0.0,
-                speed_mps: 0.0,
-                reason: Reason::RedLight,
-            })
+                && (-LINE_GAP_M..RANGE_M).contains(&distance_m)
+                && needed_mps2(speed_mps, distance_m.max(0.1)) <= LIGHT_MPS2;
+            let near_m = line.station_m - LINE_GAP_M + MODEL.gap_m_min;
+            stops.then_some(Ahead::standing(near_m, Reason::RedLight))
         })
     }
 
     /// The stop sign that it stops for, as something that stands a little behind its line.
     fn sign(&mut self, sensed: &Sensed, front_m: f64) -> Option<Ahead> {
         let stop = self.signs.next_stop(&self.scene, front_m, sensed.ego.speed_mps)?;
-        Some(Ahead {
-            near_m: stop.station_m - LINE_GAP_M + MODEL.gap_m_min,
-            age_s: 0.0,
-            speed_mps: 0.0,
-            reason: stop.reason,
-        })
+        Some(Ahead::standing(stop.station_m - LINE_GAP_M + MODEL.gap_m_min, stop.reason))
     }
 
     /// What a road user means for the ego vehicle: a leader, something in the way, or something that crosses it.
@@ -271,16 +222,15 @@ impl Idm {
         front_m: f64,
         reaches: &[Reach; LOOKS],
     ) -> Option<Ahead> {
-        let half_way_m = VehicleParameters::MKZ.width_m / 2.0 + SIDE_M;
         let rear_m = front_m - VehicleParameters::MKZ.length_m;
         let forward = unit_vector(object.pose.heading_rad);
-        let taken = |beside: &Beside| beside.taken(forward, object.length_m, object.width_m, half_way_m);
-        let reach_m = half_way_m + (object.length_m + object.width_m) / 2.0;
+        let taken = |beside: &Beside| beside.taken(forward, object.length_m, object.width_m, HALF_WAY_M);
+        let reach_m = HALF_WAY_M + (object.length_m + object.width_m) / 2.0;
         let (beside, mut tracer) =
-            self.guide.trace(object.pose.position, rear_m - 10.0, front_m + SIGHT_M, reach_m);
+            self.guide.trace(object.pose.position, rear_m - 10.0, front_m + RANGE_M, reach_m);
         if let Some(span) = taken(&beside) {
             // It is on the way now; once its middle is behind the front, the ego vehicle is past it.
-            return (span.middle_m() > front_m - 1.0).then(|| Ahead {
+            return (span.middle_m() > front_m - BESIDE_M).then(|| Ahead {
                 near_m: span.from_m,
                 age_s: 0.0,
                 speed_mps: object.velocity_mps.dot(&beside.forward).max(0.0),
@@ -316,7 +266,7 @@ impl Idm {
     fn report(&mut self, sensed: &Sensed) {
         let perceived = &mut self.status.perceived;
         perceived.clear();
-        let in_sight = sensed.objects.iter().filter(|object| object.distance_m < SIGHT_M);
+        let in_sight = sensed.objects.iter().filter(|object| object.distance_m < RANGE_M);
         perceived.extend(in_sight.map(PerceivedObject::as_it_is));
     }
 
@@ -327,66 +277,50 @@ impl Idm {
         decide: impl FnOnce(f64, Reason) -> (f64, Reason),
     ) -> Control {
         let pose = &sensed.ego.rear_axle;
-        if self.station_m.is_none() {
-            self.steer_rad = sensed.ego.steer_rad;
+        if self.helm.is_first() {
             self.find_place(pose);
         }
-        let station_m = self.guide.locate(pose.position, self.station_m).station_m;
-        self.station_m = Some(station_m);
+        let station_m = self.helm.locate(&self.guide, pose.position).station_m;
         self.look(sensed, station_m);
         let (model_mps2, model_reason) = self.acceleration_mps2(sensed, station_m);
-        let (mut acceleration_mps2, reason) = decide(model_mps2, model_reason);
-        if sensed.ego.speed_mps < 0.1 && acceleration_mps2 <= 0.0 {
-            acceleration_mps2 = HOLD_MPS2;
-        }
-        let (throttle_pct, brake_pct) = pedals_for(acceleration_mps2);
+        let (wanted_mps2, reason) = decide(model_mps2, model_reason);
+        let acceleration_mps2 = held_mps2(sensed.ego.speed_mps, wanted_mps2, 0.0);
         let steer_rad = self.steering.steer_rad(&self.guide, pose, station_m, &sensed.ego);
-        let control = Control { throttle_pct, brake_pct, steer_rad };
         self.status.localized = Some(*pose);
-        self.status.control = control;
-        self.status.steer_rate_radps = (sensed.ego.steer_rad - self.steer_rad) / DT_S;
         self.status.reason = reason;
-        self.steer_rad = sensed.ego.steer_rad;
-        self.ticks += 1;
-        control
+        self.helm.command(Control::towards(acceleration_mps2, steer_rad), &sensed.ego, &mut self.status)
     }
 
     /// Looks aside at what is seen at this moment: unless that leaves a gap, no lane change begins in the next look.
     pub(super) fn glance(&mut self, seen: &[SensedObject], ego_mps: f64, station_m: f64) {
-        let pending = self.pending_change(station_m);
-        self.is_beset = pending.is_some_and(|(index, _)| {
-            let lateral_m = self.scene.route.changes[index].lateral_m;
-            !self.has_gap(seen, ego_mps, station_m, lateral_m)
-        });
+        let next = self.changes.next();
+        self.is_beset = next.is_some_and(|change| !self.has_gap(seen, ego_mps, station_m, change.lateral_m));
     }
 
     /// Learns from the vehicle's place which lane changes of the route are begun or over, before its first look. A driver
     /// that does not drive from the start, but goes on where another one was, would otherwise take itself to be in the
     /// source lane: it would steer back to it, and what stands ahead of it would stand beside its way.
     pub(super) fn find_place(&mut self, rear_axle: &Pose) {
-        for index in 0..self.begins_m.len() {
-            if self.begins_m[index].is_finite() {
-                continue;
-            }
-            let change = &self.scene.route.changes[index];
+        while let Some(change) = self.changes.next() {
             let beside = self.guide.locate(rear_axle.position, None);
             let is_aside = beside.offset_m * change.lateral_m.signum() > WANDER_M;
             if beside.station_m < change.begin_m || !is_aside {
                 return;
             }
-            self.begins_m[index] = change.begun_m(beside.station_m, beside.offset_m);
-            self.guide = Arc::new(Guide::with_changes(&self.scene, &RULES, &self.begins_m));
+            let begun_m = change.begun_m(beside.station_m, beside.offset_m);
+            self.changes.begin(begun_m);
+            self.guide = Arc::new(self.changes.guide(&SpeedRules::TOWN));
         }
     }
 
     /// Gives up a lane change that was begun in thought alone, because the vehicle is still in the source lane.
     fn stay(&mut self, rear_axle: &Pose) {
-        let Some(last) = self.begins_m.iter().rposition(|begin_m| begin_m.is_finite()) else { return };
-        let mut begins_m = self.begins_m.clone();
-        begins_m[last] = f64::INFINITY;
-        let guide = Guide::with_changes(&self.scene, &RULES, &begins_m);
-        if guide.locate(rear_axle.position, self.station_m).offset_m.abs() <= WANDER_M {
-            (self.begins_m, self.guide) = (begins_m, Arc::new(guide));
+        let Some((last, ..)) = self.changes.begun().last() else { return };
+        let (mut changes, mut helm) = (self.changes.clone(), self.helm);
+        changes.take_back(last);
+        let guide = changes.guide(&SpeedRules::TOWN);
+        if helm.locate(&guide, rear_axle.position).offset_m.abs() <= WANDER_M {
+            (self.changes, self.guide) = (changes, Arc::new(guide));
         }
     }
 
@@ -413,15 +347,13 @@ impl Ads for Idm {
 /// The model's acceleration, m/s², with the gap (m) and speed (m/s) of what is ahead.
 fn model_mps2(speed_mps: f64, allowed_mps: f64, ahead: Option<(f64, f64)>) -> f64 {
     let free = if speed_mps <= allowed_mps {
-        let part = speed_mps / allowed_mps;
-        MODEL.acceleration_mps2 * (1.0 - part * part * part * part)
+        MODEL.free_mps2(speed_mps, allowed_mps)
     } else {
         // The model scarcely brakes for a falling limit; this follows the limit as closely as it falls.
-        (allowed_mps - speed_mps) / 0.6
+        speed_mps2(speed_mps, allowed_mps)
     };
     let Some((gap_m, ahead_mps)) = ahead else { return free };
-    let ratio = MODEL.wanted_gap_m(speed_mps, ahead_mps) / gap_m.max(0.1);
-    free.min(MODEL.acceleration_mps2) - MODEL.acceleration_mps2 * ratio * ratio
+    free.min(MODEL.acceleration_mps2) - MODEL.interaction_mps2(speed_mps, ahead_mps, gap_m)
 }
 
 #[cfg(test)]
@@ -429,6 +361,7 @@ mod tests {
     use super::*;
     use crate::ads::testing::{Rig, object, two_lanes};
     use crate::model::vocabulary::Body;
+    use crate::road::RouteLaneChange;
 
     const SOURCE_Y_M: f64 = -5.25;
     const TARGET_Y_M: f64 = -1.75;

@@ -7,14 +7,13 @@
 //! The text speaks of cut-ins. Beyond it, the bound holds here for a vehicle that is ahead already, and
 //! for road users that cross or come towards, as soon as their way leads into the ego vehicle's.
 
+use crate::kinematics::{CUT_IN_BRAKING_MPS2, CUT_IN_RESPONSE_S};
+use crate::sim::FRAME_S;
+
 use super::encounter::Encounter;
 use super::model::Model;
 use super::reflex::Braking;
 
-const DECELERATION_MPS2: f64 = 6.0;
-const RESPONSE_S: f64 = 0.35;
-/// One look of a system that looks ten times a second, s.
-const LOOK_S: f64 = 0.1;
 /// Side gap of two cars of 1.9 m at which one is 0.3 m into the other's lane of 3.5 m, m: the reading of
 /// JRC-FSM.
 const INTRUSION_SIDE_GAP_M: f64 = 0.5;
@@ -25,26 +24,26 @@ pub struct MinimalPerformance;
 
 /// Time to collision from which a cut-in can be avoided, s.
 pub fn avoidable_from_s(closing_mps: f64) -> f64 {
-    closing_mps.max(0.0) / (2.0 * DECELERATION_MPS2) + RESPONSE_S
+    closing_mps.max(0.0) / (2.0 * CUT_IN_BRAKING_MPS2) + CUT_IN_RESPONSE_S
 }
 
 impl Model for MinimalPerformance {
     fn braking(&self) -> Braking {
         Braking {
             evaluation_s: 0.0,
-            reaction_s: RESPONSE_S,
+            reaction_s: CUT_IN_RESPONSE_S,
             release_mps2: 0.0,
             jerk_mps3: f64::INFINITY,
-            deceleration_mps2_max: DECELERATION_MPS2,
+            deceleration_mps2_max: CUT_IN_BRAKING_MPS2,
         }
     }
 
     fn demand_mps2(&self, encounter: &Encounter) -> f64 {
-        let bound_s = avoidable_from_s(encounter.closing_mps()) + LOOK_S;
+        let bound_s = avoidable_from_s(encounter.closing_mps()) + FRAME_S;
         let intrudes = encounter.side_gap_m <= INTRUSION_SIDE_GAP_M && !encounter.is_beside();
         let cuts_in = intrudes && encounter.time_to_collision_s() <= bound_s;
         let from_aside = encounter.crosses || encounter.other_mps < 0.0;
         let crosses = from_aside && encounter.meeting_s.is_some_and(|time_s| time_s <= bound_s);
-        if cuts_in || crosses { DECELERATION_MPS2 } else { 0.0 }
+        if cuts_in || crosses { CUT_IN_BRAKING_MPS2 } else { 0.0 }
     }
 }

@@ -95,29 +95,24 @@ impl Reflex {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const HUMAN: Braking = Braking {
-        evaluation_s: 0.4,
-        reaction_s: 0.75,
-        release_mps2: 0.4,
-        jerk_mps3: 12.65,
-        deceleration_mps2_max: 7.593,
-    };
+    use crate::ads::reference::cc::CarefulHuman;
+    use crate::ads::reference::model::Model;
+    use crate::kinematics::CAREFUL_BRAKING_MPS2;
 
     #[test]
     fn evaluation_reaction_and_build_up_follow_each_other() {
-        let mut reflex = Reflex::new(HUMAN);
+        let mut reflex = Reflex::new(CarefulHuman.braking());
         let course: Vec<f64> = (0..200).map(|_| reflex.step(9.0, 0.01)).collect();
         assert_eq!(course[38], 0.0);
         assert_eq!(course[80], 0.4);
         // a(t) = min(0.4 + 12.65 (t - 1.15), 7.593).
         assert!((course[144] - (0.4 + 12.65 * 0.3)).abs() < 0.13, "{}", course[144]);
-        assert_eq!(course[199], 7.593);
+        assert_eq!(course[199], CAREFUL_BRAKING_MPS2);
     }
 
     #[test]
     fn a_driver_that_has_just_braked_does_not_react_anew() {
-        let mut reflex = Reflex::new(HUMAN);
+        let mut reflex = Reflex::new(CarefulHuman.braking());
         for _ in 0..200 {
             reflex.step(9.0, 0.01);
         }

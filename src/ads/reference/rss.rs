@@ -5,6 +5,8 @@
 //! lateral distance is nil. A road user that crosses the way has a small speed along it and an unsafe
 //! lateral distance: the published rule covers it as it stands.
 
+use crate::kinematics::{CAREFUL_JERK_MPS3, CAREFUL_REACTION_S, braking_m};
+
 use super::encounter::Encounter;
 use super::model::Model;
 use super::reflex::Braking;
@@ -29,7 +31,7 @@ pub struct Rss {
 impl Default for Rss {
     fn default() -> Rss {
         Rss {
-            response_s: 0.75,
+            response_s: CAREFUL_REACTION_S,
             acceleration_mps2: 3.0,
             braking_mps2_min: 6.0,
             braking_mps2_max: 6.0,
@@ -42,8 +44,7 @@ impl Default for Rss {
 impl Rss {
     /// Safe gap behind a vehicle of the same direction, m.
     pub fn longitudinal_m(&self, rear_mps: f64, front_mps: f64) -> f64 {
-        (self.stopping_m(rear_mps, self.braking_mps2_min)
-            - front_mps * front_mps / (2.0 * self.braking_mps2_max))
+        (self.stopping_m(rear_mps, self.braking_mps2_min) - braking_m(front_mps, self.braking_mps2_max))
             .max(0.0)
     }
 
@@ -58,7 +59,7 @@ impl Rss {
         let after_mps = speed_mps + self.response_s * self.lateral_mps2;
         self.wander_m
             + (speed_mps + after_mps) * self.response_s / 2.0
-            + after_mps * after_mps / (2.0 * self.lateral_mps2)
+            + braking_m(after_mps, self.lateral_mps2)
     }
 
     /// Way to rest of a vehicle that accelerates during the response, m.
@@ -66,7 +67,7 @@ impl Rss {
         let after_mps = speed_mps + self.response_s * self.acceleration_mps2;
         speed_mps * self.response_s
             + self.acceleration_mps2 * self.response_s * self.response_s / 2.0
-            + after_mps * after_mps / (2.0 * braking_mps2)
+            + braking_m(after_mps, braking_mps2)
     }
 }
 
@@ -76,7 +77,7 @@ impl Model for Rss {
             evaluation_s: 0.0,
             reaction_s: self.response_s,
             release_mps2: 0.0,
-            jerk_mps3: 12.65,
+            jerk_mps3: CAREFUL_JERK_MPS3,
             deceleration_mps2_max: self.braking_mps2_min,
         }
     }

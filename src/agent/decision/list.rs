@@ -4,6 +4,7 @@
 //! a list of rows, because the variables do not tell which rows are legal: first the row that most of the
 //! stake wants, then the row that most of the stake wants where the first is not open, and so on.
 
+use crate::agent::settings::{SettingsError, require, within};
 use crate::mdp::Observation;
 use crate::model::expr::Comparison;
 use crate::model::policy::{Condition, PolicyRule, variable_index};
@@ -20,6 +21,33 @@ pub fn chosen_by(rules: &[PolicyRule], observation: &Observation, open: &[bool])
     let applies = |rule: &&PolicyRule| rule.conditions.iter().all(|condition| holds(condition, observation));
     let rule = rules.iter().find(applies)?;
     rule.rows.iter().copied().find(|&row| open[row])
+}
+
+/// The readable rules that are distilled from the network at the end (VIPER, Bastani et al., 2018). The
+/// numbers are ours.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct RulesSettings {
+    /// Most leaves of the decision tree, and so lines of rules; 0: no rules are distilled.
+    pub rules_leaves: usize,
+    /// Largest depth of the tree, and so tests in a line.
+    pub rules_depth: usize,
+    /// Rounds of DAgger: the network drives in the first, the rules of the round before in each later one.
+    pub rules_rounds: u32,
+    /// Episodes in a round, on each road.
+    pub rules_episodes: u32,
+}
+
+impl RulesSettings {
+    /// # Errors
+    /// If a value is out of range.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        require([
+            within("rules_leaves", self.rules_leaves, 0..=256, "up to 256"),
+            within("rules_depth", self.rules_depth, 1..=32, "from 1 to 32"),
+            within("rules_rounds", self.rules_rounds, 1..=1000, "from 1 to 1000"),
+            within("rules_episodes", self.rules_episodes, 1..=1000, "from 1 to 1000"),
+        ])
+    }
 }
 
 /// Rules that imitate the visits, with at most `leaves` lines and `depth` tests in a line. There must be a

@@ -6,5 +6,5 @@
 mod list;
 mod tree;
 
-pub use list::{chosen_by, distilled};
+pub use list::{RulesSettings, chosen_by, distilled};
 pub use tree::Visit;

@@ -1,41 +1,51 @@
 //! Learning on problems whose answer is known.
 
-use ndarray::{Array1, array};
+use ndarray::{Array1, Array2, array};
 
-use crate::agent::hyperparameters::{Encoding, StateSet};
-use crate::agent::presets;
+use std::sync::Arc;
+
+use crate::agent::settings::Configured;
 use crate::agent::trajectory::Experience;
-use crate::mdp::Closeness;
-use crate::rng::stream;
+use crate::agent::{Rows, Settings, by_name};
+use crate::rng::{Stream, stream};
 
+use super::update::{loss, targets};
 use super::*;
 
 /// Plain settings for problems of a few states; each test changes what it is about.
-fn small() -> Hyperparameters {
-    Hyperparameters {
-        encoding: Encoding::Raw,
-        state: StateSet::Full,
-        pays_maker: false,
-        loss: Loss::Huber,
-        average_decay: 0.0,
-        discount: 0.9,
-        n_step: 3,
-        exploration_share: None,
-        hidden_units: vec![16],
-        learning_rate: 3e-3,
-        batch_len: 16,
-        learning_starts: 32,
-        updates_per_step: 2,
-        target_period_updates: 50,
-        exploration_steps: 400,
-        replay_capacity: 2000,
-        ..presets::avastra()
-    }
+const SMALL: &str = "
+encoding: raw
+state: full
+pays_maker: false
+loss: huber
+average_decay: 0
+discount: 0.9
+n_step: 3
+exploration_share: null
+hidden_units: [16]
+learning_rate: 0.003
+batch_len: 16
+learning_starts: 32
+updates_per_step: 2
+target_period_updates: 50
+exploration_steps: 400
+replay_capacity: 2000
+";
+
+/// [`SMALL`] without the settings of some lines, and with these lines.
+fn small(changes: &str) -> LearnerSettings {
+    let name = |line: &str| line.split(':').next().unwrap_or_default().to_owned();
+    let changed: Vec<String> = changes.lines().map(name).collect();
+    let kept = SMALL.lines().filter(|line| !changed.contains(&name(line)));
+    let text = kept.chain(changes.lines()).collect::<Vec<_>>().join("\n");
+    let read = Settings::from_yaml(by_name("ddqn").expect("it is registered"), None, &text);
+    let settings = read.expect("it is trained").expect("the settings are sound");
+    settings.learner().expect("it learns").clone()
 }
 
-fn learner(settings: Hyperparameters, rows: usize, seed: u64) -> Learner {
+fn learner(settings: LearnerSettings, rows: usize, seed: u64) -> Learner {
     let rows = Rows { allowed: vec![true; rows], environment: vec![false; rows] };
-    Learner::new(Arc::new(settings), Arc::new(rows), seed)
+    settings.build(Arc::new(rows), seed)
 }
 
 /// State number `state`, one-hot.
@@ -50,15 +60,7 @@ fn all(rows: usize) -> Array1<bool> {
 }
 
 fn experience(state: usize, row: usize, reward: f64, rows: usize) -> Experience {
-    Experience {
-        observation: sight(state),
-        legal: all(rows),
-        row,
-        reward,
-        hits: Vec::new(),
-        collided: false,
-        crashes: Vec::new(),
-    }
+    Experience { observation: sight(state), ..Experience::plain(row, reward, rows) }
 }
 
 /// An episode with a step for each reward; its rows and states count up from 0.
@@ -69,14 +71,7 @@ pub fn episode(rewards: &[f64]) -> Trajectory {
 
 /// An episode that ended of its own in a state.
 fn ended(steps: Vec<Experience>, last: usize, rows: usize) -> Trajectory {
-    Trajectory {
-        steps,
-        last: sight(last),
-        last_legal: all(rows),
-        terminal: true,
-        closeness: Closeness::default(),
-        collisions: Vec::new(),
-    }
+    Trajectory { last: sight(last), ..Trajectory::plain(steps, rows) }
 }
 
 #[test]
@@ -112,8 +107,8 @@ fn the_loss_is_the_weighted_mean_and_its_slope_is_its_derivative() {
 
 #[test]
 fn returns_take_n_steps_and_know_the_end() {
-    let settings = Hyperparameters { n_step: 2, discount: 0.5, ..small() };
-    let of = |settings: Hyperparameters, terminal| {
+    let settings = small("n_step: 2\ndiscount: 0.5");
+    let of = |settings: LearnerSettings, terminal| {
         let last_legal = array![true, false, false, false];
         let episode = Trajectory { terminal, last_legal, ..episode(&[1.0, 2.0, 3.0]) };
         transitions(&episode, &[1.0, 2.0, 3.0], &learner(settings, 4, 0).policy)
@@ -126,29 +121,29 @@ fn returns_take_n_steps_and_know_the_end() {
     // A truncated episode is bootstrapped, and so is every end for the published package.
     let discounts = |found: Vec<Transition>| found.iter().map(|one| one.discount).collect::<Vec<_>>();
     assert_eq!(discounts(of(settings.clone(), false)), [0.25, 0.25, 0.5]);
-    let released = Hyperparameters { arrival_is_terminal: false, ..settings };
+    let released = LearnerSettings { arrival_is_terminal: false, ..settings };
     assert_eq!(discounts(of(released.clone(), true)), [0.25, 0.25, 0.5]);
     assert_eq!(of(released, true)[2].next_legal, [true, false, false, false]);
 }
 
 #[test]
 fn a_collision_pays_where_its_obstacle_was_made() {
-    let settings = Hyperparameters { collision_reward: 20.0, uncounted_reward: 0.0, ..small() };
+    let payment = small("collision_reward: 20\nuncounted_reward: 0").payment;
     let mut trajectory = episode(&[-1.0, 0.4, 20.0, 20.0]);
     trajectory.steps[2].crashes = vec![Some(0), Some(0)];
     trajectory.steps[3].crashes = vec![None];
     // An uncounted collision, which the reward of its step says already, changes nothing.
     trajectory.steps[1].hits = vec![0];
-    assert_eq!(paid_to_makers(&trajectory, &settings), [20.0, 0.4, 0.0, 20.0]);
+    assert_eq!(payment.paid_to_makers(&trajectory), [20.0, 0.4, 0.0, 20.0]);
     // The step of one collision may have made the obstacle of another.
     trajectory.steps[3].crashes = vec![Some(2)];
-    assert_eq!(paid_to_makers(&trajectory, &settings), [20.0, 0.4, 20.0, 0.0]);
+    assert_eq!(payment.paid_to_makers(&trajectory), [20.0, 0.4, 20.0, 0.0]);
 }
 
 #[test]
 fn on_shuffled_states_it_no_longer_knows_when() {
     // Row 0 is right in state 0, row 1 in state 1.
-    let settings = Hyperparameters { discount: 0.0, evaluation_epsilon: 0.0, ..small() };
+    let settings = small("discount: 0\nevaluation_epsilon: 0");
     let mut learner = learner(settings, 2, 7);
     for number in 0..200 {
         let (state, row) = (number % 2, number / 2 % 2);
@@ -170,8 +165,7 @@ fn on_shuffled_states_it_no_longer_knows_when() {
 
 #[test]
 fn the_mean_of_the_networks_acts_in_the_end() {
-    let settings =
-        Hyperparameters { average_decay: 0.75, updates_per_step: 1, learning_starts: 1, ..small() };
+    let settings = small("average_decay: 0.75\nupdates_per_step: 1\nlearning_starts: 1");
     let mut learner = learner(settings, 4, 5);
     let mut mean: Vec<f32> = Vec::new();
     for number in 1..=6_u32 {
@@ -192,7 +186,7 @@ fn the_mean_of_the_networks_acts_in_the_end() {
 
 #[test]
 fn inverted_exploration_begins_greedy() {
-    let settings = Hyperparameters { exploration_inverted: true, ..small() };
+    let settings = small("exploration_inverted: true");
     let mut learner = learner(settings, 8, 3);
     let mut rng = stream(1, Stream::Exploration, 0);
     let chosen: Vec<_> = (0..20).map(|_| learner.choose(&sight(0), all(8).view(), &mut rng)).collect();
@@ -212,9 +206,8 @@ fn corridor(state: usize, row: usize) -> (f64, Option<usize>) {
 
 #[test]
 fn every_kind_of_the_algorithm_solves_a_known_problem() {
-    let known = || Hyperparameters { n_step: 1, discount: 0.6, updates_per_step: 4, ..small() };
-    let plain = Hyperparameters { double: false, dueling: false, priority_exponent: 0.0, ..known() };
-    for settings in [known(), Hyperparameters { dueling: false, ..known() }, plain] {
+    for kind in ["", "\ndueling: false", "\ndueling: false\ndouble: false\npriority_exponent: 0"] {
+        let settings = small(&format!("n_step: 1\ndiscount: 0.6\nupdates_per_step: 4{kind}"));
         let mut learner = learner(settings, 2, 11);
         for episode in 0..220 {
             let mut rng = stream(episode, Stream::Exploration, 0);
@@ -244,21 +237,12 @@ fn every_kind_of_the_algorithm_solves_a_known_problem() {
 /// a deviation of 1. The first state is worth 0, whatever is done.
 fn mean_estimate(double: bool, seed: u64) -> f64 {
     const ROWS: usize = 10;
-    let settings = Hyperparameters {
-        double,
-        dueling: false,
-        n_step: 1,
-        priority_exponent: 0.0,
-        discount: 1.0,
-        learning_rate: 1e-2,
-        exploration_end: 1.0,
-        loss: Loss::Squared,
-        // Old transitions are forgotten well before the target network is renewed, so that the two
-        // networks' errors are their own.
-        replay_capacity: 40,
-        target_period_updates: 400,
-        ..small()
-    };
+    // Old transitions are forgotten well before the target network is renewed, so that the two networks' errors are
+    // their own.
+    let renewal = "replay_capacity: 40\ntarget_period_updates: 400";
+    let plain = "dueling: false\nn_step: 1\npriority_exponent: 0\ndiscount: 1\nlearning_rate: 0.01";
+    let rest = "exploration_end: 1\nloss: squared";
+    let settings = small(&format!("double: {double}\n{plain}\n{rest}\n{renewal}"));
     let mut learner = learner(settings, ROWS, seed);
     let mut rng = stream(seed, Stream::Traffic, 0);
     let (mut sum, mut count) = (0.0, 0.0);

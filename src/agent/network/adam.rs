@@ -3,6 +3,7 @@
 /// The optimiser and its running moments, a mean and a square for each parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Adam {
+    learning_rate: f64,
     pub(in crate::agent) mean: Vec<f32>,
     pub(in crate::agent) square: Vec<f32>,
     /// Each decay rate to the power of the number of steps, in `f64` so that it does not drift.
@@ -17,9 +18,10 @@ const SQUARE_DECAY: f64 = 0.999;
 const FLOOR: f32 = 1e-8;
 
 impl Adam {
-    /// For so many parameters.
-    pub fn new(parameters: usize) -> Adam {
+    /// For a network with `parameters` parameters.
+    pub fn new(parameters: usize, learning_rate: f64) -> Adam {
         Adam {
+            learning_rate,
             mean: vec![0.0; parameters],
             square: vec![0.0; parameters],
             mean_power: 1.0,
@@ -28,12 +30,12 @@ impl Adam {
     }
 
     /// One step down the gradient.
-    pub fn step(&mut self, parameters: &mut [f32], gradient: &[f32], learning_rate: f64) {
+    pub fn step(&mut self, parameters: &mut [f32], gradient: &[f32]) {
         assert_eq!(parameters.len(), gradient.len(), "one slope for each parameter");
         assert_eq!(parameters.len(), self.mean.len(), "the optimiser is of another network");
         self.mean_power *= MEAN_DECAY;
         self.square_power *= SQUARE_DECAY;
-        let rate = (learning_rate / (1.0 - self.mean_power)) as f32;
+        let rate = (self.learning_rate / (1.0 - self.mean_power)) as f32;
         let spread = libm::sqrt(1.0 - self.square_power) as f32;
         let (mean_share, square_share) = ((1.0 - MEAN_DECAY) as f32, (1.0 - SQUARE_DECAY) as f32);
         let moments = self.mean.iter_mut().zip(&mut self.square);
@@ -59,26 +61,26 @@ mod tests {
     #[test]
     fn the_first_step_is_the_learning_rate_against_the_slope() {
         let mut parameters = [1.0, 1.0];
-        Adam::new(2).step(&mut parameters, &[0.3, -20.0], 0.01);
+        Adam::new(2, 0.01).step(&mut parameters, &[0.3, -20.0]);
         assert!((parameters[0] - 0.99).abs() < 1e-6 && (parameters[1] - 1.01).abs() < 1e-6);
     }
 
     #[test]
     fn moments_of_a_parameter_without_slope_end_at_nothing() {
-        let (mut adam, mut parameters) = (Adam::new(1), [1.0]);
-        adam.step(&mut parameters, &[1e-12], 0.01);
+        let (mut adam, mut parameters) = (Adam::new(1, 0.01), [1.0]);
+        adam.step(&mut parameters, &[1e-12]);
         for _ in 0..30_000 {
-            adam.step(&mut parameters, &[0.0], 0.01);
+            adam.step(&mut parameters, &[0.0]);
         }
         assert_eq!((adam.mean[0], adam.square[0]), (0.0, 0.0));
     }
 
     #[test]
     fn it_finds_the_bottom_of_a_bowl() {
-        let (mut adam, mut parameters) = (Adam::new(2), [3.0_f32, -2.0]);
+        let (mut adam, mut parameters) = (Adam::new(2, 0.02), [3.0_f32, -2.0]);
         for _ in 0..2000 {
             let gradient = [2.0 * (parameters[0] - 1.0), 20.0 * (parameters[1] - 0.5)];
-            adam.step(&mut parameters, &gradient, 0.02);
+            adam.step(&mut parameters, &gradient);
         }
         assert!((parameters[0] - 1.0).abs() < 1e-3 && (parameters[1] - 0.5).abs() < 1e-3, "{parameters:?}");
     }

@@ -5,4 +5,4 @@ mod perceptron;
 mod product;
 
 pub use adam::Adam;
-pub use perceptron::{Initialization, Network, Shape};
+pub use perceptron::{Initialization, Network, NetworkSettings, Shape};

@@ -8,10 +8,41 @@
 
 use ndarray::{Array2, ArrayView1, ArrayView2, Axis, s};
 
+use crate::agent::settings::{Requirement, SettingsError, require, within};
 use crate::rng;
 use crate::rng::Rng;
 
 use super::product::product;
+
+/// Settings of [`Network`].
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct NetworkSettings {
+    /// Widths of the hidden layers, each 1 to 4096; one to four of them.
+    pub hidden_units: Vec<usize>,
+    /// Whether the network has a dueling head (Wang et al., 2016).
+    pub dueling: bool,
+    pub initialization: Initialization,
+}
+
+impl NetworkSettings {
+    /// # Errors
+    /// If a value is out of range.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        let widths = &self.hidden_units;
+        require([Requirement {
+            name: "hidden_units",
+            is_met: (1..=4).contains(&widths.len()) && widths.iter().all(|width| (1..=4096).contains(width)),
+            value: format!("{widths:?}"),
+            wanted: "one to four widths from 1 to 4096",
+        }])?;
+        require(match self.initialization {
+            Initialization::Normal(deviation) => {
+                Some(within("initialization", deviation, 0.0..=10.0, "`he`, or normal from 0 to 10"))
+            }
+            Initialization::He => None,
+        })
+    }
+}
 
 /// A network without its parameters.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -3,4 +3,4 @@
 mod buffer;
 mod sum_tree;
 
-pub use buffer::{Priorities, Replay, Transition};
+pub use buffer::{Replay, ReplaySettings, Transition};

@@ -11,7 +11,7 @@ pub struct SumTree {
 }
 
 impl SumTree {
-    /// For so many values, all 0.
+    /// A tree of `values` values, all 0.
     pub fn new(values: usize) -> SumTree {
         let leaves = values.next_power_of_two();
         SumTree { leaves, nodes: vec![0.0; 2 * leaves] }

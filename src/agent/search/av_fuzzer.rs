@@ -8,18 +8,21 @@
 //! replaced for good by a random legal one. Each restart of the search also takes a new start: the
 //! published search knows one start, and would say nothing about others.
 
+use std::sync::Arc;
+
 use ndarray::ArrayView1;
 
-use crate::agent::hyperparameters::{SettingsError, require, within};
+use crate::agent::q_policy::Rows;
 use crate::agent::random::any;
 use crate::agent::registry::Agent;
-use crate::agent::trainable::{Beginning, Trainable};
+use crate::agent::settings::{Configured, SettingsError, require, unit, within};
+use crate::agent::trainable::Trainable;
 use crate::agent::trajectory::{Lesson, Trajectory};
 use crate::mdp::Observation;
 use crate::rng;
 use crate::rng::{Rng, Stream};
 
-use super::played::{Gene, seed, start_of};
+use super::genes::{Gene, seed, start_of};
 use super::population::{Individual, Population};
 use super::scripts::{Found, Scripts, keep};
 
@@ -68,11 +71,10 @@ impl Default for AvFuzzerSettings {
     }
 }
 
-impl AvFuzzerSettings {
-    /// # Errors
-    /// If a value is out of range.
-    pub fn check(&self) -> Result<(), SettingsError> {
-        let unit = |name, value: f64| within(name, value, 0.0..=1.0, "from 0 to 1");
+impl Configured for AvFuzzerSettings {
+    type Trained = AvFuzzer;
+
+    fn check(&self) -> Result<(), SettingsError> {
         require([
             within("population", self.population, 2..=1000, "from 2 to 1000"),
             unit("crossover_probability", self.crossover_probability),
@@ -89,13 +91,34 @@ impl AvFuzzerSettings {
             within("kept_scripts", self.kept_scripts, 1..=1000, "from 1 to 1000"),
         ])
     }
+
+    fn build(&self, rows: Arc<Rows>, _: u64) -> AvFuzzer {
+        AvFuzzer::new(self, rows.allowed.len())
+    }
+
+    fn restore(&self, rows: Arc<Rows>, bytes: &[u8]) -> Option<AvFuzzer> {
+        let rows = rows.allowed.len();
+        let saved: SavedAvFuzzer = serde_json::from_slice(bytes).ok()?;
+        let fits = saved.hunts.iter().flatten().all(|hunt| {
+            let populations = [Some(&hunt.population), hunt.local.as_ref().map(|(population, _)| population)];
+            let size = self.population;
+            let is_sound = |population: &Population| population.is_sound(size, self.script_steps, rows);
+            populations.into_iter().flatten().all(is_sound)
+                && !hunt.queue.is_empty()
+                && hunt.queue.iter().all(|&index| index < size)
+        });
+        let can_act =
+            |found: &Found| !found.rows.is_empty() && found.rows.iter().all(|&row| (row as usize) < rows);
+        let fits = fits && saved.best.iter().all(can_act);
+        fits.then(|| AvFuzzer { saved, ..AvFuzzer::new(self, rows) })
+    }
 }
 
 /// The search, one for each road.
 pub struct AvFuzzer {
     settings: AvFuzzerSettings,
     rows: usize,
-    memory: Memory,
+    saved: SavedAvFuzzer,
     // The episode under way.
     road: usize,
     step: usize,
@@ -104,7 +127,7 @@ pub struct AvFuzzer {
 
 /// What the search keeps from episode to episode.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-struct Memory {
+struct SavedAvFuzzer {
     steps: u64,
     hunts: Vec<Option<Hunt>>,
     best: Vec<Found>,
@@ -235,29 +258,12 @@ impl Hunt {
 impl AvFuzzer {
     /// A search over scripts of so many rows.
     pub fn new(settings: &AvFuzzerSettings, rows: usize) -> AvFuzzer {
-        let (settings, memory) = (settings.clone(), Memory::default());
-        AvFuzzer { settings, rows, memory, road: 0, step: 0, started_at: None }
-    }
-
-    /// The search that was saved; `None` if the bytes are not those of one over so many rows.
-    pub fn restore(settings: &AvFuzzerSettings, rows: usize, bytes: &[u8]) -> Option<AvFuzzer> {
-        let memory: Memory = serde_json::from_slice(bytes).ok()?;
-        let fits = memory.hunts.iter().flatten().all(|hunt| {
-            let populations = [Some(&hunt.population), hunt.local.as_ref().map(|(population, _)| population)];
-            let size = settings.population;
-            let is_sound = |population: &Population| population.is_sound(size, settings.script_steps, rows);
-            populations.into_iter().flatten().all(is_sound)
-                && !hunt.queue.is_empty()
-                && hunt.queue.iter().all(|&index| index < size)
-        });
-        let can_act =
-            |found: &Found| !found.rows.is_empty() && found.rows.iter().all(|&row| (row as usize) < rows);
-        let fits = fits && memory.best.iter().all(can_act);
-        fits.then(|| AvFuzzer { memory, ..AvFuzzer::new(settings, rows) })
+        let (settings, saved) = (settings.clone(), SavedAvFuzzer::default());
+        AvFuzzer { settings, rows, saved, road: 0, step: 0, started_at: None }
     }
 
     fn hunt(&mut self) -> Option<&mut Hunt> {
-        self.memory.hunts.get_mut(self.road)?.as_mut()
+        self.saved.hunts.get_mut(self.road)?.as_mut()
     }
 
     fn gene(&mut self) -> Option<&mut Gene> {
@@ -278,7 +284,7 @@ impl Agent for AvFuzzer {
     }
 
     fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
-        self.memory.steps += 1;
+        self.saved.steps += 1;
         self.started_at.get_or_insert(start_of(observation));
         let step = self.step;
         match self.gene() {
@@ -289,14 +295,14 @@ impl Agent for AvFuzzer {
 }
 
 impl Trainable for AvFuzzer {
-    fn beginning(&mut self, road: usize, fresh: u64) -> Beginning {
+    fn start_seed(&mut self, road: usize, fresh: u64) -> u64 {
         self.road = road;
-        if self.memory.hunts.len() <= road {
-            self.memory.hunts.resize(road + 1, None);
+        if self.saved.hunts.len() <= road {
+            self.saved.hunts.resize(road + 1, None);
         }
         let (settings, rows) = (&self.settings, self.rows);
-        let hunt = self.memory.hunts[road].get_or_insert_with(|| Hunt::new(settings, rows, fresh));
-        Beginning { seed: hunt.start_seed, from: None }
+        let hunt = self.saved.hunts[road].get_or_insert_with(|| Hunt::new(settings, rows, fresh));
+        hunt.start_seed
     }
 
     fn learn(&mut self, episode: &Trajectory, rng: &mut Rng) -> Lesson {
@@ -311,12 +317,12 @@ impl Trainable for AvFuzzer {
         hunt.queue.pop();
         hunt.advance(&settings, rows, rng);
         let found = Found { start, rows: rows_played, crashes, fitness };
-        keep(&mut self.memory.best, found, settings.kept_scripts);
+        keep(&mut self.saved.best, found, settings.kept_scripts);
         Lesson::default()
     }
 
     fn steps(&self) -> u64 {
-        self.memory.steps
+        self.saved.steps
     }
 
     fn exploration_epsilon(&self) -> f64 {
@@ -324,10 +330,10 @@ impl Trainable for AvFuzzer {
     }
 
     fn actor(&self) -> Box<dyn Agent> {
-        Box::new(Scripts::new(self.memory.best.clone()))
+        Box::new(Scripts::new(self.saved.best.clone()))
     }
 
     fn save(&self) -> Vec<u8> {
-        serde_json::to_vec(&self.memory).expect("a search is plain data")
+        serde_json::to_vec(&self.saved).expect("a search is plain data")
     }
 }

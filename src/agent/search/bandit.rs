@@ -1,12 +1,15 @@
 //! A contextual bandit: each choice by what such choices have led to in such a situation ([`Worth`]). It plans nothing
 //! and returns to nothing; a choice before the one that made the obstacle appear shares in the crash.
 
+use std::sync::Arc;
+
 use ndarray::ArrayView1;
 
-use crate::agent::hyperparameters::{Requirement, SettingsError, require, within};
+use crate::agent::q_policy::Rows;
 use crate::agent::random::any;
 use crate::agent::registry::Agent;
-use crate::agent::trainable::{Beginning, Trainable};
+use crate::agent::settings::{Configured, SettingsError, positive, require, unit, within};
+use crate::agent::trainable::Trainable;
 use crate::agent::trajectory::{Lesson, Trajectory};
 use crate::mdp::Observation;
 use crate::rng;
@@ -45,25 +48,33 @@ impl Default for BanditSettings {
     }
 }
 
-impl BanditSettings {
-    /// # Errors
-    /// If a value is out of range.
-    pub fn check(&self) -> Result<(), SettingsError> {
-        let unit = |name, value: f64| within(name, value, 0.0..=1.0, "from 0 to 1");
+impl Configured for BanditSettings {
+    type Trained = Bandit;
+
+    fn check(&self) -> Result<(), SettingsError> {
         require([
             unit("record_share", self.record_share),
             unit("credit_discount", self.credit_discount),
             unit("evaluation_epsilon", self.evaluation_epsilon),
             within("doubt", self.doubt, 0.0..=100.0, "from 0 to 100"),
-            Requirement {
-                is_met: self.prior_choices > 0.0 && self.prior_choices <= 1e6,
-                ..within("prior_choices", self.prior_choices, 0.0..=1e6, "above 0, and at most 1e6")
-            },
+            positive("prior_choices", self.prior_choices),
         ])
     }
 
+    fn build(&self, rows: Arc<Rows>, _: u64) -> Bandit {
+        Bandit::new(self, rows.allowed.len())
+    }
+
+    fn restore(&self, rows: Arc<Rows>, bytes: &[u8]) -> Option<Bandit> {
+        let rows = rows.allowed.len();
+        let saved: SavedBandit = serde_json::from_slice(bytes).ok()?;
+        saved.worth.is_of(rows).then(|| Bandit { saved, ..Bandit::new(self, rows) })
+    }
+}
+
+impl BanditSettings {
     /// A choice of the search: by the record for its share of the choices, else any legal row.
-    pub(super) fn explore(
+    fn explore(
         &self,
         worth: &Worth,
         situation: u32,
@@ -78,12 +89,7 @@ impl BanditSettings {
     }
 
     /// Enters an episode into the record; `made` has the situation and the row of each of its choices.
-    pub(super) fn note(
-        &self,
-        worth: &mut Worth,
-        made: impl Iterator<Item = (u32, usize)>,
-        episode: &Trajectory,
-    ) {
+    fn note(&self, worth: &mut Worth, made: impl Iterator<Item = (u32, usize)>, episode: &Trajectory) {
         for ((situation, row), value) in made.zip(worths(episode, self.credit_discount)) {
             worth.note(situation, row, value);
         }
@@ -93,7 +99,7 @@ impl BanditSettings {
 /// The bandit.
 pub struct Bandit {
     settings: BanditSettings,
-    memory: Memory,
+    saved: SavedBandit,
     // The episode under way.
     fresh: u64,
     step: usize,
@@ -103,7 +109,7 @@ pub struct Bandit {
 
 /// What the bandit keeps from episode to episode.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-struct Memory {
+struct SavedBandit {
     steps: u64,
     worth: Worth,
 }
@@ -111,14 +117,8 @@ struct Memory {
 impl Bandit {
     /// A bandit over so many rows.
     pub fn new(settings: &BanditSettings, rows: usize) -> Bandit {
-        let memory = Memory { steps: 0, worth: Worth::new(rows) };
-        Bandit { settings: settings.clone(), memory, fresh: 0, step: 0, made: Vec::new() }
-    }
-
-    /// The bandit that was saved; `None` if the bytes are not those of one over so many rows.
-    pub fn restore(settings: &BanditSettings, rows: usize, bytes: &[u8]) -> Option<Bandit> {
-        let memory: Memory = serde_json::from_slice(bytes).ok()?;
-        memory.worth.is_of(rows).then(|| Bandit { memory, ..Bandit::new(settings, rows) })
+        let saved = SavedBandit { steps: 0, worth: Worth::new(rows) };
+        Bandit { settings: settings.clone(), saved, fresh: 0, step: 0, made: Vec::new() }
     }
 }
 
@@ -136,27 +136,27 @@ impl Agent for Bandit {
     fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, _: &mut Rng) -> Option<usize> {
         let mut rng = rng::stream(self.fresh, Stream::Search, 1 + self.step as u64);
         let here = situation(observation);
-        let row = self.settings.explore(&self.memory.worth, here, legal, &mut rng)?;
-        self.memory.steps += 1;
+        let row = self.settings.explore(&self.saved.worth, here, legal, &mut rng)?;
+        self.saved.steps += 1;
         self.made.push((here, row));
         Some(row)
     }
 }
 
 impl Trainable for Bandit {
-    fn beginning(&mut self, _: usize, fresh: u64) -> Beginning {
+    fn start_seed(&mut self, _: usize, fresh: u64) -> u64 {
         self.fresh = fresh;
-        Beginning { seed: fresh, from: None }
+        fresh
     }
 
     fn learn(&mut self, episode: &Trajectory, _: &mut Rng) -> Lesson {
         assert_eq!(self.made.len(), episode.steps.len(), "each choice is an experience");
-        self.settings.note(&mut self.memory.worth, self.made.iter().copied(), episode);
+        self.settings.note(&mut self.saved.worth, self.made.iter().copied(), episode);
         Lesson::default()
     }
 
     fn steps(&self) -> u64 {
-        self.memory.steps
+        self.saved.steps
     }
 
     fn exploration_epsilon(&self) -> f64 {
@@ -164,16 +164,16 @@ impl Trainable for Bandit {
     }
 
     fn actor(&self) -> Box<dyn Agent> {
-        Box::new(Recorded { settings: self.settings.clone(), worth: self.memory.worth.clone() })
+        Box::new(Recorded { settings: self.settings.clone(), worth: self.saved.worth.clone() })
     }
 
     fn save(&self) -> Vec<u8> {
-        serde_json::to_vec(&self.memory).expect("a bandit is plain data")
+        serde_json::to_vec(&self.saved).expect("a bandit is plain data")
     }
 }
 
 /// Acts by the record alone.
-pub(super) struct Recorded {
+struct Recorded {
     pub settings: BanditSettings,
     pub worth: Worth,
 }

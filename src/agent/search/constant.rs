@@ -5,11 +5,14 @@
 //! episodes in which it acted. Where the leader is not legal, the next of the list acts, and so the leader also gets
 //! the collisions of what stands in for it.
 
+use std::sync::Arc;
+
 use ndarray::ArrayView1;
 
-use crate::agent::hyperparameters::{Requirement, SettingsError, require, within};
+use crate::agent::q_policy::Rows;
 use crate::agent::registry::Agent;
-use crate::agent::trainable::{Beginning, Trainable};
+use crate::agent::settings::{Configured, SettingsError, positive, require, within};
+use crate::agent::trainable::Trainable;
 use crate::agent::trajectory::{Lesson, Trajectory};
 use crate::mdp::Observation;
 use crate::rng;
@@ -34,24 +37,31 @@ impl Default for ConstantSettings {
     }
 }
 
-impl ConstantSettings {
-    /// # Errors
-    /// If a value is out of range.
-    pub fn check(&self) -> Result<(), SettingsError> {
+impl Configured for ConstantSettings {
+    type Trained = Constant;
+
+    fn check(&self) -> Result<(), SettingsError> {
         require([
             within("doubt", self.doubt, 0.0..=100.0, "from 0 to 100"),
-            Requirement {
-                is_met: self.prior_episodes > 0.0 && self.prior_episodes <= 1e6,
-                ..within("prior_episodes", self.prior_episodes, 0.0..=1e6, "above 0, and at most 1e6")
-            },
+            positive("prior_episodes", self.prior_episodes),
         ])
+    }
+
+    fn build(&self, rows: Arc<Rows>, _: u64) -> Constant {
+        Constant::new(self, rows.allowed.len())
+    }
+
+    fn restore(&self, rows: Arc<Rows>, bytes: &[u8]) -> Option<Constant> {
+        let rows = rows.allowed.len();
+        let saved: SavedConstant = serde_json::from_slice(bytes).ok()?;
+        (saved.led.len() == rows).then(|| Constant { saved, ..Constant::new(self, rows) })
     }
 }
 
 /// The search.
 pub struct Constant {
     settings: ConstantSettings,
-    memory: Memory,
+    saved: SavedConstant,
     /// Rows in the order in which they lead the episode under way.
     order: Vec<usize>,
     /// Whether its leader has acted.
@@ -60,7 +70,7 @@ pub struct Constant {
 
 /// What the search keeps from episode to episode.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-struct Memory {
+struct SavedConstant {
     steps: u64,
     all: Tally,
     /// By row: counted collisions of the episodes that it led, and in which it was legal at least once.
@@ -70,22 +80,16 @@ struct Memory {
 impl Constant {
     /// A search over so many rows.
     pub fn new(settings: &ConstantSettings, rows: usize) -> Constant {
-        let memory = Memory { steps: 0, all: Tally::default(), led: vec![Tally::default(); rows] };
-        Constant { settings: settings.clone(), memory, order: (0..rows).collect(), has_led: false }
-    }
-
-    /// The search that was saved; `None` if the bytes are not those of one over so many rows.
-    pub fn restore(settings: &ConstantSettings, rows: usize, bytes: &[u8]) -> Option<Constant> {
-        let memory: Memory = serde_json::from_slice(bytes).ok()?;
-        (memory.led.len() == rows).then(|| Constant { memory, ..Constant::new(settings, rows) })
+        let saved = SavedConstant { steps: 0, all: Tally::default(), led: vec![Tally::default(); rows] };
+        Constant { settings: settings.clone(), saved, order: (0..rows).collect(), has_led: false }
     }
 
     /// All rows, those of the highest expected number of counted collisions first.
     fn ordered(&self, doubt: Doubt, rng: &mut Rng) -> Vec<usize> {
         let weight = self.settings.prior_episodes;
-        let of_all = self.memory.all.mean(0.0, 1.0);
+        let of_all = self.saved.all.mean(0.0, 1.0);
         let value = |tally: &Tally| tally.mean(of_all, weight) + doubt.shift(tally, weight, rng);
-        let values: Vec<f64> = self.memory.led.iter().map(value).collect();
+        let values: Vec<f64> = self.saved.led.iter().map(value).collect();
         let mut order: Vec<usize> = (0..values.len()).collect();
         order.sort_by(|&one, &other| values[other].total_cmp(&values[one]));
         order
@@ -101,30 +105,30 @@ impl Agent for Constant {
     fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, _: &mut Rng) -> Option<usize> {
         let row = first_legal(&self.order, legal)?;
         self.has_led |= Some(&row) == self.order.first();
-        self.memory.steps += 1;
+        self.saved.steps += 1;
         Some(row)
     }
 }
 
 impl Trainable for Constant {
-    fn beginning(&mut self, _: usize, fresh: u64) -> Beginning {
+    fn start_seed(&mut self, _: usize, fresh: u64) -> u64 {
         let mut rng = rng::stream(fresh, Stream::Search, 0);
         self.order = self.ordered(Doubt::Try(self.settings.doubt), &mut rng);
         self.has_led = false;
-        Beginning { seed: fresh, from: None }
+        fresh
     }
 
     fn learn(&mut self, episode: &Trajectory, _: &mut Rng) -> Lesson {
         let counted = episode.steps.iter().map(|step| step.crashes.len()).sum::<usize>() as f64;
-        self.memory.all.note(counted);
+        self.saved.all.note(counted);
         if let Some(&leader) = self.order.first().filter(|_| self.has_led) {
-            self.memory.led[leader].note(counted);
+            self.saved.led[leader].note(counted);
         }
         Lesson::default()
     }
 
     fn steps(&self) -> u64 {
-        self.memory.steps
+        self.saved.steps
     }
 
     fn exploration_epsilon(&self) -> f64 {
@@ -138,7 +142,7 @@ impl Trainable for Constant {
     }
 
     fn save(&self) -> Vec<u8> {
-        serde_json::to_vec(&self.memory).expect("a search is plain data")
+        serde_json::to_vec(&self.saved).expect("a search is plain data")
     }
 }
 
@@ -155,28 +159,13 @@ impl Agent for List {
 mod tests {
     use super::*;
     use crate::agent::Experience;
-    use crate::mdp::Closeness;
     use ndarray::Array1;
 
     /// An episode of two steps with so many counted collisions.
     fn episode(counted: usize) -> Trajectory {
-        let step = |crashes: usize| Experience {
-            observation: Observation::zeros(),
-            legal: Array1::from_elem(4, true),
-            row: 0,
-            reward: 0.0,
-            hits: Vec::new(),
-            collided: crashes > 0,
-            crashes: vec![None; crashes],
-        };
-        Trajectory {
-            steps: vec![step(0), step(counted)],
-            last: Observation::zeros(),
-            last_legal: Array1::from_elem(4, true),
-            terminal: true,
-            closeness: Closeness::default(),
-            collisions: Vec::new(),
-        }
+        let quiet = Experience::plain(0, 0.0, 4);
+        let crashed = Experience { collided: counted > 0, crashes: vec![None; counted], ..quiet.clone() };
+        Trajectory::plain(vec![quiet, crashed], 4)
     }
 
     #[test]
@@ -186,7 +175,7 @@ mod tests {
         let all = Array1::from_elem(4, true);
         let mut led = [0; 4];
         for number in 0..200 {
-            search.beginning(0, number);
+            search.start_seed(0, number);
             let leader = search.choose(&Observation::zeros(), all.view(), &mut rng).unwrap();
             led[leader] += 1;
             // Row 2 crashes in every second episode, row 0 in every fourth, the others never.

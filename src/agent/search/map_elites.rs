@@ -7,20 +7,21 @@
 //! where it was played: the world is deterministic, so that a change of one step leaves what came before it.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use ndarray::ArrayView1;
 
-use crate::agent::hyperparameters::{SettingsError, require, within};
+use crate::agent::q_policy::Rows;
 use crate::agent::random::any;
 use crate::agent::registry::Agent;
-use crate::agent::settings::Settings;
-use crate::agent::trainable::{Beginning, Trainable};
+use crate::agent::settings::{Configured, SettingsError, require, unit, within};
+use crate::agent::trainable::Trainable;
 use crate::agent::trajectory::{Lesson, Trajectory};
 use crate::mdp::Observation;
 use crate::rng;
 use crate::rng::{Rng, Stream};
 
-use super::played::start_of;
+use super::genes::start_of;
 use super::population::Individual;
 use super::scripts::{Found, Scripts};
 
@@ -43,23 +44,27 @@ impl Default for MapElitesSettings {
     }
 }
 
-impl MapElitesSettings {
-    /// # Errors
-    /// If a value is out of range.
-    pub fn check(&self) -> Result<(), SettingsError> {
+impl Configured for MapElitesSettings {
+    type Trained = MapElites;
+
+    fn check(&self) -> Result<(), SettingsError> {
         require([
-            within("fresh_share", self.fresh_share, 0.0..=1.0, "from 0 to 1"),
+            unit("fresh_share", self.fresh_share),
             within("changes_max", self.changes_max, 1..=100, "from 1 to 100"),
             within("elite_steps", self.elite_steps, 1..=1000, "from 1 to 1000"),
         ])
     }
 
-    /// The settings of a YAML text.
-    ///
-    /// # Errors
-    /// As [`Settings::from_yaml`].
-    pub fn read(text: &str) -> Result<Settings, SettingsError> {
-        Settings::of_search(text, MapElitesSettings::check, Settings::MapElites)
+    fn build(&self, rows: Arc<Rows>, _: u64) -> MapElites {
+        MapElites::new(self, rows.allowed.len())
+    }
+
+    fn restore(&self, rows: Arc<Rows>, bytes: &[u8]) -> Option<MapElites> {
+        let rows = rows.allowed.len();
+        let saved: SavedMapElites = serde_json::from_slice(bytes).ok()?;
+        let fits = |elite: &Elite| elite.script.is_sound(self.elite_steps, rows);
+        let fits = saved.elites.iter().flat_map(BTreeMap::values).all(fits);
+        fits.then(|| MapElites { saved, ..MapElites::new(self, rows) })
     }
 }
 
@@ -67,7 +72,7 @@ impl MapElitesSettings {
 pub struct MapElites {
     settings: MapElitesSettings,
     rows: usize,
-    memory: Memory,
+    saved: SavedMapElites,
     // The episode under way.
     road: usize,
     seed: u64,
@@ -78,7 +83,7 @@ pub struct MapElites {
 
 /// What the search keeps from episode to episode.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-struct Memory {
+struct SavedMapElites {
     steps: u64,
     /// By road, then by kind of collision.
     elites: Vec<BTreeMap<String, Elite>>,
@@ -108,21 +113,13 @@ impl MapElites {
         MapElites {
             settings: settings.clone(),
             rows,
-            memory: Memory::default(),
+            saved: SavedMapElites::default(),
             road: 0,
             seed: 0,
             script: Individual { genes: Vec::new(), fitness: 0.0 },
             step: 0,
             started_at: None,
         }
-    }
-
-    /// The search that was saved; `None` if the bytes are not those of one over so many rows.
-    pub fn restore(settings: &MapElitesSettings, rows: usize, bytes: &[u8]) -> Option<MapElites> {
-        let memory: Memory = serde_json::from_slice(bytes).ok()?;
-        let fits = |elite: &Elite| elite.script.is_sound(settings.elite_steps, rows);
-        let fits = memory.elites.iter().flat_map(BTreeMap::values).all(fits);
-        fits.then(|| MapElites { memory, ..MapElites::new(settings, rows) })
     }
 }
 
@@ -138,7 +135,7 @@ impl Agent for MapElites {
     }
 
     fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
-        self.memory.steps += 1;
+        self.saved.steps += 1;
         self.started_at.get_or_insert(start_of(observation));
         match self.script.gene(self.step) {
             Some(gene) => gene.legal_row(self.step, legal),
@@ -148,13 +145,13 @@ impl Agent for MapElites {
 }
 
 impl Trainable for MapElites {
-    fn beginning(&mut self, road: usize, fresh: u64) -> Beginning {
+    fn start_seed(&mut self, road: usize, fresh: u64) -> u64 {
         self.road = road;
-        if self.memory.elites.len() <= road {
-            self.memory.elites.resize(road + 1, BTreeMap::new());
+        if self.saved.elites.len() <= road {
+            self.saved.elites.resize(road + 1, BTreeMap::new());
         }
         let mut rng = rng::stream(fresh, Stream::Search, 0);
-        let elites = &self.memory.elites[road];
+        let elites = &self.saved.elites[road];
         let chosen = match rng::unit(&mut rng) < self.settings.fresh_share {
             false if !elites.is_empty() => {
                 elites.values().nth(rng::below(&mut rng, elites.len() as u32) as usize)
@@ -171,7 +168,7 @@ impl Trainable for MapElites {
                 (elite.seed, script)
             }
         };
-        Beginning { seed: self.seed, from: None }
+        self.seed
     }
 
     fn learn(&mut self, episode: &Trajectory, _: &mut Rng) -> Lesson {
@@ -184,7 +181,7 @@ impl Trainable for MapElites {
         let kinds = &episode.collisions;
         let kind = kinds.iter().find(|collision| collision.counted).or(kinds.first());
         let cell = kind.map_or_else(|| "nothing".to_owned(), |collision| collision.kind.clone());
-        let elites = &mut self.memory.elites[self.road];
+        let elites = &mut self.saved.elites[self.road];
         if elites.get(&cell).is_none_or(|elite| found.beats(elite)) {
             elites.insert(cell, found);
         }
@@ -192,7 +189,7 @@ impl Trainable for MapElites {
     }
 
     fn steps(&self) -> u64 {
-        self.memory.steps
+        self.saved.steps
     }
 
     fn exploration_epsilon(&self) -> f64 {
@@ -201,7 +198,7 @@ impl Trainable for MapElites {
 
     /// Plays the elites whose collisions counted, or all if there is none.
     fn actor(&self) -> Box<dyn Agent> {
-        let elites = || self.memory.elites.iter().flat_map(BTreeMap::values);
+        let elites = || self.saved.elites.iter().flat_map(BTreeMap::values);
         let any_counts = elites().any(|elite| elite.crashes > 0);
         let found = elites().filter(|elite| elite.crashes > 0 || !any_counts).map(|elite| Found {
             start: elite.start,
@@ -213,7 +210,7 @@ impl Trainable for MapElites {
     }
 
     fn save(&self) -> Vec<u8> {
-        serde_json::to_vec(&self.memory).expect("a search is plain data")
+        serde_json::to_vec(&self.saved).expect("a search is plain data")
     }
 }
 
@@ -222,18 +219,14 @@ mod tests {
     use super::*;
     use crate::agent::trajectory::Collided;
     use crate::mdp::Closeness;
-    use ndarray::Array1;
 
     /// An episode with these collisions, and an obstacle that came this close.
     fn episode(collisions: &[(&str, bool)], distance_m: f64) -> Trajectory {
         let collided = |&(kind, counted): &(&str, bool)| Collided { kind: kind.to_owned(), counted };
         Trajectory {
-            steps: Vec::new(),
-            last: Observation::zeros(),
-            last_legal: Array1::from_elem(4, true),
-            terminal: true,
             closeness: Closeness { distance_m, margin_m: 0.0 },
             collisions: collisions.iter().map(collided).collect(),
+            ..Trajectory::plain(Vec::new(), 4)
         }
     }
 
@@ -243,7 +236,7 @@ mod tests {
         let mut search = MapElites::new(&settings, 4);
         let mut rng = rng::stream(1, Stream::Replay, 0);
         let mut play = |search: &mut MapElites, fresh, played: &Trajectory| {
-            let seed = search.beginning(0, fresh).seed;
+            let seed = search.start_seed(0, fresh);
             search.learn(played, &mut rng);
             (seed, search.script.rows())
         };
@@ -251,7 +244,7 @@ mod tests {
         let (first, _) = play(&mut search, 5, &episode(&[], 9.0));
         assert_eq!(first, 5);
         let cells = |search: &MapElites| -> Vec<(String, u64)> {
-            let elites = search.memory.elites[0].iter();
+            let elites = search.saved.elites[0].iter();
             elites.map(|(kind, elite)| (kind.clone(), elite.script.fitness as u64)).collect()
         };
         let (second, _) = play(&mut search, 6, &episode(&[("walk", false), ("overtake", true)], 2.0));
@@ -268,11 +261,11 @@ mod tests {
         let settings = MapElitesSettings { fresh_share: 0.0, ..MapElitesSettings::default() };
         let mut search = MapElites::new(&settings, 45);
         let mut rng = rng::stream(1, Stream::Replay, 0);
-        search.beginning(0, 1);
+        search.start_seed(0, 1);
         search.learn(&episode(&[], 9.0), &mut rng);
         let elite = search.script.clone();
         for fresh in 2..50 {
-            assert_eq!(search.beginning(0, fresh).seed, 1);
+            assert_eq!(search.start_seed(0, fresh), 1);
             let differ = search.script.genes.iter().zip(&elite.genes).filter(|(new, old)| new != old).count();
             assert!((1..=2).contains(&differ), "{differ} steps");
         }

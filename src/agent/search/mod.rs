@@ -6,16 +6,14 @@
 mod av_fuzzer;
 mod bandit;
 mod constant;
-mod go_explore;
+mod genes;
 mod map_elites;
-mod played;
 mod population;
 mod scripts;
 mod situation;
 mod worth;
 
-pub use av_fuzzer::{AvFuzzer, AvFuzzerSettings};
-pub use bandit::{Bandit, BanditSettings};
-pub use constant::{Constant, ConstantSettings};
-pub use go_explore::{GoExplore, GoExploreSettings};
-pub use map_elites::{MapElites, MapElitesSettings};
+pub use av_fuzzer::AvFuzzerSettings;
+pub use bandit::BanditSettings;
+pub use constant::ConstantSettings;
+pub use map_elites::MapElitesSettings;

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use crate::rng;
 use crate::rng::Rng;
 
-use super::played::{Gene, seed};
+use super::genes::{Gene, seed};
 
 /// A script and how good it is.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]

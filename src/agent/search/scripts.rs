@@ -10,7 +10,7 @@ use crate::mdp::Observation;
 use crate::rng;
 use crate::rng::Rng;
 
-use super::played::start_of;
+use super::genes::start_of;
 
 /// A script and what came of it when it was played.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -1,16 +1,6 @@
-//! Coarse views of a moment: to a search, moments with the same number are alike. All bounds are ours.
+//! A coarse view of a moment: to a search, moments with the same number are alike. All bounds are ours.
 
 use crate::mdp::{Observation, variable};
-
-/// A kind of moment, to decide which moments are worth keeping: where on the route, how fast, how many
-/// obstacles, where the nearest is, what weather.
-pub fn cell(observation: &Observation) -> u32 {
-    let value = |name| value(observation, name);
-    let place = (value("routeLeft") / 20.0).clamp(0.0, 99.0) as u32;
-    let speed = (value("speed") / 3.0).clamp(0.0, 9.0) as u32;
-    let others = value("numObs").clamp(0.0, 4.0) as u32;
-    (((place * 10 + speed) * 5 + others) * 4 + nearest(observation)) * 3 + weather(observation)
-}
 
 /// A kind of situation, to record what its choices led to: how fast, how far from a junction, where the
 /// nearest obstacle is, what weather.
@@ -80,7 +70,5 @@ mod tests {
             assert_ne!(situation(&look(kind)), situation(&look(&[])));
         }
         assert_eq!(situation(&far), 0);
-        assert_ne!(cell(&look(&[("routeLeft", 100.0)])), cell(&look(&[("routeLeft", 130.0)])));
-        assert_eq!(cell(&look(&[("routeLeft", 101.0)])), cell(&look(&[("routeLeft", 109.0)])));
     }
 }

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::action::ActionTable;
 use crate::ads::Selected;
-use crate::ads::external::{ExternalSettings, Failure as Finding, Problem, Program, Target, odd_orders};
+use crate::ads::external::{ExternalSettings, Failure as Finding, Problem, Program, odd_orders};
 use crate::agent;
 use crate::agent::Kind;
 use crate::cli::arguments::AdsCheckArguments;
@@ -18,6 +18,7 @@ use crate::cli::error::Failure;
 use crate::cli::files::{Scratch, make_way, write_new};
 use crate::cli::findings::cut_off;
 use crate::cli::load;
+use crate::cli::load::Driver;
 use crate::cli::new::shipped;
 use crate::cli::output::Output;
 use crate::episode;
@@ -27,6 +28,8 @@ use crate::sim::World;
 
 /// The space that is driven if none is named, and its name.
 const SPACE: &str = "avastra45.ava";
+/// Length of each of the four episodes, in steps of an agent (6 s), at most.
+const STEPS: usize = 5;
 /// Steps of the episode that is broken off for a reset.
 const BROKEN_OFF_STEPS: usize = 2;
 /// Lines of standard error that are shown.
@@ -55,22 +58,14 @@ struct Speed {
 
 /// Runs all checks; the first that fails ends them.
 pub fn check(output: &Output, arguments: &AdsCheckArguments) -> Result<(), Failure> {
-    let command = match arguments.program.as_slice() {
-        [] => None,
-        [one] if one.starts_with("tcp:") || one.starts_with("unix:") => {
-            Some(Target::from_text(one).map_err(Failure::usage)?)
-        }
-        words => Some(Target::Program(words.to_vec())),
+    let settings = match load::driver(&arguments.ads)? {
+        Driver::Profile(path) => load::external(Some(path), None)?,
+        Driver::Command(command) => load::external(None, Some(command))?,
+        Driver::Name(_) => None,
     };
-    let of_profile = load::external(arguments.ads_config.as_deref(), None)?;
-    let settings = match (of_profile, command) {
-        (Some(settings), Some(command)) => ExternalSettings { command, ..settings },
-        (Some(settings), None) => settings,
-        (None, Some(command)) => ExternalSettings::of(command),
-        (None, None) => {
-            return Err(Failure::usage("the profile has no `ads` block, and there is no command after `--`"));
-        }
-    };
+    let settings = settings.ok_or_else(|| {
+        Failure::usage(format!("`{}` is a driving system of avastra: check one of your own", arguments.ads))
+    })?;
     let (table, _scratch) = match &arguments.space {
         Some(path) => (load::table(output, path)?, None),
         None => {
@@ -82,15 +77,8 @@ pub fn check(output: &Output, arguments: &AdsCheckArguments) -> Result<(), Failu
         Some(road) => road.clone(),
         None => table.space().roads[0].name.clone(),
     };
-    let steps = arguments.steps as usize;
-    let mut checks = Checks {
-        output,
-        seed: arguments.seed,
-        steps,
-        parts: Vec::new(),
-        speed: None,
-        is_deterministic: true,
-    };
+    let mut checks =
+        Checks { output, seed: arguments.seed, parts: Vec::new(), speed: None, is_deterministic: true };
     checks.all(table, &road, settings)?;
     let Checks { parts, speed, .. } = checks;
     let failed = parts.iter().filter(|part| !part.passed).count();
@@ -98,7 +86,7 @@ pub fn check(output: &Output, arguments: &AdsCheckArguments) -> Result<(), Failu
         0 => "\nit can be put under test",
         _ => "\nit cannot be put under test as it is",
     });
-    output.result(serde_json::json!({ "checks": parts, "speed": speed, "protocol": null }));
+    output.result(serde_json::json!({ "checks": parts, "speed": speed }));
     if failed > 0 { Err(Failure::Ads { findings: failed }) } else { Ok(()) }
 }
 
@@ -118,7 +106,6 @@ struct Checks<'a> {
     output: &'a Output,
     seed: u64,
     /// Length of an episode.
-    steps: usize,
     parts: Vec<Part>,
     speed: Option<Speed>,
     /// Whether it says that it answers alike to the like.
@@ -153,7 +140,7 @@ impl Checks<'_> {
             Arena::new(table, &[road.to_owned()], Selected::external(Arc::clone(&program)), &[], &[])?;
         #[allow(clippy::disallowed_methods, reason = "this is cli, and the time is what is asked for")]
         let began = Instant::now();
-        let first = self.drive(&arena, 0, self.steps);
+        let first = self.drive(&arena, 0, STEPS);
         let asked_s = began.elapsed().as_secs_f64();
         if let Some(failure) = &first.failure {
             self.fail("episode", "it fails in an episode", failure.clone());
@@ -162,7 +149,7 @@ impl Checks<'_> {
         // Now all answers are known: the same again is what avastra itself takes.
         #[allow(clippy::disallowed_methods, reason = "this is cli, and the time is what is asked for")]
         let began = Instant::now();
-        self.drive(&arena, 0, self.steps);
+        self.drive(&arena, 0, STEPS);
         let own_s = began.elapsed().as_secs_f64();
         let questions = first.conversation.as_ref().map_or(0, |conversation| conversation.exchanges.len());
         let taken_s = (asked_s - own_s).max(1e-9);
@@ -184,14 +171,14 @@ impl Checks<'_> {
         // Another episode is broken off, and then the first one comes again, in the same process.
         program.forget();
         let between = self.drive(&arena, 1, BROKEN_OFF_STEPS);
-        let again = self.drive(&arena, 0, self.steps);
+        let again = self.drive(&arena, 0, STEPS);
         let failure = between.failure.as_ref().or(again.failure.as_ref());
         if !self.same("reset", "after a reset, the same episode", &first, &again, failure) {
             return Ok(());
         }
         program.forget();
         let ended = program.close();
-        let fresh = self.drive(&arena, 0, self.steps);
+        let fresh = self.drive(&arena, 0, STEPS);
         if !self.same(
             "process",
             "in a fresh process, the same episode",
@@ -290,11 +277,10 @@ impl Checks<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::arguments::Format;
 
     #[test]
     fn the_maps_that_a_planner_is_told_of_exist_as_long_as_it_is_checked() {
-        let (table, scratch) = own_space(&Output::of(Format::Json)).expect("our own space is sound");
+        let (table, scratch) = own_space(&Output::silent()).expect("our own space is sound");
         for road in &table.space().roads {
             let file = road.map.file.as_ref().expect("the map was read from a file");
             assert!(file.is_file(), "{}", file.display());

@@ -11,16 +11,10 @@ use crate::run::Shard;
 /// The driving system under test.
 #[derive(Debug, Args)]
 pub struct UnderTestArguments {
-    /// Driving system under test.
-    #[arg(long, default_value = crate::run::DEFAULT_ADS, value_parser = Named::ADS)]
+    /// Driving system under test: a name; a profile of `modular` or of one of your own (PROTOCOL.md), a YAML file; a command
+    /// that starts your own, `tcp:HOST:PORT` or `unix:PATH`.
+    #[arg(long, value_name = "NAME|FILE|COMMAND", default_value = crate::run::DEFAULT_ADS, value_parser = Named::ADS)]
     pub ads: String,
-    /// Profile of the `modular` driving system, for example scenarios/ads/cautious.yaml, or of one of your own, with an
-    /// `ads` block [default: as it comes].
-    #[arg(long, value_name = "FILE")]
-    pub ads_config: Option<PathBuf>,
-    /// Driving system of your own: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
-    #[arg(long, value_name = "COMMAND", conflicts_with = "ads")]
-    pub ads_cmd: Option<String>,
 }
 
 /// Which piece of a run, a study or an estimate is played.
@@ -90,7 +84,7 @@ pub struct RunArguments {
     #[command(flatten)]
     pub shard: ShardArguments,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "ads_cmd", "agent", "policy", "face", "episodes", "seed", "ambient", "traffic", "causes", "out", "self_contained", "shard", "dry_run", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "policy", "face", "episodes", "seed", "ambient", "traffic", "causes", "out", "self_contained", "shard", "dry_run", "without", "with"])]
     pub resume: Option<PathBuf>,
     /// Exit with status 4 if a counted collision was found.
     #[arg(long)]
@@ -112,17 +106,16 @@ pub struct EstimateArguments {
     #[arg(long, value_enum, default_value_t = EventArgument::Counted)]
     pub event: EventArgument,
     /// How: `count` plays every episode from its start; `probe` tries dangerous rows out beside those that chance chooses, each
-    /// with its weight, which pays where a crash comes in fewer than one of a hundred episodes or so;
-    /// `split` goes on from dangerous moments, and writes no scenarios. All are unbiased with a fixed number of parts, and say
-    /// what they gained or lost.
+    /// with its weight, which pays where a crash comes in fewer than one of a hundred episodes or so, and says what it
+    /// gained or lost. Both are unbiased with a fixed number of parts.
     #[arg(long, value_enum, default_value_t = MethodArgument::Count)]
     pub method: MethodArgument,
-    /// Independent parts on each road, at most; the interval of `split` comes from their spread, so give it twenty or more.
+    /// Independent parts on each road, at most.
     #[arg(long, default_value_t = 20)]
     pub parts: u32,
-    /// Episodes of a part.
-    #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::run::EPISODES_MAX)))]
-    pub episodes: u32,
+    /// Episodes of a part [default: 50; with `--than`, 250 on each road].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::run::EPISODES_MAX)))]
+    pub episodes: Option<u32>,
     /// Stop when half the width of the interval is at most this share of the probability; looks when a quarter, half and all
     /// parts are done. The interval allows for the looks; the probability itself gets a small bias.
     #[arg(long, value_name = "SHARE")]
@@ -132,6 +125,9 @@ pub struct EstimateArguments {
     pub hours: Option<f64>,
     #[command(flatten)]
     pub under_test: UnderTestArguments,
+    /// Play this driving system, too, in the same episodes, and say which of the two crashes more often; nothing is kept.
+    #[arg(long, value_name = "NAME|FILE|COMMAND", value_parser = Named::ADS, conflicts_with_all = ["method", "parts", "precision", "hours", "out", "shard", "dry_run"])]
+    pub than: Option<String>,
     #[command(flatten)]
     pub conditions: ConditionArguments,
     /// Worker threads; the result does not depend on it [default: one for each core].
@@ -143,7 +139,7 @@ pub struct EstimateArguments {
     #[command(flatten)]
     pub shard: ShardArguments,
     /// Go on with an interrupted estimate; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "event", "method", "parts", "precision", "hours", "episodes", "ads", "ads_config", "ads_cmd", "road", "agent", "seed", "ambient", "traffic", "out", "shard", "dry_run", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "event", "method", "parts", "precision", "hours", "episodes", "ads", "than", "road", "agent", "seed", "ambient", "traffic", "out", "shard", "dry_run", "without", "with"])]
     pub resume: Option<PathBuf>,
 }
 
@@ -157,7 +153,6 @@ pub enum EventArgument {
 pub enum MethodArgument {
     Count,
     Probe,
-    Split,
 }
 
 #[derive(Debug, Args)]
@@ -171,26 +166,4 @@ pub struct MergeArguments {
     /// Write nothing; print the numbers of the shards that are to be run again, or gone on with.
     #[arg(long, conflicts_with = "out")]
     pub missing: bool,
-}
-
-#[derive(Debug, Args)]
-pub struct CompareArguments {
-    /// The space.
-    pub file: PathBuf,
-    /// The first driving system: a name like `modular`, or a profile like scenarios/ads/default.yaml (of one of your own,
-    /// with an `ads` block).
-    pub first: String,
-    /// The second one, likewise.
-    pub second: String,
-    /// What is looked for in an episode.
-    #[arg(long, value_enum, default_value_t = EventArgument::Counted)]
-    pub event: EventArgument,
-    /// Episodes on each road.
-    #[arg(long, default_value_t = 250, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::run::EPISODES_MAX)))]
-    pub episodes: u32,
-    #[command(flatten)]
-    pub conditions: ConditionArguments,
-    /// Worker threads; the result does not depend on it [default: one for each core].
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
-    pub jobs: Option<u32>,
 }

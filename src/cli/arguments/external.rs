@@ -22,12 +22,10 @@ pub enum AdsCommand {
 
 #[derive(Debug, Args)]
 pub struct AdsCheckArguments {
-    /// The program and its arguments, after `--`; or `tcp:HOST:PORT` or `unix:PATH`.
-    #[arg(last = true, required_unless_present = "ads_config", value_name = "COMMAND")]
-    pub program: Vec<String>,
-    /// Its profile, with an `ads` block.
-    #[arg(long, value_name = "FILE")]
-    pub ads_config: Option<PathBuf>,
+    /// The driving system: its profile, a YAML file with an `ads` block; or the command that starts it, `tcp:HOST:PORT` or
+    /// `unix:PATH`.
+    #[arg(long, value_name = "FILE|COMMAND")]
+    pub ads: String,
     /// The space whose first road it drives [default: a space of avastra's own].
     #[arg(long, value_name = "FILE")]
     pub space: Option<PathBuf>,
@@ -37,9 +35,6 @@ pub struct AdsCheckArguments {
     /// Seed of the episodes.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Length of each of the four episodes, in steps of an agent (6 s), at most.
-    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub steps: u32,
 }
 
 #[derive(Debug, Args)]

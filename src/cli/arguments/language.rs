@@ -47,11 +47,16 @@ pub struct TableArguments {
     /// Only what this road allows, with the reason where it does not.
     #[arg(long)]
     pub road: Option<String>,
+    /// Print the whole space as Markdown instead: actions, rules, states, with their documentation and what was proved of them.
+    #[arg(long, conflicts_with_all = ["road", "try", "row"])]
+    pub markdown: bool,
     /// Carry every row out on the road, or on all of them, without other traffic, and judge whether it does what it says.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "row")]
     pub r#try: bool,
     #[command(flatten)]
     pub trials: TrialArguments,
+    #[command(flatten)]
+    pub why: WhyArguments,
 }
 
 #[derive(Debug, Args)]
@@ -59,11 +64,8 @@ pub struct TrialArguments {
     /// Tries of each row on each road, at most.
     #[arg(long, requires = "try", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub tries: u32,
-    /// Undisturbed drives of each road, from whose steps the tries set out.
-    #[arg(long, requires = "try", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub drives: u32,
-    /// Driving system of the ego vehicle.
-    #[arg(long, requires = "try", default_value = crate::run::DEFAULT_ADS, value_parser = Named::ADS)]
+    /// Driving system of the ego vehicle: a name, or a profile of `modular`.
+    #[arg(long, requires = "try", value_name = "NAME|FILE", default_value = crate::run::DEFAULT_ADS, value_parser = Named::ADS)]
     pub ads: String,
     /// Seed of the drives and tries.
     #[arg(long, requires = "try", default_value_t = 1)]
@@ -73,21 +75,22 @@ pub struct TrialArguments {
     pub out: Option<PathBuf>,
 }
 
+/// A question about one row.
 #[derive(Debug, Args)]
 pub struct WhyArguments {
-    /// The space.
-    pub file: PathBuf,
-    /// Number of the row in the table.
+    /// Only the row of this number: whether it is legal at the start of the road (the first of the space if none is named), and
+    /// which rule says no.
     #[arg(long)]
-    pub row: usize,
-    /// Road of the question [default: the first of the space].
-    #[arg(long)]
-    pub road: Option<String>,
+    pub row: Option<usize>,
     /// States at that moment, for example `time: Night, sky: { Rain: High }`.
-    #[arg(long)]
+    #[arg(long, requires = "row")]
     pub state: Option<String>,
-    #[command(flatten)]
-    pub rules: RuleArguments,
+    /// Switch a rule off at that moment; may be given several times.
+    #[arg(long, requires = "row", value_name = "RULE")]
+    pub without: Vec<String>,
+    /// Switch an optional rule on.
+    #[arg(long, requires = "row", value_name = "RULE")]
+    pub with: Vec<String>,
 }
 
 #[derive(Debug, Args)]
@@ -122,15 +125,6 @@ pub struct DiffArguments {
     pub old: PathBuf,
     /// The space that it became.
     pub new: PathBuf,
-}
-
-#[derive(Debug, Args)]
-pub struct DocArguments {
-    /// The space.
-    pub file: PathBuf,
-    /// Where to write [default: stdout].
-    #[arg(long = "out", short = 'o')]
-    pub output: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

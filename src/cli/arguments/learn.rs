@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, Subcommand};
 
 use super::drive::{ShardArguments, UnderTestArguments};
 use super::language::RuleArguments;
@@ -45,23 +45,33 @@ pub struct TrainArguments {
     #[arg(long)]
     pub self_contained: bool,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "ads_cmd", "agent", "preset", "config", "episodes", "seed", "traffic", "out", "self_contained", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "preset", "config", "episodes", "seed", "traffic", "out", "self_contained", "without", "with"])]
     pub resume: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
-pub struct DistillArguments {
+pub struct PolicyArguments {
+    #[command(subcommand)]
+    pub command: PolicyCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum PolicyCommand {
+    /// Say which rows it favours and when, what it expects of them, and which variables matter to it.
+    Explain(ExplainPolicyArguments),
+    /// Distil readable rules from its network once more, with other settings.
+    Distil(DistilArguments),
+    /// Write the weights of its network as safetensors, for other tools.
+    Weights(WeightsArguments),
+}
+
+#[derive(Debug, Args)]
+pub struct DistilArguments {
     /// The policy.
     pub file: PathBuf,
     /// Lines, at most [default: as the policy was trained with, like the others].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=256))]
     pub leaves: Option<u32>,
-    /// Tests that a line may take, at most.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=32))]
-    pub depth: Option<u32>,
-    /// Rounds; the rules of each drive the next.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub rounds: Option<u32>,
     /// Episodes of a round, on each road.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub episodes: Option<u32>,
@@ -92,7 +102,7 @@ pub struct ExplainPolicyArguments {
 }
 
 #[derive(Debug, Args)]
-pub struct ExportWeightsArguments {
+pub struct WeightsArguments {
     /// The policy.
     pub file: PathBuf,
     /// Where to write [default: STEM.safetensors beside the file].
@@ -101,13 +111,16 @@ pub struct ExportWeightsArguments {
 }
 
 #[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub struct StudyArguments {
+    #[command(subcommand)]
+    pub command: Option<StudyCommand>,
     /// The study, for example scenarios/studies/rq1.yaml.
     #[arg(required_unless_present = "resume")]
     pub file: Option<PathBuf>,
-    /// Driving system of your own in place of the study's: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
-    #[arg(long, value_name = "COMMAND")]
-    pub ads_cmd: Option<String>,
+    /// Driving system in place of the study's: a name, a profile, or a command as `avastra run --ads` takes it.
+    #[arg(long, value_name = "NAME|FILE|COMMAND", value_parser = Named::ADS)]
+    pub ads: Option<String>,
     /// Directory of the study, new or empty [default: the next free runs/NNNN].
     #[arg(long)]
     pub out: Option<PathBuf>,
@@ -117,7 +130,7 @@ pub struct StudyArguments {
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub jobs: Option<u32>,
     /// Go on with an interrupted study; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "ads_cmd", "out", "shard", "dry_run", "quick"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "ads", "out", "shard", "dry_run", "quick"])]
     pub resume: Option<PathBuf>,
     /// Take over the cells that another study has played already: those of agents with the same settings, on the same
     /// roads, with the same seeds. The result is the same as without.
@@ -126,6 +139,12 @@ pub struct StudyArguments {
     /// Cut it down to see that it works: two short trainings, few episodes. No result.
     #[arg(long)]
     pub quick: bool,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum StudyCommand {
+    /// Write what a folder of studies found as one Markdown file, beside published figures.
+    Results(ResultsArguments),
 }
 
 #[derive(Debug, Args)]

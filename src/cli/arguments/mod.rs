@@ -9,22 +9,21 @@ mod scenarios;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub use drive::{
-    CompareArguments, ConditionArguments, EstimateArguments, EventArgument, FaceArgument, MergeArguments,
-    MethodArgument, RunArguments, UnderTestArguments,
+    ConditionArguments, EstimateArguments, EventArgument, FaceArgument, MergeArguments, MethodArgument,
+    RunArguments,
 };
 pub use external::{AdsArguments, AdsCheckArguments, AdsCommand, Misbehaviour, ToyAnswer, ToyArguments};
 pub use language::{
-    CheckArguments, CompileArguments, CompletionsArguments, DiffArguments, DocArguments, Dump,
-    EditorFilesArguments, ExplainArguments, FmtArguments, NewArguments, TableArguments, WhyArguments,
+    CheckArguments, CompileArguments, CompletionsArguments, DiffArguments, Dump, EditorFilesArguments,
+    ExplainArguments, FmtArguments, NewArguments, TableArguments,
 };
 pub use learn::{
-    DistillArguments, ExplainPolicyArguments, ExportWeightsArguments, ResultsArguments, StudyArguments,
-    TrainArguments,
+    DistilArguments, ExplainPolicyArguments, PolicyArguments, PolicyCommand, ResultsArguments,
+    StudyArguments, StudyCommand, TrainArguments, WeightsArguments,
 };
 pub use scenarios::{
-    AgainstArguments, DiagnoseArguments, ExportArguments, ExportEgo, ExportFormat, ExportProfile,
-    ExportVersion, FilesArguments, ImportArguments, PackArguments, RenderArguments, ReplayArguments,
-    ReportArguments, RoadArguments, ShrinkArguments, TestArguments, VerifyArguments,
+    DiagnoseArguments, ExportArguments, ExportEgo, ExportFormat, ExportProfile, FilesArguments, ImportArguments,
+    RenderArguments, ReplayArguments, ReportArguments, RoadArguments, ShrinkArguments, TestArguments,
 };
 
 /// Finds out which of the things that may happen around a self-driving car make it crash.
@@ -41,7 +40,7 @@ pub struct Arguments {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Every command")]
 pub struct OutputArguments {
-    /// How to print.
+    /// How to print; `sarif` is for diagnostics, of `check` and `compile`.
     #[arg(long, global = true, value_enum, default_value_t = Format::Human)]
     pub format: Format,
     /// When to use colour.
@@ -61,6 +60,9 @@ pub enum Format {
     Plain,
     Json,
     Sarif,
+    /// Not at all; no command line asks for it.
+    #[value(skip)]
+    Silent,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -70,77 +72,62 @@ pub enum When {
     Never,
 }
 
+/// The commands, in the order in which a newcomer meets them; `help` puts them in groups, each in one line.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Check files and list every mistake.
-    Check(CheckArguments),
-    /// Write the typed action table of a space, with masks per road.
-    Compile(CompileArguments),
-    /// Print the action table.
-    Table(TableArguments),
-    /// Say whether a row is legal here, and which rule says no.
-    Why(WhyArguments),
-    /// Format files in the one style.
-    Fmt(FmtArguments),
-    /// Say what a code like AV0101 means, or list all.
-    Explain(ExplainArguments),
-    /// Say how two spaces differ in rows, rules and draws.
-    Diff(DiffArguments),
-    /// Print a space as Markdown.
-    Doc(DocArguments),
     /// Write a small space with its road, to begin with.
     New(NewArguments),
-    /// Print a script by which a shell completes this command line.
-    Completions(CompletionsArguments),
-    /// Serve an editor: mistakes as you type, and all else that it asks for, over stdin and stdout.
-    Lsp,
-    /// Write the parts of the VS Code extension that follow from the language.
-    #[command(hide = true)]
-    EditorFiles(EditorFilesArguments),
+    /// Check files and list every mistake.
+    Check(CheckArguments),
+    /// Format files in the one style.
+    Fmt(FmtArguments),
+    /// Print the action table, say why a row is not legal, try rows out.
+    Table(TableArguments),
+    /// Write the typed action table of a space, with masks per road.
+    Compile(CompileArguments),
+    /// Print or draw a map, and a route through it.
+    Road(RoadArguments),
+    /// Say how two spaces differ in rows, rules and draws.
+    Diff(DiffArguments),
+    /// Say what a code like AV0101 means, or list all.
+    Explain(ExplainArguments),
     /// Play episodes and write the crashes back as scenarios.
     Run(RunArguments),
     /// Train an agent and write what it learned as a policy.
     Train(TrainArguments),
-    /// Distil readable rules from a policy's network once more, with other settings.
-    Distill(DistillArguments),
-    /// Say which rows a policy favours and when, what it expects of them, and which variables matter to it.
-    ExplainPolicy(ExplainPolicyArguments),
-    /// Write the weights of a policy's network as safetensors, for other tools.
-    ExportWeights(ExportWeightsArguments),
-    /// Compare agents over roads and independent trainings, with statistics.
+    /// Explain a policy, distil its rules, or write its weights.
+    Policy(PolicyArguments),
+    /// Compare agents over roads and trainings, with statistics.
     Study(StudyArguments),
-    /// Write what a folder of studies found as one Markdown file, beside published figures.
-    Results(ResultsArguments),
-    /// Say how often a crash would happen: its probability in an episode and its rate, with intervals.
+    /// Say how often a crash would happen, or which of two crashes more.
     Estimate(EstimateArguments),
     /// Bring the shards of a run, a study or an estimate together.
     Merge(MergeArguments),
-    /// Play two driving systems in the same episodes and say which one crashes more often.
-    Compare(CompareArguments),
-    /// Run emitted scenarios again and check every claim they make; against another driving system, only say what happens.
+    /// Play scenarios and policies again and check every claim.
     Replay(ReplayArguments),
-    /// Check every claim of emitted scenarios and policies.
-    Verify(VerifyArguments),
-    /// Say which module of the driving system an emitted scenario's crash is the fault of.
-    Diagnose(DiagnoseArguments),
-    /// Find the smallest scenario that still makes the same crash.
-    Shrink(ShrinkArguments),
-    /// Copy scenarios and policies with all that they use into a folder that can be moved.
-    Pack(PackArguments),
-    /// Play emitted scenarios as a regression suite for a driving system.
-    Test(TestArguments),
-    /// Write emitted scenarios as files of other tools: OpenSCENARIO, CommonRoad, tables.
-    Export(ExportArguments),
-    /// Make scenarios of OpenSCENARIO files of others: what can be said in the language, else why not.
-    Import(ImportArguments),
-    /// Write one page of HTML to look at: of a run, a training, a study or scenarios, with replays.
+    /// Write one page of HTML to look at, with replays.
     Report(ReportArguments),
     /// Draw moments of an emitted scenario as SVG.
     Render(RenderArguments),
-    /// Print or draw a map, and a route through it.
-    Road(RoadArguments),
-    /// Attach a driving system of your own: check it, print the schema of the messages, play with a toy.
+    /// Say which module of the driving system is at fault for a crash.
+    Diagnose(DiagnoseArguments),
+    /// Find the smallest scenario that still makes the same crash.
+    Shrink(ShrinkArguments),
+    /// Play emitted scenarios as a regression suite.
+    Test(TestArguments),
+    /// Write scenarios for other tools, or as a folder that can be moved.
+    Export(ExportArguments),
+    /// Make scenarios of OpenSCENARIO files, or say what cannot be said.
+    Import(ImportArguments),
+    /// Check a driving system of your own; print the protocol's schema.
     Ads(AdsArguments),
+    /// Serve an editor over stdin and stdout.
+    Lsp,
+    /// Print a script by which a shell completes this command line.
+    Completions(CompletionsArguments),
+    /// Write the parts of the VS Code extension that follow from the language.
+    #[command(hide = true)]
+    EditorFiles(EditorFilesArguments),
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use crate::cli::help::Named;
 
 #[derive(Debug, Clone, Args)]
 pub struct FilesArguments {
-    /// Scenarios, as `avastra run` writes them; `verify` takes policies, too.
+    /// Scenarios, as `avastra run` writes them; `replay` and `export --to ava` take policies, too.
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
     /// Worker threads over files [default: one for each core].
@@ -16,38 +16,13 @@ pub struct FilesArguments {
     pub jobs: Option<u32>,
 }
 
-/// A driving system of one's own that scenarios were made against.
-#[derive(Debug, Args)]
-pub struct OwnSystemArguments {
-    /// Driving system of your own that the scenarios were made against, to be asked anew: a command (PROTOCOL.md),
-    /// `tcp:HOST:PORT` or `unix:PATH` [default: recorded answers, where there are any].
-    #[arg(long, value_name = "COMMAND")]
-    pub ads_cmd: Option<String>,
-    /// Its profile, with an `ads` block.
-    #[arg(long, value_name = "FILE")]
-    pub ads_config: Option<PathBuf>,
-}
-
 /// Another driving system than the one that scenarios were found with.
 #[derive(Debug, Args)]
 pub struct AgainstArguments {
-    /// Driving system to play against [default: the one that each scenario was found with].
-    #[arg(long, value_parser = Named::ADS)]
+    /// Driving system to play against: a name, a profile, or a command as `avastra run --ads` takes it [default: the one
+    /// that each scenario was found with; one of your own by its recorded answers].
+    #[arg(long, value_name = "NAME|FILE|COMMAND", value_parser = Named::ADS)]
     pub ads: Option<String>,
-    /// Profile of `modular`, or of a driving system of your own.
-    #[arg(long, value_name = "FILE")]
-    pub ads_config: Option<PathBuf>,
-    /// Driving system of your own: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
-    #[arg(long, value_name = "COMMAND", conflicts_with = "ads")]
-    pub ads_cmd: Option<String>,
-}
-
-#[derive(Debug, Args)]
-pub struct VerifyArguments {
-    #[command(flatten)]
-    pub own: OwnSystemArguments,
-    #[command(flatten)]
-    pub many: FilesArguments,
 }
 
 #[derive(Debug, Args)]
@@ -60,9 +35,8 @@ pub struct ReplayArguments {
 
 #[derive(Debug, Args)]
 pub struct DiagnoseArguments {
-    /// Another profile of `modular` than the recorded one. Only `modular` is made of modules that can be told apart.
-    #[arg(long, value_name = "FILE")]
-    pub ads_config: Option<PathBuf>,
+    #[command(flatten)]
+    pub against: AgainstArguments,
     /// Profile that says how good each module should be [default: `modular` as it comes].
     #[arg(long, value_name = "FILE", conflicts_with = "mechanisms")]
     pub baseline: Option<PathBuf>,
@@ -84,25 +58,15 @@ pub struct ShrinkArguments {
     #[arg(long = "out", short = 'o')]
     pub output: Option<PathBuf>,
     #[command(flatten)]
-    pub own: OwnSystemArguments,
+    pub against: AgainstArguments,
     #[command(flatten)]
     pub many: FilesArguments,
 }
 
 #[derive(Debug, Args)]
-pub struct PackArguments {
-    /// Scenarios and policies.
-    #[arg(required = true, value_name = "FILE")]
-    pub files: Vec<PathBuf>,
-    /// The folder that they are copied to.
-    #[arg(long, value_name = "DIR")]
-    pub out: PathBuf,
-}
-
-#[derive(Debug, Args)]
 pub struct ExportArguments {
-    /// What to write: `openscenario` (`.xosc`, with its map beside it), `commonroad` (XML 2020a) or `csv` (a row for each
-    /// road user and tick).
+    /// What to write: `openscenario` (`.xosc`, with its map beside it), `commonroad` (XML 2020a), `csv` (a row for each
+    /// road user and tick), or `ava`: copies of scenarios and policies with all that they use, in a folder that can be moved.
     #[arg(long, value_enum, value_name = "FORMAT")]
     pub to: ExportFormat,
     /// The folder to write to [default: a folder `exported` beside the scenarios].
@@ -112,16 +76,13 @@ pub struct ExportArguments {
     /// CommonRoad as a planning problem, which is there in any case [default: `trajectory`, `none` for `commonroad`].
     #[arg(long, value_enum)]
     pub ego: Option<ExportEgo>,
-    /// Version of OpenSCENARIO [default: 1.2].
-    #[arg(long, value_enum, value_name = "VERSION")]
-    pub osc_version: Option<ExportVersion>,
     /// Other road users as actions that a person would write (speeds, lane changes, routes, triggers), which come near to
     /// the recording, instead of exact trajectories (OpenSCENARIO).
     #[arg(long)]
     pub natural: bool,
     /// The player that is to read it: `carla` is OpenSCENARIO 1.0 as CARLA's ScenarioRunner reads it, always natural; what it
     /// cannot say is told.
-    #[arg(long, value_enum, value_name = "PLAYER", conflicts_with = "osc_version")]
+    #[arg(long, value_enum, value_name = "PLAYER")]
     pub profile: Option<ExportProfile>,
     #[command(flatten)]
     pub many: FilesArguments,
@@ -148,6 +109,7 @@ pub enum ExportFormat {
     Openscenario,
     Commonroad,
     Csv,
+    Ava,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -155,14 +117,6 @@ pub enum ExportEgo {
     Trajectory,
     Controller,
     None,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ExportVersion {
-    #[value(name = "1.2")]
-    V1_2,
-    #[value(name = "1.3")]
-    V1_3,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -202,9 +156,9 @@ pub struct ReportArguments {
     /// Where to write [default: DIR/report.html, STEM.html].
     #[arg(long = "out", short = 'o')]
     pub output: Option<PathBuf>,
-    /// Another driving system, whose drives are shown beside: a profile (a file), or a name.
-    #[arg(long, value_name = "FILE|NAME")]
-    pub compare: Option<String>,
+    /// Another driving system, whose drives are shown beside: a name, a profile, or a command as `avastra run --ads` takes it.
+    #[arg(long, value_name = "NAME|FILE|COMMAND", value_parser = Named::ADS)]
+    pub ads: Option<String>,
     /// Scenarios to show at most; one of each kind of failure comes first.
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub most: u32,

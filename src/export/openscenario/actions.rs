@@ -59,7 +59,7 @@ pub fn after_event(name: &str, event: &str) -> Element {
 pub fn within(version: Version, name: &str, (of, to): (&str, &str), metres: f64) -> Element {
     let (kind, rule) = match version {
         Version::Carla => ("cartesianDistance", "lessThan"),
-        Version::V1_2 | Version::V1_3 => ("euclidianDistance", "lessOrEqual"),
+        Version::V1_2 => ("euclidianDistance", "lessOrEqual"),
     };
     let distance = Element::new("RelativeDistanceCondition")
         .with("entityRef", to)
@@ -185,7 +185,7 @@ pub fn speed_within(speed_mps: f64, time_s: f64) -> Element {
     private(Element::new("LongitudinalAction").holding(action))
 }
 
-/// Over to a lane so many to the left of the own one, within a way.
+/// A change to the lane that lies `lanes_left` to the left of the own one, within `metres` of way.
 pub fn change_lane(version: Version, name: &str, lanes_left: i32, metres: f64) -> Element {
     let dynamics = Element::new("LaneChangeActionDynamics")
         .with("dynamicsShape", if version == Version::Carla { "linear" } else { "sinusoidal" })

@@ -6,7 +6,7 @@
 use crate::geometry::{Pose, wrap_angle};
 use crate::road::{Lane, LaneIndex, LanePlace, RoadMap};
 
-/// Every so many ticks a place is looked for: 0.1 s.
+/// Ticks between two places that are looked for: 0.1 s.
 pub const STRIDE: usize = 5;
 
 /// A pose lies in a lane whose centre is at most this far away, m, and no more across, rad.
@@ -175,7 +175,7 @@ fn lane_change(map: &RoadMap, places: &[LanePlace], poses: &[&Pose], index: usiz
     let middle = index as f64 + 0.5;
     let (early, late) = (passed(SEEN[0]), passed(SEEN[1]));
     let half = SEEN_AFTER[1] - 0.5;
-    // Of a change that is seen in part, the other half is like the one that is seen.
+    // If only one half of a change is seen, the other half is taken to be like it.
     let length = match (early, late) {
         (Some(early), Some(late)) => (late - early) / (SEEN_AFTER[1] - SEEN_AFTER[0]),
         (Some(early), None) => (middle - early) / half,

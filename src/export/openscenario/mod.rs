@@ -40,7 +40,6 @@ const BENEATH_M: f64 = 100.0;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Version {
     V1_2,
-    V1_3,
     /// 1.0, and of it what CARLA's ScenarioRunner reads; always natural, the ego vehicle too.
     Carla,
 }
@@ -83,7 +82,7 @@ pub struct Written {
 /// Others that are exact in a natural version.
 fn exact(recording: &Recording, style: Style) -> Vec<&Actor> {
     match (style.version, style.others) {
-        (Version::V1_2 | Version::V1_3, Others::Natural) => natural::exact(recording),
+        (Version::V1_2, Others::Natural) => natural::exact(recording),
         // ScenarioRunner plans a route over the points of its way.
         _ => Vec::new(),
     }
@@ -98,7 +97,7 @@ pub fn openscenario(recording: &Recording, map_file: &str, style: Style) -> Writ
     let exact = exact(recording, style);
     let entities = recording.actors().map(|actor| match style.version {
         Version::Carla => carla::entity(recording, actor),
-        Version::V1_2 | Version::V1_3 => entity(actor, style.ego),
+        Version::V1_2 => entity(actor, style.ego),
     });
     let text = Element::new("OpenSCENARIO")
         .holding(header(recording, style, &exact))
@@ -109,8 +108,8 @@ pub fn openscenario(recording: &Recording, map_file: &str, style: Style) -> Writ
         .document();
     let left_out = match style.version {
         Version::Carla => carla::dropped(recording),
-        Version::V1_2 | Version::V1_3 if exact.is_empty() => Vec::new(),
-        Version::V1_2 | Version::V1_3 => {
+        Version::V1_2 if exact.is_empty() => Vec::new(),
+        Version::V1_2 => {
             let names = natural::names(&exact);
             vec![format!(
                 "actions of {names}, which turn back onto the road that they come from: as recorded"
@@ -123,7 +122,6 @@ pub fn openscenario(recording: &Recording, map_file: &str, style: Style) -> Writ
 fn header(recording: &Recording, style: Style, exact: &[&Actor]) -> Element {
     let minor = match style.version {
         Version::V1_2 => 2,
-        Version::V1_3 => 3,
         Version::Carla => 0,
     };
     let description = match recording.docs.iter().find(|line| !line.starts_with("Emitted by")) {
@@ -182,7 +180,7 @@ fn storyboard(recording: &Recording, style: Style, exact: &[&Actor]) -> Element 
     });
     let sky = recording.seen.skies.first().map(|sky| match version {
         Version::Carla => carla::environment(sky),
-        Version::V1_2 | Version::V1_3 => environment(sky, 0),
+        Version::V1_2 => environment(sky, 0),
     });
     let end = all(vec![from_time(version, "end", recording.duration_s())]);
     Element::new("Storyboard")

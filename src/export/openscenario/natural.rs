@@ -29,12 +29,13 @@ const STANDS_M: f64 = 0.1;
 const LINE_M: f64 = 0.05;
 /// A way on foot that a contact cut short goes on straight for so long, m: in the player it may come a little later.
 const ONWARD_M: f64 = 10.0;
-/// A change of speed within so many ticks happens at once.
+/// A change of speed within this many ticks is written as instantaneous.
 const ONCE_TICKS: usize = 10;
-/// A loss of speed so many times what its brakes can do is a contact's doing. A piece of a pace may be a little steeper than
-/// what was recorded, and full braking is none.
+/// If the speed falls more than this many times faster than full braking allows, a contact caused it. The margin is
+/// there because a fitted piece may be a little steeper than the recording.
 const IMPACT_TIMES: f64 = 1.5;
-/// Where the ego vehicle's distance says when a pedestrian sets out, it came nearer by so much within so many ticks, m.
+/// The ego vehicle's distance decides when a pedestrian sets out if it came nearer by this much, m, within
+/// [`COMES_TICKS`].
 const COMES_M: f64 = 0.25;
 const COMES_TICKS: usize = 25;
 /// A route ends this far before the end of its last lane, m.
@@ -129,9 +130,7 @@ impl Natural {
             let name = actor.name();
             let added = match self.version {
                 Version::Carla => teleport(self.place),
-                Version::V1_2 | Version::V1_3 => {
-                    of_entity(&name, Element::new("AddEntityAction").holding(self.place))
-                }
+                Version::V1_2 => of_entity(&name, Element::new("AddEntityAction").holding(self.place)),
             };
             let numbered = self.from_the_first.into_iter().enumerate();
             let actions = core::iter::once(action(&format!("{name}_added"), added))
@@ -308,15 +307,16 @@ fn seconds(actor: &Actor, sample: usize) -> f64 {
     (actor.first_tick() as f64 + sample as f64) * DT_S
 }
 
-/// How far it comes within so many samples, m: at least one; beyond the last pose as fast as before.
+/// How far it comes within `length` samples from `begin`, m, at least 1 m. Beyond the last pose it goes on as fast as
+/// before.
 fn way_m(poses: &[Pose], begin: usize, length: usize) -> f64 {
     let seen = &poses[begin.min(poses.len() - 1)..(begin + length + 1).min(poses.len())];
     let seen_m: f64 = seen.windows(2).map(|pair| (pair[1].position - pair[0].position).norm()).sum();
     (seen_m * length as f64 / (seen.len() - 1).max(1) as f64).max(1.0)
 }
 
-/// Whether a loss of speed within a time is a contact's doing. It is to happen at once, as a player else keeps to what the
-/// vehicle's brakes can do.
+/// Whether a contact caused a loss of speed within a time. The export writes such a loss as instantaneous, because a
+/// player otherwise brakes only as hard as the vehicle's brakes allow.
 fn is_impact(actor: &Actor, lost_mps: f64, time_s: f64) -> bool {
     lost_mps > IMPACT_TIMES * actor.shape.deceleration_mps2_max * time_s
 }

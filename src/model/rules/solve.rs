@@ -210,7 +210,7 @@ struct Left {
 /// The values of a parameter that leave values to all later ones, after these choices.
 struct KnownChoices {
     place: usize,
-    /// Of those earlier parameters that a clause needs.
+    /// Values of the earlier parameters that a clause needs.
     after: Vec<Value>,
     choices: Rc<Choices>,
     is_exact: bool,

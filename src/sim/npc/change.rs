@@ -10,20 +10,20 @@ use crate::action::LaneChangeRules;
 use crate::geometry::{
     OrientedBox, Pose, SMOOTH_STEP_SLOPE_MAX, SmoothStep, Vec2, distance_m, smooth_step, wrap_angle,
 };
+use crate::kinematics::braking_m;
 use crate::model::vocabulary::Side;
 use crate::road;
 use crate::road::{Lane, LaneIndex, Neighbour, is_apart};
 
 use crate::sim::around::{Around, Other};
 use crate::sim::body::BodyParameters;
-use crate::sim::moment::driver_facts;
+use crate::sim::moment::{driver_facts, with_itself};
 use crate::sim::road_user::{Moved, Obstacle};
 use crate::sim::traffic::TrafficProfile;
 use crate::sim::way::Way;
 use crate::sim::world::DT_S;
 
 use super::driver::{Driver, SIDE_ROOM_M};
-use super::leader::extent_m;
 
 /// The sphere of LGSVL's check: its radius in half widths of the vehicle, and at most, m. Its centre is half a width
 /// beside the corner of the front.
@@ -95,7 +95,7 @@ impl Driver {
             }
         };
         let allowed = |rules: &Arc<LaneChangeRules>| {
-            rules.allow(around.moment_facts().with(this), driver_facts(around, this, self))
+            rules.allow(with_itself(around.moment_facts(), this), driver_facts(around, this, self))
         };
         if !due || !self.lane_changes.as_ref().is_none_or(allowed) {
             return;
@@ -192,7 +192,7 @@ impl Driver {
             let Some(other) = path.project_from(outline.pose.position, station_m + ahead_m) else {
                 return true;
             };
-            let (half_length_m, half_width_m) = extent_m(outline, heading, other.forward);
+            let (half_length_m, half_width_m) = outline.half_extent_m(heading, other.forward);
             let aside_m = other.offset_m.abs() - half_width_m - size.width_m / 2.0;
             let apart_m = (other.station_m - station_m).abs() - half_length_m - size.length_m / 2.0;
             let closing_mps = (velocity_mps.dot(&forward) - self.speed_mps)
@@ -271,8 +271,8 @@ fn change_duration_s(aside_m: f64, traffic: &TrafficProfile) -> f64 {
 /// Gap that a change needs to another vehicle in the other lane, m, if it closes at a speed: the room of the
 /// profile, and enough for the one behind to slow down as hard as is safe.
 fn change_gap_m(closing_mps: f64, traffic: &TrafficProfile) -> f64 {
-    let braking_m = closing_mps * closing_mps / (2.0 * traffic.change_safe_mps2);
-    traffic.change_room_m + braking_m.max(closing_mps * traffic.change_time_s)
+    let slowing_m = braking_m(closing_mps, traffic.change_safe_mps2);
+    traffic.change_room_m + slowing_m.max(closing_mps * traffic.change_time_s)
 }
 
 /// Way that a lane change of `aside_m` to the side takes at a speed, m.

@@ -10,6 +10,7 @@
 use std::sync::Arc;
 
 use crate::action::LaneChangeRules;
+use crate::kinematics::STANDING_MPS;
 use crate::model::vocabulary::Side;
 use crate::rng;
 use crate::rng::{Rng, Stream};
@@ -24,8 +25,8 @@ use crate::sim::way::Way;
 use crate::sim::world::DT_S;
 
 use super::change::{Change, Manoeuvre};
-use super::leader::Leader;
-use super::manners::{GIVE_UP_S, STANDS_MPS};
+use super::leader::{Leader, following};
+use super::manners::GIVE_UP_S;
 
 /// IDM: comfortable deceleration, m/s². Ours.
 pub(super) const COMFORT_MPS2: f64 = 2.0;
@@ -258,8 +259,7 @@ impl Driver {
         let free_mps2 = if wish_mps < CRAWL_MPS {
             ((wish_mps - self.speed_mps) / DT_S).clamp(-COMFORT_MPS2, size.acceleration_mps2_max)
         } else {
-            let ratio = self.speed_mps / wish_mps;
-            (size.acceleration_mps2_max * (1.0 - ratio * ratio * ratio * ratio)).max(-COMFORT_MPS2)
+            following(size.acceleration_mps2_max).free_mps2(self.speed_mps, wish_mps).max(-COMFORT_MPS2)
         };
         let mut wanted_mps2 = free_mps2;
         if let Some(leader) = &self.leader {
@@ -274,7 +274,7 @@ impl Driver {
     /// Counts a tick at rest because of others; `true` if it has waited so long that it would leave.
     fn gives_up(&mut self) -> bool {
         let blocked = self.leader.is_some_and(|leader| leader.crosswise && leader.gap_m < GAP_M_MIN + 3.0);
-        if self.speed_mps >= STANDS_MPS {
+        if self.speed_mps >= STANDING_MPS {
             self.waited_ticks = 0;
         } else if self.hold_m.is_some() || blocked {
             self.waited_ticks += 1;

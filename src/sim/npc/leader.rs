@@ -3,22 +3,31 @@
 //! A leader is ahead on the own way and within a corridor as wide as the vehicle. What would come into
 //! the way beside that corridor is found in `foresight`.
 
-use crate::geometry::{OrientedBox, Pose, Vec2, smooth_step};
+use crate::geometry::{Pose, smooth_step};
+use crate::kinematics::{Following, STANDING_MPS, needed_mps2};
 use crate::road::is_apart;
 
 use crate::sim::around::{Around, Other};
 use crate::sim::body::BodyParameters;
-use crate::sim::following::Following;
 use crate::sim::road_user::Obstacle;
 use crate::sim::way::Way;
 
 use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, LOOK_AHEAD_M, SIDE_ROOM_M};
-use super::manners::STANDS_MPS;
 
 /// IDM: time gap, s. Ours.
-pub(super) const TIME_GAP_S: f64 = 1.2;
+const TIME_GAP_S: f64 = 1.2;
 /// A vehicle at more than this angle to the way stands across it or against it (cosine of 45°).
 const CROSSWISE_COS_MAX: f64 = core::f64::consts::FRAC_1_SQRT_2;
+
+/// The driver model of a vehicle of this acceleration, m/s².
+pub(super) fn following(acceleration_mps2: f64) -> Following {
+    Following {
+        gap_m_min: GAP_M_MIN,
+        time_gap_s: TIME_GAP_S,
+        acceleration_mps2,
+        comfortable_mps2: COMFORT_MPS2,
+    }
+}
 
 /// What is in front: another road user, or a line to stop at.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,7 +93,7 @@ impl Driver {
     /// Whether a lane change under way leads past a road user that stands in the lane that it leaves: when the front reaches
     /// it, the vehicle is already beside it. A road user that moves is a leader until the end of the change.
     fn evades(&self, leader: &Leader, size: &BodyParameters, other: Other) -> bool {
-        let Some(change) = self.change.as_ref().filter(|_| other.velocity_mps.norm() < STANDS_MPS) else {
+        let Some(change) = self.change.as_ref().filter(|_| other.velocity_mps.norm() < STANDING_MPS) else {
             return false;
         };
         let there_m = self.station_m + leader.gap_m + size.length_m / 2.0;
@@ -95,25 +104,19 @@ impl Driver {
         let over_m = self.way.path.pose_at(self.station_m).to_local(target).y;
         let progress = change.progress + change.progress_per_m(self.speed_mps) * leader.gap_m.max(0.0);
         let moved_m = over_m * smooth_step(progress).value;
-        let (_, half_width_m) = extent_m(other.outline, other.forward, beside.forward);
+        let (_, half_width_m) = other.outline.half_extent_m(other.forward, beside.forward);
         (beside.offset_m - moved_m).abs() - half_width_m - size.width_m / 2.0 > SIDE_ROOM_M
     }
 
     /// Acceleration behind a leader, m/s²: IDM's, or the braking that still avoids the leader if that is harder.
     pub(super) fn follow_mps2(&self, size: &BodyParameters, leader: &Leader, free_mps2: f64) -> f64 {
         let closing_mps = self.speed_mps - leader.speed_mps;
-        let following = Following {
-            gap_m_min: GAP_M_MIN,
-            time_gap_s: TIME_GAP_S,
-            acceleration_mps2: size.acceleration_mps2_max,
-            comfortable_mps2: COMFORT_MPS2,
-        };
-        let crowding = following.wanted_gap_m(self.speed_mps, leader.speed_mps) / leader.gap_m.max(0.1);
-        let idm_mps2 = free_mps2 - size.acceleration_mps2_max * crowding * crowding;
+        let model = following(size.acceleration_mps2_max);
+        let idm_mps2 = free_mps2 - model.interaction_mps2(self.speed_mps, leader.speed_mps, leader.gap_m);
         if closing_mps <= 0.0 {
             return idm_mps2;
         }
-        let needed_mps2 = closing_mps * closing_mps / (2.0 * (leader.gap_m - GAP_M_MIN / 2.0).max(0.1));
+        let needed_mps2 = needed_mps2(closing_mps, (leader.gap_m - GAP_M_MIN / 2.0).max(0.1));
         if needed_mps2 > COMFORT_MPS2 { idm_mps2.min(-needed_mps2) } else { idm_mps2 }
     }
 }
@@ -129,7 +132,7 @@ fn in_corridor(
 ) -> Option<Leader> {
     let straight_m = (outline.pose.position - here.position).norm();
     let other = way.path.project_from(outline.pose.position, station_m + straight_m)?;
-    let (half_length_m, half_width_m) = extent_m(outline, forward, other.forward);
+    let (half_length_m, half_width_m) = outline.half_extent_m(forward, other.forward);
     let aside_m = other.offset_m.abs() - half_width_m - size.width_m / 2.0;
     let is_aside = other.station_m < station_m || aside_m > SIDE_ROOM_M;
     if is_aside || is_apart(way.height_at(other.station_m), elevation_m) {
@@ -140,14 +143,4 @@ fn in_corridor(
         speed_mps: velocity_mps.dot(&other.forward),
         crosswise: forward.dot(&other.forward) < CROSSWISE_COS_MAX,
     })
-}
-
-/// Half the length along the unit vector `along` and half the width across it, of an outline that points
-/// along `heading`, m.
-pub(super) fn extent_m(outline: &OrientedBox, heading: Vec2, along: Vec2) -> (f64, f64) {
-    let (cosine, sine) = (along.dot(&heading).abs(), along.perp(&heading).abs());
-    (
-        outline.half_length_m * cosine + outline.half_width_m * sine,
-        outline.half_length_m * sine + outline.half_width_m * cosine,
-    )
 }

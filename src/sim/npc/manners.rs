@@ -23,6 +23,7 @@
 
 use core::cell::LazyCell;
 
+use crate::kinematics::{STANDING_MPS, braking_m};
 use crate::road::LaneIndex;
 use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
@@ -50,8 +51,6 @@ const HOLD_ROOM_M: f64 = 0.5;
 const APPROACH_M: f64 = 80.0;
 /// A junction is no longer than this, m.
 const JUNCTION_M: f64 = 45.0;
-/// Below this speed a vehicle stands, m/s.
-pub(super) const STANDS_MPS: f64 = 0.1;
 /// An ego vehicle that moves faster than this is taken for one that will not stop, m/s.
 const EGO_MOVES_MPS: f64 = 1.0;
 
@@ -112,7 +111,7 @@ fn waits(own: &Passage, other: &Passage, goes_first: bool, impatient: bool) -> b
     match (own.committed, other.committed) {
         (true, false) => false,
         (false, true) => true,
-        _ if impatient && other.speed_mps < STANDS_MPS => false,
+        _ if impatient && other.speed_mps < STANDING_MPS => false,
         _ => !goes_first,
     }
 }
@@ -121,7 +120,7 @@ impl Driver {
     /// Station of the own way at which to wait now, m, if there is something to wait for.
     pub(super) fn find_hold_m(&self, this: &Obstacle, size: &BodyParameters, around: &Around) -> Option<f64> {
         let front_m = self.station_m + size.length_m / 2.0;
-        let reach_m = LOOK_AHEAD_M + self.speed_mps * self.speed_mps / (2.0 * COMFORT_MPS2);
+        let reach_m = LOOK_AHEAD_M + braking_m(self.speed_mps, COMFORT_MPS2);
         let areas = &self.way.areas;
         let open = areas.partition_point(|area| area.from_m <= front_m);
         let near = |area: &&Area| area.from_m <= front_m + reach_m;
@@ -192,7 +191,7 @@ impl Driver {
         let stops_before = |gap_m: &f64| *gap_m < in_m;
         let holds = self.hold_m.is_some_and(|hold_m| hold_m < from_m)
             || line_gap_m.iter().flatten().any(stops_before);
-        let stops_m = self.speed_mps * self.speed_mps / (2.0 * COMMITTED_MPS2);
+        let stops_m = braking_m(self.speed_mps, COMMITTED_MPS2);
         Passage {
             in_m,
             out_m: to_m - (self.station_m - size.length_m / 2.0),

@@ -15,13 +15,12 @@ use crate::road::is_apart;
 use crate::sim::around;
 use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
-use crate::sim::following::Following;
 use crate::sim::road_user::Obstacle;
 use crate::sim::traffic::TrafficProfile;
 
 use super::change::lane_beside;
-use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, SIDE_ROOM_M};
-use super::leader::{TIME_GAP_S, extent_m};
+use super::driver::{Driver, SIDE_ROOM_M};
+use super::leader::following;
 
 /// Ticks between two considerations: a second.
 const CONSIDER_TICKS: u64 = 50;
@@ -94,7 +93,7 @@ impl Driver {
             else {
                 continue;
             };
-            let (half_length_m, half_width_m) = extent_m(outline, heading, other.forward);
+            let (half_length_m, half_width_m) = outline.half_extent_m(heading, other.forward);
             let aside_m = other.offset_m.abs() - half_width_m - size.width_m / 2.0;
             if aside_m > SIDE_ROOM_M || is_apart(height_m(other.station_m), elevation_m) {
                 continue;
@@ -119,17 +118,10 @@ struct Idm {
 impl Idm {
     /// Acceleration at a speed behind a leader, m/s².
     fn acceleration_mps2(&self, speed_mps: f64, leader: Option<Other>) -> f64 {
-        let ratio = speed_mps / self.wish_mps.max(speed_mps).max(0.1);
-        let free_mps2 = self.acceleration_mps2 * (1.0 - ratio * ratio * ratio * ratio);
+        let model = following(self.acceleration_mps2);
+        let free_mps2 = model.free_mps2(speed_mps, self.wish_mps.max(speed_mps).max(0.1));
         let Some(leader) = leader else { return free_mps2 };
-        let following = Following {
-            gap_m_min: GAP_M_MIN,
-            time_gap_s: TIME_GAP_S,
-            acceleration_mps2: self.acceleration_mps2,
-            comfortable_mps2: COMFORT_MPS2,
-        };
-        let crowding = following.wanted_gap_m(speed_mps, leader.speed_mps) / leader.gap_m.max(0.1);
-        free_mps2 - self.acceleration_mps2 * crowding * crowding
+        free_mps2 - model.interaction_mps2(speed_mps, leader.speed_mps, leader.gap_m)
     }
 }
 

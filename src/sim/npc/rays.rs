@@ -10,6 +10,7 @@
 //! brakes need, where that is more than the published distance.
 
 use crate::geometry::{Frame, Vec2};
+use crate::kinematics::braking_m;
 use crate::rng;
 use crate::road::{Turn, is_apart};
 
@@ -28,7 +29,7 @@ const LIMIT_MPS: f64 = 11.176;
 /// From this distance to a line on, the wanted speed falls to 0 at 1 m before it, m. LGSVL.
 const LINE_M: f64 = 15.0;
 const LINE_M_MIN: f64 = 1.0;
-/// So near before a junction the longer stop distance holds, m. LGSVL.
+/// Within this distance before a junction the longer stop distance holds, m. LGSVL.
 const BEFORE_JUNCTION_M: f64 = 10.0;
 /// The stream of the draw of the aggression: no driver draws so often where to go.
 const AGGRESSION_DRAW: u32 = u32::MAX;
@@ -96,7 +97,7 @@ impl Driver {
         let part = (self.speed_mps / lane.speed_limit_mps).clamp(0.0, 1.0);
         let published_m = profile.stop_m_min + (at_limit_m - profile.stop_m_min) * part;
         let braking_mps2 = around.braking_mps2(size, self.speed_mps);
-        published_m.max(LINE_M_MIN + self.speed_mps * self.speed_mps / (2.0 * braking_mps2))
+        published_m.max(LINE_M_MIN + braking_m(self.speed_mps, braking_mps2))
     }
 
     /// Acceleration towards the wanted speed, m/s²: up to `wish_mps`, less before the line that is `line_m` away,

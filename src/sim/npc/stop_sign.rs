@@ -1,10 +1,10 @@
 //! Stop signs: a driver comes to rest before the line, then goes by right of way (`manners`). Yield signs need
 //! no line: they decide who goes first where lanes cross (`junction`).
 
+use crate::kinematics::STANDING_MPS;
 use crate::sim::body::BodyParameters;
 
 use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, LOOK_AHEAD_M};
-use super::manners::STANDS_MPS;
 
 /// A driver at rest with its front within this distance of the line has stopped at it, m: the gap at rest, and
 /// half a car's length for the last metres of an approach.
@@ -26,7 +26,7 @@ impl Driver {
 
     /// Notes that it stands at the line of a stop sign.
     pub(super) fn note_stop(&mut self, size: &BodyParameters) {
-        if self.speed_mps >= STANDS_MPS {
+        if self.speed_mps >= STANDING_MPS {
             return;
         }
         let front_m = self.station_m + size.length_m / 2.0;

@@ -14,6 +14,7 @@ mod on_foot;
 use std::sync::Arc;
 
 use crate::action::{SpawnFacts, SpawnRequest};
+use crate::kinematics::braking_m;
 use crate::model::vocabulary::Verb;
 
 use crate::sim::around::Around;
@@ -176,7 +177,7 @@ fn check_way(around: &Around, driver: &Driver, size: &BodyParameters) -> Result<
     let blocked = around.obstacles().any(|other| {
         driver.gap_to(size, other.into()).is_some_and(|(gap_m, speed_mps)| {
             let closing_mps = (driver.speed_mps - speed_mps).max(0.0);
-            gap_m < 1.0 + closing_mps * closing_mps / (2.0 * braking_mps2) + 0.1 * closing_mps
+            gap_m < 1.0 + braking_m(closing_mps, braking_mps2) + 0.1 * closing_mps
         })
     });
     if blocked { Err("another road user is too near in its lane".into()) } else { Ok(()) }

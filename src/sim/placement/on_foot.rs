@@ -1,5 +1,5 @@
-//! People on foot: who crosses the road goes from kerb to kerb, timed to meet the ego vehicle, and may step out from
-//! behind a parked vehicle that appears with it.
+//! People on foot. A pedestrian who crosses the road goes from kerb to kerb, timed to meet the ego vehicle, and may
+//! step out from behind a parked vehicle that appears at the same time.
 
 use core::f64::consts::FRAC_PI_2;
 
@@ -29,7 +29,7 @@ const PARKED_M: f64 = 0.2;
 const BEFORE_M: f64 = 1.0;
 /// How far within the outer side of that vehicle people stand, m: their own width. Ours.
 const HIDDEN_M: f64 = 0.5;
-/// Half the width of the strip that must be free of parked vehicles for somebody to walk, m.
+/// A pedestrian needs a strip without parked vehicles; this is half its width, m.
 const HALF_STRIP_M: f64 = 0.5;
 
 /// A way on foot that begins on the asked side.

@@ -2,9 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::ads::guide::SpeedRules;
+use crate::ads::kit::{PedalsConfig, SpeedRules, SteeringConfig};
 use crate::ads::settings::section;
-use crate::ads::steering::SteeringConfig;
 
 section! {
     /// Where objects will be.
@@ -34,11 +33,11 @@ section! {
     /// Path and speed along the route.
     pub struct PlanningConfig {
         /// Speed on a free road, m/s, in `[1, 40]`. Apollo's upstream `planning.conf`, `default_cruise_speed`: 11.18 (25 mph); the flag's own default is 5.0.
-        cruise_mps: f64 = 11.18, 1.0..=40.0;
+        cruise_mps: f64 = SpeedRules::TOWN.cruise_mps, 1.0..=40.0;
         /// Lateral acceleration in curves, m/s², in `[0.5, 6]`. Apollo's speed bounds, `max_centric_acceleration_limit`: 2.0.
-        lateral_acceleration_mps2_max: f64 = 2.0, 0.5..=6.0;
+        lateral_acceleration_mps2_max: f64 = SpeedRules::TOWN.lateral_acceleration_mps2_max, 0.5..=6.0;
         /// Slowing down for curves and limits ahead, magnitude, m/s², in `[0.5, 6]`. Ours.
-        slowdown_mps2: f64 = 1.5, 0.5..=6.0;
+        slowdown_mps2: f64 = SpeedRules::TOWN.slowdown_mps2, 0.5..=6.0;
         /// Hardest acceleration, m/s², in `[0.5, 4]`. Apollo's DP `max_acceleration`: 2.0.
         acceleration_mps2_max: f64 = 2.0, 0.5..=4.0;
         /// Hardest braking of a plan, magnitude, m/s², in `[1, 8]`. Apollo's DP `max_deceleration`: 4.0.
@@ -145,34 +144,6 @@ pub struct ControlConfig {
     pub steering: SteeringConfig,
     pub pedals: PedalsConfig,
     pub actuators: ActuatorsConfig,
-}
-
-section! {
-    /// Speed: Apollo's cascade of two controllers.
-    pub struct PedalsConfig {
-        /// Speed wanted per metre of station error, 1/s, in `[0, 5]`. Apollo station PID `kp`: 0.2.
-        station_kp: f64 = 0.2, 0.0..=5.0;
-        /// Bound of the station error, m, in `[0, 10]`. Apollo `station_error_limit`: 2.0.
-        station_error_m_max: f64 = 2.0, 0.0..=10.0;
-        /// Bound of the speed error, m/s, in `[0, 10]`. Apollo `speed_controller_input_limit`: 2.0.
-        speed_error_mps_max: f64 = 2.0, 0.0..=10.0;
-        /// Up to this speed the low gains hold, m/s, in `[0, 20]`. Apollo `switch_speed`: 2.
-        switch_mps: f64 = 2.0, 0.0..=20.0;
-        /// Acceleration per speed error at low speed, 1/s, in `[0, 5]`. Apollo `low_speed_pid_conf`, `kp`: 0.5.
-        speed_kp_low: f64 = 0.5, 0.0..=5.0;
-        /// Acceleration per speed error above `switch_mps`, 1/s, in `[0, 5]`. Apollo `high_speed_pid_conf`, `kp`: 1.0.
-        speed_kp_high: f64 = 1.0, 0.0..=5.0;
-        /// Acceleration per speed error and second, 1/s², in `[0, 5]`. Apollo `ki`: 0.3.
-        speed_ki: f64 = 0.3, 0.0..=5.0;
-        /// Bound of the integral part, m/s², in `[0, 5]`. Apollo `integrator_saturation_level`: 0.3.
-        integral_mps2_max: f64 = 0.3, 0.0..=5.0;
-        /// The plan's acceleration is read this far ahead, s, in `[0, 1]`. Apollo `preview_window`: 20 cycles of 10 ms.
-        preview_s: f64 = 0.2, 0.0..=1.0;
-        /// Braking held at rest, magnitude, m/s², in `[0, 6]`. Apollo `standstill_acceleration`: -3.0.
-        standstill_mps2: f64 = 3.0, 0.0..=6.0;
-        /// Planned speeds below this mean a full stop, m/s, in `[0, 2]`. Apollo `max_abs_speed_when_stopped`: 0.2.
-        stopped_mps: f64 = 0.2, 0.0..=2.0;
-    }
 }
 
 section! {

@@ -16,7 +16,7 @@ mod weaknesses;
 
 use serde::{Deserialize, Serialize};
 
-pub use driving::{ControlConfig, PedalsConfig, PlanningConfig, PredictionConfig};
+pub use driving::{ControlConfig, PlanningConfig, PredictionConfig};
 pub use module::Module;
 pub use read::ConfigError;
 pub use safety::EmergencyConfig;

@@ -5,11 +5,11 @@ use std::fmt::Write as _;
 use serde_json::{Map, Value};
 use sha2::{Digest, Sha256};
 
-use crate::ads::steering::SteeringConfig;
+use crate::ads::kit::{PedalsConfig, SteeringConfig};
 use crate::syntax::{nearest, yaml_mistake};
 
 use super::ModularConfig;
-use super::driving::{ActuatorsConfig, PedalsConfig, PlanningConfig, PredictionConfig};
+use super::driving::{ActuatorsConfig, PlanningConfig, PredictionConfig};
 use super::safety::EmergencyConfig;
 use super::sensing::{LocalizationConfig, PerceptionConfig, TrackingConfig};
 use super::timing::LatencyConfig;

@@ -44,11 +44,6 @@ impl Ghosts {
         Ghosts { rng: draws(seed), begun: 0, alive: Vec::new() }
     }
 
-    /// From now on ghosts appear by another seed; those there are stay.
-    pub fn reseed(&mut self, seed: u64) {
-        self.rng = draws(seed);
-    }
-
     /// Moves on by a frame; adds a detection of each ghost to `detections`.
     pub fn haunt(
         &mut self,

@@ -107,15 +107,6 @@ impl Perception {
         &self.detections
     }
 
-    /// From now on errors come from another seed. What an object's luck has been, and its size as seen, stays.
-    pub fn reseed(&mut self, seed: u64) {
-        self.seed = seed;
-        for watched in &mut self.watched {
-            watched.rng = draws(seed, watched.id);
-        }
-        self.ghosts.reseed(seed);
-    }
-
     fn ranges_in(&mut self, conditions: &Conditions) -> Ranges {
         match self.ranges {
             Some((of, ranges)) if of == *conditions => ranges,

@@ -2,7 +2,7 @@
 
 use core::ops::Range;
 
-use crate::ads::guide::Guide;
+use crate::ads::kit::Guide;
 use crate::geometry::{Beside, Span, Vec2, larger, smaller};
 use crate::sim::VehicleParameters;
 

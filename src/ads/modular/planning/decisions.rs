@@ -5,7 +5,7 @@
 //! only when the profile without it is cheaper by a margin, or when its object is gone: Apollo keeps decisions
 //! from cycle to cycle in the same spirit (`PATH_REUSE`, the sides of its speed bounds), the margin is ours.
 
-use crate::ads::guide::Guide;
+use crate::ads::kit::Guide;
 use crate::sim::VehicleParameters;
 
 use super::super::config::PlanningConfig;

@@ -1,8 +1,9 @@
 //! Traffic rules beside the lights: crosswalks and junctions to be kept clear (Apollo's `Crosswalk` and
 //! `KeepClear`). Stop and yield signs are in `stages`.
 
-use crate::ads::guide::Guide;
+use crate::ads::kit::Guide;
 use crate::ads::status::Reason;
+use crate::kinematics::stopping_m;
 use crate::sim::{Scene, VehicleParameters};
 
 use super::super::config::PlanningConfig;
@@ -104,7 +105,7 @@ pub fn can_stop(
     let lacking = (1.0 + start.acceleration_mps2.min(0.0) / decel_mps2).max(0.0);
     let build_up_s = decel_mps2 / config.jerk_mps3_down / 2.0 * lacking * lacking;
     let late_s = response_s * lacking + build_up_s;
-    speed_mps * late_s + speed_mps * speed_mps / (2.0 * decel_mps2) <= distance_m.max(0.2)
+    stopping_m(speed_mps, late_s, decel_mps2) <= distance_m.max(0.2)
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use crate::ads::guide::Guide;
+use crate::ads::kit::{Guide, RouteChanges};
 use crate::ads::status::Reason;
 use crate::geometry::{Beside, smooth_step};
 use crate::road::RouteLaneChange;
@@ -32,38 +32,15 @@ const LONG_AGO_M: f64 = -1e6;
 
 #[derive(Debug, Clone)]
 pub struct LaneChanges {
-    scene: Arc<Scene>,
-    /// Where each change of the route begins, m; infinite while it has not.
-    begins_m: Vec<f64>,
+    /// Which changes have begun.
+    pub route: RouteChanges,
     /// For how long the target lane of the next change has been clear, s.
     clear_s: f64,
 }
 
 impl LaneChanges {
     pub fn new(scene: &Arc<Scene>) -> LaneChanges {
-        let begins_m = vec![f64::INFINITY; scene.route.changes.len()];
-        LaneChanges { scene: Arc::clone(scene), begins_m, clear_s: 0.0 }
-    }
-
-    /// The guide along the lanes that are to be driven now.
-    pub fn guide(&self, config: &PlanningConfig) -> Guide {
-        if self.begins_m.is_empty() {
-            return Guide::new(&self.scene, &config.speed_rules());
-        }
-        Guide::with_changes(&self.scene, &config.speed_rules(), &self.begins_m)
-    }
-
-    /// Whether a change is under way at a station.
-    pub fn under_way(&self, station_m: f64) -> bool {
-        self.scene.route.changes.iter().zip(&self.begins_m).any(|(change, begin_m)| {
-            *begin_m <= station_m && station_m < begin_m + change.length_from_m(*begin_m)
-        })
-    }
-
-    /// The change that is due but has not begun, if there is one.
-    pub fn due(&self, station_m: f64) -> Option<&RouteLaneChange> {
-        let (_, change) = self.next()?;
-        (station_m >= change.begin_m && !self.under_way(station_m)).then_some(change)
+        LaneChanges { route: RouteChanges::new(scene), clear_s: 0.0 }
     }
 
     /// Begins the next change if it is due and its lane is clear; `true` if that changes the guide.
@@ -75,17 +52,17 @@ impl LaneChanges {
         speed_mps: f64,
         forecasts: &[Forecast],
     ) -> bool {
-        let Some((index, change)) = self.next() else { return false };
-        let soon = station_m >= change.begin_m - speed_mps * CLEAR_S && !self.under_way(station_m);
+        let Some(change) = self.route.next() else { return false };
+        let soon = station_m >= change.begin_m - speed_mps * CLEAR_S && !self.route.is_under_way(station_m);
         let lateral_m = |_| change.lateral_m;
         if !soon || !is_clear(config, guide, &lateral_m, station_m, speed_mps, forecasts) {
             self.clear_s = 0.0;
             return false;
         }
-        let begins = self.due(station_m).is_some() && self.clear_s >= CLEAR_S;
+        let begins = self.route.due(station_m).is_some() && self.clear_s >= CLEAR_S;
         self.clear_s += FRAME_S;
         if begins {
-            self.begins_m[index] = station_m;
+            self.route.begin(station_m);
             self.clear_s = 0.0;
         }
         begins
@@ -101,15 +78,11 @@ impl LaneChanges {
         speed_mps: f64,
         forecasts: &[Forecast],
     ) -> Option<(f64, f64)> {
-        let part = |change: &RouteLaneChange, begin_m: f64| {
-            (begin_m <= station_m).then(|| (station_m - begin_m) / change.length_from_m(begin_m))
+        let is_early = |&(_, change, begin_m): &(usize, &RouteLaneChange, f64)| {
+            let part = (station_m - begin_m) / change.length_from_m(begin_m);
+            begin_m <= station_m && smooth_step(part).value < BREAK_OFF_PART
         };
-        let mut changes = self.scene.route.changes.iter().zip(&self.begins_m);
-        let early = |(change, begin_m): (&RouteLaneChange, &f64)| {
-            part(change, *begin_m).is_some_and(|part| smooth_step(part).value < BREAK_OFF_PART)
-        };
-        let index = changes.position(early)?;
-        let (change, begin_m) = (&self.scene.route.changes[index], self.begins_m[index]);
+        let (index, change, begin_m) = self.route.begun().find(is_early)?;
         let gaps = PlanningConfig {
             change_gap_m: BREAK_OFF_GAPS * config.change_gap_m,
             change_time_s: BREAK_OFF_GAPS * config.change_time_s,
@@ -126,23 +99,14 @@ impl LaneChanges {
         }
         let done_m = |at_m: f64| change.postponed_offset_m(at_m, begin_m) - change.source_offset_m(at_m);
         let found = (done_m(station_m), done_m(station_m + 0.5) - done_m(station_m - 0.5));
-        self.begins_m[index] = f64::INFINITY;
+        self.route.take_back(index);
         self.clear_s = 0.0;
         Some(found)
     }
 
     /// A stop where the next change is just possible.
     pub fn constrain(&self, constraints: &mut Vec<Constraint>) {
-        if let Some((_, change)) = self.next() {
-            let wait_m = change.latest_m - RouteLaneChange::LENGTH_M_MIN;
-            let stop_m = VehicleParameters::MKZ.front_m(wait_m);
-            constraints.push(Constraint::line(Reason::LaneChange, stop_m));
-        }
-    }
-
-    fn next(&self) -> Option<(usize, &RouteLaneChange)> {
-        let index = self.begins_m.iter().position(|begin_m| begin_m.is_infinite())?;
-        Some((index, &self.scene.route.changes[index]))
+        constraints.extend(self.route.wait_m().map(|stop_m| Constraint::line(Reason::LaneChange, stop_m)));
     }
 }
 
@@ -190,7 +154,7 @@ mod tests {
     fn clear(gap_ahead_m: Option<f64>, gap_behind_m: Option<f64>, other_mps: f64) -> bool {
         let scene = two_lanes(300.0);
         let config = PlanningConfig::default();
-        let guide = LaneChanges::new(&scene).guide(&config);
+        let guide = RouteChanges::new(&scene).guide(&config.speed_rules());
         let half_m = 4.7 / 2.0;
         let front = gap_ahead_m.map(|gap_m| VehicleParameters::MKZ.front_m(100.0) + gap_m + half_m);
         let rear = gap_behind_m.map(|gap_m| VehicleParameters::MKZ.rear_m(100.0) - gap_m - half_m);

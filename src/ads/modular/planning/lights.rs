@@ -15,6 +15,7 @@ use super::super::config::PlanningConfig;
 use super::kept_clear::can_stop;
 use super::planner::HORIZON_M;
 use super::speed::Constraint;
+use super::stages::{STOPPED_M, STOPPED_MPS};
 use super::trajectory::Point;
 
 /// A bumper this far over the line while the light let it go has passed it, m. Ours.
@@ -25,10 +26,6 @@ const INSIDE_M: f64 = 3.0;
 /// From the decision until the brakes follow the plan, s: one frame, and their lag. Without it a vehicle that only
 /// just can stop comes to rest beyond the line. Ours.
 const RESPONSE_S: f64 = 0.25;
-/// A vehicle that stands so near before the line stands at it, m, below Apollo's `max_abs_speed_when_stopped`, m/s. As
-/// for stop signs.
-const STANDS_M: f64 = 2.5;
-const STANDS_MPS: f64 = 0.2;
 
 #[derive(Debug, Clone)]
 pub struct Lights {
@@ -78,7 +75,7 @@ impl Lights {
                 let stops = can_stop(&self.config, hardest_mps2, distance_m, start, RESPONSE_S);
                 *choice = if stops { Choice::Stop } else { Choice::Pass };
             }
-            if *choice == Choice::Stop && start.speed_mps < STANDS_MPS && distance_m < STANDS_M {
+            if *choice == Choice::Stop && start.speed_mps < STOPPED_MPS && distance_m < STOPPED_M {
                 *choice = Choice::Stand;
             }
             match choice {

@@ -6,9 +6,8 @@
 //! in a row are passed as one. Pedestrians and moving road users are not passed in this way. Left out is lane
 //! borrowing, a shift into the next lane: behind what stands, the stop gap leaves no room to turn out of the lane.
 
-use crate::ads::guide::Guide;
-use crate::ads::steering::Aside;
-use crate::geometry::{Span, smooth_step};
+use crate::ads::kit::{Aside, Guide};
+use crate::geometry::{Span, extent_m, smooth_step};
 use crate::sim::{Scene, VehicleParameters};
 
 use super::super::config::PlanningConfig;
@@ -260,13 +259,11 @@ impl Standing<'_> {
         self.forecasts.iter().filter(|forecast| !forecast.moving).filter_map(|forecast| {
             let (station_m, position) = (self.station_m, forecast.positions[0]);
             let beside = self.guide.project(position, station_m, station_m + HORIZON_M);
-            let sine = beside.forward.x * forecast.forward.y - beside.forward.y * forecast.forward.x;
-            let cosine = beside.forward.dot(&forecast.forward);
-            let across_m = (sine.abs() * forecast.length_m + cosine.abs() * forecast.width_m) / 2.0;
-            let reach_m = Self::HALF_WAY_M + self.config.lateral_buffer_m;
             let (length_m, width_m) = (forecast.length_m, forecast.width_m);
+            let (_, across_m) = extent_m(forecast.forward, beside.forward, (length_m, width_m));
+            let reach_m = Self::HALF_WAY_M + self.config.lateral_buffer_m;
             let span = beside.taken(forecast.forward, length_m, width_m, 2.0 * reach_m)?;
-            let (right_m, left_m) = (beside.offset_m - across_m, beside.offset_m + across_m);
+            let (right_m, left_m) = (beside.offset_m - across_m / 2.0, beside.offset_m + across_m / 2.0);
             (span.to_m > self.front_m()).then_some(Edge { id: forecast.id, span, right_m, left_m })
         })
     }

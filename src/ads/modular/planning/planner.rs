@@ -11,7 +11,7 @@
 
 use std::sync::Arc;
 
-use crate::ads::guide::Guide;
+use crate::ads::kit::Guide;
 use crate::ads::status::{Manoeuvre, Reason};
 use crate::geometry::Pose;
 use crate::sim::{Conditions, Scene, SignalColour, VehicleParameters};
@@ -87,7 +87,7 @@ impl Planner {
         let changes = LaneChanges::new(scene);
         let rights = RouteRights::of(&config, scene);
         Planner {
-            guide: Arc::new(changes.guide(&config)),
+            guide: Arc::new(changes.route.guide(&config.speed_rules())),
             lights: Lights::new(&config, scene),
             config,
             weaknesses,
@@ -151,18 +151,18 @@ impl Planner {
         let (config, guide) = (&self.config, &self.guide);
         if let Some((off_m, slope)) = self.changes.break_off(config, guide, station_m, speed_mps, forecasts) {
             self.lateral.return_from(station_m, speed_mps, off_m, slope);
-            self.guide = Arc::new(self.changes.guide(config));
+            self.guide = Arc::new(self.changes.route.guide(&config.speed_rules()));
         } else if !self.lateral.is_returning()
             && self.changes.seek(config, guide, station_m, speed_mps, forecasts)
         {
-            self.guide = Arc::new(self.changes.guide(config));
+            self.guide = Arc::new(self.changes.route.guide(&config.speed_rules()));
         }
-        self.manoeuvre = if self.changes.under_way(station_m) {
+        self.manoeuvre = if self.changes.route.is_under_way(station_m) {
             Manoeuvre::LaneChange
         } else {
             let (config, scene, guide) = (&self.config, &self.scene, &self.guide);
             self.lateral.update(config, scene, guide, station_m, speed_mps, forecasts);
-            match (self.lateral.passing(), self.changes.due(station_m)) {
+            match (self.lateral.passing(), self.changes.route.due(station_m)) {
                 (Some((id, _)), _) => Manoeuvre::Nudge(id),
                 (None, Some(_)) => Manoeuvre::AwaitGap,
                 (None, None) => Manoeuvre::LaneFollow,

@@ -16,9 +16,10 @@
 //!
 //! Left out: crests, as the maps are flat, and what buildings hide, as the maps have none.
 
-use crate::ads::guide::Guide;
+use crate::ads::kit::Guide;
 use crate::ads::status::Reason;
 use crate::geometry::{Frame, OrientedBox, Pose, Vec2};
+use crate::kinematics;
 use crate::road::{LaneIndex, RoadMap};
 use crate::sim::{Conditions, Scene, VehicleParameters};
 
@@ -236,9 +237,9 @@ fn stoppable_mps(config: &PlanningConfig, distance_m: f64) -> f64 {
     decel_mps2 * ((time_s * time_s + 2.0 * distance_m / decel_mps2).sqrt() - time_s)
 }
 
-/// The way in which the vehicle stops: v·t + v²/(2a), m.
+/// The way in which the vehicle stops, m.
 fn stopping_m(config: &PlanningConfig, speed_mps: f64) -> f64 {
-    speed_mps * config.sight_reaction_s + speed_mps * speed_mps / (2.0 * config.deceleration_mps2_max)
+    kinematics::stopping_m(speed_mps, config.sight_reaction_s, config.deceleration_mps2_max)
 }
 
 /// Time for a way from a speed on, as fast as a plan accelerates, up to another speed, s.

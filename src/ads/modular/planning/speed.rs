@@ -4,19 +4,16 @@
 //! a kinematic bound beneath it, a look-ahead on the speed that limits and curves allow. All of it
 //! goes through Apollo's jerk limits, the emergency too: that is its documented weakness `bounded_jerk`.
 
-use crate::ads::guide::Guide;
+use crate::ads::kit::{Guide, PREVIEW_S, speed_mps2};
 use crate::ads::status::Reason;
 use crate::geometry::{larger, smaller};
-use crate::sim::{Following, VehicleParameters};
+use crate::kinematics::{Following, needed_mps2};
+use crate::sim::VehicleParameters;
 
 use super::super::config::PlanningConfig;
 use super::claim::Claim;
 use super::trajectory::{POINT_S, Point, Trajectory};
 
-/// Time in which a speed error is to vanish, s.
-const SPEED_ERROR_S: f64 = 0.6;
-/// Look-ahead on the permitted speed, s.
-const PREVIEW_S: f64 = 0.6;
 /// A standing vehicle this near to its place to stop stays there, m.
 const STOPPED_SHORT_M: f64 = 0.3;
 /// Gap that even an emergency braking tries to leave, m.
@@ -113,7 +110,7 @@ impl Constraint {
                 })
             }
             Kind::Creep { stop_m, speed_mps: creep_mps } => {
-                let creeping_mps2 = (creep_mps - speed_mps) / SPEED_ERROR_S;
+                let creeping_mps2 = speed_mps2(speed_mps, *creep_mps);
                 let acceleration_mps2 =
                     larger(fence_mps2(config, speed_mps, stop_m - front_m), creeping_mps2);
                 Some(Bound { acceleration_mps2, emergency: false })
@@ -122,7 +119,7 @@ impl Constraint {
                 if front_m > *to_m || front_m < *from_m - speed_mps * PREVIEW_S {
                     return None;
                 }
-                let slowing_mps2 = larger((limit_mps - speed_mps) / SPEED_ERROR_S, -config.comfortable_mps2);
+                let slowing_mps2 = larger(speed_mps2(speed_mps, *limit_mps), -config.comfortable_mps2);
                 Some(Bound { acceleration_mps2: slowing_mps2, emergency: false })
             }
             Kind::Leader(index) => leader_bound(config, &claims[*index], time_s, front_m, speed_mps),
@@ -210,9 +207,8 @@ pub fn roll(
 
 /// Acceleration on a free road.
 fn free_mps2(config: &PlanningConfig, guide: &Guide, point: &Point) -> f64 {
-    let ahead_m = point.station_m + point.speed_mps * PREVIEW_S;
-    let allowed_mps = smaller(guide.speed_mps_max(point.station_m), guide.speed_mps_max(ahead_m));
-    smaller((allowed_mps - point.speed_mps) / SPEED_ERROR_S, config.acceleration_mps2_max)
+    let allowed_mps = guide.allowed_mps(point.station_m, point.speed_mps);
+    smaller(speed_mps2(point.speed_mps, allowed_mps), config.acceleration_mps2_max)
 }
 
 /// Acceleration that stops the vehicle in `room_m`: coming nearer, it is the braking parabola of
@@ -230,7 +226,7 @@ fn fence_mps2(config: &PlanningConfig, speed_mps: f64, room_m: f64) -> f64 {
         return -needed_mps2;
     }
     let parabola_mps = (2.0 * comfortable_mps2 * larger(room_m - STOPPED_SHORT_M, 0.0)).sqrt();
-    (parabola_mps - speed_mps) / SPEED_ERROR_S
+    speed_mps2(speed_mps, parabola_mps)
 }
 
 /// Acceleration behind a leader: the intelligent driver model's interaction term, not below the
@@ -244,7 +240,7 @@ fn leader_mps2(config: &PlanningConfig, speed_mps: f64, leader_mps: f64, gap_m: 
         acceleration_mps2,
         comfortable_mps2,
     };
-    let ratio = following.wanted_gap_m(speed_mps, leader_mps) / larger(gap_m, 0.1);
+    let ratio = following.crowding(speed_mps, leader_mps, gap_m);
     let floor_mps2 =
         if gap_m > config.follow_gap_m { comfortable_mps2 } else { config.deceleration_mps2_max };
     let model_mps2 = larger(acceleration_mps2 * (1.0 - ratio * ratio), -floor_mps2);
@@ -254,7 +250,7 @@ fn leader_mps2(config: &PlanningConfig, speed_mps: f64, leader_mps: f64, gap_m: 
 
 /// Deceleration that loses a speed within a distance, m/s².
 fn braking_mps2(speed_mps: f64, room_m: f64) -> f64 {
-    speed_mps * speed_mps / (2.0 * larger(room_m, 0.1))
+    needed_mps2(speed_mps, larger(room_m, 0.1))
 }
 
 #[cfg(test)]

@@ -9,8 +9,9 @@
 //! acceleration, which four possible accelerations do not need; and hypotheses that are too improbable to
 //! bind count in the cost, weighted with their probability.
 
-use crate::ads::guide::Guide;
+use crate::ads::kit::Guide;
 use crate::geometry::{larger, smaller};
+use crate::kinematics::braking_m;
 use crate::sim::VehicleParameters;
 
 use super::super::config::PlanningConfig;
@@ -201,7 +202,7 @@ impl Profile {
         let front_m = VehicleParameters::MKZ.front_m(start.station_m);
         let regions = &regions[..regions.len().min(REGIONS_MAX)];
         let search = Search { config, guide, front_m, regions };
-        let braking_m = start.speed_mps * start.speed_mps / (2.0 * config.deceleration_mps2_max);
+        let braking_m = braking_m(start.speed_mps, config.deceleration_mps2_max);
         let last_m = (stop_m - front_m).max(braking_m + ROW_M);
         let end = (last_m / ROW_M).min((ROWS - 1) as f64) as usize + 1;
         let mut nodes = [[UNREACHED; ROWS]; COLUMNS];

@@ -26,10 +26,10 @@ use super::trajectory::Point;
 const APPROACH_M: f64 = 40.0;
 /// The front bumper is at a line if it is so near before it, m.
 const AT_LINE_M: f64 = 0.5;
-/// A vehicle that stands so near before a stop sign has stopped for it, m, below Apollo's
+/// A vehicle that stands so near before a stop sign or a light has stopped for it, m, below Apollo's
 /// `max_abs_speed_when_stopped`, m/s.
-const STOPPED_M: f64 = 2.5;
-const STOPPED_MPS: f64 = 0.2;
+pub(super) const STOPPED_M: f64 = 2.5;
+pub(super) const STOPPED_MPS: f64 = 0.2;
 /// Room kept to the middle of the first lane that crosses, m: half a lane and a metre.
 pub(super) const CROSSING_ROOM_M: f64 = 4.0;
 
@@ -186,8 +186,8 @@ mod tests {
         }
     }
 
-    /// The stage of a vehicle whose front comes to a place at a speed, and stays there with somebody entering
-    /// or not, after so long.
+    /// The stage of a vehicle whose front comes to a place at a speed and stays there for some time, with or without a
+    /// vehicle that enters.
     fn stage(
         passage: &mut Passage,
         weak: bool,

@@ -1,5 +1,6 @@
 //! A planned drive along the route: where, how fast, and why.
 
+pub use crate::ads::kit::Point;
 use crate::ads::status::Reason;
 use crate::geometry::larger;
 use crate::sim::VehicleParameters;
@@ -10,14 +11,6 @@ use super::claim::Claim;
 pub const POINT_S: f64 = 0.1;
 /// Points of a trajectory: 8 s.
 pub const POINTS: usize = 81;
-
-/// A point of a plan: rear axle along the route.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Point {
-    pub station_m: f64,
-    pub speed_mps: f64,
-    pub acceleration_mps2: f64,
-}
 
 /// A plan of 8 s, every 0.1 s.
 #[derive(Debug, Clone)]
@@ -42,13 +35,7 @@ impl Trajectory {
             return self.points[POINTS - 1];
         }
         let fraction = place - f64::from(index as u32);
-        let (a, b) = (&self.points[index], &self.points[index + 1]);
-        let mix = |a: f64, b: f64| a + (b - a) * fraction;
-        Point {
-            station_m: mix(a.station_m, b.station_m),
-            speed_mps: mix(a.speed_mps, b.speed_mps),
-            acceleration_mps2: mix(a.acceleration_mps2, b.acceleration_mps2),
-        }
+        self.points[index].mixed(&self.points[index + 1], fraction)
     }
 
     /// Constant braking to rest.

@@ -5,8 +5,8 @@
 //! with a speed of its own.
 
 use crate::geometry::{larger, smaller};
+use crate::kinematics::{Following, needed_mps2};
 use crate::road::RoadMap;
-use crate::sim::Following;
 
 use super::course::{Course, Walk};
 use super::{STEP_S, STEPS};
@@ -68,12 +68,12 @@ pub fn roll(map: &RoadMap, course: &Course, motion: &Motion, stations_m: &mut [f
             }
         }
         if let Some(leader) = leader {
-            let gap_m = larger(leader.gap_m + leader.speed_mps * time_s - gone_m, 0.1);
-            let ratio = FOLLOWING.wanted_gap_m(speed_mps, leader.speed_mps) / gap_m;
+            let gap_m = leader.gap_m + leader.speed_mps * time_s - gone_m;
+            let ratio = FOLLOWING.crowding(speed_mps, leader.speed_mps, gap_m);
             wanted_mps2 = smaller(wanted_mps2, FOLLOWING.acceleration_mps2 * (1.0 - ratio * ratio));
         }
         if let Some(stop_m) = stop_m {
-            let needed_mps2 = speed_mps * speed_mps / (2.0 * larger(stop_m - gone_m, 0.1));
+            let needed_mps2 = needed_mps2(speed_mps, larger(stop_m - gone_m, 0.1));
             if needed_mps2 > STOP_MPS2 {
                 wanted_mps2 = smaller(wanted_mps2, -needed_mps2);
             }

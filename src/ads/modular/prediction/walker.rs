@@ -1,8 +1,7 @@
 //! What pedestrians near a carriageway may do.
-//!
-//! Whoever walks towards it crosses it, whoever walks along it stays beside it, and whoever stands at the
-//! kerb and faces it may set out: less and less probable the longer the wait. Apollo's `SEMANTIC_LSTM` learns
-//! this from maps; the rule and its figures are ours.
+//! A pedestrian who walks towards it crosses it, one who walks along it stays beside it, and one who stands at the kerb
+//! and faces it may set out, which gets less probable the longer the wait. Apollo's `SEMANTIC_LSTM` learns this from
+//! maps; the rule and its figures are ours.
 
 use crate::geometry::{Vec2, unit_vector};
 use crate::road::RoadMap;

@@ -76,7 +76,8 @@ impl Track {
             && across_m.abs() <= self.width_m / 2.0 + room_m
     }
 
-    /// Whether [`Track::holds`] says no of the centre of another track: quick, and says too little.
+    /// A quick test whether another track is too far away. If true, [`Track::holds`] of its centre is certainly false;
+    /// if false, ask [`Track::holds`].
     pub(super) fn is_far_from(&self, other: &Track, room_m: f64) -> bool {
         let off = other.position - self.position;
         let reach_m = self.length_m + self.width_m + 2.0 * room_m + self.shift_m.abs() + other.shift_m.abs();
