@@ -1,8 +1,8 @@
 //! avastra: a language for what may happen around a self-driving car, and a search for the actions that
 //! make the car crash.
 //!
-//! The modules stand in reading order, and each may use only those above it; `tests/it/layers.rs`
-//! keeps it so. `ARCHITECTURE.md` has the picture.
+//! This crate is the command line. What it is made of stands in the crates that it re-exports, one folder of `src` each;
+//! `ARCHITECTURE.md` has the picture.
 //!
 //! From a text to an episode:
 //!
@@ -27,32 +27,14 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod units;
-pub mod rng;
-pub mod statistics;
-pub mod geometry;
-pub mod kinematics;
-pub mod road;
-pub mod syntax;
-pub mod model;
-pub mod prove;
-pub mod check;
-pub mod action;
-pub mod sim;
-pub mod ads;
-pub mod mdp;
-pub mod agent;
-pub mod episode;
-pub mod oracle;
-pub mod files;
-pub mod run;
-pub mod estimate;
-pub mod train;
-pub mod trial;
-pub mod study;
-pub mod emit;
-pub mod export;
-pub mod import;
-pub mod report;
-pub mod editor;
+pub use avastra_base::{geometry, kinematics, rng, statistics, units};
+pub use avastra_campaign::{emit, episode, estimate, files, oracle, run, study, train, trial};
+pub use avastra_drivers as ads;
+pub use avastra_editor as editor;
+pub use avastra_exchange::{export, import, report};
+pub use avastra_lang::{check, model, prove, syntax};
+pub use avastra_road as road;
+pub use avastra_search::{agent, mdp};
+pub use avastra_world::{action, sim};
+
 pub mod cli;

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use crate::action::{ActionTable, audit};
-use crate::check::Loaded;
-use crate::sim::ENGINE;
-use crate::syntax::ast::FileId;
-use crate::syntax::{Diagnostic, apply_fixes};
-use crate::trial::places::{self, Scenes};
+use avastra_campaign::trial::places::{self, Scenes};
+use avastra_lang::check::Loaded;
+use avastra_lang::syntax::ast::FileId;
+use avastra_lang::syntax::{Diagnostic, apply_fixes};
+use avastra_world::action::{ActionTable, audit};
+use avastra_world::sim::ENGINE;
 
 use super::arguments::{CheckArguments, Dump};
 use super::error::Failure;

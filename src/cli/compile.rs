@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::action::{ActionTable, TableFile};
-use crate::run::road_named;
-use crate::syntax::yaml_mistake;
-use crate::trial::{Cell, TrialSettings};
+use avastra_campaign::run::road_named;
+use avastra_campaign::trial::{Cell, TrialSettings};
+use avastra_lang::syntax::yaml_mistake;
+use avastra_world::action::{ActionTable, TableFile};
 
 use super::arguments::{CompileArguments, TableArguments};
 use super::error::Failure;

@@ -1,7 +1,7 @@
 //! The settings of episodes that a command line asks for: who drives, where, under which conditions.
 
-use crate::model::Space;
-use crate::run::{RunSettings, TrafficRecord};
+use avastra_campaign::run::{RunSettings, TrafficRecord};
+use avastra_lang::model::Space;
 
 use super::arguments::ConditionArguments;
 use super::error::Failure;

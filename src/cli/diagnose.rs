@@ -3,18 +3,18 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::action::ActionTable;
-use crate::ads::{ModularConfig, Selected};
-use crate::episode::{Collision, EpisodeLog};
-use crate::model::Scenario;
-use crate::model::vocabulary::Word;
-use crate::oracle;
-use crate::oracle::{
+use avastra_base::statistics::Estimate;
+use avastra_campaign::episode::{Collision, EpisodeLog};
+use avastra_campaign::oracle;
+use avastra_campaign::oracle::{
     Comparison, Diagnosis, Evidence, Fate, Likelihood, Measure, MechanismShare, Mechanisms, Verdict,
     WeaknessFinding,
 };
-use crate::run::{Asked, Stage};
-use crate::statistics::Estimate;
+use avastra_campaign::run::{Asked, Stage};
+use avastra_drivers::{ModularConfig, Selected};
+use avastra_lang::model::Scenario;
+use avastra_lang::model::vocabulary::Word;
+use avastra_world::action::ActionTable;
 
 use super::arguments::DiagnoseArguments;
 use super::error::Failure;
@@ -375,8 +375,8 @@ fn likelihood_text(likelihood: &Likelihood) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ads::Module;
-    use crate::oracle::{Chance, ModuleFinding};
+    use avastra_campaign::oracle::{Chance, ModuleFinding};
+    use avastra_drivers::Module;
 
     /// A diagnosis of a driving system that differs from the baseline in perception, or in nothing.
     fn diagnosis(verdict: Verdict, cause: &[Module], differs: bool) -> Diagnosis {

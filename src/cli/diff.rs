@@ -2,7 +2,7 @@
 
 use core::fmt::Write;
 
-use crate::check::{Difference, differences};
+use avastra_lang::check::{Difference, differences};
 
 use super::arguments::DiffArguments;
 use super::error::Failure;

@@ -3,10 +3,10 @@
 use core::fmt::Write;
 use std::collections::BTreeSet;
 
-use crate::model::{
+use avastra_base::units::{Dimension, quantity_short};
+use avastra_lang::model::{
     ActionDef, Domain, Initial, Interval, Parameter, RuleBody, RuleDef, Space, StateDef, Type, Value,
 };
-use crate::units::{Dimension, quantity_short};
 
 use super::output::Output;
 use super::output::plural;

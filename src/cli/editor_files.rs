@@ -5,11 +5,11 @@
 
 use serde_json::{Value, json};
 
-use crate::editor::words;
-use crate::editor::words::Entry;
-use crate::model::vocabulary::{Site, StopReason};
-use crate::syntax::keyword;
-use crate::units;
+use avastra_base::units;
+use avastra_editor::words;
+use avastra_editor::words::Entry;
+use avastra_lang::model::vocabulary::{Site, StopReason};
+use avastra_lang::syntax::keyword;
 
 use super::arguments::EditorFilesArguments;
 use super::error::Failure;

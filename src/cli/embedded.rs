@@ -3,10 +3,10 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::action::ActionTable;
-use crate::run;
-use crate::run::{Run, RunSettings, TrafficRecord};
-use crate::syntax::{DiagnosticRecord, Style, record, render};
+use avastra_campaign::run;
+use avastra_campaign::run::{Run, RunSettings, TrafficRecord};
+use avastra_lang::syntax::{DiagnosticRecord, Style, record, render};
+use avastra_world::action::ActionTable;
 
 use super::conditions::roads_or_all;
 use super::load;
@@ -46,7 +46,7 @@ pub fn compile(path: &Path) -> Result<Compiled, Unusable> {
         text: render(diagnostic, &loaded.sources, Style::Plain),
     };
     let diagnostics: Vec<Said> = loaded.diagnostics.iter().map(said).collect();
-    if loaded.diagnostics.iter().any(crate::syntax::Diagnostic::is_error) {
+    if loaded.diagnostics.iter().any(avastra_lang::syntax::Diagnostic::is_error) {
         return Err(Unusable::Mistakes(diagnostics));
     }
     let is_emitted = loaded.scenario.is_some() || loaded.policy.is_some();
@@ -76,7 +76,7 @@ pub struct Conditions {
 /// In words: what does not exist, cannot be read or does not fit together.
 pub fn run(table: ActionTable, conditions: &Conditions) -> Result<Run, String> {
     let Conditions { roads, ads, ads_config, ads_cmd, ambient, traffic, with, without } = conditions;
-    let ambient_max = crate::model::AMBIENT_MAX;
+    let ambient_max = avastra_lang::model::AMBIENT_MAX;
     if *ambient > ambient_max {
         return Err(format!("{ambient} vehicles of ambient traffic: at most {ambient_max} are possible"));
     }

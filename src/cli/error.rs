@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::run::RunError;
+use avastra_campaign::run::RunError;
 
 /// Every way in which a command can fail.
 #[derive(Debug, thiserror::Error)]

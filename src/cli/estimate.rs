@@ -4,16 +4,16 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use crate::action::ActionTable;
-use crate::ads::external::Attached;
-use crate::estimate::{
+use avastra_base::statistics::Interval;
+use avastra_campaign::estimate::{
     Comparison, ComparisonResults, Estimate, EstimateDatabase, EstimateResults, EstimateSettings, EventKind,
     Found, Mass, Met, Method, PILOT, Part, Pilot, Plan, Played, Probability, Stopping, WrittenScenario,
     compared, pilot, play_parts,
 };
-use crate::run::{DatabaseError, Numbered, Run, RunSettings, Shard, Units};
-use crate::statistics::Interval;
-use crate::syntax::yaml_mistake;
+use avastra_campaign::run::{DatabaseError, Numbered, Run, RunSettings, Shard, Units};
+use avastra_drivers::external::Attached;
+use avastra_lang::syntax::yaml_mistake;
+use avastra_world::action::ActionTable;
 
 use super::arguments::{EstimateArguments, EventArgument, MethodArgument};
 use super::error::Failure;

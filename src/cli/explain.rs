@@ -1,7 +1,7 @@
 //! `avastra explain`: what a code means.
 
-use crate::check::explain::{PAGES, Page, page};
-use crate::syntax::nearest;
+use avastra_lang::check::explain::{PAGES, Page, page};
+use avastra_lang::syntax::nearest;
 
 use super::arguments::ExplainArguments;
 use super::error::Failure;

@@ -1,11 +1,11 @@
-//! Writing files for the commands: `crate::files`, with its errors as failures of a command.
+//! Writing files for the commands: `avastra_campaign::files`, with its errors as failures of a command.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use crate::ads::external;
-use crate::episode::EpisodeLog;
-use crate::files;
+use avastra_campaign::episode::EpisodeLog;
+use avastra_campaign::files;
+use avastra_drivers::external;
 
 use super::error::Failure;
 use super::load;

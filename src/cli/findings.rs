@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::ads::Selected;
-use crate::ads::external::message::EXTREME_MPS2;
-use crate::ads::external::{FailureKind, Program};
-use crate::run::{FailureCount, Stage};
+use avastra_campaign::run::{FailureCount, Stage};
+use avastra_drivers::Selected;
+use avastra_drivers::external::message::EXTREME_MPS2;
+use avastra_drivers::external::{FailureKind, Program};
 
 use super::error::Failure;
 use super::load;

@@ -3,7 +3,7 @@
 use std::io::Read;
 use std::path::Path;
 
-use crate::syntax::{FormatError, Sources};
+use avastra_lang::syntax::{FormatError, Sources};
 
 use super::arguments::FmtArguments;
 use super::error::Failure;
@@ -40,7 +40,7 @@ pub fn fmt(output: &Output, arguments: &FmtArguments) -> Result<(), Failure> {
 fn formatted(output: &Output, path: &Path, text: &str) -> Result<String, Failure> {
     let mut sources = Sources::new();
     let file = sources.add(path.display().to_string(), text);
-    crate::syntax::format(file, text).map_err(|error| match error {
+    avastra_lang::syntax::format(file, text).map_err(|error| match error {
         FormatError::Syntax(diagnostics) => {
             output.diagnostics(&sources, &diagnostics);
             Failure::Source { errors: diagnostics.len() }

@@ -7,10 +7,10 @@ use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
 use clap::error::Error;
 use clap::{Arg, Command, CommandFactory};
 
-use crate::ads;
-use crate::agent;
-use crate::agent::Kind;
-use crate::sim::TrafficProfile;
+use avastra_drivers as ads;
+use avastra_search::agent;
+use avastra_search::agent::Kind;
+use avastra_world::sim::TrafficProfile;
 
 use super::arguments::Arguments;
 use super::output::{COLUMNS, folded};

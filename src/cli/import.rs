@@ -3,15 +3,15 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use crate::action::ActionTable;
-use crate::check;
-use crate::check::ReadError;
-use crate::episode::{End, Outcome};
-use crate::files::PlainName;
-use crate::import;
-use crate::import::{Files, Imported, Refusal};
-use crate::model::Scenario;
-use crate::run::Stage;
+use avastra_campaign::episode::{End, Outcome};
+use avastra_campaign::files::PlainName;
+use avastra_campaign::run::Stage;
+use avastra_exchange::import;
+use avastra_exchange::import::{Files, Imported, Refusal};
+use avastra_lang::check;
+use avastra_lang::check::ReadError;
+use avastra_lang::model::Scenario;
+use avastra_world::action::ActionTable;
 
 use super::arguments::ImportArguments;
 use super::error::Failure;

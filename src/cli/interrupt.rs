@@ -4,7 +4,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
-use crate::ads::external;
+use avastra_drivers::external;
 
 use super::output::remark;
 

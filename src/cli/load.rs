@@ -6,17 +6,17 @@ use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-use crate::action::ActionTable;
-use crate::ads::external::{Attached, ExternalSettings, Target};
-use crate::ads::{EXTERNAL, ModularConfig, REGISTRY};
-use crate::check;
-use crate::check::{Loaded, ReadError};
-use crate::model::{Policy, Scenario, Space};
-use crate::run;
-use crate::run::{Asked, Profile, RunError, driving_system};
-use crate::sim::TrafficProfile;
-use crate::syntax::nearest;
-use crate::trial::places::{self, Scenes};
+use avastra_campaign::run;
+use avastra_campaign::run::{Asked, Profile, RunError, driving_system};
+use avastra_campaign::trial::places::{self, Scenes};
+use avastra_drivers::external::{Attached, ExternalSettings, Target};
+use avastra_drivers::{EXTERNAL, ModularConfig, REGISTRY};
+use avastra_lang::check;
+use avastra_lang::check::{Loaded, ReadError};
+use avastra_lang::model::{Policy, Scenario, Space};
+use avastra_lang::syntax::nearest;
+use avastra_world::action::ActionTable;
+use avastra_world::sim::TrafficProfile;
 
 use super::error::Failure;
 use super::output::Output;
@@ -95,7 +95,7 @@ fn check_read(path: &Path, read: &check::ReadFile<'_>) -> Result<Loaded, Failure
     }
     let mut loaded = check::load(path, read).map_err(|error| Failure::file("read", path, error))?;
     places::judge_claims(&mut loaded, &mut Scenes::default());
-    if loaded.diagnostics.iter().any(crate::syntax::Diagnostic::is_error) {
+    if loaded.diagnostics.iter().any(avastra_lang::syntax::Diagnostic::is_error) {
         check::suggest_uses(&mut loaded, &nearby(path));
     }
     Ok(loaded)

@@ -7,13 +7,13 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::action::ActionTable;
-use crate::check::{Loaded, normal};
-use crate::model::{Scenario, code};
-use crate::run;
-use crate::run::RunError;
-use crate::syntax::ast::{Expr, ExprKind, FileId};
-use crate::syntax::{Diagnostic, apply_fixes, print_expr};
+use avastra_campaign::run;
+use avastra_campaign::run::RunError;
+use avastra_lang::check::{Loaded, normal};
+use avastra_lang::model::{Scenario, code};
+use avastra_lang::syntax::ast::{Expr, ExprKind, FileId};
+use avastra_lang::syntax::{Diagnostic, apply_fixes, print_expr};
+use avastra_world::action::ActionTable;
 
 use super::error::Failure;
 use super::load;

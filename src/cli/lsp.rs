@@ -1,6 +1,6 @@
 //! `avastra lsp`: the language in an editor, by the Language Server Protocol 3.17 over stdin and stdout.
 //!
-//! Every question of the protocol is one of `crate::editor`; here it is read from JSON and its answer written as JSON.
+//! Every question of the protocol is one of `avastra_editor`; here it is read from JSON and its answer written as JSON.
 //! A thread reads messages into a queue. All that have arrived are looked at before one is answered, so that a request
 //! can be cancelled and a burst of keystrokes is checked once.
 
@@ -16,17 +16,17 @@ use std::sync::mpsc::Receiver;
 
 use serde_json::{Map, Value, json};
 
-use crate::check::ReadError;
-use crate::editor::complete::{Proposal, ProposalKind};
-use crate::editor::diagnostics::{Change, Changes, Mistake, Remedy};
-use crate::editor::formatting::Formatted;
-use crate::editor::highlight::{NameKind, Token};
-use crate::editor::outline::{Entry, OutlineKind};
-use crate::editor::{
+use avastra_editor::complete::{Proposal, ProposalKind};
+use avastra_editor::diagnostics::{Change, Changes, Mistake, Remedy};
+use avastra_editor::formatting::Formatted;
+use avastra_editor::highlight::{NameKind, Token};
+use avastra_editor::outline::{Entry, OutlineKind};
+use avastra_editor::{
     Analysis, Files, Place, Point, Range, Workspace, complete, diagnostics, formatting, highlight, hints,
     hover, navigate, outline, rename, signature, structure,
 };
-use crate::syntax::Severity;
+use avastra_lang::check::ReadError;
+use avastra_lang::syntax::Severity;
 
 use super::error::Failure;
 use super::load;

@@ -19,16 +19,16 @@ use std::path::{Component, Path, PathBuf};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::ads::external::Attached;
-use crate::estimate::{EstimateDatabase, EstimateSettings, WrittenScenario};
-use crate::files;
-use crate::files::PlainName;
-use crate::run::{
+use avastra_campaign::estimate::{EstimateDatabase, EstimateSettings, WrittenScenario};
+use avastra_campaign::files;
+use avastra_campaign::files::PlainName;
+use avastra_campaign::run::{
     Database, DatabaseError, Numbered, PolicyReference, RunSettings, Shard, Units, settings_differences,
 };
-use crate::study::{StudyDatabase, StudySettings};
-use crate::syntax::ast::{Expr, ExprKind, FileId, ItemKind};
-use crate::syntax::{parse, print_expr};
+use avastra_campaign::study::{StudyDatabase, StudySettings};
+use avastra_drivers::external::Attached;
+use avastra_lang::syntax::ast::{Expr, ExprKind, FileId, ItemKind};
+use avastra_lang::syntax::{parse, print_expr};
 
 use super::arguments::MergeArguments;
 use super::error::Failure;
@@ -685,7 +685,7 @@ impl Cut for StudySettings {
 
     fn work(&self) -> Vec<Item> {
         let mut places = 1..;
-        let job = |job: crate::study::Job| Item {
+        let job = |job: avastra_campaign::study::Job| Item {
             cost: self.episodes(&job),
             units: places.by_ref().take(job.roads.len()).collect(),
         };

@@ -56,7 +56,7 @@ use std::process::ExitCode;
 use clap::error::{ContextKind, ContextValue};
 use clap::{ArgMatches, FromArgMatches};
 
-use crate::syntax::nearest;
+use avastra_lang::syntax::nearest;
 
 use arguments::{Arguments, Command, Format};
 use error::Failure;

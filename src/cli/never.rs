@@ -3,8 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::action::ActionTable;
-use crate::run::RowCount;
+use avastra_campaign::run::RowCount;
+use avastra_world::action::ActionTable;
 
 use super::output::{COLUMNS, folded, plural};
 

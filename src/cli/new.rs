@@ -5,8 +5,8 @@ use std::path::Path;
 
 use clap::builder::PossibleValuesParser;
 
-use crate::emit;
-use crate::road::{RoadMap, propose};
+use avastra_campaign::emit;
+use avastra_road::{RoadMap, propose};
 
 use super::arguments::NewArguments;
 use super::error::Failure;

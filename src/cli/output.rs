@@ -4,7 +4,7 @@ use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::sync::Mutex;
 
-use crate::syntax::{Diagnostic, DiagnosticRecord, Sources, Style, visible};
+use avastra_lang::syntax::{Diagnostic, DiagnosticRecord, Sources, Style, visible};
 
 use super::arguments::{Format, OutputArguments, When};
 use super::error::Failure;
@@ -207,15 +207,18 @@ impl Output {
         for diagnostic in diagnostics {
             match self.format {
                 Format::Silent => {}
-                Format::Sarif => self.collected().push(crate::syntax::record(diagnostic, sources)),
+                Format::Sarif => self.collected().push(avastra_lang::syntax::record(diagnostic, sources)),
                 Format::Json => {
-                    let record = crate::syntax::record(diagnostic, sources);
+                    let record = avastra_lang::syntax::record(diagnostic, sources);
                     let line = serde_json::to_string(&record).expect("records have string keys only");
                     drawn(&line);
                 }
                 Format::Human | Format::Plain => {
                     let style = if self.colour { Style::Human } else { Style::Plain };
-                    drawn(&format!("{}\n", crate::syntax::render(diagnostic, sources, style).trim_end()));
+                    drawn(&format!(
+                        "{}\n",
+                        avastra_lang::syntax::render(diagnostic, sources, style).trim_end()
+                    ));
                 }
             }
         }

@@ -6,10 +6,10 @@
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
-use crate::check::{Loaded, LoadedFile, WrittenPath, normal};
-use crate::files;
-use crate::syntax::ast::{Expr, ExprKind, FileId};
-use crate::syntax::print_expr;
+use avastra_campaign::files;
+use avastra_lang::check::{Loaded, LoadedFile, WrittenPath, normal};
+use avastra_lang::syntax::ast::{Expr, ExprKind, FileId};
+use avastra_lang::syntax::print_expr;
 
 use super::error::Failure;
 use super::files::{make_way, write};

@@ -5,8 +5,8 @@ use std::convert::Infallible;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::ads::external::Program;
-use crate::run::{RunError, on_threads};
+use avastra_campaign::run::{RunError, on_threads};
+use avastra_drivers::external::Program;
 
 use super::arguments::FilesArguments;
 use super::error::Failure;

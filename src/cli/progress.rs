@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::syntax::visible;
-use crate::train::TrainedEpisode;
+use avastra_campaign::train::TrainedEpisode;
+use avastra_lang::syntax::visible;
 
 use super::output::{Output, Telling, plural, remark};
 

@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::action::ActionTable;
-use crate::ads::{Selected, Status};
-use crate::episode::Recorder;
-use crate::model::{Claim, Scenario};
-use crate::report::{Snapshot, Subject, picture};
-use crate::run::Stage;
-use crate::sim::{DT_S, World};
+use avastra_campaign::episode::Recorder;
+use avastra_campaign::run::Stage;
+use avastra_drivers::{Selected, Status};
+use avastra_exchange::report::{Snapshot, Subject, picture};
+use avastra_lang::model::{Claim, Scenario};
+use avastra_world::action::ActionTable;
+use avastra_world::sim::{DT_S, World};
 
 use super::arguments::RenderArguments;
 use super::error::Failure;

@@ -2,14 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::action::ActionTable;
-use crate::ads::Selected;
-use crate::check::Loaded;
-use crate::episode::{Collision, EpisodeLog};
-use crate::model::vocabulary::{Priority, Word};
-use crate::model::{Avoidability, Policy, Scenario, Space};
-use crate::oracle;
-use crate::run::{Asked, Gauges, Stage};
+use avastra_campaign::episode::{Collision, EpisodeLog};
+use avastra_campaign::oracle;
+use avastra_campaign::run::{Asked, Gauges, Stage};
+use avastra_drivers::Selected;
+use avastra_lang::check::Loaded;
+use avastra_lang::model::vocabulary::{Priority, Word};
+use avastra_lang::model::{Avoidability, Policy, Scenario, Space};
+use avastra_world::action::ActionTable;
 
 use super::arguments::ReplayArguments;
 use super::error::Failure;

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::action::ActionTable;
-use crate::check::normal;
-use crate::report;
-use crate::report::{Page, Scene, record, record_another};
-use crate::run::{Asked, Database, DatabaseError};
-use crate::study::StudyResults;
+use avastra_campaign::run::{Asked, Database, DatabaseError};
+use avastra_campaign::study::StudyResults;
+use avastra_exchange::report;
+use avastra_exchange::report::{Page, Scene, record, record_another};
+use avastra_lang::check::normal;
+use avastra_world::action::ActionTable;
 
 use super::arguments::{FilesArguments, ReportArguments};
 use super::error::Failure;

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::report;
-use crate::report::Chapter;
-use crate::study::Played;
+use avastra_campaign::study::Played;
+use avastra_exchange::report;
+use avastra_exchange::report::Chapter;
 
 use super::arguments::ResultsArguments;
 use super::error::Failure;

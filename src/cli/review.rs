@@ -5,15 +5,15 @@
 
 use std::ops::Range;
 
-use crate::action::ActionTable;
-use crate::emit;
-use crate::episode::{EpisodeLog, Outcome};
-use crate::model::{Avoidability, Claim, Scenario};
-use crate::oracle;
-use crate::oracle::ClaimResult;
-use crate::run::{Asked, EpisodeSummary, RunError, Stage, recorded_traffic};
-use crate::sim::ENGINE;
-use crate::syntax::ast::{self, ClauseKind, Doc, Expect, ExprKind, FileId, ItemKind, Span};
+use avastra_campaign::emit;
+use avastra_campaign::episode::{EpisodeLog, Outcome};
+use avastra_campaign::oracle;
+use avastra_campaign::oracle::ClaimResult;
+use avastra_campaign::run::{Asked, EpisodeSummary, RunError, Stage, recorded_traffic};
+use avastra_lang::model::{Avoidability, Claim, Scenario};
+use avastra_lang::syntax::ast::{self, ClauseKind, Doc, Expect, ExprKind, FileId, ItemKind, Span};
+use avastra_world::action::ActionTable;
+use avastra_world::sim::ENGINE;
 
 use super::error::Failure;
 
@@ -137,7 +137,7 @@ pub fn review(
         without: &scenario.origin.without,
         with: &scenario.origin.with,
     };
-    let told_anew = crate::syntax::print(&emit::retold(table, &log, &summary, &source));
+    let told_anew = avastra_lang::syntax::print(&emit::retold(table, &log, &summary, &source));
     let is_refuted: Vec<bool> = results.iter().map(ClaimResult::is_refuted).collect();
     let now = rewritten(text, &told_anew, &is_refuted);
     Ok(Review { change, differences, illegal, now: Some((now, log)) })
@@ -335,7 +335,7 @@ fn range(span: Span) -> Range<usize> {
 }
 
 fn parsed(text: &str) -> ast::File {
-    crate::syntax::parse(FileId::default(), text).0
+    avastra_lang::syntax::parse(FileId::default(), text).0
 }
 
 fn scenario_of(file: &ast::File) -> Option<(&ast::Scenario, &[Doc])> {

@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 
-use crate::report::draw;
-use crate::road::{Lane, LaneIndex, LaneKey, LanePlace, Neighbour, RoadMap, Route, Side, SignKind};
+use avastra_exchange::report::draw;
+use avastra_road::{Lane, LaneIndex, LaneKey, LanePlace, Neighbour, RoadMap, Route, Side, SignKind};
 
 use super::arguments::RoadArguments;
 use super::error::Failure;

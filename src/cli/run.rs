@@ -5,15 +5,15 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-use crate::action::ActionTable;
-use crate::ads::external::{Attached, Conversation, Problem};
-use crate::agent::Face;
-use crate::emit;
-use crate::episode::EpisodeLog;
-use crate::model::Policy;
-use crate::run::{
+use avastra_campaign::emit;
+use avastra_campaign::episode::EpisodeLog;
+use avastra_campaign::run::{
     EpisodeSummary, Group, PolicyReference, RefusalCount, Run, RunSettings, Shard, Totals, Units, play,
 };
+use avastra_drivers::external::{Attached, Conversation, Problem};
+use avastra_lang::model::Policy;
+use avastra_search::agent::Face;
+use avastra_world::action::ActionTable;
 
 use super::arguments::{FaceArgument, RunArguments};
 use super::error::Failure;

@@ -11,17 +11,17 @@ use std::fs::{File, TryLockError};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use crate::action::ActionTable;
-use crate::ads::external::{Attached, ExternalSettings};
-use crate::check::normal;
-use crate::emit;
-use crate::episode::EpisodeLog;
-use crate::estimate::PILOT;
-use crate::files;
-use crate::files::PlainName;
-use crate::run::{Database, EpisodeSummary, Units, VERSION};
-use crate::sim::ENGINE;
-use crate::syntax::yaml_mistake;
+use avastra_campaign::emit;
+use avastra_campaign::episode::EpisodeLog;
+use avastra_campaign::estimate::PILOT;
+use avastra_campaign::files;
+use avastra_campaign::files::PlainName;
+use avastra_campaign::run::{Database, EpisodeSummary, Units, VERSION};
+use avastra_drivers::external::{Attached, ExternalSettings};
+use avastra_lang::check::normal;
+use avastra_lang::syntax::yaml_mistake;
+use avastra_world::action::ActionTable;
+use avastra_world::sim::ENGINE;
 
 use super::error::Failure;
 use super::files::{folder, make, write, write_answers};
@@ -393,7 +393,7 @@ impl RunDirectory {
         write(&path.with_extension("txt"), &text)?;
         write_answers(&path, log)?;
         let file = emit::failure(table, log, &failure.in_words(), &source);
-        write(&path, &crate::syntax::print(&file))
+        write(&path, &avastra_lang::syntax::print(&file))
     }
 
     /// The file with the scenario of an episode.
@@ -432,7 +432,7 @@ pub fn write_scenario(
     let (name, space_path, episode) = (&*name, space_path.as_str(), summary.episode);
     let source = emit::Provenance { command, name, space_path, episode, agent, without, with };
     let file = emit::scenario(table, log, summary, &source);
-    let text = crate::syntax::print(&file);
+    let text = avastra_lang::syntax::print(&file);
     write_answers(path, log)?;
     write(path, &text)?;
     Ok(text)

@@ -5,8 +5,8 @@
 
 use serde_json::{Value, json};
 
-use crate::check::explain::page;
-use crate::syntax::{DiagnosticRecord, PlaceRecord, Severity};
+use avastra_lang::check::explain::page;
+use avastra_lang::syntax::{DiagnosticRecord, PlaceRecord, Severity};
 
 /// The whole log.
 pub fn log(records: &[DiagnosticRecord]) -> Value {
@@ -21,7 +21,7 @@ pub fn log(records: &[DiagnosticRecord]) -> Value {
         "runs": [{
             "tool": { "driver": {
                 "name": "avastra",
-                "semanticVersion": crate::run::VERSION,
+                "semanticVersion": avastra_campaign::run::VERSION,
                 "rules": rules,
             } },
             "columnKind": "unicodeCodePoints",
@@ -52,7 +52,7 @@ fn result(record: &DiagnosticRecord, codes: &[&str]) -> Value {
     let more = record.notes.iter().cloned().chain(record.help.iter().map(|help| format!("help: {help}")));
     more.for_each(|line| text = format!("{text}\n{line}"));
     let primary = record.labels.iter().position(|label| label.primary).unwrap_or(0);
-    let located = |label: &crate::syntax::LabelRecord| {
+    let located = |label: &avastra_lang::syntax::LabelRecord| {
         let mut place = location(&label.place);
         if !label.text.is_empty() {
             place["message"] = json!({ "text": label.text });

@@ -3,8 +3,8 @@
 
 use std::path::Path;
 
-use crate::run::{SHARDS_MAX, Shard};
-use crate::syntax::yaml_mistake;
+use avastra_campaign::run::{SHARDS_MAX, Shard};
+use avastra_lang::syntax::yaml_mistake;
 
 use super::error::Failure;
 use super::files::{remove, write};

@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::ads::Selected;
-use crate::emit;
-use crate::episode::{Outcome, Script, Setup};
-use crate::model::Claim;
-use crate::oracle;
-use crate::run;
-use crate::run::{Asked, EpisodeSummary, Stage};
+use avastra_campaign::emit;
+use avastra_campaign::episode::{Outcome, Script, Setup};
+use avastra_campaign::oracle;
+use avastra_campaign::run;
+use avastra_campaign::run::{Asked, EpisodeSummary, Stage};
+use avastra_drivers::Selected;
+use avastra_lang::model::Claim;
 
 use super::arguments::ShrinkArguments;
 use super::error::Failure;
@@ -163,7 +163,7 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
     if scenario.claims.iter().any(|claim| matches!(claim, Claim::Cause { .. })) {
         summary.find_causes(&setup, &shrunk.log).map_err(Failure::usage)?;
     }
-    let text = crate::syntax::print(&emit::scenario(&table, &shrunk.log, &summary, &source));
+    let text = avastra_lang::syntax::print(&emit::scenario(&table, &shrunk.log, &summary, &source));
     write_result(named, path, &text)?;
     write_answers(path, &shrunk.log)?;
     let actions = shrunk.log.steps.iter().filter_map(|step| match &step.outcome {

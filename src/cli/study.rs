@@ -3,15 +3,15 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crate::action::ActionTable;
-use crate::ads::external::{Attached, Program};
-use crate::report;
-use crate::run::{RunError, TrafficRecord, Units};
-use crate::study::{
+use avastra_campaign::run::{RunError, TrafficRecord, Units};
+use avastra_campaign::study::{
     CellRecord, Event, FailedCell, Job, Spent, Study, StudyDatabase, StudyError, StudyFile, StudyResults,
     StudySettings, play_jobs,
 };
-use crate::syntax::{listed, yaml_mistake};
+use avastra_drivers::external::{Attached, Program};
+use avastra_exchange::report;
+use avastra_lang::syntax::{listed, yaml_mistake};
+use avastra_world::action::ActionTable;
 
 use super::arguments::{StudyArguments, StudyCommand};
 use super::error::Failure;

@@ -4,17 +4,17 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crate::action::ActionTable;
-use crate::ads::external::{Failure as AdsFailure, FailureKind};
-use crate::check::{Loaded, normal};
-use crate::files;
-use crate::model::{Claim, Scenario};
-use crate::oracle;
-use crate::oracle::Regression;
-use crate::run;
-use crate::run::{Asked, RunError, Stage};
-use crate::syntax::ast::FileId;
-use crate::syntax::{Diagnostic, Sources, apply_fixes};
+use avastra_campaign::files;
+use avastra_campaign::oracle;
+use avastra_campaign::oracle::Regression;
+use avastra_campaign::run;
+use avastra_campaign::run::{Asked, RunError, Stage};
+use avastra_drivers::external::{Failure as AdsFailure, FailureKind};
+use avastra_lang::check::{Loaded, normal};
+use avastra_lang::model::{Claim, Scenario};
+use avastra_lang::syntax::ast::FileId;
+use avastra_lang::syntax::{Diagnostic, Sources, apply_fixes};
+use avastra_world::action::ActionTable;
 
 use super::arguments::{FilesArguments, TestArguments};
 use super::error::Failure;

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::study::{CellRecord, Spent};
+use avastra_campaign::study::{CellRecord, Spent};
 
 use super::error::Failure;
 use super::files::write;

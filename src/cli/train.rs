@@ -3,16 +3,16 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::action::Draw;
-use crate::ads::external::Attached;
-use crate::agent;
-use crate::agent::{Kind, QPolicy, Settings};
-use crate::emit;
-use crate::model::policy::{PolicyClaims, PolicyOrigin};
-use crate::model::{Policy, Space, digest_text};
-use crate::run::{RunSettings, TrafficRecord};
-use crate::syntax::listed;
-use crate::train::{Evaluation, TrainSettings, TrainedEpisode, Training, evaluate, rounded};
+use avastra_campaign::emit;
+use avastra_campaign::run::{RunSettings, TrafficRecord};
+use avastra_campaign::train::{Evaluation, TrainSettings, TrainedEpisode, Training, evaluate, rounded};
+use avastra_drivers::external::Attached;
+use avastra_lang::model::policy::{PolicyClaims, PolicyOrigin};
+use avastra_lang::model::{Policy, Space, digest_text};
+use avastra_lang::syntax::listed;
+use avastra_search::agent;
+use avastra_search::agent::{Kind, QPolicy, Settings};
+use avastra_world::action::Draw;
 
 use super::arguments::TrainArguments;
 use super::conditions::roads_or_all;

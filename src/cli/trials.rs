@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use crate::action::ActionTable;
-use crate::emit;
-use crate::emit::Provenance;
-use crate::report;
-use crate::run::{Arena, DEFAULT_ADS, driving_system};
-use crate::syntax;
-use crate::trial::{Cell, TrialSettings, Trials};
+use avastra_campaign::emit;
+use avastra_campaign::emit::Provenance;
+use avastra_campaign::run::{Arena, DEFAULT_ADS, driving_system};
+use avastra_campaign::trial::{Cell, TrialSettings, Trials};
+use avastra_exchange::report;
+use avastra_lang::syntax;
+use avastra_world::action::ActionTable;
 
 use super::arguments::TableArguments;
 use super::compile::TableResult;

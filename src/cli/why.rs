@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::action::{ActionTable, Offer, Situation};
-use crate::check::state_argument::legal_memory_from;
-use crate::emit;
-use crate::episode;
-use crate::model::{Memory, RuleBody, RulesInForce, Space, StateDef};
-use crate::run::road_named;
-use crate::sim::World;
+use avastra_campaign::emit;
+use avastra_campaign::episode;
+use avastra_campaign::run::road_named;
+use avastra_lang::check::state_argument::legal_memory_from;
+use avastra_lang::model::{Memory, RuleBody, RulesInForce, Space, StateDef};
+use avastra_world::action::{ActionTable, Offer, Situation};
+use avastra_world::sim::World;
 
 use super::arguments::TableArguments;
 use super::error::Failure;

@@ -3,11 +3,11 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use crate::check::{Symbol, normal};
-use crate::model::Type;
-use crate::syntax::ast::Span;
-use crate::syntax::keyword;
-use crate::units;
+use avastra_base::units;
+use avastra_lang::check::{Symbol, normal};
+use avastra_lang::model::Type;
+use avastra_lang::syntax::ast::Span;
+use avastra_lang::syntax::keyword;
 
 use super::context::Kind;
 use super::position::Range;

@@ -1,17 +1,17 @@
 //! What could be written at a place: the kinds of names that fit where `syntax::unfinished` puts its own name into the
 //! tree, or the keywords that the grammar expects if no name fits.
 
-use crate::check::{Declaration, References, Symbol};
-use crate::model::Type;
-use crate::model::vocabulary::{
+use avastra_lang::check::{Declaration, References, Symbol};
+use avastra_lang::model::Type;
+use avastra_lang::model::vocabulary::{
     CHANGE, EpisodeField, RoadField, ScenarioClaim, Site, SpaceClaim, SpawnField, StartField, StopReason,
     WAIT, Word, parts_of, things,
 };
-use crate::syntax::ast::{
+use avastra_lang::syntax::ast::{
     Action, ActionParam, Arm, BinaryOp, Call, Effect, EffectKind, Expr, ExprKind, Field, Initial, ItemKind,
     Name, Policy, Rule, RuleBody, Scenario, State, Step, Type as WrittenType, TypeKind,
 };
-use crate::syntax::{HERE, Unfinished, unfinished};
+use avastra_lang::syntax::{HERE, Unfinished, unfinished};
 
 use super::words;
 use super::words::Entry;
@@ -76,7 +76,7 @@ fn keywords(found: &Unfinished, fresh_line: bool) -> Vec<Kind> {
     if found.keywords.contains(&"origin") && found.keywords.contains(&"road") {
         kinds.extend(["start", "steps", "expect"].map(Kind::Keyword));
     }
-    if found.continues_expression && !(fresh_line && !kinds.is_empty()) {
+    if found.continues_expression && (!fresh_line || kinds.is_empty()) {
         kinds.push(Kind::Operators);
     }
     kinds

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::model;
-use crate::syntax::ast::{FileId, Span};
-use crate::syntax::{Diagnostic, Severity};
+use avastra_lang::model;
+use avastra_lang::syntax::ast::{FileId, Span};
+use avastra_lang::syntax::{Diagnostic, Severity};
 
 use super::position::{Place, Range};
 use super::structure;

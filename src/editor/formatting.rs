@@ -1,8 +1,8 @@
 //! The document as `avastra fmt` would write it.
 
-use crate::syntax;
-use crate::syntax::FormatError;
-use crate::syntax::ast::Span;
+use avastra_lang::syntax;
+use avastra_lang::syntax::FormatError;
+use avastra_lang::syntax::ast::Span;
 
 use super::diagnostics::Change;
 use super::workspace::Analysis;

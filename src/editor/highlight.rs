@@ -2,7 +2,7 @@
 //!
 //! Keywords, numbers and comments are coloured by the TextMate grammar.
 
-use crate::check::{Occurrence, Symbol};
+use avastra_lang::check::{Occurrence, Symbol};
 
 use super::position::Range;
 use super::workspace::Analysis;

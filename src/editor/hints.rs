@@ -3,8 +3,8 @@
 //!
 //! Hints are shown only while the space is sound: row numbers from an earlier state could be wrong.
 
-use crate::model::{Domain, Interval, Space};
-use crate::syntax::ast::{Action, ActionParam, ItemKind, ParamMode, Span};
+use avastra_lang::model::{Domain, Interval, Space};
+use avastra_lang::syntax::ast::{Action, ActionParam, ItemKind, ParamMode, Span};
 
 use super::hover::{find_action, ranges_left, row_numbers};
 use super::position::Point;

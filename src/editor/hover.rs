@@ -4,13 +4,13 @@
 use core::fmt::Write;
 use std::collections::BTreeSet;
 
-use crate::check::{Declaration, Symbol};
-use crate::model::vocabulary::{Word, WorldState};
-use crate::model::{ActionDef, Interval, Parameter, Reach, RuleBody, Space};
-use crate::syntax::ast::Span;
-use crate::syntax::{keyword, listed};
-use crate::units;
-use crate::units::Rational;
+use avastra_base::units;
+use avastra_base::units::Rational;
+use avastra_lang::check::{Declaration, Symbol};
+use avastra_lang::model::vocabulary::{Word, WorldState};
+use avastra_lang::model::{ActionDef, Interval, Parameter, Reach, RuleBody, Space};
+use avastra_lang::syntax::ast::Span;
+use avastra_lang::syntax::{keyword, listed};
 
 use super::position::Range;
 use super::workspace::Analysis;

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use crate::check::Symbol;
+use avastra_lang::check::Symbol;
 
 use super::position::{Place, Range};
 use super::rename::home;

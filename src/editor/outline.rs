@@ -1,6 +1,6 @@
 //! The declarations of a document, as a tree for the editor's outline.
 
-use crate::syntax::ast::{ActionParam, Item, ItemKind, Name, Span};
+use avastra_lang::syntax::ast::{ActionParam, Item, ItemKind, Name, Span};
 
 use super::position::Range;
 use super::workspace::Analysis;

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::syntax::ast::Span;
+use avastra_lang::syntax::ast::Span;
 
 /// A place in a text, as editors count: line and UTF-16 column, both from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]

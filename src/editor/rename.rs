@@ -6,11 +6,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use crate::check::{Loaded, Symbol};
-use crate::model::COUNTED;
-use crate::model::vocabulary::{Word, WorldState};
-use crate::syntax::ast::Span;
-use crate::syntax::{Diagnostic, keyword};
+use avastra_lang::check::{Loaded, Symbol};
+use avastra_lang::model::COUNTED;
+use avastra_lang::model::vocabulary::{Word, WorldState};
+use avastra_lang::syntax::ast::Span;
+use avastra_lang::syntax::{Diagnostic, keyword};
 
 use super::diagnostics::{Change, Changes};
 use super::position::Range;

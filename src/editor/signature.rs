@@ -1,7 +1,7 @@
 //! Signature help: the parameters of the function or action whose arguments are being written.
 
-use crate::check::Symbol;
-use crate::syntax::declaration_start;
+use avastra_lang::check::Symbol;
+use avastra_lang::syntax::declaration_start;
 
 use super::hover;
 use super::tokens::{Token, tokens};

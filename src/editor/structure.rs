@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use crate::check::Symbol;
-use crate::syntax;
-use crate::syntax::ast::{FileId, Span};
+use avastra_lang::check::Symbol;
+use avastra_lang::syntax;
+use avastra_lang::syntax::ast::{FileId, Span};
 
 use super::diagnostics::Change;
 use super::outline;

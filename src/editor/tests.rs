@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::check::ReadError;
+use avastra_lang::check::ReadError;
 
 use super::{Files, Workspace, complete, hover, navigate, rename};
 

@@ -1,11 +1,11 @@
 //! The words that no file declares, as lists for the editor. The keywords stand in `syntax::keyword`, the
 //! engine's words in `model::vocabulary`.
 
-use crate::model::vocabulary::{
+use avastra_lang::model::vocabulary::{
     Body, Colour, EpisodeField, LaneChoice, RoadField, Side, Site, SpawnField, StartField, TYPES, Then, Verb,
     Word,
 };
-use crate::model::{ENDS, MODULES};
+use avastra_lang::model::{ENDS, MODULES};
 
 /// A word and what it means.
 pub type Entry = (&'static str, &'static str);

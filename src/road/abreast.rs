@@ -8,7 +8,7 @@
 
 use core::ops::RangeInclusive;
 
-use crate::geometry::wrap_angle;
+use avastra_base::geometry::wrap_angle;
 
 use super::map::{LaneIndex, RoadMap};
 

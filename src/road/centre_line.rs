@@ -2,7 +2,7 @@
 
 use core::cell::Cell;
 
-use crate::geometry::{Path, Vec2, unit_vector, wrap_angle};
+use avastra_base::geometry::{Path, Vec2, unit_vector, wrap_angle};
 
 use super::conflict::segment_crossing;
 use super::opendrive::{Across, RoadElement, SectionElement};

@@ -1,6 +1,6 @@
 //! Where other lanes cross or join a route inside junctions, and where it meets crosswalks.
 
-use crate::geometry::{Bounds, Path, PathPoint, Vec2, wrap_angle};
+use avastra_base::geometry::{Bounds, Path, PathPoint, Vec2, wrap_angle};
 
 use super::map::{LaneIndex, RoadMap};
 use super::route::{Conflict, RouteLane};

@@ -4,7 +4,7 @@
 //! A way ends where the ground is free for as long as a refuge island is wide: at the other kerb, or on a median. It
 //! never leads through a junction, except over a crosswalk, nor through anything solid. Parked vehicles are not on the map.
 
-use crate::geometry::{OrientedBox, Vec2};
+use avastra_base::geometry::{OrientedBox, Vec2};
 
 use super::conflict::holds;
 use super::map::{RoadMap, Strip, StripKind};

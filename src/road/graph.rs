@@ -6,7 +6,7 @@
 use core::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::geometry::{Path, Vec2, wrap_angle};
+use avastra_base::geometry::{Path, Vec2, wrap_angle};
 
 use super::centre_line::{CHORD_M_MAX, CentreLine, NoCentreLine, centre_line};
 use super::heights::Heights;

@@ -3,7 +3,7 @@
 use core::ops::RangeInclusive;
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::geometry::{Bounds, Path, Pose, Projection, Vec2, wrap_angle};
+use avastra_base::geometry::{Bounds, Path, Pose, Projection, Vec2, wrap_angle};
 
 use super::map::{Lane, LaneIndex};
 

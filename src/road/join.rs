@@ -1,6 +1,6 @@
 //! Joins the moves of a way into one path, and notes where each lane and each lane change lies on it.
 
-use crate::geometry::{Path, Vec2};
+use avastra_base::geometry::{Path, Vec2};
 
 use super::lane_change::{Place, Stretch};
 use super::map::{LanePlace, RoadMap};

@@ -3,7 +3,7 @@
 //! The lateral motion is a smooth step over the station: no lateral speed, acceleration or jump of curvature at
 //! its ends (as in Apollo's and most planners' lane changes). Traffic plays no part here.
 
-use crate::geometry::{Pose, SMOOTH_STEP_BEND_MAX, Vec2, smooth_step, wrap_angle};
+use avastra_base::geometry::{Pose, SMOOTH_STEP_BEND_MAX, Vec2, smooth_step, wrap_angle};
 
 use super::map::{Lane, LaneIndex, RoadMap, Side};
 use super::opendrive::{Across, MarkRule, RoadElement, SectionElement};

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-use crate::geometry::{Bounds, OrientedBox, Path, Vec2, wrap_angle};
+use avastra_base::geometry::{Bounds, OrientedBox, Path, Vec2, wrap_angle};
 
 use super::heights::Heights;
 use super::index::LaneGrid;

@@ -6,7 +6,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::geometry::wrap_angle;
+use avastra_base::geometry::wrap_angle;
 
 use super::conflict::crossings;
 use super::map::{LaneIndex, RoadMap, StopLine};

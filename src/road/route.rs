@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::geometry::{Path, smooth_step, wrap_angle};
+use avastra_base::geometry::{Path, smooth_step, wrap_angle};
 
 use super::conflict::{conflicts, spans_inside};
 use super::graph::leap_m;

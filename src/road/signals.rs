@@ -3,7 +3,7 @@
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::geometry::{Bounds, Pose, Vec2};
+use avastra_base::geometry::{Bounds, Pose, Vec2};
 
 use super::graph::Builder;
 use super::map::{

@@ -22,10 +22,10 @@ fi
 # The linter reads each module. That a name stands once in all of them, which become one script, shows when the page opens.
 cp "$root/tests/interop/report.eslint.mjs" "$work/eslint.config.mjs"
 rm -rf "$work/lint" && mkdir "$work/lint"
-cp "$root"/src/report/page/*.js "$work/lint"
+cp "$root"/src/exchange/report/page/*.js "$work/lint"
 (cd "$work" && npx prettier --print-width 120 --check "lint/*.js" > lint.txt) || { cat "$work/lint.txt"; exit 1; }
 (cd "$work" && npx eslint --max-warnings 0 lint)
-for file in "$root"/src/report/page/*; do
+for file in "$root"/src/exchange/report/page/*; do
   [ "$(wc -l < "$file")" -lt 350 ] || { echo "$file is too long"; exit 1; }
 done
 echo "the linter finds nothing"

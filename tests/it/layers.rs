@@ -1,57 +1,42 @@
-//! The order of the modules: each may use only those to its left.
+//! The order of the modules inside each crate: each may use only those to its left. Between crates the compiler keeps it.
 
 use std::path::{Path, PathBuf};
 
 use crate::cases::root;
 
-/// From left to right, as in `src/lib.rs` and ARCHITECTURE.md.
-const ORDER: [&str; 29] = [
-    "units",
-    "rng",
-    "statistics",
-    "geometry",
-    "kinematics",
-    "road",
-    "syntax",
-    "model",
-    "prove",
-    "check",
-    "action",
-    "sim",
-    "ads",
-    "mdp",
-    "agent",
-    "episode",
-    "oracle",
-    "files",
-    "run",
-    "estimate",
-    "train",
-    "trial",
-    "study",
-    "emit",
-    "export",
-    "import",
-    "report",
-    "editor",
-    "cli",
-];
+/// The crates with several modules. Their `lib.rs` declares these from left to right.
+const CRATES: [&str; 6] = ["base", "lang", "world", "search", "campaign", "exchange"];
+
+/// The modules that the `lib.rs` of a crate declares, in order.
+fn modules(name: &str) -> Vec<String> {
+    let path = root().join("src").join(name).join("lib.rs");
+    let text = std::fs::read_to_string(path).expect("a lib.rs is readable");
+    text.lines()
+        .filter_map(|line| Some(line.strip_prefix("pub mod ")?.strip_suffix(';')?.to_owned()))
+        .collect()
+}
 
 #[test]
 fn modules_use_only_what_stands_to_their_left() {
     let mut wrong = Vec::new();
-    for path in sources(&root().join("src")) {
-        let Some(rank) = rank(&path) else { continue };
-        let text = std::fs::read_to_string(&path).expect("a source file is readable");
-        for (number, line) in text.lines().enumerate() {
-            for used in line.split("crate::").skip(1) {
-                let module: String = used.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
-                let line = format!("{}:{}: {}", path.display(), number + 1, line.trim());
-                match ORDER.iter().position(|name| *name == module) {
-                    Some(other) if other > rank => wrong.push(line),
-                    Some(_) => {}
+    for name in CRATES {
+        let (order, folder) = (modules(name), root().join("src").join(name));
+        assert!(order.len() > 1, "{name} declares {order:?}");
+        for path in sources(&folder) {
+            let inside = path.strip_prefix(&folder).expect("it was found there");
+            let module = inside.iter().next().and_then(|part| part.to_str()).unwrap_or_default();
+            let Some(rank) = order.iter().position(|one| one == module.trim_end_matches(".rs")) else {
+                continue;
+            };
+            let text = std::fs::read_to_string(&path).expect("a source file is readable");
+            for (number, line) in text.lines().enumerate() {
+                for used in line.split("crate::").skip(1) {
+                    let used: String =
+                        used.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
                     // With `crate::{…}` this test would not see the modules that are used.
-                    None => wrong.push(line),
+                    if order.iter().position(|one| *one == used).is_none_or(|other| other > rank) {
+                        wrong.push(format!("{}:{}: {}", path.display(), number + 1, line.trim()));
+                    }
                 }
             }
         }
@@ -60,20 +45,12 @@ fn modules_use_only_what_stands_to_their_left() {
 }
 
 #[test]
-fn the_library_declares_the_modules_in_order() {
-    let text = std::fs::read_to_string(root().join("src/lib.rs")).expect("src/lib.rs is readable");
-    let declared: Vec<&str> =
-        text.lines().filter_map(|line| line.strip_prefix("pub mod ")?.strip_suffix(';')).collect();
-    assert_eq!(declared, ORDER);
-}
-
-#[test]
 fn one_file_alone_names_parry() {
     let naming: Vec<PathBuf> = sources(&root().join("src"))
         .into_iter()
         .filter(|path| std::fs::read_to_string(path).is_ok_and(|text| text.contains("parry2d::")))
         .collect();
-    assert_eq!(naming, [root().join("src/geometry/contact.rs")]);
+    assert_eq!(naming, [root().join("src/base/geometry/contact.rs")]);
 }
 
 #[test]
@@ -87,9 +64,10 @@ fn cli_alone_touches_files_and_the_environment() {
         let text: String = text.lines().filter(|line| !line.trim_start().starts_with("//")).collect();
         let is_test = path.components().any(|part| part.as_os_str().to_string_lossy().contains("test"));
         // Time limits of an external driving system are by the wall clock; in one place.
-        let may_wait = path.ends_with("ads/external/link.rs") && text.matches("Instant::now").count() == 1;
+        let may_wait =
+            path.ends_with("drivers/external/link.rs") && text.matches("Instant::now").count() == 1;
         // `cli` and databases write through this file.
-        let may_write = path.ends_with("src/files.rs");
+        let may_write = path.ends_with("src/campaign/files.rs");
         for word in ["std::fs", "std::env::var", "Instant::now", "SystemTime"] {
             let may = (may_wait && word == "Instant::now") || (may_write && word == "std::fs");
             assert!(is_test || may || !text.contains(word), "{} names {word}", path.display());
@@ -115,7 +93,7 @@ const WRITING: [&str; 13] = [
 ];
 
 /// SQLite writes by itself. These files check the path first, or have it from `files`.
-const WRITING_DATABASES: [&str; 2] = ["src/run/sealed.rs", "src/run/settled.rs"];
+const WRITING_DATABASES: [&str; 2] = ["src/campaign/run/sealed.rs", "src/campaign/run/settled.rs"];
 
 #[test]
 fn files_alone_writes_and_removes() {
@@ -124,7 +102,7 @@ fn files_alone_writes_and_removes() {
         name.contains("/tests") || name.ends_with("testing.rs")
     };
     for path in sources(&root().join("src")) {
-        if path == root().join("src/files.rs") || is_test(&path) {
+        if path == root().join("src/campaign/files.rs") || is_test(&path) {
             continue;
         }
         let text = std::fs::read_to_string(&path).expect("a source file is readable");
@@ -136,17 +114,10 @@ fn files_alone_writes_and_removes() {
             for word in WRITING.iter().filter(|word| line.contains(**word)) {
                 let may = is_database && *word == "Connection::open(";
                 let place = format!("{}:{}", path.display(), number + 1);
-                assert!(may, "{place} names `{word}`: `crate::files` does that, and follows no link");
+                assert!(may, "{place} names `{word}`: `files` does that, and follows no link");
             }
         }
     }
-}
-
-/// Position in [`ORDER`] of the module that a file belongs to; `None` for `lib.rs` and `main.rs`.
-fn rank(path: &Path) -> Option<usize> {
-    let inside = path.strip_prefix(root().join("src")).expect("it was found there");
-    let module = inside.iter().next()?.to_str()?.trim_end_matches(".rs");
-    ORDER.iter().position(|name| *name == module)
 }
 
 /// Every Rust file below a directory, sorted.

@@ -8,11 +8,6 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use crate::action::ActionTable;
-use crate::ads::Selected;
-use crate::ads::external::{ExternalSettings, Failure as Finding, Problem, Program, odd_orders};
-use crate::agent;
-use crate::agent::Kind;
 use crate::cli::arguments::AdsCheckArguments;
 use crate::cli::error::Failure;
 use crate::cli::files::{Scratch, make_way, write_new};
@@ -21,10 +16,15 @@ use crate::cli::load;
 use crate::cli::load::Driver;
 use crate::cli::new::shipped;
 use crate::cli::output::Output;
-use crate::episode;
-use crate::episode::{Choice, EpisodeLog};
-use crate::run::{Arena, choose};
-use crate::sim::World;
+use avastra_campaign::episode;
+use avastra_campaign::episode::{Choice, EpisodeLog};
+use avastra_campaign::run::{Arena, choose};
+use avastra_drivers::Selected;
+use avastra_drivers::external::{ExternalSettings, Failure as Finding, Problem, Program, odd_orders};
+use avastra_search::agent;
+use avastra_search::agent::Kind;
+use avastra_world::action::ActionTable;
+use avastra_world::sim::World;
 
 /// The space that is driven if none is named, and its name.
 const SPACE: &str = "avastra45.ava";

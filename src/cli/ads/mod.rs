@@ -3,7 +3,7 @@
 mod check;
 mod toy;
 
-use crate::ads::external::schemas;
+use avastra_drivers::external::schemas;
 
 use super::arguments::{AdsArguments, AdsCommand};
 use super::error::Failure;
@@ -32,7 +32,7 @@ fn schema(output: &Output) {
         messages.keys().map(|word| serde_json::json!({ "$ref": format!("#/$defs/{word}") })).collect();
     let document = serde_json::json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": crate::ads::external::PROTOCOL,
+        "title": avastra_drivers::external::PROTOCOL,
         "description": "A line of avastra-ads/1 is one of these; PROTOCOL.md says which, when and what it means.",
         "oneOf": alternatives, "$defs": messages,
     });

@@ -5,12 +5,12 @@
 use std::io::{BufRead, Write, stdin, stdout};
 use std::time::Duration;
 
-use crate::ads::external::message::{
+use crate::cli::arguments::{Misbehaviour, ToyAnswer, ToyArguments};
+use crate::cli::error::Failure;
+use avastra_drivers::external::message::{
     AccelerationMessage, Answer, AnswerKind, ControlMessage, ErrorMessage, Internal, PROTOCOL, Point,
     Question, Ready, Step, TrajectoryMessage, TrajectoryPoint,
 };
-use crate::cli::arguments::{Misbehaviour, ToyAnswer, ToyArguments};
-use crate::cli::error::Failure;
 
 /// Its speed on a free road, m/s.
 const CRUISE_MPS: f64 = 8.0;

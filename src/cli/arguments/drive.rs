@@ -6,14 +6,14 @@ use clap::{Args, ValueEnum};
 
 use super::language::RuleArguments;
 use crate::cli::help::Named;
-use crate::run::Shard;
+use avastra_campaign::run::Shard;
 
 /// The driving system under test.
 #[derive(Debug, Args)]
 pub struct UnderTestArguments {
     /// Driving system under test: a name; a profile of `modular` or of one of your own (PROTOCOL.md), a YAML file; a command
     /// that starts your own, `tcp:HOST:PORT` or `unix:PATH`.
-    #[arg(long, value_name = "NAME|FILE|COMMAND", default_value = crate::run::DEFAULT_ADS, value_parser = Named::ADS)]
+    #[arg(long, value_name = "NAME|FILE|COMMAND", default_value = avastra_campaign::run::DEFAULT_ADS, value_parser = Named::ADS)]
     pub ads: String,
 }
 
@@ -42,7 +42,7 @@ pub struct ConditionArguments {
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// Vehicles of ambient traffic around the ego vehicle, besides those that actions make appear.
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(crate::model::AMBIENT_MAX)))]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(avastra_lang::model::AMBIENT_MAX)))]
     pub ambient: u32,
     /// How other vehicles drive: a name, or a profile like scenarios/traffic/careful.yaml [default: careful].
     #[arg(long, value_name = "NAME|FILE", value_parser = Named::TRAFFIC)]
@@ -66,7 +66,7 @@ pub struct RunArguments {
     #[arg(long, value_enum, requires = "policy", default_value_t = FaceArgument::Network)]
     pub face: FaceArgument,
     /// Episodes on each road.
-    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::run::EPISODES_MAX)))]
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=i64::from(avastra_campaign::run::EPISODES_MAX)))]
     pub episodes: u32,
     /// Say of each counted collision which module of the driving system is at fault; takes some twenty
     /// replays for each.
@@ -114,7 +114,7 @@ pub struct EstimateArguments {
     #[arg(long, default_value_t = 20)]
     pub parts: u32,
     /// Episodes of a part [default: 50; with `--than`, 250 on each road].
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::run::EPISODES_MAX)))]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(avastra_campaign::run::EPISODES_MAX)))]
     pub episodes: Option<u32>,
     /// Stop when half the width of the interval is at most this share of the probability; looks when a quarter, half and all
     /// parts are done. The interval allows for the looks; the probability itself gets a small bias.

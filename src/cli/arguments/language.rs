@@ -65,7 +65,7 @@ pub struct TrialArguments {
     #[arg(long, requires = "try", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub tries: u32,
     /// Driving system of the ego vehicle: a name, or a profile of `modular`.
-    #[arg(long, requires = "try", value_name = "NAME|FILE", default_value = crate::run::DEFAULT_ADS, value_parser = Named::ADS)]
+    #[arg(long, requires = "try", value_name = "NAME|FILE", default_value = avastra_campaign::run::DEFAULT_ADS, value_parser = Named::ADS)]
     pub ads: String,
     /// Seed of the drives and tries.
     #[arg(long, requires = "try", default_value_t = 1)]

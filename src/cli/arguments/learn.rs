@@ -28,7 +28,7 @@ pub struct TrainArguments {
     #[arg(long, value_name = "YAML")]
     pub config: Option<PathBuf>,
     /// Episodes on all roads together.
-    #[arg(long, default_value_t = 750, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::run::EPISODES_MAX)))]
+    #[arg(long, default_value_t = 750, value_parser = clap::value_parser!(u32).range(1..=i64::from(avastra_campaign::run::EPISODES_MAX)))]
     pub episodes: u32,
     /// Seed of the whole training.
     #[arg(long, default_value_t = 1)]

@@ -22,8 +22,9 @@ pub use learn::{
     StudyArguments, StudyCommand, TrainArguments, WeightsArguments,
 };
 pub use scenarios::{
-    DiagnoseArguments, ExportArguments, ExportEgo, ExportFormat, ExportProfile, FilesArguments, ImportArguments,
-    RenderArguments, ReplayArguments, ReportArguments, RoadArguments, ShrinkArguments, TestArguments,
+    DiagnoseArguments, ExportArguments, ExportEgo, ExportFormat, ExportProfile, FilesArguments,
+    ImportArguments, RenderArguments, ReplayArguments, ReportArguments, RoadArguments, ShrinkArguments,
+    TestArguments,
 };
 
 /// Finds out which of the things that may happen around a self-driving car make it crash.

@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::check::normal;
+use avastra_lang::check::normal;
 
 /// The path that a URI names.
 pub fn to_path(uri: &str) -> PathBuf {

@@ -3,13 +3,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::action::ActionTable;
-use crate::agent::Face;
 use crate::cli::error::Failure;
 use crate::cli::output::{Output, plural};
-use crate::model::policy::RulesClaims;
-use crate::model::{Policy, digest_text};
-use crate::train::{evaluate, judge_rules, rounded, training_arena};
+use avastra_campaign::train::{evaluate, judge_rules, rounded, training_arena};
+use avastra_lang::model::policy::RulesClaims;
+use avastra_lang::model::{Policy, digest_text};
+use avastra_search::agent::Face;
+use avastra_world::action::ActionTable;
 
 use super::{acting, same_world};
 

@@ -3,18 +3,18 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::agent::{Face, QPolicy};
 use crate::cli::arguments::DistilArguments;
 use crate::cli::error::Failure;
 use crate::cli::files::write_result;
 use crate::cli::load;
 use crate::cli::output::{Output, plural};
 use crate::cli::progress::Working;
-use crate::emit;
-use crate::model::Policy;
-use crate::model::policy::RulesClaims;
-use crate::run::Arena;
-use crate::train;
+use avastra_campaign::emit;
+use avastra_campaign::run::Arena;
+use avastra_campaign::train;
+use avastra_lang::model::Policy;
+use avastra_lang::model::policy::RulesClaims;
+use avastra_search::agent::{Face, QPolicy};
 
 use super::{acting, same_world};
 

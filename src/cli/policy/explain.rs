@@ -1,14 +1,14 @@
 //! `avastra policy explain`: what a policy favours, expects and looks at.
 
-use crate::agent::Face;
-use crate::check::state_argument::values_from;
 use crate::cli::arguments::ExplainPolicyArguments;
 use crate::cli::error::Failure;
 use crate::cli::load;
 use crate::cli::output::Output;
 use crate::cli::output::plural;
 use crate::cli::progress::Working;
-use crate::train::{Insight, insight, training_arena};
+use avastra_campaign::train::{Insight, insight, training_arena};
+use avastra_lang::check::state_argument::values_from;
+use avastra_search::agent::Face;
 
 use super::acting;
 

@@ -7,10 +7,10 @@ mod weights;
 
 use std::sync::Arc;
 
-use crate::action::ActionTable;
-use crate::agent::{Face, QPolicy};
-use crate::model::Policy;
-use crate::sim::ENGINE;
+use avastra_lang::model::Policy;
+use avastra_search::agent::{Face, QPolicy};
+use avastra_world::action::ActionTable;
+use avastra_world::sim::ENGINE;
 
 use super::arguments::{PolicyArguments, PolicyCommand};
 use super::error::Failure;

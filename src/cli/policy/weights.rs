@@ -1,12 +1,12 @@
 //! `avastra policy weights`: a policy's network for other tools.
 
-use crate::agent::Face;
 use crate::cli::arguments::WeightsArguments;
 use crate::cli::error::Failure;
 use crate::cli::files::write_result;
 use crate::cli::load;
 use crate::cli::output::Output;
-use crate::emit;
+use avastra_campaign::emit;
+use avastra_search::agent::Face;
 
 use super::acting;
 

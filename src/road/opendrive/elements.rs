@@ -1,7 +1,7 @@
 //! The elements of an OpenDRIVE file that are read, in OpenDRIVE's own terms.
 
-use crate::geometry::Vec2;
-use crate::road::{LeftOut, SignKind, StripKind};
+use crate::{LeftOut, SignKind, StripKind};
+use avastra_base::geometry::Vec2;
 
 use super::cubic::{Cubics, Jet};
 use super::geometry::ReferenceLine;

@@ -1,6 +1,6 @@
 //! Reference lines: lines, arcs, spirals and parametric cubics, with exact heading and curvature.
 
-use crate::geometry::{Vec2, unit_vector, wrap_angle};
+use avastra_base::geometry::{Vec2, unit_vector, wrap_angle};
 
 /// A chain of curves over the road's station.
 #[derive(Debug, Clone)]

@@ -2,7 +2,7 @@
 
 use roxmltree::Node;
 
-use crate::road::RoadError;
+use crate::RoadError;
 
 /// An error at a line of the file.
 pub fn wrong(line: u32, message: impl Into<String>) -> RoadError {

@@ -1,8 +1,8 @@
 //! What lies beside a lane: on its own road, across a median, in a junction.
 
-use crate::road::abreast::{Abreast, Opposing};
-use crate::road::testing::{lanes, street};
-use crate::road::{LaneIndex, RoadMap, Route, Side};
+use crate::abreast::{Abreast, Opposing};
+use crate::testing::{lanes, street};
+use crate::{LaneIndex, RoadMap, Route, Side};
 
 use super::places::corner;
 
@@ -124,7 +124,7 @@ fn opposing_of_all(map: &RoadMap, lane: LaneIndex, station_m: f64) -> Option<Opp
 
 #[test]
 fn the_opposing_lane_is_that_of_a_search_of_all_lanes() {
-    let roads = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/roads");
+    let roads = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/roads");
     let shipped = ["residential", "corner", "crossroad", "boulevard"].map(|name| {
         let text = std::fs::read_to_string(format!("{roads}/{name}.xodr")).expect("it is shipped");
         RoadMap::from_opendrive(name, &text).expect("it is a map")

@@ -1,7 +1,7 @@
 //! Routes with lane changes: where they may be, what their path is like, what they leave untouched.
 
-use crate::geometry::{Path, wrap_angle};
-use crate::road::{LaneIndex, RoadError, RoadMap, Route, Side};
+use crate::{LaneIndex, RoadError, RoadMap, Route, Side};
+use avastra_base::geometry::{Path, wrap_angle};
 
 /// A one-way road of three lanes, 300 m long: 150 m straight, a bend to the left of 100 m radius, two lane
 /// sections, a stop line at the end. `mark` is the marking between lanes -1 and -2, `bay` the widths of

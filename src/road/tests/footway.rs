@@ -1,8 +1,8 @@
 //! Ways on foot: where they begin and end.
 
-use crate::geometry::{OrientedBox, Pose, Vec2};
-use crate::road::RoadMap;
-use crate::road::testing::{lanes, street};
+use crate::RoadMap;
+use crate::testing::{lanes, street};
+use avastra_base::geometry::{OrientedBox, Pose, Vec2};
 
 const LEFT: Vec2 = Vec2::new(0.0, 1.0);
 

@@ -1,7 +1,7 @@
 //! Heights: what lies on another level is neither beside a lane nor in its way.
 
-use crate::road::testing::{lanes, road, street};
-use crate::road::{RoadMap, Route};
+use crate::testing::{lanes, road, street};
+use crate::{RoadMap, Route};
 
 fn read(roads: &str) -> RoadMap {
     RoadMap::from_opendrive("test", &format!("<OpenDRIVE>{roads}</OpenDRIVE>")).unwrap()

@@ -1,7 +1,7 @@
 //! Places on the map of `scenarios/roads/corner.xodr`: how they are named, found, and reached by a route.
 
-use crate::geometry::Vec2;
-use crate::road::{LaneIndex, RoadError, RoadMap, Route};
+use crate::{LaneIndex, RoadError, RoadMap, Route};
+use avastra_base::geometry::Vec2;
 
 const CORNER: &str = include_str!("../../../scenarios/roads/corner.xodr");
 

@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 
-use crate::geometry::{Path, Vec2, unit_vector, wrap_angle};
-use crate::road::{Lane, LanePlace, RoadMap, Route};
+use crate::{Lane, LanePlace, RoadMap, Route};
+use avastra_base::geometry::{Path, Vec2, unit_vector, wrap_angle};
 
 /// Largest errors of a pose: m, and a twentieth of a degree.
 const POSITION_M_MAX: f64 = 5e-3;

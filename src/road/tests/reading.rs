@@ -2,9 +2,9 @@
 
 use proptest::prelude::*;
 
-use crate::geometry::{Vec2, unit_vector, wrap_angle};
-use crate::road::testing::{road, street};
-use crate::road::{Lane, RoadError, RoadMap, Route, SignKind};
+use crate::testing::{road, street};
+use crate::{Lane, RoadError, RoadMap, Route, SignKind};
+use avastra_base::geometry::{Vec2, unit_vector, wrap_angle};
 
 const CORNER: &str = include_str!("../../../scenarios/roads/corner.xodr");
 
@@ -362,7 +362,7 @@ fn sampled_centres_are_the_curves() {
             if before_m < 0.01 || after_m < 0.01 {
                 continue;
             }
-            let mean = |p: &crate::geometry::PathPoint, q: &crate::geometry::PathPoint| {
+            let mean = |p: &avastra_base::geometry::PathPoint, q: &avastra_base::geometry::PathPoint| {
                 p.heading_rad + wrap_angle(q.heading_rad - p.heading_rad) / 2.0
             };
             let chord = (c.position - b.position).normalize();
@@ -475,7 +475,7 @@ fn a_harmless_fault_is_said_and_the_rest_is_read() {
 
 fn all_finite(map: &RoadMap) -> bool {
     map.lanes.iter().all(|lane| {
-        let finite = |point: &crate::geometry::PathPoint| {
+        let finite = |point: &avastra_base::geometry::PathPoint| {
             let numbers = [point.station_m, point.heading_rad, point.curvature_per_m];
             numbers.iter().all(|number| number.is_finite())
                 && point.position.iter().all(|part| part.is_finite())

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use crate::road::RoadMap;
-use crate::road::testing::{lanes, street};
+use crate::RoadMap;
+use crate::testing::{lanes, street};
 
 /// Streets of 20 m in a row.
 fn row(streets: u32) -> RoadMap {

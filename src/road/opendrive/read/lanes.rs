@@ -1,6 +1,6 @@
 //! Reads lane sections and their lanes.
 
-use crate::road::{LeftOut, RoadError, StripKind};
+use crate::{LeftOut, RoadError, StripKind};
 
 use super::super::elements::{LaneElement, MarkElement, MarkRule, SectionElement};
 use super::super::xml::{Element, wrong};

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::geometry::Vec2;
-use crate::road::RoadError;
+use crate::RoadError;
+use avastra_base::geometry::Vec2;
 
 use super::cubic::{Cubic, Cubics};
 use super::elements::{

@@ -1,6 +1,6 @@
 //! Reads objects: crosswalks, and things that stand beside the road.
 
-use crate::road::RoadError;
+use crate::RoadError;
 
 use super::super::elements::{ObjectElement, ObjectKind, Outline};
 use super::super::xml::Element;

@@ -1,7 +1,7 @@
 //! Reads the plan view of a road: its curves.
 
-use crate::geometry::Vec2;
-use crate::road::RoadError;
+use crate::RoadError;
+use avastra_base::geometry::Vec2;
 
 use super::super::geometry::{Piece, ReferenceLine, Shape};
 use super::super::xml::Element;

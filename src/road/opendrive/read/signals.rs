@@ -1,6 +1,6 @@
 //! Reads signals, and what they mean.
 
-use crate::road::{RoadError, SignKind};
+use crate::{RoadError, SignKind};
 
 use super::super::elements::{Meaning, Orientation, SignalElement};
 use super::super::xml::Element;

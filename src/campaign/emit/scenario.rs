@@ -1,0 +1,271 @@
+//! An episode log as a scenario file: its steps up to the last counted collision, and what the
+//! replay must find.
+
+use std::sync::Arc;
+
+use crate::episode::{Collision, EpisodeLog, Outcome};
+use crate::run::{EpisodeSummary, Finding};
+use avastra_base::units::Dimension;
+use avastra_drivers::external;
+use avastra_drivers::external::Conversation;
+use avastra_lang::model::vocabulary::Word;
+use avastra_lang::model::{ActionDef, START_MPS, Space, StateDef, Value, digest_text, ticks_s};
+use avastra_lang::syntax::ast::{
+    ClauseKind, Expect, Expr, Field, File, ItemKind, Name, Scenario, Span, Step,
+};
+use avastra_world::action::{ActionTable, Draw};
+use avastra_world::sim::{ENGINE, TrafficProfile};
+
+use super::tree;
+
+/// What an emitted file says about its origin.
+#[derive(Debug, Clone, Copy)]
+pub struct Provenance<'a> {
+    /// The command that writes it, for example `run`.
+    pub command: &'a str,
+    /// Name of the scenario.
+    pub name: &'a str,
+    /// Path of the space's file, from the emitted file.
+    pub space_path: &'a str,
+    /// Number of the episode in its run.
+    pub episode: usize,
+    pub agent: &'a str,
+    /// Rules that were switched off, and optional ones that were on.
+    pub without: &'a [String],
+    pub with: &'a [String],
+}
+
+/// The scenario of an episode, cut after the step of its last counted collision; there must be one.
+pub fn scenario(
+    table: &ActionTable,
+    log: &EpisodeLog,
+    summary: &EpisodeSummary,
+    source: &Provenance,
+) -> File {
+    let counted: Vec<&Finding> = summary.collisions.iter().filter(|finding| finding.counted).collect();
+    let last = counted.last().expect("an episode without a counted collision is not emitted");
+    let steps = last.collision.step + 1;
+    let emitted = format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command);
+    let headline = headline(table.space(), log, &counted[0].collision);
+    let origin = origin(log, source);
+    file(table, log, source, origin, [&emitted, &headline], steps, expects(log, summary, steps))
+}
+
+/// The scenario of an episode that played an emitted scenario again. It keeps all steps, because they are the scenario,
+/// and says how the episode ended.
+pub fn retold(table: &ActionTable, log: &EpisodeLog, summary: &EpisodeSummary, source: &Provenance) -> File {
+    let emitted = format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command);
+    let counted = summary.collisions.iter().find(|finding| finding.counted);
+    let headline = counted.map_or_else(String::new, |first| headline(table.space(), log, &first.collision));
+    let origin = origin(log, source);
+    let steps = log.steps.len();
+    let mut expects = expects(log, summary, steps);
+    expects.push(end(log));
+    file(table, log, source, origin, [&emitted, &headline], steps, expects)
+}
+
+/// An episode in which an external driving system failed, as a scenario that ends so. If it failed before the first step, the
+/// scenario has no step.
+pub fn failure(table: &ActionTable, log: &EpisodeLog, headline: &str, source: &Provenance) -> File {
+    let emitted = format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command);
+    let origin = origin(log, source);
+    let trace = tree::text(digest_text(&log.trace()));
+    let trace = tree::expect(tree::equal(tree::name("trace"), trace), Vec::new());
+    file(table, log, source, origin, [&emitted, headline], log.steps.len(), vec![end(log), trace])
+}
+
+/// All steps of an episode as a scenario without claims, to look at.
+pub fn unclaimed(table: &ActionTable, log: &EpisodeLog, headline: &str, source: &Provenance) -> File {
+    let emitted =
+        format!("Emitted by `avastra {}`; look at it with `avastra render FILE --strip`.", source.command);
+    let origin = origin(log, source);
+    file(table, log, source, origin, [&emitted, headline], log.steps.len(), Vec::new())
+}
+
+fn file(
+    table: &ActionTable,
+    log: &EpisodeLog,
+    source: &Provenance,
+    origin: Vec<Field>,
+    [emitted, headline]: [&str; 2],
+    steps: usize,
+    expects: Vec<Expect>,
+) -> File {
+    let space = table.space();
+    let item = Scenario {
+        name: Name::built(source.name),
+        origin,
+        road: Name::built(log.road.as_str()),
+        start: start(space, log),
+        steps: (0..steps).map(|number| step(table, log, number)).collect(),
+        expects,
+    };
+    tree::file(emitted, space, source.space_path, vec![tree::doc(headline)], ItemKind::Scenario(item))
+}
+
+/// An action as it was drawn, in one line: `drive_ahead(lane: Left, …) with { speed: 11 m/s, … }`.
+pub fn action_text(table: &ActionTable, draw: &Draw) -> String {
+    let axes = &table.rows()[draw.row].label;
+    if draw.values.is_empty() {
+        return axes.clone();
+    }
+    let drawn = drawn(table, draw);
+    let fields: Vec<String> = drawn
+        .iter()
+        .map(|field| format!("{}: {}", field.name.text, avastra_lang::syntax::print_expr(&field.value)))
+        .collect();
+    format!("{axes} with {{ {} }}", fields.join(", "))
+}
+
+fn origin(log: &EpisodeLog, source: &Provenance) -> Vec<Field> {
+    let names = |rules: &[String]| tree::list(rules.iter().map(|rule| tree::name(rule)).collect());
+    let mut fields = vec![
+        tree::field("seed", tree::whole(log.seed)),
+        tree::field("episode", tree::whole(source.episode as u64)),
+        tree::field("policy", tree::text(source.agent)),
+        tree::field("ads", tree::text(log.ads.as_str())),
+    ];
+    if let Some(profile) = &log.profile {
+        let line = profile.to_line();
+        if !line.is_empty() {
+            fields.push(tree::field("profile", tree::text(line)));
+        }
+        fields.push(tree::field("profile_digest", tree::text(profile.digest())));
+    }
+    if let Some(Conversation { attached, exchanges }) = log.conversation.as_deref() {
+        fields.push(tree::field("profile", tree::text(attached.to_line())));
+        fields.push(tree::field("profile_digest", tree::text(attached.digest())));
+        fields.push(tree::field("answers", tree::text(external::digest_of(exchanges))));
+    }
+    fields.push(tree::field("engine", tree::text(ENGINE)));
+    let traffic = &log.start.traffic;
+    if *traffic != TrafficProfile::default() {
+        fields.push(tree::field("traffic", tree::text(traffic.to_line())));
+        fields.push(tree::field("traffic_digest", tree::text(traffic.digest())));
+    }
+    if !source.without.is_empty() {
+        fields.push(tree::field("without", names(source.without)));
+    }
+    if !source.with.is_empty() {
+        fields.push(tree::field("with", names(source.with)));
+    }
+    fields
+}
+
+fn start(space: &Space, log: &EpisodeLog) -> Vec<Field> {
+    let states = space.states.iter().map(|state| tree::field(&state.name, state_value(space, log, state)));
+    states
+        .chain([
+            tree::field("signal_phase", tree::quantity(log.start.signal_phase_s, Dimension::DURATION)),
+            tree::field("traffic_seed", tree::whole(log.start.seed)),
+        ])
+        .chain(
+            (log.start.ego_mps != START_MPS)
+                .then(|| tree::field("ego_speed", tree::quantity(log.start.ego_mps, Dimension::SPEED))),
+        )
+        .chain((log.start.ambient > 0).then(|| tree::field("ambient", tree::whole(log.start.ambient.into()))))
+        .collect()
+}
+
+/// A plain state's value, or a map's cells as a record; if all cells are equal, one value.
+fn state_value(space: &Space, log: &EpisodeLog, state: &StateDef) -> Expr {
+    let cells = &log.memory.cells()[state.first_cell..state.first_cell + state.cells];
+    let literal = |value: &Value| tree::value(space, *value, state.ty);
+    match state.key {
+        Some(key) if cells.iter().any(|cell| cell != &cells[0]) => {
+            let keys = &space.enums[key.0].variants;
+            tree::record(keys.iter().zip(cells).map(|(key, cell)| tree::field(key, literal(cell))).collect())
+        }
+        _ => literal(&cells[0]),
+    }
+}
+
+fn step(table: &ActionTable, log: &EpisodeLog, number: usize) -> Step {
+    let (action, drawn, after) = match &log.steps[number].outcome {
+        Outcome::Passed | Outcome::Refused { .. } => (tree::call("wait", Vec::new()), Vec::new(), None),
+        Outcome::Done { draw, delay_ticks, .. } => {
+            let space = table.space();
+            let row = &table.rows()[draw.row];
+            let action = &space.actions[row.action];
+            let axes =
+                row.axes.iter().map(|(name, value)| (name.to_string(), literal(space, action, name, *value)));
+            // The tick at which it happened, whatever it waited for: so it replays to the bit.
+            let after = tree::quantity(ticks_s(*delay_ticks), Dimension::DURATION);
+            let after = (*delay_ticks > 0).then_some(after);
+            (tree::call(&action.name, axes.collect()), self::drawn(table, draw), after)
+        }
+    };
+    Step { number: tree::digits(number.to_string()), action, drawn, once: None, after, span: Span::NONE }
+}
+
+/// The drawn parameters of a step, as fields of its `with` block.
+fn drawn(table: &ActionTable, draw: &Draw) -> Vec<Field> {
+    let space = table.space();
+    let action = &space.actions[table.rows()[draw.row].action];
+    let field = |(name, value): &(Arc<str>, Value)| tree::field(name, literal(space, action, name, *value));
+    draw.values.iter().map(field).collect()
+}
+
+/// A parameter's value as its literal.
+fn literal(space: &Space, action: &ActionDef, parameter: &str, value: Value) -> Expr {
+    let found = action.parameters.iter().find(|candidate| &*candidate.name == parameter);
+    tree::value(space, value, found.expect("values are of the action's own parameters").ty)
+}
+
+fn expects(log: &EpisodeLog, summary: &EpisodeSummary, steps: usize) -> Vec<Expect> {
+    let mut expects = Vec::new();
+    for finding in summary.collisions.iter().filter(|finding| finding.collision.step < steps) {
+        let contact = &finding.collision.contact;
+        let obstacle = || tree::clause(ClauseKind::With, tree::road_user(contact.obstacle));
+        let at = tree::clause(ClauseKind::At, tree::rounded(contact.time_s, 2, Dimension::DURATION));
+        expects.push(tree::expect(tree::name("collision"), vec![obstacle(), at]));
+        if finding.counted {
+            expects.push(tree::expect(tree::name("counted"), vec![obstacle()]));
+        }
+        let drivers = &finding.judgement.avoided_by;
+        let by = (!drivers.is_empty()).then(|| {
+            let drivers = drivers.iter().map(|driver| tree::name(driver));
+            tree::clause(ClauseKind::By, tree::list(drivers.collect()))
+        });
+        let class = tree::name(finding.judgement.class.name());
+        expects.push(tree::expect(class, by.into_iter().chain([obstacle()]).collect()));
+        let priority = tree::name(contact.priority.name());
+        expects.push(tree::expect(tree::equal(tree::name("priority"), priority), vec![obstacle()]));
+        if let Some([first, rest @ ..]) = finding.cause.as_deref() {
+            let first = tree::name(first.name());
+            let modules = rest.iter().map(|module| tree::name(module.name()));
+            let modules = match rest {
+                [] => first,
+                _ => tree::list(core::iter::once(first).chain(modules).collect()),
+            };
+            expects.push(tree::expect(tree::equal(tree::name("cause"), modules), vec![obstacle()]));
+        }
+        if finding.minimal {
+            expects.push(tree::expect(tree::name("minimal"), vec![obstacle()]));
+        }
+    }
+    let proc = log.steps[..steps].iter().map(|step| tree::rounded(step.proc, 3, Dimension::RATIO));
+    expects.push(tree::expect(tree::equal(tree::name("proc"), tree::list(proc.collect())), Vec::new()));
+    let trace = tree::text(digest_text(&log.steps[steps - 1].trace));
+    expects.push(tree::expect(tree::equal(tree::name("trace"), trace), Vec::new()));
+    expects
+}
+
+/// How it ends.
+fn end(log: &EpisodeLog) -> Expect {
+    tree::expect(tree::equal(tree::name("end"), tree::name(log.end.name())), Vec::new())
+}
+
+/// What happens, in a sentence for the reader.
+fn headline(space: &Space, log: &EpisodeLog, collision: &Collision) -> String {
+    let contact = &collision.contact;
+    format!(
+        "{} npc#{} ({}) is hit at {:.2} s by an ego vehicle at {:.1} km/h on {}.",
+        space.body_name(collision.body),
+        contact.obstacle,
+        collision.verb.name(),
+        contact.time_s,
+        contact.ego_speed_mps * 3.6,
+        log.road
+    )
+}

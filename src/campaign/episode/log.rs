@@ -1,0 +1,207 @@
+//! The record of an episode: enough to judge it, to count it and to replay it.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use avastra_drivers::external::{Conversation, Failure, FailureKind};
+use avastra_drivers::{ModularConfig, Reason, Status};
+use avastra_lang::model::vocabulary::Verb;
+use avastra_lang::model::{BodyWord, Memory};
+use avastra_search::mdp::{PerceptionCounts, StateVector};
+use avastra_world::action::Draw;
+use avastra_world::sim::{Contact, Incident, Start};
+
+/// One episode, from start to end.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EpisodeLog {
+    pub road: String,
+    pub ads: String,
+    /// Settings of the driving system, if it has any.
+    pub profile: Option<ModularConfig>,
+    /// What an external driving system was asked and answered.
+    pub conversation: Option<Arc<Conversation>>,
+    /// Why an external driving system could not drive on.
+    pub failure: Option<Failure>,
+    pub seed: u64,
+    pub start: Start,
+    /// States of the space at the start.
+    pub memory: Memory,
+    pub steps: Vec<StepLog>,
+    /// What held the speed of the ego vehicle back, by rising time; each holds until the next one.
+    pub held: Vec<Held>,
+    pub collisions: Vec<Collision>,
+    /// Contacts of obstacles with each other.
+    pub incidents: Vec<Incident>,
+    pub end: End,
+    pub duration_s: f64,
+    /// Distance driven by the ego vehicle, m.
+    pub distance_m: f64,
+    /// Red lights passed by the ego vehicle.
+    pub red_runs: u32,
+    /// Physics steps done.
+    pub ticks: u64,
+}
+
+/// What held the speed of the ego vehicle back, by what the driving system says of itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Held {
+    /// From this time on, s.
+    pub from_s: f64,
+    reason: Reason,
+    /// In the words of an external driving system.
+    reported: Option<Arc<str>>,
+}
+
+impl Held {
+    /// What a driving system says at a time.
+    pub(super) fn new(from_s: f64, status: &Status) -> Held {
+        Held { from_s, reason: status.reason, reported: status.reported.clone() }
+    }
+
+    /// Whether a driving system still says so.
+    pub(super) fn still(&self, status: &Status) -> bool {
+        self.reason == status.reason && self.reported == status.reported
+    }
+
+    /// In a few words, for example `follow 3`.
+    pub fn text(&self) -> String {
+        self.reason.in_words(self.reported.as_deref())
+    }
+}
+
+/// One action of the agent and the observation period after it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StepLog {
+    /// When the step began, s.
+    pub time_s: f64,
+    /// The state vector before the action, shape `(STATE_LEN,)`.
+    pub state: StateVector,
+    pub outcome: Outcome,
+    /// The states of the space after the action, or after a step without one.
+    pub memory: Memory,
+    /// Largest collision probability of the observation period, in `[0, 1]`.
+    pub proc: f64,
+    pub reward: f64,
+    /// Obstacles that the driving system misses, and ghosts that it sees, at the end of the period.
+    pub perception: PerceptionCounts,
+    /// Digest of every bit of the world's state after every tick so far.
+    pub trace: [u8; 32],
+}
+
+/// What became of the agent's choice.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// Carried out as drawn, `delay_ticks` after the step began; `spawned` has the ids of the road users that it made
+    /// appear.
+    Done { draw: Draw, spawned: Vec<u32>, delay_ticks: u32 },
+    /// No action was chosen: no row was legal, or the script has none here.
+    Passed,
+    /// The chosen row could not be carried out: nothing changed, and the step passed without an action.
+    Refused { row: usize, rule: Option<String>, reason: String },
+}
+
+/// A contact of the ego vehicle with an obstacle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Collision {
+    pub contact: Contact,
+    /// Index of the step in which it happened.
+    pub step: usize,
+    pub body: BodyWord,
+    /// Mass of the obstacle, t.
+    pub mass_t: f64,
+    pub verb: Verb,
+    /// When the obstacle appeared, s.
+    pub spawned_s: f64,
+}
+
+impl EpisodeLog {
+    /// The states of the space after the action of a step; those at the start if there is no such step.
+    pub fn memory_after(&self, step: usize) -> &Memory {
+        self.steps.get(step).map_or(&self.memory, |step| &step.memory)
+    }
+
+    /// What held the speed back at a time, s; `None` before anything did.
+    pub fn held_at(&self, time_s: f64) -> Option<&Held> {
+        // Times of contacts lie within a tick, which is driven by what is said at its beginning.
+        self.held[..self.held.partition_point(|held| held.from_s <= time_s)].last()
+    }
+
+    /// The author's own bodies among the road users: number of the road user, index in the space.
+    pub fn own_bodies(&self) -> BTreeMap<u32, usize> {
+        let mut own = BTreeMap::new();
+        for step in &self.steps {
+            let Outcome::Done { draw, spawned, .. } = &step.outcome else { continue };
+            let mut ids = spawned.iter();
+            for effect in &draw.effects {
+                let first = ids.by_ref().take(effect.newcomers() as usize).min();
+                own.extend(first.into_iter().flat_map(|first| effect.own_bodies(*first)));
+            }
+        }
+        own
+    }
+
+    /// Digest of every bit of the world's state after every tick ([`Trace`]); zeros if there was no step.
+    ///
+    /// [`Trace`]: avastra_world::sim::Trace
+    pub fn trace(&self) -> [u8; 32] {
+        self.steps.last().map_or([0; 32], |step| step.trace)
+    }
+}
+
+/// Why an episode ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum End {
+    /// The goal was reached: terminal.
+    Arrived,
+    /// No progress for several steps: truncated.
+    Stalled,
+    /// No progress, because something stood in the way that would not go: wrecks, or vehicles that wait for each other.
+    /// It says nothing about the driving system.
+    Blocked,
+    /// No progress, because the ego vehicle has left its lane and does not find back.
+    Astray,
+    /// It drove beyond the end of its way, or away from every road: there is nothing to drive on. The way up to there
+    /// counts.
+    LeftMap,
+    /// The space's limit of steps was reached: truncated.
+    StepLimit,
+    /// The script of a replay has no more steps.
+    Script,
+    /// An external driving system failed: a finding of its own, and no collision.
+    Failed(FailureKind),
+}
+
+impl End {
+    pub fn name(self) -> &'static str {
+        match self {
+            End::Arrived => "arrived",
+            End::Stalled => "stalled",
+            End::Blocked => "blocked",
+            End::Astray => "astray",
+            End::LeftMap => "left_the_map",
+            End::StepLimit => "limit",
+            End::Script => "script",
+            End::Failed(kind) => kind.name(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_end_can_be_claimed() {
+        let driven = [
+            End::Arrived,
+            End::Stalled,
+            End::Blocked,
+            End::Astray,
+            End::LeftMap,
+            End::StepLimit,
+            End::Script,
+        ];
+        let ends = driven.into_iter().chain(FailureKind::ALL.map(End::Failed));
+        assert_eq!(ends.map(End::name).collect::<Vec<_>>(), avastra_lang::model::ENDS);
+    }
+}

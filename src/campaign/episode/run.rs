@@ -1,0 +1,491 @@
+//! The loop: act, drive for one observation period, record what happened.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use avastra_drivers::Ads;
+use avastra_lang::model::expr::Expr;
+use avastra_lang::model::{BodyWord, Facts, Memory, OutcomeFacts, Trigger, WorldFacts, evaluate};
+use avastra_search::mdp;
+use avastra_search::mdp::{Danger, Observation};
+use avastra_world::action::{Draw, Situation};
+use avastra_world::sim::{Contact, DT_S, Incident, Sensed, Trace, World};
+
+use super::facts::collision_facts;
+use super::log::{Collision, End, EpisodeLog, Held, Outcome, StepLog};
+use super::script::ScriptedAction;
+use super::setup::Setup;
+
+/// A step with less progress than this counts as stalled, m. The published package: 3 m in five steps.
+const PROGRESS_M_MIN: f64 = 1.0;
+
+/// Called after every tick with the world, the driving system and the contacts that began.
+pub type Watch<'a> = dyn FnMut(&World, &dyn Ads, &[Contact]) + 'a;
+
+/// What is known when an action is chosen.
+pub struct Moment<'a> {
+    pub step: usize,
+    pub observation: &'a Observation,
+    pub situation: &'a Situation<'a>,
+    play: &'a Play,
+    setup: &'a Setup<'a>,
+}
+
+impl<'a> Moment<'a> {
+    /// What the episode is made of.
+    pub fn setup(&self) -> &'a Setup<'a> {
+        self.setup
+    }
+
+    /// The log of the episode as it would be one observation period after an action. The episode itself does not
+    /// change.
+    pub fn look_ahead(&self, draw: Draw) -> EpisodeLog {
+        let mut copy = self.play.clone();
+        let begun = Begun::With(copy.carry_out(draw, 0));
+        copy.observation_period(self.setup, self.observation.clone(), begun, &mut |_, _, _| {});
+        copy.into_log(self.setup, End::Script)
+    }
+
+    /// The log of the episode up to now.
+    pub fn log(&self) -> EpisodeLog {
+        self.play.clone().into_log(self.setup, End::Script)
+    }
+
+    /// Number of collisions up to now.
+    pub fn collisions(&self) -> usize {
+        self.play.collisions.len()
+    }
+
+    /// Whether anything is still there that the action of a step made appear.
+    pub fn is_around(&self, step: usize) -> bool {
+        let spawned = match self.play.steps.get(step).map(|step| &step.outcome) {
+            Some(Outcome::Done { spawned, .. }) => &spawned[..],
+            _ => &[],
+        };
+        spawned.iter().any(|id| self.play.world.obstacle(*id).is_some())
+    }
+
+    /// Ticks since the start of the episode.
+    pub fn ticks(&self) -> u64 {
+        self.play.world.ticks()
+    }
+
+    /// A snapshot of this moment, for [`run_from`].
+    pub fn snapshot(&self) -> Play {
+        self.play.clone()
+    }
+}
+
+/// What is to happen in a step.
+pub enum Choice {
+    Act(Draw),
+    /// The action is judged and carried out when its trigger says so, if that comes within the step.
+    Await(ScriptedAction),
+    /// Nothing happens.
+    Pass,
+    /// A row was chosen that is not legal now: nothing happens.
+    Refused {
+        row: usize,
+        rule: Option<String>,
+        reason: String,
+    },
+    /// The script is at its end.
+    Stop,
+}
+
+/// Plays one episode. `choose` is called once a step, `watch` after every tick and once before the first.
+pub fn run(setup: &Setup, choose: &mut dyn FnMut(&Moment) -> Choice, watch: &mut Watch) -> EpisodeLog {
+    run_from(setup, None, choose, watch, &mut |_| {})
+}
+
+/// As [`run`], but from `from`, a kept moment of an episode with this setup, or from the start without one. The log
+/// covers the whole episode. `last` gets the moment at which the next choice would have been due.
+pub fn run_from(
+    setup: &Setup,
+    from: Option<Play>,
+    choose: &mut dyn FnMut(&Moment) -> Choice,
+    watch: &mut Watch,
+    last: &mut dyn FnMut(&Moment),
+) -> EpisodeLog {
+    let mut play = from.unwrap_or_else(|| Play::new(setup));
+    watch(&play.world, play.ads.as_ref(), &[]);
+    let end = loop {
+        let observation = match play.look() {
+            Ok(observation) => observation,
+            Err(end) => break end,
+        };
+        let choice = play.at(setup, &observation, |moment| choose(moment));
+        if let Some(end) = play.step(setup, observation, choice, watch) {
+            break end;
+        }
+    };
+    let observation = play.observation();
+    play.at(setup, &observation, |moment| last(moment));
+    play.into_log(setup, end)
+}
+
+/// What became of the choice of a step when the step began.
+enum Begun {
+    With(Outcome),
+    Waiting(Waiting),
+}
+
+/// An action whose moment has not come.
+struct Waiting {
+    action: ScriptedAction,
+    /// Tick of the step at which the condition first held.
+    held_tick: Option<i64>,
+}
+
+impl Waiting {
+    /// Whether the action happens before this tick of the step.
+    fn is_due(&mut self, tick: i64, play: &Play, setup: &Setup) -> bool {
+        let Some(trigger) = self.action.trigger.as_deref() else { return true };
+        if self.held_tick.is_none()
+            && trigger.once.as_ref().is_none_or(|once| play.holds(&once.expr, trigger, setup))
+        {
+            self.held_tick = Some(tick);
+        }
+        self.held_tick.is_some_and(|held| tick - held >= i64::from(trigger.after_ticks))
+    }
+
+    /// The moment did not come.
+    fn in_vain(self) -> Outcome {
+        let text = self.action.trigger.as_deref().map(Trigger::text).unwrap_or_default();
+        let reason = format!("`{text}` did not come within the step");
+        Outcome::Refused { row: self.action.row, rule: None, reason }
+    }
+}
+
+/// How near the ego vehicle is to a collision, and with what.
+#[derive(Clone, Copy)]
+struct Near {
+    probability: f64,
+    body: Option<BodyWord>,
+}
+
+/// An episode under way. [`run`] is a loop over [`Play::look`] and [`Play::step`]; a caller that cannot be called back
+/// from a loop uses these two itself. Each call takes the setup that the episode was begun with. A clone is a snapshot,
+/// which can be played on as often as wanted.
+#[derive(Clone)]
+pub struct Play {
+    world: World,
+    ads: Box<dyn Ads>,
+    sensed: Sensed,
+    memory: Memory,
+    steps: Vec<StepLog>,
+    held: Vec<Held>,
+    /// The author's own bodies among the road users, by number.
+    own_bodies: BTreeMap<u32, usize>,
+    collisions: Vec<Collision>,
+    incidents: Vec<Incident>,
+    /// Seed of the draws of actions, and of the agent's choices.
+    seed: u64,
+    trace: Trace,
+    distance_m: f64,
+    /// Steps without progress up to now.
+    stalled: u32,
+}
+
+impl Play {
+    /// An episode before its first step.
+    pub fn new(setup: &Setup) -> Play {
+        let world = World::new(setup.scene.clone(), &setup.start);
+        let mut ads = setup.ads.build(&setup.scene, setup.seed);
+        let mut sensed = world.sensed();
+        // The driving system looks once before the first step, so that the first observation can show its state.
+        ads.drive(&sensed);
+        world.sense(&mut sensed);
+        Play {
+            world,
+            ads,
+            sensed,
+            memory: setup.memory.clone(),
+            steps: Vec::new(),
+            held: Vec::new(),
+            own_bodies: BTreeMap::new(),
+            collisions: Vec::new(),
+            incidents: Vec::new(),
+            seed: setup.seed,
+            trace: Trace::default(),
+            distance_m: 0.0,
+            stalled: 0,
+        }
+    }
+
+    /// What is seen before the next choice.
+    ///
+    /// # Errors
+    /// The end of the episode, if its driving system cannot drive any more.
+    pub fn look(&self) -> Result<Observation, End> {
+        if let Some(end) = self.failed() {
+            return Err(end);
+        }
+        Ok(self.observation())
+    }
+
+    /// What is seen now.
+    pub fn observation(&self) -> Observation {
+        Observation::new(&self.world, self.ads.status())
+    }
+
+    /// Calls `see` with this moment, in which a choice is due, and returns what it gives.
+    pub fn at<T>(&self, setup: &Setup, observation: &Observation, see: impl FnOnce(&Moment) -> T) -> T {
+        let situation = self.situation(setup);
+        see(&Moment { step: self.steps.len(), observation, situation: &situation, play: self, setup })
+    }
+
+    /// Carries out a choice that was made on `observation`, then drives for one observation period. Returns how the
+    /// episode ended, if it ended.
+    pub fn step(
+        &mut self,
+        setup: &Setup,
+        observation: Observation,
+        choice: Choice,
+        watch: &mut Watch,
+    ) -> Option<End> {
+        let begun = match choice {
+            Choice::Act(draw) => Begun::With(self.carry_out(draw, 0)),
+            Choice::Await(action) => Begun::Waiting(Waiting { action, held_tick: None }),
+            Choice::Pass => Begun::With(Outcome::Passed),
+            Choice::Refused { row, rule, reason } => Begun::With(Outcome::Refused { row, rule, reason }),
+            Choice::Stop => return Some(End::Script),
+        };
+        self.observation_period(setup, observation, begun, watch);
+        self.end(setup)
+    }
+
+    /// The steps so far.
+    pub fn steps(&self) -> &[StepLog] {
+        &self.steps
+    }
+
+    /// The collisions so far.
+    pub fn collisions(&self) -> &[Collision] {
+        &self.collisions
+    }
+
+    fn situation<'s>(&'s self, setup: &'s Setup) -> Situation<'s> {
+        Situation {
+            memory: &self.memory,
+            road: setup.road,
+            rules: setup.rules,
+            surroundings: &self.world,
+            seed: self.seed,
+            step: self.steps.len() as u64,
+        }
+    }
+
+    /// Carries out a whole action or nothing of it: its second spawn may find its first in the way.
+    fn carry_out(&mut self, draw: Draw, delay_ticks: u32) -> Outcome {
+        let before = self.world.clone();
+        let (mut spawned, mut own_bodies) = (Vec::new(), Vec::new());
+        for effect in &draw.effects {
+            match self.world.apply(effect) {
+                Ok(newcomer) => {
+                    spawned.extend(newcomer.into_iter().flat_map(|id| id..id + effect.newcomers()));
+                    own_bodies.extend(newcomer.into_iter().flat_map(|id| effect.own_bodies(id)));
+                }
+                Err(reason) => {
+                    self.world = before;
+                    return Outcome::Refused { row: draw.row, rule: None, reason };
+                }
+            }
+        }
+        if let Some(rules) = &draw.lane_changes {
+            spawned.iter().for_each(|id| self.world.bind_lane_changes(*id, rules));
+        }
+        self.own_bodies.extend(own_bodies);
+        self.memory = draw.memory_after.clone();
+        Outcome::Done { draw, spawned, delay_ticks }
+    }
+
+    /// What every step does, in a step without an action.
+    fn wait(&mut self, setup: &Setup) {
+        let (effects, memory) =
+            setup.table.wait(&self.memory, self.steps.len() as u64, setup.road, setup.rules);
+        for effect in effects {
+            self.world.apply(&effect).expect("weather and time of day need no place");
+        }
+        self.memory = memory;
+    }
+
+    /// Drives for one observation period (OTP), or until the goal or the end of the map.
+    fn observation_period(
+        &mut self,
+        setup: &Setup,
+        observation: Observation,
+        mut begun: Begun,
+        watch: &mut Watch,
+    ) {
+        // No space in which every step does something has actions that wait (AV0609).
+        if matches!(&begun, Begun::With(Outcome::Passed | Outcome::Refused { .. })) {
+            self.wait(setup);
+        }
+        let time_s = self.world.time_s();
+        let station_m = self.world.ego_station_m();
+        let mut near: Option<Near> = None;
+        let met = self.collisions.len();
+        let shift = setup.period_shifts.get(self.steps.len()).copied().unwrap_or(0);
+        let ticks = (setup.table.space().episode.step_s / DT_S).round() as i64 + i64::from(shift);
+        for tick in 0..ticks {
+            if let Begun::Waiting(waiting) = &mut begun
+                && waiting.is_due(tick, self, setup)
+            {
+                begun = Begun::With(self.carry_out_awaited(waiting, tick, setup));
+            }
+            let Some(now) = self.tick(setup, watch) else { break };
+            if near.is_none_or(|near| now.probability > near.probability) {
+                near = Some(now);
+            }
+            let arrived = setup.table.space().episode.stop_arrived && self.world.arrived();
+            if arrived || self.world.left_the_map() {
+                break;
+            }
+        }
+        let progress_m = self.world.ego_station_m() - station_m;
+        // An ego vehicle that waits for a light does not stall, and its wait does not end a stall. After a contact no
+        // wait counts.
+        if progress_m.abs() >= PROGRESS_M_MIN {
+            self.stalled = 0;
+        } else if !self.collisions.is_empty() || !self.world.waits_for_light() {
+            self.stalled += 1;
+        }
+        let outcome = match begun {
+            Begun::With(outcome) => outcome,
+            Begun::Waiting(waiting) => waiting.in_vain(),
+        };
+        let Near { probability: proc, body } = near.unwrap_or(Near { probability: 0.0, body: None });
+        // Of several collisions in a step, the first decides.
+        let facts = match self.collisions.get(met) {
+            Some(first) => collision_facts(first, &self.collisions[..met]),
+            None => OutcomeFacts { proc, near: body, ..OutcomeFacts::default() },
+        };
+        let reward = setup.table.space().reward(facts, &self.memory);
+        let trace = self.trace.digest();
+        let state = observation.state;
+        let perception = mdp::perception_counts(&self.world, self.ads.status());
+        let memory = self.memory.clone();
+        self.steps.push(StepLog { time_s, state, outcome, memory, proc, reward, perception, trace });
+    }
+
+    /// Judges and carries out an action whose moment has come.
+    fn carry_out_awaited(&mut self, waiting: &Waiting, tick: i64, setup: &Setup) -> Outcome {
+        let judged = waiting.action.judged(setup.table, &self.situation(setup));
+        match judged {
+            Choice::Act(draw) => self.carry_out(draw, tick as u32),
+            Choice::Refused { row, rule, reason } => Outcome::Refused { row, rule, reason },
+            Choice::Await(_) | Choice::Pass | Choice::Stop => unreachable!("a judgement allows or refuses"),
+        }
+    }
+
+    /// One physics step. Returns the collision probability after it, or `None` if the driving system failed and nothing
+    /// moved. The probability is 1 at the tick of a contact. After that the obstacle is ignored: it stands against the
+    /// ego vehicle for a while and is no danger any more.
+    fn tick(&mut self, setup: &Setup, watch: &mut Watch) -> Option<Near> {
+        self.world.sense(&mut self.sensed);
+        let control = self.ads.drive(&self.sensed);
+        if self.ads.failure().is_some() {
+            return None;
+        }
+        let status = self.ads.status();
+        if self.held.last().is_none_or(|held| !held.still(status)) {
+            self.held.push(Held::new(self.world.time_s(), status));
+        }
+        let contacts = self.world.tick(&control).to_vec();
+        for &contact in &contacts {
+            self.collisions.push(self.collision(contact));
+        }
+        self.incidents.extend_from_slice(self.world.incidents());
+        self.distance_m += self.world.ego().speed_mps * DT_S;
+        self.world.trace(&mut self.trace);
+        watch(&self.world, self.ads.as_ref(), &contacts);
+        if let Some(contact) = contacts.first() {
+            return Some(Near { probability: 1.0, body: self.body(contact.obstacle) });
+        }
+        let is_hit = |id| self.collisions.iter().any(|collision| collision.contact.obstacle == id);
+        let Danger { probability, nearest } = setup.proc.danger(&self.world, &is_hit);
+        Some(Near { probability, body: nearest.and_then(|id| self.body(id)) })
+    }
+
+    /// Whether the condition of a trigger holds now.
+    fn holds(&self, condition: &Expr, trigger: &Trigger, setup: &Setup) -> bool {
+        let users = trigger.road_users().into_iter();
+        let world = WorldFacts {
+            moment: self.world.moment_facts(),
+            step: self.steps.len() as u64,
+            road_users: users.filter_map(|id| Some((id, self.world.npc_facts(id)?))).collect(),
+            ..WorldFacts::default()
+        };
+        let facts =
+            Facts { road: Some(&setup.road.facts), world: Some(&world), ..Facts::new(&[], &self.memory) };
+        evaluate(condition, &setup.table.space().functions, &facts).truth()
+    }
+
+    fn body(&self, obstacle: u32) -> Option<BodyWord> {
+        let own = self.own_bodies.get(&obstacle).copied();
+        self.world.obstacle(obstacle).map(|obstacle| BodyWord { like: obstacle.body, own })
+    }
+
+    fn collision(&self, contact: Contact) -> Collision {
+        let obstacle =
+            self.world.obstacle(contact.obstacle).expect("an obstacle stays for some time after it is hit");
+        Collision {
+            contact,
+            step: self.steps.len(),
+            body: BodyWord { like: obstacle.body, own: self.own_bodies.get(&contact.obstacle).copied() },
+            mass_t: self.world.body(contact.obstacle).map_or(0.0, |body| body.mass_t),
+            verb: obstacle.verb,
+            spawned_s: obstacle.spawned_tick as f64 * DT_S,
+        }
+    }
+
+    /// The end of an episode whose driving system cannot drive any more.
+    fn failed(&self) -> Option<End> {
+        self.ads.failure().map(|failure| End::Failed(failure.kind()))
+    }
+
+    fn end(&self, setup: &Setup) -> Option<End> {
+        let episode = &setup.table.space().episode;
+        if let Some(end) = self.failed() {
+            Some(end)
+        } else if episode.stop_arrived && self.world.arrived() {
+            Some(End::Arrived)
+        } else if self.world.left_the_map() {
+            Some(End::LeftMap)
+        } else if episode.stalled_steps.is_some_and(|limit| self.stalled >= limit) {
+            Some(match () {
+                () if self.world.is_blocked() => End::Blocked,
+                () if self.world.is_astray() => End::Astray,
+                () => End::Stalled,
+            })
+        } else if self.steps.len() >= episode.step_limit as usize {
+            Some(End::StepLimit)
+        } else {
+            None
+        }
+    }
+
+    /// The log of the episode, which ended so.
+    pub fn into_log(self, setup: &Setup, end: End) -> EpisodeLog {
+        EpisodeLog {
+            road: setup.road.name.clone(),
+            ads: setup.ads.name().to_owned(),
+            profile: setup.ads.profile().copied(),
+            conversation: self.ads.conversation().map(Arc::new),
+            failure: self.ads.failure().cloned(),
+            seed: setup.seed,
+            start: setup.start,
+            memory: setup.memory.clone(),
+            collisions: self.collisions,
+            incidents: self.incidents,
+            end,
+            duration_s: self.world.time_s(),
+            distance_m: self.distance_m,
+            red_runs: self.world.red_runs(),
+            ticks: self.world.ticks(),
+            steps: self.steps,
+            held: self.held,
+        }
+    }
+}

@@ -1,0 +1,421 @@
+//! Could a careful driver have avoided this collision?
+//!
+//! The world is taken back to the onset of the hazard (see `hazard`), or to the last moment at which an ego vehicle that
+//! had to give way could still stop, if that is earlier, but no further than 8 s. All other
+//! road users then move as recorded until the recorded contact, and after it as they themselves decide.
+//! The ego vehicle, the same car on the same road, is driven by each reference driver in turn; a driver
+//! watches for some time before it takes over, and knows from the first which lane changes of the route are begun or over.
+//! If none of the careful drivers avoids the collision,
+//! evasive manoeuvres that begin at the onset without any delay are tried.
+//!
+//! Where the ego vehicle had to give way, a driver that takes over before the ego vehicle has begun a lane change begins
+//! none without a look aside: the question is whether staying in the lane would have avoided the collision. Where another
+//! vehicle ran into the rear of an ego vehicle that had priority, no driver goes faster than the ego vehicle did: a
+//! vehicle that keeps its lane need not flee from one behind it, which keeps the distance.
+//!
+//! Beside that, each careful driver is asked to the letter of UN R157 (`r157_letter`): from the first conflict of ways
+//! on, the ego vehicle drives along its recorded path at its recorded speed until the model reacts, and then only
+//! brakes. The regulation speaks of a
+//! vehicle that keeps its lane and speed on a motorway. A careful driver in a town does more: it slows down for
+//! bends and for those that have priority before there is a risk. So the first replay counts, and the letter is
+//! reported: where only the first avoids a collision, foresight was missing rather than a reaction.
+//!
+//! A driver avoids the collision if until 4 s after the recorded contact it does not touch the obstacle,
+//! and does not run into any other road user. A contact in which another road user runs into the ego
+//! vehicle does not count, because recorded road users do not give way to a car that is now elsewhere.
+
+use std::collections::VecDeque;
+
+use crate::episode;
+use crate::episode::{Choice, EpisodeLog, Moment, Script, Setup};
+use avastra_base::geometry::{OrientedBox, Pose, wrap_angle};
+use avastra_base::kinematics::GRAVITY_MPS2;
+use avastra_drivers as ads;
+use avastra_drivers::{Ads, Careful, Evasion};
+use avastra_lang::model::Avoidability;
+use avastra_lang::model::vocabulary::Priority;
+use avastra_world::sim::{
+    Contact, Control, DT_S, EgoMotion, FRAME_TICKS, VehicleParameters, World, pedals_for,
+};
+
+use super::hazard::{Onset, last_chance, onset};
+use crate::episode::{run_into_from_behind, struck};
+
+/// A driver that is held to a speed comes near to it in about this time, s. Ours: longer than the pedal's lag.
+const CATCH_UP_S: f64 = 0.6;
+/// The careful drivers: a collision that one of them avoids is avoidable. UN R157's two performance models.
+const CAREFUL: [&str; 2] = ["cc", "fsm"];
+/// Other drivers that are tried and reported.
+const REPORTED: [&str; 2] = ["rss", "r157"];
+/// No onset is earlier than this before the contact, s. Ours: from 20 m/s a careful driver is at rest within 5 s.
+const REWIND_S: f64 = 8.0;
+/// Drivers watch for this long before they take over, s. Ours: longer than any reaction time.
+const WATCH_S: f64 = 2.0;
+/// How long after the recorded contact nothing must happen, s. Ours.
+const AFTER_S: f64 = 4.0;
+
+/// How verdicts are reached. Every run and study records it, so that one that was judged otherwise can be told apart;
+/// nothing else is possible.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct AvoidabilitySettings {
+    careful: Vec<String>,
+    reported: Vec<String>,
+    rewind_s: f64,
+    watch_s: f64,
+    after_s: f64,
+}
+
+impl Default for AvoidabilitySettings {
+    fn default() -> AvoidabilitySettings {
+        let names = |names: [&str; 2]| names.map(str::to_owned).to_vec();
+        AvoidabilitySettings {
+            careful: names(CAREFUL),
+            reported: names(REPORTED),
+            rewind_s: REWIND_S,
+            watch_s: WATCH_S,
+            after_s: AFTER_S,
+        }
+    }
+}
+
+/// The verdict on one collision.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Judgement {
+    pub class: Avoidability,
+    /// When the hazard began, s.
+    pub onset_s: f64,
+    /// Reference drivers that avoid the collision.
+    pub avoided_by: Vec<String>,
+    /// Careful drivers that avoid it to the letter of UN R157, by braking alone.
+    pub r157_letter: Vec<String>,
+    /// The evasive manoeuvre that avoids it, looked for if no careful driver does.
+    pub evasion: Option<String>,
+}
+
+/// Judges every collision of a log, in order, by playing its episode again up to the last of them. `setup` and `script`
+/// are what the log was played from.
+pub fn judge(setup: &Setup, script: &Script, log: &EpisodeLog) -> Vec<Judgement> {
+    let mut judgements = Vec::new();
+    before_each(setup, script, log, &mut |recording, contact, met| {
+        judgements.push(judge_one(recording, contact, met));
+    });
+    judgements
+}
+
+/// As [`judge`], with the ways that the reference drivers took.
+pub fn judge_with_drives(
+    setup: &Setup,
+    script: &Script,
+    log: &EpisodeLog,
+) -> Vec<(Judgement, Vec<ReferenceDrive>)> {
+    let mut found = Vec::new();
+    before_each(setup, script, log, &mut |recording, contact, met| {
+        let judgement = judge_one(recording, contact, met);
+        let from = recording.partition_point(|world| world.time_s() < judgement.onset_s);
+        let case = Case::new(recording, from, contact);
+        found.push((judgement, case.drives()));
+    });
+    found
+}
+
+/// What a reference driver does from the onset of a hazard on, until it is clear or touches something.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReferenceDrive {
+    pub name: String,
+    pub avoids: bool,
+    /// Every 0.1 s.
+    pub places: Vec<DrivenPlace>,
+}
+
+/// Where a reference driver has the ego vehicle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DrivenPlace {
+    pub time_s: f64,
+    /// Centre of its outline.
+    pub pose: Pose,
+    pub speed_mps: f64,
+}
+
+/// Plays an episode again up to its last collision, and hands on the worlds before each, its contact, and the outline of
+/// the ego vehicle there.
+fn before_each(
+    setup: &Setup,
+    script: &Script,
+    log: &EpisodeLog,
+    judge: &mut dyn FnMut(&[World], &Contact, OrientedBox),
+) {
+    let Some(last) = log.collisions.last() else { return };
+    let mut judged = 0;
+    let mut choose = |moment: &Moment<'_>| match moment.step > last.step {
+        true => Choice::Stop,
+        false => script.choose(setup.table, moment),
+    };
+    let kept = ticks(REWIND_S) + ticks(WATCH_S);
+    let mut recording: VecDeque<World> = VecDeque::with_capacity(kept);
+    episode::run(setup, &mut choose, &mut |world, _, contacts| {
+        for contact in contacts {
+            judge(recording.make_contiguous(), contact, world.ego_outline());
+            judged += 1;
+        }
+        // Only the worlds before a contact are asked for.
+        let next = log.collisions.get(judged);
+        let is_soon = |time_s: f64| world.ticks() as usize + kept >= ticks(time_s);
+        if next.is_some_and(|next| is_soon(next.contact.time_s - DT_S)) {
+            if recording.len() == kept {
+                recording.pop_front();
+            }
+            recording.push_back(world.clone());
+        } else {
+            recording.clear();
+        }
+    });
+    assert_eq!(judged, log.collisions.len(), "an episode played again is the same episode");
+}
+
+/// Judges one collision by the worlds before it.
+pub fn judge_one(recording: &[World], contact: &Contact, met: OrientedBox) -> Judgement {
+    let last = recording.len() - 1;
+    // No driver can react to what was never in sight: the takeover is then at the last moment.
+    let onset = onset(recording, contact.obstacle, met).unwrap_or(Onset { first: last, conflict: last });
+    let earliest = (last + 1).saturating_sub(ticks(REWIND_S));
+    let from = onset.first.min(last_chance(recording, contact, met).unwrap_or(last)).max(earliest);
+    let case = Case::new(recording, from, contact);
+    // The letter keeps the recorded path and speed, whoever had to give way.
+    let to_the_letter =
+        Case { from: onset.conflict.max(earliest), speed_mps_max: f64::INFINITY, looks_anew: false, ..case };
+    let avoids = |name: &&str| case.avoids(reference(name, &recording[from]).as_mut());
+    let careful = names(CAREFUL.into_iter().filter(avoids));
+    let reported = names(REPORTED.into_iter().filter(avoids));
+    let brakes_in_time = |name: &&str| {
+        ads::careful(name, recording[from].scene())
+            .is_some_and(|mut driver| to_the_letter.brakes(driver.as_mut()))
+    };
+    let r157_letter = names(CAREFUL.into_iter().filter(brakes_in_time));
+    let evasion = if careful.is_empty() { case.evasion() } else { None };
+    let class = if !careful.is_empty() {
+        Avoidability::Avoidable
+    } else if evasion.is_some() || !reported.is_empty() {
+        Avoidability::BeyondReference
+    } else {
+        Avoidability::Unavoidable
+    };
+    let onset_s = recording[from].time_s();
+    Judgement { class, onset_s, avoided_by: [careful, reported].concat(), r157_letter, evasion }
+}
+
+fn names<'a>(drivers: impl Iterator<Item = &'a str>) -> Vec<String> {
+    drivers.map(str::to_owned).collect()
+}
+
+/// A fresh reference driver.
+fn reference(name: &str, world: &World) -> Box<dyn Ads> {
+    let entry = ads::by_name(name).expect("the reference drivers are in the registry");
+    (entry.build)(world.scene(), 0)
+}
+
+/// A collision that is to be driven again.
+#[derive(Clone, Copy)]
+struct Case<'a> {
+    recording: &'a [World],
+    /// Index of the onset.
+    from: usize,
+    obstacle: u32,
+    /// Whether a driver that takes over decides anew about a lane change that has not begun: the ego vehicle had to give way.
+    looks_anew: bool,
+    /// No reference driver goes faster, m/s; infinite unless the ego vehicle was run into from behind.
+    speed_mps_max: f64,
+}
+
+impl<'a> Case<'a> {
+    fn new(recording: &'a [World], from: usize, contact: &Contact) -> Case<'a> {
+        let speed_mps_max = match run_into_from_behind(contact, &VehicleParameters::MKZ) {
+            true => recording[from..].iter().map(|world| world.ego().speed_mps).fold(0.0, f64::max),
+            false => f64::INFINITY,
+        };
+        let looks_anew = contact.priority == Priority::Other;
+        Case { recording, from, obstacle: contact.obstacle, looks_anew, speed_mps_max }
+    }
+
+    /// Whether a driver that watches first avoids the collision.
+    fn avoids(&self, driver: &mut dyn Ads) -> bool {
+        self.show(driver);
+        self.drive(driver, &mut |_| true)
+    }
+
+    /// The drives of all reference drivers.
+    fn drives(&self) -> Vec<ReferenceDrive> {
+        let drive = |name: &str| {
+            let mut driver = reference(name, &self.recording[self.from]);
+            let mut places = Vec::new();
+            self.show(driver.as_mut());
+            let avoids = self.drive(driver.as_mut(), &mut |world| {
+                let (time_s, pose) = (world.time_s(), world.ego_outline().pose);
+                places.push(DrivenPlace { time_s, pose, speed_mps: world.ego().speed_mps });
+                true
+            });
+            ReferenceDrive { name: name.to_owned(), avoids, places }
+        };
+        CAREFUL.into_iter().chain(REPORTED).map(drive).collect()
+    }
+
+    /// Shows a driver the time before the onset.
+    fn show(&self, driver: &mut dyn Ads) {
+        let watched = self.from - self.from.min(ticks(WATCH_S));
+        let mut sensed = self.recording[watched].sensed();
+        for world in &self.recording[watched..self.from] {
+            world.sense(&mut sensed);
+            driver.drive(&sensed);
+        }
+    }
+
+    /// Whether a driver's model avoids the collision to the letter of UN R157: by braking on the recorded path,
+    /// from the recorded speed. After the recorded contact the driver drives on by itself.
+    fn brakes(&self, driver: &mut dyn Careful) -> bool {
+        self.show(driver);
+        let recording = &self.recording[self.from..];
+        let mut world = recording[0].clone();
+        let mut sensed = world.sensed();
+        let mut held = Held::new(recording);
+        for recorded in &recording[1..] {
+            world.sense(&mut sensed);
+            driver.drive(&sensed);
+            let grip_mps2 = world.conditions().friction * GRAVITY_MPS2;
+            let motion = held.step(recorded.ego(), driver.braking_mps2().min(grip_mps2));
+            if self.is_hit(world.tick_placed(motion, recorded)) {
+                return false;
+            }
+        }
+        self.is_clear_after(&mut world, driver, &mut |_| true)
+    }
+
+    /// The first manoeuvre that avoids the collision on the road, in words.
+    fn evasion(&self) -> Option<String> {
+        let start = &self.recording[self.from];
+        let mut manoeuvres = Evasion::all(start.scene());
+        let starts_on_road = is_on_road(start);
+        let free = Case { speed_mps_max: f64::INFINITY, ..*self };
+        let found = manoeuvres.find(|manoeuvre| {
+            let mut driver = manoeuvre.clone();
+            free.drive(&mut driver, &mut |world| !starts_on_road || is_on_road(world))
+        })?;
+        Some(found.describe())
+    }
+
+    /// Drives from the onset on; `false` if there is a collision, or a world is not `allowed`.
+    fn drive(&self, driver: &mut dyn Ads, allowed: &mut dyn FnMut(&World) -> bool) -> bool {
+        let mut world = self.recording[self.from].clone();
+        let mut sensed = world.sensed();
+        if self.looks_anew {
+            driver.take_over(&sensed);
+        }
+        for recorded in &self.recording[self.from + 1..] {
+            world.sense(&mut sensed);
+            let control = self.held(driver.drive(&sensed), &world);
+            if self.is_hit(world.tick_recorded(&control, recorded)) || !self.is_fine(&world, allowed) {
+                return false;
+            }
+        }
+        self.is_clear_after(&mut world, driver, allowed)
+    }
+
+    /// Whether nothing happens for some time after the recorded contact.
+    fn is_clear_after(
+        &self,
+        world: &mut World,
+        driver: &mut (impl Ads + ?Sized),
+        allowed: &mut dyn FnMut(&World) -> bool,
+    ) -> bool {
+        let mut sensed = world.sensed();
+        for _ in 0..ticks(AFTER_S) {
+            world.sense(&mut sensed);
+            let control = self.held(driver.drive(&sensed), world);
+            if self.is_hit(world.tick(&control)) || !self.is_fine(world, allowed) {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// A command with no more throttle than the highest speed allows.
+    fn held(&self, control: Control, world: &World) -> Control {
+        if self.speed_mps_max.is_infinite() {
+            return control;
+        }
+        let (throttle_pct, _) = pedals_for((self.speed_mps_max - world.ego().speed_mps) / CATCH_UP_S);
+        Control { throttle_pct: control.throttle_pct.min(throttle_pct), ..control }
+    }
+
+    fn is_hit(&self, contacts: &[Contact]) -> bool {
+        contacts
+            .iter()
+            .any(|contact| contact.obstacle == self.obstacle || !struck(contact, &VehicleParameters::MKZ))
+    }
+
+    fn is_fine(&self, world: &World, allowed: &mut dyn FnMut(&World) -> bool) -> bool {
+        !world.ticks().is_multiple_of(FRAME_TICKS) || allowed(world)
+    }
+}
+
+/// An ego vehicle that moves as recorded until a model brakes, and from then on only brakes, on the recorded path.
+struct Held<'a> {
+    recording: &'a [World],
+    /// Way to each recorded place, m.
+    ways_m: Vec<f64>,
+    tick: usize,
+    /// Speed and way since the model brakes; `None` before.
+    braked: Option<(f64, f64)>,
+}
+
+impl<'a> Held<'a> {
+    fn new(recording: &'a [World]) -> Held<'a> {
+        let mut ways_m = vec![0.0];
+        for pair in recording.windows(2) {
+            let step = pair[1].ego().rear_axle.position - pair[0].ego().rear_axle.position;
+            ways_m.push(ways_m[ways_m.len() - 1] + step.norm());
+        }
+        Held { recording, ways_m, tick: 0, braked: None }
+    }
+
+    /// The motion at the end of the next tick; `recorded` is the recorded one.
+    fn step(&mut self, recorded: EgoMotion, braking_mps2: f64) -> EgoMotion {
+        let before_mps =
+            self.braked.map_or(self.recording[self.tick].ego().speed_mps, |(speed_mps, _)| speed_mps);
+        let before_m = self.braked.map_or(self.ways_m[self.tick], |(_, way_m)| way_m);
+        self.tick += 1;
+        if self.braked.is_none() && braking_mps2 <= 0.0 {
+            return recorded;
+        }
+        let speed_mps = (before_mps - braking_mps2 * DT_S).max(0.0);
+        let way_m = before_m + (before_mps + speed_mps) / 2.0 * DT_S;
+        self.braked = Some((speed_mps, way_m));
+        let acceleration_mps2 = (speed_mps - before_mps) / DT_S;
+        EgoMotion { speed_mps, acceleration_mps2, ..self.at(way_m) }
+    }
+
+    /// The recorded motion at a way; beyond the last place the path goes on straight.
+    fn at(&self, way_m: f64) -> EgoMotion {
+        let last = self.recording.len() - 1;
+        let after = self.ways_m.partition_point(|at_m| *at_m <= way_m).clamp(1, last.max(1));
+        let Some(next) = self.recording.get(after) else { return self.recording[last].ego() };
+        let (here, next) = (self.recording[after - 1].ego(), next.ego());
+        let length_m = self.ways_m[after] - self.ways_m[after - 1];
+        let beyond_m = way_m - self.ways_m[after - 1];
+        let fraction = if length_m > 1e-9 { beyond_m / length_m } else { 0.0 };
+        let (a, b) = (here.rear_axle, next.rear_axle);
+        let turn_rad = wrap_angle(b.heading_rad - a.heading_rad) * fraction.min(1.0);
+        let position = a.position + (b.position - a.position) * fraction;
+        EgoMotion { rear_axle: Pose { position, heading_rad: wrap_angle(a.heading_rad + turn_rad) }, ..here }
+    }
+}
+
+/// Whether all corners of the ego vehicle are on driving lanes, of either direction.
+fn is_on_road(world: &World) -> bool {
+    let outline = world.ego_outline();
+    let map = &world.scene().map;
+    outline.corners().into_iter().all(|corner| map.nearest(corner, outline.pose.heading_rad, 1e-6).is_some())
+}
+
+fn ticks(duration_s: f64) -> usize {
+    (duration_s / DT_S).round() as usize
+}

@@ -1,0 +1,104 @@
+//! How hard a collision was.
+//!
+//! Delta-v is the change of velocity of a perfectly inelastic impact of two bodies across the gap that closes:
+//! `m2 / (m1 + m2)` of the speed at which it closes where they meet. What slides along the contact changes nothing,
+//! so a scrape at 20 m/s is no crash at 20 m/s. Both are taken to be hit in line with their centres; an impact
+//! beside them turns the bodies and changes their velocity less, so this is an upper bound. The world carries the same
+//! impact out (`sim::contact`), as far as a car can follow: neither backwards nor sideways. Injury models are left out:
+//! their curves describe whole populations.
+
+use crate::episode::Collision;
+use avastra_base::geometry::Vec2;
+use avastra_base::kinematics::STANDING_MPS;
+use avastra_world::sim::VehicleParameters;
+
+use crate::episode::side;
+
+/// How hard an impact was.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Severity {
+    /// Speed at which the gap closed where the outlines met, m/s.
+    pub closing_speed_mps: f64,
+    /// Speed of the two relative to each other, m/s.
+    pub relative_speed_mps: f64,
+    /// Change of velocity of the ego vehicle, m/s.
+    pub delta_v_mps: f64,
+    /// Change of velocity of the obstacle, m/s.
+    pub obstacle_delta_v_mps: f64,
+    /// Where the ego vehicle was hit: `front`, `front left`, `front right` (its corners), `left`, `right`
+    /// or `rear`.
+    pub side: &'static str,
+    /// How the obstacle moved, seen from the ego vehicle: `standing`, `along` with it, `oncoming`,
+    /// `from the left` or `from the right`.
+    pub approach: &'static str,
+}
+
+/// The severity of a collision.
+pub fn severity(collision: &Collision) -> Severity {
+    let contact = &collision.contact;
+    let obstacle_mps = contact.obstacle_velocity_on_ego_mps;
+    let (ahead_mps, left_mps) = (contact.ego_speed_mps - obstacle_mps.x, obstacle_mps.y);
+    let relative_speed_mps = (ahead_mps * ahead_mps + left_mps * left_mps).sqrt();
+    let (ego_t, other_t) = (VehicleParameters::MKZ.mass_t, collision.mass_t);
+    let part = |mass_t: f64| mass_t / (ego_t + other_t) * contact.closing_speed_mps;
+    Severity {
+        closing_speed_mps: contact.closing_speed_mps,
+        relative_speed_mps,
+        delta_v_mps: part(other_t),
+        obstacle_delta_v_mps: part(ego_t),
+        side: side(contact.on_ego, &VehicleParameters::MKZ),
+        approach: approach(obstacle_mps),
+    }
+}
+
+/// How the obstacle moves, by its velocity in the ego vehicle's frame: x ahead, y left.
+fn approach(velocity_mps: Vec2) -> &'static str {
+    match velocity_mps {
+        v if v.norm() < STANDING_MPS => "standing",
+        v if v.y.abs() <= v.x.abs() && v.x > 0.0 => "along",
+        v if v.y.abs() <= v.x.abs() => "oncoming",
+        v if v.y > 0.0 => "from the right",
+        _ => "from the left",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use avastra_lang::model::BodyWord;
+    use avastra_lang::model::body::parameters;
+    use avastra_lang::model::vocabulary::{Body, Priority, Verb};
+    use avastra_world::sim::Contact;
+
+    #[test]
+    fn momentum_is_kept() {
+        let contact = Contact {
+            time_s: 10.0,
+            obstacle: 1,
+            point: Vec2::zeros(),
+            on_ego: Vec2::new(2.4, 0.3),
+            ego_speed_mps: 8.0,
+            obstacle_velocity_mps: Vec2::zeros(),
+            obstacle_velocity_on_ego_mps: Vec2::new(4.0, 3.0),
+            closing_speed_mps: 4.0,
+            priority: Priority::None,
+        };
+        for body in [Body::SchoolBus, Body::Hatchback, Body::Pedestrian] {
+            let mass_t = parameters(body).mass_t;
+            let collision = Collision {
+                contact,
+                step: 0,
+                body: BodyWord::engine(body),
+                mass_t,
+                verb: Verb::DriveAhead,
+                spawned_s: 5.0,
+            };
+            let found = severity(&collision);
+            assert_eq!((found.relative_speed_mps, found.side, found.approach), (5.0, "front", "along"));
+            // It closes at 4 m/s; 3 m/s along the bumper do nothing.
+            assert!((found.delta_v_mps + found.obstacle_delta_v_mps - 4.0).abs() < 1e-12);
+            let (ego_t, other_t) = (VehicleParameters::MKZ.mass_t, parameters(body).mass_t);
+            assert!((ego_t * found.delta_v_mps - other_t * found.obstacle_delta_v_mps).abs() < 1e-9);
+        }
+    }
+}

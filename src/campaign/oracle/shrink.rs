@@ -1,0 +1,400 @@
+//! The smallest scenario that still makes the same crash.
+//!
+//! Fewest actions first (ddmin, Zeller and Hildebrandt 2002), then fewest steps, ambient vehicles and
+//! effects, then the plainest start (noon under a clear sky) and values; all passes repeat until nothing
+//! changes. Every candidate is played, and every action in it must be legal by the rules of the space. The
+//! crash is the same if the ego vehicle hits an obstacle with the same body and verb, the class of the
+//! verdict is the same, and the space's verdict still counts it, or still does not. The result is
+//! 1-minimal: if any one step is removed, or replaced by waiting, the crash is gone or is another one.
+
+use std::sync::Arc;
+
+use crate::episode;
+use crate::episode::{Choice, Collision, EpisodeLog, Moment, Outcome, Script, ScriptedAction, Setup};
+use avastra_lang::model::vocabulary::Verb;
+use avastra_lang::model::{Avoidability, BodyWord, Domain, Memory, Value};
+use avastra_world::action::{ActionTable, Draw};
+use avastra_world::sim::Start;
+
+use super::avoidable::{Judgement, judge};
+use super::facts::counts;
+
+/// Most rounds of all passes. Each round makes something smaller or plainer; most crashes need two.
+const ROUNDS_MAX: usize = 8;
+
+/// A smaller scenario with the same crash.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shrunk {
+    pub script: Script,
+    pub start: Start,
+    /// States of the space at the start.
+    pub memory: Memory,
+    pub log: EpisodeLog,
+    /// One for each collision of the log.
+    pub judgements: Vec<Judgement>,
+    /// Index of the crash among the collisions of the log.
+    pub index: usize,
+    /// Episodes that were played to find it.
+    pub plays: u32,
+}
+
+/// Shrinks what led to the nth collision of a log that was played from `setup`.
+pub fn shrink(setup: &Setup, log: &EpisodeLog, index: usize, judgements: &[Judgement]) -> Shrunk {
+    let mut search = Search::new(setup, log, index, judgements);
+    let mut best = Candidate::of(setup, log, index);
+    for _ in 0..ROUNDS_MAX {
+        let before = best.clone();
+        search.fewest_actions(&mut best);
+        search.fewest_steps(&mut best);
+        search.fewest_ambient(&mut best);
+        search.fewest_delays(&mut best);
+        search.fewest_effects(&mut best);
+        search.plainest_start(&mut best);
+        search.plainest_values(&mut best);
+        if best == before {
+            break;
+        }
+    }
+    let (kept, _) = search.keeps(&best, None).expect("every candidate that was taken makes the crash");
+    Shrunk {
+        script: best.script,
+        start: best.start,
+        memory: best.memory,
+        log: kept.log,
+        judgements: kept.judgements,
+        index: kept.index,
+        plays: search.plays,
+    }
+}
+
+/// Steps that are not needed for the nth collision of a log: each alone could be removed, or replaced by waiting, and
+/// the collision stays the same. Empty if the scenario is 1-minimal.
+pub fn spare_steps(setup: &Setup, log: &EpisodeLog, index: usize, judgements: &[Judgement]) -> Vec<usize> {
+    let mut search = Search::new(setup, log, index, judgements);
+    let whole = Candidate::of(setup, log, index);
+    let steps = whole.script.steps.len();
+    let is_spare = |&step: &usize| {
+        let mut waiting = whole.clone();
+        let acts = waiting.script.steps[step].take().is_some();
+        let mut shorter = whole.clone();
+        shorter.script.steps.remove(step);
+        (acts && search.keeps(&waiting, None).is_some())
+            || (steps > 1 && search.keeps(&shorter, None).is_some())
+    };
+    (0..steps).filter(is_spare).collect()
+}
+
+/// What is made smaller.
+#[derive(Debug, Clone, PartialEq)]
+struct Candidate {
+    script: Script,
+    start: Start,
+    memory: Memory,
+}
+
+impl Candidate {
+    /// What led to the nth collision of a log.
+    fn of(setup: &Setup, log: &EpisodeLog, index: usize) -> Candidate {
+        let mut script = Script::of_log(log);
+        script.steps.truncate(log.collisions[index].step + 1);
+        Candidate { script, start: setup.start, memory: setup.memory.clone() }
+    }
+}
+
+/// A candidate that makes the crash.
+struct Kept {
+    log: EpisodeLog,
+    judgements: Vec<Judgement>,
+    /// Index of the crash among the collisions.
+    index: usize,
+}
+
+/// The crash that must stay, and the number of plays so far.
+struct Search<'a> {
+    setup: &'a Setup<'a>,
+    body: BodyWord,
+    verb: Verb,
+    class: Avoidability,
+    counts: bool,
+    plays: u32,
+}
+
+/// A step, and an action to try there: its values are wishes, which the rules may change.
+type Wish<'w> = Option<(usize, &'w ScriptedAction)>;
+
+impl<'a> Search<'a> {
+    fn new(setup: &'a Setup<'a>, log: &EpisodeLog, index: usize, judgements: &[Judgement]) -> Search<'a> {
+        let collision = &log.collisions[index];
+        Search {
+            setup,
+            body: collision.body,
+            verb: collision.verb,
+            class: judgements[index].class,
+            counts: counts(setup.table.space(), log, index, &judgements[index]),
+            plays: 0,
+        }
+    }
+
+    /// Plays a candidate; `None` if the crash is another or none, or an action is not legal. With a wish,
+    /// the action of one step is carried out with the legal values nearest to it. The second of the
+    /// results is the script as it was carried out, up to the crash.
+    fn keeps(&mut self, candidate: &Candidate, wish: Wish) -> Option<(Kept, Script)> {
+        self.plays += 1;
+        let log = self.play(candidate, wish);
+        let is_refused = |step: &episode::StepLog| matches!(step.outcome, Outcome::Refused { .. });
+        let alike = |collision: &Collision| collision.body == self.body && collision.verb == self.verb;
+        if log.steps.iter().any(is_refused) || !log.collisions.iter().any(alike) {
+            return None;
+        }
+        let mut script = Script::of_log(&log);
+        let judgements = judge(&self.begin(candidate), &script, &log);
+        let same = |index: &usize| {
+            let counts = counts(self.setup.table.space(), &log, *index, &judgements[*index]);
+            alike(&log.collisions[*index]) && judgements[*index].class == self.class && counts == self.counts
+        };
+        let index = (0..log.collisions.len()).find(same)?;
+        script.steps.truncate(log.collisions[index].step + 1);
+        Some((Kept { log, judgements, index }, script))
+    }
+
+    fn play(&self, candidate: &Candidate, wish: Wish) -> EpisodeLog {
+        let setup = self.begin(candidate);
+        let choose = &mut |moment: &Moment<'_>| match wish {
+            Some((step, action)) if step == moment.step => wished(setup.table, moment, action),
+            _ => candidate.script.choose(setup.table, moment),
+        };
+        episode::run(&setup, choose, &mut |_, _, _| {})
+    }
+
+    fn begin(&self, candidate: &Candidate) -> Setup<'_> {
+        Setup { start: candidate.start, memory: candidate.memory.clone(), ..self.setup.clone() }
+    }
+
+    /// Takes a candidate if it keeps the crash.
+    fn take(&mut self, best: &mut Candidate, candidate: Candidate, wish: Wish) -> bool {
+        let Some((_, script)) = self.keeps(&candidate, wish) else { return false };
+        *best = Candidate { script, ..candidate };
+        true
+    }
+
+    /// Replaces actions by waiting: ddmin over the steps that do something.
+    fn fewest_actions(&mut self, best: &mut Candidate) {
+        let mut parts = 2;
+        loop {
+            let acting: Vec<usize> =
+                (0..best.script.steps.len()).filter(|&step| best.script.steps[step].is_some()).collect();
+            if acting.is_empty() {
+                return;
+            }
+            let size = acting.len().div_ceil(parts.min(acting.len()));
+            let without = |chunk: &[usize]| {
+                let mut candidate = best.clone();
+                chunk.iter().for_each(|&step| candidate.script.steps[step] = None);
+                candidate
+            };
+            let candidates: Vec<Candidate> = acting.chunks(size).map(without).collect();
+            let found = candidates.into_iter().any(|candidate| self.take(best, candidate, None));
+            if found {
+                parts = 2.max(parts - 1);
+            } else if size == 1 {
+                return;
+            } else {
+                parts = (2 * parts).min(acting.len());
+            }
+        }
+    }
+
+    /// Leaves steps out, so that all later ones come earlier.
+    fn fewest_steps(&mut self, best: &mut Candidate) {
+        let mut step = 0;
+        while step < best.script.steps.len() {
+            let mut candidate = best.clone();
+            candidate.script.steps.remove(step);
+            if candidate.script.steps.is_empty() || !self.take(best, candidate, None) {
+                step += 1;
+            }
+        }
+    }
+
+    /// Ambient vehicles: none, or as few as halving finds.
+    fn fewest_ambient(&mut self, best: &mut Candidate) {
+        let mut fewer = 0;
+        while fewer < best.start.ambient {
+            let mut candidate = best.clone();
+            candidate.start.ambient = fewer;
+            if self.take(best, candidate, None) {
+                return;
+            }
+            fewer += (best.start.ambient - fewer).div_ceil(2);
+        }
+    }
+
+    /// Actions at the beginning of their step.
+    fn fewest_delays(&mut self, best: &mut Candidate) {
+        for step in 0..best.script.steps.len() {
+            let mut candidate = best.clone();
+            let Some(action) = candidate.script.steps.get_mut(step).and_then(Option::as_mut) else {
+                continue;
+            };
+            if action.trigger.take().is_some() {
+                self.take(best, candidate, None);
+            }
+        }
+    }
+
+    /// Rows that do less, with the same values for parameters of the same name.
+    fn fewest_effects(&mut self, best: &mut Candidate) {
+        let log = self.play(best, None);
+        self.plays += 1;
+        for (step, logged) in log.steps.iter().enumerate().take(best.script.steps.len()) {
+            let Outcome::Done { draw, .. } = &logged.outcome else { continue };
+            for row in 0..self.setup.table.rows().len() {
+                if effects(self.setup.table, row)
+                    >= draw.effects.len().min(effects(self.setup.table, draw.row))
+                {
+                    continue;
+                }
+                let mut candidate = best.clone();
+                candidate.script.steps[step] =
+                    Some(ScriptedAction { row, values: draw.values.clone(), trigger: None });
+                if self.take(best, candidate, None) {
+                    break;
+                }
+            }
+        }
+    }
+
+    /// Noon under a clear sky, or as much of it as keeps the crash.
+    fn plainest_start(&mut self, best: &mut Candidate) {
+        let space = self.setup.table.space();
+        let plain: Vec<(usize, Value)> = space.plain_weather();
+        let all: Vec<&[(usize, Value)]> = core::iter::once(&plain[..]).chain(plain.chunks(1)).collect();
+        for cells in all {
+            let mut candidate = best.clone();
+            for &(cell, value) in cells {
+                candidate.memory = candidate.memory.with(cell, value);
+            }
+            if candidate.memory == best.memory {
+                continue;
+            }
+            let Start { ego_mps, signal_phase_s, seed, ambient, traffic, .. } = best.start;
+            let start = episode::start(space, &candidate.memory, self.setup.seed);
+            candidate.start = Start { ego_mps, signal_phase_s, seed, ambient, traffic, ..start };
+            self.take(best, candidate, None);
+        }
+    }
+
+    /// Round numbers, or the bounds of what rules allow; the first of a list's words.
+    fn plainest_values(&mut self, best: &mut Candidate) {
+        let phase_s = best.start.signal_phase_s;
+        for unit_s in [10.0, 1.0] {
+            let mut candidate = best.clone();
+            candidate.start.signal_phase_s = (phase_s / unit_s).floor() * unit_s;
+            if candidate.start != best.start && self.take(best, candidate, None) {
+                break;
+            }
+        }
+        for step in 0..best.script.steps.len() {
+            let values = best.script.steps.get(step).cloned().flatten().map(|action| action.values.len());
+            for value in 0..values.unwrap_or(0) {
+                self.plainest_value(best, step, value);
+            }
+        }
+    }
+
+    fn plainest_value(&mut self, best: &mut Candidate, step: usize, index: usize) {
+        let Some(Some(action)) = best.script.steps.get(step).cloned() else { return };
+        let (name, value) = action.values[index].clone();
+        let parameters =
+            &self.setup.table.space().actions[self.setup.table.rows()[action.row].action].parameters;
+        let parameter = parameters.iter().find(|parameter| parameter.name == name);
+        let domain = &parameter.expect("a legal action has values for its own parameters").domain;
+        let with = |value: Value| {
+            let mut wish = action.clone();
+            wish.values[index].1 = value;
+            wish
+        };
+        let candidates: Vec<Value> = match domain {
+            Domain::Values(values) => values.iter().copied().take_while(|other| *other != value).collect(),
+            Domain::Range(..) => {
+                let ends = <[f64; 2]>::from(domain.ends());
+                let number = value.number();
+                let reached = ends.map(|end| self.reached(best, step, &with(Value::Number(end)), index));
+                if reached.contains(&Some(number)) {
+                    // A bound of a rule is plain; only rounder numbers are plainer.
+                    round(number).into_iter().take(2).map(Value::Number).collect()
+                } else {
+                    let bounds = reached.into_iter().flatten();
+                    round(number).into_iter().chain(bounds).map(Value::Number).collect()
+                }
+            }
+        };
+        for wanted in candidates {
+            let wish = with(wanted);
+            let Some((_, script)) = self.keeps(best, Some((step, &wish))) else { continue };
+            // A value that the rules have changed is no plainer than the old one.
+            let got = script.steps.get(step).and_then(Option::as_ref);
+            if got.is_some_and(|got| got.values[index].1 == wanted) {
+                best.script = script;
+                return;
+            }
+        }
+    }
+
+    /// What the rules make of a wish for one value.
+    fn reached(&mut self, best: &Candidate, step: usize, wish: &ScriptedAction, index: usize) -> Option<f64> {
+        self.plays += 1;
+        let log = self.play(best, Some((step, wish)));
+        match &log.steps.get(step)?.outcome {
+            Outcome::Done { draw, .. } => Some(draw.values[index].1.number()),
+            Outcome::Passed | Outcome::Refused { .. } => None,
+        }
+    }
+}
+
+/// The action with the legal values nearest to those wished for.
+fn wished(table: &ActionTable, moment: &Moment, action: &ScriptedAction) -> Choice {
+    let given: &[(Arc<str>, Value)] = &action.values;
+    match table.nearest(moment.situation, action.row, given) {
+        Ok(draw) => Choice::Act(Draw { row: action.row, ..draw }),
+        Err(refusals) => {
+            let first = refusals.into_iter().next().expect("a refusal comes with a reason");
+            Choice::Refused { row: action.row, rule: first.rule, reason: first.reason }
+        }
+    }
+}
+
+/// Number of effects that a row has in its space.
+fn effects(table: &ActionTable, row: usize) -> usize {
+    table.space().actions[table.rows()[row].action].effects.len()
+}
+
+/// Rounder numbers near a number, the roundest first: multiples of 10, 5, 1 and a half. Empty if the number
+/// is as round already.
+fn round(number: f64) -> Vec<f64> {
+    let mut found = Vec::new();
+    for unit in [10.0, 5.0, 1.0, 0.5] {
+        let nearest = (number / unit).round() * unit;
+        if nearest == number {
+            break;
+        }
+        if !found.contains(&nearest) {
+            found.push(nearest);
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounder_numbers_come_first_and_end_with_the_number_itself() {
+        assert_eq!(round(11.28125), [10.0, 11.0, 11.5]);
+        assert_eq!(round(12.5), [10.0, 15.0, 13.0]);
+        assert_eq!(round(15.0), [20.0]);
+        assert!(round(20.0).is_empty());
+        assert_eq!(round(0.75), [0.0, 1.0]);
+    }
+}

@@ -1,0 +1,103 @@
+//! Small changes of a scenario, and how often it crashes under them.
+//!
+//! On a street, no value of a scenario repeats to the last digit. A variation changes, each by its own
+//! draw: when an action happens (normal, 0.1 s, cut at 0.3 s; the first stays at the start), every
+//! speed that an action draws (normal, 2 %, cut at 6 %), the phase of the signals (normal, 0.1 s, cut
+//! at 0.3 s), and all errors of the driving system's sensors, which are drawn anew. What the rules set
+//! follows from the changed values, and values stay within the rules. The widths are ours: how much
+//! repetitions of one manoeuvre may differ on a proving ground.
+
+use std::sync::Arc;
+
+use crate::episode::{Choice, EpisodeLog, Moment, Setup};
+use avastra_base::rng;
+use avastra_base::rng::{Rng, Stream};
+use avastra_base::statistics::proportion;
+use avastra_base::units::Dimension;
+use avastra_lang::model::{Type, Value};
+use avastra_world::sim::DT_S;
+
+use super::crash::{Crash, play};
+
+/// Standard deviation of times, s.
+const TIME_S: f64 = 0.1;
+/// Standard deviation of speeds, as a part of them.
+const SPEED: f64 = 0.02;
+/// Draws are cut at this many standard deviations.
+const CUT: f64 = 3.0;
+/// Draws that are tried for a step; if all are illegal, the step is carried out as it was.
+const DRAWS_MAX: u32 = 8;
+
+/// How often a collision happens under variations.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Likelihood {
+    pub variations: u32,
+    pub crashes: u32,
+    /// Share of the variations that crash. One in which the obstacle never appeared, or the ego vehicle had
+    /// no way to it, counts as no crash.
+    pub share: f64,
+    /// 95 % interval of the share, after Wilson.
+    pub low: f64,
+    pub high: f64,
+}
+
+/// The nth collision of a log under `variations` small changes; `setup` is what it was played from.
+/// A variation crashes if the ego vehicle runs into the same obstacle.
+pub fn likelihood(setup: &Setup, log: &EpisodeLog, index: usize, variations: u32) -> Likelihood {
+    let crash = Crash::new(setup, log, index);
+    let crashes = (1..=variations).filter(|&number| crash.again(&varied(&crash, number)).is_some());
+    let crashes = crashes.count() as u32;
+    let (share, [low, high]) = proportion(crashes, variations);
+    Likelihood { variations, crashes, share, low, high }
+}
+
+/// Plays a scenario with small changes. A number selects the changes.
+fn varied(crash: &Crash, number: u32) -> EpisodeLog {
+    let seed = rng::child_seed(crash.setup.seed, Stream::Variation, u64::from(number));
+    let mut rng = rng::stream(seed, Stream::Variation, 0);
+    let mut setup = crash.setup.clone();
+    setup.seed = seed;
+    setup.start.signal_phase_s = (setup.start.signal_phase_s + cut_normal(&mut rng) * TIME_S).max(0.0);
+    let mut late_ticks = 0;
+    for _ in 1..crash.script.steps.len() {
+        let next_ticks = (cut_normal(&mut rng) * TIME_S / DT_S).round() as i32;
+        setup.period_shifts.push(next_ticks - late_ticks);
+        late_ticks = next_ticks;
+    }
+    play(&setup, |moment| choose(crash, seed, moment)).0
+}
+
+/// The action of a step with other speeds. Where none of several draws is legal, the action is tried as it
+/// was written.
+fn choose(crash: &Crash, seed: u64, moment: &Moment) -> Choice {
+    let table = crash.setup.table;
+    let Some(Some(action)) = crash.script.steps.get(moment.step) else {
+        return crash.script.choose(table, moment);
+    };
+    let parameters = &table.space().actions[table.rows()[action.row].action].parameters;
+    let is_speed =
+        |name: &str| parameters.iter().any(|p| &*p.name == name && p.ty == Type::Quantity(Dimension::SPEED));
+    let mut rng = rng::stream(seed, Stream::Variation, 1 + moment.step as u64);
+    for _ in 0..DRAWS_MAX {
+        let values: Vec<(Arc<str>, Value)> = action
+            .values
+            .iter()
+            .map(|(name, value)| match value {
+                Value::Number(speed_mps) if is_speed(name) => {
+                    let changed_mps = speed_mps * (1.0 + cut_normal(&mut rng) * SPEED);
+                    (name.clone(), Value::Number(changed_mps))
+                }
+                _ => (name.clone(), *value),
+            })
+            .collect();
+        if let Ok(draw) = table.nearest(moment.situation, action.row, &values) {
+            return Choice::Act(draw);
+        }
+    }
+    crash.script.choose(table, moment)
+}
+
+/// Standard normal, no farther out than [`CUT`].
+fn cut_normal(rng: &mut Rng) -> f64 {
+    rng::normal(rng).clamp(-CUT, CUT)
+}

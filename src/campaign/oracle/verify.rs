@@ -1,0 +1,193 @@
+//! The claims of an emitted scenario against what a replay finds.
+
+use crate::episode::{Collision, EpisodeLog, Outcome};
+use avastra_drivers::Module;
+use avastra_lang::model::vocabulary::Word;
+use avastra_lang::model::{Claim, Obstacle, Scenario, Space, digest_text};
+
+use super::avoidable::Judgement;
+use super::cause::NoModules;
+use super::facts;
+
+/// One claim, and what the replay says of it.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct ClaimResult {
+    /// The claim in words.
+    pub claim: String,
+    /// None if it could not be tried.
+    pub confirmed: Option<bool>,
+    /// What the replay found instead, or `as claimed`; why it was not tried.
+    pub found: String,
+}
+
+impl ClaimResult {
+    pub fn is_refuted(&self) -> bool {
+        self.confirmed == Some(false)
+    }
+}
+
+/// An external driving system that is known by its recorded answers alone cannot drive anything else.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("not tried (needs the driving system: `--ads`)")]
+pub struct NoTries;
+
+/// Findings that take many replays. Only some claims ask for them. Each is about the nth collision of the log.
+pub struct Replays<'a> {
+    /// The modules at fault.
+    pub cause: &'a dyn Fn(usize) -> Result<Vec<Module>, NoModules>,
+    /// Steps that could be left out with the same crash; an external driving system must be there to try.
+    pub spare_steps: &'a dyn Fn(usize) -> Result<Vec<usize>, NoTries>,
+}
+
+/// Checks every claim of a scenario, and that each of its steps was legal. `judgements` has one for
+/// each collision of the log.
+pub fn verify(
+    space: &Space,
+    scenario: &Scenario,
+    log: &EpisodeLog,
+    judgements: &[Judgement],
+    replays: &Replays,
+) -> Vec<ClaimResult> {
+    let steps = log.steps.iter().enumerate().filter_map(|(number, step)| match &step.outcome {
+        Outcome::Refused { rule, reason, .. } => {
+            let rule = rule.as_ref().map_or(String::new(), |rule| format!("rule `{rule}`: "));
+            Some(judged(format!("step {number} is legal"), Err(format!("{rule}{reason}"))))
+        }
+        _ => None,
+    });
+    let claims = scenario.claims.iter().map(|claim| check(space, claim, log, judgements, replays));
+    steps.chain(claims).collect()
+}
+
+fn check(
+    space: &Space,
+    claim: &Claim,
+    log: &EpisodeLog,
+    judgements: &[Judgement],
+    replays: &Replays,
+) -> ClaimResult {
+    match claim {
+        Claim::Collision { obstacle, time } => {
+            let at = time.as_ref().map_or(String::new(), |time| format!(" at {time}"));
+            let outcome = collision(log, *obstacle).and_then(|index| match time {
+                Some(claimed) if !claimed.rounds(log.collisions[index].contact.time_s) => {
+                    Err(format!("at {:.2} s", log.collisions[index].contact.time_s))
+                }
+                _ => Ok(()),
+            });
+            judged(format!("collision{}{at}", with(*obstacle)), outcome)
+        }
+        Claim::Verdict { name, obstacle } => {
+            let judge = |index: usize| {
+                let facts = facts(log, index, &judgements[index]);
+                match space.verdict(name, facts, log.memory_after(log.collisions[index].step)) {
+                    Some(true) => Ok(()),
+                    _ => Err(format!(
+                        "repeated: {}, sudden: {}, struck: {}, priority: {}, {}",
+                        facts.repeated,
+                        facts.sudden,
+                        facts.struck,
+                        facts.priority.name(),
+                        in_words(&judgements[index])
+                    )),
+                }
+            };
+            judged(format!("{name}{}", with(*obstacle)), collision(log, *obstacle).and_then(judge))
+        }
+        Claim::Avoidability { class, by, obstacle } => {
+            let judge = |index: usize| {
+                let found = &judgements[index];
+                let same_drivers = by.as_ref().is_none_or(|by| *by == found.avoided_by);
+                if *class == found.class && same_drivers { Ok(()) } else { Err(in_words(found)) }
+            };
+            let claim = format!("{}{}{}", class.name(), by_whom(by.as_deref()), with(*obstacle));
+            judged(claim, collision(log, *obstacle).and_then(judge))
+        }
+        Claim::Cause { modules, obstacle } => {
+            let judge = |index: usize| {
+                let found = (replays.cause)(index).map_err(|error| error.to_string())?;
+                let found: Vec<&str> = found.into_iter().map(Module::name).collect();
+                let same = modules.iter().map(String::as_str).eq(found.iter().copied());
+                if same { Ok(()) } else { Err(format!("[{}]", found.join(", "))) }
+            };
+            let claim = format!("cause [{}]{}", modules.join(", "), with(*obstacle));
+            judged(claim, collision(log, *obstacle).and_then(judge))
+        }
+        Claim::Priority { priority, obstacle } => {
+            let judge = |index: usize| match log.collisions[index].contact.priority {
+                found if found == *priority => Ok(()),
+                found => Err(format!("priority {}", found.name())),
+            };
+            let claim = format!("priority {}{}", priority.name(), with(*obstacle));
+            judged(claim, collision(log, *obstacle).and_then(judge))
+        }
+        Claim::Minimal { obstacle } => {
+            let claim = format!("minimal{}", with(*obstacle));
+            let spare = match collision(log, *obstacle) {
+                Ok(index) => (replays.spare_steps)(index),
+                Err(found) => return judged(claim, Err(found)),
+            };
+            match spare {
+                Ok(spare) if spare.is_empty() => judged(claim, Ok(())),
+                Ok(spare) => {
+                    let spare: Vec<String> = spare.iter().map(usize::to_string).collect();
+                    let found = format!("the same crash without step {}", spare.join(", or without step "));
+                    judged(claim, Err(found))
+                }
+                Err(no_tries) => ClaimResult { claim, confirmed: None, found: no_tries.to_string() },
+            }
+        }
+        Claim::Proc(claimed) => {
+            let found: Vec<f64> = log.steps.iter().map(|step| step.proc).collect();
+            let fits = claimed.len() == found.len()
+                && claimed.iter().zip(&found).all(|(claimed, found)| claimed.rounds(*found));
+            let shown: Vec<String> = found.iter().map(|proc| format!("{proc:.3}")).collect();
+            let result = if fits { Ok(()) } else { Err(format!("[{}]", shown.join(", "))) };
+            judged("collision probability of each step".to_owned(), result)
+        }
+        Claim::Trace(claimed) => {
+            let found = digest_text(&log.trace());
+            let result = if &found == claimed { Ok(()) } else { Err(found) };
+            judged("trace of the whole state".to_owned(), result)
+        }
+        Claim::End(claimed) => {
+            let found = log.end.name();
+            let result = if found == claimed { Ok(()) } else { Err(found.to_owned()) };
+            judged(format!("end {claimed}"), result)
+        }
+    }
+}
+
+/// The first collision with an obstacle, or with any obstacle.
+fn collision(log: &EpisodeLog, obstacle: Option<Obstacle>) -> Result<usize, String> {
+    let meant =
+        |collision: &Collision| obstacle.is_none_or(|wanted| collision.contact.obstacle == wanted.number);
+    let index = log.collisions.iter().position(meant).ok_or_else(|| "no such collision".to_owned())?;
+    let body = log.collisions[index].body.like;
+    match obstacle {
+        Some(wanted) if !wanted.kind.fits(body.is_vehicle()) => {
+            Err(format!("npc#{} is a {}", wanted.number, body.name()))
+        }
+        _ => Ok(index),
+    }
+}
+
+fn with(obstacle: Option<Obstacle>) -> String {
+    obstacle.map_or(String::new(), |obstacle| format!(" with {obstacle}"))
+}
+
+/// The class of a collision and the reference drivers that avoid it.
+fn in_words(judgement: &Judgement) -> String {
+    format!("{}{}", judgement.class.name(), by_whom(Some(&judgement.avoided_by)))
+}
+
+fn by_whom(drivers: Option<&[String]>) -> String {
+    drivers.map_or(String::new(), |drivers| format!(" by [{}]", drivers.join(", ")))
+}
+
+fn judged(claim: String, found: Result<(), String>) -> ClaimResult {
+    match found {
+        Ok(()) => ClaimResult { claim, confirmed: Some(true), found: "as claimed".to_owned() },
+        Err(found) => ClaimResult { claim, confirmed: Some(false), found },
+    }
+}

@@ -1,0 +1,234 @@
+//! Where episodes are played: a space with its roads, a driving system and the rules in force.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use ndarray::Array1;
+
+use crate::episode;
+use crate::episode::{Choice, Moment};
+use avastra_base::rng;
+use avastra_base::rng::{Rng, Stream};
+use avastra_drivers::Selected;
+use avastra_drivers::external::{Attached, Program};
+use avastra_lang::model::{Road, RulesInForce, Space};
+use avastra_lang::prove;
+use avastra_lang::syntax::listed;
+use avastra_search::agent::{Agent, Branch, Trial};
+use avastra_search::mdp::ProcKind;
+use avastra_world::action::{ActionTable, Offer, Situation};
+use avastra_world::sim::{Scene, Start, TrafficProfile};
+
+use crate::run::settings::RunError;
+use crate::run::summary::EpisodeSummary;
+
+/// Everything that the episodes of a run or a training share.
+pub struct Arena {
+    table: ActionTable,
+    rules: RulesInForce,
+    ads: Selected,
+    traffic: TrafficProfile,
+    /// Index of each road in the space, with its scene.
+    roads: Vec<(usize, Arc<Scene>)>,
+}
+
+impl Arena {
+    /// Looks the names up: of roads, and of the rules that are switched on (`with`) and off (`without`).
+    ///
+    /// # Errors
+    /// If a road or a rule does not exist, or is named twice, or no episode can begin under the rules.
+    pub fn new(
+        table: ActionTable,
+        roads: &[String],
+        ads: Selected,
+        with: &[String],
+        without: &[String],
+    ) -> Result<Arena, RunError> {
+        if let Some(name) = twice(roads).or_else(|| twice(with.iter().chain(without))) {
+            return Err(RunError::Twice { name });
+        }
+        let space = table.space();
+        let roads = roads.iter().map(|name| {
+            let index = road_named(space, name)?;
+            Ok((index, Arc::new(episode::scene(&space.roads[index]))))
+        });
+        let roads: Vec<(usize, Arc<Scene>)> = roads.collect::<Result<_, RunError>>()?;
+        let rules = RulesInForce::new(space, with, without)?;
+        for (index, _) in &roads {
+            space.memory_at_start(&space.roads[*index], &rules, 0)?;
+            // The rules by default were shown to last when the space was checked.
+            if rules != RulesInForce::by_default(space) {
+                prove::lasts(space, &space.roads[*index], &rules)?;
+            }
+        }
+        Ok(Arena { table, rules, ads, traffic: TrafficProfile::default(), roads })
+    }
+
+    /// The same arena, in which other vehicles drive by another profile.
+    pub fn with_traffic(self, traffic: TrafficProfile) -> Arena {
+        Arena { traffic, ..self }
+    }
+
+    pub fn table(&self) -> &ActionTable {
+        &self.table
+    }
+
+    /// Whether the driving system is made of modules that could be at fault.
+    pub(crate) fn has_modules(&self) -> bool {
+        self.ads.profile().is_some()
+    }
+
+    /// The driving system: its name here, or what an external one calls itself.
+    pub fn ads_name(&self) -> String {
+        self.ads.title()
+    }
+
+    /// The external driving system, if it is one.
+    pub fn program(&self) -> Option<&Arc<Program>> {
+        self.ads.program()
+    }
+
+    /// What identifies an external driving system.
+    pub fn attached(&self) -> Option<Attached> {
+        Some(self.ads.program()?.attached())
+    }
+
+    /// Number of roads.
+    pub fn roads(&self) -> usize {
+        self.roads.len()
+    }
+
+    /// The nth of the roads.
+    pub fn road(&self, road: usize) -> &Road {
+        &self.table.space().roads[self.roads[road].0]
+    }
+
+    /// An episode of a seed on the nth of the roads.
+    pub fn setup(&self, road: usize, seed: u64) -> episode::Setup<'_> {
+        let (index, scene) = &self.roads[road];
+        let space = self.table.space();
+        let road = &space.roads[*index];
+        let memory = space.memory_at_start(road, &self.rules, seed);
+        let memory = memory.expect("the arena was made with a start on each road");
+        episode::Setup {
+            table: &self.table,
+            road,
+            scene: scene.clone(),
+            rules: &self.rules,
+            ads: self.ads.clone(),
+            seed,
+            start: Start { traffic: self.traffic, ..episode::start(space, &memory, seed) },
+            memory,
+            period_shifts: Vec::new(),
+            proc: ProcKind::default(),
+        }
+    }
+}
+
+/// Index of a road of the space.
+///
+/// # Errors
+/// If there is none of that name; the message lists those there are.
+pub fn road_named(space: &Space, name: &str) -> Result<usize, RunError> {
+    space.roads.iter().position(|road| road.name == name).ok_or_else(|| {
+        let known = listed(&space.roads.iter().map(|road| road.name.as_str()).collect::<Vec<_>>());
+        RunError::Road { name: name.to_owned(), known }
+    })
+}
+
+/// Lets an agent choose among the offers of the moment. If no row is legal, the step passes. Returns the choice, and
+/// which rows are legal, shape `(rows,)`: all of them for an agent that does not look at the mask.
+pub fn choose(agent: &mut dyn Agent, moment: &Moment) -> (Choice, Array1<bool>) {
+    if agent.looks_at_mask() {
+        let offers = offers(agent, moment);
+        let legal = legal(&offers);
+        return (carry_out(offers, legal.view(), agent, moment), legal);
+    }
+    let situation = situation(agent, moment);
+    let table = moment.setup().table;
+    let offer = |row| table.offer(&situation, row);
+    let all = Array1::from_elem(table.rows().len(), true);
+    if !(0..all.len()).any(|row| matches!(offer(row), Offer::Legal(_))) {
+        return (Choice::Pass, all);
+    }
+    let mut rng = exploration(moment);
+    let chosen = agent.choose(moment.observation, all.view(), &mut rng);
+    (chosen.map_or(Choice::Pass, |row| taken(row, offer(row))), all)
+}
+
+/// What each row would do now.
+pub fn offers(agent: &mut dyn Agent, moment: &Moment) -> Vec<Offer> {
+    let situation = situation(agent, moment);
+    let shares = agent.draw_shares(moment.step, moment.situation.seed);
+    moment.setup().table.offers_at(&situation, shares)
+}
+
+/// The situation of the moment, with values drawn from the agent's seed if it gives one.
+fn situation<'a>(agent: &mut dyn Agent, moment: &Moment<'a>) -> Situation<'a> {
+    let seed = agent.draw_seed(moment.step).unwrap_or(moment.situation.seed);
+    Situation { seed, ..*moment.situation }
+}
+
+/// The agent's own randomness in this step.
+fn exploration(moment: &Moment) -> Rng {
+    rng::stream(moment.situation.seed, Stream::Exploration, moment.step as u64)
+}
+
+/// The choice of an offered row.
+pub(super) fn taken(row: usize, offer: Offer) -> Choice {
+    match offer {
+        Offer::Legal(draw) => Choice::Act(draw),
+        Offer::Refused(refusal) => Choice::Refused { row, rule: refusal.rule, reason: refusal.reason },
+    }
+}
+
+/// Which of the offers are legal, shape `(rows,)`.
+pub fn legal(offers: &[Offer]) -> Array1<bool> {
+    offers.iter().map(|offer| matches!(offer, Offer::Legal(_))).collect()
+}
+
+/// The agent's choice among the offers.
+pub fn carry_out(
+    mut offers: Vec<Offer>,
+    legal: ndarray::ArrayView1<bool>,
+    agent: &mut dyn Agent,
+    moment: &Moment,
+) -> Choice {
+    if !legal.iter().any(|&is_legal| is_legal) {
+        return Choice::Pass;
+    }
+    let branch = Lookahead { offers: &offers, moment };
+    let row = agent.choose_ahead(moment.observation, legal, &branch, &mut exploration(moment));
+    row.map_or(Choice::Pass, |row| taken(row, offers.swap_remove(row)))
+}
+
+/// Carries offers out in copies of the moment's world, and judges the collisions as in an episode.
+struct Lookahead<'a> {
+    offers: &'a [Offer],
+    moment: &'a Moment<'a>,
+}
+
+impl Branch for Lookahead<'_> {
+    fn try_row(&self, row: usize) -> Trial {
+        let Offer::Legal(draw) = &self.offers[row] else { return Trial::default() };
+        let log = self.moment.look_ahead(draw.clone());
+        let step = self.moment.step;
+        let collided = log.collisions.iter().any(|collision| collision.step == step);
+        let counts = || {
+            let summary = EpisodeSummary::judged(self.moment.setup(), 0, &log);
+            summary.collisions.iter().any(|finding| finding.counted && finding.collision.step == step)
+        };
+        Trial {
+            proc: log.steps[step].proc,
+            collided,
+            counted: collided && counts(),
+            simulated_s: log.duration_s - log.steps[step].time_s,
+        }
+    }
+}
+
+/// The first name that comes a second time.
+fn twice<'a>(names: impl IntoIterator<Item = &'a String>) -> Option<String> {
+    let mut seen = BTreeSet::new();
+    names.into_iter().find(|name| !seen.insert(*name)).cloned()
+}

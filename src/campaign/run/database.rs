@@ -1,0 +1,567 @@
+//! `run.db`: one row an episode, a step and a collision, in SQLite.
+//!
+//! Each episode is one transaction, so a kill at any moment loses at most the episode under way.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use rusqlite::{Connection, Transaction, params};
+use sha2::{Digest, Sha256};
+
+use crate::episode::{EpisodeLog, Outcome};
+use crate::files::PlainName;
+use crate::oracle;
+use avastra_drivers::external::Failure;
+use avastra_lang::model::policy::VARIABLES;
+use avastra_lang::model::vocabulary::Word;
+use avastra_search::mdp::STATE_LEN;
+use avastra_world::action::Draw;
+
+use crate::run::offered::{RowCount, without_figures};
+use crate::run::sealed::{DatabaseError, Layout};
+use crate::run::settled::{Numbered, Units};
+use crate::run::shape::Shape;
+use crate::run::summary::{EpisodeSummary, Finding};
+
+pub const LAYOUT: Layout = Layout {
+    version: 10,
+    unit: "episode",
+    tables: &["episode", "step", "held", "offer", "collision", "failure", "learning", "scenario"],
+    naming: Some(("offer", "reason")),
+    // A scenario names its space by a path from the file.
+    local: &["scenario"],
+};
+
+/// `held` says what held the speed of the ego vehicle back, from the row's time to that of the next row. `offer`
+/// counts, per episode and row, the steps in which the row was legal (`reason` 0) or refused (other reasons); training
+/// writes nothing there. `scenario` has the text of the file that was written of an episode. `learning`, `checkpoint`
+/// and `result` belong to a training (`train::record`) and stay empty in a run.
+const SCHEMA: &str = "
+CREATE TABLE episode (
+  episode INTEGER PRIMARY KEY, road TEXT NOT NULL, seed TEXT NOT NULL, ended TEXT NOT NULL,
+  duration_s REAL NOT NULL, distance_m REAL NOT NULL, steps INTEGER NOT NULL, red_runs INTEGER NOT NULL,
+  collisions INTEGER NOT NULL, counted INTEGER NOT NULL, first_counted_s REAL, trace TEXT NOT NULL, pet_s REAL,
+  branched_s REAL NOT NULL
+) STRICT;
+CREATE TABLE collision (
+  episode INTEGER NOT NULL REFERENCES episode, number INTEGER NOT NULL, time_s REAL NOT NULL,
+  step INTEGER NOT NULL, obstacle INTEGER NOT NULL, body TEXT NOT NULL, own_body TEXT, verb TEXT NOT NULL,
+  ego_speed_mps REAL NOT NULL, closing_speed_mps REAL NOT NULL,
+  on_ego_ahead_m REAL NOT NULL, on_ego_left_m REAL NOT NULL,
+  repeated INTEGER NOT NULL, sudden INTEGER NOT NULL, struck INTEGER NOT NULL, counted INTEGER NOT NULL,
+  avoidability TEXT NOT NULL, hazard_onset_s REAL NOT NULL, avoided_by TEXT NOT NULL, evasion TEXT,
+  side TEXT NOT NULL, approach TEXT NOT NULL, relative_speed_mps REAL NOT NULL, delta_v_mps REAL NOT NULL,
+  obstacle_delta_v_mps REAL NOT NULL, cause TEXT, shape TEXT, priority TEXT NOT NULL, r157_letter TEXT NOT NULL,
+  PRIMARY KEY (episode, number)
+) STRICT;
+CREATE TABLE scenario (episode INTEGER PRIMARY KEY REFERENCES episode, text TEXT NOT NULL) STRICT;
+CREATE TABLE failure (
+  episode INTEGER PRIMARY KEY REFERENCES episode, kind TEXT NOT NULL, problem TEXT NOT NULL, stage TEXT NOT NULL,
+  detail TEXT NOT NULL, exit TEXT, stderr TEXT NOT NULL
+) STRICT;
+CREATE TABLE held (
+  episode INTEGER NOT NULL REFERENCES episode, number INTEGER NOT NULL, from_s REAL NOT NULL, text TEXT NOT NULL,
+  PRIMARY KEY (episode, number)
+) STRICT, WITHOUT ROWID;
+CREATE TABLE reason (reason INTEGER PRIMARY KEY, text TEXT NOT NULL UNIQUE) STRICT;
+CREATE TABLE offer (
+  episode INTEGER NOT NULL REFERENCES episode, action_row INTEGER NOT NULL, reason INTEGER NOT NULL, steps INTEGER NOT NULL,
+  PRIMARY KEY (episode, action_row, reason)
+) STRICT, WITHOUT ROWID;
+CREATE TABLE learning (
+  episode INTEGER PRIMARY KEY REFERENCES episode, return REAL NOT NULL, collisions INTEGER NOT NULL,
+  counted INTEGER NOT NULL, epsilon REAL NOT NULL, loss REAL, updates INTEGER NOT NULL,
+  steps INTEGER NOT NULL, simulated_s REAL NOT NULL
+) STRICT;
+CREATE TABLE checkpoint (
+  only INTEGER PRIMARY KEY CHECK (only = 1), episodes INTEGER NOT NULL, digest TEXT NOT NULL,
+  learner BLOB NOT NULL
+) STRICT;
+CREATE TABLE result (
+  only INTEGER PRIMARY KEY CHECK (only = 1), digest TEXT NOT NULL, text TEXT NOT NULL
+) STRICT;
+";
+
+/// An open run database.
+pub struct Database {
+    pub(crate) connection: Connection,
+}
+
+impl Units for Database {
+    fn layout() -> &'static Layout {
+        &LAYOUT
+    }
+
+    fn schema() -> String {
+        format!("{SCHEMA}{}", step_table())
+    }
+
+    fn connection(&self) -> &Connection {
+        &self.connection
+    }
+
+    fn from_connection(connection: Connection) -> Database {
+        Database { connection }
+    }
+}
+
+impl Database {
+    /// Adds a whole episode, or nothing. `in_words` says what a draw does in the space's own words; `scenario` is the
+    /// text of the file that was written of it.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn add(
+        &mut self,
+        summary: &EpisodeSummary,
+        log: &EpisodeLog,
+        in_words: impl Fn(&Draw) -> String,
+        scenario: Option<&str>,
+    ) -> Result<(), DatabaseError> {
+        let transaction = self.connection.transaction()?;
+        add_all(&transaction, summary, log, in_words, scenario)?;
+        LAYOUT.seal(&transaction, summary.episode as i64)?;
+        transaction.commit()?;
+        Ok(())
+    }
+
+    /// The numbers of all episodes so far.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or holds an episode number below 0.
+    pub fn episodes(&self) -> Result<BTreeSet<usize>, DatabaseError> {
+        let mut statement = self.connection.prepare("SELECT episode FROM episode")?;
+        let numbers = statement.query_map([], |row| row.get::<_, i64>(0))?;
+        let number = |found: i64| usize::try_from(found).map_err(|_| DatabaseError::Episode { found });
+        numbers.map(|found| number(found?)).collect()
+    }
+
+    /// The episodes of which a scenario was written: number, road, and the text of the file.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or a road has a name that no file can have.
+    pub fn scenarios(&self) -> Result<Vec<(usize, PlainName, String)>, DatabaseError> {
+        let query = "SELECT episode, road, text FROM scenario JOIN episode USING (episode) ORDER BY episode";
+        let mut statement = self.connection.prepare(query)?;
+        let rows = statement
+            .query_map([], |row| Ok((row.get::<_, i64>(0)?, row.get::<_, String>(1)?, row.get(2)?)))?;
+        rows.map(|row| {
+            let (found, road, text) = row?;
+            let episode = usize::try_from(found).map_err(|_| DatabaseError::Episode { found })?;
+            Ok((episode, PlainName::new(road)?, text))
+        })
+        .collect()
+    }
+
+    /// As [`Units::take`]. `scenarios` has the episodes of which a scenario was written anew, with the text of the file.
+    ///
+    /// # Errors
+    /// As [`Units::take`].
+    pub fn take_episodes(
+        &mut self,
+        other: &Path,
+        units: &[Numbered],
+        scenarios: &[(usize, String)],
+    ) -> Result<(), DatabaseError> {
+        self.take(other, units, &|connection| {
+            let mut update = connection.prepare("UPDATE scenario SET text = ? WHERE episode = ?")?;
+            for (episode, text) in scenarios {
+                update.execute(params![text, *episode as i64])?;
+            }
+            Ok(())
+        })
+    }
+
+    /// Why chosen actions were refused, and how often; the most frequent reason first. Figures in a reason are
+    /// replaced by `…`, so that reasons that differ only in figures count as one.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn refusals(&self) -> Result<Vec<RefusalCount>, DatabaseError> {
+        let mut statement = self.connection.prepare("SELECT refused FROM step WHERE refused IS NOT NULL")?;
+        let mut counts: BTreeMap<String, i64> = BTreeMap::new();
+        for reason in statement.query_map([], |row| row.get::<_, String>(0))? {
+            *counts.entry(without_figures(&reason?)).or_default() += 1;
+        }
+        let mut refusals: Vec<RefusalCount> =
+            counts.into_iter().map(|(reason, times)| RefusalCount { reason, times }).collect();
+        refusals.sort_by_key(|refusal| -refusal.times);
+        Ok(refusals)
+    }
+
+    /// What became of each row of the table, by its number, over all episodes. A row that was never offered is
+    /// absent.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn rows(&self) -> Result<BTreeMap<i64, RowCount>, DatabaseError> {
+        let mut rows: BTreeMap<i64, RowCount> = BTreeMap::new();
+        let mut offers = self.connection.prepare(
+            "SELECT action_row, text, sum(steps) FROM offer LEFT JOIN reason USING (reason)
+             GROUP BY action_row, text ORDER BY sum(steps) DESC, text",
+        )?;
+        let offers =
+            offers.query_map([], |row| Ok((row.get(0)?, row.get::<_, Option<String>>(1)?, row.get(2)?)))?;
+        for offer in offers {
+            let (row, reason, times) = offer?;
+            let count = rows.entry(row).or_default();
+            match reason {
+                None => count.legal = times,
+                Some(reason) => count.refused.push(RefusalCount { reason, times }),
+            }
+        }
+        let mut chosen = self.connection.prepare(
+            "SELECT action_row, count(*), count(action) FROM step WHERE action_row IS NOT NULL GROUP BY action_row",
+        )?;
+        let chosen = chosen.query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
+        for found in chosen {
+            let (row, chosen, realised) = found?;
+            let count = rows.entry(row).or_default();
+            (count.chosen, count.realised) = (chosen, realised);
+        }
+        Ok(rows)
+    }
+
+    /// What went wrong with an external driving system, by what it was; the most frequent first.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn failures(&self) -> Result<Vec<FailureCount>, DatabaseError> {
+        // The bare columns of an aggregate query with `min` are those of the row that has the minimum. All steps are one stage.
+        // Other stages are counted apart, because each has its own time limit and message.
+        let mut statement = self.connection.prepare(
+            "SELECT kind, problem, count(*), min(failure.episode), stage, detail, exit, road,
+                    CASE WHEN stage LIKE 'step %' THEN 'step' ELSE stage END AS when_failed
+             FROM failure JOIN episode USING (episode) GROUP BY kind, problem, when_failed
+             ORDER BY count(*) DESC, kind, problem, when_failed",
+        )?;
+        let counts = statement.query_map([], |row| {
+            let (episode, stage, detail): (i64, String, String) = (row.get(3)?, row.get(4)?, row.get(5)?);
+            let (exit, road): (Option<String>, String) = (row.get(6)?, row.get(7)?);
+            let exit = exit.map_or_else(String::new, |exit| format!(" ({exit})"));
+            Ok(FailureCount {
+                kind: row.get(0)?,
+                problem: row.get(1)?,
+                times: row.get(2)?,
+                detail: format!("at {stage}, {detail}{exit}"),
+                scenario: format!("{road}_{episode:04}"),
+            })
+        })?;
+        Ok(counts.collect::<Result<_, _>>()?)
+    }
+
+    /// Totals over all episodes.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn totals(&self) -> Result<Totals, DatabaseError> {
+        Ok(self.connection.query_row(
+            "SELECT count(*), coalesce(sum(collisions), 0), coalesce(sum(counted), 0),
+                        coalesce(sum(collisions > 0), 0), coalesce(sum(counted > 0), 0),
+                        coalesce(sum(ended = 'arrived'), 0), coalesce(sum(ended = 'stalled'), 0),
+                        coalesce(sum(ended = 'limit'), 0), coalesce(sum(duration_s), 0.0),
+                        coalesce(sum(distance_m), 0.0), coalesce(sum(red_runs), 0), avg(first_counted_s),
+                        (SELECT coalesce(sum(sudden), 0) FROM collision),
+                        (SELECT coalesce(sum(struck), 0) FROM collision),
+                        (SELECT coalesce(sum(repeated), 0) FROM collision),
+                        (SELECT coalesce(sum(avoidability = 'avoidable'), 0) FROM collision),
+                        (SELECT coalesce(sum(avoidability = 'beyond_reference'), 0) FROM collision),
+                        (SELECT coalesce(sum(avoidability = 'unavoidable'), 0) FROM collision),
+                        coalesce(sum(branched_s), 0.0),
+                        (SELECT coalesce(sum(priority = 'ego'), 0) FROM collision),
+                        (SELECT coalesce(sum(priority = 'other'), 0) FROM collision),
+                        coalesce(sum(ended = 'blocked'), 0), (SELECT count(*) FROM failure),
+                        coalesce(sum(ended = 'astray'), 0), coalesce(sum(ended = 'left_the_map'), 0)
+                 FROM episode",
+            [],
+            |row| {
+                Ok(Totals {
+                    episodes: row.get(0)?,
+                    collisions: row.get(1)?,
+                    counted: row.get(2)?,
+                    episodes_with_collision: row.get(3)?,
+                    episodes_with_counted: row.get(4)?,
+                    arrived: row.get(5)?,
+                    stalled: row.get(6)?,
+                    step_limit: row.get(7)?,
+                    simulated_s: row.get(8)?,
+                    driven_m: row.get(9)?,
+                    red_runs: row.get(10)?,
+                    first_counted_s_mean: row.get(11)?,
+                    sudden: row.get(12)?,
+                    struck: row.get(13)?,
+                    repeated: row.get(14)?,
+                    avoidable: row.get(15)?,
+                    beyond_reference: row.get(16)?,
+                    unavoidable: row.get(17)?,
+                    branched_s: row.get(18)?,
+                    wronged: row.get(19)?,
+                    wrong: row.get(20)?,
+                    blocked: row.get(21)?,
+                    failed: row.get(22)?,
+                    astray: row.get(23)?,
+                    left_map: row.get(24)?,
+                })
+            },
+        )?)
+    }
+}
+
+/// How often a reason kept an action from being carried out.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct RefusalCount {
+    pub reason: String,
+    pub times: i64,
+}
+
+/// What went wrong with an external driving system, how often, and the first time.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct FailureCount {
+    pub kind: String,
+    pub problem: String,
+    pub times: i64,
+    /// When and how, the first time.
+    pub detail: String,
+    /// Name of the first episode's files.
+    pub scenario: String,
+}
+
+/// What a run has found so far.
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
+pub struct Totals {
+    pub episodes: i64,
+    pub collisions: i64,
+    /// Collisions that the space's verdict counts.
+    pub counted: i64,
+    pub episodes_with_collision: i64,
+    pub episodes_with_counted: i64,
+    pub arrived: i64,
+    /// Ended without progress: for a reason of the driving system's own, because others blocked its way, and
+    /// because it had left its lane.
+    pub stalled: i64,
+    pub blocked: i64,
+    pub astray: i64,
+    /// Ended because the ego vehicle drove off the map.
+    pub left_map: i64,
+    /// Ended because an external driving system failed.
+    pub failed: i64,
+    pub step_limit: i64,
+    pub simulated_s: f64,
+    pub driven_m: f64,
+    pub red_runs: i64,
+    /// Mean time to the first counted collision over the episodes that have one, s: the paper's
+    /// "TTC" (survivorship-biased, like the paper's).
+    pub first_counted_s_mean: Option<f64>,
+    /// Collisions with each of the facts that a verdict may exclude; one may have several.
+    pub sudden: i64,
+    pub struck: i64,
+    pub repeated: i64,
+    /// Collisions by their avoidability. The three numbers sum to `collisions`.
+    pub avoidable: i64,
+    pub beyond_reference: i64,
+    pub unavoidable: i64,
+    /// Time that agents with lookahead simulated in branches, outside the episodes, s.
+    pub branched_s: f64,
+    /// Collisions in which the ego vehicle had priority, and in which the other had; the rest is neither.
+    pub wronged: i64,
+    pub wrong: i64,
+}
+
+fn step_table() -> String {
+    let paper = VARIABLES[..STATE_LEN].iter();
+    let states: Vec<String> =
+        paper.map(|variable| format!("{} REAL NOT NULL", variable.observed_as)).collect();
+    format!(
+        "CREATE TABLE step (
+           episode INTEGER NOT NULL REFERENCES episode, step INTEGER NOT NULL, time_s REAL NOT NULL,
+           action_row INTEGER, action TEXT, refused TEXT, proc REAL NOT NULL, reward REAL NOT NULL,
+           ttc_s REAL, thw_s REAL, drac_mps2 REAL, required_mps2 REAL, rss_unsafe_s REAL,
+           {}, PRIMARY KEY (episode, step)) STRICT;",
+        states.join(", ")
+    )
+}
+
+/// An episode with its steps, its collisions and the text of its scenario, if one was written.
+pub fn add_all(
+    transaction: &Transaction,
+    summary: &EpisodeSummary,
+    log: &EpisodeLog,
+    in_words: impl Fn(&Draw) -> String,
+    scenario: Option<&str>,
+) -> Result<(), DatabaseError> {
+    add_episode(transaction, summary, log)?;
+    for (index, step) in log.steps.iter().enumerate() {
+        let (row, action, refused) = match &step.outcome {
+            Outcome::Done { draw, .. } => (Some(draw.row), Some(in_words(draw)), None),
+            Outcome::Passed => (None, None, None),
+            Outcome::Refused { row, rule, reason } => (
+                Some(*row),
+                None,
+                Some(rule.as_ref().map_or(reason.clone(), |rule| format!("{rule}: {reason}"))),
+            ),
+        };
+        let mut values: Vec<rusqlite::types::Value> = vec![
+            (summary.episode as i64).into(),
+            (index as i64).into(),
+            step.time_s.into(),
+            row.map(|row| row as i64).into(),
+            action.into(),
+            refused.into(),
+            step.proc.into(),
+            step.reward.into(),
+        ];
+        // A run measures this, a training does not.
+        let measured = summary.criticality.get(index);
+        values.extend([
+            measured.and_then(|step| step.ttc_s).into(),
+            measured.and_then(|step| step.thw_s).into(),
+            measured.map(|step| step.drac_mps2).into(),
+            measured.map(|step| step.required_mps2).into(),
+            measured.map(|step| step.rss_unsafe_s).into(),
+        ]);
+        values.extend(step.state.iter().map(|&value| f64::from(value).into()));
+        let places = vec!["?"; values.len()].join(", ");
+        transaction
+            .prepare_cached(&format!("INSERT INTO step VALUES ({places})"))?
+            .execute(rusqlite::params_from_iter(values))?;
+    }
+    for (number, held) in log.held.iter().enumerate() {
+        transaction.prepare_cached("INSERT INTO held VALUES (?, ?, ?, ?)")?.execute(params![
+            summary.episode as i64,
+            number as i64,
+            held.from_s,
+            held.text(),
+        ])?;
+    }
+    for finding in &summary.collisions {
+        add_collision(transaction, summary.episode, finding)?;
+    }
+    if let Some(failure) = &log.failure {
+        let Failure { problem, stage, detail, exit, stderr } = failure;
+        transaction.prepare_cached("INSERT INTO failure VALUES (?, ?, ?, ?, ?, ?, ?)")?.execute(params![
+            summary.episode as i64,
+            problem.kind().name(),
+            problem.name(),
+            stage,
+            detail,
+            exit,
+            stderr,
+        ])?;
+    }
+    add_offers(transaction, summary)?;
+    if let Some(text) = scenario {
+        let mut insert = transaction.prepare_cached("INSERT INTO scenario VALUES (?, ?)")?;
+        insert.execute(params![summary.episode as i64, text])?;
+    }
+    Ok(())
+}
+
+fn add_offers(transaction: &Transaction, summary: &EpisodeSummary) -> Result<(), rusqlite::Error> {
+    let mut known =
+        transaction.prepare_cached("INSERT OR IGNORE INTO reason (reason, text) VALUES (?, ?)")?;
+    let mut insert = transaction.prepare_cached(
+        "INSERT INTO offer VALUES (?, ?, coalesce((SELECT reason FROM reason WHERE text = ?), 0), ?)",
+    )?;
+    for ((row, reason), steps) in &summary.offered.steps() {
+        if let Some(reason) = reason {
+            known.execute(params![reason_number(reason), reason])?;
+        }
+        insert.execute(params![summary.episode as i64, *row as i64, reason, steps])?;
+    }
+    Ok(())
+}
+
+/// The number of a reason: the beginning of its digest, so that it does not depend on which thread's episode is
+/// written first. Never 0.
+fn reason_number(text: &str) -> i64 {
+    let digest: [u8; 32] = Sha256::digest(text.as_bytes()).into();
+    let [a, b, c, d, e, f, g, h, ..] = digest;
+    (i64::from_le_bytes([a, b, c, d, e, f, g, h]) & i64::MAX) | 1
+}
+
+fn add_episode(
+    transaction: &Transaction,
+    summary: &EpisodeSummary,
+    log: &EpisodeLog,
+) -> Result<(), rusqlite::Error> {
+    transaction
+        .prepare_cached("INSERT INTO episode VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?
+        .execute(params![
+            summary.episode as i64,
+            log.road,
+            log.seed.to_string(),
+            log.end.name(),
+            log.duration_s,
+            log.distance_m,
+            log.steps.len() as i64,
+            log.red_runs,
+            log.collisions.len() as i64,
+            summary.counted() as i64,
+            summary.first_counted_s(),
+            avastra_lang::model::digest_text(&log.trace()),
+            summary.pet_s,
+            summary.branched_s,
+        ])?;
+    Ok(())
+}
+
+fn add_collision(
+    transaction: &Transaction,
+    episode: usize,
+    finding: &Finding,
+) -> Result<(), rusqlite::Error> {
+    let Finding { collision, facts, judgement, .. } = finding;
+    let contact = &collision.contact;
+    let severity = oracle::severity(collision);
+    transaction
+        .prepare_cached(
+            "INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        )?
+        .execute(params![
+            episode as i64,
+            finding.number as i64,
+            contact.time_s,
+            collision.step as i64,
+            contact.obstacle,
+            collision.body.like.name(),
+            finding.own_body,
+            collision.verb.name(),
+            contact.ego_speed_mps,
+            contact.closing_speed_mps,
+            contact.on_ego.x,
+            contact.on_ego.y,
+            facts.repeated,
+            facts.sudden,
+            facts.struck,
+            finding.counted,
+            judgement.class.name(),
+            judgement.onset_s,
+            judgement.avoided_by.join(" "),
+            judgement.evasion,
+            severity.side,
+            severity.approach,
+            severity.relative_speed_mps,
+            severity.delta_v_mps,
+            severity.obstacle_delta_v_mps,
+            finding.cause_in_words(),
+            finding.shape.map(Shape::name),
+            facts.priority.name(),
+            judgement.r157_letter.join(" "),
+        ])?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reasons_differ_by_their_words() {
+        let reason = "no_teleport: the gap would be 12.5 m, a fair one is 17 m";
+        assert_eq!(without_figures(reason), "no_teleport: the gap would be … m, a fair one is … m");
+        assert_eq!(without_figures("cannot spawn: no lane on the left"), "cannot spawn: no lane on the left");
+        let median = "cannot spawn: a median of 3.2 m lies before the opposing lane";
+        assert_eq!(without_figures(median), "cannot spawn: a median lies before the opposing lane");
+        assert_eq!(without_figures("no crossing leg within 60 m"), "no crossing leg");
+    }
+}

@@ -1,0 +1,117 @@
+//! Groups of similar failures: what a run found, by what happened and not by how often.
+//!
+//! Two counted collisions are alike if these are equal: kind of obstacle, its verb, how it moved, where the ego
+//! vehicle was hit, which of the two had priority, the shape of the ego vehicle's way (see `shape`) and the modules
+//! at fault. The last two are compared only if they were recorded.
+
+use std::collections::BTreeMap;
+
+use avastra_lang::model::vocabulary::{Body, Word};
+
+use crate::run::database::Database;
+use crate::run::sealed::DatabaseError;
+
+/// Counted collisions that are alike.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Group {
+    /// `pedestrian`, `car` or `large vehicle`.
+    pub kind: String,
+    /// The obstacle's verb, for example `CrossRoad`.
+    pub manoeuvre: String,
+    /// How the obstacle moved, in the words of `oracle::Severity`.
+    pub approach: String,
+    /// Where the ego vehicle was hit.
+    pub side: String,
+    /// Which of the two had priority: `ego`, `other` or `none`.
+    pub priority: String,
+    /// The shape of the ego vehicle's way to the collision, if it was recorded: `straight`, `left turn` and so on.
+    pub shape: Option<String>,
+    /// Modules at fault, if they were looked for; empty if none was found.
+    pub cause: Option<String>,
+    pub count: usize,
+    /// The group's example: the episode with the shortest scenario, the first among equals.
+    pub episode: i64,
+    pub road: String,
+}
+
+impl Database {
+    /// The groups of counted collisions so far, the largest first.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn groups(&self) -> Result<Vec<Group>, DatabaseError> {
+        let mut statement = self.connection.prepare(
+            "SELECT body, verb, approach, side, shape, cause, collision.episode, road, collision.step,
+                    priority
+             FROM collision JOIN episode ON episode.episode = collision.episode
+             WHERE collision.counted ORDER BY collision.episode, number",
+        )?;
+        let rows = statement.query_map([], |row| {
+            let group = Group {
+                kind: kind(&row.get::<_, String>(0)?).to_owned(),
+                manoeuvre: row.get(1)?,
+                approach: row.get(2)?,
+                side: row.get(3)?,
+                shape: row.get(4)?,
+                cause: row.get(5)?,
+                count: 1,
+                episode: row.get(6)?,
+                road: row.get(7)?,
+                priority: row.get(9)?,
+            };
+            Ok((group, row.get::<_, i64>(8)?))
+        })?;
+        let mut found: BTreeMap<_, (Group, i64)> = BTreeMap::new();
+        for row in rows {
+            let (group, step) = row?;
+            let Group { kind, manoeuvre, approach, side, priority, .. } = &group;
+            let key = [kind, manoeuvre, approach, side, priority].map(Clone::clone);
+            match found.entry((key, group.shape.clone(), group.cause.clone())) {
+                std::collections::btree_map::Entry::Vacant(entry) => {
+                    entry.insert((group, step));
+                }
+                std::collections::btree_map::Entry::Occupied(mut entry) => {
+                    let (known, shortest) = entry.get_mut();
+                    let count = known.count + 1;
+                    if step < *shortest {
+                        (*known, *shortest) = (group, step);
+                    }
+                    known.count = count;
+                }
+            }
+        }
+        let mut groups: Vec<Group> = found.into_values().map(|(group, _)| group).collect();
+        groups.sort_by_key(|group| core::cmp::Reverse(group.count));
+        Ok(groups)
+    }
+
+    /// Road and number of each episode with a collision, the worst first: episodes with a counted collision, then by
+    /// the larger delta-v of the two bodies.
+    ///
+    /// # Errors
+    /// If the database cannot be read.
+    pub fn worst(&self) -> Result<Vec<(String, i64)>, DatabaseError> {
+        let mut statement = self.connection.prepare(
+            "WITH hardest AS (
+               SELECT episode, collision.counted AS counts, max(max(delta_v_mps, obstacle_delta_v_mps)) AS delta_v_mps
+               FROM collision GROUP BY episode, counts)
+             SELECT road, episode FROM hardest JOIN episode USING (episode) GROUP BY episode
+             ORDER BY max(counts) DESC, max(CASE counts WHEN counted > 0 THEN delta_v_mps END) DESC, episode",
+        )?;
+        let episodes = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?)))?;
+        Ok(episodes.collect::<Result<_, _>>()?)
+    }
+}
+
+/// What [`kind`] calls a pedestrian.
+pub const PEDESTRIAN: &str = "pedestrian";
+
+/// The kind of an obstacle by the name of its body.
+pub fn kind(body: &str) -> &'static str {
+    match Body::from_name(body) {
+        Some(Body::Pedestrian) => PEDESTRIAN,
+        Some(Body::Motorcycle | Body::Bicycle) => "two-wheeler",
+        Some(Body::BoxTruck | Body::SchoolBus) => "large vehicle",
+        Some(Body::Jeep | Body::Sedan | Body::SUV | Body::Hatchback) | None => "car",
+    }
+}

@@ -1,0 +1,54 @@
+//! A run: many episodes of one space over seeds and roads, judged, counted and kept.
+//! [`Run`] is made from [`RunSettings`] and knows how to set up, play and judge its nth episode; [`play`] does so for
+//! many, on threads. Its episodes share an [`Arena`]: space, roads, driving system, rules in force. Each gives an
+//! [`EpisodeSummary`] (its collisions with their verdicts), which [`Database`] keeps in `run.db` and reads back as
+//! totals and as groups of similar failures. [`Stage`] plays one emitted scenario again, and [`Stepped`] is an episode
+//! that another program steps through.
+
+mod arena;
+mod columns;
+mod coverage;
+mod database;
+mod gauges;
+mod groups;
+mod offered;
+mod play;
+mod profile;
+mod sealed;
+mod settings;
+mod settled;
+mod shape;
+mod shard;
+mod stage;
+mod stepped;
+mod summary;
+mod threads;
+
+pub use arena::{Arena, road_named};
+pub use arena::{carry_out, choose, legal, offers};
+pub use columns::{Column, Values, columns};
+pub use coverage::{CoverageCell, LearningPoint};
+pub use database::{Database, FailureCount, RefusalCount, Totals};
+pub use database::{LAYOUT, add_all};
+pub use gauges::Gauges;
+pub use groups::Group;
+pub use groups::{PEDESTRIAN, kind};
+pub use offered::in_words as refusal_in_words;
+pub use offered::{Offered, RowCount};
+pub use play::{Run, play};
+pub use profile::{
+    Asked, DEFAULT_ADS, Profile, TrafficRecord, driving_system, recorded, recorded_name, recorded_traffic,
+    started, trained_against,
+};
+pub use profile::{traffic_of, under_test};
+pub use sealed::differences as settings_differences;
+pub use sealed::{DatabaseError, Layout};
+pub use settings::{EPISODES_MAX, PolicyReference, RunError, RunSettings, VERSION};
+pub(crate) use settings::{agent_named, check_episodes};
+pub use settled::{Numbered, Units};
+pub use shape::Shape;
+pub use shard::{SHARDS_MAX, Shard};
+pub use stage::Stage;
+pub use stepped::{StepError, Stepped};
+pub use summary::{EpisodeSummary, Finding};
+pub use threads::on_threads;

@@ -1,0 +1,201 @@
+//! A run that is ready: the same space, roads, driving system and agent over many seeds.
+//!
+//! Episodes are independent of each other and of the number of workers; each has its own seed,
+//! derived from the run's.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use crate::episode;
+use crate::episode::{Choice, EpisodeLog, Moment, Watch};
+use crate::oracle;
+use crate::oracle::AvoidabilitySettings;
+use avastra_base::rng;
+use avastra_base::rng::Stream;
+use avastra_drivers::external::{Attached, Program};
+use avastra_lang::model::Space;
+use avastra_search::agent::{Agent, Kind, QPolicy};
+use avastra_world::action::ActionTable;
+
+use crate::run::arena::{Arena, carry_out, choose, legal, offers};
+use crate::run::gauges::Gauges;
+use crate::run::offered::Offered;
+use crate::run::profile::{traffic_of, under_test};
+use crate::run::settings::{RunError, RunSettings, agent_named, check_episodes};
+use crate::run::summary::EpisodeSummary;
+use crate::run::threads::on_threads;
+
+/// Makes the agent of an episode.
+type MakeAgent = dyn Fn() -> Box<dyn Agent> + Send + Sync;
+
+/// A run that is ready to play.
+pub struct Run {
+    arena: Arena,
+    settings: RunSettings,
+    agent: Box<MakeAgent>,
+}
+
+impl Run {
+    /// Looks everything up that the settings name.
+    ///
+    /// # Errors
+    /// If the settings name a road, a driving system, an agent or a rule that does not exist, a name
+    /// twice, or a number of episodes that is not possible.
+    pub fn new(table: ActionTable, settings: RunSettings) -> Result<Run, RunError> {
+        match agent_named(&settings.agent)?.kind {
+            Kind::Ready(build) => {
+                let odds = table.odds();
+                Run::with_agent(table, settings, Box::new(move || build(&odds)))
+            }
+            Kind::Learning(_) | Kind::Searching(_) => Err(RunError::Untrained { name: settings.agent }),
+        }
+    }
+
+    /// As [`Run::new`], with a trained policy as the agent.
+    ///
+    /// # Errors
+    /// As [`Run::new`].
+    pub fn with_policy(table: ActionTable, settings: RunSettings, policy: QPolicy) -> Result<Run, RunError> {
+        Run::with_agent(table, settings, Box::new(move || Box::new(policy.clone())))
+    }
+
+    fn with_agent(table: ActionTable, settings: RunSettings, agent: Box<MakeAgent>) -> Result<Run, RunError> {
+        check_episodes(settings.episodes)?;
+        if settings.avoidability != AvoidabilitySettings::default() {
+            return Err(RunError::Avoidability);
+        }
+        let ads = under_test(&settings.ads, settings.profile.as_ref(), settings.external.as_ref())?;
+        let traffic = traffic_of(settings.traffic.as_ref())?;
+        let arena =
+            Arena::new(table, &settings.roads, ads, &settings.with, &settings.without)?.with_traffic(traffic);
+        if settings.causes && !arena.has_modules() {
+            return Err(RunError::NoModules(oracle::NoModules { ads: arena.ads_name() }));
+        }
+        Ok(Run { arena, settings, agent })
+    }
+
+    pub fn table(&self) -> &ActionTable {
+        self.arena.table()
+    }
+
+    pub fn space(&self) -> &Arc<Space> {
+        self.arena.table().space()
+    }
+
+    pub fn settings(&self) -> &RunSettings {
+        &self.settings
+    }
+
+    /// The driving system under test: its name here, or what an external one calls itself.
+    pub fn ads_name(&self) -> String {
+        self.arena.ads_name()
+    }
+
+    /// The external driving system under test, if it is one.
+    pub fn program(&self) -> Option<&Arc<Program>> {
+        self.arena.program()
+    }
+
+    /// What identifies an external driving system.
+    pub fn attached(&self) -> Option<Attached> {
+        self.arena.attached()
+    }
+
+    /// Number of episodes on all roads together.
+    pub fn episodes(&self) -> usize {
+        self.arena.roads() * self.settings.episodes as usize
+    }
+
+    /// Plays one episode; numbers run through the roads one after another.
+    pub fn episode(&self, number: usize) -> EpisodeLog {
+        self.played(&self.setup(number)).0
+    }
+
+    /// Plays an episode of a setup with a fresh agent. Returns the log, and the time that the agent simulated in
+    /// branches, s.
+    pub fn played(&self, setup: &episode::Setup) -> (EpisodeLog, f64) {
+        let mut agent = self.agent();
+        agent.begin();
+        let mut choose = |moment: &Moment| choose(agent.as_mut(), moment).0;
+        let log = episode::run(setup, &mut choose, &mut |_, _, _| {});
+        (log, agent.branched_s())
+    }
+
+    /// Plays one episode and judges its collisions.
+    pub fn judged(&self, number: usize) -> (EpisodeSummary, EpisodeLog) {
+        self.judged_by(number, (self.agent)().as_mut())
+    }
+
+    /// As [`Run::judged`], with another agent than the run's own.
+    pub fn judged_by(&self, number: usize, agent: &mut dyn Agent) -> (EpisodeSummary, EpisodeLog) {
+        agent.begin();
+        let mut gauges = Gauges::default();
+        let mut offered = Offered::default();
+        let mut choose = |moment: &Moment| {
+            let offers = offers(agent, moment);
+            offered.note(&offers);
+            let legal = legal(&offers);
+            carry_out(offers, legal.view(), agent, moment)
+        };
+        let log = self.play(number, &mut choose, &mut |world, _, contacts| gauges.note(world, contacts));
+        let setup = self.setup(number);
+        let mut summary = EpisodeSummary::judged(&setup, number, &log);
+        (summary.criticality, summary.pet_s) = gauges.of_steps(&log);
+        for (finding, shape) in summary.collisions.iter_mut().zip(gauges.shapes()) {
+            finding.shape = *shape;
+        }
+        summary.manners = gauges.manners();
+        summary.offered = offered;
+        summary.branched_s = agent.branched_s();
+        if self.settings.causes {
+            summary.find_causes(&setup, &log).expect("a run with causes is against a system of modules");
+        }
+        (summary, log)
+    }
+
+    /// Plays one episode with other choices than the agent's: a replay, for example.
+    pub fn play(
+        &self,
+        number: usize,
+        choose: &mut dyn FnMut(&Moment) -> Choice,
+        watch: &mut Watch,
+    ) -> EpisodeLog {
+        episode::run(&self.setup(number), choose, watch)
+    }
+
+    /// Everything that the nth episode is made of but the choices.
+    pub fn setup(&self, number: usize) -> episode::Setup<'_> {
+        let seed = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
+        self.setup_of(number / self.settings.episodes as usize, seed)
+    }
+
+    /// An episode of any seed on the nth of the roads.
+    pub fn setup_of(&self, road: usize, seed: u64) -> episode::Setup<'_> {
+        let mut setup = self.arena.setup(road, seed);
+        setup.start.ambient = self.settings.ambient;
+        setup
+    }
+
+    /// A fresh agent for one episode.
+    pub fn agent(&self) -> Box<dyn Agent> {
+        (self.agent)()
+    }
+}
+
+/// Plays and judges episodes on `jobs` threads and hands each to `done` on this one, in the order in
+/// which they end. Stops early, between episodes, when `stop` is set or `done` fails.
+///
+/// # Errors
+/// The first error of `done`.
+pub fn play<E>(
+    run: &Run,
+    numbers: &[usize],
+    jobs: usize,
+    stop: &AtomicBool,
+    done: &mut dyn FnMut(EpisodeSummary, EpisodeLog) -> Result<(), E>,
+) -> Result<(), E> {
+    let work = |&number: &usize, tell: &mut dyn FnMut(_) -> bool| {
+        tell(run.judged(number));
+    };
+    on_threads(numbers, jobs, stop, work, &mut |(summary, log)| done(summary, log))
+}

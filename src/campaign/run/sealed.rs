@@ -1,0 +1,577 @@
+//! What `run.db` and `study.db` have in common: layout, settings, and seals, by which a resumed run sees that nothing
+//! was changed behind its back.
+//!
+//! The settings stand in the database as they were when it was begun. Every episode (or cell) has a seal: a digest of
+//! all its rows, written in the same transaction. SQLite's own check finds torn pages, a seal finds values that were
+//! changed. Neither protects against a forger who writes seals, too. A file from elsewhere may hold a view in place of a
+//! table, which could run for ever when it is read. So its tables are compared with those of this version before anything
+//! is read.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use rusqlite::types::ValueRef;
+use rusqlite::{Connection, OptionalExtension, Row, params};
+use serde_json::{Map, Value};
+use sha2::{Digest, Sha256};
+
+use crate::files;
+use crate::files::NotPlain;
+use avastra_lang::model::digest_text;
+
+/// Tables that every layout has.
+const TABLES: &str = "
+CREATE TABLE begun (only INTEGER PRIMARY KEY CHECK (only = 1), settings TEXT NOT NULL) STRICT;
+CREATE TABLE seal (unit INTEGER PRIMARY KEY, digest TEXT NOT NULL) STRICT;
+";
+
+/// Why a run database cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum DatabaseError {
+    #[error("it has layout {found}, this version of avastra reads {wanted}: begin a new one")]
+    Layout { found: i64, wanted: i64 },
+    #[error("it names an episode {found}")]
+    Episode { found: i64 },
+    #[error("its checkpoint is damaged: begin a new training")]
+    Checkpoint,
+    #[error("the settings were edited since it was begun: {what}; undo that, or begin a new one")]
+    Settings { what: String },
+    #[error(
+        "its rows of {unit} {number} were changed since they were written: `--resume` plays it again, and a training must \
+         be begun anew"
+    )]
+    Rows { unit: &'static str, number: i64 },
+    #[error("its results were changed since they were written: `avastra train --resume` writes them again")]
+    Results,
+    #[error("it is damaged ({what}): begin a new one")]
+    Damaged { what: String },
+    #[error(
+        "its {unit} {number} is another than that of the directories before: one of them was not played alike"
+    )]
+    Differs { unit: &'static str, number: i64 },
+    #[error("{0}: begin a new one")]
+    Name(#[from] NotPlain),
+    #[error(transparent)]
+    File(#[from] std::io::Error),
+    #[error(transparent)]
+    Sqlite(rusqlite::Error),
+}
+
+impl DatabaseError {
+    /// Whether the file was damaged or changed, so that its episodes must be played again. Other errors lose nothing.
+    pub fn is_torn(&self) -> bool {
+        matches!(self, DatabaseError::Damaged { .. } | DatabaseError::Rows { .. })
+    }
+}
+
+impl From<rusqlite::Error> for DatabaseError {
+    fn from(error: rusqlite::Error) -> DatabaseError {
+        use rusqlite::ErrorCode::{DatabaseCorrupt, NotADatabase};
+        match error.sqlite_error_code() {
+            Some(DatabaseCorrupt | NotADatabase) => DatabaseError::Damaged { what: error.to_string() },
+            _ => DatabaseError::Sqlite(error),
+        }
+    }
+}
+
+/// The layout of a database.
+pub struct Layout {
+    /// Raised whenever a column changes.
+    pub version: i64,
+    /// Name of the unit that is added as a whole, which is also the name of its key column: `episode`, `cell`. The
+    /// first of the tables has one row for each unit.
+    pub unit: &'static str,
+    /// The tables with its rows.
+    pub tables: &'static [&'static str],
+    /// A table whose rows name rows of another by a column with that one's name. What they name is sealed with them.
+    pub naming: Option<(&'static str, &'static str)>,
+    /// Those of the tables whose rows depend on where the directory is.
+    pub local: &'static [&'static str],
+}
+
+impl Layout {
+    /// Opens a database, making its tables if the file is new. `settings` are the ones that it is begun with, as
+    /// YAML; an older file must have been begun with the same, and be whole.
+    ///
+    /// # Errors
+    /// If the file cannot be opened, is a link, has another layout or other settings, or was damaged or changed.
+    pub fn open(&self, path: &Path, tables: &str, settings: &str) -> Result<Connection, DatabaseError> {
+        let (connection, damaged) = self.open_damaged(path, tables, settings)?;
+        match damaged.first() {
+            Some(&number) => Err(DatabaseError::Rows { unit: self.unit, number }),
+            None => Ok(connection),
+        }
+    }
+
+    /// As [`Layout::open`], but units whose rows were changed are no error: their numbers come beside the connection.
+    ///
+    /// # Errors
+    /// As [`Layout::open`], but for changed rows.
+    pub(super) fn open_damaged(
+        &self,
+        path: &Path,
+        tables: &str,
+        settings: &str,
+    ) -> Result<(Connection, Vec<i64>), DatabaseError> {
+        // SQLite would follow a link and write where it leads.
+        files::own_file(path)?;
+        let mut connection = Connection::open(path)?;
+        let found: i64 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
+        if found == 0 {
+            let transaction = connection.transaction()?;
+            transaction.execute_batch(TABLES)?;
+            transaction.execute_batch(tables)?;
+            transaction.execute("INSERT INTO begun VALUES (1, ?)", [settings])?;
+            transaction.pragma_update(None, "user_version", self.version)?;
+            transaction.commit()?;
+        } else if found != self.version {
+            return Err(DatabaseError::Layout { found, wanted: self.version });
+        } else {
+            check_tables(&connection, tables)?;
+            self.check(&connection, settings)?;
+        }
+        let damaged = self.damaged(&connection)?;
+        Ok((connection, damaged))
+    }
+
+    /// Checks that its pages are sound and its settings those that it was begun with.
+    fn check(&self, connection: &Connection, settings: &str) -> Result<(), DatabaseError> {
+        let state: String = connection.pragma_query_value(None, "quick_check", |row| row.get(0))?;
+        if state != "ok" {
+            return Err(DatabaseError::Damaged { what: state });
+        }
+        let begun: String = connection.query_row("SELECT settings FROM begun", [], |row| row.get(0))?;
+        if let Some(what) = differences(&begun, settings) {
+            return Err(DatabaseError::Settings { what });
+        }
+        Ok(())
+    }
+
+    /// The numbers of the units whose rows were changed, rising. A unit that has rows in any table and no seal counts as changed.
+    fn damaged(&self, connection: &Connection) -> Result<Vec<i64>, DatabaseError> {
+        let unit = self.unit;
+        let of_tables: String =
+            self.tables.iter().map(|table| format!("SELECT {unit} FROM {table} UNION ")).collect();
+        let mut numbers = connection.prepare(&format!("{of_tables}SELECT unit FROM seal ORDER BY 1"))?;
+        let mut damaged = Vec::new();
+        for number in numbers.query_map([], |row| row.get::<_, i64>(0))? {
+            let number = number?;
+            let mut seal = connection.prepare_cached("SELECT digest FROM seal WHERE unit = ?")?;
+            let seal: Option<String> = seal.query_row([number], |row| row.get(0)).optional()?;
+            if seal != Some(self.rows_digest(connection, number)?) {
+                damaged.push(number);
+            }
+        }
+        Ok(damaged)
+    }
+
+    /// Hides units from all later queries over this connection. The file stays as it is: SQLite takes a plain table name for the
+    /// temporary view.
+    pub(super) fn hide(&self, connection: &Connection, numbers: &[i64]) -> Result<(), rusqlite::Error> {
+        connection.execute_batch("CREATE TEMP TABLE hidden (unit INTEGER PRIMARY KEY) STRICT")?;
+        let mut insert = connection.prepare("INSERT INTO temp.hidden VALUES (?)")?;
+        for number in numbers {
+            insert.execute([number])?;
+        }
+        let tables = self.tables.iter().map(|table| (*table, self.unit)).chain([("seal", "unit")]);
+        for (table, unit) in tables {
+            connection.execute_batch(&format!(
+                "CREATE TEMP VIEW {table} AS SELECT * FROM main.{table} WHERE {unit} NOT IN (SELECT unit FROM temp.hidden)"
+            ))?;
+        }
+        Ok(())
+    }
+
+    /// Seals the rows of a unit; called in the transaction that adds them.
+    pub fn seal(&self, connection: &Connection, number: i64) -> Result<(), rusqlite::Error> {
+        let digest = self.rows_digest(connection, number)?;
+        connection.prepare_cached("INSERT INTO seal VALUES (?, ?)")?.execute(params![number, digest])?;
+        Ok(())
+    }
+
+    /// Deletes the rows of a unit.
+    pub(super) fn delete(&self, connection: &Connection, number: i64) -> Result<(), rusqlite::Error> {
+        for table in self.tables.iter().rev() {
+            connection
+                .prepare_cached(&format!("DELETE FROM {table} WHERE {} = ?", self.unit))?
+                .execute([number])?;
+        }
+        connection.prepare_cached("DELETE FROM seal WHERE unit = ?")?.execute([number])?;
+        Ok(())
+    }
+
+    /// Deletes the rows of all units from a number on.
+    pub fn delete_from(&self, connection: &Connection, first: i64) -> Result<(), rusqlite::Error> {
+        for table in self.tables.iter().rev() {
+            connection.execute(&format!("DELETE FROM {table} WHERE {} >= ?", self.unit), [first])?;
+        }
+        connection.execute("DELETE FROM seal WHERE unit >= ?", [first])?;
+        Ok(())
+    }
+
+    /// The digest of all rows of a unit.
+    fn rows_digest(&self, connection: &Connection, number: i64) -> Result<String, rusqlite::Error> {
+        let mut whole = Sha256::new();
+        for table in self.tables {
+            let named = self.naming.filter(|(by, _)| by == table);
+            let join =
+                named.map_or(String::new(), |(_, named)| format!(" LEFT JOIN {named} USING ({named})"));
+            let query = format!("SELECT * FROM {table}{join} WHERE {} = ?", self.unit);
+            add_rows(&mut whole, connection, table, &query, number)?;
+        }
+        Ok(digest_text(&whole.finalize().into()))
+    }
+}
+
+/// The columns of a table: name, type, and position in the key, which is 0 for a column outside the key.
+type Columns = Vec<(String, String, i64)>;
+
+/// Refuses a file unless its tables are those that `tables` makes, see [`check_plain`].
+pub(super) fn check_tables(connection: &Connection, tables: &str) -> Result<(), DatabaseError> {
+    let pattern = Connection::open_in_memory()?;
+    pattern.execute_batch(TABLES)?;
+    pattern.execute_batch(tables)?;
+    check_plain(connection, "main", &plain_tables(&pattern, "main")?)
+}
+
+/// Refuses an attached file unless it holds only plain tables, among them the wanted ones with their columns and keys. Keys
+/// matter, because without them every search for a unit would go through all rows.
+pub(super) fn check_plain(
+    connection: &Connection,
+    file: &str,
+    wanted: &BTreeMap<String, Columns>,
+) -> Result<(), DatabaseError> {
+    let found = plain_tables(connection, file)?;
+    let is_there = |name: &str, columns: &Columns| {
+        found.get(name).is_some_and(|there| columns.iter().all(|column| there.contains(column)))
+    };
+    match wanted.iter().find(|(name, columns)| !is_there(name, columns)) {
+        None => Ok(()),
+        Some((name, _)) => {
+            Err(DatabaseError::Damaged { what: format!("`{name}` is not there or has other columns") })
+        }
+    }
+}
+
+/// The tables of an attached file.
+///
+/// # Errors
+/// If it holds anything else: a view, a trigger, a virtual table, a further index or a computed column. Reading these would run
+/// code from the file.
+pub(super) fn plain_tables(
+    connection: &Connection,
+    file: &str,
+) -> Result<BTreeMap<String, Columns>, DatabaseError> {
+    let strange =
+        |name: &str| DatabaseError::Damaged { what: format!("`{name}` is no table that avastra makes") };
+    let mut schema = connection.prepare(&format!("SELECT type, name, sql FROM {file}.sqlite_schema"))?;
+    let rows = schema.query_map([], |row| {
+        Ok((row.get::<_, String>(0)?, row.get::<_, String>(1)?, row.get::<_, Option<String>>(2)?))
+    })?;
+    let mut tables = BTreeMap::new();
+    for row in rows {
+        let (kind, name, sql) = row?;
+        match (kind.as_str(), sql) {
+            // SQLite normalises the beginning of the stored text to these words.
+            ("table", Some(sql)) if sql.starts_with("CREATE TABLE ") => {}
+            // The index of a key has no text.
+            ("index", None) => continue,
+            _ => return Err(strange(&name)),
+        }
+        let (mut columns, mut is_plain) = (Columns::new(), true);
+        connection.pragma(Some(file), "table_xinfo", name.as_str(), |row| {
+            columns.push((row.get("name")?, row.get("type")?, row.get("pk")?));
+            is_plain &= row.get::<_, i64>("hidden")? == 0;
+            Ok(())
+        })?;
+        if !is_plain {
+            return Err(strange(&name));
+        }
+        tables.insert(name, columns);
+    }
+    Ok(tables)
+}
+
+/// Adds the rows of a unit in a table to a digest. SQLite need not give them in one order, so each has a digest, and these
+/// are sorted.
+pub(super) fn add_rows(
+    whole: &mut Sha256,
+    connection: &Connection,
+    table: &str,
+    query: &str,
+    number: i64,
+) -> Result<(), rusqlite::Error> {
+    let mut statement = connection.prepare_cached(query)?;
+    let columns = statement.column_count();
+    let mut digests: Vec<[u8; 32]> = Vec::new();
+    let mut rows = statement.query([number])?;
+    while let Some(row) = rows.next()? {
+        digests.push(row_digest(row, columns)?);
+    }
+    digests.sort_unstable();
+    whole.update(table.as_bytes());
+    whole.update((digests.len() as u64).to_le_bytes());
+    digests.iter().for_each(|digest| whole.update(digest));
+    Ok(())
+}
+
+/// The digest of a row: a tag for each value and, where the length is not fixed, the length.
+fn row_digest(row: &Row, columns: usize) -> Result<[u8; 32], rusqlite::Error> {
+    let mut hash = Sha256::new();
+    for column in 0..columns {
+        match row.get_ref(column)? {
+            ValueRef::Null => hash.update([0]),
+            ValueRef::Integer(value) => {
+                hash.update([1]);
+                hash.update(value.to_le_bytes());
+            }
+            ValueRef::Real(value) => {
+                hash.update([2]);
+                hash.update(value.to_le_bytes());
+            }
+            ValueRef::Text(bytes) | ValueRef::Blob(bytes) => {
+                hash.update([3]);
+                hash.update((bytes.len() as u64).to_le_bytes());
+                hash.update(bytes);
+            }
+        }
+    }
+    Ok(hash.finalize().into())
+}
+
+/// Settings that are named as different.
+const NAMED_MAX: usize = 8;
+
+/// The settings that differ, each by its path with what it was; `None` if there is none.
+pub fn differences(begun: &str, now: &str) -> Option<String> {
+    let read = |text: &str| serde_yaml::from_str::<Map<String, Value>>(text).unwrap_or_default();
+    let mut differ = Vec::new();
+    fields_that_differ("", &read(begun), &read(now), &mut differ);
+    let more = differ.len().saturating_sub(NAMED_MAX);
+    differ.truncate(NAMED_MAX);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    (!differ.is_empty()).then(|| differ.join(", ") + &more)
+}
+
+fn fields_that_differ(
+    prefix: &str,
+    begun: &Map<String, Value>,
+    now: &Map<String, Value>,
+    differ: &mut Vec<String>,
+) {
+    let mut keys: Vec<&String> = begun.keys().chain(now.keys()).collect();
+    keys.sort();
+    keys.dedup();
+    keys.retain(|key| begun.get(*key) != now.get(*key));
+    // What a digest is of says more than the digest.
+    if keys.len() > 1 {
+        keys.retain(|key| *key != "digest");
+    }
+    for key in keys {
+        value_that_differs(&format!("{prefix}{key}"), begun.get(key), now.get(key), differ);
+    }
+}
+
+fn value_that_differs(path: &str, begun: Option<&Value>, now: Option<&Value>, differ: &mut Vec<String>) {
+    match (begun, now) {
+        (Some(Value::Object(begun)), Some(Value::Object(now))) => {
+            fields_that_differ(&format!("{path}."), begun, now, differ);
+        }
+        (Some(Value::Array(begun)), Some(Value::Array(now))) => {
+            let places = 0..begun.len().max(now.len());
+            for at in places.filter(|&at| begun.get(at) != now.get(at)) {
+                value_that_differs(&format!("{path}[{at}]"), begun.get(at), now.get(at), differ);
+            }
+        }
+        // A whole block would be too long to read.
+        (Some(Value::Object(_) | Value::Array(_)), _) => differ.push(format!("`{path}` was given")),
+        (Some(value), _) => differ.push(format!("`{path}` was {value}")),
+        (None, _) => differ.push(format!("`{path}` was not there")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SETTINGS: &str = "seed: 1\nroads: [corner]\n";
+    const LAYOUT: Layout = Layout {
+        version: 3,
+        unit: "episode",
+        tables: &["episode", "step"],
+        naming: Some(("step", "reason")),
+        local: &[],
+    };
+    const OWN: &str = "CREATE TABLE episode (episode INTEGER PRIMARY KEY, name TEXT) STRICT;
+                       CREATE TABLE reason (reason INTEGER PRIMARY KEY, text TEXT) STRICT;
+                       CREATE TABLE step (episode INTEGER, step INTEGER, x REAL, reason INTEGER) STRICT;";
+
+    fn begun(path: &Path) -> Connection {
+        let mut connection = LAYOUT.open(path, OWN, SETTINGS).unwrap();
+        connection.execute("INSERT INTO reason VALUES (1, 'no room')", []).unwrap();
+        for number in 0..3_i64 {
+            let transaction = connection.transaction().unwrap();
+            transaction.execute("INSERT INTO episode VALUES (?, 'a')", [number]).unwrap();
+            transaction.execute("INSERT INTO step VALUES (?, 0, 0.5, ?1 % 2)", [number]).unwrap();
+            LAYOUT.seal(&transaction, number).unwrap();
+            transaction.commit().unwrap();
+        }
+        connection
+    }
+
+    #[test]
+    fn what_was_changed_is_said() {
+        let changes = [
+            ("UPDATE step SET x = 0.25 WHERE episode = 1", "episode 1"),
+            ("UPDATE episode SET name = 'b' WHERE episode = 2", "episode 2"),
+            ("DELETE FROM step WHERE episode = 0", "episode 0"),
+            ("DELETE FROM episode WHERE episode = 1", "episode 1"),
+            ("INSERT INTO episode VALUES (7, 'a')", "episode 7"),
+            ("DELETE FROM seal WHERE unit = 2", "episode 2"),
+            ("UPDATE reason SET text = 'no lane'", "episode 1"),
+            ("INSERT INTO reason VALUES (0, 'a red light')", "episode 0"),
+            ("INSERT INTO step VALUES (9, 0, 0.5, NULL)", "episode 9"),
+        ];
+        for (change, what) in changes {
+            let scratch = tempfile::tempdir().unwrap();
+            let path = scratch.path().join("run.db");
+            let connection = begun(&path);
+            LAYOUT.open(&path, OWN, SETTINGS).expect("nothing was changed");
+            connection.execute_batch(change).unwrap();
+            drop(connection);
+            let refused = LAYOUT.open(&path, OWN, SETTINGS).unwrap_err().to_string();
+            assert!(refused.contains(what), "{change}: {refused}");
+        }
+    }
+
+    #[test]
+    fn a_damaged_unit_can_be_hidden_or_deleted() {
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("run.db");
+        let connection = begun(&path);
+        let damage = "UPDATE step SET x = 0.25 WHERE episode = 1; INSERT INTO step VALUES (9, 0, 0.5, NULL)";
+        connection.execute_batch(damage).unwrap();
+        drop(connection);
+        let rows = |connection: &Connection| -> [i64; 3] {
+            ["episode", "step", "seal"].map(|table| {
+                let query = format!("SELECT count(*) FROM {table}");
+                connection.query_row(&query, [], |row| row.get(0)).unwrap()
+            })
+        };
+        let (hiding, damaged) = LAYOUT.open_damaged(&path, OWN, SETTINGS).unwrap();
+        assert_eq!(damaged, [1, 9]);
+        assert_eq!(rows(&hiding), [3, 4, 3]);
+        LAYOUT.hide(&hiding, &damaged).unwrap();
+        assert_eq!(rows(&hiding), [2, 2, 2]);
+        // Other connections see all rows.
+        let (deleting, damaged) = LAYOUT.open_damaged(&path, OWN, SETTINGS).unwrap();
+        assert_eq!(rows(&deleting), [3, 4, 3]);
+        damaged.iter().for_each(|&number| LAYOUT.delete(&deleting, number).unwrap());
+        let sound = LAYOUT.open(&path, OWN, SETTINGS).unwrap();
+        assert_eq!(rows(&sound), [2, 2, 2]);
+    }
+
+    #[test]
+    fn only_tables_that_avastra_makes_are_read() {
+        let endless =
+            "WITH RECURSIVE n(reason, text) AS (SELECT 1, 'a' UNION ALL SELECT reason + 1, 'a' FROM n)";
+        let view = format!(
+            "ALTER TABLE reason RENAME TO other; CREATE VIEW reason AS {endless} SELECT reason, text FROM n"
+        );
+        let changes = [
+            (view.as_str(), "`reason` is no table"),
+            ("CREATE VIEW more AS SELECT 1", "`more` is no table"),
+            ("CREATE TRIGGER t AFTER INSERT ON step BEGIN DELETE FROM episode; END", "`t` is no table"),
+            ("CREATE INDEX i ON step (hex(x))", "`i` is no table"),
+            ("CREATE VIRTUAL TABLE places USING rtree(id, a, b)", "`places` is no table"),
+            ("ALTER TABLE reason ADD COLUMN more TEXT AS (hex(text))", "`reason` is no table"),
+            ("DROP TABLE reason", "`reason` is not there"),
+            ("ALTER TABLE step DROP COLUMN x", "`step` is not there or has other columns"),
+            (
+                "DROP TABLE seal; CREATE TABLE seal (unit INTEGER, digest TEXT NOT NULL) STRICT",
+                "`seal` is not there or has other columns",
+            ),
+        ];
+        for (change, what) in changes {
+            let scratch = tempfile::tempdir().unwrap();
+            let path = scratch.path().join("run.db");
+            begun(&path).execute_batch(change).unwrap();
+            let refused = LAYOUT.open(&path, OWN, SETTINGS).unwrap_err();
+            assert!(refused.is_torn() && refused.to_string().contains(what), "{change}: {refused}");
+        }
+    }
+
+    #[test]
+    fn other_settings_are_said() {
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("run.db");
+        let connection = begun(&path);
+        LAYOUT.delete_from(&connection, 1).unwrap();
+        drop(connection);
+        LAYOUT.open(&path, OWN, "# a comment\nroads:\n  - corner\nseed: 1").expect("the same settings");
+        let refused = LAYOUT.open(&path, OWN, "seed: 2\nroads: [corner]\nx: 1").unwrap_err().to_string();
+        assert!(refused.contains("`seed` was 1, `x` was not there"), "{refused}");
+    }
+
+    #[test]
+    fn a_torn_file_is_refused_or_holds_what_was_written() {
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("run.db");
+        let rows = |connection: &Connection| -> String {
+            let query = "SELECT group_concat(episode || name || (SELECT group_concat(x) FROM step
+                         WHERE step.episode = episode.episode)) FROM episode";
+            connection.query_row(query, [], |row| row.get(0)).unwrap()
+        };
+        let written = rows(&begun(&path));
+        let whole = std::fs::read(&path).unwrap();
+        let mut refused = 0;
+        for at in (100..whole.len()).step_by(97) {
+            let mut torn = whole.clone();
+            torn[at] ^= 0x55;
+            std::fs::write(&path, &torn).unwrap();
+            // A byte that no row and no page needs may differ.
+            match LAYOUT.open(&path, OWN, SETTINGS) {
+                Ok(connection) => assert_eq!(rows(&connection), written, "byte {at}"),
+                Err(_) => refused += 1,
+            }
+        }
+        assert!(refused > 0, "pages are checked");
+        for length in [300, whole.len() / 2, whole.len() / 4 * 3] {
+            std::fs::write(&path, &whole[..length]).unwrap();
+            let refused = LAYOUT.open(&path, OWN, SETTINGS).unwrap_err();
+            assert!(refused.is_torn(), "{length} bytes: {refused}");
+        }
+        std::fs::write(&path, &whole).unwrap();
+        let other = Layout { version: 4, ..LAYOUT };
+        for refused in [other.open(&path, OWN, SETTINGS), LAYOUT.open(&path, OWN, "seed: 2")] {
+            let refused = refused.unwrap_err();
+            assert!(!refused.is_torn(), "{refused}");
+        }
+    }
+
+    #[test]
+    fn settings_are_told_apart_by_their_fields() {
+        let profile = |range_m: u32, digest: &str| {
+            format!(
+                "seed: 1\nprofile:\n  digest: {digest}\n  settings: {{ sight: {{ range_m: {range_m} }}, plan: 1 }}\n"
+            )
+        };
+        let found = |now: &str| differences(&profile(80, "a"), now);
+        assert_eq!(found(&profile(80, "a")), None);
+        assert_eq!(found(&profile(60, "b")).unwrap(), "`profile.settings.sight.range_m` was 80");
+        assert_eq!(found(&profile(80, "b")).unwrap(), "`profile.digest` was \"a\"");
+        assert_eq!(found("seed: 2\n").unwrap(), "`profile` was given, `seed` was 1");
+        let agents = |rate: f64, last: &str| {
+            let agent = |rate: f64| format!("{{ agent: ddqn, training: {{ rate: {rate} }} }}");
+            format!("agents: [{}, {}{last}]", agent(0.5), agent(rate))
+        };
+        let found = |now: &str| differences(&agents(0.5, ", { agent: none }, 3"), now).unwrap();
+        let rate = "`agents[1].training.rate` was 0.5";
+        assert_eq!(found(&agents(0.25, ", { agent: none }, 3")), rate);
+        assert_eq!(found(&agents(0.25, "")), format!("{rate}, `agents[2]` was given, `agents[3]` was 3"));
+        let one_more = "`agents[4]` was not there";
+        assert_eq!(found(&agents(0.5, ", { agent: none }, 3, { agent: random }")), one_more);
+        let (many, none) = ((0..11).map(|at| format!("k{at:02}: 1\n")).collect::<String>(), "");
+        assert!(differences(none, &many).unwrap().ends_with("`k07` was not there and 3 more"));
+    }
+}

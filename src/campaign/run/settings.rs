@@ -1,0 +1,216 @@
+//! What a run is asked to do, as `run.yaml` keeps it, and why it cannot begin.
+
+use crate::oracle;
+use crate::oracle::AvoidabilitySettings;
+use avastra_drivers as ads;
+use avastra_drivers::external::{Attached, Failure, RecordError};
+use avastra_lang::model::Space;
+use avastra_lang::syntax::listed;
+use avastra_search::agent;
+use avastra_world::sim::{ENGINE, TrafficError};
+
+use crate::run::profile::{DEFAULT_ADS, Profile, TrafficRecord};
+
+/// Version of avastra, as settings record it.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// Everything that is needed to repeat a run; written to `run.yaml`.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunSettings {
+    /// Version of avastra that wrote it.
+    pub avastra: String,
+    /// Version of the simulated world.
+    pub engine: String,
+    /// Path of the space, from the run directory.
+    pub space: String,
+    /// What the space meant: see `model::Meaning`.
+    pub space_digest: String,
+    pub roads: Vec<String>,
+    pub ads: String,
+    /// Settings of the driving system; without them it has its defaults.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<Profile>,
+    /// Who an external driving system said to be, and how it is reached and asked. Its working directory is one from
+    /// the run directory.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub external: Option<Attached>,
+    pub agent: String,
+    /// The policy that the agent follows, from the run directory, and its digest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub policy: Option<PolicyReference>,
+    /// Episodes on each road.
+    pub episodes: u32,
+    pub seed: u64,
+    /// Vehicles of ambient traffic.
+    #[serde(default)]
+    pub ambient: u32,
+    /// How other vehicles drive, if not as in the default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub traffic: Option<TrafficRecord>,
+    /// Whether each counted collision is diagnosed.
+    #[serde(default)]
+    pub causes: bool,
+    /// Rules switched off.
+    pub without: Vec<String>,
+    /// Optional rules switched on.
+    pub with: Vec<String>,
+    /// How the avoidability of collisions is judged: in one way, of which this is the record.
+    #[serde(default)]
+    pub avoidability: AvoidabilitySettings,
+}
+
+impl RunSettings {
+    /// A run on all roads of a space against the default driving system, with every option off. The caller
+    /// changes what it wants otherwise.
+    pub fn new(space: &Space, agent: &str, episodes: u32, seed: u64) -> RunSettings {
+        RunSettings {
+            avastra: VERSION.to_owned(),
+            engine: ENGINE.to_owned(),
+            space: space.path.display().to_string(),
+            space_digest: space.meaning.seal(),
+            roads: space.roads.iter().map(|road| road.name.clone()).collect(),
+            ads: DEFAULT_ADS.to_owned(),
+            profile: None,
+            external: None,
+            agent: agent.to_owned(),
+            policy: None,
+            episodes,
+            seed,
+            ambient: 0,
+            traffic: None,
+            causes: false,
+            without: Vec::new(),
+            with: Vec::new(),
+            avoidability: AvoidabilitySettings::default(),
+        }
+    }
+
+    /// These settings with an external driving system that is not started, because nothing is to be played.
+    pub fn unstarted(mut self) -> RunSettings {
+        self.external.iter_mut().for_each(|attached| attached.is_recorded = true);
+        self
+    }
+}
+
+/// The policy file that a run plays.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PolicyReference {
+    pub file: String,
+    pub digest: String,
+    /// Which of its faces acts.
+    #[serde(default)]
+    pub face: agent::Face,
+}
+
+/// Why a run or a replay cannot begin.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    #[error("no road `{name}` in this space: it has {known}")]
+    Road { name: String, known: String },
+    #[error("no driving system `{name}`: there are {known}")]
+    Ads { name: String, known: String },
+    #[error("no agent `{name}`: there are {known}")]
+    Agent { name: String, known: String },
+    #[error("`{name}` has to be trained first: `avastra train`, then `avastra run --policy FILE`")]
+    Untrained { name: String },
+    #[error("`{name}` has nothing to learn: `avastra run --agent {name}` plays it")]
+    Unteachable { name: String },
+    #[error("the checkpoint is not of a training with such settings: begin a new one")]
+    Checkpoint,
+    #[error(transparent)]
+    Settings(#[from] agent::SettingsError),
+    #[error(transparent)]
+    Rule(#[from] avastra_lang::model::UnknownRule),
+    #[error(transparent)]
+    Start(#[from] avastra_lang::model::NoStart),
+    #[error(transparent)]
+    Time(#[from] avastra_lang::prove::BrokenByTime),
+    #[error("`{name}` is asked for twice, or both on and off")]
+    Twice { name: String },
+    #[error("{found} episodes a road: from 1 to {EPISODES_MAX} are possible")]
+    Episodes { found: u32 },
+    #[error(
+        "its settings say that avoidability was judged in another way (`avoidability`), which is not possible here: begin a new one"
+    )]
+    Avoidability,
+    #[error(transparent)]
+    NoModules(#[from] oracle::NoModules),
+    #[error(transparent)]
+    NoSettings(#[from] ads::NoSettings),
+    #[error("the profile of `{name}`: {error}")]
+    Profile { name: String, error: ads::ConfigError },
+    #[error(
+        "{what} was made with settings of `{ads}` that mean something else in this version: nothing need \
+         happen alike; name a profile with `--ads FILE` to see what happens with that"
+    )]
+    ProfileDigest { what: String, ads: String },
+    #[error("the traffic of `{name}`: {error}")]
+    Traffic { name: String, error: TrafficError },
+    #[error(
+        "{what} was made with a traffic profile that means something else in this version: nothing need happen alike"
+    )]
+    TrafficDigest { what: String },
+    #[error("{}", external_text(.0))]
+    External(Box<Failure>),
+    #[error("it was begun against {begun}, and the same command now starts {found}: begin a new one")]
+    OtherProgram { begun: String, found: String },
+    #[error("an external driving system has no name here: give it with `--ads 'COMMAND'` or `--ads FILE`")]
+    ExternalUnnamed,
+    #[error(
+        "`{name}` was made against {ads}, and its recorded answers are not beside it: give the driving system with \
+         `--ads`"
+    )]
+    NoAnswers { name: String, ads: String },
+    #[error(
+        "`{name}` was trained against an external driving system, which a policy does not name: `avastra run --policy` \
+         plays it against any; its training cannot be looked at again"
+    )]
+    TrainedExternal { name: String },
+    #[error("the recorded answers of `{name}`: {error}")]
+    Answers { name: String, error: RecordError },
+    #[error("`{name}` does not say which external driving system it was made against: {reason}")]
+    Attached { name: String, reason: String },
+    #[error(
+        "`{scenario}` was made in world `{engine}`; this is `{ENGINE}`, where nothing need happen alike: \
+         `avastra test --review` plays it here and says what differs"
+    )]
+    Engine { scenario: String, engine: String },
+}
+
+/// Why an external driving system is of no use, what to do, and the end of its standard error.
+fn external_text(failure: &Failure) -> String {
+    let mut text =
+        format!("the driving system cannot be used: {}\n  {}", failure.in_words(), failure.problem.advice());
+    for line in failure.stderr_lines(STDERR_LINES) {
+        text.push_str(&format!("\n  | {line}"));
+    }
+    text
+}
+
+/// Lines of standard error that an error shows.
+const STDERR_LINES: usize = 12;
+
+/// Most episodes that a run may have on each road.
+pub const EPISODES_MAX: u32 = 1_000_000;
+
+/// The agent of that name.
+///
+/// # Errors
+/// If there is none.
+pub(crate) fn agent_named(name: &str) -> Result<&'static agent::Entry, RunError> {
+    agent::by_name(name).ok_or_else(|| {
+        let known = listed(&agent::REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>());
+        RunError::Agent { name: name.to_owned(), known }
+    })
+}
+
+/// Checks how many episodes a run is to play on each road.
+///
+/// # Errors
+/// If it is none, or more than [`EPISODES_MAX`].
+pub(crate) fn check_episodes(episodes: u32) -> Result<(), RunError> {
+    let fits = (1..=EPISODES_MAX).contains(&episodes);
+    if fits { Ok(()) } else { Err(RunError::Episodes { found: episodes }) }
+}

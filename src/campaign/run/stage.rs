@@ -1,0 +1,134 @@
+//! An emitted scenario played again, and its claims checked.
+
+use std::sync::Arc;
+
+use crate::episode;
+use crate::episode::{EpisodeLog, Script, Watch};
+use crate::oracle;
+use crate::oracle::{ClaimResult, Judgement, NoModules, NoTries, Replays};
+use avastra_drivers::{ModularConfig, Selected};
+use avastra_lang::model::{Claim, RulesInForce, Scenario, digest_text};
+use avastra_search::mdp::ProcKind;
+use avastra_world::action::ActionTable;
+use avastra_world::sim::{ENGINE, Scene, Start, TrafficProfile};
+
+use crate::run::profile::recorded_traffic;
+use crate::run::settings::RunError;
+
+/// A scenario that is ready to play: its road and the rules that it was made with.
+pub struct Stage<'a> {
+    table: &'a ActionTable,
+    scenario: &'a Scenario,
+    rules: RulesInForce,
+    scene: Arc<Scene>,
+    traffic: TrafficProfile,
+}
+
+impl<'a> Stage<'a> {
+    /// # Errors
+    /// If the scenario was made in another world, or with rules or traffic that do not exist.
+    pub fn new(table: &'a ActionTable, scenario: &'a Scenario) -> Result<Stage<'a>, RunError> {
+        let origin = &scenario.origin;
+        if let Some(engine) = origin.engine.as_ref().filter(|engine| engine.as_str() != ENGINE) {
+            return Err(RunError::Engine { scenario: scenario.name.clone(), engine: engine.clone() });
+        }
+        let rules = RulesInForce::new(table.space(), &origin.with, &origin.without)?;
+        let scene = Arc::new(episode::scene(&table.space().roads[scenario.road]));
+        let traffic = recorded_traffic(scenario)?;
+        Ok(Stage { table, scenario, rules, scene, traffic })
+    }
+
+    /// The beginning of its episode, with any driving system.
+    pub fn setup(&self, ads: &Selected) -> episode::Setup<'_> {
+        let space = self.table.space();
+        let start = &self.scenario.start;
+        let seed = self.scenario.origin.seed.unwrap_or(0);
+        let memory = start.memory.clone();
+        episode::Setup {
+            table: self.table,
+            road: &space.roads[self.scenario.road],
+            scene: self.scene.clone(),
+            rules: &self.rules,
+            ads: ads.clone(),
+            seed,
+            start: Start {
+                signal_phase_s: start.signal_phase_s,
+                seed: start.traffic_seed.unwrap_or(seed),
+                ambient: start.ambient,
+                ego_mps: start.ego_mps,
+                traffic: self.traffic,
+                ..episode::start(space, &memory, seed)
+            },
+            memory,
+            period_shifts: Vec::new(),
+            proc: ProcKind::default(),
+        }
+    }
+
+    /// Plays it as it is written down.
+    pub fn play(&self, ads: &Selected, watch: &mut Watch) -> EpisodeLog {
+        let script = Script::of_scenario(self.scenario);
+        episode::run(&self.setup(ads), &mut |moment| script.choose(self.table, moment), watch)
+    }
+
+    /// Plays it, and finds its first counted collision, if there is one.
+    pub fn first_counted(&self, ads: &Selected) -> (EpisodeLog, Vec<Judgement>, Option<usize>) {
+        let log = self.play(ads, &mut |_, _, _| {});
+        let judgements = self.judge(ads, &log);
+        let first = oracle::counted(self.table.space(), &log, &judgements).first().copied();
+        (log, judgements, first)
+    }
+
+    /// Indices of the collisions that the space's verdict counts, in a log of this scenario.
+    pub fn counted(&self, ads: &Selected, log: &EpisodeLog) -> Vec<usize> {
+        oracle::counted_at_need(self.table.space(), log, || self.judge(ads, log))
+    }
+
+    /// Whether a log of it is the recorded episode, to the bit; `None` if the scenario does not say.
+    pub fn is_as_recorded(&self, log: &EpisodeLog) -> Option<bool> {
+        self.scenario.claims.iter().find_map(|claim| match claim {
+            Claim::Trace(digest) => Some(*digest == digest_text(&log.trace())),
+            _ => None,
+        })
+    }
+
+    /// Checks its claims against a log of it.
+    pub fn verify(&self, ads: &Selected, log: &EpisodeLog) -> Vec<ClaimResult> {
+        let setup = self.setup(ads);
+        let judgements = self.judge(ads, log);
+        let replays = Replays {
+            cause: &|index| Ok(oracle::diagnose(&setup, log, index, &ModularConfig::default())?.cause),
+            spare_steps: &|index| {
+                if ads.program().is_some_and(|program| !program.can_start()) {
+                    return Err(NoTries);
+                }
+                Ok(oracle::spare_steps(&setup, log, index, &judgements))
+            },
+        };
+        oracle::verify(self.table.space(), self.scenario, log, &judgements, &replays)
+    }
+
+    /// The claims that a log of it refutes, among those that `asked` selects. Claims that need further plays (causes,
+    /// minimality) count as not tried. `judgements` has one for each collision, if one of these claims is about
+    /// verdicts.
+    pub fn refuted(
+        &self,
+        ads: &Selected,
+        log: &EpisodeLog,
+        judgements: &[Judgement],
+        asked: impl Fn(&Claim) -> bool,
+    ) -> Vec<ClaimResult> {
+        let claims = self.scenario.claims.iter().filter(|claim| asked(claim)).cloned().collect();
+        let scenario = Scenario { claims, ..self.scenario.clone() };
+        let replays =
+            Replays { cause: &|_| Err(NoModules { ads: ads.title() }), spare_steps: &|_| Err(NoTries) };
+        let mut results = oracle::verify(self.table.space(), &scenario, log, judgements, &replays);
+        results.retain(ClaimResult::is_refuted);
+        results
+    }
+
+    /// Judges the collisions of its log, by playing it again.
+    pub fn judge(&self, ads: &Selected, log: &EpisodeLog) -> Vec<Judgement> {
+        oracle::judge(&self.setup(ads), &Script::of_scenario(self.scenario), log)
+    }
+}

@@ -1,0 +1,243 @@
+//! An episode that another program steps through, one choice after another: what `python/native` gives to learners that
+//! others wrote.
+//! If the rows of an episode of `avastra run` are chosen again here under the same seed, the bytes are the same. This
+//! does not hold for agents that also choose the values of a row (`space-filling` and the searches), nor for policies
+//! with an observation period of their own.
+
+use std::sync::Arc;
+
+use ndarray::Array1;
+
+use crate::episode::{Choice, Collision, End, EpisodeLog, Play, StepLog};
+use avastra_search::mdp;
+use avastra_search::mdp::{Observation, RewardSettings, StepOutcome};
+use avastra_world::action::Offer;
+
+use crate::run::arena::{legal, taken};
+use crate::run::play::Run;
+use crate::run::summary::{EpisodeSummary, Finding};
+
+/// An episode under way. A clone goes on exactly as the original would: it is a snapshot and a branch.
+#[derive(Clone)]
+pub struct Stepped {
+    run: Arc<Run>,
+    road: usize,
+    seed: u64,
+    play: Play,
+    observation: Observation,
+    /// One for each row, at this moment.
+    offers: Vec<Offer>,
+    end: Option<End>,
+    /// The collisions that were judged already, the first of all.
+    findings: Vec<Finding>,
+}
+
+/// Why a step is not possible.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum StepError {
+    #[error("the episode has ended (`{end}`): reset it")]
+    Over { end: &'static str },
+    #[error("no row {row}: the table has rows 0 to {last}")]
+    Row { row: usize, last: usize },
+}
+
+impl Stepped {
+    /// An episode of a seed on the nth road of a run, before its first step. The run's agent is not asked. If an
+    /// external driving system fails at the beginning, the episode has ended already.
+    pub fn new(run: Arc<Run>, road: usize, seed: u64) -> Stepped {
+        let play = Play::new(&run.setup_of(road, seed));
+        let observation = play.observation();
+        let (offers, findings) = (Vec::new(), Vec::new());
+        let mut begun = Stepped { run, road, seed, play, observation, offers, end: None, findings };
+        begun.look();
+        begun
+    }
+
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// What an agent sees now.
+    pub fn observation(&self) -> &Observation {
+        &self.observation
+    }
+
+    /// Which rows are legal now, shape `(rows,)`.
+    pub fn legal(&self) -> Array1<bool> {
+        legal(&self.offers)
+    }
+
+    /// How the episode ended; `None` while it goes on.
+    pub fn end(&self) -> Option<End> {
+        self.end
+    }
+
+    /// The steps so far.
+    pub fn steps(&self) -> &[StepLog] {
+        self.play.steps()
+    }
+
+    /// The collisions so far.
+    pub fn collisions(&self) -> &[Collision] {
+        self.play.collisions()
+    }
+
+    /// Carries a row out and drives for one observation period. A row that is refused loses the step: nothing happens
+    /// in it but driving, as with `None`, or where no row is legal.
+    ///
+    /// # Errors
+    /// If the episode has ended, or there is no such row.
+    pub fn step(&mut self, row: Option<usize>) -> Result<(), StepError> {
+        self.can_step(row)?;
+        let mut offers = std::mem::take(&mut self.offers);
+        let is_any_legal = offers.iter().any(|offer| matches!(offer, Offer::Legal(_)));
+        let choice = match row.filter(|_| is_any_legal) {
+            Some(row) => taken(row, offers.swap_remove(row)),
+            None => Choice::Pass,
+        };
+        let run = Arc::clone(&self.run);
+        let setup = run.setup_of(self.road, self.seed);
+        let observation = std::mem::replace(&mut self.observation, Observation::zeros());
+        self.end = self.play.step(&setup, observation, choice, &mut |_, _, _| {});
+        self.look();
+        Ok(())
+    }
+
+    /// Whether [`Stepped::step`] takes that row now.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn can_step(&self, row: Option<usize>) -> Result<(), StepError> {
+        if let Some(end) = self.end {
+            return Err(StepError::Over { end: end.name() });
+        }
+        let rows = self.run.table().rows().len();
+        match row.filter(|row| *row >= rows) {
+            Some(row) => Err(StepError::Row { row, last: rows - 1 }),
+            None => Ok(()),
+        }
+    }
+
+    /// Every collision so far, judged. A verdict needs nothing that comes after the step of its collision, so it does not
+    /// change any more; each costs a replay of the episode and several of its last seconds.
+    pub fn findings(&mut self) -> &[Finding] {
+        if self.findings.len() < self.play.collisions().len() {
+            let setup = self.run.setup_of(self.road, self.seed);
+            let log = self.play.clone().into_log(&setup, self.end.unwrap_or(End::Script));
+            let judged = EpisodeSummary::judged(&setup, 0, &log);
+            self.findings = judged.collisions;
+        }
+        &self.findings
+    }
+
+    /// The reward of the last step by Eq. 8, which knows whether a collision counts; 0 before the first step.
+    pub fn judged_reward(&mut self, constants: &RewardSettings) -> f64 {
+        let Some(step) = self.play.steps().len().checked_sub(1) else { return 0.0 };
+        let proc = self.play.steps()[step].proc;
+        let collided = self.play.collisions().iter().any(|collision| collision.step == step);
+        let counts = |one: &Finding| one.counted && one.collision.step == step;
+        let counted = collided && self.findings().iter().any(counts);
+        mdp::reward(constants, StepOutcome { proc, collided, counted })
+    }
+
+    /// The log of the episode up to now.
+    pub fn log(&self) -> EpisodeLog {
+        let setup = self.run.setup_of(self.road, self.seed);
+        self.play.clone().into_log(&setup, self.end.unwrap_or(End::Script))
+    }
+
+    /// Looks about after a step. After the last one, too: a learner wants to know what it would have seen next.
+    fn look(&mut self) {
+        let run = Arc::clone(&self.run);
+        let setup = run.setup_of(self.road, self.seed);
+        match self.end.map_or_else(|| self.play.look(), Err) {
+            Ok(observation) => self.observation = observation,
+            Err(end) => {
+                self.end = Some(end);
+                self.observation = self.play.observation();
+            }
+        }
+        let offers = |moment: &crate::episode::Moment| setup.table.offers(moment.situation);
+        self.offers = self.play.at(&setup, &self.observation, offers);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::episode::Outcome;
+    use crate::run::RunSettings;
+    use avastra_lang::check::{ReadError, load};
+    use avastra_world::action::ActionTable;
+
+    /// A run of twelve episodes on the crossroad.
+    fn run(ads: &str) -> Arc<Run> {
+        let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()));
+        let loaded = load(Path::new("scenarios/avastra45.ava"), &read).unwrap();
+        let space = loaded.space.unwrap();
+        let settings = RunSettings {
+            roads: vec!["crossroad".to_owned()],
+            ads: ads.to_owned(),
+            ..RunSettings::new(&space, "random", 12, 5)
+        };
+        Arc::new(Run::new(ActionTable::new(space), settings).unwrap())
+    }
+
+    fn row(step: &StepLog) -> Option<usize> {
+        match &step.outcome {
+            Outcome::Done { draw, .. } => Some(draw.row),
+            Outcome::Refused { row, .. } => Some(*row),
+            Outcome::Passed => None,
+        }
+    }
+
+    /// Chooses the rows of an episode of a run again, and goes on from a branch, too. Number of its collisions.
+    fn replayed(run: &Arc<Run>, number: usize) -> usize {
+        let (summary, log) = run.judged(number);
+        let mut stepped = Stepped::new(Arc::clone(run), 0, log.seed);
+        let mut branch = None;
+        for (index, step) in log.steps.iter().enumerate() {
+            if index == 2 {
+                branch = Some(stepped.clone());
+            }
+            assert_eq!((&stepped.observation().state, stepped.end()), (&step.state, None));
+            stepped.step(row(step)).unwrap();
+            let met = stepped.collisions().len();
+            // Judged after the step, and judged at the end.
+            let (early, late) = (stepped.findings(), &summary.collisions[..met]);
+            assert_eq!(early.len(), met);
+            assert!(
+                early.iter().zip(late).all(|(a, b)| (&a.judgement, a.counted) == (&b.judgement, b.counted))
+            );
+        }
+        assert_eq!(stepped.log(), log);
+        assert_eq!(stepped.step(None), Err(StepError::Over { end: log.end.name() }));
+        let mut branch = branch.expect("no episode ends so soon");
+        log.steps[2..].iter().for_each(|step| branch.step(row(step)).unwrap());
+        assert_eq!(branch.log(), log);
+        log.collisions.len()
+    }
+
+    #[test]
+    fn the_rows_of_a_run_come_to_its_bytes() {
+        assert_eq!(replayed(&run("modular"), 0), 0);
+        assert!(replayed(&run("idm"), 11) > 0, "another seed: without a collision no verdicts were compared");
+    }
+
+    #[test]
+    fn a_refused_row_loses_the_step() {
+        let mut stepped = Stepped::new(run("idm"), 0, 1);
+        let rows = stepped.legal().len();
+        assert_eq!(stepped.step(Some(rows)), Err(StepError::Row { row: rows, last: rows - 1 }));
+        let refused =
+            stepped.legal().iter().position(|legal| !legal).expect("some row is illegal at the start");
+        let mut passes = stepped.clone();
+        stepped.step(Some(refused)).unwrap();
+        passes.step(None).unwrap();
+        assert!(matches!(stepped.steps()[0].outcome, Outcome::Refused { row, .. } if row == refused));
+        assert_eq!(stepped.observation(), passes.observation());
+        assert_eq!(stepped.steps()[0].trace, passes.steps()[0].trace);
+    }
+}

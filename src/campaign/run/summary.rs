@@ -1,0 +1,118 @@
+//! An episode's result: its collisions, each with its verdict and the facts behind it.
+
+use crate::episode::{Collision, EpisodeLog, Script, Setup};
+use crate::oracle;
+use crate::oracle::{Judgement, NoModules};
+use avastra_drivers::{ModularConfig, Module};
+use avastra_lang::model::{OutcomeFacts, Space};
+use avastra_search::mdp::Criticality;
+
+use crate::run::gauges::Manners;
+use crate::run::offered::Offered;
+use crate::run::shape::Shape;
+
+/// An episode, judged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EpisodeSummary {
+    /// Number of the episode in its run, from 0.
+    pub episode: usize,
+    pub collisions: Vec<Finding>,
+    /// Measures of danger for each step; empty if the episode was not measured.
+    pub criticality: Vec<Criticality>,
+    /// Least post-encroachment time over the obstacles that were not hit, s; `None` above 5 s.
+    pub pet_s: Option<f64>,
+    /// How the ego vehicle kept to limit and lane; zeros if the episode was not measured.
+    pub manners: Manners,
+    /// Time that an agent with lookahead simulated in branches, outside the episode, s.
+    pub branched_s: f64,
+    /// The offers of every row; empty if the episode is not a run's.
+    pub offered: Offered,
+}
+
+/// A collision, judged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding {
+    /// Index among the collisions of its episode.
+    pub number: usize,
+    pub collision: Collision,
+    pub facts: OutcomeFacts,
+    pub judgement: Judgement,
+    /// Modules at fault, if they were looked for.
+    pub cause: Option<Vec<Module>>,
+    pub counted: bool,
+    /// Whether it is proved that no step before it can be left out.
+    pub minimal: bool,
+    /// What the author calls the obstacle, if it is a body of the author's own.
+    pub own_body: Option<String>,
+    /// The shape of the ego vehicle's way to it, if the episode was measured.
+    pub shape: Option<Shape>,
+}
+
+impl Finding {
+    /// The names of the modules at fault, with a space between them.
+    pub(crate) fn cause_in_words(&self) -> Option<String> {
+        let modules = self.cause.as_ref()?;
+        Some(modules.iter().map(|module| module.name()).collect::<Vec<_>>().join(" "))
+    }
+}
+
+impl EpisodeSummary {
+    /// Judges every collision of a log by playing it again from its setup, and applies the space's verdict.
+    pub fn judged(setup: &Setup, number: usize, log: &EpisodeLog) -> EpisodeSummary {
+        let judgements = oracle::judge(setup, &Script::of_log(log), log);
+        EpisodeSummary::new(setup.table.space(), number, log, judgements)
+    }
+
+    /// Applies the space's verdict to every collision of a log. `judgements` has one for each.
+    pub fn new(space: &Space, number: usize, log: &EpisodeLog, judgements: Vec<Judgement>) -> EpisodeSummary {
+        let find = |(index, judgement)| {
+            let facts = oracle::facts(log, index, &judgement);
+            let counted = oracle::counts(space, log, index, &judgement);
+            let collision = log.collisions[index];
+            Finding {
+                number: index,
+                collision,
+                own_body: collision.body.own.map(|own| space.bodies[own].name.clone()),
+                facts,
+                judgement,
+                cause: None,
+                counted,
+                minimal: false,
+                shape: None,
+            }
+        };
+        let collisions = judgements.into_iter().enumerate().map(find).collect();
+        EpisodeSummary {
+            episode: number,
+            collisions,
+            criticality: Vec::new(),
+            pet_s: None,
+            manners: Manners::default(),
+            branched_s: 0.0,
+            offered: Offered::default(),
+        }
+    }
+
+    /// Looks for the cause of every counted collision.
+    ///
+    /// # Errors
+    /// If the driving system has no modules.
+    pub fn find_causes(&mut self, setup: &Setup, log: &EpisodeLog) -> Result<(), NoModules> {
+        for finding in self.collisions.iter_mut().filter(|finding| finding.counted) {
+            let diagnosis = oracle::diagnose(setup, log, finding.number, &ModularConfig::default())?;
+            finding.cause = Some(diagnosis.cause);
+        }
+        Ok(())
+    }
+
+    /// Number of counted collisions.
+    pub fn counted(&self) -> usize {
+        self.collisions.iter().filter(|finding| finding.counted).count()
+    }
+
+    /// Time to the first counted collision (TTFC), s.
+    pub fn first_counted_s(&self) -> Option<f64> {
+        let counted = self.collisions.iter().find(|finding| finding.counted)?;
+        Some(counted.collision.contact.time_s)
+    }
+}

@@ -1,0 +1,118 @@
+//! Jobs: what a study consists of, played on any number of threads.
+
+use std::sync::atomic::AtomicBool;
+
+use crate::run::on_threads;
+use crate::train::Training;
+use avastra_search::agent::Agent;
+
+use crate::study::ready::Study;
+use crate::study::record::{CellRecord, EpisodeRecord, Spent, TrainedRecord};
+use crate::study::settings::AgentSettings;
+
+/// One training, or one repetition of an agent that has nothing to learn, with its evaluation.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Job {
+    /// Index of the agent.
+    pub agent: usize,
+    /// Indices of the roads on which it is evaluated.
+    pub roads: Vec<usize>,
+    /// Number of the training or repetition, from 0.
+    pub number: u32,
+}
+
+/// What happens while jobs are played.
+pub enum Event {
+    /// An episode is over; the number of its counted collisions.
+    Episode { counted: usize },
+    /// A job is done: a cell for each of its roads.
+    Done(Vec<CellRecord>),
+}
+
+/// Plays jobs on several threads, and calls `on` on this thread with what happens. Stops early when `stop` is set or
+/// `on` fails; a job that is not finished then is lost. `clock` says what the calling thread has spent so far.
+///
+/// # Errors
+/// The first error of `on`.
+pub fn play_jobs<E>(
+    study: &Study,
+    jobs: &[Job],
+    threads: usize,
+    stop: &AtomicBool,
+    clock: &(dyn Fn() -> Spent + Sync),
+    on: &mut dyn FnMut(Event) -> Result<(), E>,
+) -> Result<(), E> {
+    let work = |job: &Job, tell: &mut dyn FnMut(Event) -> bool| {
+        if let Some(cells) = play(study, job, clock, &mut |counted| tell(Event::Episode { counted })) {
+            tell(Event::Done(cells));
+        }
+    };
+    on_threads(jobs, threads, stop, work, on)
+}
+
+/// What a training made, as the study judges it.
+fn actor(training: &Training, settings: &AgentSettings) -> Box<dyn Agent> {
+    let shuffled = settings.training.as_ref().is_some_and(|plan| plan.shuffled_states);
+    let shuffled = shuffled.then(|| training.shuffled_actor().expect("only networks are shuffled"));
+    shuffled.unwrap_or_else(|| training.actor())
+}
+
+/// Plays one job. `tell` gets the counted collisions of every episode and says whether to go on; if not, the
+/// result is `None`.
+fn play(
+    study: &Study,
+    job: &Job,
+    clock: &dyn Fn() -> Spent,
+    tell: &mut dyn FnMut(usize) -> bool,
+) -> Option<Vec<CellRecord>> {
+    let mut begun = clock();
+    let agent = study.agent(job);
+    let mut trained = Vec::new();
+    let mut training = agent
+        .training
+        .is_some()
+        .then(|| study.training(job).expect("the study was checked when it was made"));
+    if let Some(training) = &mut training {
+        while !training.is_done() {
+            let episode = training.episode();
+            trained.push(TrainedRecord::new(&episode));
+            if !tell(episode.summary.counted()) {
+                return None;
+            }
+        }
+    }
+    let mut cells = Vec::new();
+    for &road in &job.roads {
+        let road = &study.settings().roads[road];
+        let mut episodes = Vec::new();
+        for seed in 0..study.settings().evaluation.seeds {
+            let run = study.evaluation(job, seed, road).expect("the study was checked when it was made");
+            for number in 0..run.episodes() {
+                let (summary, log) = match &training {
+                    Some(training) => run.judged_by(number, actor(training, agent).as_mut()),
+                    None => run.judged(number),
+                };
+                episodes.push(EpisodeRecord::new(run.settings().seed, &summary, &log));
+                if !tell(summary.counted()) {
+                    return None;
+                }
+            }
+        }
+        let now = clock();
+        let spent = Spent {
+            wall_s: now.wall_s - begun.wall_s,
+            cpu_s: now.cpu_s.zip(begun.cpu_s).map(|(now_s, begun_s)| now_s - begun_s),
+        };
+        begun = now;
+        cells.push(CellRecord {
+            agent: agent.label.clone(),
+            road: road.clone(),
+            number: job.number,
+            training_seed: agent.training.is_some().then(|| study.training_seed(job.number)),
+            trained: trained.clone(),
+            episodes,
+            spent,
+        });
+    }
+    Some(cells)
+}

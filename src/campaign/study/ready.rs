@@ -1,0 +1,132 @@
+//! A study that is ready to play: its jobs, their seeds, and the training and evaluations of each.
+
+use crate::run::{Run, RunError, RunSettings};
+use crate::train::{TrainSettings, Training, with_period};
+use avastra_base::rng;
+use avastra_base::rng::Stream;
+use avastra_drivers::external::Attached;
+use avastra_world::action::ActionTable;
+
+use crate::study::job::Job;
+use crate::study::settings::{AgentSettings, StudyError, StudySettings, check};
+
+/// A study that is ready to play.
+pub struct Study {
+    table: ActionTable,
+    settings: StudySettings,
+}
+
+impl Study {
+    /// Looks up everything that the settings name, so that nothing turns out to be missing hours later.
+    ///
+    /// # Errors
+    /// If something does not exist, is named twice, or is out of range.
+    pub fn new(table: ActionTable, settings: StudySettings) -> Result<Study, StudyError> {
+        check(&settings)?;
+        let mut study = Study { table, settings };
+        let mut attached = None;
+        for job in study.jobs().iter().filter(|job| job.number == 0) {
+            let agent = study.agent(job);
+            let refuse = |error| StudyError::Agent { label: agent.label.clone(), error };
+            if agent.training.is_some() {
+                study.training(job).map_err(refuse)?;
+            }
+            for &road in &job.roads {
+                let run = study.evaluation(job, 0, &study.settings.roads[road]).map_err(refuse)?;
+                attached = run.attached();
+            }
+        }
+        // The jobs, and a later `--resume`, must meet the same driving system. One that was not started has no identity to add.
+        if study.settings.external.as_ref().is_none_or(|external| !external.is_recorded) {
+            study.settings.external = attached;
+        }
+        Ok(study)
+    }
+
+    pub fn table(&self) -> &ActionTable {
+        &self.table
+    }
+
+    pub fn settings(&self) -> &StudySettings {
+        &self.settings
+    }
+
+    /// The driving system under test: its name here, or what an external one calls itself.
+    pub fn ads_name(&self) -> String {
+        self.settings.external.as_ref().map_or_else(|| self.settings.ads.clone(), Attached::name)
+    }
+
+    /// As [`StudySettings::jobs`].
+    pub fn jobs(&self) -> Vec<Job> {
+        self.settings.jobs()
+    }
+
+    /// As [`StudySettings::episodes`].
+    pub fn episodes(&self, job: &Job) -> u64 {
+        self.settings.episodes(job)
+    }
+
+    pub(super) fn agent(&self, job: &Job) -> &AgentSettings {
+        &self.settings.agents[job.agent]
+    }
+
+    /// Seed of the nth training. It depends neither on agent nor on road, so all agents meet identical episodes.
+    pub fn training_seed(&self, number: u32) -> u64 {
+        rng::child_seed(self.settings.first_seed, Stream::StudyTraining, u64::from(number))
+    }
+
+    /// Seed of an evaluation after the nth training. It depends on the training's number, not on agent or road:
+    /// agents meet identical episodes, and trainings stay independent.
+    pub fn evaluation_seed(&self, number: u32, seed: u32) -> u64 {
+        let index = u64::from(number) * u64::from(self.settings.evaluation.seeds) + u64::from(seed);
+        rng::child_seed(self.settings.first_seed, Stream::StudyEvaluation, index)
+    }
+
+    /// The training of a job, from its beginning.
+    pub(super) fn training(&self, job: &Job) -> Result<Training, RunError> {
+        let agent = self.agent(job);
+        let plan = agent.training.as_ref().expect("only agents that learn are trained");
+        let roads = match plan.roads.as_slice() {
+            [] => job.roads.iter().map(|&road| self.settings.roads[road].clone()).collect(),
+            named => named.to_vec(),
+        };
+        let episodes = (plan.episodes, self.training_seed(job.number));
+        let settings =
+            TrainSettings::new(self.conditions(agent, roads, episodes), plan.hyperparameters.clone());
+        Training::new(self.table.clone(), settings)
+    }
+
+    /// The evaluation under one seed on one road. For a trained agent it is a run of `none`, with which the caller
+    /// plays the trained agent (see [`Run::judged_by`]).
+    pub(super) fn evaluation(&self, job: &Job, seed: u32, road: &str) -> Result<Run, RunError> {
+        let agent = self.agent(job);
+        let episodes = (self.settings.evaluation.episodes, self.evaluation_seed(job.number, seed));
+        let settings = self.conditions(agent, vec![road.to_owned()], episodes);
+        let Some(plan) = &agent.training else { return Run::new(self.table.clone(), settings) };
+        let table = with_period(self.table.clone(), plan.hyperparameters.observation_period_s());
+        Run::new(table, RunSettings { agent: "none".to_owned(), ..settings })
+    }
+
+    /// What an agent's trainings and evaluations have in common.
+    fn conditions(
+        &self,
+        agent: &AgentSettings,
+        roads: Vec<String>,
+        (episodes, seed): (u32, u64),
+    ) -> RunSettings {
+        let study = &self.settings;
+        RunSettings {
+            roads,
+            ads: study.ads.clone(),
+            profile: agent.profile.as_ref().or(study.profile.as_ref()).cloned(),
+            external: study.external.clone(),
+            ambient: study.ambient,
+            traffic: study.traffic.clone(),
+            causes: study.causes,
+            without: agent.without.clone(),
+            with: agent.with.clone(),
+            avoidability: study.avoidability.clone(),
+            ..RunSettings::new(self.table.space(), &agent.name, episodes, seed)
+        }
+    }
+}

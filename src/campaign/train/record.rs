@@ -1,0 +1,127 @@
+//! A training in the run database: learning curves, checkpoints to resume from, and its results.
+//!
+//! A checkpoint and the episodes up to it are committed together. Episodes after the last checkpoint are deleted
+//! when a training is resumed, and played again to the same bytes.
+
+use rusqlite::{OptionalExtension, params};
+
+use crate::run::{Database, DatabaseError, LAYOUT, add_all};
+use avastra_lang::model::digest;
+use avastra_world::action::Draw;
+
+use crate::train::training::TrainedEpisode;
+
+/// An agent as it was after so many episodes.
+pub struct Checkpoint {
+    pub episodes: usize,
+    pub learner: Vec<u8>,
+}
+
+impl Database {
+    /// Adds an episode of a training, and with it a checkpoint if there is one to keep. `in_words` and `scenario` are as for
+    /// [`Database::add`].
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn add_trained(
+        &mut self,
+        trained: &TrainedEpisode,
+        checkpoint: Option<&[u8]>,
+        in_words: impl Fn(&Draw) -> String,
+        scenario: Option<&str>,
+    ) -> Result<(), DatabaseError> {
+        let transaction = self.connection.transaction()?;
+        let episode = trained.summary.episode;
+        add_all(&transaction, &trained.summary, &trained.log, in_words, scenario)?;
+        transaction.prepare_cached("INSERT INTO learning VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)")?.execute(
+            params![
+                episode as i64,
+                trained.sum,
+                trained.log.collisions.len() as i64,
+                trained.summary.counted() as i64,
+                trained.exploration_epsilon,
+                trained.lesson.loss,
+                trained.lesson.updates as i64,
+                trained.steps as i64,
+                trained.simulated_s,
+            ],
+        )?;
+        if let Some(learner) = checkpoint {
+            transaction.execute(
+                "INSERT OR REPLACE INTO checkpoint VALUES (1, ?, ?, ?)",
+                params![episode as i64 + 1, seal(episode as i64 + 1, learner), learner],
+            )?;
+        }
+        LAYOUT.seal(&transaction, episode as i64)?;
+        transaction.commit()?;
+        Ok(())
+    }
+
+    /// Keeps the results of a finished training, as JSON, in place of earlier ones.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn keep_results(&self, text: &str) -> Result<(), DatabaseError> {
+        let seal = digest(text.as_bytes());
+        self.connection.execute("INSERT OR REPLACE INTO result VALUES (1, ?, ?)", params![seal, text])?;
+        Ok(())
+    }
+
+    /// The results of a training, as JSON, if it is finished.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or the results were changed.
+    pub fn results(&self) -> Result<Option<String>, DatabaseError> {
+        let kept: Option<(String, String)> = self
+            .connection
+            .query_row("SELECT digest, text FROM result", [], |row| Ok((row.get(0)?, row.get(1)?)))
+            .optional()?;
+        match kept {
+            Some((seal, text)) if digest(text.as_bytes()) != seal => Err(DatabaseError::Results),
+            kept => Ok(kept.map(|(_, text)| text)),
+        }
+    }
+
+    /// Time simulated for the episodes of a training so far, s.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn trained_s(&self) -> Result<f64, DatabaseError> {
+        let sum = "SELECT coalesce(sum(simulated_s), 0.0) FROM learning";
+        Ok(self.connection.query_row(sum, [], |row| row.get(0))?)
+    }
+
+    /// Returns the last checkpoint and deletes all episodes after it. Without a checkpoint, all episodes are
+    /// deleted.
+    ///
+    /// # Errors
+    /// If the file cannot be read or written, or the checkpoint is damaged.
+    pub fn return_to_checkpoint(&mut self) -> Result<Option<Checkpoint>, DatabaseError> {
+        let transaction = self.connection.transaction()?;
+        let kept: Option<(i64, String, Vec<u8>)> = transaction
+            .query_row("SELECT episodes, digest, learner FROM checkpoint", [], |row| {
+                Ok((row.get(0)?, row.get(1)?, row.get(2)?))
+            })
+            .optional()?;
+        let checkpoint = match kept {
+            None => None,
+            Some((episodes, claimed, learner)) => {
+                let episodes =
+                    usize::try_from(episodes).map_err(|_| DatabaseError::Episode { found: episodes })?;
+                if seal(episodes as i64, &learner) != claimed {
+                    return Err(DatabaseError::Checkpoint);
+                }
+                Some(Checkpoint { episodes, learner })
+            }
+        };
+        let first = checkpoint.as_ref().map_or(0, |checkpoint| checkpoint.episodes) as i64;
+        LAYOUT.delete_from(&transaction, first)?;
+        transaction.commit()?;
+        Ok(checkpoint)
+    }
+}
+
+/// The digest of a checkpoint: of its bytes, and of the number of episodes that it comes after.
+fn seal(episodes: i64, learner: &[u8]) -> String {
+    digest(&[&episodes.to_le_bytes(), learner].concat())
+}

@@ -1,0 +1,354 @@
+//! The training loop, one episode at a time, and what an episode teaches.
+//!
+//! Single-threaded: every episode depends on all before it. The caller keeps the records.
+
+use std::sync::Arc;
+
+use ndarray::Array1;
+
+use crate::episode;
+use crate::episode::{Choice, End, EpisodeLog, Moment, Outcome, Script, Setup};
+use crate::oracle;
+use crate::run::{
+    Arena, EpisodeSummary, Finding, Profile, RunError, RunSettings, TrafficRecord, agent_named,
+    check_episodes, choose, kind, legal, traffic_of, under_test,
+};
+use avastra_base::rng;
+use avastra_base::rng::Stream;
+use avastra_drivers::Ads;
+use avastra_drivers::external::Attached;
+use avastra_lang::model::Space;
+use avastra_lang::model::vocabulary::Word;
+use avastra_search::agent::{
+    Agent, Collided, Experience, Kind, Lesson, QPolicy, Rows, Settings, Trainable, Trajectory,
+};
+use avastra_search::mdp;
+use avastra_search::mdp::{Closeness, Observation, ProcKind, StepOutcome};
+use avastra_world::action::ActionTable;
+use avastra_world::sim::{Contact, World};
+
+/// Everything that is needed to repeat a training; written to `run.yaml`.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrainSettings {
+    /// Version of avastra that wrote it.
+    pub avastra: String,
+    /// Version of the simulated world.
+    pub engine: String,
+    /// Path of the space, from the run directory.
+    pub space: String,
+    /// Digest of the space with all that it uses.
+    pub space_digest: String,
+    /// Episodes go round them, one each.
+    pub roads: Vec<String>,
+    pub ads: String,
+    /// Settings of the driving system; without them it has its defaults.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<Profile>,
+    /// An external driving system, as in [`RunSettings`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub external: Option<Attached>,
+    pub agent: String,
+    /// Episodes on all roads together.
+    pub episodes: u32,
+    pub seed: u64,
+    /// Vehicles of ambient traffic.
+    #[serde(default)]
+    pub ambient: u32,
+    /// How other vehicles drive, if not as in the default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub traffic: Option<TrafficRecord>,
+    /// Rules switched off.
+    pub without: Vec<String>,
+    /// Optional rules switched on.
+    pub with: Vec<String>,
+    /// The agent's hyperparameters.
+    pub hyperparameters: Settings,
+}
+
+impl TrainSettings {
+    /// A training with the agent, the episodes and the conditions of a run.
+    pub fn new(run: RunSettings, hyperparameters: Settings) -> TrainSettings {
+        TrainSettings {
+            avastra: run.avastra,
+            engine: run.engine,
+            space: run.space,
+            space_digest: run.space_digest,
+            roads: run.roads,
+            ads: run.ads,
+            profile: run.profile,
+            external: run.external,
+            agent: run.agent,
+            episodes: run.episodes,
+            seed: run.seed,
+            ambient: run.ambient,
+            traffic: run.traffic,
+            without: run.without,
+            with: run.with,
+            hyperparameters,
+        }
+    }
+}
+
+/// A training that is ready to go on.
+pub struct Training {
+    arena: Arena,
+    settings: TrainSettings,
+    agent: Box<dyn Trainable>,
+    /// Number of the next episode.
+    next: usize,
+}
+
+/// An episode, and what it taught.
+pub struct TrainedEpisode {
+    pub log: EpisodeLog,
+    pub summary: EpisodeSummary,
+    /// Sum of its rewards, not discounted.
+    pub sum: f64,
+    /// The exploration rate at its beginning.
+    pub exploration_epsilon: f64,
+    pub lesson: Lesson,
+    /// Choices made in the training up to its end.
+    pub steps: u64,
+    /// Time simulated for it, s: branches included.
+    pub simulated_s: f64,
+}
+
+impl Training {
+    /// A training from the beginning.
+    ///
+    /// # Errors
+    /// If the settings name something that does not exist, name it twice, or name an agent that has
+    /// nothing to learn.
+    pub fn new(table: ActionTable, settings: TrainSettings) -> Result<Training, RunError> {
+        let (arena, rows) = prepared(table, &settings)?;
+        let agent = settings.hyperparameters.build(rows, settings.seed);
+        Ok(Training { arena, settings, agent, next: 0 })
+    }
+
+    /// A training as a checkpoint left it after so many episodes.
+    ///
+    /// # Errors
+    /// As [`Training::new`], and if the checkpoint is not of such a training.
+    pub fn resumed(
+        table: ActionTable,
+        settings: TrainSettings,
+        episodes: usize,
+        checkpoint: &[u8],
+    ) -> Result<Training, RunError> {
+        let (arena, rows) = prepared(table, &settings)?;
+        let agent = settings.hyperparameters.restore(rows, checkpoint).ok_or(RunError::Checkpoint)?;
+        Ok(Training { arena, settings, agent, next: episodes })
+    }
+
+    pub fn settings(&self) -> &TrainSettings {
+        &self.settings
+    }
+
+    pub fn arena(&self) -> &Arena {
+        &self.arena
+    }
+
+    pub fn table(&self) -> &ActionTable {
+        self.arena.table()
+    }
+
+    /// The network as trained so far, if the agent has one.
+    pub fn policy(&self) -> Option<&QPolicy> {
+        self.agent.policy()
+    }
+
+    /// What the agent has learned so far, ready to act for one episode.
+    pub fn actor(&self) -> Box<dyn Agent> {
+        self.agent.actor()
+    }
+
+    /// The same on states of other episodes; `None` if what it has learned is no network.
+    pub fn shuffled_actor(&self) -> Option<Box<dyn Agent>> {
+        self.agent.shuffled()
+    }
+
+    /// Episodes done.
+    pub fn episodes(&self) -> usize {
+        self.next
+    }
+
+    pub fn is_done(&self) -> bool {
+        self.next >= self.settings.episodes as usize
+    }
+
+    /// The agent as bytes, for [`Training::resumed`].
+    pub fn checkpoint(&self) -> Vec<u8> {
+        self.agent.save()
+    }
+
+    /// Plays the next episode and learns from it.
+    pub fn episode(&mut self) -> TrainedEpisode {
+        let number = self.next;
+        let road = number % self.arena.roads();
+        let fresh = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
+        self.agent.progress(number as f64 / f64::from(self.settings.episodes));
+        let start_seed = self.agent.start_seed(road, fresh);
+        let exploration_epsilon = self.agent.exploration_epsilon();
+        let mut setup = self.arena.setup(road, start_seed);
+        setup.start.ambient = self.settings.ambient;
+        setup.proc = self.settings.hyperparameters.proc();
+        self.agent.begin();
+        let played = play(&setup, self.agent.as_mut(), &self.settings);
+
+        let log = played.log;
+        let summary = EpisodeSummary {
+            branched_s: self.agent.branched_s(),
+            ..EpisodeSummary::judged(&setup, number, &log)
+        };
+        let (last, last_legal) = played.last.expect("every episode has a last moment");
+        let trajectory = Trajectory {
+            steps: experiences(&self.settings.hyperparameters, played.choices, &log, &summary),
+            last,
+            last_legal,
+            terminal: log.end == End::Arrived,
+            closeness: played.closeness,
+            collisions: summary.collisions.iter().map(collided).collect(),
+        };
+        let mut rng = rng::stream(self.settings.seed, Stream::Replay, number as u64);
+        let lesson = self.agent.learn(&trajectory, &mut rng);
+        self.next += 1;
+        TrainedEpisode {
+            sum: trajectory.sum(),
+            exploration_epsilon,
+            lesson,
+            steps: self.agent.steps(),
+            simulated_s: log.duration_s + summary.branched_s,
+            log,
+            summary,
+        }
+    }
+
+    /// The log of an episode with the collision probabilities that the space defines, where the agent learns with
+    /// others.
+    pub fn log_of_space(&self, log: &EpisodeLog) -> EpisodeLog {
+        if self.settings.hyperparameters.proc() == ProcKind::default() {
+            return log.clone();
+        }
+        let road = (0..self.arena.roads()).find(|&road| self.arena.road(road).name == log.road);
+        let mut setup = self.arena.setup(road.expect("it was played here"), log.seed);
+        setup.start = log.start;
+        let script = Script::of_log(log);
+        let again = episode::run(&setup, &mut |moment| script.choose(setup.table, moment), &mut |_, _, _| {});
+        EpisodeLog { end: log.end, ..again }
+    }
+}
+
+/// An episode of a training, before it is judged.
+struct Unjudged {
+    log: EpisodeLog,
+    choices: Vec<Chosen>,
+    /// The observation after the last step, and the rows that were legal then, shape `(rows,)`.
+    last: Option<(Observation, Array1<bool>)>,
+    closeness: Closeness,
+}
+
+fn play(setup: &Setup, agent: &mut dyn Trainable, settings: &TrainSettings) -> Unjudged {
+    let searches = settings.hyperparameters.learner().is_none();
+    let mut choices = Vec::new();
+    let mut last = None;
+    let mut closeness = Closeness::default();
+    let looks_at_mask = agent.looks_at_mask();
+    let mut make_choice = |moment: &Moment| {
+        let (choice, legal) = choose(agent, moment);
+        let row = match &choice {
+            Choice::Act(draw) => Some(draw.row),
+            Choice::Await(action) => Some(action.row),
+            Choice::Refused { row, .. } => Some(*row),
+            Choice::Pass | Choice::Stop => None,
+        };
+        let observation = moment.observation.clone();
+        choices.extend(row.map(|row| Chosen { step: moment.step, observation, legal, row }));
+        choice
+    };
+    let mut watch = |world: &World, _: &dyn Ads, _: &[Contact]| {
+        if searches {
+            closeness.note(world);
+        }
+    };
+    let mut at_last = |moment: &Moment| {
+        let table = moment.setup().table;
+        let legal = match looks_at_mask {
+            true => legal(&table.offers(moment.situation)),
+            false => Array1::from_elem(table.rows().len(), true),
+        };
+        last = Some((moment.observation.clone(), legal));
+    };
+    let log = episode::run_from(setup, None, &mut make_choice, &mut watch, &mut at_last);
+    Unjudged { log, choices, last, closeness }
+}
+
+/// A choice of the agent, with the observation and the legal rows that it was made on.
+struct Chosen {
+    step: usize,
+    observation: Observation,
+    legal: Array1<bool>,
+    row: usize,
+}
+
+/// What a search is told of a collision.
+fn collided(finding: &Finding) -> Collided {
+    let mechanism = (kind(finding.collision.body.like.name()), finding.collision.verb.name());
+    let severity = oracle::severity(&finding.collision);
+    let (priority, side) = (finding.facts.priority.name(), severity.side);
+    Collided {
+        kind: format!("{} {}, priority {priority}, {} {side}", mechanism.0, mechanism.1, severity.approach),
+        counted: finding.counted,
+    }
+}
+
+/// The reward and the consequences of each choice. A step in which nothing could be chosen teaches nothing.
+fn experiences(
+    settings: &Settings,
+    choices: Vec<Chosen>,
+    log: &EpisodeLog,
+    summary: &EpisodeSummary,
+) -> Vec<Experience> {
+    let steps: Vec<usize> = choices.iter().map(|choice| choice.step).collect();
+    let made_by = |obstacle: u32| {
+        let made = |outcome: &Outcome| matches!(outcome, Outcome::Done { spawned, .. } if spawned.contains(&obstacle));
+        steps.iter().position(|&step| made(&log.steps[step].outcome))
+    };
+    let experience = |choice: Chosen| {
+        let step = &log.steps[choice.step];
+        let findings = || summary.collisions.iter().filter(|one| one.collision.step == choice.step);
+        let outcome = StepOutcome {
+            proc: step.proc,
+            collided: findings().next().is_some(),
+            counted: findings().any(|finding| finding.counted),
+        };
+        let reward = settings.reward().map_or(step.reward, |constants| mdp::reward(&constants, outcome));
+        let makers = |finding: &Finding| made_by(finding.collision.contact.obstacle);
+        let hits = findings().filter_map(makers).collect();
+        let crashes = findings().filter(|finding| finding.counted).map(makers).collect();
+        let Chosen { observation, legal, row, .. } = choice;
+        Experience { observation, legal, row, reward, hits, collided: outcome.collided, crashes }
+    };
+    choices.into_iter().map(experience).collect()
+}
+
+/// Looks everything up that the settings name.
+fn prepared(table: ActionTable, settings: &TrainSettings) -> Result<(Arena, Arc<Rows>), RunError> {
+    check_episodes(settings.episodes)?;
+    if matches!(agent_named(&settings.agent)?.kind, Kind::Ready(_)) {
+        return Err(RunError::Unteachable { name: settings.agent.clone() });
+    }
+    let table = with_period(table, settings.hyperparameters.observation_period_s());
+    let rows = Arc::new(Rows::new(&table, settings.hyperparameters.actions())?);
+    let ads = under_test(&settings.ads, settings.profile.as_ref(), settings.external.as_ref())?;
+    let arena = Arena::new(table, &settings.roads, ads, &settings.with, &settings.without)?;
+    Ok((arena.with_traffic(traffic_of(settings.traffic.as_ref())?), rows))
+}
+
+/// The table with another observation period.
+pub(crate) fn with_period(table: ActionTable, period_s: Option<f64>) -> ActionTable {
+    let Some(step_s) = period_s else { return table };
+    let mut space = Space::clone(table.space());
+    space.episode.step_s = step_s;
+    ActionTable::new(Arc::new(space))
+}

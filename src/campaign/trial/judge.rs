@@ -1,0 +1,267 @@
+//! Does a road user do what its verb says? Criteria over what is seen of it.
+//!
+//! Inside junctions lanes lie over each other, so directions are judged on streets alone.
+//!
+//! All geometry is taken from the map and the outlines, none from the drivers' plans. A vehicle that
+//! does its verb stays on lanes of its own direction throughout; beyond that:
+//!
+//! | verb | realised if |
+//! |---|---|
+//! | drive ahead | it appears ahead at the asked gap, in the asked lane, heading along it, and moves; if it is asked to stand, it does not move at all |
+//! | overtake | it appears behind the ego vehicle and gets wholly in front of it |
+//! | drive opposite | it appears in a lane that runs against the route, and passes the ego vehicle head-on |
+//! | cross road | it appears on a lane that is not of the route and comes onto the route's path before the ego vehicle has passed there |
+//! | walk | it appears beside the route on the asked side and walks over the route's path |
+//! | stand | it stands on the route's path |
+//!
+//! A vehicle that is to keep its lane does not change it; a vehicle that is to change it does so once.
+//! An overtaker in the ego vehicle's own lane changes it once to get past, and comes back: it must if it is
+//! to change, and may when it is well ahead otherwise. Changes inside junctions, where lanes lie over each other, are
+//! not counted.
+
+use avastra_base::geometry::wrap_angle;
+use avastra_lang::model::vocabulary::{LaneChoice, Side, Then, Verb};
+use avastra_road::{LaneIndex, RoadMap};
+use avastra_world::action::SpawnRequest;
+use avastra_world::sim::{Scene, VehicleParameters};
+
+use crate::trial::sighting::{Ending, Frame, Sighting};
+
+/// A vehicle has this long to do what its verb says: four observation periods, s.
+pub(super) const HORIZON_S: f64 = 24.0;
+/// A vehicle whose centre is farther than this outside its lane has left the road, m: half of what a bus needs in a
+/// tight turn.
+const BESIDE_ROAD_M: f64 = 0.5;
+/// A vehicle that has driven this far counts as moving, m.
+const MOVES_M: f64 = 5.0;
+/// The gap at which a road user appears may differ from the asked one by this, m, plus this part of it: stations on
+/// parallel lanes of a bend differ.
+const GAP_M: f64 = 1.0;
+const GAP_PART: f64 = 0.1;
+/// Lanes beside the route have their centre at least this far from its path, m.
+const BESIDE_M: f64 = 1.5;
+/// A vehicle at more than this angle to the route comes the other way, rad.
+const OPPOSES_RAD: f64 = 3.0 * core::f64::consts::FRAC_PI_4;
+/// An oncoming vehicle that passes farther aside than this does not meet the ego vehicle, m.
+const MEETS_M: f64 = 12.0;
+
+/// Whether it did what its verb says; if not, what was wrong, in words.
+pub(super) fn verdict(scene: &Scene, request: &SpawnRequest, seen: &Sighting) -> Result<(), String> {
+    let first = &seen.frames[0];
+    let drives = || seen.frames.iter().try_for_each(|frame| stays_on_road(scene, frame));
+    match request.verb {
+        Verb::Walk => walks(request, seen),
+        Verb::Stand => stands(seen),
+        Verb::DriveAhead => {
+            drives()?;
+            appears_ahead(scene, request, first)?;
+            let last = &seen.frames[seen.frames.len() - 1];
+            let way_m = (last.outline.pose.position - first.outline.pose.position).norm();
+            if request.speed_mps == 0.0 && way_m > 0.0 && seen.ending != Ending::TouchedEgo {
+                return Err("it does not stand".to_owned());
+            }
+            // A vehicle that crawls need only do half of the way that its speed allows.
+            if way_m < MOVES_M.min(request.speed_mps * HORIZON_S / 2.0) {
+                return Err(ended(seen, "it had moved"));
+            }
+            let asked = usize::from(request.then == Then::Change);
+            changes(&scene.map, request, seen, [asked, asked], 0)
+        }
+        Verb::Overtake => {
+            drives()?;
+            if ahead_m(first) > 0.0 {
+                return Err("it does not appear behind the ego vehicle".to_owned());
+            }
+            let Some(passed) = seen.frames.iter().position(|frame| ahead_m(frame) > 0.0) else {
+                return Err(ended(seen, "it had passed"));
+            };
+            let out = usize::from(request.lane == LaneChoice::Current);
+            let back = usize::from(request.then == Then::Change);
+            let after = if back > 0 { passed } else { 0 };
+            changes(&scene.map, request, seen, [out + back, out + out.max(back)], after)
+        }
+        Verb::DriveOpposite => {
+            drives()?;
+            if turned_rad(first) < OPPOSES_RAD {
+                return Err("it does not appear against the direction of the route".to_owned());
+            }
+            meets(seen)?;
+            let asked = usize::from(request.then == Then::Change);
+            changes(&scene.map, request, seen, [asked, asked], 0)
+        }
+        Verb::CrossRoad => {
+            drives()?;
+            if let Some((lane, _)) = first.lane
+                && scene.route.lanes.iter().any(|part| part.lane == lane)
+            {
+                return Err("it appears on the route itself".to_owned());
+            }
+            let crossing = crosses(seen)?;
+            let until = Sighting { frames: seen.frames[..=crossing].to_vec(), ending: seen.ending };
+            let asked = usize::from(request.then == Then::Change);
+            changes(&scene.map, request, &until, [asked, asked], 0)
+        }
+    }
+}
+
+/// Every vehicle drives in lanes of its own direction: not beside the road, not on a median.
+fn stays_on_road(scene: &Scene, frame: &Frame) -> Result<(), String> {
+    let Some((lane, beyond_m)) = frame.lane else {
+        return Err(format!("it drives beside the road after {:.1} s", frame.after_s));
+    };
+    if beyond_m > BESIDE_ROAD_M {
+        return Err(format!("it drives {beyond_m:.1} m beside its lane after {:.1} s", frame.after_s));
+    }
+    let lane = scene.map.lane(lane);
+    // A turn across a junction may leave the surface of its own lane there and be over another's alone.
+    if lane.junction.is_some() {
+        return Ok(());
+    }
+    let centre = &lane.centre;
+    let station_m = centre.project(frame.outline.pose.position).station_m;
+    let turn_rad = wrap_angle(frame.outline.pose.heading_rad - centre.pose_at(station_m).heading_rad).abs();
+    if turn_rad > core::f64::consts::FRAC_PI_2 {
+        return Err(format!("it drives against its lane after {:.1} s", frame.after_s));
+    }
+    Ok(())
+}
+
+fn appears_ahead(scene: &Scene, request: &SpawnRequest, first: &Frame) -> Result<(), String> {
+    let front_m = VehicleParameters::MKZ.front_m(first.ego_station_m);
+    let gap_m = first.route_station_m - first.outline.half_length_m - front_m;
+    if (gap_m - request.distance_m).abs() > GAP_M + GAP_PART * request.distance_m {
+        return Err(format!("it appears {gap_m:.1} m ahead instead of {:.1} m", request.distance_m));
+    }
+    if turned_rad(first) > core::f64::consts::FRAC_PI_2 {
+        return Err("it appears against the direction of the route".to_owned());
+    }
+    let own = scene.map.lane(scene.route.lane_at(first.route_station_m).lane);
+    let aside_m = own.centre.project(first.outline.pose.position).offset_m;
+    let is_there = match request.lane {
+        LaneChoice::Left => aside_m > BESIDE_M,
+        LaneChoice::Current => aside_m.abs() < BESIDE_M,
+        LaneChoice::Right => aside_m < -BESIDE_M,
+    };
+    if is_there { Ok(()) } else { Err(format!("it appears {aside_m:.1} m beside the route's lane")) }
+}
+
+/// By how much its rear is in front of the ego vehicle's front, m; negative while it is not.
+fn ahead_m(frame: &Frame) -> f64 {
+    let there = frame.ego.pose.to_local(frame.outline.pose.position);
+    there.x - frame.outline.half_length_m - frame.ego.half_length_m
+}
+
+/// The angle between its heading and the route's beside it, rad, not negative.
+fn turned_rad(frame: &Frame) -> f64 {
+    wrap_angle(frame.outline.pose.heading_rad - frame.route_heading_rad).abs()
+}
+
+fn meets(seen: &Sighting) -> Result<(), String> {
+    if seen.ending == Ending::TouchedEgo {
+        return Ok(());
+    }
+    let there = |frame: &Frame| frame.ego.pose.to_local(frame.outline.pose.position);
+    let passes = |pair: &&[Frame]| there(&pair[0]).x >= 0.0 && there(&pair[1]).x < 0.0;
+    let Some(pair) = seen.frames.windows(2).find(passes) else {
+        return Err(ended(seen, "it had met the ego vehicle"));
+    };
+    let aside_m = there(&pair[1]).y.abs();
+    if aside_m > MEETS_M { Err(format!("it passes {aside_m:.1} m aside")) } else { Ok(()) }
+}
+
+/// The frame in which it is on the route's path.
+fn crosses(seen: &Sighting) -> Result<usize, String> {
+    let on_path = |frame: &Frame| {
+        let turn_rad = turned_rad(frame);
+        let reach_m = frame.outline.half_length_m * libm::sin(turn_rad).abs()
+            + frame.outline.half_width_m * libm::cos(turn_rad).abs();
+        frame.route_offset_m.abs() <= reach_m + frame.ego.half_width_m
+    };
+    let Some(index) = seen.frames.iter().position(on_path) else {
+        // An ego vehicle in a turn may be beside the path itself; a contact with it counts as a meeting all the
+        // same.
+        if seen.ending == Ending::TouchedEgo {
+            return Ok(seen.frames.len() - 1);
+        }
+        return Err(ended(seen, "it had come onto the route"));
+    };
+    let frame = &seen.frames[index];
+    if frame.route_station_m < VehicleParameters::MKZ.rear_m(frame.ego_station_m) {
+        return Err("it came when the ego vehicle had passed".to_owned());
+    }
+    Ok(index)
+}
+
+fn walks(request: &SpawnRequest, seen: &Sighting) -> Result<(), String> {
+    let side = |offset_m: f64| if request.side == Side::Left { offset_m } else { -offset_m };
+    if side(seen.frames[0].route_offset_m) <= seen.frames[0].ego.half_width_m {
+        return Err("it does not appear on the asked side of the route".to_owned());
+    }
+    let last = &seen.frames[seen.frames.len() - 1];
+    let hit = seen.ending == Ending::TouchedEgo && last.route_offset_m.abs() < last.ego.half_width_m + 1.0;
+    if hit || seen.frames.iter().any(|frame| side(frame.route_offset_m) < 0.0) {
+        return Ok(());
+    }
+    Err(ended(seen, "it had walked over the route"))
+}
+
+fn stands(seen: &Sighting) -> Result<(), String> {
+    let first = &seen.frames[0];
+    let stands = seen.frames.iter().all(|frame| frame.velocity_mps.norm() == 0.0);
+    let on_route = first.route_offset_m.abs() < first.ego.half_width_m;
+    if stands && on_route { Ok(()) } else { Err("it does not stand on the route".to_owned()) }
+}
+
+/// Checks that it changed its lane at least as often as asked, the last time after frame `after`, and at most `at_most` times
+/// if it is to keep its lane.
+fn changes(
+    map: &RoadMap,
+    request: &SpawnRequest,
+    seen: &Sighting,
+    [asked, at_most]: [usize; 2],
+    after: usize,
+) -> Result<(), String> {
+    let found = lane_changes(map, &seen.frames);
+    if found.len() < asked {
+        let what = if found.is_empty() { "it had changed its lane" } else { "it had changed its lane back" };
+        return Err(ended(seen, what));
+    }
+    if request.then == Then::Keep && found.len() > at_most {
+        return Err("it changed its lane".to_owned());
+    }
+    match found.last() {
+        Some(&last) if asked > 0 && last < after => Err("it changed its lane before it was ahead".to_owned()),
+        _ => Ok(()),
+    }
+}
+
+/// Indices of the frames in which it is in another lane of the street than one frame before.
+fn lane_changes(map: &RoadMap, frames: &[Frame]) -> Vec<usize> {
+    let lane = |index: usize| frames[index].lane.map(|(lane, _)| lane);
+    let beside = |a: LaneIndex, b: LaneIndex| {
+        let (from, to) = (map.lane(a), map.lane(b));
+        let neighbours = |lane: LaneIndex| {
+            let lane = map.lane(lane);
+            [lane.left, lane.right].into_iter().flatten().any(|neighbour| neighbour.lane == b)
+        };
+        let streets = from.junction.is_none() && to.junction.is_none();
+        streets && (neighbours(a) || from.successors.iter().any(|next| neighbours(*next)))
+    };
+    (1..frames.len())
+        .filter(|&index| match (lane(index - 1), lane(index)) {
+            (Some(a), Some(b)) => a != b && !map.lane(a).successors.contains(&b) && beside(a, b),
+            _ => false,
+        })
+        .collect()
+}
+
+/// The complaint that `what` had not happened when the sighting ended.
+fn ended(seen: &Sighting, what: &str) -> String {
+    match seen.ending {
+        Ending::TimeOver => format!("{HORIZON_S:.0} s were over before {what}"),
+        Ending::Arrived => format!("the ego vehicle arrived before {what}"),
+        Ending::TouchedEgo => format!("it touched the ego vehicle before {what}"),
+        Ending::TouchedOther => format!("it touched another road user before {what}"),
+        Ending::Left => format!("it left before {what}"),
+    }
+}

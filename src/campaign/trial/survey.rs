@@ -1,0 +1,321 @@
+//! Trials: every row on every road, at moments of undisturbed drives at which it is legal.
+//! On each road some drives go by without an action. At each of their steps every row is offered, as to an agent; this
+//! counts how often the row is legal, and which reasons refuse it otherwise. From some of the legal moments, spread
+//! over all of them, the row is carried out and what happens is judged. So a row on a road is realised, or not realised
+//! (with the reason), or masked (with the reasons).
+
+use std::sync::Arc;
+
+use crate::episode;
+use crate::episode::{Choice, EpisodeLog};
+use avastra_base::rng;
+use avastra_base::rng::Stream;
+use avastra_drivers::Ads;
+use avastra_lang::model::Row;
+use avastra_lang::model::vocabulary::Phenomenon;
+use avastra_world::action::{Draw, Effect, Offer, Refusal};
+use avastra_world::sim::{Sensed, World};
+
+use crate::run::Arena;
+use crate::trial::{fairness, judge, sighting};
+
+/// How much is tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub struct TrialSettings {
+    /// Undisturbed drives of each road.
+    pub drives: u32,
+    /// Tries of each row on each road, at most.
+    pub tries: u32,
+    pub seed: u64,
+}
+
+/// Something that happened several times, for one reason.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Count {
+    pub count: usize,
+    /// The reason, with the figures of its first occurrence.
+    pub reason: String,
+}
+
+/// What the trials say of a row on a road.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// Every try did what the row says.
+    Realised,
+    /// Some tries did what the row says.
+    Partly,
+    /// No try did what the row says, though the row was legal.
+    NotRealised,
+    /// It was legal at no moment.
+    Masked,
+}
+
+/// One row on one road.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Cell {
+    pub row: usize,
+    pub label: String,
+    pub road: String,
+    pub outcome: Outcome,
+    /// Moments at which it was offered, and those of them at which it was legal.
+    pub moments: usize,
+    pub legal: usize,
+    pub tried: usize,
+    pub realised: usize,
+    /// Why tries failed.
+    pub failures: Vec<Count>,
+    /// Why it was refused.
+    pub refusals: Vec<Count>,
+    /// Spawns that were unfair, and why.
+    pub unfair: Vec<Count>,
+    /// Smallest gap between the ego vehicle and the road user, the median of the tries, m.
+    pub nearest_m: Option<f64>,
+    /// The tries, so that they can be played again.
+    pub samples: Vec<Sample>,
+}
+
+/// One try.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Sample {
+    /// Seed of the drive.
+    pub seed: u64,
+    pub step: usize,
+    /// Why it failed; `None` if it did what the row says.
+    pub failure: Option<String>,
+}
+
+/// Trials that are ready to be made.
+pub struct Trials<'a> {
+    arena: &'a Arena,
+    settings: TrialSettings,
+}
+
+/// A moment of an undisturbed drive, and what every row would do then.
+struct Moment {
+    seed: u64,
+    step: usize,
+    world: World,
+    ads: Box<dyn Ads>,
+    offers: Vec<Offer>,
+}
+
+/// What came of one try.
+struct Try {
+    failure: Option<String>,
+    unfair: Option<String>,
+    nearest_m: Option<f64>,
+}
+
+impl<'a> Trials<'a> {
+    pub fn new(arena: &'a Arena, settings: TrialSettings) -> Trials<'a> {
+        Trials { arena, settings }
+    }
+
+    /// All cells, by row and then by road; each road is tried on a thread of its own. `judged` is called after each.
+    pub fn cells(&self, judged: &(dyn Fn() + Sync)) -> Vec<Cell> {
+        let by_road: Vec<Vec<Cell>> = std::thread::scope(|scope| {
+            let roads = 0..self.arena.roads();
+            let workers: Vec<_> = roads.map(|road| scope.spawn(move || self.road(road, judged))).collect();
+            workers.into_iter().map(|worker| worker.join().expect("no trial panics")).collect()
+        });
+        let rows = 0..self.arena.table().rows().len();
+        rows.flat_map(|row| by_road.iter().map(move |cells| cells[row].clone())).collect()
+    }
+
+    /// The cells of the nth road of the arena, by row.
+    fn road(&self, road: usize, judged: &(dyn Fn() + Sync)) -> Vec<Cell> {
+        let moments = self.moments(road);
+        let rows = self.arena.table().rows();
+        let judge = |row: &Row| {
+            let cell = self.cell(road, row.index, &moments);
+            judged();
+            cell
+        };
+        rows.iter().map(judge).collect()
+    }
+
+    /// A try again, as an episode that ends when the judge has seen enough.
+    pub fn again(&self, road: usize, row: usize, sample: &Sample) -> EpisodeLog {
+        let setup = self.arena.setup(road, sample.seed);
+        let table = self.arena.table();
+        let steps = (judge::HORIZON_S / table.space().episode.step_s).ceil() as usize;
+        let mut choose = |moment: &episode::Moment| {
+            if moment.step >= sample.step + steps {
+                return Choice::Stop;
+            }
+            if moment.step != sample.step {
+                return Choice::Pass;
+            }
+            match table.offer(moment.situation, row) {
+                Offer::Legal(draw) => Choice::Act(draw),
+                Offer::Refused(refusal) => {
+                    Choice::Refused { row, rule: refusal.rule, reason: refusal.reason }
+                }
+            }
+        };
+        episode::run(&setup, &mut choose, &mut |_, _, _| {})
+    }
+
+    fn moments(&self, road: usize) -> Vec<Moment> {
+        let table = self.arena.table();
+        let mut moments = Vec::new();
+        for drive in 0..u64::from(self.settings.drives) {
+            let seed = rng::child_seed(self.settings.seed, Stream::Episode, drive);
+            let setup = self.arena.setup(road, seed);
+            let step_ticks = (table.space().episode.step_s / avastra_world::sim::DT_S).round() as u64;
+            let mut offered = Vec::new();
+            let mut snapshots: Vec<(World, Box<dyn Ads>)> = Vec::new();
+            let log = episode::run(
+                &setup,
+                &mut |moment| {
+                    offered.push(table.offers(moment.situation));
+                    Choice::Pass
+                },
+                &mut |world, ads, _| {
+                    if world.ticks().is_multiple_of(step_ticks) {
+                        snapshots.push((world.clone(), ads.clone_box()));
+                    }
+                },
+            );
+            debug_assert!(snapshots.len() >= log.steps.len());
+            let at_steps = snapshots.into_iter().zip(offered).enumerate();
+            moments.extend(at_steps.map(|(step, ((world, ads), offers))| Moment {
+                seed,
+                step,
+                world,
+                ads,
+                offers,
+            }));
+        }
+        moments
+    }
+
+    fn cell(&self, road: usize, row: usize, moments: &[Moment]) -> Cell {
+        let legal: Vec<(&Moment, &Draw)> = moments
+            .iter()
+            .filter_map(|moment| match &moment.offers[row] {
+                Offer::Legal(draw) => Some((moment, draw)),
+                Offer::Refused(_) => None,
+            })
+            .collect();
+        let mut refusals = Vec::new();
+        for moment in moments {
+            if let Offer::Refused(refusal) = &moment.offers[row] {
+                count(&mut refusals, &refused(refusal));
+            }
+        }
+        let tries = legal.len().min(self.settings.tries as usize);
+        let (mut failures, mut unfair, mut samples) = (Vec::new(), Vec::new(), Vec::new());
+        let mut nearest_m = Vec::new();
+        for number in 0..tries {
+            let (moment, draw) = legal[number * legal.len() / tries];
+            let found = attempt(moment, draw);
+            found.failure.iter().for_each(|why| count(&mut failures, why));
+            found.unfair.iter().for_each(|why| count(&mut unfair, why));
+            nearest_m.extend(found.nearest_m);
+            samples.push(Sample { seed: moment.seed, step: moment.step, failure: found.failure });
+        }
+        let realised = samples.iter().filter(|sample| sample.failure.is_none()).count();
+        nearest_m.sort_by(f64::total_cmp);
+        let table = self.arena.table();
+        Cell {
+            row,
+            label: table.rows()[row].label.clone(),
+            road: self.arena.road(road).name.clone(),
+            outcome: match (tries, realised) {
+                (0, _) => Outcome::Masked,
+                (_, 0) => Outcome::NotRealised,
+                (tries, realised) if realised < tries => Outcome::Partly,
+                _ => Outcome::Realised,
+            },
+            moments: moments.len(),
+            legal: legal.len(),
+            tried: tries,
+            realised,
+            failures,
+            refusals,
+            unfair,
+            nearest_m: nearest_m.get(nearest_m.len() / 2).copied(),
+            samples,
+        }
+    }
+}
+
+/// Carries a draw out and judges everything that it does.
+fn attempt(moment: &Moment, draw: &Draw) -> Try {
+    let mut world = moment.world.clone();
+    let mut found = Try { failure: None, unfair: None, nearest_m: None };
+    let mut newcomers = Vec::new();
+    for effect in &draw.effects {
+        match (effect, world.apply(effect)) {
+            (_, Err(reason)) => {
+                found.failure = Some(format!("cannot spawn: {reason}"));
+                return found;
+            }
+            (Effect::Spawn(request), Ok(Some(id))) => {
+                if let Some(rules) = &draw.lane_changes {
+                    world.bind_lane_changes(id, rules);
+                }
+                newcomers.push((*request, id));
+            }
+            (_, Ok(_)) => {}
+        }
+    }
+    found.failure = unmet(&world, &draw.effects);
+    let scene = Arc::clone(world.scene());
+    for (request, id) in newcomers {
+        found.unfair = found.unfair.or_else(|| fairness::complaint(&world, &request, id));
+        let mut ads = moment.ads.clone();
+        let mut sensed: Sensed = world.sensed();
+        let Some(seen) = sighting::watch(world.clone(), ads.as_mut(), &mut sensed, id, judge::HORIZON_S)
+        else {
+            found.failure = Some("it is gone at once".to_owned());
+            continue;
+        };
+        let nearest_m = seen.frames.iter().map(|frame| frame.gap_m).fold(f64::INFINITY, f64::min);
+        found.nearest_m = Some(found.nearest_m.map_or(nearest_m, |other| other.min(nearest_m)));
+        if let Err(why) = judge::verdict(&scene, &request, &seen) {
+            found.failure.get_or_insert(why);
+        }
+    }
+    found
+}
+
+/// The first effect on weather or time that the world does not show.
+fn unmet(world: &World, effects: &[Effect]) -> Option<String> {
+    let last = |wanted: Phenomenon| {
+        effects.iter().rev().find_map(|effect| match effect {
+            Effect::Sky(phenomenon, level) if *phenomenon == wanted => Some(*level),
+            _ => None,
+        })
+    };
+    for (phenomenon, found) in
+        [Phenomenon::Rain, Phenomenon::Fog, Phenomenon::Wetness].into_iter().zip(world.sky())
+    {
+        if last(phenomenon).is_some_and(|level| level != found) {
+            return Some("the weather is not what was asked for".to_owned());
+        }
+    }
+    let time = effects.iter().rev().find_map(|effect| match effect {
+        Effect::Time(time) => Some(*time),
+        _ => None,
+    });
+    time.filter(|time| *time != world.time_of_day()).map(|_| "the time is not what was asked for".to_owned())
+}
+
+pub(super) fn refused(refusal: &Refusal) -> String {
+    match &refusal.rule {
+        Some(rule) => format!("rule `{rule}`: {}", refusal.reason),
+        None => refusal.reason.clone(),
+    }
+}
+
+/// Counts a reason; reasons that differ only in their figures count as one.
+pub(super) fn count(counts: &mut Vec<Count>, reason: &str) {
+    let words = |text: &str| text.replace(|c: char| c.is_ascii_digit() || "-.".contains(c), "");
+    match counts.iter_mut().find(|known| words(&known.reason) == words(reason)) {
+        Some(known) => known.count += 1,
+        None => counts.push(Count { count: 1, reason: reason.to_owned() }),
+    }
+}

@@ -1,0 +1,340 @@
+//! An external driving system behind the [`Ads`] trait: one episode of it.
+//!
+//! Answers come from what is known of earlier, equal conversations, and otherwise from a process. A process cannot be
+//! rewound: a copy of this driver takes another one and shows it the episode from the start, as soon as the copy is asked
+//! something new. Whether the answers are the same then is checked.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use crate::driver::Ads;
+use crate::modular::{Modular, ModularConfig};
+use crate::status::{PerceivedObject, Reason, Status};
+use avastra_base::geometry::{Pose, Vec2};
+use avastra_world::sim::{Control, DT_S, Scene, Sensed};
+
+use super::finding::{Failure, FailureKind, Problem, harmless};
+use super::follow::Follower;
+use super::message::{Answer, Event, Question};
+use super::program::{MapLine, Program};
+use super::question;
+use super::record::{Conversation, Key, Outcome};
+use super::session::Session;
+use super::settings::OnTimeout;
+
+/// After this simulated time without an answer the vehicle brakes, s: Apollo's 20 planning cycles.
+const LOST_S: f64 = 2.0;
+
+/// An external driving system in one episode.
+pub struct External {
+    program: Arc<Program>,
+    scene: Arc<Scene>,
+    seed: u64,
+    map: Arc<MapLine>,
+    /// Who believes what is shown; nothing where the truth is.
+    observer: Option<Box<Modular>>,
+    follower: Follower,
+    /// What was asked so far, the `reset` first, and what came of it.
+    exchanges: Vec<Exchange>,
+    /// The process that answers, with the number of exchanges that it took part in.
+    live: Option<(Session, usize)>,
+    /// Answers that are not yet obeyed, with the tick from which on they are.
+    coming: VecDeque<(u64, Arc<Answer>)>,
+    obeyed: Option<Arc<Answer>>,
+    /// Tick of the last step that was asked, and of the last answer.
+    asked_tick: Option<u64>,
+    answered_tick: u64,
+    touched: bool,
+    failure: Option<Arc<Failure>>,
+    status: Status,
+}
+
+#[derive(Clone)]
+struct Exchange {
+    key: Key,
+    question: Arc<str>,
+    outcome: Outcome,
+}
+
+impl Clone for External {
+    fn clone(&self) -> External {
+        External {
+            program: Arc::clone(&self.program),
+            scene: Arc::clone(&self.scene),
+            seed: self.seed,
+            map: Arc::clone(&self.map),
+            observer: self.observer.clone(),
+            follower: self.follower.clone(),
+            exchanges: self.exchanges.clone(),
+            live: None,
+            coming: self.coming.clone(),
+            obeyed: self.obeyed.clone(),
+            asked_tick: self.asked_tick,
+            answered_tick: self.answered_tick,
+            touched: self.touched,
+            failure: self.failure.clone(),
+            status: self.status.clone(),
+        }
+    }
+}
+
+impl External {
+    pub fn new(program: &Arc<Program>, scene: &Arc<Scene>, seed: u64) -> External {
+        let observer = || Box::new(Modular::new(scene, &ModularConfig::default(), seed));
+        External {
+            program: Arc::clone(program),
+            scene: Arc::clone(scene),
+            seed,
+            map: program.map_line(&scene.map),
+            observer: (!question::is_truth(program.settings())).then(observer),
+            follower: Follower::new(scene),
+            exchanges: Vec::new(),
+            live: None,
+            coming: VecDeque::new(),
+            obeyed: None,
+            asked_tick: None,
+            answered_tick: 0,
+            touched: false,
+            failure: None,
+            status: Status::default(),
+        }
+    }
+
+    /// Asks what to do, at this tick.
+    fn ask(&mut self, sensed: &Sensed, tick: u64, route_m: (f64, f64)) {
+        if self.exchanges.is_empty() {
+            let reset = question::reset(&self.scene, sensed, self.seed);
+            if let Some(outcome) = self.exchange(Question::Reset(reset).line().into(), self.map.key, None) {
+                debug_assert_eq!(outcome, Outcome::Ready);
+            }
+            if self.failure.is_some() {
+                return;
+            }
+        }
+        let (seq, t_us) = (self.exchanges.len() as u64 - 1, question::micros(tick as f64 * DT_S));
+        let step = question::step(&self.scene, sensed, self.observer.as_deref(), (seq, t_us), route_m);
+        let mut lines = String::new();
+        if sensed.ego.touched && !self.touched {
+            lines = Question::Event(Event { kind: "collision".to_owned(), t_us }).line();
+        }
+        self.touched = sensed.ego.touched;
+        lines.push_str(&Question::Step(Box::new(step)).line());
+        let before = self.exchanges[self.exchanges.len() - 1].key;
+        match self.exchange(lines.into(), before, Some((seq, t_us))) {
+            Some(Outcome::Answer(answer)) => {
+                let (_, latency) = self.program.settings().ticks();
+                self.coming.push_back((tick + latency, answer));
+                self.answered_tick = tick;
+            }
+            Some(Outcome::Ready | Outcome::Missed | Outcome::Failed(_)) | None => {}
+        }
+    }
+
+    /// One question, answered from what is known or by a process. `None` after a failure.
+    fn exchange(&mut self, question: Arc<str>, before: Key, step: Option<(u64, u64)>) -> Option<Outcome> {
+        let key = before.then(&question);
+        let outcome = match self.program.known(key) {
+            Some(outcome) => outcome,
+            None => {
+                let outcome =
+                    self.asked(&question, step).unwrap_or_else(|failure| Outcome::Failed(failure.into()));
+                if matches!(&outcome, Outcome::Answer(answer) if answer.is_extreme()) {
+                    self.program.cut_off();
+                }
+                // That no process may be started is no answer.
+                let is_absent =
+                    matches!(&outcome, Outcome::Failed(found) if found.kind() == FailureKind::Absent);
+                if !is_absent {
+                    self.program.learn(key, outcome.clone());
+                }
+                outcome
+            }
+        };
+        if let Outcome::Failed(failure) = &outcome {
+            self.failure = Some(Arc::clone(failure));
+            self.live = None;
+        }
+        self.exchanges.push(Exchange { key, question, outcome: outcome.clone() });
+        self.failure.is_none().then_some(outcome)
+    }
+
+    /// Asks a process, which first is shown all that it has missed of the episode.
+    fn asked(&mut self, question: &str, step: Option<(u64, u64)>) -> Result<Outcome, Failure> {
+        let up_to_date = self.live.take().filter(|(_, seen)| *seen == self.exchanges.len());
+        let mut session = match up_to_date {
+            Some((session, _)) => session,
+            None => self.caught_up()?,
+        };
+        let outcome = self.answer(&mut session, question, step)?;
+        self.live = Some((session, self.exchanges.len() + 1));
+        Ok(outcome)
+    }
+
+    /// A process that has the map and was shown this episode so far.
+    fn caught_up(&self) -> Result<Session, Failure> {
+        if !self.program.can_start() {
+            let stage = match self.exchanges.len() {
+                0 => "reset".to_owned(),
+                count => format!("step {}", count - 1),
+            };
+            let detail = "the recorded answers do not go on here".to_owned();
+            return Err(Failure::new(Problem::NoProcess, stage, detail));
+        }
+        let mut session = self.program.session(Some(self.map.key))?;
+        if session.map != Some(self.map.key.0) {
+            session.ready(&self.map.line, "map", self.program.settings().timeouts.map_s)?;
+            session.map = Some(self.map.key.0);
+        }
+        for (index, exchange) in self.exchanges.iter().enumerate() {
+            // The time of the step is of no use here: what is checked with it was checked before.
+            let step = index.checked_sub(1).map(|seq| (seq as u64, 0));
+            if matches!(exchange.outcome, Outcome::Missed) {
+                session.pass(&exchange.question);
+                continue;
+            }
+            let again = self.answer(&mut session, &exchange.question, step)?;
+            // What says that it may answer otherwise is not at fault when it does.
+            if self.program.is_deterministic() && !again.means(&exchange.outcome) {
+                let stage = step.map_or("reset".to_owned(), |(seq, _)| format!("step {seq}"));
+                let text = |outcome: &Outcome| serde_json::to_string(&outcome.essence()).unwrap_or_default();
+                let detail = format!(
+                    "shown the same again after a reset, it answered {} instead of {}",
+                    text(&again),
+                    text(&exchange.outcome)
+                );
+                return Err(session.otherwise(stage, detail));
+            }
+        }
+        Ok(session)
+    }
+
+    fn answer(
+        &self,
+        session: &mut Session,
+        question: &str,
+        step: Option<(u64, u64)>,
+    ) -> Result<Outcome, Failure> {
+        let settings = self.program.settings();
+        let Some((seq, t_us)) = step else {
+            session.ready(question, "reset", settings.timeouts.reset_s)?;
+            return Ok(Outcome::Ready);
+        };
+        match session.step(question, (seq, t_us), settings.timeouts.step_s)? {
+            Some(answer) => Ok(Outcome::answered(answer)),
+            None if settings.on_timeout == OnTimeout::Hold => {
+                self.program.miss();
+                Ok(Outcome::Missed)
+            }
+            None => Err(session.too_late(seq, settings.timeouts.step_s)),
+        }
+    }
+
+    /// Pedals and wheel for this tick.
+    fn control(&mut self, sensed: &Sensed, tick: u64, pose: &Pose) -> Control {
+        while let Some((_, answer)) = self.coming.pop_front_if(|(from, _)| *from <= tick) {
+            self.follower.begin(&answer);
+            self.report(&answer);
+            self.obeyed = Some(answer);
+        }
+        let lost_ticks = (LOST_S / DT_S).round() as u64;
+        let is_lost = tick - self.answered_tick.min(tick) >= lost_ticks;
+        let time_s = tick as f64 * DT_S;
+        match self.obeyed.clone() {
+            _ if is_lost => self.follower.lost(pose, &sensed.ego),
+            Some(answer) => self.follower.obey(&answer, time_s, pose, &sensed.ego),
+            // Nothing was answered yet: it rolls.
+            None => Control { steer_rad: sensed.ego.steer_rad, ..Control::default() },
+        }
+    }
+
+    /// What the driving system says of its inside.
+    fn report(&mut self, answer: &Answer) {
+        self.status.planned.clear();
+        let internal = answer.internal();
+        let plan = internal.and_then(|internal| internal.planned.as_ref());
+        match (plan, answer) {
+            (Some(plan), _) => self.status.planned.extend(plan.iter().map(|[x, y]| Vec2::new(*x, *y))),
+            (None, Answer::Trajectory(trajectory)) => {
+                let points = trajectory.points.iter().map(|point| Vec2::new(point.x, point.y));
+                self.status.planned.extend(points);
+            }
+            (None, _) => {}
+        }
+        self.status.reason = Reason::Reported;
+        let reason = internal.and_then(|internal| internal.reason.as_deref());
+        self.status.reported = reason.map(|reason| harmless(reason).into());
+        if let Some(at) = internal.and_then(|internal| internal.localized.as_ref()) {
+            self.status.localized = Some(Pose { position: Vec2::new(at.x, at.y), heading_rad: at.heading });
+        }
+    }
+
+    /// Takes over what is perceived, for those who look on.
+    fn note(&mut self, sensed: &Sensed, pose: &Pose, is_asked: bool) {
+        let says_where = self
+            .obeyed
+            .as_ref()
+            .and_then(|answer| answer.internal())
+            .is_some_and(|own| own.localized.is_some());
+        if !says_where {
+            self.status.localized = Some(*pose);
+        }
+        match &self.observer {
+            Some(observer) => {
+                if is_asked {
+                    self.status.perceived.clone_from(&observer.status().perceived);
+                    self.status.detected.clone_from(&observer.status().detected);
+                }
+            }
+            None => {
+                self.status.perceived.clear();
+                self.status.perceived.extend(sensed.objects.iter().map(PerceivedObject::as_it_is));
+            }
+        }
+    }
+}
+
+impl Ads for External {
+    fn drive(&mut self, sensed: &Sensed) -> Control {
+        if self.failure.is_some() {
+            return self.status.control;
+        }
+        if let Some(observer) = &mut self.observer {
+            observer.drive(sensed);
+        }
+        let pose = question::pose(sensed, self.observer.as_deref());
+        let route_m = self.follower.locate(&pose);
+        let tick = (sensed.time_s / DT_S).round() as u64;
+        let (period, _) = self.program.settings().ticks();
+        let is_asked = tick.is_multiple_of(period) && self.asked_tick != Some(tick);
+        if is_asked {
+            self.asked_tick = Some(tick);
+            self.ask(sensed, tick, route_m);
+        }
+        self.note(sensed, &pose, is_asked);
+        let control = self.control(sensed, tick, &pose);
+        self.follower.helm.command(control, &sensed.ego, &mut self.status)
+    }
+
+    fn status(&self) -> &Status {
+        &self.status
+    }
+
+    fn failure(&self) -> Option<&Failure> {
+        self.failure.as_deref()
+    }
+
+    fn conversation(&self) -> Option<Conversation> {
+        let exchanges = self.exchanges.iter().map(|exchange| (exchange.key, exchange.outcome.clone()));
+        Some(Conversation { attached: self.program.attached(), exchanges: exchanges.collect() })
+    }
+}
+
+impl Drop for External {
+    fn drop(&mut self) {
+        if let Some((mut session, _)) = self.live.take() {
+            let t_us = question::micros(self.asked_tick.unwrap_or(0) as f64 * DT_S);
+            session.tell(&Question::Event(Event { kind: "end".to_owned(), t_us }).line());
+            self.program.give_back(session);
+        }
+    }
+}

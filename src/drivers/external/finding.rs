@@ -1,0 +1,268 @@
+//! What goes wrong with an external driving system, each under its own name. Never a collision.
+
+use serde::{Deserialize, Serialize};
+
+use avastra_lang::syntax::acts_on_terminal;
+
+/// The kinds of findings; PROTOCOL.md, "What goes wrong".
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum FailureKind {
+    #[serde(rename = "ads_crash")]
+    Crash,
+    #[serde(rename = "ads_timeout")]
+    Timeout,
+    #[serde(rename = "ads_protocol")]
+    Protocol,
+    #[serde(rename = "ads_flood")]
+    Flood,
+    #[serde(rename = "ads_error")]
+    Error,
+    #[serde(rename = "ads_nondeterministic")]
+    Nondeterministic,
+    #[serde(rename = "ads_absent")]
+    Absent,
+}
+
+impl FailureKind {
+    pub const ALL: [FailureKind; 7] = [
+        FailureKind::Crash,
+        FailureKind::Timeout,
+        FailureKind::Protocol,
+        FailureKind::Flood,
+        FailureKind::Error,
+        FailureKind::Nondeterministic,
+        FailureKind::Absent,
+    ];
+
+    /// The name, which is also the name of an episode's end.
+    pub fn name(self) -> &'static str {
+        match self {
+            FailureKind::Crash => "ads_crash",
+            FailureKind::Timeout => "ads_timeout",
+            FailureKind::Protocol => "ads_protocol",
+            FailureKind::Flood => "ads_flood",
+            FailureKind::Error => "ads_error",
+            FailureKind::Nondeterministic => "ads_nondeterministic",
+            FailureKind::Absent => "ads_absent",
+        }
+    }
+}
+
+/// What exactly is wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Problem {
+    Exited,
+    Closed,
+    NotStarted,
+    NotReached,
+    NoAnswer,
+    NotJson,
+    TooLong,
+    WrongType,
+    WrongShape,
+    NotFinite,
+    OutOfRange,
+    WrongSeq,
+    Twice,
+    WrongProtocol,
+    Stderr,
+    Reported,
+    OtherAnswer,
+    NoProcess,
+    GivenUp,
+}
+
+impl Problem {
+    pub const ALL: [Problem; 19] = [
+        Problem::Exited,
+        Problem::Closed,
+        Problem::NotStarted,
+        Problem::NotReached,
+        Problem::NoAnswer,
+        Problem::NotJson,
+        Problem::TooLong,
+        Problem::WrongType,
+        Problem::WrongShape,
+        Problem::NotFinite,
+        Problem::OutOfRange,
+        Problem::WrongSeq,
+        Problem::Twice,
+        Problem::WrongProtocol,
+        Problem::Stderr,
+        Problem::Reported,
+        Problem::OtherAnswer,
+        Problem::NoProcess,
+        Problem::GivenUp,
+    ];
+
+    pub fn kind(self) -> FailureKind {
+        match self {
+            Problem::Exited | Problem::Closed | Problem::NotStarted | Problem::NotReached => {
+                FailureKind::Crash
+            }
+            Problem::NoAnswer => FailureKind::Timeout,
+            Problem::NotJson
+            | Problem::TooLong
+            | Problem::WrongType
+            | Problem::WrongShape
+            | Problem::NotFinite
+            | Problem::OutOfRange
+            | Problem::WrongSeq
+            | Problem::Twice
+            | Problem::WrongProtocol => FailureKind::Protocol,
+            Problem::Stderr => FailureKind::Flood,
+            Problem::Reported => FailureKind::Error,
+            Problem::OtherAnswer => FailureKind::Nondeterministic,
+            Problem::NoProcess | Problem::GivenUp => FailureKind::Absent,
+        }
+    }
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Problem::Exited => "exited",
+            Problem::Closed => "closed",
+            Problem::NotStarted => "not_started",
+            Problem::NotReached => "not_reached",
+            Problem::NoAnswer => "no_answer",
+            Problem::NotJson => "not_json",
+            Problem::TooLong => "too_long",
+            Problem::WrongType => "wrong_type",
+            Problem::WrongShape => "wrong_shape",
+            Problem::NotFinite => "not_finite",
+            Problem::OutOfRange => "out_of_range",
+            Problem::WrongSeq => "wrong_seq",
+            Problem::Twice => "twice",
+            Problem::WrongProtocol => "wrong_protocol",
+            Problem::Stderr => "stderr",
+            Problem::Reported => "reported",
+            Problem::OtherAnswer => "other_answer",
+            Problem::NoProcess => "no_process",
+            Problem::GivenUp => "given_up",
+        }
+    }
+
+    /// What the author of the driving system can do about it.
+    pub fn advice(self) -> &'static str {
+        match self {
+            Problem::Exited | Problem::Closed => {
+                "read its standard error; the program must run until `close` or the end of its input"
+            }
+            Problem::NotStarted => {
+                "try the command by hand in the same folder; there is no shell, so no `~`, `*`, `|` or variables"
+            }
+            Problem::NotReached => {
+                "avastra connects and starts nothing: start the program that listens there first"
+            }
+            Problem::NoAnswer => {
+                "flush standard output after each line; if the program needs longer, raise `timeouts` in its profile"
+            }
+            Problem::NotJson => {
+                "print nothing but messages on standard output: send prints, also those of libraries, to standard error"
+            }
+            Problem::TooLong => "a line has at most 1 MiB: send fewer points",
+            Problem::WrongType | Problem::WrongShape | Problem::OutOfRange => {
+                "compare the message with PROTOCOL.md or `avastra ads schema`"
+            }
+            Problem::NotFinite => {
+                "test for NaN before answering; in Python, `json.dumps(…, allow_nan=False)` finds the place"
+            }
+            Problem::WrongSeq => "repeat the `seq` of the step in its answer",
+            Problem::Twice => "answer each step once, and no `event`",
+            Problem::WrongProtocol => "this avastra speaks avastra-ads/1",
+            Problem::Stderr => "print less: 64 MiB in an episode are a flood",
+            Problem::Reported => "the program says so itself",
+            Problem::OtherAnswer => {
+                "forget everything at `reset`, seed all that is random from it, and use no clock"
+            }
+            Problem::NoProcess => "answers are recorded for one way only: give the program with `--ads`",
+            Problem::GivenUp => "see that the program runs and answers `init`, then play what is left",
+        }
+    }
+}
+
+/// Characters of a line of standard error that a message shows.
+const STDERR_CHARS_SHOWN: usize = 300;
+
+/// One finding about an external driving system.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Failure {
+    pub problem: Problem,
+    /// When: `start`, `init`, `map`, `reset`, `step 37`, `close`.
+    pub stage: String,
+    /// What happened, in words.
+    pub detail: String,
+    /// How the process ended, if it had ended by itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exit: Option<String>,
+    /// The end of its standard error.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub stderr: String,
+}
+
+impl Failure {
+    pub fn new(problem: Problem, stage: impl Into<String>, detail: impl Into<String>) -> Failure {
+        let detail = harmless(&detail.into());
+        Failure { problem, stage: stage.into(), detail, exit: None, stderr: String::new() }
+    }
+
+    pub fn kind(&self) -> FailureKind {
+        self.problem.kind()
+    }
+
+    /// In one line, for example `ads_crash (exited) at step 37: it ended with exit status 1`.
+    pub fn in_words(&self) -> String {
+        format!("{} ({}) at {}: {}", self.kind().name(), self.problem.name(), self.stage, self.what())
+    }
+
+    /// What happened, and how the process ended.
+    pub fn what(&self) -> String {
+        let exit = self.exit.as_ref().map_or(String::new(), |exit| format!("; it ended with {exit}"));
+        format!("{}{exit}", self.detail)
+    }
+
+    /// The last lines of its standard error, at most so many, each cut to a length that can be read.
+    pub fn stderr_lines(&self, at_most: usize) -> Vec<String> {
+        let lines: Vec<&str> = self.stderr.lines().collect();
+        let short = |line: &&str| match line.char_indices().nth(STDERR_CHARS_SHOWN) {
+            Some((end, _)) => format!("{}…", &line[..end]),
+            None => (*line).to_owned(),
+        };
+        lines[lines.len().saturating_sub(at_most)..].iter().map(short).collect()
+    }
+}
+
+/// Text of a program as it is kept in logs, databases and files, which may be printed by other programs, too: characters
+/// that would act on a terminal become U+FFFD, and a carriage return before a line feed is left out.
+pub(super) fn harmless(text: &str) -> String {
+    text.replace("\r\n", "\n").replace(acts_on_terminal, "\u{fffd}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_program_says_cannot_steer_a_terminal() {
+        let failure = Failure::new(Problem::Reported, "step 1", "lost \u{1b}[2J\u{202e}\r\n\there\u{7}");
+        assert_eq!(failure.detail, "lost \u{fffd}[2J\u{fffd}\n\there\u{fffd}");
+    }
+
+    const PROTOCOL: &str = include_str!("../../../PROTOCOL.md");
+
+    #[test]
+    fn the_specification_names_every_finding_and_no_other() {
+        for problem in Problem::ALL {
+            assert_eq!(serde_json::to_value(problem).unwrap(), problem.name());
+            assert!(PROTOCOL.contains(&format!("| `{}` |", problem.name())), "{problem:?}");
+        }
+        for kind in FailureKind::ALL {
+            assert_eq!(serde_json::to_value(kind).unwrap(), kind.name());
+            assert!(PROTOCOL.contains(&format!("`{}`", kind.name())), "{kind:?}");
+            assert!(Problem::ALL.iter().any(|problem| problem.kind() == kind));
+        }
+        let table = PROTOCOL.split("| finding | problem | when |").nth(1).expect("the table of findings");
+        let rows = table.lines().filter(|line| line.starts_with("| ")).count();
+        assert_eq!(rows, Problem::ALL.len());
+    }
+}

@@ -1,0 +1,455 @@
+//! The route as a driving system reads it off its HD map: evenly sampled, with the speed that limits
+//! and curves allow at each place.
+//!
+//! Even samples make look-ups and projections cheap enough to be done for every predicted position
+//! of every object, which the exact projections of `geometry::Path` are not. A projection here is onto the
+//! tangent of a sample:
+//!
+//! - [`Guide::project`]: of the nearest sample between two stations;
+//! - [`Guide::locate`]: near where a vehicle lately was;
+//! - [`Guide::trace`]: for a moving point, position after position.
+//!
+//! There are no signals and no obstacles here.
+
+use avastra_base::geometry::{Beside, Pose, Vec2, smaller, unit_vector, wrap_angle};
+use avastra_world::sim::Scene;
+
+use super::speed::PREVIEW_S;
+
+/// Distance between samples, m. On the tightest bend a car can drive (5 m) the chord is 6 mm off.
+const SPACING_M: f64 = 0.5;
+/// Samples skipped by the rounds of a projection, coarse to fine: 8 m, 2 m, none.
+const STRIDES: [usize; 3] = [16, 4, 1];
+
+/// How far before and behind its last place a vehicle is looked for, m: more than it drives or errs
+/// within a tick, less than to another branch of the route.
+const NEAR_M: f64 = 5.0;
+
+/// Error that the position of a vehicle may have, m: places of the route that are nearer by less are equally near.
+const POSITION_ERROR_M: f64 = 2.0;
+
+/// Most steps along tangents until a place has settled; in a bend each step leaves a fraction of the error.
+const SLIDES_MAX: usize = 8;
+
+/// Step of the differences that give the slope of a guide beside the path, m.
+const H_M: f64 = 0.25;
+
+/// What bounds the speed on a free road.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpeedRules {
+    /// Speed on a free road, m/s.
+    pub cruise_mps: f64,
+    /// Lateral acceleration in curves, m/s².
+    pub lateral_acceleration_mps2_max: f64,
+    /// Deceleration for a curve or a lower limit ahead, magnitude, m/s².
+    pub slowdown_mps2: f64,
+}
+
+impl SpeedRules {
+    /// How our drivers drive in towns, all alike, so that they can be compared. The speed is that of Apollo's upstream
+    /// `planning.conf`, `default_cruise_speed` (25 mph), the curves are its speed bounds' `max_centric_acceleration_limit`;
+    /// the slowing down is ours.
+    pub const TOWN: SpeedRules =
+        SpeedRules { cruise_mps: 11.18, lateral_acceleration_mps2_max: 2.0, slowdown_mps2: 1.5 };
+
+    /// For a guide that is only steered along: nothing bounds the speed but the limits of the road.
+    pub const NONE: SpeedRules = SpeedRules {
+        cruise_mps: f64::INFINITY,
+        lateral_acceleration_mps2_max: f64::INFINITY,
+        slowdown_mps2: f64::INFINITY,
+    };
+}
+
+/// The route, or a path beside it, in even samples.
+#[derive(Debug, Clone)]
+pub struct Guide {
+    samples: Vec<Sample>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    position: Vec2,
+    forward: Vec2,
+    heading_rad: f64,
+    curvature_per_m: f64,
+    speed_mps_max: f64,
+}
+
+impl Guide {
+    /// Along the route's path: lane changes as early as they are comfortable.
+    pub fn new(scene: &Scene, rules: &SpeedRules) -> Guide {
+        Guide::beside(scene, rules, |_| 0.0)
+    }
+
+    /// As [`Guide::new`], but each lane change begins at a station of its own (m); it does not begin at
+    /// all while that is infinite. Stations remain those of the route's path.
+    pub fn with_changes(scene: &Scene, rules: &SpeedRules, begins_m: &[f64]) -> Guide {
+        debug_assert_eq!(begins_m.len(), scene.route.changes.len());
+        let changes = || scene.route.changes.iter().zip(begins_m);
+        Guide::beside(scene, rules, |station_m| {
+            changes().map(|(change, begin_m)| change.postponed_offset_m(station_m, *begin_m)).sum()
+        })
+    }
+
+    /// A guide `offset_m` beside the route's path: a smooth function of the station, m to the left.
+    fn beside(scene: &Scene, rules: &SpeedRules, offset_m: impl Fn(f64) -> f64) -> Guide {
+        let route = &scene.route;
+        let count = (route.path.length_m() / SPACING_M).ceil() as usize + 1;
+        let mut lane = 0;
+        let mut samples: Vec<Sample> = (0..count)
+            .map(|index| {
+                let station_m = index as f64 * SPACING_M;
+                while lane + 1 < route.lanes.len() && route.lanes[lane].to_m <= station_m {
+                    lane += 1;
+                }
+                let limit_mps =
+                    route.lanes.get(lane).map_or(f64::INFINITY, |on| scene.map.lane(on.lane).speed_limit_mps);
+                let on_path = route.path.pose_at(station_m);
+                let aside_m = [-H_M, 0.0, H_M].map(|ahead_m| offset_m(station_m + ahead_m));
+                let slope = (aside_m[2] - aside_m[0]) / (2.0 * H_M);
+                let bend_per_m = (aside_m[2] - 2.0 * aside_m[1] + aside_m[0]) / (H_M * H_M);
+                let mut pose = on_path.offset(0.0, aside_m[1]);
+                pose.heading_rad = wrap_angle(pose.heading_rad + libm::atan2(slope, 1.0));
+                let curvature_per_m = route.path.curvature_at(station_m) + bend_per_m;
+                let curve_mps =
+                    (rules.lateral_acceleration_mps2_max / curvature_per_m.abs().max(1e-6)).sqrt();
+                Sample {
+                    position: pose.position,
+                    forward: unit_vector(pose.heading_rad),
+                    heading_rad: pose.heading_rad,
+                    curvature_per_m,
+                    speed_mps_max: limit_mps.min(rules.cruise_mps).min(curve_mps),
+                }
+            })
+            .collect();
+        // `sim::way` has a pass like this over its own vertices; see there why they are two.
+        for index in (0..count - 1).rev() {
+            let next_mps = samples[index + 1].speed_mps_max;
+            let reachable_mps = (next_mps * next_mps + 2.0 * rules.slowdown_mps2 * SPACING_M).sqrt();
+            samples[index].speed_mps_max = samples[index].speed_mps_max.min(reachable_mps);
+        }
+        Guide { samples }
+    }
+
+    /// Through poses, one after another, of which two may be at the same place; and the station of each, m. There is
+    /// no speed limit on it.
+    pub fn through(poses: &[Pose]) -> (Guide, Vec<f64>) {
+        let mut stations_m = vec![0.0];
+        for pair in poses.windows(2) {
+            let way_m = (pair[1].position - pair[0].position).norm();
+            stations_m.push(stations_m[stations_m.len() - 1] + way_m);
+        }
+        let last = poses.len() - 1;
+        let count = ((stations_m[last] / SPACING_M).ceil() as usize + 1).max(2);
+        let at = |station_m: f64| -> Pose {
+            let after = stations_m.partition_point(|known_m| *known_m <= station_m);
+            if after > last {
+                return poses[last].offset(station_m - stations_m[last], 0.0);
+            }
+            let (a, b) = (&poses[after - 1], &poses[after]);
+            let fraction = (station_m - stations_m[after - 1]) / (stations_m[after] - stations_m[after - 1]);
+            let turn_rad = wrap_angle(b.heading_rad - a.heading_rad) * fraction;
+            Pose {
+                position: a.position + (b.position - a.position) * fraction,
+                heading_rad: wrap_angle(a.heading_rad + turn_rad),
+            }
+        };
+        let sample = |index: usize| {
+            let station_m = index as f64 * SPACING_M;
+            let (pose, before, after) =
+                (at(station_m), at((station_m - SPACING_M).max(0.0)), at(station_m + SPACING_M));
+            let way_m = station_m.min(SPACING_M) + SPACING_M;
+            Sample {
+                position: pose.position,
+                forward: unit_vector(pose.heading_rad),
+                heading_rad: pose.heading_rad,
+                curvature_per_m: wrap_angle(after.heading_rad - before.heading_rad) / way_m,
+                speed_mps_max: f64::INFINITY,
+            }
+        };
+        (Guide { samples: (0..count).map(sample).collect() }, stations_m)
+    }
+
+    /// The pose at a station; beyond the ends the route goes on straight.
+    pub fn pose_at(&self, station_m: f64) -> Pose {
+        let (index, fraction) = self.segment(station_m);
+        let (a, b) = (&self.samples[index], &self.samples[index + 1]);
+        let turn_rad = wrap_angle(b.heading_rad - a.heading_rad) * fraction.clamp(0.0, 1.0);
+        Pose {
+            position: a.position + (b.position - a.position) * fraction,
+            heading_rad: wrap_angle(a.heading_rad + turn_rad),
+        }
+    }
+
+    /// The position of [`Guide::pose_at`], without the work for its heading.
+    pub fn position_at(&self, station_m: f64) -> Vec2 {
+        let (index, fraction) = self.segment(station_m);
+        let (a, b) = (&self.samples[index], &self.samples[index + 1]);
+        a.position + (b.position - a.position) * fraction
+    }
+
+    /// 1/m, positive to the left.
+    pub fn curvature_at(&self, station_m: f64) -> f64 {
+        let (index, fraction) = self.segment(station_m);
+        let (a, b) = (&self.samples[index], &self.samples[index + 1]);
+        a.curvature_per_m + (b.curvature_per_m - a.curvature_per_m) * fraction.clamp(0.0, 1.0)
+    }
+
+    /// Speed that limits and curves, here and ahead, allow, m/s.
+    pub fn speed_mps_max(&self, station_m: f64) -> f64 {
+        let (index, fraction) = self.segment(station_m);
+        let (a, b) = (&self.samples[index], &self.samples[index + 1]);
+        a.speed_mps_max + (b.speed_mps_max - a.speed_mps_max) * fraction.clamp(0.0, 1.0)
+    }
+
+    /// The lower of the speeds that are allowed at a station and soon after it, m/s, for a vehicle at a speed.
+    pub fn allowed_mps(&self, station_m: f64, speed_mps: f64) -> f64 {
+        smaller(self.speed_mps_max(station_m), self.speed_mps_max(station_m + speed_mps * PREVIEW_S))
+    }
+
+    /// The place of a vehicle that was lately at station `near_m`; with `None` the whole route is searched.
+    pub fn locate(&self, point: Vec2, near_m: Option<f64>) -> Beside {
+        let Some(near_m) = near_m else { return self.beside_sample(point, self.first_near(point)) };
+        let within = Stretch { first: self.index(near_m - NEAR_M), last: self.index(near_m + NEAR_M) };
+        let found = self.slide(point, self.index(near_m), within);
+        self.beside_sample(point, found.unwrap_or_else(|| self.nearest(point, within)).index)
+    }
+
+    /// The nearest place of the route between two stations.
+    pub fn project(&self, point: Vec2, from_m: f64, to_m: f64) -> Beside {
+        let within = Stretch { first: self.index(from_m), last: self.index(to_m) };
+        self.beside_sample(point, self.nearest(point, within).index)
+    }
+
+    /// Projects a moving point: returns the first projection and a [`Tracer`] for the following ones, which
+    /// returns `None` beyond `reach_m`, most often without a search.
+    pub fn trace(&self, point: Vec2, from_m: f64, to_m: f64, reach_m: f64) -> (Beside, Tracer<'_>) {
+        let within = Stretch { first: self.index(from_m), last: self.index(to_m) };
+        let nearest = self.nearest(point, within);
+        let reach_m = reach_m + SPACING_M;
+        let tracer = Tracer { guide: self, within, reach_m, point, nearest };
+        (self.beside_sample(point, nearest.index), tracer)
+    }
+
+    fn beside_sample(&self, point: Vec2, index: usize) -> Beside {
+        let Sample { position, forward, .. } = self.samples[index];
+        let delta = point - position;
+        Beside {
+            station_m: index as f64 * SPACING_M + forward.dot(&delta),
+            offset_m: forward.x * delta.y - forward.y * delta.x,
+            forward,
+        }
+    }
+
+    fn squared_m2(&self, point: Vec2, index: usize) -> f64 {
+        (point - self.samples[index].position).norm_squared()
+    }
+
+    /// The nearest sample of the whole route. Where the route passes a place twice, the first passage is meant,
+    /// within the error of a position.
+    fn first_near(&self, point: Vec2) -> usize {
+        let whole = Stretch { first: 0, last: self.samples.len() - 1 };
+        let nearest = self.nearest(point, whole);
+        let reach_m = nearest.distance_m2.sqrt() + POSITION_ERROR_M;
+        let is_near = |index: &usize| self.squared_m2(point, *index) <= reach_m * reach_m;
+        let first = (0..nearest.index).find(is_near).unwrap_or(nearest.index);
+        self.descend(point, first, whole).index
+    }
+
+    /// The sample of a stretch that is nearest to a point, coarse to fine.
+    fn nearest(&self, point: Vec2, within: Stretch) -> Nearest {
+        let Stretch { mut first, mut last } = within;
+        let mut best = Nearest { index: last, distance_m2: self.squared_m2(point, last) };
+        for stride in STRIDES {
+            // Not `step_by`: it costs as much as the distances.
+            let (samples, mut index) = (&self.samples[..last], first);
+            while let Some(sample) = samples.get(index) {
+                let distance_m2 = (point - sample.position).norm_squared();
+                if distance_m2 < best.distance_m2 {
+                    best = Nearest { index, distance_m2 };
+                }
+                index += stride;
+            }
+            first = best.index.saturating_sub(stride - 1);
+            last = (best.index + stride).min(self.samples.len());
+        }
+        best
+    }
+
+    /// The nearest sample, found by stepping along tangents from a sample nearby: much quicker than a
+    /// search, but `None` where the steps do not settle.
+    fn slide(&self, point: Vec2, from: usize, within: Stretch) -> Option<Nearest> {
+        let mut index = from;
+        for _ in 0..SLIDES_MAX {
+            let Sample { position, forward, .. } = self.samples[index];
+            let ahead = (forward.dot(&(point - position)) / SPACING_M) as i32 as isize;
+            let next = index.saturating_add_signed(ahead).clamp(within.first, within.last);
+            if next == index {
+                return Some(self.descend(point, index, within));
+            }
+            index = next;
+        }
+        None
+    }
+
+    /// Walks from a sample to one whose neighbours are both farther from a point; of several equally near,
+    /// to the first.
+    fn descend(&self, point: Vec2, from: usize, within: Stretch) -> Nearest {
+        let mut best = Nearest { index: from, distance_m2: self.squared_m2(point, from) };
+        while best.index < within.last {
+            let distance_m2 = self.squared_m2(point, best.index + 1);
+            if distance_m2 >= best.distance_m2 {
+                break;
+            }
+            best = Nearest { index: best.index + 1, distance_m2 };
+        }
+        while best.index > within.first {
+            let distance_m2 = self.squared_m2(point, best.index - 1);
+            if distance_m2 > best.distance_m2 {
+                break;
+            }
+            best = Nearest { index: best.index - 1, distance_m2 };
+        }
+        best
+    }
+
+    fn index(&self, station_m: f64) -> usize {
+        // The conversion makes 0 of what is negative.
+        ((station_m / SPACING_M) as u32 as usize).min(self.samples.len() - 1)
+    }
+
+    /// Segment and fraction of it; the fraction leaves `[0, 1]` beyond the ends.
+    fn segment(&self, station_m: f64) -> (usize, f64) {
+        let index = self.index(station_m).min(self.samples.len() - 2);
+        (index, station_m / SPACING_M - index as f64)
+    }
+}
+
+/// Samples from the first to the last.
+#[derive(Debug, Clone, Copy)]
+struct Stretch {
+    first: usize,
+    last: usize,
+}
+
+/// The sample that is nearest to a point.
+#[derive(Debug, Clone, Copy)]
+struct Nearest {
+    index: usize,
+    distance_m2: f64,
+}
+
+/// Projects a moving point onto a stretch of a guide, position after position.
+#[derive(Debug)]
+pub struct Tracer<'a> {
+    guide: &'a Guide,
+    within: Stretch,
+    reach_m: f64,
+    /// The last position, and its nearest sample.
+    point: Vec2,
+    nearest: Nearest,
+}
+
+impl Tracer<'_> {
+    /// The projection of the next position; `None` if it is out of reach.
+    pub fn next(&mut self, point: Vec2) -> Option<Beside> {
+        let distance_m = self.nearest.distance_m2.sqrt();
+        let slid = if distance_m <= self.reach_m {
+            self.guide.slide(point, self.nearest.index, self.within)
+        } else if distance_m - (point - self.point).norm() > self.reach_m {
+            // The point cannot be nearer than the last distance less the way that it has moved.
+            return None;
+        } else {
+            None
+        };
+        // A point that is out of reach of the stretch near by may be in reach of another bend.
+        let near = |nearest: &Nearest| nearest.distance_m2 <= self.reach_m * self.reach_m;
+        self.nearest = slid.filter(near).unwrap_or_else(|| self.guide.nearest(point, self.within));
+        self.point = point;
+        let is_in_reach = self.nearest.distance_m2.sqrt() <= self.reach_m;
+        is_in_reach.then(|| self.guide.beside_sample(point, self.nearest.index))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{ring, winding};
+
+    const RULES: SpeedRules =
+        SpeedRules { cruise_mps: 11.0, lateral_acceleration_mps2_max: 2.0, slowdown_mps2: 1.5 };
+
+    #[test]
+    fn places_and_projections_agree_with_the_path() {
+        let scene = winding();
+        let guide = Guide::new(&scene, &RULES);
+        for index in 0..370 {
+            let station_m = f64::from(index) + 0.3;
+            let on_path = scene.route.path.pose_at(station_m);
+            assert!((guide.pose_at(station_m).position - on_path.position).norm() < 0.01, "{station_m}");
+            let beside = guide.project(on_path.offset(0.0, 1.0).position, station_m - 20.0, station_m + 20.0);
+            assert!((beside.station_m - station_m).abs() < 0.06, "{beside:?} at {station_m}");
+            assert!((beside.offset_m - 1.0).abs() < 0.01, "{beside:?}");
+        }
+    }
+
+    #[test]
+    fn a_drive_begins_where_the_route_begins_even_if_it_comes_there_again() {
+        let guide = Guide::new(&ring(), &RULES);
+        let start = guide.pose_at(0.0);
+        for (ahead_m, left_m) in [(0.0, 0.0), (0.3, 0.2), (0.2, -0.4), (1.0, 0.1)] {
+            let place = guide.locate(start.offset(ahead_m, left_m).position, None);
+            assert!((place.station_m - ahead_m).abs() < 0.1, "{place:?}");
+        }
+        let place = guide.locate(guide.pose_at(80.0).offset(0.0, 0.3).position, None);
+        assert!((place.station_m - 80.0).abs() < 0.1, "{place:?}");
+    }
+
+    #[test]
+    fn a_moving_point_is_followed_as_if_searched_anew() {
+        let guide = Guide::new(&winding(), &RULES);
+        let (from_m, to_m, reach_m) = (20.0, 330.0, 5.0);
+        let (mut near, mut far) = (0, 0);
+        for case in 0..400 {
+            // From beside the route in all directions, up to 2.2 m a step.
+            let start = guide.pose_at(f64::from(case % 100) * 3.5).offset(0.0, f64::from(case % 13) - 6.0);
+            let step = unit_vector(f64::from(case) * 0.7) * (f64::from(case % 11) * 0.22);
+            let (first, mut tracer) = guide.trace(start.position, from_m, to_m, reach_m);
+            assert_eq!(first, guide.project(start.position, from_m, to_m));
+            for moment in 1..=25 {
+                let point = start.position + step * f64::from(moment);
+                let anew = guide.project(point, from_m, to_m);
+                match tracer.next(point) {
+                    Some(beside) => {
+                        // A search may end a few samples beyond the stretch, on another tangent.
+                        let inside = (from_m..to_m).contains(&anew.station_m);
+                        assert!(
+                            beside == anew || !inside,
+                            "case {case}, moment {moment}: {beside:?} {anew:?}"
+                        );
+                        near += 1;
+                    }
+                    None => {
+                        let beyond = anew.station_m < from_m - reach_m || anew.station_m > to_m + reach_m;
+                        assert!(anew.offset_m.abs() > reach_m || beyond, "case {case}: {anew:?}");
+                        far += 1;
+                    }
+                }
+            }
+        }
+        assert!(near > 2000 && far > 2000, "{near} {far}");
+    }
+
+    #[test]
+    fn curves_are_foreseen() {
+        let guide = Guide::new(&winding(), &RULES);
+        assert_eq!(guide.speed_mps_max(50.0), 11.0);
+        // √(2 · 15 + …): the route lies 1.75 m outside the left-hand bend's line of 15 m.
+        assert!((guide.speed_mps_max(135.0) - (2.0_f64 * 16.75).sqrt()).abs() < 0.1);
+        for index in 0..700 {
+            let (here, next) = (f64::from(index) * 0.5, f64::from(index + 1) * 0.5);
+            let (before, after) = (guide.speed_mps_max(here), guide.speed_mps_max(next));
+            assert!(before * before - after * after <= 2.0 * 1.5 * 0.5 + 1e-9, "at {here}");
+        }
+    }
+}

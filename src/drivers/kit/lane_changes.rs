@@ -1,0 +1,82 @@
+//! The lane changes of the route: the next one, when it is due, and where to wait for it.
+//!
+//! Whether the other lane is free is each driver's own idea; `corridor` says who is in it.
+
+use std::sync::Arc;
+
+use avastra_road::RouteLaneChange;
+use avastra_world::sim::{Scene, VehicleParameters};
+
+use super::guide::{Guide, SpeedRules};
+
+/// Which changes of the route have begun, and where.
+#[derive(Debug, Clone)]
+pub struct RouteChanges {
+    scene: Arc<Scene>,
+    /// Where each change begins, m; infinite while it has not.
+    begins_m: Vec<f64>,
+}
+
+impl RouteChanges {
+    pub fn new(scene: &Arc<Scene>) -> RouteChanges {
+        RouteChanges { scene: Arc::clone(scene), begins_m: vec![f64::INFINITY; scene.route.changes.len()] }
+    }
+
+    /// The guide along the lanes that are to be driven now.
+    pub fn guide(&self, rules: &SpeedRules) -> Guide {
+        Guide::with_changes(&self.scene, rules, &self.begins_m)
+    }
+
+    /// The next change, which has not begun yet.
+    pub fn next(&self) -> Option<&RouteLaneChange> {
+        Some(&self.scene.route.changes[self.next_index()?])
+    }
+
+    /// The next change, if it may be made at a station and none is under way there.
+    pub fn due(&self, station_m: f64) -> Option<&RouteLaneChange> {
+        self.next().filter(|change| station_m >= change.begin_m && !self.is_under_way(station_m))
+    }
+
+    /// Begins the next change at a station, m; minus infinity for one that is over.
+    pub fn begin(&mut self, station_m: f64) {
+        if let Some(index) = self.next_index() {
+            self.begins_m[index] = station_m;
+        }
+    }
+
+    /// Whether a change is under way at a station.
+    pub fn is_under_way(&self, station_m: f64) -> bool {
+        self.begun().any(|(_, change, begin_m)| begin_m <= station_m && station_m < end_m(change, begin_m))
+    }
+
+    /// Where the last change that has begun ends, m.
+    pub fn last_end_m(&self) -> Option<f64> {
+        self.begun().last().map(|(_, change, begin_m)| end_m(change, begin_m))
+    }
+
+    /// The changes that have begun: number, change and where it began, m.
+    pub fn begun(&self) -> impl Iterator<Item = (usize, &RouteLaneChange, f64)> {
+        let all = self.scene.route.changes.iter().zip(&self.begins_m).enumerate();
+        all.map(|(index, (change, begin_m))| (index, change, *begin_m))
+            .filter(|(_, _, begin_m)| *begin_m < f64::INFINITY)
+    }
+
+    /// Takes back the change of a number, which has begun.
+    pub fn take_back(&mut self, index: usize) {
+        self.begins_m[index] = f64::INFINITY;
+    }
+
+    /// Where the front of the vehicle must wait for the next change, m: a short one is still possible there.
+    pub fn wait_m(&self) -> Option<f64> {
+        let change = self.next()?;
+        Some(VehicleParameters::MKZ.front_m(change.latest_m - RouteLaneChange::LENGTH_M_MIN))
+    }
+
+    fn next_index(&self) -> Option<usize> {
+        self.begins_m.iter().position(|begin_m| *begin_m == f64::INFINITY)
+    }
+}
+
+fn end_m(change: &RouteLaneChange, begin_m: f64) -> f64 {
+    begin_m + change.length_from_m(begin_m)
+}

@@ -1,0 +1,95 @@
+//! What pedestrians near a carriageway may do.
+//! A pedestrian who walks towards it crosses it, one who walks along it stays beside it, and one who stands at the kerb
+//! and faces it may set out, which gets less probable the longer the wait. Apollo's `SEMANTIC_LSTM` learns this from
+//! maps; the rule and its figures are ours.
+
+use avastra_base::geometry::{Vec2, unit_vector};
+use avastra_road::RoadMap;
+
+use super::{Forecast, STEP_S};
+
+/// A pedestrian is at the kerb up to this far from the nearest lane's edge, m.
+const KERB_M: f64 = 2.0;
+/// Faces the carriageway within 60° of the way across: cosine.
+const FACING_COSINE: f64 = 0.5;
+/// Slower than this across the way, a pedestrian walks along it, m/s.
+const ACROSS_MPS: f64 = 0.3;
+/// Chance of setting out within the next seconds, at a crosswalk and elsewhere.
+const SETS_OUT_AT_CROSSWALK: f64 = 0.5;
+const SETS_OUT: f64 = 0.3;
+/// A crosswalk so near is one that the pedestrian may use, m.
+const CROSSWALK_M: f64 = 3.0;
+/// Someone who has waited for long is likely to wait on: the chance halves in this time, s.
+const WAITED_S: f64 = 3.0;
+/// Less probable is not followed.
+const PROBABILITY_MIN: f64 = 0.05;
+/// A pedestrian who sets out does so after this time, s, at this speed, m/s: the mean of walkers.
+const SETS_OUT_AFTER_S: f64 = 0.5;
+const WALK_MPS: f64 = 1.3;
+
+/// Adds the hypotheses of a pedestrian who has stood for `stood_s`; `forecast` is the one that keeps its velocity.
+pub fn predict(
+    map: &RoadMap,
+    mut forecast: Forecast,
+    stood_s: f64,
+    several: bool,
+    forecasts: &mut Vec<Forecast>,
+) {
+    let position = forecast.positions[0];
+    let Some(place) = map.nearest(position, forecast.heading_rad, KERB_M) else {
+        forecasts.push(forecast);
+        return;
+    };
+    let lane = map.lane(place.lane);
+    let along = lane.centre.pose_at(place.station_m).forward();
+    let beyond_m = place.offset_m.abs() - lane.width_at(place.station_m) / 2.0;
+    if beyond_m <= 0.0 {
+        // On the carriageway there is nothing to wait for.
+        forecasts.push(forecast);
+        return;
+    }
+    let across = Vec2::new(along.y, -along.x) * place.offset_m.signum();
+    if forecast.moving {
+        let velocity_mps = forecast.velocity_mps;
+        if velocity_mps.dot(&across).abs() < ACROSS_MPS {
+            let along_mps = along * velocity_mps.dot(&along);
+            walk(&mut forecast, along_mps, 0.0);
+        }
+        forecasts.push(forecast);
+        return;
+    }
+    let facing = unit_vector(forecast.heading_rad).dot(&across) >= FACING_COSINE;
+    let chance = if is_near_crosswalk(map, position) { SETS_OUT_AT_CROSSWALK } else { SETS_OUT };
+    let chance = chance * libm::exp2(-stood_s / WAITED_S);
+    if !several || !facing || chance < PROBABILITY_MIN {
+        forecasts.push(forecast);
+        return;
+    }
+    let mut sets_out =
+        Forecast { probability: chance, moving: true, velocity_mps: across * WALK_MPS, ..forecast.clone() };
+    walk(&mut sets_out, across * WALK_MPS, SETS_OUT_AFTER_S);
+    forecast.probability = 1.0 - chance;
+    forecasts.push(forecast);
+    forecasts.push(sets_out);
+}
+
+/// Walks at a velocity from a moment on.
+fn walk(forecast: &mut Forecast, velocity_mps: Vec2, after_s: f64) {
+    let position = forecast.positions[0];
+    for (step, slot) in forecast.positions.iter_mut().enumerate() {
+        *slot = position + velocity_mps * (step as f64 * STEP_S - after_s).max(0.0);
+    }
+}
+
+/// Whether a crosswalk begins or lies within reach: its corners are asked, and its middle.
+fn is_near_crosswalk(map: &RoadMap, position: Vec2) -> bool {
+    map.crosswalks.iter().any(|crosswalk| {
+        let corners = &crosswalk.outline;
+        corners.iter().enumerate().any(|(index, corner)| {
+            let next = &corners[(index + 1) % corners.len()];
+            let edge = next - corner;
+            let fraction = ((position - corner).dot(&edge) / edge.norm_squared().max(1e-9)).clamp(0.0, 1.0);
+            (corner + edge * fraction - position).norm() <= CROSSWALK_M
+        })
+    })
+}

@@ -1,0 +1,433 @@
+//! The intelligent driver model (Treiber, Hennecke, Helbing 2000) on the route, with true knowledge.
+//!
+//! It sees everything within 120 m, hidden or not, looking around ten times a second. Around the
+//! model stand rules of our own: it stops at red and yellow lights where it can and at stop signs, brakes for
+//! what is on its way, and gives way to what would cross its way at nearly the same time, unless it has priority
+//! and the other is not seen to take it (`giving_way`). Predictions are straight lines at constant speed.
+//!
+//! It begins a lane change of the route once no vehicle in the target lane would have to brake hard for
+//! it, nor it for them (the safety criterion of MOBIL: Kesting, Treiber, Helbing 2007); until then it
+//! stays in its lane and stops where a short change is just possible.
+
+use std::sync::Arc;
+
+use crate::driver::Ads;
+use crate::kit::{
+    BESIDE_M, Guide, HALF_WAY_M, HARDEST_MPS2, Helm, LIGHT_MPS2, RANGE_M, RouteChanges, Signs, SpeedRules,
+    Steering, held_mps2, in_lane, speed_mps2,
+};
+use crate::status::{PerceivedObject, Reason, Status};
+use avastra_base::geometry::{Beside, Pose, Vec2, unit_vector};
+use avastra_base::kinematics::{Following, WANDER_M, needed_mps2};
+use avastra_world::sim::{Control, DT_S, Scene, Sensed, SensedObject, SignalColour, VehicleParameters};
+
+use super::giving_way::goes_before;
+
+/// The model's parameters, for towns. Ours.
+const MODEL: Following =
+    Following { gap_m_min: 3.0, time_gap_s: 1.5, acceleration_mps2: 2.0, comfortable_mps2: 3.0 };
+/// Crossings are looked for this far ahead, in steps, s.
+const LOOK_AHEAD_S: f64 = 6.0;
+const LOOK_STEP_S: f64 = 0.25;
+/// Least difference of the times at which two road users pass one place, s.
+const CONFLICT_S: f64 = 1.0;
+/// Gap from the front bumper to a stop line, and to the way of a crossing road user, m.
+const LINE_GAP_M: f64 = 1.0;
+const CROSSING_GAP_M: f64 = 3.0;
+/// Greatest ratio of a guide's length to the difference of its stations: it is longer outside a bend, and
+/// where it changes lanes.
+const GUIDE_STRETCH_MAX: f64 = 1.5;
+
+/// Braking that a lane change may ask of any vehicle, magnitude, m/s².
+const SAFE_MPS2: f64 = 2.0;
+
+#[derive(Debug, Clone)]
+pub struct Idm {
+    scene: Arc<Scene>,
+    guide: Arc<Guide>,
+    changes: RouteChanges,
+    /// A glance aside, newer than what it is shown, left no gap: no lane change begins.
+    is_beset: bool,
+    steering: Arc<Steering>,
+    helm: Helm,
+    /// What it keeps away from, looked for every fifth tick.
+    ahead: Vec<Ahead>,
+    signs: Signs,
+    status: Status,
+}
+
+/// Something to keep away from, as the model sees it.
+#[derive(Debug, Clone)]
+struct Ahead {
+    /// Station of its near end when it was looked at, m.
+    near_m: f64,
+    /// Time since then, s.
+    age_s: f64,
+    speed_mps: f64,
+    reason: Reason,
+}
+
+/// Number of moments at which crossings are looked for.
+const LOOKS: usize = (LOOK_AHEAD_S / LOOK_STEP_S) as usize;
+
+/// The stretch on which the ego vehicle may be about a moment.
+#[derive(Debug, Clone, Copy)]
+struct Reach {
+    /// From now, s.
+    time_s: f64,
+    from_m: f64,
+    to_m: f64,
+}
+
+impl Reach {
+    /// The stretches of all moments, for a speed and a place of the front bumper.
+    fn of_moments(speed_mps: f64, front_m: f64) -> [Reach; LOOKS] {
+        let rear_m = front_m - VehicleParameters::MKZ.length_m;
+        core::array::from_fn(|index| {
+            let time_s = (index + 1) as f64 * LOOK_STEP_S;
+            // A slow ego vehicle may speed up meanwhile.
+            let reach_s = time_s + CONFLICT_S;
+            let way_m = (speed_mps * reach_s + reach_s * reach_s).min(SpeedRules::TOWN.cruise_mps * reach_s);
+            let from_m = rear_m + speed_mps * (time_s - CONFLICT_S).max(0.0);
+            Reach { time_s, from_m, to_m: front_m + way_m }
+        })
+    }
+}
+
+impl Ahead {
+    /// Something that stands, as seen now.
+    fn standing(near_m: f64, reason: Reason) -> Ahead {
+        Ahead { near_m, age_s: 0.0, speed_mps: 0.0, reason }
+    }
+
+    fn gap_m(&self, front_m: f64) -> f64 {
+        self.near_m + self.speed_mps * self.age_s - front_m
+    }
+}
+
+impl Idm {
+    pub fn new(scene: &Arc<Scene>) -> Idm {
+        let changes = RouteChanges::new(scene);
+        Idm {
+            scene: Arc::clone(scene),
+            guide: Arc::new(changes.guide(&SpeedRules::TOWN)),
+            changes,
+            is_beset: false,
+            steering: Steering::usual(),
+            helm: Helm::default(),
+            ahead: Vec::new(),
+            signs: Signs::default(),
+            status: Status::default(),
+        }
+    }
+
+    fn acceleration_mps2(&self, sensed: &Sensed, station_m: f64) -> (f64, Reason) {
+        let speed_mps = sensed.ego.speed_mps;
+        let front_m = VehicleParameters::MKZ.front_m(station_m);
+        let allowed_mps = self.guide.allowed_mps(station_m, speed_mps);
+        let mut wanted = (model_mps2(speed_mps, allowed_mps, None), Reason::Cruise);
+        for ahead in &self.ahead {
+            let gap = Some((ahead.gap_m(front_m), ahead.speed_mps));
+            let acceleration_mps2 = model_mps2(speed_mps, allowed_mps, gap);
+            if acceleration_mps2 < wanted.0 {
+                wanted = (acceleration_mps2, ahead.reason);
+            }
+        }
+        (wanted.0.max(-HARDEST_MPS2), wanted.1)
+    }
+
+    /// Looks around, every fifth tick.
+    fn look(&mut self, sensed: &Sensed, station_m: f64) {
+        for ahead in &mut self.ahead {
+            ahead.age_s += DT_S;
+        }
+        if !self.helm.looks() {
+            return;
+        }
+        let front_m = VehicleParameters::MKZ.front_m(station_m);
+        self.seek_gap(sensed, station_m);
+        let mut ahead = core::mem::take(&mut self.ahead);
+        ahead.clear();
+        ahead.extend(self.lights(sensed, front_m));
+        ahead.extend(self.sign(sensed, front_m));
+        let objects = sensed.objects.iter().filter(|object| object.distance_m < RANGE_M);
+        let reaches = Reach::of_moments(sensed.ego.speed_mps, front_m);
+        ahead.extend(objects.filter_map(|object| self.ahead(sensed, object, front_m, &reaches)));
+        ahead.extend(self.last_chance());
+        self.ahead = ahead;
+        self.report(sensed);
+    }
+
+    /// Begins the next lane change if it is time and there is a gap.
+    fn seek_gap(&mut self, sensed: &Sensed, station_m: f64) {
+        let Some(change) = self.changes.next() else { return };
+        let is_over = self.changes.last_end_m().is_none_or(|end_m| station_m >= end_m);
+        let has_gap = || self.has_gap(&sensed.objects, sensed.ego.speed_mps, station_m, change.lateral_m);
+        if is_over && station_m >= change.begin_m && !self.is_beset && has_gap() {
+            self.changes.begin(station_m);
+            self.guide = Arc::new(self.changes.guide(&SpeedRules::TOWN));
+        }
+    }
+
+    /// Whether gentle braking would do for every vehicle in the lane `lateral_m` to the left, and for the
+    /// ego vehicle, if the ego vehicle were in that lane now.
+    fn has_gap(&self, objects: &[SensedObject], ego_mps: f64, station_m: f64, lateral_m: f64) -> bool {
+        let front_m = VehicleParameters::MKZ.front_m(station_m);
+        let rear_m = front_m - VehicleParameters::MKZ.length_m;
+        objects.iter().all(|object| {
+            let Some((span, along_mps)) = in_lane(&self.guide, object, lateral_m, front_m) else {
+                return true;
+            };
+            let along_mps = along_mps.max(0.0);
+            let needed_mps2 = if span.from_m > front_m {
+                model_mps2(ego_mps, ego_mps.max(1.0), Some((span.from_m - front_m, along_mps)))
+            } else if span.to_m < rear_m {
+                model_mps2(along_mps, along_mps.max(1.0), Some((rear_m - span.to_m, ego_mps)))
+            } else {
+                return false;
+            };
+            needed_mps2 > -SAFE_MPS2
+        })
+    }
+
+    /// Where it must wait for a gap, as something that stands there.
+    fn last_chance(&self) -> Option<Ahead> {
+        Some(Ahead::standing(self.changes.wait_m()? + MODEL.gap_m_min, Reason::LaneChange))
+    }
+
+    /// Lights that it stops for, as things that stand a little behind their line.
+    fn lights<'a>(&'a self, sensed: &'a Sensed, front_m: f64) -> impl Iterator<Item = Ahead> + 'a {
+        let speed_mps = sensed.ego.speed_mps;
+        self.scene.route.stop_lines.iter().filter_map(move |line| {
+            let distance_m = line.station_m - front_m;
+            let stops = sensed.signals[line.signal] != SignalColour::Green
+                && (-LINE_GAP_M..RANGE_M).contains(&distance_m)
+                && needed_mps2(speed_mps, distance_m.max(0.1)) <= LIGHT_MPS2;
+            let near_m = line.station_m - LINE_GAP_M + MODEL.gap_m_min;
+            stops.then_some(Ahead::standing(near_m, Reason::RedLight))
+        })
+    }
+
+    /// The stop sign that it stops for, as something that stands a little behind its line.
+    fn sign(&mut self, sensed: &Sensed, front_m: f64) -> Option<Ahead> {
+        let stop = self.signs.next_stop(&self.scene, front_m, sensed.ego.speed_mps)?;
+        Some(Ahead::standing(stop.station_m - LINE_GAP_M + MODEL.gap_m_min, stop.reason))
+    }
+
+    /// What a road user means for the ego vehicle: a leader, something in the way, or something that crosses it.
+    fn ahead(
+        &self,
+        sensed: &Sensed,
+        object: &SensedObject,
+        front_m: f64,
+        reaches: &[Reach; LOOKS],
+    ) -> Option<Ahead> {
+        let rear_m = front_m - VehicleParameters::MKZ.length_m;
+        let forward = unit_vector(object.pose.heading_rad);
+        let taken = |beside: &Beside| beside.taken(forward, object.length_m, object.width_m, HALF_WAY_M);
+        let reach_m = HALF_WAY_M + (object.length_m + object.width_m) / 2.0;
+        let (beside, mut tracer) =
+            self.guide.trace(object.pose.position, rear_m - 10.0, front_m + RANGE_M, reach_m);
+        if let Some(span) = taken(&beside) {
+            // It is on the way now; once its middle is behind the front, the ego vehicle is past it.
+            return (span.middle_m() > front_m - BESIDE_M).then(|| Ahead {
+                near_m: span.from_m,
+                age_s: 0.0,
+                speed_mps: object.velocity_mps.dot(&beside.forward).max(0.0),
+                reason: Reason::Follow(object.id),
+            });
+        }
+        if object.velocity_mps == Vec2::zeros() {
+            return None;
+        }
+        let front = self.guide.pose_at(front_m).position;
+        for &Reach { time_s, from_m: ego_from_m, to_m: ego_to_m } in reaches {
+            let position = object.pose.position + object.velocity_mps * time_s;
+            let within_m = GUIDE_STRETCH_MAX * (ego_to_m - front_m) + reach_m;
+            if (position - front).norm_squared() > within_m * within_m {
+                continue;
+            }
+            let Some(beside) = tracer.next(position) else { continue };
+            let Some(span) = taken(&beside) else { continue };
+            let (near_m, far_m) = (span.from_m, span.to_m);
+            if near_m <= ego_to_m && far_m >= ego_from_m && near_m >= front_m {
+                if goes_before(&self.scene, sensed, object, front_m) {
+                    return None;
+                }
+                let speed_mps = object.velocity_mps.dot(&beside.forward).max(0.0);
+                let near_m = near_m - speed_mps * time_s - CROSSING_GAP_M + MODEL.gap_m_min;
+                return Some(Ahead { near_m, age_s: 0.0, speed_mps, reason: Reason::Yield(object.id) });
+            }
+        }
+        None
+    }
+
+    /// Writes the truth it drives by into the status; buffers are reused.
+    fn report(&mut self, sensed: &Sensed) {
+        let perceived = &mut self.status.perceived;
+        perceived.clear();
+        let in_sight = sensed.objects.iter().filter(|object| object.distance_m < RANGE_M);
+        perceived.extend(in_sight.map(PerceivedObject::as_it_is));
+    }
+
+    /// Drives the route, but with the acceleration (m/s²) and reason that `decide` makes of the model's.
+    pub(super) fn drive_with(
+        &mut self,
+        sensed: &Sensed,
+        decide: impl FnOnce(f64, Reason) -> (f64, Reason),
+    ) -> Control {
+        let pose = &sensed.ego.rear_axle;
+        if self.helm.is_first() {
+            self.find_place(pose);
+        }
+        let station_m = self.helm.locate(&self.guide, pose.position).station_m;
+        self.look(sensed, station_m);
+        let (model_mps2, model_reason) = self.acceleration_mps2(sensed, station_m);
+        let (wanted_mps2, reason) = decide(model_mps2, model_reason);
+        let acceleration_mps2 = held_mps2(sensed.ego.speed_mps, wanted_mps2, 0.0);
+        let steer_rad = self.steering.steer_rad(&self.guide, pose, station_m, &sensed.ego);
+        self.status.localized = Some(*pose);
+        self.status.reason = reason;
+        self.helm.command(Control::towards(acceleration_mps2, steer_rad), &sensed.ego, &mut self.status)
+    }
+
+    /// Looks aside at what is seen at this moment: unless that leaves a gap, no lane change begins in the next look.
+    pub(super) fn glance(&mut self, seen: &[SensedObject], ego_mps: f64, station_m: f64) {
+        let next = self.changes.next();
+        self.is_beset = next.is_some_and(|change| !self.has_gap(seen, ego_mps, station_m, change.lateral_m));
+    }
+
+    /// Learns from the vehicle's place which lane changes of the route are begun or over, before its first look. A driver
+    /// that does not drive from the start, but goes on where another one was, would otherwise take itself to be in the
+    /// source lane: it would steer back to it, and what stands ahead of it would stand beside its way.
+    pub(super) fn find_place(&mut self, rear_axle: &Pose) {
+        while let Some(change) = self.changes.next() {
+            let beside = self.guide.locate(rear_axle.position, None);
+            let is_aside = beside.offset_m * change.lateral_m.signum() > WANDER_M;
+            if beside.station_m < change.begin_m || !is_aside {
+                return;
+            }
+            let begun_m = change.begun_m(beside.station_m, beside.offset_m);
+            self.changes.begin(begun_m);
+            self.guide = Arc::new(self.changes.guide(&SpeedRules::TOWN));
+        }
+    }
+
+    /// Gives up a lane change that was begun in thought alone, because the vehicle is still in the source lane.
+    fn stay(&mut self, rear_axle: &Pose) {
+        let Some((last, ..)) = self.changes.begun().last() else { return };
+        let (mut changes, mut helm) = (self.changes.clone(), self.helm);
+        changes.take_back(last);
+        let guide = changes.guide(&SpeedRules::TOWN);
+        if helm.locate(&guide, rear_axle.position).offset_m.abs() <= WANDER_M {
+            (self.changes, self.guide) = (changes, Arc::new(guide));
+        }
+    }
+
+    /// The route that it drives on.
+    pub(super) fn guide(&self) -> &Guide {
+        &self.guide
+    }
+}
+
+impl Ads for Idm {
+    fn drive(&mut self, sensed: &Sensed) -> Control {
+        self.drive_with(sensed, |acceleration_mps2, reason| (acceleration_mps2, reason))
+    }
+
+    fn status(&self) -> &Status {
+        &self.status
+    }
+
+    fn take_over(&mut self, sensed: &Sensed) {
+        self.stay(&sensed.ego.rear_axle);
+    }
+}
+
+/// The model's acceleration, m/s², with the gap (m) and speed (m/s) of what is ahead.
+fn model_mps2(speed_mps: f64, allowed_mps: f64, ahead: Option<(f64, f64)>) -> f64 {
+    let free = if speed_mps <= allowed_mps {
+        MODEL.free_mps2(speed_mps, allowed_mps)
+    } else {
+        // The model scarcely brakes for a falling limit; this follows the limit as closely as it falls.
+        speed_mps2(speed_mps, allowed_mps)
+    };
+    let Some((gap_m, ahead_mps)) = ahead else { return free };
+    free.min(MODEL.acceleration_mps2) - MODEL.interaction_mps2(speed_mps, ahead_mps, gap_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Rig, object, two_lanes};
+    use avastra_lang::model::vocabulary::Body;
+    use avastra_road::RouteLaneChange;
+
+    const SOURCE_Y_M: f64 = -5.25;
+    const TARGET_Y_M: f64 = -1.75;
+
+    fn rig(open_m: f64) -> Rig {
+        let scene = two_lanes(open_m);
+        let ads = Box::new(Idm::new(&scene));
+        Rig::new(&scene, ads, 8.0)
+    }
+
+    fn place(rig: &Rig) -> Vec2 {
+        rig.sensed.ego.rear_axle.position
+    }
+
+    #[test]
+    fn on_a_free_road_it_changes_as_planned() {
+        let mut rig = rig(200.0);
+        rig.run(30.0);
+        assert!((place(&rig).y - TARGET_Y_M).abs() < 0.1, "{:?}", place(&rig));
+        assert!(rig.offset_m_max < 0.3, "{} m off the path", rig.offset_m_max);
+    }
+
+    #[test]
+    fn it_goes_on_with_a_change_that_another_driver_has_begun() {
+        let mut rig = rig(300.0);
+        rig.sensed.ego.rear_axle = Pose::new(40.0, -4.0, 0.0);
+        let mut lowest_m = f64::INFINITY;
+        for _ in 0..400 {
+            rig.tick();
+            lowest_m = lowest_m.min(place(&rig).y);
+        }
+        assert!(lowest_m > -4.05, "back towards the source lane: {lowest_m}");
+        assert!((place(&rig).y - TARGET_Y_M).abs() < 0.1, "{:?}", place(&rig));
+    }
+
+    #[test]
+    fn it_does_not_cut_in_and_waits_where_a_change_is_just_possible() {
+        let mut rig = rig(100.0);
+        // A queue stands beside all that is left of the way.
+        rig.sensed.objects = (0..14)
+            .map(|i| object(i + 1, Body::Sedan, Pose::new(f64::from(i) * 8.0, TARGET_Y_M, 0.0), 0.0))
+            .collect();
+        rig.run(30.0);
+        let waits = place(&rig);
+        assert!((waits.y - SOURCE_Y_M).abs() < 0.1, "{waits:?}");
+        let wait_m = rig.scene.route.changes[0].latest_m - RouteLaneChange::LENGTH_M_MIN;
+        assert!(waits.x <= wait_m + 0.1 && waits.x > wait_m - 4.0, "{waits:?} against {wait_m}");
+        assert_eq!(rig.ads.status().reason, Reason::LaneChange);
+        assert!(rig.gap_m_min > 1.0, "{}", rig.gap_m_min);
+        // The queue moves off; behind it there is room.
+        for object in &mut rig.sensed.objects {
+            object.velocity_mps = Vec2::new(9.0, 0.0);
+        }
+        rig.run(40.0);
+        assert!((place(&rig).y - TARGET_Y_M).abs() < 0.1 && place(&rig).x > 150.0, "{:?}", place(&rig));
+        assert!(rig.gap_m_min > 1.0, "{}", rig.gap_m_min);
+    }
+
+    #[test]
+    fn it_lets_a_faster_vehicle_pass_first() {
+        let mut rig = rig(300.0);
+        rig.sensed.objects = vec![object(1, Body::Sedan, Pose::new(-15.0, TARGET_Y_M, 0.0), 13.0)];
+        rig.run(1.0);
+        assert!((place(&rig).y - SOURCE_Y_M).abs() < 0.05, "{:?}", place(&rig));
+        rig.run(20.0);
+        assert!((place(&rig).y - TARGET_Y_M).abs() < 0.1, "{:?}", place(&rig));
+        assert!(rig.gap_m_min > 1.0, "{}", rig.gap_m_min);
+    }
+}

@@ -1,0 +1,65 @@
+//! What an editor asks about a document: pure questions, answered in plain types.
+//!
+//! A [`Workspace`] holds the texts that are open and gives an [`Analysis`] of each: the tree of `syntax::parse`, which
+//! recovers from mistakes, and what the checker knows of every name (`check::References`). Most questions are a function
+//! of an analysis and a byte; those that reach into other files take the workspace. No name is resolved here. Places
+//! are lines and UTF-16 columns, as all editors count.
+//!
+//! Nothing here reads a file, knows a protocol, or has a clock: the caller reads for it ([`Files`]), and `cli/lsp` puts
+//! questions and answers into the Language Server Protocol.
+//!
+//! ```
+//! use std::path::{Path, PathBuf};
+//!
+//! use avastra_lang::check::ReadError;
+//! use avastra_editor::{Files, Workspace, hover};
+//!
+//! /// An editor whose one document uses no other file.
+//! struct Alone;
+//!
+//! impl Files for Alone {
+//!     fn read(&self, _: &Path) -> Result<String, ReadError> {
+//!         Err(ReadError("no such file".to_owned()))
+//!     }
+//!     fn below(&self, _: &Path) -> Vec<PathBuf> {
+//!         Vec::new()
+//!     }
+//!     fn nearby(&self, _: &Path) -> Vec<(String, String)> {
+//!         Vec::new()
+//!     }
+//!     fn entries(&self, _: &Path) -> Vec<(String, bool)> {
+//!         Vec::new()
+//!     }
+//! }
+//!
+//! let path = Path::new("far.ava");
+//! let text = "language 1\nlet far = 50 m\nlet twice = far * 2\n";
+//! let mut workspace = Workspace::new(Alone);
+//! workspace.open(path.to_owned(), text.to_owned());
+//! let analysis = workspace.analysis(path).expect("it is open");
+//! let found = hover::hover(analysis, text.rfind("far").expect("it stands there")).expect("it is a name");
+//! assert!(found.text.contains("let far = 50 m"));
+//! ```
+
+pub mod complete;
+mod context;
+pub mod diagnostics;
+pub mod formatting;
+pub mod highlight;
+pub mod hints;
+pub mod hover;
+pub mod navigate;
+pub mod outline;
+mod position;
+pub mod rename;
+pub mod signature;
+pub mod structure;
+mod tokens;
+pub mod words;
+mod workspace;
+
+pub use position::{Place, Point, Range};
+pub use workspace::{Analysis, Files, Workspace};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,50 @@
+//! A recording as a table: one row for every road user at every tick.
+
+use std::fmt::Write;
+
+use avastra_lang::model::vocabulary::Word;
+use avastra_world::sim::DT_S;
+
+use super::recording::Recording;
+use super::xml::number;
+
+/// Columns: `time_s`; `id` (0 is the ego vehicle, others as claims number them); `body`; `x_m`, `y_m` of the middle of the
+/// outline, in the plane of the map; `heading_rad`; `vx_mps`, `vy_mps` in the same plane; `length_m`, `width_m`,
+/// `height_m`; `contact`: 1 at the end of the tick in which it and the ego vehicle began to touch; `like`: the body of the
+/// engine that `body` is, or that a body of the author's own is like. By rising time, then in order of appearance.
+pub fn csv(recording: &Recording) -> String {
+    let mut text =
+        "time_s,id,body,x_m,y_m,heading_rad,vx_mps,vy_mps,length_m,width_m,height_m,contact,like\n"
+            .to_owned();
+    for tick in 0..=recording.seen.end_tick {
+        let touched = |id: u32| {
+            recording.seen.touches.iter().any(|touch| touch.tick == tick && (touch.id == id || id == 0))
+        };
+        for actor in recording.actors() {
+            let Some(sample) =
+                tick.checked_sub(actor.first_tick()).and_then(|index| actor.samples.get(index as usize))
+            else {
+                continue;
+            };
+            let like = if actor.id == 0 { "ego" } else { actor.body.name() };
+            let _ = writeln!(
+                text,
+                "{},{},{},{},{},{},{},{},{},{},{},{},{}",
+                number(tick as f64 * DT_S),
+                actor.id,
+                recording.own_bodies.get(&actor.id).map_or(like, String::as_str),
+                number(sample.pose.position.x),
+                number(sample.pose.position.y),
+                number(sample.pose.heading_rad),
+                number(sample.velocity_mps.x),
+                number(sample.velocity_mps.y),
+                number(actor.shape.length_m),
+                number(actor.shape.width_m),
+                number(actor.shape.height_m),
+                u8::from(touched(actor.id)),
+                like,
+            );
+        }
+    }
+    text
+}

@@ -1,0 +1,207 @@
+//! Events, conditions and actions as OpenSCENARIO describes them.
+
+use avastra_base::geometry::Pose;
+use avastra_road::{LanePlace, RoadMap};
+
+use super::super::vertices::Vertex;
+use super::super::xml::{Element, number};
+use super::Version;
+
+pub fn maneuver_group(name: &str, actor: Option<&str>, events: Vec<Element>) -> Element {
+    let actors = Element::new("Actors")
+        .with("selectTriggeringEntities", false)
+        .holding_all(actor.map(|actor| Element::new("EntityRef").with("entityRef", actor)));
+    Element::new("ManeuverGroup")
+        .with("name", format!("{name}_group"))
+        .with("maximumExecutionCount", 1)
+        .holding(actors)
+        .holding(Element::new("Maneuver").with("name", format!("{name}_maneuver")).holding_all(events))
+}
+
+/// Events run beside each other: with `override`, a later one would end those before it. It begins when all conditions
+/// hold.
+pub fn event(name: &str, actions: Vec<Element>, conditions: Vec<Element>) -> Element {
+    let trigger = Element::new("StartTrigger").holding(all(conditions));
+    Element::new("Event")
+        .with("name", name)
+        .with("priority", "parallel")
+        .with("maximumExecutionCount", 1)
+        .holding_all(actions)
+        .holding(trigger)
+}
+
+/// An event at a time.
+pub fn event_at(version: Version, name: &str, actions: Vec<Element>, from_s: f64) -> Element {
+    event(name, actions, vec![from_time(version, &format!("{name}_time"), from_s)])
+}
+
+pub fn all(conditions: Vec<Element>) -> Element {
+    Element::new("ConditionGroup").holding_all(conditions)
+}
+
+/// A condition that holds from a time on.
+pub fn from_time(version: Version, name: &str, time_s: f64) -> Element {
+    let rule = if version == Version::Carla { "greaterThan" } else { "greaterOrEqual" };
+    let time = Element::new("SimulationTimeCondition").with("rule", rule).measured("value", time_s);
+    condition(name, Element::new("ByValueCondition").holding(time))
+}
+
+/// A condition that holds when an event is over.
+pub fn after_event(name: &str, event: &str) -> Element {
+    let state = Element::new("StoryboardElementStateCondition")
+        .with("storyboardElementType", "event")
+        .with("storyboardElementRef", event)
+        .with("state", "completeState");
+    condition(name, Element::new("ByValueCondition").holding(state))
+}
+
+/// A condition that holds when the reference points of two road users are this near, m.
+pub fn within(version: Version, name: &str, (of, to): (&str, &str), metres: f64) -> Element {
+    let (kind, rule) = match version {
+        Version::Carla => ("cartesianDistance", "lessThan"),
+        Version::V1_2 => ("euclidianDistance", "lessOrEqual"),
+    };
+    let distance = Element::new("RelativeDistanceCondition")
+        .with("entityRef", to)
+        .with("relativeDistanceType", kind)
+        .with("freespace", false)
+        .with("rule", rule)
+        .measured("value", metres);
+    of_any(name, of, distance)
+}
+
+/// A condition that holds when two road users touch.
+pub fn touched(name: &str, of: &str, by: &str) -> Element {
+    let collision =
+        Element::new("CollisionCondition").holding(Element::new("EntityRef").with("entityRef", by));
+    of_any(name, of, collision)
+}
+
+fn of_any(name: &str, entity: &str, what: Element) -> Element {
+    let entities = Element::new("TriggeringEntities")
+        .with("triggeringEntitiesRule", "any")
+        .holding(Element::new("EntityRef").with("entityRef", entity));
+    let what = Element::new("EntityCondition").holding(what);
+    condition(name, Element::new("ByEntityCondition").holding(entities).holding(what))
+}
+
+fn condition(name: &str, what: Element) -> Element {
+    Element::new("Condition").with("name", name).with("delay", 0).with("conditionEdge", "none").holding(what)
+}
+
+pub fn action(name: &str, what: Element) -> Element {
+    Element::new("Action").with("name", name).holding(what)
+}
+
+pub fn private(what: Element) -> Element {
+    Element::new("PrivateAction").holding(what)
+}
+
+pub fn of_entity(name: &str, what: Element) -> Element {
+    Element::new("GlobalAction").holding(Element::new("EntityAction").with("entityRef", name).holding(what))
+}
+
+pub fn teleport(position: Element) -> Element {
+    private(Element::new("TeleportAction").holding(position))
+}
+
+/// Along a polyline with absolute times.
+pub fn follow(name: &str, way: &[Vertex]) -> Element {
+    let timing =
+        Element::new("Timing").with("domainAbsoluteRelative", "absolute").with("scale", 1).with("offset", 0);
+    let vertex = |vertex: &Vertex| (Some(vertex.time_s), vertex.pose);
+    trajectory(name, way.iter().map(vertex), timing)
+}
+
+/// Along a polyline, as fast as other actions say. CARLA's ScenarioRunner wants times of a polyline, and none of a route.
+pub fn walk(version: Version, name: &str, way: &[Pose]) -> Element {
+    if version == Version::Carla {
+        return route(&format!("{name}_way"), way.iter().map(position));
+    }
+    trajectory(name, way.iter().map(|pose| (None, *pose)), Element::new("None"))
+}
+
+fn trajectory(name: &str, way: impl Iterator<Item = (Option<f64>, Pose)>, timing: Element) -> Element {
+    let vertex = |(time_s, pose): (Option<f64>, Pose)| {
+        let vertex = Element::new("Vertex").holding(position(&pose));
+        time_s.into_iter().fold(vertex, |vertex, time_s| vertex.measured("time", time_s))
+    };
+    let trajectory = Element::new("Trajectory")
+        .with("name", format!("{name}_way"))
+        .with("closed", false)
+        .holding(Element::new("Shape").holding(Element::new("Polyline").holding_all(way.map(vertex))));
+    let follow = Element::new("FollowTrajectoryAction")
+        .holding(Element::new("TrajectoryRef").holding(trajectory))
+        .holding(Element::new("TimeReference").holding(timing))
+        .holding(Element::new("TrajectoryFollowingMode").with("followingMode", "position"));
+    private(Element::new("RoutingAction").holding(follow))
+}
+
+pub fn position(pose: &Pose) -> Element {
+    Element::new("Position").holding(world_position(pose))
+}
+
+/// So far beneath a place, m: where nothing else is.
+pub fn beneath(pose: &Pose, metres: f64) -> Element {
+    Element::new("Position").holding(world_position(pose).measured("z", -metres))
+}
+
+fn world_position(pose: &Pose) -> Element {
+    Element::new("WorldPosition")
+        .measured("x", pose.position.x)
+        .measured("y", pose.position.y)
+        .measured("h", pose.heading_rad)
+}
+
+/// A place in a lane, along its traffic.
+pub fn lane_position(map: &RoadMap, place: LanePlace) -> Element {
+    let lane = map.lane(place.lane);
+    // The standard's offset is to the left of the road's reference line, ours to that of traffic.
+    let along = lane.road_station_m(0.0) < lane.road_station_m(lane.centre.length_m());
+    let offset_m = if along { place.offset_m } else { -place.offset_m };
+    let position = Element::new("LanePosition")
+        .with("roadId", &lane.key.road)
+        .with("laneId", lane.key.lane)
+        .with("s", number(lane.road_station_m(place.station_m)));
+    let is_aside = number(offset_m) != "0";
+    let position = if is_aside { position.measured("offset", offset_m) } else { position };
+    Element::new("Position").holding(position)
+}
+
+/// A speed at once.
+pub fn speed(speed_mps: f64) -> Element {
+    speed_within(speed_mps, 0.0)
+}
+
+/// A speed that is reached evenly within a time.
+pub fn speed_within(speed_mps: f64, time_s: f64) -> Element {
+    let dynamics = Element::new("SpeedActionDynamics")
+        .with("dynamicsShape", if time_s > 0.0 { "linear" } else { "step" })
+        .with("dynamicsDimension", "time")
+        .measured("value", time_s);
+    let target = Element::new("SpeedActionTarget")
+        .holding(Element::new("AbsoluteTargetSpeed").measured("value", speed_mps));
+    let action = Element::new("SpeedAction").holding(dynamics).holding(target);
+    private(Element::new("LongitudinalAction").holding(action))
+}
+
+/// A change to the lane that lies `lanes_left` to the left of the own one, within `metres` of way.
+pub fn change_lane(version: Version, name: &str, lanes_left: i32, metres: f64) -> Element {
+    let dynamics = Element::new("LaneChangeActionDynamics")
+        .with("dynamicsShape", if version == Version::Carla { "linear" } else { "sinusoidal" })
+        .with("dynamicsDimension", "distance")
+        .measured("value", metres);
+    let lane = Element::new("RelativeTargetLane").with("entityRef", name).with("value", lanes_left);
+    let target = Element::new("LaneChangeTarget").holding(lane);
+    let action = Element::new("LaneChangeAction").holding(dynamics).holding(target);
+    private(Element::new("LateralAction").holding(action))
+}
+
+/// A way over lanes.
+pub fn route(name: &str, places: impl Iterator<Item = Element>) -> Element {
+    let waypoint =
+        |position: Element| Element::new("Waypoint").with("routeStrategy", "shortest").holding(position);
+    let route =
+        Element::new("Route").with("name", name).with("closed", false).holding_all(places.map(waypoint));
+    private(Element::new("RoutingAction").holding(Element::new("AssignRouteAction").holding(route)))
+}

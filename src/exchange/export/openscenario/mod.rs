@@ -1,0 +1,299 @@
+//! A recording as OpenSCENARIO XML (ASAM, 1.2 and 1.3, and 1.0 for CARLA): what players of that format show again.
+//!
+//! Exactly, everyone is a `FollowTrajectoryAction` along a polyline with absolute times, so a player needs no model of
+//! driving. The last vertex is at the end of the recording, because a player may let what has no vertex left roll on.
+//! `natural` has the others as actions that a person would write. A road user that appears or leaves on the way is added
+//! and deleted. Names, in the file's order: `ego`, then `npc_N` for the road user that claims call `npc#N`.
+//!
+//! Left out: what a driving system saw or planned, heights (a player puts road users on the map's road), and lights of
+//! vehicles.
+
+mod actions;
+mod carla;
+mod entity;
+mod environment;
+mod lanes;
+mod natural;
+mod pace;
+
+use avastra_campaign::episode::Actor;
+use avastra_road::LanePlace;
+use avastra_world::sim::DT_S;
+
+use super::DATE;
+use super::recording::Recording;
+use super::vertices::{close_ticks, vertices};
+use super::xml::Element;
+
+use actions::{
+    action, all, beneath, event_at, follow, from_time, lane_position, maneuver_group, of_entity, position,
+    private, speed, teleport,
+};
+use entity::{ahead_of_centre_m, entity};
+use environment::{environment, signals};
+use natural::Natural;
+
+/// What must not be met is so far beneath its place, m.
+const BENEATH_M: f64 = 100.0;
+
+/// The standard's version.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Version {
+    V1_2,
+    /// 1.0, and of it what CARLA's ScenarioRunner reads; always natural, the ego vehicle too.
+    Carla,
+}
+
+/// What the file says of the ego vehicle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ego {
+    /// It drives as it was recorded.
+    Trajectory,
+    /// It has a controller named `ads`, which the player provides, and is told the goal.
+    Controller,
+    /// It stands at its start with its first speed; the player moves it or lets it roll.
+    None,
+}
+
+/// How the file says what others do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Others {
+    /// As recorded, tick by tick.
+    Exact,
+    /// By actions that a person would write, which come near to the recording.
+    Natural,
+}
+
+/// How a file is to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Style {
+    pub version: Version,
+    pub ego: Ego,
+    pub others: Others,
+}
+
+/// A file.
+pub struct Written {
+    pub text: String,
+    /// What it leaves out or says otherwise than its style promises.
+    pub left_out: Vec<String>,
+}
+
+/// Others that are exact in a natural version.
+fn exact(recording: &Recording, style: Style) -> Vec<&Actor> {
+    match (style.version, style.others) {
+        (Version::V1_2, Others::Natural) => natural::exact(recording),
+        // ScenarioRunner plans a route over the points of its way.
+        _ => Vec::new(),
+    }
+}
+
+/// Writes a recording. `map_file` is the path of the map from the file.
+pub fn openscenario(recording: &Recording, map_file: &str, style: Style) -> Written {
+    let signals = (style.version != Version::Carla).then(|| signals(recording)).flatten();
+    let network = Element::new("RoadNetwork")
+        .holding(Element::new("LogicFile").with("filepath", map_file))
+        .holding_all(signals);
+    let exact = exact(recording, style);
+    let entities = recording.actors().map(|actor| match style.version {
+        Version::Carla => carla::entity(recording, actor),
+        Version::V1_2 => entity(actor, style.ego),
+    });
+    let text = Element::new("OpenSCENARIO")
+        .holding(header(recording, style, &exact))
+        .holding(Element::new("CatalogLocations"))
+        .holding(network)
+        .holding(Element::new("Entities").holding_all(entities))
+        .holding(storyboard(recording, style, &exact))
+        .document();
+    let left_out = match style.version {
+        Version::Carla => carla::dropped(recording),
+        Version::V1_2 if exact.is_empty() => Vec::new(),
+        Version::V1_2 => {
+            let names = natural::names(&exact);
+            vec![format!(
+                "actions of {names}, which turn back onto the road that they come from: as recorded"
+            )]
+        }
+    };
+    Written { text, left_out }
+}
+
+fn header(recording: &Recording, style: Style, exact: &[&Actor]) -> Element {
+    let minor = match style.version {
+        Version::V1_2 => 2,
+        Version::Carla => 0,
+    };
+    let description = match recording.docs.iter().find(|line| !line.starts_with("Emitted by")) {
+        Some(line) => line,
+        None => &recording.name,
+    };
+    let header = Element::new("FileHeader")
+        .with("revMajor", 1)
+        .with("revMinor", minor)
+        .with("date", format!("{DATE}T00:00:00"))
+        .with("description", description)
+        .with("author", "avastra");
+    if style.version == Version::Carla {
+        return header;
+    }
+    let caveat = (style.others == Others::Natural).then(|| natural::caveat(exact));
+    header
+        .holding(Element::new("Properties").holding_all(recording.facts.iter().chain(&caveat).map(property)))
+}
+
+/// A fact about the file.
+fn property((name, value): &(String, String)) -> Element {
+    Element::new("Property").with("name", name).with("value", value)
+}
+
+fn storyboard(recording: &Recording, style: Style, exact: &[&Actor]) -> Element {
+    let version = style.version;
+    let mut init = Vec::new();
+    let mut groups = Vec::new();
+    for actor in recording.actors() {
+        let (begins, events) = match (version, style.others) {
+            (Version::Carla, _) if actor.id == 0 && style.ego != Ego::Trajectory => {
+                (carla::begins(recording, style.ego), Vec::new())
+            }
+            (Version::Carla, _) => natural(recording, actor, version),
+            (_, Others::Natural) if actor.id > 0 && exact.iter().all(|other| other.id != actor.id) => {
+                natural(recording, actor, version)
+            }
+            _ => (begins(recording, actor, style.ego), events(recording, actor, style)),
+        };
+        init.extend(begins);
+        if !events.is_empty() {
+            let name = actor.name();
+            groups.push(maneuver_group(&name, Some(&name), events));
+        }
+    }
+    if version != Version::Carla {
+        groups.extend(weather_group(recording, version));
+    }
+    let story = (!groups.is_empty()).then(|| {
+        let act = Element::new("Act")
+            .with("name", "recording")
+            .holding_all(groups)
+            .holding(Element::new("StartTrigger").holding(all(vec![from_time(version, "start", 0.0)])));
+        Element::new("Story").with("name", "recording").holding(act)
+    });
+    let sky = recording.seen.skies.first().map(|sky| match version {
+        Version::Carla => carla::environment(sky),
+        Version::V1_2 => environment(sky, 0),
+    });
+    let end = all(vec![from_time(version, "end", recording.duration_s())]);
+    Element::new("Storyboard")
+        .holding(Element::new("Init").holding(Element::new("Actions").holding_all(sky).holding_all(init)))
+        .holding_all(story)
+        .holding(Element::new("StopTrigger").holding(end))
+}
+
+/// What a road user does at the start and later, in actions.
+fn natural(recording: &Recording, actor: &Actor, version: Version) -> (Option<Element>, Vec<Element>) {
+    let natural = Natural::of(recording, actor, version);
+    (natural.init(actor), natural.events(actor))
+}
+
+/// Where a road user is at the start, if it is there.
+fn begins(recording: &Recording, actor: &Actor, ego: Ego) -> Option<Element> {
+    if actor.first_tick() > 0 {
+        return None;
+    }
+    let first = actor.samples[0];
+    let place = first.pose.offset(ahead_of_centre_m(actor), 0.0);
+    let private = Element::new("Private")
+        .with("entityRef", actor.name())
+        .holding(teleport(position(&place)))
+        .holding(speed(first.velocity_mps.norm()));
+    let is_driven = actor.id == 0 && ego == Ego::Controller;
+    Some(if is_driven { private.holding(activation()).holding(destination(recording)) } else { private })
+}
+
+/// What a road user does as it was recorded; nothing if the player moves it.
+fn events(recording: &Recording, actor: &Actor, style: Style) -> Vec<Element> {
+    if actor.id == 0 && style.ego != Ego::Trajectory {
+        return Vec::new();
+    }
+    let name = actor.name();
+    let way = vertices(actor, ahead_of_centre_m(actor), &close_ticks(&recording.seen, actor));
+    let first_s = actor.first_tick() as f64 * DT_S;
+    let mut actions = Vec::new();
+    if actor.first_tick() > 0 {
+        let added = Element::new("AddEntityAction").holding(position(&way[0].pose));
+        actions.push(action(&format!("{name}_appears"), of_entity(&name, added)));
+    }
+    // A single vertex is no way: the road user appears in the last tick.
+    if way.len() > 1 {
+        actions.push(action(&format!("{name}_follows"), follow(&name, &way)));
+    }
+    let mut events = Vec::new();
+    if !actions.is_empty() {
+        events.push(event_at(style.version, &format!("{name}_moves"), actions, first_s));
+    }
+    events.extend(leaves(recording.seen.end_tick, actor, style.version));
+    events
+}
+
+/// A road user that leaves sinks out of sight in the tick after its last, and is deleted in the next: esmini prints an error
+/// where one that touches another is gone at once.
+fn leaves(end_tick: u64, actor: &Actor, version: Version) -> Vec<Element> {
+    let name = actor.name();
+    let last = actor.samples[actor.samples.len() - 1];
+    if last.tick >= end_tick {
+        return Vec::new();
+    }
+    let away = teleport(beneath(&last.pose, BENEATH_M));
+    let deleted = of_entity(&name, Element::new("DeleteEntityAction"));
+    let parts = [("leaves", "sinks", away), ("is_gone", "deleted", deleted)];
+    let event = |(ticks, (event, does, what)): (u64, (&str, &str, Element))| {
+        let from_s = (last.tick + ticks) as f64 * DT_S;
+        event_at(version, &format!("{name}_{event}"), vec![action(&format!("{name}_{does}"), what)], from_s)
+    };
+    (1..).zip(parts).map(event).collect()
+}
+
+/// Changes of weather and time of day after the start.
+fn weather_group(recording: &Recording, version: Version) -> Option<Element> {
+    let change = |(number, sky)| {
+        let action = action(&format!("sky_{number}"), environment(sky, number));
+        event_at(version, &format!("sky_{number}_begins"), vec![action], sky.time_s)
+    };
+    let events: Vec<Element> = recording.seen.skies.iter().enumerate().skip(1).map(change).collect();
+    (!events.is_empty()).then(|| maneuver_group("sky", None, events))
+}
+
+fn activation() -> Element {
+    let activate = Element::new("ActivateControllerAction").with("lateral", true).with("longitudinal", true);
+    private(Element::new("ControllerAction").holding(activate))
+}
+
+/// Where the ego vehicle is to go.
+fn destination(recording: &Recording) -> Element {
+    let position = lane_position(&recording.map, LanePlace { offset_m: 0.0, ..recording.goal });
+    private(Element::new("RoutingAction").holding(Element::new("AcquirePositionAction").holding(position)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use avastra_base::geometry::{Pose, Vec2};
+    use avastra_campaign::episode::Sample;
+
+    #[test]
+    fn a_road_user_sinks_a_tick_before_it_is_deleted_unless_it_stays() {
+        let mut actor = Actor::ego();
+        actor.id = 4;
+        let pose = Pose::new(3.0, 2.0, 1.0);
+        actor.samples.extend((10..=20).map(|tick| Sample { tick, pose, velocity_mps: Vec2::zeros() }));
+        assert!(leaves(20, &actor, Version::V1_2).is_empty(), "it is there to the end");
+        let [sinks, gone] = &leaves(50, &actor, Version::V1_2)[..] else { panic!("two events") };
+        let (sinks, gone) = (sinks.clone().document(), gone.clone().document());
+        for part in ["npc_4_leaves", "TeleportAction", "z=\"-100\"", "value=\"0.42\""] {
+            assert!(sinks.contains(part), "{part}: {sinks}");
+        }
+        for part in ["npc_4_is_gone", "DeleteEntityAction", "value=\"0.44\""] {
+            assert!(gone.contains(part), "{part}: {gone}");
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! What the replay of an emitted scenario looked like, and what its file says of it.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use avastra_campaign::episode::{Actor, EpisodeLog, Outcome, Recorder};
+use avastra_campaign::oracle::ClaimResult;
+use avastra_campaign::run::{RunError, Stage};
+use avastra_drivers::Selected;
+use avastra_lang::model::vocabulary::Word;
+use avastra_lang::model::{Claim, Scenario, Space};
+use avastra_road::{LaneIndex, LanePlace, RoadMap};
+use avastra_world::action::ActionTable;
+use avastra_world::sim::DT_S;
+
+use super::standalone::{Standalone, standalone};
+
+/// Names of the facts that hold the scenario as text of the language, and what that text lacks.
+pub const SCENARIO_TEXT: &str = "scenario_text";
+pub const SCENARIO_TEXT_LACKS: &str = "scenario_text_lacks";
+
+/// A replay as [`Recorder`] saw it, with its road and the facts of its file.
+#[derive(Debug, Clone)]
+pub struct Recording {
+    pub name: String,
+    /// What the scenario's file says of it, line by line.
+    pub docs: Vec<String>,
+    pub map: Arc<RoadMap>,
+    /// The OpenDRIVE file.
+    pub map_path: PathBuf,
+    /// Where the ego vehicle is to go.
+    pub goal: LanePlace,
+    /// The lanes of its route, in order.
+    pub route: Vec<LaneIndex>,
+    pub seen: Recorder,
+    /// Names of the author's own bodies, by number of the road user.
+    pub own_bodies: BTreeMap<u32, String>,
+    /// Where the scenario comes from, what it claims, and the scenario as text of the language: name and value.
+    pub facts: Vec<(String, String)>,
+}
+
+/// Why a scenario has no recording.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// The replay is not what the scenario says.
+    #[error("it does not replay: claimed {}, found {}", claims[0].claim, claims[0].found)]
+    Refuted { claims: Vec<ClaimResult> },
+}
+
+impl Recording {
+    pub fn duration_s(&self) -> f64 {
+        self.seen.end_tick as f64 * DT_S
+    }
+
+    /// The ego vehicle and the others.
+    pub fn actors(&self) -> impl Iterator<Item = &Actor> {
+        core::iter::once(&self.seen.ego).chain(&self.seen.others)
+    }
+}
+
+/// Plays a scenario again and writes down what happens. What it claims about the drive itself (collisions, end, digest of
+/// all ticks) must hold; verdicts about collisions are handed on as they are written.
+///
+/// # Errors
+/// If it cannot be played, or plays otherwise than it claims.
+pub fn record(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Result<Recording, ExportError> {
+    let stage = Stage::new(table, scenario)?;
+    let mut seen = Recorder::default();
+    let log = stage.play(ads, &mut |world, ads, contacts| seen.note(world, ads, contacts));
+    let driven = |claim: &Claim| {
+        matches!(claim, Claim::Collision { .. } | Claim::Trace(_) | Claim::Proc(_) | Claim::End(_))
+    };
+    let claims = stage.refuted(ads, &log, &[], driven);
+    if !claims.is_empty() {
+        return Err(ExportError::Refuted { claims });
+    }
+    let road = &table.space().roads[scenario.road];
+    let mut facts = facts(scenario, &road.name);
+    if let Some(Standalone { text, lacks }) = standalone(table.space(), scenario, &log) {
+        facts.push((SCENARIO_TEXT.to_owned(), text));
+        facts.extend((!lacks.is_empty()).then(|| (SCENARIO_TEXT_LACKS.to_owned(), lacks.join("; "))));
+    }
+    Ok(Recording {
+        name: scenario.name.clone(),
+        docs: scenario.docs.clone(),
+        map: road.map.clone(),
+        map_path: road.map_path.clone(),
+        goal: road.goal,
+        route: road.route.lanes.iter().map(|part| part.lane).collect(),
+        seen,
+        own_bodies: own_bodies(table.space(), &log),
+        facts,
+    })
+}
+
+fn own_bodies(space: &Space, log: &EpisodeLog) -> BTreeMap<u32, String> {
+    let mut found = BTreeMap::new();
+    for step in &log.steps {
+        let Outcome::Done { draw, spawned, .. } = &step.outcome else { continue };
+        let mut ids = spawned.as_slice();
+        for effect in &draw.effects {
+            let (of_effect, rest) = ids.split_at((effect.newcomers() as usize).min(ids.len()));
+            if let Some(first) = of_effect.first() {
+                let named = effect.own_bodies(*first).map(|(id, own)| (id, space.bodies[own].name.clone()));
+                found.extend(named);
+            }
+            ids = rest;
+        }
+    }
+    found
+}
+
+/// Where a scenario comes from and what it claims.
+fn facts(scenario: &Scenario, road: &str) -> Vec<(String, String)> {
+    let origin = &scenario.origin;
+    let seed = origin.seed.map(|seed| seed.to_string());
+    let known = [
+        ("road", Some(road)),
+        ("seed", seed.as_deref()),
+        ("policy", origin.policy.as_deref()),
+        ("ads", origin.ads.as_deref()),
+        ("profile", origin.profile.as_deref()),
+        ("profile_digest", origin.profile_digest.as_deref()),
+        ("engine", origin.engine.as_deref()),
+        ("traffic_digest", origin.traffic_digest.as_deref()),
+    ];
+    let scenario_name = [("scenario".to_owned(), scenario.name.clone())];
+    let known = known.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?.to_owned())));
+    scenario_name.into_iter().chain(known).chain(scenario.claims.iter().filter_map(fact)).collect()
+}
+
+/// A claim as a name and a value. The collision probabilities of the steps are left out: they mean nothing elsewhere.
+fn fact(claim: &Claim) -> Option<(String, String)> {
+    let of = |what: &str, obstacle: &Option<avastra_lang::model::scenario::Obstacle>| match obstacle {
+        Some(obstacle) => format!("{what} npc_{}", obstacle.number),
+        None => what.to_owned(),
+    };
+    Some(match claim {
+        Claim::Collision { obstacle, time } => {
+            let time = time.map_or_else(|| "at any time".to_owned(), |time| time.to_string());
+            (of("collision", obstacle), time)
+        }
+        Claim::Verdict { name, obstacle } => (of("verdict", obstacle), name.clone()),
+        Claim::Avoidability { class, by, obstacle } => {
+            let by = by.as_ref().map_or_else(String::new, |by| format!(" by {}", by.join(", ")));
+            (of("avoidability", obstacle), format!("{}{by}", class.name()))
+        }
+        Claim::Cause { modules, obstacle } => (of("cause", obstacle), modules.join(", ")),
+        Claim::Priority { priority, obstacle } => (of("priority", obstacle), priority.name().to_owned()),
+        Claim::Minimal { obstacle } => (of("minimal", obstacle), "true".to_owned()),
+        Claim::End(end) => ("end".to_owned(), end.clone()),
+        Claim::Trace(digest) => ("trace".to_owned(), digest.clone()),
+        Claim::Proc(_) => return None,
+    })
+}

@@ -1,0 +1,114 @@
+//! What a page says of a whole run, training, study or estimate, beside its scenarios.
+
+use serde_json::{Value, json};
+
+use avastra_campaign::run::{Database, DatabaseError, Profile, TrafficRecord};
+use avastra_drivers::external::Attached;
+use avastra_world::action::ActionTable;
+
+/// What a run or a training found: totals, groups of like failures, rows on roads, refusals, the curve of learning, and what was
+/// learned. `settings` is the text of its `run.yaml`, `results` what a finished training wrote.
+///
+/// # Errors
+/// If the database cannot be read.
+pub fn of_run(
+    database: &Database,
+    table: Option<&ActionTable>,
+    settings: &str,
+    results: Option<&Value>,
+) -> Result<Value, DatabaseError> {
+    let rows = table.map(|table| table.rows().iter().map(|row| row.label.as_str()).collect::<Vec<_>>());
+    let learning = database.learning()?;
+    let totals = database.totals()?;
+    // A training simulates branches too, and returns to moments without playing up to them again.
+    let simulated_s = if learning.is_empty() { totals.simulated_s } else { database.trained_s()? };
+    Ok(json!({
+        "kind": if learning.is_empty() { "run" } else { "training" },
+        "settings": settings, "conditions": conditions(settings), "totals": totals, "simulated_h": simulated_s / 3600.0,
+        "groups": database.groups()?, "refusals": database.refusals()?, "failures": database.failures()?,
+        "rows": rows, "coverage": database.coverage()?, "learning": learning,
+        "evaluation": results.map(|results| &results["evaluation"]),
+    }))
+}
+
+/// A study's results, as its `results.json` has them.
+pub fn of_study(results: &Value, settings: &str) -> Value {
+    json!({ "kind": "study", "settings": settings, "conditions": conditions(settings), "study": results })
+}
+
+/// An estimate's results, as its `results.json` has them.
+pub fn of_estimate(results: &Value, settings: &str) -> Value {
+    json!({ "kind": "estimate", "settings": settings, "conditions": conditions(settings), "estimate": results })
+}
+
+/// The traffic profile of runs that ask for none.
+const CAREFUL: &str = "careful";
+
+/// What was played against what, by the settings of a run, a training, a study or an estimate: name and text of each.
+/// Nothing if they are of a version that wrote them otherwise.
+fn conditions(settings: &str) -> Vec<(&'static str, String)> {
+    #[derive(serde::Deserialize)]
+    struct Conditions {
+        space: String,
+        roads: Vec<String>,
+        ads: String,
+        profile: Option<Profile>,
+        external: Option<Attached>,
+        traffic: Option<TrafficRecord>,
+        #[serde(default)]
+        ambient: u32,
+        agent: Option<String>,
+        seed: Option<u64>,
+        /// A study has this in place of `seed`.
+        first_seed: Option<u64>,
+    }
+    let Ok(of) = serde_yaml::from_str::<Conditions>(settings) else { return Vec::new() };
+    let program = of.external.as_ref().map(Attached::name);
+    let driver = match &of.profile {
+        None => program.unwrap_or(of.ads),
+        Some(profile) => match profile.settings.to_line() {
+            line if line.is_empty() => format!("{}, default profile", of.ads),
+            line => format!("{} {line}", of.ads),
+        },
+    };
+    // A profile of the author's own is told by what it changes.
+    let manners = of.traffic.map(|TrafficRecord { settings, .. }| {
+        settings.shipped_as().map_or_else(|| settings.to_line(), str::to_owned)
+    });
+    let traffic = match (of.ambient, manners) {
+        (0, manners) => manners.unwrap_or_else(|| CAREFUL.to_owned()),
+        (ambient, manners) => {
+            format!("{}, {ambient} ambient", manners.unwrap_or_else(|| CAREFUL.to_owned()))
+        }
+    };
+    let known = [
+        ("Space", Some(of.space)),
+        ("Driving system", Some(driver)),
+        ("Traffic", Some(traffic)),
+        ("Agent", of.agent),
+        ("Roads", Some(of.roads.join(", "))),
+        ("Seed", of.seed.or(of.first_seed).map(|seed| seed.to_string())),
+    ];
+    known.into_iter().filter_map(|(name, text)| Some((name, text?))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn conditions_are_told_as_far_as_the_settings_have_them() {
+        let settings = "space: ../s.ava\nroads: [corner, boulevard]\nads: modular\nagent: random\nseed: 7\nambient: 5\nmore: 1";
+        let told = conditions(settings);
+        let text =
+            |wanted: &str| told.iter().find(|(name, _)| *name == wanted).map(|(_, text)| text.as_str());
+        assert_eq!(text("Space"), Some("../s.ava"));
+        assert_eq!(text("Driving system"), Some("modular"));
+        assert_eq!(text("Roads"), Some("corner, boulevard"));
+        assert_eq!(text("Seed"), Some("7"));
+        assert_eq!(text("Traffic"), Some("careful, 5 ambient"));
+        let calm = conditions("space: s.ava\nroads: [corner]\nads: modular");
+        assert!(calm.contains(&("Traffic", "careful".to_owned())), "{calm:?}");
+        assert!(conditions("seed: 7").is_empty());
+    }
+}

@@ -1,0 +1,680 @@
+//! Actions and groups: parameters with their domains, effects with the engine's words.
+
+use std::collections::BTreeSet;
+
+use crate::check::checker::{Checker, docs, each, literal};
+use crate::check::declaration::unknown_word;
+use crate::check::expression::{Place, is_number};
+use crate::check::references::Symbol;
+use crate::check::report::{Report, field};
+use crate::check::rule::locals;
+use crate::model::expr::{Expr, ExprKind};
+use crate::model::rules::rules_by_action;
+use crate::model::vocabulary::{Colour, LaneChoice, Side, Site, SpaceClaim, SpawnField, Then, Verb, Word};
+use crate::model::{
+    ActionDef, BodyWord, Domain, EffectDef, GroupDef, Parameter, RuleDef, SetDef, SpawnDef, Type, Value,
+    WordExpr, code,
+};
+use crate::prove::product_size;
+use crate::syntax::ast::{ItemKind, ParamMode, Span};
+use crate::syntax::{Diagnostic, ast, listed, nearest};
+use avastra_base::units::{Dimension, Rational};
+
+/// Largest number of rows in a table.
+pub(crate) const ROWS_MAX: u64 = 100_000;
+
+/// Limit on the number of proofs, which is rows times the rules that bind them times roads. It leaves room for four rules
+/// on every row of the longest table on four roads; how many steps they take is counted while they are made.
+const PROOFS_MAX: u64 = 2_000_000;
+
+/// Largest number of values in an `Int` range.
+const VALUES_MAX: i64 = 100_000;
+
+/// Largest number of values that the parameters of all actions list together. A value counts once for each of its odds.
+const LISTED_MAX: usize = 2_000_000;
+
+/// Largest number of parameters of an action or a function.
+pub(super) const PARAMETERS_MAX: usize = 100;
+
+/// Largest number of road users that one action spawns.
+const SPAWNS_MAX: usize = 100;
+
+/// Largest number of rules that bind one action. Some proofs hold each of them against each other.
+const RULES_MAX: usize = 1_000;
+
+/// Largest number of actions that all groups name together.
+const MEMBERS_MAX: usize = 1_000_000;
+
+/// Largest number of operations in conditions and effects that are written for many actions, counted once for each action.
+const COMPILED_MAX: usize = 500_000;
+
+impl Checker {
+    pub(super) fn declare_actions(&mut self, items: &[&ast::Item]) {
+        let (names, actions) = self.declared("action", items, ItemKind::as_action);
+        self.action_names = names;
+        for (item, declared) in actions {
+            let (action, is_whole) = self.action(item, declared).unzip();
+            if is_whole == Some(false) {
+                self.half_broken.insert(self.actions.len());
+            }
+            let names = action.iter().flat_map(|action: &ActionDef| &action.parameters);
+            self.parameter_names.extend(names.map(|parameter| parameter.name.to_string()));
+            self.actions.push(action);
+        }
+    }
+
+    /// Whether an action or a function has few enough parameters; reports it if not.
+    pub(super) fn has_few_parameters(&mut self, name: &ast::Name, count: usize) -> bool {
+        if count > PARAMETERS_MAX {
+            let message = format!("`{}` has {count} parameters", name.text);
+            let error = Diagnostic::error(code::TOO_MUCH, message)
+                .at(name.span, format!("at most {PARAMETERS_MAX} are possible"));
+            self.report(error.help("make several of it, each with fewer parameters"));
+        }
+        count <= PARAMETERS_MAX
+    }
+
+    /// The action, and whether all its effects are sound. The sound ones are kept in any case, so that rules on
+    /// this action are checked too.
+    pub(super) fn action(&mut self, item: &ast::Item, declared: &ast::Action) -> Option<(ActionDef, bool)> {
+        if !self.has_few_parameters(&declared.name, declared.params.len()) {
+            return None;
+        }
+        let spawns =
+            declared.effects.iter().filter(|effect| matches!(effect.kind, ast::EffectKind::Spawn { .. }));
+        let spawns = spawns.count();
+        if spawns > SPAWNS_MAX {
+            let error = Diagnostic::error(
+                code::TOO_MUCH,
+                format!("`{}` spawns {spawns} road users", declared.name.text),
+            )
+            .at(declared.name.span, format!("at most {SPAWNS_MAX} are possible"));
+            return self.reject(error.help("make several actions of it"));
+        }
+        let owner = Symbol::Action(declared.name.text.clone());
+        let mut locals: Vec<(String, Type)> = Vec::new();
+        let mut parameters = Vec::new();
+        let mut sound = true;
+        self.once("parameter", declared.params.iter().map(|parameter| &parameter.name));
+        for parameter in &declared.params {
+            let Some(ty) = self.plain_type(&parameter.ty) else {
+                // Its name is kept, so that uses of it are not reported as unknown.
+                locals.push((parameter.name.text.clone(), Type::Bool));
+                sound = false;
+                let place = Place { locals: &locals, owner: Some(&owner), ..Place::default() };
+                let values = parameter.within.iter().chain(&parameter.condition);
+                values.for_each(|expr| self.look_at(expr, &place, None));
+                continue;
+            };
+            if let Some(symbol) = owner.parameter(&parameter.name.text) {
+                self.references.typed(&symbol, ty, None);
+            }
+            // A mistake in its values is reported already; the type is enough to check the rest of the action.
+            parameters.push(self.parameter(parameter, ty, &locals, &owner).unwrap_or_else(|| Parameter {
+                name: parameter.name.text.as_str().into(),
+                ty,
+                axis: parameter.mode == ParamMode::Each,
+                domain: Domain::Values(Vec::new()),
+                condition: None,
+                span: parameter.span,
+            }));
+            locals.push((parameter.name.text.clone(), ty));
+        }
+        let place = Place { locals: &locals, owner: Some(&owner), states: true, ..Place::default() };
+        if !sound {
+            let look = |checker: &mut Checker| {
+                declared.effects.iter().for_each(|effect| drop(checker.effect(effect, &place)));
+            };
+            self.quietly(look);
+            return None;
+        }
+        if declared.effects.is_empty() {
+            let message = format!("`{}` has no effect", declared.name.text);
+            let error = Diagnostic::error(code::NO_EFFECT, message).at(declared.name.span, "does nothing");
+            self.report(error.help("give it a `set` or a `spawn`, or remove it"));
+        }
+        let effects: Vec<Option<EffectDef>> =
+            declared.effects.iter().map(|effect| self.effect(effect, &place)).collect();
+        let is_whole = effects.iter().all(Option::is_some);
+        let action = ActionDef {
+            name: declared.name.text.clone(),
+            docs: docs(item),
+            parameters,
+            effects: effects.into_iter().flatten().collect(),
+            // Until `odds actions` says otherwise.
+            odds: 1,
+            span: declared.name.span,
+        };
+        Some((action, is_whole))
+    }
+
+    fn parameter(
+        &mut self,
+        declared: &ast::ActionParam,
+        ty: Type,
+        before: &[(String, Type)],
+        owner: &Symbol,
+    ) -> Option<Parameter> {
+        let mut locals = before.to_vec();
+        locals.push((declared.name.text.clone(), ty));
+        let axis = declared.mode == ParamMode::Each;
+        // The rows are the same at every moment; what is drawn may depend on it.
+        let site = if axis { Site::Axis } else { Site::Where };
+        let place = Place { locals: &locals, owner: Some(owner), states: !axis, site };
+        let Some(domain) = self.values(declared, ty) else {
+            declared.condition.iter().for_each(|condition| self.look_at(condition, &place, Some(Type::Bool)));
+            return None;
+        };
+        let condition = match &declared.condition {
+            None => None,
+            Some(condition) => Some(self.typed(condition, &place, Type::Bool)?),
+        };
+        let name = declared.name.text.as_str().into();
+        Some(Parameter { name, ty, axis, domain, condition, span: declared.span })
+    }
+
+    /// The values of a parameter before its `where`.
+    fn values(&mut self, declared: &ast::ActionParam, ty: Type) -> Option<Domain> {
+        let axis = declared.mode == ParamMode::Each;
+        let domain = match &declared.within {
+            Some(within) => self.domain(within, ty)?,
+            None => match ty {
+                Type::Bool => Domain::Values(vec![Value::Bool(false), Value::Bool(true)]),
+                Type::Enum(of) => {
+                    let count = self.enums[of.0].variants.len();
+                    Domain::Values((0..count).map(|variant| Value::Variant(of, variant)).collect())
+                }
+                Type::Int | Type::Quantity(_) => {
+                    let name = self.references.type_name(ty);
+                    let message = format!("`{}` has no end of values", declared.name.text);
+                    let error = Diagnostic::error(code::INFINITE, message)
+                        .at(declared.ty.span, format!("any `{name}`"));
+                    return self.reject(error.help("say from where to where: `in low .. high`"));
+                }
+            },
+        };
+        let domain = match domain {
+            Domain::Values(values) if !axis => Domain::Values(self.by_odds(values, declared)?),
+            domain => domain,
+        };
+        if let Domain::Values(values) = &domain {
+            self.listed += values.len();
+            if self.listed > LISTED_MAX {
+                let message = format!("the parameters list more than {LISTED_MAX} values together");
+                let error =
+                    Diagnostic::error(code::TOO_MUCH, message).at(declared.span, "here the limit is passed");
+                let help = "list fewer values, give them smaller odds, or draw a quantity from a range";
+                return self.reject(error.help(help));
+            }
+        }
+        if axis && matches!(domain, Domain::Range(..)) {
+            let name = self.references.type_name(ty);
+            let message = format!("`each` over `{}` has no end of rows", declared.name.text);
+            let error = Diagnostic::error(code::INFINITE, message)
+                .at(declared.ty.span, format!("a range of `{name}`"));
+            return self.reject(error.help("list the values, `in [1 m, 2 m]`, or draw one with `any`"));
+        }
+        Some(domain)
+    }
+
+    /// The values to draw from, each repeated as often as its odds say.
+    fn by_odds(&mut self, values: Vec<Value>, declared: &ast::ActionParam) -> Option<Vec<Value>> {
+        let odds = |value: &Value| match value {
+            Value::Variant(of, variant) => self.enums[of.0].odds[*variant] as usize,
+            Value::Bool(_) | Value::Number(_) => 1,
+        };
+        let drawn: Vec<Value> =
+            values.iter().flat_map(|value| core::iter::repeat_n(*value, odds(value))).collect();
+        if drawn.is_empty() && !values.is_empty() {
+            let message = format!("nothing is left to draw for `{}`", declared.name.text);
+            let error =
+                Diagnostic::error(code::EMPTY, message).at(declared.span, "the odds of all its values are 0");
+            return self.reject(error.help("give at least one of them odds above 0"));
+        }
+        Some(drawn)
+    }
+
+    fn domain(&mut self, within: &ast::Expr, ty: Type) -> Option<Domain> {
+        let place = Place::default();
+        match &within.kind {
+            ast::ExprKind::Range { low, high } => {
+                if !is_number(ty) {
+                    self.look_at(within, &place, Some(ty));
+                    let name = self.references.type_name(ty);
+                    let error = Diagnostic::error(code::TYPE_MISMATCH, format!("`{name}` has no ranges"));
+                    return self.reject(error.at(within.span, "a range of numbers"));
+                }
+                let (low, high) = (self.typed(low, &place, ty), self.typed(high, &place, ty));
+                let (low, high) = (low?, high?);
+                let (low, high) = (self.fold_number(&low), self.fold_number(&high));
+                let (low, high) = (low?, high?);
+                if low > high {
+                    let error = Diagnostic::error(code::EMPTY, "the range is empty")
+                        .at(within.span, "its low end lies above its high end");
+                    return self.reject(error.help("write the low end first"));
+                }
+                if ty == Type::Int {
+                    self.whole_values(low, high, within.span)
+                } else {
+                    Some(Domain::Range(low, high))
+                }
+            }
+            ast::ExprKind::List(items) => {
+                let values: Vec<Option<Value>> = items
+                    .iter()
+                    .map(|item| {
+                        let item = self.typed(item, &place, ty)?;
+                        literal(&self.fold(&item)?)
+                    })
+                    .collect();
+                let values: Vec<Value> = values.into_iter().collect::<Option<_>>()?;
+                if values.is_empty() {
+                    return self.reject(
+                        Diagnostic::error(code::EMPTY, "the list is empty")
+                            .at(within.span, "no value is left"),
+                    );
+                }
+                Some(Domain::Values(values))
+            }
+            _ => {
+                self.look_at(within, &place, Some(ty));
+                let error = Diagnostic::error(code::TYPE_MISMATCH, "`in` needs a range or a list here");
+                self.reject(error.at(within.span, "neither"))
+            }
+        }
+    }
+
+    fn whole_values(&mut self, low: Rational, high: Rational, span: Span) -> Option<Domain> {
+        match (low.to_i64(), high.to_i64()) {
+            (Some(low), Some(high)) if high.checked_sub(low).is_some_and(|count| count < VALUES_MAX) => {
+                Some(Domain::Values((low..=high).map(|value| Value::Number(value as f64)).collect()))
+            }
+            _ => {
+                let message = format!("the range holds more than {VALUES_MAX} numbers");
+                self.reject(Diagnostic::error(code::TOO_MANY_ROWS, message).at(span, "too many"))
+            }
+        }
+    }
+
+    fn effect(&mut self, effect: &ast::Effect, place: &Place<'_>) -> Option<EffectDef> {
+        match &effect.kind {
+            ast::EffectKind::Set { state, key, value } => {
+                let Some(index) = self.state_named(state) else {
+                    key.iter().chain([value]).for_each(|expr| self.look_at(expr, place, None));
+                    return None;
+                };
+                let (key_of, ty) = (self.states[index].key, self.states[index].ty);
+                let key = match (key, key_of) {
+                    (None, _) => Some(None),
+                    (Some(key), Some(of)) => self.typed(key, place, Type::Enum(of)).map(Some),
+                    (Some(key), None) => {
+                        self.look_at(key, place, None);
+                        let message = format!("`{}` is not a map", state.text);
+                        let error = Diagnostic::error(code::TYPE_MISMATCH, message);
+                        self.reject(error.at(key.span, "takes no key"))
+                    }
+                };
+                let Some(key) = key else {
+                    self.look_at(value, place, Some(ty));
+                    return None;
+                };
+                let value = self.typed(value, place, ty)?;
+                Some(EffectDef::Set(Box::new(SetDef { state: index, key, value, span: effect.span })))
+            }
+            ast::EffectKind::Spawn { body, place: side, distance, cover, fields } => {
+                let behind = *side == ast::Place::Behind;
+                let cover = cover.as_ref().map(|cover| self.body_word(cover, place));
+                let spawn = self.spawn(body, behind, distance, fields, place, effect.span)?;
+                let cover = match cover {
+                    Some(cover) => Some(cover?),
+                    None => None,
+                };
+                self.check_cover(cover.as_ref(), &spawn.verb, effect.span);
+                Some(EffectDef::Spawn(Box::new(SpawnDef { cover, ..spawn })))
+            }
+        }
+    }
+
+    fn spawn(
+        &mut self,
+        body: &ast::Expr,
+        behind: bool,
+        distance: &ast::Expr,
+        fields: &[ast::Field],
+        place: &Place<'_>,
+        span: Span,
+    ) -> Option<SpawnDef> {
+        self.note_fields::<SpawnField>(fields, place);
+        let fields = self.fields_known(fields);
+        let find = |wanted: SpawnField| field(&fields, wanted);
+        let lacks = |what: &str| format!("the spawn does not say {what}");
+        let body_word = self.body_word(body, place);
+        let distance = self.typed(distance, place, Type::Quantity(Dimension::LENGTH));
+        let verb = match find(SpawnField::Does) {
+            Some(value) => self.word::<Verb>("verb", value, place),
+            None => self.missing_field(SpawnField::Does, span, lacks("what it does")),
+        };
+        let verb_words: Vec<Verb> = verb.as_ref().map(possible).unwrap_or_default();
+        let needs = |verbs: &[Verb]| verb_words.iter().any(|verb| verbs.contains(verb));
+        let lane = match find(SpawnField::Lane) {
+            Some(value) => self.word::<LaneChoice>("lane", value, place),
+            None if needs(&[Verb::DriveAhead, Verb::Overtake]) => {
+                self.missing_field(SpawnField::Lane, span, lacks("its lane"))
+            }
+            None => Some(WordExpr::Fixed(LaneChoice::Current)),
+        };
+        let side = match find(SpawnField::Side) {
+            Some(value) => self.word::<Side>("side", value, place),
+            None if needs(&[Verb::CrossRoad, Verb::Walk]) => {
+                self.missing_field(SpawnField::Side, span, lacks("where it comes from"))
+            }
+            None => Some(WordExpr::Fixed(Side::Right)),
+        };
+        let then = match find(SpawnField::Then) {
+            Some(value) => self.word::<Then>("word for `then`", value, place),
+            None => Some(WordExpr::Fixed(Then::Keep)),
+        };
+        let colour = match find(SpawnField::Colour) {
+            Some(value) => self.word::<Colour>("colour", value, place),
+            None => Some(WordExpr::Fixed(Colour::Black)),
+        };
+        let speed_type = Type::Quantity(Dimension::SPEED);
+        let speed = match find(SpawnField::Speed) {
+            Some(value) => self.typed(value, place, speed_type),
+            None if verb_words == [Verb::Stand] => {
+                Some(Expr { kind: ExprKind::Number(Rational::ZERO), ty: speed_type, span })
+            }
+            None => self.missing_field(SpawnField::Speed, span, lacks("how fast it is")),
+        };
+        let (body, verb) = (body_word?, verb?);
+        self.check_verb(&body, &verb, behind, span);
+        Some(SpawnDef {
+            body,
+            colour: colour?,
+            verb,
+            lane: lane?,
+            side: side?,
+            then: then?,
+            speed: speed?,
+            distance: distance?,
+            behind,
+            cover: None,
+            span,
+        })
+    }
+
+    /// Reports a cover that is no vehicle, and one for a road user that does not walk.
+    fn check_cover(&mut self, cover: Option<&WordExpr<BodyWord>>, verb: &WordExpr<Verb>, span: Span) {
+        let Some(cover) = cover else { return };
+        if let Some(body) = possible(cover).into_iter().find(|body| !body.like.is_vehicle()) {
+            let message = format!("a `{}` hides nobody", self.body_name(body));
+            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here");
+            self.report(error.help("write a vehicle after `from behind`"));
+        }
+        if let Some(verb) = possible(verb).into_iter().find(|verb| *verb != Verb::Walk) {
+            let message = format!("`{}` does not begin behind a parked vehicle", verb.name());
+            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here");
+            self.report(error.help("`from behind` is for a pedestrian that does `Walk`"));
+        }
+    }
+
+    /// Reports a vehicle that walks, a pedestrian that drives, and a wrong `ahead` or `behind`: only a vehicle that
+    /// overtakes spawns behind the ego vehicle.
+    fn check_verb(&mut self, body: &WordExpr<BodyWord>, verb: &WordExpr<Verb>, behind: bool, span: Span) {
+        let on_foot = |verb: &Verb| matches!(verb, Verb::Walk | Verb::Stand);
+        let verbs = possible(verb);
+        let clash = possible(body).into_iter().find_map(|body| {
+            verbs.iter().find(|verb| on_foot(verb) == body.like.is_vehicle()).map(|verb| (body, *verb))
+        });
+        if let Some((body, verb)) = clash {
+            let message = format!("a `{}` cannot `{}`", self.body_name(body), verb.name());
+            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here");
+            self.report(
+                error.help("`Walk` and `Stand` are for a `Pedestrian`, all other verbs for vehicles"),
+            );
+            return;
+        }
+        for verb in verbs {
+            if (verb == Verb::Overtake) != behind {
+                let (is, should) = if behind { ("behind", "ahead") } else { ("ahead", "behind") };
+                let message = format!("`{}` does not begin {is} the ego vehicle", verb.name());
+                let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here");
+                self.report(error.help(format!("write `{should}`")));
+                return;
+            }
+        }
+    }
+
+    /// A word of the engine: either the word itself, or an expression of an enum whose variants are such words.
+    fn word<W: Word>(&mut self, kind: &str, expr: &ast::Expr, place: &Place<'_>) -> Option<WordExpr<W>> {
+        if let ast::ExprKind::Name(name) = &expr.kind
+            && self.is_bare_variant(expr, place)
+        {
+            let word = W::from_name(name);
+            word.into_iter().for_each(|word| self.references.word(expr.span, word));
+            return word.map(WordExpr::Fixed).or_else(|| {
+                let locals = place.locals.iter().map(|(local, _)| local.as_str());
+                self.reject(match nearest(name, locals) {
+                    Some(near) => Diagnostic::error(code::UNKNOWN, format!("unknown name `{name}`"))
+                        .at(expr.span, "not declared")
+                        .meant(expr.span, near),
+                    None => unknown_word::<W>(kind, name, expr.span),
+                })
+            });
+        }
+        let expr = self.expr(expr, place, None)?;
+        let words = self.words::<W>(kind, expr.ty, expr.span)?;
+        Some(WordExpr::Of(expr, words))
+    }
+
+    pub(super) fn declare_groups(&mut self, items: &[&ast::Item]) {
+        for (item, declared) in each(items, ItemKind::as_group) {
+            let taken = self.group_places.contains_key(&declared.name.text);
+            if taken || self.action_names.get(&declared.name.text).is_some() {
+                let message = format!("the name `{}` is taken", declared.name.text);
+                let error = Diagnostic::error(code::DUPLICATE, message).at(declared.name.span, "again here");
+                self.report(error.help("groups and actions share their names"));
+                self.doubles.insert(item.span);
+                continue;
+            }
+            let actions = self.all_targets(&declared.members);
+            self.members += actions.len();
+            if self.members > MEMBERS_MAX {
+                let message = format!("the groups name more than {MEMBERS_MAX} actions together");
+                let error = Diagnostic::error(code::TOO_MUCH, message);
+                let error = error.at(declared.name.span, "here the limit is passed");
+                self.report(error.help("make fewer groups, or smaller ones; `actions` names all actions"));
+                return;
+            }
+            let name = declared.name.text.clone();
+            self.group_places.insert(name.clone(), self.groups.len());
+            self.groups.push(GroupDef { name, docs: docs(item), actions });
+        }
+    }
+
+    /// `on … also` adds its effects to each of its actions, after those that the action has.
+    pub(super) fn declare_also(&mut self, items: &[&ast::Item]) {
+        for (_, declared) in each(items, ItemKind::as_also) {
+            for (action, effect) in self.also(declared) {
+                self.actions[action].iter_mut().for_each(|known| known.effects.push(effect.clone()));
+            }
+            if self.has_compiled_too_much(declared.on.first().map_or(Span::NONE, |name| name.span)) {
+                return;
+            }
+        }
+    }
+
+    /// The effects that are added, each with its action.
+    pub(super) fn also(&mut self, declared: &ast::Also) -> Vec<(usize, EffectDef)> {
+        let mut actions = self.all_targets(&declared.on);
+        actions.sort_unstable();
+        let mut added = Vec::new();
+        for action in actions {
+            // A broken action was reported where it is declared.
+            let Some(definition) = &self.actions[action] else { continue };
+            let locals = locals(definition);
+            let owner = Symbol::Action(definition.name.clone());
+            let place = Place { locals: &locals, owner: Some(&owner), states: true, ..Place::default() };
+            for effect in &declared.effects {
+                let Some(effect) = self.effect(effect, &place) else { continue };
+                self.compiled += operations_of(&effect);
+                added.push((action, effect));
+            }
+            if self.compiled > COMPILED_MAX {
+                break;
+            }
+        }
+        added
+    }
+
+    pub(super) fn declare_each_step(&mut self, items: &[&ast::Item]) {
+        for (_, effects) in each(items, ItemKind::as_each_step) {
+            let sets = self.sets(effects);
+            self.each_step.extend(sets);
+        }
+    }
+
+    /// The effects of every step.
+    pub(super) fn sets(&mut self, effects: &[ast::Effect]) -> Vec<SetDef> {
+        let place = Place { states: true, ..Place::default() };
+        let found = effects.iter().filter_map(|effect| self.effect(effect, &place));
+        let sets = found.filter_map(|effect| match effect {
+            EffectDef::Set(set) => Some(*set),
+            EffectDef::Spawn(_) => None,
+        });
+        sets.collect()
+    }
+
+    /// Whether more than [`COMPILED_MAX`] operations were compiled for single actions; reports that once.
+    pub(super) fn has_compiled_too_much(&mut self, span: Span) -> bool {
+        let is_passed = self.compiled > COMPILED_MAX;
+        if is_passed && !self.diagnostics.iter().any(|one| one.code == code::TOO_MUCH) {
+            let message = "the rules and `on … also` of many actions are too much to check";
+            let error = Diagnostic::error(code::TOO_MUCH, message).at(span, "here the limit is passed");
+            self.report(error.note(format!("written out for each action, it has more than {COMPILED_MAX} operations")).help(
+                "let rules bind fewer actions by `on`, make one action with an `each` parameter of several, or shorten conditions",
+            ));
+        }
+        is_passed
+    }
+
+    /// The actions that some names mean, each once, in the order of the names.
+    pub(super) fn all_targets(&mut self, names: &[ast::Name]) -> Vec<usize> {
+        let (mut found, mut asked) = (Vec::new(), BTreeSet::new());
+        let mut seen = vec![false; self.actions.len()];
+        for name in names {
+            // This name was met before, so its actions are in the list.
+            if asked.contains(name.text.as_str()) {
+                self.references.uses_target(name.span, &name.text);
+                continue;
+            }
+            let actions = self.targets(name);
+            if !actions.is_empty() {
+                asked.insert(name.text.as_str());
+            }
+            for action in actions {
+                if !core::mem::replace(&mut seen[action], true) {
+                    found.push(action);
+                }
+            }
+        }
+        found
+    }
+
+    /// Whether a name stands for any action.
+    pub(super) fn is_target(&self, name: &str) -> bool {
+        let is_filled = |group: &usize| !self.groups[*group].actions.is_empty();
+        self.action_names.get(name).is_some()
+            || self.group_places.get(name).is_some_and(is_filled)
+            || name == SpaceClaim::Actions.name() && !self.actions.is_empty()
+    }
+
+    /// The indices of the actions that a name means: one action, or the members of a group.
+    pub(super) fn targets(&mut self, name: &ast::Name) -> Vec<usize> {
+        self.references.uses_target(name.span, &name.text);
+        if let Some(action) = self.action_names.get(&name.text) {
+            return vec![action];
+        }
+        if let Some(group) = self.group_places.get(&name.text) {
+            return self.groups[*group].actions.clone();
+        }
+        if name.text == SpaceClaim::Actions.name() {
+            self.references.word(name.span, SpaceClaim::Actions);
+            return (0..self.actions.len()).collect();
+        }
+        let groups = self.groups.iter().map(|group| group.name.as_str());
+        let error = self.unknown(
+            "action",
+            &name.text,
+            name.span,
+            self.action_names.all().chain(groups).chain([SpaceClaim::Actions.name()]),
+        );
+        self.report(error);
+        Vec::new()
+    }
+
+    /// Counts the rows of every action. Reports a table that would be too long, before it is made.
+    pub(super) fn count_rows(&mut self, rules: &[RuleDef], roads: usize) {
+        let mut total = 0_u64;
+        // A count of 0 means that an axis is broken, which is reported where it is declared.
+        let size = |action: &Option<ActionDef>| action.as_ref().map(product_size).filter(|count| *count > 0);
+        self.row_counts = self.actions.iter().map(size).collect();
+        for (action, count) in self.actions.iter().zip(&self.row_counts) {
+            let (Some(action), Some(count)) = (action, *count) else { continue };
+            total = total.saturating_add(count);
+            if count > ROWS_MAX {
+                let message = format!("`{}` multiplies to {count} rows", action.name);
+                let axes = action.parameters.iter().filter(|parameter| parameter.axis);
+                let axes: Vec<String> = axes.map(|parameter| parameter.name.to_string()).collect();
+                let error = Diagnostic::error(code::TOO_MANY_ROWS, message)
+                    .at(action.span, format!("the product of {}", listed(&axes)));
+                self.report(error.help(format!("at most {ROWS_MAX} are possible; draw some with `any`")));
+                return;
+            }
+        }
+        if total > ROWS_MAX {
+            let error =
+                Diagnostic::error(code::TOO_MANY_ROWS, format!("the actions multiply to {total} rows"));
+            self.report(error.help(format!("at most {ROWS_MAX} are possible")));
+            return;
+        }
+        // Each row is proved on each road under each rule that binds it.
+        let binding = rules_by_action(rules, self.actions.len());
+        for (action, bound) in self.actions.iter().zip(&binding) {
+            let Some(action) = action.as_ref().filter(|_| bound.len() > RULES_MAX) else { continue };
+            let message = format!("{} rules bind `{}`", bound.len(), action.name);
+            let error = Diagnostic::error(code::TOO_MUCH, message)
+                .at(action.span, format!("at most {RULES_MAX} may bind an action"))
+                .help("join rules by `and`, say them by `match` or a state, or make several actions of it");
+            self.report(error);
+            return;
+        }
+        let counts = self.row_counts.iter().zip(&binding);
+        let work: u64 = counts
+            .map(|(count, rules)| count.unwrap_or(0) * (1 + rules.len() as u64) * roads.max(1) as u64)
+            .sum();
+        if work > PROOFS_MAX {
+            let message = format!("rows, rules and roads multiply to {work} proofs");
+            let error = Diagnostic::error(code::TOO_MANY_ROWS, message);
+            self.report(error.help(format!(
+                "at most {PROOFS_MAX} are possible; draw some parameters with `any`, or bind fewer actions"
+            )));
+        }
+    }
+}
+
+/// The operations of an effect. A spawn counts as one, because the rules about it cost far more.
+fn operations_of(effect: &EffectDef) -> usize {
+    match effect {
+        EffectDef::Set(set) => 1 + set.key.iter().chain([&set.value]).map(Expr::operations).sum::<usize>(),
+        EffectDef::Spawn(_) => 1,
+    }
+}
+
+/// Every word that the expression can have as its value.
+fn possible<W: Copy>(word: &WordExpr<W>) -> Vec<W> {
+    match word {
+        WordExpr::Fixed(word) => vec![*word],
+        WordExpr::Of(_, words) => words.clone(),
+    }
+}

@@ -1,0 +1,744 @@
+//! Expressions: every name found, every type and unit fitted. Operators are in `operator`.
+
+use std::collections::BTreeSet;
+
+use crate::check::checker::Checker;
+use crate::check::declaration::HEIGHT_MAX;
+use crate::check::names::unknown;
+use crate::check::references::Symbol;
+use crate::check::report::Report;
+use crate::model::expr::{Expr, ExprKind};
+use crate::model::vocabulary::{Fact, Known, ROAD_LANES, Site, Word, WordFact, parts_of, thing_of, things};
+use crate::model::{EnumIndex, StateDef, Type, code};
+use crate::syntax::ast::{Span, UnaryOp};
+use crate::syntax::{Diagnostic, ast, listed, nearest, one_of};
+use avastra_base::units;
+use avastra_base::units::{Dimension, Rational};
+
+/// What an expression may name where it stands, apart from constants and functions.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Place<'a> {
+    pub locals: &'a [(String, Type)],
+    /// The function or the action whose parameters the locals are.
+    pub owner: Option<&'a Symbol>,
+    pub states: bool,
+    pub site: Site,
+}
+
+impl Place<'_> {
+    /// The condition of a rule.
+    pub const RULE: Place<'static> = Place { locals: &[], owner: None, states: true, site: Site::Rule };
+
+    /// The fact of that name, if it is known here.
+    fn fact(&self, name: &str) -> Option<Fact> {
+        Fact::from_name(name).filter(|fact| self.site.knows(fact.known()))
+    }
+
+    /// Whether something can be asked of a thing (`road`) here.
+    pub(super) fn knows(&self, thing: &str) -> bool {
+        self.site.knows_thing(thing)
+    }
+}
+
+/// Most enums that the error about an ambiguous variant names.
+const OWNERS_NAMED_MAX: usize = 12;
+
+/// What a bare name stands for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Named {
+    /// The parameter, constant or state of that index.
+    Local(usize),
+    Constant(usize),
+    State(usize),
+    Fact(Fact),
+    /// A variant of an enum, or no name that is known here.
+    Variant,
+}
+
+impl Checker {
+    /// What a bare name means: whichever of these comes first.
+    fn named(&self, name: &str, place: &Place<'_>) -> Named {
+        let local = || place.locals.iter().position(|(local, _)| local == name).map(Named::Local);
+        let constant = || self.constant_places.get(name).copied().map(Named::Constant);
+        let state = || self.state_places.get(name).copied().filter(|_| place.states);
+        let fact = || place.fact(name).map(Named::Fact);
+        let found = local().or_else(constant).or_else(|| state().map(Named::State)).or_else(fact);
+        found.unwrap_or(Named::Variant)
+    }
+
+    /// Whether a name can only be a variant here, so that its type must come from elsewhere.
+    pub(super) fn is_bare_variant(&self, expr: &ast::Expr, place: &Place<'_>) -> bool {
+        matches!(&expr.kind, ast::ExprKind::Name(name) if self.named(name, place) == Named::Variant)
+    }
+
+    /// An expression of a wanted type; `None` once the mistake is reported.
+    pub(super) fn typed(&mut self, expr: &ast::Expr, place: &Place<'_>, wanted: Type) -> Option<Expr> {
+        let found = self.expr(expr, place, Some(wanted))?;
+        self.fit(found, wanted)
+    }
+
+    /// Reports an expression that is not of the wanted type.
+    pub(super) fn fit(&mut self, found: Expr, wanted: Type) -> Option<Expr> {
+        if fits(found.ty, wanted) {
+            return Some(found);
+        }
+        let (wanted_name, found_name) =
+            (self.references.type_name(wanted), self.references.type_name(found.ty));
+        let both_numbers = is_number(wanted) && is_number(found.ty);
+        let (code, what) =
+            if both_numbers { (code::UNIT_MISMATCH, "unit") } else { (code::TYPE_MISMATCH, "type") };
+        let error =
+            Diagnostic::error(code, format!("{what} mismatch: wanted `{wanted_name}`, found `{found_name}`"))
+                .at(found.span, format!("this is {}", article(&found_name)));
+        self.reject(match wanted {
+            Type::Enum(of) if self.enums[of.0].variants.len() <= 12 => {
+                let variants: Vec<&str> = self.enums[of.0].variants.iter().map(String::as_str).collect();
+                error.help(format!("a `{wanted_name}` is {}", one_of(&variants)))
+            }
+            Type::Enum(_) | Type::Bool | Type::Int | Type::Quantity(_) => error,
+        })
+    }
+
+    /// An expression of any type. `hint` decides between variants of the same name.
+    pub(super) fn expr(&mut self, expr: &ast::Expr, place: &Place<'_>, hint: Option<Type>) -> Option<Expr> {
+        let span = expr.span;
+        let make = |kind, ty| Some(Expr { kind, ty, span });
+        match &expr.kind {
+            ast::ExprKind::Number(number) => self.number(number),
+            ast::ExprKind::Bool(truth) => make(ExprKind::Bool(*truth), Type::Bool),
+            ast::ExprKind::Name(name) => self.name(name, span, place, hint),
+            ast::ExprKind::Unary { op: UnaryOp::Not, operand } => {
+                let inner = self.typed(operand, place, Type::Bool)?;
+                make(ExprKind::Not(Box::new(inner)), Type::Bool)
+            }
+            ast::ExprKind::Unary { op: UnaryOp::Negate, operand } => {
+                let inner = self.numeric(operand, place)?;
+                let ty = inner.ty;
+                match inner.kind {
+                    ExprKind::Number(value) => {
+                        make(ExprKind::Number(self.exact(value.checked_neg(), span)?), ty)
+                    }
+                    _ => make(ExprKind::Negate(Box::new(inner)), ty),
+                }
+            }
+            ast::ExprKind::Binary { op, op_span, left, right } => {
+                self.binary(*op, *op_span, left, right, place, span)
+            }
+            ast::ExprKind::Field { base, field } => self.part(base, field, place, span),
+            ast::ExprKind::Index { base, index } => self.index(base, index, place, span),
+            ast::ExprKind::Call(call) => self.call(call, place),
+            ast::ExprKind::Match { subject, arms } => self.matching(subject, arms, place, hint, span),
+            ast::ExprKind::Text(_) => self.misplaced("a text", span),
+            ast::ExprKind::List(items) => {
+                items.iter().for_each(|item| self.look_at(item, place, hint));
+                self.misplaced("a list", span)
+            }
+            ast::ExprKind::Record(fields) => {
+                fields.iter().for_each(|field| self.look_at(&field.value, place, hint));
+                self.misplaced("a record", span)
+            }
+            ast::ExprKind::Range { low, high } => {
+                [low, high].into_iter().for_each(|end| self.look_at(end, place, hint));
+                self.misplaced("a range", span)
+            }
+            ast::ExprKind::LanePoint { .. } => self.misplaced("a lane point", span),
+            ast::ExprKind::Numbered { .. } => self.misplaced("a numbered road user", span),
+        }
+    }
+
+    /// Notes the names of an expression in a place that is broken already: no mistake is reported.
+    pub(super) fn look_at(&mut self, expr: &ast::Expr, place: &Place<'_>, hint: Option<Type>) {
+        self.quietly(|checker| checker.expr(expr, place, hint));
+    }
+
+    /// Notes the names of fields, and looks at the values of fields that do not exist.
+    pub(super) fn note_fields<W: Word>(&mut self, fields: &[ast::Field], place: &Place<'_>) {
+        for field in fields {
+            match W::from_name(&field.name.text) {
+                Some(word) => self.references.word(field.name.span, word),
+                None => self.look_at(&field.value, place, None),
+            }
+        }
+    }
+
+    fn misplaced(&mut self, what: &str, span: Span) -> Option<Expr> {
+        let error = Diagnostic::error(code::TYPE_MISMATCH, format!("{what} cannot be computed with"));
+        self.reject(error.at(span, "not a value of an expression"))
+    }
+
+    /// A number literal in SI units.
+    pub(super) fn number(&mut self, number: &ast::Number) -> Option<Expr> {
+        self.references.number(number);
+        let value = self.exact(Rational::from_literal(&number.digits), number.span)?;
+        let (value, ty) = match &number.unit {
+            None if value.is_integer() && !number.digits.contains(['.', 'e', 'E']) => {
+                (Some(value), Type::Int)
+            }
+            None => (Some(value), Type::Quantity(Dimension::RATIO)),
+            Some(word) => match units::unit(&word.text) {
+                Some(unit) => (value.checked_mul(unit.factor()), Type::Quantity(unit.dimension)),
+                None => {
+                    return self.reject(unknown_unit(word));
+                }
+            },
+        };
+        let value = self.exact(value, number.span)?;
+        Some(Expr { kind: ExprKind::Number(value), ty, span: number.span })
+    }
+
+    fn exact(&mut self, value: Option<Rational>, span: Span) -> Option<Rational> {
+        value.or_else(|| {
+            let message = "the number is too large or too fine to be held exactly";
+            let error = Diagnostic::error(code::NUMBER, message).at(span, "about 38 digits are possible");
+            self.reject(error.help("round it, or take a unit that is larger or smaller"))
+        })
+    }
+
+    fn name(&mut self, name: &str, span: Span, place: &Place<'_>, hint: Option<Type>) -> Option<Expr> {
+        let make = |kind, ty| Some(Expr { kind, ty, span });
+        match self.named(name, place) {
+            Named::Local(index) => {
+                if let Some(owner) = place.owner {
+                    self.references.uses_parameter(&ast::Name::new(name, span), owner);
+                }
+                make(ExprKind::Local(index), place.locals[index].1)
+            }
+            Named::Constant(index) => {
+                self.references.uses(span, Symbol::Constant(name.to_owned()));
+                self.constants[index].1.clone().map(|value| Expr { span, ..value })
+            }
+            Named::State(index) => {
+                self.references.uses(span, Symbol::State(name.to_owned()));
+                let state = &self.states[index];
+                if state.key.is_none() {
+                    return make(ExprKind::Cell(state.first_cell), state.ty);
+                }
+                let error = Diagnostic::error(code::TYPE_MISMATCH, format!("`{name}` is a map"));
+                self.reject(error.at(span, "a key is missing").help(format!("write `{name}[key]`")))
+            }
+            Named::Fact(fact) => {
+                self.references.word(span, fact);
+                make(ExprKind::Fact(fact), fact.ty())
+            }
+            Named::Variant => self.bare_variant(name, span, place, hint),
+        }
+    }
+
+    /// A variant of the wanted enum, or of the only one that has it.
+    fn bare_variant(
+        &mut self,
+        name: &str,
+        span: Span,
+        place: &Place<'_>,
+        hint: Option<Type>,
+    ) -> Option<Expr> {
+        let owners = self.references.owners(name).to_vec();
+        let wanted = match hint {
+            Some(Type::Enum(of)) => Some(of.0),
+            _ => None,
+        };
+        let of = match (wanted, owners.as_slice()) {
+            (Some(of), owners) if owners.contains(&of) => of,
+            (_, [of]) => *of,
+            (_, []) => {
+                self.note_broken(name, span, place);
+                let error = match self.lacking(name, place) {
+                    Some(note) => {
+                        let message = format!("`{name}` cannot be used here");
+                        Diagnostic::error(code::NOT_HERE, message).at(span, "not in this place").note(note)
+                    }
+                    None => self.unknown_name(name, span, place, wanted),
+                };
+                return self.reject(error);
+            }
+            (_, owners) => {
+                let named = owners.iter().take(OWNERS_NAMED_MAX);
+                let enums: Vec<&str> = named.map(|of| self.enums[*of].name.as_str()).collect();
+                let others = match owners.len() - enums.len() {
+                    0 => String::new(),
+                    others => format!(" and of {others} other enums"),
+                };
+                let error = Diagnostic::error(
+                    code::AMBIGUOUS,
+                    format!("`{name}` is a variant of {}{others}", listed(&enums)),
+                );
+                let error = error.at(span, "which one is meant does not follow from here");
+                return self.reject(
+                    error.help("compare it with what has the wanted type, or rename one of the two"),
+                );
+            }
+        };
+        let index = self.enums[of].variants.iter().position(|variant| variant == name)?;
+        self.references.variant(&ast::Name::new(name, span), Some(of));
+        Some(Expr { kind: ExprKind::Variant(EnumIndex(of), index), ty: Type::Enum(EnumIndex(of)), span })
+    }
+
+    /// The diagnostic for a bare name that stands for nothing; `wanted` is the enum that the place asks for.
+    fn unknown_name(&self, name: &str, span: Span, place: &Place<'_>, wanted: Option<usize>) -> Diagnostic {
+        let locals = place.locals.iter().map(|(name, _)| name.as_str());
+        let enums = match wanted {
+            Some(of) => core::slice::from_ref(&self.enums[of]),
+            None => self.enums.as_slice(),
+        };
+        let variants = enums.iter().flat_map(|of| &of.variants).map(String::as_str);
+        let constants = self.constants.iter().map(|(name, _)| name.as_str());
+        let states = self.states.iter().filter(|_| place.states).map(|state| state.name.as_str());
+        let facts = place.site.facts().map(|fact| fact.name());
+        let words = place.site.word_facts().map(|fact| fact.name());
+        let of_engine = facts.chain(words).filter(|name| !name.contains('.'));
+        let candidates = locals.chain(variants).chain(constants).chain(states).chain(of_engine);
+        self.unknown("name", name, span, candidates)
+    }
+
+    /// Notes the name of a declaration that is itself broken, or that is not known in this place.
+    fn note_broken(&mut self, name: &str, span: Span, place: &Place<'_>) {
+        let parameter = place.owner.and_then(|owner| owner.parameter(name));
+        let others = [Symbol::Constant, Symbol::State].map(|symbol| symbol(name.to_owned()));
+        parameter.into_iter().chain(others).for_each(|symbol| self.references.uses(span, symbol));
+        self.references.word_named::<Fact>(span, name);
+    }
+
+    /// Why a name that exists cannot be used here; `None` if there is no such name.
+    fn lacking(&self, name: &str, place: &Place<'_>) -> Option<String> {
+        if place.knows(name) {
+            let facts = place.site.facts().map(|fact| fact.name());
+            let known = facts.chain(place.site.word_facts().map(|fact| fact.name()));
+            let of_thing = known.filter(|known| thing_of(known) == Some(name));
+            let mut asked: Vec<String> = of_thing.map(str::to_owned).collect();
+            if name == "road" {
+                asked.extend(["road == corner", "road in [corner, boulevard]"].map(str::to_owned));
+            }
+            return Some(format!("`{name}` is no value: ask for {}", one_of(&asked)));
+        }
+        if let Some(fact) = WordFact::from_name(name).filter(|fact| place.site.knows(fact.known())) {
+            let example = fact.words().first().map_or("", |(word, _)| word);
+            return Some(format!("`{name}` is no value: compare it, as in `{name} == {example}`"));
+        }
+        if Fact::from_name(name).is_some() && place.fact(name).is_none() {
+            return Some(format!("`{name}` is known to the engine, but not in this place"));
+        }
+        if place.states || !self.state_places.contains_key(name) {
+            return None;
+        }
+        Some(match place.site {
+            Site::Axis => format!(
+                "`{name}` is a state, and the rows of the table are the same in every state: write a rule"
+            ),
+            Site::Change => format!("`{name}` is a state, and none is looked up when a lane change begins"),
+            _ => format!("`{name}` is a state, and functions and constants see none: pass it as a parameter"),
+        })
+    }
+
+    /// `road.limit`: a fact about a thing.
+    fn part(&mut self, base: &ast::Expr, part: &ast::Name, place: &Place<'_>, span: Span) -> Option<Expr> {
+        if let ast::ExprKind::Numbered { name, number } = &base.kind {
+            return self.part_of_road_user((name, number, base.span), part, place, span);
+        }
+        self.note_part(base, part);
+        let things = things();
+        let thing = match &base.kind {
+            ast::ExprKind::Name(name) if things.contains(&name.as_str()) => name,
+            _ => {
+                self.look_at(base, place, None);
+                let things = one_of(&things);
+                let error = Diagnostic::error(code::UNKNOWN, format!("only {things} has fields"));
+                return self.reject(error.at(base.span, format!("not {things}")));
+            }
+        };
+        let name = format!("{thing}.{}", part.text);
+        let is_known = |known: Known| place.site.knows(known);
+        if let Some(fact) = place.fact(&name) {
+            return Some(Expr { kind: ExprKind::Fact(fact), ty: fact.ty(), span });
+        } else if !place.knows(thing) || Fact::from_name(&name).is_some_and(|fact| !is_known(fact.known())) {
+            self.report(unknown_here(thing, span, place.site));
+        } else if let Some(fact) = WordFact::from_name(&name) {
+            let words = fact.words();
+            let example = words.first().map_or("", |(word, _)| word);
+            let error = Diagnostic::error(code::TYPE_MISMATCH, format!("`{name}` is a word of the engine"));
+            self.report(error.at(span, "no value").help(format!("compare it: `{name} == {example}`")));
+        } else if name == ROAD_LANES.0 {
+            let error = Diagnostic::error(code::TYPE_MISMATCH, "`road.lanes` is a set of lanes");
+            self.report(error.at(span, "not a value").help("write `lane in road.lanes`"));
+        } else {
+            let parts = parts_of(thing).into_iter().map(|(part, _)| part);
+            self.report(unknown(&format!("{thing} fact"), &part.text, part.span, parts));
+        }
+        None
+    }
+
+    /// `npc#2.gap`: a fact about a road user by its number.
+    fn part_of_road_user(
+        &mut self,
+        (name, number, at): (&ast::Name, &str, Span),
+        part: &ast::Name,
+        place: &Place<'_>,
+        span: Span,
+    ) -> Option<Expr> {
+        if place.site != Site::Trigger {
+            let error = Diagnostic::error(code::NOT_HERE, "road users have no numbers here");
+            return self.reject(error.at(at, "only a scenario's `once` asks for one by its number"));
+        }
+        let parts = || parts_of("npc").into_iter().map(|(part, _)| part);
+        let fact = Fact::from_name(&format!("npc.{}", part.text));
+        let id = number.parse::<u32>().ok().filter(|id| *id > 0 && name.text == "npc");
+        let Some(id) = id else {
+            let error = Diagnostic::error(code::UNKNOWN, "no such road user").at(at, "none has this number");
+            return self.reject(error.help("road users are `npc#1`, `npc#2` and so on, as they appear"));
+        };
+        let Some(fact) = fact else {
+            return self.reject(unknown("npc fact", &part.text, part.span, parts()));
+        };
+        self.references.note(part.span, Symbol::Engine(fact.name(), fact.meaning()), false);
+        Some(Expr { kind: ExprKind::OfRoadUser(id, fact), ty: fact.ty(), span })
+    }
+
+    /// Notes the `limit` of `road.limit`.
+    pub(super) fn note_part(&mut self, base: &ast::Expr, part: &ast::Name) {
+        let ast::ExprKind::Name(thing) = &base.kind else { return };
+        if let Some((word, meaning)) = parts_of(thing).into_iter().find(|(word, _)| *word == part.text) {
+            self.references.note(part.span, Symbol::Engine(word, meaning), false);
+        }
+    }
+
+    fn index(&mut self, base: &ast::Expr, index: &ast::Expr, place: &Place<'_>, span: Span) -> Option<Expr> {
+        let state = match &base.kind {
+            ast::ExprKind::Name(name) => {
+                self.references.uses(base.span, Symbol::State(name.clone()));
+                self.state_places.get(name).copied().filter(|_| place.states)
+            }
+            _ => {
+                self.look_at(base, place, None);
+                None
+            }
+        };
+        let Some(state) = state else {
+            let maps =
+                || self.states.iter().filter(|state| state.key.is_some()).map(|state| state.name.as_str());
+            let error = match &base.kind {
+                ast::ExprKind::Name(name) => match self.lacking(name, place) {
+                    Some(note) => {
+                        let message = format!("`{name}` cannot be used here");
+                        Diagnostic::error(code::NOT_HERE, message)
+                            .at(base.span, "not in this place")
+                            .note(note)
+                    }
+                    None => self.unknown("map", name, base.span, maps()),
+                },
+                _ => Diagnostic::error(code::TYPE_MISMATCH, "only a state can have a key")
+                    .at(base.span, "not a state"),
+            };
+            self.look_at(index, place, None);
+            return self.reject(error);
+        };
+        let StateDef { ref name, key, ty, first_cell, span: declared_at, .. } = self.states[state];
+        let Some(key_of) = key else {
+            let message = format!("`{name}` is not a map");
+            self.look_at(index, place, None);
+            let error = Diagnostic::error(code::TYPE_MISMATCH, message);
+            return self.reject(error.at(span, "takes no key").beside(declared_at, "declared here"));
+        };
+        let key = self.typed(index, place, Type::Enum(key_of))?;
+        let kind = match key.kind {
+            ExprKind::Variant(_, key) => ExprKind::Cell(first_cell + key),
+            _ => ExprKind::CellAt(first_cell, Box::new(key)),
+        };
+        Some(Expr { kind, ty, span })
+    }
+
+    fn call(&mut self, call: &ast::Call, place: &Place<'_>) -> Option<Expr> {
+        let symbol = Symbol::Function(call.name.text.clone());
+        let named = call.args.iter().filter_map(|argument| argument.name.as_ref());
+        for name in named {
+            self.references.uses_parameter(name, &symbol);
+        }
+        self.references.uses(call.name.span, symbol);
+        let Some(index) = self.function_names.get(&call.name.text) else {
+            self.look_at_arguments(&call.args, place);
+            if self.functions_to_come.contains(&call.name.text) {
+                let error = Diagnostic::error(code::NOT_HERE, "a constant cannot call functions");
+                return self
+                    .reject(error.at(call.span, "called here").help("make it a `fn` without parameters"));
+            }
+            let names = self.function_names.all();
+            let error = self.unknown("function", &call.name.text, call.name.span, names);
+            return self.reject(error);
+        };
+        // A function whose own header is broken was reported there.
+        let Some((parameters, result, header)) = self.signatures.get(index).cloned().flatten() else {
+            self.look_at_arguments(&call.args, place);
+            return None;
+        };
+        if call.args.len() != parameters.len() {
+            self.look_at_arguments(&call.args, place);
+            let message = format!(
+                "`{}` takes {} argument{}, not {}",
+                call.name.text,
+                parameters.len(),
+                if parameters.len() == 1 { "" } else { "s" },
+                call.args.len()
+            );
+            return self.reject(
+                Diagnostic::error(code::ARGUMENTS, message).at(call.span, "").beside(header, "declared here"),
+            );
+        }
+        let mut arguments: Vec<Option<Expr>> = vec![None; parameters.len()];
+        for (position, argument) in call.args.iter().enumerate() {
+            let slot = match &argument.name {
+                None => position,
+                Some(name) => match parameters.iter().position(|(parameter, _)| *parameter == name.text) {
+                    Some(slot) => slot,
+                    None => {
+                        self.look_at_arguments(&call.args[position..], place);
+                        let names = parameters.iter().map(|(parameter, _)| parameter.as_str());
+                        let error = unknown("argument", &name.text, name.span, names);
+                        return self.reject(error);
+                    }
+                },
+            };
+            arguments[slot] = self.typed(&argument.value, place, parameters[slot].1);
+        }
+        let arguments: Option<Vec<Expr>> = arguments.into_iter().collect();
+        Some(Expr { kind: ExprKind::Call(index, arguments?), ty: result, span: call.span })
+    }
+
+    fn look_at_arguments(&mut self, arguments: &[ast::Arg], place: &Place<'_>) {
+        arguments.iter().for_each(|argument| self.look_at(&argument.value, place, None));
+    }
+
+    fn matching(
+        &mut self,
+        subject: &ast::Expr,
+        arms: &[ast::Arm],
+        place: &Place<'_>,
+        hint: Option<Type>,
+        span: Span,
+    ) -> Option<Expr> {
+        let subject = self.expr(subject, place, None);
+        let of = match subject.as_ref().map(|subject| subject.ty) {
+            Some(Type::Enum(of)) => Some(of.0),
+            _ => None,
+        };
+        arms.iter().flat_map(|arm| &arm.patterns).for_each(|pattern| self.references.variant(pattern, of));
+        if subject.as_ref().is_none_or(|subject| matches!(subject.ty, Type::Quantity(_))) {
+            arms.iter().for_each(|arm| self.look_at(&arm.value, place, hint));
+        }
+        let subject = subject?;
+        let variants: Vec<String> = match subject.ty {
+            Type::Enum(of) => self.enums[of.0].variants.clone(),
+            Type::Bool => vec!["false".to_owned(), "true".to_owned()],
+            Type::Int => return self.matching_number(subject, arms, place, hint, span),
+            Type::Quantity(_) => {
+                let message = "`match` needs an enum, a truth value or a whole number";
+                let error = Diagnostic::error(code::TYPE_MISMATCH, message);
+                return self.reject(error.at(subject.span, "this may have a fraction"));
+            }
+        };
+        let mut arm_of: Vec<Option<usize>> = vec![None; variants.len()];
+        let mut bodies: Vec<Option<Expr>> = Vec::new();
+        let mut ty = hint;
+        for (index, arm) in arms.iter().enumerate() {
+            self.cover(arm, index, &variants, &mut arm_of);
+            let body = self.expr(&arm.value, place, ty);
+            let body = match (body, ty) {
+                (Some(body), Some(ty)) if index > 0 || hint.is_some() => self.fit(body, ty),
+                (body, _) => body,
+            };
+            ty = ty.or(body.as_ref().map(|body| body.ty));
+            bodies.push(body);
+        }
+        let missing: Vec<&str> = (0..variants.len())
+            .filter(|variant| arm_of[*variant].is_none())
+            .map(|variant| variants[variant].as_str())
+            .collect();
+        if !missing.is_empty() {
+            let error = Diagnostic::error(code::NOT_EXHAUSTIVE, "`match` does not cover every case");
+            let error = error.at(span, format!("missing: {}", listed(&missing)));
+            return self.reject(error.help("add an arm for each, or `_ => …` for the rest"));
+        }
+        let arms: Option<Vec<Expr>> = bodies.into_iter().collect();
+        let arms = arms?;
+        let ty = arms.first()?.ty;
+        let arm_of = arm_of.into_iter().flatten().collect();
+        Some(Expr { kind: ExprKind::Match { subject: Box::new(subject), arm_of, arms }, ty, span })
+    }
+
+    /// `match` on a whole number: a choice between an arm and the arms after it, for each arm.
+    fn matching_number(
+        &mut self,
+        subject: Expr,
+        arms: &[ast::Arm],
+        place: &Place<'_>,
+        hint: Option<Type>,
+        span: Span,
+    ) -> Option<Expr> {
+        let (mut taken, mut seen): (Vec<i64>, BTreeSet<i64>) = (Vec::new(), BTreeSet::new());
+        let mut ty = hint;
+        let mut sound = true;
+        let mut chosen: Vec<(Vec<Expr>, Expr)> = Vec::new();
+        let mut rest: Option<Expr> = None;
+        for arm in arms {
+            let before = taken.len();
+            for pattern in &arm.patterns {
+                match pattern.text.parse::<i64>() {
+                    Ok(number) if seen.insert(number) => taken.push(number),
+                    Ok(_) => {}
+                    Err(_) => {
+                        sound = false;
+                        let message = format!("`{}` is no whole number", pattern.text);
+                        let error = Diagnostic::error(code::TYPE_MISMATCH, message);
+                        let error = error.at(pattern.span, "the value is an `Int`");
+                        self.report(error.help("write a number, or `_` for all that are left"));
+                    }
+                }
+            }
+            if sound && (rest.is_some() || before == taken.len() && !arm.patterns.is_empty()) {
+                let error = Diagnostic::error(code::NEVER_REACHED, "this arm is never reached");
+                self.report(error.at(arm.span, "earlier arms take everything it names").help("remove it"));
+            }
+            let body = self.expr(&arm.value, place, ty);
+            let body = match (body, ty) {
+                (Some(body), Some(ty)) => self.fit(body, ty),
+                (body, None) => body,
+                (None, Some(_)) => None,
+            };
+            ty = ty.or(body.as_ref().map(|body| body.ty));
+            let Some(body) = body else {
+                sound = false;
+                continue;
+            };
+            let make = |kind, ty| Expr { kind, ty, span: arm.span };
+            let numbers = taken[before..]
+                .iter()
+                .map(|number| make(ExprKind::Number(Rational::integer(*number)), Type::Int));
+            match arm.patterns.is_empty() {
+                true => rest = rest.or(Some(body)),
+                false => chosen.push((numbers.collect(), body)),
+            }
+        }
+        if !sound {
+            return None;
+        }
+        let Some(rest) = rest else {
+            let error = Diagnostic::error(code::NOT_EXHAUSTIVE, "`match` does not cover every case");
+            let error = error.at(span, "missing: all other numbers");
+            return self.reject(error.help("add `_ => …` for the rest"));
+        };
+        let too_large = || {
+            let error = Diagnostic::error(code::TOO_LARGE, "this `match` has too many arms")
+                .at(span, "each arm asks for the number again, after all arms before it");
+            error.help("pass the number to a function as a parameter, or make several functions of it")
+        };
+        if chosen.len().saturating_mul(subject.operations()) > HEIGHT_MAX as usize {
+            return self.reject(too_large());
+        }
+        let chain = chosen.into_iter().rev().fold(rest, |rest, (numbers, body)| {
+            let ty = rest.ty;
+            let is_one = ExprKind::InList(Box::new(subject.clone()), numbers);
+            let subject = Box::new(Expr { kind: is_one, ty: Type::Bool, span: subject.span });
+            Expr { kind: ExprKind::Match { subject, arm_of: vec![1, 0], arms: vec![body, rest] }, ty, span }
+        });
+        if chain.height() > HEIGHT_MAX {
+            return self.reject(too_large());
+        }
+        Some(chain)
+    }
+
+    /// Notes which variants an arm takes, and reports the arm if it takes none.
+    fn cover(&mut self, arm: &ast::Arm, index: usize, variants: &[String], arm_of: &mut [Option<usize>]) {
+        let mut reached = false;
+        let mut sound = true;
+        if arm.patterns.is_empty() {
+            for slot in arm_of.iter_mut().filter(|slot| slot.is_none()) {
+                *slot = Some(index);
+                reached = true;
+            }
+        }
+        for pattern in &arm.patterns {
+            match variants.iter().position(|variant| *variant == pattern.text) {
+                None => {
+                    sound = false;
+                    let candidates = variants.iter().map(String::as_str);
+                    self.report(unknown("variant", &pattern.text, pattern.span, candidates));
+                }
+                Some(variant) if arm_of[variant].is_none() => {
+                    arm_of[variant] = Some(index);
+                    reached = true;
+                }
+                Some(_) => {}
+            }
+        }
+        if !reached && sound {
+            let error = Diagnostic::error(code::NEVER_REACHED, "this arm is never reached");
+            self.report(error.at(arm.span, "earlier arms take everything it names").help("remove it"));
+        }
+    }
+
+    pub(super) fn numeric(&mut self, expr: &ast::Expr, place: &Place<'_>) -> Option<Expr> {
+        let found = self.expr(expr, place, None)?;
+        if is_number(found.ty) {
+            return Some(found);
+        }
+        let name = self.references.type_name(found.ty);
+        let error =
+            Diagnostic::error(code::TYPE_MISMATCH, format!("type mismatch: wanted a number, found `{name}`"));
+        self.reject(error.at(found.span, format!("this is {}", article(&name))))
+    }
+}
+
+/// Where facts of the world are known, in words that a thing follows.
+pub(super) const SEEN_BY: &str = "only rules, the `where` of a drawn parameter and `once` see";
+
+/// A thing that is asked where no fact about it is known.
+pub(super) fn unknown_here(thing: &str, span: Span, site: Site) -> Diagnostic {
+    let asked = parts_of(thing).first().map_or("", |(part, _)| part);
+    let error = Diagnostic::error(code::NOT_HERE, format!("`{thing}` is not known here"));
+    match site {
+        Site::Where if thing == "npc" => error
+            .at(span, "its place is known only once all values are drawn")
+            .help("write a rule on the action"),
+        Site::Trigger if thing == "npc" => {
+            error.at(span, "which road user?").help("name it by its number, as it appeared: `npc#1.gap`")
+        }
+        Site::Axis => error
+            .at(span, "the rows of the table are the same at every moment")
+            .help("write a rule on the action, or draw the parameter with `any`"),
+        _ => error
+            .at(span, format!("{SEEN_BY} the {}", if thing == "npc" { "newcomer" } else { thing }))
+            .help(format!("write a rule, or pass a function what it needs: `f({thing}.{asked})`")),
+    }
+}
+
+/// A word that is no unit.
+pub(crate) fn unknown_unit(word: &ast::Name) -> Diagnostic {
+    let words = || units::UNITS.iter().map(|unit| unit.word);
+    let letters = |word: &str| word.chars().filter(|c| c.is_alphanumeric()).collect::<String>();
+    // `kmh` means `km/h` rather than `km`.
+    let meant = words().find(|unit| letters(unit) == letters(&word.text) && !letters(unit).is_empty());
+    let error = Diagnostic::error(code::UNKNOWN_UNIT, format!("unknown unit `{}`", word.text))
+        .at(word.span, "not a unit");
+    match meant.or(nearest(&word.text, words())) {
+        Some(near) => error.meant(word.span, near),
+        None => error.help(format!("the units are {}", words().collect::<Vec<_>>().join(", "))),
+    }
+}
+
+pub(super) fn is_number(ty: Type) -> bool {
+    matches!(ty, Type::Int | Type::Quantity(_))
+}
+
+pub(super) fn dimension(ty: Type) -> Dimension {
+    match ty {
+        Type::Quantity(dimension) => dimension,
+        Type::Int | Type::Bool | Type::Enum(_) => Dimension::RATIO,
+    }
+}
+
+/// A whole number may stand for a ratio; otherwise types must be equal.
+pub(super) fn fits(found: Type, wanted: Type) -> bool {
+    found == wanted || found == Type::Int && wanted == Type::Quantity(Dimension::RATIO)
+}
+
+pub(super) fn article(name: &str) -> String {
+    let vowel = name.starts_with(['A', 'E', 'I', 'O', 'U']);
+    format!("{} `{name}`", if vowel { "an" } else { "a" })
+}

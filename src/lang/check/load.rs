@@ -1,0 +1,461 @@
+//! Loads a root file: reads its imports and maps, compares digests, and runs the checks.
+//!
+//! Files are read through a function that `cli` gives; nothing here reads the disk itself.
+
+use std::collections::BTreeMap;
+use std::path::{Component, Path, PathBuf};
+use std::sync::Arc;
+
+use crate::check::checker::{Checked, DIAGNOSTICS_MAX, Root, Runs};
+use crate::check::meaning::meaning;
+use crate::check::references::References;
+use crate::check::road::Maps;
+use crate::check::{checker, overriding, policy, scenario, scenario_names};
+use crate::model::policy::Policy;
+use crate::model::scenario::Scenario;
+use crate::model::{Meaning, Space, code, digest};
+use crate::syntax::ast::{FileId, ItemKind, Span};
+use crate::syntax::{Diagnostic, Severity, Sources, ast, parse};
+use avastra_road::{LanePlace, RoadError, RoadMap, Route};
+
+/// Why a file cannot be read, in a few words: `no such file`, `a directory`, `not text`.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct ReadError(pub String);
+
+/// Gives the text of a file.
+pub type ReadFile<'a> = dyn Fn(&Path) -> Result<String, ReadError> + 'a;
+
+/// One file that was read.
+#[derive(Debug, Clone)]
+pub struct LoadedFile {
+    pub path: PathBuf,
+    pub tree: ast::File,
+}
+
+/// A root file with all it uses, checked.
+#[derive(Debug, Clone)]
+pub struct Loaded {
+    /// The texts that the diagnostics point into.
+    pub sources: Sources,
+    pub diagnostics: Vec<Diagnostic>,
+    /// Facts about a sound space that ask for no change; only `avastra check` prints them.
+    pub remarks: Vec<Diagnostic>,
+    /// In order of reading, the root first, so never empty; a file's [`FileId`] is its position.
+    pub files: Vec<LoadedFile>,
+    /// What each name of the files stands for, as far as it can be told of files with mistakes.
+    pub references: References,
+    /// The space that the root is or uses, if it is sound.
+    pub space: Option<Arc<Space>>,
+    /// The scenario of the root, if it has one and it is sound.
+    pub scenario: Option<Scenario>,
+    /// The policy of the root, if it has one and it is sound.
+    pub policy: Option<Policy>,
+    /// What was found of the rows of the root. A scenario or a policy claims nothing of its space.
+    pub runs: Runs,
+}
+
+/// A path that is written in a file: of a file that it uses, or of a map.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WrittenPath {
+    /// The text with its quotes.
+    pub span: Span,
+    pub written: String,
+    /// The path that is meant.
+    pub target: PathBuf,
+}
+
+impl Loaded {
+    /// The paths that are written in the files.
+    pub fn written_paths(&self) -> Vec<WrittenPath> {
+        let mut found = Vec::new();
+        for file in &self.files {
+            let used = uses(file).map(|used| (used.path.value.as_str(), used.path.span));
+            found.extend(used.chain(maps_named(file)).map(|(written, span)| WrittenPath {
+                span,
+                written: written.to_owned(),
+                target: path_from(file, written),
+            }));
+        }
+        found
+    }
+}
+
+/// Maps that were read before, by name and content, and the routes found on them. A caller that loads often, such as the
+/// editor's server, then reads each map once.
+#[derive(Debug, Clone, Default)]
+pub struct MapCache {
+    known: BTreeMap<(String, String), Result<Arc<RoadMap>, String>>,
+    routes: Vec<(Arc<RoadMap>, [LanePlace; 2], Route)>,
+}
+
+/// Maps that are parsed at the same time.
+const MAPS_AT_ONCE: usize = 4;
+
+/// Routes that are kept: while an author types a place, each keystroke makes another route.
+const ROUTES_MAX: usize = 64;
+
+/// Reads a root file, all it uses, and checks the whole.
+///
+/// # Errors
+/// If the root itself cannot be read. All other mistakes are in the diagnostics.
+pub fn load(root: &Path, read: &ReadFile<'_>) -> Result<Loaded, ReadError> {
+    load_with(root, read, &mut MapCache::default())
+}
+
+/// Does the same as [`load`], and takes maps from earlier loads.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_with(root: &Path, read: &ReadFile<'_>, cache: &mut MapCache) -> Result<Loaded, ReadError> {
+    let Loader { sources, files, order, mut diagnostics, .. } = Loader::read(root, read)?;
+    // A file that does not parse lacks declarations, and their uses would be reported as unknown. So it is
+    // checked for the names alone, and the checker's diagnostics are dropped.
+    let is_whole = !diagnostics.iter().any(Diagnostic::is_error);
+    let folders = files.iter().map(|file| folder(&file.path)).collect();
+    let mut maps = MapReader { read, folders, texts: BTreeMap::new(), cache };
+    if is_whole {
+        maps.parse(&files);
+        diagnostics.extend(check_digests(&files, &mut maps));
+    }
+    let checked = check_space(&files, &order, &mut maps, is_whole);
+    let Checked { space, runs, diagnostics: found, mut references } = checked;
+    files.iter().for_each(|file| scenario_names::note(&file.tree, &mut references));
+    references.settle(&sources);
+    let (mut remarks, found): (Vec<_>, Vec<_>) =
+        found.into_iter().partition(|found| found.severity == Severity::Note);
+    diagnostics.extend(found.into_iter().filter(|_| is_whole));
+    let space = space.filter(|_| !diagnostics.iter().any(Diagnostic::is_error));
+    let root = &files[0].tree;
+    let has_scenario = root.items.iter().any(|item| item.kind.as_scenario().is_some());
+    let scenario = space
+        .as_ref()
+        .filter(|_| has_scenario)
+        .and_then(|space| scenario::scenario(root, space).map_err(|found| diagnostics.extend(found)).ok());
+    let has_policy = root.items.iter().any(|item| item.kind.as_policy().is_some());
+    let policy = space.as_ref().filter(|_| has_policy).and_then(|space| {
+        policy::policy(sources.text(FileId(0)), root, space).map_err(|found| diagnostics.extend(found)).ok()
+    });
+    // Remarks are about the space. They are shown when the space itself is checked, not for each of its
+    // scenarios and policies.
+    if has_scenario || has_policy || diagnostics.iter().any(Diagnostic::is_error) {
+        remarks.clear();
+    }
+    let (diagnostics, remarks) = (as_many_as_help(merged(diagnostics)), as_many_as_help(merged(remarks)));
+    let space = space.map(Arc::new);
+    let runs = if has_scenario || has_policy { Runs::default() } else { runs };
+    Ok(Loaded { sources, diagnostics, remarks, files, references, space, scenario, policy, runs })
+}
+
+/// Diagnostics that say the same of the same place become one, which shows the other places of all.
+fn merged(diagnostics: Vec<Diagnostic>) -> Vec<Diagnostic> {
+    let mut merged: Vec<Diagnostic> = Vec::new();
+    let mut known: BTreeMap<(Option<Span>, String), usize> = BTreeMap::new();
+    for found in diagnostics {
+        let says = |one: &Diagnostic| (one.code, one.notes.clone(), one.help.clone(), one.fixes.clone());
+        match known.get(&(found.place(), found.message.clone())) {
+            Some(&index) if says(&merged[index]) == says(&found) => {
+                let labels = &mut merged[index].labels;
+                let new: Vec<_> = found.labels.into_iter().filter(|label| !labels.contains(label)).collect();
+                labels.extend(new);
+            }
+            _ => {
+                known.insert((found.place(), found.message.clone()), merged.len());
+                merged.push(found);
+            }
+        }
+    }
+    merged
+}
+
+/// The first [`DIAGNOSTICS_MAX`] diagnostics, and one that gives the number of the others.
+fn as_many_as_help(mut found: Vec<Diagnostic>) -> Vec<Diagnostic> {
+    if found.len() > DIAGNOSTICS_MAX {
+        let left = found.split_off(DIAGNOSTICS_MAX);
+        let message = format!("{} further mistakes are not listed", left.len());
+        let worst = left.iter().find(|one| one.is_error()).unwrap_or(&left[0]);
+        found.push(Diagnostic { severity: worst.severity, ..Diagnostic::error(worst.code, message) });
+    }
+    found
+}
+
+/// The files that a file uses, itself included, however far away. Nothing is checked.
+pub fn files_used(root: &Path, read: &ReadFile<'_>) -> Vec<PathBuf> {
+    let files = Loader::read(root, read).map(|loader| loader.files).unwrap_or_default();
+    files.into_iter().map(|file| file.path).collect()
+}
+
+fn check_space(files: &[LoadedFile], order: &[usize], maps: &mut MapReader<'_>, is_whole: bool) -> Checked {
+    let declares = |file: &LoadedFile| {
+        let declares = |item: &ast::Item| match &item.kind {
+            ItemKind::Language(_) | ItemKind::Scenario(_) | ItemKind::Policy(_) => false,
+            // A `use` that leaves something out makes a space of its own.
+            ItemKind::Use(used) => !used.without.is_empty(),
+            _ => true,
+        };
+        // A file that uses several others is a space of its own, which none of them is.
+        uses(file).count() > 1 || file.tree.items.iter().any(declares)
+    };
+    // A scenario file declares no space: its space is the first file that declares something.
+    let index = files.iter().position(declares).unwrap_or(0);
+    let root = &files[index];
+    let root = Root {
+        file: FileId(u32::try_from(index).expect("a file's id is its position")),
+        path: root.path.clone(),
+        // Without a meaning a map could not be read; then there is no space either.
+        meaning: is_whole.then(|| maps.meaning(files, &root.path)).flatten().unwrap_or_default(),
+        docs: root.tree.docs.iter().map(|doc| doc.text.clone()).collect(),
+    };
+    let (standing, mut diagnostics) = overriding::resolve(files, order);
+    let aside = overriding::set_aside(files, &standing);
+    let items: Vec<&ast::Item> = standing.iter().map(AsRef::as_ref).collect();
+    let maps = is_whole.then_some(maps as &mut dyn Maps);
+    let mut checked = checker::space(root, &items, &aside, References::declared(files), maps);
+    diagnostics.append(&mut checked.diagnostics);
+    Checked { diagnostics, ..checked }
+}
+
+/// Compares every `use … digest` with what was read.
+fn check_digests(files: &[LoadedFile], maps: &mut MapReader<'_>) -> Vec<Diagnostic> {
+    let mut diagnostics = Vec::new();
+    for file in files {
+        for used in uses(file) {
+            let Some(wanted) = &used.digest else { continue };
+            // What cannot be read is reported where it is named.
+            let Some(found) = maps.meaning(files, &used_path(file, used)) else { continue };
+            if found.is_sealed_by(&wanted.value) {
+                continue;
+            }
+            let message = "the imported file, or what it uses, does not mean what it meant";
+            let mut error = Diagnostic::error(code::DIGEST, message).at(wanted.span, "its digest differs");
+            if let Some(differences) = found.differences(&wanted.value) {
+                error = error.note(differences);
+            }
+            error = error.note(format!("its digest is now {}", found.digest())).help(
+                "get back the files as they were, or accept the change; `avastra test --review` says what it changes for \
+                 scenarios, and `--accept` writes that into them",
+            );
+            // A policy's digest of itself covers this one: it has to be trained again.
+            if !file.tree.items.iter().any(|item| item.kind.as_policy().is_some()) {
+                error = error.fix("accept the change", wanted.span, format!("\"{}\"", found.seal()));
+            }
+            diagnostics.push(error);
+        }
+    }
+    diagnostics
+}
+
+pub(super) fn uses(file: &LoadedFile) -> impl Iterator<Item = &ast::Use> {
+    file.tree.items.iter().filter_map(|item| item.kind.as_use())
+}
+
+/// The paths of the files that a file uses.
+pub(super) fn used_paths(file: &LoadedFile) -> impl Iterator<Item = PathBuf> {
+    uses(file).map(|used| used_path(file, used))
+}
+
+/// The path of the file that a `use` names.
+pub(super) fn used_path(file: &LoadedFile, used: &ast::Use) -> PathBuf {
+    path_from(file, &used.path.value)
+}
+
+/// The path that a file means by a text.
+pub(super) fn path_from(file: &LoadedFile, written: &str) -> PathBuf {
+    normal(&folder(&file.path).join(written))
+}
+
+/// The maps that a file's roads name, as written, and where.
+pub(super) fn maps_named(file: &LoadedFile) -> impl Iterator<Item = (&str, Span)> {
+    let roads = file.tree.items.iter().filter_map(|item| item.kind.plain().as_road());
+    let fields = roads.flat_map(|block| block.fields.iter().filter(|field| field.name.text == "map"));
+    fields.filter_map(|field| match &field.value.kind {
+        ast::ExprKind::Text(path) => Some((path.as_str(), field.value.span)),
+        _ => None,
+    })
+}
+
+struct Loader<'a> {
+    read: &'a ReadFile<'a>,
+    sources: Sources,
+    files: Vec<LoadedFile>,
+    /// Indices of files, imports before the files that use them.
+    order: Vec<usize>,
+    diagnostics: Vec<Diagnostic>,
+}
+
+impl<'a> Loader<'a> {
+    fn read(root: &Path, read: &'a ReadFile<'a>) -> Result<Loader<'a>, ReadError> {
+        let sources = Sources::new();
+        let (files, order, diagnostics) = (Vec::new(), Vec::new(), Vec::new());
+        let mut loader = Loader { read, sources, files, order, diagnostics };
+        loader.read_file(&normal(root), &mut Vec::new())?;
+        Ok(loader)
+    }
+
+    /// Reads a file and the files that it uses. `way` holds the files from the root to this one.
+    fn read_file(&mut self, path: &Path, way: &mut Vec<PathBuf>) -> Result<(), ReadError> {
+        if self.files.iter().any(|file| file.path == path) {
+            return Ok(());
+        }
+        let text = (self.read)(path)?;
+        let file = self.sources.add(path.display().to_string(), text);
+        let (tree, found) = parse(file, self.sources.text(file));
+        self.diagnostics.extend(found);
+        let index = self.files.len();
+        self.files.push(LoadedFile { path: path.to_owned(), tree });
+        let uses: Vec<ast::Use> = uses(&self.files[index]).cloned().collect();
+        way.push(path.to_owned());
+        for used in uses {
+            let target = normal(&folder(path).join(&used.path.value));
+            if let Some(begin) = way.iter().position(|step| *step == target) {
+                let circle: Vec<String> =
+                    way[begin..].iter().map(|step| step.display().to_string()).collect();
+                let error = Diagnostic::error(code::IMPORT_CYCLE, "files use each other in a circle");
+                let error = error.at(used.path.span, "this closes the circle");
+                let error = error.note(format!("{} → {}", circle.join(" → "), target.display()));
+                self.diagnostics.push(error.help("move what both need into a file that uses neither"));
+                continue;
+            }
+            if let Err(error) = self.read_file(&target, way) {
+                let message = format!("cannot read `{}`", target.display());
+                self.diagnostics
+                    .push(Diagnostic::error(code::UNREADABLE, message).at(used.path.span, error.to_string()));
+            }
+        }
+        way.pop();
+        self.order.push(index);
+        Ok(())
+    }
+}
+
+struct MapReader<'a> {
+    read: &'a ReadFile<'a>,
+    /// Folder of each file, by [`FileId`].
+    folders: Vec<PathBuf>,
+    texts: BTreeMap<PathBuf, Result<MapText, ReadError>>,
+    cache: &'a mut MapCache,
+}
+
+/// The text of a map, and its digest.
+struct MapText {
+    text: String,
+    digest: String,
+}
+
+impl MapText {
+    fn read(path: &Path, read: &ReadFile<'_>) -> Result<MapText, ReadError> {
+        read(path).map(|text| MapText { digest: digest(text.as_bytes()), text })
+    }
+}
+
+impl MapReader<'_> {
+    /// The text of a map, read once.
+    fn text(&mut self, path: &Path) -> &Result<MapText, ReadError> {
+        let read = self.read;
+        self.texts.entry(path.to_owned()).or_insert_with(|| MapText::read(path, read))
+    }
+
+    /// Parses the maps that the files name and that are not known yet, some at a time: they take longer than all the rest.
+    fn parse(&mut self, files: &[LoadedFile]) {
+        let mut paths: Vec<PathBuf> = files
+            .iter()
+            .flat_map(|file| maps_named(file).map(|(written, _)| path_from(file, written)))
+            .collect();
+        paths.sort_unstable();
+        paths.dedup();
+        for path in &paths {
+            let _ = self.text(path);
+        }
+        let MapReader { texts, cache, .. } = self;
+        let mut open: BTreeMap<(String, String), (&Path, &str)> = BTreeMap::new();
+        for (path, map) in paths.iter().filter_map(|path| Some((path, texts.get(path)?.as_ref().ok()?))) {
+            let key = map_key(path, map);
+            if !cache.known.contains_key(&key) {
+                open.insert(key, (path, &map.text));
+            }
+        }
+        let open: Vec<_> = open.into_iter().collect();
+        for some in open.chunks(MAPS_AT_ONCE) {
+            let parsed: Vec<_> = std::thread::scope(|scope| {
+                let workers: Vec<_> =
+                    some.iter().map(|(_, (path, text))| scope.spawn(move || map_of(path, text))).collect();
+                workers
+                    .into_iter()
+                    .map(|worker| worker.join().expect("no map makes its reader panic"))
+                    .collect()
+            });
+            cache.known.extend(some.iter().map(|(key, _)| key.clone()).zip(parsed));
+        }
+    }
+
+    /// What a file means with all that it uses, as far as all could be read.
+    fn meaning(&mut self, files: &[LoadedFile], path: &Path) -> Option<Meaning> {
+        meaning(files, path, &mut |map| self.text(map).as_ref().ok().map(|map| map.digest.clone()))
+    }
+}
+
+impl Maps for MapReader<'_> {
+    fn map(&mut self, name: &ast::Text) -> Result<(PathBuf, Arc<RoadMap>), String> {
+        let FileId(file) = name.span.file;
+        let folder = self.folders.get(file as usize).cloned().unwrap_or_default();
+        let path = normal(&folder.join(&name.value));
+        let read = self.read;
+        let found = self.texts.entry(path.clone()).or_insert_with(|| MapText::read(&path, read));
+        let map = found.as_ref().map_err(ToString::to_string)?;
+        let key = map_key(&path, map);
+        let parse = || map_of(&path, &map.text);
+        let map = self.cache.known.entry(key).or_insert_with(parse).clone()?;
+        Ok((path, map))
+    }
+
+    fn route(&mut self, map: &Arc<RoadMap>, start: LanePlace, goal: LanePlace) -> Result<Route, RoadError> {
+        let MapCache { known, routes } = &mut *self.cache;
+        let found = routes.iter().find(|(of, ends, _)| Arc::ptr_eq(of, map) && *ends == [start, goal]);
+        if let Some((_, _, route)) = found {
+            return Ok(route.clone());
+        }
+        let route = Route::find(map, start, goal)?;
+        // A map with a limit of its own is made anew at each load, so its routes are not found again.
+        if known.values().flatten().any(|of| Arc::ptr_eq(of, map)) {
+            if routes.len() >= ROUTES_MAX {
+                routes.clear();
+            }
+            routes.push((Arc::clone(map), [start, goal], route.clone()));
+        }
+        Ok(route)
+    }
+}
+
+/// By what a map is known: its name and the digest of its text.
+fn map_key(path: &Path, map: &MapText) -> (String, String) {
+    (stem(path), map.digest.clone())
+}
+
+fn map_of(path: &Path, text: &str) -> Result<Arc<RoadMap>, String> {
+    let mut map = RoadMap::from_opendrive(&stem(path), text).map_err(|error| error.to_string())?;
+    map.file = Some(path.to_owned());
+    Ok(Arc::new(map))
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+fn folder(path: &Path) -> PathBuf {
+    path.parent().map(Path::to_owned).unwrap_or_default()
+}
+
+/// The path without `.` and, where possible, without `..`, so that a file has one path.
+pub fn normal(path: &Path) -> PathBuf {
+    let mut parts: Vec<Component<'_>> = Vec::new();
+    for part in path.components() {
+        match (part, parts.last()) {
+            (Component::CurDir, _) => {}
+            (Component::ParentDir, Some(Component::Normal(_))) => {
+                parts.pop();
+            }
+            _ => parts.push(part),
+        }
+    }
+    parts.iter().collect()
+}

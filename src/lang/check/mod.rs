@@ -1,0 +1,60 @@
+//! From text to meaning: reads a file with all that it uses and gives a sound [`Space`](crate::model::Space),
+//! [`Scenario`](crate::model::Scenario) or [`Policy`](crate::model::Policy), or diagnostics.
+//!
+//! [`load`] is the entry. It reads and parses the files, decides which declarations stand (`overriding`), and
+//! hands them to the checker. The checker (`checker`, with a file for each kind of declaration) goes on after a
+//! mistake, so that one run shows every mistake. A sound space then goes through `prove`.
+//! `explain` has a page for each diagnostic code.
+//!
+//! ```
+//! use std::path::Path;
+//!
+//! use avastra_lang::check::load;
+//!
+//! let text = "language 1\nenum Time = Noon | Night\nstate time: Time = Nihgt\n";
+//! let loaded = load(Path::new("mine.ava"), &|_| Ok(text.to_owned()))?;
+//! assert!(loaded.space.is_none());
+//! assert!(loaded.diagnostics.iter().any(|mistake| mistake.message.contains("Nihgt")));
+//! # Ok::<(), avastra_lang::check::ReadError>(())
+//! ```
+
+mod action;
+mod body;
+mod checker;
+mod declaration;
+mod difference;
+mod expect;
+pub mod explain;
+mod expression;
+mod load;
+mod meaning;
+mod names;
+mod operator;
+mod overriding;
+pub mod policy;
+mod report;
+mod references;
+mod road;
+mod rule;
+mod scenario;
+mod scenario_claim;
+mod scenario_condition;
+mod scenario_names;
+mod scenario_rules;
+mod scenario_value;
+mod settings;
+pub mod state_argument;
+mod style;
+mod suggest;
+mod unused;
+
+pub use checker::{Claim, Runs};
+pub use difference::{Change, Difference, differences};
+pub use load::{
+    Loaded, LoadedFile, MapCache, ReadError, ReadFile, WrittenPath, files_used, load, load_with, normal,
+};
+pub use references::{Declaration, Occurrence, References, Symbol};
+pub use suggest::suggest_uses;
+
+#[cfg(test)]
+mod tests;

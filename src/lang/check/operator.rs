@@ -1,0 +1,371 @@
+//! Operators: logic, arithmetic, comparison and `in`, and what may stand on their two sides. Roads are no
+//! values: `road == corner` and `road in [corner, boulevard]` are read here as one condition.
+
+use crate::check::checker::Checker;
+use crate::check::expression::{Place, SEEN_BY, article, dimension, fits, is_number, unknown_here};
+use crate::check::names::unknown;
+use crate::check::references::Symbol;
+use crate::check::report::Report;
+use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
+use crate::model::vocabulary::{Body, Known, LaneChoice, Word, WordFact};
+use crate::model::{BodyWord, Type, code};
+use crate::syntax::ast::{BinaryOp, Span};
+use crate::syntax::{Diagnostic, ast, one_of};
+use avastra_base::units::Rational;
+
+impl Checker {
+    /// Two sides and what joins them.
+    pub(super) fn binary(
+        &mut self,
+        op: BinaryOp,
+        op_span: Span,
+        left: &ast::Expr,
+        right: &ast::Expr,
+        place: &Place<'_>,
+        span: Span,
+    ) -> Option<Expr> {
+        let logic: fn(Box<Expr>, Box<Expr>) -> ExprKind = match op {
+            BinaryOp::Implies => ExprKind::Implies,
+            BinaryOp::Or => ExprKind::Or,
+            BinaryOp::And => ExprKind::And,
+            BinaryOp::In => return self.membership(left, right, place, span),
+            BinaryOp::Compare(op) => return self.comparison(op, left, right, place, span),
+            BinaryOp::Arithmetic(op) => return self.arithmetic(op, op_span, left, right, place, span),
+        };
+        // Both sides are looked at, so that mistakes in both are reported.
+        let left = self.typed(left, place, Type::Bool);
+        let right = self.typed(right, place, Type::Bool);
+        Some(Expr { kind: logic(Box::new(left?), Box::new(right?)), ty: Type::Bool, span })
+    }
+
+    fn arithmetic(
+        &mut self,
+        op: Arithmetic,
+        op_span: Span,
+        left: &ast::Expr,
+        right: &ast::Expr,
+        place: &Place<'_>,
+        span: Span,
+    ) -> Option<Expr> {
+        let left = self.numeric(left, place);
+        let right = self.numeric(right, place);
+        let (left, right) = (left?, right?);
+        let (a, b) = (dimension(left.ty), dimension(right.ty));
+        if op == Arithmetic::Divide && right.kind == ExprKind::Number(Rational::ZERO) {
+            let error = Diagnostic::error(code::NUMBER, "a division by 0 has no value");
+            return self.reject(error.at(span, "").beside(right.span, "is 0"));
+        }
+        let both_whole = left.ty == Type::Int && right.ty == Type::Int;
+        let result = match op {
+            Arithmetic::Add | Arithmetic::Subtract if a == b => Some(a),
+            Arithmetic::Add | Arithmetic::Subtract => {
+                let verb = if op == Arithmetic::Add { "added" } else { "subtracted" };
+                self.mismatch(&format!("cannot be {verb}"), op_span, &left, &right);
+                return None;
+            }
+            Arithmetic::Multiply => a.times(b),
+            Arithmetic::Divide => a.per(b),
+        };
+        let Some(result) = result else {
+            return self.reject(
+                Diagnostic::error(code::UNIT_MISMATCH, "the dimension is out of range").at(span, ""),
+            );
+        };
+        let ty = if both_whole && op != Arithmetic::Divide { Type::Int } else { Type::Quantity(result) };
+        Some(Expr { kind: ExprKind::Arithmetic(op, Box::new(left), Box::new(right)), ty, span })
+    }
+
+    /// Reports that the two sides have different dimensions or types.
+    fn mismatch(&mut self, what: &str, at: Span, left: &Expr, right: &Expr) {
+        let (a, b) = (self.references.type_name(left.ty), self.references.type_name(right.ty));
+        let code =
+            if is_number(left.ty) && is_number(right.ty) { code::UNIT_MISMATCH } else { code::TYPE_MISMATCH };
+        let error = Diagnostic::error(code, format!("`{a}` and `{b}` {what}")).at(at, "");
+        self.report(error.beside(left.span, article(&a)).beside(right.span, article(&b)));
+    }
+
+    fn comparison(
+        &mut self,
+        op: Comparison,
+        left: &ast::Expr,
+        right: &ast::Expr,
+        place: &Place<'_>,
+        span: Span,
+    ) -> Option<Expr> {
+        let is_road = [self.names_road(left, place), self.names_road(right, place)];
+        if let Some(road) = beside_word(left, right, is_road) {
+            if op.orders() {
+                self.note_roads(core::slice::from_ref(road));
+                let help = "write `road == corner`, or `road in [corner, boulevard]`";
+                return self.unordered("roads have no order", op, span, help);
+            }
+            return Some(equal_or_not(op, self.on_road(core::slice::from_ref(road), place, span)?));
+        }
+        let facts = [self.word_fact(left, place), self.word_fact(right, place)];
+        if let Some(fact) = facts[0].or(facts[1]) {
+            let word = if facts[0].is_some() { right } else { left };
+            if op.orders() {
+                let words = fact.words();
+                let help = format!(
+                    "write `{0} == {1}`, or `{0} in [{1}, {2}]`",
+                    fact.name(),
+                    words[0].0,
+                    words[1].0
+                );
+                return self.unordered(&format!("`{}` has no order", fact.name()), op, span, &help);
+            }
+            return Some(equal_or_not(op, self.is_word(fact, core::slice::from_ref(word), place, span)?));
+        }
+        let (left, right) = self.both_sides(left, right, place)?;
+        if !fits(left.ty, right.ty) && !fits(right.ty, left.ty) {
+            self.mismatch("cannot be compared", span, &left, &right);
+            return None;
+        }
+        match left.ty {
+            Type::Bool if op.orders() => {
+                let help = "compare them with `==` or `!=`, or join them with `and`, `or`, `implies`";
+                return self.unordered("truth values have no order", op, span, help);
+            }
+            Type::Enum(of) if op.orders() && !self.enums[of.0].ordered => {
+                let of = &self.enums[of.0];
+                let error = Diagnostic::error(code::UNORDERED, format!("`{}` has no order", of.name))
+                    .at(span, format!("`{}` needs one", op.symbol()))
+                    .beside(of.span, "declared with `|`")
+                    .help("declare its variants with `<` between them, or compare with `==` or `in [..]`");
+                return self.reject(error);
+            }
+            Type::Bool | Type::Enum(_) | Type::Int | Type::Quantity(_) => {}
+        }
+        Some(Expr { kind: ExprKind::Compare(op, Box::new(left), Box::new(right)), ty: Type::Bool, span })
+    }
+
+    /// Checks first the side that tells the type of the other.
+    fn both_sides(&mut self, left: &ast::Expr, right: &ast::Expr, place: &Place<'_>) -> Option<(Expr, Expr)> {
+        if self.is_bare_variant(left, place) {
+            let Some(right) = self.expr(right, place, None) else {
+                self.look_at(left, place, None);
+                return None;
+            };
+            return Some((self.expr(left, place, Some(right.ty))?, right));
+        }
+        let left = self.expr(left, place, None);
+        let right = self.expr(right, place, left.as_ref().map(|left| left.ty));
+        Some((left?, right?))
+    }
+
+    fn membership(
+        &mut self,
+        left: &ast::Expr,
+        right: &ast::Expr,
+        place: &Place<'_>,
+        span: Span,
+    ) -> Option<Expr> {
+        if let ast::ExprKind::List(items) = &right.kind
+            && items.is_empty()
+        {
+            self.look_at(left, place, None);
+            let error = Diagnostic::error(code::EMPTY, "nothing is in an empty list").at(right.span, "empty");
+            return self.reject(error.help("list what is meant, or leave the condition out"));
+        }
+        if let (true, ast::ExprKind::List(roads)) = (self.names_road(left, place), &right.kind) {
+            return self.on_road(roads, place, span);
+        }
+        if let (ast::ExprKind::List(words), Some(fact)) = (&right.kind, self.word_fact(left, place)) {
+            return self.is_word(fact, words, place, span);
+        }
+        let Some(value) = self.expr(left, place, None) else {
+            self.look_at(right, place, None);
+            return None;
+        };
+        let ty = value.ty;
+        let value = Box::new(value);
+        let kind = match &right.kind {
+            ast::ExprKind::Range { low, high } => {
+                let low = self.typed(low, place, ty);
+                let high = self.typed(high, place, ty);
+                if !is_number(ty) {
+                    return self.reject(
+                        Diagnostic::error(code::TYPE_MISMATCH, "a range holds numbers")
+                            .at(value.span, "not a number"),
+                    );
+                }
+                ExprKind::InRange(value, Box::new(low?), Box::new(high?))
+            }
+            ast::ExprKind::List(items) => {
+                let items: Vec<Option<Expr>> = items.iter().map(|item| self.typed(item, place, ty)).collect();
+                let items: Option<Vec<Expr>> = items.into_iter().collect();
+                ExprKind::InList(value, items?)
+            }
+            ast::ExprKind::Field { base, field }
+                if field.text == "lanes"
+                    && matches!(&base.kind, ast::ExprKind::Name(name) if name == "road") =>
+            {
+                self.note_part(base, field);
+                if !place.knows("road") {
+                    return self.reject(unknown_here("road", right.span, place.site));
+                }
+                let lanes = self.words::<LaneChoice>("lane", ty, value.span)?;
+                ExprKind::InLanes(value, lanes)
+            }
+            _ => {
+                self.look_at(right, place, Some(ty));
+                let error =
+                    Diagnostic::error(code::TYPE_MISMATCH, "`in` needs a list, a range or `road.lanes`");
+                return self.reject(error.at(right.span, "none of them"));
+            }
+        };
+        Some(Expr { kind, ty: Type::Bool, span })
+    }
+
+    /// Reports that an operator asks for an order where there is none.
+    fn unordered(&mut self, what: &str, op: Comparison, span: Span, help: &str) -> Option<Expr> {
+        let error = Diagnostic::error(code::UNORDERED, what).at(span, format!("`{}` needs one", op.symbol()));
+        self.reject(error.help(help))
+    }
+
+    /// `road == corner`: whether the road is one of these.
+    fn on_road(&mut self, names: &[ast::Expr], place: &Place<'_>, span: Span) -> Option<Expr> {
+        self.note_roads(names);
+        if !place.knows("road") {
+            return self.reject(unknown_here("road", span, place.site));
+        }
+        let road = |name: &ast::Expr| match &name.kind {
+            ast::ExprKind::Name(text) if self.road_names.contains(text) => Some(text.clone()),
+            ast::ExprKind::Name(text) => {
+                let known = self.road_names.iter().map(String::as_str);
+                self.reject(unknown("road", text, name.span, known))
+            }
+            _ => {
+                let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted the name of a road");
+                self.reject(error.at(name.span, "not a name").help("write `road == corner`"))
+            }
+        };
+        // Every unknown road is reported, not just the first.
+        let roads: Vec<Option<String>> = names.iter().map(road).collect();
+        let roads = roads.into_iter().collect::<Option<_>>()?;
+        Some(Expr { kind: ExprKind::OnRoad(roads), ty: Type::Bool, span })
+    }
+
+    /// `priority == ego`, `ego.light in [Yellow, Red]`: whether the fact is one of these words.
+    fn is_word(
+        &mut self,
+        fact: WordFact,
+        words: &[ast::Expr],
+        place: &Place<'_>,
+        span: Span,
+    ) -> Option<Expr> {
+        if !place.site.knows(fact.known()) {
+            let error = Diagnostic::error(code::NOT_HERE, format!("`{}` is not known here", fact.name()));
+            let who = match fact.known() {
+                Known::Road | Known::World | Known::Spawn => format!("{SEEN_BY} the moment"),
+                Known::Step => "only rewards and verdicts see what happened in the step".to_owned(),
+                Known::Judgement => "only verdicts see how a collision was judged".to_owned(),
+            };
+            return self.reject(error.at(span, who));
+        }
+        if matches!(fact, WordFact::Hit | WordFact::Near) {
+            let found: Vec<Option<BodyWord>> = words.iter().map(|word| self.body_of(word)).collect();
+            let kind = ExprKind::IsBody(fact, found.into_iter().collect::<Option<_>>()?);
+            return Some(Expr { kind, ty: Type::Bool, span });
+        }
+        // Every unknown word is reported, not just the first.
+        let found: Vec<Option<String>> = words.iter().map(|word| self.word_of(fact, word)).collect();
+        let kind = ExprKind::IsWord(fact, found.into_iter().collect::<Option<_>>()?);
+        Some(Expr { kind, ty: Type::Bool, span })
+    }
+
+    /// A body beside `hit` or `near`: of the engine, or of the author's own.
+    fn body_of(&mut self, word: &ast::Expr) -> Option<BodyWord> {
+        let known = match &word.kind {
+            ast::ExprKind::Name(name) => self.body_named(name).map(|body| (name, body)),
+            _ => None,
+        };
+        let Some((name, body)) = known else {
+            let own = self.bodies.iter().map(|body| body.name.clone()).collect::<Vec<_>>();
+            return match &word.kind {
+                ast::ExprKind::Name(name) => {
+                    let names = Body::names().chain(own.iter().map(String::as_str));
+                    self.reject(unknown("body", name, word.span, names))
+                }
+                _ => {
+                    let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted the name of a body");
+                    self.reject(error.at(word.span, "not a name"))
+                }
+            };
+        };
+        self.note_body(word.span, name);
+        Some(body)
+    }
+
+    fn word_of(&mut self, fact: WordFact, word: &ast::Expr) -> Option<String> {
+        let words = fact.words();
+        let names = || words.iter().map(|(name, _)| *name);
+        let ast::ExprKind::Name(name) = &word.kind else {
+            let names: Vec<&str> = names().collect();
+            let message = format!("wanted {}", one_of(&names));
+            return self.reject(Diagnostic::error(code::TYPE_MISMATCH, message).at(word.span, "not a name"));
+        };
+        let Some((known, meaning)) = words.iter().find(|(known, _)| known == name) else {
+            return self.reject(unknown(fact.name(), name, word.span, names()));
+        };
+        self.references.note(word.span, Symbol::Engine(known, meaning), false);
+        Some(name.clone())
+    }
+
+    /// Notes the names among the expressions as roads.
+    pub(super) fn note_roads(&mut self, names: &[ast::Expr]) {
+        for expr in names {
+            if let ast::ExprKind::Name(name) = &expr.kind {
+                self.references.uses(expr.span, Symbol::Road(name.clone()));
+            }
+        }
+    }
+
+    /// Whether the expression is the word `road`.
+    fn names_road(&self, expr: &ast::Expr, place: &Place<'_>) -> bool {
+        self.names(expr, "road", place)
+    }
+
+    /// The fact that is compared with words, if the expression names one, which is then noted.
+    fn word_fact(&mut self, expr: &ast::Expr, place: &Place<'_>) -> Option<WordFact> {
+        match &expr.kind {
+            ast::ExprKind::Name(name) => {
+                let fact = WordFact::from_name(name).filter(|_| self.is_bare_variant(expr, place))?;
+                self.references.note(expr.span, Symbol::Engine(fact.name(), fact.meaning()), false);
+                Some(fact)
+            }
+            ast::ExprKind::Field { base, field } => {
+                let ast::ExprKind::Name(thing) = &base.kind else { return None };
+                let fact = WordFact::from_name(&format!("{thing}.{}", field.text))?;
+                self.note_part(base, field);
+                Some(fact)
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether the expression is a word, and no parameter, constant or state of that name hides it.
+    fn names(&self, expr: &ast::Expr, word: &str, place: &Place<'_>) -> bool {
+        matches!(&expr.kind, ast::ExprKind::Name(name) if name == word) && self.is_bare_variant(expr, place)
+    }
+}
+
+/// If one side is a word of the language, the other side.
+fn beside_word<'a>(left: &'a ast::Expr, right: &'a ast::Expr, is_word: [bool; 2]) -> Option<&'a ast::Expr> {
+    match is_word {
+        [true, _] => Some(right),
+        [_, true] => Some(left),
+        [false, false] => None,
+    }
+}
+
+/// What `==` gives, or its opposite for `!=`.
+fn equal_or_not(op: Comparison, is_so: Expr) -> Expr {
+    match op {
+        Comparison::NotEqual => {
+            let span = is_so.span;
+            Expr { kind: ExprKind::Not(Box::new(is_so)), ty: Type::Bool, span }
+        }
+        _ => is_so,
+    }
+}

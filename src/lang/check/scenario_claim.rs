@@ -1,0 +1,197 @@
+//! What a scenario claims of its replay: `expect collision with npc#2 at 14.22 s`, `expect end == arrived`.
+
+use crate::check::names::unknown;
+use crate::check::report::Report;
+use crate::check::scenario::Reader;
+use crate::check::scenario_value::figure;
+use crate::model::code;
+use crate::model::scenario::{Avoidability, Claim, DRIVERS, ENDS, Figure, MODULES, Obstacle, ObstacleKind};
+use crate::model::vocabulary::{Fact, Priority, ScenarioClaim, Word};
+use crate::syntax::ast::{BinaryOp, ClauseKind, Comparison};
+use crate::syntax::{Diagnostic, ast, listed};
+use avastra_base::units::Dimension;
+
+impl Reader<'_> {
+    /// A claim of a scenario; `None` once what is wrong with it is reported.
+    pub(super) fn claim(&mut self, expect: &ast::Expect) -> Option<Claim> {
+        let unclear = || {
+            Diagnostic::error(code::UNKNOWN_CLAIM, "unknown claim").at(expect.span, "cannot be checked").help(
+                "claims are `collision with npc#2 at 14.22 s`, `proc == [0.5]`, `trace == \"sha256:…\"`, \
+                 `end == arrived`, `avoidable by [cc, fsm]`, `cause == perception`, `priority == other`, \
+                 `minimal`, or the name of a verdict",
+            )
+        };
+        match &expect.claim.kind {
+            ast::ExprKind::Name(name) if name == Fact::Collision.name() => {
+                let (obstacle, time) = self.clauses(&expect.clauses, true)?;
+                Some(Claim::Collision { obstacle, time })
+            }
+            ast::ExprKind::Name(name) if self.space.verdicts.iter().any(|verdict| verdict.name == *name) => {
+                let (obstacle, _) = self.clauses(&expect.clauses, false)?;
+                Some(Claim::Verdict { name: name.clone(), obstacle })
+            }
+            ast::ExprKind::Name(name) if name == ScenarioClaim::Minimal.name() => {
+                let (obstacle, _) = self.clauses(&expect.clauses, false)?;
+                Some(Claim::Minimal { obstacle })
+            }
+            ast::ExprKind::Name(name) if Avoidability::ALL.iter().any(|class| class.name() == name) => {
+                let class = Avoidability::ALL.into_iter().find(|class| class.name() == name)?;
+                self.avoidability(class, expect)
+            }
+            ast::ExprKind::Binary { op: BinaryOp::Compare(Comparison::Equal), left, right, .. } => {
+                match (&left.kind, &right.kind) {
+                    (ast::ExprKind::Name(name), ast::ExprKind::List(items)) if name == "proc" => {
+                        let values = items.iter().map(|item| self.take(figure(item, Dimension::RATIO)));
+                        values.collect::<Option<_>>().map(Claim::Proc)
+                    }
+                    (ast::ExprKind::Name(name), ast::ExprKind::Text(text))
+                        if name == ScenarioClaim::Trace.name() =>
+                    {
+                        if !is_digest(text) {
+                            let error =
+                                Diagnostic::error(code::UNKNOWN_CLAIM, "this is the digest of no trace");
+                            let error = error.at(right.span, "not `sha256:` and 64 digits from 0 to f");
+                            return self
+                                .reject(error.help("`avastra replay FILE` says which digest was found"));
+                        }
+                        Some(Claim::Trace(text.clone()))
+                    }
+                    (ast::ExprKind::Name(name), _) if name == ScenarioClaim::Cause.name() => {
+                        let modules = self.modules(right)?;
+                        let (obstacle, _) = self.clauses(&expect.clauses, false)?;
+                        Some(Claim::Cause { modules, obstacle })
+                    }
+                    (ast::ExprKind::Name(name), _) if name == ScenarioClaim::Priority.name() => {
+                        let priority = self.priority(right)?;
+                        let (obstacle, _) = self.clauses(&expect.clauses, false)?;
+                        Some(Claim::Priority { priority, obstacle })
+                    }
+                    (ast::ExprKind::Name(name), ast::ExprKind::Name(end))
+                        if name == ScenarioClaim::End.name() =>
+                    {
+                        if !ENDS.contains(&end.as_str()) {
+                            let message = format!("an episode does not end `{end}`");
+                            let error = Diagnostic::error(code::UNKNOWN_CLAIM, message);
+                            let error = error.at(right.span, "unknown end");
+                            return self.reject(error.help(format!("ends are {}", listed(&ENDS))));
+                        }
+                        Some(Claim::End(end.clone()))
+                    }
+                    _ => self.reject(unclear()),
+                }
+            }
+            _ => self.reject(unclear()),
+        }
+    }
+
+    /// `ego`, `other` or `none`.
+    fn priority(&mut self, value: &ast::Expr) -> Option<Priority> {
+        let ast::ExprKind::Name(name) = &value.kind else {
+            let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted `ego`, `other` or `none`");
+            return self.reject(error.at(value.span, "not a name"));
+        };
+        let Some(priority) = Priority::from_name(name) else {
+            return self.reject(unknown("priority", name, value.span, Priority::names()));
+        };
+        Some(priority)
+    }
+
+    /// `perception`, or `[tracking, planning]`.
+    fn modules(&mut self, value: &ast::Expr) -> Option<Vec<String>> {
+        let items = match &value.kind {
+            ast::ExprKind::List(items) => items.as_slice(),
+            _ => core::slice::from_ref(value),
+        };
+        self.words(items, "module", "a module of the driving system", &MODULES)
+    }
+
+    /// Names out of a closed set; `what` is one of them, `wanted` with its article.
+    fn words(
+        &mut self,
+        items: &[ast::Expr],
+        what: &str,
+        wanted: &str,
+        known: &[&'static str],
+    ) -> Option<Vec<String>> {
+        let mut words = Vec::new();
+        for item in items {
+            let ast::ExprKind::Name(name) = &item.kind else {
+                let error = Diagnostic::error(code::TYPE_MISMATCH, format!("wanted {wanted}"));
+                return self.reject(error.at(item.span, "not a name"));
+            };
+            if !known.contains(&name.as_str()) {
+                return self.reject(unknown(what, name, item.span, known.iter().copied()));
+            }
+            words.push(name.clone());
+        }
+        Some(words)
+    }
+
+    /// `avoidable by [cc, fsm] with npc#2`.
+    fn avoidability(&mut self, class: Avoidability, expect: &ast::Expect) -> Option<Claim> {
+        let (by, others): (Vec<&ast::Clause>, Vec<&ast::Clause>) =
+            expect.clauses.iter().partition(|clause| clause.kind == ClauseKind::By);
+        let drivers = match by.as_slice() {
+            [] => None,
+            [clause] if let ast::ExprKind::List(items) = &clause.value.kind => {
+                Some(self.words(items, "reference driver", "a reference driver", &DRIVERS)?)
+            }
+            [clause, ..] => {
+                let error = Diagnostic::error(code::UNKNOWN_CLAIM, "wanted one list of reference drivers");
+                return self.reject(error.at(clause.span, "not one").help("write `avoidable by [cc, fsm]`"));
+            }
+        };
+        let others: Vec<ast::Clause> = others.into_iter().cloned().collect();
+        let (obstacle, _) = self.clauses(&others, false)?;
+        Some(Claim::Avoidability { class, by: drivers, obstacle })
+    }
+
+    /// `with npc#2` and, if the claim has a time, `at 14.22 s`.
+    fn clauses(
+        &mut self,
+        clauses: &[ast::Clause],
+        timed: bool,
+    ) -> Option<(Option<Obstacle>, Option<Figure>)> {
+        let (mut obstacle, mut time) = (None, None);
+        for clause in clauses {
+            match (clause.kind, &clause.value.kind) {
+                (ClauseKind::With, ast::ExprKind::Numbered { name, number })
+                    if number.parse::<u32>().is_ok_and(|number| number > 0) =>
+                {
+                    let kind = ObstacleKind::ALL.into_iter().find(|kind| kind.name() == name.text);
+                    let Some(kind) = kind else {
+                        let words = ObstacleKind::ALL.map(ObstacleKind::name);
+                        return self.reject(unknown("road user", &name.text, name.span, words));
+                    };
+                    obstacle = number.parse().ok().map(|number| Obstacle { kind, number });
+                }
+                (ClauseKind::At, _) if timed => {
+                    let found = self.take(figure(&clause.value, Dimension::DURATION))?;
+                    if found.value < 0.0 {
+                        let error =
+                            Diagnostic::error(code::UNKNOWN_CLAIM, "no time of an episode is negative");
+                        return self.reject(
+                            error.at(clause.value.span, "before its beginning").help("count from 0 s"),
+                        );
+                    }
+                    time = Some(found);
+                }
+                _ => {
+                    let error = Diagnostic::error(code::UNKNOWN_CLAIM, "unknown clause of this claim");
+                    return self.reject(
+                        error
+                            .at(clause.span, "")
+                            .help("write `collision with npc#2 at 14.22 s`; obstacles are numbered from 1"),
+                    );
+                }
+            }
+        }
+        Some((obstacle, time))
+    }
+}
+
+/// Whether a text has the form in which avastra prints a SHA-256 digest.
+fn is_digest(text: &str) -> bool {
+    let digits = text.strip_prefix("sha256:").unwrap_or("");
+    digits.len() == 64 && digits.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
+}

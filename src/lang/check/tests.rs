@@ -1,0 +1,659 @@
+//! What a checked file becomes. What the checker says of a broken one is tested by `tests/cases/diagnostics`.
+
+use std::path::Path;
+
+use crate::check::state_argument::memory_from;
+use crate::check::{Loaded, ReadError, differences, load, suggest_uses};
+use crate::model::vocabulary::{Body, Priority, Word};
+use crate::model::{
+    Avoidability, BodyWord, Claim, Facts, Memory, Obstacle, ObstacleKind, OutcomeFacts, Reach, RulesInForce,
+    Value, code, evaluate,
+};
+use crate::syntax::{Style, render};
+
+/// A small sound space; tests put declarations of their own after it.
+const BASE: &str = "language 1
+enum Time = Morning | Noon | Night
+enum Sky = Rain | Fog | Wetness
+enum Level = None < Light < Moderate < High
+enum Lane = Left | Current | Right
+enum Side = Left | Right
+enum Vehicle = Jeep | BoxTruck
+state time: Time = any
+state sky: Sky -> Level = None
+fn gap(v: Speed) -> Length = 12 m + v * 0.5 s
+action set_time(each to: Time) { set time = to }
+action ahead(each lane: Lane, any vehicle: Vehicle, any speed: Speed in 10 m/s .. 20 m/s, any distance: Length in 1 m .. 120 m) {
+  spawn vehicle ahead distance { lane: lane, speed: speed, does: DriveAhead }
+}
+road corner {
+  map: \"corner.xodr\"
+  start: lane 1/-1 at 105.88 m
+  goal: lane 5/-3 at 75.27 m
+}
+";
+
+/// Loads files given as `(name, text)`; the first is the root.
+fn load_files(files: &[(&str, &str)]) -> Loaded {
+    let map = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/roads/corner.xodr");
+    load(Path::new(files[0].0), &|path| {
+        if path.ends_with("corner.xodr") {
+            return Ok(std::fs::read_to_string(&map).unwrap());
+        }
+        let found = files.iter().find(|(name, _)| Path::new(name) == path);
+        found.map(|(_, text)| (*text).to_owned()).ok_or(ReadError("no such file".to_owned()))
+    })
+    .unwrap()
+}
+
+fn codes(loaded: &Loaded) -> Vec<&'static str> {
+    // `BASE` declares more than each test uses.
+    let all = loaded.diagnostics.iter().map(|found| found.code);
+    all.filter(|code| *code != code::UNUSED).collect()
+}
+
+fn shown(loaded: &Loaded) -> String {
+    let all: Vec<String> =
+        loaded.diagnostics.iter().map(|found| render(found, &loaded.sources, Style::Plain)).collect();
+    all.join("\n")
+}
+
+#[test]
+fn a_file_that_is_used_twice_is_read_once() {
+    let loaded = load_files(&[
+        ("d/a.ava", "language 1\nuse \"b.ava\"\nuse \"../d/c.ava\"\nlet x = y\n"),
+        ("d/b.ava", "language 1\nuse \"c.ava\"\n"),
+        ("d/c.ava", "language 1\nlet y = 3 m\n"),
+    ]);
+    assert_eq!(codes(&loaded), Vec::<&str>::new(), "{}", shown(&loaded));
+}
+
+const SCENARIO: &str = "language 1
+use \"a.ava\"
+scenario s {
+  origin { seed: 7, episode: 412, policy: \"random\", ads: \"modular\", engine: \"plane/1\" }
+  road: corner
+  start { time: Noon, sky: { Rain: High }, signal_phase: 12.5 s, traffic_seed: 18446744073709551615 }
+  steps {
+    0: set_time(to: Night)
+    1: wait()
+    2: ahead(lane: Left) with { vehicle: BoxTruck, speed: 11.25 m/s, distance: 20.1 m }
+  }
+  expect collision with npc#2 at 14.22 s
+  expect counted with npc#2
+  expect avoidable by [cc, fsm] with npc#2
+  expect proc == [0.0, 0.125]
+  expect trace == \"sha256:abababababababababababababababababababababababababababababababab\"
+  expect end == arrived
+}
+";
+
+const CLOCK: &str = "rule chronology on time {
+  Morning -> Morning | Noon
+  Noon -> Noon | Night
+  Night -> Night | Morning
+}
+verdict counted: collision and not repeated
+";
+
+#[test]
+fn scenarios_are_read() {
+    let space = format!("{BASE}{CLOCK}");
+    let loaded = load_files(&[("s.ava", SCENARIO), ("a.ava", &space)]);
+    assert!(codes(&loaded).is_empty(), "{}", shown(&loaded));
+    let (space, scenario) = (loaded.space.unwrap(), loaded.scenario.unwrap());
+    assert_eq!(space.path, Path::new("a.ava"));
+    assert_eq!(scenario.origin.seed, Some(7));
+    assert_eq!(scenario.start.traffic_seed, Some(u64::MAX));
+    let rows: Vec<Option<usize>> = scenario.steps.iter().map(|step| step.row).collect();
+    assert_eq!(rows, [Some(2), None, Some(3)]);
+    assert_eq!(scenario.steps[2].drawn[2].1.number(), 20.1);
+    let npc = Obstacle { kind: ObstacleKind::Npc, number: 2 };
+    let Claim::Collision { obstacle: Some(found), time: Some(time) } = &scenario.claims[0] else { panic!() };
+    assert_eq!(*found, npc);
+    assert!(time.rounds(14.2249) && !time.rounds(14.23));
+    let by = Some(vec!["cc".to_owned(), "fsm".to_owned()]);
+    let avoidable = Claim::Avoidability { class: Avoidability::Avoidable, by, obstacle: Some(npc) };
+    assert_eq!(scenario.claims[2], avoidable);
+    assert_eq!(scenario.claims.len(), 6);
+}
+
+/// A time is compared in the unit and to the decimals in which it is written.
+#[test]
+fn times_may_have_any_unit() {
+    let space = format!("{BASE}{CLOCK}");
+    let figure = |written: &str| {
+        let scenario = SCENARIO.replace("at 14.22 s", &format!("at {written}"));
+        assert_ne!(scenario, SCENARIO);
+        let loaded = load_files(&[("s.ava", &scenario), ("a.ava", &space)]);
+        let scenario = loaded.scenario.clone().unwrap_or_else(|| panic!("{}", shown(&loaded)));
+        let Claim::Collision { time: Some(time), .. } = &scenario.claims[0] else { panic!() };
+        *time
+    };
+    for (written, is, is_not) in [
+        ("0.401 min", 24.06, 24.1),
+        ("24060 ms", 24.0604, 24.061),
+        ("24.06 s", 24.062, 24.07),
+        ("2406e-2 s", 24.062, 24.07),
+        ("0.2406e2 s", 24.062, 24.07),
+        ("24 s", 24.3, 24.6),
+    ] {
+        let figure = figure(written);
+        assert!(figure.rounds(is) && !figure.rounds(is_not), "{written}: {figure:?}");
+        assert!((figure.si() - is).abs() < 0.5, "{written}");
+    }
+}
+
+#[test]
+fn states_can_be_given_as_text() {
+    let loaded = load_files(&[("a.ava", BASE)]);
+    let space = loaded.space.unwrap();
+    let memory = memory_from(&space, "time: Night, sky: { Rain: High }", 0).unwrap();
+    let (time, sky) = space.weather(&memory);
+    assert_eq!(format!("{time:?} {sky:?}"), "Night [High, None, None]");
+    let plain =
+        space.plain_weather().into_iter().fold(memory, |memory, (cell, value)| memory.with(cell, value));
+    assert_eq!(format!("{:?}", space.weather(&plain)), "(Noon, [None, None, None])");
+    let error = memory_from(&space, "tim: Night", 0).unwrap_err();
+    assert_eq!(error, "unknown state `tim`; did you mean `time`?");
+    assert!(memory_from(&space, "}", 0).is_err());
+    let error = memory_from(&space, "time: Night, sky: None, time: Noon", 0).unwrap_err();
+    assert_eq!(error, "`time` is given twice");
+}
+
+#[test]
+fn each_key_of_a_map_begins_and_moves_by_itself() {
+    let text = format!(
+        "{BASE}state calm: Sky -> Bool = {{ Rain: any, Fog: true, _: false }}
+action shower(each how: Level) {{ set sky[Rain] = how }}
+action weather(each what: Sky) {{ set sky[what] = Light }}
+rule slow_rain on sky[Rain] {{
+  None -> None | Light
+  Light -> Light | Moderate
+  Moderate -> High | Light
+  High -> Moderate
+}}
+"
+    );
+    let loaded = load_files(&[("space.ava", &text)]);
+    let space = loaded.space.clone().unwrap_or_else(|| panic!("{}", shown(&loaded)));
+    let calm = space.state("calm").expect("it is declared");
+    let mut rains = [0, 0];
+    for seed in 0..64 {
+        let memory = space.initial_memory(seed);
+        let cells = &memory.cells()[calm.first_cell..];
+        rains[cells[0].variant()] += 1;
+        assert_eq!([cells[1].truth(), cells[2].truth()], [true, false]);
+    }
+    assert!(rains.iter().all(|count| *count > 10), "{rains:?}");
+    let rule = space.rules.iter().position(|rule| rule.name == "slow_rain").expect("it is declared");
+    let bound = space.rows.iter().filter(|row| row.rules.contains(&rule)).map(|row| row.label.as_str());
+    let rows: Vec<&str> = bound.collect();
+    let shower = ["None", "Light", "Moderate", "High"].map(|how| format!("shower(how: {how})"));
+    let expected: Vec<&str> = shower.iter().map(String::as_str).chain(["weather(what: Rain)"]).collect();
+    assert_eq!(rows, expected);
+}
+
+#[test]
+fn what_every_step_does_comes_last_and_keeps_to_the_rules() {
+    let text = format!(
+        "{BASE}state count: Int = 0
+state rest: Int = 0
+on ahead also {{ set count = count + 1, set rest = rest + 2 }}
+on ahead also {{ set count = count * 10 }}
+each step {{
+  set rest = match rest {{ 0 => 0  _ => rest - 1 }}
+  set sky[Wetness] = match sky[Wetness] {{ None => Light  Light => Moderate  _ => High }}
+}}
+rule never_soaked: sky[Wetness] <= Moderate
+"
+    );
+    let loaded = load_files(&[("space.ava", &text)]);
+    let space = loaded.space.clone().unwrap_or_else(|| panic!("{}", shown(&loaded)));
+    let cell = |name: &str| space.state(name).expect("it is declared").first_cell;
+    let action = space.actions.iter().position(|action| action.name == "ahead").expect("it is declared");
+    let locals = vec![Value::Bool(false); space.actions[action].parameters.len()];
+    let after = space.memory_after(action, &locals, &space.initial_memory(0));
+    assert_eq!(after.cells()[cell("count")], Value::Number(10.0));
+    assert_eq!(after.cells()[cell("rest")], Value::Number(1.0));
+    let (road, rules) = (&space.roads[0].facts, RulesInForce::by_default(&space));
+    let wait = |memory: &Memory| space.memory_after_wait(memory, Some(1), Some(road), &rules);
+    let waited = wait(&after);
+    assert_eq!(waited.cells()[cell("rest")], Value::Number(0.0));
+    assert_eq!(waited.cells()[cell("sky") + 2].variant(), 2);
+    // Another level would break the rule, so nothing of it happens.
+    assert_eq!(wait(&waited), waited);
+}
+
+#[test]
+fn whole_numbers_choose_between_arms() {
+    let text = format!(
+        "{BASE}state count: Int = 0
+fn room(n: Int) -> Length = match n {{ 0 | 2 => 30 m  3 => 40 m  _ => 50 m }}
+action more() {{
+  set count = count + 1
+  spawn Sedan ahead room(count) {{ lane: Current, speed: 5 m/s, does: DriveAhead }}
+}}
+rule not_too_often on more: count <= 2
+"
+    );
+    let loaded = load_files(&[("space.ava", &text)]);
+    let space = loaded.space.clone().unwrap_or_else(|| panic!("{}", shown(&loaded)));
+    let count = space.state("count").expect("it is declared").first_cell;
+    let room = space.functions.iter().find(|function| function.name == "room").expect("it is declared");
+    let rooms = [-1.0, 0.0, 1.0, 2.0, 3.0].map(|n| {
+        let locals = [Value::Number(n)];
+        evaluate(&room.body, &space.functions, &Facts::new(&locals, &Memory::default())).number()
+    });
+    assert_eq!(rooms, [50.0, 30.0, 50.0, 30.0, 40.0]);
+    let action = space.actions.iter().position(|action| action.name == "more").expect("it is declared");
+    let memory = space.memory_after(action, &[], &space.initial_memory(0));
+    assert_eq!(memory.cells()[count], Value::Number(1.0));
+}
+
+#[test]
+fn rows_are_masked_only_where_they_are_dead() {
+    let text = format!(
+        "{BASE}road outer {{\n  map: \"corner.xodr\"\n  start: lane 1/-2 at 80 m\n  goal: lane 1/-2 at 100 m\n}}\n\
+         rule lane_exists on ahead: lane in road.lanes\nexpect every(actions, realisable)\n"
+    );
+    let loaded = load_files(&[("a.ava", &text)]);
+    assert!(codes(&loaded).is_empty(), "{}", shown(&loaded));
+    assert!(loaded.remarks.iter().any(|remark| remark.code == "AV0402"), "{:?}", loaded.remarks);
+    let space = loaded.space.unwrap();
+    let masked = |road: usize| {
+        let dead = space.rows.iter().filter(|row| matches!(row.roads[road], Reach::Dead { .. }));
+        dead.map(|row| row.label.as_str()).collect::<Vec<_>>()
+    };
+    assert_eq!(masked(0), Vec::<&str>::new());
+    assert_eq!(masked(1), ["ahead(lane: Right)"]);
+}
+
+#[test]
+fn rewards_and_verdicts_are_computed() {
+    let text = format!(
+        "{BASE}reward {{\n collision => 7.5\n proc > 20 % => proc\n _ => -1\n}}\nverdict counted: collision and not struck\n"
+    );
+    let space = load_files(&[("a.ava", &text)]).space.unwrap();
+    let states = Memory::default();
+    let quiet = OutcomeFacts { proc: 0.5, ..Default::default() };
+    let crash = OutcomeFacts { collision: true, ..quiet };
+    let hit = OutcomeFacts { struck: true, ..crash };
+    assert_eq!(
+        [crash, quiet, Default::default()].map(|outcome| space.reward(outcome, &states)),
+        [7.5, 0.5, -1.0]
+    );
+    assert_eq!([crash, quiet, hit].map(|outcome| space.counts(outcome, &states)), [true, false, false]);
+
+    let loaded = load_files(&[("a.ava", &format!("{BASE}verdict counted: collision and avoidable\n"))]);
+    let space = loaded.space.unwrap();
+    let careless = OutcomeFacts { avoidable: true, ..crash };
+    assert_eq!([crash, careless].map(|outcome| space.counts(outcome, &states)), [false, true]);
+    assert_eq!(space.verdict("unknown", crash, &states), None);
+
+    for (condition, expected) in [
+        ("priority == ego", [true, false, false]),
+        ("priority != ego", [false, true, true]),
+        ("other == priority", [false, true, false]),
+        ("priority in [ego, none]", [true, false, true]),
+    ] {
+        let loaded = load_files(&[("a.ava", &format!("{BASE}verdict counted: {condition}\n"))]);
+        let space = loaded.space.unwrap();
+        let counts = |priority| space.counts(OutcomeFacts { priority, ..crash }, &states);
+        assert_eq!(Priority::ALL.iter().copied().map(counts).collect::<Vec<_>>(), expected, "{condition}");
+    }
+}
+
+#[test]
+fn a_space_without_a_verdict_counts_as_the_paper_does() {
+    let scenario = SCENARIO.replace("expect trace", "expect counted\n  expect trace");
+    let loaded = load_files(&[
+        ("s.ava", &scenario),
+        (
+            "a.ava",
+            &CLOCK.replace("verdict counted: collision and not repeated\n", "").replacen(
+                "rule",
+                &format!("{BASE}rule"),
+                1,
+            ),
+        ),
+    ]);
+    assert!(codes(&loaded).is_empty(), "{}", shown(&loaded));
+    let space = loaded.space.unwrap();
+    let crash = OutcomeFacts { collision: true, ..Default::default() };
+    let states = Memory::default();
+    let again = OutcomeFacts { repeated: true, ..crash };
+    let sudden = OutcomeFacts { sudden: true, ..crash };
+    let found = [crash, again, sudden, Default::default()].map(|outcome| space.counts(outcome, &states));
+    assert_eq!(found, [true, false, false, false]);
+}
+
+#[test]
+fn digests_cover_everything_that_is_used() {
+    const ROOT: &str = "language 1\nuse \"parts/b.ava\"\n";
+    const PART: &str = "language 1\nroad r {\n  map: \"../corner.xodr\"\n  start: lane 1/-1 at 105.88 m\n  goal: lane 5/-3 at 75.27 m\n}\n";
+    let map = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/roads/corner.xodr");
+    let map = std::fs::read_to_string(map).unwrap();
+    let load_at = |folder: &str, root: &str, part: &str, map: &str| {
+        let files = [("s.ava", root), ("a.ava", ROOT), ("parts/b.ava", part), ("corner.xodr", map)];
+        let files = files.map(|(name, text)| (Path::new(folder).join(name), text.to_owned()));
+        let read = |path: &Path| {
+            let found = files.iter().find(|(name, _)| name == path);
+            found.map(|(_, text)| text.clone()).ok_or(ReadError("no such file".to_owned()))
+        };
+        load(&Path::new(folder).join("s.ava"), &read).unwrap()
+    };
+    let space =
+        load_at("", "language 1\nuse \"a.ava\"\nuse \"parts/b.ava\" digest \"sha256:0\"\n", PART, &map);
+    assert_eq!(codes(&space), ["AV0110"]);
+    // The digest that `use` compares is the one that the space has when it is loaded as the root.
+    let plain = load_at("", ROOT, PART, &map);
+    assert!(plain.diagnostics.is_empty(), "{}", shown(&plain));
+    let digest = {
+        let loaded = load_at("", "language 1\nuse \"a.ava\" digest \"sha256:0\"\n", PART, &map);
+        loaded.diagnostics[0].notes[0].rsplit(' ').next().unwrap().to_owned()
+    };
+    let user = format!("language 1\nuse \"a.ava\" digest \"{digest}\"\n");
+    assert_eq!(codes(&load_at("", &user, PART, &map)), Vec::<&str>::new());
+    assert_eq!(codes(&load_at("else/where", &user, PART, &map)), Vec::<&str>::new());
+    assert_eq!(codes(&load_at("/far/away", &user, PART, &map)), Vec::<&str>::new());
+    let shorter = PART.replace("75.27", "70");
+    assert_eq!(codes(&load_at("", &user, &shorter, &map)), ["AV0110"]);
+    assert_eq!(codes(&load_at("", &user, PART, &format!("{map}\n"))), ["AV0110"]);
+    let moved = load_at("else/where", ROOT, PART, &map).space.unwrap();
+    assert_eq!(moved.meaning, plain.space.unwrap().meaning);
+}
+
+#[test]
+fn digests_cover_meaning_and_not_text() {
+    let base = format!(
+        "{BASE}let far = 17 m\nfn twice(x: Length) -> Length = 2 * x\n{CLOCK}rule g on ahead: distance <= far\n"
+    );
+    let meaning = |files: &[(&str, &str)]| {
+        let loaded = load_files(files);
+        loaded.space.clone().unwrap_or_else(|| panic!("{}", shown(&loaded))).meaning.clone()
+    };
+    let of = |text: &str| meaning(&[("a.ava", text)]);
+    let then = of(&base);
+    let same = [
+        ("a comment", base.replace("let far = 17 m", "// why\nlet far = 17 m // m")),
+        ("documentation", base.replace("let far", "/// How far.\nlet far")),
+        ("spaces", base.replace("let far = 17 m", "let  far\n = 17 m")),
+        ("a claim", format!("{base}expect count(actions) == 6\n")),
+        ("the order of helpers", {
+            let far = "let far = 17 m\n";
+            format!("{}{far}", base.replace(far, ""))
+        }),
+    ];
+    for (what, text) in same {
+        assert_eq!(of(&text), then, "{what}");
+    }
+    let (head, helpers) = ("language 1\n", "let far = 17 m\nfn twice(x: Length) -> Length = 2 * x\n");
+    let body = base.replace(helpers, "").replace(head, "");
+    let apart = [
+        ("a.ava", &*format!("{head}use \"helpers.ava\"\n{body}")),
+        ("helpers.ava", &*format!("{head}{helpers}")),
+    ];
+    assert_eq!(meaning(&apart), then, "helpers in a file of their own");
+    let seal = then.seal();
+    let other = [
+        (base.replace("17 m", "13 m"), "changed or new: let `far`"),
+        (base.replace("distance <= far", "distance < far"), "changed or new: rule `g`"),
+        (base.replace("2 * x", "3 * x"), "changed or new: fn `twice`"),
+        (format!("{base}rule h on ahead: distance > 1 m\n"), "changed or new: rule `h`"),
+        (base.replace("rule g on ahead: distance <= far\n", ""), "1 declaration of then missing"),
+    ];
+    for (text, differences) in other {
+        assert_eq!(of(&text).differences(&seal).as_deref(), Some(differences));
+    }
+    let without = [("b.ava", "language 1\nuse \"a.ava\" without g\n"), ("a.ava", &*base)];
+    assert_eq!(meaning(&without).differences(&seal).as_deref(), Some("1 declaration of then missing"));
+}
+
+#[test]
+fn what_is_left_out_takes_with_it_what_it_leaves_empty() {
+    let base = format!("{BASE}{CLOCK}rule awake: time != Night\n");
+    let own = |base: &str, text: &str| {
+        let text = format!("language 1\nuse \"base.ava\" without {text}\n");
+        load_files(&[("own.ava", &text), ("base.ava", base)])
+    };
+    let names = |loaded: &Loaded| -> Vec<String> {
+        let space = loaded.space.clone().unwrap_or_else(|| panic!("{}", shown(loaded)));
+        space.rules.iter().map(|rule| rule.name.clone()).collect()
+    };
+    assert!(names(&own(&base, "set_time")).iter().all(|name| name != "chronology" && name != "awake"));
+    // A new action is bound by the rules that bound the action left out.
+    let kept = names(&own(&base, "set_time\naction noon() { set time = Noon }"));
+    assert!(["chronology", "awake"].iter().all(|rule| kept.iter().any(|name| name == rule)), "{kept:?}");
+    let circle = format!("{base}group one = two\ngroup two = one\n");
+    assert!(codes(&own(&circle, "one")).iter().all(|code| *code != "AV0101"));
+}
+
+#[test]
+fn overrides_stand_where_the_old_one_stood() {
+    let base = format!("{BASE}let far = 12 m\nlet near = far / 2\n{CLOCK}expect count(actions) == 6\n");
+    let own = |text: &str| {
+        let text = format!("language 1\nuse \"base.ava\"\n{text}\n");
+        load_files(&[("own.ava", &text), ("base.ava", &base)])
+    };
+    // Constants may use each other in any order.
+    let sound = own("let farther = 40 m\noverride let far = farther\noverride enum Lane = Left | Current\n\
+         override fn gap(v: Speed) -> Length = near + v * 1 s\nrule g on ahead: distance <= gap(speed)\n\
+         override rule chronology on time {\n Morning -> Night\n Noon -> Noon | Night\n Night -> Morning | Noon\n}\n\
+         action extra() { set time = Night }\nexpect count(actions) == 6");
+    let space = sound.space.clone().unwrap_or_else(|| panic!("{}", shown(&sound)));
+    let labels: Vec<&str> = space.rows.iter().map(|row| row.label.as_str()).collect();
+    assert_eq!(labels.len(), 6);
+    assert_eq!(labels[3..], ["ahead(lane: Left)", "ahead(lane: Current)", "extra()"]);
+    assert_eq!(space.rules[0].name, "chronology");
+    // Two files that do not use each other cannot both override the same constant.
+    let one = "language 1\nuse \"base.ava\"\noverride let far = 1 m\n";
+    let both = "language 1\nuse \"one.ava\"\nuse \"two.ava\"\n";
+    let found = load_files(&[("both.ava", both), ("one.ava", one), ("two.ava", one), ("base.ava", &base)]);
+    assert_eq!(codes(&found), ["AV0112"], "{}", shown(&found));
+    let last = "language 1\nuse \"one.ava\"\noverride let far = 2 m\n";
+    let found = load_files(&[("last.ava", last), ("one.ava", one), ("base.ava", &base)]);
+    assert_eq!(codes(&found), Vec::<&str>::new(), "{}", shown(&found));
+}
+
+#[test]
+fn names_of_files_nearby_are_suggested() {
+    let mut loaded = load_files(&[("a.ava", "language 1\nlet far = wide + 1 m\n")]);
+    let nearby = [("b.ava".to_owned(), "language 1\nlet wide = 3 m\n".to_owned())];
+    suggest_uses(&mut loaded, &nearby);
+    assert_eq!(
+        loaded.diagnostics[0].help.as_deref(),
+        Some("`wide` is declared in `b.ava`: add `use \"b.ava\"`")
+    );
+    assert_eq!(loaded.diagnostics[0].fixes[0].edits[0].text, "\nuse \"b.ava\"");
+}
+
+#[test]
+fn ten_thousand_actions_are_no_trouble() {
+    let mut text = "language 1\nstate count: Int = 0\n".to_owned();
+    for number in 0..10_000 {
+        text.push_str(&format!("action a{number}() {{ set count = {number} }}\n"));
+    }
+    let loaded = load_files(&[("a.ava", &text)]);
+    assert_eq!(codes(&loaded), Vec::<&str>::new());
+    assert_eq!(loaded.space.unwrap().rows.len(), 10_000);
+}
+
+mod hostile {
+    use proptest::prelude::*;
+
+    use crate::syntax::Diagnostic;
+
+    use super::*;
+
+    /// Deletes, doubles and swaps words, as the edits say.
+    fn scrambled(text: &str, edits: Vec<(usize, usize, u8)>) -> String {
+        let mut words: Vec<&str> = text.split(' ').collect();
+        for (at, other, edit) in edits {
+            let (at, other) = (at % words.len(), other % words.len());
+            match edit {
+                0 => {
+                    words.remove(at);
+                }
+                1 => words[at] = words[other],
+                _ => words.swap(at, other),
+            }
+        }
+        words.join(" ")
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(300))]
+
+        /// A scrambled file gives a space or an error, and no panic.
+        #[test]
+        fn scrambled_spaces_do_not_panic(edits in prop::collection::vec((0_usize..400, 0_usize..400, 0_u8..3), 1..4)) {
+            let text = format!("{BASE}{CLOCK}rule gap_rule on ahead: distance == gap(speed)\nexpect count(actions) == 6\n");
+            let loaded = load_files(&[("a.ava", &scrambled(&text, edits))]);
+            prop_assert_eq!(loaded.space.is_none(), loaded.diagnostics.iter().any(Diagnostic::is_error));
+            shown(&loaded);
+        }
+
+        #[test]
+        fn scrambled_scenarios_do_not_panic(edits in prop::collection::vec((0_usize..200, 0_usize..200, 0_u8..3), 1..4)) {
+            let space = format!("{BASE}{CLOCK}");
+            let loaded = load_files(&[("s.ava", &scrambled(SCENARIO, edits)), ("a.ava", &space)]);
+            shown(&loaded);
+        }
+    }
+}
+
+#[test]
+fn rules_of_the_first_step_bind_the_start() {
+    let text = format!(
+        "{BASE}state dark: Bool = any
+action switch(each to: Bool) {{ set dark = to }}
+rule begins: step == 0 implies dark
+rule early: elapsed >= 12 s or dark
+"
+    );
+    let loaded = load_files(&[("space.ava", &text)]);
+    let space = loaded.space.clone().unwrap_or_else(|| panic!("{}", shown(&loaded)));
+    let dark = space.state("dark").expect("it is declared").first_cell;
+    let rules = RulesInForce::by_default(&space);
+    for seed in 0..20 {
+        let memory = space.memory_at_start(&space.roads[0], &rules, seed).expect("it may be dark");
+        assert_eq!(memory.cells()[dark], Value::Bool(true), "seed {seed}");
+    }
+}
+
+#[test]
+fn hit_and_near_name_bodies_of_ones_own() {
+    let text = format!(
+        "{BASE}body Scooter {{ like: Motorcycle, length: 1.8 m }}
+reward {{
+  near == Scooter => 3
+  hit in [Motorcycle, Sedan] => 2
+  _ => 0
+}}
+"
+    );
+    let loaded = load_files(&[("space.ava", &text)]);
+    let space = loaded.space.clone().unwrap_or_else(|| panic!("{}", shown(&loaded)));
+    let scooter = BodyWord { like: Body::Motorcycle, own: Some(0) };
+    let reward = |hit: Option<BodyWord>, near: Option<BodyWord>| {
+        space.reward(OutcomeFacts { hit, near, ..OutcomeFacts::default() }, &space.initial_memory(0))
+    };
+    let motorcycle = BodyWord::engine(Body::Motorcycle);
+    assert_eq!(reward(None, Some(scooter)), 3.0);
+    assert_eq!(reward(None, Some(motorcycle)), 0.0);
+    // What is like a motorcycle is one.
+    assert_eq!(reward(Some(scooter), None), 2.0);
+    assert_eq!(reward(Some(motorcycle), None), 2.0);
+    assert_eq!(reward(Some(BodyWord::engine(Body::SUV)), None), 0.0);
+    assert_eq!(space.body_name(scooter), "Scooter");
+}
+
+/// Long sums are read, checked and evaluated within the stack of a thread.
+#[test]
+fn the_longest_sums_are_checked() {
+    let sum = format!("1 m{}", " + 1 m".repeat(128));
+    let text = format!(
+        "{BASE}fn long(x: Length) -> Length = {}
+rule far on ahead: long(distance) >= distance + {}
+",
+        sum.replace("1 m", "x"),
+        sum.replacen(" + 1 m", "", 4)
+    );
+    let loaded = load_files(&[("space.ava", &text)]);
+    let space = loaded.space.clone().unwrap_or_else(|| panic!("{}", shown(&loaded)));
+    let long = space.functions.iter().find(|function| function.name == "long").expect("it is declared");
+    let value =
+        evaluate(&long.body, &space.functions, &Facts::new(&[Value::Number(0.5)], &Memory::default()));
+    assert_eq!(value, Value::Number(64.5));
+}
+
+/// A file that only uses several others is a space: its claims, digest and differences are those of all of them.
+#[test]
+fn a_file_that_uses_several_is_a_space_of_its_own() {
+    let with = |more: &str| {
+        let first = format!("{BASE}expect count(actions) == 6\n");
+        let root = "language 1\nuse \"a.ava\"\nuse \"b.ava\"\n";
+        let more = format!("language 1\nstate calm: Bool = false\n{more}");
+        load_files(&[("s.ava", root), ("a.ava", &first), ("b.ava", &more)])
+    };
+    let (one, other) = (with("action rest() { set calm = true }\n"), with(""));
+    assert!(codes(&one).is_empty() && codes(&other).is_empty(), "{}", shown(&one));
+    let space = one.space.as_ref().expect("it has no mistakes");
+    assert_eq!((space.path.as_path(), space.rows.len()), (Path::new("s.ava"), 7));
+    assert_eq!(differences(&other, &one).map(|found| found.len()), Some(2), "the action and its row");
+}
+
+/// `diff` tells every change of the digest, also one that changes neither a row nor a range.
+#[test]
+fn every_declaration_that_differs_is_told() {
+    let more = "state calm: Bool = false
+on ahead also { set calm = true }
+each step { set calm = false }
+rule calm_first on ahead: speed <= road.limit
+rule roomy: spawn_gap >= safety_gap
+reward {
+  collision => 1
+  _ => 0
+}
+";
+    let loaded = |text: &str| load_files(&[("a.ava", text)]);
+    let text = format!("{BASE}{CLOCK}{more}");
+    let old = loaded(&text);
+    assert!(codes(&old).is_empty(), "{}", shown(&old));
+    let told = |from: &str, to: &str| -> String {
+        assert!(text.contains(from), "{from}");
+        let new = loaded(&text.replacen(from, to, 1));
+        assert!(codes(&new).is_empty(), "{}", shown(&new));
+        let line = |found: &crate::check::Difference| {
+            format!("{} {}: {}", found.change, found.subject, found.detail)
+        };
+        let found = differences(&old, &new).expect("both are sound");
+        found.iter().map(line).collect::<Vec<_>>().join("\n")
+    };
+    assert_eq!(told("language 1\n", "language 1\n// looked at\n"), "");
+    assert_eq!(
+        told("distance {", "distance + 5 m {"),
+        "changed action `ahead`: spawn vehicle ahead distance { lane: lane, speed: speed, does: DriveAhead } → \
+         spawn vehicle ahead distance + 5 m { lane: lane, speed: speed, does: DriveAhead }"
+    );
+    for (from, to, wanted) in [
+        ("speed: speed, does", "speed: speed - 1 m/s, does", "changed action `ahead`: spawn vehicle "),
+        ("speed: speed, does", "speed: speed, colour: Red, does", "changed action `ahead`: spawn vehicle "),
+        ("{ set time = to }", "{ set time = to set sky = None }", "changed action `set_time`: "),
+        ("set calm = false", "set calm = calm", "changed `each step`: "),
+        ("set calm = true", "set calm = not calm", "changed `on ahead also`: "),
+        ("collision => 1", "collision => 2", "changed `reward`: collision => 1 → collision => 2"),
+        ("and not repeated", "and not sudden", "changed verdict `counted`: "),
+        ("at 105.88 m", "at 100 m", "changed road `corner`: start: lane 1/-1 at 105.88 m → "),
+        ("spawn_gap >=", "spawn_gap >", "changed rule `roomy`: "),
+        ("speed <= road.limit", "speed <= 90 % * road.limit", "tightened rule `calm_first`: speed "),
+        ("rule roomy: spawn_gap >= safety_gap\n", "", "removed rule `roomy`: rule roomy: spawn_gap"),
+        ("rule roomy", "optional rule roomy", "loosened rule `roomy`: it is optional now"),
+    ] {
+        assert!(told(from, to).starts_with(wanted), "`{wanted}` in\n{}", told(from, to));
+    }
+    let rules = "rule calm_first on ahead: speed <= road.limit\nrule roomy: spawn_gap >= safety_gap\n";
+    let turned = "rule roomy: spawn_gap >= safety_gap\nrule calm_first on ahead: speed <= road.limit\n";
+    assert_eq!(told(rules, turned), "moved rule `roomy`: it comes before rule `calm_first` now");
+}

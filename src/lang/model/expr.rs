@@ -1,0 +1,176 @@
+//! Typed expressions: names are resolved, units are gone (all numbers are SI), every type fits.
+
+use crate::model::space::BodyWord;
+use crate::model::value::{EnumIndex, Type};
+use crate::model::vocabulary::{Fact, Known, LaneChoice, WordFact};
+use crate::syntax::ast::Span;
+pub use crate::syntax::ast::{Arithmetic, Comparison};
+use avastra_base::units::Rational;
+
+/// An expression with its type and the place where it was written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Expr {
+    pub kind: ExprKind,
+    pub ty: Type,
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum ExprKind {
+    Bool(bool),
+    Number(Rational),
+    Variant(EnumIndex, usize),
+    /// A parameter of the function or action around it, by position.
+    Local(usize),
+    /// A cell of the memory that is known by position.
+    Cell(usize),
+    /// A map in the memory: its first cell and the key.
+    CellAt(usize, Box<Expr>),
+    Fact(Fact),
+    /// `npc#2.speed`: a fact about the road user with that number. NaN while it is not there.
+    OfRoadUser(u32, Fact),
+    /// A function by its index in `Space::functions`.
+    Call(usize, Vec<Expr>),
+    Not(Box<Expr>),
+    Negate(Box<Expr>),
+    Arithmetic(Arithmetic, Box<Expr>, Box<Expr>),
+    /// Compares numbers, or variants of one ordered enum.
+    Compare(Comparison, Box<Expr>, Box<Expr>),
+    And(Box<Expr>, Box<Expr>),
+    Or(Box<Expr>, Box<Expr>),
+    Implies(Box<Expr>, Box<Expr>),
+    /// Both ends included.
+    InRange(Box<Expr>, Box<Expr>, Box<Expr>),
+    InList(Box<Expr>, Vec<Expr>),
+    /// Membership in `road.lanes`; the list gives the lane for each variant of the expression's enum.
+    InLanes(Box<Expr>, Vec<LaneChoice>),
+    /// `road == corner`, `road in [corner, boulevard]`: whether the road is one of these.
+    OnRoad(Vec<String>),
+    /// `priority == ego`, `ego.light in [Yellow, Red]`: whether the fact is one of these words.
+    IsWord(WordFact, Vec<String>),
+    /// `hit == Scooter`, `near in [Sedan, SUV]`: whether the fact is one of these bodies.
+    IsBody(WordFact, Vec<BodyWord>),
+    /// The arm for each variant of the subject's enum is `arms[arm_of[variant]]`.
+    Match {
+        subject: Box<Expr>,
+        arm_of: Vec<usize>,
+        arms: Vec<Expr>,
+    },
+}
+
+impl Expr {
+    /// Calls `visit` for this expression and everything inside it; bodies of called functions are
+    /// not entered, because they know only their arguments.
+    pub fn walk(&self, visit: &mut dyn FnMut(&Expr)) {
+        visit(self);
+        self.each_part(&mut |part| part.walk(visit));
+    }
+
+    /// Calls `visit` for the expressions of which this one is made.
+    fn each_part(&self, visit: &mut dyn FnMut(&Expr)) {
+        match &self.kind {
+            ExprKind::Bool(_)
+            | ExprKind::Number(_)
+            | ExprKind::Variant(..)
+            | ExprKind::Local(_)
+            | ExprKind::Cell(_)
+            | ExprKind::OnRoad(_)
+            | ExprKind::IsWord(..)
+            | ExprKind::IsBody(..)
+            | ExprKind::OfRoadUser(..)
+            | ExprKind::Fact(_) => {}
+            ExprKind::CellAt(_, inner)
+            | ExprKind::Not(inner)
+            | ExprKind::Negate(inner)
+            | ExprKind::InLanes(inner, _) => visit(inner),
+            ExprKind::Call(_, arguments) => arguments.iter().for_each(visit),
+            ExprKind::Arithmetic(_, left, right)
+            | ExprKind::Compare(_, left, right)
+            | ExprKind::And(left, right)
+            | ExprKind::Or(left, right)
+            | ExprKind::Implies(left, right) => {
+                visit(left);
+                visit(right);
+            }
+            ExprKind::InRange(value, low, high) => {
+                visit(value);
+                visit(low);
+                visit(high);
+            }
+            ExprKind::InList(value, list) => {
+                visit(value);
+                list.iter().for_each(visit);
+            }
+            ExprKind::Match { subject, arms, .. } => {
+                visit(subject);
+                arms.iter().for_each(visit);
+            }
+        }
+    }
+
+    /// Number of its operations, names and literals; those of called functions do not count.
+    pub fn operations(&self) -> usize {
+        let mut count = 0;
+        self.walk(&mut |_| count += 1);
+        count
+    }
+
+    /// How deep its parts stand in one another.
+    pub fn height(&self) -> u32 {
+        let mut deepest = 0;
+        self.each_part(&mut |part| deepest = deepest.max(part.height()));
+        deepest + 1
+    }
+
+    /// Whether the expression or a part of it passes the test.
+    pub fn any(&self, mut test: impl FnMut(&ExprKind) -> bool) -> bool {
+        let mut found = false;
+        self.walk(&mut |expr| found |= test(&expr.kind));
+        found
+    }
+
+    /// From when on all facts are known that the expression names; [`Known::Road`] if it names none.
+    pub fn known(&self) -> Known {
+        let mut latest = Known::Road;
+        self.walk(&mut |expr| match &expr.kind {
+            ExprKind::Fact(fact) => latest = latest.max(fact.known()),
+            ExprKind::IsWord(fact, _) | ExprKind::IsBody(fact, _) => latest = latest.max(fact.known()),
+            _ => {}
+        });
+        latest
+    }
+
+    /// Whether it asks about the moment in the world ([`Known::World`]).
+    pub fn asks_the_world(&self) -> bool {
+        self.any(|kind| match kind {
+            ExprKind::Fact(fact) => fact.known() == Known::World,
+            ExprKind::IsWord(fact, _) => fact.known() == Known::World,
+            _ => false,
+        })
+    }
+
+    /// Whether the start of an episode answers all that it asks: when `step` and `elapsed` are 0.
+    pub(crate) fn is_known_at_start(&self) -> bool {
+        !self.any(|kind| match kind {
+            ExprKind::Fact(Fact::StepNumber | Fact::Elapsed) => false,
+            ExprKind::Fact(fact) => fact.known() > Known::Road,
+            ExprKind::IsWord(fact, _) | ExprKind::IsBody(fact, _) => fact.known() > Known::Road,
+            _ => false,
+        })
+    }
+
+    /// Whether it asks about the moment, or about more of a spawn than its gaps.
+    pub(crate) fn asks_about_moment(&self) -> bool {
+        let about_npc = |kind: &ExprKind| match kind {
+            ExprKind::Fact(fact) => {
+                fact.known() == Known::Spawn && !matches!(fact, Fact::SpawnGap | Fact::SafetyGap)
+            }
+            _ => false,
+        };
+        self.asks_the_world() || self.any(about_npc)
+    }
+
+    pub fn reads_memory(&self) -> bool {
+        self.any(|kind| matches!(kind, ExprKind::Cell(_) | ExprKind::CellAt(..)))
+    }
+}

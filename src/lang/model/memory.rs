@@ -1,0 +1,196 @@
+//! How the memory begins and how actions change it.
+
+use crate::model::effort;
+use crate::model::eval::{Facts, evaluate};
+use crate::model::expr::ExprKind;
+use crate::model::rules::RulesInForce;
+use crate::model::space::{Initial, Road, RoadFacts, RuleBody, SetDef, Space, StateDef, StateMeaning};
+use crate::model::value::{Memory, Type, Value};
+use crate::model::vocabulary::{Level, TimeOfDay};
+use avastra_base::rng;
+use avastra_base::rng::{Rng, Stream};
+
+impl Space {
+    /// The states as they are declared; those that begin as `any` are drawn from [`Stream::Reset`], whatever the rules
+    /// say. [`Space::memory_at_start`] also asks the rules.
+    pub fn initial_memory(&self, seed: u64) -> Memory {
+        let mut rng = rng::stream(seed, Stream::Reset, 0);
+        let mut memory = Memory::default();
+        for state in &self.states {
+            for initial in &state.initial {
+                let value = match initial {
+                    Initial::Any => self.draw(state.ty, &mut rng),
+                    Initial::Value(expr) => {
+                        evaluate(expr, &self.functions, &Facts::new(&[], &Memory::default()))
+                    }
+                };
+                memory.cells.push(value);
+            }
+        }
+        memory
+    }
+
+    /// The memories with which an episode may begin on a road, at most `count_max`, and whether these are all.
+    pub(crate) fn initial_memories(
+        &self,
+        road: &Road,
+        rules: &RulesInForce,
+        count_max: usize,
+    ) -> (Vec<Memory>, bool) {
+        let begun = self.initial_memory(0);
+        let open: Vec<(usize, Vec<(u32, Value)>)> = self
+            .open_cells()
+            .into_iter()
+            .map(|cell| (cell, self.drawn_values(self.state_of(cell).ty)))
+            .collect();
+        // Memories are numbered, the last cell varying fastest, so that none is made beyond `count_max`.
+        let all = self.start_count();
+        let are_all = all <= count_max;
+        let numbered = |number: usize| {
+            effort::spend(begun.cells.len());
+            let (mut left, mut memory) = (number, begun.clone());
+            for (cell, values) in open.iter().rev() {
+                memory.cells[*cell] = values[left % values.len()].1;
+                left /= values.len();
+            }
+            memory
+        };
+        let mut memories: Vec<Memory> = (0..all.min(count_max)).map(numbered).collect();
+        memories.retain(|memory| self.broken_start(memory, &road.facts, rules).is_none());
+        if memories.is_empty() {
+            memories.extend(self.memory_at_start(road, rules, 0));
+        }
+        (memories, are_all)
+    }
+
+    /// The number of memories with which an episode may begin, before any rule; at most `usize::MAX`.
+    pub(crate) fn start_count(&self) -> usize {
+        let open = self.open_cells();
+        effort::spend(open.len());
+        let counts = open.into_iter().map(|cell| self.drawn_values(self.state_of(cell).ty).len());
+        counts.fold(1, usize::saturating_mul)
+    }
+
+    /// A state by name.
+    pub fn state(&self, name: &str) -> Option<&StateDef> {
+        self.states.iter().find(|state| state.name == name)
+    }
+
+    /// What the memory says about the world: time of day, and levels of rain, fog and wetness. Without such
+    /// a state it is noon with a clear sky.
+    pub fn weather(&self, memory: &Memory) -> (TimeOfDay, [Level; 3]) {
+        let (mut time, mut sky) = (TimeOfDay::Noon, [Level::None; 3]);
+        for state in &self.states {
+            let cells = &memory.cells[state.first_cell..][..state.cells];
+            match &state.meaning {
+                StateMeaning::Private => {}
+                StateMeaning::Time(words) => time = words[cells[0].variant()],
+                StateMeaning::Sky(phenomena, levels) => {
+                    for (phenomenon, cell) in phenomena.iter().zip(cells) {
+                        sky[*phenomenon as usize] = levels[cell.variant()];
+                    }
+                }
+            }
+        }
+        (time, sky)
+    }
+
+    /// The cells for weather and time of day with their plainest values: noon, and the level `None`. Cells
+    /// whose enum has no such word are left out.
+    pub fn plain_weather(&self) -> Vec<(usize, Value)> {
+        let mut plain = Vec::new();
+        for state in &self.states {
+            let variant = match &state.meaning {
+                StateMeaning::Private => None,
+                StateMeaning::Time(words) => words.iter().position(|word| *word == TimeOfDay::Noon),
+                StateMeaning::Sky(_, levels) => levels.iter().position(|level| *level == Level::None),
+            };
+            if let (Some(variant), Type::Enum(of)) = (variant, state.ty) {
+                let cells = state.first_cell..state.first_cell + state.cells;
+                plain.extend(cells.map(|cell| (cell, Value::Variant(of, variant))));
+            }
+        }
+        plain
+    }
+
+    /// The memory after a step with this action and these parameter values.
+    pub fn memory_after(&self, action: usize, locals: &[Value], before: &Memory) -> Memory {
+        effort::spend(before.cells.len());
+        let mut after = before.clone();
+        self.sets(Some(action)).for_each(|set| self.change(&mut after, set, locals));
+        after
+    }
+
+    /// The memory after a step without an action. If the effects of every step would break a rule in force that
+    /// stands for all states or orders their changes, or give a state no value, they do not happen. `step` is its number, if it is known.
+    pub fn memory_after_wait(
+        &self,
+        before: &Memory,
+        step: Option<u64>,
+        road: Option<&RoadFacts>,
+        rules: &RulesInForce,
+    ) -> Memory {
+        if self.each_step.is_empty() {
+            return before.clone();
+        }
+        effort::spend(before.cells.len());
+        let mut after = before.clone();
+        self.sets(None).for_each(|set| self.change(&mut after, set, &[]));
+        let is_broken = |rule: usize| {
+            let RuleBody::Moves { cell, allowed, .. } = &self.rules[rule].body else {
+                return !self.stands(rule, &after, road, step);
+            };
+            let [from, to] = [before, &after].map(|memory| memory.cells[*cell].variant());
+            self.may_set_each_step(*cell) && !allowed[from][to]
+        };
+        let is_kept = after.cells.iter().all(|value| value.is_kept());
+        if !is_kept || rules.all().any(is_broken) { before.clone() } else { after }
+    }
+
+    /// Whether the effects of every step may set a cell.
+    pub(crate) fn may_set_each_step(&self, cell: usize) -> bool {
+        effort::spend(self.each_step.len());
+        self.sets(None).any(|set| self.sets_cell(set, cell))
+    }
+
+    /// Whether an effect sets a cell, as far as its key is written out.
+    pub(crate) fn sets_cell(&self, set: &SetDef, cell: usize) -> bool {
+        let position = self.states[set.state].position_of(cell);
+        position.is_some_and(|position| match set.key.as_ref().map(|key| &key.kind) {
+            Some(ExprKind::Variant(_, key)) => *key == position,
+            _ => true,
+        })
+    }
+
+    fn change(&self, memory: &mut Memory, set: &SetDef, locals: &[Value]) {
+        let facts = Facts::new(locals, memory);
+        let value = evaluate(&set.value, &self.functions, &facts);
+        let key = set.key.as_ref().map(|key| evaluate(key, &self.functions, &facts).variant());
+        let state = &self.states[set.state];
+        effort::spend(key.map_or(state.cells, |_| 1));
+        match key {
+            Some(key) => memory.cells[state.first_cell + key] = value,
+            None => memory.cells[state.first_cell..][..state.cells].fill(value),
+        }
+    }
+
+    /// Draws a value of a type. The checker allows `any` states only for finite types.
+    fn draw(&self, ty: Type, rng: &mut Rng) -> Value {
+        match ty {
+            Type::Bool => Value::Bool(rng::below(rng, 2) == 1),
+            Type::Enum(of) => {
+                let odds = &self.enums[of.0].odds;
+                let mut ticket = rng::below(rng, odds.iter().sum());
+                let drawn = odds.iter().position(|odds| match ticket.checked_sub(*odds) {
+                    Some(rest) => {
+                        ticket = rest;
+                        false
+                    }
+                    None => true,
+                });
+                Value::Variant(of, drawn.expect("the ticket is below the sum of the odds"))
+            }
+            Type::Int | Type::Quantity(_) => Value::Number(0.0),
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! What a space, a scenario and a policy *are*, once they are checked. `check` builds them, `prove` reasons
+//! about them, and everything to the right only reads them.
+//!
+//! Read [`Space`] first: actions, rules, states and roads, with every name resolved and every number in SI.
+//! Its expressions are [`expr::Expr`], and [`evaluate`] is their one evaluator. A [`Row`] is one entry of the
+//! action table; [`Memory`] holds the values of the states during an episode.
+
+pub mod body;
+pub mod code;
+mod digest;
+pub(crate) mod effort;
+mod eval;
+pub mod expr;
+mod interval;
+mod limits;
+mod meaning;
+mod memory;
+mod on_route;
+pub mod policy;
+mod row;
+pub mod rules;
+pub mod scenario;
+mod space;
+mod value;
+pub mod vocabulary;
+
+pub use digest::{digest, digest_text};
+pub use eval::{
+    Facts, JUNCTION_AHEAD_M_MAX, MomentFacts, NpcFacts, OutcomeFacts, SpawnFacts, WorldFacts, evaluate,
+};
+pub use interval::{End, Interval};
+pub use limits::{
+    AMBIENT_MAX, COMMANDED_MAX, EGO_ACCELERATION_MPS2_MAX, LIMIT_PART_MAX, SIGNAL_PHASE_S, SPAWN_DISTANCE_M,
+    SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, TICK_MS,
+};
+pub use limits::{rounded_into, spawn_out_of_bounds};
+pub use meaning::Meaning;
+pub use on_route::stretches;
+pub use on_route::{NEAR_JUNCTION_M, OnRoute, Stretch, junction_ahead_m};
+pub use policy::Policy;
+pub use row::locals;
+pub use row::{Reach, Row};
+pub use rules::{NoStart, RulesInForce, UnknownRule};
+pub use scenario::{
+    Avoidability, Claim, DRIVERS, ENDS, Figure, MODULES, Obstacle, ObstacleKind, Origin, Scenario,
+    ScenarioStart, ScenarioStep, Trigger, ticks_s,
+};
+pub use space::{
+    ActionDef, BodyDef, BodyWord, COUNTED, Domain, EffectDef, EnumDef, EpisodeDef, FnDef, GroupDef, Initial,
+    Parameter, RewardCase, Road, RoadFacts, RuleBinding, RuleBody, RuleDef, SetDef, Space, SpawnDef,
+    StateDef, StateMeaning, VerdictDef, WordExpr,
+};
+pub(crate) use value::STATE_MAX;
+pub use value::{EnumIndex, Memory, Type, Value};

@@ -1,0 +1,109 @@
+//! What a row's values must satisfy, piece by piece: each `where`, and each rule that binds the action, with the
+//! parameters that decide it.
+
+use std::collections::BTreeSet;
+
+use crate::model::effort;
+use crate::model::expr::{Expr, ExprKind};
+use crate::model::rules::{Demand, locals, rules_by_action, state_at};
+use crate::model::space::{ActionDef, SetDef, Space, StateDef};
+
+/// One `where` or one rule of an action.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Clause {
+    pub source: Source,
+    /// The parameters that decide it: those that it names, and those that decide the states which it reads,
+    /// because it reads them as they are after the action.
+    needs: Vec<usize>,
+    /// Whether it depends on what the step does to the memory.
+    pub reads_effects: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Source {
+    /// The `where` of the parameter with that index.
+    Where(usize),
+    /// The rule with that index.
+    Rule(usize),
+}
+
+impl Clause {
+    pub fn needs(&self, local: usize) -> bool {
+        self.needs.contains(&local)
+    }
+
+    pub fn needs_any(&self, locals: &[usize]) -> bool {
+        locals.iter().any(|local| self.needs(*local))
+    }
+
+    /// The rule; `None` for a `where`.
+    pub fn rule(&self) -> Option<usize> {
+        match self.source {
+            Source::Where(_) => None,
+            Source::Rule(rule) => Some(rule),
+        }
+    }
+}
+
+/// By action: its `where`s, then the rules that bind it, in the order of their declarations.
+pub fn clauses(space: &Space) -> Vec<Vec<Clause>> {
+    let Space { actions, rules, states, .. } = space;
+    let binding = rules_by_action(rules, actions.len());
+    let of_action = |(index, action): (usize, &ActionDef)| {
+        let sets: Vec<&SetDef> = space.sets(Some(index)).collect();
+        let mut found = Vec::new();
+        for (parameter, definition) in action.parameters.iter().enumerate() {
+            if let Some(condition) = &definition.condition {
+                let (source, mut needs) = (Source::Where(parameter), locals(condition));
+                let read = states_read(condition, states);
+                let reads_effects = add_effects(&sets, states, read, &mut needs);
+                found.push(Clause { source, needs, reads_effects });
+            }
+        }
+        for &rule in &binding[index] {
+            effort::spend(sets.len());
+            if effort::is_spent() {
+                break;
+            }
+            let (mut needs, read) = match rules[rule].body.demand(index) {
+                Some(Demand::Holds(condition)) => (locals(condition), states_read(condition, states)),
+                Some(Demand::Moves { state, .. }) => (Vec::new(), vec![state]),
+                None => continue,
+            };
+            let reads_effects = add_effects(&sets, states, read, &mut needs);
+            found.push(Clause { source: Source::Rule(rule), needs, reads_effects });
+        }
+        found
+    };
+    actions.iter().enumerate().map(of_action).collect()
+}
+
+/// Adds the parameters that decide these states after the step; whether the step sets any of them.
+fn add_effects(sets: &[&SetDef], states: &[StateDef], read: Vec<usize>, needs: &mut Vec<usize>) -> bool {
+    let mut is_set = false;
+    let mut read: BTreeSet<usize> = read.into_iter().collect();
+    // Backwards, because an effect reads what the effects before it have set.
+    for SetDef { state, key, value, .. } in sets.iter().rev() {
+        if !read.contains(state) {
+            continue;
+        }
+        is_set = true;
+        for part in key.iter().chain([value]) {
+            needs.extend(locals(part));
+            needs.sort_unstable();
+            needs.dedup();
+            read.extend(states_read(part, states));
+        }
+    }
+    is_set
+}
+
+/// The states that an expression names, by index.
+pub fn states_read(expr: &Expr, states: &[StateDef]) -> Vec<usize> {
+    let mut found = Vec::new();
+    expr.walk(&mut |part| {
+        let (ExprKind::Cell(cell) | ExprKind::CellAt(cell, _)) = part.kind else { return };
+        found.push(state_at(cell, states));
+    });
+    found
+}

@@ -1,0 +1,268 @@
+//! The states with which an episode may begin.
+//!
+//! A rule without `on` that asks about states, and perhaps the road, `step` and `elapsed`, holds from the start on ([`RuleDef::start`]):
+//! the actions that set such a state keep it, and no other action can break it. A rule with `on` is about the actions
+//! that it names, and says nothing about the start.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::model::effort;
+use crate::model::eval::{Facts, MomentFacts, WorldFacts, evaluate};
+use crate::model::expr::{Expr, ExprKind};
+use crate::model::rules::RulesInForce;
+use crate::model::space::{Initial, Road, RoadFacts, RuleDef, Space, StateDef};
+use crate::model::value::{Memory, Type, Value};
+use avastra_base::rng;
+use avastra_base::rng::{Rng, Stream};
+
+/// The most combinations of drawn values that are looked at for rules that share states.
+const COMBINATIONS_MAX: usize = 100_000;
+
+/// No episode can begin so.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("on `{road}` {}", self.words())]
+pub struct NoStart {
+    pub road: String,
+    pub rule: String,
+    /// The index of the rule.
+    pub(crate) index: usize,
+    /// The cells that the rule reads.
+    pub(crate) cells: Vec<usize>,
+    /// Whether states were left untried, because there are too many.
+    pub(crate) is_too_large: bool,
+}
+
+impl NoStart {
+    /// What is wrong, without the road.
+    pub(crate) fn words(&self) -> String {
+        match self.is_too_large {
+            true => format!("whether an episode can begin under rule `{}` is not known", self.rule),
+            false => format!("no episode can begin under rule `{}`", self.rule),
+        }
+    }
+}
+
+impl Space {
+    /// The memory at the start of an episode: fixed states as declared, `any` states drawn from what the rules in
+    /// force leave on the road.
+    ///
+    /// # Errors
+    /// If a rule leaves nothing.
+    pub fn memory_at_start(&self, road: &Road, rules: &RulesInForce, seed: u64) -> Result<Memory, NoStart> {
+        self.memory_from_start(self.initial_memory(seed), &self.open_cells(), road, rules, seed)
+    }
+
+    /// As [`Space::memory_at_start`], where only the given cells may still be drawn, and the others are fixed.
+    pub(crate) fn memory_from_start(
+        &self,
+        begun: Memory,
+        open: &[usize],
+        road: &Road,
+        rules: &RulesInForce,
+        seed: u64,
+    ) -> Result<Memory, NoStart> {
+        // What the first draw cannot keep is drawn again from all that is left, with the same odds.
+        let mut memory = begun;
+        if self.broken_start(&memory, &road.facts, rules).is_none() {
+            return Ok(memory);
+        }
+        let mut rng = rng::stream(seed, Stream::Reset, 1);
+        for group in self.groups(rules) {
+            let left = Starts::of(self, &group, &memory, open, road)?;
+            memory = left.draw(&mut rng);
+        }
+        Ok(memory)
+    }
+
+    /// The first rule in force that a start breaks on a road, by index.
+    pub(crate) fn broken_start(
+        &self,
+        memory: &Memory,
+        road: &RoadFacts,
+        rules: &RulesInForce,
+    ) -> Option<usize> {
+        rules.all().find(|rule| !self.stands(*rule, memory, Some(road), Some(0)))
+    }
+
+    /// Whether the states obey what a rule says about them where no action is judged: at the start, and after a step
+    /// without an action. Where the step is not known, a rule that asks for it is taken to be obeyed.
+    pub(crate) fn stands(
+        &self,
+        rule: usize,
+        memory: &Memory,
+        road: Option<&RoadFacts>,
+        step: Option<u64>,
+    ) -> bool {
+        let Some(condition) = &self.rules[rule].start else { return true };
+        let step = match step {
+            None if condition.asks_the_world() => return true,
+            step => step.unwrap_or(0),
+        };
+        let elapsed_s = self.episode.time_s(step);
+        let moment = MomentFacts { elapsed_s, ..MomentFacts::default() };
+        let world = WorldFacts { moment, step, ..WorldFacts::default() };
+        let facts = Facts { road, world: Some(&world), ..Facts::new(&[], memory) };
+        evaluate(condition, &self.functions, &facts).truth()
+    }
+
+    /// The cells that are drawn when an episode begins.
+    pub(crate) fn open_cells(&self) -> Vec<usize> {
+        let of_state = |state: &StateDef| {
+            let drawn = state.initial.iter().enumerate().filter(|(_, initial)| **initial == Initial::Any);
+            drawn.map(|(cell, _)| state.first_cell + cell).collect::<Vec<_>>()
+        };
+        self.states.iter().flat_map(of_state).collect()
+    }
+
+    /// The state to which a cell belongs.
+    pub(crate) fn state_of(&self, cell: usize) -> &StateDef {
+        &self.states[state_at(cell, &self.states)]
+    }
+
+    /// The rules about the start that are in force, those that share states together.
+    fn groups(&self, rules: &RulesInForce) -> Vec<Group> {
+        let mut groups: Vec<Option<Group>> = Vec::new();
+        // By cell: the group that it is in. A joined group leaves its number to none, and the joint one is the last.
+        let mut group_of: BTreeMap<usize, usize> = BTreeMap::new();
+        for rule in rules.all() {
+            let Some(condition) = &self.rules[rule].start else { continue };
+            let mut group = Group { rules: vec![rule], cells: cells_read(condition, &self.states) };
+            let near: BTreeSet<usize> =
+                group.cells.iter().filter_map(|cell| group_of.get(cell).copied()).collect();
+            for other in near.into_iter().filter_map(|number| groups[number].take()) {
+                group.rules.extend(other.rules);
+                group.cells.extend(other.cells);
+            }
+            group.rules.sort_unstable();
+            group.cells.sort_unstable();
+            group.cells.dedup();
+            effort::spend(group.rules.len() + group.cells.len());
+            if effort::is_spent() {
+                break;
+            }
+            group_of.extend(group.cells.iter().map(|cell| (*cell, groups.len())));
+            groups.push(Some(group));
+        }
+        groups.into_iter().flatten().collect()
+    }
+
+    /// The values of a cell's type that are drawn, each with its odds.
+    pub(crate) fn drawn_values(&self, ty: Type) -> Vec<(u32, Value)> {
+        match ty {
+            Type::Bool => vec![(1, Value::Bool(false)), (1, Value::Bool(true))],
+            Type::Enum(of) => {
+                let odds = self.enums[of.0].odds.iter().enumerate().filter(|(_, odds)| **odds > 0);
+                odds.map(|(variant, odds)| (*odds, Value::Variant(of, variant))).collect()
+            }
+            // The checker allows `any` states for finite types alone.
+            Type::Int | Type::Quantity(_) => vec![(1, Value::Number(0.0))],
+        }
+    }
+}
+
+/// Rules that share states, and the cells which they read.
+struct Group {
+    rules: Vec<usize>,
+    cells: Vec<usize>,
+}
+
+/// The legal combinations of the open cells that a group of rules reads.
+struct Starts<'a> {
+    memory: &'a Memory,
+    /// The open cells, each with its values and their odds.
+    cells: Vec<(usize, Vec<(u32, Value)>)>,
+    /// Numbers of the combinations that obey the rules.
+    legal: Vec<usize>,
+}
+
+impl<'a> Starts<'a> {
+    fn of(
+        space: &Space,
+        group: &Group,
+        memory: &'a Memory,
+        open: &[usize],
+        road: &Road,
+    ) -> Result<Starts<'a>, NoStart> {
+        let no_start = |index: usize, is_too_large| {
+            let (road, rule) = (road.name.clone(), space.rules[index].name.clone());
+            let cells = space.rules[index].start.iter().flat_map(|start| cells_read(start, &space.states));
+            NoStart { road, rule, index, cells: cells.collect(), is_too_large }
+        };
+        let mut cells = Vec::new();
+        let open: BTreeSet<usize> = open.iter().copied().collect();
+        for cell in group.cells.iter().filter(|cell| open.contains(cell)) {
+            cells.push((*cell, space.drawn_values(space.state_of(*cell).ty)));
+        }
+        let combinations = cells.iter().map(|(_, values)| values.len()).try_fold(1, usize::checked_mul);
+        let combinations = combinations.filter(|combinations| *combinations <= COMBINATIONS_MAX);
+        let mut starts = Starts { memory, cells, legal: Vec::new() };
+        starts.legal = match combinations {
+            Some(combinations) => (0..combinations).collect(),
+            None => return Err(no_start(group.rules[0], true)),
+        };
+        for rule in &group.rules {
+            let mut legal = core::mem::take(&mut starts.legal);
+            legal.retain(|number| {
+                !effort::is_spent()
+                    && space.stands(*rule, &starts.combination(*number).1, Some(&road.facts), Some(0))
+            });
+            if legal.is_empty() {
+                return Err(no_start(*rule, false));
+            }
+            starts.legal = legal;
+        }
+        Ok(starts)
+    }
+
+    /// The odds of a combination, relative to the others, and the memory with it.
+    fn combination(&self, mut number: usize) -> (f64, Memory) {
+        effort::spend(self.memory.cells.len());
+        let (mut odds, mut memory) = (1.0, self.memory.clone());
+        for (cell, values) in &self.cells {
+            let (of_value, value) = values[number % values.len()];
+            number /= values.len();
+            odds *= f64::from(of_value);
+            memory.cells[*cell] = value;
+        }
+        (odds, memory)
+    }
+
+    fn draw(&self, rng: &mut Rng) -> Memory {
+        let odds: Vec<f64> = self.legal.iter().map(|number| self.combination(*number).0).collect();
+        let mut ticket = rng::unit(rng) * odds.iter().sum::<f64>();
+        let mut drawn = self.legal.iter().zip(odds);
+        let found = drawn.find(|(_, odds)| {
+            ticket -= odds;
+            ticket < 0.0
+        });
+        let number = found.map(|(number, _)| number).or(self.legal.last());
+        self.combination(*number.expect("no rule left nothing")).1
+    }
+}
+
+/// The cells that an expression reads.
+pub(crate) fn cells_read(expr: &Expr, states: &[StateDef]) -> Vec<usize> {
+    let (mut found, mut passed) = (Vec::new(), 0);
+    expr.walk(&mut |part| {
+        passed += 1;
+        match part.kind {
+            ExprKind::Cell(cell) => found.push(cell),
+            ExprKind::CellAt(first, _) => found.extend(first..first + states[state_at(first, states)].cells),
+            _ => {}
+        }
+    });
+    effort::spend(passed + found.len());
+    found
+}
+
+/// The index of the state to which a cell belongs. States have consecutive cells, and each state has at least one.
+pub(crate) fn state_at(cell: usize, states: &[StateDef]) -> usize {
+    states.partition_point(|state| state.first_cell <= cell) - 1
+}
+
+impl RuleDef {
+    /// Whether the rule also binds the start of an episode.
+    pub fn binds_start(&self) -> bool {
+        self.start.is_some()
+    }
+}

@@ -1,0 +1,486 @@
+//! The checked space: what may happen around the car. If a [`Space`] exists, it is sound: every name
+//! resolves, every type fits, every rule can be enforced.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use crate::model::body::BodyParameters;
+use crate::model::expr::Expr;
+use crate::model::interval::Interval;
+use crate::model::meaning::Meaning;
+use crate::model::on_route::Stretch;
+use crate::model::row::{Reach, Row};
+use crate::model::rules::{Bound, Clause};
+use crate::model::value::{EnumIndex, Type, Value};
+use crate::model::vocabulary::{
+    Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb, Word,
+};
+use crate::syntax::ast::Span;
+use avastra_base::units::{Rational, Unit, decimal, quantity, quantity_in, quantity_short, unit_of_all};
+use avastra_road::{LanePlace, RoadMap, Route};
+
+/// Name of the verdict that decides which collisions count. Every space has it: the checker adds the
+/// paper's where the author declares none.
+pub const COUNTED: &str = "counted";
+
+/// A whole space.
+#[derive(Debug, Clone)]
+pub struct Space {
+    /// Path of the root file, as given.
+    pub path: PathBuf,
+    /// What all declarations say, maps included: see [`Use::digest`](crate::syntax::ast::Use).
+    pub meaning: Meaning,
+    /// Documentation of the root file.
+    pub docs: Vec<String>,
+    pub enums: Vec<EnumDef>,
+    pub states: Vec<StateDef>,
+    pub bodies: Vec<BodyDef>,
+    pub functions: Vec<FnDef>,
+    pub actions: Vec<ActionDef>,
+    pub groups: Vec<GroupDef>,
+    /// What happens at the end of every step, after the effects of its action.
+    pub each_step: Vec<SetDef>,
+    pub rules: Vec<RuleDef>,
+    pub episode: EpisodeDef,
+    /// The first case that applies gives the reward.
+    pub reward: Vec<RewardCase>,
+    /// In the order of declaration; one of them is [`COUNTED`].
+    pub verdicts: Vec<VerdictDef>,
+    /// The roads of `episode.roads`, in that order; every declared road if there is no `episode`.
+    pub roads: Vec<Road>,
+    /// The action table: actions as declared, axes left to right, the last varying fastest.
+    pub rows: Vec<Row>,
+    /// For each action: the bounds that `where`s and rules set for each of its drawn numbers.
+    pub bounds: Vec<Vec<Bound>>,
+    /// For each action: its `where`s and rules, with the parameters that decide each.
+    pub clauses: Vec<Vec<Clause>>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct EnumDef {
+    pub name: String,
+    pub docs: Vec<String>,
+    pub variants: Vec<String>,
+    /// Whether `<` compares its variants.
+    pub ordered: bool,
+    /// How often each variant is drawn, relative to the others; 1 unless `odds` names it.
+    pub odds: Vec<u32>,
+    pub span: Span,
+}
+
+/// A state variable.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StateDef {
+    pub name: String,
+    pub docs: Vec<String>,
+    /// The enum of its keys, if it is a map.
+    pub key: Option<EnumIndex>,
+    /// Type of a cell.
+    pub ty: Type,
+    /// Position of its first cell in [`Memory`](super::Memory).
+    pub first_cell: usize,
+    /// 1, or the number of keys.
+    pub cells: usize,
+    /// How each of its cells begins.
+    pub initial: Vec<Initial>,
+    /// What the state stands for in the world.
+    pub meaning: StateMeaning,
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum Initial {
+    /// The cell is drawn at reset.
+    Any,
+    /// A constant.
+    Value(Expr),
+}
+
+/// What a state variable stands for in the world. The lists give the engine's word for each variant.
+#[derive(Debug, Clone, PartialEq)]
+pub enum StateMeaning {
+    /// Nothing: only the space's rules and effects use it.
+    Private,
+    /// The state `time`: the time of day for each variant.
+    Time(Vec<TimeOfDay>),
+    /// The state `sky`: the phenomenon for each key, the level for each variant.
+    Sky(Vec<Phenomenon>, Vec<Level>),
+}
+
+/// A body of the author's own.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BodyDef {
+    pub name: String,
+    pub docs: Vec<String>,
+    pub like: Body,
+    pub shape: BodyParameters,
+    pub span: Span,
+}
+
+/// What a spawn calls a body: one of the engine, or one of the author's own that is like it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BodyWord {
+    pub like: Body,
+    /// Index in [`Space::bodies`].
+    pub own: Option<usize>,
+}
+
+impl BodyWord {
+    /// A body of the engine.
+    pub const fn engine(like: Body) -> BodyWord {
+        BodyWord { like, own: None }
+    }
+
+    /// Whether this is what a body of that name means: one of the engine's names stands for the author's own that are
+    /// like it, too.
+    pub(crate) fn is(self, named: BodyWord) -> bool {
+        self.like == named.like && (named.own.is_none() || self.own == named.own)
+    }
+}
+
+/// A pure function; its parameters are the locals of its body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FnDef {
+    pub name: String,
+    pub parameters: Vec<(String, Type)>,
+    pub result: Type,
+    pub body: Expr,
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct ActionDef {
+    pub name: String,
+    pub docs: Vec<String>,
+    /// `each` and `any` parameters, in the order of declaration: the locals of the action's expressions.
+    pub parameters: Vec<Parameter>,
+    /// Its own, then those that `on … also` adds.
+    pub effects: Vec<EffectDef>,
+    /// How often each of its rows is drawn by chance, relative to other rows.
+    pub odds: u32,
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameter {
+    pub name: Arc<str>,
+    pub ty: Type,
+    /// True for `each` (an axis of the table), false for `any` (drawn).
+    pub axis: bool,
+    pub domain: Domain,
+    /// The `where` condition, which may name the parameters before this one.
+    pub condition: Option<Expr>,
+    pub span: Span,
+}
+
+impl Parameter {
+    /// The unit in which people read its listed values or the ends of its range, if it is not SI's.
+    pub fn unit(&self) -> Option<&'static Unit> {
+        let Type::Quantity(dimension) = self.ty else { return None };
+        let numbers: Vec<f64> = match &self.domain {
+            Domain::Values(values) => values.iter().map(|value| value.number()).collect(),
+            Domain::Range(low, high) => vec![low.to_f64(), high.to_f64()],
+        };
+        unit_of_all(&numbers, dimension)
+    }
+}
+
+impl ActionDef {
+    /// The parameters that are drawn.
+    pub fn drawn(&self) -> impl Iterator<Item = &Parameter> {
+        self.parameters.iter().filter(|parameter| !parameter.axis)
+    }
+
+    /// Its own `set`s and those that `on … also` adds, in the order in which they happen; those of every step come after
+    /// them: [`Space::sets`].
+    pub(crate) fn sets(&self) -> impl Iterator<Item = &SetDef> {
+        self.effects.iter().filter_map(|effect| match effect {
+            EffectDef::Set(set) => Some(&**set),
+            EffectDef::Spawn(_) => None,
+        })
+    }
+
+    /// The values of the parameters that are drawn, given those of all, as declared.
+    pub fn drawn_of(&self, values: &[Value]) -> Vec<(Arc<str>, Value)> {
+        let drawn = self.parameters.iter().zip(values).filter(|(parameter, _)| !parameter.axis);
+        drawn.map(|(parameter, value)| (parameter.name.clone(), *value)).collect()
+    }
+
+    /// The drawn parameters with a range, by index; the others have a list of values.
+    pub fn drawn_numbers(&self) -> impl Iterator<Item = usize> {
+        let is_open = |(_, parameter): &(usize, &Parameter)| {
+            !parameter.axis && matches!(parameter.domain, Domain::Range(..))
+        };
+        self.parameters.iter().enumerate().filter(is_open).map(|(index, _)| index)
+    }
+}
+
+/// The values that a parameter may have.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Domain {
+    /// A list, of which one value is drawn; a value that it holds twice is twice as likely.
+    Values(Vec<Value>),
+    /// A range, both ends included, SI.
+    Range(Rational, Rational),
+}
+
+impl Domain {
+    /// Whether the value is one of these.
+    pub fn holds(&self, value: Value) -> bool {
+        match self {
+            Domain::Values(values) => values.contains(&value),
+            Domain::Range(low, high) => (low.to_f64()..=high.to_f64()).contains(&value.number()),
+        }
+    }
+
+    /// The ends of a range in SI; infinite for a list.
+    pub fn ends(&self) -> (f64, f64) {
+        match self {
+            Domain::Values(_) => (f64::NEG_INFINITY, f64::INFINITY),
+            Domain::Range(low, high) => (low.to_f64(), high.to_f64()),
+        }
+    }
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum EffectDef {
+    Set(Box<SetDef>),
+    Spawn(Box<SpawnDef>),
+}
+
+/// How a state changes: all its cells, or only the cell of a key.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SetDef {
+    /// Index in `Space::states`.
+    pub state: usize,
+    pub key: Option<Expr>,
+    pub value: Expr,
+    pub span: Span,
+}
+
+/// How a spawn request is made from an action's parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpawnDef {
+    pub body: WordExpr<BodyWord>,
+    pub colour: WordExpr<Colour>,
+    pub verb: WordExpr<Verb>,
+    pub lane: WordExpr<LaneChoice>,
+    pub side: WordExpr<Side>,
+    pub then: WordExpr<Then>,
+    /// m/s.
+    pub speed: Expr,
+    /// m.
+    pub distance: Expr,
+    /// Whether the file says `behind`; the verb decides which place that is.
+    pub behind: bool,
+    /// The parked vehicle from behind which a pedestrian steps.
+    pub cover: Option<WordExpr<BodyWord>>,
+    pub span: Span,
+}
+
+/// A word of the engine: fixed, or chosen by a value of one of the author's enums.
+#[derive(Debug, Clone, PartialEq)]
+pub enum WordExpr<W> {
+    Fixed(W),
+    /// The word for each variant of the expression's enum.
+    Of(Expr, Vec<W>),
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct GroupDef {
+    pub name: String,
+    pub docs: Vec<String>,
+    /// Indices of actions.
+    pub actions: Vec<usize>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct RuleDef {
+    pub name: String,
+    pub docs: Vec<String>,
+    /// Off unless `--with` names it.
+    pub optional: bool,
+    pub body: RuleBody,
+    /// Its condition for the states with which an episode begins; `None` if it says nothing about them.
+    pub start: Option<Expr>,
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum RuleBody {
+    /// A condition, compiled once for every action that it binds. States in it have their values
+    /// after the action.
+    Holds(Vec<RuleBinding>),
+    /// A condition under which a commanded lane change may begin; states are not known then.
+    During(Vec<RuleBinding>),
+    /// `allowed[from][to]` for a plain state, or for one key of a map; `cell` is its position in the memory. The rule
+    /// binds the actions that may set it.
+    Moves { state: usize, cell: usize, allowed: Vec<Vec<bool>>, actions: Vec<usize> },
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct RuleBinding {
+    pub action: usize,
+    pub condition: Expr,
+}
+
+/// How episodes run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EpisodeDef {
+    /// The observation period (OTP), s. Default: the paper's 6 s.
+    pub step_s: f64,
+    /// Whether arrival at the goal ends an episode. Default: yes.
+    pub stop_arrived: bool,
+    /// Steps without progress that end an episode. Default: none does.
+    pub stalled_steps: Option<u32>,
+    /// Steps after which an episode is cut off. Default: 20.
+    pub step_limit: u32,
+}
+
+impl EpisodeDef {
+    /// When a step begins, s: the number nearest to the exact time, so that `elapsed >= 0.7 s` holds at 0.7 s.
+    pub(crate) fn time_s(&self, step: u64) -> f64 {
+        (step as f64 * self.step_s * 1000.0).round() / 1000.0
+    }
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct RewardCase {
+    /// `None` for `_`.
+    pub condition: Option<Expr>,
+    pub value: Expr,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct VerdictDef {
+    pub name: String,
+    pub docs: Vec<String>,
+    pub condition: Expr,
+}
+
+/// A road with its map and the ego vehicle's way through it.
+#[derive(Debug, Clone)]
+pub struct Road {
+    pub name: String,
+    pub docs: Vec<String>,
+    /// The map's path as resolved from the file that names it.
+    pub map_path: PathBuf,
+    pub map: Arc<RoadMap>,
+    pub start: LanePlace,
+    pub goal: LanePlace,
+    pub route: Route,
+    pub facts: RoadFacts,
+}
+
+/// What rules may ask about a road.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RoadFacts {
+    /// What the road is called.
+    pub name: String,
+    /// The lowest limit of the route's lanes: a drawn speed must be legal on the whole of it, SI.
+    pub limit: Rational,
+    /// `limit` as a float, m/s.
+    pub limit_mps: f64,
+    /// Where on the route that is, in words, unless it is everywhere.
+    pub limited_at: Option<String>,
+    /// Which lanes in the ego vehicle's direction exist somewhere along the route, by
+    /// [`LaneChoice`] in its order: left, current, right.
+    pub lanes: [bool; 3],
+    /// The lowest and the highest limit of any lane of the map, m/s.
+    pub map_limits_mps: [f64; 2],
+    /// The route, by what each part of it says of a moment; none, if that is not known.
+    pub stretches: Arc<[Stretch]>,
+}
+
+impl RoadFacts {
+    pub fn has_lane(&self, lane: LaneChoice) -> bool {
+        self.lanes[lane as usize]
+    }
+}
+
+impl StateDef {
+    /// The position of a cell among the cells of this state.
+    pub(crate) fn position_of(&self, cell: usize) -> Option<usize> {
+        cell.checked_sub(self.first_cell).filter(|position| *position < self.cells)
+    }
+}
+
+impl Space {
+    /// All that a step sets, in the order in which it happens: by its action, by `on … also`, and by every step. Without
+    /// an action only the last is left.
+    pub(crate) fn sets(&self, action: Option<usize>) -> impl Iterator<Item = &SetDef> {
+        let of_action = action.into_iter().flat_map(|action| self.actions[action].sets());
+        of_action.chain(&self.each_step)
+    }
+
+    /// The rows of an action: rows are numbered in the order of the actions.
+    pub fn rows_of(&self, action: usize) -> &[Row] {
+        let first = self.rows.partition_point(|row| row.action < action);
+        let end = self.rows.partition_point(|row| row.action <= action);
+        &self.rows[first..end]
+    }
+
+    /// What the rules leave of a parameter's range on a road, over all rows of its action that can run
+    /// there; `None` if none can, or the parameter has no range.
+    pub fn range_on(&self, action: usize, parameter: &Parameter, road: usize) -> Option<Interval> {
+        let reaches = self.rows_of(action).iter().map(|row| &row.roads[road]);
+        let kept = reaches.filter_map(|reach| match reach {
+            Reach::Open(ranges) => {
+                ranges.iter().find(|(name, _)| *name == parameter.name).map(|(_, interval)| *interval)
+            }
+            Reach::Dead { .. } => None,
+        });
+        kept.reduce(|all, interval| all.hull(&interval))
+    }
+
+    /// A cell of the memory as the language spells it: `time`, `sky[Rain]`.
+    pub fn cell_name(&self, cell: usize) -> String {
+        let state = self.state_of(cell);
+        let position = cell - state.first_cell;
+        match state.key {
+            None => state.name.clone(),
+            Some(of) => format!("{}[{}]", state.name, self.enums[of.0].variants[position]),
+        }
+    }
+
+    /// A body as its author calls it.
+    pub fn body_name(&self, body: BodyWord) -> &str {
+        body.own.map_or_else(|| body.like.name(), |own| &self.bodies[own].name)
+    }
+
+    /// A listed value of a parameter as people read it, in the unit that [`Parameter::unit`] gives.
+    pub fn show_listed(&self, value: Value, parameter: &Parameter, unit: Option<&Unit>) -> String {
+        match (value, parameter.ty) {
+            (Value::Number(number), Type::Quantity(dimension)) => quantity_in(number, dimension, unit),
+            _ => self.show(value, parameter.ty),
+        }
+    }
+
+    /// Values of a type as people read them, quantities all in one unit.
+    pub fn show_all(&self, values: &[Value], ty: Type) -> Vec<String> {
+        let Type::Quantity(dimension) = ty else {
+            return values.iter().map(|value| self.show(*value, ty)).collect();
+        };
+        let numbers: Vec<f64> = values.iter().map(|value| value.number()).collect();
+        let unit = unit_of_all(&numbers, dimension);
+        numbers.into_iter().map(|number| quantity_in(number, dimension, unit)).collect()
+    }
+
+    /// A value as the language spells it, a quantity in a unit in which it is short.
+    pub fn show(&self, value: Value, ty: Type) -> String {
+        match (value, ty) {
+            (Value::Number(number), Type::Quantity(dimension)) => quantity_short(number, dimension),
+            _ => self.show_in_si(value, ty),
+        }
+    }
+
+    /// A value as the language spells it, in SI: for programs that read it.
+    pub fn show_in_si(&self, value: Value, ty: Type) -> String {
+        match (value, ty) {
+            (Value::Bool(truth), _) => truth.to_string(),
+            (Value::Variant(of, variant), _) => self.enums[of.0].variants[variant].clone(),
+            (Value::Number(number), Type::Quantity(dimension)) => quantity(number, dimension),
+            (Value::Number(number), _) => decimal(number, false),
+        }
+    }
+}

@@ -1,0 +1,495 @@
+//! The table of the engine's words: facts, fields, claims, and what a `spawn`, a `set time` or a `set sky`
+//! may mean.
+//! A row holds the spelling of a word and one sentence for people. A fact also has its type, and becomes known at a
+//! stated time; that time decides where it may be read and when a rule that reads it is judged. The checker, the
+//! editor's server, the highlighter and the test of LANGUAGE.md read the rows. Keywords stand in `syntax::keyword`,
+//! because the grammar knows them.
+//!
+//! Enums are the author's; the names of their variants must be found here wherever a value reaches
+//! the world.
+
+use crate::model::value::Type;
+use avastra_base::units::Dimension;
+
+/// A word of the engine: it has a spelling, and the spelling finds it again.
+pub trait Word: Copy + PartialEq + 'static {
+    /// Every word of this kind, in the order in which they are listed to authors.
+    const ALL: &'static [Self];
+
+    fn name(self) -> &'static str;
+
+    /// One sentence for people.
+    fn meaning(self) -> &'static str;
+
+    fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|word| word.name() == name)
+    }
+
+    /// The spellings, in the order of [`Word::ALL`].
+    fn names<'a>() -> impl Iterator<Item = &'a str> {
+        Self::ALL.iter().map(|word| -> &'a str { word.name() })
+    }
+}
+
+/// Declares an enum of words. A row is the variant, its spelling if that differs, and its sentence if the
+/// sentence of the kind is not enough.
+macro_rules! words {
+    ($(#[$doc:meta])* $kind:ident $each:literal: $($word:ident $($spelling:literal)? $(= $own:literal)?),+ $(,)?) => {
+        #[doc = $each]
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+        pub enum $kind { $($(#[doc = $own])? $word),+ }
+
+        impl Word for $kind {
+            const ALL: &'static [$kind] = &[$($kind::$word),+];
+
+            fn name(self) -> &'static str {
+                match self { $($kind::$word => words!(@last stringify!($word) $(, $spelling)?)),+ }
+            }
+
+            fn meaning(self) -> &'static str {
+                match self { $($kind::$word => words!(@last $each $(, $own)?)),+ }
+            }
+        }
+    };
+    (@last $only:expr) => { $only };
+    (@last $first:expr, $second:expr) => { $second };
+}
+
+/// Declares the facts: words with a type and the moment from which they are known.
+macro_rules! facts {
+    ($($fact:ident $spelling:literal $ty:expr, $known:ident = $meaning:literal;)+) => {
+        words! { Fact "What an expression may ask about the world.": $($fact $spelling = $meaning),+ }
+
+        impl Fact {
+            pub fn ty(self) -> Type {
+                match self { $(Fact::$fact => $ty),+ }
+            }
+
+            pub fn known(self) -> Known {
+                match self { $(Fact::$fact => Known::$known),+ }
+            }
+        }
+    };
+}
+
+/// Declares the facts that are one of a list of words.
+macro_rules! word_facts {
+    ($($fact:ident $spelling:literal $words:ident, $known:ident = $meaning:literal;)+) => {
+        words! {
+            /// The words are no values: they stand only beside the fact, and mean nothing elsewhere.
+            WordFact "What is compared with words of the engine.": $($fact $spelling = $meaning),+
+        }
+
+        impl WordFact {
+            pub fn known(self) -> Known {
+                match self { $(WordFact::$fact => Known::$known),+ }
+            }
+
+            /// The words that it may be, each with its sentence.
+            pub fn words(self) -> Vec<(&'static str, &'static str)> {
+                match self {
+                    $(WordFact::$fact => $words::ALL.iter().map(|word| (word.name(), word.meaning())).collect()),+
+                }
+            }
+        }
+    };
+}
+
+/// From when on a fact is known; later ones come later in an episode.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Known {
+    /// Without the world, once the road is known: the checker judges rules about it, and numbers are drawn
+    /// within their bounds.
+    Road,
+    /// At the draw, in the world; without a world it is left to the replay.
+    World,
+    /// At the draw, for each spawn, once the world has found a place for it.
+    Spawn,
+    /// After the step.
+    Step,
+    /// After a collision was judged.
+    Judgement,
+}
+
+/// Where an expression stands, which decides the facts that it may read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Site {
+    /// In functions, constants and effects, which see no facts.
+    #[default]
+    Elsewhere,
+    /// In the `where` of an axis, which is decided before any episode.
+    Axis,
+    /// In the `where` of a drawn parameter.
+    Where,
+    Rule,
+    /// In a rule `during change`.
+    Change,
+    /// In `once` of a scenario's step.
+    Trigger,
+    Reward,
+    Verdict,
+}
+
+impl Site {
+    /// Whether what is known from then on is known here. A verdict knows what a reward knows, and how the
+    /// collision was judged.
+    pub fn knows(self, known: Known) -> bool {
+        match known {
+            Known::Road | Known::World => {
+                matches!(self, Site::Where | Site::Rule | Site::Change | Site::Trigger)
+            }
+            Known::Spawn => matches!(self, Site::Rule | Site::Change),
+            Known::Step => matches!(self, Site::Reward | Site::Verdict),
+            Known::Judgement => self == Site::Verdict,
+        }
+    }
+
+    /// The facts that are known here.
+    pub fn facts(self) -> impl Iterator<Item = Fact> {
+        Fact::ALL.iter().copied().filter(move |fact| self.knows(fact.known()))
+    }
+
+    /// Those that are words.
+    pub fn word_facts(self) -> impl Iterator<Item = WordFact> {
+        WordFact::ALL.iter().copied().filter(move |fact| self.knows(fact.known()))
+    }
+
+    /// Whether anything can be asked of a thing (`road`) here.
+    pub fn knows_thing(self, thing: &str) -> bool {
+        self.facts().any(|fact| thing_of(fact.name()) == Some(thing))
+            || self.word_facts().any(|fact| thing_of(fact.name()) == Some(thing))
+    }
+}
+
+/// The types of the language itself, with their spelling and a sentence.
+pub const TYPES: &[(&str, Type, &str)] = &[
+    ("Bool", Type::Bool, "`true` or `false`."),
+    ("Int", Type::Int, "A whole number; may stand wherever a ratio may."),
+    ("Length", LENGTH, "In `m` or `km`."),
+    ("Duration", Type::Quantity(Dimension::DURATION), "In `s`, `ms` or `min`."),
+    ("Speed", SPEED, "In `m/s`, `km/h` or `mph`."),
+    ("Accel", Type::Quantity(Dimension::ACCEL), "In `m/s^2`."),
+    ("Angle", Type::Quantity(Dimension::ANGLE), "In `deg` or `rad`."),
+    ("Mass", Type::Quantity(Dimension::MASS), "In `kg`."),
+    ("Ratio", RATIO, "A number without a unit, or with `%`."),
+];
+
+const ACCEL: Type = Type::Quantity(Dimension::ACCEL);
+const DURATION: Type = Type::Quantity(Dimension::DURATION);
+const LENGTH: Type = Type::Quantity(Dimension::LENGTH);
+const RATIO: Type = Type::Quantity(Dimension::RATIO);
+const SPEED: Type = Type::Quantity(Dimension::SPEED);
+
+// Policies have variables of their own (`policy::VARIABLES`): what an agent observes is rounded and cut off.
+facts! {
+    RoadLimit "road.limit" SPEED, Road = "A `Speed`: the lowest limit along the route.";
+    EgoSpeed "ego.speed" SPEED, World = "A `Speed`: how fast the ego vehicle is.";
+    EgoAcceleration "ego.acceleration" ACCEL, World = "A `Accel`: of the ego vehicle, negative when it brakes.";
+    EgoLimit "ego.limit" SPEED, World = "A `Speed`: the limit of the lane that the ego vehicle is in.";
+    EgoJunctionAhead "ego.junction_ahead" LENGTH, World = "A `Length`: along the route to the next junction; 0 in one, 1000 m if there is none nearer.";
+    EgoRouteLeft "ego.route_left" LENGTH, World = "A `Length`: along the route to the goal.";
+    EgoOffset "ego.offset" LENGTH, World = "A `Length`: how far the ego vehicle is to the left of its route.";
+    RoadUsers "road_users" Type::Int, World = "A `Int`: how many there are beside the ego vehicle.";
+    NearestGap "nearest.gap" LENGTH, World = "A `Length`: to the nearest road user; 100 m if there is none.";
+    NearestSpeed "nearest.speed" SPEED, World = "A `Speed`: of the nearest road user; 0 if there is none.";
+    Elapsed "elapsed" DURATION, World = "A `Duration`: since the episode began.";
+    StepNumber "step" Type::Int, World = "A `Int`: the number of the step, from 0.";
+    NpcSpeed "npc.speed" SPEED, Spawn = "A `Speed`: of the road user that appears.";
+    NpcGap "npc.gap" LENGTH, Spawn = "A `Length`: from the road user that appears to the ego vehicle.";
+    NpcJunctionAhead "npc.junction_ahead" LENGTH, Spawn = "A `Length`: along its way to the next junction; 0 in one, 1000 m if there is none nearer.";
+    NpcLimit "npc.limit" SPEED, Spawn = "A `Speed`: the limit of the lane in which it appears.";
+    SpawnGap "spawn_gap" LENGTH, Spawn = "A `Length`: the gap from the ego vehicle to the road user that appears.";
+    SafetyGap "safety_gap" LENGTH, Spawn = "A `Length`: the gap that a careful driver needs.";
+    Proc "proc" RATIO, Step = "A `Ratio`: the collision probability of the step.";
+    Collision "collision" Type::Bool, Step = "A `Bool`: the ego vehicle collided.";
+    Repeated "repeated" Type::Bool, Step = "A `Bool`: with an obstacle that it has hit before.";
+    Sudden "sudden" Type::Bool, Step = "A `Bool`: with an obstacle that appeared a moment ago.";
+    Struck "struck" Type::Bool, Step = "A `Bool`: the ego vehicle did not have to give way, and the obstacle ran into its side or rear, or into any part of it while it stood.";
+    Avoidable "avoidable" Type::Bool, Judgement = "A `Bool`: a careful reference driver avoids it. Verdicts only.";
+}
+
+/// What a rule may restrict instead of the draw.
+pub const CHANGE: (&str, &str) = (
+    "change",
+    "`during change`: a lane change that the action commands begins only while the condition holds.",
+);
+
+/// `lane in road.lanes`: spelt like a fact, but a set, which may only stand after `in`.
+pub const ROAD_LANES: (&str, &str) =
+    ("road.lanes", "The lanes in the ego vehicle's direction: `lane in road.lanes`.");
+
+word_facts! {
+    EgoLight "ego.light" Light, World = "The next traffic light within 100 m: `ego.light == Red`, `ego.light in [Yellow, Red]`.";
+    EgoRoad "ego.road" RoadKind, World = "Where the ego vehicle drives: `ego.road == InJunction`.";
+    Priority "priority" Priority, Step = "Whether the ego vehicle or the road user that was hit had to give way: `priority == ego`, `priority in [other, none]`.";
+    Hit "hit" Body, Step = "What was hit: `hit == Pedestrian`; nothing if there was no collision.";
+    Near "near" Body, Step = "The road user with the greatest collision probability of the step: `near == Pedestrian`.";
+}
+
+/// The thing before the `.` of a name: `road` for `road.limit`.
+pub fn thing_of(name: &'static str) -> Option<&'static str> {
+    name.split_once('.').map(|(thing, _)| thing)
+}
+
+/// The names with a `.`, each with its sentence.
+fn dotted() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let facts = Fact::ALL.iter().map(|fact| (fact.name(), fact.meaning()));
+    let words = WordFact::ALL.iter().map(|fact| (fact.name(), fact.meaning()));
+    facts.chain([ROAD_LANES]).chain(words).filter(|(name, _)| name.contains('.'))
+}
+
+/// The things that have facts: the words before a `.`.
+pub fn things() -> Vec<&'static str> {
+    let mut things: Vec<&str> = Vec::new();
+    for thing in dotted().filter_map(|(name, _)| thing_of(name)) {
+        if !things.contains(&thing) {
+            things.push(thing);
+        }
+    }
+    things
+}
+
+/// The facts of a thing (`road`): the words after its `.`, each with its sentence.
+pub fn parts_of(thing: &str) -> Vec<(&'static str, &'static str)> {
+    let parts = dotted().filter_map(|(name, meaning)| Some((name.split_once('.')?, meaning)));
+    parts.filter(|((of, _), _)| *of == thing).map(|((_, part), meaning)| (part, meaning)).collect()
+}
+
+words! {
+    EpisodeField "A setting of `episode`.":
+    Roads "roads" = "The roads on which episodes are driven, in this order: `roads: [corner, boulevard]`.",
+    Step "step" = "The observation period after each action: `step: 6 s`.",
+    Stop "stop" = "What ends an episode: `arrived`, `stalled >= 4`, or both with `or`.",
+    Limit "limit" = "The steps after which an episode is cut off: `limit: 20 steps`.",
+}
+
+words! {
+    StopReason "What an episode may stop for.":
+    Arrived "arrived" = "The ego vehicle is at the goal.",
+    Stalled "stalled" = "Steps without progress: `stalled >= 4`.",
+}
+
+words! {
+    RoadField "A field of `road`.":
+    Map "map" = "The OpenDRIVE file, relative to this file: `map: \"roads/corner.xodr\"`.",
+    Start "start" = "Where the ego vehicle starts: `start: lane 1/-1 at 12 m`.",
+    Goal "goal" = "Where it is to arrive: `goal: lane 7/-1 at 80 m`.",
+    Limit "limit" = "A lower limit for the whole road: `limit: 30 km/h`.",
+    Unlit "unlit" = "Whether to drive through junctions whose lights hold no lane, as if they had none: `unlit: true`.",
+}
+
+words! {
+    BodyField "A field of `body`.":
+    Like "like" = "The body of the engine that it is like: what it does not say itself, it has from there.",
+    Length "length" = "How long it is.",
+    Width "width" = "How wide it is.",
+    Height "height" = "How high it is.",
+    Wheelbase "wheelbase" = "From the rear axle to the front axle.",
+    Mass "mass" = "How heavy it is.",
+    Acceleration "acceleration" = "How fast it can gain speed.",
+    Deceleration "deceleration" = "How hard it can brake on a dry road.",
+}
+
+words! {
+    SpawnField "A field of `spawn`.":
+    Does "does" = "What the road user does: a verb of the engine.",
+    Lane "lane" = "Its lane, seen from the ego vehicle: `Left`, `Current` or `Right`.",
+    Side "side" = "The side that it comes from: `Left` or `Right`.",
+    Then "then" = "Whether it keeps its lane or changes it: `Keep` or `Change`.",
+    Speed "speed" = "How fast it is.",
+    Colour "colour" = "Its paint.",
+}
+
+words! {
+    /// A scenario's `start` also has a field for each state.
+    StartField "A field of `start` in a scenario.":
+    SignalPhase "signal_phase" = "Where the cycle of the signals begins, in seconds.",
+    TrafficSeed "traffic_seed" = "The seed of the choices of other road users.",
+    Ambient "ambient" = "The number of vehicles of ambient traffic.",
+    EgoSpeed "ego_speed" = "The speed of the ego vehicle as the episode begins.",
+}
+
+words! {
+    OriginField "A field of `origin` in a scenario: where it came from.":
+    Seed "seed" = "The seed of the run.",
+    Episode "episode" = "The number of the episode in the run.",
+    Policy "policy" = "The agent that chose the actions.",
+    Ads "ads" = "The driving system.",
+    Profile "profile" = "The settings of the driving system that differ from the default.",
+    ProfileDigest "profile_digest" = "The digest of all settings of the driving system.",
+    Answers "answers" = "The digest of the recorded answers of an external driving system.",
+    Engine "engine" = "The version of the world's physics.",
+    Traffic "traffic" = "How other vehicles drove, if not as they usually do.",
+    TrafficDigest "traffic_digest" = "The digest of all settings of the traffic.",
+    With "with" = "The optional rules that were on.",
+    Without "without" = "The rules that were off.",
+}
+
+words! {
+    SpaceClaim "What a space may claim of itself.":
+    Count "count" = "The number of rows of an action, a group, or all `actions`: `count(actions)`.",
+    Every "every" = "`every(actions, realisable)`: each row can run on some road.",
+    Actions "actions" = "All actions.",
+    Realisable "realisable" = "Found to run on some road, in states to which an episode comes.",
+}
+
+words! {
+    ScenarioClaim "What a scenario may claim beside facts and verdicts.":
+    Cause "cause" = "The module at fault: `expect cause == perception`.",
+    Priority "priority" = "Who had priority in a collision: `expect priority == other with npc#2`.",
+    End "end" = "How the episode ends: `expect end == arrived`.",
+    Minimal "minimal" = "Without any one of its steps the scenario loses its crash.",
+    Trace "trace" = "The digest of the whole state stream: `expect trace == \"sha256:…\"`.",
+}
+
+/// Stands for an action in a step of a scenario.
+pub const WAIT: (&str, &str) = ("wait", "A step without an action: `3: wait()`.");
+
+words! {
+    /// Its sentence is the form in which it must be declared.
+    WorldState "A state that the world reads.":
+    Time "time" = "time: Time",
+    Sky "sky" = "sky: Sky -> Level",
+}
+
+words! {
+    /// 10:00, 14:00 and 20:00 in the published package.
+    TimeOfDay "A period of the day.": Morning, Noon, Night
+}
+
+words! {
+    Phenomenon "What the sky does to the road.": Rain, Fog, Wetness
+}
+
+words! {
+    /// 0, 0.2, 0.5 and 1 on LGSVL's scale.
+    Level "How strong a phenomenon is.": None, Light, Moderate, High
+}
+
+words! {
+    Body "The body of a road user.": Jeep, Sedan, SUV, Hatchback, BoxTruck, SchoolBus, Pedestrian, Motorcycle,
+    Bicycle = "It rides on the road, as a vehicle does.",
+}
+
+words! {
+    /// Paint changes nothing but the picture, yet it is part of the scenario.
+    Colour "A paint.": Pink, Red, Yellow, Black, White, Skyblue
+}
+
+words! {
+    Verb "What a spawned road user does.":
+    DriveAhead = "Drives ahead of the ego vehicle in the same direction.",
+    Overtake = "Comes from behind, faster, and passes.",
+    DriveOpposite = "Comes towards the ego vehicle in an opposing lane.",
+    CrossRoad = "Crosses the ego vehicle's way at a junction.",
+    Walk = "A pedestrian who crosses the road on foot.",
+    Stand = "A pedestrian who stands in the lane.",
+}
+
+words! {
+    LaneChoice "A lane, seen from the ego vehicle's lane.": Left, Current, Right
+}
+
+words! {
+    /// The side from which a crossing road user comes.
+    Side "A side, seen from the ego vehicle's lane.": Left, Right
+}
+
+words! {
+    Light "What the next traffic light shows.":
+    Red = "The next traffic light is red.",
+    Yellow = "The next traffic light is yellow.",
+    Green = "The next traffic light is green.",
+    None = "No traffic light within 100 m.",
+}
+
+words! {
+    RoadKind "Where the ego vehicle drives.":
+    OneWay = "On a street without lanes in the other direction.",
+    TwoWay = "On a street with lanes in both directions.",
+    NearJunction = "At most 20 m before a junction.",
+    InJunction = "Inside a junction.",
+}
+
+words! {
+    /// As far as the two meet: whoever has priority may count on the other to give way.
+    Priority "Which of the ego vehicle and a road user has priority over the other.":
+    Ego "ego" = "The ego vehicle: the road user had to give way.",
+    Other "other" = "The road user: the ego vehicle had to give way.",
+    None "none" = "Neither, or both owed each other care.",
+}
+
+words! {
+    /// The paper's "lane-change" group.
+    Then "Whether a vehicle keeps its lane or changes it.": Keep, Change
+}
+
+#[allow(clippy::derivable_impls, reason = "the macro has no place for the mark of a default")]
+impl Default for Light {
+    fn default() -> Light {
+        Light::None
+    }
+}
+
+#[allow(clippy::derivable_impls, reason = "the macro has no place for the mark of a default")]
+impl Default for RoadKind {
+    fn default() -> RoadKind {
+        RoadKind::OneWay
+    }
+}
+
+#[allow(clippy::derivable_impls, reason = "the macro has no place for the mark of a default")]
+impl Default for Priority {
+    fn default() -> Priority {
+        Priority::None
+    }
+}
+
+impl Level {
+    /// LGSVL's scale, in `[0, 1]`.
+    pub fn intensity(self) -> f64 {
+        match self {
+            Level::None => 0.0,
+            Level::Light => 0.2,
+            Level::Moderate => 0.5,
+            Level::High => 1.0,
+        }
+    }
+}
+
+impl Body {
+    /// Everything on wheels.
+    pub fn is_vehicle(self) -> bool {
+        self != Body::Pedestrian
+    }
+
+    pub fn has_two_wheels(self) -> bool {
+        matches!(self, Body::Motorcycle | Body::Bicycle)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn types_are_spelt_as_they_are_shown() {
+        let quantities = TYPES.iter().filter_map(|(word, ty, _)| match ty {
+            Type::Quantity(dimension) => Some((*word, dimension.to_string())),
+            Type::Bool | Type::Int | Type::Enum(_) => None,
+        });
+        let quantities: Vec<(&str, String)> = quantities.collect();
+        assert!(quantities.iter().all(|(word, shown)| word == shown), "{quantities:?}");
+        assert_eq!(quantities.len(), Dimension::NAMED.len());
+    }
+
+    #[test]
+    fn the_sentence_of_a_fact_begins_with_its_type() {
+        for fact in Fact::ALL {
+            let ty = TYPES.iter().find(|(_, ty, _)| *ty == fact.ty()).map(|(word, ..)| *word);
+            let begins = format!("A `{}`: ", ty.expect("it has a name"));
+            assert!(fact.meaning().starts_with(&begins), "{fact:?}");
+        }
+    }
+}

@@ -1,0 +1,361 @@
+//! Interval evaluation: all values that an expression may have, given all values of what it names.
+//!
+//! The static counterpart of `eval`, over exact numbers. It over-approximates, so "never true" is a
+//! proof and "may be true" is not.
+
+use crate::model::effort;
+use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
+use crate::model::vocabulary::Fact;
+use crate::model::{
+    AMBIENT_MAX, COMMANDED_MAX, EGO_ACCELERATION_MPS2_MAX, FnDef, Interval, JUNCTION_AHEAD_M_MAX, RoadFacts,
+    SPEED_MPS_MAX, Value,
+};
+use crate::prove::moment::Case;
+use crate::prove::sums::{difference, is_same, lacks_value};
+use avastra_base::units::Rational;
+
+/// The most variants of an enum: a set of them fits one integer.
+pub const VARIANTS_MAX: usize = 128;
+
+/// A set of values of one type.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Values {
+    Truth {
+        may_hold: bool,
+        may_fail: bool,
+    },
+    Number(Interval),
+    /// Bit `i` is variant `i`.
+    Variants(u128),
+}
+
+/// What is known where an expression stands.
+#[derive(Clone, Copy)]
+pub struct Known<'a> {
+    pub functions: &'a [FnDef],
+    pub locals: &'a [Values],
+    pub cells: &'a [Values],
+    /// `None`: any road.
+    pub road: Option<&'a RoadFacts>,
+    /// `None`: any moment.
+    pub case: Option<&'a Case>,
+}
+
+/// The numbers of the bits that are set: the variants of [`Values::Variants`].
+pub(crate) fn bits(set: u128) -> impl Iterator<Item = usize> {
+    (0..VARIANTS_MAX).filter(move |bit| set >> bit & 1 == 1)
+}
+
+impl Values {
+    pub const UNKNOWN_TRUTH: Values = Values::Truth { may_hold: true, may_fail: true };
+
+    pub fn truth(value: bool) -> Values {
+        Values::Truth { may_hold: value, may_fail: !value }
+    }
+
+    /// One value alone.
+    pub fn point(value: Value) -> Values {
+        match value {
+            Value::Bool(truth) => Values::truth(truth),
+            Value::Variant(_, variant) => Values::Variants(1 << variant),
+            Value::Number(number) => {
+                Values::Number(Rational::from_rounded(number).map_or(Interval::ALL, Interval::point))
+            }
+        }
+    }
+
+    pub fn may_hold(self) -> bool {
+        matches!(self, Values::Truth { may_hold: true, .. })
+    }
+
+    pub fn may_fail(self) -> bool {
+        matches!(self, Values::Truth { may_fail: true, .. })
+    }
+
+    pub fn interval(self) -> Interval {
+        match self {
+            Values::Number(interval) => interval,
+            Values::Truth { .. } | Values::Variants(_) => Interval::ALL,
+        }
+    }
+
+    /// The positions as bits; `false` is bit 0 and `true` is bit 1.
+    pub fn variants(self) -> u128 {
+        match self {
+            Values::Variants(set) => set,
+            Values::Truth { may_hold, may_fail } => u128::from(may_fail) | u128::from(may_hold) << 1,
+            Values::Number(_) => 0,
+        }
+    }
+
+    /// Everything in either.
+    pub fn union(self, other: Values) -> Values {
+        match (self, other) {
+            (Values::Number(a), Values::Number(b)) => Values::Number(a.hull(&b)),
+            (Values::Variants(a), Values::Variants(b)) => Values::Variants(a | b),
+            (a, b) => Values::Truth {
+                may_hold: a.may_hold() || b.may_hold(),
+                may_fail: a.may_fail() || b.may_fail(),
+            },
+        }
+    }
+}
+
+/// All values that the expression may have.
+pub fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
+    effort::spend(1);
+    let values = |expr: &Expr| enclose(expr, known);
+    match &expr.kind {
+        ExprKind::Bool(truth) => Values::truth(*truth),
+        ExprKind::Number(number) => Values::Number(Interval::point(*number)),
+        ExprKind::Variant(_, index) => Values::Variants(1 << index),
+        ExprKind::Local(index) => known.locals[*index],
+        ExprKind::Cell(cell) => known.cells[*cell],
+        ExprKind::CellAt(first, key) => {
+            let keys = values(key).variants();
+            effort::spend(keys.count_ones() as usize);
+            let chosen = positions(keys).map(|key| known.cells[first + key]);
+            chosen.reduce(Values::union).unwrap_or(Values::Variants(0))
+        }
+        ExprKind::Fact(fact) => match known.case.and_then(|case| case.number(*fact)) {
+            Some(piece) => Values::Number(piece),
+            None => fact_values(*fact, known),
+        },
+        ExprKind::OfRoadUser(_, fact) => fact_values(*fact, known),
+        ExprKind::Call(function, arguments) => {
+            let locals: Vec<Values> = arguments.iter().map(values).collect();
+            enclose(&known.functions[*function].body, &Known { locals: &locals, ..*known })
+        }
+        ExprKind::Not(inner) => {
+            let inner = values(inner);
+            Values::Truth { may_hold: inner.may_fail(), may_fail: inner.may_hold() }
+        }
+        ExprKind::Negate(inner) => Values::Number(values(inner).interval().neg()),
+        ExprKind::Arithmetic(Arithmetic::Subtract, left, right) if is_same(left, right) => {
+            Values::Number(Interval::point(Rational::ZERO))
+        }
+        ExprKind::Arithmetic(op, left, right) => {
+            Values::Number(arithmetic(*op, &values(left).interval(), &values(right).interval()))
+        }
+        ExprKind::Compare(op, left, right) => compare_parts(*op, left, right, known),
+        ExprKind::And(left, right) => and(values(left), values(right)),
+        ExprKind::Or(left, right) => or(values(left), values(right)),
+        ExprKind::Implies(left, right) => {
+            let left = values(left);
+            or(Values::Truth { may_hold: left.may_fail(), may_fail: left.may_hold() }, values(right))
+        }
+        ExprKind::InRange(inner, low, high) => {
+            let compared = |op, end: &Expr| compare_parts(op, inner, end, known);
+            and(compared(Comparison::GreaterEqual, low), compared(Comparison::LessEqual, high))
+        }
+        ExprKind::InList(inner, list) => {
+            let equals = list.iter().map(|item| compare_parts(Comparison::Equal, inner, item, known));
+            equals.reduce(or).unwrap_or(Values::truth(false))
+        }
+        ExprKind::InLanes(inner, lanes) => match known.road {
+            None => Values::UNKNOWN_TRUTH,
+            Some(road) => {
+                let inside = positions(values(inner).variants()).map(|v| road.has_lane(lanes[v]));
+                let (may_hold, may_fail) =
+                    inside.fold((false, false), |(hold, fail), inside| (hold || inside, fail || !inside));
+                Values::Truth { may_hold, may_fail }
+            }
+        },
+        ExprKind::OnRoad(names) => match known.road {
+            None => Values::UNKNOWN_TRUTH,
+            Some(road) => Values::truth(names.contains(&road.name)),
+        },
+        ExprKind::IsWord(fact, words) => match known.case.and_then(|case| case.word(*fact)) {
+            Some(word) => Values::truth(words.iter().any(|one| one == word)),
+            None => Values::UNKNOWN_TRUTH,
+        },
+        ExprKind::IsBody(..) => Values::UNKNOWN_TRUTH,
+        ExprKind::Match { subject, arm_of, arms } => {
+            // Each arm is looked at once, however many variants take it, because nested `match`es would multiply.
+            let mut taken: u128 = 0;
+            let is_first = |arm: &usize| {
+                let bit = 1_u128.checked_shl(u32::try_from(*arm).unwrap_or(u32::MAX)).unwrap_or(0);
+                let is_first = bit == 0 || taken & bit == 0;
+                taken |= bit;
+                is_first
+            };
+            let arms_taken = positions(values(subject).variants()).map(|variant| arm_of[variant]);
+            let chosen = arms_taken.filter(is_first).map(|arm| values(&arms[arm]));
+            chosen.reduce(Values::union).unwrap_or_else(|| values(&arms[0]))
+        }
+    }
+}
+
+fn fact_values(fact: Fact, known: &Known<'_>) -> Values {
+    match (fact, known.road) {
+        (Fact::RoadLimit, Some(road)) => Values::Number(Interval::point(road.limit)),
+        _ => fact_range(fact).map_or(Values::UNKNOWN_TRUTH, Values::Number),
+    }
+}
+
+/// What a fact that is a number may be, on any road and at any moment.
+pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
+    let between = |low: f64, high: f64| match (Rational::from_f64(low), Rational::from_f64(high)) {
+        (Some(low), Some(high)) => Interval::closed(low, high),
+        _ => Interval::ALL,
+    };
+    Some(match fact {
+        Fact::EgoSpeed => between(0.0, SPEED_MPS_MAX),
+        Fact::EgoAcceleration => between(-EGO_ACCELERATION_MPS2_MAX, EGO_ACCELERATION_MPS2_MAX),
+        Fact::EgoJunctionAhead | Fact::NpcJunctionAhead => between(0.0, JUNCTION_AHEAD_M_MAX),
+        Fact::EgoOffset | Fact::EgoRouteLeft => Interval::ALL,
+        Fact::RoadUsers => between(0.0, f64::from(COMMANDED_MAX + AMBIENT_MAX)),
+        Fact::RoadLimit
+        | Fact::EgoLimit
+        | Fact::NearestGap
+        | Fact::NearestSpeed
+        | Fact::Elapsed
+        | Fact::StepNumber
+        | Fact::NpcSpeed
+        | Fact::NpcGap
+        | Fact::NpcLimit
+        | Fact::SpawnGap
+        | Fact::SafetyGap => Interval::NOT_NEGATIVE,
+        Fact::Proc => between(0.0, 1.0),
+        Fact::Collision | Fact::Repeated | Fact::Sudden | Fact::Struck | Fact::Avoidable => return None,
+    })
+}
+
+fn positions(set: u128) -> impl Iterator<Item = usize> {
+    let mut left = set;
+    core::iter::from_fn(move || {
+        let position = (left != 0).then(|| left.trailing_zeros() as usize)?;
+        left &= left - 1;
+        Some(position)
+    })
+}
+
+fn and(left: Values, right: Values) -> Values {
+    Values::Truth {
+        may_hold: left.may_hold() && right.may_hold(),
+        may_fail: left.may_fail() || right.may_fail(),
+    }
+}
+
+fn or(left: Values, right: Values) -> Values {
+    Values::Truth {
+        may_hold: left.may_hold() || right.may_hold(),
+        may_fail: left.may_fail() && right.may_fail(),
+    }
+}
+
+fn arithmetic(op: Arithmetic, left: &Interval, right: &Interval) -> Interval {
+    match op {
+        Arithmetic::Add => left.add(right),
+        Arithmetic::Subtract => left.add(&right.neg()),
+        Arithmetic::Multiply => left.mul(right),
+        Arithmetic::Divide => left.div(right),
+    }
+}
+
+/// Compares two expressions. What both name has one value: `step > step` never holds, whatever the step is, and
+/// `ego.speed > ego.speed + nearest.gap` neither.
+fn compare_parts(op: Comparison, left: &Expr, right: &Expr, known: &Known<'_>) -> Values {
+    if lacks_value(left, known) || lacks_value(right, known) {
+        return Values::truth(op == Comparison::NotEqual);
+    }
+    let apart = compare(op, enclose(left, known), enclose(right, known));
+    if !(apart.may_hold() && apart.may_fail()) {
+        return apart;
+    }
+    let zero = Interval::point(Rational::ZERO);
+    match difference(left, right, known) {
+        // Nearly equal numbers are `==`, so only those that are the same are surely so.
+        Some(found) if found == zero || !matches!(op, Comparison::Equal | Comparison::NotEqual) => {
+            compare(op, Values::Number(found), Values::Number(zero))
+        }
+        _ => apart,
+    }
+}
+
+fn compare(op: Comparison, left: Values, right: Values) -> Values {
+    // `(may hold, may fail)` of equality, of less, and of less or equal.
+    let (less, at_most, equal) = match (left, right) {
+        (Values::Number(a), Values::Number(b)) => (
+            (!b.is_at_most(&a), !a.is_below(&b)),
+            (!b.is_below(&a), !a.is_at_most(&b)),
+            (!a.intersect(&b).is_empty(), a.single().is_none() || a.single() != b.single()),
+        ),
+        (Values::Variants(a), Values::Variants(b)) if a != 0 && b != 0 => {
+            let (low, high) = (u128::trailing_zeros, |set: u128| 127 - set.leading_zeros());
+            (
+                (low(a) < high(b), high(a) >= low(b)),
+                (low(a) <= high(b), high(a) > low(b)),
+                (a & b != 0, !(a == b && a.is_power_of_two())),
+            )
+        }
+        (Values::Variants(_), Values::Variants(_)) => ((false, true), (false, true), (false, true)),
+        (a, b) => {
+            let same = a.may_hold() && b.may_hold() || a.may_fail() && b.may_fail();
+            let differ = a.may_hold() && b.may_fail() || a.may_fail() && b.may_hold();
+            ((true, true), (true, true), (same, differ))
+        }
+    };
+    let (may_hold, may_fail) = match op {
+        Comparison::Equal => equal,
+        Comparison::NotEqual => (equal.1, equal.0),
+        Comparison::Less => less,
+        Comparison::LessEqual => at_most,
+        Comparison::Greater => (at_most.1, at_most.0),
+        Comparison::GreaterEqual => (less.1, less.0),
+    };
+    Values::Truth { may_hold, may_fail }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Facts, Memory, Type, evaluate};
+    use crate::syntax::ast::{FileId, Span};
+    use proptest::prelude::*;
+
+    fn number(kind: ExprKind) -> Expr {
+        Expr { kind, ty: Type::Int, span: Span::new(FileId(0), 0, 0) }
+    }
+
+    /// `a * x + b * y - (c * x - d)`, with `x` and `y` as parameters.
+    fn sum([a, b, c, d]: [i64; 4]) -> Expr {
+        let literal = |value| number(ExprKind::Number(Rational::integer(value)));
+        let of = |op, left, right| number(ExprKind::Arithmetic(op, Box::new(left), Box::new(right)));
+        let times = |factor, local| of(Arithmetic::Multiply, literal(factor), number(ExprKind::Local(local)));
+        let inner = of(Arithmetic::Subtract, times(c, 0), literal(d));
+        of(Arithmetic::Subtract, of(Arithmetic::Add, times(a, 0), times(b, 1)), inner)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(400))]
+
+        /// What two sums share is cancelled: the verdict holds for every value, and where nothing else is left it is sharp.
+        #[test]
+        fn sums_that_share_terms_are_compared(
+            left in prop::array::uniform4(-3..4_i64), right in prop::array::uniform4(-3..4_i64),
+            low in prop::array::uniform2(-5..5_i64), wide in prop::array::uniform2(0..4_i64), at in prop::array::uniform2(0..4_i64),
+            op in 0..6_usize,
+        ) {
+            use Comparison::{Equal, Greater, GreaterEqual, Less, LessEqual, NotEqual};
+            let op = [Equal, NotEqual, Less, LessEqual, Greater, GreaterEqual][op];
+            let (l, r) = (sum(left), sum(right));
+            let compared = Expr {
+                ty: Type::Bool,
+                ..number(ExprKind::Compare(op, Box::new(l), Box::new(r)))
+            };
+            let interval = |of: usize| {
+                Values::Number(Interval::closed(Rational::integer(low[of]), Rational::integer(low[of] + wide[of])))
+            };
+            let known = Known { functions: &[], locals: &[interval(0), interval(1)], cells: &[], road: None, case: None };
+            let found = enclose(&compared, &known);
+            let values = [0, 1].map(|of| Value::Number((low[of] + at[of].min(wide[of])) as f64));
+            let holds = evaluate(&compared, &[], &Facts::new(&values, &Memory::default())).truth();
+            let is_allowed = if holds { found.may_hold() } else { found.may_fail() };
+            prop_assert!(is_allowed);
+            let shares_all = left[0] - left[2] == right[0] - right[2] && left[1] == right[1];
+            let is_sharp = !(found.may_hold() && found.may_fail());
+            prop_assert!(is_sharp || !shares_all || matches!(op, Equal | NotEqual));
+        }
+    }
+}

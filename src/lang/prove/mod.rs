@@ -1,0 +1,63 @@
+//! What holds of a space whatever is drawn: which rows are dead, which rules are idle, which spawns are
+//! unfair.
+//!
+//! A proof works on exact intervals (`enclose`, `reach`), so it may say too little, never too much. It goes
+//! over the demands and bounds of `model::rules`. A witness is found by search and judged as drawing judges.
+//!
+//! Three proofs follow states, and each needs a walk of its own. `clock` asks of one cell, on all roads and at any time,
+//! what the moves of its rule allow. `time` follows sets of values, too many rather than too few, because it must not let
+//! a rule pass that time breaks. `realise` follows single memories that an episode certainly comes to, too few rather
+//! than too many, because a row that it says runs must run. With `time`'s states `realise` would call rows possible that
+//! are not; with `realise`'s, `time` would miss what it did not follow.
+
+mod cells;
+mod clock;
+mod cut;
+mod enclose;
+mod implied;
+mod moment;
+mod never_drawn;
+mod reach;
+mod realise;
+mod reduce;
+mod spawn_bounds;
+mod start;
+mod sums;
+mod time;
+mod twins;
+mod undecided;
+mod unfair;
+mod witness;
+
+pub use clock::{forbids, next_rows, shortest_way};
+pub use cut::{Removal, removals};
+pub use enclose::{Known, VARIANTS_MAX, Values, enclose};
+pub use reach::{product_size, rows};
+pub use realise::RunsIn;
+pub use realise::{Realisable, Realised, realise, with_dead};
+pub use time::BrokenByTime;
+pub use time::lasts;
+pub use witness::{Witness, witness};
+
+use crate::model::{Space, effort};
+use crate::syntax::Diagnostic;
+
+/// Errors, warnings and remarks about a space whose names and types are right.
+pub(crate) fn report(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> {
+    let proofs: [&dyn Fn() -> Vec<Diagnostic>; 12] = [
+        &|| reach::report(space),
+        &|| start::report(space),
+        &|| time::report(space),
+        &|| spawn_bounds::report(space),
+        &|| twins::report(space),
+        &|| undecided::report(space, realisable),
+        &|| cut::report(space),
+        &|| never_drawn::report(space),
+        &|| implied::report(space),
+        &|| unfair::report(space),
+        &|| moment::report(space),
+        &|| clock::report(space),
+    ];
+    // Once the steps are spent, the checker drops all findings.
+    proofs.into_iter().take_while(|_| !effort::is_spent()).flat_map(|report| report()).collect()
+}

@@ -1,0 +1,419 @@
+//! Whether facts of the moment can meet conditions together: `ego.light == Red and ego.light == Green` holds at no
+//! moment, nor does `ego.speed >= 200 m/s`.
+//!
+//! What a fact may be is cut into pieces where a condition compares it with something known. If in every combination
+//! of pieces some condition fails, no moment meets them all. What is known of facts together stands in [`Case::is_possible`], of
+//! a newcomer in [`newcomers`], and of a road in its stretches, one of which the ego vehicle is on; otherwise facts are taken to be independent, so a combination that is possible here may
+//! still never come.
+
+use core::ops::RangeInclusive;
+
+use crate::model::expr::{Comparison, Expr, ExprKind};
+use crate::model::rules::RowRules;
+use crate::model::vocabulary::{Fact, Known as From, Light, RoadKind, Verb, Word, WordFact};
+use crate::model::{
+    ActionDef, EffectDef, End, EpisodeDef, Interval, LIMIT_PART_MAX, NEAR_JUNCTION_M, RoadFacts, Row,
+    RuleBody, RulesInForce, SPAWN_SPEED_MPS, SPEED_MPS_MAX, Space, SpawnDef, Stretch, Type, WordExpr, code,
+    effort,
+};
+use crate::prove::enclose::{Known, enclose, fact_range};
+use crate::prove::sums::oppose;
+use crate::syntax::Diagnostic;
+use avastra_base::units::Rational;
+
+/// The most combinations of pieces for one question; facts beyond it stay whole.
+const CASES_MAX: usize = 2_048;
+
+/// A piece for each of some facts.
+#[derive(Debug, Clone, Default)]
+pub struct Case {
+    numbers: Vec<(Fact, Interval)>,
+    words: Vec<(WordFact, &'static str)>,
+    /// What some facts are not.
+    not_words: Vec<(WordFact, &'static str)>,
+}
+
+impl Case {
+    /// A moment of which the steps alone are known: one of their beginnings, or, of whole steps, any moment within them.
+    pub fn of_steps(episode: &EpisodeDef, steps: RangeInclusive<u64>, are_whole: bool) -> Case {
+        let at = |step: u64| Rational::from_rounded(episode.time_s(step));
+        let (first, last) = (*steps.start(), *steps.end());
+        let elapsed = match (at(first), at(last + u64::from(are_whole))) {
+            (Some(from), Some(to)) => Interval::closed(from, to),
+            _ => Interval::NOT_NEGATIVE,
+        };
+        let number = |step: u64| Rational::integer(i64::try_from(step).unwrap_or(i64::MAX));
+        let steps = Interval::closed(number(first), number(last));
+        Case { numbers: vec![(Fact::Elapsed, elapsed), (Fact::StepNumber, steps)], ..Case::default() }
+    }
+
+    pub fn number(&self, fact: Fact) -> Option<Interval> {
+        self.numbers.iter().find(|(known, _)| *known == fact).map(|(_, piece)| *piece)
+    }
+
+    /// What a stretch of a route says of a moment.
+    fn of_stretch(stretch: &Stretch) -> Case {
+        let Stretch { limit_mps, junction_ahead_m, route_left_m, has_light, road } = stretch;
+        let numbers = vec![
+            (Fact::EgoLimit, measured(*limit_mps, *limit_mps)),
+            (Fact::EgoJunctionAhead, measured(*junction_ahead_m.start(), *junction_ahead_m.end())),
+            (Fact::EgoRouteLeft, measured(*route_left_m.start(), *route_left_m.end())),
+        ];
+        let no_light = (WordFact::EgoLight, Light::None.name());
+        let (lights, not_words) =
+            if *has_light { (None, vec![no_light]) } else { (Some(no_light), Vec::new()) };
+        let words = lights.into_iter().chain([(WordFact::EgoRoad, road.name())]).collect();
+        Case { numbers, words, not_words }
+    }
+
+    /// What both say, of facts that only one of them knows.
+    fn and(&self, other: &Case) -> Case {
+        let mut both = self.clone();
+        both.numbers.extend(&other.numbers);
+        both.words.extend(&other.words);
+        both.not_words.extend(&other.not_words);
+        both
+    }
+
+    /// Whether the facts may have these values at one moment, by what the engine says of each two of them.
+    fn is_possible(&self, episode: &EpisodeDef) -> bool {
+        let of = |fact: Fact| self.number(fact);
+        let both = |a: Fact, b: Fact| Some((of(a)?, of(b)?));
+        let is_zero = |piece: &Interval| piece.single() == Some(Rational::ZERO);
+        // An action of a scenario may happen within its step.
+        let in_time = both(Fact::StepNumber, Fact::Elapsed).is_none_or(|(step, elapsed)| {
+            let Some(step_s) = Rational::from_rounded(episode.step_s) else { return true };
+            let from = step.mul(&Interval::point(step_s));
+            let within = Interval { low: End::At(Rational::ZERO, true), high: End::At(step_s, false) };
+            !from.add(&within).intersect(&elapsed).is_empty()
+        });
+        let on_road =
+            match (self.word(WordFact::EgoRoad).and_then(RoadKind::from_name), of(Fact::EgoJunctionAhead)) {
+                (Some(RoadKind::InJunction), Some(ahead)) => ahead.contains(Rational::ZERO),
+                (Some(RoadKind::NearJunction), Some(ahead)) => {
+                    !ahead.intersect(&at_most(NEAR_JUNCTION_M)).is_empty()
+                }
+                _ => true,
+            };
+        let is_alone = of(Fact::RoadUsers).is_some_and(|count| is_zero(&count));
+        let at_default =
+            |fact: Fact, value: i64| of(fact).is_none_or(|piece| piece.contains(Rational::integer(value)));
+        let alone =
+            !is_alone || at_default(Fact::NearestGap, NO_ROAD_USER_M) && at_default(Fact::NearestSpeed, 0);
+        // The gap of a spawn is that to the vehicle which is parked with it, if that is nearer.
+        let gaps = both(Fact::SpawnGap, Fact::NpcGap).is_none_or(|(spawn, npc)| !npc.is_below(&spawn));
+        in_time && on_road && alone && gaps
+    }
+
+    pub fn word(&self, fact: WordFact) -> Option<&'static str> {
+        self.words.iter().find(|(known, _)| *known == fact).map(|(_, word)| *word)
+    }
+}
+
+/// `nearest.gap` where there is nobody, m.
+const NO_ROAD_USER_M: i64 = 100;
+
+/// What is known of each newcomer of an action before it appears, beside what is known of the moment; of an action
+/// without newcomers, that of the moment. The world lets nothing appear faster than it was asked to be. Where `lands` is set, it also appears at the distance that was asked for, as far as its verb means a place on
+/// the route: so it is where the road is straight and free.
+pub(super) fn newcomers(action: &ActionDef, known: &Known<'_>, lands: bool) -> Vec<Case> {
+    let spawns = action.effects.iter().filter_map(|effect| match effect {
+        EffectDef::Spawn(spawn) => Some(&**spawn),
+        EffectDef::Set(_) => None,
+    });
+    let newcomers: Vec<Case> = spawns.map(|spawn| newcomer(spawn, known, lands)).collect();
+    match newcomers.is_empty() {
+        true => vec![known.case.cloned().unwrap_or_default()],
+        false => newcomers,
+    }
+}
+
+fn newcomer(spawn: &SpawnDef, known: &Known<'_>, lands: bool) -> Case {
+    let verbs = match &spawn.verb {
+        WordExpr::Fixed(verb) => vec![*verb],
+        WordExpr::Of(expr, words) => {
+            let may_be = enclose(expr, known).variants();
+            words
+                .iter()
+                .enumerate()
+                .filter(|(word, _)| may_be >> word & 1 == 1)
+                .map(|(_, verb)| *verb)
+                .collect()
+        }
+    };
+    let Case { mut numbers, words, not_words } = known.case.cloned().unwrap_or_default();
+    let asked = enclose(&spawn.speed, known).interval().intersect(&at_most(*SPAWN_SPEED_MPS.end()));
+    // On foot one waits at first, or stands for good.
+    let speed = match verbs.iter().all(|verb| matches!(verb, Verb::Walk | Verb::Stand)) {
+        true => Interval::point(Rational::ZERO),
+        false => Interval { low: End::At(Rational::ZERO, true), high: asked.high },
+    };
+    if !speed.is_empty() {
+        numbers.push((Fact::NpcSpeed, speed));
+    }
+    let distance = enclose(&spawn.distance, known).interval().intersect(&Interval::NOT_NEGATIVE);
+    let is_on_route = |verb: &Verb| !matches!(verb, Verb::Walk | Verb::CrossRoad);
+    if lands && verbs.iter().all(is_on_route) && !distance.is_empty() {
+        numbers.extend([(Fact::NpcGap, distance), (Fact::SpawnGap, distance)]);
+    }
+    Case { numbers, words, not_words }
+}
+
+/// Whether the conditions may all hold at one moment of a draw, for each of these newcomers.
+pub(super) fn may_hold_together(
+    conditions: &[&Expr],
+    known: &Known<'_>,
+    episode: &EpisodeDef,
+    newcomers: &[Case],
+) -> bool {
+    let may_all_hold = |conditions: &[&Expr], known: &Known<'_>| {
+        conditions.iter().all(|condition| enclose(condition, known).may_hold())
+    };
+    let asking: Vec<&Expr> = conditions.iter().copied().filter(|c| c.known() > From::Road).collect();
+    let is_met = |case: &Case| may_all_hold(&asking, &Known { case: Some(case), ..*known });
+    let meets = |newcomer: &Case| cases(&asking, known, episode, newcomer).iter().any(is_met);
+    let meets_all = |place: &Case| newcomers.iter().all(|newcomer| meets(&newcomer.and(place)));
+    may_all_hold(conditions, known)
+        && (asking.is_empty()
+            || !oppose(&asking, known, false) && places(&asking, known).iter().any(meets_all))
+}
+
+/// What the road says of the moments of which conditions ask: a case for each stretch of the route, or one of which nothing is
+/// known.
+fn places(asking: &[&Expr], known: &Known<'_>) -> Vec<Case> {
+    let is_of_place = |kind: &ExprKind| {
+        matches!(
+            kind,
+            ExprKind::Fact(Fact::EgoLimit | Fact::EgoJunctionAhead | Fact::EgoRouteLeft)
+                | ExprKind::IsWord(WordFact::EgoRoad | WordFact::EgoLight, _)
+        )
+    };
+    let stretches = known.road.map_or(&[][..], |road| &road.stretches);
+    match stretches.is_empty() || !asking.iter().any(|condition| condition.any(is_of_place)) {
+        true => vec![Case::default()],
+        false => stretches.iter().map(Case::of_stretch).collect(),
+    }
+}
+
+/// Whether the condition can fail at no moment, given what is known.
+pub(super) fn always_holds(condition: &Expr, known: &Known<'_>, episode: &EpisodeDef) -> bool {
+    let holds = |known: &Known<'_>| !enclose(condition, known).may_fail();
+    holds(known)
+        || cases(&[condition], known, episode, &Case::default())
+            .iter()
+            .all(|case| holds(&Known { case: Some(case), ..*known }))
+}
+
+/// One warning for each rule that lets no lane change begin, at any moment.
+pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
+    let in_force = RulesInForce::by_default(space);
+    let mut diagnostics = Vec::new();
+    for (rule, definition) in space.rules.iter().enumerate() {
+        if !in_force.contains(rule) || !matches!(definition.body, RuleBody::During(_)) {
+            continue;
+        }
+        let mut bound =
+            definition.body.actions().into_iter().flat_map(|action| space.rows_of(action)).peekable();
+        if effort::is_spent() || bound.peek().is_none() {
+            continue;
+        }
+        let never = |row: &Row| {
+            let rules = RowRules { space, row, road: None, in_force: &in_force };
+            let (Some(locals), Some(condition)) = (rules.settle(), definition.body.during(row.action)) else {
+                return true;
+            };
+            let cells = space.cells_unknown();
+            !may_hold_together(
+                &[condition],
+                &rules.known(&locals, &cells),
+                &space.episode,
+                &[Case::default()],
+            )
+        };
+        if bound.all(never) {
+            let message = format!("rule `{}` lets no lane change begin", definition.name);
+            let warning =
+                Diagnostic::warning(code::NO_CHANGE, message).at(definition.span, "holds at no moment");
+            let help = "say when lane changes may begin; to have none, write `then: Keep` in the spawn";
+            diagnostics.push(warning.help(help));
+        }
+    }
+    diagnostics
+}
+
+/// The facts of the moment and of newcomers that conditions name and that are bounded, each with its range.
+pub(super) fn ranges_named(
+    conditions: &[&Expr],
+    known: &Known<'_>,
+    episode: &EpisodeDef,
+    newcomers: &[Case],
+) -> Vec<(Fact, Interval)> {
+    let range = |fact: Fact| range(fact, known.road, episode);
+    let of = |fact: Fact| {
+        let ranges = newcomers.iter().map(|newcomer| newcomer.number(fact).unwrap_or_else(|| range(fact)));
+        ranges.reduce(|a, b| a.hull(&b)).unwrap_or_else(|| range(fact))
+    };
+    let named = facts_named(conditions).0.into_iter();
+    named.map(|fact| (fact, of(fact))).filter(|(_, range)| range.high != End::Unbounded).collect()
+}
+
+/// Every combination of pieces that is possible, within what is known of a newcomer.
+fn cases(conditions: &[&Expr], known: &Known<'_>, episode: &EpisodeDef, newcomer: &Case) -> Vec<Case> {
+    let (numbers, words) = facts_named(conditions);
+    let mut cases = vec![Case::default()];
+    for fact in words {
+        let is_possible = |word: &'static str| {
+            newcomer.word(fact).is_none_or(|known| known == word)
+                && !newcomer.not_words.contains(&(fact, word))
+        };
+        let named: Vec<&'static str> =
+            fact.words().into_iter().map(|(word, _)| word).filter(|word| is_possible(word)).collect();
+        if cases.len() * named.len() > CASES_MAX {
+            continue;
+        }
+        let with = |case: &Case| {
+            let case = case.clone();
+            let one = |word: &&'static str| {
+                let mut case = case.clone();
+                case.words.push((fact, *word));
+                case
+            };
+            named.iter().map(one).collect::<Vec<_>>()
+        };
+        cases = cases.iter().flat_map(with).collect();
+    }
+    for fact in numbers {
+        let whole = newcomer.number(fact).unwrap_or_else(|| range(fact, known.road, episode));
+        let mut pieces = pieces(&whole, cuts(fact, conditions, known));
+        pieces.retain(|piece| fact.ty() != Type::Int || piece.has_integer());
+        if cases.len() * pieces.len() > CASES_MAX {
+            pieces = vec![whole];
+        }
+        let with = |case: &Case| {
+            let case = case.clone();
+            let one = |piece: &Interval| {
+                let mut case = case.clone();
+                case.numbers.push((fact, *piece));
+                case
+            };
+            pieces.iter().map(one).collect::<Vec<_>>()
+        };
+        cases = cases.iter().flat_map(with).collect();
+    }
+    effort::spend(cases.len() * (8 + conditions.len()));
+    cases.retain(|case| case.is_possible(episode));
+    cases
+}
+
+/// The facts of the moment and of the newcomer that conditions name.
+fn facts_named(conditions: &[&Expr]) -> (Vec<Fact>, Vec<WordFact>) {
+    let (mut numbers, mut words) = (Vec::new(), Vec::new());
+    for condition in conditions {
+        condition.walk(&mut |part| match part.kind {
+            ExprKind::Fact(fact)
+                if matches!(fact.known(), From::World | From::Spawn) && !numbers.contains(&fact) =>
+            {
+                numbers.push(fact);
+            }
+            ExprKind::IsWord(fact, _) if fact.known() == From::World && !words.contains(&fact) => {
+                words.push(fact);
+            }
+            _ => {}
+        });
+    }
+    (numbers, words)
+}
+
+/// What a fact may be at a draw, on a road if one is given.
+fn range(fact: Fact, road: Option<&RoadFacts>, episode: &EpisodeDef) -> Interval {
+    let all = fact_range(fact).unwrap_or(Interval::ALL);
+    let along = |of: fn(&Stretch) -> (f64, f64)| {
+        let ranges = road?.stretches.iter().map(of).map(|(low, high)| measured(low, high));
+        ranges.reduce(|a, b| a.hull(&b))
+    };
+    let of_road = match fact {
+        Fact::Elapsed => Some(at_most(episode.step_s * f64::from(episode.step_limit))),
+        Fact::StepNumber => Some(at_most(f64::from(episode.step_limit.saturating_sub(1)))),
+        Fact::NpcSpeed => Some(at_most(*SPAWN_SPEED_MPS.end())),
+        Fact::EgoLimit => along(|stretch| (stretch.limit_mps, stretch.limit_mps)),
+        Fact::EgoJunctionAhead => {
+            along(|stretch| (*stretch.junction_ahead_m.start(), *stretch.junction_ahead_m.end()))
+        }
+        Fact::EgoRouteLeft => along(|stretch| (*stretch.route_left_m.start(), *stretch.route_left_m.end())),
+        Fact::NpcLimit => road.map(|road| measured(road.map_limits_mps[0], road.map_limits_mps[1])),
+        // What is pushed is no faster than what pushes it.
+        Fact::NearestSpeed => road.map(|road| {
+            let ambient_mps = LIMIT_PART_MAX * road.map_limits_mps[1];
+            measured(0.0, SPEED_MPS_MAX.max(ambient_mps))
+        }),
+        // So far it may come beside its route if it drives straight away from it.
+        Fact::EgoOffset => {
+            let way_m = SPEED_MPS_MAX * episode.step_s * f64::from(episode.step_limit);
+            Some(measured(-way_m, way_m))
+        }
+        _ => None,
+    };
+    of_road.map_or(all, |range| range.intersect(&all))
+}
+
+/// A range of measured numbers, a little wider than it is, because authors round.
+fn measured(low: f64, high: f64) -> Interval {
+    let wider = |end: f64, by: f64| Rational::from_f64(end + by * (1e-6 + end.abs() * 1e-6));
+    match (wider(low, -1.0), wider(high, 1.0)) {
+        (Some(low), Some(high)) => Interval::closed(low, high),
+        _ => Interval::ALL,
+    }
+}
+
+/// From 0 to a number.
+fn at_most(high: f64) -> Interval {
+    Rational::from_f64(high).map_or(Interval::NOT_NEGATIVE, |high| Interval::closed(Rational::ZERO, high))
+}
+
+/// Where conditions compare a fact with something that no fact of the moment decides.
+fn cuts(fact: Fact, conditions: &[&Expr], known: &Known<'_>) -> Vec<Rational> {
+    let is_fact = |expr: &Expr| expr.kind == ExprKind::Fact(fact);
+    let mut cuts = Vec::new();
+    let mut cut_at = |expr: &Expr| {
+        if expr.known() > From::Road {
+            return;
+        }
+        let Interval { low, high } = enclose(expr, known).interval();
+        for end in [low, high] {
+            if let End::At(at, _) = end {
+                cuts.push(at);
+            }
+        }
+    };
+    for condition in conditions {
+        condition.walk(&mut |part| match &part.kind {
+            // A measured number is `==` another if nearly so: no cut divides these. Whole numbers are what they are.
+            ExprKind::Compare(Comparison::Equal | Comparison::NotEqual, ..) | ExprKind::InList(..)
+                if fact.ty() != Type::Int => {}
+            ExprKind::Compare(_, left, right) if is_fact(left) => cut_at(right),
+            ExprKind::Compare(_, left, right) if is_fact(right) => cut_at(left),
+            ExprKind::InRange(inner, low, high) if is_fact(inner) => {
+                cut_at(low);
+                cut_at(high);
+            }
+            ExprKind::InList(inner, list) if is_fact(inner) => list.iter().for_each(&mut cut_at),
+            _ => {}
+        });
+    }
+    cuts.sort_unstable();
+    cuts.dedup();
+    cuts
+}
+
+/// A range cut at these places: what lies between two of them, and each of them alone.
+fn pieces(whole: &Interval, cuts: Vec<Rational>) -> Vec<Interval> {
+    let mut pieces = Vec::new();
+    let mut low = End::Unbounded;
+    for cut in cuts {
+        pieces.push(Interval { low, high: End::At(cut, false) });
+        pieces.push(Interval::point(cut));
+        low = End::At(cut, false);
+    }
+    pieces.push(Interval { low, high: End::Unbounded });
+    pieces.iter().map(|piece| piece.intersect(whole)).filter(|piece| !piece.is_empty()).collect()
+}

@@ -1,0 +1,373 @@
+//! Which rows run on which road, in the states to which an episode comes.
+//!
+//! A row is searched for in the states in which an episode begins, then step by step in those to which rows and time lead
+//! from there, until every row has run once or the episode is over. What never ran there is searched for in other states
+//! and at other times.
+
+use std::collections::BTreeSet;
+
+use crate::model::expr::ExprKind;
+use crate::model::rules::RowRules;
+use crate::model::vocabulary::Fact;
+use crate::model::{Memory, Reach, Road, Row, RulesInForce, Space, effort};
+use crate::prove::moment::Case;
+use crate::prove::witness::{Found, Left, Search};
+use crate::syntax::listed;
+
+/// The most boxes of ranges that the searches of all rows look at; most rows need one for each road.
+const BOXES_MAX: usize = 20_000;
+/// The most states that are followed from step to step on one road, beside those to which time alone leads.
+const STATES_MAX: usize = 256;
+
+/// What is found of a row on a road.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Realised {
+    /// It runs in a state in which a step of an episode may begin, at its time.
+    Runs,
+    /// It runs, but not in a state in which a step begins, at its time.
+    Unreached,
+    /// It runs, but in no state and at no time of which that was found out.
+    Elsewhere,
+    /// There are no values that obey its rules.
+    Never,
+    /// There may be values, but none were found.
+    Unknown,
+    /// The boxes were spent before.
+    NotSearched,
+}
+
+/// What is found of every row on every road, by row and road.
+pub type Realisable = Vec<Vec<Realised>>;
+
+/// The states in which rows were found to run.
+#[derive(Debug, Clone, Default)]
+pub struct RunsIn {
+    /// By road.
+    states: Vec<Vec<Memory>>,
+    /// By row and road: a position among the states of the road.
+    found: Vec<Vec<Option<usize>>>,
+}
+
+impl RunsIn {
+    /// The number of a state in which a step begins on the road, and the row runs; `None` if none was found.
+    pub fn state_of(&self, row: usize, road: usize) -> Option<usize> {
+        *self.found.get(row)?.get(road)?
+    }
+
+    /// The state of a road with that number.
+    pub fn state(&self, road: usize, number: usize) -> &Memory {
+        &self.states[road][number]
+    }
+}
+
+/// Searches for values of every row on every road.
+pub fn realise(space: &Space) -> (Realisable, RunsIn) {
+    let left = Left::new(BOXES_MAX);
+    let in_force = RulesInForce::by_default(space);
+    let mut realisable = vec![vec![Realised::NotSearched; space.roads.len()]; space.rows.len()];
+    let mut runs_in = RunsIn { states: Vec::new(), found: vec![Vec::new(); space.rows.len()] };
+    for (index, road) in space.roads.iter().enumerate() {
+        let on_road = OnRoad { space, road, in_force: &in_force, left: &left };
+        let OfRoad { found, runs_in: places, states } = on_road.rows(index);
+        for (row, (found, state)) in found.into_iter().zip(places).enumerate() {
+            realisable[row][index] = found;
+            runs_in.found[row].push(state);
+        }
+        runs_in.states.push(states);
+    }
+    (realisable, runs_in)
+}
+
+/// The rows with those marked as dead for which no values exist.
+pub fn with_dead(space: &Space, realisable: &Realisable) -> Vec<Row> {
+    let (in_force, left) = (RulesInForce::by_default(space), Left::new(BOXES_MAX));
+    let mut rows = space.rows.clone();
+    for (row, found) in rows.iter_mut().zip(realisable) {
+        for (index, road) in space.roads.iter().enumerate() {
+            if found[index] == Realised::Never && matches!(row.roads[index], Reach::Open(_)) {
+                row.roads[index] = dead(space, &space.rows[row.index], road, &in_force, &left);
+            }
+        }
+    }
+    rows
+}
+
+/// A row without values on a road, and the rules that leave it none.
+fn dead(space: &Space, row: &Row, road: &Road, in_force: &RulesInForce, left: &Left) -> Reach {
+    let mut conflict = in_force.clone();
+    for rule in in_force.on_row(row) {
+        if effort::is_spent() {
+            break;
+        }
+        let fewer = conflict.except(rule);
+        let rules = RowRules { space, row, road: Some(&road.facts), in_force: &fewer };
+        let search = Search { rules, left, moment: None };
+        if search.memories().0.iter().all(|memory| search.at(memory) == Found::Never) {
+            conflict = fewer;
+        }
+    }
+    let rules: Vec<usize> = conflict.on_row(row).collect();
+    let names: Vec<&str> = rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
+    let rules_on_row = RowRules { space, row, road: Some(&road.facts), in_force };
+    let search = Search { rules: rules_on_row, left, moment: None };
+    let place = match search.reads_any() {
+        true => " in states to which an episode comes in time",
+        false => "",
+    };
+    let reason = match names.as_slice() {
+        [] => "its own ranges and conditions leave no value".to_owned(),
+        names => format!("no values obey {}{place} (road `{}`)", listed(names), road.name),
+    };
+    Reach::Dead { rules, reason }
+}
+
+/// What is found of each row on a road.
+struct OfRoad {
+    found: Vec<Realised>,
+    /// The state in which it runs, by position in `states`.
+    runs_in: Vec<Option<usize>>,
+    states: Vec<Memory>,
+}
+
+/// The rows of a space on one of its roads.
+struct OnRoad<'a> {
+    space: &'a Space,
+    road: &'a Road,
+    in_force: &'a RulesInForce,
+    left: &'a Left,
+}
+
+impl<'a> OnRoad<'a> {
+    /// A search for values of a row, at a moment of which that is known.
+    fn search<'s>(&'s self, row: &'s Row, moment: Option<&'s Case>) -> Search<'s> {
+        let OnRoad { space, road, in_force, left } = *self;
+        Search { rules: RowRules { space, row, road: Some(&road.facts), in_force }, left, moment }
+    }
+
+    fn asked(&self, row: &'a Row) -> Asked<'a> {
+        let search = self.search(row, None);
+        Asked {
+            row,
+            about_states: search.reads_any(),
+            about_time: is_about_time(search.rules),
+            is_undecided: false,
+        }
+    }
+
+    /// Whether a row may run in some state at that moment.
+    fn is_in_time(&self, asked: &Asked<'_>, moment: &Case) -> bool {
+        !asked.about_time || self.search(asked.row, Some(moment)).may_run(&self.space.cells_unknown())
+    }
+
+    /// What is found of each row.
+    fn rows(&self, index: usize) -> OfRoad {
+        let is_open = |row: &&Row| matches!(row.roads[index], Reach::Open(_));
+        let open: Vec<Asked<'_>> =
+            self.space.rows.iter().filter(is_open).map(|row| self.asked(row)).collect();
+        let sets = |asked: &&Asked<'_>| self.space.actions[asked.row.action].sets().next().is_some();
+        let movers: Vec<Asked<'_>> = open.iter().filter(sets).copied().collect();
+        let mut found = vec![Realised::Never; self.space.rows.len()];
+        let mut runs_in = vec![None; self.space.rows.len()];
+        let mut pending = open;
+        let mut way = Way::begin(self, &movers);
+        for step in 0..u64::from(self.space.episode.step_limit) {
+            let moment = Case::of_steps(&self.space.episode, step..=step, false);
+            pending.retain_mut(|asked| {
+                if effort::is_spent() {
+                    return true;
+                }
+                let state = way.runs(self, asked, step, &moment);
+                if state.is_some() {
+                    found[asked.row.index] = Realised::Runs;
+                    runs_in[asked.row.index] = state;
+                }
+                state.is_none()
+            });
+            if effort::is_spent()
+                || self.left.is_spent()
+                || !pending.iter().any(|asked| asked.about_states || asked.about_time)
+            {
+                break;
+            }
+            let is_at_rest = !way.go_on(self, &movers, step, &moment);
+            if is_at_rest && !pending.iter().any(|asked| asked.about_time) {
+                break;
+            }
+        }
+        for asked in pending {
+            found[asked.row.index] = self.elsewhere(&asked, way.is_complete);
+        }
+        OfRoad { found, runs_in, states: way.states.into_iter().map(|met| met.memory).collect() }
+    }
+
+    /// What there is of a row that did not run in any state that was followed.
+    fn elsewhere(&self, asked: &Asked<'a>, is_way_complete: bool) -> Realised {
+        if effort::is_spent() {
+            return Realised::NotSearched;
+        }
+        let search = self.search(asked.row, None);
+        let (memories, are_all) = match asked.about_states {
+            true => search.memories(),
+            false => (vec![self.space.initial_memory(0)], true),
+        };
+        let is_complete = !asked.is_undecided && (is_way_complete || !asked.about_states);
+        let mut is_proved = are_all || is_complete;
+        for memory in &memories {
+            if effort::is_spent() || self.left.is_spent() {
+                return Realised::NotSearched;
+            }
+            match search.at(memory) {
+                _ if self.left.is_spent() => return Realised::NotSearched,
+                Found::Runs(_) if is_complete => return Realised::Unreached,
+                Found::Runs(_) => return Realised::Elsewhere,
+                Found::Never => {}
+                Found::Unknown => is_proved = false,
+            }
+        }
+        match (is_proved, is_complete) {
+            (true, _) => Realised::Never,
+            (false, true) => Realised::Unreached,
+            (false, false) => Realised::Unknown,
+        }
+    }
+}
+
+/// Whether a rule on a row asks for the time.
+pub(super) fn is_about_time(rules: RowRules<'_>) -> bool {
+    let is_time = |kind: &ExprKind| matches!(kind, ExprKind::Fact(Fact::Elapsed | Fact::StepNumber));
+    rules.conditions().iter().any(|condition| condition.any(is_time))
+}
+
+/// A row, and on what it depends whether it runs.
+#[derive(Clone, Copy)]
+struct Asked<'a> {
+    row: &'a Row,
+    about_states: bool,
+    about_time: bool,
+    /// Whether in some state and step neither values were found nor a proof that there are none.
+    is_undecided: bool,
+}
+
+/// The states to which episodes come, step by step.
+struct Way {
+    states: Vec<Met>,
+    /// The states in which the step may begin.
+    now: BTreeSet<usize>,
+    /// Whether no state was left out.
+    is_complete: bool,
+}
+
+/// A state that was met.
+struct Met {
+    memory: Memory,
+    since: u64,
+    /// Whether the first start comes here without an action. Such states are followed however many others there are.
+    is_waited_for: bool,
+    /// What rows make of it that ask for no time.
+    led_to: BTreeSet<usize>,
+    /// The rows, by position, that were not tried here, or that ask for the time.
+    open: Vec<usize>,
+}
+
+impl Way {
+    fn begin(on_road: &OnRoad<'_>, movers: &[Asked<'_>]) -> Way {
+        let (starts, are_all) = on_road.space.initial_memories(on_road.road, on_road.in_force, STATES_MAX);
+        let mut way = Way { states: Vec::new(), now: BTreeSet::new(), is_complete: are_all };
+        for (nth, start) in starts.into_iter().enumerate() {
+            let start = way.number(start, 0, nth == 0, movers);
+            way.now.extend(start);
+        }
+        way
+    }
+
+    /// The number of a state; `None` if there are too many.
+    fn number(
+        &mut self,
+        memory: Memory,
+        since: u64,
+        is_waited_for: bool,
+        movers: &[Asked<'_>],
+    ) -> Option<usize> {
+        effort::spend(self.states.len() + memory.cells().len());
+        if let Some(known) = self.states.iter().position(|known| known.memory == memory) {
+            self.states[known].is_waited_for |= is_waited_for;
+            return Some(known);
+        }
+        if self.states.len() >= STATES_MAX && !is_waited_for {
+            self.is_complete = false;
+            return None;
+        }
+        effort::spend(movers.len());
+        let open = (0..movers.len()).collect();
+        self.states.push(Met { memory, since, is_waited_for, led_to: BTreeSet::new(), open });
+        Some(self.states.len() - 1)
+    }
+
+    /// A state in which the step begins and a row runs, as far as it was not asked before.
+    fn runs(&self, on_road: &OnRoad<'_>, asked: &mut Asked<'_>, step: u64, moment: &Case) -> Option<usize> {
+        if !on_road.is_in_time(asked, moment) {
+            return None;
+        }
+        let search = on_road.search(asked.row, asked.about_time.then_some(moment));
+        effort::spend(self.now.len());
+        for (nth, number) in self.now.iter().enumerate() {
+            let state = &self.states[*number];
+            let is_due = match (asked.about_states, asked.about_time) {
+                (true, true) => true,
+                (true, false) => state.since == step,
+                (false, true) => nth == 0,
+                (false, false) => nth == 0 && step == 0,
+            };
+            if !is_due {
+                continue;
+            }
+            if on_road.left.is_spent() {
+                return None;
+            }
+            match search.at(&state.memory) {
+                Found::Runs(_) => return Some(*number),
+                Found::Never => {}
+                Found::Unknown => asked.is_undecided = true,
+            }
+        }
+        None
+    }
+
+    /// Goes on to the states in which the next step begins. Gives whether they are others, or may be later.
+    fn go_on(&mut self, on_road: &OnRoad<'_>, movers: &[Asked<'_>], step: u64, moment: &Case) -> bool {
+        let OnRoad { space, road, in_force, .. } = *on_road;
+        effort::spend(movers.len());
+        let in_time: Vec<bool> = movers.iter().map(|mover| on_road.is_in_time(mover, moment)).collect();
+        let now = core::mem::take(&mut self.now);
+        for state in &now {
+            let Met { memory, is_waited_for, .. } = &self.states[*state];
+            let (memory, is_waited_for) = (memory.clone(), *is_waited_for);
+            let waited = space.memory_after_wait(&memory, Some(step), Some(&road.facts), in_force);
+            let waited = self.number(waited, step + 1, is_waited_for, movers);
+            self.now.extend(waited);
+            for position in core::mem::take(&mut self.states[*state].open) {
+                if effort::is_spent() {
+                    return false;
+                }
+                let mover = &movers[position];
+                if mover.about_time {
+                    self.states[*state].open.push(position);
+                }
+                if !in_time[position] {
+                    continue;
+                }
+                let search = on_road.search(mover.row, mover.about_time.then_some(moment));
+                let (led_to, are_all) = search.successors(&memory);
+                self.is_complete &= are_all;
+                let led_to: Vec<usize> =
+                    led_to.into_iter().filter_map(|to| self.number(to, step + 1, false, movers)).collect();
+                match mover.about_time {
+                    true => self.now.extend(led_to),
+                    false => self.states[*state].led_to.extend(led_to),
+                }
+            }
+            self.now.extend(&self.states[*state].led_to);
+        }
+        self.now != now || now.iter().any(|state| !self.states[*state].open.is_empty())
+    }
+}

@@ -1,0 +1,162 @@
+//! Deep Q-learning: DQN (Mnih et al., 2015, Algorithm 1), Double DQN (van Hasselt, Guez and Silver, 2016)
+//! and prioritised replay (Schaul et al., 2016, Algorithm 1), as the settings say.
+//!
+//! `update` improves the network by one batch, `n_step` makes the transitions, `replay` keeps and draws them, and
+//! `quirks` holds what only the published packages do. `settings` puts the parts together.
+
+mod settings;
+mod update;
+
+pub use settings::LearnerSettings;
+pub use update::{Loss, improve};
+
+use std::sync::Arc;
+
+use ndarray::ArrayView1;
+
+use crate::mdp::Observation;
+use avastra_base::rng;
+use avastra_base::rng::Rng;
+
+use super::exploration::ExplorationSettings;
+use super::n_step::transitions;
+use super::network::{Adam, Network};
+use super::q_policy::QPolicy;
+use super::registry::Agent;
+use super::replay::{Replay, Transition};
+use super::shuffled::{STATES, Shuffled};
+use super::trainable::Trainable;
+use super::trajectory::{Lesson, Trajectory};
+
+/// A learning agent.
+pub struct Learner {
+    /// The online network, and how it acts.
+    pub(super) policy: QPolicy,
+    /// The mean of the online networks, which acts in the end, if the settings ask for one.
+    pub(super) average: Option<QPolicy>,
+    pub(super) target: Network,
+    pub(super) adam: Adam,
+    pub(super) replay: Replay,
+    exploration: ExplorationSettings,
+    /// Choices made.
+    pub(super) steps: u64,
+    /// Updates made.
+    pub(super) updates: u64,
+    /// The share of the training's episodes that are over.
+    over: f64,
+}
+
+impl Learner {
+    /// A learner that has learned nothing: its first network, an empty replay, an optimiser for this network, and how ε
+    /// falls.
+    pub fn new(policy: QPolicy, replay: Replay, adam: Adam, exploration: ExplorationSettings) -> Learner {
+        let target = policy.network.clone();
+        let average = (policy.settings.average_decay > 0.0).then(|| policy.clone());
+        Learner { policy, average, target, adam, replay, exploration, steps: 0, updates: 0, over: 0.0 }
+    }
+
+    /// What acts after the training.
+    fn trained(&self) -> &QPolicy {
+        self.average.as_ref().unwrap_or(&self.policy)
+    }
+
+    /// Draws a batch, improves the online network by it and renews its priorities; its loss.
+    fn update(&mut self, rng: &mut Rng) -> f64 {
+        let settings = self.policy.settings.clone();
+        let samples = self.replay.sample(settings.batch_len, self.updates, rng);
+        let batch: Vec<&Transition> = samples.iter().map(|sample| self.replay.get(sample.index)).collect();
+        let weights: Vec<f32> = samples.iter().map(|sample| sample.weight).collect();
+        let online = &mut self.policy.network;
+        let (loss, td_errors) = improve(online, &self.target, &mut self.adam, &settings, &batch, &weights);
+        for (sample, td_error) in samples.iter().zip(td_errors) {
+            self.replay.update(sample.index, f64::from(td_error));
+        }
+        self.updates += 1;
+        if self.updates.is_multiple_of(settings.target_period_updates) {
+            self.target.copy_from(&self.policy.network);
+        }
+        if let Some(average) = &mut self.average {
+            // At first it is the plain mean, or the first weights, which know nothing, would stay in it for long.
+            let decay = settings.average_decay.min(1.0 - 1.0 / self.updates as f64);
+            average.network.approach(&self.policy.network, (1.0 - decay) as f32);
+        }
+        loss
+    }
+}
+
+impl Agent for Learner {
+    fn begin(&mut self) {
+        self.policy.begin();
+    }
+
+    /// ε-greedy over the open rows.
+    fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
+        let open = self.policy.open(legal);
+        let explores = rng::unit(rng) < self.exploration_epsilon();
+        self.steps += 1;
+        let row = if self.policy.quirks.explores(explores) {
+            self.policy.quirks.random_row(&open, rng)
+        } else {
+            self.policy.greedy(observation, &open)
+        }?;
+        self.policy.chosen(row);
+        Some(row)
+    }
+
+    fn looks_at_mask(&self) -> bool {
+        self.policy.looks_at_mask() || self.policy.settings().choice.masks_target
+    }
+}
+
+impl Trainable for Learner {
+    fn progress(&mut self, over: f64) {
+        self.over = over;
+    }
+
+    /// Keeps what the episode showed, and makes the updates that its steps are worth.
+    fn learn(&mut self, episode: &Trajectory, rng: &mut Rng) -> Lesson {
+        let payment = &self.policy.settings.payment;
+        let rewards = match payment.pays_maker {
+            true => payment.paid_to_makers(episode),
+            false => self.policy.quirks.rewards(episode),
+        };
+        for transition in transitions(episode, &rewards, &self.policy) {
+            self.replay.push(transition);
+        }
+        let settings = self.policy.settings();
+        if self.replay.len() < settings.learning_starts {
+            return Lesson::default();
+        }
+        let updates = episode.steps.len() as u64 * u64::from(settings.updates_per_step);
+        let losses: f64 = (0..updates).map(|_| self.update(rng)).sum();
+        Lesson { updates, loss: (updates > 0).then(|| losses / updates as f64) }
+    }
+
+    fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    fn exploration_epsilon(&self) -> f64 {
+        self.exploration.epsilon(self.steps, self.over)
+    }
+
+    fn actor(&self) -> Box<dyn Agent> {
+        Box::new(self.trained().clone())
+    }
+
+    fn shuffled(&self) -> Option<Box<dyn Agent>> {
+        let states = self.replay.latest(STATES).map(|transition| transition.inputs.clone()).collect();
+        Some(Box::new(Shuffled { policy: self.trained().clone(), states: Arc::new(states) }))
+    }
+
+    fn policy(&self) -> Option<&QPolicy> {
+        Some(self.trained())
+    }
+
+    fn save(&self) -> Vec<u8> {
+        self.to_bytes()
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests;

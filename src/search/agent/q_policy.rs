@@ -1,0 +1,235 @@
+//! A policy that acts: ε-greedy over the rows that are open to it, by its network or by its rules.
+
+use std::sync::Arc;
+
+use ndarray::{Array1, ArrayView1, ArrayView2, Axis};
+
+use crate::mdp::Observation;
+use avastra_base::rng;
+use avastra_base::rng::Rng;
+use avastra_lang::model::policy::PolicyRule;
+use avastra_lang::model::{EffectDef, Policy};
+use avastra_lang::syntax::nearest;
+use avastra_world::action::ActionTable;
+
+use super::decision::chosen_by;
+use super::features::{Encoding, Features, StateSet};
+use super::learner::LearnerSettings;
+use super::network::{Network, Shape};
+use super::quirks::Quirks;
+use super::random::any;
+use super::registry::Agent;
+use super::settings::SettingsError;
+
+/// What the agent sees and may do.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ChoiceSettings {
+    /// State variables that the agent sees (RQ2).
+    pub state: StateSet,
+    /// How these variables go into the network.
+    pub encoding: Encoding,
+    /// Names of the actions and groups that the agent may choose from (RQ2); empty: all.
+    pub actions: Vec<String>,
+    /// Whether the agent chooses only among rows that the rules allow. If not, a forbidden choice loses
+    /// the step.
+    pub masks_choice: bool,
+    /// Whether the learning target considers only rows that the rules allow.
+    pub masks_target: bool,
+    /// Steps that must pass between two changes of weather or time; 0: no gate. Published package: 5. A
+    /// quirk (see `quirks`).
+    pub environment_gate_steps: u32,
+}
+
+/// What an agent knows about the rows before any episode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rows {
+    /// Whether the agent may choose the row at all, shape `(rows,)`.
+    pub allowed: Vec<bool>,
+    /// Whether the row changes weather or time alone, and makes no road user appear, shape `(rows,)`.
+    pub environment: Vec<bool>,
+}
+
+impl Rows {
+    /// The rows of a table; `actions` names the actions and groups that are allowed, empty: all.
+    ///
+    /// # Errors
+    /// If the space has no action or group of such a name.
+    pub fn new(table: &ActionTable, actions: &[String]) -> Result<Rows, SettingsError> {
+        let space = table.space();
+        let mut allowed = vec![actions.is_empty(); space.actions.len()];
+        for name in actions {
+            let action = space.actions.iter().position(|action| action.name == *name);
+            let group = space.groups.iter().find(|group| group.name == *name);
+            match (action, group) {
+                (Some(action), _) => allowed[action] = true,
+                (None, Some(group)) => group.actions.iter().for_each(|&action| allowed[action] = true),
+                (None, None) => {
+                    let actions = space.actions.iter().map(|action| action.name.as_str());
+                    let groups = space.groups.iter().map(|group| group.name.as_str());
+                    let suggestion = nearest(name, actions.chain(groups));
+                    let hint = suggestion.map_or(String::new(), |name| format!(": did you mean `{name}`?"));
+                    let message = format!("`actions`: the space has no action or group `{name}`{hint}");
+                    return Err(SettingsError::Text(message));
+                }
+            }
+        }
+        let is_environment = |action: usize| {
+            !space.actions[action].effects.iter().any(|effect| matches!(effect, EffectDef::Spawn(_)))
+        };
+        Ok(Rows {
+            allowed: table.rows().iter().map(|row| allowed[row.action]).collect(),
+            environment: table.rows().iter().map(|row| is_environment(row.action)).collect(),
+        })
+    }
+}
+
+/// Which of the two faces of a policy chooses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Face {
+    /// The exact network.
+    #[default]
+    Network,
+    /// The readable rules that were distilled from it.
+    Rules,
+}
+
+/// A Q-network with everything that it takes to act.
+#[derive(Debug, Clone)]
+pub struct QPolicy {
+    pub(super) settings: Arc<LearnerSettings>,
+    pub(super) features: Features,
+    pub(super) rows: Arc<Rows>,
+    pub(super) network: Network,
+    /// Rules that choose in place of the network.
+    rules: Option<Arc<Vec<PolicyRule>>>,
+    pub(super) quirks: Quirks,
+}
+
+impl QPolicy {
+    /// Shape of the network that these settings need for a table of `rows` rows.
+    pub fn shape(settings: &LearnerSettings, rows: usize) -> Shape {
+        let inputs = Features::new(settings.choice.state, settings.choice.encoding).len();
+        let hidden = settings.network.hidden_units.iter().copied();
+        let layers = core::iter::once(inputs).chain(hidden).chain([rows]).collect();
+        Shape { layers, dueling: settings.network.dueling }
+    }
+
+    /// The network must have the [`QPolicy::shape`] of the settings.
+    pub fn new(settings: Arc<LearnerSettings>, rows: Arc<Rows>, network: Network) -> QPolicy {
+        assert_eq!(*network.shape(), QPolicy::shape(&settings, rows.allowed.len()), "the network fits");
+        let features = Features::new(settings.choice.state, settings.choice.encoding);
+        let quirks = Quirks::new(&settings, rows.allowed.len());
+        QPolicy { settings, features, rows, network, rules: None, quirks }
+    }
+
+    /// The policy that a file describes, for the table that it is to choose from.
+    ///
+    /// # Errors
+    /// If its settings cannot be read, or describe another network than it has.
+    pub fn read(file: &Policy, table: &ActionTable) -> Result<QPolicy, SettingsError> {
+        let settings = LearnerSettings::from_record(&file.hyperparameters)?;
+        let rows = Rows::new(table, &settings.choice.actions)?;
+        let shape = Shape { layers: file.layers.clone(), dueling: file.dueling };
+        if shape != QPolicy::shape(&settings, rows.allowed.len()) {
+            let message = "the network is not the one that its settings describe";
+            return Err(SettingsError::Text(message.to_owned()));
+        }
+        // The checker has counted the weights.
+        let network = Network::from_parameters(shape, file.parameters.clone());
+        Ok(QPolicy::new(Arc::new(settings), Arc::new(rows), network))
+    }
+
+    /// This policy with rules in place of the network; exploration, gate and masks stay.
+    pub fn with_rules(&self, rules: Arc<Vec<PolicyRule>>) -> QPolicy {
+        QPolicy { rules: Some(rules), ..self.clone() }
+    }
+
+    pub fn settings(&self) -> &LearnerSettings {
+        &self.settings
+    }
+
+    pub fn network(&self) -> &Network {
+        &self.network
+    }
+
+    /// The variables that the network sees, by index.
+    pub fn variables(&self) -> &[usize] {
+        self.features.variables()
+    }
+
+    /// Q-values of a state, shape `(rows,)`.
+    pub fn q_values(&self, observation: &Observation) -> Array1<f32> {
+        self.values(&self.features.encode(observation))
+    }
+
+    /// Q-values of a state that is encoded already, shape `(rows,)`.
+    pub(super) fn values(&self, inputs: &[f32]) -> Array1<f32> {
+        let inputs = ArrayView2::from_shape((1, inputs.len()), inputs).expect("one row of its length");
+        self.network.q_values(inputs).index_axis_move(Axis(0), 0)
+    }
+
+    /// Rows to choose from, shape `(rows,)`. Rules choose among legal rows whatever the settings say.
+    pub(super) fn open(&self, legal: ArrayView1<bool>) -> Vec<bool> {
+        let masks = self.looks_at_mask();
+        self.allowed_now(legal.iter().map(|&legal| legal || !masks))
+    }
+
+    /// Rows to choose from that are legal, shape `(rows,)`.
+    pub fn legal_rows(&self, legal: ArrayView1<bool>) -> Vec<bool> {
+        self.allowed_now(legal.iter().copied())
+    }
+
+    fn allowed_now(&self, candidates: impl Iterator<Item = bool>) -> Vec<bool> {
+        let rows = self.rows.allowed.iter().zip(candidates).enumerate();
+        let passes = |row: usize| self.quirks.lets_pass(row, self.rows.environment[row]);
+        rows.map(|(row, (&allowed, candidate))| allowed && candidate && passes(row)).collect()
+    }
+
+    /// Takes note of the row that was chosen.
+    pub(super) fn chosen(&mut self, row: usize) {
+        self.quirks.chosen(row, self.rows.environment[row]);
+    }
+
+    /// The row that the policy takes when it does not explore.
+    fn decide(&self, observation: &Observation, open: &[bool]) -> Option<usize> {
+        match &self.rules {
+            Some(rules) => chosen_by(rules, observation, open),
+            None => self.greedy(observation, open),
+        }
+    }
+
+    /// The open row of the highest Q-value, the first of equals.
+    pub fn greedy(&self, observation: &Observation, open: &[bool]) -> Option<usize> {
+        best(self.q_values(observation).view(), open)
+    }
+}
+
+/// The trained policy.
+impl Agent for QPolicy {
+    fn begin(&mut self) {
+        self.quirks.begin();
+    }
+
+    fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
+        let open = self.open(legal);
+        let explores = rng::unit(rng) < self.settings.exploration.evaluation_epsilon;
+        let row = if explores { any(&open, rng) } else { self.decide(observation, &open) }?;
+        self.chosen(row);
+        Some(row)
+    }
+
+    fn looks_at_mask(&self) -> bool {
+        self.settings.choice.masks_choice || self.rules.is_some()
+    }
+}
+
+/// The open row of the largest value, the first of equals.
+pub(super) fn best(values: ArrayView1<f32>, open: &[bool]) -> Option<usize> {
+    let rows = values.iter().zip(open).enumerate().filter(|(_, (_, is_open))| **is_open);
+    let better = |best: Option<(usize, f32)>, (row, value): (usize, f32)| match best {
+        Some((_, most)) if most >= value => best,
+        _ => Some((row, value)),
+    };
+    rows.map(|(row, (&value, _))| (row, value)).fold(None, better).map(|(row, _)| row)
+}

@@ -1,0 +1,302 @@
+//! What an agent is, and every agent by name. A new agent is a file and one entry here; the conformance
+//! tests run through all of them.
+
+use ndarray::{Array1, ArrayView1};
+use serde_json::{Map, Value};
+
+use crate::mdp::Observation;
+use avastra_base::rng::Rng;
+
+use super::branch::Branch;
+use super::presets::Preset;
+use super::search::{AvFuzzerSettings, BanditSettings, ConstantSettings, MapElitesSettings};
+use super::settings::{Settings, SettingsError, changed};
+use super::{greedy, presets, random, space_filling};
+
+/// Chooses rows of the action table.
+pub trait Agent: Send {
+    /// A new episode begins.
+    fn begin(&mut self) {}
+
+    /// The row to carry out next, or none. `legal` has shape `(rows,)`; at least one is true.
+    fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize>;
+
+    /// As [`Agent::choose`], for an agent that tries rows out before it chooses.
+    fn choose_ahead(
+        &mut self,
+        observation: &Observation,
+        legal: ArrayView1<bool>,
+        branch: &dyn Branch,
+        rng: &mut Rng,
+    ) -> Option<usize> {
+        let _ = branch;
+        self.choose(observation, legal, rng)
+    }
+
+    /// Whether the choice, or what is learned of it, depends on which rows are legal. If not, only the chosen row is
+    /// drawn, and all others pass for legal.
+    fn looks_at_mask(&self) -> bool {
+        true
+    }
+
+    /// A step begins: the seed for its draws, or `None` if they come from the episode's own.
+    fn draw_seed(&mut self, step: usize) -> Option<u64> {
+        let _ = step;
+        None
+    }
+
+    /// A step begins in an episode of that seed: where in their ranges the drawn values of the row shall lie, each in
+    /// `[0, 1)`, by parameter; what is left out is drawn by chance.
+    fn draw_shares(&mut self, step: usize, seed: u64) -> &[f64] {
+        let _ = (step, seed);
+        &[]
+    }
+
+    /// The probability with which each row is chosen, shape `(rows,)`, where it depends on nothing but what is legal;
+    /// `None` for an agent that knows no probabilities.
+    fn chances(&self, legal: ArrayView1<bool>) -> Option<Array1<f64>> {
+        let _ = legal;
+        None
+    }
+
+    /// Whether it tries rows out before it chooses.
+    fn looks_ahead(&self) -> bool {
+        false
+    }
+
+    /// Time driven in branches since the episode began, s.
+    fn branched_s(&self) -> f64 {
+        0.0
+    }
+}
+
+/// An agent that can be asked for by name.
+pub struct Entry {
+    pub name: &'static str,
+    pub summary: &'static str,
+    pub kind: Kind,
+}
+
+/// How an agent is made.
+pub enum Kind {
+    /// It can act at once: a fresh one for each episode, under the odds of the rows.
+    Ready(fn(&[u32]) -> Box<dyn Agent>),
+    /// It must be trained: its presets, the default first. See [`super::Learner`].
+    Learning(&'static [Preset]),
+    /// It searches over many episodes, and what it found can act: how its settings are made from changes by name.
+    /// See [`super::Trainable`].
+    Searching(fn(Map<String, Value>) -> Result<Settings, SettingsError>),
+}
+
+/// Every agent of avastra.
+pub const REGISTRY: &[Entry] = &[
+    Entry {
+        name: "none",
+        summary: "nothing happens but ordinary traffic, if there is any",
+        kind: Kind::Ready(|_| Box::new(Idle)),
+    },
+    Entry {
+        name: "random",
+        summary: "by chance among the rows that the rules allow at the moment, each as likely unless the space gives odds",
+        kind: Kind::Ready(|odds| Box::new(random::MaskedRandom::new(odds))),
+    },
+    Entry {
+        name: "random-raw",
+        summary: "uniform over all rows, as the published random search; an illegal choice is a step lost",
+        kind: Kind::Ready(|_| Box::new(random::RawRandom)),
+    },
+    Entry {
+        name: "space-filling",
+        summary: "random, but spread evenly over the rows and their drawn values: a Latin hypercube in each episode",
+        kind: Kind::Ready(|_| Box::new(space_filling::SpaceFilling::default())),
+    },
+    Entry {
+        name: "ddqn",
+        summary: "the paper's agent: Double DQN with prioritised replay",
+        kind: Kind::Learning(presets::DDQN),
+    },
+    Entry {
+        name: "deep_collision",
+        summary: "DeepCollision's agent: plain DQN over 12 variables",
+        kind: Kind::Learning(presets::DEEP_COLLISION),
+    },
+    Entry {
+        name: "greedy",
+        summary: "one step of lookahead: tries every legal row in a copy of the world, takes the most dangerous",
+        kind: Kind::Ready(|_| Box::new(greedy::Greedy::default())),
+    },
+    Entry {
+        name: "av-fuzzer",
+        summary: "AV-Fuzzer's genetic search over scripts of rows",
+        kind: Kind::Searching(|changes| {
+            changed(&AvFuzzerSettings::default(), changes).map(Settings::AvFuzzer)
+        }),
+    },
+    Entry {
+        name: "map-elites",
+        summary: "the best script of every kind of collision, and new ones by changing those",
+        kind: Kind::Searching(|changes| {
+            changed(&MapElitesSettings::default(), changes).map(Settings::MapElites)
+        }),
+    },
+    Entry {
+        name: "constant",
+        summary: "a fixed list of rows, those first that crashed most in training: the first legal one acts",
+        kind: Kind::Searching(|changes| {
+            changed(&ConstantSettings::default(), changes).map(Settings::Constant)
+        }),
+    },
+    Entry {
+        name: "bandit",
+        summary: "the row after which most crashes came in such a situation; it plans nothing",
+        kind: Kind::Searching(|changes| changed(&BanditSettings::default(), changes).map(Settings::Bandit)),
+    },
+];
+
+/// Never chooses anything.
+struct Idle;
+
+impl Agent for Idle {
+    fn choose(&mut self, _: &Observation, _: ArrayView1<bool>, _: &mut Rng) -> Option<usize> {
+        None
+    }
+
+    fn looks_at_mask(&self) -> bool {
+        false
+    }
+}
+
+/// The agent of that name.
+pub fn by_name(name: &str) -> Option<&'static Entry> {
+    REGISTRY.iter().find(|entry| entry.name == name)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::agent::settings::Configured;
+    use crate::agent::{Collided, Experience, Rows, Trainable, Trajectory};
+    use crate::mdp::Closeness;
+    use avastra_base::rng::{Stream, child_seed, stream};
+
+    const ROWS: usize = 5;
+
+    /// Fresh agents of an entry, one for each of its presets, and whether each obeys the mask.
+    fn fresh(entry: &Entry, seed: u64) -> Vec<(Box<dyn Agent>, bool)> {
+        let rows = || Arc::new(Rows { allowed: vec![true; ROWS], environment: vec![false; ROWS] });
+        match entry.kind {
+            Kind::Ready(build) => vec![(build(&[1; ROWS]), entry.name != "random-raw")],
+            Kind::Learning(presets) => {
+                let learner = |preset: &Preset| -> (Box<dyn Agent>, bool) {
+                    let settings = (preset.settings)();
+                    let obeys = settings.choice.masks_choice;
+                    (Box::new(settings.build(rows(), seed)), obeys)
+                };
+                presets.iter().map(learner).collect()
+            }
+            Kind::Searching(read) => {
+                let mut search = read(Map::new()).unwrap().build(rows(), seed);
+                assert_eq!(search.start_seed(0, seed), seed, "it knows no other start yet");
+                vec![(search, true)]
+            }
+        }
+    }
+
+    #[test]
+    fn every_agent_but_none_chooses_a_row_and_repeats_itself() {
+        let legal = Array1::from_vec(vec![false, true, false, true, true]);
+        for entry in REGISTRY {
+            let choices = |seed| -> Vec<Vec<Option<usize>>> {
+                let choices = |(mut agent, obeys): (Box<dyn Agent>, bool)| {
+                    let mut rng = stream(seed, Stream::Exploration, 0);
+                    agent.begin();
+                    let observation = Observation::zeros();
+                    let choose = |step| {
+                        agent.draw_seed(step);
+                        agent.draw_shares(step, seed);
+                        agent.choose(&observation, legal.view(), &mut rng)
+                    };
+                    let chosen: Vec<Option<usize>> = (0..50).map(choose).collect();
+                    let fits = |row: &usize| *row < ROWS && (legal[*row] || !obeys);
+                    assert!(chosen.iter().flatten().all(fits), "{}", entry.name);
+                    assert_eq!(agent.branched_s(), 0.0, "{}: it has tried nothing", entry.name);
+                    chosen
+                };
+                fresh(entry, seed).into_iter().map(choices).collect()
+            };
+            assert_eq!(choices(1), choices(1), "{}", entry.name);
+            if entry.name == "none" {
+                assert!(choices(1).iter().flatten().all(Option::is_none));
+                continue;
+            }
+            assert!(choices(1).iter().flatten().all(Option::is_some), "{}", entry.name);
+            // A constant row may be the same for two seeds, but not for all.
+            let others: Vec<Vec<Vec<Option<usize>>>> = (2..10).map(choices).collect();
+            for (preset, one) in choices(1).iter().enumerate() {
+                assert!(others.iter().any(|other| other[preset] != *one), "{}", entry.name);
+            }
+        }
+    }
+
+    /// An episode in which the first choice makes an obstacle appear that is hit for good in the last.
+    fn episode(rows: &[usize]) -> Trajectory {
+        let experience = |(at, &row): (usize, &usize)| {
+            if at + 1 < rows.len() {
+                return Experience::plain(row, -1.0, ROWS);
+            }
+            let (hits, crashes) = (vec![0], vec![Some(0)]);
+            Experience { hits, collided: true, crashes, ..Experience::plain(row, 7.5, ROWS) }
+        };
+        Trajectory {
+            closeness: Closeness { distance_m: 5.0 + rows[0] as f64, margin_m: 0.0 },
+            collisions: vec![Collided { kind: format!("walk {}", rows[0]), counted: true }],
+            ..Trajectory::plain(rows.iter().enumerate().map(experience).collect(), ROWS)
+        }
+    }
+
+    #[test]
+    fn every_trained_agent_goes_on_after_a_kill_as_if_there_had_been_none() {
+        let rows = || Arc::new(Rows { allowed: vec![true; ROWS], environment: vec![false; ROWS] });
+        for entry in REGISTRY {
+            let text = match entry.kind {
+                // So small that everything which a checkpoint holds is in use.
+                Kind::Learning(_) => {
+                    "learning_starts: 32\nreplay_capacity: 60\nrandom_decay: 0.05\nhidden_units: [16]\naverage_decay: 0.9"
+                }
+                Kind::Ready(_) | Kind::Searching(_) => "",
+            };
+            let Some(settings) = Settings::from_yaml(entry, None, text) else { continue };
+            let settings = settings.unwrap();
+            let play = |agent: &mut Box<dyn Trainable>, number: u64| {
+                let seed = agent.start_seed((number % 2) as usize, child_seed(9, Stream::Episode, number));
+                agent.begin();
+                let mut chosen = Vec::new();
+                for step in 0..6 {
+                    agent.draw_seed(step);
+                    let mut rng = stream(seed, Stream::Exploration, step as u64);
+                    let legal = Array1::from_elem(ROWS, true);
+                    chosen.push(agent.choose(&Observation::zeros(), legal.view(), &mut rng).unwrap());
+                }
+                let mut rng = stream(9, Stream::Replay, number);
+                agent.learn(&episode(&chosen), &mut rng);
+            };
+            let mut whole = settings.build(rows(), 9);
+            for number in 0..40 {
+                play(&mut whole, number);
+            }
+            let bytes = whole.save();
+            let mut restored = settings.restore(rows(), &bytes).expect("the bytes are its own");
+            assert_eq!(restored.save(), bytes, "{}", entry.name);
+            for number in 40..60 {
+                play(&mut whole, number);
+                play(&mut restored, number);
+            }
+            assert_eq!(whole.save(), restored.save(), "{}", entry.name);
+            for damaged in [&bytes[1..], &bytes[..bytes.len() - 1]] {
+                assert!(settings.restore(rows(), damaged).is_none(), "{}", entry.name);
+            }
+        }
+    }
+}

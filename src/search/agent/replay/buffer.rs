@@ -1,0 +1,251 @@
+//! Proportional prioritised replay (Schaul et al., 2016), and with exponent 0 the plain kind.
+
+use crate::agent::settings::{SettingsError, count, positive, require, unit};
+use avastra_base::rng;
+use avastra_base::rng::Rng;
+
+use super::sum_tree::SumTree;
+
+/// What a learner learns from: a state, what was done in it, and what came of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Transition {
+    /// Features of the state, shape `(inputs,)`.
+    pub inputs: Vec<f32>,
+    pub row: u32,
+    /// Discounted sum of the rewards on the way to the next state.
+    pub reward: f32,
+    /// What the value of the next state is multiplied by: 0 if there is none.
+    pub discount: f32,
+    pub next_inputs: Vec<f32>,
+    /// Rows that may be chosen in the next state, shape `(rows,)`.
+    pub next_legal: Vec<bool>,
+}
+
+/// Settings of [`Replay`]: how many transitions are kept, and how they are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ReplaySettings {
+    /// Transitions that the replay keeps.
+    pub replay_capacity: usize,
+    /// α of prioritised replay, in `[0, 1]`; 0 draws uniformly.
+    pub priority_exponent: f64,
+    /// Added to the size of each TD error, so that no priority is 0; above 0.
+    pub priority_floor: f64,
+    /// Priority of the first transition, before there is any TD error; above 0.
+    pub priority_first: f64,
+    /// β at the first update, in `[0, 1]`.
+    pub importance_begin: f64,
+    /// β after `importance_updates` updates and from then on.
+    pub importance_end: f64,
+    /// Updates over which β goes from `importance_begin` to `importance_end`.
+    pub importance_updates: u64,
+}
+
+impl ReplaySettings {
+    /// # Errors
+    /// If a value is out of range.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        require([
+            unit("priority_exponent", self.priority_exponent),
+            unit("importance_begin", self.importance_begin),
+            unit("importance_end", self.importance_end),
+            positive("priority_floor", self.priority_floor),
+            positive("priority_first", self.priority_first),
+            count("replay_capacity", self.replay_capacity as u64, 1_000_000),
+            count("importance_updates", self.importance_updates, 1_000_000_000),
+        ])
+    }
+
+    /// β after `updates` updates.
+    fn importance_exponent(&self, updates: u64) -> f64 {
+        let share = (updates as f64 / self.importance_updates as f64).min(1.0);
+        self.importance_begin + (self.importance_end - self.importance_begin) * share
+    }
+}
+
+/// A transition that was drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SampledTransition {
+    pub index: usize,
+    /// Importance weight, in `(0, 1]`, the largest of its batch being 1.
+    pub weight: f32,
+}
+
+/// The most recent transitions, up to a capacity.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Replay {
+    settings: ReplaySettings,
+    transitions: Vec<Transition>,
+    /// Where the next transition goes once the buffer is full.
+    next: usize,
+    tree: SumTree,
+    /// Largest priority so far: what a newcomer gets, so that it is looked at soon.
+    priority_max: f64,
+}
+
+impl Replay {
+    pub fn new(settings: ReplaySettings) -> Replay {
+        Replay {
+            settings,
+            transitions: Vec::new(),
+            next: 0,
+            tree: SumTree::new(settings.replay_capacity),
+            priority_max: settings.priority_first,
+        }
+    }
+
+    /// A buffer as it was: transitions with their priorities by index. `None` if it has no room for them.
+    pub(in crate::agent) fn restored(
+        settings: ReplaySettings,
+        items: Vec<(Transition, f64)>,
+        next: u64,
+        priority_max: f64,
+    ) -> Option<Replay> {
+        let next = usize::try_from(next).ok().filter(|&next| next < settings.replay_capacity)?;
+        let mut replay = Replay { next, priority_max, ..Replay::new(settings) };
+        if items.len() > settings.replay_capacity {
+            return None;
+        }
+        for (index, (transition, priority)) in items.into_iter().enumerate() {
+            replay.transitions.push(transition);
+            replay.tree.set(index, priority);
+        }
+        Some(replay)
+    }
+
+    /// Every transition with its priority, the place of the next one, and the largest priority.
+    pub(in crate::agent) fn contents(&self) -> (impl Iterator<Item = (&Transition, f64)>, usize, f64) {
+        let items = self.transitions.iter().enumerate().map(|(at, one)| (one, self.tree.get(at)));
+        (items, self.next, self.priority_max)
+    }
+
+    pub fn len(&self) -> usize {
+        self.transitions.len()
+    }
+
+    /// The last transitions, at most `count`, the newest first.
+    pub fn latest(&self, count: usize) -> impl Iterator<Item = &Transition> {
+        let capacity = self.settings.replay_capacity;
+        let newest = self.next + capacity - 1;
+        (0..count.min(self.len())).map(move |back| &self.transitions[(newest - back) % capacity])
+    }
+
+    pub fn get(&self, index: usize) -> &Transition {
+        &self.transitions[index]
+    }
+
+    /// Keeps a transition, in place of the oldest if there is no more room.
+    pub fn push(&mut self, transition: Transition) {
+        let index = if self.transitions.len() < self.settings.replay_capacity {
+            self.transitions.push(transition);
+            self.transitions.len() - 1
+        } else {
+            self.transitions[self.next] = transition;
+            self.next
+        };
+        self.tree.set(index, self.priority_max);
+        self.next = (index + 1) % self.settings.replay_capacity;
+    }
+
+    /// Draws a batch, one from each of `count` equal parts of the whole mass, with replacement.
+    ///
+    /// β, which depends on the updates so far, makes up for the uneven draw: 0 not at all, 1 in full. The buffer must
+    /// not be empty.
+    pub fn sample(&self, count: usize, updates: u64, rng: &mut Rng) -> Vec<SampledTransition> {
+        let importance_exponent = self.settings.importance_exponent(updates);
+        let part = self.tree.total() / count as f64;
+        let mut samples = Vec::with_capacity(count);
+        let mut weights = Vec::with_capacity(count);
+        for nth in 0..count {
+            let index = self.tree.find(part * (nth as f64 + rng::unit(rng)));
+            let probability = self.tree.get(index) / self.tree.total();
+            weights.push(libm::pow(self.len() as f64 * probability, -importance_exponent));
+            samples.push(index);
+        }
+        let weight_max = weights.iter().copied().fold(0.0, f64::max);
+        let drawn = samples.into_iter().zip(weights);
+        drawn
+            .map(|(index, weight)| SampledTransition { index, weight: (weight / weight_max) as f32 })
+            .collect()
+    }
+
+    /// Sets a priority by a new TD error.
+    pub fn update(&mut self, index: usize, td_error: f64) {
+        let priority =
+            libm::pow(td_error.abs() + self.settings.priority_floor, self.settings.priority_exponent);
+        self.priority_max = self.priority_max.max(priority);
+        self.tree.set(index, priority);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use avastra_base::rng::{Stream, stream};
+
+    fn transition(reward: f32) -> Transition {
+        let (inputs, next_inputs) = (vec![0.0], vec![0.0]);
+        Transition { inputs, row: 0, reward, discount: 0.9, next_inputs, next_legal: vec![true] }
+    }
+
+    /// A buffer for five; β goes from 0 to 1 in two updates.
+    fn empty(priority_exponent: f64) -> Replay {
+        Replay::new(ReplaySettings {
+            replay_capacity: 5,
+            priority_exponent,
+            priority_floor: 0.1,
+            priority_first: 1.0,
+            importance_begin: 0.0,
+            importance_end: 1.0,
+            importance_updates: 2,
+        })
+    }
+
+    fn filled(exponent: f64) -> Replay {
+        let mut replay = empty(exponent);
+        for reward in 0..5 {
+            replay.push(transition(reward as f32));
+            replay.update(reward, reward as f64);
+        }
+        replay
+    }
+
+    #[test]
+    fn it_draws_and_weighs_by_the_formula() {
+        for exponent in [0.0, 0.6, 1.0] {
+            let (replay, mut rng) = (filled(exponent), stream(3, Stream::Replay, 0));
+            let mass = |index: usize| libm::pow(index as f64 + 0.1, exponent);
+            let total: f64 = (0..5).map(mass).sum();
+            let mut drawn = [0_u32; 5];
+            for _ in 0..2000 {
+                let samples = replay.sample(10, 1, &mut rng);
+                let weight = |index: usize| libm::pow(5.0 * mass(index) / total, -0.5);
+                let most = samples.iter().map(|sample| weight(sample.index)).fold(0.0, f64::max);
+                for sample in samples {
+                    drawn[sample.index] += 1;
+                    let expected = weight(sample.index) / most;
+                    assert!((f64::from(sample.weight) - expected).abs() < 1e-6);
+                }
+            }
+            for (index, &count) in drawn.iter().enumerate() {
+                let (found, expected) = (f64::from(count) / 20_000.0, mass(index) / total);
+                assert!((found - expected).abs() < 0.01, "{exponent} {index}: {found} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_oldest_gives_way_and_newcomers_come_first() {
+        let mut replay = filled(1.0);
+        replay.push(transition(9.0));
+        assert_eq!((replay.len(), replay.get(0).reward), (5, 9.0));
+        assert_eq!(replay.tree.get(0), 4.1);
+        replay.push(transition(8.0));
+        assert_eq!((replay.get(0).reward, replay.get(1).reward), (9.0, 8.0));
+        let latest = |replay: &Replay, count| replay.latest(count).map(|one| one.reward).collect::<Vec<_>>();
+        assert_eq!(latest(&replay, 3), [8.0, 9.0, 4.0]);
+        assert_eq!(latest(&replay, 9), [8.0, 9.0, 4.0, 3.0, 2.0]);
+        let mut short = empty(1.0);
+        short.push(transition(7.0));
+        assert_eq!(latest(&short, 3), [7.0]);
+    }
+}

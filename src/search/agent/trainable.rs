@@ -1,0 +1,49 @@
+//! What learners and searches have in common: they get better from episode to episode.
+
+use avastra_base::rng::Rng;
+
+use super::q_policy::QPolicy;
+use super::registry::Agent;
+use super::trajectory::{Lesson, Trajectory};
+
+/// An agent in training. An episode is: `progress`, `start_seed`, [`Agent::begin`], a choice for each
+/// step, `learn`.
+pub trait Trainable: Agent {
+    /// The share of the training's episodes that are over, in `[0, 1)`; told before each episode.
+    fn progress(&mut self, over: f64) {
+        let _ = over;
+    }
+
+    /// The seed of the next episode's start, on the nth of the roads. `fresh` is a seed that no episode had
+    /// before; an agent that returns to an old start gives that start's seed instead.
+    fn start_seed(&mut self, road: usize, fresh: u64) -> u64 {
+        let _ = road;
+        fresh
+    }
+
+    /// Takes in an episode that has been judged.
+    fn learn(&mut self, episode: &Trajectory, rng: &mut Rng) -> Lesson;
+
+    /// Choices made in training.
+    fn steps(&self) -> u64;
+
+    /// The present share of random choices.
+    fn exploration_epsilon(&self) -> f64;
+
+    /// What it has learned, ready to act for one episode on any start.
+    fn actor(&self) -> Box<dyn Agent>;
+
+    /// The same, but at each choice it is shown the state of another episode, drawn from the last ones of the training;
+    /// `None` if it is no network.
+    fn shuffled(&self) -> Option<Box<dyn Agent>> {
+        None
+    }
+
+    /// What it has learned as a network, if there is one.
+    fn policy(&self) -> Option<&QPolicy> {
+        None
+    }
+
+    /// The whole agent as bytes; see [`super::Settings::restore`].
+    fn save(&self) -> Vec<u8>;
+}

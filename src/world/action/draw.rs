@@ -1,0 +1,344 @@
+//! Drawing the values of a row, and judging given values. Both end in `Judge::judge`.
+
+use std::cell::Cell;
+use std::sync::Arc;
+
+use crate::action::table::{Draw, Refusal, Situation};
+use crate::action::{Effect, LaneChangeRules, SpawnRequest};
+use avastra_base::rng;
+use avastra_base::rng::{Rng, Stream};
+use avastra_lang::model::body::OwnBody;
+use avastra_lang::model::expr::Expr;
+use avastra_lang::model::rules::{
+    Before, Candidate, Choose, Clause, Nearest, Room, RowRules, TRIES_MAX, Unsolved,
+};
+use avastra_lang::model::{
+    ActionDef, BodyWord, Domain, EffectDef, Facts, Memory, MomentFacts, Parameter, SPAWN_DISTANCE_M,
+    SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value, WorldFacts, evaluate, locals, rounded_into,
+    spawn_out_of_bounds,
+};
+
+/// Draws of one row in a step before the row is refused. Every draw obeys what can be known before; a further one
+/// is made only if the world has no place for the spawn, or a rule about its gap refuses that place.
+const DRAWS_MAX: usize = 16;
+
+/// One row in one situation.
+pub(super) struct Judge<'a> {
+    /// The row on its road, with the rules in force.
+    row: RowRules<'a>,
+    action: &'a ActionDef,
+    situation: &'a Situation<'a>,
+    /// Filled in if a rule or a `where` asks for it.
+    moment: MomentFacts,
+}
+
+impl<'a> Judge<'a> {
+    pub fn new(space: &'a Space, situation: &'a Situation<'a>, row: usize) -> Judge<'a> {
+        let row = &space.rows[row];
+        let action = &space.actions[row.action];
+        let row = RowRules { space, row, road: Some(&situation.road.facts), in_force: situation.rules };
+        let wheres = action.parameters.iter().filter_map(|parameter| parameter.condition.as_ref());
+        let mut asked = wheres.chain(row.demands().filter_map(|(_, demand)| demand.condition()));
+        let moment = match asked.any(Expr::asks_the_world) {
+            true => situation.surroundings.moment(),
+            false => MomentFacts::default(),
+        };
+        Judge { row, action, situation, moment }
+    }
+
+    /// Draws until all rules hold. `shares` places the values of the first try: for each parameter, where in its range
+    /// its value lies, in `[0, 1)`. Parameters without a share, and every further try, are drawn by chance.
+    ///
+    /// # Errors
+    /// The most frequent refusal; the earliest, if several are equally frequent.
+    pub fn draw(&self, shares: &[f64]) -> Result<Draw, Refusal> {
+        let seed = rng::child_seed(self.situation.seed, Stream::Draw, self.situation.step);
+        let mut rng = rng::stream(seed, Stream::Draw, self.row.row.index as u64);
+        let mut failures: Vec<(usize, Refusal)> = Vec::new();
+        // Refusals by the same rule count as one, because only their figures differ from draw to draw.
+        // Refusals by the world are told apart by their reasons.
+        let same = |a: &Refusal, b: &Refusal| a.rule == b.rule && (a.rule.is_some() || a.reason == b.reason);
+        let mut note = |refusal: Refusal| match failures.iter_mut().find(|(_, known)| same(known, &refusal)) {
+            Some((count, _)) => *count += 1,
+            None => failures.push((1, refusal)),
+        };
+        let parameters = self.action.parameters.iter().enumerate();
+        let open: Vec<usize> = parameters.filter(|(_, p)| !p.axis).map(|(local, _)| local).collect();
+        let (world, tries) = (self.world(), Cell::new(TRIES_MAX));
+        let before = Before { memory: self.situation.memory, world: Some(&world), tries: &tries };
+        // No other draw finds what does not exist.
+        let refused = |unsolved: Unsolved| self.refused(&unsolved, &world);
+        let given = locals(self.action, self.row.row, &[]);
+        let mut solver = self.row.solver(given, &open, before).map_err(refused)?;
+        // With nothing to draw, every try gives the same result.
+        let fixed = self.action.drawn().next().is_none();
+        let mut chance = Chance { rng: &mut rng, shares: shares.iter().copied().map(Some).collect() };
+        for _ in 0..if fixed { 1 } else { DRAWS_MAX } {
+            tries.set(TRIES_MAX);
+            let values = solver.solve(&mut chance).map_err(refused)?;
+            chance.shares.clear();
+            match self.judge(&values, 1).map_err(first) {
+                Ok(draw) => return Ok(draw),
+                Err(refusal) => note(refusal),
+            }
+        }
+        let most = failures.iter().map(|(count, _)| *count).max();
+        let worst = failures.into_iter().find(|(count, _)| Some(*count) == most);
+        Err(worst.map(|(_, refusal)| refusal).expect("every draw that failed left its reason"))
+    }
+
+    /// The draw with these values.
+    ///
+    /// # Errors
+    /// Everything that is wrong with the values.
+    pub fn check(&self, values: &[(Arc<str>, Value)]) -> Result<Draw, Vec<Refusal>> {
+        let mut refusals = Vec::new();
+        let is_drawn = |name: &Arc<str>| self.action.drawn().any(|parameter| parameter.name == *name);
+        for (name, _) in values.iter().filter(|(name, _)| !is_drawn(name)) {
+            refusals.push(refuse(None, format!("`{}` draws no `{name}`", self.action.name)));
+        }
+        for parameter in self.action.drawn() {
+            match values.iter().find(|(name, _)| *name == parameter.name) {
+                None => refusals.push(refuse(None, format!("`{}` is missing", parameter.name))),
+                Some((_, value)) if !parameter.domain.holds(*value) => {
+                    refusals.push(self.out_of_range(parameter, *value));
+                }
+                Some(_) => {}
+            }
+        }
+        if !refusals.is_empty() {
+            return Err(refusals);
+        }
+        self.judge(&locals(self.action, self.row.row, values), usize::MAX)
+    }
+
+    /// The draw with the legal values nearest to these.
+    ///
+    /// # Errors
+    /// Everything that is wrong with the nearest values, or with the values that are not numbers.
+    pub fn nearest(&self, wanted: &[(Arc<str>, Value)]) -> Result<Draw, Vec<Refusal>> {
+        let given = locals(self.action, self.row.row, wanted);
+        let open: Vec<usize> = self.action.drawn_numbers().collect();
+        let mut choose = Nearest { wanted: given.clone() };
+        let (world, tries) = (self.world(), Cell::new(TRIES_MAX));
+        let before = Before { memory: self.situation.memory, world: Some(&world), tries: &tries };
+        let values = self.row.solve(given, &open, before, &mut choose);
+        let values = values.map_err(|unsolved| vec![self.refused(&unsolved, &world)])?;
+        self.check(&self.action.drawn_of(&values))
+    }
+
+    /// Asks the world about every spawn, then applies every rule in force to a complete set of values.
+    ///
+    /// # Errors
+    /// The first refusals, at most `refusals_max`.
+    fn judge(&self, values: &[Value], refusals_max: usize) -> Result<Draw, Vec<Refusal>> {
+        let before = self.situation.memory;
+        let after = self.row.space.memory_after(self.row.row.action, values, before);
+        let mut effects = self.effects(values, &after);
+        let mut refusals = Vec::new();
+        let mut spawns = Vec::new();
+        for effect in &effects {
+            if refusals.len() >= refusals_max {
+                return Err(refusals);
+            }
+            let Effect::Spawn(request) = effect else {
+                let refusal =
+                    self.situation.surroundings.weather_refusal().map(|reason| refuse(None, reason));
+                // One reason is enough for an action that sets several.
+                refusals.extend(refusal.filter(|refusal| !refusals.contains(refusal)));
+                continue;
+            };
+            if let Some(reason) = spawn_out_of_bounds(request.speed_mps, request.distance_m) {
+                refusals.push(refuse(None, reason));
+                continue;
+            }
+            match self.situation.surroundings.survey(request) {
+                Ok(facts) => spawns.push(facts),
+                Err(reason) => refusals.push(refuse(None, format!("cannot spawn: {reason}"))),
+            }
+        }
+        let world = WorldFacts { spawns, ..self.world() };
+        let candidate = Candidate { values, before, after: &after, world: Some(&world) };
+        let breaches = self.row.breaches(candidate).take(refusals_max.saturating_sub(refusals.len()));
+        refusals.extend(breaches.map(|breach| {
+            let rule = breach.rule().map(|rule| self.row.space.rules[rule].name.clone());
+            refuse(rule, self.row.words(breach, candidate))
+        }));
+        if !refusals.is_empty() {
+            return Err(refusals);
+        }
+        // What every step changes comes without a question: it is no action, and not the world's to refuse.
+        for effect in Effect::of_change(self.row.space, before, &after) {
+            if !effects.contains(&effect) {
+                effects.push(effect);
+            }
+        }
+        let lane_changes = self.lane_changes(values);
+        let values = self.action.drawn_of(values);
+        Ok(Draw { row: self.row.row.index, values, effects, memory_after: after, lane_changes })
+    }
+
+    /// The rules on the lane changes of what the action spawns.
+    fn lane_changes(&self, values: &[Value]) -> Option<Arc<LaneChangeRules>> {
+        let conditions: Vec<Expr> = self.row.during().cloned().collect();
+        (!conditions.is_empty()).then(|| {
+            Arc::new(LaneChangeRules {
+                conditions,
+                functions: self.row.space.functions.clone(),
+                locals: values.to_vec(),
+                road: self.row.road.cloned(),
+                step_ms: (self.row.space.episode.step_s * 1000.0).round() as u64,
+            })
+        })
+    }
+
+    fn facts<'f>(&'f self, values: &'f [Value], memory: &'f Memory) -> Facts<'f> {
+        Facts { road: self.row.road, ..Facts::new(values, memory) }
+    }
+
+    /// The changes of the world. They carry the values of the memory after the action, so that world and
+    /// memory agree.
+    fn effects(&self, locals: &[Value], after: &Memory) -> Vec<Effect> {
+        let mut effects = Vec::new();
+        for effect in &self.action.effects {
+            match effect {
+                EffectDef::Set(set) => {
+                    let state = &self.row.space.states[set.state];
+                    let key = set.key.as_ref().map(|key| {
+                        evaluate(key, &self.row.space.functions, &self.facts(locals, after)).variant()
+                    });
+                    let touched = key.map_or(0..state.cells, |key| key..key + 1);
+                    for effect in touched.filter_map(|cell| Effect::of_cell(state, cell, after)) {
+                        if !effects.contains(&effect) {
+                            effects.push(effect);
+                        }
+                    }
+                }
+                EffectDef::Spawn(spawn) => effects.push(Effect::Spawn(self.request(spawn, locals, after))),
+            }
+        }
+        effects
+    }
+
+    fn request(&self, spawn: &SpawnDef, locals: &[Value], after: &Memory) -> SpawnRequest {
+        let functions = &self.row.space.functions;
+        let facts = self.facts(locals, after);
+        let own = |body: BodyWord| {
+            let shape = |index: usize| self.row.space.bodies[index].shape;
+            body.own.map(|index| OwnBody { index, shape: shape(index) })
+        };
+        let body = spawn.body.word(functions, &facts);
+        let cover = spawn.cover.as_ref().map(|cover| cover.word(functions, &facts));
+        SpawnRequest {
+            body: body.like,
+            own: own(body),
+            cover_own: cover.and_then(own),
+            colour: spawn.colour.word(functions, &facts),
+            verb: spawn.verb.word(functions, &facts),
+            lane: spawn.lane.word(functions, &facts),
+            side: spawn.side.word(functions, &facts),
+            then: spawn.then.word(functions, &facts),
+            speed_mps: rounded_into(evaluate(&spawn.speed, functions, &facts).number(), SPAWN_SPEED_MPS),
+            distance_m: rounded_into(evaluate(&spawn.distance, functions, &facts).number(), SPAWN_DISTANCE_M),
+            cover: cover.map(|cover| cover.like),
+        }
+    }
+
+    /// What the world says before it is asked about spawns.
+    fn world(&self) -> WorldFacts {
+        WorldFacts { moment: self.moment, step: self.situation.step, ..WorldFacts::default() }
+    }
+
+    /// Why there are no values, in words.
+    fn refused(&self, unsolved: &Unsolved, world: &WorldFacts) -> Refusal {
+        let space = self.row.space;
+        let values = &unsolved.values;
+        let after = space.memory_after(self.row.row.action, values, self.situation.memory);
+        let candidate =
+            Candidate { values, before: self.situation.memory, after: &after, world: Some(world) };
+        let clause = unsolved.clause.map(|clause| &space.clauses[self.row.row.action][clause]);
+        let rule = clause.and_then(Clause::rule);
+        let named = rule.map(|rule| space.rules[rule].name.clone());
+        let Some(local) = unsolved.local else {
+            let breach = self.row.breaches(candidate).find(|breach| breach.rule() == rule);
+            let words = breach.map(|breach| self.row.words(breach, candidate));
+            return refuse(named, words.unwrap_or_else(|| "its conditions leave no value".to_owned()));
+        };
+        let Parameter { name, ty, domain, .. } = &self.action.parameters[local];
+        let range = match domain {
+            Domain::Values(_) => format!("none of its values {}", self.values_of(domain, *ty)),
+            Domain::Range(..) => format!("no value of its range {}", self.values_of(domain, *ty)),
+        };
+        let bound = rule
+            .and_then(|rule| self.row.broken_bounds(rule, candidate, None).find(|(b, _)| b.local == local));
+        let wanted = match bound {
+            Some((bound, limit)) => format!("it wants {} {}", bound.op.symbol(), space.show(limit, *ty)),
+            None => "with the values of the others".to_owned(),
+        };
+        refuse(named, format!("`{name}`: {range} is possible, {wanted}"))
+    }
+
+    /// The values of a list or the ends of a range, in words.
+    fn values_of(&self, domain: &Domain, ty: Type) -> String {
+        let space = self.row.space;
+        match domain {
+            Domain::Values(values) => {
+                // A value that is likelier stands in the list more than once.
+                let mut words: Vec<String> = Vec::new();
+                for word in space.show_all(values, ty) {
+                    if !words.contains(&word) {
+                        words.push(word);
+                    }
+                }
+                words.join(" | ")
+            }
+            Domain::Range(low, high) => {
+                let ends = [low, high].map(|end| Value::Number(end.to_f64()));
+                space.show_all(&ends, ty).join(" .. ")
+            }
+        }
+    }
+
+    fn out_of_range(&self, parameter: &Parameter, value: Value) -> Refusal {
+        let shown = self.row.space.show(value, parameter.ty);
+        let range = self.values_of(&parameter.domain, parameter.ty);
+        refuse(None, format!("`{}` is {shown}, its range is {range}", parameter.name))
+    }
+}
+
+/// Draws every value with equal chances, but for the shares that are given.
+struct Chance<'a> {
+    rng: &'a mut Rng,
+    /// By parameter: where in its range the value is to lie, in `[0, 1)`. A share is used once: a solver that asks
+    /// again could not use the same value.
+    shares: Vec<Option<f64>>,
+}
+
+impl Chance<'_> {
+    fn share(&mut self, local: usize) -> Option<f64> {
+        self.shares.get_mut(local).and_then(Option::take)
+    }
+}
+
+impl Choose for Chance<'_> {
+    fn value(&mut self, local: usize, left: &[Value]) -> Value {
+        match self.share(local) {
+            Some(share) => left[((share * left.len() as f64) as usize).min(left.len() - 1)],
+            None => left[rng::below(self.rng, left.len() as u32) as usize],
+        }
+    }
+
+    fn number(&mut self, local: usize, room: &Room) -> Option<f64> {
+        // Also where a rule sets the value: to switch it off must not shift later draws.
+        room.at(self.share(local).unwrap_or_else(|| rng::unit(self.rng)))
+    }
+}
+
+fn refuse(rule: Option<String>, reason: String) -> Refusal {
+    Refusal { rule, reason }
+}
+
+/// The first of several refusals; judging never fails without one.
+fn first(refusals: Vec<Refusal>) -> Refusal {
+    refusals.into_iter().next().expect("a judgement that fails names its reason")
+}

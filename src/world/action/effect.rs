@@ -1,0 +1,135 @@
+//! What a row does to the world once its parameters are drawn.
+
+use avastra_lang::model::body::OwnBody;
+use avastra_lang::model::expr::Expr;
+use avastra_lang::model::vocabulary::{
+    Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb,
+};
+use avastra_lang::model::{
+    Facts, FnDef, Memory, MomentFacts, NpcFacts, RoadFacts, Space, SpawnFacts, StateDef, StateMeaning, Value,
+    WorldFacts, evaluate,
+};
+
+/// One change of the world. A row has one or more, applied in order.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Effect {
+    Time(TimeOfDay),
+    /// Sets one phenomenon and leaves the others.
+    Sky(Phenomenon, Level),
+    Spawn(SpawnRequest),
+}
+
+/// A road user that is to appear.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpawnRequest {
+    pub body: Body,
+    pub colour: Colour,
+    pub verb: Verb,
+    /// Lane of `DriveAhead` and `Overtake`; ignored by the other verbs.
+    pub lane: LaneChoice,
+    /// Where `CrossRoad` and `Walk` come from; ignored by the other verbs.
+    pub side: Side,
+    pub then: Then,
+    /// Cruising speed, m/s.
+    pub speed_mps: f64,
+    /// Gap to the ego vehicle along its route, m; behind the ego vehicle for `Overtake`. `sim::placement`
+    /// says for each verb what exactly lies at that distance.
+    pub distance_m: f64,
+    /// The author's own body that is meant, in place of `body` and of `cover`.
+    pub own: Option<OwnBody>,
+    pub cover_own: Option<OwnBody>,
+    /// A vehicle that is parked with it, so that it steps out from behind; for `Walk` alone.
+    pub cover: Option<Body>,
+}
+
+impl Effect {
+    /// What the world sees of a cell of a state: nothing, if the state is the author's own record.
+    pub(super) fn of_cell(state: &StateDef, cell: usize, memory: &Memory) -> Option<Effect> {
+        let value = memory.cells()[state.first_cell + cell].variant();
+        match &state.meaning {
+            StateMeaning::Private => None,
+            StateMeaning::Time(words) => Some(Effect::Time(words[value])),
+            StateMeaning::Sky(phenomena, levels) => Some(Effect::Sky(phenomena[cell], levels[value])),
+        }
+    }
+
+    /// What the world sees of a change of the memory.
+    pub(super) fn of_change(space: &Space, before: &Memory, after: &Memory) -> Vec<Effect> {
+        let cells = space.states.iter().flat_map(|state| (0..state.cells).map(move |cell| (state, cell)));
+        let changed = cells.filter(|(state, cell)| {
+            let cell = state.first_cell + cell;
+            before.cells()[cell] != after.cells()[cell]
+        });
+        changed.filter_map(|(state, cell)| Effect::of_cell(state, cell, after)).collect()
+    }
+
+    /// The author's own bodies among the newcomers: id of the road user, and index of the body in the space. `first` is
+    /// the id of the first newcomer.
+    pub fn own_bodies(&self, first: u32) -> impl Iterator<Item = (u32, usize)> {
+        let own = match self {
+            Effect::Spawn(request) => [request.own, request.cover_own],
+            Effect::Time(_) | Effect::Sky(..) => [None, None],
+        };
+        (first..).zip(own).filter_map(|(id, own)| Some((id, own?.index)))
+    }
+
+    /// How many road users it makes appear. Their ids follow each other; the one that was asked for is the first.
+    pub fn newcomers(&self) -> u32 {
+        match self {
+            Effect::Spawn(request) => 1 + u32::from(request.cover.is_some()),
+            Effect::Time(_) | Effect::Sky(..) => 0,
+        }
+    }
+}
+
+/// The rules in force on the lane changes of a commanded road user (`during change`), with the values of its action.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LaneChangeRules {
+    pub(super) conditions: Vec<Expr>,
+    pub(super) functions: Vec<FnDef>,
+    pub(super) locals: Vec<Value>,
+    pub(super) road: Option<RoadFacts>,
+    /// How long a step lasts, ms.
+    pub(super) step_ms: u64,
+}
+
+impl LaneChangeRules {
+    /// Whether a lane change may begin at a moment.
+    pub fn allow(&self, moment: MomentFacts, npc: NpcFacts) -> bool {
+        let step = (moment.elapsed_s * 1000.0).round() as u64 / self.step_ms.max(1);
+        let world = WorldFacts { moment, step, ..WorldFacts::default() };
+        let spawn = SpawnFacts { spawn_gap_m: npc.gap_m, npc, ..SpawnFacts::default() };
+        // No such condition names a state.
+        let memory = Memory::default();
+        let facts = Facts {
+            road: self.road.as_ref(),
+            world: Some(&world),
+            spawn: Some(spawn),
+            ..Facts::new(&self.locals, &memory)
+        };
+        self.conditions.iter().all(|condition| evaluate(condition, &self.functions, &facts).truth())
+    }
+}
+
+/// What the action table may ask the world.
+pub trait Surroundings {
+    /// Where a spawn would put its road user, in numbers; or why it cannot, in words.
+    ///
+    /// # Errors
+    /// A reason that completes "cannot spawn: …", for example `no lane on the left`.
+    fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String>;
+
+    /// What can be asked about the ego vehicle and its surroundings now.
+    fn moment(&self) -> MomentFacts;
+
+    /// Surroundings for many questions about this moment, which find once what the questions have in common; `None` if
+    /// nothing is gained by that.
+    fn for_many(&self) -> Option<Box<dyn Surroundings + '_>> {
+        None
+    }
+
+    /// Why the time of day and the weather cannot change now, in words.
+    fn weather_refusal(&self) -> Option<String> {
+        None
+    }
+}

@@ -1,0 +1,148 @@
+//! The action table of a space: what each row would do now, or which rule refuses it.
+
+use std::sync::Arc;
+
+use crate::action::draw::Judge;
+use crate::action::{Effect, LaneChangeRules, Surroundings};
+use avastra_lang::model::{Memory, Road, Row, RulesInForce, Space, Value};
+
+/// The rows that an agent chooses from.
+#[derive(Debug, Clone)]
+pub struct ActionTable {
+    space: Arc<Space>,
+}
+
+/// The moment in which a row is offered or judged.
+#[derive(Clone, Copy)]
+pub struct Situation<'a> {
+    pub memory: &'a Memory,
+    pub road: &'a Road,
+    pub rules: &'a RulesInForce,
+    pub surroundings: &'a dyn Surroundings,
+    /// Seed of the episode.
+    pub seed: u64,
+    /// Number of the step, from 0.
+    pub step: u64,
+}
+
+/// What choosing a row would do now.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Offer {
+    Legal(Draw),
+    Refused(Refusal),
+}
+
+/// A row with its drawn values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Draw {
+    pub row: usize,
+    /// Values of the `any` parameters, as declared; numbers in SI units.
+    pub values: Vec<(Arc<str>, Value)>,
+    /// What it does to the world, in order.
+    pub effects: Vec<Effect>,
+    pub memory_after: Memory,
+    /// Rules on the lane changes of what it makes appear; `None` without any.
+    pub lane_changes: Option<Arc<LaneChangeRules>>,
+}
+
+/// Why a row cannot be chosen.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Refusal {
+    /// The rule that refuses; `None` if the world has no place for a spawn, or a value is out of range or
+    /// breaks a `where`.
+    pub rule: Option<String>,
+    /// In words, with figures.
+    pub reason: String,
+}
+
+impl Draw {
+    /// Whether it makes road users appear.
+    pub fn makes_appear(&self) -> bool {
+        self.effects.iter().any(|effect| effect.newcomers() > 0)
+    }
+}
+
+impl ActionTable {
+    pub fn new(space: Arc<Space>) -> ActionTable {
+        ActionTable { space }
+    }
+
+    pub fn space(&self) -> &Arc<Space> {
+        &self.space
+    }
+
+    pub fn rows(&self) -> &[Row] {
+        &self.space.rows
+    }
+
+    /// How often each row is drawn by chance, relative to the others.
+    pub fn odds(&self) -> Vec<u32> {
+        self.rows().iter().map(|row| self.space.actions[row.action].odds).collect()
+    }
+
+    /// One offer for each row. Every row draws from a stream of its own, so that one row's draws do not
+    /// change another's.
+    pub fn offers(&self, situation: &Situation<'_>) -> Vec<Offer> {
+        self.offers_at(situation, &[])
+    }
+
+    /// As [`ActionTable::offers`], but the first try of each row takes its values at `shares` of their ranges, each in
+    /// `[0, 1)`, by parameter of the row. Parameters without a share, and every further try, are drawn by chance.
+    pub fn offers_at(&self, situation: &Situation<'_>, shares: &[f64]) -> Vec<Offer> {
+        let kept = situation.surroundings.for_many();
+        let surroundings = kept.as_deref().unwrap_or(situation.surroundings);
+        let situation = Situation { surroundings, ..*situation };
+        (0..self.rows().len()).map(|row| self.drawn(&situation, row, shares)).collect()
+    }
+
+    /// The offer of one row: the same as in [`ActionTable::offers`].
+    pub fn offer(&self, situation: &Situation<'_>, row: usize) -> Offer {
+        self.drawn(situation, row, &[])
+    }
+
+    fn drawn(&self, situation: &Situation<'_>, row: usize, shares: &[f64]) -> Offer {
+        match Judge::new(&self.space, situation, row).draw(shares) {
+            Ok(draw) => Offer::Legal(draw),
+            Err(refusal) => Offer::Refused(refusal),
+        }
+    }
+
+    /// What a step without an action does: to the world, and the memory after it.
+    pub fn wait(
+        &self,
+        memory: &Memory,
+        step: u64,
+        road: &Road,
+        rules: &RulesInForce,
+    ) -> (Vec<Effect>, Memory) {
+        let after = self.space.memory_after_wait(memory, Some(step), Some(&road.facts), rules);
+        (Effect::of_change(&self.space, memory, &after), after)
+    }
+
+    /// The draw with the legal values nearest to given ones. A number that a rule sets is computed from the
+    /// others; a number out of bounds moves to the bound.
+    ///
+    /// # Errors
+    /// As [`ActionTable::check`].
+    pub fn nearest(
+        &self,
+        situation: &Situation<'_>,
+        row: usize,
+        values: &[(Arc<str>, Value)],
+    ) -> Result<Draw, Vec<Refusal>> {
+        Judge::new(&self.space, situation, row).nearest(values)
+    }
+
+    /// Judges given values by the same rules as drawing. Replays use it.
+    ///
+    /// # Errors
+    /// Every rule that refuses, and every value that is missing, unknown or out of range.
+    pub fn check(
+        &self,
+        situation: &Situation<'_>,
+        row: usize,
+        values: &[(Arc<str>, Value)],
+    ) -> Result<Draw, Vec<Refusal>> {
+        Judge::new(&self.space, situation, row).check(values)
+    }
+}

@@ -1,0 +1,47 @@
+//! The shipped spaces as tables, and draws against what proofs say of them. What each rule refuses is tested in
+//! `tests/it/rules.rs`.
+
+mod promise;
+mod rules;
+mod sound;
+mod table;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::action::{ActionTable, SpawnFacts, SpawnRequest, Surroundings};
+use avastra_lang::check::{ReadError, load};
+use avastra_lang::model::MomentFacts;
+use avastra_lang::syntax::{Style, render};
+
+/// The table of a shipped space on Road 2.
+fn table(path: &str) -> ActionTable {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
+    let loaded =
+        load(&root, &|path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string())))
+            .unwrap();
+    let shown: Vec<String> =
+        loaded.diagnostics.iter().map(|found| render(found, &loaded.sources, Style::Plain)).collect();
+    assert!(shown.is_empty(), "{}", shown.join("\n"));
+    ActionTable::new(loaded.space.unwrap())
+}
+
+/// A world in which everything fits, no gap is too small, and the gap is the distance asked for.
+struct Plain;
+
+impl Surroundings for Plain {
+    fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
+        Ok(SpawnFacts { spawn_gap_m: request.distance_m, ..SpawnFacts::default() })
+    }
+
+    fn moment(&self) -> MomentFacts {
+        MomentFacts { ego_speed_mps: 10.0, ..MomentFacts::default() }
+    }
+}
+
+fn value_of(
+    values: &[(Arc<str>, avastra_lang::model::Value)],
+    name: &str,
+) -> Option<avastra_lang::model::Value> {
+    values.iter().find(|(known, _)| &**known == name).map(|(_, value)| *value)
+}

@@ -1,0 +1,114 @@
+//! Ambient traffic: vehicles that no action commanded and that only drive on.
+//!
+//! An episode that asks for it keeps a number of them within [`AROUND_M`] of the ego vehicle. At the start
+//! they are there already. Later ones appear on streets beyond the range of the ego vehicle's sensors.
+//! They leave when they are well beyond that range behind it, or farther than [`AROUND_M`] away. Place,
+//! body, colour and speed are drawn from a stream of their own, with one index for each attempt, so that
+//! commanded traffic draws the same with and without them. They drive at 80 to 100 % of each lane's limit,
+//! change lanes where they gain by it (`npc::mobil`), turn as drawn, and yield (`npc::manners`) to the ego vehicle, too. They count
+//! neither towards the ten obstacles of the published package nor among `npc#1`, `npc#2`, …: their
+//! ids begin above [`COMMANDED_MAX`].
+
+use avastra_base::geometry::OrientedBox;
+use avastra_base::rng;
+use avastra_base::rng::{Rng, Stream};
+use avastra_lang::model::AMBIENT_MAX;
+use avastra_lang::model::vocabulary::{Body, Colour, Verb, Word};
+
+use super::around::Around;
+use super::body;
+use super::npc::{Cruise, Driver};
+use super::road_user::{Motion, Mover, Obstacle, RoadUser};
+use super::sense::RANGE_M;
+use super::trace::Trace;
+use super::way::Way;
+
+/// Ids up to this are of obstacles that an action made appear.
+pub(super) const COMMANDED_MAX: u32 = 1_000_000;
+
+/// Ticks between two checks whether vehicles are missing: half a second.
+pub(super) const RENEWAL_TICKS: u64 = 25;
+
+/// Ambient vehicles farther from the ego vehicle than this leave, m.
+const AROUND_M: f64 = 200.0;
+/// Least distance to the ego vehicle at the start of an episode, m: two seconds at 50 km/h and the way
+/// to brake.
+const START_ROOM_M: f64 = 45.0;
+/// Least gap between a newcomer and any other road user, m.
+const ROOM_M: f64 = 20.0;
+/// Least distance of a newcomer to the end of a street, where a signal may be red, m: the way to brake
+/// from 50 km/h at 3 m/s², rounded down.
+const STREET_END_M: f64 = 30.0;
+/// Draws before an attempt is given up.
+const DRAWS_MAX: usize = 8;
+
+/// How many vehicles are wanted, and how many attempts were made.
+#[derive(Debug, Clone)]
+pub(super) struct Ambient {
+    wanted: u32,
+    attempts: u64,
+    next_id: u32,
+}
+
+impl Ambient {
+    pub fn new(wanted: u32) -> Ambient {
+        Ambient { wanted: wanted.min(AMBIENT_MAX), attempts: 0, next_id: COMMANDED_MAX + 1 }
+    }
+
+    /// Whether `present` ambient vehicles are too few.
+    pub fn lacks(&self, present: usize) -> bool {
+        present < self.wanted as usize
+    }
+
+    pub fn wanted(&self) -> u32 {
+        self.wanted
+    }
+
+    /// One attempt at a newcomer. `begins`: before the first tick, when the ego vehicle has seen nothing.
+    pub fn attempt(&mut self, around: &Around, begins: bool) -> Option<RoadUser> {
+        let mut rng = rng::stream(around.seed, Stream::Ambient, self.attempts);
+        self.attempts += 1;
+        let nearest_m = if begins { START_ROOM_M } else { RANGE_M };
+        let id = self.next_id;
+        let placed = (0..DRAWS_MAX).find_map(|_| draw(around, nearest_m, id, &mut rng))?;
+        self.next_id += 1;
+        Some(placed)
+    }
+
+    pub fn trace(&self, trace: &mut Trace) {
+        trace.word(u64::from(self.wanted));
+        trace.word(self.attempts);
+        trace.word(u64::from(self.next_id));
+    }
+}
+
+/// Whether an ambient vehicle is so far away that it can leave unseen.
+pub(super) fn is_gone(obstacle: &Obstacle, ego: &OrientedBox) -> bool {
+    let there = ego.pose.to_local(obstacle.outline.pose.position);
+    let away_m2 = there.norm_squared();
+    away_m2 > AROUND_M * AROUND_M || (there.x < 0.0 && away_m2 > (RANGE_M + 20.0) * (RANGE_M + 20.0))
+}
+
+/// A vehicle somewhere on a street, if it may appear there.
+fn draw(around: &Around, nearest_m: f64, id: u32, rng: &mut Rng) -> Option<RoadUser> {
+    let (lane, station_m) = around.scene.street_at(rng::unit(rng))?;
+    let bodies = || Body::ALL.iter().filter(|body| body.is_vehicle() && !body.has_two_wheels());
+    let body = *bodies().nth(rng::below(rng, bodies().count() as u32) as usize)?;
+    let colour = Colour::ALL[rng::below(rng, Colour::ALL.len() as u32) as usize];
+    let cruise =
+        Cruise::Limit(rng::between(rng, around.traffic.limit_part_min, around.traffic.limit_part_max));
+    let size = body::parameters(body);
+    let centre = &around.scene.map.lane(lane).centre;
+    let away = centre.pose_at(station_m).position - around.ego_outline.pose.position;
+    if !(nearest_m * nearest_m..AROUND_M * AROUND_M).contains(&away.norm_squared())
+        || !(size.length_m..centre.length_m() - STREET_END_M).contains(&station_m)
+    {
+        return None;
+    }
+    let way = Way::along(around.scene, &[lane], rng)?;
+    let driver = Driver::new(around.scene, way, station_m, cruise, Vec::new(), 1);
+    let moved = driver.moved(&size);
+    let mover = Mover::new(size, Motion::Drive(driver));
+    let newcomer = RoadUser::new(around, id, body, colour, Verb::DriveAhead, mover, moved);
+    newcomer.has_room(around, ROOM_M).then_some(newcomer)
+}

@@ -1,0 +1,61 @@
+//! The world: ego vehicle, other road users, weather, light, signals, contacts.
+//!
+//! [`World`] is the whole state of an episode; its `Clone` is a snapshot. [`Scene`] is what stays the
+//! same in all episodes of a road, and is shared. Time passes in ticks of [`DT_S`] (50 Hz). A tick does,
+//! in this order (`World::tick`):
+//!
+//! 1. The ego vehicle moves by its pedals and wheel (`ego`), and its place beside the route is found.
+//! 2. The other road users move one after another, each among the others as they stand at that moment
+//!    (`road_user`, `around`). A driver looks around every fifth tick and then follows, stops or changes
+//!    lanes (`npc`); a pedestrian walks or waits (`pedestrian`).
+//! 3. A road user that would move into another shares its momentum with it (`incident`), and so does one that
+//!    the ego vehicle touches (`contact`). Both come to rest by friction, and leave when out of sight.
+//! 4. Twice a second, ambient traffic leaves and appears (`ambient`).
+//! 5. Every fifth tick, water rises and drains (`environment`) and lines of sight are worked out (`sense`).
+//!
+//! Between ticks an action may change the sky or the time of day, or make a road user appear
+//! (`World::apply`). `placement` decides where it appears, along which `way`, or why it cannot;
+//! `traffic` holds the manners that a run can change;
+//! `safety` says how much room a careful driver would need. `junction` knows where lanes cross and which
+//! goes first, `signals` the colour of every light at every tick. `moment` says what can be asked about a moment,
+//! `trace` digests the states of all ticks.
+
+mod ambient;
+mod around;
+mod contact;
+mod ego;
+mod environment;
+mod incident;
+mod junction;
+mod moment;
+mod npc;
+mod pedestrian;
+mod placement;
+mod right_of_way;
+mod road_user;
+mod safety;
+mod scene;
+mod sense;
+mod signals;
+#[cfg(any(test, feature = "testing"))]
+pub mod testing;
+#[cfg(test)]
+mod tests;
+mod trace;
+mod traffic;
+mod way;
+mod world;
+
+use avastra_lang::model::body;
+
+pub use contact::Contact;
+pub use ego::{Control, VehicleParameters, pedal_acceleration_mps2, pedals_for};
+pub use environment::friction_scale;
+pub use incident::Incident;
+pub use right_of_way::right_of_way;
+pub use road_user::Obstacle;
+pub use scene::Scene;
+pub use sense::{Conditions, EgoMotion, FRAME_S, FRAME_TICKS, Sensed, SensedObject, SignalColour};
+pub use trace::Trace;
+pub use traffic::{TrafficError, TrafficProfile};
+pub use world::{DT_S, ENGINE, Start, World};

@@ -1,0 +1,249 @@
+//! What can be asked about a moment: the facts of the ego vehicle and its surroundings, and those of another road
+//! user. Rules, policies and the paper's state variables read the same ones.
+
+use avastra_lang::model::vocabulary::Light;
+use avastra_lang::model::{MomentFacts, NpcFacts, OnRoute, junction_ahead_m};
+
+use super::around::Around;
+use super::npc::Driver;
+use super::road_user::{Motion, Obstacle};
+use super::sense::SignalColour;
+use super::world::{DT_S, World};
+
+/// Distance that stands for "no road user around", m, as in the published package.
+const NO_ROAD_USER_M: f64 = 100.0;
+
+impl World {
+    /// The facts of this moment.
+    pub fn moment_facts(&self) -> MomentFacts {
+        self.alone().moment_facts()
+    }
+
+    /// As [`Around::light_changes_in_s`].
+    pub fn light_changes_in_s(&self, most_s: f64) -> Option<f64> {
+        self.alone().light_changes_in_s(most_s)
+    }
+
+    /// As [`Around::conflict_ahead_m`].
+    pub fn conflict_ahead_m(&self) -> Option<f64> {
+        self.alone().conflict_ahead_m()
+    }
+}
+
+impl Around<'_> {
+    /// The facts of this moment. A road user that looks around does not count itself: see [`MomentFacts::with`].
+    pub fn moment_facts(&self) -> MomentFacts {
+        let OnRoute { limit_mps, junction_ahead_m, route_left_m, signal, road } = self.on_route();
+        let gaps =
+            self.obstacles_on_level().map(|obstacle| (obstacle.distance_m, obstacle.velocity_mps.norm()));
+        let nearest = gaps.min_by(|a, b| a.0.total_cmp(&b.0));
+        MomentFacts {
+            ego_speed_mps: self.ego.speed_mps,
+            ego_acceleration_mps2: self.ego.acceleration_mps2,
+            ego_limit_mps: limit_mps,
+            ego_junction_ahead_m: junction_ahead_m,
+            ego_route_left_m: route_left_m,
+            ego_offset_m: self.ego_offset_m,
+            ego_light: self.light(signal),
+            ego_road: road,
+            road_users: self.obstacles_on_level().count() as u32,
+            nearest_gap_m: nearest.map_or(NO_ROAD_USER_M, |(gap_m, _)| gap_m),
+            nearest_speed_mps: nearest.map_or(0.0, |(_, speed_mps)| speed_mps),
+            // The number nearest to the exact time, so that `elapsed >= 0.7 s` holds at 0.7 s.
+            elapsed_s: (self.tick as f64 * DT_S * 1000.0).round() / 1000.0,
+        }
+    }
+
+    /// What the ego vehicle's place says.
+    fn on_route(&self) -> OnRoute {
+        OnRoute::at(&self.scene.map, &self.scene.route, self.ego_station_m)
+    }
+
+    /// Time until the next traffic light on the route changes its colour, s, in steps of half a second and at most
+    /// `most_s`; `None` without a light within reach.
+    pub fn light_changes_in_s(&self, most_s: f64) -> Option<f64> {
+        const STEP_S: f64 = 0.5;
+        let signal = self.on_route().signal?;
+        let colour = |later_s: f64| {
+            self.signals.colour(&self.scene.map, signal, self.tick + (later_s / DT_S).round() as u64)
+        };
+        let now = colour(0.0);
+        let steps = (1..=(most_s / STEP_S) as u32).map(|step| f64::from(step) * STEP_S);
+        Some(steps.into_iter().find(|&later_s| colour(later_s) != now).unwrap_or(most_s))
+    }
+
+    /// Distance along the route to the next place where another lane crosses or joins it, m.
+    pub fn conflict_ahead_m(&self) -> Option<f64> {
+        let ahead = self.scene.route.conflicts.iter().map(|conflict| conflict.station_m - self.ego_station_m);
+        ahead.into_iter().find(|&ahead_m| ahead_m >= 0.0)
+    }
+
+    /// What a traffic light shows; `None` without one.
+    fn light(&self, signal: Option<usize>) -> Light {
+        match signal.map(|signal| self.signals.colour(&self.scene.map, signal, self.tick)) {
+            None => Light::None,
+            Some(SignalColour::Red) => Light::Red,
+            Some(SignalColour::Yellow) => Light::Yellow,
+            Some(SignalColour::Green) => Light::Green,
+        }
+    }
+}
+
+/// The same moment with one road user more: the one that looked around, and did not count itself.
+pub(super) fn with_itself(moment: MomentFacts, this: &Obstacle) -> MomentFacts {
+    if this.is_apart {
+        return moment;
+    }
+    let is_nearest = moment.road_users == 0 || this.distance_m < moment.nearest_gap_m;
+    let (nearest_gap_m, nearest_speed_mps) = match is_nearest {
+        true => (this.distance_m, this.velocity_mps.norm()),
+        false => (moment.nearest_gap_m, moment.nearest_speed_mps),
+    };
+    MomentFacts { road_users: moment.road_users + 1, nearest_gap_m, nearest_speed_mps, ..moment }
+}
+
+/// The facts of a road user. One on foot has those of the ego vehicle's route beside it.
+pub(super) fn npc_facts(around: &Around, obstacle: &Obstacle, motion: &Motion) -> NpcFacts {
+    let scene = around.scene;
+    match motion {
+        Motion::Drive(driver) => driver_facts(around, obstacle, driver),
+        Motion::Walk(_) | Motion::Stand => {
+            let station_m = scene.route.path.project(obstacle.outline.pose.position).station_m;
+            let beside = OnRoute::at(&scene.map, &scene.route, station_m);
+            facts(obstacle, beside.limit_mps, beside.junction_ahead_m)
+        }
+    }
+}
+
+/// The facts of a road user that drives.
+pub(super) fn driver_facts(around: &Around, obstacle: &Obstacle, driver: &Driver) -> NpcFacts {
+    let (scene, way, station_m) = (around.scene, driver.way(), driver.station_m());
+    // Lane by lane: the first begins behind the station, the others follow each other.
+    let mut begin_m = station_m;
+    let ahead = way.lanes_from(station_m).map(|(lane, on_lane_m)| {
+        let from_m = begin_m;
+        begin_m += scene.map.lane(lane).centre.length_m() - on_lane_m;
+        (lane, from_m)
+    });
+    let ahead_m = junction_ahead_m(&scene.map, ahead, station_m);
+    facts(obstacle, way.limit_mps(scene, station_m), ahead_m)
+}
+
+fn facts(obstacle: &Obstacle, limit_mps: f64, junction_ahead_m: f64) -> NpcFacts {
+    let (speed_mps, gap_m) = (obstacle.velocity_mps.norm(), obstacle.distance_m);
+    NpcFacts { speed_mps, gap_m, junction_ahead_m, limit_mps }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::Arc;
+
+    use crate::action::{ActionTable, Offer, Situation};
+    use crate::sim::{Control, DT_S, Scene, World, testing};
+    use avastra_lang::check::{ReadError, load};
+    use avastra_lang::model::vocabulary::{Light, RoadKind, Verb};
+    use avastra_lang::model::{NpcFacts, Row, RulesInForce};
+
+    #[test]
+    fn a_moment_says_how_far_it_is_to_the_junction() {
+        let world = testing::world(&testing::crossing());
+        let facts = world.moment_facts();
+        let route = &world.scene().route;
+        let inside = route.lanes.iter().find(|lane| world.scene().map.lane(lane.lane).junction.is_some());
+        let begin_m = inside.expect("the route crosses a junction").enter_m;
+        assert_eq!(facts.ego_junction_ahead_m, begin_m);
+        assert_eq!((facts.ego_road, facts.ego_light), (RoadKind::OneWay, Light::None));
+        assert_eq!((facts.road_users, facts.nearest_gap_m), (0, 100.0));
+        assert_eq!(testing::world(&testing::straight()).moment_facts().ego_junction_ahead_m, 1000.0);
+    }
+
+    #[test]
+    fn the_light_changes_when_it_is_said_to() {
+        let mut world = testing::world(&testing::crossing());
+        assert_eq!(world.light_changes_in_s(60.0), None, "it is out of reach");
+        let conflict_m = world.conflict_ahead_m().expect("another street crosses");
+        assert!(conflict_m > world.moment_facts().ego_junction_ahead_m, "{conflict_m}");
+        let drive = Control { throttle_pct: 20.0, ..Control::default() };
+        while world.light_changes_in_s(60.0).is_none() && world.time_s() < 60.0 {
+            world.tick(&drive);
+        }
+        let (light, left_s) = (world.moment_facts().ego_light, world.light_changes_in_s(60.0));
+        let left_s = left_s.expect("it is in reach by now");
+        assert!((0.5..60.0).contains(&left_s), "{left_s}");
+        assert_eq!(world.light_changes_in_s(0.5), Some(0.5));
+        let end_s = world.time_s() + left_s;
+        while world.time_s() + 0.5 * DT_S < end_s {
+            // It looks ahead in steps of half a second.
+            assert!(world.moment_facts().ego_light == light || end_s - world.time_s() <= 0.5);
+            world.tick(&Control { brake_pct: 100.0, ..Control::default() });
+        }
+        assert_ne!(world.moment_facts().ego_light, light);
+    }
+
+    #[test]
+    fn a_vehicle_ahead_is_nearer_to_the_junction() {
+        use crate::action::Surroundings;
+        let world = testing::world(&testing::crossing());
+        let ego_m = world.moment_facts().ego_junction_ahead_m;
+        let facts = world.survey(&testing::request(Verb::DriveAhead, 40.0, 8.0)).expect("there is room");
+        // From the rear axle to the bumper, the gap, and half a vehicle.
+        let ahead_m = ego_m - facts.npc.junction_ahead_m;
+        assert!((40.0..50.0).contains(&ahead_m), "{ahead_m}");
+        assert_eq!(facts.npc.speed_mps, 8.0);
+    }
+
+    /// A lane change that an action commands begins only while the rules `during change` hold; without them others
+    /// begin too.
+    #[test]
+    fn lane_changes_begin_only_while_their_rules_hold() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("../../tests/cases/wishes/no_cut_ins_near_junctions.ava");
+        let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()));
+        let space = load(&path, &read).expect("it can be read").space.expect("it is sound");
+        let table = ActionTable::new(Arc::clone(&space));
+        let rules = RulesInForce::by_default(&space);
+        let is_changer =
+            |row: &&Row| row.label.contains("then: Change") && !row.label.starts_with("cross_road");
+        let (mut bound, mut wrong, mut free) = (0, 0, 0);
+        for road in &space.roads {
+            let scene = Arc::new(Scene::new(road.map.clone(), road.route.clone()));
+            let world = World::new(scene, &testing::start());
+            let memory = space.initial_memory(1);
+            let situation =
+                Situation { memory: &memory, road, rules: &rules, surroundings: &world, seed: 1, step: 0 };
+            for row in space.rows.iter().filter(is_changer) {
+                let Offer::Legal(draw) = table.offer(&situation, row.index) else { continue };
+                let rules = draw.lane_changes.as_ref().expect("the rule binds it");
+                for binds in [true, false] {
+                    let mut world = world.clone();
+                    let id = world.apply(&draw.effects[0]).expect("it is legal").expect("it spawns");
+                    if binds {
+                        world.bind_lane_changes(id, rules);
+                    }
+                    let Some(begin) = first_change(&mut world, id) else { continue };
+                    let holds = begin.junction_ahead_m >= 40.0 && begin.gap_m >= 12.0;
+                    assert!(!binds || holds, "{}: {begin:?}", row.label);
+                    bound += usize::from(binds);
+                    free += usize::from(!binds);
+                    wrong += usize::from(!binds && !holds);
+                }
+            }
+        }
+        assert!(bound > 0 && free > bound && wrong > 0, "{bound} of {free}, {wrong}");
+    }
+
+    /// What was known of a driver when its first lane change began, within 20 s.
+    fn first_change(world: &mut World, id: u32) -> Option<NpcFacts> {
+        for _ in 0..1000 {
+            let before = world.npc_facts(id)?;
+            world.tick(&Control { throttle_pct: 20.0, ..Control::default() });
+            let around = world.alone();
+            let (.., driver) = around.drivers().find(|(obstacle, ..)| obstacle.id == id)?;
+            if driver.is_changing_lanes() {
+                return Some(before);
+            }
+        }
+        None
+    }
+}

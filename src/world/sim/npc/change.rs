@@ -1,0 +1,314 @@
+//! Lane changes of other drivers: what they plan, when they begin one, and how they move over.
+//!
+//! A change is a smooth step from the way in one lane to that in another; its length depends on the speed
+//! and the distance. All drivers obey markings, and none changes lanes inside a junction. How much room they
+//! want, and how fast they move over, is the traffic profile's.
+
+use std::sync::Arc;
+
+use crate::action::LaneChangeRules;
+use avastra_base::geometry::{
+    OrientedBox, Pose, SMOOTH_STEP_SLOPE_MAX, SmoothStep, Vec2, distance_m, smooth_step, wrap_angle,
+};
+use avastra_base::kinematics::braking_m;
+use avastra_lang::model::vocabulary::Side;
+use avastra_road as road;
+use avastra_road::{Lane, LaneIndex, Neighbour, is_apart};
+
+use crate::sim::around::{Around, Other};
+use crate::sim::body::BodyParameters;
+use crate::sim::moment::{driver_facts, with_itself};
+use crate::sim::road_user::{Moved, Obstacle};
+use crate::sim::traffic::TrafficProfile;
+use crate::sim::way::Way;
+use crate::sim::world::DT_S;
+
+use super::driver::{Driver, SIDE_ROOM_M};
+
+/// The sphere of LGSVL's check: its radius in half widths of the vehicle, and at most, m. Its centre is half a width
+/// beside the corner of the front.
+const SPHERE_PART: f64 = 0.75;
+const SPHERE_M_MAX: f64 = 1.2;
+/// Below this speed a lane change slows down with the vehicle, which cannot slide sideways, m/s.
+const CHANGE_FULL_MPS: f64 = 5.0;
+/// Neighbouring lanes whose centres are farther apart than this have parted, m.
+const CHANGE_M_MAX: f64 = 8.0;
+
+/// A lane change that waits for its occasion.
+#[derive(Debug, Clone)]
+pub(in crate::sim) struct Manoeuvre {
+    pub when: When,
+    pub towards: Towards,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::sim) enum When {
+    /// From this tick on.
+    Tick(u64),
+    /// When its rear is this far in front of the ego vehicle's front, m.
+    AheadOfEgo(f64),
+}
+
+#[derive(Debug, Clone)]
+pub(in crate::sim) enum Towards {
+    To(Side),
+    /// Left if that lane is there and free, else right.
+    Either,
+    /// Opposite to the change before.
+    Back,
+    Way(Arc<Way>),
+}
+
+/// A lane change under way.
+#[derive(Debug, Clone)]
+pub(super) struct Change {
+    pub to: Arc<Way>,
+    pub to_station_m: f64,
+    /// In `[0, 1)`.
+    pub progress: f64,
+    pub duration_s: f64,
+}
+
+impl Change {
+    /// The part of the change that is done on each metre of the way, at a speed.
+    pub fn progress_per_m(&self, speed_mps: f64) -> f64 {
+        1.0 / (speed_mps.max(CHANGE_FULL_MPS) * self.duration_s)
+    }
+}
+
+impl Driver {
+    /// Begins the next lane change of the plan if it is due, or one for its own gain, there is a lane, and it
+    /// is free.
+    pub(super) fn begin_change(&mut self, this: &Obstacle, size: &BodyParameters, around: &Around) {
+        let Some(next) = self.plan.last() else {
+            let Some(side) = self.wants_side(this, size, around) else { return };
+            if let Some(begun) = self.change_to(side, this, size, around) {
+                self.set_out(begun, this, around);
+            }
+            return;
+        };
+        let due = match next.when {
+            When::Tick(tick) => around.tick >= tick,
+            When::AheadOfEgo(gap_m) => {
+                let ahead_m = around.ego_outline.pose.to_local(this.outline.pose.position).x;
+                ahead_m - size.length_m / 2.0 - around.ego_outline.half_length_m >= gap_m
+            }
+        };
+        let allowed = |rules: &Arc<LaneChangeRules>| {
+            rules.allow(with_itself(around.moment_facts(), this), driver_facts(around, this, self))
+        };
+        if !due || !self.lane_changes.as_ref().is_none_or(allowed) {
+            return;
+        }
+        let begun = match next.towards.clone() {
+            Towards::Way(way) => {
+                let to_m = way.path.project(this.outline.pose.position).station_m;
+                Some((way, to_m, None))
+            }
+            Towards::To(side) => self.change_to(side, this, size, around),
+            Towards::Either => self
+                .change_to(Side::Left, this, size, around)
+                .or_else(|| self.change_to(Side::Right, this, size, around)),
+            Towards::Back => match self.last_change {
+                Some(Side::Left) => self.change_to(Side::Right, this, size, around),
+                Some(Side::Right) => self.change_to(Side::Left, this, size, around),
+                None => None,
+            },
+        };
+        let Some(begun) = begun else { return };
+        self.set_out(begun, this, around);
+        self.plan.pop();
+    }
+
+    /// Begins a change to a way, at the own station there.
+    fn set_out(
+        &mut self,
+        (to, to_station_m, side): (Arc<Way>, f64, Option<Side>),
+        this: &Obstacle,
+        around: &Around,
+    ) {
+        let aside_m = (to.path.pose_at(to_station_m).position - this.outline.pose.position).norm();
+        let duration_s = change_duration_s(aside_m, around.traffic);
+        self.change = Some(Change { to, to_station_m, progress: 0.0, duration_s });
+        self.last_change = side;
+    }
+
+    /// The way in the neighbouring lane, if there is one and room in it, and the own station there.
+    fn change_to(
+        &mut self,
+        side: Side,
+        this: &Obstacle,
+        size: &BodyParameters,
+        around: &Around,
+    ) -> Option<(Arc<Way>, f64, Option<Side>)> {
+        let map = &around.scene.map;
+        let (here, here_m) = self.way.lane_at(self.station_m);
+        let target = lane_beside(around, here, side)?;
+        let centre = &map.lane(target).centre;
+        let there = centre.project(this.outline.pose.position);
+        // `change_room_m` ends at markings that forbid a change, and at junctions, where lanes part.
+        let room_m = map.change_room_m(here, on_road(side), here_m);
+        if there.distance_m > CHANGE_M_MAX
+            || room_m < change_length_m(self.speed_mps, there.distance_m, around.traffic)
+            || !self.may_enter(side, map.lane(target), there.station_m, this, size, around)
+        {
+            return None;
+        }
+        let mut rng = self.draw(this.id, around);
+        let way = Way::along(around.scene, &[target], &mut rng)?;
+        Some((way, there.station_m, Some(side)))
+    }
+
+    /// Whether the profile's check of the other lane lets it change.
+    fn may_enter(
+        &self,
+        side: Side,
+        lane: &Lane,
+        station_m: f64,
+        this: &Obstacle,
+        size: &BodyParameters,
+        around: &Around,
+    ) -> bool {
+        if !around.traffic.change_by_sphere {
+            return self.is_free(lane, station_m, size, around);
+        }
+        let left = Vec2::new(-this.forward.y, this.forward.x);
+        let sphere_m = (SPHERE_PART * size.width_m / 2.0).min(SPHERE_M_MAX);
+        let aside = if side == Side::Left { left * size.width_m } else { left * -size.width_m };
+        let centre = this.outline.pose.position + this.forward * (size.length_m / 2.0) + aside;
+        let point = OrientedBox::new(Pose { position: centre, ..this.outline.pose }, 0.0, 0.0);
+        around.others().all(|other| {
+            distance_m(&point, other.outline) > sphere_m || is_apart(this.elevation_m, other.elevation_m)
+        })
+    }
+
+    /// Whether no vehicle is beside it in another lane or would be soon, and none has to brake hard for it.
+    fn is_free(&self, lane: &Lane, station_m: f64, size: &BodyParameters, around: &Around) -> bool {
+        let path = &lane.centre;
+        let here = path.pose_at(station_m);
+        let forward = here.forward();
+        around.others().all(|Other { outline, forward: heading, velocity_mps, elevation_m }| {
+            let ahead_m = forward.dot(&(outline.pose.position - here.position));
+            let Some(other) = path.project_from(outline.pose.position, station_m + ahead_m) else {
+                return true;
+            };
+            let (half_length_m, half_width_m) = outline.half_extent_m(heading, other.forward);
+            let aside_m = other.offset_m.abs() - half_width_m - size.width_m / 2.0;
+            let apart_m = (other.station_m - station_m).abs() - half_length_m - size.length_m / 2.0;
+            let closing_mps = (velocity_mps.dot(&forward) - self.speed_mps)
+                * if other.station_m < station_m { 1.0 } else { -1.0 };
+            aside_m > SIDE_ROOM_M
+                || apart_m > change_gap_m(closing_mps.max(0.0), around.traffic)
+                || is_apart(lane.height_at(other.station_m), elevation_m)
+        })
+    }
+
+    /// Where it is after a tick in which it drove `way_m`, with the lane change under way moved on. `before`
+    /// is where its centre was.
+    pub(super) fn advance_change(&mut self, way_m: f64, before: Vec2, size: &BodyParameters) -> Moved {
+        let from = self.way.body_at(self.station_m, size);
+        // The velocity is measured, because in a bend the centre of a body is slower than its way, and
+        // between two lanes it has neither lane's speed.
+        let at = |pose: Pose, lane_heading_rad| Moved {
+            pose,
+            forward: pose.forward(),
+            lane_heading_rad,
+            velocity_mps: (pose.position - before) / DT_S,
+        };
+        let from_lane_rad = self.lane_heading_rad();
+        let Some(change) = &mut self.change else {
+            return at(from, from_lane_rad);
+        };
+        let guess_m = change.to_station_m + way_m;
+        change.to_station_m =
+            change.to.path.project_from(from.position, guess_m).map_or(guess_m, |found| found.station_m);
+        let to = change.to.body_at(change.to_station_m, size);
+        let to_lane_rad = change.to.path.heading_at(change.to_station_m);
+        let progress_per_m = change.progress_per_m(self.speed_mps);
+        change.progress += progress_per_m * way_m;
+        if change.progress >= 1.0 {
+            (self.way, self.station_m) = (Arc::clone(&change.to), change.to_station_m);
+            (self.change, self.hold_m) = (None, None);
+            (self.insists_to_m, self.stopped_to_m) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+            return at(to, to_lane_rad);
+        }
+        let SmoothStep { value: blend, slope, .. } = smooth_step(change.progress);
+        let heading_rad = from.heading_rad + wrap_angle(to.heading_rad - from.heading_rad) * blend;
+        let turned_rad = libm::atan(from.to_local(to.position).y * slope * progress_per_m);
+        let pose = Pose {
+            position: from.position + (to.position - from.position) * blend,
+            heading_rad: wrap_angle(heading_rad + turned_rad),
+        };
+        at(pose, if change.progress < 0.5 { from_lane_rad } else { to_lane_rad })
+    }
+}
+
+/// Whether the street on which a way is at a station, or the next one if it is in a junction, has room for
+/// a lane change to a side.
+pub(in crate::sim) fn can_change(
+    around: &Around,
+    way: &Way,
+    station_m: f64,
+    side: Side,
+    speed_mps: f64,
+) -> bool {
+    let map = &around.scene.map;
+    let in_junction = |lane: LaneIndex| map.lane(lane).junction.is_some();
+    let ahead = way.lanes_from(station_m).skip_while(|(lane, _)| in_junction(*lane));
+    ahead.take_while(|(lane, _)| !in_junction(*lane)).any(|(lane, at_m)| {
+        let Some(target) = lane_beside(around, lane, side) else { return false };
+        let here = map.lane(lane).centre.pose_at(at_m).position;
+        let length_m =
+            change_length_m(speed_mps, map.lane(target).centre.project(here).distance_m, around.traffic);
+        map.changes_from_m(lane, on_road(side), at_m).iter().any(|(_, room_m)| *room_m >= length_m)
+    })
+}
+
+fn change_duration_s(aside_m: f64, traffic: &TrafficProfile) -> f64 {
+    (SMOOTH_STEP_SLOPE_MAX * aside_m / traffic.change_mps_max).max(traffic.change_s_min)
+}
+
+/// Gap that a change needs to another vehicle in the other lane, m, if it closes at a speed: the room of the
+/// profile, and enough for the one behind to slow down as hard as is safe.
+fn change_gap_m(closing_mps: f64, traffic: &TrafficProfile) -> f64 {
+    let slowing_m = braking_m(closing_mps, traffic.change_safe_mps2);
+    traffic.change_room_m + slowing_m.max(closing_mps * traffic.change_time_s)
+}
+
+/// Way that a lane change of `aside_m` to the side takes at a speed, m.
+fn change_length_m(speed_mps: f64, aside_m: f64, traffic: &TrafficProfile) -> f64 {
+    speed_mps.max(CHANGE_FULL_MPS) * change_duration_s(aside_m, traffic)
+}
+
+fn on_road(side: Side) -> road::Side {
+    match side {
+        Side::Left => road::Side::Left,
+        Side::Right => road::Side::Right,
+    }
+}
+
+/// The same-direction lane on a side of a lane, if there is one and no median lies between.
+pub(in crate::sim) fn lane_beside(around: &Around, lane: LaneIndex, side: Side) -> Option<LaneIndex> {
+    let lane = around.scene.map.lane(lane);
+    let neighbour = match side {
+        Side::Left => lane.left,
+        Side::Right => lane.right,
+    };
+    let reachable = |neighbour: &Neighbour| neighbour.same_direction && neighbour.gap_m <= road::STRIP_M_MAX;
+    neighbour.filter(reachable).map(|neighbour| neighbour.lane)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_change_leaves_the_vehicle_behind_room_to_slow_down() {
+        let traffic = TrafficProfile::default();
+        assert_eq!(change_gap_m(0.0, &traffic), 2.0);
+        assert_eq!(change_gap_m(6.0, &traffic), 8.0, "a second");
+        assert_eq!(change_gap_m(12.0, &traffic), 20.0, "144 / (2 · 4)");
+        // One lane of 3.5 m at 1.8 m/s.
+        assert!((change_duration_s(3.5, &traffic) * 1.8 - 3.5 * SMOOTH_STEP_SLOPE_MAX).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,334 @@
+//! Other drivers: along their way by the Intelligent Driver Model.
+//!
+//! IDM after Treiber, Hennecke and Helbing (2000), with the brakes of the body on the grip of the
+//! road and a kinematic floor, because IDM alone assumes brakes without limit. Ten times a second,
+//! which is their reaction time, drivers look for a leader (`leader`, `foresight`), for a reason to wait
+//! at a junction (`manners`) and for the occasion of their next lane change (`change`); in every tick
+//! they slow down for bends, stop at red lights (`red_light`) and stop signs (`stop_sign`) and follow. What else they do to the ego
+//! vehicle is the scenario's business.
+
+use std::sync::Arc;
+
+use crate::action::LaneChangeRules;
+use avastra_base::kinematics::STANDING_MPS;
+use avastra_base::rng;
+use avastra_base::rng::{Rng, Stream};
+use avastra_lang::model::vocabulary::Side;
+
+use crate::sim::around::Around;
+use crate::sim::body::BodyParameters;
+use crate::sim::road_user::{Moved, Obstacle};
+use crate::sim::scene::Scene;
+use crate::sim::sense::FRAME_TICKS;
+use crate::sim::trace::Trace;
+use crate::sim::way::Way;
+use crate::sim::world::DT_S;
+
+use super::change::{Change, Manoeuvre};
+use super::leader::{Leader, following};
+use super::manners::GIVE_UP_S;
+
+/// IDM: comfortable deceleration, m/s². Ours.
+pub(super) const COMFORT_MPS2: f64 = 2.0;
+/// IDM: gap at standstill, m: that of its authors.
+pub(super) const GAP_M_MIN: f64 = 2.0;
+/// How far drivers look ahead beyond the way on which they could stop gently, m.
+pub(super) const LOOK_AHEAD_M: f64 = 25.0;
+/// Room that drivers want free beside the outline, m.
+pub(super) const SIDE_ROOM_M: f64 = 0.2;
+/// A wished speed below this is reached exactly, m/s, because the model's acceleration would oscillate around it. A vehicle
+/// that is asked to stand has a wish of 0.
+const CRAWL_MPS: f64 = 0.1;
+/// A driver slower than this when a wait ends sets out anew, m/s.
+const SETS_OUT_MPS: f64 = 1.0;
+
+/// How fast a driver wants to drive, and how it treats the ego vehicle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::sim) enum Cruise {
+    /// At the speed that an action asked for, m/s, and without yielding to the ego vehicle at junctions.
+    Commanded(f64),
+    /// At a part of each lane's limit, yielding to all others: ambient traffic.
+    Limit(f64),
+}
+
+#[derive(Debug, Clone)]
+pub(in crate::sim) struct Driver {
+    pub(super) way: Arc<Way>,
+    /// Station on the way: on a straight one, that of the outline's centre (see [`Way::body_at`]).
+    pub(super) station_m: f64,
+    pub speed_mps: f64,
+    pub(super) cruise_mps: f64,
+    /// Part of the limits that it drives at; `None` if its speed was asked for.
+    limit_part: Option<f64>,
+    pub(super) yields_to_ego: bool,
+    /// 1 to 3 in a profile that has it; 0 before the first look.
+    pub(super) aggression: u32,
+    pub(super) leader: Option<Leader>,
+    /// Station at which it waits for others, or will.
+    pub(super) hold_m: Option<f64>,
+    /// After a wait it goes on up to this station, whatever comes.
+    pub(super) insists_to_m: f64,
+    /// It has stood at the stop sign's line at this station, and at those before.
+    pub(super) stopped_to_m: f64,
+    /// Ticks at rest because of others.
+    pub(super) waited_ticks: u32,
+    pub(super) change: Option<Change>,
+    pub(super) last_change: Option<Side>,
+    /// In reverse order: the next manoeuvre is last.
+    pub(super) plan: Vec<Manoeuvre>,
+    /// Rules of the space on the lane changes of `plan`.
+    pub lane_changes: Option<Arc<LaneChangeRules>>,
+    /// How often it drew where to go, so that each draw has its own stream.
+    draws: u32,
+}
+
+impl Driver {
+    /// A driver with its centre at a station of a way, at its cruising speed or what the bend there
+    /// allows.
+    ///
+    /// `plan` is in order; `draws` tells how many draws went into it.
+    pub fn new(
+        scene: &Scene,
+        way: Arc<Way>,
+        station_m: f64,
+        cruise: Cruise,
+        mut plan: Vec<Manoeuvre>,
+        draws: u32,
+    ) -> Driver {
+        plan.reverse();
+        let (cruise_mps, limit_part) = match cruise {
+            Cruise::Commanded(speed_mps) => (speed_mps, None),
+            Cruise::Limit(part) => (part * way.limit_mps(scene, station_m), Some(part)),
+        };
+        Driver {
+            speed_mps: cruise_mps.min(way.speed_mps_max(station_m)),
+            way,
+            station_m,
+            cruise_mps,
+            limit_part,
+            yields_to_ego: false,
+            aggression: 0,
+            leader: None,
+            hold_m: None,
+            insists_to_m: f64::NEG_INFINITY,
+            stopped_to_m: f64::NEG_INFINITY,
+            waited_ticks: 0,
+            change: None,
+            last_change: None,
+            plan,
+            lane_changes: None,
+            draws,
+        }
+    }
+
+    /// The way it follows now.
+    pub fn way(&self) -> &Way {
+        &self.way
+    }
+
+    pub fn shared_way(&self) -> &Arc<Way> {
+        &self.way
+    }
+
+    pub fn station_m(&self) -> f64 {
+        self.station_m
+    }
+
+    pub fn is_changing_lanes(&self) -> bool {
+        self.change.is_some()
+    }
+
+    /// Where it is before its first tick.
+    pub fn moved(&self, size: &BodyParameters) -> Moved {
+        let pose = self.way.body_at(self.station_m, size);
+        let forward = pose.forward();
+        Moved {
+            pose,
+            forward,
+            lane_heading_rad: self.lane_heading_rad(),
+            velocity_mps: forward * self.speed_mps,
+        }
+    }
+
+    /// Whether its lane and the map have ended. A lane change is done first.
+    fn is_beyond_map(&self) -> bool {
+        self.change.is_none() && self.station_m >= self.way.path.length_m()
+    }
+
+    /// Heading of the way where it is, rad.
+    pub(super) fn lane_heading_rad(&self) -> f64 {
+        self.way.path.heading_at(self.station_m)
+    }
+
+    /// One tick; `None` if it leaves the world, which it does only while the ego vehicle does not see it
+    /// (`in_sight`). One that has `touched` the ego vehicle only brakes.
+    pub fn step(
+        &mut self,
+        this: &Obstacle,
+        size: &BodyParameters,
+        touched: bool,
+        in_sight: bool,
+        around: &Around,
+    ) -> Option<Moved> {
+        let looks = !touched && (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS);
+        if looks {
+            self.look(this, size, around);
+        }
+        let braking_mps2 = around.braking_mps2(size, self.speed_mps);
+        let acceleration_mps2 = if touched {
+            -braking_mps2
+        } else {
+            self.wanted_mps2(size, around, braking_mps2).clamp(-braking_mps2, size.acceleration_mps2_max)
+        };
+        let speed_mps = (self.speed_mps + acceleration_mps2 * DT_S).max(0.0);
+        let way_m = (self.speed_mps + speed_mps) / 2.0 * DT_S;
+        self.speed_mps = speed_mps;
+        self.station_m += way_m;
+        if self.gives_up() && !in_sight {
+            return None;
+        }
+        if let Some(leader) = &mut self.leader {
+            leader.gap_m += leader.speed_mps * DT_S - way_m;
+        }
+        // A lane that ends under a lane change goes on straight until the change is done. So does one that
+        // ends at the edge of the map while the vehicle is in sight.
+        if self.is_beyond_map() && !in_sight {
+            return None;
+        }
+        // A vehicle that stands keeps its place to the bit, even if its way was laid anew.
+        if way_m == 0.0 && self.change.is_none() {
+            return Some(Moved::at_rest(this));
+        }
+        Some(self.advance_change(way_m, this.outline.pose.position, size))
+    }
+
+    /// Prolongs the way, begins a lane change that is due, and finds what to follow and what to wait for.
+    fn look(&mut self, this: &Obstacle, size: &BodyParameters, around: &Around) {
+        if self.way.ends_soon(self.station_m) {
+            let mut rng = self.draw(this.id, around);
+            if let Some((way, station_m)) = self.way.prolonged(around.scene, self.station_m, &mut rng) {
+                self.insists_to_m += station_m - self.station_m;
+                self.stopped_to_m += station_m - self.station_m;
+                (self.way, self.station_m) = (way, station_m);
+            }
+        }
+        self.note_stop(size);
+        self.yields_to_ego = self.is_ambient() && around.traffic.yields_to_ego;
+        if let Some(part) = self.limit_part {
+            self.cruise_mps = part * self.way.limit_mps(around.scene, self.station_m);
+        }
+        if self.change.is_none() {
+            self.begin_change(this, size, around);
+        }
+        self.leader = if around.traffic.rays {
+            self.take_temper(this.id, around);
+            self.ray_leader(this, size, around)
+        } else {
+            let beside = self.foresee(this, size, around);
+            let leader = self.find_leader(this, size, around);
+            let nearer = |a: &Leader, b: &Leader| a.gap_m.total_cmp(&b.gap_m);
+            leader.into_iter().chain(beside).min_by(nearer)
+        };
+        let held = self.hold_m.is_some();
+        self.hold_m = self.find_hold_m(this, size, around);
+        if held && self.hold_m.is_none() && self.speed_mps < SETS_OUT_MPS {
+            self.insists_to_m = self.junction_end_m(size);
+        }
+    }
+
+    /// The lowest acceleration that the cruising speed, bends, the leader, a light or a wait demands.
+    fn wanted_mps2(&self, size: &BodyParameters, around: &Around, braking_mps2: f64) -> f64 {
+        let mut bend_mps = self.way.speed_mps_max(self.station_m);
+        if let Some(change) = &self.change {
+            bend_mps = bend_mps.min(change.to.speed_mps_max(change.to_station_m));
+        }
+        let wish_mps = self.cruise_mps.min(bend_mps);
+        let front_m = self.station_m + size.length_m / 2.0;
+        let end_m = if self.change.is_none() { self.way.end_m } else { None };
+        let line_ahead_m = [
+            self.stop_gap_m(size, around, braking_mps2),
+            self.sign_gap_m(size, braking_mps2),
+            end_m.map(|end_m| end_m - front_m),
+            self.hold_m.map(|hold_m| hold_m - front_m),
+        ];
+        let line_ahead_m = line_ahead_m.into_iter().flatten().fold(f64::INFINITY, f64::min);
+        if around.traffic.rays {
+            return self.tending_mps2(size, around, wish_mps, line_ahead_m);
+        }
+        // To be too fast is no emergency.
+        let free_mps2 = if wish_mps < CRAWL_MPS {
+            ((wish_mps - self.speed_mps) / DT_S).clamp(-COMFORT_MPS2, size.acceleration_mps2_max)
+        } else {
+            following(size.acceleration_mps2_max).free_mps2(self.speed_mps, wish_mps).max(-COMFORT_MPS2)
+        };
+        let mut wanted_mps2 = free_mps2;
+        if let Some(leader) = &self.leader {
+            wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, leader, free_mps2));
+        }
+        if line_ahead_m < f64::INFINITY {
+            wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, &Leader::line(line_ahead_m), free_mps2));
+        }
+        wanted_mps2
+    }
+
+    /// Counts a tick at rest because of others; `true` if it has waited so long that it would leave.
+    fn gives_up(&mut self) -> bool {
+        let blocked = self.leader.is_some_and(|leader| leader.crosswise && leader.gap_m < GAP_M_MIN + 3.0);
+        if self.speed_mps >= STANDING_MPS {
+            self.waited_ticks = 0;
+        } else if self.hold_m.is_some() || blocked {
+            self.waited_ticks += 1;
+        }
+        self.has_given_up()
+    }
+
+    /// Whether it has waited for others so long that it would leave if it were not seen.
+    pub fn has_given_up(&self) -> bool {
+        f64::from(self.waited_ticks) * DT_S >= GIVE_UP_S
+    }
+
+    /// Whether it was asked to stand.
+    pub fn is_parked(&self) -> bool {
+        self.cruise_mps == 0.0
+    }
+
+    /// Whether no action commanded it.
+    pub(super) fn is_ambient(&self) -> bool {
+        self.limit_part.is_some()
+    }
+
+    /// The stream of its next draw of where to go.
+    pub(super) fn draw(&mut self, id: u32, around: &Around) -> Rng {
+        self.draws += 1;
+        choices(around.seed, id, self.draws - 1)
+    }
+
+    /// Feeds every bit that later ticks depend on to `trace`; ways follow from the draws.
+    pub fn trace(&self, trace: &mut Trace) {
+        for value in [self.station_m, self.speed_mps, self.cruise_mps] {
+            trace.number(value);
+        }
+        let leader = self.leader.unwrap_or(Leader::line(-1.0));
+        trace.number(leader.gap_m);
+        trace.number(leader.speed_mps);
+        trace.word(u64::from(leader.crosswise));
+        trace.number(self.hold_m.unwrap_or(f64::INFINITY));
+        trace.number(self.insists_to_m);
+        trace.number(self.stopped_to_m);
+        trace.word(u64::from(self.waited_ticks));
+        trace.word(u64::from(self.aggression));
+        if let Some(change) = &self.change {
+            for value in [change.to_station_m, change.progress, change.duration_s] {
+                trace.number(value);
+            }
+        }
+        trace.word(self.last_change.map_or(0, |side| side as u64 + 1));
+        trace.word(self.plan.len() as u64);
+        trace.word(u64::from(self.draws));
+    }
+}
+
+/// The stream of one choice of one road user.
+pub(in crate::sim) fn choices(seed: u64, id: u32, draw: u32) -> Rng {
+    rng::stream(seed, Stream::Traffic, u64::from(id) << 32 | u64::from(draw))
+}

@@ -1,0 +1,146 @@
+//! Leaders: which road user a driver follows, and the acceleration that the gap to it allows.
+//!
+//! A leader is ahead on the own way and within a corridor as wide as the vehicle. What would come into
+//! the way beside that corridor is found in `foresight`.
+
+use avastra_base::geometry::{Pose, smooth_step};
+use avastra_base::kinematics::{Following, STANDING_MPS, needed_mps2};
+use avastra_road::is_apart;
+
+use crate::sim::around::{Around, Other};
+use crate::sim::body::BodyParameters;
+use crate::sim::road_user::Obstacle;
+use crate::sim::way::Way;
+
+use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, LOOK_AHEAD_M, SIDE_ROOM_M};
+
+/// IDM: time gap, s. Ours.
+const TIME_GAP_S: f64 = 1.2;
+/// A vehicle at more than this angle to the way stands across it or against it (cosine of 45°).
+const CROSSWISE_COS_MAX: f64 = core::f64::consts::FRAC_1_SQRT_2;
+
+/// The driver model of a vehicle of this acceleration, m/s².
+pub(super) fn following(acceleration_mps2: f64) -> Following {
+    Following {
+        gap_m_min: GAP_M_MIN,
+        time_gap_s: TIME_GAP_S,
+        acceleration_mps2,
+        comfortable_mps2: COMFORT_MPS2,
+    }
+}
+
+/// What is in front: another road user, or a line to stop at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Leader {
+    pub gap_m: f64,
+    /// Along the own way; negative if it comes nearer.
+    pub speed_mps: f64,
+    /// Whether it heads across the way or against it.
+    pub crosswise: bool,
+}
+
+impl Leader {
+    /// A place at which to stand.
+    pub fn line(gap_m: f64) -> Leader {
+        Leader { gap_m, speed_mps: 0.0, crosswise: false }
+    }
+}
+
+impl Driver {
+    /// Gap to another road user on its way, m, and the other's speed along the way. `None` if the other is
+    /// not ahead in its corridor.
+    pub fn gap_to(&self, size: &BodyParameters, other: Other) -> Option<(f64, f64)> {
+        let here = self.way.path.pose_at(self.station_m);
+        in_corridor(&self.way, self.station_m, &here, size, other)
+            .map(|leader| (leader.gap_m, leader.speed_mps))
+    }
+
+    /// The nearest leader on the own way, or on the way to which it is changing.
+    pub(super) fn find_leader(
+        &self,
+        this: &Obstacle,
+        size: &BodyParameters,
+        around: &Around,
+    ) -> Option<Leader> {
+        let here = &this.outline.pose;
+        let forward = this.forward;
+        let reach_m = LOOK_AHEAD_M
+            + self.speed_mps * (TIME_GAP_S + self.speed_mps / (2.0 * COMFORT_MPS2))
+            + size.length_m / 2.0;
+        let mut nearest: Option<Leader> = None;
+        for other in around.others() {
+            let outline = other.outline;
+            let delta = outline.pose.position - here.position;
+            let reach_m = reach_m + outline.half_length_m;
+            if delta.norm_squared() > reach_m * reach_m || forward.dot(&delta) < 0.0 {
+                continue;
+            }
+            let on_own_way = in_corridor(&self.way, self.station_m, here, size, other)
+                .filter(|leader| !self.evades(leader, size, other));
+            let on_next_way = self
+                .change
+                .as_ref()
+                .and_then(|change| in_corridor(&change.to, change.to_station_m, here, size, other));
+            for leader in on_own_way.into_iter().chain(on_next_way) {
+                if nearest.is_none_or(|found| leader.gap_m < found.gap_m) {
+                    nearest = Some(leader);
+                }
+            }
+        }
+        nearest
+    }
+
+    /// Whether a lane change under way leads past a road user that stands in the lane that it leaves: when the front reaches
+    /// it, the vehicle is already beside it. A road user that moves is a leader until the end of the change.
+    fn evades(&self, leader: &Leader, size: &BodyParameters, other: Other) -> bool {
+        let Some(change) = self.change.as_ref().filter(|_| other.velocity_mps.norm() < STANDING_MPS) else {
+            return false;
+        };
+        let there_m = self.station_m + leader.gap_m + size.length_m / 2.0;
+        let Some(beside) = self.way.path.project_from(other.outline.pose.position, there_m) else {
+            return false;
+        };
+        let target = change.to.path.position_at(change.to_station_m);
+        let over_m = self.way.path.pose_at(self.station_m).to_local(target).y;
+        let progress = change.progress + change.progress_per_m(self.speed_mps) * leader.gap_m.max(0.0);
+        let moved_m = over_m * smooth_step(progress).value;
+        let (_, half_width_m) = other.outline.half_extent_m(other.forward, beside.forward);
+        (beside.offset_m - moved_m).abs() - half_width_m - size.width_m / 2.0 > SIDE_ROOM_M
+    }
+
+    /// Acceleration behind a leader, m/s²: IDM's, or the braking that still avoids the leader if that is harder.
+    pub(super) fn follow_mps2(&self, size: &BodyParameters, leader: &Leader, free_mps2: f64) -> f64 {
+        let closing_mps = self.speed_mps - leader.speed_mps;
+        let model = following(size.acceleration_mps2_max);
+        let idm_mps2 = free_mps2 - model.interaction_mps2(self.speed_mps, leader.speed_mps, leader.gap_m);
+        if closing_mps <= 0.0 {
+            return idm_mps2;
+        }
+        let needed_mps2 = needed_mps2(closing_mps, (leader.gap_m - GAP_M_MIN / 2.0).max(0.1));
+        if needed_mps2 > COMFORT_MPS2 { idm_mps2.min(-needed_mps2) } else { idm_mps2 }
+    }
+}
+
+/// Another road user as the leader of a driver at `station_m` of a way, if it is ahead and in the driver's
+/// corridor.
+fn in_corridor(
+    way: &Way,
+    station_m: f64,
+    here: &Pose,
+    size: &BodyParameters,
+    Other { outline, forward, velocity_mps, elevation_m }: Other,
+) -> Option<Leader> {
+    let straight_m = (outline.pose.position - here.position).norm();
+    let other = way.path.project_from(outline.pose.position, station_m + straight_m)?;
+    let (half_length_m, half_width_m) = outline.half_extent_m(forward, other.forward);
+    let aside_m = other.offset_m.abs() - half_width_m - size.width_m / 2.0;
+    let is_aside = other.station_m < station_m || aside_m > SIDE_ROOM_M;
+    if is_aside || is_apart(way.height_at(other.station_m), elevation_m) {
+        return None;
+    }
+    Some(Leader {
+        gap_m: other.station_m - station_m - half_length_m - size.length_m / 2.0,
+        speed_mps: velocity_mps.dot(&other.forward),
+        crosswise: forward.dot(&other.forward) < CROSSWISE_COS_MAX,
+    })
+}

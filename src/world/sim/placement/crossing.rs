@@ -1,0 +1,162 @@
+//! Crossing traffic: a rendezvous with the ego vehicle at a conflict of its route, on a leg whose signal will
+//! be green.
+
+use crate::action::SpawnRequest;
+use avastra_lang::model::vocabulary::{Side, Then};
+use avastra_road::{Conflict, LaneIndex};
+
+use crate::sim::around::Around;
+use crate::sim::body::BodyParameters;
+use crate::sim::ego::VehicleParameters;
+use crate::sim::npc::{Driver, Manoeuvre, Towards, When, can_change, choices, lane_beside};
+use crate::sim::sense::SignalColour;
+use crate::sim::way::Way;
+use crate::sim::world::DT_S;
+
+use super::arrival::TIMING_M;
+use super::{Arrivals, commanded};
+
+/// How far beyond the asked distance a crossing may lie, m.
+const CROSSING_M: f64 = 60.0;
+/// A stop line within this distance behind a newcomer counts as passed when it appears, m.
+const BEYOND_LINE_M: f64 = 30.0;
+/// How long a vehicle stands at a stop sign, s, and its braking before it, m/s². Ours, and that of the drivers' model.
+const STANDS_S: f64 = 1.0;
+const STOPS_MPS2: f64 = 2.0;
+
+pub(super) fn cross_road(
+    around: &Around,
+    arrivals: &Arrivals,
+    request: &SpawnRequest,
+    size: &BodyParameters,
+    id: u32,
+) -> Result<Driver, String> {
+    let front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
+    let mut reason = None;
+    for conflict in &around.scene.route.conflicts {
+        let distance_m = conflict.station_m - front_m;
+        let from_right = conflict.angle_rad > 0.0;
+        if !(request.distance_m..=request.distance_m + CROSSING_M).contains(&distance_m)
+            || from_right != (request.side == Side::Right)
+        {
+            continue;
+        }
+        match rendezvous(around, request, size, id, conflict, arrivals.after_s(around, distance_m)) {
+            Ok(driver) => return Ok(driver),
+            Err(why) => reason = Some(why),
+        }
+    }
+    Err(reason.unwrap_or_else(|| {
+        let side = match request.side {
+            Side::Left => "left",
+            Side::Right => "right",
+        };
+        format!("no crossing leg from the {side} within {CROSSING_M} m")
+    }))
+}
+
+/// A driver that reaches a conflict after `arrival_s`, when the ego vehicle does, if nothing is in its way.
+fn rendezvous(
+    around: &Around,
+    request: &SpawnRequest,
+    size: &BodyParameters,
+    id: u32,
+    conflict: &Conflict,
+    arrival_s: f64,
+) -> Result<Driver, String> {
+    let map = &around.scene.map;
+    let needed_m = request.speed_mps * arrival_s + size.length_m;
+    let mut lanes = vec![conflict.lane];
+    let mut upstream_m = conflict.lane_station_m;
+    let on_route = |lane: LaneIndex| around.scene.route.lanes.iter().any(|part| part.lane == lane);
+    while upstream_m < needed_m {
+        let before = &map.lane(lanes[0]).predecessors;
+        let Some(previous) = before.iter().copied().find(|lane| !on_route(*lane)) else { break };
+        upstream_m += map.lane(previous).centre.length_m();
+        lanes.insert(0, previous);
+    }
+    let mut rng = choices(around.seed, id, 0);
+    let way = Way::along(around.scene, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
+    let meeting_m = way.lane_begin_m(conflict.lane).expect("the way was made through this lane")
+        + conflict.lane_station_m;
+    let front_m = approach_m(around, request, size, &way, meeting_m, arrival_s)?;
+    let station_m = front_m - size.length_m / 2.0;
+    if request.then == Then::Keep {
+        return Ok(commanded(around, request, way, station_m, Vec::new()));
+    }
+    // It starts beside its way and changes into it on the approach.
+    let start = way.path.pose_at(station_m).position;
+    let (leg, _) = way.lane_at(station_m);
+    if map.lane(leg).junction.is_some() {
+        return Err("too near to the junction for a lane change".into());
+    }
+    let mut reason = "no second lane in the crossing leg";
+    let mut found = None;
+    for (side, back) in [(Side::Right, Side::Left), (Side::Left, Side::Right)] {
+        let Some(beside) = lane_beside(around, leg, side) else { continue };
+        let first = Way::along(around.scene, &[beside], &mut rng).ok_or("that lane leads nowhere")?;
+        let station_m = map.lane(beside).centre.project(start).station_m;
+        if can_change(around, &first, station_m, back, request.speed_mps) {
+            found = Some((first, station_m));
+            break;
+        }
+        reason = "no room to change lanes before the junction";
+    }
+    let (first, station_m) = found.ok_or(reason)?;
+    let change = Manoeuvre { when: When::Tick(around.tick), towards: Towards::Way(way) };
+    Ok(commanded(around, request, first, station_m, vec![change]))
+}
+
+/// Station at which a front has to start to be at the meeting point after `arrival_s`, m. It is found by
+/// going back from there at the speed that each bend allows.
+///
+/// # Errors
+/// If the way begins nearer, a signal on it will not be green, or a stop sign leaves no time.
+fn approach_m(
+    around: &Around,
+    request: &SpawnRequest,
+    size: &BodyParameters,
+    way: &Way,
+    meeting_m: f64,
+    arrival_s: f64,
+) -> Result<f64, String> {
+    let mut front_m = meeting_m;
+    let mut left_s = arrival_s;
+    let mut passed_lines: Vec<(usize, f64)> = Vec::new();
+    while left_s > 1e-9 {
+        let speed_mps = request.speed_mps.min(way.speed_mps_max(front_m)).max(0.1);
+        let step_m = TIMING_M.min(speed_mps * left_s);
+        front_m -= step_m;
+        left_s -= step_m / speed_mps;
+        for line in &way.stop_lines {
+            if (front_m..front_m + step_m).contains(&line.station_m) {
+                passed_lines.push((line.signal, left_s.max(0.0)));
+            }
+        }
+        if way.stop_signs_m.iter().any(|line_m| (front_m..front_m + step_m).contains(line_m)) {
+            left_s -= STANDS_S + speed_mps / 2.0 * (1.0 / STOPS_MPS2 + 1.0 / size.acceleration_mps2_max);
+            if left_s < 0.0 {
+                return Err("it would have to stop at a sign".into());
+            }
+        }
+        if front_m < size.length_m {
+            return Err("the crossing road is too short".into());
+        }
+    }
+    // No vehicle appears just beyond a line at which it would have had to stop.
+    let beyond = front_m - BEYOND_LINE_M..front_m;
+    if way.stop_signs_m.iter().any(|line_m| beyond.contains(line_m)) {
+        return Err("it would have had to stop at a sign".into());
+    }
+    let behind =
+        way.stop_lines.iter().filter(|line| (front_m - BEYOND_LINE_M..front_m).contains(&line.station_m));
+    passed_lines.extend(behind.map(|line| (line.signal, 0.0)));
+    let is_green = |(signal, after_s): &(usize, f64)| {
+        let tick = around.tick + (after_s / DT_S) as u64;
+        around.signals.colour(&around.scene.map, *signal, tick) == SignalColour::Green
+    };
+    if !passed_lines.iter().all(is_green) {
+        return Err("its signal will not be green".into());
+    }
+    Ok(front_m)
+}

@@ -1,0 +1,136 @@
+//! Drivers that appear ahead, from behind or as oncoming traffic.
+
+use crate::action::SpawnRequest;
+use avastra_base::rng;
+use avastra_lang::model::vocabulary::{LaneChoice, Side, Then};
+use avastra_road::LaneIndex;
+
+use crate::sim::around::Around;
+use crate::sim::body::BodyParameters;
+use crate::sim::ego::VehicleParameters;
+use crate::sim::npc::{Driver, Manoeuvre, Towards, When, can_change, choices, lane_beside};
+use crate::sim::way::Way;
+use crate::sim::world::DT_S;
+
+use super::lanes::{chosen_lane, lane_along, lane_before, opposing_lane};
+use super::{ahead_m, commanded};
+
+/// Time after which a vehicle ahead changes lanes, s.
+const CHANGE_AFTER_S: f64 = 1.0;
+/// How far in front of the ego vehicle an overtaker cuts in, m.
+const CUT_IN_M: f64 = 5.0;
+/// How far in front of the ego vehicle an overtaker that only wants to pass comes back to its lane, m: two seconds in town.
+/// Ours.
+const RETURN_M: f64 = 20.0;
+
+pub(super) fn drive_ahead(
+    around: &Around,
+    request: &SpawnRequest,
+    size: &BodyParameters,
+    id: u32,
+) -> Result<Driver, String> {
+    let station_m = ahead_m(around, request, size)?;
+    let lane = chosen_lane(around, station_m, request.lane)?;
+    let mut rng = choices(around.seed, id, 0);
+    let beside_ego = around.scene.route.path.pose_at(station_m).position;
+    let station_m = around.scene.map.lane(lane).centre.project(beside_ego).station_m;
+    let way = Way::along(around.scene, &[lane], &mut rng).ok_or("that lane leads nowhere")?;
+    let mut plan = Vec::new();
+    if request.then == Then::Change {
+        let sides: &[Side] = match request.lane {
+            LaneChoice::Left => &[Side::Right],
+            LaneChoice::Right => &[Side::Left],
+            LaneChoice::Current => &[Side::Left, Side::Right],
+        };
+        let begin_m = station_m + request.speed_mps * CHANGE_AFTER_S;
+        let possible = |side: &Side| can_change(around, &way, begin_m, *side, request.speed_mps);
+        let sides: Vec<Side> = sides.iter().copied().filter(possible).collect();
+        if sides.is_empty() {
+            return Err(no_change(around, lane).into());
+        }
+        let towards = Towards::To(sides[rng::below(&mut rng, sides.len() as u32) as usize]);
+        let when = When::Tick(around.tick + (CHANGE_AFTER_S / DT_S + 0.5) as u64);
+        plan.push(Manoeuvre { when, towards });
+    }
+    Ok(commanded(around, request, way, station_m, plan))
+}
+
+/// Why a vehicle in this lane cannot change it.
+fn no_change(around: &Around, lane: LaneIndex) -> &'static str {
+    match [Side::Left, Side::Right].into_iter().all(|side| lane_beside(around, lane, side).is_none()) {
+        true => "no lane beside it to change to",
+        false => "no room to change lanes before the junction",
+    }
+}
+
+pub(super) fn overtake(
+    around: &Around,
+    request: &SpawnRequest,
+    size: &BodyParameters,
+    id: u32,
+) -> Result<Driver, String> {
+    if request.speed_mps <= around.ego.speed_mps {
+        return Err("it would be no faster than the ego vehicle".into());
+    }
+    let lane = chosen_lane(around, around.ego_station_m, request.lane)?;
+    let mut rng = choices(around.seed, id, 0);
+    let mut plan = Vec::new();
+    let when_ahead = |gap_m, towards| Manoeuvre { when: When::AheadOfEgo(gap_m), towards };
+    match (request.lane, request.then) {
+        (LaneChoice::Current, then) => {
+            plan.push(Manoeuvre { when: When::Tick(around.tick), towards: Towards::Either });
+            let gap_m = if then == Then::Change { CUT_IN_M } else { RETURN_M };
+            plan.push(when_ahead(gap_m, Towards::Back));
+        }
+        (LaneChoice::Left, Then::Change) => plan.push(when_ahead(CUT_IN_M, Towards::To(Side::Right))),
+        (LaneChoice::Right, Then::Change) => plan.push(when_ahead(CUT_IN_M, Towards::To(Side::Left))),
+        (LaneChoice::Left | LaneChoice::Right, Then::Keep) => {}
+    }
+    // Its front bumper is `distance_m` behind the ego vehicle's rear bumper, measured in its own lane.
+    let rear = around.ego.rear_axle.offset(-VehicleParameters::MKZ.rear_axle_to_back_m, 0.0);
+    let map = &around.scene.map;
+    let centre = &map.lane(lane).centre;
+    let beside_m = centre.project(rear.position).station_m;
+    // A lane that begins farther ahead, like a bay for turning, is continued backwards to the ego vehicle.
+    let before_m = centre.pose_at(beside_m).to_local(rear.position).x.min(0.0);
+    let mut station_m = beside_m + before_m - request.distance_m - size.length_m / 2.0;
+    let mut lanes = vec![lane];
+    while station_m < size.length_m / 2.0 {
+        let previous = lane_before(around, lanes[0]).ok_or("the road begins too near behind")?;
+        station_m += map.lane(previous).centre.length_m();
+        lanes.insert(0, previous);
+    }
+    let way = Way::along(around.scene, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
+    let passes = |side| can_change(around, &way, station_m, side, request.speed_mps);
+    if request.lane == LaneChoice::Current && !passes(Side::Left) && !passes(Side::Right) {
+        return Err(no_change(around, lane).into());
+    }
+    Ok(commanded(around, request, way, station_m, plan))
+}
+
+pub(super) fn drive_opposite(
+    around: &Around,
+    request: &SpawnRequest,
+    size: &BodyParameters,
+    id: u32,
+) -> Result<Driver, String> {
+    let station_m = ahead_m(around, request, size)?;
+    let map = &around.scene.map;
+    let inner = lane_along(around, station_m, false, |lane| opposing_lane(around, lane, station_m))?;
+    let mut rng = choices(around.seed, id, 0);
+    let (lane, plan) = match request.then {
+        Then::Keep => (inner, Vec::new()),
+        Then::Change => {
+            let second = lane_beside(around, inner, Side::Right).ok_or("no second opposing lane")?;
+            let when = When::Tick(around.tick);
+            (second, vec![Manoeuvre { when, towards: Towards::To(Side::Left) }])
+        }
+    };
+    let beside_route = around.scene.route.path.pose_at(station_m).position;
+    let station_m = map.lane(lane).centre.project(beside_route).station_m;
+    let way = Way::along(around.scene, &[lane], &mut rng).ok_or("that lane leads nowhere")?;
+    if request.then == Then::Change && !can_change(around, &way, station_m, Side::Left, request.speed_mps) {
+        return Err("no room to change lanes before the junction".into());
+    }
+    Ok(commanded(around, request, way, station_m, plan))
+}

@@ -1,0 +1,81 @@
+//! Which lane a request means: the ego vehicle's, one beside it, or an oncoming one.
+
+use avastra_lang::model::vocabulary::{LaneChoice, Side};
+use avastra_road::{LaneIndex, RouteLane, Turn};
+
+use crate::sim::around::Around;
+use crate::sim::npc::lane_beside;
+
+/// A median wider than this divides a road: lanes beyond it do not count as oncoming, m.
+const MEDIAN_M_MAX: f64 = 3.0;
+
+pub(super) fn chosen_lane(around: &Around, station_m: f64, choice: LaneChoice) -> Result<LaneIndex, String> {
+    let beside = |side, refusal: &str| {
+        lane_along(around, station_m, true, |lane| lane_beside(around, lane, side).ok_or(refusal.into()))
+    };
+    match choice {
+        LaneChoice::Current => Ok(lane_at(around, station_m)),
+        LaneChoice::Left => beside(Side::Left, "no lane on the left"),
+        LaneChoice::Right => beside(Side::Right, "no lane on the right"),
+    }
+}
+
+/// The nearest oncoming lane beside a lane of the route, on its road or another, if no wide median lies
+/// between.
+pub(super) fn opposing_lane(around: &Around, lane: LaneIndex, station_m: f64) -> Result<LaneIndex, String> {
+    let map = &around.scene.map;
+    let here = around.scene.route.path.pose_at(station_m).position;
+    let beside_m = map.lane(lane).centre.project(here).station_m;
+    let opposing = map.opposing(lane, beside_m).ok_or("no opposing lane")?;
+    if opposing.median_m > MEDIAN_M_MAX {
+        let median_m = opposing.median_m;
+        return Err(format!("a median of {median_m:.1} m lies before the opposing lane"));
+    }
+    Ok(opposing.lane)
+}
+
+/// The lane that `pick` finds for the lane of the route at a station.
+///
+/// Inside junctions lanes have few neighbours. There the result is the lane that joins what `pick` finds
+/// for the streets before and after, in the direction of the route (`forward`) or against it.
+pub(super) fn lane_along(
+    around: &Around,
+    station_m: f64,
+    forward: bool,
+    pick: impl Fn(LaneIndex) -> Result<LaneIndex, String>,
+) -> Result<LaneIndex, String> {
+    let map = &around.scene.map;
+    let here = lane_at(around, station_m);
+    let refusal = match pick(here) {
+        Ok(found) => return Ok(found),
+        Err(refusal) => refusal,
+    };
+    let route = &around.scene.route.lanes;
+    let Some(index) = route.iter().position(|part| part.lane == here) else { return Err(refusal) };
+    let is_street = |part: &&RouteLane| map.lane(part.lane).junction.is_none();
+    let before = route[..index].iter().rfind(is_street);
+    let after = route[index + 1..].iter().find(is_street);
+    let (Some(before), Some(after), Some(_)) = (before, after, map.lane(here).junction) else {
+        return Err(refusal);
+    };
+    let (from, to) = match (pick(before.lane)?, pick(after.lane)?) {
+        (before, after) if forward => (before, after),
+        (before, after) => (after, before),
+    };
+    let through = &map.lane(from).successors;
+    through.iter().copied().find(|lane| map.lane(*lane).successors.contains(&to)).ok_or(refusal)
+}
+
+/// The predecessor of a lane: the one on the route if there is one, else one that leads straight on, else
+/// the first.
+pub(super) fn lane_before(around: &Around, lane: LaneIndex) -> Option<LaneIndex> {
+    let (map, route) = (&around.scene.map, &around.scene.route.lanes);
+    let before = &map.lane(lane).predecessors;
+    let on_route = before.iter().find(|lane| route.iter().any(|part| part.lane == **lane));
+    let straight = || before.iter().find(|lane| map.lane(**lane).turn == Turn::Straight);
+    on_route.or_else(straight).or(before.first()).copied()
+}
+
+fn lane_at(around: &Around, station_m: f64) -> LaneIndex {
+    around.scene.route.lane_at(station_m).lane
+}

@@ -1,0 +1,194 @@
+//! Where a spawn puts its road user, and whether there is room.
+//!
+//! `distance_m` is always the gap between the outlines along the ego vehicle's route. What lies at
+//! that distance is each verb's business; the waiting times are those of the published package (its
+//! offsets are not: they ignore the lanes). A pedestrian who walks begins at a kerb, at most 10 m from the asked
+//! place (`on_foot`). Traffic drives on the right.
+
+mod arrival;
+mod crossing;
+mod driving;
+mod lanes;
+mod on_foot;
+
+use std::sync::Arc;
+
+use crate::action::{SpawnFacts, SpawnRequest};
+use avastra_base::kinematics::braking_m;
+use avastra_lang::model::vocabulary::Verb;
+
+use crate::sim::around::Around;
+use crate::sim::body::BodyParameters;
+use crate::sim::ego::VehicleParameters;
+use crate::sim::moment::npc_facts;
+use crate::sim::npc::{Cruise, Driver, Manoeuvre};
+use crate::sim::road_user::{Motion, Moved, Mover, RoadUser};
+use crate::sim::sense::{RANGE_M, visible_fraction};
+use crate::sim::way::Way;
+use crate::sim::{body, safety};
+
+pub(super) use arrival::Arrivals;
+
+use crossing::cross_road;
+use driving::{drive_ahead, drive_opposite, overtake};
+use on_foot::on_foot;
+
+/// Fastest and farthest that a request may ask for, m/s and m: beyond any road of a scenario, and
+/// small enough for every sum that is made of them.
+const SPEED_MPS_MAX: f64 = 70.0;
+const DISTANCE_M_MAX: f64 = 1000.0;
+/// Least gap between a newcomer and any other road user, m.
+const ROOM_M: f64 = 0.5;
+
+/// What a request makes appear.
+pub(super) struct Newcomers {
+    pub asked: RoadUser,
+    /// The vehicle that is parked with it; its id follows.
+    pub cover: Option<RoadUser>,
+}
+
+/// The road user that a request would make appear, with a new id, and its cover. `arrivals` are those of this moment.
+///
+/// # Errors
+/// Why it cannot, in words that complete "cannot spawn: …".
+pub(super) fn place(
+    around: &Around,
+    arrivals: &Arrivals,
+    request: &SpawnRequest,
+    id: u32,
+) -> Result<Newcomers, String> {
+    check(request)?;
+    let size = request.own.map_or_else(|| body::parameters(request.body), |own| own.shape);
+    let driver = match request.verb {
+        Verb::DriveAhead => drive_ahead(around, request, &size, id)?,
+        Verb::Overtake => overtake(around, request, &size, id)?,
+        Verb::DriveOpposite => drive_opposite(around, request, &size, id)?,
+        Verb::CrossRoad => cross_road(around, arrivals, request, &size, id)?,
+        Verb::Walk | Verb::Stand => return on_foot(around, arrivals, request, size, id),
+    };
+    check_way(around, &driver, &size)?;
+    let moved = driver.moved(&size);
+    let asked = finish(around, request, Mover::new(size, Motion::Drive(driver)), id, moved)?;
+    Ok(Newcomers { asked, cover: None })
+}
+
+/// Refuses what no road user could do. Requests of scripts come from outside, so nothing is taken for
+/// granted; NaN is in no range.
+fn check(request: &SpawnRequest) -> Result<(), String> {
+    if !(0.0..=SPEED_MPS_MAX).contains(&request.speed_mps) {
+        return Err(format!("the speed is not between 0 and {SPEED_MPS_MAX} m/s"));
+    }
+    if !(0.0..=DISTANCE_M_MAX).contains(&request.distance_m) {
+        return Err(format!("the distance is not between 0 and {DISTANCE_M_MAX} m"));
+    }
+    if request.cover.is_some_and(|cover| !cover.is_vehicle() || request.verb != Verb::Walk) {
+        return Err("only a pedestrian who walks comes from behind a vehicle".into());
+    }
+    match request.verb {
+        Verb::Walk | Verb::Stand if request.body.is_vehicle() => Err("only a pedestrian walks".into()),
+        Verb::Walk | Verb::Stand => Ok(()),
+        Verb::DriveAhead | Verb::Overtake | Verb::DriveOpposite | Verb::CrossRoad => {
+            if request.body.is_vehicle() { Ok(()) } else { Err("a pedestrian does not drive".into()) }
+        }
+    }
+}
+
+/// The distances that rules ask for.
+///
+/// The gap at the spawn is between the outlines. The safety gap is what a careful driver needs (see
+/// `safety`): to slow down to a vehicle ahead, or to stop for a newcomer that crosses, walks or stands.
+/// For a newcomer from behind it is what the newcomer needs to slow down to the ego vehicle. An oncoming
+/// vehicle stays in its own lanes and needs none, unless its way crosses the route at a junction.
+///
+/// A newcomer in plain view (not from behind, and not hidden by others, fog or distance) needs at least
+/// the way that the ego vehicle drives while a careful driver perceives and reacts, even if it would be
+/// no danger: it must not seem to come from nowhere.
+///
+/// A parked vehicle that appears with a pedestrian is nearer than the pedestrian, and the gap is that to the
+/// vehicle: both appear where a careful driver could still stop.
+pub(super) fn facts(around: &Around, request: &SpawnRequest, newcomers: &Newcomers) -> SpawnFacts {
+    let newcomer = &newcomers.asked;
+    let along_mps = around.ego_outline.pose.forward().dot(&newcomer.obstacle.velocity_mps);
+    let (ego_mps, friction) = (around.ego.speed_mps, around.friction);
+    let braking_gap_m = match request.verb {
+        Verb::DriveAhead => safety::behind_leader_m(ego_mps, along_mps, friction),
+        Verb::Overtake => {
+            let braking_mps2 = around.braking_mps2(&newcomer.mover.size, along_mps.max(0.0));
+            safety::from_behind_m(along_mps, ego_mps, braking_mps2)
+        }
+        Verb::DriveOpposite if meets_route(around, &newcomer.mover) => {
+            safety::oncoming_m(ego_mps, -along_mps, friction)
+        }
+        Verb::DriveOpposite => 0.0,
+        Verb::CrossRoad | Verb::Walk | Verb::Stand => safety::behind_leader_m(ego_mps, 0.0, friction),
+    };
+    let cover_m = newcomers.cover.as_ref().map_or(f64::INFINITY, |cover| cover.obstacle.distance_m);
+    let spawn_gap_m = newcomer.obstacle.distance_m.min(cover_m);
+    let is_behind = request.verb == Verb::Overtake;
+    let sight_m = RANGE_M.min(around.visibility_m);
+    let in_view = || {
+        let eye = around.ego_outline.pose.position;
+        spawn_gap_m < sight_m && visible_fraction(eye, &newcomer.obstacle, around.obstacles_on_level()) > 0.0
+    };
+    let noticing_m = safety::noticing_m(ego_mps);
+    let is_sudden = !is_behind && noticing_m > braking_gap_m && in_view();
+    let safety_gap_m = if is_sudden { noticing_m } else { braking_gap_m };
+    let npc = npc_facts(around, &newcomer.obstacle, &newcomer.mover.motion);
+    SpawnFacts { spawn_gap_m, safety_gap_m, npc }
+}
+
+/// Whether the way of a driver crosses or joins the rest of the ego vehicle's route.
+fn meets_route(around: &Around, mover: &Mover) -> bool {
+    let Motion::Drive(driver) = &mover.motion else { return false };
+    let mut ahead =
+        around.scene.route.conflicts.iter().filter(|conflict| conflict.station_m > around.ego_station_m);
+    ahead.any(|conflict| driver.way().lane_begin_m(conflict.lane).is_some())
+}
+
+/// A driver at the speed that was asked for.
+fn commanded(
+    around: &Around,
+    request: &SpawnRequest,
+    way: Arc<Way>,
+    station_m: f64,
+    plan: Vec<Manoeuvre>,
+) -> Driver {
+    // One draw went into it so far: that of its way.
+    Driver::new(around.scene, way, station_m, Cruise::Commanded(request.speed_mps), plan, 1)
+}
+
+/// The newcomer, if there is room for it.
+fn finish(
+    around: &Around,
+    request: &SpawnRequest,
+    mover: Mover,
+    id: u32,
+    moved: Moved,
+) -> Result<RoadUser, String> {
+    let SpawnRequest { body, colour, verb, .. } = *request;
+    let newcomer = RoadUser::new(around, id, body, colour, verb, mover, moved);
+    if newcomer.has_room(around, ROOM_M) { Ok(newcomer) } else { Err("another road user is there".into()) }
+}
+
+/// Refuses a newcomer that could not brake for a road user ahead of it. The ego vehicle does not count:
+/// the rules of the space say how near to it a newcomer may appear.
+fn check_way(around: &Around, driver: &Driver, size: &BodyParameters) -> Result<(), String> {
+    let braking_mps2 = around.braking_mps2(size, driver.speed_mps);
+    let blocked = around.obstacles().any(|other| {
+        driver.gap_to(size, other.into()).is_some_and(|(gap_m, speed_mps)| {
+            let closing_mps = (driver.speed_mps - speed_mps).max(0.0);
+            gap_m < 1.0 + braking_m(closing_mps, braking_mps2) + 0.1 * closing_mps
+        })
+    });
+    if blocked { Err("another road user is too near in its lane".into()) } else { Ok(()) }
+}
+
+/// Station on the route of a centre that lies `distance_m` before the ego vehicle's front.
+fn ahead_m(around: &Around, request: &SpawnRequest, size: &BodyParameters) -> Result<f64, String> {
+    let front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
+    let station_m = front_m + request.distance_m + size.length_m / 2.0;
+    if station_m > around.scene.route.path.length_m() {
+        return Err("the route ends before that distance".into());
+    }
+    Ok(station_m)
+}

@@ -1,0 +1,169 @@
+//! Priority at contacts made by hand.
+
+use std::sync::Arc;
+
+use super::*;
+use crate::action::{Effect, SpawnRequest};
+use crate::sim::testing::{self, Heading, request};
+use crate::sim::tests::hold;
+use crate::sim::{Contact, Scene, Start, World};
+use avastra_lang::model::vocabulary::{LaneChoice, Then, Verb};
+
+fn inside(map: &RoadMap, road: &str) -> LaneIndex {
+    LaneIndex(map.lanes.iter().position(|lane| lane.key.road == road).expect("it is there"))
+}
+
+#[test]
+fn a_red_light_decides_before_the_right() {
+    use SignalColour::{Green, Red};
+    let map = testing::crossing().map.clone();
+    let (east, north) = (inside(&map, "2"), inside(&map, "5"));
+    let decided = |colours: [SignalColour; 2]| {
+        [
+            right_of_way(&map, |signal| colours[signal], east, north),
+            right_of_way(&map, |signal| colours[signal], north, east),
+        ]
+    };
+    // Signal 0 is that of the lane to the east.
+    assert_eq!(decided([Green, Red]), [Priority::Ego, Priority::Other]);
+    assert_eq!(decided([Red, Green]), [Priority::Other, Priority::Ego]);
+    assert_eq!(decided([Red, Red]), [Priority::None, Priority::None]);
+    assert_eq!(decided([Green, Green]), [Priority::Other, Priority::Ego], "the one from the right");
+}
+
+#[test]
+fn signs_decide_before_the_right_and_lights_before_signs() {
+    let decided = |ego: &str, other: &str| {
+        let map = testing::crossing_of(ego, other).map.clone();
+        right_of_way(&map, |_| SignalColour::Green, inside(&map, "2"), inside(&map, "5"))
+    };
+    let (light, stop, yields, priority, none) = ("1000001", "206", "205", "306", "274");
+    assert_eq!(decided(none, none), Priority::Other, "the one from the right");
+    assert_eq!(decided(priority, none), Priority::Ego);
+    assert_eq!(decided(none, yields), Priority::Ego);
+    assert_eq!(decided(priority, stop), Priority::Ego);
+    assert_eq!(decided(yields, priority), Priority::Other);
+    assert_eq!(decided(stop, stop), Priority::Other, "both signs say the same");
+    assert_eq!(decided(light, light), Priority::Other);
+}
+
+/// Drives the route at a speed until a contact.
+fn contact(world: &mut World, speed_mps: f64) -> Contact {
+    for _ in 0..3000 {
+        let control = hold(world, speed_mps);
+        if let Some(contact) = world.tick(&control).first() {
+            return *contact;
+        }
+    }
+    panic!("no contact in a minute");
+}
+
+/// The scene with a light, entered at a green one: 34 s are a cycle.
+fn begin(scene: &Arc<Scene>, signal_phase_s: f64) -> World {
+    World::new(Arc::clone(scene), &Start { signal_phase_s, ..testing::start() })
+}
+
+/// Drives until the ego vehicle's front is at a station.
+fn drive_to(world: &mut World, front_m: f64, speed_mps: f64) {
+    while VehicleParameters::MKZ.front_m(world.ego_station_m()) < front_m {
+        let control = hold(world, speed_mps);
+        assert_eq!(world.tick(&control), []);
+    }
+}
+
+#[test]
+fn a_vehicle_that_turns_across_gives_way_and_so_does_the_ego_vehicle() {
+    // Straight on at 10 m/s, 30 m before the middle; the other turns left at 7 m/s, 17 m before it.
+    let mut world = begin(&testing::oncoming(Heading::Straight), 0.0);
+    drive_to(&mut world, 80.0, 10.0);
+    world.put("3", 1, "8", 193.0, 7.0);
+    let met = contact(&mut world, 10.0);
+    assert_eq!(met.priority, Priority::Ego, "{met:?}");
+    assert!(met.on_ego.x > 2.0, "it is hit by the front of the ego vehicle: {met:?}");
+
+    // The ego vehicle turns left at 5 m/s before one that comes straight on at 10 m/s.
+    let mut world = begin(&testing::oncoming(Heading::Left), 0.0);
+    drive_to(&mut world, 90.0, 5.0);
+    world.put("3", 1, "2", 173.0, 10.0);
+    let met = contact(&mut world, 5.0);
+    assert_eq!(met.priority, Priority::Other, "{met:?}");
+}
+
+#[test]
+fn a_vehicle_that_stands_in_the_junction_has_given_way_long_ago() {
+    let mut world = begin(&testing::oncoming(Heading::Straight), 0.0);
+    drive_to(&mut world, 20.0, 8.0);
+    world.put("3", 1, "8", 208.0, 0.3);
+    let met = contact(&mut world, 8.0);
+    assert_eq!(met.priority, Priority::Other, "{met:?}");
+}
+
+#[test]
+fn a_red_light_is_remembered_until_the_contact() {
+    // 5 s into the cycle the ego vehicle's light is green, 15 s later the other's.
+    let mut world = begin(&testing::crossing(), 5.0);
+    drive_to(&mut world, 90.0, 15.0);
+    assert!((world.time_s() - 8.5).abs() < 1.5, "{}", world.time_s());
+    world.put("4", -1, "5", 240.0, 8.0);
+    let met = contact(&mut world, 15.0);
+    assert_eq!((met.priority, world.red_runs()), (Priority::Other, 1), "{met:?}");
+}
+
+#[test]
+fn of_two_in_a_lane_the_one_ahead_has_priority() {
+    let mut world = testing::world(&testing::straight());
+    drive_to(&mut world, 60.0, 10.0);
+    world.apply(&Effect::Spawn(request(Verb::DriveAhead, 30.0, 4.0))).expect("there is room");
+    assert_eq!(contact(&mut world, 10.0).priority, Priority::Other);
+}
+
+#[test]
+fn one_who_cuts_in_gives_way_unless_there_is_room() {
+    let cuts_in = |distance_m: f64, speed_mps: f64| {
+        let mut world = testing::world(&testing::straight());
+        drive_to(&mut world, 60.0, 12.0);
+        let lane = LaneChoice::Right;
+        let cuts_in =
+            SpawnRequest { lane, then: Then::Change, ..request(Verb::DriveAhead, distance_m, speed_mps) };
+        world.apply(&Effect::Spawn(cuts_in)).expect("there is room");
+        contact(&mut world, 12.0).priority
+    };
+    assert_eq!(cuts_in(22.0, 5.0), Priority::Ego);
+    assert_eq!(cuts_in(75.0, 8.0), Priority::Other);
+}
+
+#[test]
+fn one_who_cuts_in_and_stops_has_not_given_way_before_the_distance_is_back() {
+    let side = |apart_m: f64, other_mps: f64| Side {
+        aside_m: -1.0,
+        apart_m,
+        ego_is_ahead: false,
+        along: 1.0,
+        ego_mps: 10.0,
+        other_mps,
+        ego_towards_mps: 0.0,
+        other_towards_mps: 1.0,
+    };
+    // As fast as the ego vehicle, less than a second before it.
+    assert_eq!(side(4.0, 10.0).at_coming(true, || None), Some(Priority::Ego));
+    assert_eq!(side(11.0, 10.0).at_coming(true, || None), None);
+    // What was found stays while it brakes to rest, and until there is room to brake gently for it.
+    assert!(!side(4.0, 10.0).is_gentle() && !side(6.0, 5.0).is_gentle() && !side(4.0, 0.0).is_gentle());
+    assert!(side(22.0, 0.0).is_gentle());
+}
+
+#[test]
+fn on_foot_the_crosswalk_decides_and_elsewhere_the_time_to_brake() {
+    let crosses = |scene: &Arc<Scene>, verb: Verb, distance_m: f64| {
+        let mut world = testing::world(scene);
+        drive_to(&mut world, 60.0, 11.0);
+        world.apply(&Effect::Spawn(request(verb, distance_m, 1.4))).expect("there is room");
+        contact(&mut world, 11.0).priority
+    };
+    // 11 m/s: 4.4 m until the brakes act, and 8 m to stop.
+    let street = testing::straight();
+    assert_eq!(crosses(&street, Verb::Stand, 10.0), Priority::Ego);
+    assert_eq!(crosses(&street, Verb::Stand, 16.0), Priority::None);
+    let zebra = testing::zebra();
+    assert_eq!(crosses(&zebra, Verb::Stand, 10.0), Priority::Other);
+}

@@ -1,0 +1,302 @@
+//! A road user other than the ego vehicle: what others may see of it (`Obstacle`), and what moves it
+//! (`Mover`): a driver, two legs, or nothing.
+
+use std::sync::Arc;
+
+use avastra_base::geometry::{OrientedBox, Pose, Sweep, Vec2, distance_m, unit_vector};
+use avastra_base::kinematics::GRAVITY_MPS2;
+use avastra_lang::model::vocabulary::{Body, Colour, Verb};
+use avastra_road::is_apart;
+
+use super::ambient::COMMANDED_MAX;
+use super::around::Around;
+use super::body::BodyParameters;
+use super::npc::Driver;
+use super::pedestrian::Walker;
+use super::right_of_way::{Rights, SIDEWAYS_MPS};
+use super::trace::Trace;
+use super::world::DT_S;
+
+/// How long a wreck stays where it came to rest, s; longer while the ego vehicle sees it.
+const WRECK_S: f64 = 2.0;
+
+/// What walks or stands does so beside this stretch of the ego vehicle's route, before and behind it, m.
+const ON_FOOT_M: f64 = 200.0;
+
+/// A road user other than the ego vehicle, as others may see it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Obstacle {
+    /// From 1, in order of appearance; ambient traffic has numbers of its own.
+    pub id: u32,
+    pub body: Body,
+    pub colour: Colour,
+    pub verb: Verb,
+    pub outline: OrientedBox,
+    /// Unit vector along the outline's heading, kept because it is asked for so often.
+    pub forward: Vec2,
+    pub height_m: f64,
+    /// Heading of the lane that it drives in; a pedestrian's own heading.
+    pub lane_heading_rad: f64,
+    pub velocity_mps: Vec2,
+    /// Height of the road under it, m.
+    pub elevation_m: f64,
+    /// Whether its road passes over or under that of the ego vehicle, which then neither sees nor meets it; at
+    /// most 0.1 s old.
+    pub is_apart: bool,
+    /// Gap between its outline and the ego vehicle's, m; 0 if they touch.
+    pub distance_m: f64,
+    pub spawned_tick: u64,
+}
+
+impl Obstacle {
+    /// Whether it is ambient traffic, which no action made appear.
+    pub fn is_ambient(&self) -> bool {
+        self.id > COMMANDED_MAX
+    }
+
+    /// Whether a vehicle comes out of its lane sideways, as in a lane change.
+    pub fn moves_aside(&self) -> bool {
+        let lane = unit_vector(self.lane_heading_rad);
+        self.body.is_vehicle() && lane.perp(&self.velocity_mps).abs() > SIDEWAYS_MPS
+    }
+}
+
+/// One road user of the world.
+#[derive(Debug, Clone)]
+pub(super) struct RoadUser {
+    pub obstacle: Obstacle,
+    pub mover: Mover,
+}
+
+/// The hidden side of a road user.
+#[derive(Debug, Clone)]
+pub(super) struct Mover {
+    pub size: BodyParameters,
+    pub motion: Motion,
+    /// Whether it and the ego vehicle have touched, whichever ran into the other.
+    pub touched: bool,
+    /// The obstacle that it touched last: it slides to rest.
+    crashed_with: Option<u32>,
+    /// Ticks that it has been a wreck at rest.
+    rest_ticks: u32,
+    /// Part of it that the ego vehicle's sensors saw when they last looked.
+    pub visible_fraction: f64,
+    /// Which of the two has priority: it or the ego vehicle.
+    pub rights: Rights,
+}
+
+#[derive(Debug, Clone)]
+pub(super) enum Motion {
+    Drive(Driver),
+    Walk(Walker),
+    Stand,
+}
+
+/// Where a road user is after a tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Moved {
+    /// Centre of the outline.
+    pub pose: Pose,
+    /// Unit vector along its heading.
+    pub forward: Vec2,
+    /// Heading of the lane that it drives in; a pedestrian's own heading.
+    pub lane_heading_rad: f64,
+    pub velocity_mps: Vec2,
+}
+
+impl RoadUser {
+    /// A newcomer where `moved` says.
+    pub fn new(
+        around: &Around,
+        id: u32,
+        body: Body,
+        colour: Colour,
+        verb: Verb,
+        mover: Mover,
+        moved: Moved,
+    ) -> RoadUser {
+        let outline = OrientedBox::new(moved.pose, mover.size.length_m, mover.size.width_m);
+        let obstacle = Obstacle {
+            id,
+            body,
+            colour,
+            verb,
+            outline,
+            forward: moved.forward,
+            height_m: mover.size.height_m,
+            lane_heading_rad: moved.lane_heading_rad,
+            velocity_mps: moved.velocity_mps,
+            elevation_m: mover.elevation_m().unwrap_or_else(|| {
+                let route = &around.scene.route;
+                let beside = route.path.project_near(moved.pose.position, around.ego_station_m, ON_FOOT_M);
+                route.height_at(&around.scene.map, beside.station_m)
+            }),
+            is_apart: false,
+            distance_m: distance_m(around.ego_outline, &outline),
+            spawned_tick: around.tick,
+        };
+        let mut newcomer = RoadUser { obstacle, mover };
+        newcomer.obstacle.is_apart = around.is_apart_from_ego(&newcomer);
+        newcomer
+    }
+
+    /// Whether every other road user, the ego vehicle included, is at least `room_m` away.
+    pub fn has_room(&self, around: &Around, room_m: f64) -> bool {
+        let this = &self.obstacle;
+        !around.others().any(|other| {
+            distance_m(&this.outline, other.outline) < room_m
+                && !is_apart(this.elevation_m, other.elevation_m)
+        })
+    }
+
+    /// Every bit that later ticks depend on.
+    pub fn trace(&self, trace: &mut Trace) {
+        let Obstacle { id, body, colour, verb, outline, velocity_mps, spawned_tick, .. } = &self.obstacle;
+        trace.word(u64::from(*id));
+        trace.word(*spawned_tick);
+        for word in [*body as u64, *colour as u64, *verb as u64] {
+            trace.word(word);
+        }
+        let pose = &outline.pose;
+        for value in [pose.position.x, pose.position.y, pose.heading_rad] {
+            trace.number(value);
+        }
+        for value in velocity_mps.iter() {
+            trace.number(*value);
+        }
+        self.mover.trace(trace);
+    }
+}
+
+impl Mover {
+    pub fn new(size: BodyParameters, motion: Motion) -> Mover {
+        Mover {
+            size,
+            motion,
+            touched: false,
+            crashed_with: None,
+            rest_ticks: 0,
+            visible_fraction: 1.0,
+            rights: Rights::default(),
+        }
+    }
+
+    /// Height of the road on its way, m; `None` for what has no way.
+    pub fn elevation_m(&self) -> Option<f64> {
+        match &self.motion {
+            Motion::Drive(driver) => Some(driver.way().height_at(driver.station_m())),
+            Motion::Walk(_) | Motion::Stand => None,
+        }
+    }
+
+    /// Whether it does nothing any more but come to rest.
+    pub fn is_wreck(&self) -> bool {
+        self.touched || self.crashed_with.is_some()
+    }
+
+    /// Whether it has crashed into another obstacle, or another into it.
+    pub fn has_crashed(&self) -> bool {
+        self.crashed_with.is_some()
+    }
+
+    /// Whether it stands and will not go by itself: a wreck, a driver that has given up waiting, or one that was asked to
+    /// stand.
+    pub fn is_stuck(&self, this: &Obstacle) -> bool {
+        match &self.motion {
+            _ if self.is_wreck() => this.velocity_mps == Vec2::zeros(),
+            Motion::Drive(driver) => driver.has_given_up() || driver.is_parked(),
+            Motion::Walk(_) | Motion::Stand => false,
+        }
+    }
+
+    /// One tick of the obstacle `this`; `None` if it leaves the world.
+    pub fn step(&mut self, this: &Obstacle, around: &Around) -> Option<Moved> {
+        let in_sight = around.is_in_sight(this, self.visible_fraction);
+        if self.is_wreck() && this.velocity_mps == Vec2::zeros() {
+            self.rest_ticks = self.rest_ticks.saturating_add(1);
+            if f64::from(self.rest_ticks) * DT_S >= WRECK_S && !in_sight {
+                return None;
+            }
+        }
+        let rest = Moved::at_rest(this);
+        match &mut self.motion {
+            _ if self.crashed_with.is_some() => Some(slide(this, around)),
+            Motion::Drive(driver) => {
+                let (way, before_m) = (Arc::as_ptr(driver.shared_way()), driver.station_m());
+                let moved = driver.step(this, &self.size, self.touched, in_sight, around);
+                if way == Arc::as_ptr(driver.shared_way()) {
+                    let front_m = this.outline.half_length_m;
+                    self.rights.pass(driver.way(), before_m + front_m, driver.station_m() + front_m, around);
+                }
+                moved
+            }
+            Motion::Walk(_) if self.touched => Some(rest),
+            Motion::Walk(walker) => walker.step(this, in_sight, around),
+            Motion::Stand => Some(rest),
+        }
+    }
+
+    /// The area that it sweeps within a tick.
+    pub fn sweep(&self, mut start: OrientedBox, end: Pose) -> Sweep {
+        if let Motion::Walk(_) = self.motion {
+            // A person turns round on the spot, so the corners of its box must not sweep half a circle within a tick.
+            start.pose.heading_rad = end.heading_rad;
+        }
+        Sweep { start, end }
+    }
+
+    /// It touched the ego vehicle: from now on it goes at most `speed_mps`, until its brakes stop it.
+    pub fn touch(&mut self, speed_mps: f64) {
+        self.touched = true;
+        if let Motion::Drive(driver) = &mut self.motion {
+            driver.speed_mps = speed_mps;
+        }
+    }
+
+    /// It and another obstacle touched: from now on it slides to rest. Returns the obstacle that it had
+    /// touched last.
+    pub fn crash(&mut self, other: u32) -> Option<u32> {
+        if let Motion::Drive(driver) = &mut self.motion {
+            driver.speed_mps = 0.0;
+        }
+        self.crashed_with.replace(other)
+    }
+
+    fn trace(&self, trace: &mut Trace) {
+        trace.word(u64::from(self.touched));
+        trace.word(u64::from(self.crashed_with.unwrap_or(0)));
+        trace.word(u64::from(self.rest_ticks));
+        trace.number(self.visible_fraction);
+        self.rights.trace(trace);
+        match &self.motion {
+            Motion::Drive(driver) => driver.trace(trace),
+            Motion::Walk(walker) => walker.trace(trace),
+            Motion::Stand => {}
+        }
+    }
+}
+
+/// A tick with wheels locked: straight on, without turning, slowed by the friction of the road.
+fn slide(this: &Obstacle, around: &Around) -> Moved {
+    let speed_mps = this.velocity_mps.norm();
+    let rest = Moved::at_rest(this);
+    if speed_mps == 0.0 {
+        return rest;
+    }
+    let lost_mps = around.grip.friction(speed_mps) * GRAVITY_MPS2 * DT_S;
+    let velocity_mps = this.velocity_mps * (1.0 - lost_mps / speed_mps).max(0.0);
+    let position = rest.pose.position + (this.velocity_mps + velocity_mps) / 2.0 * DT_S;
+    Moved { pose: Pose { position, ..rest.pose }, velocity_mps, ..rest }
+}
+
+impl Moved {
+    /// Standing where it was.
+    pub fn at_rest(this: &Obstacle) -> Moved {
+        Moved {
+            pose: this.outline.pose,
+            forward: this.forward,
+            lane_heading_rad: this.lane_heading_rad,
+            velocity_mps: Vec2::zeros(),
+        }
+    }
+}

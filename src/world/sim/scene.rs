@@ -1,0 +1,102 @@
+//! A road as the world needs it: the map, the ego vehicle's route, and what follows from both.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use avastra_road::{FootWay, LaneIndex, RoadMap, Route};
+
+use super::junction::ConflictAreas;
+use super::right_of_way::{RouteArea, route_areas};
+use super::way::Ways;
+
+/// What stays the same during all episodes of one road. Shared, never copied.
+#[derive(Debug)]
+pub struct Scene {
+    pub map: Arc<RoadMap>,
+    /// Where the ego vehicle is to go.
+    pub route: Route,
+    areas: ConflictAreas,
+    route_areas: Vec<RouteArea>,
+    ways: Ways,
+    foot_ways: FootWays,
+    /// Lanes outside junctions, each with the sum of the lengths up to its end, m.
+    streets: Vec<(LaneIndex, f64)>,
+}
+
+impl Scene {
+    pub fn new(map: Arc<RoadMap>, route: Route) -> Scene {
+        let mut streets = Vec::new();
+        let mut end_m = 0.0;
+        for (index, lane) in map.lanes.iter().enumerate().filter(|(_, lane)| lane.junction.is_none()) {
+            end_m += lane.centre.length_m();
+            streets.push((LaneIndex(index), end_m));
+        }
+        let areas = ConflictAreas::new(&map);
+        let route_areas = route_areas(&areas, &route);
+        Scene {
+            areas,
+            route_areas,
+            ways: Ways::default(),
+            foot_ways: FootWays::default(),
+            streets,
+            map,
+            route,
+        }
+    }
+
+    /// The place at a fraction of all streets laid end to end, so that every metre is equally likely.
+    pub(super) fn street_at(&self, fraction: f64) -> Option<(LaneIndex, f64)> {
+        let at_m = fraction * self.streets.last()?.1;
+        let index = self.streets.partition_point(|street| street.1 <= at_m).min(self.streets.len() - 1);
+        let begin_m = if index == 0 { 0.0 } else { self.streets[index - 1].1 };
+        Some((self.streets[index].0, at_m - begin_m))
+    }
+
+    /// The way on foot over the road at a station of the route, along the crosswalk if one is there.
+    ///
+    /// # Errors
+    /// Why people do not cross there, in words that complete "cannot spawn: …".
+    pub(super) fn foot_way(&self, station_m: f64) -> Result<FootWay, &'static str> {
+        // Even if a thread panicked while it held the lock, the ways in here are whole.
+        let known = || self.foot_ways.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(way) = known().get(&station_m.to_bits()) {
+            return *way;
+        }
+        let here = self.route.path.pose_at(station_m);
+        let mut left = here.left();
+        if let Some(along) = self.map.crosswalk_at(here.position) {
+            let along = if along.dot(&left) < 0.0 { -along } else { along };
+            // An outline that is longer along the road than across says nothing of the way over it.
+            if along.dot(&left) > core::f64::consts::FRAC_1_SQRT_2 {
+                left = along;
+            }
+        }
+        let way = self.map.foot_way(here.position, left);
+        let mut known = known();
+        if known.len() >= FOOT_WAYS_MAX {
+            known.clear();
+        }
+        known.insert(station_m.to_bits(), way);
+        way
+    }
+
+    pub(super) fn ways(&self) -> &Ways {
+        &self.ways
+    }
+
+    /// Where the ways of others cross or join the route, by rising station.
+    pub(super) fn route_areas(&self) -> &[RouteArea] {
+        &self.route_areas
+    }
+
+    pub(super) fn conflict_areas(&self) -> &ConflictAreas {
+        &self.areas
+    }
+}
+
+/// Number of ways on foot that are kept for a road: several rows and draws of a moment ask for the same.
+const FOOT_WAYS_MAX: usize = 2048;
+
+/// The ways on foot that were asked for lately, by the bits of their station.
+#[derive(Debug, Default)]
+struct FootWays(Mutex<BTreeMap<u64, Result<FootWay, &'static str>>>);

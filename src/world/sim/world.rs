@@ -1,0 +1,624 @@
+//! The world of one episode, and what a tick does to it. `world/playback` moves it by a recording, `world/survey`
+//! answers what drawing asks.
+
+mod playback;
+mod survey;
+#[cfg(any(test, feature = "testing"))]
+mod testing;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use crate::action::{Effect, LaneChangeRules, SpawnRequest};
+use avastra_base::geometry::{Frame, OrientedBox, Pose, Sweep, Vec2};
+use avastra_lang::model::body::BodyParameters;
+use avastra_lang::model::vocabulary::{Level, TimeOfDay};
+use avastra_lang::model::{COMMANDED_MAX, NpcFacts, TICK_MS};
+use avastra_road::{RouteLaneChange, is_apart};
+
+use super::ambient::{Ambient, RENEWAL_TICKS, is_gone};
+use super::around::Around;
+use super::contact::{Contact, Party, meet};
+use super::ego::{Control, Ego, VehicleParameters};
+use super::environment::Environment;
+use super::incident::{Bump, Incident, bump, exchange, impact};
+use super::moment::npc_facts;
+use super::placement;
+use super::placement::Arrivals;
+use super::right_of_way::PassedLight;
+use super::road_user::{Motion, Moved, Obstacle, RoadUser};
+use super::scene::Scene;
+use super::sense::{
+    Conditions, EgoMotion, FRAME_S, FRAME_TICKS, RANGE_M, Sensed, SensedObject, SignalColour,
+    visible_fraction,
+};
+use super::signals::SignalClock;
+use super::trace::Trace;
+use super::traffic::TrafficProfile;
+
+/// Name of this simulated world. Raised whenever the same seed no longer gives the same episode and trace, so that an
+/// old scenario is told apart from a refuted one.
+pub const ENGINE: &str = "plane/8";
+
+/// One physics step, s: 50 Hz.
+pub const DT_S: f64 = TICK_MS as f64 / 1000.0;
+
+/// Commanded obstacles at a time. For the next one, the oldest that is out of sight leaves; in the published package the
+/// oldest leaves wherever it is.
+const OBSTACLES_MAX: usize = COMMANDED_MAX as usize;
+
+/// What stands farther ahead than this on the route does not block the ego vehicle, m: a queue of five cars.
+const QUEUE_M: f64 = 40.0;
+
+/// A queue before a light is at most this long, m: seven cars.
+const LIGHT_QUEUE_M: f64 = 50.0;
+
+/// An ego vehicle farther than this from its way and from every lane of the map has left the map, m. One that went astray beside
+/// a street is nearer.
+const OFF_MAP_M: f64 = 20.0;
+
+/// Added to the way of two bodies before they are taken to be too far apart to touch, m: far more than rounding.
+const NEAR_M: f64 = 1e-3;
+
+/// How far along the route the ego vehicle is looked for from where it was, m. More than it drives
+/// in a tick, so that it is found again after a corner cut, and less than any loop of a route.
+const ROUTE_SEARCH_M: f64 = 2.0;
+
+/// How an episode begins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Start {
+    /// Speed of the ego vehicle, m/s.
+    pub ego_mps: f64,
+    pub time: TimeOfDay,
+    pub rain: Level,
+    pub fog: Level,
+    pub wetness: Level,
+    /// Time in the signals' cycle at which the episode begins, s.
+    pub signal_phase_s: f64,
+    /// Seed of the choices of other road users.
+    pub seed: u64,
+    /// Vehicles of ambient traffic that are kept around the ego vehicle, at most `model::AMBIENT_MAX`.
+    pub ambient: u32,
+    /// How other vehicles drive.
+    pub traffic: TrafficProfile,
+}
+
+/// The whole state of an episode: `Clone` is a snapshot.
+#[derive(Debug, Clone)]
+pub struct World {
+    scene: Arc<Scene>,
+    // The state: what later ticks depend on. `trace` covers all of it.
+    ticks: u64,
+    ego: Ego,
+    /// Place of the ego vehicle's rear axle beside the route.
+    ego_station_m: f64,
+    ego_offset_m: f64,
+    /// Height of the road under it, m. It follows from the station.
+    ego_elevation_m: f64,
+    red_runs: u32,
+    ego_passed: Option<PassedLight>,
+    environment: Environment,
+    conditions: Conditions,
+    signals: SignalClock,
+    /// In order of appearance.
+    users: Vec<RoadUser>,
+    next_id: u32,
+    ambient: Ambient,
+    traffic: TrafficProfile,
+    /// Tick from which time of day and weather may change.
+    weather_tick: u64,
+    /// Seed of the choices of other road users.
+    seed: u64,
+    // What the last tick has to tell. No later tick reads it.
+    contacts: Vec<Contact>,
+    incidents: Vec<Incident>,
+}
+
+impl World {
+    /// The beginning of an episode: the ego vehicle rolls with its rear axle on the start of
+    /// the route; beside ambient traffic, if asked for, nothing else is there.
+    pub fn new(scene: Arc<Scene>, start: &Start) -> World {
+        World::with_ego_at(scene, start, 0.0, start.ego_mps)
+    }
+
+    /// The beginning of an episode that begins elsewhere on the route, at another speed.
+    pub fn with_ego_at(scene: Arc<Scene>, start: &Start, station_m: f64, speed_mps: f64) -> World {
+        let environment = Environment::new(start.time, [start.rain, start.fog, start.wetness]);
+        let mut world = World {
+            ticks: 0,
+            ego: Ego::new(scene.route.path.pose_at(station_m), speed_mps),
+            ego_station_m: station_m,
+            ego_offset_m: 0.0,
+            ego_elevation_m: scene.route.height_at(&scene.map, station_m),
+            red_runs: 0,
+            ego_passed: None,
+            conditions: environment.conditions(speed_mps),
+            environment,
+            signals: SignalClock::new(start.signal_phase_s),
+            users: Vec::with_capacity(OBSTACLES_MAX),
+            next_id: 1,
+            ambient: Ambient::new(start.ambient),
+            traffic: start.traffic,
+            weather_tick: 0,
+            seed: start.seed,
+            contacts: Vec::new(),
+            incidents: Vec::new(),
+            scene,
+        };
+        for _ in 0..world.ambient.wanted() {
+            world.renew_ambient(true);
+        }
+        world
+    }
+
+    pub fn scene(&self) -> &Arc<Scene> {
+        &self.scene
+    }
+
+    /// Advances by [`DT_S`]; returns the contacts that began.
+    ///
+    /// An obstacle that the ego vehicle touched once brakes to rest and touches it no more. Two obstacles
+    /// that touch each other slide to rest (see [`World::incidents`]). A wreck leaves when it has stood for
+    /// 2 s and the ego vehicle does not see it; so do drivers who waited for others for 20 s.
+    pub fn tick(&mut self, control: &Control) -> &[Contact] {
+        self.contacts.clear();
+        self.incidents.clear();
+        if self.ticks.is_multiple_of(FRAME_TICKS) {
+            self.watch_rights();
+        }
+        let start = self.ego.outline;
+        let friction = self.environment.grip().friction(self.ego.motion.speed_mps);
+        self.ego.step(control, friction, DT_S);
+        self.follow_route();
+        // Taken once: of two contacts in a tick, the second does not see what the first did to the ego.
+        let ego = Party {
+            sweep: Sweep { start, end: self.ego.outline.pose },
+            velocity_mps: self.ego.velocity_mps(),
+        };
+        let ego_mps = self.ego.motion.speed_mps;
+        // Taken out for the tick, so that each can move while it looks at the others and at the world.
+        let mut users = core::mem::take(&mut self.users);
+        let mut index = 0;
+        while index < users.len() {
+            if self.tick_user(index, &mut users, &ego, ego_mps) {
+                index += 1;
+            } else {
+                users.remove(index);
+            }
+        }
+        self.users = users;
+        self.measure();
+        self.ticks += 1;
+        if self.ambient.wanted() > 0 && self.ticks.is_multiple_of(RENEWAL_TICKS) {
+            self.renew_ambient(false);
+        }
+        if self.ticks.is_multiple_of(FRAME_TICKS) {
+            self.environment.pass(FRAME_S);
+            self.conditions = self.environment.conditions(self.ego.motion.speed_mps);
+            self.look();
+        }
+        &self.contacts
+    }
+
+    /// Carries out an effect.
+    ///
+    /// # Errors
+    /// Why a spawn is impossible; the world is then unchanged. The id of the newcomer otherwise.
+    pub fn apply(&mut self, effect: &Effect) -> Result<Option<u32>, String> {
+        match effect {
+            Effect::Time(time) => self.environment.time = *time,
+            Effect::Sky(phenomenon, level) => self.environment.set(*phenomenon, *level),
+            Effect::Spawn(request) => return self.spawn(request).map(Some),
+        }
+        self.weather_tick = self.ticks + (self.traffic.weather_rest_s / DT_S).round() as u64;
+        self.conditions = self.environment.conditions(self.ego.motion.speed_mps);
+        Ok(None)
+    }
+
+    /// Dimensions, mass and limits of a road user; `None` if there is none with that id.
+    pub fn body(&self, id: u32) -> Option<&BodyParameters> {
+        self.users.iter().find(|user| user.obstacle.id == id).map(|user| &user.mover.size)
+    }
+
+    pub fn ticks(&self) -> u64 {
+        self.ticks
+    }
+
+    pub fn time_s(&self) -> f64 {
+        self.ticks as f64 * DT_S
+    }
+
+    pub fn ego(&self) -> EgoMotion {
+        self.ego.motion
+    }
+
+    pub fn ego_outline(&self) -> OrientedBox {
+        self.ego.outline
+    }
+
+    /// Station of the ego vehicle's rear axle on the route, m.
+    pub fn ego_station_m(&self) -> f64 {
+        self.ego_station_m
+    }
+
+    /// How far the ego vehicle's rear axle is to the left of the route, m.
+    pub fn ego_offset_m(&self) -> f64 {
+        self.ego_offset_m
+    }
+
+    /// Whether the ego vehicle comes to a light that is not green, or waits in the queue before one.
+    pub fn waits_for_light(&self) -> bool {
+        let front_m = self.ego_front_m();
+        let mut ahead = self.scene.route.stop_lines.iter().filter(|line| line.station_m > front_m - 1.0);
+        let next = ahead.next().filter(|line| line.station_m < front_m + LIGHT_QUEUE_M);
+        next.is_some_and(|line| self.signal(line.signal) != SignalColour::Green)
+    }
+
+    /// Stop lines of the route that the ego vehicle's front passed under a red light.
+    pub fn red_runs(&self) -> u32 {
+        self.red_runs
+    }
+
+    /// All road users but the ego vehicle, in order of appearance.
+    pub fn obstacles(&self) -> impl ExactSizeIterator<Item = &Obstacle> + Clone {
+        self.users.iter().map(|user| &user.obstacle)
+    }
+
+    /// The obstacles whose roads neither pass over nor under that of the ego vehicle.
+    pub fn obstacles_on_level(&self) -> impl Iterator<Item = &Obstacle> + Clone {
+        self.obstacles().filter(|obstacle| !obstacle.is_apart)
+    }
+
+    /// The road user with an id, if it is there.
+    pub fn obstacle(&self, id: u32) -> Option<&Obstacle> {
+        self.obstacles().find(|obstacle| obstacle.id == id)
+    }
+
+    /// Binds the lane changes of a road user that just appeared by rules.
+    pub fn bind_lane_changes(&mut self, id: u32, rules: &Arc<LaneChangeRules>) {
+        let user = self.users.iter_mut().find(|user| user.obstacle.id == id);
+        if let Some(Motion::Drive(driver)) = user.map(|user| &mut user.mover.motion) {
+            driver.lane_changes = Some(Arc::clone(rules));
+        }
+    }
+
+    /// What can be asked about the road user with an id, if it is there.
+    pub fn npc_facts(&self, id: u32) -> Option<NpcFacts> {
+        let user = self.users.iter().find(|user| user.obstacle.id == id)?;
+        Some(npc_facts(&self.alone(), &user.obstacle, &user.mover.motion))
+    }
+
+    /// Contacts among obstacles that began in the tick before.
+    pub fn incidents(&self) -> &[Incident] {
+        &self.incidents
+    }
+
+    pub fn time_of_day(&self) -> TimeOfDay {
+        self.environment.time
+    }
+
+    /// Levels of rain, fog and wetness.
+    pub fn sky(&self) -> [Level; 3] {
+        [self.environment.rain, self.environment.fog, self.environment.wetness]
+    }
+
+    /// Light, weather and grip.
+    pub fn conditions(&self) -> Conditions {
+        self.conditions
+    }
+
+    /// Colour of a signal now, by index in `RoadMap::signals`.
+    pub fn signal(&self, signal: usize) -> SignalColour {
+        self.signals.colour(&self.scene.map, signal, self.ticks)
+    }
+
+    /// What the sensors see now, in buffers of its own.
+    pub fn sensed(&self) -> Sensed {
+        let mut sensed = Sensed {
+            time_s: 0.0,
+            ego: self.ego.motion,
+            objects: Vec::new(),
+            signals: Vec::new(),
+            conditions: self.conditions,
+        };
+        self.sense(&mut sensed);
+        sensed
+    }
+
+    /// Fills `into` with what the sensors see now; its buffers are reused.
+    ///
+    /// Everything is of this tick, except lines of sight, which are worked out ten times a second.
+    pub fn sense(&self, into: &mut Sensed) {
+        into.time_s = self.time_s();
+        into.ego = self.ego.motion;
+        into.conditions = self.conditions;
+        into.signals.clear();
+        into.signals.extend((0..self.scene.map.signals.len()).map(|signal| self.signal(signal)));
+        into.objects.clear();
+        for RoadUser { obstacle, mover } in self.users.iter().filter(|user| !user.obstacle.is_apart) {
+            let away = obstacle.outline.pose.position - self.ego.outline.pose.position;
+            if away.norm_squared() > RANGE_M * RANGE_M {
+                continue;
+            }
+            into.objects.push(SensedObject {
+                id: obstacle.id,
+                body: obstacle.body,
+                pose: obstacle.outline.pose,
+                velocity_mps: obstacle.velocity_mps,
+                length_m: mover.size.length_m,
+                width_m: mover.size.width_m,
+                height_m: mover.size.height_m,
+                visible_fraction: mover.visible_fraction,
+                distance_m: obstacle.distance_m,
+            });
+        }
+    }
+
+    /// Feeds every bit of the state that later ticks depend on to `trace`, in a fixed order.
+    pub fn trace(&self, trace: &mut Trace) {
+        trace.word(self.ticks);
+        self.ego.trace(trace);
+        trace.number(self.ego_station_m);
+        trace.number(self.ego_offset_m);
+        trace.word(u64::from(self.red_runs));
+        PassedLight::trace(self.ego_passed.as_ref(), trace);
+        self.environment.trace(trace);
+        trace.number(self.conditions.friction);
+        self.signals.trace(trace);
+        trace.word(u64::from(self.next_id));
+        self.ambient.trace(trace);
+        trace.word(self.weather_tick);
+        trace.word(self.seed);
+        for user in &self.users {
+            user.trace(trace);
+        }
+    }
+
+    /// Whether the ego vehicle's front bumper is at most 1 m before the goal, or beyond it.
+    pub fn arrived(&self) -> bool {
+        self.ego_front_m() >= self.scene.route.goal_m - 1.0
+    }
+
+    /// Whether something stands in the ego vehicle's way that will not go: a wreck, or a driver that waits for
+    /// others that wait for it. Vehicles that stand between them belong to the same queue. After a contact the ego
+    /// vehicle itself is a wreck.
+    pub fn is_blocked(&self) -> bool {
+        let front_m = self.ego_front_m();
+        let stands_in_way = |user: &RoadUser| user.mover.is_stuck(&user.obstacle) && !user.obstacle.is_apart;
+        !self.ego.motion.touched
+            && self.users.iter().filter(|user| stands_in_way(user)).any(|user| {
+                let Obstacle { outline, forward, .. } = &user.obstacle;
+                let beside = self.scene.route.path.project_from(outline.pose.position, front_m);
+                let (length_m, width_m) = (2.0 * outline.half_length_m, 2.0 * outline.half_width_m);
+                let taken = beside.and_then(|beside| {
+                    beside.taken(*forward, length_m, width_m, self.ego.outline.half_width_m)
+                });
+                taken.is_some_and(|span| span.to_m > front_m && span.from_m < front_m + QUEUE_M)
+            })
+    }
+
+    /// Whether the ego vehicle is in a junction that it entered at a red light.
+    pub fn ego_runs_red(&self) -> bool {
+        self.ego_passed.is_some_and(|passed| passed.is_being_run(&self.scene.map, &self.ego.outline))
+    }
+
+    /// Whether the road user with an id is in a junction that it entered at a red light.
+    pub fn runs_red(&self, id: u32) -> bool {
+        let user = self.users.iter().find(|user| user.obstacle.id == id);
+        let passed = user.and_then(|user| Some((user.mover.rights.passed_light()?, &user.obstacle.outline)));
+        passed.is_some_and(|(passed, outline)| passed.is_being_run(&self.scene.map, outline))
+    }
+
+    /// Whether the ego vehicle has left its lane without a contact: the middle of its rear axle is beside it. During a
+    /// lane change it is in one of two lanes.
+    pub fn is_astray(&self) -> bool {
+        let (route, station_m) = (&self.scene.route, self.ego_station_m);
+        let here = route.lane_at(station_m);
+        let half_m = self.scene.map.lane(here.lane).width_at(station_m - here.from_m) / 2.0;
+        let changes = |change: &RouteLaneChange| (change.begin_m..change.latest_m).contains(&station_m);
+        !self.ego.motion.touched && self.ego_offset_m.abs() > half_m && !route.changes.iter().any(changes)
+    }
+
+    /// Whether the ego vehicle has driven off the map: its front bumper is beyond the end of its way (the end of the
+    /// lanes, or 60 m past the goal), or no lane is near it. Nothing can happen there, because road users appear beside
+    /// the way.
+    pub fn left_the_map(&self) -> bool {
+        let (map, path) = (&self.scene.map, &self.scene.route.path);
+        let Pose { position, heading_rad } = self.ego.motion.rear_axle;
+        let aside_m = (position - path.position_at(self.ego_station_m)).norm();
+        let is_near_road = aside_m <= OFF_MAP_M || map.nearest(position, heading_rad, OFF_MAP_M).is_some();
+        !is_near_road || self.ego_front_m() >= path.length_m()
+    }
+
+    /// Station of the ego vehicle's front bumper on the route, m.
+    fn ego_front_m(&self) -> f64 {
+        VehicleParameters::MKZ.front_m(self.ego_station_m)
+    }
+
+    /// The world as nobody in it looks around.
+    pub(super) fn alone(&self) -> Around<'_> {
+        self.around([&self.users, &[]])
+    }
+
+    fn around<'a>(&'a self, users: [&'a [RoadUser]; 2]) -> Around<'a> {
+        Around {
+            scene: &self.scene,
+            ego: &self.ego.motion,
+            ego_outline: &self.ego.outline,
+            ego_forward: self.ego.frame.forward(),
+            ego_velocity_mps: self.ego.velocity_mps(),
+            ego_elevation_m: self.ego_elevation_m,
+            ego_station_m: self.ego_station_m,
+            ego_offset_m: self.ego_offset_m,
+            users,
+            signals: &self.signals,
+            tick: self.ticks,
+            friction: self.conditions.friction,
+            grip: self.environment.grip(),
+            visibility_m: self.conditions.visibility_m,
+            traffic: &self.traffic,
+            seed: self.seed,
+        }
+    }
+
+    fn spawn(&mut self, request: &SpawnRequest) -> Result<u32, String> {
+        let leave = self.make_room(request)?;
+        let placed = placement::place(&self.alone(), &Arrivals::default(), request, self.next_id)?;
+        for index in leave.into_iter().rev() {
+            self.users.remove(index);
+        }
+        let id = self.next_id;
+        self.next_id += 1 + u32::from(placed.cover.is_some());
+        self.users.extend([placed.asked].into_iter().chain(placed.cover));
+        self.look();
+        Ok(id)
+    }
+
+    /// Indices of the commanded obstacles that leave for new ones, if there are as many as there may be.
+    fn make_room(&self, request: &SpawnRequest) -> Result<Vec<usize>, String> {
+        let commanded = self.users.iter().enumerate().filter(|(_, user)| !user.obstacle.is_ambient());
+        let wanted = commanded.clone().count() + Effect::Spawn(*request).newcomers() as usize;
+        let too_many = wanted.saturating_sub(OBSTACLES_MAX);
+        let around = self.around([&self.users, &[]]);
+        let is_hidden = |user: &RoadUser| {
+            self.traffic.oldest_leaves_in_sight
+                || !around.is_in_sight(&user.obstacle, user.mover.visible_fraction)
+        };
+        let hidden = commanded.filter(|(_, user)| too_many > 0 && is_hidden(user));
+        let oldest: Vec<usize> = hidden.take(too_many).map(|(index, _)| index).collect();
+        if oldest.len() < too_many { Err("ten road users are there already".into()) } else { Ok(oldest) }
+    }
+
+    /// Lets ambient traffic leave and appear; `begins` is before the first tick.
+    fn renew_ambient(&mut self, begins: bool) {
+        let ego_outline = self.ego.outline;
+        let is_gone = |user: &RoadUser| user.obstacle.is_ambient() && is_gone(&user.obstacle, &ego_outline);
+        self.users.retain(|user| !is_gone(user));
+        let present = self.obstacles().filter(|obstacle| obstacle.is_ambient()).count();
+        if !self.ambient.lacks(present) {
+            return;
+        }
+        // A copy, because the attempt looks at the world.
+        let mut ambient = self.ambient.clone();
+        let newcomer = ambient.attempt(&self.around([&self.users, &[]]), begins);
+        self.users.extend(newcomer);
+        self.ambient = ambient;
+    }
+
+    /// Notes for each road user whether it came into the ego vehicle's way or the ego vehicle into its way.
+    fn watch_rights(&mut self) {
+        let mut users = core::mem::take(&mut self.users);
+        let around = self.around([&[], &[]]);
+        for RoadUser { obstacle, mover } in users.iter_mut().filter(|user| !user.obstacle.is_apart) {
+            if mover.has_crashed() {
+                mover.rights.watch_wreck(obstacle, &around);
+            } else {
+                let in_sight = around.is_in_sight(obstacle, mover.visible_fraction);
+                mover.rights.watch(obstacle, &mover.motion, self.ego_passed, in_sight, &around);
+            }
+        }
+        self.users = users;
+    }
+
+    /// Moves one road user and finds what it touches; `false` if it left.
+    /// `ego_mps` is the ego vehicle's speed before any contact of this tick.
+    fn tick_user(&mut self, index: usize, users: &mut [RoadUser], ego: &Party, ego_mps: f64) -> bool {
+        let (earlier, rest) = users.split_at_mut(index);
+        let (user, later) = rest.split_first_mut().expect("the index is that of a user");
+        let before = user.obstacle;
+        let Some(mut moved) = user.mover.step(&before, &self.around([earlier, later])) else { return false };
+        if let Some(Bump { other, pose, normal, incident }) = bump(users, index, &moved.pose, self.ticks) {
+            // Obstacles that touch already push where the one that moves goes.
+            let pushes = moved.velocity_mps.try_normalize(0.0).unwrap_or(moved.forward);
+            let normal = if normal == Vec2::zeros() { pushes } else { normal };
+            let mass_t = |index: usize| users[index].mover.size.mass_t;
+            let other_mps = users[other].obstacle.velocity_mps;
+            let (velocity_mps, other_mps) =
+                impact(normal, (mass_t(index), moved.velocity_mps), (mass_t(other), other_mps));
+            moved = Moved { pose, forward: pose.forward(), velocity_mps, ..moved };
+            users[other].obstacle.velocity_mps = other_mps;
+            let known = users[index].mover.crash(incident.other) == Some(incident.other);
+            let known_there = users[other].mover.crash(incident.obstacle) == Some(incident.obstacle);
+            // Two that slide on together may touch in every tick; that is one incident.
+            if !known && !known_there {
+                self.incidents.push(incident);
+            }
+        }
+        let RoadUser { obstacle, mover } = &mut users[index];
+        (obstacle.outline.pose, obstacle.velocity_mps) = (moved.pose, moved.velocity_mps);
+        (obstacle.forward, obstacle.lane_heading_rad) = (moved.forward, moved.lane_heading_rad);
+        obstacle.elevation_m = mover.elevation_m().unwrap_or(obstacle.elevation_m);
+        if mover.touched || is_apart(self.ego_elevation_m, obstacle.elevation_m) {
+            return true;
+        }
+        let sweep = mover.sweep(before.outline, moved.pose);
+        if before.distance_m > ego.sweep.most_m() + sweep.most_m() + NEAR_M {
+            // The gap is wider than both together can close it in a tick.
+            return true;
+        }
+        let other = Party { sweep, velocity_mps: moved.velocity_mps };
+        if let Some((contact, normal)) = meet(ego, ego_mps, &other, before.id, self.ticks) {
+            let around = self.around([&[], &[]]);
+            let priority = if mover.has_crashed() {
+                mover.rights.at_contact_with_wreck(obstacle)
+            } else {
+                mover.rights.at_contact(obstacle, &mover.motion, contact.point, &around)
+            };
+            // If two impacts happen in one tick, the second acts on the speed that is left after the first.
+            let now_mps = self.ego.velocity_mps();
+            let lost_mps = (ego.velocity_mps - now_mps).dot(&normal);
+            let closing_mps = (contact.closing_speed_mps - lost_mps).max(0.0);
+            let this = (VehicleParameters::MKZ.mass_t, now_mps);
+            let that = (mover.size.mass_t, moved.velocity_mps);
+            let (ego_mps, other_mps) = exchange(normal, closing_mps, this, that);
+            self.ego.motion.speed_mps = self.ego.frame.forward().dot(&ego_mps).max(0.0);
+            self.ego.motion.touched = true;
+            mover.touch(moved.forward.dot(&other_mps).max(0.0));
+            self.contacts.push(Contact { priority, ..contact });
+        }
+        true
+    }
+
+    /// Brings the gaps to the ego vehicle up to date.
+    fn measure(&mut self) {
+        for RoadUser { obstacle, .. } in &mut self.users {
+            let outline = Frame::along(&obstacle.outline, obstacle.forward);
+            obstacle.distance_m = self.ego.frame.distance_m(&outline);
+        }
+    }
+
+    /// Brings up to date what is seen along the lines of sight from the ego vehicle's roof.
+    fn look(&mut self) {
+        let eye = self.ego.outline.pose.position;
+        for index in 0..self.users.len() {
+            self.users[index].obstacle.is_apart = self.alone().is_apart_from_ego(&self.users[index]);
+        }
+        for index in 0..self.users.len() {
+            let target = &self.users[index].obstacle;
+            let visible_fraction =
+                if target.is_apart { 0.0 } else { visible_fraction(eye, target, self.obstacles_on_level()) };
+            self.users[index].mover.visible_fraction = visible_fraction;
+        }
+    }
+
+    /// Finds the ego vehicle beside its route again, and counts the red lights it passed.
+    fn follow_route(&mut self) {
+        let front_before_m = self.ego_front_m();
+        let route = &self.scene.route;
+        let found =
+            route.path.project_near(self.ego.motion.rear_axle.position, self.ego_station_m, ROUTE_SEARCH_M);
+        self.ego_station_m = found.station_m;
+        self.ego_offset_m = found.offset_m;
+        self.ego_elevation_m = route.height_at(&self.scene.map, found.station_m);
+        let passed = front_before_m..self.ego_front_m();
+        let colour = |signal| self.signal(signal);
+        let light = PassedLight::between(&route.stop_lines, passed.start, passed.end, colour);
+        self.ego_passed = light.or(self.ego_passed);
+        self.red_runs += route
+            .stop_lines
+            .iter()
+            .filter(|line| passed.contains(&line.station_m) && self.signal(line.signal) == SignalColour::Red)
+            .count() as u32;
+    }
+}

@@ -1,0 +1,59 @@
+//! What drawing asks a world: the facts of its moment, and where spawns would be put.
+
+use std::cell::OnceCell;
+
+use crate::action::{SpawnFacts, SpawnRequest, Surroundings};
+use crate::sim::placement;
+use crate::sim::placement::Arrivals;
+use avastra_lang::model::MomentFacts;
+
+use super::{DT_S, World};
+
+/// A moment of a world, with what several questions about it have in common.
+struct Survey<'a> {
+    world: &'a World,
+    arrivals: Arrivals,
+    moment: OnceCell<MomentFacts>,
+}
+
+impl World {
+    fn at_this_moment(&self) -> Survey<'_> {
+        Survey { world: self, arrivals: Arrivals::default(), moment: OnceCell::new() }
+    }
+}
+
+impl Surroundings for World {
+    fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
+        self.at_this_moment().survey(request)
+    }
+
+    fn moment(&self) -> MomentFacts {
+        self.moment_facts()
+    }
+
+    fn for_many(&self) -> Option<Box<dyn Surroundings + '_>> {
+        Some(Box::new(self.at_this_moment()))
+    }
+
+    fn weather_refusal(&self) -> Option<String> {
+        let left_s = self.weather_tick.saturating_sub(self.ticks) as f64 * DT_S;
+        (left_s > 0.0).then(|| format!("this traffic profile keeps the weather for {left_s} s more"))
+    }
+}
+
+impl Surroundings for Survey<'_> {
+    fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
+        let _leave = self.world.make_room(request)?;
+        let around = self.world.alone();
+        let newcomers = placement::place(&around, &self.arrivals, request, self.world.next_id)?;
+        Ok(placement::facts(&around, request, &newcomers))
+    }
+
+    fn moment(&self) -> MomentFacts {
+        *self.moment.get_or_init(|| self.world.moment_facts())
+    }
+
+    fn weather_refusal(&self) -> Option<String> {
+        self.world.weather_refusal()
+    }
+}

@@ -1,0 +1,32 @@
+//! Traffic put where a test of another module wants it.
+
+use crate::sim::World;
+use crate::sim::body::parameters;
+use crate::sim::npc::{Cruise, Driver, choices};
+use crate::sim::road_user::{Motion, Mover, RoadUser};
+use crate::sim::way::Way;
+use avastra_lang::model::vocabulary::{Body, Colour, Verb};
+use avastra_road::LaneIndex;
+
+impl World {
+    /// Puts a sedan on a lane of a road, at a station of its way, with a speed that it keeps where it can; its
+    /// way leads through the other road. It does not yield to the ego vehicle.
+    pub fn put(&mut self, road: &str, lane: i32, through: &str, station_m: f64, speed_mps: f64) {
+        let map = &self.scene.map;
+        let first = map.place(road, lane, 100.0).expect("the lane is there").lane;
+        let next = map.lane(first).successors.iter().copied();
+        let next = next.filter(|lane| map.lane(*lane).key.road == through);
+        let lanes: Vec<LaneIndex> = [first].into_iter().chain(next).collect();
+        let mut rng = choices(self.seed, self.next_id, 0);
+        let way = Way::along(&self.scene, &lanes, &mut rng).expect("the lanes follow each other");
+        let size = parameters(Body::Sedan);
+        let driver = Driver::new(&self.scene, way, station_m, Cruise::Commanded(speed_mps), Vec::new(), 1);
+        let moved = driver.moved(&size);
+        let mover = Mover::new(size, Motion::Drive(driver));
+        let around = self.around([&self.users, &[]]);
+        let verb = Verb::CrossRoad;
+        let user = RoadUser::new(&around, self.next_id, Body::Sedan, Colour::Red, verb, mover, moved);
+        self.users.push(user);
+        self.next_id += 1;
+    }
+}
