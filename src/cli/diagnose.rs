@@ -19,6 +19,7 @@ use avastra_world::action::ActionTable;
 use super::arguments::DiagnoseArguments;
 use super::error::Failure;
 use super::load;
+use super::look;
 use super::output::Output;
 use super::output::plural;
 use super::parallel::each_file;
@@ -136,7 +137,7 @@ fn explain(
     baseline: &ModularConfig,
     file: &Path,
 ) -> Result<Explained, Failure> {
-    let (table, scenario) = load::scenario(output, file)?;
+    let (table, scenario) = look::unchanged(output, file)?;
     let Case { stage, ads, log, index } = Case::of(&table, &scenario, asked)?;
     let setup = stage.setup(&ads);
     let diagnosis = oracle::diagnose(&setup, &log, index, baseline).map_err(Failure::usage)?;
@@ -150,7 +151,7 @@ fn explain(
 /// The share of all files' crashes that vanish without each documented weakness, and by chance.
 fn mechanisms(output: &Output, arguments: &DiagnoseArguments, asked: &Asked) -> Result<(), Failure> {
     let found = each_file(output, &arguments.many, None, |file| {
-        let (table, scenario) = load::scenario(output, file)?;
+        let (table, scenario) = look::unchanged(output, file)?;
         let Case { stage, ads, log, index } = Case::of(&table, &scenario, asked)?;
         let found = oracle::mechanisms(&stage.setup(&ads), &log, index).map_err(Failure::usage)?;
         Ok((file.clone(), scenario.name.clone(), found))
@@ -313,12 +314,7 @@ fn sentence(diagnosis: &Diagnosis) -> String {
             let error = evidence.beyond_specification().map_or(String::new(), |found| {
                 format!("{} was {:.2}, and {:.2} is specified", found.what, found.worst, found.bound)
             });
-            let is_told_apart = evidence.told_apart().any(|found| cause.contains(&found.module));
-            let chance =
-                if is_told_apart { String::new() } else { format!(", which is {}", chance_text(evidence)) };
-            format!(
-                "{name} is at fault by what it gave this time: {error}; {changed}, there is no crash{chance}"
-            )
+            format!("{name} is at fault by what it gave this time: {error}; {changed}, there is no crash")
         }
         Verdict::Deciding => format!("{name} is at fault: {changed}, there is no crash{others}"),
         Verdict::Brittle => format!(
@@ -336,7 +332,7 @@ fn sentence(diagnosis: &Diagnosis) -> String {
             )
         }
         Verdict::Chance => format!(
-            "no module is named: what prevents the crash with its own noise ({}) is {}",
+            "no module is named: what prevents the crash with its own noise ({}) is not told apart from chance{}",
             preventing(evidence).join(", "),
             chance_text(evidence)
         ),
@@ -344,12 +340,11 @@ fn sentence(diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// Says that the change is not told apart from chance, and how often chance alone prevents the collision.
+/// How often chance alone prevents the collision.
 fn chance_text(evidence: &Evidence) -> String {
-    let alone = evidence.chance.map_or(String::new(), |chance| {
+    evidence.chance.map_or(String::new(), |chance| {
         format!(": other sensor noise alone prevents it in {} of {} replays", chance.vanished, chance.replays)
-    });
-    format!("not told apart from chance{alone}")
+    })
 }
 
 /// The changes that prevent the collision with the noise that it was recorded with.

@@ -197,9 +197,11 @@ fn at_look(
 pub struct Contents {
     /// The text of its settings.
     pub settings: String,
-    /// `None` before the first part is played.
+    /// `None` if no sound part is there.
     pub results: Option<EstimateResults>,
-    /// Remarks for its page: files and rows that were changed.
+    /// Says which rows were changed; their parts count for nothing.
+    pub damaged: Option<String>,
+    /// Remarks for its page: files that were changed or are gone, and a space that cannot be read.
     pub remarks: Vec<String>,
 }
 
@@ -208,14 +210,14 @@ pub fn read(directory: &Path) -> Result<Contents, Failure> {
     let (path, file) = (directory.join("estimate.yaml"), directory.join("estimate.db"));
     let text = load::text(&path)?;
     if !file.is_file() {
-        return Ok(Contents { settings: text, results: None, remarks: Vec::new() });
+        return Ok(Contents { settings: text, results: None, damaged: None, remarks: Vec::new() });
     }
     let settings: EstimateSettings = serde_yaml::from_str(&text)
         .map_err(|error| Failure::file("read", &path, yaml_mistake(&error, &text)))?;
     let unread = |error| Failure::file("read", &file, error);
     let (database, damaged) = run_directory::open_to_read::<EstimateDatabase>(&file, &text)?;
-    let mut remarks: Vec<String> = damaged.into_iter().collect();
-    remarks.extend(run_directory::remarks_on(&files_of(directory, database.scenarios().map_err(unread)?)));
+    let scenarios = database.scenarios().map_err(unread)?;
+    let mut remarks = run_directory::remarks_on(&files_of(directory, scenarios));
     let table = load::table(&Output::silent(), &directory.join(&settings.run.space)).ok();
     let is_it = |table: &ActionTable| table.space().meaning.is_sealed_by(&settings.run.space_digest);
     let labels: Vec<String> = match table.filter(is_it) {
@@ -242,7 +244,7 @@ pub fn read(directory: &Path) -> Result<Contents, Failure> {
             break;
         }
     }
-    Ok(Contents { settings: text, results: results.filter(|_| all > 0), remarks })
+    Ok(Contents { settings: text, results: results.filter(|_| all > 0), damaged, remarks })
 }
 
 /// No table has more rows than this.

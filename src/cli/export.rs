@@ -13,7 +13,7 @@ use super::files::{copy_map, folder, make, write};
 use super::output::{Output, plural};
 use super::parallel::each_file;
 use super::replay::refutation;
-use super::{load, pack};
+use super::{load, look, pack};
 
 /// The folder of what is written, beside the scenarios, unless another one is named.
 const FOLDER: &str = "exported";
@@ -31,7 +31,7 @@ pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failur
     let asked = load::asked(None)?;
     let maps = Mutex::new(());
     let exported = each_file(output, &arguments.many, None, |file| {
-        let (table, scenario) = load::scenario(output, file)?;
+        let (table, scenario) = look::unchanged(output, file)?;
         let (ads, _) = asked.selected_for(&scenario)?;
         let recording = match record(&table, &scenario, &ads) {
             Ok(recording) => recording,

@@ -3,7 +3,7 @@
 //! A run, a training and an estimate keep a copy of their space. A scenario whose space has changed is played in that copy,
 //! as it was recorded. Without a copy it is played in the present space, and the digest of its trace tells whether that is the
 //! recorded episode. Either way a banner says what has changed, and how the scenario can be brought along. `test`, `shrink`,
-//! `diagnose` and `export` judge by the space, so they refuse one that has changed.
+//! `diagnose` and `export` judge by the space or hand on what it says, so they refuse one that has changed, and say where its copy is.
 
 use std::path::{Path, PathBuf};
 
@@ -112,6 +112,37 @@ pub fn scenario_in(output: &Output, path: &Path, loaded: Loaded) -> Result<Looke
     changed.what.extend(beside);
     let changed = (!changed.what.is_empty()).then_some(changed);
     Ok(Looked { table, scenario, changed })
+}
+
+/// The scenario of a file for a command that needs its space as it was. If that has changed, the help says how the command
+/// can have it: in the copy that is kept, if there is one.
+///
+/// # Errors
+/// If the file cannot be read, has no scenario, or does not mean what it meant.
+pub fn unchanged(output: &Output, path: &Path) -> Result<(ActionTable, Scenario), Failure> {
+    let mut loaded = load::read_and_check(path)?;
+    let place = |is: &dyn Fn(&Diagnostic) -> bool| loaded.diagnostics.iter().position(is);
+    let outdated = place(&|found| found.is_error() && found.code == code::DIGEST);
+    if let Some(mistake) = outdated.or_else(|| place(&Diagnostic::is_error)) {
+        let restore = format!(
+            "get back the files as they were: no copy of them is kept beside the scenario. {BRING_ALONG}"
+        );
+        if let Some(help) = in_copy(path, &loaded).or_else(|| outdated.map(|_| restore)) {
+            loaded.diagnostics[mistake].help = Some(help);
+        }
+    }
+    load::scenario_in(output, path, loaded)
+}
+
+/// How a scenario whose space has changed is played in the copy of it; `None` without a copy.
+fn in_copy(path: &Path, loaded: &Loaded) -> Option<String> {
+    let (copy, _) = kept(path, loaded)?;
+    let written = load::relative(path.parent().unwrap_or(Path::new("")), &copy).ok()?;
+    Some(format!(
+        "its space is kept as it was at `{}`: write `use \"{written}\"` with the same digest, and it is played there. \
+         {BRING_ALONG}",
+        copy.display()
+    ))
 }
 
 /// The first mistake of a file that cannot be played, in words.

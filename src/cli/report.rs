@@ -156,18 +156,23 @@ fn of_directory(output: &Output, directory: &Path) -> Result<Found, Failure> {
     if settings("run").is_file() {
         remarks = of_run(output, directory, &load::text(&settings("run"))?, &mut found)?;
     } else if settings("study").is_file() {
-        let played = match directory.join("study.db").is_file() {
-            true => Some(study::read_sound(directory)?).filter(|(_, cells, _)| !cells.is_empty()),
-            false => None,
-        };
-        let (of_study, cells, remark) = played.ok_or_else(|| unfinished(directory, "study"))?;
+        if !directory.join("study.db").is_file() {
+            return Err(without_results(directory, "study", None));
+        }
+        let (of_study, cells, remark) = study::read_sound(directory)?;
+        if cells.is_empty() {
+            return Err(without_results(directory, "study", remark));
+        }
         remarks.extend(remark);
         let results = in_json(&StudyResults::new(&of_study, &cells));
         found.overview = report::of_study(&results, &load::text(&settings("study"))?);
     } else if settings("estimate").is_file() {
         let contents = estimate::read(directory)?;
-        let results = contents.results.ok_or_else(|| unfinished(directory, "estimate"))?;
-        remarks = contents.remarks;
+        let Some(results) = contents.results else {
+            return Err(without_results(directory, "estimate", contents.damaged));
+        };
+        remarks.extend(contents.damaged);
+        remarks.extend(contents.remarks);
         found.overview = report::of_estimate(&in_json(&results), &contents.settings);
     } else if found.files.is_empty() {
         found.files = load::sources_in(directory)?;
@@ -177,12 +182,14 @@ fn of_directory(output: &Output, directory: &Path) -> Result<Found, Failure> {
     Ok(found)
 }
 
-/// The failure of a directory without results.
-fn unfinished(directory: &Path, command: &str) -> Failure {
+/// The failure of a directory without results. `damaged` says which of its rows were changed, if any were.
+fn without_results(directory: &Path, command: &str, damaged: Option<String>) -> Failure {
     let directory = directory.display();
-    Failure::usage(format!(
-        "`{directory}` has no results yet: finish it with `avastra {command} --resume {directory}`"
-    ))
+    let resume = format!("`avastra {command} --resume {directory}`");
+    Failure::usage(match damaged {
+        None => format!("`{directory}` has no results yet: finish it with {resume}"),
+        Some(damaged) => format!("`{directory}` has no results: {damaged}; {resume} plays them again"),
+    })
 }
 
 fn in_json(results: &impl serde::Serialize) -> Value {

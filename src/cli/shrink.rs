@@ -15,6 +15,7 @@ use super::error::Failure;
 use super::files::{folder, make, write_answers, write_result};
 use super::findings::{doubts, spot_check};
 use super::load;
+use super::look;
 use super::output::Output;
 use super::output::plural;
 use super::parallel::each_file;
@@ -124,7 +125,7 @@ fn apart(file: &Path) -> Result<PathBuf, Failure> {
 
 /// Shrinks the scenario of a file into another, for which the user may have named a path.
 fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked) -> Result<Small, Failure> {
-    let (table, scenario) = load::scenario(output, file)?;
+    let (table, scenario) = look::unchanged(output, file)?;
     let (ads, _) = asked.selected_for(&scenario)?;
     if ads.program().is_some_and(|program| !program.can_start()) {
         return Err(Failure::usage(format!(

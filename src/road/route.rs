@@ -94,6 +94,9 @@ pub struct Conflict {
 /// Length of the path beyond the goal, if the lanes go on, m.
 const PAST_GOAL_M: f64 = 60.0;
 
+/// Steps that find where a lane change began: to less than a micrometre.
+const HALVINGS: usize = 32;
+
 /// A stop line counts as on the route up to this distance outside the part of its lane that the route uses, m.
 const PART_M: f64 = 0.2;
 
@@ -214,6 +217,24 @@ impl RouteLaneChange {
     pub fn postponed_offset_m(&self, station_m: f64, begin_m: f64) -> f64 {
         let part = smooth_step((station_m - begin_m) / self.length_from_m(begin_m)).value;
         self.source_offset_m(station_m) + self.shift_m(station_m) * part
+    }
+
+    /// Station at which a vehicle began the change, m: its path leads through a place `from_source_m` left of the source
+    /// lane's centre at a station. A vehicle that is farther aside than the earliest change would have it began there.
+    pub fn begun_m(&self, station_m: f64, from_source_m: f64) -> f64 {
+        let (mut early_m, mut late_m) = (self.begin_m, station_m.max(self.begin_m));
+        let shift_m = self.shift_m(station_m);
+        // The later it began, the nearer it still is to the source lane.
+        for _ in 0..HALVINGS {
+            let middle_m = (early_m + late_m) / 2.0;
+            let part = smooth_step((station_m - middle_m) / self.length_from_m(middle_m)).value;
+            if part * shift_m.abs() > from_source_m * self.lateral_m.signum() {
+                early_m = middle_m;
+            } else {
+                late_m = middle_m;
+            }
+        }
+        early_m
     }
 
     /// Least length of a lane change, m.

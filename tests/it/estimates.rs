@@ -116,6 +116,16 @@ fn only_its_database_counts(scratch: &Path, files: &[PathBuf]) {
     assert!(is_told, "{stdout}");
     assert_eq!(text(gone), gone_text);
     assert_eq!(kept(&directory), results);
+
+    // Where all parts were changed there is nothing to show, but it is not unfinished.
+    let database = rusqlite::Connection::open(directory.join("estimate.db")).expect("it is a database");
+    database.execute_batch("UPDATE part SET probability = 0.9").expect("it can be changed");
+    drop(database);
+    let (status, _, stderr) = outcome(&mut avastra(&["report", &out, "--out", &page]));
+    let is_told = stderr.contains("were changed since they were written")
+        && stderr.contains("--resume")
+        && stderr.contains("plays them again");
+    assert!(status == 1 && is_told && !stderr.contains("yet"), "{stderr}");
 }
 
 #[test]

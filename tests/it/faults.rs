@@ -131,7 +131,7 @@ fn follows(found: &Diagnosis) -> bool {
     match (found.verdict, found.cause.as_slice()) {
         (Verdict::Outside | Verdict::Deciding, [module]) => told_apart.contains(module),
         (Verdict::Weakness, [_]) => found.weakness.is_some(),
-        (Verdict::Measured, [module]) => excess(*module) > 1.0,
+        (Verdict::Measured, [module]) => excess(*module) > 1.0 && told_apart.contains(module),
         (Verdict::Brittle, [Module::Planning]) => told_apart.iter().all(|module| excess(*module) <= 1.0),
         (Verdict::Together, [_, _]) => !evidence.pairs.is_empty(),
         (Verdict::Baseline, []) => evidence.baseline.is_some_and(|fate| fate != Fate::Vanished),

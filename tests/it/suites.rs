@@ -121,6 +121,15 @@ fn findings_can_always_be_looked_at() {
     let strip = found.path("strip.svg");
     let looks: [&[&str]; 3] =
         [&["replay", &first], &["render", &first, "--strip", "-o", &strip], &["report", &run]];
+    // A command that judges by the space refuses a scenario whose space has changed, and says what to do.
+    let refused = |says: &str| {
+        let commands: [&[&str]; 3] = [&["diagnose"], &["shrink"], &["export", "--to", "csv"]];
+        for command in commands {
+            let (status, stdout, stderr) = outcome(&mut avastra(&[command, &[&first]].concat()));
+            let is_told = [says, "--review", "--self-contained"].iter().all(|wanted| stderr.contains(wanted));
+            assert!(status == 2 && is_told, "{command:?}: {status} {stdout}{stderr}");
+        }
+    };
     let told = |wanted: &[i32], says: &str| {
         for look in looks {
             let (status, stdout, stderr) = outcome(&mut avastra(look));
@@ -130,8 +139,20 @@ fn findings_can_always_be_looked_at() {
     // No scenario meets this change.
     found.edit(space, "let weight_mode = 1.0", "let weight_mode = 1.0\nodds Side { Left => 3 }");
     told(&[0], "changed or new: odds `Side`; shown as it was recorded, in the copy of its space at `");
+    refused("write `use \"../space/avastra45.ava\"` with the same digest");
+    // The advice holds.
+    let text = std::fs::read_to_string(&first).expect("it is readable");
+    let line = text.lines().find(|line| line.starts_with("use ")).expect("it uses its space");
+    let digest = line.split_once("digest").expect("it has a digest").1;
+    let moved = text.replace(line, &format!("use \"../space/avastra45.ava\" digest{digest}"));
+    let in_copy = found.path("run/critical/in_the_copy.ava");
+    std::fs::write(&in_copy, moved).expect("it is writable");
+    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &in_copy]));
+    assert!(status == 0 && !stderr.contains("odds `Side`"), "{stdout}{stderr}");
+    std::fs::remove_file(&in_copy).expect("it is there");
     std::fs::rename(found.path("run/space"), found.path("away")).expect("the run keeps a copy");
     told(&[0], "odds `Side`; it still plays as it was recorded, to the bit");
+    refused("no copy of them is kept beside the scenario");
     // The road is in all of them, and begins elsewhere now.
     found.edit("space/roads.ava", "start: lane 1/-1 at 105.88 m", "start: lane 1/-1 at 100 m");
     told(&[0, 3], "what is shown is what plays now, not what was recorded");

@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use avastra::action::ActionTable;
-use avastra::model::{Claim, Scenario};
+use avastra::model::{Avoidability, Claim, Scenario};
 use avastra::run::{Stage, on_threads, recorded};
 
 use crate::cases::root;
-use crate::world::read;
+use crate::world::{read, run_of};
 
 /// The folder with a folder for each family of situations.
 const AREA: &str = "tests/cases/verdicts";
@@ -45,6 +45,24 @@ fn disputed_situations_are_still_disputed() {
         assert!(shown.missing.is_empty(), "{}: without {:?}", shown.path.display(), shown.missing);
         assert!(!shown.refuted.is_empty(), "{} is settled: move it to its family", shown.path.display());
     }
+}
+
+/// A driver that takes over after a lane change of the route stays in the lane that it is in: it neither swerves into one
+/// that stands there, nor takes it to be beside its way.
+#[test]
+fn people_who_stand_in_plain_view_can_be_avoided_after_a_lane_change_too() {
+    let loaded =
+        avastra::check::load(&root().join("tests/cases/faults/statues.ava"), &read).expect("it is there");
+    let run = run_of(loaded.space.expect("a space without mistakes is a space"), 15, 5, &[]);
+    let mut hits = 0;
+    for number in 0..run.episodes() {
+        for found in run.judged(number).0.collisions {
+            let (class, by) = (found.judgement.class, &found.judgement.avoided_by);
+            assert_eq!(class, Avoidability::Avoidable, "episode {number}, by {by:?}");
+            hits += 1;
+        }
+    }
+    assert!(hits >= 5, "{hits} hits show little");
 }
 
 /// The names of the families, sorted.

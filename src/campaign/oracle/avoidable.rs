@@ -4,7 +4,8 @@
 //! had to give way could still stop, if that is earlier, but no further than 8 s. All other
 //! road users then move as recorded until the recorded contact, and after it as they themselves decide.
 //! The ego vehicle, the same car on the same road, is driven by each reference driver in turn; a driver
-//! watches for some time before it takes over. If none of the careful drivers avoids the collision,
+//! watches for some time before it takes over, and knows from the first which lane changes of the route are begun or over.
+//! If none of the careful drivers avoids the collision,
 //! evasive manoeuvres that begin at the onset without any delay are tried.
 //!
 //! Where the ego vehicle had to give way, a driver that takes over before the ego vehicle has begun a lane change begins

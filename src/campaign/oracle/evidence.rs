@@ -20,8 +20,10 @@
 //!    from chance. If several do, the one whose errors alone lead to the collision most often is named.
 //! 2. None differs, and a documented weakness, switched off, prevents the collision, told apart from chance.
 //! 3. No change alone is told apart from chance, and two modules together prevent the collision, told apart from it.
-//! 4. A module's output was beyond its specification in the seconds before (see `measured`), and with the same noise the
-//!    collision vanishes if the module is changed. A rare draw of its errors is found so.
+//! 4. None differs, a module's output was beyond its specification in the seconds before (see `measured`), and the module
+//!    prevents the collision without its errors, told apart from chance. Beyond its specification alone is no proof: so is
+//!    some module before many a near miss, and where other noise prevents the collision anyway, another draw of any
+//!    module's errors would have, too. The table shows what was measured all the same.
 //! 5. None differs, and a module that decides (planning, control, emergency braking) prevents the collision without its
 //!    errors, told apart from chance.
 //! 6. None differs, and a module that gives planning its picture prevents the collision without its errors, told apart from
@@ -60,7 +62,8 @@ pub enum Verdict {
     Outside,
     /// The driving system is the baseline, and a documented weakness of the module makes the collision.
     Weakness,
-    /// Replays do not tell, but what the module gave in the seconds before was beyond its specification.
+    /// The driving system is the baseline. What the module gave in the seconds before was beyond its specification, and
+    /// without its errors it prevents the collision.
     Measured,
     /// The driving system is the baseline, and without its errors the module prevents the collision.
     Deciding,
@@ -224,7 +227,7 @@ impl Evidence {
         if let Some(pair) = self.pairs.iter().find(|pair| is_told_apart(pair.noise)) {
             return (Verdict::Together, pair.modules.to_vec(), None);
         }
-        if let Some(found) = self.beyond_specification() {
+        if !differs && let Some(found) = self.beyond_specification() {
             return (Verdict::Measured, vec![found.module], None);
         }
         if !differs && let Some(found) = foremost(self.told_apart().filter(|found| decides(found.module))) {
@@ -249,12 +252,10 @@ impl Evidence {
         told_apart.min_by_key(|found| Reverse(found.noise.map(|noise| noise.vanished)))
     }
 
-    /// The module that was farthest beyond its specification, of those that prevent the collision.
+    /// The module that was farthest beyond its specification, of those that prevent the collision, told apart from chance.
     pub fn beyond_specification(&self) -> Option<&Measure> {
-        let vanishes = |module: Module| {
-            self.modules.iter().any(|found| found.module == module && found.vanishes(self.differs()))
-        };
-        let beyond = self.measured.iter().filter(|found| found.excess() > 1.0 && vanishes(found.module));
+        let prevents = |module: Module| self.told_apart().any(|found| found.module == module);
+        let beyond = self.measured.iter().filter(|found| found.excess() > 1.0 && prevents(found.module));
         beyond.max_by(|a, b| a.excess().total_cmp(&b.excess()))
     }
 }
@@ -362,6 +363,8 @@ mod tests {
         perception.restored = Some(Fate::Vanished);
         found.chance = Some(Chance { replays: 64, vanished: 60 });
         assert_eq!(named(&found), (Verdict::Chance, vec![]));
+        found.measured.push(Measure { module: Module::Perception, what: "error, m", worst: 9.0, bound: 1.0 });
+        assert_eq!(named(&found), (Verdict::Chance, vec![]), "chance explains it, however wrong it was");
         found.modules[Module::Perception as usize].noise = Some(compared(10, 0, 1));
         assert_eq!(named(&found), (Verdict::Outside, vec![Module::Perception]));
     }
@@ -388,6 +391,10 @@ mod tests {
         found.chance = Some(Chance { replays: 12, vanished: 2 });
         found.modules[Module::Perception as usize].idealised = Fate::Vanished;
         assert_eq!(named(&found), (Verdict::Chance, vec![]));
+        found.measured =
+            vec![Measure { module: Module::Perception, what: "error, m", worst: 9.0, bound: 1.0 }];
+        assert_eq!(named(&found), (Verdict::Chance, vec![]), "chance explains it, however wrong it was");
+        found.measured.clear();
         found.modules[Module::Perception as usize].noise = Some(compared(10, 0, 1));
         assert_eq!(named(&found), (Verdict::Brittle, vec![Module::Planning]));
         found.modules[Module::Planning as usize].idealised = Fate::Vanished;
@@ -460,6 +467,9 @@ mod tests {
                 let says_so = verdict == Verdict::Brittle || of(module).vanishes(found.differs());
                 assert!(says_so, "{verdict:?} of {module:?}, without which there is the collision as well");
             }
+            if is_named {
+                assert!(found.is_told_apart(), "{verdict:?} of {cause:?}, which chance explains");
+            }
             if verdict == Verdict::Brittle {
                 let within = |one: &ModuleFinding| {
                     let own = found.measured.iter().find(|measure| measure.module == one.module);
@@ -471,6 +481,6 @@ mod tests {
                 );
             }
         }
-        assert!(named > 800, "{named}");
+        assert!(named > 500, "{named}");
     }
 }

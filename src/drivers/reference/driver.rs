@@ -159,6 +159,9 @@ impl<M: Model> Careful for Reference<M> {
 
 impl<M: Model> Ads for Reference<M> {
     fn drive(&mut self, sensed: &Sensed) -> Control {
+        if self.helm.is_first() {
+            self.route.find_place(&sensed.ego.rear_axle);
+        }
         let station_m = self.helm.locate(self.route.guide(), sensed.ego.rear_axle.position).station_m;
         if self.helm.looks() {
             self.look(sensed, station_m);
@@ -201,8 +204,8 @@ impl<M: Model> Ads for Reference<M> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::CarefulHuman;
     use crate::testing::{Rig, object, two_lanes};
+    use crate::{CarefulHuman, by_name};
     use avastra_base::geometry::Pose;
     use avastra_lang::model::vocabulary::Body;
 
@@ -228,5 +231,20 @@ mod tests {
         let (blindly_m, carefully_m) = (moved_aside_m(false), moved_aside_m(true));
         assert!(blindly_m > 0.1, "{blindly_m}");
         assert!(carefully_m.abs() < 0.05, "{carefully_m}");
+    }
+
+    #[test]
+    fn one_that_takes_over_knows_the_lane_that_it_is_in() {
+        let scene = two_lanes(300.0);
+        for name in ["cc", "fsm", "rss", "r157"] {
+            let entry = by_name(name).expect("it is registered");
+            let mut rig = Rig::new(&scene, (entry.build)(&scene, 0), 0.8);
+            // Another driver has changed lanes, and creeps towards a person that stands in the target lane.
+            rig.sensed.ego.rear_axle = Pose::new(150.0, TARGET_Y_M, 0.0);
+            rig.sensed.objects = vec![object(1, Body::Pedestrian, Pose::new(160.0, TARGET_Y_M, 0.0), 0.0)];
+            rig.run(12.0);
+            assert!(rig.gap_m_min > 1.0, "{name}: {} m", rig.gap_m_min);
+            assert!(rig.offset_m_max < 0.1, "{name}: {} m beside its lane", rig.offset_m_max);
+        }
     }
 }

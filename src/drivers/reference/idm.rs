@@ -277,6 +277,9 @@ impl Idm {
         decide: impl FnOnce(f64, Reason) -> (f64, Reason),
     ) -> Control {
         let pose = &sensed.ego.rear_axle;
+        if self.helm.is_first() {
+            self.find_place(pose);
+        }
         let station_m = self.helm.locate(&self.guide, pose.position).station_m;
         self.look(sensed, station_m);
         let (model_mps2, model_reason) = self.acceleration_mps2(sensed, station_m);
@@ -292,6 +295,22 @@ impl Idm {
     pub(super) fn glance(&mut self, seen: &[SensedObject], ego_mps: f64, station_m: f64) {
         let next = self.changes.next();
         self.is_beset = next.is_some_and(|change| !self.has_gap(seen, ego_mps, station_m, change.lateral_m));
+    }
+
+    /// Learns from the vehicle's place which lane changes of the route are begun or over, before its first look. A driver
+    /// that does not drive from the start, but goes on where another one was, would otherwise take itself to be in the
+    /// source lane: it would steer back to it, and what stands ahead of it would stand beside its way.
+    pub(super) fn find_place(&mut self, rear_axle: &Pose) {
+        while let Some(change) = self.changes.next() {
+            let beside = self.guide.locate(rear_axle.position, None);
+            let is_aside = beside.offset_m * change.lateral_m.signum() > WANDER_M;
+            if beside.station_m < change.begin_m || !is_aside {
+                return;
+            }
+            let begun_m = change.begun_m(beside.station_m, beside.offset_m);
+            self.changes.begin(begun_m);
+            self.guide = Arc::new(self.changes.guide(&SpeedRules::TOWN));
+        }
     }
 
     /// Gives up a lane change that was begun in thought alone, because the vehicle is still in the source lane.
@@ -363,6 +382,19 @@ mod tests {
         rig.run(30.0);
         assert!((place(&rig).y - TARGET_Y_M).abs() < 0.1, "{:?}", place(&rig));
         assert!(rig.offset_m_max < 0.3, "{} m off the path", rig.offset_m_max);
+    }
+
+    #[test]
+    fn it_goes_on_with_a_change_that_another_driver_has_begun() {
+        let mut rig = rig(300.0);
+        rig.sensed.ego.rear_axle = Pose::new(40.0, -4.0, 0.0);
+        let mut lowest_m = f64::INFINITY;
+        for _ in 0..400 {
+            rig.tick();
+            lowest_m = lowest_m.min(place(&rig).y);
+        }
+        assert!(lowest_m > -4.05, "back towards the source lane: {lowest_m}");
+        assert!((place(&rig).y - TARGET_Y_M).abs() < 0.1, "{:?}", place(&rig));
     }
 
     #[test]

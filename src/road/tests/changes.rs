@@ -122,6 +122,14 @@ fn the_source_lane_can_be_kept_until_the_latest_station() {
         assert_eq!(later_m, expected_m);
         assert!(station_m < 171.3 || later_m.abs() < 1e-9, "{later_m} at {station_m}");
     }
+    // The place of a vehicle within its change tells where it began.
+    for i in 125..160 {
+        let station_m = f64::from(i);
+        let from_source_m = change.postponed_offset_m(station_m, 120.0) - change.source_offset_m(station_m);
+        let begun_m = change.begun_m(station_m, from_source_m);
+        assert!((begun_m - 120.0).abs() < 1e-3, "{begun_m} at {station_m}");
+        assert_eq!(change.begun_m(station_m, 9.0), change.begin_m, "farther than the earliest change leads");
+    }
 }
 
 #[test]
