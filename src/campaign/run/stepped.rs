@@ -175,7 +175,7 @@ mod tests {
     /// A run of twelve episodes on the crossroad.
     fn run(ads: &str) -> Arc<Run> {
         let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()));
-        let loaded = load(Path::new("scenarios/avastra45.ava"), &read).unwrap();
+        let loaded = load(Path::new("../../scenarios/avastra45.ava"), &read).unwrap();
         let space = loaded.space.unwrap();
         let settings = RunSettings {
             roads: vec!["crossroad".to_owned()],

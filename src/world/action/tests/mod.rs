@@ -16,7 +16,7 @@ use avastra_lang::syntax::{Style, render};
 
 /// The table of a shipped space on Road 2.
 fn table(path: &str) -> ActionTable {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path);
     let loaded =
         load(&root, &|path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string())))
             .unwrap();
