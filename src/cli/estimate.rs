@@ -7,15 +7,15 @@ use std::sync::atomic::AtomicBool;
 use avastra_base::statistics::Interval;
 use avastra_campaign::estimate::{
     Comparison, ComparisonResults, Estimate, EstimateDatabase, EstimateResults, EstimateSettings, EventKind,
-    Found, Mass, Met, Method, PILOT, Part, Pilot, Plan, Played, Probability, Stopping, WrittenScenario,
-    compared, pilot, play_parts,
+    Found, Mass, Met, Method, PILOT, Part, Pilot, Plan, Played, Probability, Stopping, compared, pilot,
+    play_parts,
 };
-use avastra_campaign::run::{DatabaseError, Numbered, Run, RunSettings, Shard, Units};
-use avastra_drivers::external::Attached;
+use avastra_campaign::run::{DatabaseError, Run, Shard, Units};
 use avastra_lang::syntax::yaml_mistake;
 use avastra_world::action::ActionTable;
 
 use super::arguments::{EstimateArguments, EventArgument, MethodArgument};
+use super::campaign::{Campaign, Cut, Item, Kind, Outside, as_they_are};
 use super::error::Failure;
 use super::files::{remove, write};
 use super::findings::doubts;
@@ -25,14 +25,39 @@ use super::pack::pack_space;
 use super::parallel::jobs;
 use super::progress::{Progress, Working};
 use super::run::{critical_text, cut_short};
-use super::run_directory::{Held, Resumed, WrittenFile, write_scenario};
-use super::{conditions, load, run_directory, shard};
+use super::run_directory::{Held, Resumed, write_scenario, written};
+use super::{conditions, load, merge, run_directory, shard};
 
 /// Episodes of a part, if a command line gives no number.
 const EPISODES: u32 = 50;
 
 /// Episodes on each road in which two driving systems are compared, if a command line gives no number.
 const EPISODES_OF_TWO: u32 = 250;
+
+impl Campaign for EstimateSettings {
+    const KIND: Kind = Kind {
+        what: "estimate",
+        command: "estimate",
+        file: "estimate",
+        is_in: |directory| directory.join("estimate.yaml").is_file(),
+        merge: Some(merge::merged::<EstimateSettings>),
+    };
+    type Database = EstimateDatabase;
+
+    fn outside(&mut self) -> Outside<'_> {
+        self.run.outside()
+    }
+}
+
+impl Cut for EstimateSettings {
+    fn work(&self) -> Vec<Item> {
+        self.all_parts().into_iter().map(|part| Item { cost: 1, units: vec![self.place(part)] }).collect()
+    }
+
+    fn conclude(output: &Output, directory: &Path) -> Result<(), Failure> {
+        play_all(output, resumed(output, directory, true)?, None)
+    }
+}
 
 /// Plays what an estimate still lacks and prints its result, or compares two driving systems.
 pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Failure> {
@@ -62,11 +87,6 @@ pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Fa
     play_all(output, begun, arguments.jobs)
 }
 
-/// Ends an estimate whose parts were all played, in shards.
-pub fn conclude(output: &Output, path: &Path) -> Result<(), Failure> {
-    play_all(output, resumed(output, path, true)?, None)
-}
-
 /// Plays the parts that a directory still lacks, and says what all of them came to.
 fn play_all(
     output: &Output,
@@ -78,7 +98,7 @@ fn play_all(
     let stop = stop_on_interrupt();
     let mut database: EstimateDatabase = run_directory::open_to_go_on(output, &file, &settings)?;
     let unread = |error| Failure::file("read", &file, error);
-    run_directory::restore(output, "estimate", &files_of(&path, database.scenarios().map_err(unread)?))?;
+    run_directory::restore(output, "estimate", &written(&path, database.scenarios().map_err(unread)?))?;
     let shard = shard::kept(&path)?;
     output.tell(&format!("{}, into {}", heading(&estimate), path.display()));
     let jobs = jobs(asked_jobs, estimate.run().program())?;
@@ -119,7 +139,7 @@ fn play_all(
                 output.say("no estimate: the driving system failed; `avastra run` with it says how");
                 return Err(Failure::Ads { findings: played.record.failed as usize });
             }
-            let scenarios = written(&estimate, &path, &played)?;
+            let scenarios = write_scenarios(&estimate, &path, &played)?;
             for number in 0..played.record.episodes {
                 progress.episode(usize::from(number < played.record.events));
             }
@@ -217,7 +237,7 @@ pub fn read(directory: &Path) -> Result<Contents, Failure> {
     let unread = |error| Failure::file("read", &file, error);
     let (database, damaged) = run_directory::open_to_read::<EstimateDatabase>(&file, &text)?;
     let scenarios = database.scenarios().map_err(unread)?;
-    let mut remarks = run_directory::remarks_on(&files_of(directory, scenarios));
+    let mut remarks = run_directory::remarks_on(&written(directory, scenarios));
     let table = load::table(&Output::silent(), &directory.join(&settings.run.space)).ok();
     let is_it = |table: &ActionTable| table.space().meaning.is_sealed_by(&settings.run.space_digest);
     let labels: Vec<String> = match table.filter(is_it) {
@@ -250,12 +270,6 @@ pub fn read(directory: &Path) -> Result<Contents, Failure> {
 /// No table has more rows than this.
 const ROWS_MAX: usize = 1_000_000;
 
-/// The files of scenarios in a directory.
-fn files_of(directory: &Path, scenarios: Vec<WrittenScenario>) -> Vec<WrittenFile> {
-    let critical = directory.join("critical");
-    scenarios.into_iter().map(|found| (critical.join(found.name), found.text)).collect()
-}
-
 /// Settles the database with these parts alone; what was found in others goes, too.
 fn settled(
     settings: &EstimateSettings,
@@ -267,14 +281,13 @@ fn settled(
     let unread = |error| Failure::file("read", &file, error);
     let wanted: BTreeSet<i64> = parts.iter().map(|part| settings.place(*part)).chain([PILOT]).collect();
     let mut scenarios = database.scenarios().map_err(unread)?;
-    scenarios.retain(|scenario| !wanted.contains(&scenario.part));
-    for (scenario, _) in files_of(directory, scenarios) {
+    scenarios.retain(|scenario| !wanted.contains(&scenario.unit));
+    for (scenario, _) in written(directory, scenarios) {
         remove(&load::answers_path(&scenario))?;
         remove(&scenario)?;
     }
-    let mut kept = database.numbers().map_err(unread)?;
-    kept.retain(|number| wanted.contains(number));
-    let kept: Vec<Numbered> = kept.into_iter().map(|number| (number, number)).collect();
+    let mut kept = as_they_are(&database).map_err(unread)?;
+    kept.retain(|(number, _)| wanted.contains(number));
     database.settle(&file, &kept).map_err(|error| Failure::file("write", &file, error))
 }
 
@@ -311,7 +324,7 @@ fn piloted(
 
 /// Writes what a part met as scenarios, where the space's verdict counts it; name and text of the file of each event, if
 /// there is one.
-fn written(
+fn write_scenarios(
     estimate: &Estimate,
     directory: &Path,
     played: &Played,
@@ -372,25 +385,16 @@ fn begun(
     shard::keep(&held.path, shard)?;
     // As in a run: its scenarios can be looked at even if the author changes the space.
     pack_space(&estimate.run().space().path, &held.path)?;
-    let space = load::relative(&held.path, &estimate.run().space().path)?;
-    let attached = estimate.run().attached();
-    let external = attached.map(|attached| run_directory::to_record(&held.path, attached)).transpose()?;
-    let settings = estimate.settings().clone();
-    let settings = EstimateSettings { run: RunSettings { space, external, ..settings.run }, ..settings };
-    let text = run_directory::write_settings(&held.path, "estimate", &settings)?;
+    let (space, attached) = (&estimate.run().space().path, estimate.run().attached());
+    let text = run_directory::begin(&held.path, estimate.settings().clone(), space, attached)?;
     Ok((estimate, held, text))
 }
 
 /// The rest of an interrupted estimate, with the text of its settings.
 /// With `is_played`, nothing of it is left to play, and no program is started.
 fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Estimate, Held, String), Failure> {
-    let resumed: Resumed<EstimateSettings> = run_directory::resume(output, path, "estimate", "estimate")?;
+    let resumed = run_directory::resume::<EstimateSettings>(output, path, is_played)?;
     let Resumed { settings, text, table, held } = resumed;
-    let external = settings
-        .run
-        .external
-        .map(|attached| Attached { is_recorded: is_played, ..run_directory::from_record(path, attached) });
-    let settings = EstimateSettings { run: RunSettings { external, ..settings.run }, ..settings };
     Ok((Estimate::new(table, settings).map_err(Failure::usage)?, held, text))
 }
 

@@ -8,14 +8,16 @@ use std::time::Instant;
 use avastra_campaign::emit;
 use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::run::{
-    EpisodeSummary, Group, PolicyReference, RefusalCount, Run, RunSettings, Shard, Totals, Units, play,
+    Database, EpisodeSummary, Group, PolicyReference, RefusalCount, Run, RunSettings, Shard, Totals, Units,
+    play,
 };
-use avastra_drivers::external::{Attached, Conversation, Problem};
+use avastra_drivers::external::{Conversation, Problem};
 use avastra_lang::model::Policy;
 use avastra_search::agent::Face;
 use avastra_world::action::ActionTable;
 
 use super::arguments::{FaceArgument, RunArguments};
+use super::campaign::{Campaign, Cut, Item, Kind, Outside, as_they_are};
 use super::error::Failure;
 use super::files::write_answers;
 use super::findings::{cut_off, doubts, failures_text, unfinished};
@@ -27,11 +29,46 @@ use super::pack::pack_space;
 use super::parallel::jobs;
 use super::policy::acting;
 use super::progress::Progress;
-use super::run_directory::{Resumed, RunDirectory, WrittenFile};
-use super::{compile, conditions, load, run_directory, shard};
+use super::run_directory::{Resumed, RunDirectory};
+use super::{compile, conditions, load, merge, run_directory, shard};
 
 /// Largest number of critical scenarios, groups and refusal reasons that the summary lists.
 const NAMED_MAX: usize = 10;
+
+impl Campaign for RunSettings {
+    const KIND: Kind = Kind {
+        what: "run",
+        command: "run",
+        file: "run",
+        is_in: |directory| {
+            run_directory::fields_of(directory, "run")
+                .is_some_and(|fields| !fields.contains_key("hyperparameters"))
+        },
+        merge: Some(merge::merged::<RunSettings>),
+    };
+    type Database = Database;
+
+    fn outside(&mut self) -> Outside<'_> {
+        Outside {
+            space: &mut self.space,
+            space_digest: &self.space_digest,
+            external: &mut self.external,
+            policy: Some(&mut self.policy),
+        }
+    }
+}
+
+impl Cut for RunSettings {
+    fn work(&self) -> Vec<Item> {
+        let episodes = self.roads.len() as i64 * i64::from(self.episodes);
+        (0..episodes).map(|number| Item { cost: 1, units: vec![number] }).collect()
+    }
+
+    fn conclude(output: &Output, directory: &Path) -> Result<(), Failure> {
+        let (run, directory) = resumed(output, directory, true)?;
+        play_all(output, run, directory, None).map(drop)
+    }
+}
 
 /// Plays the episodes of a new run, or those that an interrupted one still lacks.
 pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
@@ -59,12 +96,6 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
         return Err(Failure::Ads { findings: found.failed as usize });
     }
     Ok(())
-}
-
-/// Ends a run whose episodes were all played, in shards.
-pub fn conclude(output: &Output, path: &Path) -> Result<(), Failure> {
-    let (run, directory) = resumed(output, path, true)?;
-    play_all(output, run, directory, None).map(drop)
 }
 
 /// Plays the episodes that a directory still lacks, and says what all of them came to.
@@ -109,7 +140,7 @@ fn play_all(
     let is_over = own.iter().all(|&number| all.contains(&(number as i64)));
     if is_over {
         let file = path.join("run.db");
-        let units: Vec<_> = all.iter().map(|&number| (number, number)).collect();
+        let units = as_they_are(&directory.database).map_err(unread)?;
         let settled = directory.database.settle(&file, &units);
         directory.database = settled.map_err(|error| Failure::file("write", &file, error))?;
     }
@@ -201,27 +232,21 @@ fn begun(output: &Output, arguments: &RunArguments, wanted: Wanted) -> Result<(R
     } else {
         run
     };
-    let space = load::relative(path, &run.space().path)?;
     let reference = match (&arguments.policy, &policy) {
         (Some(file), Some((_, policy))) => {
             Some(PolicyReference { file: load::relative(path, file)?, digest: policy.digest.clone(), face })
         }
         _ => None,
     };
-    let external = run.attached().map(|attached| run_directory::to_record(path, attached)).transpose()?;
-    let settings = RunSettings { space, policy: reference, external, ..run.settings().clone() };
-    let text = run_directory::write_settings(path, "run", &settings)?;
+    let settings = RunSettings { policy: reference, ..run.settings().clone() };
+    let text = run_directory::begin(path, settings, &run.space().path, run.attached())?;
     Ok((run, RunDirectory::open(held, &text)?))
 }
 
 /// The rest of an interrupted run. With `is_played`, nothing of it is left to play, and no program is started.
 fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Run, RunDirectory), Failure> {
-    let resumed: Resumed<RunSettings> = run_directory::resume(output, path, "run", "run")?;
+    let resumed = run_directory::resume::<RunSettings>(output, path, is_played)?;
     let Resumed { settings, text, table, held } = resumed;
-    let external = settings
-        .external
-        .map(|attached| Attached { is_recorded: is_played, ..run_directory::from_record(path, attached) });
-    let settings = RunSettings { external, ..settings };
     let policy = match &settings.policy {
         None => None,
         Some(reference) => {
@@ -309,7 +334,9 @@ fn write_scenario(
 
 /// Writes missing scenarios again, with the answers of an external driving system, and names those that were edited.
 fn restore(output: &Output, run: &Run, directory: &RunDirectory) -> Result<(), Failure> {
-    let (episodes, files): (Vec<usize>, Vec<WrittenFile>) = directory.written()?.into_iter().unzip();
+    let scenarios = directory.scenarios()?;
+    let episodes: Vec<usize> = scenarios.iter().map(|written| written.unit as usize).collect();
+    let files = run_directory::written(&directory.path, scenarios);
     let restored = run_directory::restore(output, "run", &files)?;
     if run.program().is_some() {
         // The database has the text of a scenario, but not the answers beside it: the program is asked for them again.

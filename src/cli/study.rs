@@ -3,17 +3,18 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use avastra_campaign::run::{RunError, TrafficRecord, Units};
+use avastra_campaign::run::{DatabaseError, Numbered, RunError, TrafficRecord, Units};
 use avastra_campaign::study::{
     CellRecord, Event, FailedCell, Job, Spent, Study, StudyDatabase, StudyError, StudyFile, StudyResults,
     StudySettings, play_jobs,
 };
-use avastra_drivers::external::{Attached, Program};
+use avastra_drivers::external::Program;
 use avastra_exchange::report;
 use avastra_lang::syntax::{listed, yaml_mistake};
 use avastra_world::action::ActionTable;
 
 use super::arguments::{StudyArguments, StudyCommand};
+use super::campaign::{Campaign, Cut, Item, Kind, Outside};
 use super::error::Failure;
 use super::files::{remove, write};
 use super::findings::kinds_text;
@@ -24,7 +25,52 @@ use super::parallel::jobs;
 use super::progress::Progress;
 use super::run_directory::{Held, Resumed};
 use super::timing::Times;
-use super::{load, results, run_directory, shard};
+use super::{load, merge, results, run_directory, shard};
+
+impl Campaign for StudySettings {
+    const KIND: Kind = Kind {
+        what: "study",
+        command: "study",
+        file: "study",
+        is_in: |directory| directory.join("study.yaml").is_file(),
+        merge: Some(merge::merged::<StudySettings>),
+    };
+    type Database = StudyDatabase;
+
+    fn outside(&mut self) -> Outside<'_> {
+        Outside {
+            space: &mut self.space,
+            space_digest: &self.space_digest,
+            external: &mut self.external,
+            policy: None,
+        }
+    }
+}
+
+impl Cut for StudySettings {
+    fn work(&self) -> Vec<Item> {
+        let mut places = 1..;
+        let job = |job: Job| Item {
+            cost: self.episodes(&job),
+            units: places.by_ref().take(job.roads.len()).collect(),
+        };
+        self.jobs().into_iter().map(job).collect()
+    }
+
+    fn numbered(&self, database: &StudyDatabase) -> Result<Vec<Numbered>, DatabaseError> {
+        database.places(self)
+    }
+
+    fn take_beside([from, to]: [&Path; 2]) -> Result<(), Failure> {
+        let mut times = Times::read(to)?;
+        times.extend(Times::read(from)?);
+        times.write(to)
+    }
+
+    fn conclude(output: &Output, directory: &Path) -> Result<(), Failure> {
+        play_all(output, resumed(output, directory, true)?, &[], None)
+    }
+}
 
 /// Plays what a study still lacks and prints its result, or writes the results of a folder of studies.
 pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure> {
@@ -53,21 +99,13 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
             let reused = played_elsewhere(&arguments.reuse, &study)?;
             let held = run_directory::create_empty(arguments.out.as_deref())?;
             shard::keep(&held.path, shard)?;
-            let space = load::relative(&held.path, &study.table().space().path)?;
-            let external = study.settings().external.clone();
-            let external =
-                external.map(|attached| run_directory::to_record(&held.path, attached)).transpose()?;
-            let settings = StudySettings { space, external, ..study.settings().clone() };
-            let text = run_directory::write_settings(&held.path, "study", &settings)?;
+            let settings = study.settings().clone();
+            let attached = settings.external.clone();
+            let text = run_directory::begin(&held.path, settings, &study.table().space().path, attached)?;
             ((study, held, text), reused)
         }
     };
     play_all(output, begun, &reused, arguments.jobs)
-}
-
-/// Ends a study whose jobs were all played, in shards.
-pub fn conclude(output: &Output, path: &Path) -> Result<(), Failure> {
-    play_all(output, resumed(output, path, true)?, &[], None)
 }
 
 /// Plays the jobs that a directory still lacks, and says what all of them came to.
@@ -281,12 +319,8 @@ pub fn wanted(
 /// The rest of an interrupted study, with the text of its settings. With `is_played`, nothing of it is left to play, and no
 /// program is started.
 fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Study, Held, String), Failure> {
-    let resumed: Resumed<StudySettings> = run_directory::resume(output, path, "study", "study")?;
+    let resumed = run_directory::resume::<StudySettings>(output, path, is_played)?;
     let Resumed { settings, text, table, held } = resumed;
-    let external = settings
-        .external
-        .map(|attached| Attached { is_recorded: is_played, ..run_directory::from_record(path, attached) });
-    let settings = StudySettings { external, ..settings };
     let study = Study::new(table, settings).map_err(|error| match error {
         StudyError::Agent { error: error @ RunError::OtherProgram { .. }, .. } => error.into(),
         error => Failure::usage(error),
