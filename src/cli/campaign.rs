@@ -2,19 +2,25 @@
 //! scenarios that were written of them. Each says in its own file what it is; `run_directory` begins and resumes all of them,
 //! and `merge` brings the shards of all together that can be cut.
 
+use std::collections::BTreeSet;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use avastra_campaign::estimate::EstimateSettings;
-use avastra_campaign::run::{DatabaseError, Numbered, PolicyReference, RunSettings, Units};
+use avastra_campaign::run::{DatabaseError, Numbered, PolicyReference, RunSettings, Shard, Units};
 use avastra_campaign::study::StudySettings;
 use avastra_campaign::train::TrainSettings;
-use avastra_drivers::external::Attached;
+use avastra_drivers::external::{Attached, Program};
 
 use super::error::Failure;
+use super::findings::unfinished;
 use super::output::Output;
+use super::progress::Progress;
+use super::shard;
 
 /// All kinds. One directory holds one of them; the first that it holds counts.
 pub const KINDS: [Kind; 4] =
@@ -76,9 +82,74 @@ pub trait Cut: Campaign {
 
 /// What a shard has as a whole, or not at all.
 pub struct Item {
+    /// Its cost in episodes.
     pub cost: u64,
     /// The numbers of its units in a settled file.
-    pub units: Vec<i64>,
+    pub units: Range<i64>,
+}
+
+impl Item {
+    /// Whether all of its units are among these.
+    pub fn is_in(&self, units: &BTreeSet<i64>) -> bool {
+        self.units.clone().all(|unit| units.contains(&unit))
+    }
+}
+
+/// The costs of all items, by which they are shared out.
+pub fn costs(work: &[Item]) -> Vec<u64> {
+    work.iter().map(|item| item.cost).collect()
+}
+
+/// What a directory has to play. Items go by their positions in the work of the whole.
+pub struct Share {
+    pub shard: Shard,
+    /// The items of its shard, rising.
+    pub own: Vec<usize>,
+    work: Vec<Item>,
+}
+
+impl Share {
+    /// The share of the shard that a directory holds.
+    pub fn of<C: Cut>(directory: &Path, settings: &C) -> Result<Share, Failure> {
+        let (shard, work) = (shard::kept(directory)?, settings.work());
+        Ok(Share { shard, own: shard.share(&costs(&work)), work })
+    }
+
+    /// Those of its items that are not played.
+    pub fn lacking<C: Cut>(&self, settings: &C, database: &C::Database) -> Result<Vec<usize>, DatabaseError> {
+        let played = settings.numbered(database)?.into_iter().map(|(_, place)| place).collect();
+        Ok(self.own.iter().copied().filter(|&item| !self.work[item].is_in(&played)).collect())
+    }
+
+    /// The progress over its episodes. `how` is as for [`Progress`], `lacking` has the items that are not played.
+    pub fn progress(&self, output: &Output, how: &'static str, lacking: &[usize]) -> Progress {
+        let episodes = |items: &[usize]| items.iter().map(|&item| self.work[item].cost).sum::<u64>();
+        let all = episodes(&self.own);
+        Progress::new(output, how, all, all - episodes(lacking))
+    }
+
+    /// What comes after playing: how to go on if something is left, and how to bring shards together.
+    pub fn end<C: Cut>(
+        &self,
+        output: &Output,
+        directory: PathBuf,
+        is_over: bool,
+        program: Option<&Arc<Program>>,
+    ) -> Result<(), Failure> {
+        if !is_over {
+            return Err(unfinished(C::KIND.command, directory, program));
+        }
+        if !self.shard.is_whole() {
+            output.say(&shard::next_step(self.shard));
+        }
+        Ok(())
+    }
+}
+
+/// Settles a database in which all is played; `file` is where it is.
+pub fn settled<C: Cut>(settings: &C, database: C::Database, file: &Path) -> Result<C::Database, Failure> {
+    let units = settings.numbered(&database).map_err(|error| Failure::file("read", file, error))?;
+    database.settle(file, &units).map_err(|error| Failure::file("write", file, error))
 }
 
 /// Units that have the same numbers in every file.

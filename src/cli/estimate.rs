@@ -10,12 +10,12 @@ use avastra_campaign::estimate::{
     Found, Mass, Met, Method, PILOT, Part, Pilot, Plan, Played, Probability, Stopping, compared, pilot,
     play_parts,
 };
-use avastra_campaign::run::{DatabaseError, Run, Shard, Units};
+use avastra_campaign::run::{DatabaseError, Run, RunSettings, Shard, Units};
 use avastra_lang::syntax::yaml_mistake;
 use avastra_world::action::ActionTable;
 
 use super::arguments::{EstimateArguments, EventArgument, MethodArgument};
-use super::campaign::{Campaign, Cut, Item, Kind, Outside, as_they_are};
+use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, as_they_are};
 use super::error::Failure;
 use super::files::{remove, write};
 use super::findings::doubts;
@@ -25,7 +25,7 @@ use super::pack::pack_space;
 use super::parallel::jobs;
 use super::progress::{Progress, Working};
 use super::run::{critical_text, cut_short};
-use super::run_directory::{Held, Resumed, write_scenario, written};
+use super::run_directory::{Held, Player, Resumed, written};
 use super::{conditions, load, merge, run_directory, shard};
 
 /// Episodes of a part, if a command line gives no number.
@@ -51,7 +51,9 @@ impl Campaign for EstimateSettings {
 
 impl Cut for EstimateSettings {
     fn work(&self) -> Vec<Item> {
-        self.all_parts().into_iter().map(|part| Item { cost: 1, units: vec![self.place(part)] }).collect()
+        let cost = u64::from(self.run.episodes);
+        let place = |part| self.place(part);
+        self.all_parts().into_iter().map(place).map(|part| Item { cost, units: part..part + 1 }).collect()
     }
 
     fn conclude(output: &Output, directory: &Path) -> Result<(), Failure> {
@@ -69,17 +71,9 @@ pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Fa
         None => {
             let (estimate, shard) = wanted(output, arguments)?;
             if arguments.shard.dry_run {
-                run_directory::refuse_used(arguments.out.as_deref())?;
                 let settings = estimate.settings();
-                let costs = vec![u64::from(settings.run.episodes); settings.all_parts().len()];
-                shard::planned(
-                    output,
-                    &heading(&estimate),
-                    &planned_text(settings, costs.len()),
-                    &costs,
-                    shard,
-                );
-                return Ok(());
+                let texts = (&*heading(&estimate), &*planned_text(settings, settings.all_parts().len()));
+                return shard::planned(output, arguments.out.as_deref(), settings, texts, shard);
             }
             begun(arguments, estimate, shard)?
         }
@@ -99,37 +93,31 @@ fn play_all(
     let mut database: EstimateDatabase = run_directory::open_to_go_on(output, &file, &settings)?;
     let unread = |error| Failure::file("read", &file, error);
     run_directory::restore(output, "estimate", &written(&path, database.scenarios().map_err(unread)?))?;
-    let shard = shard::kept(&path)?;
+    let share = Share::of(&path, estimate.settings())?;
     output.tell(&format!("{}, into {}", heading(&estimate), path.display()));
     let jobs = jobs(asked_jobs, estimate.run().program())?;
-    let interrupted = || Failure::Interrupted { command: "estimate", directory: path.clone() };
     let Some(pilot) = piloted(output, &estimate, (&mut database, &file), jobs, &stop)? else {
-        return Err(interrupted());
+        return share.end::<EstimateSettings>(output, path, false, None);
     };
     let plan = Plan::of(&pilot, 0.0);
 
     let labels: Vec<String> = estimate.run().table().rows().iter().map(|row| row.label.clone()).collect();
     let all = estimate.settings().all_parts();
-    let own: Vec<Part> = shard.share(&vec![1; all.len()]).into_iter().map(|part| all[part]).collect();
-    let episodes = u64::from(estimate.settings().run.episodes);
-    let mut progress = Progress::new(
-        output,
-        estimate.settings().event.noun(),
-        own.len() as u64 * episodes,
-        database.parts().map_err(unread)?.len() as u64 * episodes,
-    );
+    let lacking = |database: &EstimateDatabase| share.lacking(estimate.settings(), database).map_err(unread);
+    let noun = estimate.settings().event.noun();
+    let mut progress = share.progress(output, noun, &lacking(&database)?);
     // A shard cannot know when all of them together are precise enough: it plays all of its parts, and the looks are taken
     // when they are merged.
-    let looks = match shard.is_whole() {
+    let looks = match share.shard.is_whole() {
         true => estimate.settings().looks(),
         false => vec![estimate.settings().parts],
     };
     let mut results = None;
     for look in looks {
-        let is_at_look = |part: &Part| part.number < look;
-        let done: Vec<Part> = database.parts().map_err(unread)?.iter().map(|record| record.part).collect();
-        let wanted: Vec<Part> = own.iter().copied().filter(is_at_look).collect();
-        let todo: Vec<Part> = wanted.iter().copied().filter(|part| !done.contains(part)).collect();
+        let at = |items: &[usize]| -> Vec<Part> {
+            items.iter().map(|&part| all[part]).filter(|part| part.number < look).collect()
+        };
+        let (wanted, todo) = (at(&share.own), at(&lacking(&database)?));
         if !todo.is_empty() {
             run_directory::refuse_to_play(&path, "estimate", is_started(&estimate))?;
         }
@@ -157,11 +145,11 @@ fn play_all(
 
     let (results, kept, is_unfinished) = results.expect("every estimate looks once");
     if !is_unfinished {
-        settled(estimate.settings(), database, &path, &kept)?;
+        settled_with(estimate.settings(), database, &path, &kept)?;
     }
     let text = serde_json::to_string_pretty(&results).expect("results have string keys only");
     write(&path.join("results.json"), &format!("{text}\n"))?;
-    output.say(&estimate_text(&results, is_unfinished, shard));
+    output.say(&estimate_text(&results, is_unfinished, share.shard));
     let critical = load::sources_in(&path.join("critical"))?;
     output.say(&critical_text(&path, &critical));
     let doubts = doubts(estimate.run().program());
@@ -169,13 +157,7 @@ fn play_all(
     output.result(serde_json::json!({
         "directory": path, "results": results, "critical": critical, "reproducible": doubts.is_empty(),
     }));
-    if is_unfinished {
-        return Err(interrupted());
-    }
-    if !shard.is_whole() {
-        output.say(&shard::next_step(shard));
-    }
-    Ok(())
+    share.end::<EstimateSettings>(output, path, !is_unfinished, None)
 }
 
 /// An estimate's results up to a look.
@@ -271,7 +253,7 @@ pub fn read(directory: &Path) -> Result<Contents, Failure> {
 const ROWS_MAX: usize = 1_000_000;
 
 /// Settles the database with these parts alone; what was found in others goes, too.
-fn settled(
+fn settled_with(
     settings: &EstimateSettings,
     database: EstimateDatabase,
     directory: &Path,
@@ -329,8 +311,8 @@ fn write_scenarios(
     directory: &Path,
     played: &Played,
 ) -> Result<Vec<Option<(String, String)>>, Failure> {
-    let settings = &estimate.settings().run;
-    let rules = [&settings.without[..], &settings.with];
+    let RunSettings { agent, without, with, .. } = &estimate.settings().run;
+    let player = Player { command: "estimate", table: estimate.run().table(), agent, without, with };
     let critical = directory.join("critical");
     let write_one = |met: &Met| {
         if met.summary.counted() == 0 {
@@ -344,8 +326,7 @@ fn write_scenarios(
             _ => String::new(),
         };
         let name = format!("{}_{:04}{tried}.ava", met.log.road, met.summary.episode);
-        let (table, episode) = (estimate.run().table(), (&met.log, &met.summary));
-        let text = write_scenario(&critical.join(&name), "estimate", table, episode, &settings.agent, rules)?;
+        let text = player.write_scenario(&critical.join(&name), (&met.log, &met.summary))?;
         Ok(Some((name, text)))
     };
     played.met.iter().map(write_one).collect()

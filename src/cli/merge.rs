@@ -26,7 +26,7 @@ use avastra_lang::syntax::ast::{Expr, ExprKind, FileId, ItemKind};
 use avastra_lang::syntax::{parse, print_expr};
 
 use super::arguments::MergeArguments;
-use super::campaign::{Cut, Item, Kind};
+use super::campaign::{Cut, Item, Kind, costs};
 use super::error::Failure;
 use super::files::{folder, make, remove, write};
 use super::output::{Output, plural};
@@ -214,9 +214,8 @@ impl Survey {
         }
         let (settings, work) = wanted.expect("there is a directory");
         let shards = cut.map_or(1, |(shard, _)| shard.count());
-        let costs: Vec<u64> = work.iter().map(|item| item.cost).collect();
-        let of_items = Shard::of_items(&costs, shards);
-        let lacks = |(item, _): &(&Item, u32)| !item.units.iter().all(|unit| have.contains(unit));
+        let of_items = Shard::of_items(&costs(&work), shards);
+        let lacks = |(item, _): &(&Item, u32)| !item.is_in(&have);
         let missing = work.iter().zip(of_items).filter(lacks).map(|(_, shard)| shard).collect();
         Ok(Survey { settings, shards, missing })
     }

@@ -8,8 +8,8 @@ use std::time::Instant;
 use avastra_campaign::emit;
 use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::run::{
-    Database, EpisodeSummary, Group, PolicyReference, RefusalCount, Run, RunSettings, Shard, Totals, Units,
-    play,
+    Database, DatabaseError, EpisodeSummary, Group, Numbered, PolicyReference, RefusalCount, Run,
+    RunSettings, Shard, Totals, play,
 };
 use avastra_drivers::external::{Conversation, Problem};
 use avastra_lang::model::Policy;
@@ -17,10 +17,10 @@ use avastra_search::agent::Face;
 use avastra_world::action::ActionTable;
 
 use super::arguments::{FaceArgument, RunArguments};
-use super::campaign::{Campaign, Cut, Item, Kind, Outside, as_they_are};
+use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, settled};
 use super::error::Failure;
 use super::files::write_answers;
-use super::findings::{cut_off, doubts, failures_text, unfinished};
+use super::findings::{cut_off, doubts, failures_text};
 use super::interrupt::stop_on_interrupt;
 use super::never::Never;
 use super::output::Output;
@@ -28,8 +28,7 @@ use super::output::plural;
 use super::pack::pack_space;
 use super::parallel::jobs;
 use super::policy::acting;
-use super::progress::Progress;
-use super::run_directory::{Resumed, RunDirectory};
+use super::run_directory::{Player, Resumed, RunDirectory};
 use super::{compile, conditions, load, merge, run_directory, shard};
 
 /// Largest number of critical scenarios, groups and refusal reasons that the summary lists.
@@ -61,7 +60,11 @@ impl Campaign for RunSettings {
 impl Cut for RunSettings {
     fn work(&self) -> Vec<Item> {
         let episodes = self.roads.len() as i64 * i64::from(self.episodes);
-        (0..episodes).map(|number| Item { cost: 1, units: vec![number] }).collect()
+        (0..episodes).map(|number| Item { cost: 1, units: number..number + 1 }).collect()
+    }
+
+    fn numbered(&self, database: &Database) -> Result<Vec<Numbered>, DatabaseError> {
+        Ok(database.episodes()?.into_iter().map(|number| (number as i64, number as i64)).collect())
     }
 
     fn conclude(output: &Output, directory: &Path) -> Result<(), Failure> {
@@ -77,11 +80,9 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
         None => {
             let wanted = wanted(output, arguments)?;
             if arguments.shard.dry_run {
-                run_directory::refuse_used(arguments.out.as_deref())?;
-                let costs = vec![1; wanted.run.episodes()];
-                let what = plural(costs.len(), "episode");
-                shard::planned(output, &heading(&wanted.run, arguments), &what, &costs, wanted.shard);
-                return Ok(());
+                let (run, out) = (&wanted.run, arguments.out.as_deref());
+                let texts = (&*heading(run, arguments), &*plural(run.episodes(), "episode"));
+                return shard::planned(output, out, run.settings(), texts, wanted.shard);
             }
             begun(output, arguments, wanted)?
         }
@@ -107,10 +108,10 @@ fn play_all(
 ) -> Result<Totals, Failure> {
     let path = directory.path.clone();
     let unread = |error| Failure::file("read", &path, error);
-    let shard = shard::kept(&path)?;
-    let own = shard.share(&vec![1; run.episodes()]);
-    let done = directory.database.episodes().map_err(unread)?;
-    let todo: Vec<usize> = own.iter().copied().filter(|number| !done.contains(number)).collect();
+    let share = Share::of(&path, run.settings())?;
+    let lacking = |database: &Database| share.lacking(run.settings(), database).map_err(unread);
+    // Items are episodes, by their numbers.
+    let todo = lacking(&directory.database)?;
     if !todo.is_empty() {
         let is_started = run.program().is_none_or(|program| program.can_start());
         run_directory::refuse_to_play(&path, "run", is_started)?;
@@ -120,7 +121,7 @@ fn play_all(
     #[allow(clippy::disallowed_methods, reason = "this is cli, and the time goes nowhere but the summary")]
     let started = Instant::now();
     let jobs = jobs(asked_jobs, run.program())?;
-    let mut progress = Progress::new(output, "counted", own.len() as u64, (own.len() - todo.len()) as u64);
+    let mut progress = share.progress(output, "counted", &todo);
     let mut driven: Option<(usize, Arc<Conversation>)> = None;
     play(&run, &todo, jobs, &stop, &mut |summary, log| {
         // An episode that was not driven is not kept, so that `--resume` plays it.
@@ -136,13 +137,9 @@ fn play_all(
         Ok::<_, Failure>(())
     })?;
     drop(progress);
-    let all = directory.database.numbers().map_err(unread)?;
-    let is_over = own.iter().all(|&number| all.contains(&(number as i64)));
+    let is_over = lacking(&directory.database)?.is_empty();
     if is_over {
-        let file = path.join("run.db");
-        let units = as_they_are(&directory.database).map_err(unread)?;
-        let settled = directory.database.settle(&file, &units);
-        directory.database = settled.map_err(|error| Failure::file("write", &file, error))?;
+        directory.database = settled(run.settings(), directory.database, &path.join("run.db"))?;
     }
 
     let totals = directory.database.totals().map_err(unread)?;
@@ -178,12 +175,7 @@ fn play_all(
         "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups, "never": never,
         "critical": critical, "failures": failures, "reproducible": doubts.is_empty(),
     }));
-    if !is_over {
-        return Err(unfinished("run", directory.path, run.program()));
-    }
-    if !shard.is_whole() {
-        output.say(&shard::next_step(shard));
-    }
+    share.end::<RunSettings>(output, directory.path, is_over, run.program())?;
     Ok(totals)
 }
 
@@ -305,31 +297,15 @@ fn keep(
     summary: &EpisodeSummary,
     log: &EpisodeLog,
 ) -> Result<(), Failure> {
-    let scenario = match summary.counted() {
-        0 => None,
-        _ => Some(write_scenario(run, directory, summary, log)?),
-    };
-    if log.failure.is_some() {
-        let settings = run.settings();
-        let rules = [&settings.without[..], &settings.with];
-        directory.write_failure("run", run.table(), (log, summary), &settings.agent, rules)?;
-    }
+    let RunSettings { agent, without, with, .. } = run.settings();
+    let player = Player { command: "run", table: run.table(), agent, without, with };
+    let is_critical = summary.counted() > 0;
+    let scenario = is_critical.then(|| directory.write_critical(&player, (log, summary))).transpose()?;
+    directory.write_failure(&player, (log, summary))?;
     directory
         .database
         .add(summary, log, |draw| emit::action_text(run.table(), draw), scenario.as_deref())
         .map_err(|error| Failure::file("write", &directory.path.join("run.db"), error))
-}
-
-/// Writes the scenario of an episode, and gives the text of the file.
-fn write_scenario(
-    run: &Run,
-    directory: &RunDirectory,
-    summary: &EpisodeSummary,
-    log: &EpisodeLog,
-) -> Result<String, Failure> {
-    let settings = run.settings();
-    let rules = [&settings.without[..], &settings.with];
-    directory.write_critical("run", run.table(), (log, summary), &settings.agent, rules)
 }
 
 /// Writes missing scenarios again, with the answers of an external driving system, and names those that were edited.

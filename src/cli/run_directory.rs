@@ -17,7 +17,7 @@ use avastra_campaign::files;
 use avastra_campaign::run::{Database, EpisodeSummary, Units, VERSION, WrittenScenario};
 use avastra_drivers::external::{Attached, ExternalSettings};
 use avastra_lang::check::normal;
-use avastra_lang::syntax::yaml_mistake;
+use avastra_lang::syntax::{ast, print, yaml_mistake};
 use avastra_world::action::ActionTable;
 use avastra_world::sim::ENGINE;
 
@@ -217,16 +217,14 @@ fn tidy(directory: &Path) -> Result<(), Failure> {
 
 /// Refuses to play the rest of a directory whose driving system was not started because nothing seemed to be left to play.
 pub fn refuse_to_play(directory: &Path, command: &str, is_started: bool) -> Result<(), Failure> {
-    match is_started {
-        true => Ok(()),
-        false => {
-            let directory = directory.display();
-            Err(Failure::usage(format!(
-                "`{directory}` is not played to the end, and no program that a file names is started for that: look at its \
-                 settings, then go on with `avastra {command} --resume {directory}`"
-            )))
-        }
+    if is_started {
+        return Ok(());
     }
+    let directory = directory.display();
+    Err(Failure::usage(format!(
+        "`{directory}` is not played to the end, and no program that a file names is started for that: look at its \
+         settings, then go on with `avastra {command} --resume {directory}`"
+    )))
 }
 
 /// The settings of a directory and their text, if they were written by this version of avastra.
@@ -368,66 +366,67 @@ impl RunDirectory {
 
     /// Writes an episode that an external driving system failed in: `failures/ROAD_NNNN.txt` says how, and a scenario of
     /// that name ends so.
-    pub fn write_failure(
-        &self,
-        command: &str,
-        table: &ActionTable,
-        (log, summary): (&EpisodeLog, &EpisodeSummary),
-        agent: &str,
-        [without, with]: [&[String]; 2],
-    ) -> Result<(), Failure> {
+    pub fn write_failure(&self, player: &Player, (log, summary): Judged) -> Result<(), Failure> {
         let Some(failure) = &log.failure else { return Ok(()) };
         let folder = folder(&self.path, "failures")?;
-        let name = format!("{}_{:04}", log.road, summary.episode);
-        let space_path = load::relative(&folder, &table.space().path)?;
-        let (name, space_path, episode) = (name.as_str(), space_path.as_str(), summary.episode);
-        let source = emit::Provenance { command, name, space_path, episode, agent, without, with };
-        let path = folder.join(format!("{name}.ava"));
         let mut text = format!("{}\n{}\n", failure.in_words(), failure.problem.advice());
         if !failure.stderr.is_empty() {
             text.push_str(&format!("\nthe end of its standard error:\n{}", failure.stderr));
         }
+        let path = folder.join(format!("{}_{:04}.ava", log.road, summary.episode));
+        let file = player.file(&path, summary.episode, &|source| {
+            emit::failure(player.table, log, &failure.in_words(), source)
+        })?;
         write(&path.with_extension("txt"), &text)?;
         write_answers(&path, log)?;
-        let file = emit::failure(table, log, &failure.in_words(), &source);
-        write(&path, &avastra_lang::syntax::print(&file))
+        write(&path, &file)
     }
 
     /// Writes the counted collisions of an episode as a scenario, `critical/ROAD_NNNN.ava`, and gives the text of the
-    /// file. `agent` is the one that played it, `rules` are those switched off and those switched on.
-    pub fn write_critical(
-        &self,
-        command: &str,
-        table: &ActionTable,
-        (log, summary): (&EpisodeLog, &EpisodeSummary),
-        agent: &str,
-        rules: [&[String]; 2],
-    ) -> Result<String, Failure> {
-        let path = self.path.join("critical").join(format!("{}_{:04}.ava", log.road, summary.episode));
-        write_scenario(&path, command, table, (log, summary), agent, rules)
+    /// file.
+    pub fn write_critical(&self, player: &Player, (log, summary): Judged) -> Result<String, Failure> {
+        let name = format!("{}_{:04}.ava", log.road, summary.episode);
+        player.write_scenario(&self.path.join("critical").join(name), (log, summary))
     }
 }
 
-/// Writes the counted collisions of an episode as a scenario that has the name of the file, and gives its text. `agent`
-/// is the one that played it, `rules` are those switched off and those switched on.
-pub fn write_scenario(
-    path: &Path,
-    command: &str,
-    table: &ActionTable,
-    (log, summary): (&EpisodeLog, &EpisodeSummary),
-    agent: &str,
-    [without, with]: [&[String]; 2],
-) -> Result<String, Failure> {
-    let (folder, name) = (path.parent().unwrap_or(Path::new(".")), path.file_stem().unwrap_or_default());
-    let space_path = load::relative(folder, &table.space().path)?;
-    let name = name.to_string_lossy();
-    let (name, space_path, episode) = (&*name, space_path.as_str(), summary.episode);
-    let source = emit::Provenance { command, name, space_path, episode, agent, without, with };
-    let file = emit::scenario(table, log, summary, &source);
-    let text = avastra_lang::syntax::print(&file);
-    write_answers(path, log)?;
-    write(path, &text)?;
-    Ok(text)
+/// An episode and what was found in it.
+pub type Judged<'a> = (&'a EpisodeLog, &'a EpisodeSummary);
+
+/// What plays the episodes of which scenarios are written.
+pub struct Player<'a> {
+    pub command: &'a str,
+    pub table: &'a ActionTable,
+    pub agent: &'a str,
+    /// Rules switched off, and those switched on.
+    pub without: &'a [String],
+    pub with: &'a [String],
+}
+
+impl Player<'_> {
+    /// Writes the counted collisions of an episode as a scenario that has the name of the file, and gives its text.
+    pub fn write_scenario(&self, path: &Path, (log, summary): Judged) -> Result<String, Failure> {
+        let text =
+            self.file(path, summary.episode, &|source| emit::scenario(self.table, log, summary, source))?;
+        write_answers(path, log)?;
+        write(path, &text)?;
+        Ok(text)
+    }
+
+    /// The text of a scenario that has the name of the file.
+    fn file(
+        &self,
+        path: &Path,
+        episode: usize,
+        emitted: &dyn Fn(&emit::Provenance) -> ast::File,
+    ) -> Result<String, Failure> {
+        let (folder, name) = (path.parent().unwrap_or(Path::new(".")), path.file_stem().unwrap_or_default());
+        let space_path = load::relative(folder, &self.table.space().path)?;
+        let Player { command, agent, without, with, .. } = *self;
+        let (name, space_path) = (&*name.to_string_lossy(), space_path.as_str());
+        let source = emit::Provenance { command, name, space_path, episode, agent, without, with };
+        Ok(print(&emitted(&source)))
+    }
 }
 
 fn make_empty(path: &Path) -> Result<Held, Failure> {

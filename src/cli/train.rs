@@ -29,7 +29,7 @@ use super::policy::distil;
 use super::policy::distil::rules_text;
 use super::progress::{TrainingProgress, Working};
 use super::run::groups_text;
-use super::run_directory::{Resumed, RunDirectory};
+use super::run_directory::{Player, Resumed, RunDirectory};
 use super::{load, run_directory};
 
 /// Episodes between two checkpoints: at most so many are played again after a kill.
@@ -165,20 +165,15 @@ fn keep(
     stop: &AtomicBool,
 ) -> Result<(), Failure> {
     let settings = training.settings();
-    let rules = [&settings.without[..], &settings.with];
-    if trained.log.failure.is_some() {
-        let episode = (&trained.log, &trained.summary);
-        directory.write_failure("train", training.table(), episode, &settings.agent, rules)?;
-    }
+    let TrainSettings { agent, without, with, .. } = settings;
+    let player = Player { command: "train", table: training.table(), agent, without, with };
+    directory.write_failure(&player, (&trained.log, &trained.summary))?;
     // A training with an observation period of its own writes no scenario, because a replay would use the period
     // of the space.
     let has_scenario =
         trained.summary.counted() > 0 && settings.hyperparameters.observation_period_s().is_none();
-    let scenario = has_scenario.then(|| {
-        let log = training.log_of_space(&trained.log);
-        let episode = (&log, &trained.summary);
-        directory.write_critical("train", training.table(), episode, &settings.agent, rules)
-    });
+    let scenario = has_scenario
+        .then(|| directory.write_critical(&player, (&training.log_of_space(&trained.log), &trained.summary)));
     let scenario = scenario.transpose()?;
     let is_due = training.episodes().is_multiple_of(CHECKPOINT_EPISODES)
         || training.is_done()
