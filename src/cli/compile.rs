@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use avastra_campaign::run::road_named;
 use avastra_campaign::trial::{Cell, TrialSettings};
-use avastra_lang::syntax::yaml_mistake;
 use avastra_world::action::{ActionTable, TableFile};
 
 use super::arguments::{CompileArguments, TableArguments};
@@ -47,8 +46,7 @@ pub fn last(output: &Output) -> Result<ActionTable, Failure> {
     let path = load::read(Path::new(LAST)).map_err(|_| no_table())?;
     let path = PathBuf::from(path.trim_end());
     let text = load::text(&path)?;
-    let file: TableFile = serde_yaml::from_str(&text)
-        .map_err(|error| Failure::file("read", &path, yaml_mistake(&error, &text)))?;
+    let file: TableFile = load::parsed(&path, &text)?;
     let table = load::table(output, Path::new(&file.space))?;
     if table.file() != file {
         return Err(Failure::usage(format!(

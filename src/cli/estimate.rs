@@ -11,7 +11,6 @@ use avastra_campaign::estimate::{
     play_parts,
 };
 use avastra_campaign::run::{DatabaseError, Run, RunSettings, Shard, Units};
-use avastra_lang::syntax::yaml_mistake;
 use avastra_world::action::ActionTable;
 
 use super::arguments::{EstimateArguments, EventArgument, MethodArgument};
@@ -214,8 +213,7 @@ pub fn read(directory: &Path) -> Result<Contents, Failure> {
     if !file.is_file() {
         return Ok(Contents { settings: text, results: None, damaged: None, remarks: Vec::new() });
     }
-    let settings: EstimateSettings = serde_yaml::from_str(&text)
-        .map_err(|error| Failure::file("read", &path, yaml_mistake(&error, &text)))?;
+    let settings: EstimateSettings = load::parsed(&path, &text)?;
     let unread = |error| Failure::file("read", &file, error);
     let (database, damaged) = run_directory::open_to_read::<EstimateDatabase>(&file, &text)?;
     let scenarios = database.scenarios().map_err(unread)?;

@@ -14,7 +14,7 @@ use avastra_drivers::{EXTERNAL, ModularConfig, REGISTRY};
 use avastra_lang::check;
 use avastra_lang::check::{Loaded, ReadError};
 use avastra_lang::model::{Policy, Scenario, Space};
-use avastra_lang::syntax::nearest;
+use avastra_lang::syntax::{nearest, yaml_mistake};
 use avastra_world::action::ActionTable;
 use avastra_world::sim::TrafficProfile;
 
@@ -436,6 +436,14 @@ pub fn is_policy(loaded: &Loaded) -> bool {
 fn space(loaded: Loaded, path: &Path) -> Result<Arc<Space>, Failure> {
     let space = loaded.space.filter(|space| !space.actions.is_empty());
     space.ok_or_else(|| Failure::usage(format!("`{}` declares no action", path.display())))
+}
+
+/// What a text in YAML says; `path` is its file.
+///
+/// # Errors
+/// If it has another form: the reason, with its place.
+pub fn parsed<T: serde::de::DeserializeOwned>(path: &Path, text: &str) -> Result<T, Failure> {
+    serde_yaml::from_str(text).map_err(|error| Failure::file("read", path, yaml_mistake(&error, text)))
 }
 
 /// The text of a file that a command needs.

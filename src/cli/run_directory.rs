@@ -17,7 +17,7 @@ use avastra_campaign::files;
 use avastra_campaign::run::{Database, EpisodeSummary, Units, VERSION, WrittenScenario};
 use avastra_drivers::external::{Attached, ExternalSettings};
 use avastra_lang::check::normal;
-use avastra_lang::syntax::{ast, print, yaml_mistake};
+use avastra_lang::syntax::{ast, print};
 use avastra_world::action::ActionTable;
 use avastra_world::sim::ENGINE;
 
@@ -232,9 +232,8 @@ pub fn settings_of<C: Campaign>(directory: &Path) -> Result<(C, String), Failure
     let Kind { file: kind, what, .. } = C::KIND;
     let path = directory.join(format!("{kind}.yaml"));
     let text = load::text(&path)?;
-    let refuse = |error| Failure::file("read", &path, yaml_mistake(&error, &text));
     // Settings of another version may have other fields: this comes first.
-    let begun: Begun = serde_yaml::from_str(&text).map_err(refuse)?;
+    let begun: Begun = load::parsed(&path, &text)?;
     if (begun.engine.as_str(), begun.avastra.as_str()) != (ENGINE, VERSION) {
         return Err(Failure::usage(format!(
             "the {what} in `{}` was begun by avastra {} in world `{}`, this is avastra {VERSION} in `{ENGINE}`: begin a new one",
@@ -243,7 +242,7 @@ pub fn settings_of<C: Campaign>(directory: &Path) -> Result<(C, String), Failure
             begun.engine
         )));
     }
-    let settings = serde_yaml::from_str(&text).map_err(refuse)?;
+    let settings = load::parsed(&path, &text)?;
     Ok((settings, text))
 }
 

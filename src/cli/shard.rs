@@ -4,7 +4,6 @@
 use std::path::Path;
 
 use avastra_campaign::run::{SHARDS_MAX, Shard};
-use avastra_lang::syntax::yaml_mistake;
 
 use super::campaign::{Cut, costs};
 use super::error::Failure;
@@ -61,8 +60,7 @@ pub fn kept(directory: &Path) -> Result<Shard, Failure> {
     if !file.exists() {
         return Ok(Shard::WHOLE);
     }
-    let text = load::text(&file)?;
-    serde_yaml::from_str(&text).map_err(|error| Failure::file("read", &file, yaml_mistake(&error, &text)))
+    load::parsed(&file, &load::text(&file)?)
 }
 
 /// What comes after a shard is played.

@@ -10,7 +10,7 @@ use avastra_campaign::study::{
 };
 use avastra_drivers::external::Program;
 use avastra_exchange::report;
-use avastra_lang::syntax::{listed, yaml_mistake};
+use avastra_lang::syntax::listed;
 use avastra_world::action::ActionTable;
 
 use super::arguments::{StudyArguments, StudyCommand};
@@ -240,8 +240,7 @@ pub fn read_sound(directory: &Path) -> Result<(StudySettings, Vec<CellRecord>, O
         )));
     }
     let text = load::text(&path)?;
-    let settings: StudySettings = serde_yaml::from_str(&text)
-        .map_err(|error| Failure::file("read", &path, yaml_mistake(&error, &text)))?;
+    let settings: StudySettings = load::parsed(&path, &text)?;
     let unread = |error| Failure::file("read", &file, error);
     let (database, remark) = run_directory::open_to_read::<StudyDatabase>(&file, &text)?;
     let cells = Times::read(directory)?.on(database.cells().map_err(unread)?);
