@@ -50,7 +50,7 @@ impl Arena {
         let space = table.space();
         let roads = roads.iter().map(|name| {
             let index = road_named(space, name)?;
-            Ok((index, Arc::new(episode::scene(&space.roads[index]))))
+            Ok((index, Arc::new(Scene::of(&space.roads[index]))))
         });
         let roads: Vec<(usize, Arc<Scene>)> = roads.collect::<Result<_, RunError>>()?;
         let rules = RulesInForce::new(space, with, without)?;
@@ -117,7 +117,7 @@ impl Arena {
             rules: &self.rules,
             ads: self.ads.clone(),
             seed,
-            start: Start { traffic: self.traffic, ..episode::start(space, &memory, seed) },
+            start: Start { traffic: self.traffic, ..Start::drawn(space, &memory, seed) },
             memory,
             period_shifts: Vec::new(),
             proc: ProcKind::default(),
