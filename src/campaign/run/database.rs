@@ -23,7 +23,7 @@ use crate::run::settled::{Numbered, Units};
 use crate::run::shape::Shape;
 use crate::run::summary::{EpisodeSummary, Finding};
 
-pub const LAYOUT: Layout = Layout {
+pub(crate) const LAYOUT: Layout = Layout {
     version: 10,
     unit: "episode",
     tables: &["episode", "step", "held", "offer", "collision", "failure", "learning", "scenario"],
@@ -396,7 +396,7 @@ fn step_table() -> String {
 }
 
 /// An episode with its steps, its collisions and the text of its scenario, if one was written.
-pub fn add_all(
+pub(crate) fn add_all(
     transaction: &Transaction,
     summary: &EpisodeSummary,
     log: &EpisodeLog,

@@ -373,7 +373,7 @@ pub fn listed<S: AsRef<str>>(words: &[S]) -> String {
 }
 
 /// `a`, `b` or `c`.
-pub fn one_of<S: AsRef<str>>(words: &[S]) -> String {
+pub(crate) fn one_of<S: AsRef<str>>(words: &[S]) -> String {
     enumerated(&quoted(words), "or")
 }
 
@@ -382,7 +382,7 @@ fn quoted<S: AsRef<str>>(words: &[S]) -> Vec<String> {
 }
 
 /// `a, b or c`, with the given conjunction.
-pub fn enumerated<S: AsRef<str>>(words: &[S], conjunction: &str) -> String {
+pub(crate) fn enumerated<S: AsRef<str>>(words: &[S], conjunction: &str) -> String {
     let words: Vec<&str> = words.iter().map(S::as_ref).collect();
     match words.as_slice() {
         [] => String::new(),

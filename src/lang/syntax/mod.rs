@@ -29,10 +29,11 @@ mod scan;
 mod unfinished;
 mod yaml;
 
+pub use diagnostic::acts_on_terminal;
 pub use diagnostic::{
     Diagnostic, Edit, Fix, Label, Severity, Sources, Style, listed, nearest, render, visible,
 };
-pub use diagnostic::{acts_on_terminal, enumerated, one_of};
+pub(crate) use diagnostic::{enumerated, one_of};
 pub use format::{FormatError, format, same_meaning};
 pub use parse::{DEPTH_MAX, LANGUAGE, OPERATORS_MAX, TOKENS_MAX, parse, parse_fields};
 pub use print::{print, print_expr, print_item};
