@@ -154,15 +154,6 @@ pub fn recorded(scenario: &Scenario) -> Result<Selected, RunError> {
     selected(&scenario.name, ads, origin.profile.as_deref(), origin.profile_digest.as_deref())
 }
 
-/// The name of the driving system that a scenario was made with.
-pub fn recorded_name(scenario: &Scenario) -> String {
-    let ads = scenario.origin.ads.as_deref().unwrap_or(DEFAULT_ADS);
-    attached(scenario)
-        .ok()
-        .filter(|_| ads == EXTERNAL)
-        .map_or_else(|| ads.to_owned(), |attached| attached.name())
-}
-
 /// The external driving system that a scenario names.
 fn attached(scenario: &Scenario) -> Result<Attached, RunError> {
     let line = scenario.origin.profile.as_deref().unwrap_or_default();
