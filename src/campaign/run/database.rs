@@ -39,7 +39,7 @@ pub(crate) const LAYOUT: Layout = Layout {
            AND coalesce(first_counted_s, 0) BETWEEN 0 AND 1e9",
         ),
         ("collision", "time_s BETWEEN 0 AND 1e9 AND max(abs(ego_speed_mps), abs(delta_v_mps)) <= 1e9"),
-        ("learning", "simulated_s BETWEEN 0 AND 1e9 AND abs(return) <= 1e9"),
+        ("learning", "simulated_s BETWEEN 0 AND 1e9 AND abs(return) <= 1e12"),
     ],
 };
 
