@@ -7,15 +7,15 @@ use std::sync::atomic::AtomicBool;
 use avastra_base::statistics::Interval;
 use avastra_campaign::estimate::{
     Comparison, ComparisonResults, Estimate, EstimateDatabase, EstimateResults, EstimateSettings, EventKind,
-    Found, Mass, Met, Method, PILOT, Part, Pilot, Plan, Played, Probability, Stopping, WrittenScenario,
-    compared, pilot, play_parts,
+    Found, Mass, Met, Method, PILOT, Part, Pilot, Plan, Played, Probability, Stopping, compared, pilot,
+    play_parts,
 };
-use avastra_campaign::run::{DatabaseError, Numbered, Run, RunSettings, Shard, Units};
-use avastra_drivers::external::Attached;
+use avastra_campaign::run::{DatabaseError, Run, RunSettings, Shard, Units};
 use avastra_lang::syntax::yaml_mistake;
 use avastra_world::action::ActionTable;
 
 use super::arguments::{EstimateArguments, EventArgument, MethodArgument};
+use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, as_they_are};
 use super::error::Failure;
 use super::files::{remove, write};
 use super::findings::doubts;
@@ -25,14 +25,41 @@ use super::pack::pack_space;
 use super::parallel::jobs;
 use super::progress::{Progress, Working};
 use super::run::{critical_text, cut_short};
-use super::run_directory::{Held, Resumed, WrittenFile, write_scenario};
-use super::{conditions, load, run_directory, shard};
+use super::run_directory::{Held, Player, Resumed, written};
+use super::{conditions, load, merge, run_directory, shard};
 
 /// Episodes of a part, if a command line gives no number.
 const EPISODES: u32 = 50;
 
 /// Episodes on each road in which two driving systems are compared, if a command line gives no number.
 const EPISODES_OF_TWO: u32 = 250;
+
+impl Campaign for EstimateSettings {
+    const KIND: Kind = Kind {
+        what: "estimate",
+        command: "estimate",
+        file: "estimate",
+        is_in: |directory| directory.join("estimate.yaml").is_file(),
+        merge: Some(merge::merged::<EstimateSettings>),
+    };
+    type Database = EstimateDatabase;
+
+    fn outside(&mut self) -> Outside<'_> {
+        self.run.outside()
+    }
+}
+
+impl Cut for EstimateSettings {
+    fn work(&self) -> Vec<Item> {
+        let cost = u64::from(self.run.episodes);
+        let place = |part| self.place(part);
+        self.all_parts().into_iter().map(place).map(|part| Item { cost, units: part..part + 1 }).collect()
+    }
+
+    fn conclude(output: &Output, directory: &Path) -> Result<(), Failure> {
+        play_all(output, resumed(output, directory, true)?, None)
+    }
+}
 
 /// Plays what an estimate still lacks and prints its result, or compares two driving systems.
 pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Failure> {
@@ -44,27 +71,14 @@ pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Fa
         None => {
             let (estimate, shard) = wanted(output, arguments)?;
             if arguments.shard.dry_run {
-                run_directory::refuse_used(arguments.out.as_deref())?;
                 let settings = estimate.settings();
-                let costs = vec![u64::from(settings.run.episodes); settings.all_parts().len()];
-                shard::planned(
-                    output,
-                    &heading(&estimate),
-                    &planned_text(settings, costs.len()),
-                    &costs,
-                    shard,
-                );
-                return Ok(());
+                let texts = (&*heading(&estimate), &*planned_text(settings, settings.all_parts().len()));
+                return shard::planned(output, arguments.out.as_deref(), settings, texts, shard);
             }
             begun(arguments, estimate, shard)?
         }
     };
     play_all(output, begun, arguments.jobs)
-}
-
-/// Ends an estimate whose parts were all played, in shards.
-pub fn conclude(output: &Output, path: &Path) -> Result<(), Failure> {
-    play_all(output, resumed(output, path, true)?, None)
 }
 
 /// Plays the parts that a directory still lacks, and says what all of them came to.
@@ -78,38 +92,32 @@ fn play_all(
     let stop = stop_on_interrupt();
     let mut database: EstimateDatabase = run_directory::open_to_go_on(output, &file, &settings)?;
     let unread = |error| Failure::file("read", &file, error);
-    run_directory::restore(output, "estimate", &files_of(&path, database.scenarios().map_err(unread)?))?;
-    let shard = shard::kept(&path)?;
+    run_directory::restore(output, "estimate", &written(&path, database.scenarios().map_err(unread)?))?;
+    let share = Share::of(&path, estimate.settings())?;
     output.tell(&format!("{}, into {}", heading(&estimate), path.display()));
     let jobs = jobs(asked_jobs, estimate.run().program())?;
-    let interrupted = || Failure::Interrupted { command: "estimate", directory: path.clone() };
     let Some(pilot) = piloted(output, &estimate, (&mut database, &file), jobs, &stop)? else {
-        return Err(interrupted());
+        return share.end::<EstimateSettings>(output, path, false, None);
     };
     let plan = Plan::of(&pilot, 0.0);
 
     let labels: Vec<String> = estimate.run().table().rows().iter().map(|row| row.label.clone()).collect();
     let all = estimate.settings().all_parts();
-    let own: Vec<Part> = shard.share(&vec![1; all.len()]).into_iter().map(|part| all[part]).collect();
-    let episodes = u64::from(estimate.settings().run.episodes);
-    let mut progress = Progress::new(
-        output,
-        estimate.settings().event.noun(),
-        own.len() as u64 * episodes,
-        database.parts().map_err(unread)?.len() as u64 * episodes,
-    );
+    let lacking = |database: &EstimateDatabase| share.lacking(estimate.settings(), database).map_err(unread);
+    let noun = estimate.settings().event.noun();
+    let mut progress = share.progress(output, noun, &lacking(&database)?);
     // A shard cannot know when all of them together are precise enough: it plays all of its parts, and the looks are taken
     // when they are merged.
-    let looks = match shard.is_whole() {
+    let looks = match share.shard.is_whole() {
         true => estimate.settings().looks(),
         false => vec![estimate.settings().parts],
     };
     let mut results = None;
     for look in looks {
-        let is_at_look = |part: &Part| part.number < look;
-        let done: Vec<Part> = database.parts().map_err(unread)?.iter().map(|record| record.part).collect();
-        let wanted: Vec<Part> = own.iter().copied().filter(is_at_look).collect();
-        let todo: Vec<Part> = wanted.iter().copied().filter(|part| !done.contains(part)).collect();
+        let at = |items: &[usize]| -> Vec<Part> {
+            items.iter().map(|&part| all[part]).filter(|part| part.number < look).collect()
+        };
+        let (wanted, todo) = (at(&share.own), at(&lacking(&database)?));
         if !todo.is_empty() {
             run_directory::refuse_to_play(&path, "estimate", is_started(&estimate))?;
         }
@@ -119,7 +127,7 @@ fn play_all(
                 output.say("no estimate: the driving system failed; `avastra run` with it says how");
                 return Err(Failure::Ads { findings: played.record.failed as usize });
             }
-            let scenarios = written(&estimate, &path, &played)?;
+            let scenarios = write_scenarios(&estimate, &path, &played)?;
             for number in 0..played.record.episodes {
                 progress.episode(usize::from(number < played.record.events));
             }
@@ -137,11 +145,11 @@ fn play_all(
 
     let (results, kept, is_unfinished) = results.expect("every estimate looks once");
     if !is_unfinished {
-        settled(estimate.settings(), database, &path, &kept)?;
+        settled_with(estimate.settings(), database, &path, &kept)?;
     }
     let text = serde_json::to_string_pretty(&results).expect("results have string keys only");
     write(&path.join("results.json"), &format!("{text}\n"))?;
-    output.say(&estimate_text(&results, is_unfinished, shard));
+    output.say(&estimate_text(&results, is_unfinished, share.shard));
     let critical = load::sources_in(&path.join("critical"))?;
     output.say(&critical_text(&path, &critical));
     let doubts = doubts(estimate.run().program());
@@ -149,13 +157,7 @@ fn play_all(
     output.result(serde_json::json!({
         "directory": path, "results": results, "critical": critical, "reproducible": doubts.is_empty(),
     }));
-    if is_unfinished {
-        return Err(interrupted());
-    }
-    if !shard.is_whole() {
-        output.say(&shard::next_step(shard));
-    }
-    Ok(())
+    share.end::<EstimateSettings>(output, path, !is_unfinished, None)
 }
 
 /// An estimate's results up to a look.
@@ -217,7 +219,7 @@ pub fn read(directory: &Path) -> Result<Contents, Failure> {
     let unread = |error| Failure::file("read", &file, error);
     let (database, damaged) = run_directory::open_to_read::<EstimateDatabase>(&file, &text)?;
     let scenarios = database.scenarios().map_err(unread)?;
-    let mut remarks = run_directory::remarks_on(&files_of(directory, scenarios));
+    let mut remarks = run_directory::remarks_on(&written(directory, scenarios));
     let table = load::table(&Output::silent(), &directory.join(&settings.run.space)).ok();
     let is_it = |table: &ActionTable| table.space().meaning.is_sealed_by(&settings.run.space_digest);
     let labels: Vec<String> = match table.filter(is_it) {
@@ -250,14 +252,8 @@ pub fn read(directory: &Path) -> Result<Contents, Failure> {
 /// No table has more rows than this.
 const ROWS_MAX: usize = 1_000_000;
 
-/// The files of scenarios in a directory.
-fn files_of(directory: &Path, scenarios: Vec<WrittenScenario>) -> Vec<WrittenFile> {
-    let critical = directory.join("critical");
-    scenarios.into_iter().map(|found| (critical.join(found.name), found.text)).collect()
-}
-
 /// Settles the database with these parts alone; what was found in others goes, too.
-fn settled(
+fn settled_with(
     settings: &EstimateSettings,
     database: EstimateDatabase,
     directory: &Path,
@@ -267,14 +263,13 @@ fn settled(
     let unread = |error| Failure::file("read", &file, error);
     let wanted: BTreeSet<i64> = parts.iter().map(|part| settings.place(*part)).chain([PILOT]).collect();
     let mut scenarios = database.scenarios().map_err(unread)?;
-    scenarios.retain(|scenario| !wanted.contains(&scenario.part));
-    for (scenario, _) in files_of(directory, scenarios) {
+    scenarios.retain(|scenario| !wanted.contains(&scenario.unit));
+    for (scenario, _) in written(directory, scenarios) {
         remove(&load::answers_path(&scenario))?;
         remove(&scenario)?;
     }
-    let mut kept = database.numbers().map_err(unread)?;
-    kept.retain(|number| wanted.contains(number));
-    let kept: Vec<Numbered> = kept.into_iter().map(|number| (number, number)).collect();
+    let mut kept = as_they_are(&database).map_err(unread)?;
+    kept.retain(|(number, _)| wanted.contains(number));
     database.settle(&file, &kept).map_err(|error| Failure::file("write", &file, error))
 }
 
@@ -311,13 +306,13 @@ fn piloted(
 
 /// Writes what a part met as scenarios, where the space's verdict counts it; name and text of the file of each event, if
 /// there is one.
-fn written(
+fn write_scenarios(
     estimate: &Estimate,
     directory: &Path,
     played: &Played,
 ) -> Result<Vec<Option<(String, String)>>, Failure> {
-    let settings = &estimate.settings().run;
-    let rules = [&settings.without[..], &settings.with];
+    let RunSettings { agent, without, with, .. } = &estimate.settings().run;
+    let player = Player { command: "estimate", table: estimate.run().table(), agent, without, with };
     let critical = directory.join("critical");
     let write_one = |met: &Met| {
         if met.summary.counted() == 0 {
@@ -331,8 +326,7 @@ fn written(
             _ => String::new(),
         };
         let name = format!("{}_{:04}{tried}.ava", met.log.road, met.summary.episode);
-        let (table, episode) = (estimate.run().table(), (&met.log, &met.summary));
-        let text = write_scenario(&critical.join(&name), "estimate", table, episode, &settings.agent, rules)?;
+        let text = player.write_scenario(&critical.join(&name), (&met.log, &met.summary))?;
         Ok(Some((name, text)))
     };
     played.met.iter().map(write_one).collect()
@@ -372,25 +366,16 @@ fn begun(
     shard::keep(&held.path, shard)?;
     // As in a run: its scenarios can be looked at even if the author changes the space.
     pack_space(&estimate.run().space().path, &held.path)?;
-    let space = load::relative(&held.path, &estimate.run().space().path)?;
-    let attached = estimate.run().attached();
-    let external = attached.map(|attached| run_directory::to_record(&held.path, attached)).transpose()?;
-    let settings = estimate.settings().clone();
-    let settings = EstimateSettings { run: RunSettings { space, external, ..settings.run }, ..settings };
-    let text = run_directory::write_settings(&held.path, "estimate", &settings)?;
+    let (space, attached) = (&estimate.run().space().path, estimate.run().attached());
+    let text = run_directory::begin(&held.path, estimate.settings().clone(), space, attached)?;
     Ok((estimate, held, text))
 }
 
 /// The rest of an interrupted estimate, with the text of its settings.
 /// With `is_played`, nothing of it is left to play, and no program is started.
 fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Estimate, Held, String), Failure> {
-    let resumed: Resumed<EstimateSettings> = run_directory::resume(output, path, "estimate", "estimate")?;
+    let resumed = run_directory::resume::<EstimateSettings>(output, path, is_played)?;
     let Resumed { settings, text, table, held } = resumed;
-    let external = settings
-        .run
-        .external
-        .map(|attached| Attached { is_recorded: is_played, ..run_directory::from_record(path, attached) });
-    let settings = EstimateSettings { run: RunSettings { external, ..settings.run }, ..settings };
     Ok((Estimate::new(table, settings).map_err(Failure::usage)?, held, text))
 }
 

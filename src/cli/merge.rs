@@ -16,26 +16,21 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
 use std::path::{Component, Path, PathBuf};
 
-use serde::Serialize;
-use serde::de::DeserializeOwned;
-
-use avastra_campaign::estimate::{EstimateDatabase, EstimateSettings, WrittenScenario};
 use avastra_campaign::files;
 use avastra_campaign::files::PlainName;
 use avastra_campaign::run::{
-    Database, DatabaseError, Numbered, PolicyReference, RunSettings, Shard, Units, settings_differences,
+    DatabaseError, Numbered, PolicyReference, Shard, Units, WrittenScenario, settings_differences,
 };
-use avastra_campaign::study::{StudyDatabase, StudySettings};
 use avastra_drivers::external::Attached;
 use avastra_lang::syntax::ast::{Expr, ExprKind, FileId, ItemKind};
 use avastra_lang::syntax::{parse, print_expr};
 
 use super::arguments::MergeArguments;
+use super::campaign::{Cut, Item, Kind, costs};
 use super::error::Failure;
 use super::files::{folder, make, remove, write};
 use super::output::{Output, plural};
-use super::timing::Times;
-use super::{estimate, load, pack, run, run_directory, shard, study, timing};
+use super::{load, pack, run_directory, shard, timing};
 
 /// Tells a directory that a killed merge left from one of somebody else's.
 const MARK: &str = "merge.partial";
@@ -55,48 +50,13 @@ pub fn merge(output: &Output, arguments: &MergeArguments) -> Result<(), Failure>
     };
     let out = arguments.out.as_deref();
     match run_directory::what_was_begun(first) {
-        Some("run") => merged::<RunSettings>(output, &directories, out),
-        Some("study") => merged::<StudySettings>(output, &directories, out),
-        Some("estimate") => merged::<EstimateSettings>(output, &directories, out),
-        Some(other) => Err(Failure::usage(format!(
-            "`{}` holds a {other}, which is one piece: each episode is chosen with what was learned before",
+        Some(Kind { merge: Some(merge), .. }) => merge(output, &directories, out),
+        Some(Kind { what, .. }) => Err(Failure::usage(format!(
+            "`{}` holds a {what}, which is one piece: each episode is chosen with what was learned before",
             first.display()
         ))),
         None => Err(Failure::usage(format!("`{}` holds no run, study or estimate", first.display()))),
     }
-}
-
-/// What is cut into shards, by its settings.
-trait Cut: Serialize + DeserializeOwned {
-    type Database: Units;
-    /// The name of its files: `run.yaml`, `run.db`.
-    const KIND: &'static str;
-    /// The path and the digest of its space.
-    fn space(&self) -> (&str, &str);
-    /// The policy that is played.
-    fn policy(&self) -> Option<&PolicyReference>;
-    /// The settings as they stand in another directory.
-    fn moved(self, way: &Way) -> Result<Self, Failure>;
-    /// Everything that is shared out.
-    fn work(&self) -> Vec<Item>;
-    /// The numbers of the units of a file, each with the one in a settled file.
-    fn numbered(&self, database: &Self::Database) -> Result<Vec<Numbered>, DatabaseError>;
-    /// Takes a shard's units over, with the files that were written of them.
-    fn take(
-        output: &Output,
-        into: &mut Self::Database,
-        shard: &Played<Self>,
-        way: &Way,
-    ) -> Result<(), Failure>;
-    /// Ends a directory in which all is played.
-    fn conclude(output: &Output, directory: &Path) -> Result<(), Failure>;
-}
-
-/// What a shard has as a whole, or not at all.
-struct Item {
-    cost: u64,
-    /// The numbers of its units in a settled file.
-    units: Vec<i64>,
 }
 
 /// What the settings of all shards name outside of them.
@@ -127,7 +87,7 @@ struct Played<C: Cut> {
 
 impl<C: Cut> Played<C> {
     fn file(&self) -> PathBuf {
-        self.path.join(format!("{}.db", C::KIND))
+        self.path.join(format!("{}.db", C::KIND.file))
     }
 
     fn text(&self) -> String {
@@ -136,14 +96,15 @@ impl<C: Cut> Played<C> {
 
     /// Reads the settings of a directory; `to` is one beside the merged directory, or itself.
     fn read(path: &Path, to: &Path, outside: &Outside) -> Result<Played<C>, Failure> {
-        if run_directory::what_was_begun(path) != Some(C::KIND) {
-            let (path, kind) = (path.display(), C::KIND);
-            return Err(Failure::usage(format!("`{path}` holds no {kind}, which the first directory does")));
+        let what = C::KIND.what;
+        if run_directory::what_was_begun(path).is_none_or(|found| found.what != what) {
+            let path = path.display();
+            return Err(Failure::usage(format!("`{path}` holds no {what}, which the first directory does")));
         }
-        let (settings, begun) = run_directory::settings_of::<C>(path, C::KIND, C::KIND)?;
+        let (settings, begun) = run_directory::settings_of::<C>(path)?;
         Ok(Played {
             path: path.to_owned(),
-            settings: settings.moved(&Way { from: path, to, outside })?,
+            settings: Way { from: path, to, outside }.settings(settings)?,
             begun,
             shard: shard::kept(path)?,
             database: None,
@@ -163,8 +124,8 @@ impl<C: Cut> Played<C> {
     }
 }
 
-/// Without `out`, only says what is missing.
-fn merged<C: Cut>(output: &Output, directories: &[PathBuf], out: Option<&Path>) -> Result<(), Failure> {
+/// Brings the shards of one kind together. Without `out`, only says what is missing.
+pub fn merged<C: Cut>(output: &Output, directories: &[PathBuf], out: Option<&Path>) -> Result<(), Failure> {
     let outside = Outside::of::<C>(&directories[0])?;
     let unusable = |file: &Path, error| Failure::file("open", file, error);
     let Some(out) = out else {
@@ -237,7 +198,7 @@ impl Survey {
                 let (path, first) = (path.display(), directories[0].display());
                 return Err(Failure::usage(format!(
                     "`{path}` is no shard of the {} in `{first}`, where {what}",
-                    C::KIND
+                    C::KIND.what
                 )));
             }
             have.extend(played.units.iter().map(|(_, place)| place));
@@ -253,9 +214,8 @@ impl Survey {
         }
         let (settings, work) = wanted.expect("there is a directory");
         let shards = cut.map_or(1, |(shard, _)| shard.count());
-        let costs: Vec<u64> = work.iter().map(|item| item.cost).collect();
-        let of_items = Shard::of_items(&costs, shards);
-        let lacks = |(item, _): &(&Item, u32)| !item.units.iter().all(|unit| have.contains(unit));
+        let of_items = Shard::of_items(&costs(&work), shards);
+        let lacks = |(item, _): &(&Item, u32)| !item.is_in(&have);
         let missing = work.iter().zip(of_items).filter(lacks).map(|(_, shard)| shard).collect();
         Ok(Survey { settings, shards, missing })
     }
@@ -323,15 +283,21 @@ fn bring_together<C: Cut>(
     (partial, outside): (&Path, &Outside),
     text: &str,
 ) -> Result<(), Failure> {
-    write(&partial.join(format!("{}.yaml", C::KIND)), text)?;
-    let file = partial.join(format!("{}.db", C::KIND));
+    write(&partial.join(format!("{}.yaml", C::KIND.file)), text)?;
+    let file = partial.join(format!("{}.db", C::KIND.file));
     let mut into = C::Database::open(&file, text).map_err(|error| Failure::file("open", &file, error))?;
     for path in directories {
         let _held = run_directory::hold(path)?;
         let mut played = Played::<C>::read(path, partial, outside)?;
         played.open().map_err(|error| Failure::file("open", &played.file(), error))?;
-        if played.database.is_some() {
-            C::take(output, &mut into, &played, &Way { from: path, to: partial, outside })?;
+        if let Some(database) = &played.database {
+            let written =
+                database.scenarios().map_err(|error| Failure::file("read", &played.file(), error))?;
+            let way = Way { from: path, to: partial, outside };
+            let moved = if C::Database::keeps_scenarios() { way.files(output, written)? } else { Vec::new() };
+            C::take_beside([path, partial])?;
+            into.take(&played.file(), &played.units, &moved)
+                .map_err(|error| Failure::file("merge", &played.file(), error))?;
         }
     }
     Ok(())
@@ -345,7 +311,7 @@ fn publish<C: Cut>(
     text: &str,
 ) -> Result<(), Failure> {
     // Its warnings are told when the directory is ended; why it cannot be is told here.
-    let resumed = |output| run_directory::resume::<C>(output, partial, C::KIND, C::KIND).map(drop);
+    let resumed = |output| run_directory::resume::<C>(output, partial, true).map(drop);
     resumed(&Output::silent()).or_else(|_| resumed(output))?;
     if !out.exists() || std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_none()) {
         // In this order: a kill in between leaves a whole directory, and not a partial one that nobody would take up.
@@ -412,9 +378,11 @@ fn files_of(directory: &Path) -> Result<BTreeMap<PathBuf, PathBuf>, Failure> {
 impl Outside {
     /// What the settings of a directory name, where they say or elsewhere, if it means what it meant.
     fn of<C: Cut>(directory: &Path) -> Result<Outside, Failure> {
-        let (settings, _) = run_directory::settings_of::<C>(directory, C::KIND, C::KIND)?;
+        let (mut settings, _) = run_directory::settings_of::<C>(directory)?;
+        let named = settings.outside();
         let silent = Output::silent();
-        let (path, seal) = settings.space();
+        let (path, seal, policy) =
+            (&*named.space, named.space_digest, named.policy.as_deref().and_then(Option::as_ref));
         let is_sealed = |file: &PathBuf| {
             load::table(&silent, file).is_ok_and(|table| table.space().meaning.is_sealed_by(seal))
         };
@@ -422,12 +390,12 @@ impl Outside {
         let space = match found("space", path, directory, &is_sealed) {
             Err(_) if direct.is_file() => {
                 // What has changed in it is said before the directory is published. A policy cannot be read in it.
-                let policy = settings.policy().map(|policy| directory.join(&policy.file));
+                let policy = policy.map(|policy| directory.join(&policy.file));
                 return Ok(Outside { space: direct, policy });
             }
             found => found?,
         };
-        let policy = settings.policy().map(|policy| {
+        let policy = policy.map(|policy| {
             let is_it = |file: &PathBuf| {
                 load::policy(&silent, file).is_ok_and(|(_, found)| found.digest == policy.digest)
             };
@@ -506,17 +474,62 @@ impl Way<'_> {
         external.map(moved).transpose()
     }
 
-    /// Settings of a run as they stand in the other directory.
-    fn run(&self, settings: RunSettings) -> Result<RunSettings, Failure> {
-        let policy = settings.policy.zip(self.outside.policy.as_deref()).map(|(policy, found)| {
-            load::relative(self.to, found).map(|file| PolicyReference { file, ..policy })
-        });
-        Ok(RunSettings {
-            space: self.space(&settings.space)?,
-            policy: policy.transpose()?,
-            external: self.external(settings.external)?,
-            ..settings
-        })
+    /// Settings as they stand in the other directory.
+    fn settings<C: Cut>(&self, mut settings: C) -> Result<C, Failure> {
+        let named = settings.outside();
+        *named.space = self.space(named.space)?;
+        *named.external = self.external(named.external.take())?;
+        if let Some(policy) = named.policy {
+            let moved = policy.take().zip(self.outside.policy.as_deref()).map(|(policy, found)| {
+                load::relative(self.to, found).map(|file| PolicyReference { file, ..policy })
+            });
+            *policy = moved.transpose()?;
+        }
+        Ok(settings)
+    }
+
+    /// Takes over the files of a directory with these scenarios, and returns the scenarios with their texts in the other one.
+    fn files(
+        &self,
+        output: &Output,
+        written: Vec<WrittenScenario>,
+    ) -> Result<Vec<(WrittenScenario, String)>, Failure> {
+        let [from, to] = self.within("critical")?;
+        folder(self.to, "critical")?;
+        let critical = Way { from: &from, to: &to, ..*self };
+        if from.join(pack::SPACE).is_dir() {
+            copy_folder(OsStr::new(pack::SPACE), [&from, &to])?;
+        }
+        self.copy_space()?;
+        let copied = |found: WrittenScenario| {
+            let text = copy_written(output, &found.name, &found.text, &critical)?;
+            Ok::<_, Failure>((found, text))
+        };
+        let moved = written.into_iter().map(copied).collect::<Result<_, _>>()?;
+        self.failures()?;
+        Ok(moved)
+    }
+
+    /// Takes over the episodes that an external driving system failed in.
+    fn failures(&self) -> Result<(), Failure> {
+        let [from, to] = self.within("failures")?;
+        if !from.is_dir() {
+            return Ok(());
+        }
+        let failures = Way { from: &from, to: &to, ..*self };
+        folder(self.to, "failures")?;
+        let failed = |error| Failure::file("read", &from, error);
+        for entry in std::fs::read_dir(&from).map_err(failed)? {
+            let path = entry.map_err(failed)?.path();
+            let name = PlainName::new(path.file_name().unwrap_or_default().to_string_lossy());
+            let name = name.map_err(|error| Failure::file("merge", &path, error))?;
+            match path.extension().and_then(OsStr::to_str) {
+                Some("ava") => drop(copy_scenario(&name, &own_text(&path)?, &failures)?),
+                Some("txt") => copy_text(&to.join(name), &own_text(&path)?)?,
+                _ => {}
+            }
+        }
+        Ok(())
     }
 
     /// Folders of this name in both directories. The first may be missing, and must be no link.
@@ -593,180 +606,4 @@ fn copy_folder(name: &OsStr, [from, to]: [&Path; 2]) -> Result<(), Failure> {
         }
     }
     Ok(())
-}
-
-impl Cut for RunSettings {
-    type Database = Database;
-    const KIND: &'static str = "run";
-
-    fn space(&self) -> (&str, &str) {
-        (&self.space, &self.space_digest)
-    }
-
-    fn policy(&self) -> Option<&PolicyReference> {
-        self.policy.as_ref()
-    }
-
-    fn moved(self, way: &Way) -> Result<RunSettings, Failure> {
-        way.run(self)
-    }
-
-    fn work(&self) -> Vec<Item> {
-        let episodes = self.roads.len() as i64 * i64::from(self.episodes);
-        (0..episodes).map(|number| Item { cost: 1, units: vec![number] }).collect()
-    }
-
-    fn numbered(&self, database: &Database) -> Result<Vec<Numbered>, DatabaseError> {
-        as_they_are(database)
-    }
-
-    fn take(
-        output: &Output,
-        into: &mut Database,
-        shard: &Played<RunSettings>,
-        way: &Way,
-    ) -> Result<(), Failure> {
-        let [from, to] = way.within("critical")?;
-        folder(way.to, "critical")?;
-        let critical = Way { from: &from, to: &to, ..*way };
-        if from.join(pack::SPACE).is_dir() {
-            copy_folder(OsStr::new(pack::SPACE), [&from, &to])?;
-        }
-        way.copy_space()?;
-        let database = shard.database.iter().map(Database::scenarios).next();
-        let written = database.transpose().map_err(|error| Failure::file("read", &shard.file(), error))?;
-        let mut scenarios = Vec::new();
-        for (episode, road, text) in written.unwrap_or_default() {
-            let name = PlainName::scenario(format!("{}.ava", run_directory::scenario_name(&road, episode)));
-            let name = name.map_err(|error| Failure::file("merge", &shard.file(), error))?;
-            scenarios.push((episode, copy_written(output, &name, &text, &critical)?));
-        }
-        let [from, to] = way.within("failures")?;
-        let failures = Way { from: &from, to: &to, ..*way };
-        if from.is_dir() {
-            folder(way.to, "failures")?;
-            let failed = |error| Failure::file("read", &from, error);
-            for entry in std::fs::read_dir(&from).map_err(failed)? {
-                let path = entry.map_err(failed)?.path();
-                let name = PlainName::new(path.file_name().unwrap_or_default().to_string_lossy());
-                let name = name.map_err(|error| Failure::file("merge", &path, error))?;
-                match path.extension().and_then(OsStr::to_str) {
-                    Some("ava") => drop(copy_scenario(&name, &own_text(&path)?, &failures)?),
-                    Some("txt") => copy_text(&to.join(name), &own_text(&path)?)?,
-                    _ => {}
-                }
-            }
-        }
-        let taken = into.take_episodes(&shard.file(), &shard.units, &scenarios);
-        taken.map_err(|error| Failure::file("merge", &shard.file(), error))
-    }
-
-    fn conclude(output: &Output, directory: &Path) -> Result<(), Failure> {
-        run::conclude(output, directory)
-    }
-}
-
-impl Cut for StudySettings {
-    type Database = StudyDatabase;
-    const KIND: &'static str = "study";
-
-    fn space(&self) -> (&str, &str) {
-        (&self.space, &self.space_digest)
-    }
-
-    fn policy(&self) -> Option<&PolicyReference> {
-        None
-    }
-
-    fn moved(self, way: &Way) -> Result<StudySettings, Failure> {
-        let (space, external) = (way.space(&self.space)?, way.external(self.external.clone())?);
-        Ok(StudySettings { space, external, ..self })
-    }
-
-    fn work(&self) -> Vec<Item> {
-        let mut places = 1..;
-        let job = |job: avastra_campaign::study::Job| Item {
-            cost: self.episodes(&job),
-            units: places.by_ref().take(job.roads.len()).collect(),
-        };
-        self.jobs().into_iter().map(job).collect()
-    }
-
-    fn numbered(&self, database: &StudyDatabase) -> Result<Vec<Numbered>, DatabaseError> {
-        database.places(self)
-    }
-
-    fn take(
-        _: &Output,
-        into: &mut StudyDatabase,
-        shard: &Played<StudySettings>,
-        way: &Way,
-    ) -> Result<(), Failure> {
-        let mut times = Times::read(way.to)?;
-        if shard.database.is_some() {
-            times.extend(Times::read(&shard.path)?);
-        }
-        times.write(way.to)?;
-        let taken = into.take(&shard.file(), &shard.units, &|_| Ok(()));
-        taken.map_err(|error| Failure::file("merge", &shard.file(), error))
-    }
-
-    fn conclude(output: &Output, directory: &Path) -> Result<(), Failure> {
-        study::conclude(output, directory)
-    }
-}
-
-impl Cut for EstimateSettings {
-    type Database = EstimateDatabase;
-    const KIND: &'static str = "estimate";
-
-    fn space(&self) -> (&str, &str) {
-        self.run.space()
-    }
-
-    fn policy(&self) -> Option<&PolicyReference> {
-        self.run.policy()
-    }
-
-    fn moved(self, way: &Way) -> Result<EstimateSettings, Failure> {
-        Ok(EstimateSettings { run: way.run(self.run)?, ..self })
-    }
-
-    fn work(&self) -> Vec<Item> {
-        self.all_parts().into_iter().map(|part| Item { cost: 1, units: vec![self.place(part)] }).collect()
-    }
-
-    fn numbered(&self, database: &EstimateDatabase) -> Result<Vec<Numbered>, DatabaseError> {
-        as_they_are(database)
-    }
-
-    fn take(
-        output: &Output,
-        into: &mut EstimateDatabase,
-        shard: &Played<EstimateSettings>,
-        way: &Way,
-    ) -> Result<(), Failure> {
-        let [from, to] = way.within("critical")?;
-        folder(way.to, "critical")?;
-        let critical = Way { from: &from, to: &to, ..*way };
-        way.copy_space()?;
-        let written = shard.database.iter().map(EstimateDatabase::scenarios).next();
-        let written = written.transpose().map_err(|error| Failure::file("read", &shard.file(), error))?;
-        let mut scenarios = Vec::new();
-        for found in written.unwrap_or_default() {
-            let text = copy_written(output, &found.name, &found.text, &critical)?;
-            scenarios.push(WrittenScenario { text, ..found });
-        }
-        let taken = into.take_parts(&shard.file(), &shard.units, &scenarios);
-        taken.map_err(|error| Failure::file("merge", &shard.file(), error))
-    }
-
-    fn conclude(output: &Output, directory: &Path) -> Result<(), Failure> {
-        estimate::conclude(output, directory)
-    }
-}
-
-/// Units that have the same numbers in every file.
-fn as_they_are(database: &impl Units) -> Result<Vec<Numbered>, DatabaseError> {
-    Ok(database.numbers()?.into_iter().map(|number| (number, number)).collect())
 }

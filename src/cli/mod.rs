@@ -2,6 +2,7 @@
 
 mod ads;
 mod arguments;
+mod campaign;
 mod check;
 mod compile;
 mod completions;

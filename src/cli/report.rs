@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use avastra_campaign::run::{Asked, Database, DatabaseError};
+use avastra_campaign::run::{Asked, Database, DatabaseError, Units};
 use avastra_campaign::study::StudyResults;
 use avastra_exchange::report;
 use avastra_exchange::report::{Page, Scene, record, record_another};
@@ -215,11 +215,8 @@ fn of_run(
     let unread = |error| Failure::file("read", &path, error);
     let (database, damaged) = run_directory::open_to_read::<Database>(&path, settings)?;
     let mut remarks: Vec<String> = damaged.into_iter().collect();
-    let written = database.scenarios().map_err(unread)?.into_iter().map(|(episode, road, text)| {
-        let name = run_directory::scenario_name(&road, episode);
-        (directory.join("critical").join(format!("{name}.ava")), text)
-    });
-    remarks.extend(run_directory::remarks_on(&written.collect::<Vec<_>>()));
+    let written = run_directory::written(directory, database.scenarios().map_err(unread)?);
+    remarks.extend(run_directory::remarks_on(&written));
     let space = serde_yaml::from_str::<Begun>(settings).ok().map(|begun| directory.join(begun.space));
     // A page of what was found is worth having without the names of the rows.
     let table: Option<ActionTable> = space.and_then(|space| load::table(output, &space).ok());

@@ -8,17 +8,19 @@ use std::time::Instant;
 use avastra_campaign::emit;
 use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::run::{
-    EpisodeSummary, Group, PolicyReference, RefusalCount, Run, RunSettings, Shard, Totals, Units, play,
+    Database, DatabaseError, EpisodeSummary, Group, Numbered, PolicyReference, RefusalCount, Run,
+    RunSettings, Shard, Totals, play,
 };
-use avastra_drivers::external::{Attached, Conversation, Problem};
+use avastra_drivers::external::{Conversation, Problem};
 use avastra_lang::model::Policy;
 use avastra_search::agent::Face;
 use avastra_world::action::ActionTable;
 
 use super::arguments::{FaceArgument, RunArguments};
+use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, settled};
 use super::error::Failure;
 use super::files::write_answers;
-use super::findings::{cut_off, doubts, failures_text, unfinished};
+use super::findings::{cut_off, doubts, failures_text};
 use super::interrupt::stop_on_interrupt;
 use super::never::Never;
 use super::output::Output;
@@ -26,12 +28,50 @@ use super::output::plural;
 use super::pack::pack_space;
 use super::parallel::jobs;
 use super::policy::acting;
-use super::progress::Progress;
-use super::run_directory::{Resumed, RunDirectory, WrittenFile};
-use super::{compile, conditions, load, run_directory, shard};
+use super::run_directory::{Player, Resumed, RunDirectory};
+use super::{compile, conditions, load, merge, run_directory, shard};
 
 /// Largest number of critical scenarios, groups and refusal reasons that the summary lists.
 const NAMED_MAX: usize = 10;
+
+impl Campaign for RunSettings {
+    const KIND: Kind = Kind {
+        what: "run",
+        command: "run",
+        file: "run",
+        is_in: |directory| {
+            run_directory::fields_of(directory, "run")
+                .is_some_and(|fields| !fields.contains_key("hyperparameters"))
+        },
+        merge: Some(merge::merged::<RunSettings>),
+    };
+    type Database = Database;
+
+    fn outside(&mut self) -> Outside<'_> {
+        Outside {
+            space: &mut self.space,
+            space_digest: &self.space_digest,
+            external: &mut self.external,
+            policy: Some(&mut self.policy),
+        }
+    }
+}
+
+impl Cut for RunSettings {
+    fn work(&self) -> Vec<Item> {
+        let episodes = self.roads.len() as i64 * i64::from(self.episodes);
+        (0..episodes).map(|number| Item { cost: 1, units: number..number + 1 }).collect()
+    }
+
+    fn numbered(&self, database: &Database) -> Result<Vec<Numbered>, DatabaseError> {
+        Ok(database.episodes()?.into_iter().map(|number| (number as i64, number as i64)).collect())
+    }
+
+    fn conclude(output: &Output, directory: &Path) -> Result<(), Failure> {
+        let (run, directory) = resumed(output, directory, true)?;
+        play_all(output, run, directory, None).map(drop)
+    }
+}
 
 /// Plays the episodes of a new run, or those that an interrupted one still lacks.
 pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
@@ -40,11 +80,9 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
         None => {
             let wanted = wanted(output, arguments)?;
             if arguments.shard.dry_run {
-                run_directory::refuse_used(arguments.out.as_deref())?;
-                let costs = vec![1; wanted.run.episodes()];
-                let what = plural(costs.len(), "episode");
-                shard::planned(output, &heading(&wanted.run, arguments), &what, &costs, wanted.shard);
-                return Ok(());
+                let (run, out) = (&wanted.run, arguments.out.as_deref());
+                let texts = (&*heading(run, arguments), &*plural(run.episodes(), "episode"));
+                return shard::planned(output, out, run.settings(), texts, wanted.shard);
             }
             begun(output, arguments, wanted)?
         }
@@ -61,12 +99,6 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Ends a run whose episodes were all played, in shards.
-pub fn conclude(output: &Output, path: &Path) -> Result<(), Failure> {
-    let (run, directory) = resumed(output, path, true)?;
-    play_all(output, run, directory, None).map(drop)
-}
-
 /// Plays the episodes that a directory still lacks, and says what all of them came to.
 fn play_all(
     output: &Output,
@@ -76,10 +108,10 @@ fn play_all(
 ) -> Result<Totals, Failure> {
     let path = directory.path.clone();
     let unread = |error| Failure::file("read", &path, error);
-    let shard = shard::kept(&path)?;
-    let own = shard.share(&vec![1; run.episodes()]);
-    let done = directory.database.episodes().map_err(unread)?;
-    let todo: Vec<usize> = own.iter().copied().filter(|number| !done.contains(number)).collect();
+    let share = Share::of(&path, run.settings())?;
+    let lacking = |database: &Database| share.lacking(run.settings(), database).map_err(unread);
+    // Items are episodes, by their numbers.
+    let todo = lacking(&directory.database)?;
     if !todo.is_empty() {
         let is_started = run.program().is_none_or(|program| program.can_start());
         run_directory::refuse_to_play(&path, "run", is_started)?;
@@ -89,7 +121,7 @@ fn play_all(
     #[allow(clippy::disallowed_methods, reason = "this is cli, and the time goes nowhere but the summary")]
     let started = Instant::now();
     let jobs = jobs(asked_jobs, run.program())?;
-    let mut progress = Progress::new(output, "counted", own.len() as u64, (own.len() - todo.len()) as u64);
+    let mut progress = share.progress(output, "counted", &todo);
     let mut driven: Option<(usize, Arc<Conversation>)> = None;
     play(&run, &todo, jobs, &stop, &mut |summary, log| {
         // An episode that was not driven is not kept, so that `--resume` plays it.
@@ -105,13 +137,9 @@ fn play_all(
         Ok::<_, Failure>(())
     })?;
     drop(progress);
-    let all = directory.database.numbers().map_err(unread)?;
-    let is_over = own.iter().all(|&number| all.contains(&(number as i64)));
+    let is_over = lacking(&directory.database)?.is_empty();
     if is_over {
-        let file = path.join("run.db");
-        let units: Vec<_> = all.iter().map(|&number| (number, number)).collect();
-        let settled = directory.database.settle(&file, &units);
-        directory.database = settled.map_err(|error| Failure::file("write", &file, error))?;
+        directory.database = settled(run.settings(), directory.database, &path.join("run.db"))?;
     }
 
     let totals = directory.database.totals().map_err(unread)?;
@@ -147,12 +175,7 @@ fn play_all(
         "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups, "never": never,
         "critical": critical, "failures": failures, "reproducible": doubts.is_empty(),
     }));
-    if !is_over {
-        return Err(unfinished("run", directory.path, run.program()));
-    }
-    if !shard.is_whole() {
-        output.say(&shard::next_step(shard));
-    }
+    share.end::<RunSettings>(output, directory.path, is_over, run.program())?;
     Ok(totals)
 }
 
@@ -201,27 +224,21 @@ fn begun(output: &Output, arguments: &RunArguments, wanted: Wanted) -> Result<(R
     } else {
         run
     };
-    let space = load::relative(path, &run.space().path)?;
     let reference = match (&arguments.policy, &policy) {
         (Some(file), Some((_, policy))) => {
             Some(PolicyReference { file: load::relative(path, file)?, digest: policy.digest.clone(), face })
         }
         _ => None,
     };
-    let external = run.attached().map(|attached| run_directory::to_record(path, attached)).transpose()?;
-    let settings = RunSettings { space, policy: reference, external, ..run.settings().clone() };
-    let text = run_directory::write_settings(path, "run", &settings)?;
+    let settings = RunSettings { policy: reference, ..run.settings().clone() };
+    let text = run_directory::begin(path, settings, &run.space().path, run.attached())?;
     Ok((run, RunDirectory::open(held, &text)?))
 }
 
 /// The rest of an interrupted run. With `is_played`, nothing of it is left to play, and no program is started.
 fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Run, RunDirectory), Failure> {
-    let resumed: Resumed<RunSettings> = run_directory::resume(output, path, "run", "run")?;
+    let resumed = run_directory::resume::<RunSettings>(output, path, is_played)?;
     let Resumed { settings, text, table, held } = resumed;
-    let external = settings
-        .external
-        .map(|attached| Attached { is_recorded: is_played, ..run_directory::from_record(path, attached) });
-    let settings = RunSettings { external, ..settings };
     let policy = match &settings.policy {
         None => None,
         Some(reference) => {
@@ -280,36 +297,22 @@ fn keep(
     summary: &EpisodeSummary,
     log: &EpisodeLog,
 ) -> Result<(), Failure> {
-    let scenario = match summary.counted() {
-        0 => None,
-        _ => Some(write_scenario(run, directory, summary, log)?),
-    };
-    if log.failure.is_some() {
-        let settings = run.settings();
-        let rules = [&settings.without[..], &settings.with];
-        directory.write_failure("run", run.table(), (log, summary), &settings.agent, rules)?;
-    }
+    let RunSettings { agent, without, with, .. } = run.settings();
+    let player = Player { command: "run", table: run.table(), agent, without, with };
+    let is_critical = summary.counted() > 0;
+    let scenario = is_critical.then(|| directory.write_critical(&player, (log, summary))).transpose()?;
+    directory.write_failure(&player, (log, summary))?;
     directory
         .database
         .add(summary, log, |draw| emit::action_text(run.table(), draw), scenario.as_deref())
         .map_err(|error| Failure::file("write", &directory.path.join("run.db"), error))
 }
 
-/// Writes the scenario of an episode, and gives the text of the file.
-fn write_scenario(
-    run: &Run,
-    directory: &RunDirectory,
-    summary: &EpisodeSummary,
-    log: &EpisodeLog,
-) -> Result<String, Failure> {
-    let settings = run.settings();
-    let rules = [&settings.without[..], &settings.with];
-    directory.write_critical("run", run.table(), (log, summary), &settings.agent, rules)
-}
-
 /// Writes missing scenarios again, with the answers of an external driving system, and names those that were edited.
 fn restore(output: &Output, run: &Run, directory: &RunDirectory) -> Result<(), Failure> {
-    let (episodes, files): (Vec<usize>, Vec<WrittenFile>) = directory.written()?.into_iter().unzip();
+    let scenarios = directory.scenarios()?;
+    let episodes: Vec<usize> = scenarios.iter().map(|written| written.unit as usize).collect();
+    let files = run_directory::written(&directory.path, scenarios);
     let restored = run_directory::restore(output, "run", &files)?;
     if run.program().is_some() {
         // The database has the text of a scenario, but not the answers beside it: the program is asked for them again.

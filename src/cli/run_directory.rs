@@ -1,4 +1,4 @@
-//! Run directories: `run.yaml`, `run.db` and `critical/*.ava`; those of studies have `study.yaml` and `study.db`.
+//! Directories of campaigns: `run.yaml`, `run.db` and `critical/*.ava`; those of studies have `study.yaml` and `study.db`.
 //!
 //! A directory is begun when its settings stand in it. What a kill leaves before that counts as empty, so the
 //! directory can be begun again; what it leaves after that can be resumed. One process at a time works in it.
@@ -13,16 +13,15 @@ use std::path::{Path, PathBuf};
 
 use avastra_campaign::emit;
 use avastra_campaign::episode::EpisodeLog;
-use avastra_campaign::estimate::PILOT;
 use avastra_campaign::files;
-use avastra_campaign::files::PlainName;
-use avastra_campaign::run::{Database, EpisodeSummary, Units, VERSION};
+use avastra_campaign::run::{Database, EpisodeSummary, Units, VERSION, WrittenScenario};
 use avastra_drivers::external::{Attached, ExternalSettings};
 use avastra_lang::check::normal;
-use avastra_lang::syntax::yaml_mistake;
+use avastra_lang::syntax::{ast, print, yaml_mistake};
 use avastra_world::action::ActionTable;
 use avastra_world::sim::ENGINE;
 
+use super::campaign::{Campaign, KINDS, Kind};
 use super::error::Failure;
 use super::files::{folder, make, write, write_answers};
 use super::load;
@@ -74,15 +73,19 @@ pub fn hold(path: &Path) -> Result<Held, Failure> {
     Ok(Held { path: path.to_owned(), _lock: lock })
 }
 
-/// Writes the settings, `run.yaml` or `study.yaml`, and returns their text. They come before the database: from then
-/// on the run can be resumed.
-pub fn write_settings(
+/// Writes the settings with the space and the driving system as they are from the directory, and returns their text. They come
+/// before the database: from then on the campaign can be resumed.
+pub fn begin<C: Campaign>(
     directory: &Path,
-    kind: &str,
-    settings: &impl serde::Serialize,
+    mut settings: C,
+    space: &Path,
+    attached: Option<Attached>,
 ) -> Result<String, Failure> {
-    let text = serde_yaml::to_string(settings).expect("settings are plain strings and numbers");
-    write(&directory.join(format!("{kind}.yaml")), &text)?;
+    let outside = settings.outside();
+    *outside.space = load::relative(directory, space)?;
+    *outside.external = attached.map(|attached| to_record(directory, attached)).transpose()?;
+    let text = serde_yaml::to_string(&settings).expect("settings are plain strings and numbers");
+    write(&directory.join(format!("{}.yaml", C::KIND.file)), &text)?;
     Ok(text)
 }
 
@@ -136,19 +139,19 @@ pub struct Resumed<S> {
     pub held: Held,
 }
 
-/// The settings of an interrupted run, training or study, and the table of its space, if neither the space nor
-/// avastra has changed since. The settings are in the file `KIND.yaml`; `what` is what was begun, in a word.
-pub fn resume<S: serde::de::DeserializeOwned>(
+/// The settings of an interrupted campaign, and the table of its space, if neither the space nor avastra has changed since.
+/// With `is_played`, nothing of it is left to play, and no program is started.
+pub fn resume<C: Campaign>(
     output: &Output,
     directory: &Path,
-    kind: &str,
-    what: &str,
-) -> Result<Resumed<S>, Failure> {
+    is_played: bool,
+) -> Result<Resumed<C>, Failure> {
+    let Kind { file: kind, what, .. } = C::KIND;
     let path = directory.join(format!("{kind}.yaml"));
-    let found = what_was_begun(directory);
-    if found.is_some_and(|found| found != what) {
-        let (found, directory) = (found.unwrap_or_default(), directory.display());
-        let command = if found == "training" { "train" } else { found };
+    if let Some(Kind { what: found, command, .. }) =
+        what_was_begun(directory).filter(|found| found.what != what)
+    {
+        let directory = directory.display();
         return Err(Failure::usage(format!(
             "`{directory}` holds a {found}: go on with `avastra {command} --resume {directory}`"
         )));
@@ -179,7 +182,7 @@ pub fn resume<S: serde::de::DeserializeOwned>(
         Some(how) => output.tell(&format!("`{}` is {how}: the {what} begins anew", database.display())),
         None => {}
     }
-    let (settings, text) = settings_of(directory, kind, what)?;
+    let (mut settings, text) = settings_of::<C>(directory)?;
     let begun: Begun = serde_yaml::from_str(&text).expect("it was read so before");
     let table = load::table(output, &directory.join(&begun.space))?;
     let meaning = &table.space().meaning;
@@ -191,6 +194,10 @@ pub fn resume<S: serde::de::DeserializeOwned>(
             table.space().path.display()
         )));
     }
+    let external = settings.outside().external;
+    *external = external
+        .take()
+        .map(|attached| Attached { is_recorded: is_played, ..from_record(directory, attached) });
     Ok(Resumed { settings, text, table, held })
 }
 
@@ -210,24 +217,19 @@ fn tidy(directory: &Path) -> Result<(), Failure> {
 
 /// Refuses to play the rest of a directory whose driving system was not started because nothing seemed to be left to play.
 pub fn refuse_to_play(directory: &Path, command: &str, is_started: bool) -> Result<(), Failure> {
-    match is_started {
-        true => Ok(()),
-        false => {
-            let directory = directory.display();
-            Err(Failure::usage(format!(
-                "`{directory}` is not played to the end, and no program that a file names is started for that: look at its \
-                 settings, then go on with `avastra {command} --resume {directory}`"
-            )))
-        }
+    if is_started {
+        return Ok(());
     }
+    let directory = directory.display();
+    Err(Failure::usage(format!(
+        "`{directory}` is not played to the end, and no program that a file names is started for that: look at its \
+         settings, then go on with `avastra {command} --resume {directory}`"
+    )))
 }
 
-/// The settings in the file `KIND.yaml` and their text, if they were written by this version of avastra.
-pub fn settings_of<S: serde::de::DeserializeOwned>(
-    directory: &Path,
-    kind: &str,
-    what: &str,
-) -> Result<(S, String), Failure> {
+/// The settings of a directory and their text, if they were written by this version of avastra.
+pub fn settings_of<C: Campaign>(directory: &Path) -> Result<(C, String), Failure> {
+    let Kind { file: kind, what, .. } = C::KIND;
     let path = directory.join(format!("{kind}.yaml"));
     let text = load::text(&path)?;
     let refuse = |error| Failure::file("read", &path, yaml_mistake(&error, &text));
@@ -245,20 +247,24 @@ pub fn settings_of<S: serde::de::DeserializeOwned>(
     Ok((settings, text))
 }
 
-/// `run`, `training`, `study` or `estimate`, if the directory holds one.
-pub fn what_was_begun(directory: &Path) -> Option<&'static str> {
-    if let Some(kind) =
-        ["study", "estimate"].into_iter().find(|kind| directory.join(format!("{kind}.yaml")).is_file())
-    {
-        return Some(kind);
-    }
-    let text = load::read(&directory.join("run.yaml")).ok()?;
-    let settings: serde_json::Map<String, serde_json::Value> = serde_yaml::from_str(&text).ok()?;
-    Some(if settings.contains_key("hyperparameters") { "training" } else { "run" })
+/// What a directory holds, if anything.
+pub fn what_was_begun(directory: &Path) -> Option<Kind> {
+    KINDS.into_iter().find(|kind| (kind.is_in)(directory))
+}
+
+/// The fields in the settings of a directory; `None` if they cannot be read.
+pub fn fields_of(directory: &Path, file: &str) -> Option<serde_json::Map<String, serde_json::Value>> {
+    serde_yaml::from_str(&load::read(&directory.join(format!("{file}.yaml"))).ok()?).ok()
 }
 
 /// A scenario of a directory: its file, and its text from the database.
 pub type WrittenFile = (PathBuf, String);
+
+/// The files of scenarios in a directory.
+pub fn written(directory: &Path, scenarios: Vec<WrittenScenario>) -> Vec<WrittenFile> {
+    let critical = directory.join("critical");
+    scenarios.into_iter().map(|found| (critical.join(found.name), found.text)).collect()
+}
 
 /// Whether the file of a scenario exists and differs from the text in the database.
 pub fn is_edited((path, text): &WrittenFile) -> bool {
@@ -331,13 +337,7 @@ const NAMED_MAX: usize = 8;
 
 /// Says that rows of units were changed.
 fn changed<D: Units>(file: &Path, damaged: &[i64]) -> String {
-    let unit = D::layout().unit;
-    // The pilot is stored as a part with a number of its own.
-    let name = |&number: &i64| match number {
-        PILOT => "the pilot".to_owned(),
-        number => format!("{unit} {number}"),
-    };
-    let named: Vec<String> = damaged.iter().take(NAMED_MAX).map(name).collect();
+    let named: Vec<String> = damaged.iter().take(NAMED_MAX).map(|&number| D::called(number)).collect();
     let more = damaged.len() - named.len();
     let more = if more > 0 { format!(" and of {more} more") } else { String::new() };
     let file = file.display();
@@ -359,87 +359,74 @@ impl RunDirectory {
         Ok(RunDirectory { path: held.path.clone(), database, _held: held })
     }
 
-    /// The scenarios that were written into the directory, each with the number of its episode.
-    pub fn written(&self) -> Result<Vec<(usize, WrittenFile)>, Failure> {
-        let scenarios =
-            self.database.scenarios().map_err(|error| Failure::file("read", &self.path, error))?;
-        let with_path = |(episode, road, text): (usize, PlainName, String)| {
-            (episode, (self.critical(&road, episode), text))
-        };
-        Ok(scenarios.into_iter().map(with_path).collect())
+    /// The scenarios that were written.
+    pub fn scenarios(&self) -> Result<Vec<WrittenScenario>, Failure> {
+        self.database.scenarios().map_err(|error| Failure::file("read", &self.path, error))
     }
 
     /// Writes an episode that an external driving system failed in: `failures/ROAD_NNNN.txt` says how, and a scenario of
     /// that name ends so.
-    pub fn write_failure(
-        &self,
-        command: &str,
-        table: &ActionTable,
-        (log, summary): (&EpisodeLog, &EpisodeSummary),
-        agent: &str,
-        [without, with]: [&[String]; 2],
-    ) -> Result<(), Failure> {
+    pub fn write_failure(&self, player: &Player, (log, summary): Judged) -> Result<(), Failure> {
         let Some(failure) = &log.failure else { return Ok(()) };
         let folder = folder(&self.path, "failures")?;
-        let name = format!("{}_{:04}", log.road, summary.episode);
-        let space_path = load::relative(&folder, &table.space().path)?;
-        let (name, space_path, episode) = (name.as_str(), space_path.as_str(), summary.episode);
-        let source = emit::Provenance { command, name, space_path, episode, agent, without, with };
-        let path = folder.join(format!("{name}.ava"));
         let mut text = format!("{}\n{}\n", failure.in_words(), failure.problem.advice());
         if !failure.stderr.is_empty() {
             text.push_str(&format!("\nthe end of its standard error:\n{}", failure.stderr));
         }
+        let path = folder.join(format!("{}_{:04}.ava", log.road, summary.episode));
+        let file = player.file(&path, summary.episode, &|source| {
+            emit::failure(player.table, log, &failure.in_words(), source)
+        })?;
         write(&path.with_extension("txt"), &text)?;
         write_answers(&path, log)?;
-        let file = emit::failure(table, log, &failure.in_words(), &source);
-        write(&path, &avastra_lang::syntax::print(&file))
-    }
-
-    /// The file with the scenario of an episode.
-    pub fn critical(&self, road: &str, episode: usize) -> PathBuf {
-        self.path.join("critical").join(format!("{}.ava", scenario_name(road, episode)))
+        write(&path, &file)
     }
 
     /// Writes the counted collisions of an episode as a scenario, `critical/ROAD_NNNN.ava`, and gives the text of the
-    /// file. `agent` is the one that played it, `rules` are those switched off and those switched on.
-    pub fn write_critical(
-        &self,
-        command: &str,
-        table: &ActionTable,
-        (log, summary): (&EpisodeLog, &EpisodeSummary),
-        agent: &str,
-        rules: [&[String]; 2],
-    ) -> Result<String, Failure> {
-        let path = self.critical(&log.road, summary.episode);
-        write_scenario(&path, command, table, (log, summary), agent, rules)
+    /// file.
+    pub fn write_critical(&self, player: &Player, (log, summary): Judged) -> Result<String, Failure> {
+        let name = format!("{}_{:04}.ava", log.road, summary.episode);
+        player.write_scenario(&self.path.join("critical").join(name), (log, summary))
     }
 }
 
-/// Writes the counted collisions of an episode as a scenario that has the name of the file, and gives its text. `agent`
-/// is the one that played it, `rules` are those switched off and those switched on.
-pub fn write_scenario(
-    path: &Path,
-    command: &str,
-    table: &ActionTable,
-    (log, summary): (&EpisodeLog, &EpisodeSummary),
-    agent: &str,
-    [without, with]: [&[String]; 2],
-) -> Result<String, Failure> {
-    let (folder, name) = (path.parent().unwrap_or(Path::new(".")), path.file_stem().unwrap_or_default());
-    let space_path = load::relative(folder, &table.space().path)?;
-    let name = name.to_string_lossy();
-    let (name, space_path, episode) = (&*name, space_path.as_str(), summary.episode);
-    let source = emit::Provenance { command, name, space_path, episode, agent, without, with };
-    let file = emit::scenario(table, log, summary, &source);
-    let text = avastra_lang::syntax::print(&file);
-    write_answers(path, log)?;
-    write(path, &text)?;
-    Ok(text)
+/// An episode and what was found in it.
+pub type Judged<'a> = (&'a EpisodeLog, &'a EpisodeSummary);
+
+/// What plays the episodes of which scenarios are written.
+pub struct Player<'a> {
+    pub command: &'a str,
+    pub table: &'a ActionTable,
+    pub agent: &'a str,
+    /// Rules switched off, and those switched on.
+    pub without: &'a [String],
+    pub with: &'a [String],
 }
 
-pub fn scenario_name(road: &str, episode: usize) -> String {
-    format!("{road}_{episode:04}")
+impl Player<'_> {
+    /// Writes the counted collisions of an episode as a scenario that has the name of the file, and gives its text.
+    pub fn write_scenario(&self, path: &Path, (log, summary): Judged) -> Result<String, Failure> {
+        let text =
+            self.file(path, summary.episode, &|source| emit::scenario(self.table, log, summary, source))?;
+        write_answers(path, log)?;
+        write(path, &text)?;
+        Ok(text)
+    }
+
+    /// The text of a scenario that has the name of the file.
+    fn file(
+        &self,
+        path: &Path,
+        episode: usize,
+        emitted: &dyn Fn(&emit::Provenance) -> ast::File,
+    ) -> Result<String, Failure> {
+        let (folder, name) = (path.parent().unwrap_or(Path::new(".")), path.file_stem().unwrap_or_default());
+        let space_path = load::relative(folder, &self.table.space().path)?;
+        let Player { command, agent, without, with, .. } = *self;
+        let (name, space_path) = (&*name.to_string_lossy(), space_path.as_str());
+        let source = emit::Provenance { command, name, space_path, episode, agent, without, with };
+        Ok(print(&emitted(&source)))
+    }
 }
 
 fn make_empty(path: &Path) -> Result<Held, Failure> {
@@ -471,10 +458,11 @@ pub fn is_unbegun(path: &Path) -> std::io::Result<bool> {
     for entry in std::fs::read_dir(path)? {
         let entry = entry?;
         let name = entry.file_name();
-        let settings = ["run.yaml", "study.yaml", "estimate.yaml", shard::FILE];
+        let settings = || KINDS.into_iter().map(|kind| format!("{}.yaml", kind.file));
         let is_left = match name.to_str() {
             Some(shard::FILE) => true,
-            Some(name) if settings.iter().any(|of| files::is_partial(name, of)) => true,
+            Some(name) if files::is_partial(name, shard::FILE) => true,
+            Some(name) if settings().any(|of| files::is_partial(name, &of)) => true,
             // A link is no directory here, so it counts as begun.
             Some(pack::SPACE) if entry.file_type()?.is_dir() => true,
             Some("critical") if entry.file_type()?.is_dir() => {

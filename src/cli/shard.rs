@@ -6,10 +6,12 @@ use std::path::Path;
 use avastra_campaign::run::{SHARDS_MAX, Shard};
 use avastra_lang::syntax::yaml_mistake;
 
+use super::campaign::{Cut, costs};
 use super::error::Failure;
 use super::files::{remove, write};
 use super::load;
 use super::output::Output;
+use super::run_directory::refuse_used;
 
 /// The file that keeps it; a directory of the whole has none.
 pub const FILE: &str = "shard.yaml";
@@ -70,9 +72,17 @@ pub fn next_step(shard: Shard) -> String {
     )
 }
 
-/// Says what a command would play, for `--dry-run`. `what` says it of the whole, `costs` in episodes for each unit of its work.
-pub fn planned(output: &Output, heading: &str, what: &str, costs: &[u64], shard: Shard) {
-    let (units, own) = (costs.len(), shard.share(costs));
+/// Says what a command would play, for `--dry-run`; `what` says it of the whole.
+pub fn planned(
+    output: &Output,
+    out: Option<&Path>,
+    settings: &impl Cut,
+    (heading, what): (&str, &str),
+    shard: Shard,
+) -> Result<(), Failure> {
+    refuse_used(out)?;
+    let costs = costs(&settings.work());
+    let (units, own) = (costs.len(), shard.share(&costs));
     let most = units.min(SHARDS_MAX as usize);
     let mut text = format!("{heading}\nwould play {what}");
     if !shard.is_whole() {
@@ -87,6 +97,7 @@ pub fn planned(output: &Output, heading: &str, what: &str, costs: &[u64], shard:
     output.result(serde_json::json!({
         "planned": { "units": own.len(), "episodes": episodes, "shards_max": most },
     }));
+    Ok(())
 }
 
 /// The shard that a scheduler gave this process, and by which variable; `None` where there is no scheduler.

@@ -3,17 +3,18 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use avastra_campaign::run::{RunError, TrafficRecord, Units};
+use avastra_campaign::run::{DatabaseError, Numbered, RunError, TrafficRecord};
 use avastra_campaign::study::{
     CellRecord, Event, FailedCell, Job, Spent, Study, StudyDatabase, StudyError, StudyFile, StudyResults,
     StudySettings, play_jobs,
 };
-use avastra_drivers::external::{Attached, Program};
+use avastra_drivers::external::Program;
 use avastra_exchange::report;
 use avastra_lang::syntax::{listed, yaml_mistake};
 use avastra_world::action::ActionTable;
 
 use super::arguments::{StudyArguments, StudyCommand};
+use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, settled};
 use super::error::Failure;
 use super::files::{remove, write};
 use super::findings::kinds_text;
@@ -21,10 +22,55 @@ use super::interrupt::stop_on_interrupt;
 use super::output::Output;
 use super::output::plural;
 use super::parallel::jobs;
-use super::progress::Progress;
 use super::run_directory::{Held, Resumed};
 use super::timing::Times;
-use super::{load, results, run_directory, shard};
+use super::{load, merge, results, run_directory, shard};
+
+impl Campaign for StudySettings {
+    const KIND: Kind = Kind {
+        what: "study",
+        command: "study",
+        file: "study",
+        is_in: |directory| directory.join("study.yaml").is_file(),
+        merge: Some(merge::merged::<StudySettings>),
+    };
+    type Database = StudyDatabase;
+
+    fn outside(&mut self) -> Outside<'_> {
+        Outside {
+            space: &mut self.space,
+            space_digest: &self.space_digest,
+            external: &mut self.external,
+            policy: None,
+        }
+    }
+}
+
+impl Cut for StudySettings {
+    fn work(&self) -> Vec<Item> {
+        let mut next = 1;
+        let job = |job: Job| {
+            let first = next;
+            next += job.roads.len() as i64;
+            Item { cost: self.episodes(&job), units: first..next }
+        };
+        self.jobs().into_iter().map(job).collect()
+    }
+
+    fn numbered(&self, database: &StudyDatabase) -> Result<Vec<Numbered>, DatabaseError> {
+        database.places(self)
+    }
+
+    fn take_beside([from, to]: [&Path; 2]) -> Result<(), Failure> {
+        let mut times = Times::read(to)?;
+        times.extend(Times::read(from)?);
+        times.write(to)
+    }
+
+    fn conclude(output: &Output, directory: &Path) -> Result<(), Failure> {
+        play_all(output, resumed(output, directory, true)?, &[], None)
+    }
+}
 
 /// Plays what a study still lacks and prints its result, or writes the results of a folder of studies.
 pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure> {
@@ -42,32 +88,29 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
             let shard = shard::asked(output, arguments.shard.shard)?;
             let study = begun(output, file, arguments)?;
             if arguments.shard.dry_run {
-                run_directory::refuse_used(arguments.out.as_deref())?;
-                let costs: Vec<u64> = study.jobs().iter().map(|job| study.episodes(job)).collect();
-                let episodes = plural(costs.iter().sum::<u64>() as usize, "episode");
-                let what = format!("{} trainings or repetitions, {episodes} together", costs.len());
-                shard::planned(output, &heading(&study), &what, &costs, shard);
-                return Ok(());
+                let (jobs, settings) = (study.jobs(), study.settings());
+                let episodes = jobs.iter().map(|job| study.episodes(job)).sum::<u64>() as usize;
+                let episodes = plural(episodes, "episode");
+                let what = format!("{} trainings or repetitions, {episodes} together", jobs.len());
+                return shard::planned(
+                    output,
+                    arguments.out.as_deref(),
+                    settings,
+                    (&heading(&study), &what),
+                    shard,
+                );
             }
             // A driving system that was not started has no name to compare.
             let reused = played_elsewhere(&arguments.reuse, &study)?;
             let held = run_directory::create_empty(arguments.out.as_deref())?;
             shard::keep(&held.path, shard)?;
-            let space = load::relative(&held.path, &study.table().space().path)?;
-            let external = study.settings().external.clone();
-            let external =
-                external.map(|attached| run_directory::to_record(&held.path, attached)).transpose()?;
-            let settings = StudySettings { space, external, ..study.settings().clone() };
-            let text = run_directory::write_settings(&held.path, "study", &settings)?;
+            let settings = study.settings().clone();
+            let attached = settings.external.clone();
+            let text = run_directory::begin(&held.path, settings, &study.table().space().path, attached)?;
             ((study, held, text), reused)
         }
     };
     play_all(output, begun, &reused, arguments.jobs)
-}
-
-/// Ends a study whose jobs were all played, in shards.
-pub fn conclude(output: &Output, path: &Path) -> Result<(), Failure> {
-    play_all(output, resumed(output, path, true)?, &[], None)
 }
 
 /// Plays the jobs that a directory still lacks, and says what all of them came to.
@@ -83,16 +126,14 @@ fn play_all(
     let unread = |error| Failure::file("read", &file, error);
     let unwritten = |error| Failure::file("write", &file, error);
     let mut database: StudyDatabase = run_directory::open_to_go_on(output, &file, &settings)?;
-    let shard = shard::kept(&path)?;
+    let share = Share::of(&path, study.settings())?;
     let all = study.jobs();
-    let costs: Vec<u64> = all.iter().map(|job| study.episodes(job)).collect();
-    let own: Vec<_> = shard.share(&costs).into_iter().map(|job| all[job].clone()).collect();
-    let missing = |database: &StudyDatabase| database.missing(study.settings(), own.clone());
+    let lacking = |database: &StudyDatabase| share.lacking(study.settings(), database).map_err(unread);
     output.tell(&format!("{}, into {}", heading(&study), path.display()));
     let mut times = Times::read(&path)?;
     for Reused { directory, played } in reused {
-        let lacking = missing(&database).map_err(unread)?;
-        let new: Vec<_> = played.iter().filter(|(job, _)| lacking.contains(job)).collect();
+        let lacking: Vec<&Job> = lacking(&database)?.into_iter().map(|job| &all[job]).collect();
+        let new: Vec<_> = played.iter().filter(|(job, _)| lacking.contains(&job)).collect();
         for (_, cells) in &new {
             times.add(cells);
             database.add(cells).map_err(unwritten)?;
@@ -101,17 +142,16 @@ fn play_all(
         let count = plural(new.iter().map(|(_, cells)| cells.len()).sum(), "cell");
         output.tell(&format!("{count} taken over from {}", directory.display()));
     }
-    let todo = missing(&database).map_err(unread)?;
+    let left = lacking(&database)?;
+    let todo: Vec<Job> = left.iter().map(|&job| all[job].clone()).collect();
 
-    let episodes = |jobs: &[_]| jobs.iter().map(|job| study.episodes(job)).sum::<u64>();
-    let (episodes, left) = (episodes(&own), episodes(&todo));
     // Each job has a process, or a connection, of its own: these are only to see that they can be had.
     let external = study.settings().external.as_ref().filter(|_| !todo.is_empty());
     run_directory::refuse_to_play(&path, "study", external.is_none_or(|attached| !attached.is_recorded))?;
     let probe = external.map(|attached| Program::new(attached.settings.clone()));
     let jobs = jobs(asked_jobs, probe.as_ref())?;
     drop(probe);
-    let mut progress = Progress::new(output, "counted", episodes, episodes - left);
+    let mut progress = share.progress(output, "counted", &left);
     play_jobs(&study, &todo, jobs, &stop, &spent, &mut |event| match event {
         Event::Episode { counted } => {
             progress.episode(counted);
@@ -124,11 +164,10 @@ fn play_all(
         }
     })?;
     drop(progress);
-    let is_over = missing(&database).map_err(unread)?.is_empty();
+    let is_over = lacking(&database)?.is_empty();
     if is_over {
         times.write(&path)?;
-        let places = database.places(study.settings()).map_err(unread)?;
-        database = database.settle(&file, &places).map_err(unwritten)?;
+        database = settled(study.settings(), database, &file)?;
     }
 
     let cells = times.on(database.cells().map_err(unread)?);
@@ -150,13 +189,7 @@ fn play_all(
     output.result(
         serde_json::json!({ "directory": path, "results": results, "failures": failed, "timing": timing }),
     );
-    if !is_over {
-        return Err(Failure::Interrupted { command: "study", directory: path });
-    }
-    if !shard.is_whole() {
-        output.say(&shard::next_step(shard));
-    }
-    Ok(())
+    share.end::<StudySettings>(output, path, is_over, None)
 }
 
 /// Another study's directory, with the jobs that it has played of this one.
@@ -281,12 +314,8 @@ pub fn wanted(
 /// The rest of an interrupted study, with the text of its settings. With `is_played`, nothing of it is left to play, and no
 /// program is started.
 fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Study, Held, String), Failure> {
-    let resumed: Resumed<StudySettings> = run_directory::resume(output, path, "study", "study")?;
+    let resumed = run_directory::resume::<StudySettings>(output, path, is_played)?;
     let Resumed { settings, text, table, held } = resumed;
-    let external = settings
-        .external
-        .map(|attached| Attached { is_recorded: is_played, ..run_directory::from_record(path, attached) });
-    let settings = StudySettings { external, ..settings };
     let study = Study::new(table, settings).map_err(|error| match error {
         StudyError::Agent { error: error @ RunError::OtherProgram { .. }, .. } => error.into(),
         error => Failure::usage(error),

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use avastra_campaign::emit;
-use avastra_campaign::run::{RunSettings, TrafficRecord, Units};
+use avastra_campaign::run::{Database, RunSettings, TrafficRecord, Units};
 use avastra_campaign::train::{Evaluation, TrainSettings, TrainedEpisode, Training, evaluate, rounded};
 use avastra_drivers::external::Attached;
 use avastra_lang::model::policy::{PolicyClaims, PolicyOrigin};
@@ -15,6 +15,7 @@ use avastra_search::agent::{Kind, QPolicy, Settings};
 use avastra_world::action::Draw;
 
 use super::arguments::TrainArguments;
+use super::campaign::{self, Campaign, Outside, as_they_are};
 use super::conditions::roads_or_all;
 use super::error::Failure;
 use super::files::{folder, write};
@@ -28,13 +29,37 @@ use super::policy::distil;
 use super::policy::distil::rules_text;
 use super::progress::{TrainingProgress, Working};
 use super::run::groups_text;
-use super::run_directory::{Resumed, RunDirectory, WrittenFile};
+use super::run_directory::{Player, Resumed, RunDirectory};
 use super::{load, run_directory};
 
 /// Episodes between two checkpoints: at most so many are played again after a kill.
 const CHECKPOINT_EPISODES: usize = 25;
 /// Episodes on each road that the finished policy is judged by: the paper's number.
 const EVALUATION_EPISODES: u64 = 15;
+
+impl Campaign for TrainSettings {
+    const KIND: campaign::Kind = campaign::Kind {
+        what: "training",
+        command: "train",
+        file: "run",
+        is_in: |directory| {
+            run_directory::fields_of(directory, "run")
+                .is_some_and(|fields| fields.contains_key("hyperparameters"))
+        },
+        // Each episode is chosen with what was learned before.
+        merge: None,
+    };
+    type Database = Database;
+
+    fn outside(&mut self) -> Outside<'_> {
+        Outside {
+            space: &mut self.space,
+            space_digest: &self.space_digest,
+            external: &mut self.external,
+            policy: None,
+        }
+    }
+}
 
 /// Trains to the end, or until Ctrl-C; then says how to go on.
 pub fn train(output: &Output, arguments: &TrainArguments) -> Result<(), Failure> {
@@ -90,11 +115,8 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
     if arguments.self_contained {
         training = Training::new(load::table(output, &copy)?, training.settings().clone())?;
     }
-    let space = load::relative(path, &training.table().space().path)?;
-    let attached = training.arena().attached();
-    let external = attached.map(|attached| run_directory::to_record(path, attached)).transpose()?;
-    let settings = TrainSettings { space, external, ..training.settings().clone() };
-    let text = run_directory::write_settings(path, "run", &settings)?;
+    let (space, attached) = (&training.table().space().path, training.arena().attached());
+    let text = run_directory::begin(path, training.settings().clone(), space, attached)?;
     Ok((training, RunDirectory::open(held, &text)?))
 }
 
@@ -119,10 +141,8 @@ fn settings(arguments: &TrainArguments) -> Result<Settings, Failure> {
 
 /// The rest of an interrupted training.
 fn resumed(output: &Output, path: &Path) -> Result<(Training, RunDirectory), Failure> {
-    let resumed: Resumed<TrainSettings> = run_directory::resume(output, path, "run", "training")?;
+    let resumed = run_directory::resume::<TrainSettings>(output, path, false)?;
     let Resumed { settings, text, table, held } = resumed;
-    let external = settings.external.map(|attached| run_directory::from_record(path, attached));
-    let settings = TrainSettings { external, ..settings };
     let mut directory = RunDirectory::open(held, &text)?;
     let checkpoint =
         directory.database.return_to_checkpoint().map_err(|error| Failure::file("resume", path, error))?;
@@ -131,7 +151,7 @@ fn resumed(output: &Output, path: &Path) -> Result<(Training, RunDirectory), Fai
         Some(checkpoint) => Training::resumed(table, settings, checkpoint.episodes, &checkpoint.learner)?,
     };
     // Only scenarios up to the checkpoint are restored; later episodes are played again.
-    let written: Vec<WrittenFile> = directory.written()?.into_iter().map(|(_, file)| file).collect();
+    let written = run_directory::written(path, directory.scenarios()?);
     run_directory::restore(output, "training", &written)?;
     Ok((training, directory))
 }
@@ -145,20 +165,15 @@ fn keep(
     stop: &AtomicBool,
 ) -> Result<(), Failure> {
     let settings = training.settings();
-    let rules = [&settings.without[..], &settings.with];
-    if trained.log.failure.is_some() {
-        let episode = (&trained.log, &trained.summary);
-        directory.write_failure("train", training.table(), episode, &settings.agent, rules)?;
-    }
+    let TrainSettings { agent, without, with, .. } = settings;
+    let player = Player { command: "train", table: training.table(), agent, without, with };
+    directory.write_failure(&player, (&trained.log, &trained.summary))?;
     // A training with an observation period of its own writes no scenario, because a replay would use the period
     // of the space.
     let has_scenario =
         trained.summary.counted() > 0 && settings.hyperparameters.observation_period_s().is_none();
-    let scenario = has_scenario.then(|| {
-        let log = training.log_of_space(&trained.log);
-        let episode = (&log, &trained.summary);
-        directory.write_critical("train", training.table(), episode, &settings.agent, rules)
-    });
+    let scenario = has_scenario
+        .then(|| directory.write_critical(&player, (&training.log_of_space(&trained.log), &trained.summary)));
     let scenario = scenario.transpose()?;
     let is_due = training.episodes().is_multiple_of(CHECKPOINT_EPISODES)
         || training.is_done()
@@ -250,8 +265,7 @@ fn finish(output: &Output, training: &Training, mut directory: RunDirectory) -> 
     let unwritten = |error| Failure::file("write", &file, error);
     directory.database.keep_results(&text).map_err(unwritten)?;
     // A kill leaves free pages behind where episodes are played again, so the bytes would tell of it.
-    let numbers = directory.database.numbers().map_err(unwritten)?;
-    let units: Vec<_> = numbers.into_iter().map(|number| (number, number)).collect();
+    let units = as_they_are(&directory.database).map_err(unwritten)?;
     directory.database = directory.database.settle(&file, &units).map_err(unwritten)?;
     write(&directory.path.join("results.json"), &format!("{text}\n"))?;
     output.result(serde_json::json!({

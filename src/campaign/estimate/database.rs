@@ -1,11 +1,9 @@
 //! `estimate.db`: the pilot, the parts and the events of an estimate, in SQLite, one transaction for each part.
 
-use std::path::Path;
-
 use rusqlite::{Connection, OptionalExtension, params};
 
 use crate::files::PlainName;
-use crate::run::{DatabaseError, Layout, Numbered, Units};
+use crate::run::{DatabaseError, Layout, Units, WrittenScenario};
 
 use crate::estimate::part::{Event, Part, PartRecord, Played};
 use crate::estimate::plan::{Cell, Pilot, Seen, Situation};
@@ -61,17 +59,6 @@ CREATE TABLE seen (
 ) STRICT;
 ";
 
-/// A file that was written of an event.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct WrittenScenario {
-    /// Place of the part, and number of the event in it.
-    pub part: i64,
-    pub event: i64,
-    /// Name and text of the file.
-    pub name: PlainName,
-    pub text: String,
-}
-
 /// An open database of an estimate.
 pub struct EstimateDatabase {
     connection: Connection,
@@ -92,6 +79,22 @@ impl Units for EstimateDatabase {
 
     fn from_connection(connection: Connection) -> EstimateDatabase {
         EstimateDatabase { connection }
+    }
+
+    fn scenarios(&self) -> Result<Vec<WrittenScenario>, DatabaseError> {
+        let mut query =
+            self.connection.prepare("SELECT part, name, text FROM scenario ORDER BY part, event")?;
+        let rows = query.query_map([], |row| Ok((row.get(0)?, row.get::<_, String>(1)?, row.get(2)?)))?;
+        rows.map(|row| {
+            let (unit, name, text) = row?;
+            Ok(WrittenScenario { unit, name: PlainName::scenario(name)?, text })
+        })
+        .collect()
+    }
+
+    fn called(number: i64) -> String {
+        // The pilot is stored as a part with a number of its own.
+        if number == PILOT { "the pilot".to_owned() } else { format!("part {number}") }
     }
 }
 
@@ -206,42 +209,6 @@ impl EstimateDatabase {
         })?;
         pilot.cells = cells.collect::<Result<_, _>>()?;
         Ok(Some(pilot))
-    }
-
-    /// The files that were written, in the order of their events.
-    ///
-    /// # Errors
-    /// If the file cannot be read, or the name of a scenario is none.
-    pub fn scenarios(&self) -> Result<Vec<WrittenScenario>, DatabaseError> {
-        let mut query =
-            self.connection.prepare("SELECT part, event, name, text FROM scenario ORDER BY part, event")?;
-        let rows = query
-            .query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get::<_, String>(2)?, row.get(3)?)))?;
-        rows.map(|row| {
-            let (part, event, name, text) = row?;
-            Ok(WrittenScenario { part, event, name: PlainName::scenario(name)?, text })
-        })
-        .collect()
-    }
-
-    /// As [`Units::take`]. `scenarios` are those that were written anew.
-    ///
-    /// # Errors
-    /// As [`Units::take`].
-    pub fn take_parts(
-        &mut self,
-        other: &Path,
-        units: &[Numbered],
-        scenarios: &[WrittenScenario],
-    ) -> Result<(), DatabaseError> {
-        self.take(other, units, &|connection| {
-            let mut update =
-                connection.prepare("UPDATE scenario SET text = ? WHERE part = ? AND event = ?")?;
-            for WrittenScenario { part, event, text, .. } in scenarios {
-                update.execute(params![text, part, event])?;
-            }
-            Ok(())
-        })
     }
 
     /// All parts so far, in order.

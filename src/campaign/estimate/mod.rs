@@ -18,7 +18,7 @@ mod results;
 mod settings;
 
 pub use compare::{Comparison, ComparisonResults, Pair, Side, compared};
-pub use database::{EstimateDatabase, PILOT, WrittenScenario};
+pub use database::{EstimateDatabase, PILOT};
 pub use part::{Event, Met, Part, PartRecord, Played, play_parts};
 pub use plan::{Pilot, Plan};
 pub use probing::pilot;

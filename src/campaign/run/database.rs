@@ -3,7 +3,6 @@
 //! Each episode is one transaction, so a kill at any moment loses at most the episode under way.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
 use rusqlite::{Connection, Transaction, params};
 use sha2::{Digest, Sha256};
@@ -19,7 +18,7 @@ use avastra_world::action::Draw;
 
 use crate::run::offered::{RowCount, without_figures};
 use crate::run::sealed::{DatabaseError, Layout};
-use crate::run::settled::{Numbered, Units};
+use crate::run::settled::{Units, WrittenScenario};
 use crate::run::shape::Shape;
 use crate::run::summary::{EpisodeSummary, Finding};
 
@@ -114,6 +113,24 @@ impl Units for Database {
     fn from_connection(connection: Connection) -> Database {
         Database { connection }
     }
+
+    fn scenarios(&self) -> Result<Vec<WrittenScenario>, DatabaseError> {
+        let query = "SELECT episode, road, text FROM scenario JOIN episode USING (episode) ORDER BY episode";
+        let mut statement = self.connection.prepare(query)?;
+        let rows = statement.query_map([], |row| Ok((row.get(0)?, row.get::<_, String>(1)?, row.get(2)?)))?;
+        rows.map(|row| {
+            let (unit, road, text) = row?;
+            if unit < 0 {
+                return Err(DatabaseError::Episode { found: unit });
+            }
+            // Names of files begin with that of the road.
+            let road = PlainName::new(road)?;
+            PlainName::scenario(format!("{}.ava", &*road))?;
+            let name = PlainName::scenario(format!("{}_{unit:04}.ava", &*road))?;
+            Ok(WrittenScenario { unit, name, text })
+        })
+        .collect()
+    }
 }
 
 impl Database {
@@ -145,45 +162,6 @@ impl Database {
         let numbers = statement.query_map([], |row| row.get::<_, i64>(0))?;
         let number = |found: i64| usize::try_from(found).map_err(|_| DatabaseError::Episode { found });
         numbers.map(|found| number(found?)).collect()
-    }
-
-    /// The episodes of which a scenario was written: number, road, and the text of the file.
-    ///
-    /// # Errors
-    /// If the file cannot be read, or a road has a name that no file can have.
-    pub fn scenarios(&self) -> Result<Vec<(usize, PlainName, String)>, DatabaseError> {
-        let query = "SELECT episode, road, text FROM scenario JOIN episode USING (episode) ORDER BY episode";
-        let mut statement = self.connection.prepare(query)?;
-        let rows = statement
-            .query_map([], |row| Ok((row.get::<_, i64>(0)?, row.get::<_, String>(1)?, row.get(2)?)))?;
-        rows.map(|row| {
-            let (found, road, text) = row?;
-            let episode = usize::try_from(found).map_err(|_| DatabaseError::Episode { found })?;
-            let road = PlainName::new(road)?;
-            // Names of files begin with that of the road.
-            PlainName::scenario(format!("{}.ava", &*road))?;
-            Ok((episode, road, text))
-        })
-        .collect()
-    }
-
-    /// As [`Units::take`]. `scenarios` has the episodes of which a scenario was written anew, with the text of the file.
-    ///
-    /// # Errors
-    /// As [`Units::take`].
-    pub fn take_episodes(
-        &mut self,
-        other: &Path,
-        units: &[Numbered],
-        scenarios: &[(usize, String)],
-    ) -> Result<(), DatabaseError> {
-        self.take(other, units, &|connection| {
-            let mut update = connection.prepare("UPDATE scenario SET text = ? WHERE episode = ?")?;
-            for (episode, text) in scenarios {
-                update.execute(params![text, *episode as i64])?;
-            }
-            Ok(())
-        })
     }
 
     /// Why chosen actions were refused, and how often; the most frequent reason first. Figures in a reason are

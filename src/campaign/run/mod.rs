@@ -45,7 +45,7 @@ pub use sealed::differences as settings_differences;
 pub use sealed::{DatabaseError, Layout};
 pub use settings::{EPISODES_MAX, PolicyReference, RunError, RunSettings, VERSION};
 pub(crate) use settings::{agent_named, check_episodes};
-pub use settled::{Numbered, Units};
+pub use settled::{Numbered, Units, WrittenScenario};
 pub use shape::Shape;
 pub use shard::{SHARDS_MAX, Shard};
 pub use stage::Stage;

@@ -8,14 +8,22 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use rusqlite::Connection;
+use rusqlite::{Connection, params};
 use sha2::{Digest, Sha256};
 
-use crate::files::Temporary;
+use crate::files::{PlainName, Temporary};
 use crate::run::sealed::{DatabaseError, Layout, add_rows, check_plain, plain_tables};
 
 /// A unit to take over: its number in the other file, and the number that it gets here.
 pub type Numbered = (i64, i64);
+
+/// A scenario that was written of a unit: the name and the text of its file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WrittenScenario {
+    pub unit: i64,
+    pub name: PlainName,
+    pub text: String,
+}
 
 /// A database of units that know nothing of each other.
 pub trait Units: Sized {
@@ -28,6 +36,24 @@ pub trait Units: Sized {
     fn connection(&self) -> &Connection;
     #[doc(hidden)]
     fn from_connection(connection: Connection) -> Self;
+
+    /// The scenarios that were written, in the order of their units; none where none are kept.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or the name of a scenario is none.
+    fn scenarios(&self) -> Result<Vec<WrittenScenario>, DatabaseError> {
+        Ok(Vec::new())
+    }
+
+    /// Whether scenarios are kept.
+    fn keeps_scenarios() -> bool {
+        Self::layout().tables.contains(&"scenario")
+    }
+
+    /// What a message calls a unit.
+    fn called(number: i64) -> String {
+        format!("{} {number}", Self::layout().unit)
+    }
 
     /// Opens the file, making the tables if it is new. `settings` is the text of the settings that it is begun with.
     ///
@@ -77,7 +103,7 @@ pub trait Units: Sized {
     }
 
     /// Takes units over from another file of this kind, all or none. A unit that is here already must be equal.
-    /// `adjust` is called before they are sealed.
+    /// `moved` has their scenarios, each with the text that it gets here.
     ///
     /// # Errors
     /// If one of the files cannot be used, or a unit that both have differs.
@@ -85,9 +111,17 @@ pub trait Units: Sized {
         &mut self,
         other: &Path,
         units: &[Numbered],
-        adjust: &dyn Fn(&Connection) -> Result<(), rusqlite::Error>,
+        moved: &[(WrittenScenario, String)],
     ) -> Result<(), DatabaseError> {
-        Self::layout().take(self.connection(), other, units, adjust)
+        let layout = Self::layout();
+        layout.take(self.connection(), other, units, &|connection| {
+            for (WrittenScenario { unit, text, .. }, new) in moved {
+                // A unit may have several scenarios; what they are called by differs from table to table.
+                let update = format!("UPDATE scenario SET text = ? WHERE {} = ? AND text = ?", layout.unit);
+                connection.prepare_cached(&update)?.execute(params![new, unit, text])?;
+            }
+            Ok(())
+        })
     }
 
     /// Writes the file, which is at `path`, anew with these units, in the order of their new numbers, and with what belongs
@@ -103,8 +137,8 @@ pub trait Units: Sized {
         let (temporary, file) = Temporary::beside(path)?;
         // SQLite opens it by its name, and takes an empty file for a new database.
         drop(file);
-        let mut settled = Self::open(temporary.path(), &settings)?;
-        settled.take(path, units, &take_apart(Self::layout()))?;
+        let settled = Self::open(temporary.path(), &settings)?;
+        Self::layout().take(settled.connection(), path, units, &take_apart(Self::layout()))?;
         drop(settled);
         temporary.take_place_of(path)?;
         Ok(Self::from_connection(Connection::open(path)?))

@@ -8,7 +8,6 @@ use rusqlite::{Connection, Row, params};
 
 use crate::run::{DatabaseError, Layout, Numbered, Units};
 
-use crate::study::job::Job;
 use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureClass, Spent, TrainedRecord};
 use crate::study::settings::StudySettings;
 
@@ -117,28 +116,6 @@ impl StudyDatabase {
         }
         transaction.commit()?;
         Ok(())
-    }
-
-    /// The jobs among these that are not done yet.
-    ///
-    /// # Errors
-    /// If the file cannot be read.
-    pub fn missing(&self, settings: &StudySettings, jobs: Vec<Job>) -> Result<Vec<Job>, DatabaseError> {
-        let mut is_there =
-            self.connection.prepare("SELECT 1 FROM cell WHERE agent = ? AND road = ? AND number = ?")?;
-        let mut missing = Vec::new();
-        for job in jobs {
-            let agent = &settings.agents[job.agent].label;
-            // All cells of a job come together, but one of them may have been dropped since.
-            let mut is_whole = true;
-            for &road in &job.roads {
-                is_whole &= is_there.exists(params![agent, settings.roads[road], job.number])?;
-            }
-            if !is_whole {
-                missing.push(job);
-            }
-        }
-        Ok(missing)
     }
 
     /// The numbers of all cells, each with its number in a settled file, which is its place in the study.

@@ -1,0 +1,158 @@
+//! What a run, a training, a study and an estimate have in common: a directory with settings, a database of units, and
+//! scenarios that were written of them. Each says in its own file what it is; `run_directory` begins and resumes all of them,
+//! and `merge` brings the shards of all together that can be cut.
+
+use std::collections::BTreeSet;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use avastra_campaign::estimate::EstimateSettings;
+use avastra_campaign::run::{DatabaseError, Numbered, PolicyReference, RunSettings, Shard, Units};
+use avastra_campaign::study::StudySettings;
+use avastra_campaign::train::TrainSettings;
+use avastra_drivers::external::{Attached, Program};
+
+use super::error::Failure;
+use super::findings::unfinished;
+use super::output::Output;
+use super::progress::Progress;
+use super::shard;
+
+/// All kinds. One directory holds one of them; the first that it holds counts.
+pub const KINDS: [Kind; 4] =
+    [StudySettings::KIND, EstimateSettings::KIND, TrainSettings::KIND, RunSettings::KIND];
+
+/// A kind of campaign.
+pub struct Kind {
+    /// What was begun, in a word.
+    pub what: &'static str,
+    /// The command that begins it and goes on with it.
+    pub command: &'static str,
+    /// The name of its files: `run.yaml`, `run.db`.
+    pub file: &'static str,
+    /// Whether a directory holds one.
+    pub is_in: fn(&Path) -> bool,
+    /// Brings shards together; nothing for what is one piece.
+    pub merge: Option<Merge>,
+}
+
+/// Brings the shards in these directories together; without a new directory, only says what is missing.
+pub type Merge = fn(&Output, &[PathBuf], Option<&Path>) -> Result<(), Failure>;
+
+/// A campaign, by its settings.
+pub trait Campaign: Serialize + DeserializeOwned {
+    const KIND: Kind;
+    type Database: Units;
+
+    /// What the settings name outside of the directory.
+    fn outside(&mut self) -> Outside<'_>;
+}
+
+/// What settings name outside of their directory, by paths from there.
+pub struct Outside<'a> {
+    pub space: &'a mut String,
+    pub space_digest: &'a str,
+    pub external: &'a mut Option<Attached>,
+    /// The policy that is played; nothing where no policy can be.
+    pub policy: Option<&'a mut Option<PolicyReference>>,
+}
+
+/// A campaign that can be cut into shards.
+pub trait Cut: Campaign {
+    /// Everything that is shared out.
+    fn work(&self) -> Vec<Item>;
+
+    /// The numbers of the units of a file, each with the one in a settled file.
+    fn numbered(&self, database: &Self::Database) -> Result<Vec<Numbered>, DatabaseError> {
+        as_they_are(database)
+    }
+
+    /// Takes over what a shard keeps beside its database.
+    fn take_beside(_: [&Path; 2]) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    /// Ends a directory in which all is played.
+    fn conclude(output: &Output, directory: &Path) -> Result<(), Failure>;
+}
+
+/// What a shard has as a whole, or not at all.
+pub struct Item {
+    /// Its cost in episodes.
+    pub cost: u64,
+    /// The numbers of its units in a settled file.
+    pub units: Range<i64>,
+}
+
+impl Item {
+    /// Whether all of its units are among these.
+    pub fn is_in(&self, units: &BTreeSet<i64>) -> bool {
+        self.units.clone().all(|unit| units.contains(&unit))
+    }
+}
+
+/// The costs of all items, by which they are shared out.
+pub fn costs(work: &[Item]) -> Vec<u64> {
+    work.iter().map(|item| item.cost).collect()
+}
+
+/// What a directory has to play. Items go by their positions in the work of the whole.
+pub struct Share {
+    pub shard: Shard,
+    /// The items of its shard, rising.
+    pub own: Vec<usize>,
+    work: Vec<Item>,
+}
+
+impl Share {
+    /// The share of the shard that a directory holds.
+    pub fn of<C: Cut>(directory: &Path, settings: &C) -> Result<Share, Failure> {
+        let (shard, work) = (shard::kept(directory)?, settings.work());
+        Ok(Share { shard, own: shard.share(&costs(&work)), work })
+    }
+
+    /// Those of its items that are not played.
+    pub fn lacking<C: Cut>(&self, settings: &C, database: &C::Database) -> Result<Vec<usize>, DatabaseError> {
+        let played = settings.numbered(database)?.into_iter().map(|(_, place)| place).collect();
+        Ok(self.own.iter().copied().filter(|&item| !self.work[item].is_in(&played)).collect())
+    }
+
+    /// The progress over its episodes. `how` is as for [`Progress`], `lacking` has the items that are not played.
+    pub fn progress(&self, output: &Output, how: &'static str, lacking: &[usize]) -> Progress {
+        let episodes = |items: &[usize]| items.iter().map(|&item| self.work[item].cost).sum::<u64>();
+        let all = episodes(&self.own);
+        Progress::new(output, how, all, all - episodes(lacking))
+    }
+
+    /// What comes after playing: how to go on if something is left, and how to bring shards together.
+    pub fn end<C: Cut>(
+        &self,
+        output: &Output,
+        directory: PathBuf,
+        is_over: bool,
+        program: Option<&Arc<Program>>,
+    ) -> Result<(), Failure> {
+        if !is_over {
+            return Err(unfinished(C::KIND.command, directory, program));
+        }
+        if !self.shard.is_whole() {
+            output.say(&shard::next_step(self.shard));
+        }
+        Ok(())
+    }
+}
+
+/// Settles a database in which all is played; `file` is where it is.
+pub fn settled<C: Cut>(settings: &C, database: C::Database, file: &Path) -> Result<C::Database, Failure> {
+    let units = settings.numbered(&database).map_err(|error| Failure::file("read", file, error))?;
+    database.settle(file, &units).map_err(|error| Failure::file("write", file, error))
+}
+
+/// Units that have the same numbers in every file.
+pub fn as_they_are(database: &impl Units) -> Result<Vec<Numbered>, DatabaseError> {
+    Ok(database.numbers()?.into_iter().map(|number| (number, number)).collect())
+}
