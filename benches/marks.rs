@@ -49,7 +49,7 @@ const EPISODES: u32 = 24;
 
 fn main() {
     let space = load();
-    let scene = Arc::new(episode::scene(&space.roads[0]));
+    let scene = Arc::new(Scene::of(&space.roads[0]));
     let world = crowded(&scene);
     println!("# {} obstacles around the ego vehicle", world.obstacles().len());
     for name in ["modular", "frenet", "reactive", "idm"] {

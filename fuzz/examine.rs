@@ -9,9 +9,9 @@ use std::path::Path;
 use avastra::action::{ActionTable, Offer, Situation, SpawnFacts, SpawnRequest, Surroundings};
 use avastra::check::{ReadError, load};
 use avastra::model::{MomentFacts, RulesInForce};
+use avastra::places::{self, Scenes};
 use avastra::syntax::ast::FileId;
 use avastra::syntax::{Diagnostic, Style, apply_fixes, format, parse, print, record, render, same_meaning};
-use avastra::trial::places::{self, Scenes};
 
 /// The shipped space; its roads are those of [`ROADS`].
 const AVASTRA: &str = include_str!("../scenarios/avastra45.ava");

@@ -3,7 +3,7 @@
 #
 # One training for each road, with the default preset, against the driving system with dirty sensors: against the
 # default profile there is next to nothing to learn. The same version on any machine writes the same bytes. What was
-# made before is replaced only when all four are there and verified.
+# made before is replaced only when all four are there and their claims hold.
 set -eu
 
 space=scenarios/avastra45.ava
@@ -19,7 +19,7 @@ for road in residential corner crossroad boulevard; do
     # A policy may move: its seal covers everything but the path of its `use`.
     sed 's|^use "[^"]*"|use "../scenarios/avastra45.ava"|' \
         "$work/$road/policy/${road}_ddqn_1.ava" > "policies/$road.ava.new"
-    "$avastra" verify "policies/$road.ava.new"
+    "$avastra" replay "policies/$road.ava.new"
 done
 for road in residential corner crossroad boulevard; do
     mv "policies/$road.ava.new" "policies/$road.ava"

@@ -35,6 +35,6 @@ pub use avastra_exchange::{export, import, report};
 pub use avastra_lang::{check, model, prove, syntax};
 pub use avastra_road as road;
 pub use avastra_search::{agent, mdp};
-pub use avastra_world::{action, sim};
+pub use avastra_world::{action, places, sim};
 
 pub mod cli;

@@ -6,7 +6,7 @@ fail. Takes a sample by seed, because each change is a build of its own (a minut
 
     python3 tests/mutants.py            lists how many places there are
     python3 tests/mutants.py 1 20       tries 20 of them, chosen by seed 1
-    python3 tests/mutants.py 1 20 src/action/draw.rs
+    python3 tests/mutants.py 1 20 src/world/action/draw.rs
 
 It works in the checkout and puts every file back, also when it is interrupted. What survives is printed with its
 line. A change that does not compile counts as none and is replaced by another.
@@ -19,20 +19,21 @@ import subprocess
 import sys
 
 FILES = [
-    "src/model/rules/*.rs",
-    "src/model/memory.rs",
-    "src/action/draw.rs",
-    "src/check/rule.rs",
-    "src/check/scenario_rules.rs",
-    "src/prove/reach.rs",
-    "src/prove/realise.rs",
-    "src/prove/time.rs",
-    "src/prove/moment.rs",
-    "src/prove/witness.rs",
+    "src/lang/model/rules/*.rs",
+    "src/lang/model/memory.rs",
+    "src/world/action/draw.rs",
+    "src/lang/check/rule.rs",
+    "src/lang/check/scenario_rules.rs",
+    "src/lang/prove/reach.rs",
+    "src/lang/prove/realise.rs",
+    "src/lang/prove/time.rs",
+    "src/lang/prove/moment.rs",
+    "src/lang/prove/witness.rs",
 ]
+UNIT_TESTS = ["cargo", "test", "-q", "-p", "avastra-lang", "-p", "avastra-world", "--lib"]
 # The cases of diagnostics are asked only where the unit tests notice nothing: they take a build more.
 TESTS = [
-    ["cargo", "test", "--lib", "-q", "--", "action::", "model::", "prove::", "check::"],
+    [*UNIT_TESTS, "--", "action::", "model::", "prove::", "check::"],
     ["cargo", "test", "--test", "it", "-q", "--", "every_broken_file_has_its_diagnostics"],
 ]
 # A change may make a search endless.
@@ -87,7 +88,7 @@ def tried(change):
     before = open(path, encoding="utf-8").read()
     try:
         open(path, "w", encoding="utf-8").write(changed)
-        build = subprocess.run(["cargo", "test", "--lib", "--no-run", "-q"], capture_output=True, check=False)
+        build = subprocess.run([*UNIT_TESTS, "--no-run"], capture_output=True, check=False)
         if build.returncode != 0:
             return "broken"
         for tests in TESTS:

@@ -3,6 +3,39 @@
 //! [`episode`] plays one; [`oracle`] judges its collisions; [`run`], [`train`], [`study`], [`estimate`] and [`trial`] play
 //! many and keep them in a database; [`emit`] writes what they find as files of the language; [`files`] alone creates,
 //! replaces and removes files.
+//!
+//! ```
+//! use std::path::Path;
+//!
+//! use avastra_campaign::episode::{self, Choice, Moment, Script};
+//! use avastra_campaign::run::Arena;
+//! use avastra_drivers::{Selected, by_name};
+//! use avastra_lang::check::{ReadError, load};
+//! use avastra_world::action::{ActionTable, Offer};
+//!
+//! let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()));
+//! let space = load(Path::new("../../scenarios/avastra45.ava"), &read)?.space.expect("it has no mistakes");
+//! let ads = Selected::new(by_name("modular").expect("it is in the registry"));
+//! let arena = Arena::new(ActionTable::new(space), &["corner".to_owned()], ads, &[], &[])?;
+//!
+//! // The episode of seed 1: at each step the last legal row is carried out.
+//! let mut last_legal = |moment: &Moment| {
+//!     let offers = arena.table().offers(moment.situation).into_iter().rev();
+//!     let mut legal = offers.filter_map(|offer| match offer {
+//!         Offer::Legal(draw) => Some(draw),
+//!         Offer::Refused(_) => None,
+//!     });
+//!     legal.next().map_or(Choice::Pass, Choice::Act)
+//! };
+//! let log = episode::run(&arena.setup(0, 1), &mut last_legal, &mut |_, _, _| {});
+//!
+//! // Its choices alone, as a script, play it again to the bit.
+//! let script = Script::of_log(&log);
+//! let mut as_written = |moment: &Moment| script.choose(arena.table(), moment);
+//! let again = episode::run(&arena.setup(0, 1), &mut as_written, &mut |_, _, _| {});
+//! assert_eq!(again.trace(), log.trace());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod episode;
 pub mod oracle;

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use avastra_campaign::trial::places::{self, Scenes};
 use avastra_lang::check::Loaded;
 use avastra_lang::syntax::ast::FileId;
 use avastra_lang::syntax::{Diagnostic, apply_fixes};
 use avastra_world::action::{ActionTable, audit};
+use avastra_world::places::{self, Scenes};
 use avastra_world::sim::ENGINE;
 
 use super::arguments::{CheckArguments, Dump};

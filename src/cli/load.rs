@@ -8,7 +8,6 @@ use std::sync::Arc;
 
 use avastra_campaign::run;
 use avastra_campaign::run::{Asked, Profile, RunError, driving_system};
-use avastra_campaign::trial::places::{self, Scenes};
 use avastra_drivers::external::{Attached, ExternalSettings, Target};
 use avastra_drivers::{EXTERNAL, ModularConfig, REGISTRY};
 use avastra_lang::check;
@@ -16,6 +15,7 @@ use avastra_lang::check::{Loaded, ReadError};
 use avastra_lang::model::{Policy, Scenario, Space};
 use avastra_lang::syntax::{nearest, yaml_mistake};
 use avastra_world::action::ActionTable;
+use avastra_world::places::{self, Scenes};
 use avastra_world::sim::TrafficProfile;
 
 use super::error::Failure;

@@ -173,7 +173,7 @@ struct Survey {
     /// The text of the settings in the merged directory.
     settings: String,
     shards: u32,
-    /// Those of the shards that lack a unit.
+    /// The numbers of the shards that lack a unit.
     missing: BTreeSet<u32>,
 }
 

@@ -66,8 +66,10 @@ use output::Output;
 /// An unknown command's error with what it is called now, or else with the command that differs least: clap's own measure
 /// prefers `render` to `run` for `rn`.
 fn with_nearest_command(mut error: clap::Error) -> clap::Error {
-    let unknown = error.get(ContextKind::InvalidSubcommand).or(error.get(ContextKind::InvalidArg));
-    if let Some(ContextValue::String(word)) = unknown
+    let is_option =
+        |value: &&ContextValue| matches!(value, ContextValue::String(word) if word.starts_with("--"));
+    let option = error.get(ContextKind::InvalidArg).filter(is_option);
+    if let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidSubcommand).or(option)
         && let Some(now) = help::moved(word)
     {
         return help::command().error(error.kind(), format!("`{word}` is now `{now}`"));

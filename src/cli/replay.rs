@@ -141,7 +141,7 @@ pub fn refutation(refuted: usize) -> Result<(), Failure> {
 /// What a replay of one file found.
 struct Played {
     path: PathBuf,
-    /// Of the scenario.
+    /// The name of the scenario.
     name: String,
     /// Its claims, if it was played as it was recorded.
     claims: Option<Vec<oracle::ClaimResult>>,

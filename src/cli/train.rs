@@ -294,7 +294,7 @@ fn played(settings: &TrainSettings, evaluation: &Evaluation) -> usize {
     evaluation.episodes as usize * settings.roads.len()
 }
 
-/// Those of them that ended because the driving system failed.
+/// Episodes of an evaluation that ended because the driving system failed.
 fn failed(evaluation: &Evaluation) -> usize {
     evaluation.failures.values().sum::<u64>() as usize
 }

@@ -4,12 +4,11 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use avastra_campaign::emit;
-use avastra_campaign::episode;
 use avastra_campaign::run::road_named;
 use avastra_lang::check::state_argument::legal_memory_from;
 use avastra_lang::model::{Memory, RuleBody, RulesInForce, Space, StateDef};
 use avastra_world::action::{ActionTable, Offer, Situation};
-use avastra_world::sim::World;
+use avastra_world::sim::{Scene, Start, World};
 
 use super::arguments::TableArguments;
 use super::error::Failure;
@@ -43,8 +42,8 @@ pub fn why(
         None => space.memory_at_start(road, &rules, SEED).map_err(Failure::usage)?,
         Some(text) => legal_memory_from(space, text, road, &rules, SEED).map_err(Failure::usage)?,
     };
-    let start = episode::start(space, &memory, SEED);
-    let world = World::new(Arc::new(episode::scene(road)), &start);
+    let start = Start::drawn(space, &memory, SEED);
+    let world = World::new(Arc::new(Scene::of(road)), &start);
     let situation =
         Situation { memory: &memory, road, rules: &rules, surroundings: &world, seed: SEED, step: 0 };
     let offer = table.offer(&situation, number);

@@ -7,7 +7,6 @@ a message that says the way out, which is then taken. `kill.c` strikes; see ther
 import os
 import random
 import shutil
-import sqlite3
 import subprocess
 import sys
 import tempfile
@@ -35,26 +34,13 @@ def call(arguments, **fault):
     return ended.returncode, ended.stderr
 
 
-def rows(path):
-    """All rows of a database but those of SQLite's own: a training is not settled."""
-    database = sqlite3.connect(path)
-    tables = [name for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY 1")]
-    found = {}
-    for table in tables:
-        columns = [row[1] for row in database.execute(f"PRAGMA table_info({table})")]
-        named = ", ".join(f'"{name}"' for name in columns)
-        found[table] = sorted(map(repr, database.execute(f"SELECT {named} FROM {table}")))
-    return found
-
-
 def kept(out):
     """What a directory holds, file by file."""
     found = {}
     for path in sorted(out.rglob("*")):
         # Two plays of a study need not take the same time.
         if path.is_file() and not path.name.endswith((".partial", "-journal", "timing.jsonl")):
-            is_settled = path.name != "run.db" or "hyperparameters:" not in (out / "run.yaml").read_text()
-            found[str(path.relative_to(out))] = path.read_bytes() if is_settled else rows(path)
+            found[str(path.relative_to(out))] = path.read_bytes()
     return found
 
 

@@ -1,4 +1,4 @@
-"""Mutates emitted scenarios and policies and verifies each: no crash, no hang, and no false claim confirmed.
+"""Mutates emitted scenarios and policies and replays each: no crash, no hang, and no false claim confirmed.
 
 Arguments: the avastra binary, a folder for what it makes, and how many scenarios and policies. A mutant is confirmed
 (exit status 0) only if what it claims is true. All confirmed mutants whose claims differ from those of the original

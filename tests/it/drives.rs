@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
+use avastra::ads;
 use avastra::model::vocabulary::{Level, TimeOfDay, Word};
 use avastra::sim::{Scene, Start, TrafficProfile, World};
-use avastra::{ads, episode};
 
 use crate::world::space;
 
@@ -21,7 +21,7 @@ fn undisturbed_drives_arrive_in_every_weather() {
         for (index, road) in space.roads.iter().enumerate() {
             let dealt = (index as u64, space.roads.len());
             threads.spawn(move || {
-                let scene = Arc::new(episode::scene(road));
+                let scene = Arc::new(Scene::of(road));
                 for entry in ads::REGISTRY {
                     let (first, stride) = if entry.name == "modular" { (0, 1) } else { dealt };
                     for seed in (first..DRIVES).step_by(stride) {
@@ -38,7 +38,7 @@ fn a_healthy_driving_system_mostly_survives_ambient_traffic() {
     let space = space("avastra45.ava");
     let (mut drives, mut failed) = (0, Vec::new());
     for (index, road) in space.roads.iter().enumerate() {
-        let scene = Arc::new(episode::scene(road));
+        let scene = Arc::new(Scene::of(road));
         for entry in ads::REGISTRY {
             for seed in (index as u64..60).step_by(space.roads.len()) {
                 drives += 1;

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use avastra::action::ActionTable;
+use avastra::ads;
 use avastra::episode::{End, StepLog};
 use avastra::road::{LaneIndex, Precedence, RoadMap, Route};
 use avastra::run::{Run, RunSettings};
 use avastra::sim::{Scene, SensedObject, Start, World};
-use avastra::{ads, episode};
 
 use crate::cases::{expect_snapshot, root};
 use crate::command::{avastra, outcome};
@@ -58,7 +58,7 @@ fn drive(scene: &Arc<Scene>, entry: &ads::Entry, seed: u64, ambient: u32) -> (us
 fn every_driving_system_arrives_at_every_place() {
     for place in PLACES {
         for road in &space_at(&path(&format!("{place}.ava"))).roads {
-            let scene = Arc::new(episode::scene(road));
+            let scene = Arc::new(Scene::of(road));
             for entry in ads::REGISTRY {
                 for seed in 0..3 {
                     let case = format!("{} on {place}, {}, seed {seed}", entry.name, road.name);

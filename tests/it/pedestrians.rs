@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use avastra::action::{Effect, SpawnRequest, Surroundings};
+use avastra::ads;
 use avastra::episode::Outcome;
 use avastra::geometry::distance_m;
 use avastra::model::vocabulary::{Body, Colour, LaneChoice, Level, Side, Then, TimeOfDay, Verb};
 use avastra::sim::{Control, Obstacle, Scene, Start, World};
-use avastra::{ads, episode};
 
 use crate::world::{assert_replays, run_of, space, space_at};
 
@@ -38,7 +38,7 @@ fn walks_lead_from_kerb_to_kerb_on_every_road() {
     std::thread::scope(|threads| {
         for road in &space.roads {
             threads.spawn(move || {
-                let scene = Arc::new(episode::scene(road));
+                let scene = Arc::new(Scene::of(road));
                 for side in [Side::Left, Side::Right] {
                     let walks = walks(&scene, side, &[None]);
                     assert!(walks >= SPAWNS, "{walks} walks from the {side:?} on {}", road.name);

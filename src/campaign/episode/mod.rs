@@ -16,4 +16,4 @@ pub use log::{Collision, End, EpisodeLog, Held, Outcome, StepLog};
 pub use recorder::{Actor, Lights, Recorder, Sample, Sky, Touch};
 pub use run::{Choice, Moment, Play, Watch, run, run_from};
 pub use script::{Script, ScriptedAction};
-pub use setup::{Setup, scene, start};
+pub use setup::Setup;

@@ -50,7 +50,7 @@ impl Arena {
         let space = table.space();
         let roads = roads.iter().map(|name| {
             let index = road_named(space, name)?;
-            Ok((index, Arc::new(episode::scene(&space.roads[index]))))
+            Ok((index, Arc::new(Scene::of(&space.roads[index]))))
         });
         let roads: Vec<(usize, Arc<Scene>)> = roads.collect::<Result<_, RunError>>()?;
         let rules = RulesInForce::new(space, with, without)?;
@@ -117,7 +117,7 @@ impl Arena {
             rules: &self.rules,
             ads: self.ads.clone(),
             seed,
-            start: Start { traffic: self.traffic, ..episode::start(space, &memory, seed) },
+            start: Start { traffic: self.traffic, ..Start::drawn(space, &memory, seed) },
             memory,
             period_shifts: Vec::new(),
             proc: ProcKind::default(),
@@ -157,7 +157,7 @@ pub fn choose(agent: &mut dyn Agent, moment: &Moment) -> (Choice, Array1<bool>) 
 }
 
 /// What each row would do now.
-pub fn offers(agent: &mut dyn Agent, moment: &Moment) -> Vec<Offer> {
+pub(crate) fn offers(agent: &mut dyn Agent, moment: &Moment) -> Vec<Offer> {
     let situation = situation(agent, moment);
     let shares = agent.draw_shares(moment.step, moment.situation.seed);
     moment.setup().table.offers_at(&situation, shares)
@@ -183,12 +183,12 @@ pub(super) fn taken(row: usize, offer: Offer) -> Choice {
 }
 
 /// Which of the offers are legal, shape `(rows,)`.
-pub fn legal(offers: &[Offer]) -> Array1<bool> {
+pub(crate) fn legal(offers: &[Offer]) -> Array1<bool> {
     offers.iter().map(|offer| matches!(offer, Offer::Legal(_))).collect()
 }
 
 /// The agent's choice among the offers.
-pub fn carry_out(
+pub(crate) fn carry_out(
     mut offers: Vec<Offer>,
     legal: ndarray::ArrayView1<bool>,
     agent: &mut dyn Agent,

@@ -22,7 +22,7 @@ use crate::run::settled::{Units, WrittenScenario};
 use crate::run::shape::Shape;
 use crate::run::summary::{EpisodeSummary, Finding};
 
-pub const LAYOUT: Layout = Layout {
+pub(crate) const LAYOUT: Layout = Layout {
     version: 10,
     unit: "episode",
     tables: &["episode", "step", "held", "offer", "collision", "failure", "learning", "scenario"],
@@ -38,7 +38,7 @@ pub const LAYOUT: Layout = Layout {
            AND coalesce(first_counted_s, 0) BETWEEN 0 AND 1e9",
         ),
         ("collision", "time_s BETWEEN 0 AND 1e9 AND max(abs(ego_speed_mps), abs(delta_v_mps)) <= 1e9"),
-        ("learning", "simulated_s BETWEEN 0 AND 1e9 AND abs(return) <= 1e9"),
+        ("learning", "simulated_s BETWEEN 0 AND 1e9 AND abs(return) <= 1e12"),
     ],
 };
 
@@ -374,7 +374,7 @@ fn step_table() -> String {
 }
 
 /// An episode with its steps, its collisions and the text of its scenario, if one was written.
-pub fn add_all(
+pub(crate) fn add_all(
     transaction: &Transaction,
     summary: &EpisodeSummary,
     log: &EpisodeLog,

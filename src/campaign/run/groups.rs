@@ -104,7 +104,7 @@ impl Database {
 }
 
 /// What [`kind`] calls a pedestrian.
-pub const PEDESTRIAN: &str = "pedestrian";
+pub(crate) const PEDESTRIAN: &str = "pedestrian";
 
 /// The kind of an obstacle by the name of its body.
 pub fn kind(body: &str) -> &'static str {

@@ -24,23 +24,23 @@ mod stepped;
 mod summary;
 mod threads;
 
-pub use arena::{Arena, road_named};
-pub use arena::{carry_out, choose, legal, offers};
+pub use arena::{Arena, choose, road_named};
+pub(crate) use arena::{carry_out, legal, offers};
 pub use columns::{Column, Values, columns};
 pub use coverage::{CoverageCell, LearningPoint};
 pub use database::{Database, FailureCount, RefusalCount, Totals};
-pub use database::{LAYOUT, add_all};
+pub(crate) use database::{LAYOUT, add_all};
 pub use gauges::Gauges;
-pub use groups::Group;
-pub use groups::{PEDESTRIAN, kind};
+pub(crate) use groups::PEDESTRIAN;
+pub use groups::{Group, kind};
 pub use offered::in_words as refusal_in_words;
 pub use offered::{Offered, RowCount};
 pub use play::{Run, play};
 pub use profile::{
-    Asked, DEFAULT_ADS, Profile, TrafficRecord, driving_system, recorded, recorded_name, recorded_traffic,
-    started, trained_against,
+    Asked, DEFAULT_ADS, Profile, TrafficRecord, driving_system, recorded, recorded_traffic, started,
+    trained_against,
 };
-pub use profile::{traffic_of, under_test};
+pub(crate) use profile::{traffic_of, under_test};
 pub use sealed::differences as settings_differences;
 pub use sealed::{DatabaseError, Layout};
 pub use settings::{EPISODES_MAX, PolicyReference, RunError, RunSettings, VERSION};

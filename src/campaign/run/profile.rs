@@ -63,7 +63,7 @@ impl TrafficRecord {
 ///
 /// # Errors
 /// If its settings mean something else in this version.
-pub fn traffic_of(record: Option<&TrafficRecord>) -> Result<TrafficProfile, RunError> {
+pub(crate) fn traffic_of(record: Option<&TrafficRecord>) -> Result<TrafficProfile, RunError> {
     match record {
         None => Ok(TrafficProfile::default()),
         Some(record) if record.settings.digest() != record.digest => {
@@ -98,7 +98,7 @@ pub fn recorded_traffic(scenario: &Scenario) -> Result<TrafficProfile, RunError>
 /// # Errors
 /// If there is none of that name, it has no settings, or they mean something else in this version; if an external one
 /// cannot be started, or has another name, version or kind of answer.
-pub fn under_test(
+pub(crate) fn under_test(
     ads: &str,
     profile: Option<&Profile>,
     external: Option<&Attached>,
@@ -152,15 +152,6 @@ pub fn recorded(scenario: &Scenario) -> Result<Selected, RunError> {
         return Ok(Selected::external(Program::recorded(attached, answers)));
     }
     selected(&scenario.name, ads, origin.profile.as_deref(), origin.profile_digest.as_deref())
-}
-
-/// The name of the driving system that a scenario was made with.
-pub fn recorded_name(scenario: &Scenario) -> String {
-    let ads = scenario.origin.ads.as_deref().unwrap_or(DEFAULT_ADS);
-    attached(scenario)
-        .ok()
-        .filter(|_| ads == EXTERNAL)
-        .map_or_else(|| ads.to_owned(), |attached| attached.name())
 }
 
 /// The external driving system that a scenario names.

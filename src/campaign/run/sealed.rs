@@ -85,7 +85,7 @@ pub struct Layout {
     pub tables: &'static [&'static str],
     /// A table whose rows name rows of another by a column with that one's name. What they name is sealed with them.
     pub naming: Option<(&'static str, &'static str)>,
-    /// Those of the tables whose rows depend on where the directory is.
+    /// The tables whose rows depend on where the directory is.
     pub local: &'static [&'static str],
     /// Tables whose rows belong to no unit. They are kept when the database is settled, and no merge takes them.
     pub apart: &'static [&'static str],

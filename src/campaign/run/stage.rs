@@ -33,7 +33,7 @@ impl<'a> Stage<'a> {
             return Err(RunError::Engine { scenario: scenario.name.clone(), engine: engine.clone() });
         }
         let rules = RulesInForce::new(table.space(), &origin.with, &origin.without)?;
-        let scene = Arc::new(episode::scene(&table.space().roads[scenario.road]));
+        let scene = Arc::new(Scene::of(&table.space().roads[scenario.road]));
         let traffic = recorded_traffic(scenario)?;
         Ok(Stage { table, scenario, rules, scene, traffic })
     }
@@ -57,7 +57,7 @@ impl<'a> Stage<'a> {
                 ambient: start.ambient,
                 ego_mps: start.ego_mps,
                 traffic: self.traffic,
-                ..episode::start(space, &memory, seed)
+                ..Start::drawn(space, &memory, seed)
             },
             memory,
             period_shifts: Vec::new(),

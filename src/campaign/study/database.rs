@@ -20,7 +20,7 @@ const LAYOUT: Layout = Layout {
     local: &[],
     apart: &[],
     sound: &[
-        ("trained", "simulated_s BETWEEN 0 AND 1e9 AND abs(return) <= 1e9"),
+        ("trained", "simulated_s BETWEEN 0 AND 1e9 AND abs(return) <= 1e12"),
         (
             "evaluated",
             "min(duration_s, distance_m, red_runs, speeding_s, astray_s, branched_s) >= 0

@@ -2,13 +2,11 @@
 //!
 //! [`Trials`] offers every row at moments of undisturbed drives (`survey`), watches the road users that it makes
 //! appear (`sighting`) and judges what they do (`judge`) and whether they appeared fairly (`fairness`). The
-//! criteria are written apart from the drivers and rules that they test. [`places`] only asks whether a row finds a place,
-//! and drives nothing.
+//! criteria are written apart from the drivers and rules that they test.
 
 mod fairness;
 mod judge;
-pub mod places;
 mod sighting;
 mod survey;
 
-pub use survey::{Cell, Count, Outcome, Sample, TrialSettings, Trials};
+pub use survey::{Cell, Outcome, Sample, TrialSettings, Trials};

@@ -13,7 +13,7 @@ use avastra_base::rng::Stream;
 use avastra_drivers::Ads;
 use avastra_lang::model::Row;
 use avastra_lang::model::vocabulary::Phenomenon;
-use avastra_world::action::{Draw, Effect, Offer, Refusal};
+use avastra_world::action::{Count, Draw, Effect, Offer};
 use avastra_world::sim::{Sensed, World};
 
 use crate::run::Arena;
@@ -27,14 +27,6 @@ pub struct TrialSettings {
     /// Tries of each row on each road, at most.
     pub tries: u32,
     pub seed: u64,
-}
-
-/// Something that happened several times, for one reason.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
-pub struct Count {
-    pub count: usize,
-    /// The reason, with the figures of its first occurrence.
-    pub reason: String,
 }
 
 /// What the trials say of a row on a road.
@@ -202,7 +194,7 @@ impl<'a> Trials<'a> {
         let mut refusals = Vec::new();
         for moment in moments {
             if let Offer::Refused(refusal) = &moment.offers[row] {
-                count(&mut refusals, &refused(refusal));
+                Count::add(&mut refusals, &refusal.in_words());
             }
         }
         let tries = legal.len().min(self.settings.tries as usize);
@@ -211,8 +203,8 @@ impl<'a> Trials<'a> {
         for number in 0..tries {
             let (moment, draw) = legal[number * legal.len() / tries];
             let found = attempt(moment, draw);
-            found.failure.iter().for_each(|why| count(&mut failures, why));
-            found.unfair.iter().for_each(|why| count(&mut unfair, why));
+            found.failure.iter().for_each(|why| Count::add(&mut failures, why));
+            found.unfair.iter().for_each(|why| Count::add(&mut unfair, why));
             nearest_m.extend(found.nearest_m);
             samples.push(Sample { seed: moment.seed, step: moment.step, failure: found.failure });
         }
@@ -302,20 +294,4 @@ fn unmet(world: &World, effects: &[Effect]) -> Option<String> {
         _ => None,
     });
     time.filter(|time| *time != world.time_of_day()).map(|_| "the time is not what was asked for".to_owned())
-}
-
-pub(super) fn refused(refusal: &Refusal) -> String {
-    match &refusal.rule {
-        Some(rule) => format!("rule `{rule}`: {}", refusal.reason),
-        None => refusal.reason.clone(),
-    }
-}
-
-/// Counts a reason; reasons that differ only in their figures count as one.
-pub(super) fn count(counts: &mut Vec<Count>, reason: &str) {
-    let words = |text: &str| text.replace(|c: char| c.is_ascii_digit() || "-.".contains(c), "");
-    match counts.iter_mut().find(|known| words(&known.reason) == words(reason)) {
-        Some(known) => known.count += 1,
-        None => counts.push(Count { count: 1, reason: reason.to_owned() }),
-    }
 }

@@ -58,13 +58,18 @@ struct Speed {
 
 /// Runs all checks; the first that fails ends them.
 pub fn check(output: &Output, arguments: &AdsCheckArguments) -> Result<(), Failure> {
-    let settings = match load::driver(&arguments.ads)? {
+    let given = load::driver(&arguments.ads)?;
+    let settings = match given {
         Driver::Profile(path) => load::external(Some(path), None)?,
         Driver::Command(command) => load::external(None, Some(command))?,
         Driver::Name(_) => None,
     };
     let settings = settings.ok_or_else(|| {
-        Failure::usage(format!("`{}` is a driving system of avastra: check one of your own", arguments.ads))
+        let is = match given {
+            Driver::Profile(_) => "has no `ads` block, so it is a profile of `modular`",
+            _ => "is a driving system of avastra",
+        };
+        Failure::usage(format!("`{}` {is}: check one of your own", arguments.ads))
     })?;
     let (table, _scratch) = match &arguments.space {
         Some(path) => (load::table(output, path)?, None),

@@ -4,11 +4,9 @@ use std::sync::Arc;
 
 use avastra_world::sim::Scene;
 
-mod cc;
 mod driver;
 mod encounter;
 mod evasion;
-mod fsm;
 mod giving_way;
 mod idm;
 mod model;
@@ -18,12 +16,10 @@ mod rss;
 #[cfg(test)]
 mod tests;
 
-pub use cc::CarefulHuman;
 pub use driver::{Careful, Reference, in_sight};
 pub use evasion::Evasion;
-pub use fsm::FuzzySafety;
 pub use idm::Idm;
-pub use r157::MinimalPerformance;
+pub use r157::{CarefulHuman, FuzzySafety, MinimalPerformance};
 pub use rss::Rss;
 
 /// The reference driver of that name, if it follows a published model; its names are those of the registry.

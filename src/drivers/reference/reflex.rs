@@ -95,8 +95,8 @@ impl Reflex {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reference::cc::CarefulHuman;
     use crate::reference::model::Model;
+    use crate::reference::r157::CarefulHuman;
     use avastra_base::kinematics::CAREFUL_BRAKING_MPS2;
 
     #[test]

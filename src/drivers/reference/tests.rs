@@ -1,10 +1,8 @@
 //! The published cut-in grid, recomputed from the equations.
 
-use super::cc::CarefulHuman;
 use super::encounter::Encounter;
-use super::fsm::FuzzySafety;
 use super::model::Model;
-use super::r157::MinimalPerformance;
+use super::r157::{CarefulHuman, FuzzySafety, MinimalPerformance};
 use super::reflex::{Braking, Reflex};
 use super::rss::Rss;
 

@@ -1,6 +1,7 @@
 //! What became of every row on every road, as text.
 
-use avastra_campaign::trial::{Cell, Count, Outcome};
+use avastra_campaign::trial::{Cell, Outcome};
+use avastra_world::action::Count;
 
 /// One line a row, and under it one for each road. `cells` are by row, then by road.
 pub fn trials(cells: &[Cell]) -> String {

@@ -28,6 +28,7 @@ pub mod explain;
 mod expression;
 mod load;
 mod meaning;
+mod missing_use;
 mod names;
 mod operator;
 mod overriding;
@@ -45,7 +46,6 @@ mod scenario_value;
 mod settings;
 pub mod state_argument;
 mod style;
-mod suggest;
 mod unused;
 
 pub use checker::{Claim, Runs};
@@ -53,8 +53,8 @@ pub use difference::{Change, Difference, differences};
 pub use load::{
     Loaded, LoadedFile, MapCache, ReadError, ReadFile, WrittenPath, files_used, load, load_with, normal,
 };
+pub use missing_use::suggest_uses;
 pub use references::{Declaration, Occurrence, References, Symbol};
-pub use suggest::suggest_uses;
 
 #[cfg(test)]
 mod tests;

@@ -35,7 +35,7 @@ pub use limits::{
 };
 pub use limits::{rounded_into, spawn_out_of_bounds};
 pub use meaning::Meaning;
-pub use on_route::stretches;
+pub(crate) use on_route::stretches;
 pub use on_route::{NEAR_JUNCTION_M, OnRoute, Stretch, junction_ahead_m};
 pub use policy::Policy;
 pub use row::locals;

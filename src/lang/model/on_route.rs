@@ -88,7 +88,7 @@ fn road_kind(map: &RoadMap, route: &Route, station_m: f64) -> RoadKind {
 }
 
 /// A route in stretches; every station belongs to one of them. None, if there would be too many.
-pub fn stretches(map: &RoadMap, route: &Route) -> Vec<Stretch> {
+pub(crate) fn stretches(map: &RoadMap, route: &Route) -> Vec<Stretch> {
     let end_m = route.path.length_m();
     let lanes = route.lanes.iter().map(|lane| lane.enter_m);
     let before_lanes =

@@ -76,13 +76,13 @@ pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
 
 /// The shortest sequence of rows that brings a state from one value to another under a transition rule;
 /// empty if there is none, or if both values are the same.
-pub fn shortest_way<'a>(space: &'a Space, rule: &'a RuleDef, from: Value, to: Value) -> Vec<&'a Row> {
+pub(crate) fn shortest_way<'a>(space: &'a Space, rule: &'a RuleDef, from: Value, to: Value) -> Vec<&'a Row> {
     let Some(graph) = graph_of(space, rule) else { return Vec::new() };
     graph.way(from.variant(), to.variant()).into_iter().map(|index| graph.rows[index].0).collect()
 }
 
 /// The rows that a transition rule allows from that value. Only rows that always set the same value count.
-pub fn next_rows<'a>(space: &'a Space, rule: &'a RuleDef, from: Value) -> Vec<&'a Row> {
+pub(crate) fn next_rows<'a>(space: &'a Space, rule: &'a RuleDef, from: Value) -> Vec<&'a Row> {
     let Some(graph) = graph_of(space, rule) else { return Vec::new() };
     let allowed =
         |sets: u128| sets.is_power_of_two() && graph.allowed[from.variant()][sets.trailing_zeros() as usize];
@@ -90,7 +90,7 @@ pub fn next_rows<'a>(space: &'a Space, rule: &'a RuleDef, from: Value) -> Vec<&'
 }
 
 /// Whether a transition rule forbids a row wherever the state has one of these values (bits).
-pub fn forbids(space: &Space, rule: &RuleDef, row: &Row, from: u128) -> bool {
+pub(crate) fn forbids(space: &Space, rule: &RuleDef, row: &Row, from: u128) -> bool {
     let Some(graph) = graph_of(space, rule) else { return false };
     let sets = graph.rows.iter().find(|(other, _)| other.index == row.index).map_or(0, |(_, sets)| *sets);
     sets != 0 && !bits(from).any(|from| bits(sets).any(|to| graph.allowed[from][to]))

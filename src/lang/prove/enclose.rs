@@ -15,11 +15,11 @@ use crate::prove::sums::{difference, is_same, lacks_value};
 use avastra_base::units::Rational;
 
 /// The most variants of an enum: a set of them fits one integer.
-pub const VARIANTS_MAX: usize = 128;
+pub(crate) const VARIANTS_MAX: usize = 128;
 
 /// A set of values of one type.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Values {
+pub(crate) enum Values {
     Truth {
         may_hold: bool,
         may_fail: bool,
@@ -31,7 +31,7 @@ pub enum Values {
 
 /// What is known where an expression stands.
 #[derive(Clone, Copy)]
-pub struct Known<'a> {
+pub(crate) struct Known<'a> {
     pub functions: &'a [FnDef],
     pub locals: &'a [Values],
     pub cells: &'a [Values],
@@ -102,7 +102,7 @@ impl Values {
 }
 
 /// All values that the expression may have.
-pub fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
+pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
     effort::spend(1);
     let values = |expr: &Expr| enclose(expr, known);
     match &expr.kind {

@@ -29,14 +29,13 @@ mod undecided;
 mod unfair;
 mod witness;
 
-pub use clock::{forbids, next_rows, shortest_way};
+pub(crate) use clock::{forbids, next_rows, shortest_way};
 pub use cut::{Removal, removals};
-pub use enclose::{Known, VARIANTS_MAX, Values, enclose};
-pub use reach::{product_size, rows};
-pub use realise::RunsIn;
-pub use realise::{Realisable, Realised, realise, with_dead};
-pub use time::BrokenByTime;
-pub use time::lasts;
+pub(crate) use enclose::{Known, VARIANTS_MAX, Values, enclose};
+pub(crate) use reach::{product_size, rows};
+pub(crate) use realise::with_dead;
+pub use realise::{Realisable, Realised, RunsIn, realise};
+pub use time::{BrokenByTime, lasts};
 pub use witness::{Witness, witness};
 
 use crate::model::{Space, effort};

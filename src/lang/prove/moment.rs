@@ -26,7 +26,7 @@ const CASES_MAX: usize = 2_048;
 
 /// A piece for each of some facts.
 #[derive(Debug, Clone, Default)]
-pub struct Case {
+pub(crate) struct Case {
     numbers: Vec<(Fact, Interval)>,
     words: Vec<(WordFact, &'static str)>,
     /// What some facts are not.

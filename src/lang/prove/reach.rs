@@ -22,7 +22,7 @@ use avastra_base::units::Unit;
 const ROUNDS: usize = 3;
 
 /// The number of rows of an action before its `where`s remove any.
-pub fn product_size(action: &ActionDef) -> u64 {
+pub(crate) fn product_size(action: &ActionDef) -> u64 {
     let sizes = action.parameters.iter().filter(|parameter| parameter.axis).map(|axis| match &axis.domain {
         Domain::Values(values) => values.len() as u64,
         Domain::Range(..) => u64::MAX,
@@ -31,7 +31,7 @@ pub fn product_size(action: &ActionDef) -> u64 {
 }
 
 /// All rows, in order.
-pub fn rows(space: &Space) -> Vec<Row> {
+pub(crate) fn rows(space: &Space) -> Vec<Row> {
     let in_force = RulesInForce::by_default(space);
     let binding = rules_by_action(&space.rules, space.actions.len());
     let mut rows = Vec::new();
@@ -146,7 +146,7 @@ impl<'a> RowRules<'a> {
     }
 
     /// Rules that forbid something together, of which none can be spared; `forbid` says whether some still do.
-    pub fn conflict(self, forbid: &dyn Fn(RowRules<'_>) -> bool) -> Vec<usize> {
+    pub(crate) fn conflict(self, forbid: &dyn Fn(RowRules<'_>) -> bool) -> Vec<usize> {
         let mut conflict = self.in_force.clone();
         for rule in self.in_force.on_row(self.row) {
             if effort::is_spent() {
@@ -161,13 +161,13 @@ impl<'a> RowRules<'a> {
     }
 
     /// All values that the parameters may have under the rules in force; `None` if the rules leave none.
-    pub fn settle(self) -> Option<Vec<Values>> {
+    pub(crate) fn settle(self) -> Option<Vec<Values>> {
         self.narrow(declared(self.space, self.row), &self.space.cells_unknown(), None)
     }
 
     /// As [`RowRules::settle`], begun with these values of the parameters and cells, and with what is known of the
     /// moment.
-    pub fn narrow(
+    pub(crate) fn narrow(
         self,
         mut locals: Vec<Values>,
         before: &[Values],
@@ -216,14 +216,14 @@ impl<'a> RowRules<'a> {
 
     /// The conditions of a draw: those of rules, and the `where`s that ask about the moment. The others are bounds, or
     /// are left to solving.
-    pub fn conditions(self) -> Vec<&'a Expr> {
+    pub(crate) fn conditions(self) -> Vec<&'a Expr> {
         let parameters = &self.space.actions[self.row.action].parameters;
         let wheres = parameters.iter().filter_map(|parameter| parameter.condition.as_ref());
         let of_rules = self.demands().filter_map(|(_, demand)| demand.condition());
         of_rules.chain(wheres.filter(|condition| condition.asks_the_world())).collect()
     }
 
-    pub fn known<'k>(&'k self, locals: &'k [Values], cells: &'k [Values]) -> Known<'k> {
+    pub(crate) fn known<'k>(&'k self, locals: &'k [Values], cells: &'k [Values]) -> Known<'k> {
         Known { functions: &self.space.functions, locals, cells, road: self.road, case: None }
     }
 

@@ -79,7 +79,7 @@ pub fn realise(space: &Space) -> (Realisable, RunsIn) {
 }
 
 /// The rows with those marked as dead for which no values exist.
-pub fn with_dead(space: &Space, realisable: &Realisable) -> Vec<Row> {
+pub(crate) fn with_dead(space: &Space, realisable: &Realisable) -> Vec<Row> {
     let (in_force, left) = (RulesInForce::by_default(space), Left::new(BOXES_MAX));
     let mut rows = space.rows.clone();
     for (row, found) in rows.iter_mut().zip(realisable) {

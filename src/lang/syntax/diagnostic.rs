@@ -342,38 +342,13 @@ fn floor_boundary(text: &str, offset: usize) -> usize {
     text.floor_char_boundary(offset.min(text.len()))
 }
 
-/// Most names that are compared with a misspelt one: a file may have thousands of both.
-const CANDIDATES_MAX: usize = 1000;
-
-/// Most characters of a word that is compared: two words cost their lengths multiplied.
-const COMPARED_MAX: usize = 64;
-
-/// The candidate that the author may have meant by `word`, if one is near enough.
-pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let length = word.chars().count();
-    if length > COMPARED_MAX {
-        return None;
-    }
-    // At most a third of the word may be wrong; beyond that the guess is noise.
-    let distance_max = (length / 3).max(1);
-    candidates
-        .into_iter()
-        .take(CANDIDATES_MAX)
-        // Words are at least as far apart as their lengths.
-        .filter(|candidate| candidate.chars().count().abs_diff(length) <= distance_max)
-        .map(|candidate| (strsim::damerau_levenshtein(word, candidate), candidate))
-        .filter(|(distance, candidate)| *distance <= distance_max && *candidate != word)
-        .min_by_key(|(distance, _)| *distance)
-        .map(|(_, candidate)| candidate)
-}
-
 /// A list of the author's words: `` `a`, `b` and `c` ``.
 pub fn listed<S: AsRef<str>>(words: &[S]) -> String {
     enumerated(&quoted(words), "and")
 }
 
 /// `a`, `b` or `c`.
-pub fn one_of<S: AsRef<str>>(words: &[S]) -> String {
+pub(crate) fn one_of<S: AsRef<str>>(words: &[S]) -> String {
     enumerated(&quoted(words), "or")
 }
 
@@ -382,7 +357,7 @@ fn quoted<S: AsRef<str>>(words: &[S]) -> Vec<String> {
 }
 
 /// `a, b or c`, with the given conjunction.
-pub fn enumerated<S: AsRef<str>>(words: &[S], conjunction: &str) -> String {
+pub(crate) fn enumerated<S: AsRef<str>>(words: &[S], conjunction: &str) -> String {
     let words: Vec<&str> = words.iter().map(S::as_ref).collect();
     match words.as_slice() {
         [] => String::new(),
@@ -439,11 +414,5 @@ mod tests {
             let diagnostic = Diagnostic::warning("AV0001", "odd").at(span, "x");
             assert!(render(&diagnostic, &sources, Style::Plain).contains("odd"));
         }
-    }
-
-    #[test]
-    fn suggests_only_what_is_near() {
-        assert_eq!(nearest("acton", ["action", "road"]), Some("action"));
-        assert_eq!(nearest("zebra", ["action", "road"]), None);
     }
 }

@@ -20,6 +20,7 @@ mod format;
 mod grammar;
 pub mod keyword;
 mod layout;
+mod nearest;
 mod operator;
 mod parse;
 mod print;
@@ -29,11 +30,11 @@ mod scan;
 mod unfinished;
 mod yaml;
 
-pub use diagnostic::{
-    Diagnostic, Edit, Fix, Label, Severity, Sources, Style, listed, nearest, render, visible,
-};
-pub use diagnostic::{acts_on_terminal, enumerated, one_of};
+pub use diagnostic::acts_on_terminal;
+pub use diagnostic::{Diagnostic, Edit, Fix, Label, Severity, Sources, Style, listed, render, visible};
+pub(crate) use diagnostic::{enumerated, one_of};
 pub use format::{FormatError, format, same_meaning};
+pub use nearest::nearest;
 pub use parse::{DEPTH_MAX, LANGUAGE, OPERATORS_MAX, TOKENS_MAX, parse, parse_fields};
 pub use print::{print, print_expr, print_item};
 pub use record::{

@@ -1,6 +1,7 @@
 //! What is wrong with a settings file in YAML, in words for its author: line, field, and what is allowed.
 
-use super::diagnostic::{listed, nearest};
+use super::diagnostic::listed;
+use super::nearest;
 
 /// The message for an error of the YAML reader, whose own words speak of Rust and of YAML's grammar.
 pub fn yaml_mistake(error: &serde_yaml::Error, text: &str) -> String {

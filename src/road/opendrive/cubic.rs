@@ -67,7 +67,7 @@ impl Cubics {
         self.0.iter().map(|piece| piece.begin_m)
     }
 
-    /// Those of the beginnings that lie between two stations, m.
+    /// The beginnings of pieces that lie between two stations, m.
     pub fn beginnings_between(&self, from_m: f64, to_m: f64) -> impl Iterator<Item = f64> {
         let first = self.0.partition_point(|piece| piece.begin_m <= from_m);
         self.0[first..].iter().map(|piece| piece.begin_m).take_while(move |at_m| *at_m < to_m)

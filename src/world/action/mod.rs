@@ -17,6 +17,7 @@
 //! ```
 
 mod audit;
+mod count;
 mod draw;
 mod effect;
 mod file;
@@ -24,6 +25,7 @@ mod table;
 
 pub use audit::{Audit, Enforcement, RuleAudit, audit};
 pub use avastra_lang::model::SpawnFacts;
+pub use count::Count;
 pub use effect::{Effect, LaneChangeRules, SpawnRequest, Surroundings};
 pub use file::{AxisRecord, DrawRecord, RoadRecord, RowRecord, RuleRecord, TableFile};
 pub use table::{ActionTable, Draw, Offer, Refusal, Situation};

@@ -55,6 +55,16 @@ pub struct Refusal {
     pub reason: String,
 }
 
+impl Refusal {
+    /// The reason, after the rule if there is one.
+    pub fn in_words(&self) -> String {
+        match &self.rule {
+            Some(rule) => format!("rule `{rule}`: {}", self.reason),
+            None => self.reason.clone(),
+        }
+    }
+}
+
 impl Draw {
     /// Whether it makes road users appear.
     pub fn makes_appear(&self) -> bool {

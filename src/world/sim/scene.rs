@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use avastra_lang::model::Road;
 use avastra_road::{FootWay, LaneIndex, RoadMap, Route};
 
 use super::junction::ConflictAreas;
@@ -24,6 +25,11 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// The scene of a road of a space.
+    pub fn of(road: &Road) -> Scene {
+        Scene::new(road.map.clone(), road.route.clone())
+    }
+
     pub fn new(map: Arc<RoadMap>, route: Route) -> Scene {
         let mut streets = Vec::new();
         let mut end_m = 0.0;

@@ -539,7 +539,7 @@ fn drivers_seldom_run_into_each_other() {
             }
         }
     }
-    // Of 300 worlds with up to ten vehicles that were put where they are without a thought.
+    // Counts all 300 worlds, whose vehicles (up to ten each) were placed without regard to what comes.
     assert!(met <= 5, "{met}");
 }
 

@@ -12,9 +12,11 @@ use std::sync::Arc;
 
 use crate::action::{Effect, LaneChangeRules, SpawnRequest};
 use avastra_base::geometry::{Frame, OrientedBox, Pose, Sweep, Vec2};
+use avastra_base::rng;
+use avastra_base::rng::Stream;
 use avastra_lang::model::body::BodyParameters;
 use avastra_lang::model::vocabulary::{Level, TimeOfDay};
-use avastra_lang::model::{COMMANDED_MAX, NpcFacts, TICK_MS};
+use avastra_lang::model::{COMMANDED_MAX, Memory, NpcFacts, START_MPS, Space, TICK_MS};
 use avastra_road::{RouteLaneChange, is_apart};
 
 use super::ambient::{Ambient, RENEWAL_TICKS, is_gone};
@@ -65,6 +67,9 @@ const NEAR_M: f64 = 1e-3;
 /// in a tick, so that it is found again after a corner cut, and less than any loop of a route.
 const ROUTE_SEARCH_M: f64 = 2.0;
 
+/// Signals begin anywhere in this span, s: a whole number of cycles of two, three and four groups.
+const PHASES_S: f64 = 204.0;
+
 /// How an episode begins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Start {
@@ -82,6 +87,27 @@ pub struct Start {
     pub ambient: u32,
     /// How other vehicles drive.
     pub traffic: TrafficProfile,
+}
+
+impl Start {
+    /// The start of an episode with this seed and memory, without ambient traffic, under the default traffic profile.
+    pub fn drawn(space: &Space, memory: &Memory, seed: u64) -> Start {
+        let mut rng = rng::stream(seed, Stream::Reset, 1);
+        // A multiple of 1/64 s is a short decimal in a file.
+        let signal_phase_s = (rng::between(&mut rng, 0.0, PHASES_S) * 64.0).floor() / 64.0;
+        let (time, [rain, fog, wetness]) = space.weather(memory);
+        Start {
+            ego_mps: START_MPS,
+            time,
+            rain,
+            fog,
+            wetness,
+            signal_phase_s,
+            seed,
+            ambient: 0,
+            traffic: TrafficProfile::default(),
+        }
+    }
 }
 
 /// The whole state of an episode: `Clone` is a snapshot.

@@ -35,7 +35,7 @@ impl Bound {
 
 /// By action: every bound on its numeric parameters, first by their `where`s, then by the rules in the
 /// order of their declarations.
-pub fn bounds(actions: &[ActionDef], rules: &[RuleDef]) -> Vec<Vec<Bound>> {
+pub(crate) fn bounds(actions: &[ActionDef], rules: &[RuleDef]) -> Vec<Vec<Bound>> {
     let binding = rules_by_action(rules, actions.len());
     let of_action = |(index, action): (usize, &ActionDef)| {
         let mut found = Vec::new();
@@ -56,7 +56,7 @@ pub fn bounds(actions: &[ActionDef], rules: &[RuleDef]) -> Vec<Vec<Bound>> {
 }
 
 /// The numbers that the comparison allows, given those of the limit.
-pub fn allowed(op: Comparison, limit: &Interval) -> Interval {
+pub(crate) fn allowed(op: Comparison, limit: &Interval) -> Interval {
     let open = |end: End| match end {
         End::At(value, _) => End::At(value, false),
         End::Unbounded => End::Unbounded,

@@ -46,7 +46,7 @@ impl Clause {
 }
 
 /// By action: its `where`s, then the rules that bind it, in the order of their declarations.
-pub fn clauses(space: &Space) -> Vec<Vec<Clause>> {
+pub(crate) fn clauses(space: &Space) -> Vec<Vec<Clause>> {
     let Space { actions, rules, states, .. } = space;
     let binding = rules_by_action(rules, actions.len());
     let of_action = |(index, action): (usize, &ActionDef)| {
@@ -99,7 +99,7 @@ fn add_effects(sets: &[&SetDef], states: &[StateDef], read: Vec<usize>, needs: &
 }
 
 /// The states that an expression names, by index.
-pub fn states_read(expr: &Expr, states: &[StateDef]) -> Vec<usize> {
+pub(crate) fn states_read(expr: &Expr, states: &[StateDef]) -> Vec<usize> {
     let mut found = Vec::new();
     expr.walk(&mut |part| {
         let (ExprKind::Cell(cell) | ExprKind::CellAt(cell, _)) = part.kind else { return };

@@ -30,8 +30,10 @@ mod room;
 mod solve;
 mod start;
 
-pub use bound::{Bound, allowed, bounds};
-pub use clause::{Clause, Source, clauses, states_read};
+pub use bound::Bound;
+pub(crate) use bound::{allowed, bounds};
+pub use clause::{Clause, Source};
+pub(crate) use clause::{clauses, states_read};
 pub use in_force::{RulesInForce, UnknownRule};
 pub use judge::{Breach, Candidate};
 pub use room::Room;

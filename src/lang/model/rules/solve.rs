@@ -179,9 +179,9 @@ pub struct Solver<'a> {
     places: Vec<Place>,
     /// What backwards left before.
     known_choices: Vec<KnownChoices>,
-    /// Of all parameters; some value of their type for those to choose.
+    /// A value for each parameter of the action. A parameter that is still to be chosen has any value of its type.
     given: Vec<Value>,
-    /// Of all parameters. Those that are not chosen yet have some value of their type.
+    /// As `given`, with the values that are chosen so far.
     values: Vec<Value>,
     /// Whether every polynomial that was needed was found.
     is_exact: Cell<bool>,

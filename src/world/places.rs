@@ -7,15 +7,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use crate::episode;
+use crate::action::{ActionTable, Count, Offer, Situation, Surroundings};
+use crate::sim::{Scene, Start, World};
 use avastra_lang::check::{Claim, Loaded, Runs};
 use avastra_lang::model::{EffectDef, Memory, Road, Row, RulesInForce, Space, code};
 use avastra_lang::syntax::{Diagnostic, listed};
 use avastra_road::{LanePlace, RoadMap};
-use avastra_world::action::{ActionTable, Offer, Situation, Surroundings};
-use avastra_world::sim::{Scene, Start, World};
-
-use super::survey::{Count, count, refused};
 
 /// Stations of a road at which rows are offered.
 const STATIONS: usize = 64;
@@ -52,7 +49,7 @@ impl Scenes {
         if self.0.len() >= SCENES_MAX {
             self.0.clear();
         }
-        let scene = Arc::new(episode::scene(road));
+        let scene = Arc::new(Scene::of(road));
         self.0.push((Arc::clone(&road.map), ends, Arc::clone(&scene)));
         scene
     }
@@ -148,9 +145,9 @@ impl Lost<'_> {
                 }
             }
             Offer::Legal(_) => return true,
-            Offer::Refused(refusal) => refused(&refusal),
+            Offer::Refused(refusal) => refusal.in_words(),
         };
-        count(self.refusals.entry(road).or_default(), &reason);
+        Count::add(self.refusals.entry(road).or_default(), &reason);
         false
     }
 
@@ -288,7 +285,7 @@ impl Moment {
         let station_m = self.share * scene.route.goal_m;
         let limit_mps = scene.map.lane(scene.route.lane_at(station_m).lane).speed_limit_mps;
         let speed_mps = if self.is_fast { SHARE_OF_LIMIT * limit_mps.min(FAST_MPS_MAX) } else { SPEED_MPS };
-        let start = Start { signal_phase_s: self.phase_s, ..episode::start(space, memory, self.number) };
+        let start = Start { signal_phase_s: self.phase_s, ..Start::drawn(space, memory, self.number) };
         World::with_ego_at(Arc::clone(scene), &start, station_m, speed_mps)
     }
 }

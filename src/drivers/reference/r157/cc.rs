@@ -16,9 +16,9 @@ use avastra_base::kinematics::{
     WANDER_M,
 };
 
-use super::encounter::Encounter;
-use super::model::Model;
-use super::reflex::Braking;
+use crate::reference::encounter::Encounter;
+use crate::reference::model::Model;
+use crate::reference::reflex::Braking;
 
 /// Critical time to collision and critical time headway, s.
 const CRITICAL_S: f64 = 2.0;

@@ -8,9 +8,9 @@
 
 use avastra_base::kinematics::{CAREFUL_JERK_MPS3, CAREFUL_REACTION_S, braking_m};
 
-use super::encounter::Encounter;
-use super::model::Model;
-use super::reflex::Braking;
+use crate::reference::encounter::Encounter;
+use crate::reference::model::Model;
+use crate::reference::reflex::Braking;
 
 /// Parameters of the surrogates.
 #[derive(Debug, Clone, Copy, PartialEq)]
