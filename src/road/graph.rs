@@ -46,7 +46,7 @@ const VERTICES_A_ROAD: usize = 100;
 
 /// Limit on the steps of `centre_line` for all centre lines, also with more for each road. A map within the limit on vertices
 /// exceeds it only if it curls, or if tens of lanes beside each other change their widths all the time.
-const STEPS_MAX: u64 = 60_000_000;
+const STEPS_MAX: u64 = 50_000_000;
 const STEPS_A_ROAD: u64 = 5_000;
 
 /// Limit on the length of all lanes of a map together, m.
