@@ -362,10 +362,14 @@ impl Checker {
             Some(ExprKind::Variant(_, other)) => set.state == index && *other == position,
             _ => set.state == index,
         };
-        let sets = |action: &ActionDef| action.sets().any(may_set) || self.each_step.iter().any(may_set);
-        let all = self.actions.iter().enumerate();
-        let actions: Vec<usize> =
-            all.filter(|(_, a)| a.as_ref().is_some_and(sets)).map(|(index, _)| index).collect();
+        let is_sound = |action: &usize| self.actions[*action].is_some();
+        let sets =
+            |action: &usize| self.actions[*action].as_ref().is_some_and(|action| action.sets().any(may_set));
+        let actions: BTreeSet<usize> = match self.each_step.iter().any(may_set) {
+            true => (0..self.actions.len()).filter(is_sound).collect(),
+            false => self.setters[index].iter().copied().filter(sets).collect(),
+        };
+        let actions: Vec<usize> = actions.into_iter().collect();
         if actions.is_empty() {
             let key = key.map_or(String::new(), |key| format!("[{}]", key.text));
             let what = format!("`{}{key}`", definition.name);

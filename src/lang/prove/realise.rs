@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use crate::model::expr::ExprKind;
 use crate::model::rules::RowRules;
 use crate::model::vocabulary::Fact;
-use crate::model::{Memory, Reach, Road, Row, RulesInForce, Space, effort};
+use crate::model::{Memory, Reach, Road, Row, RulesInForce, Space, Value, effort};
 use crate::prove::moment::Case;
 use crate::prove::witness::{Found, Left, Search};
 use crate::syntax::listed;
@@ -260,6 +260,8 @@ struct Way {
 /// A state that was met.
 struct Met {
     memory: Memory,
+    /// Of `memory`: most states differ in it, which spares a look at all their cells.
+    digest: u64,
     since: u64,
     /// Whether the first start comes here without an action. Such states are followed however many others there are.
     is_waited_for: bool,
@@ -267,6 +269,19 @@ struct Met {
     led_to: BTreeSet<usize>,
     /// The rows, by position, that were not tried here, or that ask for the time.
     open: Vec<usize>,
+}
+
+/// Equal for equal memories (FNV-1a over the cells).
+fn digest(memory: &Memory) -> u64 {
+    memory.cells().iter().fold(0xcbf2_9ce4_8422_2325, |digest: u64, cell| {
+        let bits = match cell {
+            Value::Bool(truth) => u64::from(*truth),
+            // Both zeros are equal.
+            Value::Number(number) => (number + 0.0).to_bits(),
+            Value::Variant(_, variant) => *variant as u64,
+        };
+        (digest ^ bits).wrapping_mul(0x100_0000_01b3)
+    })
 }
 
 impl Way {
@@ -289,7 +304,9 @@ impl Way {
         movers: &[Asked<'_>],
     ) -> Option<usize> {
         effort::spend(self.states.len() + memory.cells().len());
-        if let Some(known) = self.states.iter().position(|known| known.memory == memory) {
+        let digest = digest(&memory);
+        let is_it = |known: &Met| known.digest == digest && known.memory == memory;
+        if let Some(known) = self.states.iter().position(is_it) {
             self.states[known].is_waited_for |= is_waited_for;
             return Some(known);
         }
@@ -299,7 +316,7 @@ impl Way {
         }
         effort::spend(movers.len());
         let open = (0..movers.len()).collect();
-        self.states.push(Met { memory, since, is_waited_for, led_to: BTreeSet::new(), open });
+        self.states.push(Met { memory, digest, since, is_waited_for, led_to: BTreeSet::new(), open });
         Some(self.states.len() - 1)
     }
 
