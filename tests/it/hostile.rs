@@ -20,9 +20,9 @@ use crate::scaling_maps::constructs::CONSTRUCTS;
 
 /// Limits on processor time (s) and memory (MB) for a text of 64 KB. The aim is 1 s, which `fuzz/run.sh` checks
 /// with an optimised build. The limit here only catches what grows without bound, on any build and a busy
-/// machine.
+/// machine. The system counts a child's peak from its fork on, and so never less than what the tests hold by then.
 const CPU_S_MAX: f64 = 10.0;
-const PEAK_MB_MAX: f64 = 256.0;
+const PEAK_MB_MAX: f64 = 500.0;
 
 #[test]
 fn what_the_fuzz_target_kept_breaks_no_law() {

@@ -28,7 +28,7 @@ use avastra_base::units::Rational;
 pub(super) const DIAGNOSTICS_MAX: usize = 1_000;
 
 /// The most steps of all proofs about a space: about half a second of an optimised build.
-const STEPS_MAX: u64 = 15_000_000;
+const STEPS_MAX: u64 = 20_000_000;
 
 /// Further steps for each row on each road, up to the longest table on four roads, which must be checked: a row on a road
 /// takes some 80 steps.
