@@ -318,6 +318,29 @@ pub const GRAMMAR: &[Construct] = &[
         },
     },
     Construct {
+        name: "rows that a rule about the moment tells apart",
+        text: |n| {
+            let spawn = "spawn Sedan ahead 50 m { lane: Current, speed: v, does: DriveAhead }";
+            let drawn = "any v: Speed in 5 m/s .. 20 m/s";
+            let rule = "rule r on a: v <= ego.speed and ego.junction_ahead >= 20 m + x * 0.0001 m\n";
+            format!("{ROADS}action a(each x: Int in 1 .. {n}, {drawn}) {{ {spawn} }}\n{rule}")
+        },
+    },
+    Construct {
+        name: "rows under three rules",
+        text: |n| {
+            let n = n.div_ceil(2);
+            let spawn = "spawn Sedan ahead d { lane: Current, speed: v, does: DriveAhead }";
+            let drawn = "any v: Speed in 5 m/s .. 20 m/s, any d: Length in 1 m .. 120 m";
+            let gap =
+                "fn gap(m: Mode, v: Speed) -> Length = match m { Near => 12 m, Far => 50 m } + v * 0.5 s\n";
+            let rules = "rule r on a: v <= road.limit\nrule s on a: d == gap(m, v)\nrule t on a: x * 0.001 m <= d + 60 m\n";
+            format!(
+                "{ROADS}enum Mode = Near | Far\n{gap}action a(each x: Int in 1 .. {n}, each m: Mode, {drawn}) {{ {spawn} }}\n{rules}"
+            )
+        },
+    },
+    Construct {
         name: "axes of two values",
         text: |n| {
             format!(

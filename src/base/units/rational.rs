@@ -90,10 +90,11 @@ impl Rational {
         exponent += spare;
         let power = 1_i128.checked_shl(exponent.unsigned_abs()).filter(|power| *power > 0)?;
         let signed = if value < 0.0 { -mantissa } else { mantissa };
-        match exponent >= 0 {
-            true => Rational::new(signed.checked_mul(power)?, 1),
-            false => Rational::new(signed, power),
-        }
+        // Lowest terms: the mantissa is odd, and the denominator is a power of two.
+        Some(match exponent >= 0 {
+            true => Rational { numerator: signed.checked_mul(power)?, denominator: 1 },
+            false => Rational { numerator: signed, denominator: power },
+        })
     }
 
     /// The simplest fraction whose nearest f64 is this one, among the convergents of its continued fraction: the number of

@@ -30,11 +30,6 @@ pub(super) const DIAGNOSTICS_MAX: usize = 1_000;
 /// The most steps of all proofs about a space: about half a second of an optimised build.
 const STEPS_MAX: u64 = 20_000_000;
 
-/// Further steps for each row on each road, up to the longest table on four roads, which must be checked: a row on a road
-/// takes some 80 steps.
-const STEPS_A_ROW: u64 = 100;
-const ROWS_ON_ROADS_MAX: u64 = 400_000;
-
 /// A function's parameters, its result type, and the span of its header.
 pub(super) type Signature = (Vec<(String, Type)>, Type, Span);
 
@@ -190,10 +185,7 @@ pub(super) fn space(
         clauses: Vec::new(),
     };
     let is_told = checker.diagnostics.len();
-    let rows: u64 = checker.row_counts.iter().flatten().sum();
-    let on_roads = rows.saturating_mul(space.roads.len() as u64).min(ROWS_ON_ROADS_MAX);
-    let steps_max = STEPS_MAX + STEPS_A_ROW * on_roads;
-    let ((space, runs_in), sufficed) = effort::within(steps_max, || checker.proved(space, &own, items));
+    let ((space, runs_in), sufficed) = effort::within(STEPS_MAX, || checker.proved(space, &own, items));
     if !sufficed {
         // Findings of proofs that were cut short would mislead.
         checker.diagnostics.truncate(is_told);

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::check::state_argument::memory_from;
 use crate::check::{Loaded, ReadError, differences, load, suggest_uses};
+use crate::model::rules::RowRules;
 use crate::model::vocabulary::{Body, Priority, Word};
 use crate::model::{
     Avoidability, BodyWord, Claim, Facts, Memory, Obstacle, ObstacleKind, OutcomeFacts, Reach, RulesInForce,
@@ -289,6 +290,37 @@ rule not_too_often on more: count <= 2
     let action = space.actions.iter().position(|action| action.name == "more").expect("it is declared");
     let memory = space.memory_after(action, &[], &space.initial_memory(0));
     assert_eq!(memory.cells()[count], Value::Number(1.0));
+}
+
+/// Rows share a proof if the values that decide it are equal: `copy` decides nothing, `time` only what a rule sees after the step.
+#[test]
+fn a_row_that_shares_a_proof_has_its_own() {
+    let text = format!(
+        "{BASE}road outer {{ map: \"corner.xodr\", start: lane 1/-2 at 80 m, goal: lane 1/-2 at 100 m }}
+        enum Does = DriveAhead | DriveOpposite
+        action b(each copy: Int in 1 .. 3, each part: Int in 3 .. 4, each lane: Lane, each far: Bool, each to: Time, each does: Does,
+                  any speed: Speed in 10 m/s .. 20 m/s) {{
+          set time = to
+          spawn Jeep ahead 30 m {{ lane: lane, speed: speed, does: does }}
+        }}
+        rule slow on b: speed <= part * 4 m/s and (lane in road.lanes or far)
+        rule clock on b: time != Night or ego.speed <= 10 m/s
+        rule moves on b: npc.speed >= 5 m/s and ego.junction_ahead >= 20 m
+"
+    );
+    let loaded = load_files(&[("a.ava", &text)]);
+    let space = loaded.space.as_ref().unwrap_or_else(|| panic!("{}", shown(&loaded)));
+    let dead =
+        space.rows.iter().filter(|row| row.roads.iter().any(|reach| matches!(reach, Reach::Dead { .. })));
+    // On `outer`, a third of the lanes, unless the row is far.
+    assert_eq!(dead.count(), 216 / 3 / 2);
+    let in_force = RulesInForce::by_default(space);
+    for row in &space.rows {
+        for (road, reach) in space.roads.iter().zip(&row.roads) {
+            let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };
+            assert_eq!(rules.reach(), *reach, "{} on {}", row.label, road.name);
+        }
+    }
 }
 
 #[test]

@@ -23,6 +23,25 @@ pub(crate) fn is_spent() -> bool {
     SPENT.get() > LIMIT.get()
 }
 
+/// Allows further steps to the innermost [`within`].
+pub(crate) fn grant(steps: u64) {
+    LIMIT.set(LIMIT.get().saturating_add(steps));
+}
+
+/// Gives up now if so many steps, which are to come, will not suffice.
+pub(crate) fn foresee(steps: u64) {
+    if SPENT.get().saturating_add(steps) > LIMIT.get() {
+        SPENT.set(LIMIT.get().saturating_add(1));
+    }
+}
+
+/// Does some work. Returns its result and the steps that it took.
+pub(crate) fn counted<T>(work: impl FnOnce() -> T) -> (T, u64) {
+    let begun = SPENT.get();
+    let done = work();
+    (done, SPENT.get().wrapping_sub(begun))
+}
+
 /// Does some work with a limit of steps. Returns its result, and whether the steps sufficed.
 pub(crate) fn within<T>(steps: u64, work: impl FnOnce() -> T) -> (T, bool) {
     let _restore = Restore(LIMIT.replace(SPENT.get().saturating_add(steps)));

@@ -30,6 +30,16 @@ pub enum Value {
 }
 
 impl Value {
+    /// Equal for equal values of one type.
+    pub(crate) fn bits(self) -> u64 {
+        match self {
+            Value::Bool(truth) => u64::from(truth),
+            // Both zeros are equal.
+            Value::Number(number) => (number + 0.0).to_bits(),
+            Value::Variant(_, variant) => variant as u64,
+        }
+    }
+
     /// The truth value; `false` for any other type, which the checker rules out.
     pub fn truth(self) -> bool {
         self == Value::Bool(true)

@@ -17,6 +17,9 @@ use avastra_base::units::Rational;
 /// The most variants of an enum: a set of them fits one integer.
 pub(crate) const VARIANTS_MAX: usize = 128;
 
+/// Steps for the product of two intervals: up to four products of fractions, each brought to its lowest terms.
+const PRODUCT_STEPS: usize = 2;
+
 /// A set of values of one type.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Values {
@@ -248,8 +251,10 @@ fn arithmetic(op: Arithmetic, left: &Interval, right: &Interval) -> Interval {
     match op {
         Arithmetic::Add => left.add(right),
         Arithmetic::Subtract => left.add(&right.neg()),
-        Arithmetic::Multiply => left.mul(right),
-        Arithmetic::Divide => left.div(right),
+        Arithmetic::Multiply | Arithmetic::Divide => {
+            effort::spend(PRODUCT_STEPS);
+            if op == Arithmetic::Multiply { left.mul(right) } else { left.div(right) }
+        }
     }
 }
 

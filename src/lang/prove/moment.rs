@@ -24,6 +24,11 @@ use avastra_base::units::Rational;
 /// The most combinations of pieces for one question; facts beyond it stay whole.
 const CASES_MAX: usize = 2_048;
 
+/// Steps that a combination of pieces takes beside the evaluation of conditions, and those for each operation of a
+/// condition whose facts are looked for.
+const CASE_STEPS: usize = 8;
+const PARTS_STEPS: usize = 2;
+
 /// A piece for each of some facts.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Case {
@@ -164,23 +169,29 @@ pub(super) fn may_hold_together(
     conditions: &[&Expr],
     known: &Known<'_>,
     episode: &EpisodeDef,
-    newcomers: &[Case],
+    newcomers: impl FnOnce() -> Vec<Case>,
 ) -> bool {
     let may_all_hold = |conditions: &[&Expr], known: &Known<'_>| {
         conditions.iter().all(|condition| enclose(condition, known).may_hold())
     };
+    if !may_all_hold(conditions, known) {
+        return false;
+    }
     let asking: Vec<&Expr> = conditions.iter().copied().filter(|c| c.known() > From::Road).collect();
+    if asking.is_empty() {
+        return true;
+    }
+    let asked = Asked::of(&asking, known);
+    let newcomers = newcomers();
     let is_met = |case: &Case| may_all_hold(&asking, &Known { case: Some(case), ..*known });
-    let meets = |newcomer: &Case| cases(&asking, known, episode, newcomer).iter().any(is_met);
+    let meets = |within: &Case| asked.any_case(within, known, episode, &is_met);
     let meets_all = |place: &Case| newcomers.iter().all(|newcomer| meets(&newcomer.and(place)));
-    may_all_hold(conditions, known)
-        && (asking.is_empty()
-            || !oppose(&asking, known, false) && places(&asking, known).iter().any(meets_all))
+    !oppose(&asking, known, false) && places(&asking, known).any(|place| meets_all(&place))
 }
 
 /// What the road says of the moments of which conditions ask: a case for each stretch of the route, or one of which nothing is
 /// known.
-fn places(asking: &[&Expr], known: &Known<'_>) -> Vec<Case> {
+fn places<'a>(asking: &[&Expr], known: &Known<'a>) -> impl Iterator<Item = Case> + use<'a> {
     let is_of_place = |kind: &ExprKind| {
         matches!(
             kind,
@@ -188,20 +199,17 @@ fn places(asking: &[&Expr], known: &Known<'_>) -> Vec<Case> {
                 | ExprKind::IsWord(WordFact::EgoRoad | WordFact::EgoLight, _)
         )
     };
-    let stretches = known.road.map_or(&[][..], |road| &road.stretches);
-    match stretches.is_empty() || !asking.iter().any(|condition| condition.any(is_of_place)) {
-        true => vec![Case::default()],
-        false => stretches.iter().map(Case::of_stretch).collect(),
-    }
+    let asks = asking.iter().any(|condition| condition.any(is_of_place));
+    let stretches = known.road.filter(|_| asks).map_or(&[][..], |road| &road.stretches);
+    let anywhere = stretches.is_empty().then(Case::default);
+    anywhere.into_iter().chain(stretches.iter().map(Case::of_stretch))
 }
 
 /// Whether the condition can fail at no moment, given what is known.
 pub(super) fn always_holds(condition: &Expr, known: &Known<'_>, episode: &EpisodeDef) -> bool {
     let holds = |known: &Known<'_>| !enclose(condition, known).may_fail();
-    holds(known)
-        || cases(&[condition], known, episode, &Case::default())
-            .iter()
-            .all(|case| holds(&Known { case: Some(case), ..*known }))
+    let fails = |case: &Case| !holds(&Known { case: Some(case), ..*known });
+    holds(known) || !Asked::of(&[condition], known).any_case(&Case::default(), known, episode, &fails)
 }
 
 /// One warning for each rule that lets no lane change begin, at any moment.
@@ -223,12 +231,9 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
                 return true;
             };
             let cells = space.cells_unknown();
-            !may_hold_together(
-                &[condition],
-                &rules.known(&locals, &cells),
-                &space.episode,
-                &[Case::default()],
-            )
+            !may_hold_together(&[condition], &rules.known(&locals, &cells), &space.episode, || {
+                vec![Case::default()]
+            })
         };
         if bound.all(never) {
             let message = format!("rule `{}` lets no lane change begin", definition.name);
@@ -257,52 +262,84 @@ pub(super) fn ranges_named(
     named.map(|fact| (fact, of(fact))).filter(|(_, range)| range.high != End::Unbounded).collect()
 }
 
-/// Every combination of pieces that is possible, within what is known of a newcomer.
-fn cases(conditions: &[&Expr], known: &Known<'_>, episode: &EpisodeDef, newcomer: &Case) -> Vec<Case> {
-    let (numbers, words) = facts_named(conditions);
-    let mut cases = vec![Case::default()];
-    for fact in words {
-        let is_possible = |word: &'static str| {
-            newcomer.word(fact).is_none_or(|known| known == word)
-                && !newcomer.not_words.contains(&(fact, word))
-        };
-        let named: Vec<&'static str> =
-            fact.words().into_iter().map(|(word, _)| word).filter(|word| is_possible(word)).collect();
-        if cases.len() * named.len() > CASES_MAX {
-            continue;
-        }
-        let with = |case: &Case| {
-            let case = case.clone();
-            let one = |word: &&'static str| {
-                let mut case = case.clone();
-                case.words.push((fact, *word));
-                case
-            };
-            named.iter().map(one).collect::<Vec<_>>()
-        };
-        cases = cases.iter().flat_map(with).collect();
+/// The facts that conditions ask for. The numbers have the places at which the conditions cut them.
+struct Asked {
+    words: Vec<WordFact>,
+    numbers: Vec<(Fact, Vec<Rational>)>,
+}
+
+impl Asked {
+    fn of(conditions: &[&Expr], known: &Known<'_>) -> Asked {
+        let (numbers, words) = facts_named(conditions);
+        effort::spend(PARTS_STEPS * conditions.iter().map(|condition| condition.operations()).sum::<usize>());
+        let numbers = numbers.into_iter().map(|fact| (fact, cuts(fact, conditions, known))).collect();
+        Asked { words, numbers }
     }
-    for fact in numbers {
-        let whole = newcomer.number(fact).unwrap_or_else(|| range(fact, known.road, episode));
-        let mut pieces = pieces(&whole, cuts(fact, conditions, known));
-        pieces.retain(|piece| fact.ty() != Type::Int || piece.has_integer());
-        if cases.len() * pieces.len() > CASES_MAX {
-            pieces = vec![whole];
-        }
-        let with = |case: &Case| {
-            let case = case.clone();
-            let one = |piece: &Interval| {
-                let mut case = case.clone();
-                case.numbers.push((fact, *piece));
-                case
+
+    /// Whether a possible combination of pieces, within what is known of a newcomer, is as `is_wanted` asks.
+    fn any_case(
+        &self,
+        newcomer: &Case,
+        known: &Known<'_>,
+        episode: &EpisodeDef,
+        is_wanted: &dyn Fn(&Case) -> bool,
+    ) -> bool {
+        let mut combinations = 1;
+        let mut words: Vec<(WordFact, Vec<&'static str>)> = Vec::new();
+        for fact in &self.words {
+            let is_possible = |word: &&'static str| {
+                newcomer.word(*fact).is_none_or(|known| known == *word)
+                    && !newcomer.not_words.contains(&(*fact, *word))
             };
-            pieces.iter().map(one).collect::<Vec<_>>()
+            let possible: Vec<&'static str> =
+                fact.words().into_iter().map(|(word, _)| word).filter(is_possible).collect();
+            if combinations * possible.len() <= CASES_MAX {
+                combinations *= possible.len();
+                words.push((*fact, possible));
+            }
+        }
+        let mut numbers: Vec<(Fact, Vec<Interval>)> = Vec::new();
+        for (fact, cuts) in &self.numbers {
+            let whole = newcomer.number(*fact).unwrap_or_else(|| range(*fact, known.road, episode));
+            let mut pieces = pieces(&whole, cuts);
+            pieces.retain(|piece| fact.ty() != Type::Int || piece.has_integer());
+            if combinations * pieces.len() > CASES_MAX {
+                pieces = vec![whole];
+            }
+            combinations *= pieces.len();
+            numbers.push((*fact, pieces));
+        }
+        effort::spend(CASE_STEPS);
+        let is_met = |case: &Case| {
+            effort::spend(CASE_STEPS);
+            case.is_possible(episode) && is_wanted(case)
         };
-        cases = cases.iter().flat_map(with).collect();
+        any_combination(&words, &numbers, &mut Case::default(), &is_met)
     }
-    effort::spend(cases.len() * (8 + conditions.len()));
-    cases.retain(|case| case.is_possible(episode));
-    cases
+}
+
+/// Whether some choice of one word and one piece for each fact is met.
+fn any_combination(
+    words: &[(WordFact, Vec<&'static str>)],
+    numbers: &[(Fact, Vec<Interval>)],
+    case: &mut Case,
+    is_met: &dyn Fn(&Case) -> bool,
+) -> bool {
+    if let [(fact, choices), words @ ..] = words {
+        return choices.iter().any(|word| {
+            case.words.push((*fact, *word));
+            let is_found = any_combination(words, numbers, case, is_met);
+            case.words.pop();
+            is_found
+        });
+    }
+    let [(fact, pieces), numbers @ ..] = numbers else { return is_met(case) };
+    pieces.iter().any(|piece| {
+        case.numbers.push((*fact, *piece));
+        let is_found = any_combination(words, numbers, case, is_met);
+        case.numbers.pop();
+        is_found
+    })
 }
 
 /// The facts of the moment and of the newcomer that conditions name.
@@ -406,13 +443,13 @@ fn cuts(fact: Fact, conditions: &[&Expr], known: &Known<'_>) -> Vec<Rational> {
 }
 
 /// A range cut at these places: what lies between two of them, and each of them alone.
-fn pieces(whole: &Interval, cuts: Vec<Rational>) -> Vec<Interval> {
+fn pieces(whole: &Interval, cuts: &[Rational]) -> Vec<Interval> {
     let mut pieces = Vec::new();
     let mut low = End::Unbounded;
     for cut in cuts {
-        pieces.push(Interval { low, high: End::At(cut, false) });
-        pieces.push(Interval::point(cut));
-        low = End::At(cut, false);
+        pieces.push(Interval { low, high: End::At(*cut, false) });
+        pieces.push(Interval::point(*cut));
+        low = End::At(*cut, false);
     }
     pieces.push(Interval { low, high: End::Unbounded });
     pieces.iter().map(|piece| piece.intersect(whole)).filter(|piece| !piece.is_empty()).collect()

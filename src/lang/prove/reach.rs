@@ -3,20 +3,32 @@
 //! A row is dead on a road if intervals prove that no draw satisfies the rules there. Every other row is
 //! open. An open row may still fail: what lies around the car is not known here.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use crate::model::effort;
 use crate::model::expr::Expr;
-use crate::model::rules::{Bound, Demand, RowRules, allowed, rules_by_action};
+use crate::model::rules::{self, Bound, Demand, RowRules, allowed, rules_by_action};
 use crate::model::vocabulary::Word;
 use crate::model::{
-    ActionDef, Domain, Facts, Interval, Memory, Parameter, Reach, Road, Row, RuleBody, RulesInForce, Space,
-    Value, code, evaluate, locals,
+    ActionDef, Domain, EffectDef, Facts, Interval, Memory, Parameter, Reach, Road, Row, RuleBody,
+    RulesInForce, Space, Value, WordExpr, code, evaluate, locals,
 };
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::prove::moment::{Case, may_hold_together, newcomers, ranges_named};
 use crate::syntax::{Diagnostic, listed};
 use avastra_base::units::Unit;
+
+/// Each row allows all proofs together this many more steps for each road, counting up to `ROADS_MAX` roads. A row under a
+/// few rules takes fewer, so the longest table can be checked.
+const STEPS_A_ROW: u64 = 100;
+const ROADS_MAX: u64 = 4;
+
+/// The proofs after this one need at least so many steps.
+const STEPS_OF_LATER_PROOFS: u64 = 5_000_000;
+
+/// The steps to come are foreseen each time that so many more rows of an action are proved.
+const ROWS_OF_A_SAMPLE: u64 = 256;
 
 /// Rounds of narrowing: a bound may depend on another one, rarely on two.
 const ROUNDS: usize = 3;
@@ -34,12 +46,24 @@ pub(crate) fn product_size(action: &ActionDef) -> u64 {
 pub(crate) fn rows(space: &Space) -> Vec<Row> {
     let in_force = RulesInForce::by_default(space);
     let binding = rules_by_action(&space.rules, space.actions.len());
+    let granted = STEPS_A_ROW * ROADS_MAX.min(space.roads.len() as u64);
     let mut rows = Vec::new();
     for ((index, action), bound) in space.actions.iter().enumerate().zip(binding) {
         let bound: Arc<[usize]> = bound.into();
         let units: Vec<Option<&Unit>> =
             action.parameters.iter().filter(|parameter| parameter.axis).map(Parameter::unit).collect();
-        for values in products(space, action) {
+        let deciding = deciding_axes(space, index);
+        let are_all = deciding.len() == units.len();
+        let key_of =
+            |values: &[Value]| -> Vec<u64> { deciding.iter().map(|local| values[*local].bits()).collect() };
+        let products = products(space, action);
+        let mut pace = Pace { proved: 0, spent: 0, count: products.len() as u64 };
+        if !are_all {
+            pace.count = products.iter().map(|values| key_of(values)).collect::<BTreeSet<_>>().len() as u64;
+        }
+        // A row that runs everywhere, for each combination of the values that decide it.
+        let mut open: BTreeMap<Vec<u64>, usize> = BTreeMap::new();
+        for values in products {
             if effort::is_spent() {
                 return rows;
             }
@@ -60,13 +84,65 @@ pub(crate) fn rows(space: &Space) -> Vec<Row> {
             if let Some(fewer) = without_other_keys(space, &row) {
                 row.rules = fewer;
             }
-            let rules = RowRules { space, row: &row, road: None, in_force: &in_force };
-            let reach = |road: &Road| RowRules { road: Some(&road.facts), ..rules }.reach();
-            let roads = space.roads.iter().map(reach).collect();
+            effort::grant(granted);
+            let key = key_of(&values);
+            let roads: Vec<Reach> = match open.get(&key) {
+                Some(alike) => rows[*alike].roads.clone(),
+                None => {
+                    let rules = RowRules { space, row: &row, road: None, in_force: &in_force };
+                    let reach = |road: &Road| RowRules { road: Some(&road.facts), ..rules }.reach();
+                    let (roads, steps) = effort::counted(|| space.roads.iter().map(reach).collect());
+                    pace.note(steps, granted);
+                    roads
+                }
+            };
+            // The reason why a row is dead may name that row.
+            if !are_all && roads.iter().all(|reach| matches!(reach, Reach::Open(_))) {
+                open.entry(key).or_insert(row.index);
+            }
             rows.push(Row { roads, ..row });
         }
     }
     rows
+}
+
+/// How many rows of an action are proved, in how many steps, and how many proofs there will be if no row is dead.
+struct Pace {
+    proved: u64,
+    spent: u64,
+    count: u64,
+}
+
+impl Pace {
+    /// Counts a proof. From time to time it gives up if the other rows, which bring `granted` steps each, would take more
+    /// than there are.
+    fn note(&mut self, steps: u64, granted: u64) {
+        self.proved += 1;
+        self.spent += steps;
+        if self.proved.is_multiple_of(ROWS_OF_A_SAMPLE) {
+            let each = (self.spent / self.proved).saturating_sub(granted);
+            effort::foresee(each * self.count.saturating_sub(self.proved) + STEPS_OF_LATER_PROOFS);
+        }
+    }
+}
+
+/// The axes, by their places among the parameters, that decide what [`RowRules::reach`] says of a row.
+fn deciding_axes(space: &Space, action: usize) -> Vec<usize> {
+    let ActionDef { parameters, effects, .. } = &space.actions[action];
+    let mut of_spawns: Vec<usize> = Vec::new();
+    for effect in effects {
+        let EffectDef::Spawn(spawn) = effect else { continue };
+        let verb = match &spawn.verb {
+            WordExpr::Fixed(_) => None,
+            WordExpr::Of(expr, _) => Some(expr),
+        };
+        of_spawns.extend([&spawn.speed, &spawn.distance].into_iter().chain(verb).flat_map(rules::locals));
+    }
+    let decides = |local: &usize| {
+        let is_named = space.clauses[action].iter().any(|clause| clause.needs(*local));
+        parameters[*local].axis && (is_named || of_spawns.contains(local))
+    };
+    (0..parameters.len()).filter(decides).collect()
 }
 
 /// All values that an expression of the row's action may have by the parameters' own ranges and
@@ -131,7 +207,7 @@ fn products(space: &Space, action: &ActionDef) -> Vec<Vec<Value>> {
 }
 
 impl<'a> RowRules<'a> {
-    fn reach(self) -> Reach {
+    pub(crate) fn reach(self) -> Reach {
         let parameters = &self.space.actions[self.row.action].parameters;
         if let Some(locals) = self.settle() {
             let drawn = parameters.iter().zip(locals).filter(|(parameter, _)| !parameter.axis);
@@ -208,9 +284,9 @@ impl<'a> RowRules<'a> {
             },
         });
         let known = Known { case: moment, ..self.known(&locals, &after) };
-        let newcomers = newcomers(&self.space.actions[self.row.action], &known, false);
+        let newcomers = || newcomers(&self.space.actions[self.row.action], &known, false);
         let possible =
-            may_move && may_hold_together(&self.conditions(), &known, &self.space.episode, &newcomers);
+            may_move && may_hold_together(&self.conditions(), &known, &self.space.episode, newcomers);
         possible.then_some(locals)
     }
 

@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use crate::model::expr::ExprKind;
 use crate::model::rules::RowRules;
 use crate::model::vocabulary::Fact;
-use crate::model::{Memory, Reach, Road, Row, RulesInForce, Space, Value, effort};
+use crate::model::{Memory, Reach, Road, Row, RulesInForce, Space, effort};
 use crate::prove::moment::Case;
 use crate::prove::witness::{Found, Left, Search};
 use crate::syntax::listed;
@@ -273,15 +273,10 @@ struct Met {
 
 /// Equal for equal memories (FNV-1a over the cells).
 fn digest(memory: &Memory) -> u64 {
-    memory.cells().iter().fold(0xcbf2_9ce4_8422_2325, |digest: u64, cell| {
-        let bits = match cell {
-            Value::Bool(truth) => u64::from(*truth),
-            // Both zeros are equal.
-            Value::Number(number) => (number + 0.0).to_bits(),
-            Value::Variant(_, variant) => *variant as u64,
-        };
-        (digest ^ bits).wrapping_mul(0x100_0000_01b3)
-    })
+    memory
+        .cells()
+        .iter()
+        .fold(0xcbf2_9ce4_8422_2325, |digest: u64, cell| (digest ^ cell.bits()).wrapping_mul(0x100_0000_01b3))
 }
 
 impl Way {

@@ -352,10 +352,10 @@ impl Search<'_> {
     fn is_left_open(&self, candidate: Candidate<'_>) -> bool {
         let (locals, cells) = (points(candidate.values), followed(candidate.after));
         let known = Known { case: self.moment, ..self.rules.known(&locals, &cells) };
-        let newcomers = newcomers(self.action(), &known, true);
+        let newcomers = || newcomers(self.action(), &known, true);
         let conditions = self.rules.conditions();
         !oppose(&conditions, &known, true)
-            && may_hold_together(&conditions, &known, &self.rules.space.episode, &newcomers)
+            && may_hold_together(&conditions, &known, &self.rules.space.episode, newcomers)
     }
 
     /// Memories to try: the initial one first, then every value of the cells that the rules or effects of the
@@ -396,7 +396,7 @@ impl Search<'_> {
         let states = &self.rules.space.states;
         let mut found = BTreeSet::new();
         let mut named = |expr: &Expr| found.extend(cells_read(expr, states));
-        for set in self.rules.space.sets(Some(self.rules.row.action)) {
+        for set in self.rules.space.sets(Some(self.rules.row.action)).take_while(|_| !effort::is_spent()) {
             set.key.iter().chain([&set.value]).for_each(&mut named);
         }
         for effect in &self.action().effects {

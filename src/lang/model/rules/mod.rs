@@ -31,7 +31,7 @@ mod solve;
 mod start;
 
 pub use bound::Bound;
-pub(crate) use bound::{allowed, bounds};
+pub(crate) use bound::{allowed, bounds, locals};
 pub use clause::{Clause, Source};
 pub(crate) use clause::{clauses, states_read};
 pub use in_force::{RulesInForce, UnknownRule};
@@ -41,8 +41,6 @@ pub use solve::{Before, Choose, Nearest, TRIES_MAX, Unsolved};
 
 pub use start::NoStart;
 pub(crate) use start::{cells_read, state_at};
-
-use bound::locals;
 
 use crate::model::effort;
 use crate::model::expr::Expr;
