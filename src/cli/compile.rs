@@ -9,8 +9,7 @@ use avastra_world::action::{ActionTable, TableFile};
 use super::arguments::{CompileArguments, TableArguments};
 use super::error::Failure;
 use super::files::{folder, write, write_result};
-use super::output::Output;
-use super::output::plural;
+use super::output::{Output, plural};
 use super::{doc, load, trials, why};
 
 /// The folder for tables without `--out`.

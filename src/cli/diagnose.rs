@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 
 use avastra_base::statistics::Estimate;
 use avastra_campaign::episode::{Collision, EpisodeLog};
-use avastra_campaign::oracle;
 use avastra_campaign::oracle::{
-    Comparison, Diagnosis, Evidence, Fate, Likelihood, Measure, MechanismShare, Mechanisms, Verdict,
+    self, Comparison, Diagnosis, Evidence, Fate, Likelihood, Measure, MechanismShare, Mechanisms, Verdict,
     WeaknessFinding,
 };
 use avastra_campaign::run::{Asked, Stage};
@@ -20,8 +19,7 @@ use super::arguments::DiagnoseArguments;
 use super::error::Failure;
 use super::load;
 use super::look;
-use super::output::Output;
-use super::output::plural;
+use super::output::{Output, plural};
 use super::parallel::each_file;
 use super::replay::priority_text;
 

@@ -8,8 +8,7 @@ use avastra_lang::model::{
     ActionDef, Domain, Initial, Interval, Parameter, RuleBody, RuleDef, Space, StateDef, Type, Value,
 };
 
-use super::output::Output;
-use super::output::plural;
+use super::output::{Output, plural};
 
 /// Prints the page.
 pub fn doc(output: &Output, space: &Space) {

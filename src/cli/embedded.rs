@@ -3,14 +3,12 @@
 
 use std::path::{Path, PathBuf};
 
-use avastra_campaign::run;
-use avastra_campaign::run::{Run, RunSettings, TrafficRecord};
+use avastra_campaign::run::{self, Run, RunSettings, TrafficRecord};
 use avastra_lang::syntax::{DiagnosticRecord, Style, record, render};
 use avastra_world::action::ActionTable;
 
 use super::conditions::roads_or_all;
-use super::load;
-use super::load::UnderTest;
+use super::load::{self, UnderTest};
 
 /// A space that was read, and what there is to say of it.
 pub struct Compiled {

@@ -8,8 +8,7 @@ use avastra_campaign::files;
 use avastra_drivers::external;
 
 use super::error::Failure;
-use super::load;
-use super::load::answers_path;
+use super::load::{self, answers_path};
 
 /// Refuses a file by its name before work begins, so that nobody's scenario or database is written over by mistake. A pipe
 /// or a device may have any name.

@@ -8,8 +8,7 @@ use clap::error::Error;
 use clap::{Arg, Command, CommandFactory};
 
 use avastra_drivers as ads;
-use avastra_search::agent;
-use avastra_search::agent::Kind;
+use avastra_search::agent::{self, Kind};
 use avastra_world::sim::TrafficProfile;
 
 use super::arguments::Arguments;

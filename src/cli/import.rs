@@ -6,10 +6,8 @@ use std::path::{Path, PathBuf};
 use avastra_campaign::episode::{End, Outcome};
 use avastra_campaign::files::PlainName;
 use avastra_campaign::run::Stage;
-use avastra_exchange::import;
-use avastra_exchange::import::{Files, Imported, Refusal};
-use avastra_lang::check;
-use avastra_lang::check::ReadError;
+use avastra_exchange::import::{self, Files, Imported, Refusal};
+use avastra_lang::check::{self, ReadError};
 use avastra_lang::model::Scenario;
 use avastra_world::action::ActionTable;
 

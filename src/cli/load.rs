@@ -6,12 +6,10 @@ use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-use avastra_campaign::run;
-use avastra_campaign::run::{Asked, Profile, RunError, driving_system};
+use avastra_campaign::run::{self, Asked, Profile, RunError, driving_system};
 use avastra_drivers::external::{Attached, ExternalSettings, Target};
 use avastra_drivers::{EXTERNAL, ModularConfig, REGISTRY};
-use avastra_lang::check;
-use avastra_lang::check::{Loaded, ReadError};
+use avastra_lang::check::{self, Loaded, ReadError};
 use avastra_lang::model::{Policy, Scenario, Space};
 use avastra_lang::syntax::{nearest, yaml_mistake};
 use avastra_world::action::ActionTable;

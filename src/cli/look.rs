@@ -7,8 +7,7 @@
 
 use std::path::{Path, PathBuf};
 
-use avastra_campaign::run;
-use avastra_campaign::run::RunError;
+use avastra_campaign::run::{self, RunError};
 use avastra_lang::check::{Loaded, normal};
 use avastra_lang::model::{Scenario, code};
 use avastra_lang::syntax::ast::{Expr, ExprKind, FileId};

@@ -16,8 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
 use std::path::{Component, Path, PathBuf};
 
-use avastra_campaign::files;
-use avastra_campaign::files::PlainName;
+use avastra_campaign::files::{self, PlainName};
 use avastra_campaign::run::{
     DatabaseError, Numbered, PolicyReference, Shard, Units, WrittenScenario, settings_differences,
 };

@@ -15,8 +15,7 @@ use super::arguments::ReplayArguments;
 use super::error::Failure;
 use super::load;
 use super::look::{self, Changed, Looked};
-use super::output::Output;
-use super::output::plural;
+use super::output::{Output, plural};
 use super::parallel::each_file;
 use super::policy::claims;
 

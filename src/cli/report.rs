@@ -7,8 +7,7 @@ use serde_json::Value;
 
 use avastra_campaign::run::{Asked, Database, DatabaseError, Units};
 use avastra_campaign::study::StudyResults;
-use avastra_exchange::report;
-use avastra_exchange::report::{Page, Scene, record, record_another};
+use avastra_exchange::report::{self, Page, Scene, record, record_another};
 use avastra_lang::check::normal;
 use avastra_world::action::ActionTable;
 

@@ -3,8 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use avastra_campaign::study::Played;
-use avastra_exchange::report;
-use avastra_exchange::report::Chapter;
+use avastra_exchange::report::{self, Chapter};
 
 use super::arguments::ResultsArguments;
 use super::error::Failure;

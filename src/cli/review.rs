@@ -7,8 +7,7 @@ use std::ops::Range;
 
 use avastra_campaign::emit;
 use avastra_campaign::episode::{EpisodeLog, Outcome};
-use avastra_campaign::oracle;
-use avastra_campaign::oracle::ClaimResult;
+use avastra_campaign::oracle::{self, ClaimResult};
 use avastra_campaign::run::{Asked, EpisodeSummary, RunError, Stage, recorded_traffic};
 use avastra_lang::model::{Avoidability, Claim, Scenario};
 use avastra_lang::syntax::ast::{self, ClauseKind, Doc, Expect, ExprKind, FileId, ItemKind, Span};

@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 use avastra_campaign::emit;
 use avastra_campaign::episode::{Outcome, Script, Setup};
 use avastra_campaign::oracle;
-use avastra_campaign::run;
-use avastra_campaign::run::{Asked, EpisodeSummary, Stage};
+use avastra_campaign::run::{self, Asked, EpisodeSummary, Stage};
 use avastra_drivers::Selected;
 use avastra_lang::model::Claim;
 
@@ -16,8 +15,7 @@ use super::files::{folder, make, write_answers, write_result};
 use super::findings::{doubts, spot_check};
 use super::load;
 use super::look;
-use super::output::Output;
-use super::output::plural;
+use super::output::{Output, plural};
 use super::parallel::each_file;
 use super::replay::refutation;
 

@@ -5,10 +5,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use avastra_campaign::files;
-use avastra_campaign::oracle;
-use avastra_campaign::oracle::Regression;
-use avastra_campaign::run;
-use avastra_campaign::run::{Asked, RunError, Stage};
+use avastra_campaign::oracle::{self, Regression};
+use avastra_campaign::run::{self, Asked, RunError, Stage};
 use avastra_drivers::external::{Failure as AdsFailure, FailureKind};
 use avastra_lang::check::{Loaded, normal};
 use avastra_lang::model::{Claim, Scenario};
@@ -20,11 +18,9 @@ use super::arguments::{FilesArguments, TestArguments};
 use super::error::Failure;
 use super::files::{write, write_answers, write_named};
 use super::findings::{doubts, spot_check};
-use super::load;
-use super::load::Emitted;
+use super::load::{self, Emitted};
 use super::look::{is_outdated, meaning_text};
-use super::output::Output;
-use super::output::plural;
+use super::output::{Output, plural};
 use super::parallel::each_file_in_turn;
 use super::review::{Change, Review, review};
 

@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use avastra_campaign::emit;
-use avastra_campaign::emit::Provenance;
+use avastra_campaign::emit::{self, Provenance};
 use avastra_campaign::run::{Arena, DEFAULT_ADS, driving_system};
 use avastra_campaign::trial::{Cell, TrialSettings, Trials};
 use avastra_exchange::report;
@@ -15,8 +14,7 @@ use super::compile::TableResult;
 use super::conditions::roads_or_all;
 use super::error::Failure;
 use super::files::{make, write};
-use super::load;
-use super::load::Driver;
+use super::load::{self, Driver};
 use super::output::Output;
 use super::progress::Pieces;
 

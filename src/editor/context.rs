@@ -13,8 +13,7 @@ use avastra_lang::syntax::ast::{
 };
 use avastra_lang::syntax::{HERE, Unfinished, unfinished};
 
-use super::words;
-use super::words::Entry;
+use super::words::{self, Entry};
 
 /// A kind of thing that can be written at a place.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,8 +1,7 @@
 //! The document as `avastra fmt` would write it.
 
-use avastra_lang::syntax;
-use avastra_lang::syntax::FormatError;
 use avastra_lang::syntax::ast::Span;
+use avastra_lang::syntax::{self, FormatError};
 
 use super::diagnostics::Change;
 use super::workspace::Analysis;

@@ -4,8 +4,7 @@
 use core::fmt::Write;
 use std::collections::BTreeSet;
 
-use avastra_base::units;
-use avastra_base::units::Rational;
+use avastra_base::units::{self, Rational};
 use avastra_lang::check::{Declaration, Symbol};
 use avastra_lang::model::vocabulary::{Word, WorldState};
 use avastra_lang::model::{ActionDef, Interval, Parameter, Reach, RuleBody, Space};
