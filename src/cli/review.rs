@@ -397,18 +397,6 @@ scenario s {
 ";
 
     #[test]
-    fn claims_that_hold_and_comments_stay() {
-        // Of the same crash at another time, only that goes in; what the author took out stays out.
-        let new = NEW.replace("npc#2", "npc#1").replace("unavoidable", "avoidable by [cc]");
-        let now = rewritten(OLD, &new, &[true, false, false, false, false]);
-        let wanted = OLD
-            .replace("3.00 s", "4.00 s")
-            .replace("Sedan npc#1 (DriveAhead) is hit at 3.0", "SUV npc#1 (Stand) is hit at 4.0");
-        assert_eq!(now, wanted);
-        assert_eq!(rewritten(OLD, &new, &[false; 5]), OLD);
-    }
-
-    #[test]
     fn claims_about_another_crash_take_the_place_of_those_about_the_one() {
         let now = rewritten(OLD, NEW, &[true; 5]);
         let (_, claims) = now.split_once("wait() }\n").unwrap();
