@@ -14,6 +14,15 @@ use avastra_lang::syntax::visible;
 
 use super::output::{Output, Telling, plural, remark};
 
+/// The time now.
+#[allow(
+    clippy::disallowed_methods,
+    reason = "this is cli, and the time is only told or stands beside results"
+)]
+pub fn now() -> Instant {
+    Instant::now()
+}
+
 /// How far a run or a study is. Dropping it clears the bar.
 pub struct Progress {
     count: Count,
@@ -136,9 +145,7 @@ impl Count {
             bar.set_style(ProgressStyle::with_template(&template).expect("a fixed template"));
             bar
         });
-        #[allow(clippy::disallowed_methods, reason = "this is cli, and the time only decides what is told")]
-        let begun = Instant::now();
-        Count { bar, lines: telling == Telling::Lines, noun, begun, total, done }
+        Count { bar, lines: telling == Telling::Lines, noun, begun: now(), total, done }
     }
 
     fn up(&mut self, message: String) {

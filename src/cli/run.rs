@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::Instant;
 
 use avastra_campaign::emit;
 use avastra_campaign::episode::EpisodeLog;
@@ -27,6 +26,7 @@ use super::output::{Output, plural};
 use super::pack::pack_space;
 use super::parallel::jobs;
 use super::policy::acting;
+use super::progress::now;
 use super::run_directory::{Player, Resumed, RunDirectory};
 use super::{compile, conditions, load, merge, run_directory, shard};
 
@@ -117,8 +117,7 @@ fn play_all(
     }
 
     let stop = stop_on_interrupt();
-    #[allow(clippy::disallowed_methods, reason = "this is cli, and the time goes nowhere but the summary")]
-    let started = Instant::now();
+    let started = now();
     let jobs = jobs(asked_jobs, run.program())?;
     let mut progress = share.progress(output, "counted", &todo);
     let mut driven: Option<(usize, Arc<Conversation>)> = None;

@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use avastra_campaign::files;
 use avastra_campaign::oracle::{self, Regression};
@@ -22,6 +21,7 @@ use super::load::{self, Emitted};
 use super::look::{is_outdated, meaning_text};
 use super::output::{Output, plural};
 use super::parallel::each_file_in_turn;
+use super::progress::now;
 use super::review::{Change, Review, review};
 
 /// The result for one scenario.
@@ -191,8 +191,7 @@ impl Notes {
 impl Suite<'_> {
     /// Plays one file; `None` if it holds no scenario.
     fn play(&self, file: &Path) -> Option<(Case, Notes)> {
-        #[allow(clippy::disallowed_methods, reason = "this is cli, and the time goes nowhere but the report")]
-        let started = Instant::now();
+        let started = now();
         let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let mut notes = Notes::default();
         let (scenario, road, outcome) = match self.open(file, &mut notes) {
