@@ -17,7 +17,6 @@ use serde_json::{Map, Value, json};
 
 use avastra_editor::complete::{Proposal, ProposalKind};
 use avastra_editor::diagnostics::{Change, Changes, Mistake, Remedy};
-use avastra_editor::formatting::Formatted;
 use avastra_editor::highlight::{NameKind, Token};
 use avastra_editor::outline::{Entry, OutlineKind};
 use avastra_editor::{
@@ -324,12 +323,9 @@ impl Server {
             }
             "textDocument/formatting" => {
                 let path = self.document(params)?;
-                match formatting::format(self.analysis(&path)?) {
-                    Ok(Formatted::Broken) => Ok(Value::Null),
-                    Ok(Formatted::Already) => Ok(json!([])),
-                    Ok(Formatted::By(one)) => Ok(json!([change(&one)])),
-                    Err(error) => Err(Refusal::Impossible(error.to_string())),
-                }
+                let changes = formatting::format(self.analysis(&path)?);
+                let changes = changes.map_err(|error| Refusal::Impossible(error.to_string()))?;
+                Ok(changes.map_or(Value::Null, |changes| changes.iter().map(change).collect()))
             }
             "textDocument/documentSymbol" => {
                 let path = self.document(params)?;
