@@ -17,7 +17,7 @@ use serde_json::{Map, Value, json};
 
 use avastra_editor::complete::{Proposal, ProposalKind};
 use avastra_editor::diagnostics::{Change, Changes, Mistake, Remedy};
-use avastra_editor::highlight::{NameKind, Token};
+use avastra_editor::highlight::Token;
 use avastra_editor::outline::{Entry, OutlineKind};
 use avastra_editor::{
     Analysis, Files, Place, Point, Range, Workspace, complete, diagnostics, formatting, highlight, hints,
@@ -40,7 +40,8 @@ const NOT_INITIALIZED: i64 = -32002;
 const REQUEST_FAILED: i64 = -32803;
 const REQUEST_CANCELLED: i64 = -32800;
 
-/// The kinds of names. A token holds the position of its kind in this list.
+/// The kinds of names, in the order of [`NameKind`](avastra_editor::highlight::NameKind). A token holds the position of its
+/// kind in this list.
 const TOKEN_TYPES: [&str; 9] =
     ["enum", "enumMember", "variable", "function", "parameter", "event", "namespace", "type", "property"];
 
@@ -665,24 +666,12 @@ fn token_data(tokens: &[Token]) -> Vec<usize> {
     for token in tokens {
         let start = token.range.start;
         let since = if start.line == last.line { start.column - last.column } else { start.column };
-        // The position in `TOKEN_TYPES`.
-        let kind = match token.kind {
-            NameKind::Enum => 0,
-            NameKind::Variant => 1,
-            NameKind::Variable => 2,
-            NameKind::Function => 3,
-            NameKind::Parameter => 4,
-            NameKind::Action => 5,
-            NameKind::Namespace => 6,
-            NameKind::Type => 7,
-            NameKind::Property => 8,
-        };
         let flags = [token.declares, token.is_constant, token.is_built_in];
         let modifiers: usize =
             flags.iter().enumerate().map(|(bit, is_set)| usize::from(*is_set) << bit).sum();
         // No name has a line break in it.
         let length = token.range.end.column - start.column;
-        data.extend([start.line - last.line, since, length, kind, modifiers]);
+        data.extend([start.line - last.line, since, length, token.kind as usize, modifiers]);
         last = start;
     }
     data
