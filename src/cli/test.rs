@@ -10,7 +10,7 @@ use avastra_drivers::external::{Failure as AdsFailure, FailureKind};
 use avastra_lang::check::{Loaded, normal};
 use avastra_lang::model::{Claim, Scenario};
 use avastra_lang::syntax::ast::FileId;
-use avastra_lang::syntax::{Diagnostic, Sources, apply_fixes};
+use avastra_lang::syntax::{Diagnostic, Sources};
 use avastra_world::action::ActionTable;
 
 use super::arguments::{FilesArguments, TestArguments};
@@ -18,7 +18,7 @@ use super::error::Failure;
 use super::files::{write, write_answers, write_named};
 use super::findings::{doubts, spot_check};
 use super::load::{self, Emitted};
-use super::look::{is_outdated, meaning_text};
+use super::look::{as_it_is_now, is_outdated, meaning_text};
 use super::output::{Output, plural};
 use super::parallel::each_file_in_turn;
 use super::progress::now;
@@ -234,19 +234,14 @@ impl Suite<'_> {
         loaded: &Loaded,
         notes: &mut Notes,
     ) -> Result<(Emitted, Option<Outcome>), Failure> {
-        let root = FileId::default();
-        let (before, mut spaces) = (loaded.sources.text(root), Vec::new());
-        let text = match is_outdated(loaded) {
-            false => before.to_owned(),
+        let (before, mut spaces) = (loaded.sources.text(FileId::default()), Vec::new());
+        let (text, checked) = match is_outdated(loaded) {
+            false => (before.to_owned(), load::check_text(file, before)?),
             true => {
                 spaces.push(meaning_text(loaded));
-                apply_fixes(root, before, &loaded.diagnostics).0
+                as_it_is_now(file, loaded)?
             }
         };
-        let mut checked = load::check_text(file, &text)?;
-        for mistake in checked.diagnostics.iter_mut().filter(|_| !spaces.is_empty()) {
-            mistake.notes.push("the space has changed since the scenario was written".to_owned());
-        }
         let emitted = notes.emitted(file, checked)?;
         let Emitted::Scenario(table, scenario) = &emitted else { return Ok((emitted, None)) };
         let Review { change, mut differences, illegal, now } = review(table, scenario, &self.asked, &text)?;
