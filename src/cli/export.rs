@@ -8,7 +8,7 @@ use avastra_exchange::export::{self, ExportError, Recording, record};
 
 use super::arguments::{ExportArguments, ExportEgo, ExportFormat, ExportProfile};
 use super::error::Failure;
-use super::files::{copy_map, folder, make, write};
+use super::files::{copy_map, folder, make, target, write};
 use super::output::{Output, plural};
 use super::parallel::each_file;
 use super::replay::refutation;
@@ -112,13 +112,7 @@ fn targets(arguments: &ExportArguments) -> Result<BTreeMap<PathBuf, PathBuf>, Fa
     let mut targets = BTreeMap::new();
     let mut sources: BTreeMap<PathBuf, &Path> = BTreeMap::new();
     for file in &arguments.many.files {
-        let folder = match &arguments.out {
-            Some(folder) => folder.clone(),
-            None => file.parent().unwrap_or(Path::new("")).join(FOLDER),
-        };
-        let stem = file.file_stem();
-        let stem = stem.ok_or_else(|| Failure::file("read", file, "it is a folder: name a file in it"))?;
-        let target = folder.join(stem).with_added_extension(extension(arguments.to));
+        let target = target(file, arguments.out.as_ref(), FOLDER, extension(arguments.to))?;
         if let Some(other) = sources.insert(target.clone(), file).filter(|other| other != file) {
             return Err(Failure::usage(format!(
                 "`{}` and `{}` would both be written to `{}`: export them to two folders",

@@ -100,6 +100,14 @@ pub fn make_way(directory: &Path, file: &Path) -> Result<(), Failure> {
     files::make_way(directory, file).map_err(way)
 }
 
+/// Where what is made of a file is written: to the folder that the user named, or else to `own` beside the file.
+pub fn target(file: &Path, named: Option<&PathBuf>, own: &str, extension: &str) -> Result<PathBuf, Failure> {
+    let beside = || file.parent().unwrap_or(Path::new("")).join(own);
+    let stem = file.file_stem();
+    let stem = stem.ok_or_else(|| Failure::file("read", file, "it is a folder: name a file in it"))?;
+    Ok(named.cloned().unwrap_or_else(beside).join(stem).with_added_extension(extension))
+}
+
 /// Copies a map. Several scenarios share it; nothing else that has its name is overwritten.
 pub fn copy_map(map: &Path, target: &Path) -> Result<(), Failure> {
     let text = load::text(map)?;

@@ -13,7 +13,7 @@ use avastra_world::action::ActionTable;
 
 use super::arguments::ImportArguments;
 use super::error::Failure;
-use super::files::{copy_map, folder, make, write_new};
+use super::files::{copy_map, folder, make, target, write_new};
 use super::load;
 use super::output::{Output, plural};
 
@@ -166,13 +166,7 @@ fn parameters(arguments: &ImportArguments) -> Result<BTreeMap<String, String>, F
 fn targets(arguments: &ImportArguments) -> Result<Vec<PathBuf>, Failure> {
     let mut targets: Vec<PathBuf> = Vec::new();
     for file in &arguments.files {
-        let folder = match &arguments.out {
-            Some(folder) => folder.clone(),
-            None => file.parent().unwrap_or(Path::new("")).join(FOLDER),
-        };
-        let stem = file.file_stem();
-        let stem = stem.ok_or_else(|| Failure::file("read", file, "it is a folder: name a file in it"))?;
-        let target = folder.join(stem).with_added_extension("ava");
+        let target = target(file, arguments.out.as_ref(), FOLDER, "ava")?;
         if targets.contains(&target) {
             let message =
                 format!("two files would be written to `{}`: import them to two folders", target.display());
