@@ -17,7 +17,7 @@ use super::arguments::{EstimateArguments, EventArgument, MethodArgument};
 use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, as_they_are};
 use super::error::Failure;
 use super::files::{remove, write};
-use super::findings::doubts;
+use super::findings::is_reproducible;
 use super::interrupt::stop_on_interrupt;
 use super::output::{Output, plural};
 use super::pack::pack_space;
@@ -151,10 +151,9 @@ fn play_all(
     output.say(&estimate_text(&results, is_unfinished, share.shard));
     let critical = load::sources_in(&path.join("critical"))?;
     output.say(&critical_text(&path, &critical));
-    let doubts = doubts(estimate.run().program());
-    doubts.iter().for_each(|doubt| output.warn(doubt));
+    let is_reproducible = is_reproducible(output, estimate.run().program());
     output.result(serde_json::json!({
-        "directory": path, "results": results, "critical": critical, "reproducible": doubts.is_empty(),
+        "directory": path, "results": results, "critical": critical, "reproducible": is_reproducible,
     }));
     share.end::<EstimateSettings>(output, path, !is_unfinished, None)
 }
@@ -423,11 +422,10 @@ fn compare(
     }
     let results = ComparisonResults::new(comparison.event, &pairs).expect("there is at least one episode");
     output.say(&comparison_text(&results, sides));
-    let doubts: Vec<String> =
-        [&comparison.first, &comparison.second].into_iter().flat_map(|run| doubts(run.program())).collect();
-    doubts.iter().for_each(|doubt| output.warn(doubt));
-    output
-        .result(serde_json::json!({ "sides": sides, "results": results, "reproducible": doubts.is_empty() }));
+    let sides_repeat =
+        [&comparison.first, &comparison.second].map(|run| is_reproducible(output, run.program()));
+    let is_reproducible = sides_repeat == [true; 2];
+    output.result(serde_json::json!({ "sides": sides, "results": results, "reproducible": is_reproducible }));
     Ok(())
 }
 

@@ -19,7 +19,7 @@ use super::arguments::{FaceArgument, RunArguments};
 use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, settled};
 use super::error::Failure;
 use super::files::write_answers;
-use super::findings::{cut_off, doubts, failures_text};
+use super::findings::{cut_off, failures_text, is_reproducible};
 use super::interrupt::stop_on_interrupt;
 use super::never::Never;
 use super::output::{Output, plural};
@@ -166,12 +166,11 @@ fn play_all(
     {
         program.spot_check(&first, || run.episode(number).conversation);
     }
-    let doubts = doubts(run.program());
-    doubts.iter().for_each(|doubt| output.warn(doubt));
+    let is_reproducible = is_reproducible(output, run.program());
     cut_off(run.program()).iter().for_each(|note| output.warn(note));
     output.result(serde_json::json!({
         "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups, "never": never,
-        "critical": critical, "failures": failures, "reproducible": doubts.is_empty(),
+        "critical": critical, "failures": failures, "reproducible": is_reproducible,
     }));
     share.end::<RunSettings>(output, directory.path, is_over, run.program())?;
     Ok(totals)

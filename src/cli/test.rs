@@ -16,7 +16,7 @@ use avastra_world::action::ActionTable;
 use super::arguments::{FilesArguments, TestArguments};
 use super::error::Failure;
 use super::files::{write, write_answers, write_named};
-use super::findings::{doubts, spot_check};
+use super::findings::{is_reproducible, spot_check};
 use super::load::{self, Emitted};
 use super::look::{as_it_is_now, is_outdated, meaning_text};
 use super::output::{Output, plural};
@@ -98,8 +98,7 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
             if !matches!(found, Regression::AdsFailed(_) | Regression::FailsAgain(_)))
     });
     spot_check(suite.asked.external.as_ref(), driven.map(|case| case.file.as_path()));
-    let doubts = doubts(suite.asked.external.as_ref());
-    doubts.iter().for_each(|doubt| output.warn(doubt));
+    let is_reproducible = is_reproducible(output, suite.asked.external.as_ref());
     if ads_failed > 0 {
         output.say(&format!("in {ads_failed} more the driving system itself failed"));
     }
@@ -112,7 +111,7 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
         })
         .collect();
     output.result(
-        serde_json::json!({ "still_fails": fails, "fixed": fixed, "changed": changed, "errors": errors, "ads_failed": ads_failed, "reproducible": doubts.is_empty(),
+        serde_json::json!({ "still_fails": fails, "fixed": fixed, "changed": changed, "errors": errors, "ads_failed": ads_failed, "reproducible": is_reproducible,
                                       "accepted": accepted, "reviewed": reviewed, "scenarios": listed }),
     );
     let failing = count(&Outcome::is_failure);

@@ -18,7 +18,7 @@ use super::campaign::{self, Campaign, Outside, as_they_are};
 use super::conditions::roads_or_all;
 use super::error::Failure;
 use super::files::{folder, write};
-use super::findings::{cut_off, doubts, failures_text, kinds_text, unfinished};
+use super::findings::{cut_off, failures_text, is_reproducible, kinds_text, unfinished};
 use super::interrupt::stop_on_interrupt;
 use super::load::UnderTest;
 use super::output::{Output, plural};
@@ -247,8 +247,7 @@ fn finish(output: &Output, training: &Training, mut directory: RunDirectory) -> 
             plural(all, "episode"),
         ));
     }
-    let doubts = doubts(training.arena().program());
-    doubts.iter().for_each(|doubt| output.warn(doubt));
+    let is_reproducible = is_reproducible(output, training.arena().program());
     cut_off(training.arena().program()).iter().for_each(|note| output.warn(note));
     let evaluation = serde_json::json!({
         "episodes": played(settings, &evaluation), "collisions": evaluation.collisions,
@@ -266,7 +265,7 @@ fn finish(output: &Output, training: &Training, mut directory: RunDirectory) -> 
     directory.database = directory.database.settle(&file, &units).map_err(unwritten)?;
     write(&directory.path.join("results.json"), &format!("{text}\n"))?;
     output.result(serde_json::json!({
-        "reproducible": doubts.is_empty(),
+        "reproducible": is_reproducible,
         "directory": directory.path, "totals": totals, "groups": groups, "policy": kept.as_ref().map(|(path, _)| path),
         "rules": rules, "simulated_h": simulated_h, "failures": failures, "evaluation": evaluation,
     }));
