@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use avastra_campaign::run::recorded;
 use avastra_exchange::export::{self, ExportError, Recording, record};
 
 use super::arguments::{ExportArguments, ExportEgo, ExportFormat, ExportProfile};
@@ -12,7 +13,7 @@ use super::files::{copy_map, folder, make, target, write};
 use super::output::{Output, plural};
 use super::parallel::each_file;
 use super::replay::refutation;
-use super::{load, look, pack};
+use super::{look, pack};
 
 /// The folder of what is written, beside the scenarios, unless another one is named.
 const FOLDER: &str = "exported";
@@ -27,11 +28,10 @@ pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failur
         return pack::pack(output, &arguments.many.files, folder);
     }
     let targets = targets(arguments)?;
-    let asked = load::asked(None)?;
     let maps = Mutex::new(());
     let exported = each_file(output, &arguments.many, None, |file| {
         let (table, scenario) = look::unchanged(output, file)?;
-        let (ads, _) = asked.selected_for(&scenario)?;
+        let ads = recorded(&scenario)?;
         let recording = match record(&table, &scenario, &ads) {
             Ok(recording) => recording,
             Err(ExportError::Run(error)) => return Err(error.into()),

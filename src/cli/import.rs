@@ -5,10 +5,9 @@ use std::path::{Path, PathBuf};
 
 use avastra_campaign::episode::{End, Outcome};
 use avastra_campaign::files::PlainName;
-use avastra_campaign::run::Stage;
+use avastra_campaign::run::{Stage, recorded};
 use avastra_exchange::import::{self, Files, Imported, Refusal};
 use avastra_lang::check::{self, ReadError};
-use avastra_lang::model::Scenario;
 use avastra_world::action::ActionTable;
 
 use super::arguments::ImportArguments;
@@ -114,14 +113,8 @@ fn plays(imported: &Imported, target: &Path, map: &Path, source: &Path) -> Resul
         return Err("it gives no scenario".to_owned());
     };
     let table = ActionTable::new(space);
-    first_step(&table, &scenario)
-}
-
-/// Plays the one step of an imported scenario.
-fn first_step(table: &ActionTable, scenario: &Scenario) -> Result<(), String> {
-    let asked = load::asked(None).map_err(|error| error.to_string())?;
-    let (ads, _) = asked.selected_for(scenario).map_err(|error| error.to_string())?;
-    let stage = Stage::new(table, scenario).map_err(|error| error.to_string())?;
+    let ads = recorded(&scenario).map_err(|error| error.to_string())?;
+    let stage = Stage::new(&table, &scenario).map_err(|error| error.to_string())?;
     let log = stage.play(&ads, &mut |_, _, _| {});
     match log.steps.first().map(|step| &step.outcome) {
         Some(Outcome::Refused { reason, .. }) => Err(format!("what it places cannot appear: {reason}")),

@@ -50,9 +50,6 @@ pub fn load(output: &Output, path: &Path) -> Result<Loaded, Failure> {
 }
 
 /// Prints the diagnostics of a file.
-///
-/// # Errors
-/// If the source has mistakes.
 fn sound(output: &Output, loaded: Loaded) -> Result<Loaded, Failure> {
     output.diagnostics(&loaded.sources, &loaded.diagnostics);
     without_mistakes(loaded)
@@ -204,9 +201,6 @@ pub fn scenario(output: &Output, path: &Path) -> Result<(ActionTable, Scenario),
 }
 
 /// The table and the scenario of a file that was read and checked.
-///
-/// # Errors
-/// As [`scenario`].
 pub fn scenario_in(output: &Output, path: &Path, loaded: Loaded) -> Result<(ActionTable, Scenario), Failure> {
     let mut loaded = sound(output, loaded)?;
     let Some(scenario) = loaded.scenario.take() else {
@@ -305,9 +299,6 @@ pub fn profile_path(text: &str) -> Option<&Path> {
 }
 
 /// The driving system under test that `--ads` gives.
-///
-/// # Errors
-/// As [`driver`] and [`under_test`].
 pub fn named(text: &str) -> Result<UnderTest, Failure> {
     match driver(text)? {
         Driver::Name(name) => under_test(name, None, None),
@@ -416,9 +407,6 @@ pub fn policy(output: &Output, path: &Path) -> Result<(ActionTable, Policy), Fai
 }
 
 /// The table and the policy of a file that was read and checked.
-///
-/// # Errors
-/// As [`policy`].
 pub fn policy_in(output: &Output, path: &Path, loaded: Loaded) -> Result<(ActionTable, Policy), Failure> {
     match emitted_in(path, sound(output, loaded)?)? {
         Emitted::Policy(table, policy) => Ok((table, *policy)),

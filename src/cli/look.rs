@@ -79,9 +79,6 @@ pub fn scenario(output: &Output, path: &Path) -> Result<Looked, Failure> {
 }
 
 /// As [`scenario`], of a file that was read and checked.
-///
-/// # Errors
-/// As [`scenario`].
 pub fn scenario_in(output: &Output, path: &Path, loaded: Loaded) -> Result<Looked, Failure> {
     let mut changed = Changed { what: Vec::new(), copy: None };
     let loaded = match loaded.diagnostics.iter().any(Diagnostic::is_error) {

@@ -81,9 +81,6 @@ fn hand_on<T>(
 
 /// Does `work` for every file on as many threads as [`jobs`] says, for `program` if one is to drive. Of several files, it
 /// says which failed; after Ctrl-C those under way are ended, and it says which are not done.
-///
-/// # Errors
-/// As [`jobs`].
 pub fn each_file<T: Send>(
     output: &Output,
     many: &FilesArguments,
@@ -94,9 +91,6 @@ pub fn each_file<T: Send>(
 }
 
 /// As [`each_file`], and hands on what came of each file as soon as it and all before it are done.
-///
-/// # Errors
-/// As [`jobs`].
 pub fn each_file_in_turn<T: Send>(
     output: &Output,
     many: &FilesArguments,

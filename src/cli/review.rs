@@ -10,7 +10,7 @@ use avastra_campaign::episode::{EpisodeLog, Outcome};
 use avastra_campaign::oracle::{self, ClaimResult};
 use avastra_campaign::run::{Asked, EpisodeSummary, RunError, Stage, recorded_traffic};
 use avastra_lang::model::{Avoidability, Claim, Scenario};
-use avastra_lang::syntax::ast::{self, ClauseKind, Doc, Expect, ExprKind, FileId, ItemKind, Span};
+use avastra_lang::syntax::ast::{self, ClauseKind, Doc, Expect, ExprKind, FileId, Span};
 use avastra_world::action::ActionTable;
 use avastra_world::sim::ENGINE;
 
@@ -338,10 +338,7 @@ fn parsed(text: &str) -> ast::File {
 }
 
 fn scenario_of(file: &ast::File) -> Option<(&ast::Scenario, &[Doc])> {
-    file.items.iter().find_map(|item| match &item.kind {
-        ItemKind::Scenario(scenario) => Some((scenario, item.docs.as_slice())),
-        _ => None,
-    })
+    file.items.iter().find_map(|item| Some((item.kind.as_scenario()?, item.docs.as_slice())))
 }
 
 #[cfg(test)]
