@@ -15,7 +15,7 @@ pub use drive::{
 pub use external::{AdsArguments, AdsCheckArguments, AdsCommand, Misbehaviour, ToyAnswer, ToyArguments};
 pub use language::{
     CheckArguments, CompileArguments, CompletionsArguments, DiffArguments, Dump, EditorFilesArguments,
-    ExplainArguments, FmtArguments, NewArguments, TableArguments,
+    ExplainArguments, FmtArguments, NewArguments, RuleArguments, TableArguments,
 };
 pub use learn::{
     DistilArguments, ExplainPolicyArguments, PolicyArguments, PolicyCommand, ResultsArguments,
