@@ -371,8 +371,7 @@ fn begun(
 /// The rest of an interrupted estimate, with the text of its settings.
 /// With `is_played`, nothing of it is left to play, and no program is started.
 fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Estimate, Held, String), Failure> {
-    let resumed = run_directory::resume::<EstimateSettings>(output, path, is_played)?;
-    let Resumed { settings, text, table, held } = resumed;
+    let Resumed { settings, text, table, held } = run_directory::resume(output, path, is_played)?;
     Ok((Estimate::new(table, settings).map_err(Failure::usage)?, held, text))
 }
 

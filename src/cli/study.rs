@@ -314,8 +314,7 @@ pub fn wanted(
 /// The rest of an interrupted study, with the text of its settings. With `is_played`, nothing of it is left to play, and no
 /// program is started.
 fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Study, Held, String), Failure> {
-    let resumed = run_directory::resume::<StudySettings>(output, path, is_played)?;
-    let Resumed { settings, text, table, held } = resumed;
+    let Resumed { settings, text, table, held } = run_directory::resume(output, path, is_played)?;
     let study = Study::new(table, settings).map_err(|error| match error {
         StudyError::Agent { error: error @ RunError::OtherProgram { .. }, .. } => error.into(),
         error => Failure::usage(error),

@@ -138,8 +138,7 @@ fn settings(arguments: &TrainArguments) -> Result<Settings, Failure> {
 
 /// The rest of an interrupted training.
 fn resumed(output: &Output, path: &Path) -> Result<(Training, RunDirectory), Failure> {
-    let resumed = run_directory::resume::<TrainSettings>(output, path, false)?;
-    let Resumed { settings, text, table, held } = resumed;
+    let Resumed { settings, text, table, held } = run_directory::resume(output, path, false)?;
     let mut directory = RunDirectory::open(held, &text)?;
     let checkpoint =
         directory.database.return_to_checkpoint().map_err(|error| Failure::file("resume", path, error))?;
