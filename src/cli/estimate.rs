@@ -6,14 +6,13 @@ use std::sync::atomic::AtomicBool;
 
 use avastra_base::statistics::Interval;
 use avastra_campaign::estimate::{
-    Comparison, ComparisonResults, Estimate, EstimateDatabase, EstimateResults, EstimateSettings, EventKind,
-    Found, Mass, Met, Method, PILOT, Part, Pilot, Plan, Played, Probability, Stopping, compared, pilot,
-    play_parts,
+    Comparison, ComparisonResults, Estimate, EstimateDatabase, EstimateResults, EstimateSettings, Found,
+    Mass, Met, Method, PILOT, Part, Pilot, Plan, Played, Probability, Stopping, compared, pilot, play_parts,
 };
 use avastra_campaign::run::{DatabaseError, Run, RunSettings, Shard, Units};
 use avastra_world::action::ActionTable;
 
-use super::arguments::{EstimateArguments, EventArgument, MethodArgument};
+use super::arguments::EstimateArguments;
 use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, as_they_are};
 use super::error::Failure;
 use super::files::{remove, write};
@@ -337,11 +336,8 @@ fn wanted(output: &Output, arguments: &EstimateArguments) -> Result<(Estimate, S
     let under_test = load::named(&arguments.under_test.ads)?;
     let (conditions, episodes) = (&arguments.conditions, arguments.episodes.unwrap_or(EPISODES));
     let settings = EstimateSettings {
-        event: event(arguments.event),
-        method: match arguments.method {
-            MethodArgument::Count => Method::Count,
-            MethodArgument::Probe => Method::Probe,
-        },
+        event: arguments.event,
+        method: arguments.method,
         parts: arguments.parts,
         stopping: Stopping { precision: arguments.precision, hours: arguments.hours },
         run: conditions::settings(table.space(), conditions, &conditions.agent, under_test, episodes)?,
@@ -391,7 +387,7 @@ fn compare(
         Ok::<_, Failure>(Run::new(table.clone(), settings)?)
     };
     let (first, second) = (side(sides[0])?, side(sides[1])?);
-    let comparison = Comparison { first, second, event: event(arguments.event) };
+    let comparison = Comparison { first, second, event: arguments.event };
     let numbers: Vec<usize> = (0..comparison.pairs()).collect();
     output.tell(&format!(
         "{}: {} and {} in the same {}",
@@ -426,13 +422,6 @@ fn compare(
     let is_reproducible = sides_repeat == [true; 2];
     output.result(serde_json::json!({ "sides": sides, "results": results, "reproducible": is_reproducible }));
     Ok(())
-}
-
-fn event(argument: EventArgument) -> EventKind {
-    match argument {
-        EventArgument::Counted => EventKind::Counted,
-        EventArgument::Collision => EventKind::Collision,
-    }
 }
 
 fn heading(estimate: &Estimate) -> String {

@@ -15,7 +15,7 @@ use avastra_lang::model::Policy;
 use avastra_search::agent::Face;
 use avastra_world::action::ActionTable;
 
-use super::arguments::{FaceArgument, RunArguments};
+use super::arguments::RunArguments;
 use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, settled};
 use super::error::Failure;
 use super::files::write_answers;
@@ -199,10 +199,7 @@ fn wanted(output: &Output, arguments: &RunArguments) -> Result<Wanted, Failure> 
     let settings = conditions::settings(space, &arguments.conditions, agent, under_test, arguments.episodes)?;
     let settings = RunSettings { causes: arguments.causes, ..settings };
     let settings = if arguments.shard.dry_run { settings.unstarted() } else { settings };
-    let face = match arguments.face {
-        FaceArgument::Network => Face::Network,
-        FaceArgument::Rules => Face::Rules,
-    };
+    let face = arguments.face;
     let run = ready(table, settings, policy.as_ref(), face)?;
     Ok(Wanted { run, policy, face, shard })
 }

@@ -8,10 +8,7 @@ mod scenarios;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-pub use drive::{
-    ConditionArguments, EstimateArguments, EventArgument, FaceArgument, MergeArguments, MethodArgument,
-    RunArguments,
-};
+pub use drive::{ConditionArguments, EstimateArguments, MergeArguments, RunArguments};
 pub use external::{AdsArguments, AdsCheckArguments, AdsCommand, Misbehaviour, ToyAnswer, ToyArguments};
 pub use language::{
     CheckArguments, CompileArguments, CompletionsArguments, DiffArguments, Dump, EditorFilesArguments,
