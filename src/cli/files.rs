@@ -58,16 +58,9 @@ impl Scratch {
     /// If no folder can be made there.
     pub fn new(purpose: &str) -> Result<Scratch, Failure> {
         let folder = std::env::temp_dir();
-        for number in 0.. {
-            let path = folder.join(format!("avastra-{purpose}-{}-{number}", std::process::id()));
-            // It fails if anything has the name, a link included, so nothing is written through a link.
-            match files::make_new(&path) {
-                Ok(()) => return Ok(Scratch { path }),
-                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
-                Err(error) => return Err(Failure::file("create", &path, error)),
-            }
-        }
-        unreachable!("there is always a next number")
+        let id = std::process::id();
+        // A name that anything has, a link included, is passed over, so nothing is written through a link.
+        Ok(Scratch { path: make_first(|number| folder.join(format!("avastra-{purpose}-{id}-{number}")))? })
     }
 }
 
@@ -76,6 +69,18 @@ impl Drop for Scratch {
         // If it cannot be removed, the system clears it with the other temporary files.
         let _ = files::remove_all(&self.path);
     }
+}
+
+/// Makes the first of these folders whose name nothing has yet; numbers begin with 1.
+pub fn make_first(numbered: impl Fn(u32) -> PathBuf) -> Result<PathBuf, Failure> {
+    for path in (1..).map(numbered) {
+        match files::make_new(&path) {
+            Ok(()) => return Ok(path),
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(Failure::file("create", &path, error)),
+        }
+    }
+    unreachable!("there is always a next number")
 }
 
 /// Removes a file, if it is there.

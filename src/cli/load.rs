@@ -474,15 +474,11 @@ fn read_up_to(path: &Path, bytes_max: u64) -> Result<String, ReadError> {
     // The file may grow while it is read.
     File::open(path).and_then(|file| file.take(bytes_max + 1).read_to_end(&mut bytes)).map_err(unread)?;
     if bytes.len() as u64 > bytes_max {
-        return Err(ReadError(format!("it is larger than {}", in_bytes(bytes_max))));
+        return Err(ReadError(format!("it is larger than {} MiB", bytes_max >> 20)));
     }
     String::from_utf8(bytes).map_err(|error| {
         ReadError(format!("not text: byte {} is not UTF-8", error.utf8_error().valid_up_to()))
     })
-}
-
-fn in_bytes(bytes: u64) -> String {
-    if bytes >= 1 << 20 { format!("{} MiB", bytes >> 20) } else { format!("{bytes} bytes") }
 }
 
 /// The system's reason without its error number.

@@ -23,7 +23,7 @@ use avastra_world::sim::ENGINE;
 
 use super::campaign::{Campaign, KINDS, Kind};
 use super::error::Failure;
-use super::files::{folder, make, write, write_answers};
+use super::files::{folder, make, make_first, write, write_answers};
 use super::load;
 use super::output::{Output, plural};
 use super::{pack, shard};
@@ -49,7 +49,10 @@ pub struct RunDirectory {
 pub fn create_empty(out: Option<&Path>) -> Result<Held, Failure> {
     match out {
         Some(path) => make_empty(path),
-        None => hold(&next_free(Path::new("runs"))?),
+        None => {
+            let runs = folder(Path::new(""), "runs")?;
+            hold(&make_first(|number| runs.join(format!("{number:04}")))?)
+        }
     }
 }
 
@@ -475,18 +478,4 @@ pub fn is_unbegun(path: &Path) -> std::io::Result<bool> {
         }
     }
     Ok(true)
-}
-
-/// Makes the first directory `NNNN` that does not exist yet.
-fn next_free(runs: &Path) -> Result<PathBuf, Failure> {
-    let runs = folder(Path::new(""), runs)?;
-    for number in 1.. {
-        let path = runs.join(format!("{number:04}"));
-        match files::make_new(&path) {
-            Ok(()) => return Ok(path),
-            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
-            Err(error) => return Err(Failure::file("create", &path, error)),
-        }
-    }
-    unreachable!("there is always a next number")
 }
