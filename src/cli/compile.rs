@@ -44,8 +44,7 @@ pub fn last(output: &Output) -> Result<ActionTable, Failure> {
     };
     let path = load::read(Path::new(LAST)).map_err(|_| no_table())?;
     let path = PathBuf::from(path.trim_end());
-    let text = load::text(&path)?;
-    let file: TableFile = load::parsed(&path, &text)?;
+    let file: TableFile = load::parsed(&path, &load::text(&path)?)?;
     let table = load::table(output, Path::new(&file.space))?;
     if table.file() != file {
         return Err(Failure::usage(format!(

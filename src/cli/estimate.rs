@@ -102,8 +102,7 @@ fn play_all(
     let labels: Vec<String> = estimate.run().table().rows().iter().map(|row| row.label.clone()).collect();
     let all = estimate.settings().all_parts();
     let lacking = |database: &EstimateDatabase| share.lacking(estimate.settings(), database).map_err(unread);
-    let noun = estimate.settings().event.noun();
-    let mut progress = share.progress(output, noun, &lacking(&database)?);
+    let mut progress = share.progress(output, estimate.settings().event.noun(), &lacking(&database)?);
     // A shard cannot know when all of them together are precise enough: it plays all of its parts, and the looks are taken
     // when they are merged.
     let looks = match share.shard.is_whole() {

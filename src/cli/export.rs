@@ -40,8 +40,7 @@ pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failur
                 return Ok(Exported { file: file.clone(), written, left_out: Vec::new() });
             }
         };
-        let target = &targets[file];
-        let (written, left_out) = write_all(arguments, &recording, target, &maps)?;
+        let (written, left_out) = write_all(arguments, &recording, &targets[file], &maps)?;
         Ok(Exported { file: file.clone(), written: Ok(written), left_out })
     })?;
     let mut refuted = 0;

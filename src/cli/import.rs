@@ -82,8 +82,7 @@ fn one(
     let name = PlainName::new(name).map_err(|error| Failure::file("import", file, error))?;
     let map = target.with_file_name(&*name);
     if let Err(reason) = plays(&imported, target, &map, &source) {
-        let refusal = Refusal { line: 1, element: "OpenSCENARIO".to_owned(), reason };
-        return Ok(Err(vec![refusal]));
+        return Ok(Err(vec![Refusal { line: 1, element: "OpenSCENARIO".to_owned(), reason }]));
     }
     match &arguments.out {
         Some(named) => make(named)?,

@@ -484,8 +484,7 @@ fn read_up_to(path: &Path, bytes_max: u64) -> Result<String, ReadError> {
 /// The system's reason without its error number.
 fn reason(error: &std::io::Error) -> String {
     let text = error.to_string();
-    let text = text.split(" (os error").next().unwrap_or(&text).to_lowercase();
-    text.to_owned()
+    text.split(" (os error").next().unwrap_or(&text).to_lowercase()
 }
 
 /// A path to `file` that holds in `directory`, with `/` between its parts.

@@ -478,8 +478,7 @@ impl Server {
     }
 
     fn analysis(&mut self, path: &Path) -> Result<&Analysis, Refusal> {
-        let gone = || Refusal::NotOpen(path.display().to_string());
-        self.workspace.analysis(path).ok_or_else(gone)
+        self.workspace.analysis(path).ok_or_else(|| Refusal::NotOpen(path.display().to_string()))
     }
 
     /// The analysis of a document that [`Server::place`] has brought up to date.

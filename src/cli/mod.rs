@@ -125,8 +125,7 @@ pub fn main() -> ExitCode {
             if !error.use_stderr() {
                 return if is_lost { ExitCode::FAILURE } else { ExitCode::SUCCESS };
             }
-            let failure = Failure::usage(error.kind().to_string());
-            return ExitCode::from(failure.status());
+            return ExitCode::from(Failure::usage(error.kind().to_string()).status());
         }
     };
     let arguments = Arguments::from_arg_matches(&found).expect("clap has parsed them");

@@ -205,8 +205,7 @@ impl Output {
                 Format::Sarif => self.collected().push(avastra_lang::syntax::record(diagnostic, sources)),
                 Format::Json => {
                     let record = avastra_lang::syntax::record(diagnostic, sources);
-                    let line = serde_json::to_string(&record).expect("records have string keys only");
-                    drawn(&line);
+                    drawn(&serde_json::to_string(&record).expect("records have string keys only"));
                 }
                 Format::Human | Format::Plain => {
                     let style = if self.colour { Style::Human } else { Style::Plain };

@@ -93,8 +93,7 @@ pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failur
     let changes = changes(&scenes);
     let (scenarios, title) = (scenes.len(), found.title.clone());
     let compared_with = arguments.ads.clone();
-    let page = Page { title, overview: found.overview, remarks, scenes, compared_with };
-    let html = page.html();
+    let html = Page { title, overview: found.overview, remarks, scenes, compared_with }.html();
     write_result(arguments.output.as_ref(), &path, &html)?;
     output.say(&format!(
         "{}: {}, {:.1} MB; open it with a browser",

@@ -150,8 +150,7 @@ fn play_all(
     if !groups.is_empty() {
         output.say(&groups_text(&groups));
     }
-    let rows = directory.database.rows().map_err(unread)?;
-    let never = Never::new(run.table(), &rows);
+    let never = Never::new(run.table(), &directory.database.rows().map_err(unread)?);
     output.say(&never.in_words(output.verbose));
     let critical = load::sources_in(&directory.path.join("critical"))?;
     output.say(&critical_text(&directory.path, &critical));
@@ -199,9 +198,8 @@ fn wanted(output: &Output, arguments: &RunArguments) -> Result<Wanted, Failure> 
     let settings = conditions::settings(space, &arguments.conditions, agent, under_test, arguments.episodes)?;
     let settings = RunSettings { causes: arguments.causes, ..settings };
     let settings = if arguments.shard.dry_run { settings.unstarted() } else { settings };
-    let face = arguments.face;
-    let run = ready(table, settings, policy.as_ref(), face)?;
-    Ok(Wanted { run, policy, face, shard })
+    let run = ready(table, settings, policy.as_ref(), arguments.face)?;
+    Ok(Wanted { run, policy, face: arguments.face, shard })
 }
 
 /// A new run in a directory of its own.

@@ -245,8 +245,7 @@ pub fn settings_of<C: Campaign>(directory: &Path) -> Result<(C, String), Failure
             begun.engine
         )));
     }
-    let settings = load::parsed(&path, &text)?;
-    Ok((settings, text))
+    Ok((load::parsed(&path, &text)?, text))
 }
 
 /// What a directory holds, if anything.

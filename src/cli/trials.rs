@@ -50,8 +50,7 @@ pub fn trials(output: &Output, arguments: &TableArguments, table: ActionTable) -
     }
     output.say(report::trials(&cells).trim_end());
     output.tell("each row was tried alone: the roads held no other traffic");
-    let table = arena.table().file();
-    output.result(TableResult { table, trials: Some(settings), cells: Some(cells) });
+    output.result(TableResult { table: arena.table().file(), trials: Some(settings), cells: Some(cells) });
     Ok(())
 }
 

@@ -67,8 +67,7 @@ pub fn describe(analysis: &Analysis, symbol: &Symbol) -> Option<String> {
         Symbol::File(path) => return Some(format!("`{}`", path.display())),
         Symbol::Engine(word, meaning) => return Some(format!("**{word}**\n\n{meaning}")),
         Symbol::Type(name) => {
-            let meaning = words::meaning(&words::types(), name)?;
-            return Some(format!("**{name}**\n\n{meaning}"));
+            return Some(format!("**{name}**\n\n{}", words::meaning(&words::types(), name)?));
         }
         Symbol::Number(digits, unit) => return number(digits, unit.as_deref()?),
         _ => {}
