@@ -106,19 +106,17 @@ fn take(
             Ok(body) => body.map_err(|error| Failure::usage(error.to_string()))?,
             Err(ended) => return Ok(ended),
         };
-        match parsed(&body) {
-            Err(reply) => send(vec![reply]),
-            Ok(message) => match cancelled(&message) {
-                Some(id) => cancel(id, waiting),
-                None => waiting.push_back(message),
-            },
+        match serde_json::from_slice::<Value>(&body) {
+            Err(error) => {
+                let reason = format!("the message is not JSON: {error}");
+                send(vec![error_reply(&Value::Null, PARSE_ERROR, &reason)]);
+            }
+            Ok(message) if message["method"] == "$/cancelRequest" => {
+                cancel(&message["params"]["id"], waiting);
+            }
+            Ok(message) => waiting.push_back(message),
         }
     }
-}
-
-/// The request that a `$/cancelRequest` is about.
-fn cancelled(message: &Value) -> Option<&Value> {
-    (message["method"] == "$/cancelRequest").then(|| &message["params"]["id"])
 }
 
 /// Answers a waiting request as cancelled. A request that is done has its answer already.
@@ -235,7 +233,6 @@ impl Server {
     /// Takes a message in; gives the answers to it.
     fn receive(&mut self, message: &Value) -> Vec<Value> {
         let (id, method) = (message.get("id"), message.get("method").and_then(Value::as_str));
-        let is_object = message.is_object();
         match (id, method) {
             (Some(id), Some(method)) if id.is_string() || id.is_number() => {
                 vec![self.answer(id, method, &message["params"])]
@@ -247,8 +244,10 @@ impl Server {
             // A reply to a request that the server never sent.
             (Some(_), None) if message.get("result").or(message.get("error")).is_some() => Vec::new(),
             _ => {
-                let what =
-                    if is_object { "neither a request nor a notification" } else { "no JSON-RPC object" };
+                let what = match message.is_object() {
+                    true => "neither a request nor a notification",
+                    false => "no JSON-RPC object",
+                };
                 vec![error_reply(&Value::Null, INVALID_REQUEST, what)]
             }
         }
@@ -558,12 +557,6 @@ fn byte(analysis: &Analysis, position: &Value, name: &'static str) -> Result<usi
     let number = |key: &str| position[key].as_u64().and_then(|number| usize::try_from(number).ok());
     let (line, column) = number("line").zip(number("character")).ok_or(Refusal::Params(name))?;
     Ok(analysis.byte(line, column))
-}
-
-/// The message in a body, or the error reply to a body that is not JSON.
-fn parsed(body: &[u8]) -> Result<Value, Value> {
-    serde_json::from_slice(body)
-        .map_err(|error| error_reply(&Value::Null, PARSE_ERROR, &format!("the message is not JSON: {error}")))
 }
 
 /// The folders that the editor has open, as `initialize` names them.
