@@ -171,8 +171,13 @@ fn mechanisms(output: &Output, arguments: &DiagnoseArguments, asked: &Asked) -> 
 
 fn shares_text(crashes: usize, shares: &[MechanismShare], placebo: Option<&Estimate>) -> String {
     let mut text = format!(
-        "{}; each weakness switched off alone when the obstacle appears, what vanishes (95 %):",
+        "{}; each weakness switched off alone when the obstacle appears, what vanishes (95 %):\n\
+         {:<34}{:<24}{:<24}{}",
         plural(crashes, "collision"),
+        "weakness",
+        "with the crash's noise",
+        "with other noise",
+        "beyond chance"
     );
     let mut line = |weakness: &str, as_it_was: &str, noise: Option<&Estimate>, beyond: Option<&Estimate>| {
         let [noise, beyond] = [noise, beyond].map(|found| found.map_or(String::new(), percent_text));
@@ -186,11 +191,7 @@ fn shares_text(crashes: usize, shares: &[MechanismShare], placebo: Option<&Estim
         line(found.mechanism, &as_it_was, found.other_noise.as_ref(), found.beyond_chance.as_ref());
     }
     line("none, by chance", "", placebo, None);
-    let heads = format!(
-        "{:<34}{:<24}{:<24}{}",
-        "weakness", "with the crash's noise", "with other noise", "beyond chance"
-    );
-    text.replacen('\n', &format!("\n{heads}\n"), 1)
+    text
 }
 
 /// A mean share with its interval, in percent.

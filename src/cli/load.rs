@@ -56,9 +56,6 @@ fn sound(output: &Output, loaded: Loaded) -> Result<Loaded, Failure> {
 }
 
 /// Passes a file on if it has no mistakes. Its diagnostics are not printed here.
-///
-/// # Errors
-/// If the source has mistakes.
 pub fn without_mistakes(loaded: Loaded) -> Result<Loaded, Failure> {
     match loaded.diagnostics.iter().filter(|diagnostic| diagnostic.is_error()).count() {
         0 => Ok(loaded),
@@ -67,9 +64,6 @@ pub fn without_mistakes(loaded: Loaded) -> Result<Loaded, Failure> {
 }
 
 /// Reads and checks a file. For a missing name, the diagnostic names a nearby file that declares it.
-///
-/// # Errors
-/// If the file cannot be read.
 pub fn read_and_check(path: &Path) -> Result<Loaded, Failure> {
     let own = check::normal(path);
     check_read(path, &|other| if other == own { read(other) } else { read_used(other) })
@@ -433,9 +427,6 @@ pub fn parsed<T: serde::de::DeserializeOwned>(path: &Path, text: &str) -> Result
 }
 
 /// The text of a file that a command needs.
-///
-/// # Errors
-/// If it cannot be read.
 pub fn text(path: &Path) -> Result<String, Failure> {
     read(path).map_err(|error| Failure::file("read", path, error))
 }

@@ -16,9 +16,6 @@ use super::progress::{Pieces, Working};
 
 /// Worker threads: as many as asked for, or one for each core. A driving system behind a socket may serve one connection
 /// at a time, so it gets one, and otherwise must show that it serves as many.
-///
-/// # Errors
-/// If it does not.
 pub fn jobs(asked: Option<u32>, program: Option<&Arc<Program>>) -> Result<usize, Failure> {
     let cores = || match program {
         Some(program) if program.settings().command.is_socket() => 1,

@@ -51,9 +51,6 @@ pub fn keep(directory: &Path, shard: Shard) -> Result<(), Failure> {
 }
 
 /// The shard that a directory holds.
-///
-/// # Errors
-/// If its file cannot be read.
 pub fn kept(directory: &Path) -> Result<Shard, Failure> {
     let file = directory.join(FILE);
     if !file.exists() {

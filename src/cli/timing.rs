@@ -30,9 +30,6 @@ struct Line {
 
 impl Times {
     /// Those that a directory of a study has.
-    ///
-    /// # Errors
-    /// If a file cannot be read.
     pub fn read(directory: &Path) -> Result<Times, Failure> {
         let mut times = Times::default();
         let file = directory.join(FILE);

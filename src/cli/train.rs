@@ -304,6 +304,8 @@ fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Pol
     let network = acting.network();
     let attached = training.arena().attached();
     let attached = attached.as_ref();
+    let profile = settings.profile.as_ref();
+    let (line, digest) = profile.map(|profile| (profile.settings.to_line(), profile.digest.clone())).unzip();
     let policy = Policy {
         name,
         docs: vec![headline(settings, evaluation)],
@@ -313,17 +315,8 @@ fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Pol
             episodes: u64::from(settings.episodes),
             roads: settings.roads.clone(),
             ads: settings.ads.clone(),
-            profile: settings
-                .profile
-                .as_ref()
-                .map(|profile| profile.settings.to_line())
-                .filter(|line| !line.is_empty())
-                .or_else(|| attached.map(Attached::to_line)),
-            profile_digest: settings
-                .profile
-                .as_ref()
-                .map(|profile| profile.digest.clone())
-                .or_else(|| attached.map(Attached::digest)),
+            profile: line.filter(|line| !line.is_empty()).or_else(|| attached.map(Attached::to_line)),
+            profile_digest: digest.or_else(|| attached.map(Attached::digest)),
             engine: settings.engine.clone(),
             avastra: settings.avastra.clone(),
             with: settings.with.clone(),
