@@ -136,12 +136,8 @@ impl Files for Beside<'_> {
 
     fn catalogues(&self, folder: &str) -> Result<Vec<String>, String> {
         let folder = self.folder.join(slashed(folder));
-        let entries = std::fs::read_dir(&folder).map_err(|error| error.to_string())?;
-        let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-        files.retain(|file| file.extension().is_some_and(|extension| extension == "xosc"));
-        files.sort();
-        files.truncate(CATALOGUES_MAX);
-        Ok(files.iter().filter_map(|file| load::read(file).ok()).collect())
+        let files = load::files_in(&folder, "xosc").map_err(|error| error.to_string())?;
+        Ok(files.iter().take(CATALOGUES_MAX).filter_map(|file| load::read(file).ok()).collect())
     }
 }
 

@@ -126,12 +126,17 @@ pub fn nearby(path: &Path) -> Vec<(String, String)> {
 /// # Errors
 /// If the directory cannot be read, or the name of one of them is not UTF-8.
 pub fn sources_in(directory: &Path) -> Result<Vec<PathBuf>, Failure> {
-    let entries = std::fs::read_dir(directory).map_err(|error| Failure::file("read", directory, error))?;
-    let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    files.retain(|file| is_source(file));
-    if let Some(file) = files.iter().find(|file| file.to_str().is_none()) {
-        return Err(Failure::file("read", file, NOT_UTF8));
+    let files = files_in(directory, "ava").map_err(|error| Failure::file("read", directory, error))?;
+    match files.iter().find(|file| file.to_str().is_none()) {
+        Some(file) => Err(Failure::file("read", file, NOT_UTF8)),
+        None => Ok(files),
     }
+}
+
+/// Files with an extension in a directory, sorted.
+pub fn files_in(directory: &Path, extension: &str) -> std::io::Result<Vec<PathBuf>> {
+    let mut files: Vec<PathBuf> = std::fs::read_dir(directory)?.flatten().map(|entry| entry.path()).collect();
+    files.retain(|file| file.extension().is_some_and(|found| found == extension));
     files.sort();
     Ok(files)
 }

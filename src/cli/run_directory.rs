@@ -16,7 +16,6 @@ use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::files;
 use avastra_campaign::run::{Database, EpisodeSummary, Units, VERSION, WrittenScenario};
 use avastra_drivers::external::{Attached, ExternalSettings};
-use avastra_lang::check::normal;
 use avastra_lang::syntax::{ast, print};
 use avastra_world::action::ActionTable;
 use avastra_world::sim::ENGINE;
@@ -108,12 +107,8 @@ pub fn to_record(directory: &Path, attached: Attached) -> Result<Attached, Failu
 /// # Errors
 /// If this process has no folder that it works in.
 pub fn to_record_absent(directory: &Path, attached: Attached) -> Result<Attached, Failure> {
-    let absolute = |path: &Path| {
-        let found = std::path::absolute(path).map_err(|error| Failure::file("find", path, error));
-        found.map(|path| normal(&path))
-    };
     let folder = attached.settings.working_directory.as_deref().unwrap_or(Path::new("."));
-    let between = load::path_between(&absolute(directory)?, &absolute(folder)?)?;
+    let between = load::path_between(&pack::absolute(directory)?, &pack::absolute(folder)?)?;
     let working_directory = Some(PathBuf::from(between));
     Ok(Attached { settings: ExternalSettings { working_directory, ..attached.settings }, ..attached })
 }

@@ -12,7 +12,7 @@ use crate::cli::error::Failure;
 use crate::cli::files::{Scratch, make_way, write_new};
 use crate::cli::findings::cut_off;
 use crate::cli::load::{self, Driver};
-use crate::cli::new::shipped;
+use crate::cli::new::SHIPPED;
 use crate::cli::output::Output;
 use crate::cli::progress::now;
 use avastra_campaign::episode::{self, Choice, EpisodeLog};
@@ -96,7 +96,7 @@ pub fn check(output: &Output, arguments: &AdsCheckArguments) -> Result<(), Failu
 /// file of its map, so that must lie on disk as long as the planner is checked.
 fn own_space(output: &Output) -> Result<(ActionTable, Scratch), Failure> {
     let scratch = Scratch::new("ads-check")?;
-    for (name, text) in shipped() {
+    for (name, text) in SHIPPED {
         let file = scratch.path.join(name);
         make_way(&scratch.path, &file)?;
         write_new(&file, text)?;
