@@ -38,10 +38,7 @@ impl Campaign for RunSettings {
         what: "run",
         command: "run",
         file: "run",
-        is_in: |directory| {
-            run_directory::fields_of(directory, "run")
-                .is_some_and(|fields| !fields.contains_key("hyperparameters"))
-        },
+        is_in: |directory| run_directory::is_training(directory) == Some(false),
         merge: Some(merge::merged::<RunSettings>),
     };
     type Database = Database;

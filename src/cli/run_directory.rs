@@ -248,9 +248,11 @@ pub fn what_was_begun(directory: &Path) -> Option<Kind> {
     KINDS.into_iter().find(|kind| (kind.is_in)(directory))
 }
 
-/// The fields in the settings of a directory; `None` if they cannot be read.
-pub fn fields_of(directory: &Path, file: &str) -> Option<serde_json::Map<String, serde_json::Value>> {
-    serde_yaml::from_str(&load::read(&directory.join(format!("{file}.yaml"))).ok()?).ok()
+/// Whether the settings in `run.yaml` are those of a training; `None` if they cannot be read.
+pub fn is_training(directory: &Path) -> Option<bool> {
+    let text = load::read(&directory.join("run.yaml")).ok()?;
+    let fields: serde_json::Map<String, serde_json::Value> = serde_yaml::from_str(&text).ok()?;
+    Some(fields.contains_key("hyperparameters"))
 }
 
 /// A scenario of a directory: its file, and its text from the database.

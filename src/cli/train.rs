@@ -39,10 +39,7 @@ impl Campaign for TrainSettings {
         what: "training",
         command: "train",
         file: "run",
-        is_in: |directory| {
-            run_directory::fields_of(directory, "run")
-                .is_some_and(|fields| fields.contains_key("hyperparameters"))
-        },
+        is_in: |directory| run_directory::is_training(directory) == Some(true),
         // Each episode is chosen with what was learned before.
         merge: None,
     };
