@@ -283,10 +283,7 @@ impl Server {
             "textDocument/hover" => {
                 let (path, byte) = self.place(params)?;
                 let found = hover::hover(self.analysis(&path)?, byte);
-                Ok(found.map_or(
-                    Value::Null,
-                    |found| json!({ "contents": markdown(&found.text), "range": range(found.range) }),
-                ))
+                Ok(found.map(|of| json!({ "contents": markdown(&of.text), "range": range(of.range) })).into())
             }
             "textDocument/completion" => {
                 let (path, byte) = self.place(params)?;
@@ -333,13 +330,11 @@ impl Server {
             }
             "textDocument/foldingRange" => {
                 let path = self.document(params)?;
-                let found = structure::folds(self.analysis(&path)?).into_iter();
-                let kind = |is_comment| if is_comment { "comment" } else { "region" };
-                Ok(found
-                    .map(
-                        |of| json!({ "startLine": of.start, "endLine": of.end, "kind": kind(of.is_comment) }),
-                    )
-                    .collect())
+                let fold = |of: structure::Fold| {
+                    let kind = if of.is_comment { "comment" } else { "region" };
+                    json!({ "startLine": of.start, "endLine": of.end, "kind": kind })
+                };
+                Ok(structure::folds(self.analysis(&path)?).into_iter().map(fold).collect())
             }
             "textDocument/documentLink" => {
                 let path = self.document(params)?;
@@ -350,13 +345,14 @@ impl Server {
             }
             "textDocument/signatureHelp" => {
                 let (path, byte) = self.place(params)?;
-                Ok(signature::help(self.analysis(&path)?, byte).map_or(Value::Null, |found| {
-                    let labels = found.parameters.iter().map(|label| json!({ "label": label }));
-                    let parameters: Vec<Value> = labels.collect();
+                let signature = |found: signature::Signature| {
+                    let parameters: Value =
+                        found.parameters.iter().map(|label| json!({ "label": label })).collect();
                     let text = markdown(&found.text);
                     let of = json!({ "label": found.label, "parameters": parameters, "documentation": text });
                     json!({ "signatures": [of], "activeSignature": 0, "activeParameter": found.due })
-                }))
+                };
+                Ok(signature::help(self.analysis(&path)?, byte).map(signature).into())
             }
             "workspace/symbol" => {
                 let query = params["query"].as_str().ok_or(Refusal::Params("query"))?;
@@ -370,13 +366,8 @@ impl Server {
             }
             "textDocument/inlayHint" => {
                 let (path, from, to) = self.span(params)?;
-                let found = hints::hints(self.analysis(&path)?, from, to).into_iter();
-                Ok(found
-                    .map(|of| {
-                        let (label, tooltip) = (of.label, of.tooltip);
-                        json!({ "position": point(of.at), "label": label, "tooltip": tooltip, "paddingLeft": true })
-                    })
-                    .collect())
+                let hint = |hints::Hint { at, label, tooltip }| json!({ "position": point(at), "label": label, "tooltip": tooltip, "paddingLeft": true });
+                Ok(hints::hints(self.analysis(&path)?, from, to).into_iter().map(hint).collect())
             }
             "textDocument/codeAction" => {
                 let (path, from, to) = self.span(params)?;
