@@ -81,12 +81,15 @@ pub fn why(
 fn shown(space: &Space, state: &StateDef, memory: &Memory) -> String {
     let cells = &memory.cells()[state.first_cell..][..state.cells];
     let values: Vec<String> = cells.iter().map(|value| space.show(*value, state.ty)).collect();
-    match state.key {
-        Some(of) if values.iter().any(|value| *value != values[0]) => {
-            let keys = space.enums[of.0].variants.iter().zip(&values);
-            let entries: Vec<String> = keys.map(|(key, value)| format!("{key}: {value}")).collect();
-            format!("{{ {} }}", entries.join(", "))
-        }
-        _ => values.first().cloned().unwrap_or_default(),
+    match by_key(space, state, &values) {
+        Some(entries) => format!("{{ {entries} }}"),
+        None => values.first().cloned().unwrap_or_default(),
     }
+}
+
+/// The values of a state with their keys: `Rain: High, Fog: None`; `None` if it has no keys, or one value at all of them.
+pub fn by_key(space: &Space, state: &StateDef, values: &[String]) -> Option<String> {
+    let keys = space.enums[state.key?.0].variants.iter().zip(values);
+    let entries: Vec<String> = keys.map(|(key, value)| format!("{key}: {value}")).collect();
+    values.iter().any(|value| *value != values[0]).then(|| entries.join(", "))
 }
