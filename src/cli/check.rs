@@ -13,8 +13,7 @@ use super::arguments::{CheckArguments, Dump};
 use super::error::Failure;
 use super::files::write_named;
 use super::load;
-use super::output::Output;
-use super::output::plural;
+use super::output::{Output, plural};
 
 /// Checks each file by itself; the mistakes of all are printed before the command fails.
 pub fn check(output: &Output, arguments: &CheckArguments) -> Result<(), Failure> {

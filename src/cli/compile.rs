@@ -9,8 +9,7 @@ use avastra_world::action::{ActionTable, TableFile};
 use super::arguments::{CompileArguments, TableArguments};
 use super::error::Failure;
 use super::files::{folder, write, write_result};
-use super::output::Output;
-use super::output::plural;
+use super::output::{Output, plural};
 use super::{doc, load, trials, why};
 
 /// The folder for tables without `--out`.
@@ -45,8 +44,7 @@ pub fn last(output: &Output) -> Result<ActionTable, Failure> {
     };
     let path = load::read(Path::new(LAST)).map_err(|_| no_table())?;
     let path = PathBuf::from(path.trim_end());
-    let text = load::text(&path)?;
-    let file: TableFile = load::parsed(&path, &text)?;
+    let file: TableFile = load::parsed(&path, &load::text(&path)?)?;
     let table = load::table(output, Path::new(&file.space))?;
     if table.file() != file {
         return Err(Failure::usage(format!(

@@ -5,8 +5,7 @@ use avastra_lang::model::Space;
 
 use super::arguments::ConditionArguments;
 use super::error::Failure;
-use super::load;
-use super::load::UnderTest;
+use super::load::{self, UnderTest};
 
 /// So many episodes of an agent on each road against a driving system.
 pub fn settings(

@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 
 use avastra_base::statistics::Estimate;
 use avastra_campaign::episode::{Collision, EpisodeLog};
-use avastra_campaign::oracle;
 use avastra_campaign::oracle::{
-    Comparison, Diagnosis, Evidence, Fate, Likelihood, Measure, MechanismShare, Mechanisms, Verdict,
+    self, Comparison, Diagnosis, Evidence, Fate, Likelihood, Measure, MechanismShare, Mechanisms, Verdict,
     WeaknessFinding,
 };
 use avastra_campaign::run::{Asked, Stage};
@@ -20,8 +19,7 @@ use super::arguments::DiagnoseArguments;
 use super::error::Failure;
 use super::load;
 use super::look;
-use super::output::Output;
-use super::output::plural;
+use super::output::{Output, plural};
 use super::parallel::each_file;
 use super::replay::priority_text;
 
@@ -173,8 +171,13 @@ fn mechanisms(output: &Output, arguments: &DiagnoseArguments, asked: &Asked) -> 
 
 fn shares_text(crashes: usize, shares: &[MechanismShare], placebo: Option<&Estimate>) -> String {
     let mut text = format!(
-        "{}; each weakness switched off alone when the obstacle appears, what vanishes (95 %):",
+        "{}; each weakness switched off alone when the obstacle appears, what vanishes (95 %):\n\
+         {:<34}{:<24}{:<24}{}",
         plural(crashes, "collision"),
+        "weakness",
+        "with the crash's noise",
+        "with other noise",
+        "beyond chance"
     );
     let mut line = |weakness: &str, as_it_was: &str, noise: Option<&Estimate>, beyond: Option<&Estimate>| {
         let [noise, beyond] = [noise, beyond].map(|found| found.map_or(String::new(), percent_text));
@@ -188,11 +191,7 @@ fn shares_text(crashes: usize, shares: &[MechanismShare], placebo: Option<&Estim
         line(found.mechanism, &as_it_was, found.other_noise.as_ref(), found.beyond_chance.as_ref());
     }
     line("none, by chance", "", placebo, None);
-    let heads = format!(
-        "{:<34}{:<24}{:<24}{}",
-        "weakness", "with the crash's noise", "with other noise", "beyond chance"
-    );
-    text.replacen('\n', &format!("\n{heads}\n"), 1)
+    text
 }
 
 /// A mean share with its interval, in percent.

@@ -8,8 +8,8 @@ use avastra_lang::model::{
     ActionDef, Domain, Initial, Interval, Parameter, RuleBody, RuleDef, Space, StateDef, Type, Value,
 };
 
-use super::output::Output;
-use super::output::plural;
+use super::output::{Output, plural};
+use super::why::by_key;
 
 /// Prints the page.
 pub fn doc(output: &Output, space: &Space) {
@@ -81,13 +81,7 @@ fn begins(space: &Space, state: &StateDef) -> String {
             Initial::Value(_) => space.show(*value, state.ty),
         })
         .collect();
-    match (words.iter().all(|word| *word == words[0]), state.key) {
-        (false, Some(of)) => {
-            let keys = space.enums[of.0].variants.iter().zip(&words);
-            keys.map(|(key, word)| format!("{key}: {word}")).collect::<Vec<_>>().join(", ")
-        }
-        _ => words[0].clone(),
-    }
+    by_key(space, state, &words).unwrap_or_else(|| words[0].clone())
 }
 
 fn action_section(text: &mut String, space: &Space, index: usize, action: &ActionDef) {

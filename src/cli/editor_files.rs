@@ -6,8 +6,7 @@
 use serde_json::{Value, json};
 
 use avastra_base::units;
-use avastra_editor::words;
-use avastra_editor::words::Entry;
+use avastra_editor::words::{self, Entry};
 use avastra_lang::model::vocabulary::{Site, StopReason};
 use avastra_lang::syntax::keyword;
 

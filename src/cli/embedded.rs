@@ -3,14 +3,13 @@
 
 use std::path::{Path, PathBuf};
 
-use avastra_campaign::run;
-use avastra_campaign::run::{Run, RunSettings, TrafficRecord};
+use avastra_campaign::run::Run;
 use avastra_lang::syntax::{DiagnosticRecord, Style, record, render};
 use avastra_world::action::ActionTable;
 
-use super::conditions::roads_or_all;
+use super::arguments::{ConditionArguments, RuleArguments};
+use super::conditions::settings;
 use super::load;
-use super::load::UnderTest;
 
 /// A space that was read, and what there is to say of it.
 pub struct Compiled {
@@ -80,20 +79,16 @@ pub fn run(table: ActionTable, conditions: &Conditions) -> Result<Run, String> {
     if *ambient > ambient_max {
         return Err(format!("{ambient} vehicles of ambient traffic: at most {ambient_max} are possible"));
     }
-    let UnderTest { ads, profile, external } =
-        load::under_test(ads, ads_config.as_deref(), ads_cmd.as_deref())
-            .map_err(|error| error.to_string())?;
-    let traffic = traffic.as_deref().map(load::traffic).transpose().map_err(|error| error.to_string())?;
-    let settings = RunSettings {
-        roads: roads_or_all(roads, table.space()),
-        ads,
-        profile,
-        external,
+    let arguments = ConditionArguments {
+        road: roads.clone(),
+        agent: "random".to_owned(),
+        seed: 0,
         ambient: *ambient,
-        traffic: traffic.as_ref().and_then(TrafficRecord::new),
-        with: with.clone(),
-        without: without.clone(),
-        ..RunSettings::new(table.space(), "random", 1, 0)
+        traffic: traffic.clone(),
+        rules: RuleArguments { without: without.clone(), with: with.clone() },
     };
-    Run::new(table, settings).map_err(|error: run::RunError| error.to_string())
+    let settings = load::under_test(ads, ads_config.as_deref(), ads_cmd.as_deref())
+        .and_then(|under_test| settings(table.space(), &arguments, &arguments.agent, under_test, 1))
+        .map_err(|error| error.to_string())?;
+    Run::new(table, settings).map_err(|error| error.to_string())
 }

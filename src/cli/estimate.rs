@@ -6,18 +6,17 @@ use std::sync::atomic::AtomicBool;
 
 use avastra_base::statistics::Interval;
 use avastra_campaign::estimate::{
-    Comparison, ComparisonResults, Estimate, EstimateDatabase, EstimateResults, EstimateSettings, EventKind,
-    Found, Mass, Met, Method, PILOT, Part, Pilot, Plan, Played, Probability, Stopping, compared, pilot,
-    play_parts,
+    Comparison, ComparisonResults, Estimate, EstimateDatabase, EstimateResults, EstimateSettings, Found,
+    Mass, Met, Method, PILOT, Part, Pilot, Plan, Played, Probability, Stopping, compared, pilot, play_parts,
 };
 use avastra_campaign::run::{DatabaseError, Run, RunSettings, Shard, Units};
 use avastra_world::action::ActionTable;
 
-use super::arguments::{EstimateArguments, EventArgument, MethodArgument};
+use super::arguments::EstimateArguments;
 use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, as_they_are};
 use super::error::Failure;
 use super::files::{remove, write};
-use super::findings::doubts;
+use super::findings::is_reproducible;
 use super::interrupt::stop_on_interrupt;
 use super::output::{Output, plural};
 use super::pack::pack_space;
@@ -103,8 +102,7 @@ fn play_all(
     let labels: Vec<String> = estimate.run().table().rows().iter().map(|row| row.label.clone()).collect();
     let all = estimate.settings().all_parts();
     let lacking = |database: &EstimateDatabase| share.lacking(estimate.settings(), database).map_err(unread);
-    let noun = estimate.settings().event.noun();
-    let mut progress = share.progress(output, noun, &lacking(&database)?);
+    let mut progress = share.progress(output, estimate.settings().event.noun(), &lacking(&database)?);
     // A shard cannot know when all of them together are precise enough: it plays all of its parts, and the looks are taken
     // when they are merged.
     let looks = match share.shard.is_whole() {
@@ -151,10 +149,9 @@ fn play_all(
     output.say(&estimate_text(&results, is_unfinished, share.shard));
     let critical = load::sources_in(&path.join("critical"))?;
     output.say(&critical_text(&path, &critical));
-    let doubts = doubts(estimate.run().program());
-    doubts.iter().for_each(|doubt| output.warn(doubt));
+    let is_reproducible = is_reproducible(output, estimate.run().program());
     output.result(serde_json::json!({
-        "directory": path, "results": results, "critical": critical, "reproducible": doubts.is_empty(),
+        "directory": path, "results": results, "critical": critical, "reproducible": is_reproducible,
     }));
     share.end::<EstimateSettings>(output, path, !is_unfinished, None)
 }
@@ -338,11 +335,8 @@ fn wanted(output: &Output, arguments: &EstimateArguments) -> Result<(Estimate, S
     let under_test = load::named(&arguments.under_test.ads)?;
     let (conditions, episodes) = (&arguments.conditions, arguments.episodes.unwrap_or(EPISODES));
     let settings = EstimateSettings {
-        event: event(arguments.event),
-        method: match arguments.method {
-            MethodArgument::Count => Method::Count,
-            MethodArgument::Probe => Method::Probe,
-        },
+        event: arguments.event,
+        method: arguments.method,
         parts: arguments.parts,
         stopping: Stopping { precision: arguments.precision, hours: arguments.hours },
         run: conditions::settings(table.space(), conditions, &conditions.agent, under_test, episodes)?,
@@ -372,8 +366,7 @@ fn begun(
 /// The rest of an interrupted estimate, with the text of its settings.
 /// With `is_played`, nothing of it is left to play, and no program is started.
 fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Estimate, Held, String), Failure> {
-    let resumed = run_directory::resume::<EstimateSettings>(output, path, is_played)?;
-    let Resumed { settings, text, table, held } = resumed;
+    let Resumed { settings, text, table, held } = run_directory::resume(output, path, is_played)?;
     Ok((Estimate::new(table, settings).map_err(Failure::usage)?, held, text))
 }
 
@@ -393,7 +386,7 @@ fn compare(
         Ok::<_, Failure>(Run::new(table.clone(), settings)?)
     };
     let (first, second) = (side(sides[0])?, side(sides[1])?);
-    let comparison = Comparison { first, second, event: event(arguments.event) };
+    let comparison = Comparison { first, second, event: arguments.event };
     let numbers: Vec<usize> = (0..comparison.pairs()).collect();
     output.tell(&format!(
         "{}: {} and {} in the same {}",
@@ -423,19 +416,11 @@ fn compare(
     }
     let results = ComparisonResults::new(comparison.event, &pairs).expect("there is at least one episode");
     output.say(&comparison_text(&results, sides));
-    let doubts: Vec<String> =
-        [&comparison.first, &comparison.second].into_iter().flat_map(|run| doubts(run.program())).collect();
-    doubts.iter().for_each(|doubt| output.warn(doubt));
-    output
-        .result(serde_json::json!({ "sides": sides, "results": results, "reproducible": doubts.is_empty() }));
+    let sides_repeat =
+        [&comparison.first, &comparison.second].map(|run| is_reproducible(output, run.program()));
+    let is_reproducible = sides_repeat == [true; 2];
+    output.result(serde_json::json!({ "sides": sides, "results": results, "reproducible": is_reproducible }));
     Ok(())
-}
-
-fn event(argument: EventArgument) -> EventKind {
-    match argument {
-        EventArgument::Counted => EventKind::Counted,
-        EventArgument::Collision => EventKind::Collision,
-    }
 }
 
 fn heading(estimate: &Estimate) -> String {

@@ -21,7 +21,9 @@ pub fn explain(output: &Output, arguments: &ExplainArguments) -> Result<(), Fail
     };
     if code == "json" {
         output.say(&schema::in_words());
-        output.result(serde_json::json!({ "pages": [], "always": schema::ALWAYS, "shapes": schema::SHAPES }));
+        output.result(
+            serde_json::json!({ "pages": [], "always": schema::always(), "shapes": schema::shapes() }),
+        );
         return Ok(());
     }
     let Some(page) = page(code) else {

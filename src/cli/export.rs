@@ -4,16 +4,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use avastra_exchange::export;
-use avastra_exchange::export::{ExportError, Recording, record};
+use avastra_campaign::run::recorded;
+use avastra_exchange::export::{self, ExportError, Recording, record};
 
 use super::arguments::{ExportArguments, ExportEgo, ExportFormat, ExportProfile};
 use super::error::Failure;
-use super::files::{copy_map, folder, make, write};
+use super::files::{copy_map, folder, make, target, write};
 use super::output::{Output, plural};
 use super::parallel::each_file;
 use super::replay::refutation;
-use super::{load, look, pack};
+use super::{look, pack};
 
 /// The folder of what is written, beside the scenarios, unless another one is named.
 const FOLDER: &str = "exported";
@@ -28,11 +28,10 @@ pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failur
         return pack::pack(output, &arguments.many.files, folder);
     }
     let targets = targets(arguments)?;
-    let asked = load::asked(None)?;
     let maps = Mutex::new(());
     let exported = each_file(output, &arguments.many, None, |file| {
         let (table, scenario) = look::unchanged(output, file)?;
-        let (ads, _) = asked.selected_for(&scenario)?;
+        let ads = recorded(&scenario)?;
         let recording = match record(&table, &scenario, &ads) {
             Ok(recording) => recording,
             Err(ExportError::Run(error)) => return Err(error.into()),
@@ -41,8 +40,7 @@ pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failur
                 return Ok(Exported { file: file.clone(), written, left_out: Vec::new() });
             }
         };
-        let target = &targets[file];
-        let (written, left_out) = write_all(arguments, &recording, target, &maps)?;
+        let (written, left_out) = write_all(arguments, &recording, &targets[file], &maps)?;
         Ok(Exported { file: file.clone(), written: Ok(written), left_out })
     })?;
     let mut refuted = 0;
@@ -113,13 +111,7 @@ fn targets(arguments: &ExportArguments) -> Result<BTreeMap<PathBuf, PathBuf>, Fa
     let mut targets = BTreeMap::new();
     let mut sources: BTreeMap<PathBuf, &Path> = BTreeMap::new();
     for file in &arguments.many.files {
-        let folder = match &arguments.out {
-            Some(folder) => folder.clone(),
-            None => file.parent().unwrap_or(Path::new("")).join(FOLDER),
-        };
-        let stem = file.file_stem();
-        let stem = stem.ok_or_else(|| Failure::file("read", file, "it is a folder: name a file in it"))?;
-        let target = folder.join(stem).with_added_extension(extension(arguments.to));
+        let target = target(file, arguments.out.as_ref(), FOLDER, extension(arguments.to))?;
         if let Some(other) = sources.insert(target.clone(), file).filter(|other| other != file) {
             return Err(Failure::usage(format!(
                 "`{}` and `{}` would both be written to `{}`: export them to two folders",

@@ -8,8 +8,7 @@ use avastra_campaign::files;
 use avastra_drivers::external;
 
 use super::error::Failure;
-use super::load;
-use super::load::answers_path;
+use super::load::{self, answers_path};
 
 /// Refuses a file by its name before work begins, so that nobody's scenario or database is written over by mistake. A pipe
 /// or a device may have any name.
@@ -59,16 +58,9 @@ impl Scratch {
     /// If no folder can be made there.
     pub fn new(purpose: &str) -> Result<Scratch, Failure> {
         let folder = std::env::temp_dir();
-        for number in 0.. {
-            let path = folder.join(format!("avastra-{purpose}-{}-{number}", std::process::id()));
-            // It fails if anything has the name, a link included, so nothing is written through a link.
-            match files::make_new(&path) {
-                Ok(()) => return Ok(Scratch { path }),
-                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
-                Err(error) => return Err(Failure::file("create", &path, error)),
-            }
-        }
-        unreachable!("there is always a next number")
+        let id = std::process::id();
+        // A name that anything has, a link included, is passed over, so nothing is written through a link.
+        Ok(Scratch { path: make_first(|number| folder.join(format!("avastra-{purpose}-{id}-{number}")))? })
     }
 }
 
@@ -77,6 +69,18 @@ impl Drop for Scratch {
         // If it cannot be removed, the system clears it with the other temporary files.
         let _ = files::remove_all(&self.path);
     }
+}
+
+/// Makes the first of these folders whose name nothing has yet; numbers begin with 1.
+pub fn make_first(numbered: impl Fn(u32) -> PathBuf) -> Result<PathBuf, Failure> {
+    for path in (1..).map(numbered) {
+        match files::make_new(&path) {
+            Ok(()) => return Ok(path),
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(Failure::file("create", &path, error)),
+        }
+    }
+    unreachable!("there is always a next number")
 }
 
 /// Removes a file, if it is there.
@@ -99,6 +103,14 @@ pub fn folder(directory: &Path, inside: impl AsRef<Path>) -> Result<PathBuf, Fai
 pub fn make_way(directory: &Path, file: &Path) -> Result<(), Failure> {
     let way = |error| Failure::file("use", file.parent().unwrap_or(directory), error);
     files::make_way(directory, file).map_err(way)
+}
+
+/// Where what is made of a file is written: to the folder that the user named, or else to `own` beside the file.
+pub fn target(file: &Path, named: Option<&PathBuf>, own: &str, extension: &str) -> Result<PathBuf, Failure> {
+    let beside = || file.parent().unwrap_or(Path::new("")).join(own);
+    let stem = file.file_stem();
+    let stem = stem.ok_or_else(|| Failure::file("read", file, "it is a folder: name a file in it"))?;
+    Ok(named.cloned().unwrap_or_else(beside).join(stem).with_added_extension(extension))
 }
 
 /// Copies a map. Several scenarios share it; nothing else that has its name is overwritten.

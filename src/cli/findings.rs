@@ -17,9 +17,10 @@ use super::run::cut_short;
 /// Most scenarios that are tried for a spot check, because the driving system may fail in some.
 const SPOT_CHECKS_MAX: usize = 3;
 
-/// Why the same command need not lead to the same run, if an external driving system gives a reason.
-pub fn doubts(program: Option<&Arc<Program>>) -> Vec<String> {
-    let Some(program) = program else { return Vec::new() };
+/// Warns of each reason that an external driving system gives why the same command need not lead to the same run. Returns
+/// whether there is none.
+pub fn is_reproducible(output: &Output, program: Option<&Arc<Program>>) -> bool {
+    let Some(program) = program else { return true };
     let attached = program.attached();
     let loose = (!attached.is_deterministic()).then(|| {
         format!(
@@ -43,7 +44,9 @@ pub fn doubts(program: Option<&Arc<Program>>) -> Vec<String> {
             plural(program.missed() as usize, "step")
         )
     });
-    loose.into_iter().chain(otherwise).chain(missed).collect()
+    let doubts: Vec<String> = loose.into_iter().chain(otherwise).chain(missed).collect();
+    doubts.iter().for_each(|doubt| output.warn(doubt));
+    doubts.is_empty()
 }
 
 /// A note on answers that asked for more than any vehicle can do, if there were any.
@@ -57,8 +60,8 @@ pub fn cut_off(program: Option<&Arc<Program>>) -> Option<String> {
     })
 }
 
-/// Plays one of these scenarios a second time with a driving system that says it is deterministic. Other answers become one
-/// of its [`doubts`].
+/// Plays one of these scenarios a second time with a driving system that says it is deterministic. With other answers it
+/// is not [reproducible](is_reproducible).
 pub fn spot_check<'a>(program: Option<&Arc<Program>>, files: impl Iterator<Item = &'a Path>) {
     let Some(program) = program else { return };
     let ads = Selected::external(Arc::clone(program));

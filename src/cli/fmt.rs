@@ -1,6 +1,5 @@
 //! `avastra fmt`: the one style.
 
-use std::io::Read;
 use std::path::Path;
 
 use avastra_lang::syntax::{FormatError, Sources};
@@ -17,7 +16,11 @@ pub fn fmt(output: &Output, arguments: &FmtArguments) -> Result<(), Failure> {
     let mut texts = Vec::new();
     for path in &arguments.files {
         let from_stdin = path == Path::new("-");
-        let text = if from_stdin { stdin()? } else { load::text(path)? };
+        let text = match from_stdin {
+            true => std::io::read_to_string(std::io::stdin())
+                .map_err(|error| Failure::file("read", Path::new("stdin"), error))?,
+            false => load::text(path)?,
+        };
         let formatted = formatted(output, path, &text)?;
         let is_formatted = formatted == text;
         if arguments.check {
@@ -47,12 +50,4 @@ fn formatted(output: &Output, path: &Path, text: &str) -> Result<String, Failure
         }
         FormatError::Meaning => Failure::file("format", path, error),
     })
-}
-
-fn stdin() -> Result<String, Failure> {
-    let mut text = String::new();
-    std::io::stdin()
-        .read_to_string(&mut text)
-        .map_err(|error| Failure::file("read", Path::new("stdin"), error))?;
-    Ok(text)
 }

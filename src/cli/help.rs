@@ -8,8 +8,7 @@ use clap::error::Error;
 use clap::{Arg, Command, CommandFactory};
 
 use avastra_drivers as ads;
-use avastra_search::agent;
-use avastra_search::agent::Kind;
+use avastra_search::agent::{self, Kind};
 use avastra_world::sim::TrafficProfile;
 
 use super::arguments::Arguments;
@@ -32,211 +31,91 @@ Exit status:
 `avastra COMMAND --help` has examples. `avastra explain` lists every diagnostic,
 `avastra explain json` describes what `--format json` prints.";
 
-/// For every command, lines to type: what stands after `avastra`, and what that does.
-const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
-    (
-        "check",
-        &[
-            ("check scenarios/avastra45.ava", "list every mistake"),
-            ("check --strict --fix mine.ava", "make the changes on offer; fail on warnings"),
-            ("check --audit scenarios/avastra45.ava", "where each rule is enforced"),
-            ("check --dump actions --format json scenarios/avastra45.ava", "the table, for tools"),
-        ],
-    ),
-    (
-        "compile",
-        &[
-            ("compile scenarios/avastra45.ava", "write build/avastra45.table.yaml"),
-            ("compile scenarios/avastra45.ava -o table.yaml", ""),
-        ],
-    ),
-    (
-        "table",
-        &[
-            ("table scenarios/avastra45.ava", "the rows, numbered"),
-            ("table scenarios/avastra45.ava --road corner", "what one road allows"),
-            ("table scenarios/avastra45.ava --row 12", "which rule says no?"),
-            ("table scenarios/avastra45.ava --row 0 --state 'time: Night'", ""),
-            ("table scenarios/avastra45.ava --markdown", "the space, to read"),
-            ("table scenarios/avastra45.ava --try --tries 2", "drive each row and judge it"),
-        ],
-    ),
-    (
-        "fmt",
-        &[
-            ("fmt mine.ava roads.ava", "rewrite both"),
-            ("fmt --check scenarios/avastra45.ava", "for a continuous build"),
-            ("fmt -", "from stdin to stdout, for an editor"),
-        ],
-    ),
-    ("explain", &[("explain", "all codes"), ("explain AV0401", "one code, with an example")]),
-    (
-        "diff",
-        &[(
-            "diff scenarios/avastra45.ava scenarios/deepcollision52.ava",
-            "rows, rules and draws that differ",
-        )],
-    ),
-    (
-        "new",
-        &[
-            ("new mine", "write mine/space.ava, mine/roads.ava and a map"),
-            ("new town --map roads/corner.xodr", "on routes through the junctions of your own map"),
-        ],
-    ),
-    (
-        "completions",
-        &[
-            ("completions bash > ~/.local/share/bash-completion/completions/avastra", ""),
-            ("completions zsh > ~/.zfunc/_avastra", ""),
-        ],
-    ),
-    ("lsp", &[("lsp", "an editor starts it; editors/vscode is an extension")]),
-    (
-        "run",
-        &[
-            ("run scenarios/avastra45.ava --episodes 20", "20 episodes on each road"),
-            ("run scenarios/avastra45.ava --ads scenarios/ads/degraded.yaml", "dirty sensors"),
-            ("run scenarios/avastra45.ava --ads reactive --traffic released", ""),
-            ("run scenarios/avastra45.ava --road corner --without npc_gap", "with one rule switched off"),
-            ("run --policy policies/corner.ava", "let a learned policy choose"),
-            ("run scenarios/avastra45.ava --ads './my_planner --fast'", "a driving system of your own"),
-            ("run --resume runs/0001", "go on after Ctrl-C"),
-            ("run scenarios/avastra45.ava --shard 3/8 --out shards/3", "an eighth of it, for `merge`"),
-        ],
-    ),
-    (
-        "train",
-        &[
-            ("train scenarios/avastra45.ava --road corner --episodes 750", ""),
-            ("train scenarios/avastra45.ava --agent map-elites", "a search in place of a learner"),
-            ("train --resume runs/0001", "go on after Ctrl-C"),
-        ],
-    ),
-    (
-        "policy",
-        &[
-            ("policy explain policies/corner.ava", ""),
-            ("policy explain policies/corner.ava --state 'ego_speed: 12 m/s, time: Night'", ""),
-            ("policy distil policies/corner.ava --leaves 8 -o short.ava", "at most 8 readable rules"),
-            ("policy weights policies/corner.ava -o corner.safetensors", ""),
-        ],
-    ),
-    (
-        "study",
-        &[
-            ("study scenarios/studies/rq1.yaml", "compare agents; takes hours"),
-            ("study scenarios/studies/rq1.yaml --quick", "see that it works"),
-            ("study --resume runs/0001", "go on after Ctrl-C"),
-            ("study scenarios/studies/rq1.yaml --shard 3/8 --out shards/3", "an eighth of it, for `merge`"),
-            ("study results", "write RESULTS.md from scenarios/studies"),
-            ("study results --add runs/0001 --commit 8c11ccf", "keep what a study found, and write it"),
-        ],
-    ),
-    (
-        "estimate",
-        &[
-            ("estimate scenarios/avastra45.ava --ads scenarios/ads/degraded.yaml", "by counting"),
-            (
-                "estimate scenarios/avastra45.ava --road corner --method probe",
-                "rare crashes: try dangerous rows out",
-            ),
-            ("estimate scenarios/avastra45.ava --precision 0.2 --parts 400", "until it is precise enough"),
-            (
-                "estimate scenarios/avastra45.ava --than scenarios/ads/degraded.yaml",
-                "what do dirty sensors cost?",
-            ),
-            ("estimate scenarios/avastra45.ava --ads idm --than cc --event collision", ""),
-            ("estimate --resume runs/0001", "go on after Ctrl-C"),
-        ],
-    ),
-    (
-        "merge",
-        &[
-            ("merge shards/* --out runs/whole", "the directory that one machine would have made"),
-            ("merge shards/* --missing", "which shards are to be played again"),
-        ],
-    ),
-    (
-        "replay",
-        &[
-            ("replay runs/0001/critical/*.ava", "check every claim"),
-            ("replay policies/corner.ava", "play the evaluation of a policy again"),
-            ("replay runs/0001/critical/corner_0004.ava --ads idm", "the same scene, another driver"),
-        ],
-    ),
-    (
-        "diagnose",
-        &[
-            ("diagnose runs/0001/critical/corner_0004.ava", "which module is at fault"),
-            ("diagnose --mechanisms runs/0001/critical/*.ava", "which weakness, over all files"),
-        ],
-    ),
-    ("shrink", &[("shrink runs/0001/critical/*.ava", "write the smallest that still crash")]),
-    (
-        "test",
-        &[
-            ("test runs/0001", "do its scenarios still crash?"),
-            ("test runs/0001 --ads scenarios/ads/cautious.yaml --junit out.xml", ""),
-            ("test runs/0001 --review", "what has changed for each of them, in meaning"),
-            ("test runs/0001 --accept", "and take it over"),
-        ],
-    ),
-    (
-        "export",
-        &[
-            ("export --to openscenario runs/0001/critical/*.ava", "with their maps, for any player"),
-            ("export --to openscenario --ego none --out suite runs/0001/critical/*.ava", ""),
-            (
-                "export --to openscenario --profile carla runs/0001/critical/*.ava",
-                "for CARLA's ScenarioRunner",
-            ),
-            ("export --to commonroad runs/0001/critical/corner_0004.ava", "with a planning problem"),
-            ("export --to csv runs/0001/critical/corner_0004.ava", "where everyone was at every tick"),
-            ("export --to ava runs/0001/critical/*.ava --out suite", "a folder that can be moved"),
-        ],
-    ),
-    (
-        "import",
-        &[
-            ("import cut_in.xosc", "write imported/cut_in.ava and its map, or say what cannot be said"),
-            ("import --set ego_speed=10 cut_in.xosc", "with another value of a parameter"),
-            ("import --ego Host --out catalogue suite/*.xosc", ""),
-        ],
-    ),
-    (
-        "report",
-        &[
-            ("report runs/0001", "write runs/0001/report.html"),
-            ("report runs/0001/critical/corner_0004.ava -o crash.html", "one scenario"),
-            ("report runs/0001 --ads scenarios/ads/default.yaml", "two driving systems on one clock"),
-            ("report runs/0001 --ads cc", "beside UN R157's careful driver"),
-        ],
-    ),
-    (
-        "render",
-        &[
-            ("render runs/0001/critical/corner_0004.ava --strip", "the seconds up to the crash"),
-            ("render runs/0001/critical/corner_0004.ava --at 12.5 -o moment.svg", ""),
-        ],
-    ),
-    (
-        "ads",
-        &[
-            ("ads check --ads './my_planner --fast'", "does it follow PROTOCOL.md?"),
-            ("ads check --ads tcp:127.0.0.1:5555", "one that listens on a socket"),
-            ("ads schema", "JSON Schema of every message"),
-            ("ads check --ads 'avastra ads toy --misbehave nan'", "what a finding looks like"),
-        ],
-    ),
-    (
-        "road",
-        &[
-            ("road scenarios/roads/corner.xodr", "describe a map in words"),
-            ("road scenarios/avastra45.ava --road corner --svg corner.svg", "draw it"),
-        ],
-    ),
-];
+/// Lines to type behind `avastra`, each with what it does; those of a command begin with it.
+const EXAMPLES: &str = "\
+check scenarios/avastra45.ava # list every mistake
+check --strict --fix mine.ava # make the changes on offer; fail on warnings
+check --audit scenarios/avastra45.ava # where each rule is enforced
+check --dump actions --format json scenarios/avastra45.ava # the table, for tools
+compile scenarios/avastra45.ava # write build/avastra45.table.yaml
+compile scenarios/avastra45.ava -o table.yaml
+table scenarios/avastra45.ava # the rows, numbered
+table scenarios/avastra45.ava --road corner # what one road allows
+table scenarios/avastra45.ava --row 12 # which rule says no?
+table scenarios/avastra45.ava --row 0 --state 'time: Night'
+table scenarios/avastra45.ava --markdown # the space, to read
+table scenarios/avastra45.ava --try --tries 2 # drive each row and judge it
+fmt mine.ava roads.ava # rewrite both
+fmt --check scenarios/avastra45.ava # for a continuous build
+fmt - # from stdin to stdout, for an editor
+explain # all codes
+explain AV0401 # one code, with an example
+diff scenarios/avastra45.ava scenarios/deepcollision52.ava # rows, rules and draws that differ
+new mine # write mine/space.ava, mine/roads.ava and a map
+new town --map roads/corner.xodr # on routes through the junctions of your own map
+completions bash > ~/.local/share/bash-completion/completions/avastra
+completions zsh > ~/.zfunc/_avastra
+lsp # an editor starts it; editors/vscode is an extension
+run scenarios/avastra45.ava --episodes 20 # 20 episodes on each road
+run scenarios/avastra45.ava --ads scenarios/ads/degraded.yaml # dirty sensors
+run scenarios/avastra45.ava --ads reactive --traffic released
+run scenarios/avastra45.ava --road corner --without npc_gap # with one rule switched off
+run --policy policies/corner.ava # let a learned policy choose
+run scenarios/avastra45.ava --ads './my_planner --fast' # a driving system of your own
+run --resume runs/0001 # go on after Ctrl-C
+run scenarios/avastra45.ava --shard 3/8 --out shards/3 # an eighth of it, for `merge`
+train scenarios/avastra45.ava --road corner --episodes 750
+train scenarios/avastra45.ava --agent map-elites # a search in place of a learner
+train --resume runs/0001 # go on after Ctrl-C
+policy explain policies/corner.ava
+policy explain policies/corner.ava --state 'ego_speed: 12 m/s, time: Night'
+policy distil policies/corner.ava --leaves 8 -o short.ava # at most 8 readable rules
+policy weights policies/corner.ava -o corner.safetensors
+study scenarios/studies/rq1.yaml # compare agents; takes hours
+study scenarios/studies/rq1.yaml --quick # see that it works
+study --resume runs/0001 # go on after Ctrl-C
+study scenarios/studies/rq1.yaml --shard 3/8 --out shards/3 # an eighth of it, for `merge`
+study results # write RESULTS.md from scenarios/studies
+study results --add runs/0001 --commit 8c11ccf # keep what a study found, and write it
+estimate scenarios/avastra45.ava --ads scenarios/ads/degraded.yaml # by counting
+estimate scenarios/avastra45.ava --road corner --method probe # rare crashes: try dangerous rows out
+estimate scenarios/avastra45.ava --precision 0.2 --parts 400 # until it is precise enough
+estimate scenarios/avastra45.ava --than scenarios/ads/degraded.yaml # what do dirty sensors cost?
+estimate scenarios/avastra45.ava --ads idm --than cc --event collision
+estimate --resume runs/0001 # go on after Ctrl-C
+merge shards/* --out runs/whole # the directory that one machine would have made
+merge shards/* --missing # which shards are to be played again
+replay runs/0001/critical/*.ava # check every claim
+replay policies/corner.ava # play the evaluation of a policy again
+replay runs/0001/critical/corner_0004.ava --ads idm # the same scene, another driver
+diagnose runs/0001/critical/corner_0004.ava # which module is at fault
+diagnose --mechanisms runs/0001/critical/*.ava # which weakness, over all files
+shrink runs/0001/critical/*.ava # write the smallest that still crash
+test runs/0001 # do its scenarios still crash?
+test runs/0001 --ads scenarios/ads/cautious.yaml --junit out.xml
+test runs/0001 --review # what has changed for each of them, in meaning
+test runs/0001 --accept # and take it over
+export --to openscenario runs/0001/critical/*.ava # with their maps, for any player
+export --to openscenario --ego none --out suite runs/0001/critical/*.ava
+export --to openscenario --profile carla runs/0001/critical/*.ava # for CARLA's ScenarioRunner
+export --to commonroad runs/0001/critical/corner_0004.ava # with a planning problem
+export --to csv runs/0001/critical/corner_0004.ava # where everyone was at every tick
+export --to ava runs/0001/critical/*.ava --out suite # a folder that can be moved
+import cut_in.xosc # write imported/cut_in.ava and its map, or say what cannot be said
+import --set ego_speed=10 cut_in.xosc # with another value of a parameter
+import --ego Host --out catalogue suite/*.xosc
+report runs/0001 # write runs/0001/report.html
+report runs/0001/critical/corner_0004.ava -o crash.html # one scenario
+report runs/0001 --ads scenarios/ads/default.yaml # two driving systems on one clock
+report runs/0001 --ads cc # beside UN R157's careful driver
+render runs/0001/critical/corner_0004.ava --strip # the seconds up to the crash
+render runs/0001/critical/corner_0004.ava --at 12.5 -o moment.svg
+ads check --ads './my_planner --fast' # does it follow PROTOCOL.md?
+ads check --ads tcp:127.0.0.1:5555 # one that listens on a socket
+ads schema # JSON Schema of every message
+ads check --ads 'avastra ads toy --misbehave nan' # what a finding looks like
+road scenarios/roads/corner.xodr # describe a map in words
+road scenarios/avastra45.ava --road corner --svg corner.svg # draw it";
 
 /// The commands in groups, in the order in which a newcomer meets them.
 const GROUPS: &[(&str, &[&str])] = &[
@@ -291,13 +170,13 @@ pub fn command() -> Command {
     command = command.help_template(format!(
         "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{groups}Every command:\n{{options}}{{after-help}}"
     ));
-    for (name, examples) in EXAMPLES {
-        let notes = match *name {
+    for name in taught() {
+        let notes = match name {
             "run" => format!("\n\n{}\n\n{}", agents(is_ready), driving_systems()),
             "train" => format!("\n\n{}\n\n{ONE_THREAD}", agents(is_trained)),
             _ => String::new(),
         };
-        let text = format!("{}{notes}", examples_text(examples));
+        let text = format!("{}{notes}", examples_text(name));
         command = command.mut_subcommand(name, |command| command.after_help(text));
     }
     command
@@ -313,12 +192,20 @@ const NAMED_AT: usize = 18;
 /// Where the explanations begin; an example that is longer has its own in the next line.
 const EXPLAINED_AT: usize = 44;
 
-fn examples_text(examples: &[(&str, &str)]) -> String {
+/// The commands that have examples.
+fn taught() -> Vec<&'static str> {
+    let mut names: Vec<&str> = EXAMPLES.lines().filter_map(|line| line.split(' ').next()).collect();
+    names.dedup();
+    names
+}
+
+fn examples_text(command: &str) -> String {
     let mut text = "Examples:".to_owned();
-    for (line, what) in examples {
+    for line in EXAMPLES.lines().filter(|line| line.split(' ').next() == Some(command)) {
+        let (line, what) = line.split_once(" # ").unwrap_or((line, ""));
         let line = format!("  avastra {line}");
         match what {
-            &"" => text.push_str(&format!("\n{line}")),
+            "" => text.push_str(&format!("\n{line}")),
             what if line.len() + 2 <= EXPLAINED_AT => text.push_str(&format!("\n{line:EXPLAINED_AT$}{what}")),
             what => text.push_str(&format!("\n{line}\n{:EXPLAINED_AT$}{what}", "")),
         }
@@ -424,16 +311,13 @@ mod tests {
             .filter(|command| !command.is_hide_set())
             .map(|command| command.get_name().to_owned())
             .collect();
-        let taught: Vec<&str> = EXAMPLES.iter().map(|(name, _)| *name).collect();
+        let taught = taught();
         let missing: Vec<&String> = shown.iter().filter(|name| !taught.contains(&name.as_str())).collect();
         assert!(missing.is_empty(), "no example for {missing:?}");
-        for (name, examples) in EXAMPLES {
-            for (line, _) in *examples {
-                let words = words(line);
-                assert_eq!(words[0], *name, "{line}");
-                let all = std::iter::once("avastra".to_owned()).chain(words);
-                command().try_get_matches_from(all).unwrap_or_else(|error| panic!("{line}: {error}"));
-            }
+        for line in EXAMPLES.lines() {
+            let typed = line.split(" # ").next().unwrap_or(line);
+            let all = std::iter::once("avastra".to_owned()).chain(words(typed));
+            command().try_get_matches_from(all).unwrap_or_else(|error| panic!("{line}: {error}"));
         }
     }
 
@@ -510,7 +394,7 @@ mod tests {
             let error = command().term_width(80).try_get_matches_from(words).expect_err("help is asked for");
             error.to_string()
         };
-        let names = EXAMPLES.iter().map(|(name, _)| vec!["avastra", *name]);
+        let names = taught().into_iter().map(|name| vec!["avastra", name]);
         for words in names.chain([vec!["avastra"]]) {
             let text = help(&[&words[..], &["--help"]].concat());
             assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");

@@ -5,17 +5,14 @@ use std::path::{Path, PathBuf};
 
 use avastra_campaign::episode::{End, Outcome};
 use avastra_campaign::files::PlainName;
-use avastra_campaign::run::Stage;
-use avastra_exchange::import;
-use avastra_exchange::import::{Files, Imported, Refusal};
-use avastra_lang::check;
-use avastra_lang::check::ReadError;
-use avastra_lang::model::Scenario;
+use avastra_campaign::run::{Stage, recorded};
+use avastra_exchange::import::{self, Files, Imported, Refusal};
+use avastra_lang::check::{self, ReadError};
 use avastra_world::action::ActionTable;
 
 use super::arguments::ImportArguments;
 use super::error::Failure;
-use super::files::{copy_map, folder, make, write_new};
+use super::files::{copy_map, folder, make, target, write_new};
 use super::load;
 use super::output::{Output, plural};
 
@@ -85,8 +82,7 @@ fn one(
     let name = PlainName::new(name).map_err(|error| Failure::file("import", file, error))?;
     let map = target.with_file_name(&*name);
     if let Err(reason) = plays(&imported, target, &map, &source) {
-        let refusal = Refusal { line: 1, element: "OpenSCENARIO".to_owned(), reason };
-        return Ok(Err(vec![refusal]));
+        return Ok(Err(vec![Refusal { line: 1, element: "OpenSCENARIO".to_owned(), reason }]));
     }
     match &arguments.out {
         Some(named) => make(named)?,
@@ -116,14 +112,8 @@ fn plays(imported: &Imported, target: &Path, map: &Path, source: &Path) -> Resul
         return Err("it gives no scenario".to_owned());
     };
     let table = ActionTable::new(space);
-    first_step(&table, &scenario)
-}
-
-/// Plays the one step of an imported scenario.
-fn first_step(table: &ActionTable, scenario: &Scenario) -> Result<(), String> {
-    let asked = load::asked(None).map_err(|error| error.to_string())?;
-    let (ads, _) = asked.selected_for(scenario).map_err(|error| error.to_string())?;
-    let stage = Stage::new(table, scenario).map_err(|error| error.to_string())?;
+    let ads = recorded(&scenario).map_err(|error| error.to_string())?;
+    let stage = Stage::new(&table, &scenario).map_err(|error| error.to_string())?;
     let log = stage.play(&ads, &mut |_, _, _| {});
     match log.steps.first().map(|step| &step.outcome) {
         Some(Outcome::Refused { reason, .. }) => Err(format!("what it places cannot appear: {reason}")),
@@ -146,12 +136,8 @@ impl Files for Beside<'_> {
 
     fn catalogues(&self, folder: &str) -> Result<Vec<String>, String> {
         let folder = self.folder.join(slashed(folder));
-        let entries = std::fs::read_dir(&folder).map_err(|error| error.to_string())?;
-        let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-        files.retain(|file| file.extension().is_some_and(|extension| extension == "xosc"));
-        files.sort();
-        files.truncate(CATALOGUES_MAX);
-        Ok(files.iter().filter_map(|file| load::read(file).ok()).collect())
+        let files = load::files_in(&folder, "xosc").map_err(|error| error.to_string())?;
+        Ok(files.iter().take(CATALOGUES_MAX).filter_map(|file| load::read(file).ok()).collect())
     }
 }
 
@@ -168,13 +154,7 @@ fn parameters(arguments: &ImportArguments) -> Result<BTreeMap<String, String>, F
 fn targets(arguments: &ImportArguments) -> Result<Vec<PathBuf>, Failure> {
     let mut targets: Vec<PathBuf> = Vec::new();
     for file in &arguments.files {
-        let folder = match &arguments.out {
-            Some(folder) => folder.clone(),
-            None => file.parent().unwrap_or(Path::new("")).join(FOLDER),
-        };
-        let stem = file.file_stem();
-        let stem = stem.ok_or_else(|| Failure::file("read", file, "it is a folder: name a file in it"))?;
-        let target = folder.join(stem).with_added_extension("ava");
+        let target = target(file, arguments.out.as_ref(), FOLDER, "ava")?;
         if targets.contains(&target) {
             let message =
                 format!("two files would be written to `{}`: import them to two folders", target.display());

@@ -6,12 +6,10 @@ use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-use avastra_campaign::run;
-use avastra_campaign::run::{Asked, Profile, RunError, driving_system};
+use avastra_campaign::run::{self, Asked, Profile, RunError, driving_system};
 use avastra_drivers::external::{Attached, ExternalSettings, Target};
 use avastra_drivers::{EXTERNAL, ModularConfig, REGISTRY};
-use avastra_lang::check;
-use avastra_lang::check::{Loaded, ReadError};
+use avastra_lang::check::{self, Loaded, ReadError};
 use avastra_lang::model::{Policy, Scenario, Space};
 use avastra_lang::syntax::{nearest, yaml_mistake};
 use avastra_world::action::ActionTable;
@@ -52,18 +50,12 @@ pub fn load(output: &Output, path: &Path) -> Result<Loaded, Failure> {
 }
 
 /// Prints the diagnostics of a file.
-///
-/// # Errors
-/// If the source has mistakes.
 fn sound(output: &Output, loaded: Loaded) -> Result<Loaded, Failure> {
     output.diagnostics(&loaded.sources, &loaded.diagnostics);
     without_mistakes(loaded)
 }
 
 /// Passes a file on if it has no mistakes. Its diagnostics are not printed here.
-///
-/// # Errors
-/// If the source has mistakes.
 pub fn without_mistakes(loaded: Loaded) -> Result<Loaded, Failure> {
     match loaded.diagnostics.iter().filter(|diagnostic| diagnostic.is_error()).count() {
         0 => Ok(loaded),
@@ -72,9 +64,6 @@ pub fn without_mistakes(loaded: Loaded) -> Result<Loaded, Failure> {
 }
 
 /// Reads and checks a file. For a missing name, the diagnostic names a nearby file that declares it.
-///
-/// # Errors
-/// If the file cannot be read.
 pub fn read_and_check(path: &Path) -> Result<Loaded, Failure> {
     let own = check::normal(path);
     check_read(path, &|other| if other == own { read(other) } else { read_used(other) })
@@ -137,12 +126,17 @@ pub fn nearby(path: &Path) -> Vec<(String, String)> {
 /// # Errors
 /// If the directory cannot be read, or the name of one of them is not UTF-8.
 pub fn sources_in(directory: &Path) -> Result<Vec<PathBuf>, Failure> {
-    let entries = std::fs::read_dir(directory).map_err(|error| Failure::file("read", directory, error))?;
-    let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    files.retain(|file| is_source(file));
-    if let Some(file) = files.iter().find(|file| file.to_str().is_none()) {
-        return Err(Failure::file("read", file, NOT_UTF8));
+    let files = files_in(directory, "ava").map_err(|error| Failure::file("read", directory, error))?;
+    match files.iter().find(|file| file.to_str().is_none()) {
+        Some(file) => Err(Failure::file("read", file, NOT_UTF8)),
+        None => Ok(files),
     }
+}
+
+/// Files with an extension in a directory, sorted.
+pub fn files_in(directory: &Path, extension: &str) -> std::io::Result<Vec<PathBuf>> {
+    let mut files: Vec<PathBuf> = std::fs::read_dir(directory)?.flatten().map(|entry| entry.path()).collect();
+    files.retain(|file| file.extension().is_some_and(|found| found == extension));
     files.sort();
     Ok(files)
 }
@@ -206,9 +200,6 @@ pub fn scenario(output: &Output, path: &Path) -> Result<(ActionTable, Scenario),
 }
 
 /// The table and the scenario of a file that was read and checked.
-///
-/// # Errors
-/// As [`scenario`].
 pub fn scenario_in(output: &Output, path: &Path, loaded: Loaded) -> Result<(ActionTable, Scenario), Failure> {
     let mut loaded = sound(output, loaded)?;
     let Some(scenario) = loaded.scenario.take() else {
@@ -307,9 +298,6 @@ pub fn profile_path(text: &str) -> Option<&Path> {
 }
 
 /// The driving system under test that `--ads` gives.
-///
-/// # Errors
-/// As [`driver`] and [`under_test`].
 pub fn named(text: &str) -> Result<UnderTest, Failure> {
     match driver(text)? {
         Driver::Name(name) => under_test(name, None, None),
@@ -418,9 +406,6 @@ pub fn policy(output: &Output, path: &Path) -> Result<(ActionTable, Policy), Fai
 }
 
 /// The table and the policy of a file that was read and checked.
-///
-/// # Errors
-/// As [`policy`].
 pub fn policy_in(output: &Output, path: &Path, loaded: Loaded) -> Result<(ActionTable, Policy), Failure> {
     match emitted_in(path, sound(output, loaded)?)? {
         Emitted::Policy(table, policy) => Ok((table, *policy)),
@@ -447,9 +432,6 @@ pub fn parsed<T: serde::de::DeserializeOwned>(path: &Path, text: &str) -> Result
 }
 
 /// The text of a file that a command needs.
-///
-/// # Errors
-/// If it cannot be read.
 pub fn text(path: &Path) -> Result<String, Failure> {
     read(path).map_err(|error| Failure::file("read", path, error))
 }
@@ -488,22 +470,17 @@ fn read_up_to(path: &Path, bytes_max: u64) -> Result<String, ReadError> {
     // The file may grow while it is read.
     File::open(path).and_then(|file| file.take(bytes_max + 1).read_to_end(&mut bytes)).map_err(unread)?;
     if bytes.len() as u64 > bytes_max {
-        return Err(ReadError(format!("it is larger than {}", in_bytes(bytes_max))));
+        return Err(ReadError(format!("it is larger than {} MiB", bytes_max >> 20)));
     }
     String::from_utf8(bytes).map_err(|error| {
         ReadError(format!("not text: byte {} is not UTF-8", error.utf8_error().valid_up_to()))
     })
 }
 
-fn in_bytes(bytes: u64) -> String {
-    if bytes >= 1 << 20 { format!("{} MiB", bytes >> 20) } else { format!("{bytes} bytes") }
-}
-
 /// The system's reason without its error number.
 fn reason(error: &std::io::Error) -> String {
     let text = error.to_string();
-    let text = text.split(" (os error").next().unwrap_or(&text).to_lowercase();
-    text.to_owned()
+    text.split(" (os error").next().unwrap_or(&text).to_lowercase()
 }
 
 /// A path to `file` that holds in `directory`, with `/` between its parts.

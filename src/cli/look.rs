@@ -7,8 +7,7 @@
 
 use std::path::{Path, PathBuf};
 
-use avastra_campaign::run;
-use avastra_campaign::run::RunError;
+use avastra_campaign::run::{self, RunError};
 use avastra_lang::check::{Loaded, normal};
 use avastra_lang::model::{Scenario, code};
 use avastra_lang::syntax::ast::{Expr, ExprKind, FileId};
@@ -80,9 +79,6 @@ pub fn scenario(output: &Output, path: &Path) -> Result<Looked, Failure> {
 }
 
 /// As [`scenario`], of a file that was read and checked.
-///
-/// # Errors
-/// As [`scenario`].
 pub fn scenario_in(output: &Output, path: &Path, loaded: Loaded) -> Result<Looked, Failure> {
     let mut changed = Changed { what: Vec::new(), copy: None };
     let loaded = match loaded.diagnostics.iter().any(Diagnostic::is_error) {
@@ -94,7 +90,7 @@ pub fn scenario_in(output: &Output, path: &Path, loaded: Loaded) -> Result<Looke
             }
             None if is_outdated(&loaded) => {
                 changed.what.push(meaning_text(&loaded));
-                as_it_is_now(path, &loaded)?
+                as_it_is_now(path, &loaded)?.1
             }
             None => loaded,
         },
@@ -153,15 +149,15 @@ pub fn first_mistake(path: &Path) -> Option<String> {
     Some(format!("{}{note}", first.message))
 }
 
-/// The file with the digest of the present space, and checked in it.
-fn as_it_is_now(path: &Path, loaded: &Loaded) -> Result<Loaded, Failure> {
+/// The text of the file with the digest of the present space, and the file checked in it.
+pub fn as_it_is_now(path: &Path, loaded: &Loaded) -> Result<(String, Loaded), Failure> {
     let root = FileId::default();
     let (text, _) = apply_fixes(root, loaded.sources.text(root), &loaded.diagnostics);
     let mut checked = load::check_text(path, &text)?;
     for mistake in &mut checked.diagnostics {
         mistake.notes.push("the space has changed since the scenario was written".to_owned());
     }
-    Ok(checked)
+    Ok((text, checked))
 }
 
 /// The path of a copy of the scenario's space as it was when the scenario was written, and the file checked in it. A run or an estimate

@@ -11,15 +11,13 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::io::BufReader;
 use std::panic::AssertUnwindSafe;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc;
-use std::sync::mpsc::Receiver;
+use std::sync::mpsc::{self, Receiver};
 
 use serde_json::{Map, Value, json};
 
 use avastra_editor::complete::{Proposal, ProposalKind};
 use avastra_editor::diagnostics::{Change, Changes, Mistake, Remedy};
-use avastra_editor::formatting::Formatted;
-use avastra_editor::highlight::{NameKind, Token};
+use avastra_editor::highlight::Token;
 use avastra_editor::outline::{Entry, OutlineKind};
 use avastra_editor::{
     Analysis, Files, Place, Point, Range, Workspace, complete, diagnostics, formatting, highlight, hints,
@@ -42,7 +40,8 @@ const NOT_INITIALIZED: i64 = -32002;
 const REQUEST_FAILED: i64 = -32803;
 const REQUEST_CANCELLED: i64 = -32800;
 
-/// The kinds of names. A token holds the position of its kind in this list.
+/// The kinds of names, in the order of [`NameKind`](avastra_editor::highlight::NameKind). A token holds the position of its
+/// kind in this list.
 const TOKEN_TYPES: [&str; 9] =
     ["enum", "enumMember", "variable", "function", "parameter", "event", "namespace", "type", "property"];
 
@@ -107,19 +106,17 @@ fn take(
             Ok(body) => body.map_err(|error| Failure::usage(error.to_string()))?,
             Err(ended) => return Ok(ended),
         };
-        match parsed(&body) {
-            Err(reply) => send(vec![reply]),
-            Ok(message) => match cancelled(&message) {
-                Some(id) => cancel(id, waiting),
-                None => waiting.push_back(message),
-            },
+        match serde_json::from_slice::<Value>(&body) {
+            Err(error) => {
+                let reason = format!("the message is not JSON: {error}");
+                send(vec![error_reply(&Value::Null, PARSE_ERROR, &reason)]);
+            }
+            Ok(message) if message["method"] == "$/cancelRequest" => {
+                cancel(&message["params"]["id"], waiting);
+            }
+            Ok(message) => waiting.push_back(message),
         }
     }
-}
-
-/// The request that a `$/cancelRequest` is about.
-fn cancelled(message: &Value) -> Option<&Value> {
-    (message["method"] == "$/cancelRequest").then(|| &message["params"]["id"])
 }
 
 /// Answers a waiting request as cancelled. A request that is done has its answer already.
@@ -236,7 +233,6 @@ impl Server {
     /// Takes a message in; gives the answers to it.
     fn receive(&mut self, message: &Value) -> Vec<Value> {
         let (id, method) = (message.get("id"), message.get("method").and_then(Value::as_str));
-        let is_object = message.is_object();
         match (id, method) {
             (Some(id), Some(method)) if id.is_string() || id.is_number() => {
                 vec![self.answer(id, method, &message["params"])]
@@ -248,8 +244,10 @@ impl Server {
             // A reply to a request that the server never sent.
             (Some(_), None) if message.get("result").or(message.get("error")).is_some() => Vec::new(),
             _ => {
-                let what =
-                    if is_object { "neither a request nor a notification" } else { "no JSON-RPC object" };
+                let what = match message.is_object() {
+                    true => "neither a request nor a notification",
+                    false => "no JSON-RPC object",
+                };
                 vec![error_reply(&Value::Null, INVALID_REQUEST, what)]
             }
         }
@@ -285,10 +283,7 @@ impl Server {
             "textDocument/hover" => {
                 let (path, byte) = self.place(params)?;
                 let found = hover::hover(self.analysis(&path)?, byte);
-                Ok(found.map_or(
-                    Value::Null,
-                    |found| json!({ "contents": markdown(&found.text), "range": range(found.range) }),
-                ))
+                Ok(found.map(|of| json!({ "contents": markdown(&of.text), "range": range(of.range) })).into())
             }
             "textDocument/completion" => {
                 let (path, byte) = self.place(params)?;
@@ -325,12 +320,9 @@ impl Server {
             }
             "textDocument/formatting" => {
                 let path = self.document(params)?;
-                match formatting::format(self.analysis(&path)?) {
-                    Ok(Formatted::Broken) => Ok(Value::Null),
-                    Ok(Formatted::Already) => Ok(json!([])),
-                    Ok(Formatted::By(one)) => Ok(json!([change(&one)])),
-                    Err(error) => Err(Refusal::Impossible(error.to_string())),
-                }
+                let changes = formatting::format(self.analysis(&path)?);
+                let changes = changes.map_err(|error| Refusal::Impossible(error.to_string()))?;
+                Ok(changes.map_or(Value::Null, |changes| changes.iter().map(change).collect()))
             }
             "textDocument/documentSymbol" => {
                 let path = self.document(params)?;
@@ -338,13 +330,11 @@ impl Server {
             }
             "textDocument/foldingRange" => {
                 let path = self.document(params)?;
-                let found = structure::folds(self.analysis(&path)?).into_iter();
-                let kind = |is_comment| if is_comment { "comment" } else { "region" };
-                Ok(found
-                    .map(
-                        |of| json!({ "startLine": of.start, "endLine": of.end, "kind": kind(of.is_comment) }),
-                    )
-                    .collect())
+                let fold = |of: structure::Fold| {
+                    let kind = if of.is_comment { "comment" } else { "region" };
+                    json!({ "startLine": of.start, "endLine": of.end, "kind": kind })
+                };
+                Ok(structure::folds(self.analysis(&path)?).into_iter().map(fold).collect())
             }
             "textDocument/documentLink" => {
                 let path = self.document(params)?;
@@ -355,13 +345,14 @@ impl Server {
             }
             "textDocument/signatureHelp" => {
                 let (path, byte) = self.place(params)?;
-                Ok(signature::help(self.analysis(&path)?, byte).map_or(Value::Null, |found| {
-                    let labels = found.parameters.iter().map(|label| json!({ "label": label }));
-                    let parameters: Vec<Value> = labels.collect();
+                let signature = |found: signature::Signature| {
+                    let parameters: Value =
+                        found.parameters.iter().map(|label| json!({ "label": label })).collect();
                     let text = markdown(&found.text);
                     let of = json!({ "label": found.label, "parameters": parameters, "documentation": text });
                     json!({ "signatures": [of], "activeSignature": 0, "activeParameter": found.due })
-                }))
+                };
+                Ok(signature::help(self.analysis(&path)?, byte).map(signature).into())
             }
             "workspace/symbol" => {
                 let query = params["query"].as_str().ok_or(Refusal::Params("query"))?;
@@ -375,13 +366,8 @@ impl Server {
             }
             "textDocument/inlayHint" => {
                 let (path, from, to) = self.span(params)?;
-                let found = hints::hints(self.analysis(&path)?, from, to).into_iter();
-                Ok(found
-                    .map(|of| {
-                        let (label, tooltip) = (of.label, of.tooltip);
-                        json!({ "position": point(of.at), "label": label, "tooltip": tooltip, "paddingLeft": true })
-                    })
-                    .collect())
+                let hint = |hints::Hint { at, label, tooltip }| json!({ "position": point(at), "label": label, "tooltip": tooltip, "paddingLeft": true });
+                Ok(hints::hints(self.analysis(&path)?, from, to).into_iter().map(hint).collect())
             }
             "textDocument/codeAction" => {
                 let (path, from, to) = self.span(params)?;
@@ -482,8 +468,7 @@ impl Server {
     }
 
     fn analysis(&mut self, path: &Path) -> Result<&Analysis, Refusal> {
-        let gone = || Refusal::NotOpen(path.display().to_string());
-        self.workspace.analysis(path).ok_or_else(gone)
+        self.workspace.analysis(path).ok_or_else(|| Refusal::NotOpen(path.display().to_string()))
     }
 
     /// The analysis of a document that [`Server::place`] has brought up to date.
@@ -563,12 +548,6 @@ fn byte(analysis: &Analysis, position: &Value, name: &'static str) -> Result<usi
     let number = |key: &str| position[key].as_u64().and_then(|number| usize::try_from(number).ok());
     let (line, column) = number("line").zip(number("character")).ok_or(Refusal::Params(name))?;
     Ok(analysis.byte(line, column))
-}
-
-/// The message in a body, or the error reply to a body that is not JSON.
-fn parsed(body: &[u8]) -> Result<Value, Value> {
-    serde_json::from_slice(body)
-        .map_err(|error| error_reply(&Value::Null, PARSE_ERROR, &format!("the message is not JSON: {error}")))
 }
 
 /// The folders that the editor has open, as `initialize` names them.
@@ -670,24 +649,12 @@ fn token_data(tokens: &[Token]) -> Vec<usize> {
     for token in tokens {
         let start = token.range.start;
         let since = if start.line == last.line { start.column - last.column } else { start.column };
-        // The position in `TOKEN_TYPES`.
-        let kind = match token.kind {
-            NameKind::Enum => 0,
-            NameKind::Variant => 1,
-            NameKind::Variable => 2,
-            NameKind::Function => 3,
-            NameKind::Parameter => 4,
-            NameKind::Action => 5,
-            NameKind::Namespace => 6,
-            NameKind::Type => 7,
-            NameKind::Property => 8,
-        };
         let flags = [token.declares, token.is_constant, token.is_built_in];
         let modifiers: usize =
             flags.iter().enumerate().map(|(bit, is_set)| usize::from(*is_set) << bit).sum();
         // No name has a line break in it.
         let length = token.range.end.column - start.column;
-        data.extend([start.line - last.line, since, length, kind, modifiers]);
+        data.extend([start.line - last.line, since, length, token.kind as usize, modifiers]);
         last = start;
     }
     data

@@ -16,8 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
 use std::path::{Component, Path, PathBuf};
 
-use avastra_campaign::files;
-use avastra_campaign::files::PlainName;
+use avastra_campaign::files::{self, PlainName};
 use avastra_campaign::run::{
     DatabaseError, Numbered, PolicyReference, Shard, Units, WrittenScenario, settings_differences,
 };
@@ -333,13 +332,12 @@ fn publish<C: Cut>(
         let read = |path| std::fs::read(path).map_err(|error| Failure::file("read", path, error));
         known.get(name).map_or(Ok(false), |known| Ok(read(known)? == read(path)?))
     };
-    let equal: Vec<bool> = merged.iter().map(is_equal).collect::<Result<_, _>>()?;
     // Further files, a page for example, do not make it another directory.
-    let is_it = equal.into_iter().all(|is_equal| is_equal);
+    let equal: Vec<bool> = merged.iter().map(is_equal).collect::<Result<_, _>>()?;
     discard(partial)?;
-    match is_it {
-        true => remove(&out.join(MARK)),
-        false => Err(Failure::usage(format!("`{}` is not empty: name a new directory", out.display()))),
+    match equal.contains(&false) {
+        false => remove(&out.join(MARK)),
+        true => Err(Failure::usage(format!("`{}` is not empty: name a new directory", out.display()))),
     }
 }
 
@@ -444,21 +442,10 @@ fn elsewhere(path: &str, directory: &Path) -> Vec<PathBuf> {
 }
 
 impl Way<'_> {
-    /// Takes over the copy of the space that a directory keeps. Copies of one meaning may differ in comments: that of the first
-    /// directory is kept.
-    fn copy_space(&self) -> Result<(), Failure> {
-        let is_new = self.from.join(pack::SPACE).is_dir() && !self.to.join(pack::SPACE).exists();
-        if is_new { copy_folder(OsStr::new(pack::SPACE), [self.from, self.to]) } else { Ok(()) }
-    }
-
-    /// A path in the settings of one directory as it stands in those of another. What is inside the directory stays there.
-    fn moved(&self, path: &str, target: &Path) -> Result<String, Failure> {
-        let is_inside = Path::new(path).is_relative() && !Path::new(path).starts_with("..");
-        if is_inside { Ok(path.to_owned()) } else { load::relative(self.to, target) }
-    }
-
+    /// The path of the space in one directory as it stands in another. What is inside the directory stays there.
     fn space(&self, path: &str) -> Result<String, Failure> {
-        self.moved(path, &self.outside.space)
+        let is_inside = Path::new(path).is_relative() && !Path::new(path).starts_with("..");
+        if is_inside { Ok(path.to_owned()) } else { load::relative(self.to, &self.outside.space) }
     }
 
     /// The driving system is not started here, so its working directory need not exist on this machine.
@@ -500,9 +487,17 @@ impl Way<'_> {
         if from.join(pack::SPACE).is_dir() {
             copy_folder(OsStr::new(pack::SPACE), [&from, &to])?;
         }
-        self.copy_space()?;
+        // Copies of one meaning may differ in comments: that of the first directory is kept.
+        if self.from.join(pack::SPACE).is_dir() && !self.to.join(pack::SPACE).exists() {
+            copy_folder(OsStr::new(pack::SPACE), [self.from, self.to])?;
+        }
         let copied = |found: WrittenScenario| {
-            let text = copy_written(output, &found.name, &found.text, &critical)?;
+            let file = (from.join(&found.name), found.text.clone());
+            if run_directory::is_edited(&file) {
+                let path = file.0.display();
+                output.warn(&format!("{path} was edited since it was written: what was written is taken"));
+            }
+            let text = copy_scenario(&found.name, &found.text, &critical)?;
             Ok::<_, Failure>((found, text))
         };
         let moved = written.into_iter().map(copied).collect::<Result<_, _>>()?;
@@ -550,16 +545,6 @@ fn copy_scenario(name: &PlainName, text: &str, way: &Way) -> Result<String, Fail
         copy_text(&load::answers_path(&way.to.join(name)), &own_text(&answers)?)?;
     }
     Ok(text)
-}
-
-/// As [`copy_scenario`], for a scenario whose text is in the database; warns if its file was edited.
-fn copy_written(output: &Output, name: &PlainName, text: &str, way: &Way) -> Result<String, Failure> {
-    let file = (way.from.join(name), text.to_owned());
-    if run_directory::is_edited(&file) {
-        let path = file.0.display();
-        output.warn(&format!("{path} was edited since it was written: what was written is taken"));
-    }
-    copy_scenario(name, text, way)
 }
 
 /// The text of a file in a shard, which must be no link.

@@ -100,16 +100,20 @@ fn words_of(found: &ArgMatches) -> String {
     words.join(" ")
 }
 
+/// Ends a process whose command line cannot be carried out.
+fn refused(failure: &Failure) -> ExitCode {
+    match output::asks_for_json() {
+        true => output::usage_in_json(failure),
+        false => output::remark(&format!("error: {failure}")),
+    }
+    ExitCode::from(failure.status())
+}
+
 /// Runs the command that the process was started with.
 pub fn main() -> ExitCode {
     // File names end up in files and in JSON, which are text. So this is said before anything is played.
     if let Some(argument) = std::env::args_os().find(|argument| argument.to_str().is_none()) {
-        let failure = Failure::usage(format!("{argument:?} is not UTF-8: rename the file"));
-        match output::asks_for_json() {
-            true => output::usage_in_json(&failure),
-            false => output::remark(&format!("error: {failure}")),
-        }
-        return ExitCode::from(failure.status());
+        return refused(&Failure::usage(format!("{argument:?} is not UTF-8: rename the file")));
     }
     let found = match help::command().try_get_matches() {
         Ok(found) => found,
@@ -117,27 +121,23 @@ pub fn main() -> ExitCode {
             let error = with_nearest_command(error);
             // Help and version are not failures; every other message of clap's is a usage error.
             if error.use_stderr() && output::asks_for_json() {
-                let failure = Failure::usage(error.to_string().trim_end().trim_start_matches("error: "));
-                output::usage_in_json(&failure);
-                return ExitCode::from(failure.status());
+                let reason = error.to_string();
+                return refused(&Failure::usage(reason.trim_end().trim_start_matches("error: ")));
             }
             let is_lost = error.print().or_else(output::unless_closed).is_err();
             if !error.use_stderr() {
                 return if is_lost { ExitCode::FAILURE } else { ExitCode::SUCCESS };
             }
-            let failure = Failure::usage(error.kind().to_string());
-            return ExitCode::from(failure.status());
+            return ExitCode::from(Failure::usage(error.kind().to_string()).status());
         }
     };
     let arguments = Arguments::from_arg_matches(&found).expect("clap has parsed them");
     let name = words_of(&found);
     let has_diagnostics = matches!(arguments.command, Command::Check(_) | Command::Compile(_));
     if arguments.output.format == Format::Sarif && !has_diagnostics {
-        let failure = Failure::usage(format!(
+        return refused(&Failure::usage(format!(
             "`--format sarif` is for diagnostics, which `check` and `compile` print: use `--format json` with `{name}`"
-        ));
-        output::remark(&format!("error: {failure}"));
-        return ExitCode::from(failure.status());
+        )));
     }
     // An editor's server speaks its protocol on stdout, whatever is asked for.
     let output = match arguments.command {

@@ -21,13 +21,8 @@ const STARTER: [(&str, &str); 3] = [
     ("roads/corner.xodr", include_str!("../../scenarios/roads/corner.xodr")),
 ];
 
-/// The files of the paper's space, which are in the program: their names, from its folder, and their texts.
-pub fn shipped() -> &'static [(&'static str, &'static str)] {
-    &USED
-}
-
-/// What the examples use.
-const USED: [(&str, &str); 6] = [
+/// The files of the paper's space, which the examples use: their names, from its folder, and their texts.
+pub const SHIPPED: [(&str, &str); 6] = [
     ("avastra45.ava", include_str!("../../scenarios/avastra45.ava")),
     ("roads.ava", include_str!("../../scenarios/roads.ava")),
     ("roads/boulevard.xodr", include_str!("../../scenarios/roads/boulevard.xodr")),
@@ -98,7 +93,7 @@ fn example(name: &str) -> Vec<(String, String)> {
     let (_, own, maps) = found.expect("clap takes the names of examples alone");
     // Here it stands beside what it uses.
     let mut files = vec![(format!("{name}.ava"), own.replace("use \"../", "use \""))];
-    files.extend(USED.iter().chain(*maps).map(|(name, text)| ((*name).to_owned(), (*text).to_owned())));
+    files.extend(SHIPPED.iter().chain(*maps).map(|(name, text)| ((*name).to_owned(), (*text).to_owned())));
     files
 }
 

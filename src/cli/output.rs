@@ -67,14 +67,13 @@ impl Output {
 
     /// Without colour.
     pub fn of(format: Format) -> Output {
-        let (collected, result) = (Mutex::default(), Mutex::default());
         Output {
             format,
             colour: false,
             quiet: false,
             verbose: false,
-            collected,
-            result,
+            collected: Mutex::default(),
+            result: Mutex::default(),
             lost: Mutex::default(),
         }
     }
@@ -98,10 +97,6 @@ impl Output {
         }
     }
 
-    fn is_sarif(&self) -> bool {
-        self.format == Format::Sarif
-    }
-
     /// Whether a program reads what is printed, or nobody.
     fn is_for_no_person(&self) -> bool {
         matches!(self.format, Format::Json | Format::Silent)
@@ -116,7 +111,7 @@ impl Output {
             self.print(&serde_json::to_string(&line).expect("results have string keys only"));
             return;
         }
-        if self.is_sarif() {
+        if self.format == Format::Sarif {
             let log = sarif::log(&self.collected());
             self.print(&serde_json::to_string_pretty(&log).expect("it is JSON already"));
         }
@@ -210,8 +205,7 @@ impl Output {
                 Format::Sarif => self.collected().push(avastra_lang::syntax::record(diagnostic, sources)),
                 Format::Json => {
                     let record = avastra_lang::syntax::record(diagnostic, sources);
-                    let line = serde_json::to_string(&record).expect("records have string keys only");
-                    drawn(&line);
+                    drawn(&serde_json::to_string(&record).expect("records have string keys only"));
                 }
                 Format::Human | Format::Plain => {
                     let style = if self.colour { Style::Human } else { Style::Plain };

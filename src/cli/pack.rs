@@ -157,7 +157,7 @@ fn moved<'a>(
 
 /// The path from the root of the file system, without `..`; links are not followed, as files name each other
 /// without following them.
-fn absolute(path: &Path) -> Result<PathBuf, Failure> {
+pub fn absolute(path: &Path) -> Result<PathBuf, Failure> {
     let absolute = std::path::absolute(path).map_err(|error| Failure::file("find", path, error))?;
     Ok(normal(&absolute))
 }

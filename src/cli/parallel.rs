@@ -16,9 +16,6 @@ use super::progress::{Pieces, Working};
 
 /// Worker threads: as many as asked for, or one for each core. A driving system behind a socket may serve one connection
 /// at a time, so it gets one, and otherwise must show that it serves as many.
-///
-/// # Errors
-/// If it does not.
 pub fn jobs(asked: Option<u32>, program: Option<&Arc<Program>>) -> Result<usize, Failure> {
     let cores = || match program {
         Some(program) if program.settings().command.is_socket() => 1,
@@ -81,9 +78,6 @@ fn hand_on<T>(
 
 /// Does `work` for every file on as many threads as [`jobs`] says, for `program` if one is to drive. Of several files, it
 /// says which failed; after Ctrl-C those under way are ended, and it says which are not done.
-///
-/// # Errors
-/// As [`jobs`].
 pub fn each_file<T: Send>(
     output: &Output,
     many: &FilesArguments,
@@ -94,9 +88,6 @@ pub fn each_file<T: Send>(
 }
 
 /// As [`each_file`], and hands on what came of each file as soon as it and all before it are done.
-///
-/// # Errors
-/// As [`jobs`].
 pub fn each_file_in_turn<T: Send>(
     output: &Output,
     many: &FilesArguments,

@@ -1,7 +1,7 @@
 //! Progress of long work, on stderr: a bar on a terminal, plain lines elsewhere, nothing in JSON or with `--quiet`.
 //!
 //! A bar is as wide as the terminal: its message is cut, never folded. Lines begin after some seconds, so that short
-//! work says nothing.
+//! work says nothing. A bar that is dropped is cleared: so does `indicatif` with every bar that is not finished otherwise.
 
 use std::collections::VecDeque;
 use std::sync::Mutex;
@@ -13,6 +13,15 @@ use avastra_campaign::train::TrainedEpisode;
 use avastra_lang::syntax::visible;
 
 use super::output::{Output, Telling, plural, remark};
+
+/// The time now.
+#[allow(
+    clippy::disallowed_methods,
+    reason = "this is cli, and the time is only told or stands beside results"
+)]
+pub fn now() -> Instant {
+    Instant::now()
+}
 
 /// How far a run or a study is. Dropping it clears the bar.
 pub struct Progress {
@@ -91,7 +100,9 @@ impl Pieces {
 }
 
 /// Work that does not know how far it is: the time spent runs on a terminal. Dropping it clears the line.
-pub struct Working(Option<ProgressBar>);
+pub struct Working {
+    _bar: Option<ProgressBar>,
+}
 
 impl Working {
     pub fn new(output: &Output, doing: impl Into<String>) -> Working {
@@ -102,15 +113,7 @@ impl Working {
             bar.enable_steady_tick(Duration::from_millis(200));
             bar
         });
-        Working(bar)
-    }
-}
-
-impl Drop for Working {
-    fn drop(&mut self) {
-        if let Some(bar) = &self.0 {
-            bar.finish_and_clear();
-        }
+        Working { _bar: bar }
     }
 }
 
@@ -136,9 +139,7 @@ impl Count {
             bar.set_style(ProgressStyle::with_template(&template).expect("a fixed template"));
             bar
         });
-        #[allow(clippy::disallowed_methods, reason = "this is cli, and the time only decides what is told")]
-        let begun = Instant::now();
-        Count { bar, lines: telling == Telling::Lines, noun, begun, total, done }
+        Count { bar, lines: telling == Telling::Lines, noun, begun: now(), total, done }
     }
 
     fn up(&mut self, message: String) {
@@ -152,14 +153,6 @@ impl Count {
         {
             let message = if message.is_empty() { message } else { format!(", {message}") };
             remark(&format!("{}/{} {}{message}", self.done, self.total, self.noun));
-        }
-    }
-}
-
-impl Drop for Count {
-    fn drop(&mut self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
         }
     }
 }

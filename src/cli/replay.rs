@@ -15,8 +15,7 @@ use super::arguments::ReplayArguments;
 use super::error::Failure;
 use super::load;
 use super::look::{self, Changed, Looked};
-use super::output::Output;
-use super::output::plural;
+use super::output::{Output, plural};
 use super::parallel::each_file;
 use super::policy::claims;
 
@@ -171,14 +170,13 @@ fn play(
     let severities: Vec<oracle::Severity> = log.collisions.iter().map(oracle::severity).collect();
     let priorities: Vec<&str> =
         log.collisions.iter().map(|collision| collision.contact.priority.name()).collect();
-    let doubts = ads.program().filter(|program| program.can_start()).map_or_else(Vec::new, |program| {
-        if program.attached().is_deterministic() { Vec::new() } else { vec![program.attached().name()] }
-    });
+    let started = ads.program().filter(|program| program.can_start()).map(|program| program.attached());
+    let doubted = started.filter(|attached| !attached.is_deterministic()).map(|attached| attached.name());
     let claims = other.is_none().then(|| {
         let mut claims = stage.verify(ads, &log);
         for claim in claims.iter_mut().filter(|claim| claim.is_refuted()) {
             // What says that it may answer otherwise cannot refute a claim by doing so.
-            for name in &doubts {
+            if let Some(name) = &doubted {
                 claim.confirmed = None;
                 claim.found =
                     format!("{} this time, but {name} says that it is not deterministic", claim.found);
@@ -213,7 +211,7 @@ fn play(
     let result = serde_json::json!({
         "file": path, "changed": banner, "scenario": scenario.name, "ads": other.as_deref().unwrap_or(ads.name()),
         "claims": claims, "end": log.end.name(), "collisions": log.collisions.len(), "counted": counted, "judgements": judgements,
-        "reproducible": doubts.is_empty(), "failure": log.failure.as_ref().map(|failure| failure.in_words()),
+        "reproducible": doubted.is_none(), "failure": log.failure.as_ref().map(|failure| failure.in_words()),
         "held": log.held.iter().map(|held| serde_json::json!({ "from_s": held.from_s, "by": held.text() })).collect::<Vec<_>>(),
         "severities": severities, "priorities": priorities, "criticality": criticality, "pet_s": pet_s,
     });

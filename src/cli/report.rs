@@ -5,10 +5,9 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use avastra_campaign::run::{Asked, Database, DatabaseError, Units};
+use avastra_campaign::run::{Asked, Database, DatabaseError, Units, recorded};
 use avastra_campaign::study::StudyResults;
-use avastra_exchange::report;
-use avastra_exchange::report::{Page, Scene, record, record_another};
+use avastra_exchange::report::{self, Page, Scene, record, record_another};
 use avastra_lang::check::normal;
 use avastra_world::action::ActionTable;
 
@@ -33,7 +32,7 @@ const FOLDERS: [&str; 3] = ["critical", "failures", shrink::FOLDER];
 pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failure> {
     let path = arguments.output.clone().unwrap_or_else(|| default_path(&arguments.paths));
     must_end_in(&path, "html")?;
-    let asked = compared(arguments)?;
+    let asked = arguments.ads.as_deref().map(|text| load::asked(Some(text))).transpose()?;
     let is_folder = matches!(arguments.paths.as_slice(), [directory] if directory.is_dir());
     let found = match arguments.paths.as_slice() {
         [directory] if directory.is_dir() => of_directory(output, directory)?,
@@ -94,8 +93,7 @@ pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failur
     let changes = changes(&scenes);
     let (scenarios, title) = (scenes.len(), found.title.clone());
     let compared_with = arguments.ads.clone();
-    let page = Page { title, overview: found.overview, remarks, scenes, compared_with };
-    let html = page.html();
+    let html = Page { title, overview: found.overview, remarks, scenes, compared_with }.html();
     write_result(arguments.output.as_ref(), &path, &html)?;
     output.say(&format!(
         "{}: {}, {:.1} MB; open it with a browser",
@@ -259,15 +257,10 @@ fn chosen(found: &Found, most: usize) -> (Vec<PathBuf>, usize) {
     (files, left_out)
 }
 
-/// The driving system to compare with, if one is asked for: a profile by its file, or a driver by its name.
-fn compared(arguments: &ReportArguments) -> Result<Option<Asked>, Failure> {
-    arguments.ads.as_deref().map(|text| load::asked(Some(text))).transpose()
-}
-
 fn scene(output: &Output, file: &Path, compared: Option<&Asked>) -> Result<Scene, Failure> {
     let Looked { table, scenario, changed } = look::scenario(output, file)?;
     let source = load::text(file)?;
-    let (ads, _) = Asked::default().selected_for(&scenario)?;
+    let ads = recorded(&scenario)?;
     let recording = record(&table, &scenario, &ads, &source)?;
     let another = |asked: &Asked| {
         let (other, _) = asked.selected_for(&scenario)?;

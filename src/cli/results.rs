@@ -3,8 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use avastra_campaign::study::Played;
-use avastra_exchange::report;
-use avastra_exchange::report::Chapter;
+use avastra_exchange::report::{self, Chapter};
 
 use super::arguments::ResultsArguments;
 use super::error::Failure;
@@ -58,10 +57,7 @@ pub fn results(output: &Output, arguments: &ResultsArguments) -> Result<(), Fail
 
 /// The studies of a folder, in the order of their names, with what is kept of playing them.
 fn chapters(output: &Output, folder: &Path) -> Result<Vec<Chapter>, Failure> {
-    let entries = std::fs::read_dir(folder).map_err(|error| Failure::file("read", folder, error))?;
-    let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    files.retain(|file| file.extension().is_some_and(|extension| extension == "yaml"));
-    files.sort();
+    let files = load::files_in(folder, "yaml").map_err(|error| Failure::file("read", folder, error))?;
     if files.is_empty() {
         return Err(Failure::file("use", folder, "it has no study (`*.yaml`)"));
     }

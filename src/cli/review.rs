@@ -7,11 +7,10 @@ use std::ops::Range;
 
 use avastra_campaign::emit;
 use avastra_campaign::episode::{EpisodeLog, Outcome};
-use avastra_campaign::oracle;
-use avastra_campaign::oracle::ClaimResult;
+use avastra_campaign::oracle::{self, ClaimResult};
 use avastra_campaign::run::{Asked, EpisodeSummary, RunError, Stage, recorded_traffic};
 use avastra_lang::model::{Avoidability, Claim, Scenario};
-use avastra_lang::syntax::ast::{self, ClauseKind, Doc, Expect, ExprKind, FileId, ItemKind, Span};
+use avastra_lang::syntax::ast::{self, ClauseKind, Doc, Expect, ExprKind, FileId, Span};
 use avastra_world::action::ActionTable;
 use avastra_world::sim::ENGINE;
 
@@ -124,8 +123,7 @@ pub fn review(
     if claims(|claim| matches!(claim, Claim::Minimal { .. })) {
         let judgements: Vec<_> = summary.collisions.iter().map(|found| found.judgement.clone()).collect();
         for found in summary.collisions.iter_mut().filter(|found| found.counted) {
-            let spare = oracle::spare_steps(&setup, &log, found.number, &judgements);
-            found.minimal = spare.is_empty();
+            found.minimal = oracle::spare_steps(&setup, &log, found.number, &judgements).is_empty();
         }
     }
     let source = emit::Provenance {
@@ -339,10 +337,7 @@ fn parsed(text: &str) -> ast::File {
 }
 
 fn scenario_of(file: &ast::File) -> Option<(&ast::Scenario, &[Doc])> {
-    file.items.iter().find_map(|item| match &item.kind {
-        ItemKind::Scenario(scenario) => Some((scenario, item.docs.as_slice())),
-        _ => None,
-    })
+    file.items.iter().find_map(|item| Some((item.kind.as_scenario()?, item.docs.as_slice())))
 }
 
 #[cfg(test)]
@@ -396,18 +391,6 @@ scenario s {
   expect trace == \"sha256:0\"
 }
 ";
-
-    #[test]
-    fn claims_that_hold_and_comments_stay() {
-        // Of the same crash at another time, only that goes in; what the author took out stays out.
-        let new = NEW.replace("npc#2", "npc#1").replace("unavoidable", "avoidable by [cc]");
-        let now = rewritten(OLD, &new, &[true, false, false, false, false]);
-        let wanted = OLD
-            .replace("3.00 s", "4.00 s")
-            .replace("Sedan npc#1 (DriveAhead) is hit at 3.0", "SUV npc#1 (Stand) is hit at 4.0");
-        assert_eq!(now, wanted);
-        assert_eq!(rewritten(OLD, &new, &[false; 5]), OLD);
-    }
 
     #[test]
     fn claims_about_another_crash_take_the_place_of_those_about_the_one() {

@@ -15,8 +15,7 @@ use super::arguments::RoadArguments;
 use super::error::Failure;
 use super::files::write_named;
 use super::load;
-use super::output::Output;
-use super::output::plural;
+use super::output::{Output, plural};
 
 /// Distance between two printed poses of a lane, m.
 const SPACING_M: f64 = 1.0;

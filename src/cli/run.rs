@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::Instant;
 
 use avastra_campaign::emit;
 use avastra_campaign::episode::EpisodeLog;
@@ -16,18 +15,18 @@ use avastra_lang::model::Policy;
 use avastra_search::agent::Face;
 use avastra_world::action::ActionTable;
 
-use super::arguments::{FaceArgument, RunArguments};
+use super::arguments::RunArguments;
 use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, settled};
 use super::error::Failure;
 use super::files::write_answers;
-use super::findings::{cut_off, doubts, failures_text};
+use super::findings::{cut_off, failures_text, is_reproducible};
 use super::interrupt::stop_on_interrupt;
 use super::never::Never;
-use super::output::Output;
-use super::output::plural;
+use super::output::{Output, plural};
 use super::pack::pack_space;
 use super::parallel::jobs;
 use super::policy::acting;
+use super::progress::now;
 use super::run_directory::{Player, Resumed, RunDirectory};
 use super::{compile, conditions, load, merge, run_directory, shard};
 
@@ -39,10 +38,7 @@ impl Campaign for RunSettings {
         what: "run",
         command: "run",
         file: "run",
-        is_in: |directory| {
-            run_directory::fields_of(directory, "run")
-                .is_some_and(|fields| !fields.contains_key("hyperparameters"))
-        },
+        is_in: |directory| run_directory::is_training(directory) == Some(false),
         merge: Some(merge::merged::<RunSettings>),
     };
     type Database = Database;
@@ -118,8 +114,7 @@ fn play_all(
     }
 
     let stop = stop_on_interrupt();
-    #[allow(clippy::disallowed_methods, reason = "this is cli, and the time goes nowhere but the summary")]
-    let started = Instant::now();
+    let started = now();
     let jobs = jobs(asked_jobs, run.program())?;
     let mut progress = share.progress(output, "counted", &todo);
     let mut driven: Option<(usize, Arc<Conversation>)> = None;
@@ -152,8 +147,7 @@ fn play_all(
     if !groups.is_empty() {
         output.say(&groups_text(&groups));
     }
-    let rows = directory.database.rows().map_err(unread)?;
-    let never = Never::new(run.table(), &rows);
+    let never = Never::new(run.table(), &directory.database.rows().map_err(unread)?);
     output.say(&never.in_words(output.verbose));
     let critical = load::sources_in(&directory.path.join("critical"))?;
     output.say(&critical_text(&directory.path, &critical));
@@ -168,12 +162,11 @@ fn play_all(
     {
         program.spot_check(&first, || run.episode(number).conversation);
     }
-    let doubts = doubts(run.program());
-    doubts.iter().for_each(|doubt| output.warn(doubt));
+    let is_reproducible = is_reproducible(output, run.program());
     cut_off(run.program()).iter().for_each(|note| output.warn(note));
     output.result(serde_json::json!({
         "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups, "never": never,
-        "critical": critical, "failures": failures, "reproducible": doubts.is_empty(),
+        "critical": critical, "failures": failures, "reproducible": is_reproducible,
     }));
     share.end::<RunSettings>(output, directory.path, is_over, run.program())?;
     Ok(totals)
@@ -202,12 +195,8 @@ fn wanted(output: &Output, arguments: &RunArguments) -> Result<Wanted, Failure> 
     let settings = conditions::settings(space, &arguments.conditions, agent, under_test, arguments.episodes)?;
     let settings = RunSettings { causes: arguments.causes, ..settings };
     let settings = if arguments.shard.dry_run { settings.unstarted() } else { settings };
-    let face = match arguments.face {
-        FaceArgument::Network => Face::Network,
-        FaceArgument::Rules => Face::Rules,
-    };
-    let run = ready(table, settings, policy.as_ref(), face)?;
-    Ok(Wanted { run, policy, face, shard })
+    let run = ready(table, settings, policy.as_ref(), arguments.face)?;
+    Ok(Wanted { run, policy, face: arguments.face, shard })
 }
 
 /// A new run in a directory of its own.

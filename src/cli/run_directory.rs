@@ -16,14 +16,13 @@ use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::files;
 use avastra_campaign::run::{Database, EpisodeSummary, Units, VERSION, WrittenScenario};
 use avastra_drivers::external::{Attached, ExternalSettings};
-use avastra_lang::check::normal;
 use avastra_lang::syntax::{ast, print};
 use avastra_world::action::ActionTable;
 use avastra_world::sim::ENGINE;
 
 use super::campaign::{Campaign, KINDS, Kind};
 use super::error::Failure;
-use super::files::{folder, make, write, write_answers};
+use super::files::{folder, make, make_first, write, write_answers};
 use super::load;
 use super::output::{Output, plural};
 use super::{pack, shard};
@@ -49,7 +48,10 @@ pub struct RunDirectory {
 pub fn create_empty(out: Option<&Path>) -> Result<Held, Failure> {
     match out {
         Some(path) => make_empty(path),
-        None => hold(&next_free(Path::new("runs"))?),
+        None => {
+            let runs = folder(Path::new(""), "runs")?;
+            hold(&make_first(|number| runs.join(format!("{number:04}")))?)
+        }
     }
 }
 
@@ -105,12 +107,8 @@ pub fn to_record(directory: &Path, attached: Attached) -> Result<Attached, Failu
 /// # Errors
 /// If this process has no folder that it works in.
 pub fn to_record_absent(directory: &Path, attached: Attached) -> Result<Attached, Failure> {
-    let absolute = |path: &Path| {
-        let found = std::path::absolute(path).map_err(|error| Failure::file("find", path, error));
-        found.map(|path| normal(&path))
-    };
     let folder = attached.settings.working_directory.as_deref().unwrap_or(Path::new("."));
-    let between = load::path_between(&absolute(directory)?, &absolute(folder)?)?;
+    let between = load::path_between(&pack::absolute(directory)?, &pack::absolute(folder)?)?;
     let working_directory = Some(PathBuf::from(between));
     Ok(Attached { settings: ExternalSettings { working_directory, ..attached.settings }, ..attached })
 }
@@ -242,8 +240,7 @@ pub fn settings_of<C: Campaign>(directory: &Path) -> Result<(C, String), Failure
             begun.engine
         )));
     }
-    let settings = load::parsed(&path, &text)?;
-    Ok((settings, text))
+    Ok((load::parsed(&path, &text)?, text))
 }
 
 /// What a directory holds, if anything.
@@ -251,9 +248,11 @@ pub fn what_was_begun(directory: &Path) -> Option<Kind> {
     KINDS.into_iter().find(|kind| (kind.is_in)(directory))
 }
 
-/// The fields in the settings of a directory; `None` if they cannot be read.
-pub fn fields_of(directory: &Path, file: &str) -> Option<serde_json::Map<String, serde_json::Value>> {
-    serde_yaml::from_str(&load::read(&directory.join(format!("{file}.yaml"))).ok()?).ok()
+/// Whether the settings in `run.yaml` are those of a training; `None` if they cannot be read.
+pub fn is_training(directory: &Path) -> Option<bool> {
+    let text = load::read(&directory.join("run.yaml")).ok()?;
+    let fields: serde_json::Map<String, serde_json::Value> = serde_yaml::from_str(&text).ok()?;
+    Some(fields.contains_key("hyperparameters"))
 }
 
 /// A scenario of a directory: its file, and its text from the database.
@@ -475,18 +474,4 @@ pub fn is_unbegun(path: &Path) -> std::io::Result<bool> {
         }
     }
     Ok(true)
-}
-
-/// Makes the first directory `NNNN` that does not exist yet.
-fn next_free(runs: &Path) -> Result<PathBuf, Failure> {
-    let runs = folder(Path::new(""), runs)?;
-    for number in 1.. {
-        let path = runs.join(format!("{number:04}"));
-        match files::make_new(&path) {
-            Ok(()) => return Ok(path),
-            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
-            Err(error) => return Err(Failure::file("create", &path, error)),
-        }
-    }
-    unreachable!("there is always a next number")
 }

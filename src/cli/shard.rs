@@ -44,17 +44,13 @@ pub fn asked(output: &Output, argument: Option<Shard>) -> Result<Shard, Failure>
 pub fn keep(directory: &Path, shard: Shard) -> Result<(), Failure> {
     let file = directory.join(FILE);
     if !shard.is_whole() {
-        let text = serde_yaml::to_string(&shard).expect("a shard is two numbers");
-        return write(&file, &text);
+        return write(&file, &serde_yaml::to_string(&shard).expect("a shard is two numbers"));
     }
     // A kill may have left the one of a shard that was never begun.
     remove(&file)
 }
 
 /// The shard that a directory holds.
-///
-/// # Errors
-/// If its file cannot be read.
 pub fn kept(directory: &Path) -> Result<Shard, Failure> {
     let file = directory.join(FILE);
     if !file.exists() {

@@ -5,19 +5,17 @@ use std::path::{Path, PathBuf};
 use avastra_campaign::emit;
 use avastra_campaign::episode::{Outcome, Script, Setup};
 use avastra_campaign::oracle;
-use avastra_campaign::run;
-use avastra_campaign::run::{Asked, EpisodeSummary, Stage};
+use avastra_campaign::run::{self, Asked, EpisodeSummary, Stage};
 use avastra_drivers::Selected;
 use avastra_lang::model::Claim;
 
 use super::arguments::ShrinkArguments;
 use super::error::Failure;
 use super::files::{folder, make, write_answers, write_result};
-use super::findings::{doubts, spot_check};
+use super::findings::{is_reproducible, spot_check};
 use super::load;
 use super::look;
-use super::output::Output;
-use super::output::plural;
+use super::output::{Output, plural};
 use super::parallel::each_file;
 use super::replay::refutation;
 
@@ -65,13 +63,12 @@ pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failur
         ));
     }
     spot_check(asked.external.as_ref(), done.iter().map(|small| small.path.as_path()));
-    let doubts = doubts(asked.external.as_ref());
-    doubts.iter().for_each(|doubt| output.warn(doubt));
+    let is_reproducible = is_reproducible(output, asked.external.as_ref());
     output.result(serde_json::json!({
         "median_steps_before": before.0, "median_actions_before": before.1,
         "median_steps": after.0, "median_actions": after.1, "kept": kept,
         "scenarios": done.iter().map(Small::in_json).collect::<Vec<_>>(),
-        "reproducible": doubts.is_empty(), "failed": shrunk.failed_in_json(),
+        "reproducible": is_reproducible, "failed": shrunk.failed_in_json(),
     }));
     let refuted = done.iter().map(|small| small.refuted).sum();
     shrunk.complete("shrunk")?;

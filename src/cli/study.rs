@@ -1,6 +1,7 @@
 //! `avastra study`: agents compared, with statistics.
 
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 use std::time::Instant;
 
 use avastra_campaign::run::{DatabaseError, Numbered, RunError, TrafficRecord};
@@ -19,9 +20,9 @@ use super::error::Failure;
 use super::files::{remove, write};
 use super::findings::kinds_text;
 use super::interrupt::stop_on_interrupt;
-use super::output::Output;
-use super::output::plural;
+use super::output::{Output, plural};
 use super::parallel::jobs;
+use super::progress::now;
 use super::run_directory::{Held, Resumed};
 use super::timing::Times;
 use super::{load, merge, results, run_directory, shard};
@@ -313,8 +314,7 @@ pub fn wanted(
 /// The rest of an interrupted study, with the text of its settings. With `is_played`, nothing of it is left to play, and no
 /// program is started.
 fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Study, Held, String), Failure> {
-    let resumed = run_directory::resume::<StudySettings>(output, path, is_played)?;
-    let Resumed { settings, text, table, held } = resumed;
+    let Resumed { settings, text, table, held } = run_directory::resume(output, path, is_played)?;
     let study = Study::new(table, settings).map_err(|error| match error {
         StudyError::Agent { error: error @ RunError::OtherProgram { .. }, .. } => error.into(),
         error => Failure::usage(error),
@@ -339,19 +339,14 @@ fn heading(study: &Study) -> String {
 
 /// Time that the calling thread has spent so far.
 fn spent() -> Spent {
-    #[allow(
-        clippy::disallowed_methods,
-        reason = "this is cli, and the time goes nowhere but beside the result"
-    )]
-    let now = Instant::now();
+    let now = now();
     // On Linux, the first word of this file is the thread's time on a processor, ns.
     let schedule = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let on_cpu_ns = schedule.and_then(|text| text.split(' ').next()?.parse::<f64>().ok());
     Spent { wall_s: now.duration_since(*BEGAN).as_secs_f64(), cpu_s: on_cpu_ns.map(|ns| ns / 1e9) }
 }
 
-#[allow(clippy::disallowed_methods, reason = "as above")]
-static BEGAN: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
+static BEGAN: LazyLock<Instant> = LazyLock::new(now);
 
 /// Mean times of an agent's cells.
 #[derive(serde::Serialize)]

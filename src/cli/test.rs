@@ -1,31 +1,26 @@
 //! `avastra test`: emitted scenarios as a regression suite for a driving system.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use avastra_campaign::files;
-use avastra_campaign::oracle;
-use avastra_campaign::oracle::Regression;
-use avastra_campaign::run;
-use avastra_campaign::run::{Asked, RunError, Stage};
+use avastra_campaign::oracle::{self, Regression};
+use avastra_campaign::run::{self, Asked, RunError, Stage};
 use avastra_drivers::external::{Failure as AdsFailure, FailureKind};
 use avastra_lang::check::{Loaded, normal};
 use avastra_lang::model::{Claim, Scenario};
 use avastra_lang::syntax::ast::FileId;
-use avastra_lang::syntax::{Diagnostic, Sources, apply_fixes};
+use avastra_lang::syntax::{Diagnostic, Sources};
 use avastra_world::action::ActionTable;
 
 use super::arguments::{FilesArguments, TestArguments};
 use super::error::Failure;
 use super::files::{write, write_answers, write_named};
-use super::findings::{doubts, spot_check};
-use super::load;
-use super::load::Emitted;
-use super::look::{is_outdated, meaning_text};
-use super::output::Output;
-use super::output::plural;
+use super::findings::{is_reproducible, spot_check};
+use super::load::{self, Emitted};
+use super::look::{as_it_is_now, is_outdated, meaning_text};
+use super::output::{Output, plural};
 use super::parallel::each_file_in_turn;
+use super::progress::now;
 use super::review::{Change, Review, review};
 
 /// The result for one scenario.
@@ -81,15 +76,10 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
         }
         write_named(path, &junit(&named, &cases))?;
     }
-    let count = |is: &dyn Fn(&Outcome) -> bool| cases.iter().filter(|case| is(&case.outcome)).count();
-    let fails = count(&|outcome| {
-        matches!(outcome, Outcome::Played(Regression::StillFails { .. } | Regression::FailsAgain(_)))
-    });
-    let fixed = count(&|outcome| matches!(outcome, Outcome::Played(Regression::Fixed)));
-    let changed = count(&Outcome::is_changed);
-    let ads_failed = count(&|outcome| matches!(outcome, Outcome::Played(Regression::AdsFailed(_))));
-    let errors = count(&|outcome| matches!(outcome, Outcome::NotPlayed { .. }));
-    let in_source = count(&|outcome| matches!(outcome, Outcome::NotPlayed { in_source: true, .. }));
+    let count = |word: &str| cases.iter().filter(|case| case.outcome.in_words().0 == word).count();
+    let (fails, fixed, ads_failed, errors) =
+        (count("still fails"), count("fixed"), count("ads failed"), count("error"));
+    let changed = count("changed") + count("gone");
     if arguments.accept {
         output.say(&format!("{} written anew", plural(accepted, "scenario")));
     }
@@ -102,8 +92,7 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
             if !matches!(found, Regression::AdsFailed(_) | Regression::FailsAgain(_)))
     });
     spot_check(suite.asked.external.as_ref(), driven.map(|case| case.file.as_path()));
-    let doubts = doubts(suite.asked.external.as_ref());
-    doubts.iter().for_each(|doubt| output.warn(doubt));
+    let is_reproducible = is_reproducible(output, suite.asked.external.as_ref());
     if ads_failed > 0 {
         output.say(&format!("in {ads_failed} more the driving system itself failed"));
     }
@@ -116,14 +105,17 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
         })
         .collect();
     output.result(
-        serde_json::json!({ "still_fails": fails, "fixed": fixed, "changed": changed, "errors": errors, "ads_failed": ads_failed, "reproducible": doubts.is_empty(),
+        serde_json::json!({ "still_fails": fails, "fixed": fixed, "changed": changed, "errors": errors, "ads_failed": ads_failed, "reproducible": is_reproducible,
                                       "accepted": accepted, "reviewed": reviewed, "scenarios": listed }),
     );
-    let failing = count(&Outcome::is_failure);
     if errors > 0 {
-        return Err(Failure::NotPlayed { scenarios: errors, in_source: in_source > 0 });
+        let in_source = |case: &Case| matches!(case.outcome, Outcome::NotPlayed { in_source: true, .. });
+        return Err(Failure::NotPlayed { scenarios: errors, in_source: cases.iter().any(in_source) });
     }
-    if failing > 0 { Err(Failure::Failing { scenarios: failing }) } else { Ok(()) }
+    match cases.iter().filter(|case| case.outcome.is_failure()).count() {
+        0 => Ok(()),
+        scenarios => Err(Failure::Failing { scenarios }),
+    }
 }
 
 /// Prints what came of a file.
@@ -195,8 +187,7 @@ impl Notes {
 impl Suite<'_> {
     /// Plays one file; `None` if it holds no scenario.
     fn play(&self, file: &Path) -> Option<(Case, Notes)> {
-        #[allow(clippy::disallowed_methods, reason = "this is cli, and the time goes nowhere but the report")]
-        let started = Instant::now();
+        let started = now();
         let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let mut notes = Notes::default();
         let (scenario, road, outcome) = match self.open(file, &mut notes) {
@@ -239,19 +230,14 @@ impl Suite<'_> {
         loaded: &Loaded,
         notes: &mut Notes,
     ) -> Result<(Emitted, Option<Outcome>), Failure> {
-        let root = FileId::default();
-        let (before, mut spaces) = (loaded.sources.text(root), Vec::new());
-        let text = match is_outdated(loaded) {
-            false => before.to_owned(),
+        let (before, mut spaces) = (loaded.sources.text(FileId::default()), Vec::new());
+        let (text, checked) = match is_outdated(loaded) {
+            false => (before.to_owned(), load::check_text(file, before)?),
             true => {
                 spaces.push(meaning_text(loaded));
-                apply_fixes(root, before, &loaded.diagnostics).0
+                as_it_is_now(file, loaded)?
             }
         };
-        let mut checked = load::check_text(file, &text)?;
-        for mistake in checked.diagnostics.iter_mut().filter(|_| !spaces.is_empty()) {
-            mistake.notes.push("the space has changed since the scenario was written".to_owned());
-        }
         let emitted = notes.emitted(file, checked)?;
         let Emitted::Scenario(table, scenario) = &emitted else { return Ok((emitted, None)) };
         let Review { change, mut differences, illegal, now } = review(table, scenario, &self.asked, &text)?;
@@ -368,10 +354,6 @@ impl Outcome {
         matches!(self, Outcome::Played(Regression::NeverMet) | Outcome::Allowed(_) | Outcome::Gone(_))
     }
 
-    fn is_changed(&self) -> bool {
-        self.is_skipped() || matches!(self, Outcome::Played(found) if found.is_other_crash())
-    }
-
     /// One of six words, and why.
     fn in_words(&self) -> (&'static str, String) {
         let (found, more) = match self {
@@ -434,14 +416,12 @@ fn junit(suite: &str, cases: &[Case]) -> String {
         } else {
             format!("{} ({})", case.scenario, case.file.display())
         };
-        writeln!(
-            text,
-            "    <testcase classname=\"{}\" name=\"{}\" time=\"{:.3}\">{inside}</testcase>",
+        text.push_str(&format!(
+            "    <testcase classname=\"{}\" name=\"{}\" time=\"{:.3}\">{inside}</testcase>\n",
             escaped(&case.road),
             escaped(&name),
             case.elapsed_s
-        )
-        .expect("a string takes everything");
+        ));
     }
     text.push_str("  </testsuite>\n</testsuites>\n");
     text

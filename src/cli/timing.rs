@@ -2,7 +2,7 @@
 //! `study.db`: two machines agree on everything else.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use avastra_campaign::study::{CellRecord, Spent};
 
@@ -30,9 +30,6 @@ struct Line {
 
 impl Times {
     /// Those that a directory of a study has.
-    ///
-    /// # Errors
-    /// If a file cannot be read.
     pub fn read(directory: &Path) -> Result<Times, Failure> {
         let mut times = Times::default();
         let file = directory.join(FILE);
@@ -64,8 +61,7 @@ impl Times {
             let line = Line { agent: agent.clone(), road: road.clone(), number: *number, spent: *spent };
             serde_json::to_string(&line).expect("it has string keys only") + "\n"
         };
-        let file: PathBuf = directory.join(FILE);
-        write(&file, &self.of_cells.iter().map(line).collect::<String>())
+        write(&directory.join(FILE), &self.of_cells.iter().map(line).collect::<String>())
     }
 
     /// The cells with their times.

@@ -10,8 +10,7 @@ use avastra_drivers::external::Attached;
 use avastra_lang::model::policy::{PolicyClaims, PolicyOrigin};
 use avastra_lang::model::{Policy, Space, digest_text};
 use avastra_lang::syntax::listed;
-use avastra_search::agent;
-use avastra_search::agent::{Kind, QPolicy, Settings};
+use avastra_search::agent::{self, Kind, QPolicy, Settings};
 use avastra_world::action::Draw;
 
 use super::arguments::TrainArguments;
@@ -19,14 +18,12 @@ use super::campaign::{self, Campaign, Outside, as_they_are};
 use super::conditions::roads_or_all;
 use super::error::Failure;
 use super::files::{folder, write};
-use super::findings::{cut_off, doubts, failures_text, kinds_text, unfinished};
+use super::findings::{cut_off, failures_text, is_reproducible, kinds_text, unfinished};
 use super::interrupt::stop_on_interrupt;
 use super::load::UnderTest;
-use super::output::Output;
-use super::output::plural;
+use super::output::{Output, plural};
 use super::pack::pack_space;
-use super::policy::distil;
-use super::policy::distil::rules_text;
+use super::policy::distil::{self, rules_text};
 use super::progress::{TrainingProgress, Working};
 use super::run::groups_text;
 use super::run_directory::{Player, Resumed, RunDirectory};
@@ -42,10 +39,7 @@ impl Campaign for TrainSettings {
         what: "training",
         command: "train",
         file: "run",
-        is_in: |directory| {
-            run_directory::fields_of(directory, "run")
-                .is_some_and(|fields| fields.contains_key("hyperparameters"))
-        },
+        is_in: |directory| run_directory::is_training(directory) == Some(true),
         // Each episode is chosen with what was learned before.
         merge: None,
     };
@@ -141,8 +135,7 @@ fn settings(arguments: &TrainArguments) -> Result<Settings, Failure> {
 
 /// The rest of an interrupted training.
 fn resumed(output: &Output, path: &Path) -> Result<(Training, RunDirectory), Failure> {
-    let resumed = run_directory::resume::<TrainSettings>(output, path, false)?;
-    let Resumed { settings, text, table, held } = resumed;
+    let Resumed { settings, text, table, held } = run_directory::resume(output, path, false)?;
     let mut directory = RunDirectory::open(held, &text)?;
     let checkpoint =
         directory.database.return_to_checkpoint().map_err(|error| Failure::file("resume", path, error))?;
@@ -250,8 +243,7 @@ fn finish(output: &Output, training: &Training, mut directory: RunDirectory) -> 
             plural(all, "episode"),
         ));
     }
-    let doubts = doubts(training.arena().program());
-    doubts.iter().for_each(|doubt| output.warn(doubt));
+    let is_reproducible = is_reproducible(output, training.arena().program());
     cut_off(training.arena().program()).iter().for_each(|note| output.warn(note));
     let evaluation = serde_json::json!({
         "episodes": played(settings, &evaluation), "collisions": evaluation.collisions,
@@ -269,7 +261,7 @@ fn finish(output: &Output, training: &Training, mut directory: RunDirectory) -> 
     directory.database = directory.database.settle(&file, &units).map_err(unwritten)?;
     write(&directory.path.join("results.json"), &format!("{text}\n"))?;
     output.result(serde_json::json!({
-        "reproducible": doubts.is_empty(),
+        "reproducible": is_reproducible,
         "directory": directory.path, "totals": totals, "groups": groups, "policy": kept.as_ref().map(|(path, _)| path),
         "rules": rules, "simulated_h": simulated_h, "failures": failures, "evaluation": evaluation,
     }));
@@ -309,6 +301,8 @@ fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Pol
     let network = acting.network();
     let attached = training.arena().attached();
     let attached = attached.as_ref();
+    let profile = settings.profile.as_ref();
+    let (line, digest) = profile.map(|profile| (profile.settings.to_line(), profile.digest.clone())).unzip();
     let policy = Policy {
         name,
         docs: vec![headline(settings, evaluation)],
@@ -318,17 +312,8 @@ fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Pol
             episodes: u64::from(settings.episodes),
             roads: settings.roads.clone(),
             ads: settings.ads.clone(),
-            profile: settings
-                .profile
-                .as_ref()
-                .map(|profile| profile.settings.to_line())
-                .filter(|line| !line.is_empty())
-                .or_else(|| attached.map(Attached::to_line)),
-            profile_digest: settings
-                .profile
-                .as_ref()
-                .map(|profile| profile.digest.clone())
-                .or_else(|| attached.map(Attached::digest)),
+            profile: line.filter(|line| !line.is_empty()).or_else(|| attached.map(Attached::to_line)),
+            profile_digest: digest.or_else(|| attached.map(Attached::digest)),
             engine: settings.engine.clone(),
             avastra: settings.avastra.clone(),
             with: settings.with.clone(),

@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use avastra_campaign::emit;
-use avastra_campaign::emit::Provenance;
+use avastra_campaign::emit::{self, Provenance};
 use avastra_campaign::run::{Arena, DEFAULT_ADS, driving_system};
 use avastra_campaign::trial::{Cell, TrialSettings, Trials};
 use avastra_exchange::report;
@@ -15,8 +14,7 @@ use super::compile::TableResult;
 use super::conditions::roads_or_all;
 use super::error::Failure;
 use super::files::{make, write};
-use super::load;
-use super::load::Driver;
+use super::load::{self, Driver};
 use super::output::Output;
 use super::progress::Pieces;
 
@@ -52,8 +50,7 @@ pub fn trials(output: &Output, arguments: &TableArguments, table: ActionTable) -
     }
     output.say(report::trials(&cells).trim_end());
     output.tell("each row was tried alone: the roads held no other traffic");
-    let table = arena.table().file();
-    output.result(TableResult { table, trials: Some(settings), cells: Some(cells) });
+    output.result(TableResult { table: arena.table().file(), trials: Some(settings), cells: Some(cells) });
     Ok(())
 }
 

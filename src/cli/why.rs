@@ -7,7 +7,7 @@ use avastra_campaign::emit;
 use avastra_campaign::run::road_named;
 use avastra_lang::check::state_argument::legal_memory_from;
 use avastra_lang::model::{Memory, RuleBody, RulesInForce, Space, StateDef};
-use avastra_world::action::{ActionTable, Offer, Situation};
+use avastra_world::action::{ActionTable, Offer, Refusal, Situation};
 use avastra_world::sim::{Scene, Start, World};
 
 use super::arguments::TableArguments;
@@ -63,21 +63,17 @@ pub fn why(
         };
         output.say(&format!("  bound by {}{state}", space.rules[rule].name));
     }
-    let verdict = match &offer {
-        Offer::Legal(draw) => format!("legal, for example {}", emit::action_text(table, draw)),
-        Offer::Refused(refusal) => match &refusal.rule {
-            Some(rule) => format!("not legal: rule `{rule}` says no: {}", refusal.reason),
-            None => format!("not legal: {}", refusal.reason),
-        },
+    let (verdict, rule, reason) = match offer {
+        Offer::Legal(draw) => (format!("legal, for example {}", emit::action_text(table, &draw)), None, None),
+        Offer::Refused(Refusal { rule, reason }) => {
+            let by = rule.as_ref().map_or(String::new(), |rule| format!("rule `{rule}` says no: "));
+            (format!("not legal: {by}{reason}"), rule, Some(reason))
+        }
     };
     output.say(&format!("at the start of the road, {verdict}"));
-    let (legal, rule, reason) = match offer {
-        Offer::Legal(_) => (true, None, None),
-        Offer::Refused(refusal) => (false, refusal.rule, Some(refusal.reason)),
-    };
     output.result(serde_json::json!({ "row": row.index, "label": row.label, "road": road.name,
                             "states": states.into_iter().collect::<BTreeMap<_, _>>(),
-                            "legal": legal, "rule": rule, "reason": reason }));
+                            "legal": reason.is_none(), "rule": rule, "reason": reason }));
     Ok(())
 }
 
@@ -85,12 +81,15 @@ pub fn why(
 fn shown(space: &Space, state: &StateDef, memory: &Memory) -> String {
     let cells = &memory.cells()[state.first_cell..][..state.cells];
     let values: Vec<String> = cells.iter().map(|value| space.show(*value, state.ty)).collect();
-    match state.key {
-        Some(of) if values.iter().any(|value| *value != values[0]) => {
-            let keys = space.enums[of.0].variants.iter().zip(&values);
-            let entries: Vec<String> = keys.map(|(key, value)| format!("{key}: {value}")).collect();
-            format!("{{ {} }}", entries.join(", "))
-        }
-        _ => values.first().cloned().unwrap_or_default(),
+    match by_key(space, state, &values) {
+        Some(entries) => format!("{{ {entries} }}"),
+        None => values.first().cloned().unwrap_or_default(),
     }
+}
+
+/// The values of a state with their keys: `Rain: High, Fog: None`; `None` if it has no keys, or one value at all of them.
+pub fn by_key(space: &Space, state: &StateDef, values: &[String]) -> Option<String> {
+    let keys = space.enums[state.key?.0].variants.iter().zip(values);
+    let entries: Vec<String> = keys.map(|(key, value)| format!("{key}: {value}")).collect();
+    values.iter().any(|value| *value != values[0]).then(|| entries.join(", "))
 }

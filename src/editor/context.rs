@@ -13,8 +13,7 @@ use avastra_lang::syntax::ast::{
 };
 use avastra_lang::syntax::{HERE, Unfinished, unfinished};
 
-use super::words;
-use super::words::Entry;
+use super::words::{self, Entry};
 
 /// A kind of thing that can be written at a place.
 #[derive(Debug, Clone, PartialEq)]
@@ -218,11 +217,7 @@ impl<'a> Place<'a> {
 
     fn in_state(&self, state: &State) -> Option<Vec<Kind>> {
         let ty = self.written_type(&state.ty);
-        let any = Kind::Keyword("any");
-        let initial = |value: &Expr| {
-            let kinds = self.within(value, ty, ty)?;
-            Some(if is_named_here(value) { [vec![any.clone()], kinds].concat() } else { kinds })
-        };
+        let initial = |value: &Expr| self.word_or_value(Kind::Keyword("any"), value, ty);
         self.in_type(&state.ty).or_else(|| match &state.initial {
             Initial::Any => None,
             Initial::Value(value) => initial(value),
@@ -256,10 +251,7 @@ impl<'a> Place<'a> {
             EffectKind::Spawn { body, distance, cover, fields, .. } => {
                 let mut bodies = [Some(body), cover.as_ref()].into_iter().flatten();
                 bodies
-                    .find_map(|body| {
-                        let kinds = self.within(body, None, None)?;
-                        Some(if is_named_here(body) { [vec![Kind::Bodies], kinds].concat() } else { kinds })
-                    })
+                    .find_map(|body| self.word_or_value(Kind::Bodies, body, None))
                     .or_else(|| self.within(distance, None, None))
                     .or_else(|| self.in_spawn(fields))
             }
@@ -271,9 +263,8 @@ impl<'a> Place<'a> {
             if is_here(&field.name) {
                 return Some(unused::<SpawnField>(fields));
             }
-            let kinds = self.within(&field.value, None, None)?;
             let words = Kind::Words(words::engine_words(&field.name.text));
-            Some(if is_named_here(&field.value) { [vec![words], kinds].concat() } else { kinds })
+            self.word_or_value(words, &field.value, None)
         })
     }
 
@@ -381,6 +372,12 @@ impl<'a> Place<'a> {
                 })
             })
         })
+    }
+
+    /// Within a value in whose place these words may stand, too.
+    fn word_or_value(&self, words: Kind, value: &Expr, ty: Option<Type>) -> Option<Vec<Kind>> {
+        let kinds = self.within(value, ty, ty)?;
+        Some(if is_named_here(value) { [vec![words], kinds].concat() } else { kinds })
     }
 
     /// Within a value that is about nothing else, as in a start.

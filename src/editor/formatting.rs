@@ -1,25 +1,25 @@
 //! The document as `avastra fmt` would write it.
 
-use avastra_lang::syntax;
-use avastra_lang::syntax::FormatError;
 use avastra_lang::syntax::ast::Span;
+use avastra_lang::syntax::{self, FormatError};
 
 use super::diagnostics::Change;
 use super::workspace::Analysis;
 
-/// One change, from the first character that differs to the last.
+/// The changes that format the document: none, or one from the first character that differs to the last; `None` if it does
+/// not parse and stays as it is.
 ///
 /// # Errors
 /// If the formatted text would mean something else, which is a mistake of ours.
-pub fn format(analysis: &Analysis) -> Result<Formatted, FormatError> {
+pub fn format(analysis: &Analysis) -> Result<Option<Vec<Change>>, FormatError> {
     let text = analysis.text(Analysis::ROOT);
     let formatted = match syntax::format(Analysis::ROOT, text) {
         Ok(formatted) => formatted,
-        Err(FormatError::Syntax(_)) => return Ok(Formatted::Broken),
+        Err(FormatError::Syntax(_)) => return Ok(None),
         Err(error @ FormatError::Meaning) => return Err(error),
     };
     if formatted == text {
-        return Ok(Formatted::Already);
+        return Ok(Some(Vec::new()));
     }
     let same = |(a, b): &(char, char)| a == b;
     let mut before: usize =
@@ -32,14 +32,5 @@ pub fn format(analysis: &Analysis) -> Result<Formatted, FormatError> {
     before -= usize::from(splits(before));
     after -= usize::from(splits(text.len() - after));
     let range = analysis.range(Span::new(Analysis::ROOT, before, text.len() - after));
-    Ok(Formatted::By(Change { range, text: formatted[before..formatted.len() - after].to_owned() }))
-}
-
-/// What formatting comes to.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Formatted {
-    /// The document does not parse and stays as it is.
-    Broken,
-    Already,
-    By(Change),
+    Ok(Some(vec![Change { range, text: formatted[before..formatted.len() - after].to_owned() }]))
 }

@@ -7,7 +7,7 @@ use avastra_lang::check::{Occurrence, Symbol};
 use super::position::Range;
 use super::workspace::Analysis;
 
-/// What a name is to a reader.
+/// What a name is to a reader. `cli/lsp` names the kinds in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NameKind {
     Enum,

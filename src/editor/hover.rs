@@ -4,8 +4,7 @@
 use core::fmt::Write;
 use std::collections::BTreeSet;
 
-use avastra_base::units;
-use avastra_base::units::Rational;
+use avastra_base::units::{self, Rational};
 use avastra_lang::check::{Declaration, Symbol};
 use avastra_lang::model::vocabulary::{Word, WorldState};
 use avastra_lang::model::{ActionDef, Interval, Parameter, Reach, RuleBody, Space};
@@ -68,8 +67,7 @@ pub fn describe(analysis: &Analysis, symbol: &Symbol) -> Option<String> {
         Symbol::File(path) => return Some(format!("`{}`", path.display())),
         Symbol::Engine(word, meaning) => return Some(format!("**{word}**\n\n{meaning}")),
         Symbol::Type(name) => {
-            let meaning = words::meaning(&words::types(), name)?;
-            return Some(format!("**{name}**\n\n{meaning}"));
+            return Some(format!("**{name}**\n\n{}", words::meaning(&words::types(), name)?));
         }
         Symbol::Number(digits, unit) => return number(digits, unit.as_deref()?),
         _ => {}

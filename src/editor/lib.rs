@@ -60,6 +60,3 @@ mod workspace;
 
 pub use position::{Place, Point, Range};
 pub use workspace::{Analysis, Files, Workspace};
-
-#[cfg(test)]
-mod tests;

@@ -72,6 +72,7 @@ pub fn rename(workspace: &mut Workspace, path: &Path, byte: usize, name: &str) -
     let analysis = workspace.known(path).ok_or("the document is not open")?;
     let span = nameable(analysis, byte)?;
     let old = analysis.slice(span).to_owned();
+    let refusal = |reason: &str| format!("`{old}` cannot be called `{name}`: {reason}");
     check_name(name)?;
     let occurrence = analysis.references().at(Analysis::ROOT, byte).ok_or("there is no name here")?;
     let mut symbols = analysis.references().tied(&occurrence.symbols.iter().cloned().collect());
@@ -88,7 +89,7 @@ pub fn rename(workspace: &mut Workspace, path: &Path, byte: usize, name: &str) -
         symbols = known.references().tied(&symbols);
     }
     if touched.iter().any(|known| is_taken(known, &symbols, name)) {
-        return Err(format!("`{old}` cannot be called `{name}`: that name is taken"));
+        return Err(refusal("that name is taken"));
     }
     let (texts, changes) = renamed(&touched, &symbols, name);
     let touched: Vec<PathBuf> =
@@ -99,12 +100,10 @@ pub fn rename(workspace: &mut Workspace, path: &Path, byte: usize, name: &str) -
         let errors = |loaded: &Loaded| loaded.diagnostics.iter().filter(|found| found.is_error()).count();
         if errors(&after) > errors(&before) {
             let first = after.diagnostics.into_iter().find(Diagnostic::is_error);
-            let reason = first.map(|first| first.message).unwrap_or_default();
-            return Err(format!("`{old}` cannot be called `{name}`: {reason}"));
+            return Err(refusal(&first.map(|first| first.message).unwrap_or_default()));
         }
         if after.references.pattern() != before.references.pattern() {
-            let reason = "a name would stand for something else";
-            return Err(format!("`{old}` cannot be called `{name}`: {reason}"));
+            return Err(refusal("a name would stand for something else"));
         }
     }
     Ok(changes)

@@ -7,8 +7,7 @@ use avastra_lang::syntax;
 use avastra_lang::syntax::ast::{FileId, Span};
 
 use super::diagnostics::Change;
-use super::outline;
-use super::outline::OutlineKind;
+use super::outline::{self, OutlineKind};
 use super::position::{Lines, Place, Range};
 use super::workspace::{Analysis, Workspace};
 

@@ -9,10 +9,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use avastra_lang::check;
-use avastra_lang::check::{Loaded, MapCache, ReadError, References};
-use avastra_lang::model;
-use avastra_lang::model::Space;
+use avastra_lang::check::{self, Loaded, MapCache, ReadError, References};
+use avastra_lang::model::{self, Space};
 use avastra_lang::syntax::Diagnostic;
 use avastra_lang::syntax::ast::{FileId, Span};
 use avastra_world::places::{self, Scenes};

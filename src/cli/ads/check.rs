@@ -4,7 +4,6 @@
 //! well may fail at the hundredth. Whatever fails is named with its stage and what to do about it.
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use serde::Serialize;
 
@@ -12,17 +11,15 @@ use crate::cli::arguments::AdsCheckArguments;
 use crate::cli::error::Failure;
 use crate::cli::files::{Scratch, make_way, write_new};
 use crate::cli::findings::cut_off;
-use crate::cli::load;
-use crate::cli::load::Driver;
-use crate::cli::new::shipped;
+use crate::cli::load::{self, Driver};
+use crate::cli::new::SHIPPED;
 use crate::cli::output::Output;
-use avastra_campaign::episode;
-use avastra_campaign::episode::{Choice, EpisodeLog};
+use crate::cli::progress::now;
+use avastra_campaign::episode::{self, Choice, EpisodeLog};
 use avastra_campaign::run::{Arena, choose};
 use avastra_drivers::Selected;
 use avastra_drivers::external::{ExternalSettings, Failure as Finding, Problem, Program, odd_orders};
-use avastra_search::agent;
-use avastra_search::agent::Kind;
+use avastra_search::agent::{self, Kind};
 use avastra_world::action::ActionTable;
 use avastra_world::sim::World;
 
@@ -99,7 +96,7 @@ pub fn check(output: &Output, arguments: &AdsCheckArguments) -> Result<(), Failu
 /// file of its map, so that must lie on disk as long as the planner is checked.
 fn own_space(output: &Output) -> Result<(ActionTable, Scratch), Failure> {
     let scratch = Scratch::new("ads-check")?;
-    for (name, text) in shipped() {
+    for (name, text) in SHIPPED {
         let file = scratch.path.join(name);
         make_way(&scratch.path, &file)?;
         write_new(&file, text)?;
@@ -110,7 +107,6 @@ fn own_space(output: &Output) -> Result<(ActionTable, Scratch), Failure> {
 struct Checks<'a> {
     output: &'a Output,
     seed: u64,
-    /// Length of an episode.
     parts: Vec<Part>,
     speed: Option<Speed>,
     /// Whether it says that it answers alike to the like.
@@ -120,8 +116,7 @@ struct Checks<'a> {
 impl Checks<'_> {
     fn all(&mut self, table: ActionTable, road: &str, settings: ExternalSettings) -> Result<(), Failure> {
         let program = Program::new(settings);
-        #[allow(clippy::disallowed_methods, reason = "this is cli, and the time is what is asked for")]
-        let began = Instant::now();
+        let began = now();
         let identity = match program.start() {
             Ok(identity) => identity,
             Err(failure) => {
@@ -143,8 +138,7 @@ impl Checks<'_> {
 
         let arena =
             Arena::new(table, &[road.to_owned()], Selected::external(Arc::clone(&program)), &[], &[])?;
-        #[allow(clippy::disallowed_methods, reason = "this is cli, and the time is what is asked for")]
-        let began = Instant::now();
+        let began = now();
         let first = self.drive(&arena, 0, STEPS);
         let asked_s = began.elapsed().as_secs_f64();
         if let Some(failure) = &first.failure {
@@ -152,8 +146,7 @@ impl Checks<'_> {
             return Ok(());
         }
         // Now all answers are known: the same again is what avastra itself takes.
-        #[allow(clippy::disallowed_methods, reason = "this is cli, and the time is what is asked for")]
-        let began = Instant::now();
+        let began = now();
         self.drive(&arena, 0, STEPS);
         let own_s = began.elapsed().as_secs_f64();
         let questions = first.conversation.as_ref().map_or(0, |conversation| conversation.exchanges.len());

@@ -36,7 +36,6 @@ fn schema(output: &Output) {
         "description": "A line of avastra-ads/1 is one of these; PROTOCOL.md says which, when and what it means.",
         "oneOf": alternatives, "$defs": messages,
     });
-    let text = serde_json::to_string_pretty(&document).expect("schemas are plain data");
-    output.document(&text);
+    output.document(&serde_json::to_string_pretty(&document).expect("schemas are plain data"));
     output.result(serde_json::json!({ "protocol": document }));
 }

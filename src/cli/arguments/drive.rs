@@ -2,11 +2,14 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::language::RuleArguments;
 use crate::cli::help::Named;
+use avastra_campaign::estimate::{EventKind, Method};
 use avastra_campaign::run::Shard;
+use avastra_search::agent::Face;
 
 /// The driving system under test.
 #[derive(Debug, Args)]
@@ -63,8 +66,8 @@ pub struct RunArguments {
     #[arg(long, value_name = "POLICY", conflicts_with = "agent")]
     pub policy: Option<PathBuf>,
     /// Which face of the policy acts: its network, or the rules distilled from it.
-    #[arg(long, value_enum, requires = "policy", default_value_t = FaceArgument::Network)]
-    pub face: FaceArgument,
+    #[arg(long, requires = "policy", default_value = "network", value_parser = one_of::<Face>(["network", "rules"]))]
+    pub face: Face,
     /// Episodes on each road.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=i64::from(avastra_campaign::run::EPISODES_MAX)))]
     pub episodes: u32,
@@ -91,25 +94,19 @@ pub struct RunArguments {
     pub fail_on_collision: bool,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum FaceArgument {
-    Network,
-    Rules,
-}
-
 #[derive(Debug, Args)]
 pub struct EstimateArguments {
     /// The space.
     #[arg(required_unless_present = "resume")]
     pub file: Option<PathBuf>,
     /// What is looked for in an episode.
-    #[arg(long, value_enum, default_value_t = EventArgument::Counted)]
-    pub event: EventArgument,
+    #[arg(long, default_value = "counted", value_parser = one_of::<EventKind>(["counted", "collision"]))]
+    pub event: EventKind,
     /// How: `count` plays every episode from its start; `probe` tries dangerous rows out beside those that chance chooses, each
     /// with its weight, which pays where a crash comes in fewer than one of a hundred episodes or so, and says what it
     /// gained or lost. Both are unbiased with a fixed number of parts.
-    #[arg(long, value_enum, default_value_t = MethodArgument::Count)]
-    pub method: MethodArgument,
+    #[arg(long, default_value = "count", value_parser = one_of::<Method>(["count", "probe"]))]
+    pub method: Method,
     /// Independent parts on each road, at most.
     #[arg(long, default_value_t = 20)]
     pub parts: u32,
@@ -143,18 +140,6 @@ pub struct EstimateArguments {
     pub resume: Option<PathBuf>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum EventArgument {
-    Counted,
-    Collision,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum MethodArgument {
-    Count,
-    Probe,
-}
-
 #[derive(Debug, Args)]
 pub struct MergeArguments {
     /// Directories of shards of one run, study or estimate, in any order.
@@ -166,4 +151,13 @@ pub struct MergeArguments {
     /// Write nothing; print the numbers of the shards that are to be run again, or gone on with.
     #[arg(long, conflicts_with = "out")]
     pub missing: bool,
+}
+
+/// Parses the words by which a type is written in settings, too.
+fn one_of<T>(words: [&'static str; 2]) -> impl TypedValueParser<Value = T>
+where
+    T: serde::de::DeserializeOwned + Clone + Send + Sync + 'static,
+{
+    PossibleValuesParser::new(words)
+        .map(|word| serde_json::from_value(word.into()).expect("the type has these words"))
 }

@@ -8,14 +8,11 @@ mod scenarios;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-pub use drive::{
-    ConditionArguments, EstimateArguments, EventArgument, FaceArgument, MergeArguments, MethodArgument,
-    RunArguments,
-};
+pub use drive::{ConditionArguments, EstimateArguments, MergeArguments, RunArguments};
 pub use external::{AdsArguments, AdsCheckArguments, AdsCommand, Misbehaviour, ToyAnswer, ToyArguments};
 pub use language::{
     CheckArguments, CompileArguments, CompletionsArguments, DiffArguments, Dump, EditorFilesArguments,
-    ExplainArguments, FmtArguments, NewArguments, TableArguments,
+    ExplainArguments, FmtArguments, NewArguments, RuleArguments, TableArguments,
 };
 pub use learn::{
     DistilArguments, ExplainPolicyArguments, PolicyArguments, PolicyCommand, ResultsArguments,

@@ -3,8 +3,7 @@
 use crate::cli::arguments::ExplainPolicyArguments;
 use crate::cli::error::Failure;
 use crate::cli::load;
-use crate::cli::output::Output;
-use crate::cli::output::plural;
+use crate::cli::output::{Output, plural};
 use crate::cli::progress::Working;
 use avastra_campaign::train::{Insight, insight, training_arena};
 use avastra_lang::check::state_argument::values_from;

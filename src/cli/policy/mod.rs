@@ -26,9 +26,6 @@ pub fn policy(output: &Output, arguments: &PolicyArguments) -> Result<(), Failur
 }
 
 /// Checks that a policy was trained in this version of the simulated world.
-///
-/// # Errors
-/// If it was not.
 pub fn same_world(policy: &Policy) -> Result<(), Failure> {
     let (name, engine) = (&policy.name, &policy.origin.engine);
     if engine == ENGINE {
