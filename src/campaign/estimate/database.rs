@@ -3,7 +3,7 @@
 use rusqlite::{Connection, OptionalExtension, params};
 
 use crate::files::PlainName;
-use crate::run::{DatabaseError, Layout, Units, WrittenScenario};
+use crate::run::{DatabaseError, Layout, Units, WrittenScenario, query_all};
 
 use crate::estimate::part::{Event, Part, PartRecord, Played};
 use crate::estimate::plan::{Cell, Pilot, Seen, Situation};
@@ -82,14 +82,12 @@ impl Units for EstimateDatabase {
     }
 
     fn scenarios(&self) -> Result<Vec<WrittenScenario>, DatabaseError> {
-        let mut query =
-            self.connection.prepare("SELECT part, name, text FROM scenario ORDER BY part, event")?;
-        let rows = query.query_map([], |row| Ok((row.get(0)?, row.get::<_, String>(1)?, row.get(2)?)))?;
-        rows.map(|row| {
-            let (unit, name, text) = row?;
+        let query = "SELECT part, name, text FROM scenario ORDER BY part, event";
+        let rows = query_all(&self.connection, query, |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
+        let named = |(unit, name, text): (i64, String, String)| {
             Ok(WrittenScenario { unit, name: PlainName::scenario(name)?, text })
-        })
-        .collect()
+        };
+        rows.into_iter().map(named).collect()
     }
 
     fn called(number: i64) -> String {
@@ -194,10 +192,9 @@ impl EstimateDatabase {
             })
             .optional()?;
         let Some(mut pilot) = totals else { return Ok(None) };
-        let mut query = self.connection.prepare(
-            "SELECT action_row, road, situation, trials, events, moments, chance FROM seen ORDER BY 1, 2, 3",
-        )?;
-        let cells = query.query_map([], |row| {
+        let query =
+            "SELECT action_row, road, situation, trials, events, moments, chance FROM seen ORDER BY 1, 2, 3";
+        let cells = query_all(&self.connection, query, |row| {
             let cell = Cell {
                 row: row.get::<_, i64>(0)? as usize,
                 road: row.get::<_, i64>(1)? as usize,
@@ -207,7 +204,7 @@ impl EstimateDatabase {
                 Seen { trials: row.get(3)?, events: row.get(4)?, moments: row.get(5)?, chance: row.get(6)? };
             Ok((cell, seen))
         })?;
-        pilot.cells = cells.collect::<Result<_, _>>()?;
+        pilot.cells = cells.into_iter().collect();
         Ok(Some(pilot))
     }
 
@@ -216,11 +213,10 @@ impl EstimateDatabase {
     /// # Errors
     /// If the file cannot be read.
     pub fn parts(&self) -> Result<Vec<PartRecord>, DatabaseError> {
-        let mut query = self.connection.prepare(
-            "SELECT road, number, probability, episodes, driven_m, duration_s, events, squares, largest, simulated_s
-             FROM part ORDER BY part",
-        )?;
-        let records = query.query_map([], |row| {
+        let query =
+            "SELECT road, number, probability, episodes, driven_m, duration_s, events, squares, largest,
+                            simulated_s FROM part ORDER BY part";
+        query_all(&self.connection, query, |row| {
             Ok(PartRecord {
                 part: Part { road: row.get::<_, i64>(0)? as usize, number: row.get(1)? },
                 probability: row.get(2)?,
@@ -233,8 +229,7 @@ impl EstimateDatabase {
                 simulated_s: row.get(9)?,
                 failed: 0,
             })
-        })?;
-        Ok(records.collect::<Result<_, _>>()?)
+        })
     }
 
     /// All events so far, each with its part, in order.
@@ -242,11 +237,9 @@ impl EstimateDatabase {
     /// # Errors
     /// If the file cannot be read.
     pub fn events(&self) -> Result<Vec<(Part, Event)>, DatabaseError> {
-        let mut query = self.connection.prepare(
-            "SELECT road, number, episode, step, action_row, weight FROM event JOIN part USING (part)
-             ORDER BY part, event",
-        )?;
-        let events = query.query_map([], |row| {
+        let query = "SELECT road, number, episode, step, action_row, weight FROM event JOIN part USING (part)
+             ORDER BY part, event";
+        query_all(&self.connection, query, |row| {
             let part = Part { road: row.get::<_, i64>(0)? as usize, number: row.get(1)? };
             let event = Event {
                 episode: row.get(2)?,
@@ -255,7 +248,6 @@ impl EstimateDatabase {
                 weight: row.get(5)?,
             };
             Ok((part, event))
-        })?;
-        Ok(events.collect::<Result<_, _>>()?)
+        })
     }
 }

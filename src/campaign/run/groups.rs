@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use avastra_lang::model::vocabulary::{Body, Word};
 
 use crate::run::database::Database;
-use crate::run::sealed::DatabaseError;
+use crate::run::sealed::{DatabaseError, query_all};
 
 /// Counted collisions that are alike.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
@@ -91,15 +91,12 @@ impl Database {
     /// # Errors
     /// If the database cannot be read.
     pub fn worst(&self) -> Result<Vec<(String, i64)>, DatabaseError> {
-        let mut statement = self.connection.prepare(
-            "WITH hardest AS (
+        let query = "WITH hardest AS (
                SELECT episode, collision.counted AS counts, max(max(delta_v_mps, obstacle_delta_v_mps)) AS delta_v_mps
                FROM collision GROUP BY episode, counts)
              SELECT road, episode FROM hardest JOIN episode USING (episode) GROUP BY episode
-             ORDER BY max(counts) DESC, max(CASE counts WHEN counted > 0 THEN delta_v_mps END) DESC, episode",
-        )?;
-        let episodes = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?)))?;
-        Ok(episodes.collect::<Result<_, _>>()?)
+             ORDER BY max(counts) DESC, max(CASE counts WHEN counted > 0 THEN delta_v_mps END) DESC, episode";
+        query_all(&self.connection, query, |row| Ok((row.get(0)?, row.get(1)?)))
     }
 }
 

@@ -160,16 +160,13 @@ impl Layout {
         for (table, condition) in self.sound {
             // A missing number makes the condition neither true nor false.
             let query = format!("SELECT {unit} FROM {table} WHERE ({condition}) IS NOT TRUE");
-            let mut rows = connection.prepare(&query)?;
-            let numbers = rows.query_map([], |row| row.get::<_, i64>(0))?;
-            unsound.extend(numbers.collect::<Result<Vec<_>, _>>()?);
+            unsound.extend(query_all(connection, &query, |row| row.get::<_, i64>(0))?);
         }
         let of_tables: String =
             self.tables.iter().map(|table| format!("SELECT {unit} FROM {table} UNION ")).collect();
-        let mut numbers = connection.prepare(&format!("{of_tables}SELECT unit FROM seal ORDER BY 1"))?;
+        let numbers = format!("{of_tables}SELECT unit FROM seal ORDER BY 1");
         let mut damaged = Vec::new();
-        for number in numbers.query_map([], |row| row.get::<_, i64>(0))? {
-            let number = number?;
+        for number in query_all(connection, &numbers, |row| row.get::<_, i64>(0))? {
             let mut seal = connection.prepare_cached("SELECT digest FROM seal WHERE unit = ?")?;
             let seal: Option<String> = seal.query_row([number], |row| row.get(0)).optional()?;
             if unsound.contains(&number) || seal != Some(self.rows_digest(connection, number)?) {
@@ -278,13 +275,12 @@ pub(super) fn plain_tables(
 ) -> Result<BTreeMap<String, Columns>, DatabaseError> {
     let strange =
         |name: &str| DatabaseError::Damaged { what: format!("`{name}` is no table that avastra makes") };
-    let mut schema = connection.prepare(&format!("SELECT type, name, sql FROM {file}.sqlite_schema"))?;
-    let rows = schema.query_map([], |row| {
-        Ok((row.get::<_, String>(0)?, row.get::<_, String>(1)?, row.get::<_, Option<String>>(2)?))
-    })?;
+    let schema =
+        query_all(connection, &format!("SELECT type, name, sql FROM {file}.sqlite_schema"), |row| {
+            Ok((row.get::<_, String>(0)?, row.get::<_, String>(1)?, row.get::<_, Option<String>>(2)?))
+        })?;
     let mut tables = BTreeMap::new();
-    for row in rows {
-        let (kind, name, sql) = row?;
+    for (kind, name, sql) in schema {
         match (kind.as_str(), sql) {
             // SQLite normalises the beginning of the stored text to these words.
             ("table", Some(sql)) if sql.starts_with("CREATE TABLE ") => {}
@@ -304,6 +300,17 @@ pub(super) fn plain_tables(
         tables.insert(name, columns);
     }
     Ok(tables)
+}
+
+/// All rows of a query, each as `read` gives it.
+pub(crate) fn query_all<T>(
+    connection: &Connection,
+    query: &str,
+    read: impl FnMut(&Row) -> Result<T, rusqlite::Error>,
+) -> Result<Vec<T>, DatabaseError> {
+    let mut statement = connection.prepare(query)?;
+    let rows = statement.query_map([], read)?;
+    Ok(rows.collect::<Result<_, _>>()?)
 }
 
 /// Adds the rows of a unit in a table to a digest. SQLite need not give them in one order, so each has a digest, and these

@@ -12,7 +12,7 @@ use rusqlite::{Connection, params};
 use sha2::{Digest, Sha256};
 
 use crate::files::{PlainName, Temporary};
-use crate::run::sealed::{DatabaseError, Layout, add_rows, check_plain, plain_tables};
+use crate::run::sealed::{DatabaseError, Layout, add_rows, check_plain, plain_tables, query_all};
 
 /// A unit to take over: its number in the other file, and the number that it gets here.
 pub type Numbered = (i64, i64);
@@ -97,9 +97,8 @@ pub trait Units: Sized {
     /// # Errors
     /// If the file cannot be read.
     fn numbers(&self) -> Result<BTreeSet<i64>, DatabaseError> {
-        let mut seals = self.connection().prepare("SELECT unit FROM seal ORDER BY unit")?;
-        let numbers = seals.query_map([], |row| row.get(0))?;
-        Ok(numbers.collect::<Result<_, _>>()?)
+        let numbers = query_all(self.connection(), "SELECT unit FROM seal", |row| row.get::<_, i64>(0))?;
+        Ok(numbers.into_iter().collect())
     }
 
     /// Takes units over from another file of this kind, all or none. A unit that is here already must be equal.

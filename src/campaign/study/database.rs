@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use rusqlite::types::Type as Kind;
 use rusqlite::{Connection, Row, params};
 
-use crate::run::{DatabaseError, Layout, Numbered, Units};
+use crate::run::{DatabaseError, Layout, Numbered, Units, query_all};
 
 use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureClass, Spent, TrainedRecord};
 use crate::study::settings::StudySettings;
@@ -124,20 +124,18 @@ impl StudyDatabase {
     /// If the file cannot be read, or has a cell that is none of the study's.
     pub fn places(&self, settings: &StudySettings) -> Result<Vec<Numbered>, DatabaseError> {
         let places: BTreeMap<(&str, &str, u32), i64> = settings.cells().zip(1..).collect();
-        let mut query =
-            self.connection.prepare("SELECT cell, agent, road, number FROM cell ORDER BY cell")?;
-        let cells = query.query_map([], |row| {
-            Ok((row.get(0)?, row.get::<_, String>(1)?, row.get::<_, String>(2)?, row.get(3)?))
+        let query = "SELECT cell, agent, road, number FROM cell ORDER BY cell";
+        let cells = query_all(&self.connection, query, |row| {
+            Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?))
         })?;
-        let placed = |cell: Result<(i64, String, String, u32), rusqlite::Error>| {
-            let (cell, agent, road, number) = cell?;
+        let placed = |(cell, agent, road, number): (i64, String, String, u32)| {
             let place = places.get(&(agent.as_str(), road.as_str(), number)).copied();
             let what = || {
                 format!("it has a cell of `{agent}` on `{road}`, number {number}, which is not in the study")
             };
             place.map(|place| (cell, place)).ok_or_else(|| DatabaseError::Damaged { what: what() })
         };
-        cells.map(placed).collect()
+        cells.into_iter().map(placed).collect()
     }
 
     /// All cells so far, in the order in which they ended.
@@ -199,9 +197,7 @@ impl StudyDatabase {
         query: &str,
         read: impl Fn(&Row) -> Result<T, rusqlite::Error>,
     ) -> Result<Vec<(i64, T)>, DatabaseError> {
-        let mut statement = self.connection.prepare(query)?;
-        let rows = statement.query_map([], |row| Ok((row.get(0)?, read(row)?)))?;
-        Ok(rows.collect::<Result<_, _>>()?)
+        query_all(&self.connection, query, |row| Ok((row.get(0)?, read(row)?)))
     }
 }
 
