@@ -3,7 +3,7 @@
 use rusqlite::{Connection, OptionalExtension, params};
 
 use crate::files::PlainName;
-use crate::run::{DatabaseError, Layout, Units, WrittenScenario, query_all};
+use crate::run::{DatabaseError, Layout, Units, WrittenScenario, insert_row, query_all};
 
 use crate::estimate::part::{Event, Part, PartRecord, Played};
 use crate::estimate::plan::{Cell, Pilot, Seen, Situation};
@@ -111,34 +111,28 @@ impl EstimateDatabase {
         let Part { road, number } = record.part;
         let place = estimate.settings().place(record.part);
         let transaction = self.connection.transaction()?;
-        transaction.execute(
-            "INSERT INTO part VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 0)",
-            params![
-                place,
-                road as i64,
-                number,
-                record.probability,
-                record.episodes,
-                record.driven_m,
-                record.duration_s,
-                record.events,
-                record.weight_squares,
-                record.weight_max,
-                record.simulated_s,
-            ],
-        )?;
+        let values = params![
+            place,
+            road as i64,
+            number,
+            record.probability,
+            record.episodes,
+            record.driven_m,
+            record.duration_s,
+            record.events,
+            record.weight_squares,
+            record.weight_max,
+            record.simulated_s,
+            0,
+        ];
+        insert_row(&transaction, "part", values)?;
         for (index, (met, scenario)) in played.met.iter().zip(scenarios).enumerate() {
             let Event { episode, step, row, weight } = met.event;
             let row = row.map(|row| row as i64);
-            transaction.execute(
-                "INSERT INTO event VALUES (?, ?, ?, ?, ?, ?)",
-                params![place, index as i64, episode, step as i64, row, weight],
-            )?;
+            let values = params![place, index as i64, episode, step as i64, row, weight];
+            insert_row(&transaction, "event", values)?;
             if let Some((name, text)) = scenario {
-                transaction.execute(
-                    "INSERT INTO scenario VALUES (?, ?, ?, ?)",
-                    params![place, index as i64, name, text],
-                )?;
+                insert_row(&transaction, "scenario", params![place, index as i64, name, text])?;
             }
         }
         LAYOUT.seal(&transaction, place)?;
@@ -153,22 +147,12 @@ impl EstimateDatabase {
     pub fn keep_pilot(&mut self, pilot: &Pilot) -> Result<(), DatabaseError> {
         let transaction = self.connection.transaction()?;
         let Pilot { cells, whole_s, tried_s, tried } = pilot;
-        transaction
-            .execute("INSERT INTO pilot VALUES (?, ?, ?, ?)", params![PILOT, whole_s, tried_s, tried])?;
+        insert_row(&transaction, "pilot", params![PILOT, whole_s, tried_s, tried])?;
         for (Cell { row, road, situation }, seen) in cells {
-            transaction.execute(
-                "INSERT INTO seen VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
-                params![
-                    PILOT,
-                    *row as i64,
-                    *road as i64,
-                    situation.number(),
-                    seen.trials,
-                    seen.events,
-                    seen.moments,
-                    seen.chance,
-                ],
-            )?;
+            let Seen { trials, events, moments, chance } = seen;
+            let (row, road, situation) = (*row as i64, *road as i64, situation.number());
+            let values = params![PILOT, row, road, situation, trials, events, moments, chance];
+            insert_row(&transaction, "seen", values)?;
         }
         LAYOUT.seal(&transaction, PILOT)?;
         transaction.commit()?;

@@ -17,7 +17,7 @@ use avastra_search::mdp::STATE_LEN;
 use avastra_world::action::Draw;
 
 use crate::run::offered::{RowCount, without_figures};
-use crate::run::sealed::{DatabaseError, Layout, query_all};
+use crate::run::sealed::{DatabaseError, Layout, insert_row, query_all};
 use crate::run::settled::{Units, WrittenScenario};
 use crate::run::shape::Shape;
 use crate::run::summary::{EpisodeSummary, Finding};
@@ -408,32 +408,21 @@ pub(crate) fn add_all(
             .execute(rusqlite::params_from_iter(values))?;
     }
     for (number, held) in log.held.iter().enumerate() {
-        transaction.prepare_cached("INSERT INTO held VALUES (?, ?, ?, ?)")?.execute(params![
-            summary.episode as i64,
-            number as i64,
-            held.from_s,
-            held.text(),
-        ])?;
+        let values = params![summary.episode as i64, number as i64, held.from_s, held.text()];
+        insert_row(transaction, "held", values)?;
     }
     for finding in &summary.collisions {
         add_collision(transaction, summary.episode, finding)?;
     }
     if let Some(failure) = &log.failure {
         let Failure { problem, stage, detail, exit, stderr } = failure;
-        transaction.prepare_cached("INSERT INTO failure VALUES (?, ?, ?, ?, ?, ?, ?)")?.execute(params![
-            summary.episode as i64,
-            problem.kind().name(),
-            problem.name(),
-            stage,
-            detail,
-            exit,
-            stderr,
-        ])?;
+        let (kind, problem) = (problem.kind().name(), problem.name());
+        let values = params![summary.episode as i64, kind, problem, stage, detail, exit, stderr];
+        insert_row(transaction, "failure", values)?;
     }
     add_offers(transaction, summary)?;
     if let Some(text) = scenario {
-        let mut insert = transaction.prepare_cached("INSERT INTO scenario VALUES (?, ?)")?;
-        insert.execute(params![summary.episode as i64, text])?;
+        insert_row(transaction, "scenario", params![summary.episode as i64, text])?;
     }
     Ok(())
 }
@@ -466,25 +455,23 @@ fn add_episode(
     summary: &EpisodeSummary,
     log: &EpisodeLog,
 ) -> Result<(), rusqlite::Error> {
-    transaction
-        .prepare_cached("INSERT INTO episode VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?
-        .execute(params![
-            summary.episode as i64,
-            log.road,
-            log.seed.to_string(),
-            log.end.name(),
-            log.duration_s,
-            log.distance_m,
-            log.steps.len() as i64,
-            log.red_runs,
-            log.collisions.len() as i64,
-            summary.counted() as i64,
-            summary.first_counted_s(),
-            avastra_lang::model::digest_text(&log.trace()),
-            summary.pet_s,
-            summary.branched_s,
-        ])?;
-    Ok(())
+    let values = params![
+        summary.episode as i64,
+        log.road,
+        log.seed.to_string(),
+        log.end.name(),
+        log.duration_s,
+        log.distance_m,
+        log.steps.len() as i64,
+        log.red_runs,
+        log.collisions.len() as i64,
+        summary.counted() as i64,
+        summary.first_counted_s(),
+        avastra_lang::model::digest_text(&log.trace()),
+        summary.pet_s,
+        summary.branched_s,
+    ];
+    insert_row(transaction, "episode", values)
 }
 
 fn add_collision(
@@ -495,42 +482,38 @@ fn add_collision(
     let Finding { collision, facts, judgement, .. } = finding;
     let contact = &collision.contact;
     let severity = oracle::severity(collision);
-    transaction
-        .prepare_cached(
-            "INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-        )?
-        .execute(params![
-            episode as i64,
-            finding.number as i64,
-            contact.time_s,
-            collision.step as i64,
-            contact.obstacle,
-            collision.body.like.name(),
-            finding.own_body,
-            collision.verb.name(),
-            contact.ego_speed_mps,
-            contact.closing_speed_mps,
-            contact.on_ego.x,
-            contact.on_ego.y,
-            facts.repeated,
-            facts.sudden,
-            facts.struck,
-            finding.counted,
-            judgement.class.name(),
-            judgement.onset_s,
-            judgement.avoided_by.join(" "),
-            judgement.evasion,
-            severity.side,
-            severity.approach,
-            severity.relative_speed_mps,
-            severity.delta_v_mps,
-            severity.obstacle_delta_v_mps,
-            finding.cause_in_words(),
-            finding.shape.map(Shape::name),
-            facts.priority.name(),
-            judgement.r157_letter.join(" "),
-        ])?;
-    Ok(())
+    let values = params![
+        episode as i64,
+        finding.number as i64,
+        contact.time_s,
+        collision.step as i64,
+        contact.obstacle,
+        collision.body.like.name(),
+        finding.own_body,
+        collision.verb.name(),
+        contact.ego_speed_mps,
+        contact.closing_speed_mps,
+        contact.on_ego.x,
+        contact.on_ego.y,
+        facts.repeated,
+        facts.sudden,
+        facts.struck,
+        finding.counted,
+        judgement.class.name(),
+        judgement.onset_s,
+        judgement.avoided_by.join(" "),
+        judgement.evasion,
+        severity.side,
+        severity.approach,
+        severity.relative_speed_mps,
+        severity.delta_v_mps,
+        severity.obstacle_delta_v_mps,
+        finding.cause_in_words(),
+        finding.shape.map(Shape::name),
+        facts.priority.name(),
+        judgement.r157_letter.join(" "),
+    ];
+    insert_row(transaction, "collision", values)
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use rusqlite::types::ValueRef;
-use rusqlite::{Connection, OptionalExtension, Row, params};
+use rusqlite::{Connection, OptionalExtension, Row, ToSql, params};
 use serde_json::{Map, Value};
 use sha2::{Digest, Sha256};
 
@@ -196,8 +196,7 @@ impl Layout {
     /// Seals the rows of a unit; called in the transaction that adds them.
     pub fn seal(&self, connection: &Connection, number: i64) -> Result<(), rusqlite::Error> {
         let digest = self.rows_digest(connection, number)?;
-        connection.prepare_cached("INSERT INTO seal VALUES (?, ?)")?.execute(params![number, digest])?;
-        Ok(())
+        insert_row(connection, "seal", params![number, digest])
     }
 
     /// Deletes the rows of a unit.
@@ -300,6 +299,17 @@ pub(super) fn plain_tables(
         tables.insert(name, columns);
     }
     Ok(tables)
+}
+
+/// Adds a row with a value for each column of a table.
+pub(crate) fn insert_row(
+    connection: &Connection,
+    table: &str,
+    values: &[&dyn ToSql],
+) -> Result<(), rusqlite::Error> {
+    let places = vec!["?"; values.len()].join(", ");
+    connection.prepare_cached(&format!("INSERT INTO {table} VALUES ({places})"))?.execute(values)?;
+    Ok(())
 }
 
 /// All rows of a query, each as `read` gives it.

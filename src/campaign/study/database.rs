@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use rusqlite::types::Type as Kind;
 use rusqlite::{Connection, Row, params};
 
-use crate::run::{DatabaseError, Layout, Numbered, Units, query_all};
+use crate::run::{DatabaseError, Layout, Numbered, Units, insert_row, query_all};
 
 use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureClass, Spent, TrainedRecord};
 use crate::study::settings::StudySettings;
@@ -94,10 +94,8 @@ impl StudyDatabase {
             let insert = "INSERT INTO cell (agent, road, number, training_seed) VALUES (?, ?, ?, ?)";
             transaction.execute(insert, params![agent, road, number, seed])?;
             let cell = transaction.last_insert_rowid();
-            let mut insert =
-                transaction.prepare_cached("INSERT INTO trained VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)")?;
             for (index, episode) in record.trained.iter().enumerate() {
-                insert.execute(params![
+                let values = params![
                     cell,
                     index as i64,
                     episode.ended,
@@ -107,7 +105,8 @@ impl StudyDatabase {
                     episode.exploration_epsilon,
                     episode.loss,
                     episode.simulated_s,
-                ])?;
+                ];
+                insert_row(&transaction, "trained", values)?;
             }
             for (index, episode) in record.episodes.iter().enumerate() {
                 add_episode(&transaction, cell, index as i64, episode)?;
@@ -207,27 +206,24 @@ fn add_episode(
     index: i64,
     episode: &EpisodeRecord,
 ) -> Result<(), rusqlite::Error> {
-    connection.prepare_cached("INSERT INTO evaluated VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?.execute(
-        params![
-            cell,
-            index,
-            episode.seed.to_string(),
-            episode.number,
-            episode.ended,
-            episode.duration_s,
-            episode.distance_m,
-            episode.red_runs,
-            episode.speeding_s,
-            episode.astray_s,
-            episode.branched_s,
-            episode.trace,
-        ],
-    )?;
-    let mut insert = connection
-        .prepare_cached("INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?;
+    let values = params![
+        cell,
+        index,
+        episode.seed.to_string(),
+        episode.number,
+        episode.ended,
+        episode.duration_s,
+        episode.distance_m,
+        episode.red_runs,
+        episode.speeding_s,
+        episode.astray_s,
+        episode.branched_s,
+        episode.trace,
+    ];
+    insert_row(connection, "evaluated", values)?;
     for (number, found) in episode.collisions.iter().enumerate() {
         let FailureClass { kind, manoeuvre, approach, side, cause } = &found.failure;
-        insert.execute(params![
+        let values = params![
             cell,
             index,
             number as i64,
@@ -243,7 +239,8 @@ fn add_episode(
             side,
             cause,
             found.priority,
-        ])?;
+        ];
+        insert_row(connection, "collision", values)?;
     }
     Ok(())
 }
