@@ -12,6 +12,7 @@ use crate::estimate::ready::Estimate;
 /// Versions begin at 2001, so that it is never taken for another database.
 const LAYOUT: Layout = Layout {
     version: 2003,
+    schema: || SCHEMA.to_owned(),
     unit: "part",
     tables: &["part", "event", "scenario", "pilot", "seen"],
     naming: None,
@@ -65,13 +66,7 @@ pub struct EstimateDatabase {
 }
 
 impl Units for EstimateDatabase {
-    fn layout() -> &'static Layout {
-        &LAYOUT
-    }
-
-    fn schema() -> String {
-        SCHEMA.to_owned()
-    }
+    const LAYOUT: &'static Layout = &LAYOUT;
 
     fn connection(&self) -> &Connection {
         &self.connection

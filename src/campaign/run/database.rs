@@ -24,6 +24,7 @@ use crate::run::summary::{EpisodeSummary, Finding};
 
 pub(crate) const LAYOUT: Layout = Layout {
     version: 10,
+    schema: || format!("{SCHEMA}{}", step_table()),
     unit: "episode",
     tables: &["episode", "step", "held", "offer", "collision", "failure", "learning", "scenario"],
     naming: Some(("offer", "reason")),
@@ -98,13 +99,7 @@ pub struct Database {
 }
 
 impl Units for Database {
-    fn layout() -> &'static Layout {
-        &LAYOUT
-    }
-
-    fn schema() -> String {
-        format!("{SCHEMA}{}", step_table())
-    }
+    const LAYOUT: &'static Layout = &LAYOUT;
 
     fn connection(&self) -> &Connection {
         &self.connection

@@ -78,6 +78,8 @@ impl From<rusqlite::Error> for DatabaseError {
 pub struct Layout {
     /// Raised whenever a column changes.
     pub version: i64,
+    /// The statements that make the tables of a new file.
+    pub schema: fn() -> String,
     /// Name of the unit that is added as a whole, which is also the name of its key column: `episode`, `cell`. The
     /// first of the tables has one row for each unit.
     pub unit: &'static str,
@@ -100,8 +102,8 @@ impl Layout {
     ///
     /// # Errors
     /// If the file cannot be opened, is a link, has another layout or other settings, or was damaged or changed.
-    pub fn open(&self, path: &Path, tables: &str, settings: &str) -> Result<Connection, DatabaseError> {
-        let (connection, damaged) = self.open_damaged(path, tables, settings)?;
+    pub fn open(&self, path: &Path, settings: &str) -> Result<Connection, DatabaseError> {
+        let (connection, damaged) = self.open_damaged(path, settings)?;
         match damaged.first() {
             Some(&number) => Err(DatabaseError::Rows { unit: self.unit, number }),
             None => Ok(connection),
@@ -115,7 +117,6 @@ impl Layout {
     pub(super) fn open_damaged(
         &self,
         path: &Path,
-        tables: &str,
         settings: &str,
     ) -> Result<(Connection, Vec<i64>), DatabaseError> {
         // SQLite would follow a link and write where it leads.
@@ -125,18 +126,26 @@ impl Layout {
         if found == 0 {
             let transaction = connection.transaction()?;
             transaction.execute_batch(TABLES)?;
-            transaction.execute_batch(tables)?;
+            transaction.execute_batch(&(self.schema)())?;
             transaction.execute("INSERT INTO begun VALUES (1, ?)", [settings])?;
             transaction.pragma_update(None, "user_version", self.version)?;
             transaction.commit()?;
         } else if found != self.version {
             return Err(DatabaseError::Layout { found, wanted: self.version });
         } else {
-            check_tables(&connection, tables)?;
+            self.check_tables(&connection)?;
             self.check(&connection, settings)?;
         }
         let damaged = self.damaged(&connection)?;
         Ok((connection, damaged))
+    }
+
+    /// Refuses a file unless its tables are those of this layout, see [`check_plain`].
+    pub(super) fn check_tables(&self, connection: &Connection) -> Result<(), DatabaseError> {
+        let pattern = Connection::open_in_memory()?;
+        pattern.execute_batch(TABLES)?;
+        pattern.execute_batch(&(self.schema)())?;
+        check_plain(connection, "main", &plain_tables(&pattern, "main")?)
     }
 
     /// Checks that its pages are sound and its settings those that it was begun with.
@@ -235,14 +244,6 @@ impl Layout {
 
 /// The columns of a table: name, type, and position in the key, which is 0 for a column outside the key.
 type Columns = Vec<(String, String, i64)>;
-
-/// Refuses a file unless its tables are those that `tables` makes, see [`check_plain`].
-pub(super) fn check_tables(connection: &Connection, tables: &str) -> Result<(), DatabaseError> {
-    let pattern = Connection::open_in_memory()?;
-    pattern.execute_batch(TABLES)?;
-    pattern.execute_batch(tables)?;
-    check_plain(connection, "main", &plain_tables(&pattern, "main")?)
-}
 
 /// Refuses an attached file unless it holds only plain tables, among them the wanted ones with their columns and keys. Keys
 /// matter, because without them every search for a unit would go through all rows.
@@ -428,6 +429,7 @@ mod tests {
     const SETTINGS: &str = "seed: 1\nroads: [corner]\n";
     const LAYOUT: Layout = Layout {
         version: 3,
+        schema: || OWN.to_owned(),
         unit: "episode",
         tables: &["episode", "step"],
         naming: Some(("step", "reason")),
@@ -440,7 +442,7 @@ mod tests {
                        CREATE TABLE step (episode INTEGER, step INTEGER, x REAL, reason INTEGER) STRICT;";
 
     fn begun(path: &Path) -> Connection {
-        let mut connection = LAYOUT.open(path, OWN, SETTINGS).unwrap();
+        let mut connection = LAYOUT.open(path, SETTINGS).unwrap();
         connection.execute("INSERT INTO reason VALUES (1, 'no room')", []).unwrap();
         for number in 0..3_i64 {
             let transaction = connection.transaction().unwrap();
@@ -469,10 +471,10 @@ mod tests {
             let scratch = tempfile::tempdir().unwrap();
             let path = scratch.path().join("run.db");
             let connection = begun(&path);
-            LAYOUT.open(&path, OWN, SETTINGS).expect("nothing was changed");
+            LAYOUT.open(&path, SETTINGS).expect("nothing was changed");
             connection.execute_batch(change).unwrap();
             drop(connection);
-            let refused = LAYOUT.open(&path, OWN, SETTINGS).unwrap_err().to_string();
+            let refused = LAYOUT.open(&path, SETTINGS).unwrap_err().to_string();
             assert!(refused.contains(what), "{change}: {refused}");
         }
     }
@@ -491,16 +493,16 @@ mod tests {
                 connection.query_row(&query, [], |row| row.get(0)).unwrap()
             })
         };
-        let (hiding, damaged) = LAYOUT.open_damaged(&path, OWN, SETTINGS).unwrap();
+        let (hiding, damaged) = LAYOUT.open_damaged(&path, SETTINGS).unwrap();
         assert_eq!(damaged, [1, 9]);
         assert_eq!(rows(&hiding), [3, 4, 3]);
         LAYOUT.hide(&hiding, &damaged).unwrap();
         assert_eq!(rows(&hiding), [2, 2, 2]);
         // Other connections see all rows.
-        let (deleting, damaged) = LAYOUT.open_damaged(&path, OWN, SETTINGS).unwrap();
+        let (deleting, damaged) = LAYOUT.open_damaged(&path, SETTINGS).unwrap();
         assert_eq!(rows(&deleting), [3, 4, 3]);
         damaged.iter().for_each(|&number| LAYOUT.delete(&deleting, number).unwrap());
-        let sound = LAYOUT.open(&path, OWN, SETTINGS).unwrap();
+        let sound = LAYOUT.open(&path, SETTINGS).unwrap();
         assert_eq!(rows(&sound), [2, 2, 2]);
     }
 
@@ -529,7 +531,7 @@ mod tests {
             let scratch = tempfile::tempdir().unwrap();
             let path = scratch.path().join("run.db");
             begun(&path).execute_batch(change).unwrap();
-            let refused = LAYOUT.open(&path, OWN, SETTINGS).unwrap_err();
+            let refused = LAYOUT.open(&path, SETTINGS).unwrap_err();
             assert!(refused.is_torn() && refused.to_string().contains(what), "{change}: {refused}");
         }
     }
@@ -546,7 +548,7 @@ mod tests {
             connection.execute_batch(&forged).unwrap();
             LAYOUT.seal(&connection, 1).unwrap();
             drop(connection);
-            let refused = LAYOUT.open(&path, OWN, SETTINGS).unwrap_err();
+            let refused = LAYOUT.open(&path, SETTINGS).unwrap_err();
             assert!(matches!(refused, DatabaseError::Rows { number: 1, .. }), "{number}: {refused}");
         }
     }
@@ -558,8 +560,8 @@ mod tests {
         let connection = begun(&path);
         LAYOUT.delete_from(&connection, 1).unwrap();
         drop(connection);
-        LAYOUT.open(&path, OWN, "# a comment\nroads:\n  - corner\nseed: 1").expect("the same settings");
-        let refused = LAYOUT.open(&path, OWN, "seed: 2\nroads: [corner]\nx: 1").unwrap_err().to_string();
+        LAYOUT.open(&path, "# a comment\nroads:\n  - corner\nseed: 1").expect("the same settings");
+        let refused = LAYOUT.open(&path, "seed: 2\nroads: [corner]\nx: 1").unwrap_err().to_string();
         assert!(refused.contains("`seed` was 1, `x` was not there"), "{refused}");
     }
 
@@ -580,7 +582,7 @@ mod tests {
             torn[at] ^= 0x55;
             std::fs::write(&path, &torn).unwrap();
             // A byte that no row and no page needs may differ.
-            match LAYOUT.open(&path, OWN, SETTINGS) {
+            match LAYOUT.open(&path, SETTINGS) {
                 Ok(connection) => assert_eq!(rows(&connection), written, "byte {at}"),
                 Err(_) => refused += 1,
             }
@@ -588,12 +590,12 @@ mod tests {
         assert!(refused > 0, "pages are checked");
         for length in [300, whole.len() / 2, whole.len() / 4 * 3] {
             std::fs::write(&path, &whole[..length]).unwrap();
-            let refused = LAYOUT.open(&path, OWN, SETTINGS).unwrap_err();
+            let refused = LAYOUT.open(&path, SETTINGS).unwrap_err();
             assert!(refused.is_torn(), "{length} bytes: {refused}");
         }
         std::fs::write(&path, &whole).unwrap();
         let other = Layout { version: 4, ..LAYOUT };
-        for refused in [other.open(&path, OWN, SETTINGS), LAYOUT.open(&path, OWN, "seed: 2")] {
+        for refused in [other.open(&path, SETTINGS), LAYOUT.open(&path, "seed: 2")] {
             let refused = refused.unwrap_err();
             assert!(!refused.is_torn(), "{refused}");
         }

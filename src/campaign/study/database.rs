@@ -14,6 +14,7 @@ use crate::study::settings::StudySettings;
 /// Versions begin at 1001, so that a `run.db` is never taken for a `study.db`.
 const LAYOUT: Layout = Layout {
     version: 1005,
+    schema: || SCHEMA.to_owned(),
     unit: "cell",
     tables: &["cell", "trained", "evaluated", "collision"],
     naming: None,
@@ -60,13 +61,7 @@ pub struct StudyDatabase {
 }
 
 impl Units for StudyDatabase {
-    fn layout() -> &'static Layout {
-        &LAYOUT
-    }
-
-    fn schema() -> String {
-        SCHEMA.to_owned()
-    }
+    const LAYOUT: &'static Layout = &LAYOUT;
 
     fn connection(&self) -> &Connection {
         &self.connection
