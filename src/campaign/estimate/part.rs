@@ -11,7 +11,7 @@ use crate::estimate::ready::Estimate;
 use crate::estimate::settings::Method;
 
 /// An independent part of an estimate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Part {
     /// Index among the roads of the estimate.
     pub road: usize,
@@ -20,7 +20,7 @@ pub struct Part {
 }
 
 /// What a part found.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct PartRecord {
     pub part: Part,
     /// Estimate of the probability of the event in an episode.
@@ -118,7 +118,7 @@ fn count(estimate: &Estimate, part: Part, stop: &AtomicBool) -> Option<Played> {
 
 impl Played {
     pub(super) fn new(part: Part) -> Played {
-        Played { record: PartRecord::new(part), met: Vec::new() }
+        Played { record: PartRecord { part, ..PartRecord::default() }, met: Vec::new() }
     }
 
     /// Takes in what an episode, with what was tried beside it, met.
@@ -138,21 +138,6 @@ impl Played {
 }
 
 impl PartRecord {
-    pub(super) fn new(part: Part) -> PartRecord {
-        PartRecord {
-            part,
-            probability: 0.0,
-            episodes: 0,
-            driven_m: 0.0,
-            duration_s: 0.0,
-            events: 0,
-            weight_squares: 0.0,
-            weight_max: 0.0,
-            simulated_s: 0.0,
-            failed: 0,
-        }
-    }
-
     /// Takes in an episode that was played from start to end.
     pub(super) fn note_whole(&mut self, log: &EpisodeLog) {
         self.episodes += 1;

@@ -68,7 +68,7 @@ pub fn pilot(estimate: &Estimate, threads: usize, stop: &AtomicBool) -> Option<P
         let mut found = Vec::new();
         let work = |&(part, episode): &(Part, u32), tell: &mut dyn FnMut(_) -> bool| {
             let mut seen = Pilot::default();
-            let mut record = PartRecord::new(part);
+            let mut record = PartRecord { part, ..PartRecord::default() };
             sampled(estimate, part, episode, &plan, &mut record, &mut |_, _, _| {}, Some(&mut seen));
             tell(((part, episode), seen));
         };
