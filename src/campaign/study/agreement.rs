@@ -109,14 +109,14 @@ mod tests {
 
     use super::*;
     use crate::study::measures::MEASURES;
-    use crate::study::record::Spent;
 
     fn cells(agent: &str, counted: &[f64]) -> Vec<MeasuredCell> {
         let cell = |(number, value): (usize, &f64)| MeasuredCell {
             agent: agent.to_owned(),
             road: "corner".to_owned(),
             number: number as u32,
-            spent: Spent::default(),
+            wall_s: 0.0,
+            cpu_s: None,
             values: MEASURES.iter().map(|measure| (measure.name == "counted").then_some(*value)).collect(),
         };
         counted.iter().enumerate().map(cell).collect()
