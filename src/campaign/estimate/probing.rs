@@ -9,7 +9,7 @@
 //! A trial shares all seeds with its episode, so it is an episode of its own seed with another script: what it finds is written
 //! as a scenario like any other. `plan` says how rows are chosen for trials, and where the weights come from.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use crate::episode;
 use crate::episode::{Choice, EpisodeLog, Moment, Play, Setup};
@@ -19,7 +19,7 @@ use avastra_base::rng::{Rng, Stream};
 use avastra_search::agent::Agent;
 use avastra_world::action::{Draw, Offer};
 
-use crate::estimate::part::{Event, Part, PartRecord, Played};
+use crate::estimate::part::{Event, Part, PartRecord};
 use crate::estimate::plan::{Cell, Pilot, Plan, Situation, weight};
 use crate::estimate::ready::{Estimate, EventPlace};
 
@@ -69,7 +69,7 @@ pub fn pilot(estimate: &Estimate, threads: usize, stop: &AtomicBool) -> Option<P
         let work = |&(part, episode): &(Part, u32), tell: &mut dyn FnMut(_) -> bool| {
             let mut seen = Pilot::default();
             let mut record = PartRecord { part, ..PartRecord::default() };
-            sampled(estimate, part, episode, &plan, &mut record, &mut |_, _, _| {}, Some(&mut seen));
+            sampled(estimate, episode, &plan, &mut record, &mut |_, _, _| {}, Some(&mut seen));
             tell(((part, episode), seen));
         };
         let kept = on_threads(&items, threads, stop, work, &mut |news| {
@@ -87,35 +87,33 @@ pub fn pilot(estimate: &Estimate, threads: usize, stop: &AtomicBool) -> Option<P
     Some(all)
 }
 
-/// A part of the estimate; `None` if it was stopped.
-pub fn probe(estimate: &Estimate, part: Part, plan: &Plan, stop: &AtomicBool) -> Option<Played> {
-    let mut played = Played::new(part);
-    for number in 0..estimate.settings().run.episodes {
-        if stop.load(Ordering::Relaxed) {
-            return None;
-        }
-        let mut events = Vec::new();
-        let mut on = |considered: Option<Considered>, step: usize, log: EpisodeLog| {
-            let weight = considered.map_or(1.0, |considered| considered.weight);
-            let row = considered.map(|considered| considered.cell.row);
-            events.push((Event { episode: number, step, row, weight }, log));
-        };
-        sampled(estimate, part, number, plan, &mut played.record, &mut on, None);
-        played.note_sample(estimate, events);
-    }
-    Some(played)
+/// An episode of a part, with the trials beside it: their events.
+pub fn probe(
+    estimate: &Estimate,
+    number: u32,
+    plan: &Plan,
+    record: &mut PartRecord,
+) -> Vec<(Event, EpisodeLog)> {
+    let mut events = Vec::new();
+    let mut on = |considered: Option<Considered>, step: usize, log: EpisodeLog| {
+        let weight = considered.map_or(1.0, |considered| considered.weight);
+        let row = considered.map(|considered| considered.cell.row);
+        events.push((Event { episode: number, step, row, weight }, log));
+    };
+    sampled(estimate, number, plan, record, &mut on, None);
+    events
 }
 
-/// Plays an episode and the trials beside it, and hands on each event with the row of the step that it belongs to.
+/// Plays an episode of a part and the trials beside it, and hands on each event with the row of the step that it belongs to.
 fn sampled(
     estimate: &Estimate,
-    part: Part,
     number: u32,
     plan: &Plan,
     record: &mut PartRecord,
     on: &mut dyn FnMut(Option<Considered>, usize, EpisodeLog),
     mut seen: Option<&mut Pilot>,
 ) {
+    let part = record.part;
     let setup = estimate.setup(part, number);
     let mut rng = rng::stream(setup.seed, Stream::Estimate, 0);
     let mut agent = estimate.run().agent();
