@@ -191,13 +191,17 @@ fn considered(
     for row in (0..offers.len()).filter(|&row| matters[row]) {
         *heaviest = heaviest.max(weighed(row).0.weight);
     }
-    // Every row draws, so that the plan for one does not shift the draws of another.
-    let drawn: Vec<usize> = (0..offers.len())
-        .filter(|&row| {
-            let ticket = rng::unit(rng);
-            ticket < weighed(row).1
-        })
-        .collect();
+    let mut trials: Vec<(Considered, Draw)> = Vec::new();
+    for (row, offer) in offers.iter().enumerate() {
+        // Every row draws, so that the plan for one does not shift the draws of another.
+        let ticket = rng::unit(rng);
+        let (considered, share) = weighed(row);
+        if let Offer::Legal(draw) = offer
+            && ticket < share
+        {
+            trials.push((considered, draw.clone()));
+        }
+    }
     if let Some(pilot) = seen {
         for row in (0..offers.len()).filter(|&row| matters[row] && chances[row] > 0.0) {
             let seen = pilot.cells.entry(weighed(row).0.cell).or_default();
@@ -205,17 +209,9 @@ fn considered(
             seen.chance += chances[row];
         }
     }
-    let mut trials: Vec<(Considered, Draw)> = drawn
-        .into_iter()
-        .filter_map(|row| match &offers[row] {
-            Offer::Legal(draw) => Some((weighed(row).0, draw.clone())),
-            Offer::Refused(_) => None,
-        })
-        .collect();
-    let all: Vec<Considered> = (0..offers.len()).map(|row| weighed(row).0).collect();
     let choice = carry_out(offers, legal.view(), agent, moment);
     let chosen = match &choice {
-        Choice::Act(draw) => Some(all[draw.row]),
+        Choice::Act(draw) => Some(weighed(draw.row).0),
         _ => None,
     };
     // A trial of the chosen row would be the episode itself: it is seen already.
