@@ -54,7 +54,7 @@ impl Database {
                 side: row.get(3)?,
                 shape: row.get(4)?,
                 cause: row.get(5)?,
-                count: 1,
+                count: 0,
                 episode: row.get(6)?,
                 road: row.get(7)?,
                 priority: row.get(9)?,
@@ -66,18 +66,11 @@ impl Database {
             let (group, step) = row?;
             let Group { kind, manoeuvre, approach, side, priority, .. } = &group;
             let key = [kind, manoeuvre, approach, side, priority].map(Clone::clone);
-            match found.entry((key, group.shape.clone(), group.cause.clone())) {
-                std::collections::btree_map::Entry::Vacant(entry) => {
-                    entry.insert((group, step));
-                }
-                std::collections::btree_map::Entry::Occupied(mut entry) => {
-                    let (known, shortest) = entry.get_mut();
-                    let count = known.count + 1;
-                    if step < *shortest {
-                        (*known, *shortest) = (group, step);
-                    }
-                    known.count = count;
-                }
+            let key = (key, group.shape.clone(), group.cause.clone());
+            let (known, shortest) = found.entry(key).or_insert_with(|| (group.clone(), step));
+            known.count += 1;
+            if step < *shortest {
+                (*known, *shortest) = (Group { count: known.count, ..group }, step);
             }
         }
         let mut groups: Vec<Group> = found.into_values().map(|(group, _)| group).collect();
