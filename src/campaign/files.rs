@@ -24,6 +24,10 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use sha2::{Digest, Sha256};
 
+// What needs no care: `make` makes a folder that the user named, with those on the way to it; `make_new` makes a folder where
+// nothing is; `rename` gives a folder a name that nothing has, or an empty folder; `remove_empty` removes an empty one.
+pub use std::fs::{create_dir as make_new, create_dir_all as make, remove_dir as remove_empty, rename};
+
 /// Longest name of a file that common file systems take, in bytes.
 const NAME_BYTES_MAX: usize = 255;
 
@@ -226,38 +230,6 @@ pub fn remove(file: &Path) -> Result<()> {
 pub fn remove_all(folder: &Path) -> Result<()> {
     own_folder(folder)?;
     std::fs::remove_dir_all(folder)
-}
-
-/// Removes a folder if it is empty.
-///
-/// # Errors
-/// If it is not, or cannot be removed.
-pub fn remove_empty(folder: &Path) -> Result<()> {
-    std::fs::remove_dir(folder)
-}
-
-/// Gives a folder another name, which nothing has, or an empty folder.
-///
-/// # Errors
-/// If that is not possible.
-pub fn rename(from: &Path, to: &Path) -> Result<()> {
-    std::fs::rename(from, to)
-}
-
-/// Makes a folder that the user named, with those on the way to it.
-///
-/// # Errors
-/// If that is not possible.
-pub fn make(folder: &Path) -> Result<()> {
-    std::fs::create_dir_all(folder)
-}
-
-/// Makes a new folder.
-///
-/// # Errors
-/// If something is there (`AlreadyExists`), or it cannot be made.
-pub fn make_new(folder: &Path) -> Result<()> {
-    std::fs::create_dir(folder)
 }
 
 /// Makes the missing parts of a path of folders inside a directory, and returns the whole path. No part may be a link.
