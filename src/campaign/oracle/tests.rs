@@ -1,24 +1,18 @@
 //! Collisions made by hand, whose verdicts are known beforehand.
 
-use std::path::Path;
-use std::sync::Arc;
-
 use crate::episode::Collision;
 use avastra_base::geometry::{OrientedBox, Vec2};
 use avastra_drivers as ads;
 use avastra_drivers::{Ads, Status};
-use avastra_lang::check::{self, ReadError};
-use avastra_lang::model::vocabulary::{Body, Priority, Verb};
-use avastra_lang::model::{Avoidability, BodyWord, Memory, OutcomeFacts, Space};
+use avastra_lang::model::vocabulary::{Body, Verb};
+use avastra_lang::model::{Avoidability, BodyWord};
 use avastra_road::testing::{lanes, street};
 use avastra_world::action::Effect;
-use avastra_world::sim::testing::Heading;
-use avastra_world::sim::{Contact, Control, DT_S, Sensed, Start, VehicleParameters, World, testing};
+use avastra_world::sim::{Contact, Control, DT_S, Sensed, Start, World, testing};
 
 use super::avoidable::{Judgement, judge_one};
 use super::hazard::{Onset, onset};
 use super::severity::severity;
-use crate::episode::{collision_facts, struck};
 
 /// A lane along +x for 800 m, 3 m wide: too narrow to pass another vehicle.
 fn world() -> World {
@@ -183,80 +177,6 @@ impl Ads for Blind {
     fn status(&self) -> &Status {
         self.0.status()
     }
-}
-
-/// A blind ego vehicle goes through a junction at a green light, and a vehicle comes from the other side: when
-/// the ego vehicle's front is at `front_m`, it is put at a station of its way through a road, with a speed.
-fn meets(
-    heading: Heading,
-    front_m: f64,
-    (through, station_m, speed_mps): (&str, f64, f64),
-) -> Option<(Contact, Judgement)> {
-    let scene = testing::oncoming(heading);
-    let mut world = World::new(scene, &Start { seed: 1, ..testing::start() });
-    let mut blind = Blind(ads::Idm::new(world.scene()));
-    let mut recording: Vec<World> = Vec::new();
-    let mut sensed = world.sensed();
-    let mut is_put = false;
-    for _ in 0..1500 {
-        if !is_put && VehicleParameters::MKZ.front_m(world.ego_station_m()) >= front_m {
-            world.put("3", 1, through, station_m, speed_mps);
-            is_put = true;
-        }
-        world.sense(&mut sensed);
-        let control = blind.drive(&sensed);
-        if let Some(contact) = world.tick(&control).first().copied() {
-            let judgement = judge_one(&recording, &contact, world.ego_outline());
-            return Some((contact, judgement));
-        }
-        recording.push(world.clone());
-    }
-    None
-}
-
-fn shipped_space() -> Arc<Space> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/avastra45.ava");
-    let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()));
-    check::load(&path, &read).expect("it can be read").space.expect("the shipped space is sound")
-}
-
-fn counts(contact: Contact, judgement: &Judgement) -> bool {
-    let collision = Collision {
-        contact,
-        step: 0,
-        body: BodyWord::engine(Body::Sedan),
-        mass_t: 1.55,
-        verb: Verb::CrossRoad,
-        spawned_s: 0.0,
-    };
-    let avoidable = judgement.class == Avoidability::Avoidable;
-    let facts = OutcomeFacts { avoidable, ..collision_facts(&collision, &[]) };
-    shipped_space().counts(facts, &Memory::default())
-}
-
-#[test]
-fn who_turns_across_a_green_light_wrongs_the_ego_vehicle() {
-    let (contact, judgement) = meets(Heading::Straight, 70.0, ("8", 188.0, 9.0)).expect("they meet");
-    assert_eq!(contact.priority, Priority::Ego, "{contact:?}");
-    assert!(!struck(&contact, &VehicleParameters::MKZ), "the ego vehicle's front hits it: {contact:?}");
-    assert!(!counts(contact, &judgement), "{judgement:?}");
-    let had_to_give_way = Contact { priority: Priority::Other, ..contact };
-    assert_eq!(counts(had_to_give_way, &judgement), judgement.class == Avoidability::Avoidable);
-}
-
-#[test]
-fn an_ego_vehicle_that_turns_across_is_at_fault_though_hit_in_the_flank() {
-    let mut stations = (130..200).step_by(3);
-    let met = stations.find_map(|station_m| meets(Heading::Left, 85.0, ("2", f64::from(station_m), 13.0)));
-    let (contact, judgement) = met.expect("one of them is there at the right moment");
-    assert_eq!(contact.priority, Priority::Other, "{contact:?}");
-    assert_eq!(judgement.class, Avoidability::Avoidable, "{judgement:?}");
-    assert!(counts(contact, &judgement));
-    // A moment later the other would have run into the right flank.
-    let in_the_flank = Contact { on_ego: Vec2::new(0.0, -1.03), ..contact };
-    assert!(struck(&in_the_flank, &VehicleParameters::MKZ));
-    assert!(counts(in_the_flank, &judgement), "whoever has to give way is not the one that is run into");
-    assert!(!counts(Contact { priority: Priority::Ego, ..in_the_flank }, &judgement));
 }
 
 /// Judges a blind ego vehicle at 11.2 m/s before which a pedestrian stands, `distance_m` away when it appears.
