@@ -8,7 +8,7 @@ use avastra_lang::model::expr::Expr;
 use avastra_lang::model::{BodyWord, Facts, Memory, OutcomeFacts, Trigger, WorldFacts, evaluate};
 use avastra_search::mdp;
 use avastra_search::mdp::{Danger, Observation};
-use avastra_world::action::{Draw, Situation};
+use avastra_world::action::{Draw, Offer, Refusal, Situation};
 use avastra_world::sim::{Contact, DT_S, Incident, Sensed, Trace, World};
 
 use super::facts::collision_facts;
@@ -91,6 +91,24 @@ pub enum Choice {
     },
     /// The script is at its end.
     Stop,
+}
+
+impl Choice {
+    /// The choice of a row as it is offered.
+    pub fn of(row: usize, offer: Offer) -> Choice {
+        match offer {
+            Offer::Legal(draw) => Choice::Act(draw),
+            Offer::Refused(Refusal { rule, reason }) => Choice::Refused { row, rule, reason },
+        }
+    }
+
+    /// The choice of a row with given values. Of several refusals the first counts.
+    pub fn judged(row: usize, judged: Result<Draw, Vec<Refusal>>) -> Choice {
+        match judged {
+            Ok(draw) => Choice::Act(draw),
+            Err(mut refusals) => Choice::of(row, Offer::Refused(refusals.swap_remove(0))),
+        }
+    }
 }
 
 /// Plays one episode. `choose` is called once a step, `watch` after every tick and once before the first.
