@@ -58,10 +58,7 @@ impl<'a> Moment<'a> {
 
     /// Whether anything is still there that the action of a step made appear.
     pub fn is_around(&self, step: usize) -> bool {
-        let spawned = match self.play.steps.get(step).map(|step| &step.outcome) {
-            Some(Outcome::Done { spawned, .. }) => &spawned[..],
-            _ => &[],
-        };
+        let spawned = self.play.steps.get(step).map_or(&[][..], |step| step.outcome.spawned());
         spawned.iter().any(|id| self.play.world.obstacle(*id).is_some())
     }
 

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use ndarray::Array1;
 
 use crate::episode;
-use crate::episode::{Choice, End, EpisodeLog, Moment, Outcome, Script, Setup};
+use crate::episode::{Choice, End, EpisodeLog, Moment, Script, Setup};
 use crate::oracle;
 use crate::run::{
     Arena, EpisodeSummary, Finding, Profile, RunError, RunSettings, TrafficRecord, agent_named,
@@ -310,10 +310,8 @@ fn experiences(
     summary: &EpisodeSummary,
 ) -> Vec<Experience> {
     let steps: Vec<usize> = choices.iter().map(|choice| choice.step).collect();
-    let made_by = |obstacle: u32| {
-        let made = |outcome: &Outcome| matches!(outcome, Outcome::Done { spawned, .. } if spawned.contains(&obstacle));
-        steps.iter().position(|&step| made(&log.steps[step].outcome))
-    };
+    let made_by =
+        |obstacle: u32| steps.iter().position(|&step| log.steps[step].outcome.spawned().contains(&obstacle));
     let experience = |choice: Chosen| {
         let step = &log.steps[choice.step];
         let findings = || summary.collisions.iter().filter(|one| one.collision.step == choice.step);
