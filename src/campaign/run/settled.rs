@@ -238,9 +238,8 @@ impl Layout {
             ))?;
         }
         adjust(&transaction)?;
-        let mut numbers: Vec<i64> = new.iter().map(|(_, number)| *number).collect();
-        numbers.sort_unstable();
-        for number in numbers {
+        new.sort_unstable_by_key(|(_, number)| *number);
+        for (_, number) in new {
             self.seal(&transaction, number)?;
         }
         transaction.execute_batch("DELETE FROM taking")?;
