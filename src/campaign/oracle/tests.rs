@@ -112,14 +112,6 @@ fn appears(distance_m: f64) -> Judgement {
 }
 
 #[test]
-fn what_appears_in_front_of_the_bumper_is_unavoidable() {
-    let judgement = appears(3.0);
-    assert_eq!(judgement.class, Avoidability::Unavoidable);
-    assert!(judgement.avoided_by.is_empty() && judgement.evasion.is_none());
-    assert!((judgement.onset_s - EVENT_S).abs() < 0.11, "{}", judgement.onset_s);
-}
-
-#[test]
 fn between_human_and_machine_lies_the_beyond() {
     let judgement = appears(9.0);
     assert_eq!(judgement.class, Avoidability::BeyondReference);
