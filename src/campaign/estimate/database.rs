@@ -145,7 +145,7 @@ impl EstimateDatabase {
         insert_row(&transaction, "pilot", params![PILOT, whole_s, tried_s, tried])?;
         for (Cell { row, road, situation }, seen) in cells {
             let Seen { trials, events, moments, chance } = seen;
-            let (row, road, situation) = (*row as i64, *road as i64, situation.number());
+            let (row, road, situation) = (*row as i64, *road as i64, situation.0);
             let values = params![PILOT, row, road, situation, trials, events, moments, chance];
             insert_row(&transaction, "seen", values)?;
         }
@@ -177,7 +177,7 @@ impl EstimateDatabase {
             let cell = Cell {
                 row: row.get::<_, i64>(0)? as usize,
                 road: row.get::<_, i64>(1)? as usize,
-                situation: Situation::from_number(row.get(2)?),
+                situation: Situation(row.get(2)?),
             };
             let seen =
                 Seen { trials: row.get(3)?, events: row.get(4)?, moments: row.get(5)?, chance: row.get(6)? };
