@@ -73,11 +73,6 @@ impl Arena {
         &self.table
     }
 
-    /// Whether the driving system is made of modules that could be at fault.
-    pub(crate) fn has_modules(&self) -> bool {
-        self.ads.profile().is_some()
-    }
-
     /// The driving system: its name here, or what an external one calls itself.
     pub fn ads_name(&self) -> String {
         self.ads.title()
