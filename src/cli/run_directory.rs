@@ -316,7 +316,7 @@ pub fn open_to_go_on<D: Units>(output: &Output, file: &Path, settings: &str) -> 
         D::open_and_drop(file, settings).map_err(|error| Failure::file("open", file, error))?;
     if !damaged.is_empty() {
         let changed = changed::<D>(file, &damaged);
-        output.warn(&format!("{changed}: each such {} is played again", D::layout().unit));
+        output.warn(&format!("{changed}: each such {} is played again", D::LAYOUT.unit));
     }
     Ok(database)
 }

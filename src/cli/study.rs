@@ -89,8 +89,8 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
             let shard = shard::asked(output, arguments.shard.shard)?;
             let study = begun(output, file, arguments)?;
             if arguments.shard.dry_run {
-                let (jobs, settings) = (study.jobs(), study.settings());
-                let episodes = jobs.iter().map(|job| study.episodes(job)).sum::<u64>() as usize;
+                let (jobs, settings) = (study.settings().jobs(), study.settings());
+                let episodes = jobs.iter().map(|job| settings.episodes(job)).sum::<u64>() as usize;
                 let episodes = plural(episodes, "episode");
                 let what = format!("{} trainings or repetitions, {episodes} together", jobs.len());
                 return shard::planned(
@@ -128,7 +128,7 @@ fn play_all(
     let unwritten = |error| Failure::file("write", &file, error);
     let mut database: StudyDatabase = run_directory::open_to_go_on(output, &file, &settings)?;
     let share = Share::of(&path, study.settings())?;
-    let all = study.jobs();
+    let all = study.settings().jobs();
     let lacking = |database: &StudyDatabase| share.lacking(study.settings(), database).map_err(unread);
     output.tell(&format!("{}, into {}", heading(&study), path.display()));
     let mut times = Times::read(&path)?;

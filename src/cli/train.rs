@@ -171,7 +171,7 @@ fn keep(
     let is_due = training.episodes().is_multiple_of(CHECKPOINT_EPISODES)
         || training.is_done()
         || stop.load(Ordering::Relaxed);
-    let checkpoint = is_due.then(|| training.checkpoint());
+    let checkpoint = is_due.then(|| training.agent().save());
     let in_words = |draw: &Draw| emit::action_text(training.table(), draw);
     directory
         .database
@@ -184,9 +184,9 @@ fn finish(output: &Output, training: &Training, mut directory: RunDirectory) -> 
     let settings = training.settings();
     let test = (EVALUATION_EPISODES, settings.seed);
     let working = Working::new(output, "playing what it learned");
-    let evaluation = evaluate(training.arena(), &|| training.actor(), test);
+    let evaluation = evaluate(training.arena(), &|| training.agent().actor(), test);
     drop(working);
-    let kept = training.policy().map(|acting| {
+    let kept = training.agent().policy().map(|acting| {
         output.tell("distilling rules from the network");
         let _working = Working::new(output, "distilling rules from the network");
         let policy = policy(training, acting, &evaluation);
@@ -367,7 +367,7 @@ fn headline(settings: &TrainSettings, evaluation: &Evaluation) -> String {
 
 fn heading(training: &Training, directory: &Path) -> String {
     let settings = training.settings();
-    let network = training.policy().map_or(String::new(), |policy| {
+    let network = training.agent().policy().map_or(String::new(), |policy| {
         let network = policy.network();
         let widths: Vec<String> = network.shape().layers.iter().map(ToString::to_string).collect();
         format!(", network {}, {} parameters", widths.join("-"), network.parameters().len())

@@ -72,7 +72,7 @@ fn what_is_trained_goes_on_from_a_checkpoint_to_the_same_episodes() {
         for _ in 0..14 {
             whole.episode();
         }
-        let checkpoint = whole.checkpoint();
+        let checkpoint = whole.agent().save();
         let mut resumed = training(entry, Some((14, &checkpoint))).expect("it is trained");
         while !whole.is_done() {
             let (one, other): (TrainedEpisode, TrainedEpisode) = (whole.episode(), resumed.episode());
@@ -81,7 +81,7 @@ fn what_is_trained_goes_on_from_a_checkpoint_to_the_same_episodes() {
             assert_eq!((one.sum, one.simulated_s), (other.sum, other.simulated_s), "{name}");
             assert!(one.simulated_s > 0.0 && one.simulated_s <= one.log.duration_s, "{name}");
         }
-        assert_eq!(whole.checkpoint(), resumed.checkpoint(), "{}", entry.name);
+        assert_eq!(whole.agent().save(), resumed.agent().save(), "{}", entry.name);
     }
 }
 

@@ -45,62 +45,57 @@ pub fn scenario(
     let counted: Vec<&Finding> = summary.collisions.iter().filter(|finding| finding.counted).collect();
     let last = counted.last().expect("an episode without a counted collision is not emitted");
     let steps = last.collision.step + 1;
-    let emitted = format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command);
     let headline = headline(table.space(), log, &counted[0].collision);
-    let origin = origin(log, source);
-    file(table, log, source, origin, [&emitted, &headline], steps, expects(log, summary, steps))
+    file(table, log, source, [REPLAY, &headline], steps, expects(log, summary, steps))
 }
 
 /// The scenario of an episode that played an emitted scenario again. It keeps all steps, because they are the scenario,
 /// and says how the episode ended.
 pub fn retold(table: &ActionTable, log: &EpisodeLog, summary: &EpisodeSummary, source: &Provenance) -> File {
-    let emitted = format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command);
     let counted = summary.collisions.iter().find(|finding| finding.counted);
     let headline = counted.map_or_else(String::new, |first| headline(table.space(), log, &first.collision));
-    let origin = origin(log, source);
     let steps = log.steps.len();
     let mut expects = expects(log, summary, steps);
     expects.push(end(log));
-    file(table, log, source, origin, [&emitted, &headline], steps, expects)
+    file(table, log, source, [REPLAY, &headline], steps, expects)
 }
 
 /// An episode in which an external driving system failed, as a scenario that ends so. If it failed before the first step, the
 /// scenario has no step.
 pub fn failure(table: &ActionTable, log: &EpisodeLog, headline: &str, source: &Provenance) -> File {
-    let emitted = format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command);
-    let origin = origin(log, source);
     let trace = tree::text(digest_text(&log.trace()));
     let trace = tree::expect(tree::equal(tree::name("trace"), trace), Vec::new());
-    file(table, log, source, origin, [&emitted, headline], log.steps.len(), vec![end(log), trace])
+    file(table, log, source, [REPLAY, headline], log.steps.len(), vec![end(log), trace])
 }
 
 /// All steps of an episode as a scenario without claims, to look at.
 pub fn unclaimed(table: &ActionTable, log: &EpisodeLog, headline: &str, source: &Provenance) -> File {
-    let emitted =
-        format!("Emitted by `avastra {}`; look at it with `avastra render FILE --strip`.", source.command);
-    let origin = origin(log, source);
-    file(table, log, source, origin, [&emitted, headline], log.steps.len(), Vec::new())
+    let look = "look at it with `avastra render FILE --strip`";
+    file(table, log, source, [look, headline], log.steps.len(), Vec::new())
 }
+
+/// What a reader can do with most files.
+const REPLAY: &str = "replay with `avastra replay FILE`";
 
 fn file(
     table: &ActionTable,
     log: &EpisodeLog,
     source: &Provenance,
-    origin: Vec<Field>,
-    [emitted, headline]: [&str; 2],
+    [advice, headline]: [&str; 2],
     steps: usize,
     expects: Vec<Expect>,
 ) -> File {
     let space = table.space();
     let item = Scenario {
         name: Name::built(source.name),
-        origin,
+        origin: origin(log, source),
         road: Name::built(log.road.as_str()),
         start: start(space, log),
         steps: (0..steps).map(|number| step(table, log, number)).collect(),
         expects,
     };
-    tree::file(emitted, space, source.space_path, vec![tree::doc(headline)], ItemKind::Scenario(item))
+    let emitted = format!("Emitted by `avastra {}`; {advice}.", source.command);
+    tree::file(&emitted, space, source.space_path, vec![tree::doc(headline)], ItemKind::Scenario(item))
 }
 
 /// An action as it was drawn, in one line: `drive_ahead(lane: Left, …) with { speed: 11 m/s, … }`.

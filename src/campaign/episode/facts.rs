@@ -189,6 +189,17 @@ mod tests {
     }
 
     #[test]
+    fn an_ego_vehicle_that_had_to_give_way_was_not_run_into() {
+        let flank = collision(0.0, 1.03, 8.0, (8.0, -0.5));
+        for (priority, expected) in [(Priority::None, true), (Priority::Ego, true), (Priority::Other, false)]
+        {
+            let contact = Contact { priority, ..flank.contact };
+            let found = collision_facts(&Collision { contact, ..flank }, &[]);
+            assert_eq!(found.struck, expected, "{priority:?}");
+        }
+    }
+
+    #[test]
     fn one_that_comes_from_behind_is_faster_and_meets_the_rear() {
         let mkz = VehicleParameters::MKZ;
         let is_so = |x_m: f64, velocity_mps: (f64, f64), priority: Priority| {

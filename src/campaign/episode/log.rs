@@ -100,6 +100,16 @@ pub enum Outcome {
     Refused { row: usize, rule: Option<String>, reason: String },
 }
 
+impl Outcome {
+    /// The ids of the road users that it made appear.
+    pub fn spawned(&self) -> &[u32] {
+        match self {
+            Outcome::Done { spawned, .. } => spawned,
+            Outcome::Passed | Outcome::Refused { .. } => &[],
+        }
+    }
+}
+
 /// A contact of the ego vehicle with an obstacle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Collision {

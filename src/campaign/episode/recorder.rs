@@ -120,7 +120,8 @@ impl Recorder {
             let place = *self.places.entry(obstacle.id).or_insert(self.others.len());
             if place == self.others.len() {
                 let shape = *world.body(obstacle.id).expect("an obstacle of the world has a body");
-                self.others.push(Actor::new(obstacle, shape));
+                let (id, body, first) = (obstacle.id, obstacle.body, Some(*obstacle));
+                self.others.push(Actor { id, body, shape, first, ..Actor::ego() });
             }
             let sample = Sample { tick, pose: obstacle.outline.pose, velocity_mps: obstacle.velocity_mps };
             self.others[place].note(sample);
@@ -183,13 +184,7 @@ impl Actor {
             acceleration_mps2_max: mkz.acceleration_mps2_max,
             deceleration_mps2_max: mkz.deceleration_mps2_max,
         };
-        let (samples, brake_lights) = (Vec::new(), Vec::new());
-        Actor { id: 0, body: Body::Sedan, shape, first: None, samples, brake_lights }
-    }
-
-    fn new(obstacle: &Obstacle, shape: BodyParameters) -> Actor {
-        let (samples, brake_lights) = (Vec::new(), Vec::new());
-        Actor { id: obstacle.id, body: obstacle.body, shape, first: Some(*obstacle), samples, brake_lights }
+        Actor { id: 0, body: Body::Sedan, shape, first: None, samples: Vec::new(), brake_lights: Vec::new() }
     }
 
     /// What other tools call it: `ego`, or `npc_3` for the one that claims call `npc#3`.

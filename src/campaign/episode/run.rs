@@ -8,7 +8,7 @@ use avastra_lang::model::expr::Expr;
 use avastra_lang::model::{BodyWord, Facts, Memory, OutcomeFacts, Trigger, WorldFacts, evaluate};
 use avastra_search::mdp;
 use avastra_search::mdp::{Danger, Observation};
-use avastra_world::action::{Draw, Situation};
+use avastra_world::action::{Draw, Offer, Refusal, Situation};
 use avastra_world::sim::{Contact, DT_S, Incident, Sensed, Trace, World};
 
 use super::facts::collision_facts;
@@ -58,10 +58,7 @@ impl<'a> Moment<'a> {
 
     /// Whether anything is still there that the action of a step made appear.
     pub fn is_around(&self, step: usize) -> bool {
-        let spawned = match self.play.steps.get(step).map(|step| &step.outcome) {
-            Some(Outcome::Done { spawned, .. }) => &spawned[..],
-            _ => &[],
-        };
+        let spawned = self.play.steps.get(step).map_or(&[][..], |step| step.outcome.spawned());
         spawned.iter().any(|id| self.play.world.obstacle(*id).is_some())
     }
 
@@ -91,6 +88,24 @@ pub enum Choice {
     },
     /// The script is at its end.
     Stop,
+}
+
+impl Choice {
+    /// The choice of a row as it is offered.
+    pub fn of(row: usize, offer: Offer) -> Choice {
+        match offer {
+            Offer::Legal(draw) => Choice::Act(draw),
+            Offer::Refused(Refusal { rule, reason }) => Choice::Refused { row, rule, reason },
+        }
+    }
+
+    /// The choice of a row with given values. Of several refusals the first counts.
+    pub fn judged(row: usize, judged: Result<Draw, Vec<Refusal>>) -> Choice {
+        match judged {
+            Ok(draw) => Choice::Act(draw),
+            Err(mut refusals) => Choice::of(row, Offer::Refused(refusals.swap_remove(0))),
+        }
+    }
 }
 
 /// Plays one episode. `choose` is called once a step, `watch` after every tick and once before the first.

@@ -27,13 +27,7 @@ pub struct ScriptedAction {
 impl ScriptedAction {
     /// The action under the rules of the run, or its refusal.
     pub(super) fn judged(&self, table: &ActionTable, situation: &Situation) -> Choice {
-        match table.check(situation, self.row, &self.values) {
-            Ok(draw) => Choice::Act(draw),
-            Err(refusals) => {
-                let first = refusals.into_iter().next().expect("a refusal comes with a reason");
-                Choice::Refused { row: self.row, rule: first.rule, reason: first.reason }
-            }
-        }
+        Choice::judged(self.row, table.check(situation, self.row, &self.values))
     }
 }
 

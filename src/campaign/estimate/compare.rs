@@ -91,7 +91,7 @@ pub fn compared<E>(
         let side = |run: &Run| {
             let setup = run.setup(episode);
             let (log, _) = run.played(&setup);
-            let happened = comparison.event.happened(&setup, &log);
+            let happened = comparison.event.first(&setup, &log).is_some();
             Side { happened, failed: log.failure.is_some(), driven_m: log.distance_m }
         };
         tell(Pair { number: *number, first: side(&comparison.first), second: side(&comparison.second) });

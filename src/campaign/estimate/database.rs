@@ -3,7 +3,7 @@
 use rusqlite::{Connection, OptionalExtension, params};
 
 use crate::files::PlainName;
-use crate::run::{DatabaseError, Layout, Units, WrittenScenario};
+use crate::run::{DatabaseError, Layout, Units, WrittenScenario, insert_row, query_all};
 
 use crate::estimate::part::{Event, Part, PartRecord, Played};
 use crate::estimate::plan::{Cell, Pilot, Seen, Situation};
@@ -12,6 +12,7 @@ use crate::estimate::ready::Estimate;
 /// Versions begin at 2001, so that it is never taken for another database.
 const LAYOUT: Layout = Layout {
     version: 2003,
+    schema: || SCHEMA.to_owned(),
     unit: "part",
     tables: &["part", "event", "scenario", "pilot", "seen"],
     naming: None,
@@ -65,13 +66,7 @@ pub struct EstimateDatabase {
 }
 
 impl Units for EstimateDatabase {
-    fn layout() -> &'static Layout {
-        &LAYOUT
-    }
-
-    fn schema() -> String {
-        SCHEMA.to_owned()
-    }
+    const LAYOUT: &'static Layout = &LAYOUT;
 
     fn connection(&self) -> &Connection {
         &self.connection
@@ -82,14 +77,12 @@ impl Units for EstimateDatabase {
     }
 
     fn scenarios(&self) -> Result<Vec<WrittenScenario>, DatabaseError> {
-        let mut query =
-            self.connection.prepare("SELECT part, name, text FROM scenario ORDER BY part, event")?;
-        let rows = query.query_map([], |row| Ok((row.get(0)?, row.get::<_, String>(1)?, row.get(2)?)))?;
-        rows.map(|row| {
-            let (unit, name, text) = row?;
+        let query = "SELECT part, name, text FROM scenario ORDER BY part, event";
+        let rows = query_all(&self.connection, query, |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
+        let named = |(unit, name, text): (i64, String, String)| {
             Ok(WrittenScenario { unit, name: PlainName::scenario(name)?, text })
-        })
-        .collect()
+        };
+        rows.into_iter().map(named).collect()
     }
 
     fn called(number: i64) -> String {
@@ -113,34 +106,28 @@ impl EstimateDatabase {
         let Part { road, number } = record.part;
         let place = estimate.settings().place(record.part);
         let transaction = self.connection.transaction()?;
-        transaction.execute(
-            "INSERT INTO part VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 0)",
-            params![
-                place,
-                road as i64,
-                number,
-                record.probability,
-                record.episodes,
-                record.driven_m,
-                record.duration_s,
-                record.events,
-                record.weight_squares,
-                record.weight_max,
-                record.simulated_s,
-            ],
-        )?;
+        let values = params![
+            place,
+            road as i64,
+            number,
+            record.probability,
+            record.episodes,
+            record.driven_m,
+            record.duration_s,
+            record.events,
+            record.weight_squares,
+            record.weight_max,
+            record.simulated_s,
+            0,
+        ];
+        insert_row(&transaction, "part", values)?;
         for (index, (met, scenario)) in played.met.iter().zip(scenarios).enumerate() {
             let Event { episode, step, row, weight } = met.event;
             let row = row.map(|row| row as i64);
-            transaction.execute(
-                "INSERT INTO event VALUES (?, ?, ?, ?, ?, ?)",
-                params![place, index as i64, episode, step as i64, row, weight],
-            )?;
+            let values = params![place, index as i64, episode, step as i64, row, weight];
+            insert_row(&transaction, "event", values)?;
             if let Some((name, text)) = scenario {
-                transaction.execute(
-                    "INSERT INTO scenario VALUES (?, ?, ?, ?)",
-                    params![place, index as i64, name, text],
-                )?;
+                insert_row(&transaction, "scenario", params![place, index as i64, name, text])?;
             }
         }
         LAYOUT.seal(&transaction, place)?;
@@ -155,22 +142,12 @@ impl EstimateDatabase {
     pub fn keep_pilot(&mut self, pilot: &Pilot) -> Result<(), DatabaseError> {
         let transaction = self.connection.transaction()?;
         let Pilot { cells, whole_s, tried_s, tried } = pilot;
-        transaction
-            .execute("INSERT INTO pilot VALUES (?, ?, ?, ?)", params![PILOT, whole_s, tried_s, tried])?;
+        insert_row(&transaction, "pilot", params![PILOT, whole_s, tried_s, tried])?;
         for (Cell { row, road, situation }, seen) in cells {
-            transaction.execute(
-                "INSERT INTO seen VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
-                params![
-                    PILOT,
-                    *row as i64,
-                    *road as i64,
-                    situation.number(),
-                    seen.trials,
-                    seen.events,
-                    seen.moments,
-                    seen.chance,
-                ],
-            )?;
+            let Seen { trials, events, moments, chance } = seen;
+            let (row, road, situation) = (*row as i64, *road as i64, situation.0);
+            let values = params![PILOT, row, road, situation, trials, events, moments, chance];
+            insert_row(&transaction, "seen", values)?;
         }
         LAYOUT.seal(&transaction, PILOT)?;
         transaction.commit()?;
@@ -194,20 +171,19 @@ impl EstimateDatabase {
             })
             .optional()?;
         let Some(mut pilot) = totals else { return Ok(None) };
-        let mut query = self.connection.prepare(
-            "SELECT action_row, road, situation, trials, events, moments, chance FROM seen ORDER BY 1, 2, 3",
-        )?;
-        let cells = query.query_map([], |row| {
+        let query =
+            "SELECT action_row, road, situation, trials, events, moments, chance FROM seen ORDER BY 1, 2, 3";
+        let cells = query_all(&self.connection, query, |row| {
             let cell = Cell {
                 row: row.get::<_, i64>(0)? as usize,
                 road: row.get::<_, i64>(1)? as usize,
-                situation: Situation::from_number(row.get(2)?),
+                situation: Situation(row.get(2)?),
             };
             let seen =
                 Seen { trials: row.get(3)?, events: row.get(4)?, moments: row.get(5)?, chance: row.get(6)? };
             Ok((cell, seen))
         })?;
-        pilot.cells = cells.collect::<Result<_, _>>()?;
+        pilot.cells = cells.into_iter().collect();
         Ok(Some(pilot))
     }
 
@@ -216,11 +192,10 @@ impl EstimateDatabase {
     /// # Errors
     /// If the file cannot be read.
     pub fn parts(&self) -> Result<Vec<PartRecord>, DatabaseError> {
-        let mut query = self.connection.prepare(
-            "SELECT road, number, probability, episodes, driven_m, duration_s, events, squares, largest, simulated_s
-             FROM part ORDER BY part",
-        )?;
-        let records = query.query_map([], |row| {
+        let query =
+            "SELECT road, number, probability, episodes, driven_m, duration_s, events, squares, largest,
+                            simulated_s FROM part ORDER BY part";
+        query_all(&self.connection, query, |row| {
             Ok(PartRecord {
                 part: Part { road: row.get::<_, i64>(0)? as usize, number: row.get(1)? },
                 probability: row.get(2)?,
@@ -233,8 +208,7 @@ impl EstimateDatabase {
                 simulated_s: row.get(9)?,
                 failed: 0,
             })
-        })?;
-        Ok(records.collect::<Result<_, _>>()?)
+        })
     }
 
     /// All events so far, each with its part, in order.
@@ -242,11 +216,9 @@ impl EstimateDatabase {
     /// # Errors
     /// If the file cannot be read.
     pub fn events(&self) -> Result<Vec<(Part, Event)>, DatabaseError> {
-        let mut query = self.connection.prepare(
-            "SELECT road, number, episode, step, action_row, weight FROM event JOIN part USING (part)
-             ORDER BY part, event",
-        )?;
-        let events = query.query_map([], |row| {
+        let query = "SELECT road, number, episode, step, action_row, weight FROM event JOIN part USING (part)
+             ORDER BY part, event";
+        query_all(&self.connection, query, |row| {
             let part = Part { road: row.get::<_, i64>(0)? as usize, number: row.get(1)? };
             let event = Event {
                 episode: row.get(2)?,
@@ -255,7 +227,6 @@ impl EstimateDatabase {
                 weight: row.get(5)?,
             };
             Ok((part, event))
-        })?;
-        Ok(events.collect::<Result<_, _>>()?)
+        })
     }
 }

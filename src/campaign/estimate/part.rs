@@ -11,7 +11,7 @@ use crate::estimate::ready::Estimate;
 use crate::estimate::settings::Method;
 
 /// An independent part of an estimate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Part {
     /// Index among the roads of the estimate.
     pub road: usize,
@@ -20,7 +20,7 @@ pub struct Part {
 }
 
 /// What a part found.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct PartRecord {
     pub part: Part,
     /// Estimate of the probability of the event in an episode.
@@ -80,49 +80,43 @@ pub fn play_parts<E>(
     stop: &AtomicBool,
     on: &mut dyn FnMut(Played) -> Result<(), E>,
 ) -> Result<(), E> {
-    let work = |part: &Part, tell: &mut dyn FnMut(Played) -> bool| {
-        let played = match estimate.settings().method {
-            Method::Count => count(estimate, *part, stop),
-            Method::Probe => probe(estimate, *part, plan, stop),
-        };
-        if let Some(played) = played {
-            tell(played);
+    let work = |&part: &Part, tell: &mut dyn FnMut(Played) -> bool| {
+        let mut played = Played { record: PartRecord { part, ..PartRecord::default() }, met: Vec::new() };
+        for number in 0..estimate.settings().run.episodes {
+            if stop.load(Ordering::Relaxed) {
+                return;
+            }
+            let events = match estimate.settings().method {
+                Method::Count => count(estimate, number, &mut played.record),
+                Method::Probe => probe(estimate, number, plan, &mut played.record),
+            };
+            played.note_sample(estimate, events);
         }
+        tell(played);
     };
     on_threads(parts, threads, stop, work, on)
 }
 
-/// Crude Monte Carlo: every episode from its start. `None` if it was stopped.
-fn count(estimate: &Estimate, part: Part, stop: &AtomicBool) -> Option<Played> {
-    let mut played = Played::new(part);
-    played.record.weight_max = 1.0;
-    for number in 0..estimate.settings().run.episodes {
-        if stop.load(Ordering::Relaxed) {
-            return None;
-        }
-        let setup = estimate.setup(part, number);
-        let (log, branched_s) = estimate.run().played(&setup);
-        played.record.note_whole(&log);
-        played.record.simulated_s += log.duration_s + branched_s;
-        let event = estimate.event(&setup, &log).map(|found| {
-            let row = match log.steps.get(found.step).map(|step| &step.outcome) {
-                Some(Outcome::Done { draw, .. }) => Some(draw.row),
-                _ => None,
-            };
-            (Event { episode: number, step: found.step, row, weight: 1.0 }, log)
-        });
-        played.note_sample(estimate, event.into_iter().collect());
-    }
-    Some(played)
+/// Crude Monte Carlo: an episode of a part from its start. Its event, if it met one.
+fn count(estimate: &Estimate, number: u32, record: &mut PartRecord) -> Vec<(Event, EpisodeLog)> {
+    let setup = estimate.setup(record.part, number);
+    let (log, branched_s) = estimate.run().played(&setup);
+    record.note_whole(&log);
+    record.simulated_s += log.duration_s + branched_s;
+    record.weight_max = 1.0;
+    let event = estimate.event(&setup, &log).map(|found| {
+        let row = match log.steps.get(found.step).map(|step| &step.outcome) {
+            Some(Outcome::Done { draw, .. }) => Some(draw.row),
+            _ => None,
+        };
+        (Event { episode: number, step: found.step, row, weight: 1.0 }, log)
+    });
+    event.into_iter().collect()
 }
 
 impl Played {
-    pub(super) fn new(part: Part) -> Played {
-        Played { record: PartRecord::new(part), met: Vec::new() }
-    }
-
     /// Takes in what an episode, with what was tried beside it, met.
-    pub(super) fn note_sample(&mut self, estimate: &Estimate, events: Vec<(Event, EpisodeLog)>) {
+    fn note_sample(&mut self, estimate: &Estimate, events: Vec<(Event, EpisodeLog)>) {
         let record = &mut self.record;
         let sample: f64 = events.iter().map(|(event, _)| event.weight).sum();
         // The mean of the samples so far.
@@ -138,21 +132,6 @@ impl Played {
 }
 
 impl PartRecord {
-    pub(super) fn new(part: Part) -> PartRecord {
-        PartRecord {
-            part,
-            probability: 0.0,
-            episodes: 0,
-            driven_m: 0.0,
-            duration_s: 0.0,
-            events: 0,
-            weight_squares: 0.0,
-            weight_max: 0.0,
-            simulated_s: 0.0,
-            failed: 0,
-        }
-    }
-
     /// Takes in an episode that was played from start to end.
     pub(super) fn note_whole(&mut self, log: &EpisodeLog) {
         self.episodes += 1;

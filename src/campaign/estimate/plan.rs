@@ -30,9 +30,9 @@ pub struct Cell {
     pub situation: Situation,
 }
 
-/// A class of situations: the kind of road, and how fast the ego vehicle is.
+/// A class of situations: the kind of road, and how fast the ego vehicle is. A database keeps the number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Situation(u32);
+pub struct Situation(pub(super) u32);
 
 /// What a pilot saw of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -92,16 +92,6 @@ impl Situation {
             _ => 2,
         };
         Situation(3 * road + speed)
-    }
-
-    /// The class that a database has under a number.
-    pub(super) fn from_number(number: u32) -> Situation {
-        Situation(number)
-    }
-
-    /// The number under which a database keeps it.
-    pub(super) fn number(self) -> u32 {
-        self.0
     }
 }
 

@@ -9,7 +9,7 @@
 //! A trial shares all seeds with its episode, so it is an episode of its own seed with another script: what it finds is written
 //! as a scenario like any other. `plan` says how rows are chosen for trials, and where the weights come from.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use crate::episode;
 use crate::episode::{Choice, EpisodeLog, Moment, Play, Setup};
@@ -19,7 +19,7 @@ use avastra_base::rng::{Rng, Stream};
 use avastra_search::agent::Agent;
 use avastra_world::action::{Draw, Offer};
 
-use crate::estimate::part::{Event, Part, PartRecord, Played};
+use crate::estimate::part::{Event, Part, PartRecord};
 use crate::estimate::plan::{Cell, Pilot, Plan, Situation, weight};
 use crate::estimate::ready::{Estimate, EventPlace};
 
@@ -68,8 +68,8 @@ pub fn pilot(estimate: &Estimate, threads: usize, stop: &AtomicBool) -> Option<P
         let mut found = Vec::new();
         let work = |&(part, episode): &(Part, u32), tell: &mut dyn FnMut(_) -> bool| {
             let mut seen = Pilot::default();
-            let mut record = PartRecord::new(part);
-            sampled(estimate, part, episode, &plan, &mut record, &mut |_, _, _| {}, Some(&mut seen));
+            let mut record = PartRecord { part, ..PartRecord::default() };
+            sampled(estimate, episode, &plan, &mut record, &mut |_, _, _| {}, Some(&mut seen));
             tell(((part, episode), seen));
         };
         let kept = on_threads(&items, threads, stop, work, &mut |news| {
@@ -87,35 +87,33 @@ pub fn pilot(estimate: &Estimate, threads: usize, stop: &AtomicBool) -> Option<P
     Some(all)
 }
 
-/// A part of the estimate; `None` if it was stopped.
-pub fn probe(estimate: &Estimate, part: Part, plan: &Plan, stop: &AtomicBool) -> Option<Played> {
-    let mut played = Played::new(part);
-    for number in 0..estimate.settings().run.episodes {
-        if stop.load(Ordering::Relaxed) {
-            return None;
-        }
-        let mut events = Vec::new();
-        let mut on = |considered: Option<Considered>, step: usize, log: EpisodeLog| {
-            let weight = considered.map_or(1.0, |considered| considered.weight);
-            let row = considered.map(|considered| considered.cell.row);
-            events.push((Event { episode: number, step, row, weight }, log));
-        };
-        sampled(estimate, part, number, plan, &mut played.record, &mut on, None);
-        played.note_sample(estimate, events);
-    }
-    Some(played)
+/// An episode of a part, with the trials beside it: their events.
+pub fn probe(
+    estimate: &Estimate,
+    number: u32,
+    plan: &Plan,
+    record: &mut PartRecord,
+) -> Vec<(Event, EpisodeLog)> {
+    let mut events = Vec::new();
+    let mut on = |considered: Option<Considered>, step: usize, log: EpisodeLog| {
+        let weight = considered.map_or(1.0, |considered| considered.weight);
+        let row = considered.map(|considered| considered.cell.row);
+        events.push((Event { episode: number, step, row, weight }, log));
+    };
+    sampled(estimate, number, plan, record, &mut on, None);
+    events
 }
 
-/// Plays an episode and the trials beside it, and hands on each event with the row of the step that it belongs to.
+/// Plays an episode of a part and the trials beside it, and hands on each event with the row of the step that it belongs to.
 fn sampled(
     estimate: &Estimate,
-    part: Part,
     number: u32,
     plan: &Plan,
     record: &mut PartRecord,
     on: &mut dyn FnMut(Option<Considered>, usize, EpisodeLog),
     mut seen: Option<&mut Pilot>,
 ) {
+    let part = record.part;
     let setup = estimate.setup(part, number);
     let mut rng = rng::stream(setup.seed, Stream::Estimate, 0);
     let mut agent = estimate.run().agent();
@@ -193,13 +191,17 @@ fn considered(
     for row in (0..offers.len()).filter(|&row| matters[row]) {
         *heaviest = heaviest.max(weighed(row).0.weight);
     }
-    // Every row draws, so that the plan for one does not shift the draws of another.
-    let drawn: Vec<usize> = (0..offers.len())
-        .filter(|&row| {
-            let ticket = rng::unit(rng);
-            ticket < weighed(row).1
-        })
-        .collect();
+    let mut trials: Vec<(Considered, Draw)> = Vec::new();
+    for (row, offer) in offers.iter().enumerate() {
+        // Every row draws, so that the plan for one does not shift the draws of another.
+        let ticket = rng::unit(rng);
+        let (considered, share) = weighed(row);
+        if let Offer::Legal(draw) = offer
+            && ticket < share
+        {
+            trials.push((considered, draw.clone()));
+        }
+    }
     if let Some(pilot) = seen {
         for row in (0..offers.len()).filter(|&row| matters[row] && chances[row] > 0.0) {
             let seen = pilot.cells.entry(weighed(row).0.cell).or_default();
@@ -207,17 +209,9 @@ fn considered(
             seen.chance += chances[row];
         }
     }
-    let mut trials: Vec<(Considered, Draw)> = drawn
-        .into_iter()
-        .filter_map(|row| match &offers[row] {
-            Offer::Legal(draw) => Some((weighed(row).0, draw.clone())),
-            Offer::Refused(_) => None,
-        })
-        .collect();
-    let all: Vec<Considered> = (0..offers.len()).map(|row| weighed(row).0).collect();
     let choice = carry_out(offers, legal.view(), agent, moment);
     let chosen = match &choice {
-        Choice::Act(draw) => Some(all[draw.row]),
+        Choice::Act(draw) => Some(weighed(draw.row).0),
         _ => None,
     };
     // A trial of the chosen row would be the episode itself: it is seen already.

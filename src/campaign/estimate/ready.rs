@@ -2,7 +2,7 @@
 
 use ndarray::Array1;
 
-use crate::episode::{EpisodeLog, Outcome, Setup, StepLog};
+use crate::episode::{EpisodeLog, Setup, StepLog};
 use crate::estimate::part::Part;
 use crate::estimate::settings::{EstimateError, EstimateSettings, Method};
 use crate::run::{EpisodeSummary, Run};
@@ -65,10 +65,7 @@ impl Estimate {
     pub(super) fn event(&self, setup: &Setup, log: &EpisodeLog) -> Option<EventPlace> {
         let first = self.settings.event.first(setup, log)?;
         let hit = &log.collisions[first];
-        let made_it = |step: &StepLog| match &step.outcome {
-            Outcome::Done { spawned, .. } => spawned.contains(&hit.contact.obstacle),
-            Outcome::Passed | Outcome::Refused { .. } => false,
-        };
+        let made_it = |step: &StepLog| step.outcome.spawned().contains(&hit.contact.obstacle);
         Some(EventPlace { step: log.steps.iter().position(made_it).unwrap_or(hit.step), hit_step: hit.step })
     }
 

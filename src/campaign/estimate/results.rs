@@ -266,6 +266,7 @@ mod tests {
 
     fn record(road: usize, number: u32, events: u32) -> PartRecord {
         PartRecord {
+            part: Part { road, number },
             probability: f64::from(events) / 100.0,
             episodes: 100,
             driven_m: 50_000.0,
@@ -274,7 +275,7 @@ mod tests {
             weight_squares: f64::from(events),
             weight_max: 1.0,
             simulated_s: 4000.0,
-            ..PartRecord::new(Part { road, number })
+            ..PartRecord::default()
         }
     }
 

@@ -30,11 +30,6 @@ impl EventKind {
         }
     }
 
-    /// Whether it is in an episode.
-    pub(super) fn happened(self, setup: &Setup, log: &EpisodeLog) -> bool {
-        self.first(setup, log).is_some()
-    }
-
     /// What so many of them are called, after their number.
     pub fn noun(self) -> &'static str {
         match self {

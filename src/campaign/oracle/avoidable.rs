@@ -96,11 +96,7 @@ pub struct Judgement {
 /// Judges every collision of a log, in order, by playing its episode again up to the last of them. `setup` and `script`
 /// are what the log was played from.
 pub fn judge(setup: &Setup, script: &Script, log: &EpisodeLog) -> Vec<Judgement> {
-    let mut judgements = Vec::new();
-    before_each(setup, script, log, &mut |recording, contact, met| {
-        judgements.push(judge_one(recording, contact, met));
-    });
-    judgements
+    before_each(setup, script, log, judge_one)
 }
 
 /// As [`judge`], with the ways that the reference drivers took.
@@ -109,14 +105,12 @@ pub fn judge_with_drives(
     script: &Script,
     log: &EpisodeLog,
 ) -> Vec<(Judgement, Vec<ReferenceDrive>)> {
-    let mut found = Vec::new();
-    before_each(setup, script, log, &mut |recording, contact, met| {
+    before_each(setup, script, log, |recording, contact, met| {
         let judgement = judge_one(recording, contact, met);
         let from = recording.partition_point(|world| world.time_s() < judgement.onset_s);
         let case = Case::new(recording, from, contact);
-        found.push((judgement, case.drives()));
-    });
-    found
+        (judgement, case.drives())
+    })
 }
 
 /// What a reference driver does from the onset of a hazard on, until it is clear or touches something.
@@ -137,16 +131,16 @@ pub struct DrivenPlace {
     pub speed_mps: f64,
 }
 
-/// Plays an episode again up to its last collision, and hands on the worlds before each, its contact, and the outline of
-/// the ego vehicle there.
-fn before_each(
+/// Plays an episode again up to its last collision. Gives what `judge` makes of each: of the worlds before it, its contact,
+/// and the outline of the ego vehicle there.
+fn before_each<T>(
     setup: &Setup,
     script: &Script,
     log: &EpisodeLog,
-    judge: &mut dyn FnMut(&[World], &Contact, OrientedBox),
-) {
-    let Some(last) = log.collisions.last() else { return };
-    let mut judged = 0;
+    judge: impl Fn(&[World], &Contact, OrientedBox) -> T,
+) -> Vec<T> {
+    let mut judged = Vec::new();
+    let Some(last) = log.collisions.last() else { return judged };
     let mut choose = |moment: &Moment<'_>| match moment.step > last.step {
         true => Choice::Stop,
         false => script.choose(setup.table, moment),
@@ -155,11 +149,10 @@ fn before_each(
     let mut recording: VecDeque<World> = VecDeque::with_capacity(kept);
     episode::run(setup, &mut choose, &mut |world, _, contacts| {
         for contact in contacts {
-            judge(recording.make_contiguous(), contact, world.ego_outline());
-            judged += 1;
+            judged.push(judge(recording.make_contiguous(), contact, world.ego_outline()));
         }
         // Only the worlds before a contact are asked for.
-        let next = log.collisions.get(judged);
+        let next = log.collisions.get(judged.len());
         let is_soon = |time_s: f64| world.ticks() as usize + kept >= ticks(time_s);
         if next.is_some_and(|next| is_soon(next.contact.time_s - DT_S)) {
             if recording.len() == kept {
@@ -170,7 +163,8 @@ fn before_each(
             recording.clear();
         }
     });
-    assert_eq!(judged, log.collisions.len(), "an episode played again is the same episode");
+    assert_eq!(judged.len(), log.collisions.len(), "an episode played again is the same episode");
+    judged
 }
 
 /// Judges one collision by the worlds before it.

@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use crate::episode;
-use crate::episode::{Choice, Collision, End, EpisodeLog, Moment, Outcome, Script, Setup};
+use crate::episode::{Choice, Collision, End, EpisodeLog, Moment, Script, Setup};
 use avastra_drivers::external::FailureKind;
 use avastra_drivers::{Foresight, Selected};
 
@@ -104,11 +104,8 @@ impl<'a> Crash<'a> {
     pub fn new(setup: &'a Setup<'a>, log: &EpisodeLog, index: usize) -> Crash<'a> {
         let collision = log.collisions[index];
         let obstacle = collision.contact.obstacle;
-        let place = |(step, logged): (usize, &episode::StepLog)| match &logged.outcome {
-            Outcome::Done { spawned, .. } => {
-                spawned.iter().position(|id| *id == obstacle).map(|place| (step, place))
-            }
-            Outcome::Passed | Outcome::Refused { .. } => None,
+        let place = |(step, logged): (usize, &episode::StepLog)| {
+            Some((step, logged.outcome.spawned().iter().position(|id| *id == obstacle)?))
         };
         let appeared = log.steps.iter().enumerate().find_map(place);
         let mut script = Script::of_log(log);
@@ -148,10 +145,7 @@ impl<'a> Crash<'a> {
     /// The obstacle's number in another play.
     fn obstacle(&self, log: &EpisodeLog) -> Option<u32> {
         let Some((step, place)) = self.appeared else { return Some(self.collision.contact.obstacle) };
-        match &log.steps.get(step)?.outcome {
-            Outcome::Done { spawned, .. } => spawned.get(place).copied(),
-            Outcome::Passed | Outcome::Refused { .. } => None,
-        }
+        log.steps.get(step)?.outcome.spawned().get(place).copied()
     }
 }
 

@@ -10,7 +10,10 @@ use super::avoidable::Judgement;
 
 /// The facts about one collision of a log; `judgement` is the verdict on it.
 pub fn facts(log: &EpisodeLog, index: usize, judgement: &Judgement) -> OutcomeFacts {
-    let avoidable = judgement.class == Avoidability::Avoidable;
+    facts_if(log, index, judgement.class == Avoidability::Avoidable)
+}
+
+fn facts_if(log: &EpisodeLog, index: usize, avoidable: bool) -> OutcomeFacts {
     OutcomeFacts { avoidable, ..episode::collision_facts(&log.collisions[index], &log.collisions[..index]) }
 }
 
@@ -36,11 +39,8 @@ pub fn counted_at_need(
     judge: impl FnOnce() -> Vec<Judgement>,
 ) -> Vec<usize> {
     let counted_if = |avoidable: bool| -> Vec<usize> {
-        let facts = |index: usize| {
-            let facts = episode::collision_facts(&log.collisions[index], &log.collisions[..index]);
-            OutcomeFacts { avoidable, ..facts }
-        };
-        (0..log.collisions.len()).filter(|&index| counts_by(space, log, index, facts(index))).collect()
+        let counts = |&index: &usize| counts_by(space, log, index, facts_if(log, index, avoidable));
+        (0..log.collisions.len()).filter(counts).collect()
     };
     let if_avoidable = counted_if(true);
     if if_avoidable == counted_if(false) { if_avoidable } else { counted(space, log, &judge()) }

@@ -56,7 +56,7 @@ impl Measure {
 /// their specification.
 pub(super) fn measure(crash: &Crash, own: &ModularConfig, baseline: &ModularConfig) -> Vec<Measure> {
     let contact = &crash.collision.contact;
-    let mut gauge = Gauge::new(contact.obstacle, contact.time_s);
+    let mut gauge = Gauge { obstacle: contact.obstacle, contact_s: contact.time_s, ..Gauge::default() };
     episode::run(
         crash.setup,
         &mut |moment| crash.script.choose(crash.setup.table, moment),
@@ -66,6 +66,7 @@ pub(super) fn measure(crash: &Crash, own: &ModularConfig, baseline: &ModularConf
 }
 
 /// What was seen of one obstacle so far.
+#[derive(Default)]
 struct Gauge {
     obstacle: u32,
     contact_s: f64,
@@ -139,22 +140,6 @@ impl Spell {
 }
 
 impl Gauge {
-    fn new(obstacle: u32, contact_s: f64) -> Gauge {
-        Gauge {
-            obstacle,
-            contact_s,
-            before: None,
-            localization_m: 0.0,
-            undetected: Spell::default(),
-            unknown: Spell::default(),
-            forecast_m: 0.0,
-            forecasts: Vec::new(),
-            velocity_errors_mps: Vec::new(),
-            detected_before: false,
-            objects: 0,
-        }
-    }
-
     /// After a tick of the world.
     fn look(&mut self, world: &World, ads: &dyn Ads) {
         let now_s = world.time_s();
@@ -261,7 +246,7 @@ mod tests {
 
     #[test]
     fn an_error_is_judged_against_the_specification() {
-        let mut gauge = Gauge::new(1, 10.0);
+        let mut gauge = Gauge::default();
         (0..15).for_each(|_| gauge.undetected.note(true));
         let default = ModularConfig::default();
         let found = gauge.measures(&default, &default);

@@ -7,13 +7,11 @@
 //! verdict is the same, and the space's verdict still counts it, or still does not. The result is
 //! 1-minimal: if any one step is removed, or replaced by waiting, the crash is gone or is another one.
 
-use std::sync::Arc;
-
 use crate::episode;
 use crate::episode::{Choice, Collision, EpisodeLog, Moment, Outcome, Script, ScriptedAction, Setup};
 use avastra_lang::model::vocabulary::Verb;
 use avastra_lang::model::{Avoidability, BodyWord, Domain, Memory, Value};
-use avastra_world::action::{ActionTable, Draw};
+use avastra_world::action::ActionTable;
 use avastra_world::sim::Start;
 
 use super::avoidable::{Judgement, judge};
@@ -160,7 +158,9 @@ impl<'a> Search<'a> {
     fn play(&self, candidate: &Candidate, wish: Wish) -> EpisodeLog {
         let setup = self.begin(candidate);
         let choose = &mut |moment: &Moment<'_>| match wish {
-            Some((step, action)) if step == moment.step => wished(setup.table, moment, action),
+            Some((step, ScriptedAction { row, values, .. })) if step == moment.step => {
+                Choice::judged(*row, setup.table.nearest(moment.situation, *row, values))
+            }
             _ => candidate.script.choose(setup.table, moment),
         };
         episode::run(&setup, choose, &mut |_, _, _| {})
@@ -348,18 +348,6 @@ impl<'a> Search<'a> {
         match &log.steps.get(step)?.outcome {
             Outcome::Done { draw, .. } => Some(draw.values[index].1.number()),
             Outcome::Passed | Outcome::Refused { .. } => None,
-        }
-    }
-}
-
-/// The action with the legal values nearest to those wished for.
-fn wished(table: &ActionTable, moment: &Moment, action: &ScriptedAction) -> Choice {
-    let given: &[(Arc<str>, Value)] = &action.values;
-    match table.nearest(moment.situation, action.row, given) {
-        Ok(draw) => Choice::Act(Draw { row: action.row, ..draw }),
-        Err(refusals) => {
-            let first = refusals.into_iter().next().expect("a refusal comes with a reason");
-            Choice::Refused { row: action.row, rule: first.rule, reason: first.reason }
         }
     }
 }

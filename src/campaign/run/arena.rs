@@ -73,11 +73,6 @@ impl Arena {
         &self.table
     }
 
-    /// Whether the driving system is made of modules that could be at fault.
-    pub(crate) fn has_modules(&self) -> bool {
-        self.ads.profile().is_some()
-    }
-
     /// The driving system: its name here, or what an external one calls itself.
     pub fn ads_name(&self) -> String {
         self.ads.title()
@@ -153,7 +148,7 @@ pub fn choose(agent: &mut dyn Agent, moment: &Moment) -> (Choice, Array1<bool>) 
     }
     let mut rng = exploration(moment);
     let chosen = agent.choose(moment.observation, all.view(), &mut rng);
-    (chosen.map_or(Choice::Pass, |row| taken(row, offer(row))), all)
+    (chosen.map_or(Choice::Pass, |row| Choice::of(row, offer(row))), all)
 }
 
 /// What each row would do now.
@@ -174,14 +169,6 @@ fn exploration(moment: &Moment) -> Rng {
     rng::stream(moment.situation.seed, Stream::Exploration, moment.step as u64)
 }
 
-/// The choice of an offered row.
-pub(super) fn taken(row: usize, offer: Offer) -> Choice {
-    match offer {
-        Offer::Legal(draw) => Choice::Act(draw),
-        Offer::Refused(refusal) => Choice::Refused { row, rule: refusal.rule, reason: refusal.reason },
-    }
-}
-
 /// Which of the offers are legal, shape `(rows,)`.
 pub(crate) fn legal(offers: &[Offer]) -> Array1<bool> {
     offers.iter().map(|offer| matches!(offer, Offer::Legal(_))).collect()
@@ -199,7 +186,7 @@ pub(crate) fn carry_out(
     }
     let branch = Lookahead { offers: &offers, moment };
     let row = agent.choose_ahead(moment.observation, legal, &branch, &mut exploration(moment));
-    row.map_or(Choice::Pass, |row| taken(row, offers.swap_remove(row)))
+    row.map_or(Choice::Pass, |row| Choice::of(row, offers.swap_remove(row)))
 }
 
 /// Carries offers out in copies of the moment's world, and judges the collisions as in an episode.

@@ -5,9 +5,8 @@ use std::path::Path;
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, OpenFlags};
 
-use crate::run::database::{Database, LAYOUT};
-use crate::run::sealed::{DatabaseError, check_tables};
-use crate::run::settled::Units;
+use crate::run::database::LAYOUT;
+use crate::run::sealed::DatabaseError;
 
 /// A column of a table.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,7 +36,7 @@ pub fn columns(path: &Path, table: &str) -> Result<Vec<Column>, DatabaseError> {
     if found != LAYOUT.version {
         return Err(DatabaseError::Layout { found, wanted: LAYOUT.version });
     }
-    check_tables(&connection, &Database::schema())?;
+    LAYOUT.check_tables(&connection)?;
     let mut described = connection
         .prepare("SELECT name, type, pk FROM pragma_table_info(?) WHERE type <> 'BLOB' ORDER BY cid")?;
     let described: Vec<(String, String, i64)> = described

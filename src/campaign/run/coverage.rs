@@ -1,7 +1,7 @@
 //! What a run or a training did, in more detail than its totals: rows on roads, and the episodes of a training.
 
 use crate::run::database::Database;
-use crate::run::sealed::DatabaseError;
+use crate::run::sealed::{DatabaseError, query_all};
 
 /// What became of a row on a road.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
@@ -34,8 +34,7 @@ impl Database {
     /// If the file cannot be read.
     pub fn coverage(&self) -> Result<Vec<CoverageCell>, DatabaseError> {
         // The bare column of an aggregate query with `max` is that of the row that has the maximum.
-        let mut statement = self.connection.prepare(
-            "WITH offered AS (
+        let query = "WITH offered AS (
                SELECT road, action_row, reason, sum(offer.steps) AS times FROM offer JOIN episode USING (episode)
                GROUP BY road, action_row, reason),
              refused AS (
@@ -51,9 +50,8 @@ impl Database {
                     coalesce(done, 0), why
              FROM cell LEFT JOIN legal USING (road, action_row) LEFT JOIN refused USING (road, action_row)
                   LEFT JOIN chosen USING (road, action_row)
-             ORDER BY road, action_row",
-        )?;
-        let cells = statement.query_map([], |row| {
+             ORDER BY road, action_row";
+        query_all(&self.connection, query, |row| {
             Ok(CoverageCell {
                 road: row.get(0)?,
                 row: row.get(1)?,
@@ -63,8 +61,7 @@ impl Database {
                 realised: row.get(5)?,
                 why: row.get(6)?,
             })
-        })?;
-        Ok(cells.collect::<Result<_, _>>()?)
+        })
     }
 
     /// The episodes of a training; none for a run.
@@ -73,8 +70,7 @@ impl Database {
     /// If the file cannot be read.
     pub fn learning(&self) -> Result<Vec<LearningPoint>, DatabaseError> {
         let query = "SELECT episode, return, counted, epsilon, loss FROM learning ORDER BY episode";
-        let mut statement = self.connection.prepare(query)?;
-        let points = statement.query_map([], |row| {
+        query_all(&self.connection, query, |row| {
             Ok(LearningPoint {
                 episode: row.get(0)?,
                 reward: row.get(1)?,
@@ -82,7 +78,6 @@ impl Database {
                 exploration: row.get(3)?,
                 loss: row.get(4)?,
             })
-        })?;
-        Ok(points.collect::<Result<_, _>>()?)
+        })
     }
 }

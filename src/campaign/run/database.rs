@@ -17,13 +17,14 @@ use avastra_search::mdp::STATE_LEN;
 use avastra_world::action::Draw;
 
 use crate::run::offered::{RowCount, without_figures};
-use crate::run::sealed::{DatabaseError, Layout};
+use crate::run::sealed::{DatabaseError, Layout, insert_row, query_all};
 use crate::run::settled::{Units, WrittenScenario};
 use crate::run::shape::Shape;
 use crate::run::summary::{EpisodeSummary, Finding};
 
 pub(crate) const LAYOUT: Layout = Layout {
     version: 10,
+    schema: || format!("{SCHEMA}{}", step_table()),
     unit: "episode",
     tables: &["episode", "step", "held", "offer", "collision", "failure", "learning", "scenario"],
     naming: Some(("offer", "reason")),
@@ -98,13 +99,7 @@ pub struct Database {
 }
 
 impl Units for Database {
-    fn layout() -> &'static Layout {
-        &LAYOUT
-    }
-
-    fn schema() -> String {
-        format!("{SCHEMA}{}", step_table())
-    }
+    const LAYOUT: &'static Layout = &LAYOUT;
 
     fn connection(&self) -> &Connection {
         &self.connection
@@ -116,10 +111,8 @@ impl Units for Database {
 
     fn scenarios(&self) -> Result<Vec<WrittenScenario>, DatabaseError> {
         let query = "SELECT episode, road, text FROM scenario JOIN episode USING (episode) ORDER BY episode";
-        let mut statement = self.connection.prepare(query)?;
-        let rows = statement.query_map([], |row| Ok((row.get(0)?, row.get::<_, String>(1)?, row.get(2)?)))?;
-        rows.map(|row| {
-            let (unit, road, text) = row?;
+        let rows = query_all(&self.connection, query, |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
+        let named = |(unit, road, text): (i64, String, String)| {
             if unit < 0 {
                 return Err(DatabaseError::Episode { found: unit });
             }
@@ -128,8 +121,8 @@ impl Units for Database {
             PlainName::scenario(format!("{}.ava", &*road))?;
             let name = PlainName::scenario(format!("{}_{unit:04}.ava", &*road))?;
             Ok(WrittenScenario { unit, name, text })
-        })
-        .collect()
+        };
+        rows.into_iter().map(named).collect()
     }
 }
 
@@ -158,10 +151,9 @@ impl Database {
     /// # Errors
     /// If the file cannot be read, or holds an episode number below 0.
     pub fn episodes(&self) -> Result<BTreeSet<usize>, DatabaseError> {
-        let mut statement = self.connection.prepare("SELECT episode FROM episode")?;
-        let numbers = statement.query_map([], |row| row.get::<_, i64>(0))?;
+        let numbers = query_all(&self.connection, "SELECT episode FROM episode", |row| row.get(0))?;
         let number = |found: i64| usize::try_from(found).map_err(|_| DatabaseError::Episode { found });
-        numbers.map(|found| number(found?)).collect()
+        numbers.into_iter().map(number).collect()
     }
 
     /// Why chosen actions were refused, and how often; the most frequent reason first. Figures in a reason are
@@ -188,26 +180,22 @@ impl Database {
     /// If the file cannot be read.
     pub fn rows(&self) -> Result<BTreeMap<i64, RowCount>, DatabaseError> {
         let mut rows: BTreeMap<i64, RowCount> = BTreeMap::new();
-        let mut offers = self.connection.prepare(
-            "SELECT action_row, text, sum(steps) FROM offer LEFT JOIN reason USING (reason)
-             GROUP BY action_row, text ORDER BY sum(steps) DESC, text",
-        )?;
-        let offers =
-            offers.query_map([], |row| Ok((row.get(0)?, row.get::<_, Option<String>>(1)?, row.get(2)?)))?;
-        for offer in offers {
-            let (row, reason, times) = offer?;
+        let offers = "SELECT action_row, text, sum(steps) FROM offer LEFT JOIN reason USING (reason)
+             GROUP BY action_row, text ORDER BY sum(steps) DESC, text";
+        let offers = query_all(&self.connection, offers, |row| {
+            Ok((row.get(0)?, row.get::<_, Option<String>>(1)?, row.get(2)?))
+        })?;
+        for (row, reason, times) in offers {
             let count = rows.entry(row).or_default();
             match reason {
                 None => count.legal = times,
                 Some(reason) => count.refused.push(RefusalCount { reason, times }),
             }
         }
-        let mut chosen = self.connection.prepare(
-            "SELECT action_row, count(*), count(action) FROM step WHERE action_row IS NOT NULL GROUP BY action_row",
-        )?;
-        let chosen = chosen.query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
-        for found in chosen {
-            let (row, chosen, realised) = found?;
+        let chosen = "SELECT action_row, count(*), count(action) FROM step WHERE action_row IS NOT NULL
+             GROUP BY action_row";
+        let chosen = query_all(&self.connection, chosen, |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
+        for (row, chosen, realised) in chosen {
             let count = rows.entry(row).or_default();
             (count.chosen, count.realised) = (chosen, realised);
         }
@@ -221,13 +209,11 @@ impl Database {
     pub fn failures(&self) -> Result<Vec<FailureCount>, DatabaseError> {
         // The bare columns of an aggregate query with `min` are those of the row that has the minimum. All steps are one stage.
         // Other stages are counted apart, because each has its own time limit and message.
-        let mut statement = self.connection.prepare(
-            "SELECT kind, problem, count(*), min(failure.episode), stage, detail, exit, road,
+        let query = "SELECT kind, problem, count(*), min(failure.episode), stage, detail, exit, road,
                     CASE WHEN stage LIKE 'step %' THEN 'step' ELSE stage END AS when_failed
              FROM failure JOIN episode USING (episode) GROUP BY kind, problem, when_failed
-             ORDER BY count(*) DESC, kind, problem, when_failed",
-        )?;
-        let counts = statement.query_map([], |row| {
+             ORDER BY count(*) DESC, kind, problem, when_failed";
+        query_all(&self.connection, query, |row| {
             let (episode, stage, detail): (i64, String, String) = (row.get(3)?, row.get(4)?, row.get(5)?);
             let (exit, road): (Option<String>, String) = (row.get(6)?, row.get(7)?);
             let exit = exit.map_or_else(String::new, |exit| format!(" ({exit})"));
@@ -238,8 +224,7 @@ impl Database {
                 detail: format!("at {stage}, {detail}{exit}"),
                 scenario: format!("{road}_{episode:04}"),
             })
-        })?;
-        Ok(counts.collect::<Result<_, _>>()?)
+        })
     }
 
     /// Totals over all episodes.
@@ -418,32 +403,21 @@ pub(crate) fn add_all(
             .execute(rusqlite::params_from_iter(values))?;
     }
     for (number, held) in log.held.iter().enumerate() {
-        transaction.prepare_cached("INSERT INTO held VALUES (?, ?, ?, ?)")?.execute(params![
-            summary.episode as i64,
-            number as i64,
-            held.from_s,
-            held.text(),
-        ])?;
+        let values = params![summary.episode as i64, number as i64, held.from_s, held.text()];
+        insert_row(transaction, "held", values)?;
     }
     for finding in &summary.collisions {
         add_collision(transaction, summary.episode, finding)?;
     }
     if let Some(failure) = &log.failure {
         let Failure { problem, stage, detail, exit, stderr } = failure;
-        transaction.prepare_cached("INSERT INTO failure VALUES (?, ?, ?, ?, ?, ?, ?)")?.execute(params![
-            summary.episode as i64,
-            problem.kind().name(),
-            problem.name(),
-            stage,
-            detail,
-            exit,
-            stderr,
-        ])?;
+        let (kind, problem) = (problem.kind().name(), problem.name());
+        let values = params![summary.episode as i64, kind, problem, stage, detail, exit, stderr];
+        insert_row(transaction, "failure", values)?;
     }
     add_offers(transaction, summary)?;
     if let Some(text) = scenario {
-        let mut insert = transaction.prepare_cached("INSERT INTO scenario VALUES (?, ?)")?;
-        insert.execute(params![summary.episode as i64, text])?;
+        insert_row(transaction, "scenario", params![summary.episode as i64, text])?;
     }
     Ok(())
 }
@@ -476,25 +450,23 @@ fn add_episode(
     summary: &EpisodeSummary,
     log: &EpisodeLog,
 ) -> Result<(), rusqlite::Error> {
-    transaction
-        .prepare_cached("INSERT INTO episode VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?
-        .execute(params![
-            summary.episode as i64,
-            log.road,
-            log.seed.to_string(),
-            log.end.name(),
-            log.duration_s,
-            log.distance_m,
-            log.steps.len() as i64,
-            log.red_runs,
-            log.collisions.len() as i64,
-            summary.counted() as i64,
-            summary.first_counted_s(),
-            avastra_lang::model::digest_text(&log.trace()),
-            summary.pet_s,
-            summary.branched_s,
-        ])?;
-    Ok(())
+    let values = params![
+        summary.episode as i64,
+        log.road,
+        log.seed.to_string(),
+        log.end.name(),
+        log.duration_s,
+        log.distance_m,
+        log.steps.len() as i64,
+        log.red_runs,
+        log.collisions.len() as i64,
+        summary.counted() as i64,
+        summary.first_counted_s(),
+        avastra_lang::model::digest_text(&log.trace()),
+        summary.pet_s,
+        summary.branched_s,
+    ];
+    insert_row(transaction, "episode", values)
 }
 
 fn add_collision(
@@ -505,42 +477,38 @@ fn add_collision(
     let Finding { collision, facts, judgement, .. } = finding;
     let contact = &collision.contact;
     let severity = oracle::severity(collision);
-    transaction
-        .prepare_cached(
-            "INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-        )?
-        .execute(params![
-            episode as i64,
-            finding.number as i64,
-            contact.time_s,
-            collision.step as i64,
-            contact.obstacle,
-            collision.body.like.name(),
-            finding.own_body,
-            collision.verb.name(),
-            contact.ego_speed_mps,
-            contact.closing_speed_mps,
-            contact.on_ego.x,
-            contact.on_ego.y,
-            facts.repeated,
-            facts.sudden,
-            facts.struck,
-            finding.counted,
-            judgement.class.name(),
-            judgement.onset_s,
-            judgement.avoided_by.join(" "),
-            judgement.evasion,
-            severity.side,
-            severity.approach,
-            severity.relative_speed_mps,
-            severity.delta_v_mps,
-            severity.obstacle_delta_v_mps,
-            finding.cause_in_words(),
-            finding.shape.map(Shape::name),
-            facts.priority.name(),
-            judgement.r157_letter.join(" "),
-        ])?;
-    Ok(())
+    let values = params![
+        episode as i64,
+        finding.number as i64,
+        contact.time_s,
+        collision.step as i64,
+        contact.obstacle,
+        collision.body.like.name(),
+        finding.own_body,
+        collision.verb.name(),
+        contact.ego_speed_mps,
+        contact.closing_speed_mps,
+        contact.on_ego.x,
+        contact.on_ego.y,
+        facts.repeated,
+        facts.sudden,
+        facts.struck,
+        finding.counted,
+        judgement.class.name(),
+        judgement.onset_s,
+        judgement.avoided_by.join(" "),
+        judgement.evasion,
+        severity.side,
+        severity.approach,
+        severity.relative_speed_mps,
+        severity.delta_v_mps,
+        severity.obstacle_delta_v_mps,
+        finding.cause_in_words(),
+        finding.shape.map(Shape::name),
+        facts.priority.name(),
+        judgement.r157_letter.join(" "),
+    ];
+    insert_row(transaction, "collision", values)
 }
 
 #[cfg(test)]

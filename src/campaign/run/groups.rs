@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use avastra_lang::model::vocabulary::{Body, Word};
 
 use crate::run::database::Database;
-use crate::run::sealed::DatabaseError;
+use crate::run::sealed::{DatabaseError, query_all};
 
 /// Counted collisions that are alike.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
@@ -54,7 +54,7 @@ impl Database {
                 side: row.get(3)?,
                 shape: row.get(4)?,
                 cause: row.get(5)?,
-                count: 1,
+                count: 0,
                 episode: row.get(6)?,
                 road: row.get(7)?,
                 priority: row.get(9)?,
@@ -66,18 +66,11 @@ impl Database {
             let (group, step) = row?;
             let Group { kind, manoeuvre, approach, side, priority, .. } = &group;
             let key = [kind, manoeuvre, approach, side, priority].map(Clone::clone);
-            match found.entry((key, group.shape.clone(), group.cause.clone())) {
-                std::collections::btree_map::Entry::Vacant(entry) => {
-                    entry.insert((group, step));
-                }
-                std::collections::btree_map::Entry::Occupied(mut entry) => {
-                    let (known, shortest) = entry.get_mut();
-                    let count = known.count + 1;
-                    if step < *shortest {
-                        (*known, *shortest) = (group, step);
-                    }
-                    known.count = count;
-                }
+            let key = (key, group.shape.clone(), group.cause.clone());
+            let (known, shortest) = found.entry(key).or_insert_with(|| (group.clone(), step));
+            known.count += 1;
+            if step < *shortest {
+                (*known, *shortest) = (Group { count: known.count, ..group }, step);
             }
         }
         let mut groups: Vec<Group> = found.into_values().map(|(group, _)| group).collect();
@@ -91,15 +84,12 @@ impl Database {
     /// # Errors
     /// If the database cannot be read.
     pub fn worst(&self) -> Result<Vec<(String, i64)>, DatabaseError> {
-        let mut statement = self.connection.prepare(
-            "WITH hardest AS (
+        let query = "WITH hardest AS (
                SELECT episode, collision.counted AS counts, max(max(delta_v_mps, obstacle_delta_v_mps)) AS delta_v_mps
                FROM collision GROUP BY episode, counts)
              SELECT road, episode FROM hardest JOIN episode USING (episode) GROUP BY episode
-             ORDER BY max(counts) DESC, max(CASE counts WHEN counted > 0 THEN delta_v_mps END) DESC, episode",
-        )?;
-        let episodes = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?)))?;
-        Ok(episodes.collect::<Result<_, _>>()?)
+             ORDER BY max(counts) DESC, max(CASE counts WHEN counted > 0 THEN delta_v_mps END) DESC, episode";
+        query_all(&self.connection, query, |row| Ok((row.get(0)?, row.get(1)?)))
     }
 }
 

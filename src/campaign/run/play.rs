@@ -65,10 +65,11 @@ impl Run {
             return Err(RunError::Avoidability);
         }
         let ads = under_test(&settings.ads, settings.profile.as_ref(), settings.external.as_ref())?;
+        let has_modules = ads.profile().is_some();
         let traffic = traffic_of(settings.traffic.as_ref())?;
         let arena =
             Arena::new(table, &settings.roads, ads, &settings.with, &settings.without)?.with_traffic(traffic);
-        if settings.causes && !arena.has_modules() {
+        if settings.causes && !has_modules {
             return Err(RunError::NoModules(oracle::NoModules { ads: arena.ads_name() }));
         }
         Ok(Run { arena, settings, agent })

@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use rusqlite::types::ValueRef;
-use rusqlite::{Connection, OptionalExtension, Row, params};
+use rusqlite::{Connection, OptionalExtension, Row, ToSql, params};
 use serde_json::{Map, Value};
 use sha2::{Digest, Sha256};
 
@@ -78,6 +78,8 @@ impl From<rusqlite::Error> for DatabaseError {
 pub struct Layout {
     /// Raised whenever a column changes.
     pub version: i64,
+    /// The statements that make the tables of a new file.
+    pub schema: fn() -> String,
     /// Name of the unit that is added as a whole, which is also the name of its key column: `episode`, `cell`. The
     /// first of the tables has one row for each unit.
     pub unit: &'static str,
@@ -100,8 +102,8 @@ impl Layout {
     ///
     /// # Errors
     /// If the file cannot be opened, is a link, has another layout or other settings, or was damaged or changed.
-    pub fn open(&self, path: &Path, tables: &str, settings: &str) -> Result<Connection, DatabaseError> {
-        let (connection, damaged) = self.open_damaged(path, tables, settings)?;
+    pub fn open(&self, path: &Path, settings: &str) -> Result<Connection, DatabaseError> {
+        let (connection, damaged) = self.open_damaged(path, settings)?;
         match damaged.first() {
             Some(&number) => Err(DatabaseError::Rows { unit: self.unit, number }),
             None => Ok(connection),
@@ -115,7 +117,6 @@ impl Layout {
     pub(super) fn open_damaged(
         &self,
         path: &Path,
-        tables: &str,
         settings: &str,
     ) -> Result<(Connection, Vec<i64>), DatabaseError> {
         // SQLite would follow a link and write where it leads.
@@ -125,18 +126,26 @@ impl Layout {
         if found == 0 {
             let transaction = connection.transaction()?;
             transaction.execute_batch(TABLES)?;
-            transaction.execute_batch(tables)?;
+            transaction.execute_batch(&(self.schema)())?;
             transaction.execute("INSERT INTO begun VALUES (1, ?)", [settings])?;
             transaction.pragma_update(None, "user_version", self.version)?;
             transaction.commit()?;
         } else if found != self.version {
             return Err(DatabaseError::Layout { found, wanted: self.version });
         } else {
-            check_tables(&connection, tables)?;
+            self.check_tables(&connection)?;
             self.check(&connection, settings)?;
         }
         let damaged = self.damaged(&connection)?;
         Ok((connection, damaged))
+    }
+
+    /// Refuses a file unless its tables are those of this layout, see [`check_plain`].
+    pub(super) fn check_tables(&self, connection: &Connection) -> Result<(), DatabaseError> {
+        let pattern = Connection::open_in_memory()?;
+        pattern.execute_batch(TABLES)?;
+        pattern.execute_batch(&(self.schema)())?;
+        check_plain(connection, "main", &plain_tables(&pattern, "main")?)
     }
 
     /// Checks that its pages are sound and its settings those that it was begun with.
@@ -160,16 +169,13 @@ impl Layout {
         for (table, condition) in self.sound {
             // A missing number makes the condition neither true nor false.
             let query = format!("SELECT {unit} FROM {table} WHERE ({condition}) IS NOT TRUE");
-            let mut rows = connection.prepare(&query)?;
-            let numbers = rows.query_map([], |row| row.get::<_, i64>(0))?;
-            unsound.extend(numbers.collect::<Result<Vec<_>, _>>()?);
+            unsound.extend(query_all(connection, &query, |row| row.get::<_, i64>(0))?);
         }
         let of_tables: String =
             self.tables.iter().map(|table| format!("SELECT {unit} FROM {table} UNION ")).collect();
-        let mut numbers = connection.prepare(&format!("{of_tables}SELECT unit FROM seal ORDER BY 1"))?;
+        let numbers = format!("{of_tables}SELECT unit FROM seal ORDER BY 1");
         let mut damaged = Vec::new();
-        for number in numbers.query_map([], |row| row.get::<_, i64>(0))? {
-            let number = number?;
+        for number in query_all(connection, &numbers, |row| row.get::<_, i64>(0))? {
             let mut seal = connection.prepare_cached("SELECT digest FROM seal WHERE unit = ?")?;
             let seal: Option<String> = seal.query_row([number], |row| row.get(0)).optional()?;
             if unsound.contains(&number) || seal != Some(self.rows_digest(connection, number)?) {
@@ -199,8 +205,7 @@ impl Layout {
     /// Seals the rows of a unit; called in the transaction that adds them.
     pub fn seal(&self, connection: &Connection, number: i64) -> Result<(), rusqlite::Error> {
         let digest = self.rows_digest(connection, number)?;
-        connection.prepare_cached("INSERT INTO seal VALUES (?, ?)")?.execute(params![number, digest])?;
-        Ok(())
+        insert_row(connection, "seal", params![number, digest])
     }
 
     /// Deletes the rows of a unit.
@@ -240,14 +245,6 @@ impl Layout {
 /// The columns of a table: name, type, and position in the key, which is 0 for a column outside the key.
 type Columns = Vec<(String, String, i64)>;
 
-/// Refuses a file unless its tables are those that `tables` makes, see [`check_plain`].
-pub(super) fn check_tables(connection: &Connection, tables: &str) -> Result<(), DatabaseError> {
-    let pattern = Connection::open_in_memory()?;
-    pattern.execute_batch(TABLES)?;
-    pattern.execute_batch(tables)?;
-    check_plain(connection, "main", &plain_tables(&pattern, "main")?)
-}
-
 /// Refuses an attached file unless it holds only plain tables, among them the wanted ones with their columns and keys. Keys
 /// matter, because without them every search for a unit would go through all rows.
 pub(super) fn check_plain(
@@ -278,13 +275,12 @@ pub(super) fn plain_tables(
 ) -> Result<BTreeMap<String, Columns>, DatabaseError> {
     let strange =
         |name: &str| DatabaseError::Damaged { what: format!("`{name}` is no table that avastra makes") };
-    let mut schema = connection.prepare(&format!("SELECT type, name, sql FROM {file}.sqlite_schema"))?;
-    let rows = schema.query_map([], |row| {
-        Ok((row.get::<_, String>(0)?, row.get::<_, String>(1)?, row.get::<_, Option<String>>(2)?))
-    })?;
+    let schema =
+        query_all(connection, &format!("SELECT type, name, sql FROM {file}.sqlite_schema"), |row| {
+            Ok((row.get::<_, String>(0)?, row.get::<_, String>(1)?, row.get::<_, Option<String>>(2)?))
+        })?;
     let mut tables = BTreeMap::new();
-    for row in rows {
-        let (kind, name, sql) = row?;
+    for (kind, name, sql) in schema {
         match (kind.as_str(), sql) {
             // SQLite normalises the beginning of the stored text to these words.
             ("table", Some(sql)) if sql.starts_with("CREATE TABLE ") => {}
@@ -304,6 +300,28 @@ pub(super) fn plain_tables(
         tables.insert(name, columns);
     }
     Ok(tables)
+}
+
+/// Adds a row with a value for each column of a table.
+pub(crate) fn insert_row(
+    connection: &Connection,
+    table: &str,
+    values: &[&dyn ToSql],
+) -> Result<(), rusqlite::Error> {
+    let places = vec!["?"; values.len()].join(", ");
+    connection.prepare_cached(&format!("INSERT INTO {table} VALUES ({places})"))?.execute(values)?;
+    Ok(())
+}
+
+/// All rows of a query, each as `read` gives it.
+pub(crate) fn query_all<T>(
+    connection: &Connection,
+    query: &str,
+    read: impl FnMut(&Row) -> Result<T, rusqlite::Error>,
+) -> Result<Vec<T>, DatabaseError> {
+    let mut statement = connection.prepare(query)?;
+    let rows = statement.query_map([], read)?;
+    Ok(rows.collect::<Result<_, _>>()?)
 }
 
 /// Adds the rows of a unit in a table to a digest. SQLite need not give them in one order, so each has a digest, and these
@@ -411,6 +429,7 @@ mod tests {
     const SETTINGS: &str = "seed: 1\nroads: [corner]\n";
     const LAYOUT: Layout = Layout {
         version: 3,
+        schema: || OWN.to_owned(),
         unit: "episode",
         tables: &["episode", "step"],
         naming: Some(("step", "reason")),
@@ -423,7 +442,7 @@ mod tests {
                        CREATE TABLE step (episode INTEGER, step INTEGER, x REAL, reason INTEGER) STRICT;";
 
     fn begun(path: &Path) -> Connection {
-        let mut connection = LAYOUT.open(path, OWN, SETTINGS).unwrap();
+        let mut connection = LAYOUT.open(path, SETTINGS).unwrap();
         connection.execute("INSERT INTO reason VALUES (1, 'no room')", []).unwrap();
         for number in 0..3_i64 {
             let transaction = connection.transaction().unwrap();
@@ -452,39 +471,12 @@ mod tests {
             let scratch = tempfile::tempdir().unwrap();
             let path = scratch.path().join("run.db");
             let connection = begun(&path);
-            LAYOUT.open(&path, OWN, SETTINGS).expect("nothing was changed");
+            LAYOUT.open(&path, SETTINGS).expect("nothing was changed");
             connection.execute_batch(change).unwrap();
             drop(connection);
-            let refused = LAYOUT.open(&path, OWN, SETTINGS).unwrap_err().to_string();
+            let refused = LAYOUT.open(&path, SETTINGS).unwrap_err().to_string();
             assert!(refused.contains(what), "{change}: {refused}");
         }
-    }
-
-    #[test]
-    fn a_damaged_unit_can_be_hidden_or_deleted() {
-        let scratch = tempfile::tempdir().unwrap();
-        let path = scratch.path().join("run.db");
-        let connection = begun(&path);
-        let damage = "UPDATE step SET x = 0.25 WHERE episode = 1; INSERT INTO step VALUES (9, 0, 0.5, NULL)";
-        connection.execute_batch(damage).unwrap();
-        drop(connection);
-        let rows = |connection: &Connection| -> [i64; 3] {
-            ["episode", "step", "seal"].map(|table| {
-                let query = format!("SELECT count(*) FROM {table}");
-                connection.query_row(&query, [], |row| row.get(0)).unwrap()
-            })
-        };
-        let (hiding, damaged) = LAYOUT.open_damaged(&path, OWN, SETTINGS).unwrap();
-        assert_eq!(damaged, [1, 9]);
-        assert_eq!(rows(&hiding), [3, 4, 3]);
-        LAYOUT.hide(&hiding, &damaged).unwrap();
-        assert_eq!(rows(&hiding), [2, 2, 2]);
-        // Other connections see all rows.
-        let (deleting, damaged) = LAYOUT.open_damaged(&path, OWN, SETTINGS).unwrap();
-        assert_eq!(rows(&deleting), [3, 4, 3]);
-        damaged.iter().for_each(|&number| LAYOUT.delete(&deleting, number).unwrap());
-        let sound = LAYOUT.open(&path, OWN, SETTINGS).unwrap();
-        assert_eq!(rows(&sound), [2, 2, 2]);
     }
 
     #[test]
@@ -512,7 +504,7 @@ mod tests {
             let scratch = tempfile::tempdir().unwrap();
             let path = scratch.path().join("run.db");
             begun(&path).execute_batch(change).unwrap();
-            let refused = LAYOUT.open(&path, OWN, SETTINGS).unwrap_err();
+            let refused = LAYOUT.open(&path, SETTINGS).unwrap_err();
             assert!(refused.is_torn() && refused.to_string().contains(what), "{change}: {refused}");
         }
     }
@@ -529,21 +521,9 @@ mod tests {
             connection.execute_batch(&forged).unwrap();
             LAYOUT.seal(&connection, 1).unwrap();
             drop(connection);
-            let refused = LAYOUT.open(&path, OWN, SETTINGS).unwrap_err();
+            let refused = LAYOUT.open(&path, SETTINGS).unwrap_err();
             assert!(matches!(refused, DatabaseError::Rows { number: 1, .. }), "{number}: {refused}");
         }
-    }
-
-    #[test]
-    fn other_settings_are_said() {
-        let scratch = tempfile::tempdir().unwrap();
-        let path = scratch.path().join("run.db");
-        let connection = begun(&path);
-        LAYOUT.delete_from(&connection, 1).unwrap();
-        drop(connection);
-        LAYOUT.open(&path, OWN, "# a comment\nroads:\n  - corner\nseed: 1").expect("the same settings");
-        let refused = LAYOUT.open(&path, OWN, "seed: 2\nroads: [corner]\nx: 1").unwrap_err().to_string();
-        assert!(refused.contains("`seed` was 1, `x` was not there"), "{refused}");
     }
 
     #[test]
@@ -563,7 +543,7 @@ mod tests {
             torn[at] ^= 0x55;
             std::fs::write(&path, &torn).unwrap();
             // A byte that no row and no page needs may differ.
-            match LAYOUT.open(&path, OWN, SETTINGS) {
+            match LAYOUT.open(&path, SETTINGS) {
                 Ok(connection) => assert_eq!(rows(&connection), written, "byte {at}"),
                 Err(_) => refused += 1,
             }
@@ -571,12 +551,12 @@ mod tests {
         assert!(refused > 0, "pages are checked");
         for length in [300, whole.len() / 2, whole.len() / 4 * 3] {
             std::fs::write(&path, &whole[..length]).unwrap();
-            let refused = LAYOUT.open(&path, OWN, SETTINGS).unwrap_err();
+            let refused = LAYOUT.open(&path, SETTINGS).unwrap_err();
             assert!(refused.is_torn(), "{length} bytes: {refused}");
         }
         std::fs::write(&path, &whole).unwrap();
         let other = Layout { version: 4, ..LAYOUT };
-        for refused in [other.open(&path, OWN, SETTINGS), LAYOUT.open(&path, OWN, "seed: 2")] {
+        for refused in [other.open(&path, SETTINGS), LAYOUT.open(&path, "seed: 2")] {
             let refused = refused.unwrap_err();
             assert!(!refused.is_torn(), "{refused}");
         }
@@ -591,6 +571,7 @@ mod tests {
         };
         let found = |now: &str| differences(&profile(80, "a"), now);
         assert_eq!(found(&profile(80, "a")), None);
+        assert_eq!(differences("a: [b]\nc: 1\n", "# a comment\nc: 1\na:\n  - b"), None);
         assert_eq!(found(&profile(60, "b")).unwrap(), "`profile.settings.sight.range_m` was 80");
         assert_eq!(found(&profile(80, "b")).unwrap(), "`profile.digest` was \"a\"");
         assert_eq!(found("seed: 2\n").unwrap(), "`profile` was given, `seed` was 1");

@@ -12,7 +12,7 @@ use rusqlite::{Connection, params};
 use sha2::{Digest, Sha256};
 
 use crate::files::{PlainName, Temporary};
-use crate::run::sealed::{DatabaseError, Layout, add_rows, check_plain, plain_tables};
+use crate::run::sealed::{DatabaseError, Layout, add_rows, check_plain, plain_tables, query_all};
 
 /// A unit to take over: its number in the other file, and the number that it gets here.
 pub type Numbered = (i64, i64);
@@ -28,10 +28,7 @@ pub struct WrittenScenario {
 /// A database of units that know nothing of each other.
 pub trait Units: Sized {
     #[doc(hidden)]
-    fn layout() -> &'static Layout;
-    /// The tables of a new file.
-    #[doc(hidden)]
-    fn schema() -> String;
+    const LAYOUT: &'static Layout;
     #[doc(hidden)]
     fn connection(&self) -> &Connection;
     #[doc(hidden)]
@@ -47,12 +44,12 @@ pub trait Units: Sized {
 
     /// Whether scenarios are kept.
     fn keeps_scenarios() -> bool {
-        Self::layout().tables.contains(&"scenario")
+        Self::LAYOUT.tables.contains(&"scenario")
     }
 
     /// What a message calls a unit.
     fn called(number: i64) -> String {
-        format!("{} {number}", Self::layout().unit)
+        format!("{} {number}", Self::LAYOUT.unit)
     }
 
     /// Opens the file, making the tables if it is new. `settings` is the text of the settings that it is begun with.
@@ -60,7 +57,7 @@ pub trait Units: Sized {
     /// # Errors
     /// If the file cannot be opened, has another layout or other settings, or was damaged or changed.
     fn open(path: &Path, settings: &str) -> Result<Self, DatabaseError> {
-        Ok(Self::from_connection(Self::layout().open(path, &Self::schema(), settings)?))
+        Ok(Self::from_connection(Self::LAYOUT.open(path, settings)?))
     }
 
     /// As [`Units::open`], but units whose rows were changed are deleted; their numbers come beside the database.
@@ -68,11 +65,10 @@ pub trait Units: Sized {
     /// # Errors
     /// As [`Units::open`], but for changed rows.
     fn open_and_drop(path: &Path, settings: &str) -> Result<(Self, Vec<i64>), DatabaseError> {
-        let layout = Self::layout();
-        let (mut connection, damaged) = layout.open_damaged(path, &Self::schema(), settings)?;
+        let (mut connection, damaged) = Self::LAYOUT.open_damaged(path, settings)?;
         let transaction = connection.transaction()?;
         for &number in &damaged {
-            layout.delete(&transaction, number)?;
+            Self::LAYOUT.delete(&transaction, number)?;
         }
         transaction.commit()?;
         Ok((Self::from_connection(connection), damaged))
@@ -84,10 +80,9 @@ pub trait Units: Sized {
     /// # Errors
     /// As [`Units::open`], but for changed rows.
     fn open_without_damaged(path: &Path, settings: &str) -> Result<(Self, Vec<i64>), DatabaseError> {
-        let layout = Self::layout();
-        let (connection, damaged) = layout.open_damaged(path, &Self::schema(), settings)?;
+        let (connection, damaged) = Self::LAYOUT.open_damaged(path, settings)?;
         if !damaged.is_empty() {
-            layout.hide(&connection, &damaged)?;
+            Self::LAYOUT.hide(&connection, &damaged)?;
         }
         Ok((Self::from_connection(connection), damaged))
     }
@@ -97,9 +92,8 @@ pub trait Units: Sized {
     /// # Errors
     /// If the file cannot be read.
     fn numbers(&self) -> Result<BTreeSet<i64>, DatabaseError> {
-        let mut seals = self.connection().prepare("SELECT unit FROM seal ORDER BY unit")?;
-        let numbers = seals.query_map([], |row| row.get(0))?;
-        Ok(numbers.collect::<Result<_, _>>()?)
+        let numbers = query_all(self.connection(), "SELECT unit FROM seal", |row| row.get::<_, i64>(0))?;
+        Ok(numbers.into_iter().collect())
     }
 
     /// Takes units over from another file of this kind, all or none. A unit that is here already must be equal.
@@ -113,11 +107,11 @@ pub trait Units: Sized {
         units: &[Numbered],
         moved: &[(WrittenScenario, String)],
     ) -> Result<(), DatabaseError> {
-        let layout = Self::layout();
-        layout.take(self.connection(), other, units, &|connection| {
+        Self::LAYOUT.take(self.connection(), other, units, &|connection| {
             for (WrittenScenario { unit, text, .. }, new) in moved {
                 // A unit may have several scenarios; what they are called by differs from table to table.
-                let update = format!("UPDATE scenario SET text = ? WHERE {} = ? AND text = ?", layout.unit);
+                let update =
+                    format!("UPDATE scenario SET text = ? WHERE {} = ? AND text = ?", Self::LAYOUT.unit);
                 connection.prepare_cached(&update)?.execute(params![new, unit, text])?;
             }
             Ok(())
@@ -138,7 +132,7 @@ pub trait Units: Sized {
         // SQLite opens it by its name, and takes an empty file for a new database.
         drop(file);
         let settled = Self::open(temporary.path(), &settings)?;
-        Self::layout().take(settled.connection(), path, units, &take_apart(Self::layout()))?;
+        Self::LAYOUT.take(settled.connection(), path, units, &take_apart(Self::LAYOUT))?;
         drop(settled);
         temporary.take_place_of(path)?;
         Ok(Self::from_connection(Connection::open(path)?))
@@ -244,9 +238,8 @@ impl Layout {
             ))?;
         }
         adjust(&transaction)?;
-        let mut numbers: Vec<i64> = new.iter().map(|(_, number)| *number).collect();
-        numbers.sort_unstable();
-        for number in numbers {
+        new.sort_unstable_by_key(|(_, number)| *number);
+        for (_, number) in new {
             self.seal(&transaction, number)?;
         }
         transaction.execute_batch("DELETE FROM taking")?;

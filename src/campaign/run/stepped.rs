@@ -13,7 +13,7 @@ use avastra_search::mdp;
 use avastra_search::mdp::{Observation, RewardSettings, StepOutcome};
 use avastra_world::action::Offer;
 
-use crate::run::arena::{legal, taken};
+use crate::run::arena::legal;
 use crate::run::play::Run;
 use crate::run::summary::{EpisodeSummary, Finding};
 
@@ -92,7 +92,7 @@ impl Stepped {
         let mut offers = std::mem::take(&mut self.offers);
         let is_any_legal = offers.iter().any(|offer| matches!(offer, Offer::Legal(_)));
         let choice = match row.filter(|_| is_any_legal) {
-            Some(row) => taken(row, offers.swap_remove(row)),
+            Some(row) => Choice::of(row, offers.swap_remove(row)),
             None => Choice::Pass,
         };
         let run = Arc::clone(&self.run);

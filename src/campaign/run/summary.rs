@@ -12,7 +12,7 @@ use crate::run::offered::Offered;
 use crate::run::shape::Shape;
 
 /// An episode, judged.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct EpisodeSummary {
     /// Number of the episode in its run, from 0.
     pub episode: usize,
@@ -82,15 +82,7 @@ impl EpisodeSummary {
             }
         };
         let collisions = judgements.into_iter().enumerate().map(find).collect();
-        EpisodeSummary {
-            episode: number,
-            collisions,
-            criticality: Vec::new(),
-            pet_s: None,
-            manners: Manners::default(),
-            branched_s: 0.0,
-            offered: Offered::default(),
-        }
+        EpisodeSummary { episode: number, collisions, ..EpisodeSummary::default() }
     }
 
     /// Looks for the cause of every counted collision.

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use rusqlite::types::Type as Kind;
 use rusqlite::{Connection, Row, params};
 
-use crate::run::{DatabaseError, Layout, Numbered, Units};
+use crate::run::{DatabaseError, Layout, Numbered, Units, insert_row, query_all};
 
 use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureClass, Spent, TrainedRecord};
 use crate::study::settings::StudySettings;
@@ -14,6 +14,7 @@ use crate::study::settings::StudySettings;
 /// Versions begin at 1001, so that a `run.db` is never taken for a `study.db`.
 const LAYOUT: Layout = Layout {
     version: 1005,
+    schema: || SCHEMA.to_owned(),
     unit: "cell",
     tables: &["cell", "trained", "evaluated", "collision"],
     naming: None,
@@ -60,13 +61,7 @@ pub struct StudyDatabase {
 }
 
 impl Units for StudyDatabase {
-    fn layout() -> &'static Layout {
-        &LAYOUT
-    }
-
-    fn schema() -> String {
-        SCHEMA.to_owned()
-    }
+    const LAYOUT: &'static Layout = &LAYOUT;
 
     fn connection(&self) -> &Connection {
         &self.connection
@@ -94,10 +89,8 @@ impl StudyDatabase {
             let insert = "INSERT INTO cell (agent, road, number, training_seed) VALUES (?, ?, ?, ?)";
             transaction.execute(insert, params![agent, road, number, seed])?;
             let cell = transaction.last_insert_rowid();
-            let mut insert =
-                transaction.prepare_cached("INSERT INTO trained VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)")?;
             for (index, episode) in record.trained.iter().enumerate() {
-                insert.execute(params![
+                let values = params![
                     cell,
                     index as i64,
                     episode.ended,
@@ -107,7 +100,8 @@ impl StudyDatabase {
                     episode.exploration_epsilon,
                     episode.loss,
                     episode.simulated_s,
-                ])?;
+                ];
+                insert_row(&transaction, "trained", values)?;
             }
             for (index, episode) in record.episodes.iter().enumerate() {
                 add_episode(&transaction, cell, index as i64, episode)?;
@@ -124,20 +118,18 @@ impl StudyDatabase {
     /// If the file cannot be read, or has a cell that is none of the study's.
     pub fn places(&self, settings: &StudySettings) -> Result<Vec<Numbered>, DatabaseError> {
         let places: BTreeMap<(&str, &str, u32), i64> = settings.cells().zip(1..).collect();
-        let mut query =
-            self.connection.prepare("SELECT cell, agent, road, number FROM cell ORDER BY cell")?;
-        let cells = query.query_map([], |row| {
-            Ok((row.get(0)?, row.get::<_, String>(1)?, row.get::<_, String>(2)?, row.get(3)?))
+        let query = "SELECT cell, agent, road, number FROM cell ORDER BY cell";
+        let cells = query_all(&self.connection, query, |row| {
+            Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?))
         })?;
-        let placed = |cell: Result<(i64, String, String, u32), rusqlite::Error>| {
-            let (cell, agent, road, number) = cell?;
+        let placed = |(cell, agent, road, number): (i64, String, String, u32)| {
             let place = places.get(&(agent.as_str(), road.as_str(), number)).copied();
             let what = || {
                 format!("it has a cell of `{agent}` on `{road}`, number {number}, which is not in the study")
             };
             place.map(|place| (cell, place)).ok_or_else(|| DatabaseError::Damaged { what: what() })
         };
-        cells.map(placed).collect()
+        cells.into_iter().map(placed).collect()
     }
 
     /// All cells so far, in the order in which they ended.
@@ -199,9 +191,7 @@ impl StudyDatabase {
         query: &str,
         read: impl Fn(&Row) -> Result<T, rusqlite::Error>,
     ) -> Result<Vec<(i64, T)>, DatabaseError> {
-        let mut statement = self.connection.prepare(query)?;
-        let rows = statement.query_map([], |row| Ok((row.get(0)?, read(row)?)))?;
-        Ok(rows.collect::<Result<_, _>>()?)
+        query_all(&self.connection, query, |row| Ok((row.get(0)?, read(row)?)))
     }
 }
 
@@ -211,27 +201,24 @@ fn add_episode(
     index: i64,
     episode: &EpisodeRecord,
 ) -> Result<(), rusqlite::Error> {
-    connection.prepare_cached("INSERT INTO evaluated VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?.execute(
-        params![
-            cell,
-            index,
-            episode.seed.to_string(),
-            episode.number,
-            episode.ended,
-            episode.duration_s,
-            episode.distance_m,
-            episode.red_runs,
-            episode.speeding_s,
-            episode.astray_s,
-            episode.branched_s,
-            episode.trace,
-        ],
-    )?;
-    let mut insert = connection
-        .prepare_cached("INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?;
+    let values = params![
+        cell,
+        index,
+        episode.seed.to_string(),
+        episode.number,
+        episode.ended,
+        episode.duration_s,
+        episode.distance_m,
+        episode.red_runs,
+        episode.speeding_s,
+        episode.astray_s,
+        episode.branched_s,
+        episode.trace,
+    ];
+    insert_row(connection, "evaluated", values)?;
     for (number, found) in episode.collisions.iter().enumerate() {
         let FailureClass { kind, manoeuvre, approach, side, cause } = &found.failure;
-        insert.execute(params![
+        let values = params![
             cell,
             index,
             number as i64,
@@ -247,7 +234,8 @@ fn add_episode(
             side,
             cause,
             found.priority,
-        ])?;
+        ];
+        insert_row(connection, "collision", values)?;
     }
     Ok(())
 }

@@ -53,8 +53,8 @@ pub fn play_jobs<E>(
 /// What a training made, as the study judges it.
 fn actor(training: &Training, settings: &AgentSettings) -> Box<dyn Agent> {
     let shuffled = settings.training.as_ref().is_some_and(|plan| plan.shuffled_states);
-    let shuffled = shuffled.then(|| training.shuffled_actor().expect("only networks are shuffled"));
-    shuffled.unwrap_or_else(|| training.actor())
+    let shuffled = shuffled.then(|| training.agent().shuffled().expect("only networks are shuffled"));
+    shuffled.unwrap_or_else(|| training.agent().actor())
 }
 
 /// Plays one job. `tell` gets the counted collisions of every episode and says whether to go on; if not, the

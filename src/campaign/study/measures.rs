@@ -8,7 +8,7 @@ use crate::run::PEDESTRIAN;
 use avastra_base::statistics::{Lifetime, restricted_mean};
 
 use crate::study::file::EvaluationPlan;
-use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureClass, Spent, TrainedRecord};
+use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureClass, TrainedRecord};
 
 /// Computes a number; `None` if the cell has no such number, for example the time to a collision without any
 /// collision.
@@ -100,15 +100,18 @@ pub const MEASURES: &[Measure] = &[
     }),
 ];
 
-/// A cell without its episodes: all that the statistics need.
-#[derive(Debug, Clone, PartialEq)]
+/// A cell without its episodes: all that the statistics need, and a line of a study that is kept (see `played`).
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct MeasuredCell {
     pub agent: String,
     pub road: String,
     /// Number of the training or repetition, from 0.
     pub number: u32,
-    pub spent: Spent,
-    /// In the order of [`MEASURES`].
+    /// Time that it took on the machine that played it, as in `Spent`.
+    pub wall_s: f64,
+    pub cpu_s: Option<f64>,
+    /// In the order of [`MEASURES`]; in a line, in that of the study's head.
     pub values: Vec<Option<f64>>,
 }
 
@@ -118,7 +121,8 @@ impl MeasuredCell {
             agent: cell.agent.clone(),
             road: cell.road.clone(),
             number: cell.number,
-            spent: cell.spent,
+            wall_s: cell.spent.wall_s,
+            cpu_s: cell.spent.cpu_s,
             values: MEASURES.iter().map(|measure| (measure.of)(cell, plan)).collect(),
         }
     }

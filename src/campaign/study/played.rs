@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::study::measures::{MEASURES, MeasuredCell};
-use crate::study::record::{CellRecord, Spent};
+use crate::study::record::CellRecord;
 use crate::study::settings::{AgentSettings, StudySettings};
 use avastra_lang::model::digest;
 use avastra_search::agent::by_name;
@@ -43,17 +43,6 @@ struct Head {
     settings: StudySettings,
     /// Names of the values of each cell.
     measures: Vec<String>,
-}
-
-#[derive(serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Line {
-    agent: String,
-    road: String,
-    number: u32,
-    wall_s: f64,
-    cpu_s: Option<f64>,
-    values: Vec<Option<f64>>,
 }
 
 /// The last line.
@@ -113,16 +102,8 @@ impl Played {
             measures: MEASURES.iter().map(|measure| measure.name.to_owned()).collect(),
         };
         let mut text = serde_json::to_string(&head).expect("it has string keys only") + "\n";
-        for MeasuredCell { agent, road, number, spent, values } in &self.cells {
-            let line = Line {
-                agent: agent.clone(),
-                road: road.clone(),
-                number: *number,
-                wall_s: spent.wall_s,
-                cpu_s: spent.cpu_s,
-                values: values.clone(),
-            };
-            text.push_str(&serde_json::to_string(&line).expect("it has string keys only"));
+        for cell in &self.cells {
+            text.push_str(&serde_json::to_string(cell).expect("it has string keys only"));
             text.push('\n');
         }
         let seal = Seal { seal: digest(text.as_bytes()) };
@@ -146,20 +127,15 @@ impl Played {
         let places: BTreeMap<&str, usize> =
             head.measures.iter().enumerate().map(|(place, name)| (name.as_str(), place)).collect();
         let cell = |(index, line): (usize, &str)| {
-            let line: Line = serde_json::from_str(line).map_err(at(index))?;
-            if line.values.len() != head.measures.len() {
-                let (found, wanted) = (line.values.len(), head.measures.len());
+            let cell: MeasuredCell = serde_json::from_str(line).map_err(at(index))?;
+            if cell.values.len() != head.measures.len() {
+                let (found, wanted) = (cell.values.len(), head.measures.len());
                 return Err(format!("line {}: {found} values of {wanted} measures", index + 1));
             }
             let value =
-                |name: &str| places.get(name).and_then(|&place| line.values.get(place).copied().flatten());
-            Ok(MeasuredCell {
-                values: MEASURES.iter().map(|measure| value(measure.name)).collect(),
-                agent: line.agent,
-                road: line.road,
-                number: line.number,
-                spent: Spent { wall_s: line.wall_s, cpu_s: line.cpu_s },
-            })
+                |name: &str| places.get(name).and_then(|&place| cell.values.get(place).copied().flatten());
+            let values = MEASURES.iter().map(|measure| value(measure.name)).collect();
+            Ok(MeasuredCell { values, ..cell })
         };
         let cells = lines.map(cell).collect::<Result<Vec<_>, String>>()?;
         let mut known = BTreeSet::new();
@@ -173,7 +149,7 @@ impl Played {
 
     /// Time of one worker for all cells, s.
     pub fn wall_s(&self) -> f64 {
-        self.cells.iter().map(|cell| cell.spent.wall_s).sum()
+        self.cells.iter().map(|cell| cell.wall_s).sum()
     }
 
     /// Simulated time of all trainings, branches and evaluations, h.

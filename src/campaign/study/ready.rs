@@ -25,7 +25,7 @@ impl Study {
         check(&settings)?;
         let mut study = Study { table, settings };
         let mut attached = None;
-        for job in study.jobs().iter().filter(|job| job.number == 0) {
+        for job in study.settings.jobs().iter().filter(|job| job.number == 0) {
             let agent = study.agent(job);
             let refuse = |error| StudyError::Agent { label: agent.label.clone(), error };
             if agent.training.is_some() {
@@ -54,16 +54,6 @@ impl Study {
     /// The driving system under test: its name here, or what an external one calls itself.
     pub fn ads_name(&self) -> String {
         self.settings.external.as_ref().map_or_else(|| self.settings.ads.clone(), Attached::name)
-    }
-
-    /// As [`StudySettings::jobs`].
-    pub fn jobs(&self) -> Vec<Job> {
-        self.settings.jobs()
-    }
-
-    /// As [`StudySettings::episodes`].
-    pub fn episodes(&self, job: &Job) -> u64 {
-        self.settings.episodes(job)
     }
 
     pub(super) fn agent(&self, job: &Job) -> &AgentSettings {

@@ -154,22 +154,21 @@ impl StudyResults {
     pub fn new(settings: &StudySettings, cells: &[CellRecord]) -> StudyResults {
         let measured: Vec<MeasuredCell> =
             cells.iter().map(|cell| MeasuredCell::new(cell, &settings.evaluation)).collect();
+        let mut cells: Vec<&CellRecord> = cells.iter().collect();
+        cells.sort_by_key(|cell| (settings.roads.iter().position(|road| *road == cell.road), cell.number));
         let roads = measured_roads(settings, &measured).into_iter().map(|measured| {
             let agents = measured.agents.into_iter().map(|agent| {
                 let own = cells.iter().filter(|cell| cell.agent == agent.agent && cell.road == measured.road);
-                let mut own: Vec<&CellRecord> = own.collect();
-                own.sort_by_key(|cell| cell.number);
+                let own: Vec<&CellRecord> = own.copied().collect();
                 agent_results(agent, &own)
             });
             RoadResults { agents: agents.collect(), road: measured.road, comparisons: measured.comparisons }
         });
         let together = settings.agents.iter().map(|agent| {
             let own = cells.iter().filter(|cell| cell.agent == agent.label);
-            let mut own: Vec<_> = own.collect();
-            own.sort_by_key(|cell| (settings.roads.iter().position(|road| *road == cell.road), cell.number));
             Together {
                 agent: agent.label.clone(),
-                episodes: Pooled::new(own.into_iter().flat_map(|cell| &cell.episodes)),
+                episodes: Pooled::new(own.flat_map(|cell| &cell.episodes)),
             }
         });
         let repeats: usize = settings.agents.iter().map(|agent| agent.repeats as usize).sum();

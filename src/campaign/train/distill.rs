@@ -13,7 +13,7 @@ use avastra_lang::model::policy::{PolicyRule, RulesClaims};
 use avastra_search::agent::{QPolicy, Visit, chosen_by, distilled};
 
 use crate::train::evaluation::evaluate;
-use crate::train::visits::{Visits, visits};
+use crate::train::visits::{VisitingPolicy, visits};
 
 /// Rules that imitate a policy, with the limits that its settings give; empty if the policy never made a choice.
 pub fn distill(arena: &Arena, policy: &QPolicy, seed: u64) -> Vec<PolicyRule> {
@@ -42,11 +42,10 @@ pub fn judge_rules(
     rules: &Arc<Vec<PolicyRule>>,
     test: (u64, u64),
 ) -> RulesClaims {
-    let student = policy.with_rules(rules.clone());
-    let visited = Visits::default();
-    let evaluation = evaluate(arena, &|| Box::new(visited.of(&student)), test);
+    let visiting = VisitingPolicy::new(&policy.with_rules(rules.clone()));
+    let evaluation = evaluate(arena, &|| Box::new(visiting.clone()), test);
     let (mut states, mut same, mut lost) = (0_u64, 0_u64, 0.0);
-    for visit in visited.visits() {
+    for visit in visiting.visits() {
         let row = chosen_by(rules, &visit.observation, &visit.open);
         states += 1;
         same += u64::from(row == Some(visit.best));

@@ -5,7 +5,7 @@
 
 use rusqlite::{OptionalExtension, params};
 
-use crate::run::{Database, DatabaseError, LAYOUT, add_all};
+use crate::run::{Database, DatabaseError, LAYOUT, add_all, insert_row};
 use avastra_lang::model::digest;
 use avastra_world::action::Draw;
 
@@ -33,19 +33,18 @@ impl Database {
         let transaction = self.connection.transaction()?;
         let episode = trained.summary.episode;
         add_all(&transaction, &trained.summary, &trained.log, in_words, scenario)?;
-        transaction.prepare_cached("INSERT INTO learning VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)")?.execute(
-            params![
-                episode as i64,
-                trained.sum,
-                trained.log.collisions.len() as i64,
-                trained.summary.counted() as i64,
-                trained.exploration_epsilon,
-                trained.lesson.loss,
-                trained.lesson.updates as i64,
-                trained.steps as i64,
-                trained.simulated_s,
-            ],
-        )?;
+        let values = params![
+            episode as i64,
+            trained.sum,
+            trained.log.collisions.len() as i64,
+            trained.summary.counted() as i64,
+            trained.exploration_epsilon,
+            trained.lesson.loss,
+            trained.lesson.updates as i64,
+            trained.steps as i64,
+            trained.simulated_s,
+        ];
+        insert_row(&transaction, "learning", values)?;
         if let Some(learner) = checkpoint {
             transaction.execute(
                 "INSERT OR REPLACE INTO checkpoint VALUES (1, ?, ?, ?)",

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use ndarray::Array1;
 
 use crate::episode;
-use crate::episode::{Choice, End, EpisodeLog, Moment, Outcome, Script, Setup};
+use crate::episode::{Choice, End, EpisodeLog, Moment, Script, Setup};
 use crate::oracle;
 use crate::run::{
     Arena, EpisodeSummary, Finding, Profile, RunError, RunSettings, TrafficRecord, agent_named,
@@ -19,9 +19,7 @@ use avastra_drivers::Ads;
 use avastra_drivers::external::Attached;
 use avastra_lang::model::Space;
 use avastra_lang::model::vocabulary::Word;
-use avastra_search::agent::{
-    Agent, Collided, Experience, Kind, Lesson, QPolicy, Rows, Settings, Trainable, Trajectory,
-};
+use avastra_search::agent::{Collided, Experience, Kind, Lesson, Rows, Settings, Trainable, Trajectory};
 use avastra_search::mdp;
 use avastra_search::mdp::{Closeness, Observation, ProcKind, StepOutcome};
 use avastra_world::action::ActionTable;
@@ -153,19 +151,9 @@ impl Training {
         self.arena.table()
     }
 
-    /// The network as trained so far, if the agent has one.
-    pub fn policy(&self) -> Option<&QPolicy> {
-        self.agent.policy()
-    }
-
-    /// What the agent has learned so far, ready to act for one episode.
-    pub fn actor(&self) -> Box<dyn Agent> {
-        self.agent.actor()
-    }
-
-    /// The same on states of other episodes; `None` if what it has learned is no network.
-    pub fn shuffled_actor(&self) -> Option<Box<dyn Agent>> {
-        self.agent.shuffled()
+    /// The agent, as trained so far. [`Training::resumed`] takes what it saves.
+    pub fn agent(&self) -> &dyn Trainable {
+        self.agent.as_ref()
     }
 
     /// Episodes done.
@@ -175,11 +163,6 @@ impl Training {
 
     pub fn is_done(&self) -> bool {
         self.next >= self.settings.episodes as usize
-    }
-
-    /// The agent as bytes, for [`Training::resumed`].
-    pub fn checkpoint(&self) -> Vec<u8> {
-        self.agent.save()
     }
 
     /// Plays the next episode and learns from it.
@@ -310,10 +293,8 @@ fn experiences(
     summary: &EpisodeSummary,
 ) -> Vec<Experience> {
     let steps: Vec<usize> = choices.iter().map(|choice| choice.step).collect();
-    let made_by = |obstacle: u32| {
-        let made = |outcome: &Outcome| matches!(outcome, Outcome::Done { spawned, .. } if spawned.contains(&obstacle));
-        steps.iter().position(|&step| made(&log.steps[step].outcome))
-    };
+    let made_by =
+        |obstacle: u32| steps.iter().position(|&step| log.steps[step].outcome.spawned().contains(&obstacle));
     let experience = |choice: Chosen| {
         let step = &log.steps[choice.step];
         let findings = || summary.collisions.iter().filter(|one| one.collision.step == choice.step);

@@ -17,24 +17,22 @@ use avastra_world::action::ActionTable;
 use crate::train::training::with_period;
 
 /// A policy that acts as usual and records every state in which it chooses, with the legal rows, even if its
-/// settings ignore what is legal. States without an open row are left out.
+/// settings ignore what is legal. States without an open row are left out. Each clone serves one episode; all record into
+/// one list.
+#[derive(Clone)]
 pub(super) struct VisitingPolicy {
     policy: QPolicy,
     visits: Arc<Mutex<Vec<Visit>>>,
 }
 
-/// The visits that visiting policies have in common; each of them serves one episode, one after another.
-#[derive(Default)]
-pub(super) struct Visits(Arc<Mutex<Vec<Visit>>>);
-
-impl Visits {
-    pub fn of(&self, policy: &QPolicy) -> VisitingPolicy {
-        VisitingPolicy { policy: policy.clone(), visits: self.0.clone() }
+impl VisitingPolicy {
+    pub fn new(policy: &QPolicy) -> VisitingPolicy {
+        VisitingPolicy { policy: policy.clone(), visits: Arc::default() }
     }
 
     /// All recorded visits.
     pub fn visits(self) -> Vec<Visit> {
-        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
+        std::mem::take(&mut *self.visits.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
@@ -77,13 +75,13 @@ pub(super) fn visits(
     episodes: u64,
     (seed, stream, first): (u64, Stream, u64),
 ) -> Vec<Visit> {
-    let visited = Visits::default();
+    let visiting = VisitingPolicy::new(policy);
     for number in 0..episodes * arena.roads() as u64 {
         let seed = rng::child_seed(seed, stream, first + number);
         let setup = arena.setup((number % arena.roads() as u64) as usize, seed);
-        let mut agent = visited.of(policy);
+        let mut agent = visiting.clone();
         agent.begin();
         episode::run(&setup, &mut |moment: &Moment| choose(&mut agent, moment).0, &mut |_, _, _| {});
     }
-    visited.visits()
+    visiting.visits()
 }

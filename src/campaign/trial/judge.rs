@@ -49,6 +49,7 @@ const MEETS_M: f64 = 12.0;
 pub(super) fn verdict(scene: &Scene, request: &SpawnRequest, seen: &Sighting) -> Result<(), String> {
     let first = &seen.frames[0];
     let drives = || seen.frames.iter().try_for_each(|frame| stays_on_road(scene, frame));
+    let asked = usize::from(request.then == Then::Change);
     match request.verb {
         Verb::Walk => walks(request, seen),
         Verb::Stand => stands(seen),
@@ -64,7 +65,6 @@ pub(super) fn verdict(scene: &Scene, request: &SpawnRequest, seen: &Sighting) ->
             if way_m < MOVES_M.min(request.speed_mps * HORIZON_S / 2.0) {
                 return Err(ended(seen, "it had moved"));
             }
-            let asked = usize::from(request.then == Then::Change);
             changes(&scene.map, request, seen, [asked, asked], 0)
         }
         Verb::Overtake => {
@@ -76,9 +76,8 @@ pub(super) fn verdict(scene: &Scene, request: &SpawnRequest, seen: &Sighting) ->
                 return Err(ended(seen, "it had passed"));
             };
             let out = usize::from(request.lane == LaneChoice::Current);
-            let back = usize::from(request.then == Then::Change);
-            let after = if back > 0 { passed } else { 0 };
-            changes(&scene.map, request, seen, [out + back, out + out.max(back)], after)
+            let after = if asked > 0 { passed } else { 0 };
+            changes(&scene.map, request, seen, [out + asked, out + out.max(asked)], after)
         }
         Verb::DriveOpposite => {
             drives()?;
@@ -86,7 +85,6 @@ pub(super) fn verdict(scene: &Scene, request: &SpawnRequest, seen: &Sighting) ->
                 return Err("it does not appear against the direction of the route".to_owned());
             }
             meets(seen)?;
-            let asked = usize::from(request.then == Then::Change);
             changes(&scene.map, request, seen, [asked, asked], 0)
         }
         Verb::CrossRoad => {
@@ -98,7 +96,6 @@ pub(super) fn verdict(scene: &Scene, request: &SpawnRequest, seen: &Sighting) ->
             }
             let crossing = crosses(seen)?;
             let until = Sighting { frames: seen.frames[..=crossing].to_vec(), ending: seen.ending };
-            let asked = usize::from(request.then == Then::Change);
             changes(&scene.map, request, &until, [asked, asked], 0)
         }
     }

@@ -139,12 +139,7 @@ impl<'a> Trials<'a> {
             if moment.step != sample.step {
                 return Choice::Pass;
             }
-            match table.offer(moment.situation, row) {
-                Offer::Legal(draw) => Choice::Act(draw),
-                Offer::Refused(refusal) => {
-                    Choice::Refused { row, rule: refusal.rule, reason: refusal.reason }
-                }
-            }
+            Choice::of(row, table.offer(moment.situation, row))
         };
         episode::run(&setup, &mut choose, &mut |_, _, _| {})
     }
