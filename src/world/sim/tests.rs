@@ -32,8 +32,7 @@ fn drive(world: &mut World, speed_mps: f64, time_s: f64) -> Vec<Contact> {
     let end_s = world.time_s() + time_s;
     let mut contacts = Vec::new();
     while world.time_s() < end_s - 1e-9 {
-        let control = hold(world, speed_mps);
-        contacts.extend_from_slice(world.tick(&control));
+        contacts.extend_from_slice(world.tick(&hold(world, speed_mps)));
     }
     contacts
 }
@@ -63,8 +62,7 @@ fn ahead_and_then_into_the_lane_of_the_ego_vehicle() {
     assert!((beside.outline.pose.position.y + 5.25).abs() < 1e-9);
     let mut sideways_mps: f64 = 0.0;
     for _ in 0..400 {
-        let control = hold(&world, 8.0);
-        world.tick(&control);
+        world.tick(&hold(&world, 8.0));
         let now = world.obstacle(beside.id).expect("it drives on");
         sideways_mps = sideways_mps.max(now.velocity_mps.y);
     }
@@ -161,8 +159,7 @@ fn crosses_when_the_ego_vehicle_is_there() {
         let start = Start { signal_phase_s: 10.0, ..testing::start() };
         let mut world = World::new(testing::crossing(), &start);
         while world.ego_station_m() < begin_m {
-            let control = hold(&world, 13.5);
-            world.tick(&control);
+            world.tick(&hold(&world, 13.5));
         }
         let across = SpawnRequest { then, ..request(Verb::CrossRoad, 30.0, 10.0) };
         // Its light is green from 7 to 19 s.
@@ -341,9 +338,8 @@ proptest! {
         // The ego vehicle brakes: those behind must, too.
         for _ in 0..1000 {
             let speed_mps = if world.time_s() < 10.0 { 10.0 } else { 0.0 };
-            let control = hold(&world, speed_mps);
             let before: Vec<Obstacle> = world.obstacles().copied().collect();
-            world.tick(&control);
+            world.tick(&hold(&world, speed_mps));
             for was in before.iter().filter(|was| was.verb != Verb::Walk) {
                 let Some(now) = world.obstacle(was.id) else { continue };
                 let now_met = world.incidents().iter().map(|incident| (incident.obstacle, incident.other));
@@ -378,8 +374,7 @@ proptest! {
         let level = Level::ALL[turn as usize];
         let sky = [Effect::Sky(Phenomenon::Rain, level), Effect::Sky(Phenomenon::Fog, Level::Light)];
         for _ in 0..moment {
-            let control = hold(&world, 9.0);
-            world.tick(&control);
+            world.tick(&hold(&world, 9.0));
         }
         let mut branch = world.clone();
         let go_on = |world: &mut World| {
@@ -392,8 +387,7 @@ proptest! {
                     // Some do not fit, which is no matter here.
                     let _refusal = world.apply(&Effect::Spawn(request(Verb::DriveAhead, 40.0, 10.0)));
                 }
-                let control = hold(world, 7.0);
-                met.extend_from_slice(world.tick(&control));
+                met.extend_from_slice(world.tick(&hold(world, 7.0)));
             }
             (met, digest(world), world.sensed())
         };
@@ -450,8 +444,7 @@ fn no_vehicle_changes_lanes_across_a_median() {
 fn a_crosser_that_cannot_go_on_does_not_vanish_in_sight() {
     let mut world = World::new(testing::crossing(), &Start { signal_phase_s: 10.0, ..testing::start() });
     while world.ego_station_m() < 150.0 {
-        let control = hold(&world, 15.0);
-        world.tick(&control);
+        world.tick(&hold(&world, 15.0));
     }
     let across = spawn(&mut world, request(Verb::CrossRoad, 25.0, 10.0));
     // The ego vehicle stops on the crossing and stays there.
@@ -506,8 +499,7 @@ fn ambient_traffic_is_there_and_comes_from_afar() {
     let mut known: Vec<u32> = world.obstacles().map(|obstacle| obstacle.id).collect();
     let mut newcomers = 0;
     while !world.arrived() {
-        let control = hold(&world, 7.0);
-        world.tick(&control);
+        world.tick(&hold(&world, 7.0));
         assert!(world.obstacles().len() <= 6);
         for obstacle in world.obstacles() {
             assert!(obstacle.is_ambient());
@@ -531,8 +523,7 @@ fn drivers_seldom_run_into_each_other() {
         for seed in 0..100 {
             let mut world = busy_world(&scene, seed);
             for _ in 0..1500 {
-                let control = hold(&world, 8.0);
-                world.tick(&control);
+                world.tick(&hold(&world, 8.0));
                 let drives = |id| world.obstacle(id).is_some_and(|obstacle| obstacle.verb != Verb::Walk);
                 let of_drivers = |incident: &&Incident| drives(incident.obstacle) && drives(incident.other);
                 met += world.incidents().iter().filter(of_drivers).count();

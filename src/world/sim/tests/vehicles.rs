@@ -51,8 +51,7 @@ fn vehicles_that_touch_slide_to_rest_by_friction() {
     let mut last = [behind, ahead];
     let mut crashes = 0;
     for _ in 0..500 {
-        let control = hold(&world, 0.0);
-        world.tick(&control);
+        world.tick(&hold(&world, 0.0));
         let met = world.incidents().len();
         crashes += met;
         for was in &mut last {
@@ -73,8 +72,7 @@ fn a_vehicle_that_is_asked_to_stand_stands_to_the_bit() {
     let mut world = testing::world(&testing::straight());
     let stands = spawn(&mut world, request(Verb::DriveAhead, 30.0, 0.0));
     for _ in 0..500 {
-        let control = hold(&world, 0.0);
-        world.tick(&control);
+        world.tick(&hold(&world, 0.0));
         let now = world.obstacle(stands.id).expect("it stands in sight");
         assert_eq!((now.outline, now.velocity_mps), (stands.outline, Vec2::zeros()));
     }
@@ -102,8 +100,7 @@ fn an_overtaker_that_keeps_its_lane_comes_back_to_it_well_ahead() {
     let mut begins_m = None;
     let mut most_aside_m: f64 = 0.0;
     for _ in 0..1200 {
-        let control = hold(&world, 8.0);
-        world.tick(&control);
+        world.tick(&hold(&world, 8.0));
         let now = world.obstacle(passing.id).expect("it drives on");
         most_aside_m = most_aside_m.max(-1.75 - now.outline.pose.position.y);
         if most_aside_m > 3.4 && now.velocity_mps.y > 0.1 {
@@ -170,8 +167,7 @@ fn released_vehicles_see_what_their_rays_meet_and_stop_at_once() {
         let mut hardest_mps2: f64 = 0.0;
         let mut was_mps = 12.0;
         for _ in 0..500 {
-            let control = hold(&world, 0.0);
-            world.tick(&control);
+            world.tick(&hold(&world, 0.0));
             let now_mps = world.obstacle(ahead.id).expect("it is in sight").velocity_mps.norm();
             hardest_mps2 = hardest_mps2.max((was_mps - now_mps) / DT_S);
             was_mps = now_mps;
@@ -231,8 +227,7 @@ fn ambient_vehicles_change_lanes_where_they_gain() {
             let mut world = World::new(testing::straight(), &start);
             let mut lanes = std::collections::BTreeMap::new();
             for _ in 0..3000 {
-                let control = hold(&world, 5.0);
-                world.tick(&control);
+                world.tick(&hold(&world, 5.0));
                 assert_eq!(world.incidents(), []);
                 for obstacle in world.obstacles() {
                     let lane = (obstacle.outline.pose.position.y / 3.5).floor() as i32;
