@@ -117,7 +117,7 @@ pub(super) fn npc_facts(around: &Around, obstacle: &Obstacle, motion: &Motion) -
 
 /// The facts of a road user that drives.
 pub(super) fn driver_facts(around: &Around, obstacle: &Obstacle, driver: &Driver) -> NpcFacts {
-    let (scene, way, station_m) = (around.scene, driver.way(), driver.station_m());
+    let (scene, way, station_m) = (around.scene, &driver.way, driver.station_m);
     // Lane by lane: the first begins behind the station, the others follow each other.
     let mut begin_m = station_m;
     let ahead = way.lanes_from(station_m).map(|(lane, on_lane_m)| {

@@ -177,7 +177,7 @@ impl PassedLight {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rights {
     /// The light that the road user passed last.
-    passed: Option<PassedLight>,
+    pub passed: Option<PassedLight>,
     /// Whether it and the ego vehicle are in one lane, or it is a pedestrian in the ego vehicle's way; `None` before
     /// the first look.
     shares: Option<bool>,
@@ -208,11 +208,6 @@ enum Place {
 }
 
 impl Rights {
-    /// The light that the road user passed last.
-    pub fn passed_light(&self) -> Option<&PassedLight> {
-        self.passed.as_ref()
-    }
-
     /// Notes the light of a stop line that the road user's front passes in this tick.
     pub fn pass(&mut self, way: &Way, from_m: f64, to_m: f64, around: &Around) {
         let colour = |signal| around.signals.colour(&around.scene.map, signal, around.tick);
@@ -402,14 +397,14 @@ impl Crossing {
         let car = VehicleParameters::MKZ;
         let (front_m, rear_m) = (car.front_m(around.ego_station_m), car.rear_m(around.ego_station_m));
         let half_m = this.outline.half_length_m;
-        let (other_front_m, other_rear_m) = (driver.station_m() + half_m, driver.station_m() - half_m);
+        let (other_front_m, other_rear_m) = (driver.station_m + half_m, driver.station_m - half_m);
         // By rising begin: those that begin too far behind or ahead are left out at once.
-        let areas = around.scene.route_areas();
+        let areas = &around.scene.route_areas;
         let first = areas.partition_point(|found| found.area.from_m < rear_m - AREA_M);
         let last = areas.partition_point(|found| found.area.from_m < front_m + APPROACH_M);
         let mut best: Option<Crossing> = None;
         for RouteArea { lane, area } in areas[first..last].iter().filter(|found| found.area.to_m > rear_m) {
-            let Some(begin_m) = driver.way().lane_ahead_m(area.other, other_rear_m) else { continue };
+            let Some(begin_m) = driver.way.lane_ahead_m(area.other, other_rear_m) else { continue };
             let ego = Passage {
                 lane: *lane,
                 in_m: area.from_m - front_m,
@@ -506,15 +501,15 @@ struct Side {
 impl Side {
     /// `None` if the ego vehicle is nowhere near the other's way.
     fn of(this: &Obstacle, driver: &Driver, around: &Around) -> Option<Side> {
-        let path = &driver.way().path;
+        let path = &driver.way.path;
         let here = this.outline.pose.position;
         let away = around.ego_outline.pose.position - here;
-        let guess_m = driver.station_m() + this.forward.dot(&away);
+        let guess_m = driver.station_m + this.forward.dot(&away);
         let ego = path.project_from(around.ego_outline.pose.position, guess_m)?;
         if ego.offset_m.abs() > ASIDE_M {
             return None;
         }
-        let other = path.project_from(here, driver.station_m())?;
+        let other = path.project_from(here, driver.station_m)?;
         let (ego_length_m, ego_width_m) = around.ego_outline.half_extent_m(around.ego_forward, ego.forward);
         let (other_length_m, other_width_m) = this.outline.half_extent_m(this.forward, other.forward);
         let across_m = other.offset_m - ego.offset_m;

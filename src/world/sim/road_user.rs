@@ -184,7 +184,7 @@ impl Mover {
     /// Height of the road on its way, m; `None` for what has no way.
     pub fn elevation_m(&self) -> Option<f64> {
         match &self.motion {
-            Motion::Drive(driver) => Some(driver.way().height_at(driver.station_m())),
+            Motion::Drive(driver) => Some(driver.way.height_at(driver.station_m)),
             Motion::Walk(_) | Motion::Stand => None,
         }
     }
@@ -222,11 +222,11 @@ impl Mover {
         match &mut self.motion {
             _ if self.crashed_with.is_some() => Some(slide(this, around)),
             Motion::Drive(driver) => {
-                let (way, before_m) = (Arc::as_ptr(driver.shared_way()), driver.station_m());
+                let (way, before_m) = (Arc::as_ptr(&driver.way), driver.station_m);
                 let moved = driver.step(this, &self.size, self.touched, in_sight, around);
-                if way == Arc::as_ptr(driver.shared_way()) {
+                if way == Arc::as_ptr(&driver.way) {
                     let front_m = this.outline.half_length_m;
-                    self.rights.pass(driver.way(), before_m + front_m, driver.station_m() + front_m, around);
+                    self.rights.pass(&driver.way, before_m + front_m, driver.station_m + front_m, around);
                 }
                 moved
             }

@@ -84,7 +84,7 @@ impl Way {
             beyond_m += map.lane(last).centre.length_m();
             chain.push(last);
         }
-        scene.ways().through(scene, chain)
+        scene.ways.through(scene, chain)
     }
 
     fn through(scene: &Scene, chain: &[LaneIndex]) -> Option<Way> {
@@ -108,7 +108,7 @@ impl Way {
             );
             let stops = lane.sign_lines.iter().filter(|line| line.kind == SignKind::Stop);
             stop_signs_m.extend(stops.map(|line| from_m + line.station_m));
-            let on_lane = scene.conflict_areas().of(*index).iter();
+            let on_lane = scene.areas.of(*index).iter();
             areas.extend(on_lane.map(|area| Area {
                 from_m: from_m + area.from_m,
                 to_m: from_m + area.to_m,

@@ -432,7 +432,7 @@ impl World {
     /// Whether the road user with an id is in a junction that it entered at a red light.
     pub fn runs_red(&self, id: u32) -> bool {
         let user = self.users.iter().find(|user| user.obstacle.id == id);
-        let passed = user.and_then(|user| Some((user.mover.rights.passed_light()?, &user.obstacle.outline)));
+        let passed = user.and_then(|user| Some((user.mover.rights.passed?, &user.obstacle.outline)));
         passed.is_some_and(|(passed, outline)| passed.is_being_run(&self.scene.map, outline))
     }
 

@@ -53,9 +53,10 @@ pub(in crate::sim) enum Cruise {
 
 #[derive(Debug, Clone)]
 pub(in crate::sim) struct Driver {
-    pub(super) way: Arc<Way>,
+    /// The way that it follows now.
+    pub way: Arc<Way>,
     /// Station on the way: on a straight one, that of the outline's centre (see [`Way::body_at`]).
-    pub(super) station_m: f64,
+    pub station_m: f64,
     pub speed_mps: f64,
     pub(super) cruise_mps: f64,
     /// Part of the limits that it drives at; `None` if its speed was asked for.
@@ -119,19 +120,6 @@ impl Driver {
             lane_changes: None,
             draws,
         }
-    }
-
-    /// The way it follows now.
-    pub fn way(&self) -> &Way {
-        &self.way
-    }
-
-    pub fn shared_way(&self) -> &Arc<Way> {
-        &self.way
-    }
-
-    pub fn station_m(&self) -> f64 {
-        self.station_m
     }
 
     pub fn is_changing_lanes(&self) -> bool {

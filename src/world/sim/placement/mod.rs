@@ -151,7 +151,7 @@ fn meets_route(around: &Around, mover: &Mover) -> bool {
     let Motion::Drive(driver) = &mover.motion else { return false };
     let mut ahead =
         around.scene.route.conflicts.iter().filter(|conflict| conflict.station_m > around.ego_station_m);
-    ahead.any(|conflict| driver.way().lane_begin_m(conflict.lane).is_some())
+    ahead.any(|conflict| driver.way.lane_begin_m(conflict.lane).is_some())
 }
 
 /// A driver at the speed that was asked for.
