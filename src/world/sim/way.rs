@@ -137,43 +137,6 @@ impl Way {
         })
     }
 
-    /// Where the outline's centre of a body is that has driven to a station: both axles are on the way.
-    ///
-    /// The station is that of the rear axle plus the distance from there to the centre, so on a straight
-    /// way it is the centre's. In a bend the body is a chord of the way: its middle cuts the bend, and its
-    /// tail swings out less than if the body turned about its centre. A real rear axle cuts a bend farther;
-    /// its driver swings out before to stay in the lane, which is not modelled.
-    pub fn body_at(&self, station_m: f64, body: &BodyParameters) -> Pose {
-        let rear_m = station_m - body.rear_axle_m;
-        let rear = self.path.position_at(rear_m);
-        let wheelbase = self.path.position_at(rear_m + body.wheelbase_m) - rear;
-        let length_m = wheelbase.norm();
-        Pose {
-            position: rear + wheelbase * (body.rear_axle_m / length_m),
-            heading_rad: libm::atan2(wheelbase.y, wheelbase.x),
-        }
-    }
-
-    /// A path as a way without lanes.
-    #[cfg(test)]
-    pub fn of_path(path: Path) -> Way {
-        let speeds_mps_max = bend_speeds_mps(&path);
-        let (lanes, stop_lines, areas) = (Vec::new(), Vec::new(), Vec::new());
-        let stop_signs_m = Vec::new();
-        Way {
-            path,
-            lanes,
-            heights: Heights::default(),
-            lane_bits: 0,
-            stop_lines,
-            stop_signs_m,
-            areas,
-            speeds_mps_max,
-            open: false,
-            end_m: None,
-        }
-    }
-
     /// Height of the road at a station, m.
     pub fn height_at(&self, station_m: f64) -> f64 {
         self.heights.at(station_m)
@@ -232,6 +195,23 @@ impl Way {
         let after = self.lanes.partition_point(|part| part.from_m <= station_m - BEHIND_M).max(1);
         let rest: Vec<LaneIndex> = self.lanes[after - 1..].iter().map(|part| part.lane).collect();
         Some((Way::along(scene, &rest, rng)?, station_m - self.lanes[after - 1].from_m))
+    }
+}
+
+/// Where the outline's centre of a body is that has driven to a station of a way: both axles are on the way.
+///
+/// The station is that of the rear axle plus the distance from there to the centre, so on a straight
+/// way it is the centre's. In a bend the body is a chord of the way: its middle cuts the bend, and its
+/// tail swings out less than if the body turned about its centre. A real rear axle cuts a bend farther;
+/// its driver swings out before to stay in the lane, which is not modelled.
+pub(super) fn body_at(path: &Path, station_m: f64, body: &BodyParameters) -> Pose {
+    let rear_m = station_m - body.rear_axle_m;
+    let rear = path.position_at(rear_m);
+    let wheelbase = path.position_at(rear_m + body.wheelbase_m) - rear;
+    let length_m = wheelbase.norm();
+    Pose {
+        position: rear + wheelbase * (body.rear_axle_m / length_m),
+        heading_rad: libm::atan2(wheelbase.y, wheelbase.x),
     }
 }
 

@@ -20,7 +20,7 @@ use crate::sim::body::BodyParameters;
 use crate::sim::moment::{driver_facts, with_itself};
 use crate::sim::road_user::{Moved, Obstacle};
 use crate::sim::traffic::TrafficProfile;
-use crate::sim::way::Way;
+use crate::sim::way::{Way, body_at};
 use crate::sim::world::DT_S;
 
 use super::driver::{Driver, SIDE_ROOM_M};
@@ -206,7 +206,7 @@ impl Driver {
     /// Where it is after a tick in which it drove `way_m`, with the lane change under way moved on. `before`
     /// is where its centre was.
     pub(super) fn advance_change(&mut self, way_m: f64, before: Vec2, size: &BodyParameters) -> Moved {
-        let from = self.way.body_at(self.station_m, size);
+        let from = body_at(&self.way.path, self.station_m, size);
         // The velocity is measured, because in a bend the centre of a body is slower than its way, and
         // between two lanes it has neither lane's speed.
         let at = |pose: Pose, lane_heading_rad| Moved {
@@ -222,7 +222,7 @@ impl Driver {
         let guess_m = change.to_station_m + way_m;
         change.to_station_m =
             change.to.path.project_from(from.position, guess_m).map_or(guess_m, |found| found.station_m);
-        let to = change.to.body_at(change.to_station_m, size);
+        let to = body_at(&change.to.path, change.to_station_m, size);
         let to_lane_rad = change.to.path.heading_at(change.to_station_m);
         let progress_per_m = change.progress_per_m(self.speed_mps);
         change.progress += progress_per_m * way_m;

@@ -21,7 +21,7 @@ use crate::sim::road_user::{Moved, Obstacle};
 use crate::sim::scene::Scene;
 use crate::sim::sense::FRAME_TICKS;
 use crate::sim::trace::Trace;
-use crate::sim::way::Way;
+use crate::sim::way::{Way, body_at};
 use crate::sim::world::DT_S;
 
 use super::change::{Change, Manoeuvre};
@@ -55,7 +55,7 @@ pub(in crate::sim) enum Cruise {
 pub(in crate::sim) struct Driver {
     /// The way that it follows now.
     pub way: Arc<Way>,
-    /// Station on the way: on a straight one, that of the outline's centre (see [`Way::body_at`]).
+    /// Station on the way: on a straight one, that of the outline's centre (see [`body_at`]).
     pub station_m: f64,
     pub speed_mps: f64,
     pub(super) cruise_mps: f64,
@@ -128,7 +128,7 @@ impl Driver {
 
     /// Where it is before its first tick.
     pub fn moved(&self, size: &BodyParameters) -> Moved {
-        let pose = self.way.body_at(self.station_m, size);
+        let pose = body_at(&self.way.path, self.station_m, size);
         let forward = pose.forward();
         Moved {
             pose,

@@ -11,6 +11,7 @@ use core::cell::LazyCell;
 use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
 use crate::sim::road_user::Obstacle;
+use crate::sim::way::body_at;
 use avastra_base::geometry::{OrientedBox, Pose, distance_m};
 use avastra_road::is_apart;
 
@@ -46,7 +47,7 @@ impl Driver {
         // The own poses at those moments, worked out only if there is a vehicle to meet.
         let speed_mps = self.speed_mps.max(CREEP_MPS);
         let own = LazyCell::new(|| {
-            MOMENTS_S.map(|time_s| self.way.body_at(self.station_m + speed_mps * time_s, size))
+            MOMENTS_S.map(|time_s| body_at(&self.way.path, self.station_m + speed_mps * time_s, size))
         });
         let mut free_m = f64::INFINITY;
         if self.yields_to_ego && matters(around.ego_outline, around.ego_elevation_m, around.ego.speed_mps) {
@@ -61,7 +62,8 @@ impl Driver {
             {
                 continue;
             }
-            let other = |time_s| driver.way.body_at(driver.station_m + driver.speed_mps * time_s, body);
+            let other =
+                |time_s| body_at(&driver.way.path, driver.station_m + driver.speed_mps * time_s, body);
             free_m = free_m.min(free_way_m(this, &own, speed_mps, &obstacle.outline, other));
         }
         free_m.is_finite().then_some(Leader { gap_m: free_m + STOP_M, speed_mps: 0.0, crosswise: true })

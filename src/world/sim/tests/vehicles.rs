@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::action::{Effect, SpawnRequest, Surroundings};
 use crate::sim::body::BodyParameters;
 use crate::sim::testing::request;
-use crate::sim::way::Way;
+use crate::sim::way::body_at;
 use crate::sim::{Control, DT_S, Scene, Start, TrafficProfile, World, body, testing};
 use avastra_base::geometry::{OrientedBox, Path, Pose, Vec2};
 use avastra_lang::model::vocabulary::{Body, LaneChoice, Level, Phenomenon, Side, Then, Verb, Word};
@@ -15,23 +15,23 @@ use super::{drive, hold, spawn, y_m};
 #[test]
 fn a_bus_in_a_bend_keeps_its_tail_near_its_lane() {
     // How far the outline reaches beyond the sides that the widest part of it has on a straight way, m.
-    let sweep_m = |radius_m: f64, pose_at: &dyn Fn(&Way, f64, &BodyParameters) -> Pose| -> f64 {
+    let sweep_m = |radius_m: f64, pose_at: fn(&Path, f64, &BodyParameters) -> Pose| -> f64 {
         let arc = (0..=200).map(|i| {
             let turn_rad = f64::from(i) / 200.0 * core::f64::consts::PI;
             let (sin, cos) = libm::sincos(turn_rad);
             (Vec2::new(radius_m * sin, radius_m * (1.0 - cos)), turn_rad, 1.0 / radius_m)
         });
-        let way = Way::of_path(Path::new(arc).expect("it is a path"));
+        let path = Path::new(arc).expect("it is a path");
         let bus = body::parameters(Body::SchoolBus);
-        let pose = pose_at(&way, way.path.length_m() / 2.0, &bus);
+        let pose = pose_at(&path, path.length_m() / 2.0, &bus);
         let outline = OrientedBox::new(pose, bus.length_m, bus.width_m);
         let centre = Vec2::new(0.0, radius_m);
         let far_m = outline.corners().iter().map(|corner| (corner - centre).norm()).fold(0.0, f64::max);
         far_m - radius_m - bus.width_m / 2.0
     };
     for (radius_m, most_m) in [(7.0, 1.25), (10.0, 1.0)] {
-        let about_its_centre = sweep_m(radius_m, &|way, station_m, _| way.path.pose_at(station_m));
-        let on_its_axles = sweep_m(radius_m, &|way, station_m, bus| way.body_at(station_m, bus));
+        let about_its_centre = sweep_m(radius_m, |path, station_m, _| path.pose_at(station_m));
+        let on_its_axles = sweep_m(radius_m, body_at);
         assert!(on_its_axles < most_m, "{on_its_axles}");
         assert!(on_its_axles < 0.8 * about_its_centre, "{on_its_axles} {about_its_centre}");
     }
