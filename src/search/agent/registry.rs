@@ -246,8 +246,7 @@ mod tests {
             if at + 1 < rows.len() {
                 return Experience::plain(row, -1.0, ROWS);
             }
-            let (hits, crashes) = (vec![0], vec![Some(0)]);
-            Experience { hits, collided: true, crashes, ..Experience::plain(row, 7.5, ROWS) }
+            Experience { hits: vec![0], crashes: vec![Some(0)], ..Experience::plain(row, 7.5, ROWS) }
         };
         Trajectory {
             closeness: Closeness { distance_m: 5.0 + rows[0] as f64, margin_m: 0.0 },
