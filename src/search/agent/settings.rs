@@ -51,16 +51,17 @@ pub enum SettingsError {
     Text(String),
     #[error("no preset `{name}` for this agent: it has {known}")]
     Preset { name: String, known: String },
-    #[error("no setting `{name}`{}", hint(suggestion))]
-    Unknown { name: String, suggestion: Option<String> },
+    #[error("no setting `{name}`{hint}")]
+    Unknown { name: String, hint: String },
     #[error("this agent has no setting `{name}`: it is one of {owners}")]
     Elsewhere { name: String, owners: String },
     #[error("`{name}` is {value}, but must be {wanted}")]
     Range { name: &'static str, value: String, wanted: &'static str },
 }
 
-fn hint(suggestion: &Option<String>) -> String {
-    suggestion.as_ref().map_or(String::new(), |name| format!(": did you mean `{name}`?"))
+/// The one of some names that is most like an unknown one, as the end of a message; empty if none is.
+pub(super) fn hint<'a>(unknown: &str, names: impl IntoIterator<Item = &'a str>) -> String {
+    nearest(unknown, names).map_or(String::new(), |name| format!(": did you mean `{name}`?"))
 }
 
 /// Does the same with the settings of whichever agent they are of.
@@ -203,8 +204,8 @@ fn no_setting(name: String, own: &Map<String, Value>) -> SettingsError {
     if !owners.is_empty() {
         return SettingsError::Elsewhere { name, owners: listed(&owners) };
     }
-    let suggestion = nearest(&name, own.keys().map(String::as_str)).map(str::to_owned);
-    SettingsError::Unknown { name, suggestion }
+    let hint = hint(&name, own.keys().map(String::as_str));
+    SettingsError::Unknown { name, hint }
 }
 
 /// What a setting must be, and whether it is.
