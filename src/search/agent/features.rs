@@ -67,7 +67,8 @@ enum Scale {
 /// A list of variables and how they are encoded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Features {
-    variables: Vec<usize>,
+    /// The variables that go in, by index.
+    pub(super) variables: Vec<usize>,
     encoding: Encoding,
     len: usize,
 }
@@ -93,11 +94,6 @@ impl Features {
     #[allow(clippy::len_without_is_empty, reason = "every set of variables has some")]
     pub fn len(&self) -> usize {
         self.len
-    }
-
-    /// The variables that go in, by index.
-    pub fn variables(&self) -> &[usize] {
-        &self.variables
     }
 
     /// Network inputs, shape `(len,)`.

@@ -153,7 +153,7 @@ impl QPolicy {
 
     /// The variables that the network sees, by index.
     pub fn variables(&self) -> &[usize] {
-        self.features.variables()
+        &self.features.variables
     }
 
     /// Q-values of a state, shape `(rows,)`.
