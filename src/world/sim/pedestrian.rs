@@ -27,7 +27,7 @@ use super::around::{Around, Other};
 use super::road_user::{Moved, Obstacle};
 use super::sense::FRAME_TICKS;
 use super::trace::Trace;
-use super::world::DT_S;
+use super::world::{DT_S, ticks};
 
 /// Least time at the kerb before setting out, s (published package).
 const WAIT_S: f64 = 1.0;
@@ -307,10 +307,6 @@ fn arrival_s(outline: &OrientedBox, vehicle: &OrientedBox, velocity_mps: Vec2) -
         return f64::INFINITY;
     }
     ahead_m / speed_mps
-}
-
-fn ticks(time_s: f64) -> u64 {
-    (time_s / DT_S + 0.5) as u64
 }
 
 #[cfg(test)]

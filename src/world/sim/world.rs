@@ -46,6 +46,11 @@ pub const ENGINE: &str = "plane/8";
 /// One physics step, s: 50 Hz.
 pub const DT_S: f64 = TICK_MS as f64 / 1000.0;
 
+/// The ticks of a time, to the nearest.
+pub(super) const fn ticks(time_s: f64) -> u64 {
+    (time_s / DT_S + 0.5) as u64
+}
+
 /// Commanded obstacles at a time. For the next one, the oldest that is out of sight leaves; in the published package the
 /// oldest leaves wherever it is.
 const OBSTACLES_MAX: usize = COMMANDED_MAX as usize;

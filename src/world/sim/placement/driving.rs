@@ -8,7 +8,7 @@ use crate::sim::around::Around;
 use crate::sim::ego::VehicleParameters;
 use crate::sim::npc::{Driver, Manoeuvre, Towards, When, can_change, choices, lane_beside};
 use crate::sim::way::Way;
-use crate::sim::world::DT_S;
+use crate::sim::world::ticks;
 
 use super::lanes::{chosen_lane, lane_along, lane_before, opposing_lane};
 use super::{Asked, ahead_m, commanded};
@@ -43,7 +43,7 @@ pub(super) fn drive_ahead(asked: &Asked) -> Result<Driver, String> {
             return Err(no_change(around, lane).into());
         }
         let towards = Towards::To(sides[rng::below(&mut rng, sides.len() as u32) as usize]);
-        let when = When::Tick(around.tick + (CHANGE_AFTER_S / DT_S + 0.5) as u64);
+        let when = When::Tick(around.tick + ticks(CHANGE_AFTER_S));
         plan.push(Manoeuvre { when, towards });
     }
     Ok(commanded(asked, way, station_m, plan))
