@@ -458,22 +458,15 @@ impl Crossing {
             (true, true) => return by_rule,
             (ego_first, _) => ego_first,
         };
+        // The first has left the second, which goes before it, room to brake gently: it has given way. At a red light
+        // that excuses the second alone.
+        let given_way = |is_red: bool, first: Priority| if is_red { Priority::None } else { first };
         match by_rule {
-            // The first has left the second, which goes before it, room to brake gently: it has given way. At a red
-            // light that excuses the second alone.
             Priority::Other if ego_first && self.other.has_time_for(&self.ego) => {
-                if ego_red {
-                    Priority::None
-                } else {
-                    Priority::Ego
-                }
+                given_way(ego_red, Priority::Ego)
             }
             Priority::Ego if !ego_first && self.ego.has_time_for(&self.other) => {
-                if other_red {
-                    Priority::None
-                } else {
-                    Priority::Other
-                }
+                given_way(other_red, Priority::Other)
             }
             _ => by_rule,
         }

@@ -511,7 +511,7 @@ impl World {
         let commanded = self.users.iter().enumerate().filter(|(_, user)| !user.obstacle.is_ambient());
         let wanted = commanded.clone().count() + Effect::Spawn(*request).newcomers() as usize;
         let too_many = wanted.saturating_sub(OBSTACLES_MAX);
-        let around = self.around([&self.users, &[]]);
+        let around = self.alone();
         let is_hidden = |user: &RoadUser| {
             self.traffic.oldest_leaves_in_sight
                 || !around.is_in_sight(&user.obstacle, user.mover.visible_fraction)
@@ -532,7 +532,7 @@ impl World {
         }
         // A copy, because the attempt looks at the world.
         let mut ambient = self.ambient.clone();
-        let newcomer = ambient.attempt(&self.around([&self.users, &[]]), begins);
+        let newcomer = ambient.attempt(&self.alone(), begins);
         self.users.extend(newcomer);
         self.ambient = ambient;
     }

@@ -23,7 +23,7 @@ impl World {
         let driver = Driver::new(&self.scene, way, station_m, Cruise::Commanded(speed_mps), Vec::new(), 1);
         let moved = driver.moved(&size);
         let mover = Mover::new(size, Motion::Drive(driver));
-        let around = self.around([&self.users, &[]]);
+        let around = self.alone();
         let verb = Verb::CrossRoad;
         let user = RoadUser::new(&around, self.next_id, Body::Sedan, Colour::Red, verb, mover, moved);
         self.users.push(user);
