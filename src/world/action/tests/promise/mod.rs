@@ -20,7 +20,7 @@ use crate::action::tests::sound::compiled;
 use crate::action::{ActionTable, Draw, Offer, Situation, SpawnFacts, SpawnRequest, Surroundings};
 use avastra_base::rng;
 use avastra_base::rng::Stream;
-use avastra_lang::model::{Memory, MomentFacts, Row, RulesInForce, Space, Type, Value, code};
+use avastra_lang::model::{Memory, MomentFacts, Row, RulesInForce, Space, Value, code};
 use avastra_lang::prove::{Realised, realise};
 
 use made::{Binds, Condition, EachStep, Level, Made, Maker, Number, ROADS, Rule};
@@ -375,15 +375,4 @@ fn random_spaces_keep_the_promise_at_length() {
     let seen = audit(300, DRAWS_MAX);
     println!("{seen:?}");
     assert!(seen.rows_realised >= 300 * 8 && seen.timed >= 60, "{seen:?}");
-}
-
-/// The types of the drawn values are those of the parameters.
-#[test]
-fn the_twin_knows_every_action() {
-    let made = Maker(rng::stream(0, Stream::Exploration, 77)).space();
-    let drawn = ["thicken", "soak", "turn", "tick", "ahead", "pair"];
-    let space = compiled(&made.text).space.expect("without rules it is sound");
-    let names: Vec<&str> = space.actions.iter().map(|action| action.name.as_str()).collect();
-    assert_eq!(names, drawn);
-    assert!(space.states.iter().all(|state| !matches!(state.ty, Type::Quantity(_))));
 }
