@@ -260,28 +260,6 @@ mod tests {
     use crate::sim::DT_S;
     use crate::sim::environment::Grip;
 
-    /// Way from `speed_mps` to rest under full brakes, m.
-    fn stopping_m(speed_mps: f64, friction: f64) -> f64 {
-        let mut ego = Ego::new(Pose::new(0.0, 0.0, 0.0), speed_mps);
-        let control = Control { brake_pct: 100.0, ..Control::default() };
-        for _ in 0..2000 {
-            ego.step(&control, friction, DT_S);
-        }
-        assert_eq!(ego.motion.speed_mps, 0.0);
-        ego.motion.rear_axle.position.x
-    }
-
-    #[test]
-    fn stopping_distance_is_braking_plus_lag() {
-        let speed_mps = 50.0 / 3.6;
-        // v²/2a with a = min(6, μg): the published 11.6 m at 0.85 is beyond the brakes of the MKZ.
-        for (friction, braking_m) in [(0.85, 16.1), (0.55, 17.9), (0.40, 24.6), (0.25, 39.3), (0.10, 98.3)] {
-            let found_m = stopping_m(speed_mps, friction);
-            let lag_m = found_m - braking_m;
-            assert!((0.2..0.25 * speed_mps).contains(&lag_m), "μ {friction}: {found_m} m");
-        }
-    }
-
     /// The calibration of stopping distances: 30, 50 and 70 km/h on a dry, a wet (0.2 mm) and a flooded
     /// (2 mm) road, against ∫ v / min(6, μ(v) g) dv and a lag of at most a quarter of a second.
     #[test]
