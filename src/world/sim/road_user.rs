@@ -11,7 +11,7 @@ use avastra_road::is_apart;
 use super::ambient::COMMANDED_MAX;
 use super::around::Around;
 use super::body::BodyParameters;
-use super::npc::Driver;
+use super::npc::{Driver, View};
 use super::pedestrian::Walker;
 use super::right_of_way::{Rights, SIDEWAYS_MPS};
 use super::trace::Trace;
@@ -223,7 +223,7 @@ impl Mover {
             _ if self.crashed_with.is_some() => Some(slide(this, around)),
             Motion::Drive(driver) => {
                 let (way, before_m) = (Arc::as_ptr(&driver.way), driver.station_m);
-                let moved = driver.step(this, &self.size, self.touched, in_sight, around);
+                let moved = driver.step(&View { this, size: &self.size, around }, self.touched, in_sight);
                 if way == Arc::as_ptr(&driver.way) {
                     let front_m = this.outline.half_length_m;
                     self.rights.pass(&driver.way, before_m + front_m, driver.station_m + front_m, around);

@@ -83,6 +83,13 @@ pub(in crate::sim) struct Driver {
     draws: u32,
 }
 
+/// What a driver decides by: itself as others see it, its body, and the world around it.
+pub(in crate::sim) struct View<'a> {
+    pub this: &'a Obstacle,
+    pub size: &'a BodyParameters,
+    pub around: &'a Around<'a>,
+}
+
 impl Driver {
     /// A driver with its centre at a station of a way, at its cruising speed or what the bend there
     /// allows.
@@ -150,17 +157,11 @@ impl Driver {
 
     /// One tick; `None` if it leaves the world, which it does only while the ego vehicle does not see it
     /// (`in_sight`). One that has `touched` the ego vehicle only brakes.
-    pub fn step(
-        &mut self,
-        this: &Obstacle,
-        size: &BodyParameters,
-        touched: bool,
-        in_sight: bool,
-        around: &Around,
-    ) -> Option<Moved> {
+    pub fn step(&mut self, view: &View, touched: bool, in_sight: bool) -> Option<Moved> {
+        let View { this, size, around } = *view;
         let looks = !touched && (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS);
         if looks {
-            self.look(this, size, around);
+            self.look(view);
         }
         let braking_mps2 = around.braking_mps2(size, self.speed_mps);
         let acceleration_mps2 = if touched {
@@ -191,7 +192,8 @@ impl Driver {
     }
 
     /// Prolongs the way, begins a lane change that is due, and finds what to follow and what to wait for.
-    fn look(&mut self, this: &Obstacle, size: &BodyParameters, around: &Around) {
+    fn look(&mut self, view: &View) {
+        let View { this, size, around } = *view;
         if self.way.ends_soon(self.station_m) {
             let mut rng = self.draw(this.id, around);
             if let Some((way, station_m)) = self.way.prolonged(around.scene, self.station_m, &mut rng) {
@@ -206,19 +208,19 @@ impl Driver {
             self.cruise_mps = part * self.way.limit_mps(around.scene, self.station_m);
         }
         if self.change.is_none() {
-            self.begin_change(this, size, around);
+            self.begin_change(view);
         }
         self.leader = if around.traffic.rays {
             self.take_temper(this.id, around);
-            self.ray_leader(this, size, around)
+            self.ray_leader(view)
         } else {
-            let beside = self.foresee(this, size, around);
-            let leader = self.find_leader(this, size, around);
+            let beside = self.foresee(view);
+            let leader = self.find_leader(view);
             let nearer = |a: &Leader, b: &Leader| a.gap_m.total_cmp(&b.gap_m);
             leader.into_iter().chain(beside).min_by(nearer)
         };
         let held = self.hold_m.is_some();
-        self.hold_m = self.find_hold_m(this, size, around);
+        self.hold_m = self.find_hold_m(view);
         if held && self.hold_m.is_none() && self.speed_mps < SETS_OUT_MPS {
             self.insists_to_m = self.junction_end_m(size);
         }

@@ -8,14 +8,12 @@
 
 use core::cell::LazyCell;
 
-use crate::sim::around::Around;
-use crate::sim::body::BodyParameters;
 use crate::sim::road_user::Obstacle;
 use crate::sim::way::body_at;
 use avastra_base::geometry::{OrientedBox, Pose, distance_m};
 use avastra_road::is_apart;
 
-use super::driver::Driver;
+use super::driver::{Driver, View};
 use super::leader::Leader;
 
 /// Moments ahead that are looked at, s.
@@ -31,7 +29,8 @@ const STOP_M: f64 = 1.0;
 
 impl Driver {
     /// A vehicle that the own outline would soon meet, as a leader that stands there.
-    pub(super) fn foresee(&self, this: &Obstacle, size: &BodyParameters, around: &Around) -> Option<Leader> {
+    pub(super) fn foresee(&self, view: &View) -> Option<Leader> {
+        let View { this, size, around } = *view;
         let half_m = size.length_m / 2.0;
         let turns = |station_m: f64| around.scene.map.lane(self.way.lane_at(station_m).0).junction.is_some();
         if self.change.is_some() || !(turns(self.station_m + half_m) || turns(self.station_m - half_m)) {
