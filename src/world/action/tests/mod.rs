@@ -4,7 +4,6 @@
 mod promise;
 mod rules;
 mod sound;
-mod table;
 
 use std::path::Path;
 use std::sync::Arc;

@@ -73,6 +73,12 @@ fn a_first_draw_lies_where_its_shares_say() {
     assert_eq!(table.offers_at(&situation, &[]), table.offers(&situation));
 }
 
+#[test]
+fn the_text_of_one_road_has_its_ranges() {
+    let text = table("scenarios/avastra45.ava").text(Some("corner"));
+    assert!(text.contains("speed 10.00..11.18 m/s"), "{text}");
+}
+
 struct ByChance(Rng);
 
 impl Choose for ByChance {
