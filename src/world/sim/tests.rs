@@ -322,17 +322,16 @@ fn busy_world(scene: &Arc<Scene>, seed: u64) -> World {
     world
 }
 
+fn scenes() -> [Arc<Scene>; 3] {
+    [testing::straight(), testing::crossing(), testing::corner()]
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
     #[test]
     fn drivers_do_not_run_into_each_other(seed in 0_u64..1000, road in 0..3) {
-        let scene = match road {
-            0 => testing::straight(),
-            1 => testing::crossing(),
-            _ => testing::corner(),
-        };
-        let mut world = busy_world(&scene, seed);
+        let mut world = busy_world(&scenes()[road as usize], seed);
         world.apply(&Effect::Sky(Phenomenon::Wetness, Level::Moderate)).expect("the sky obeys");
         let mut met = Vec::new();
         // The ego vehicle brakes: those behind must, too.
@@ -361,16 +360,11 @@ proptest! {
             }
         }
     }
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
     /// With all road users under way, in a changing sky: a clone of any moment drives on as its original.
     #[test]
     fn a_branch_of_any_moment_goes_on_alike(seed in 0_u64..1000, road in 0..3, moment in 1_u32..900, turn in 0..4) {
-        let scene = [testing::straight(), testing::crossing(), testing::corner()][road as usize].clone();
-        let mut world = busy_world(&scene, seed);
+        let mut world = busy_world(&scenes()[road as usize], seed);
         let level = Level::ALL[turn as usize];
         let sky = [Effect::Sky(Phenomenon::Rain, level), Effect::Sky(Phenomenon::Fog, Level::Light)];
         for _ in 0..moment {
@@ -519,7 +513,7 @@ fn ambient_traffic_is_there_and_comes_from_afar() {
 #[test]
 fn drivers_seldom_run_into_each_other() {
     let mut met = 0;
-    for scene in [testing::straight(), testing::crossing(), testing::corner()] {
+    for scene in scenes() {
         for seed in 0..100 {
             let mut world = busy_world(&scene, seed);
             for _ in 0..1500 {
