@@ -1,7 +1,8 @@
 //! How the settings of an agent are read, checked and recorded. Each agent's own stand beside it.
 
 use core::fmt::Display;
-use core::ops::RangeInclusive;
+use core::ops::Bound::{Excluded, Included};
+use core::ops::RangeBounds;
 use std::sync::Arc;
 
 use serde::Serialize;
@@ -220,7 +221,7 @@ pub(super) struct Requirement {
 pub(super) fn within<T: PartialOrd + Display>(
     name: &'static str,
     value: T,
-    range: RangeInclusive<T>,
+    range: impl RangeBounds<T>,
     wanted: &'static str,
 ) -> Requirement {
     Requirement { name, is_met: range.contains(&value), value: value.to_string(), wanted }
@@ -232,8 +233,7 @@ pub(super) fn unit(name: &'static str, value: f64) -> Requirement {
 }
 
 pub(super) fn positive(name: &'static str, value: f64) -> Requirement {
-    let is_met = value > 0.0 && value <= 1e6;
-    Requirement { is_met, ..within(name, value, 0.0..=1e6, "above 0, and at most 1e6") }
+    within(name, value, (Excluded(0.0), Included(1e6)), "above 0, and at most 1e6")
 }
 
 pub(super) fn count(name: &'static str, value: u64, most: u64) -> Requirement {
