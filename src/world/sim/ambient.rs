@@ -76,9 +76,7 @@ impl Ambient {
     }
 
     pub fn trace(&self, trace: &mut Trace) {
-        trace.word(u64::from(self.wanted));
-        trace.word(self.attempts);
-        trace.word(u64::from(self.next_id));
+        trace.words([u64::from(self.wanted), self.attempts, u64::from(self.next_id)]);
     }
 }
 

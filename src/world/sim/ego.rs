@@ -211,7 +211,7 @@ impl Ego {
     /// Every bit that later ticks depend on.
     pub fn trace(&self, trace: &mut Trace) {
         let motion = &self.motion;
-        for value in [
+        trace.numbers([
             motion.rear_axle.position.x,
             motion.rear_axle.position.y,
             motion.rear_axle.heading_rad,
@@ -221,9 +221,7 @@ impl Ego {
             motion.steer_rad,
             self.throttle_pct,
             self.brake_pct,
-        ] {
-            trace.number(value);
-        }
+        ]);
         trace.word(u64::from(motion.touched));
     }
 }

@@ -190,7 +190,7 @@ impl Walker {
     }
 
     pub fn trace(&self, trace: &mut Trace) {
-        for value in [
+        trace.numbers([
             self.from.position.x,
             self.from.position.y,
             self.from.heading_rad,
@@ -201,15 +201,9 @@ impl Walker {
             self.aside_m,
             self.pace_mps,
             self.wants_aside_m,
-        ] {
-            trace.number(value);
-        }
-        for count in [self.startle_ticks, self.stuck_ticks, u32::from(self.returns)] {
-            trace.word(u64::from(count));
-        }
-        trace.word(self.begins_tick);
-        trace.word(self.begins_tick_max);
-        trace.word(self.manner as u64);
+        ]);
+        trace.words([self.startle_ticks, self.stuck_ticks, u32::from(self.returns)].map(u64::from));
+        trace.words([self.begins_tick, self.begins_tick_max, self.manner as u64]);
     }
 
     /// Whether it has come to the end of its walk, or back to the beginning.

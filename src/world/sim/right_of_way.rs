@@ -287,9 +287,7 @@ impl Rights {
                 Place::Area(ego, other) => (ego.0 as u64, other.0 as u64),
                 Place::Lane => (u64::MAX, u64::MAX),
             };
-            for word in [ego, other, priority as u64, tick] {
-                trace.word(word);
-            }
+            trace.words([ego, other, priority as u64, tick]);
         }
     }
 

@@ -152,18 +152,10 @@ impl RoadUser {
     /// Every bit that later ticks depend on.
     pub fn trace(&self, trace: &mut Trace) {
         let Obstacle { id, body, colour, verb, outline, velocity_mps, spawned_tick, .. } = &self.obstacle;
-        trace.word(u64::from(*id));
-        trace.word(*spawned_tick);
-        for word in [*body as u64, *colour as u64, *verb as u64] {
-            trace.word(word);
-        }
+        trace.words([u64::from(*id), *spawned_tick, *body as u64, *colour as u64, *verb as u64]);
         let pose = &outline.pose;
-        for value in [pose.position.x, pose.position.y, pose.heading_rad] {
-            trace.number(value);
-        }
-        for value in velocity_mps.iter() {
-            trace.number(*value);
-        }
+        trace.numbers([pose.position.x, pose.position.y, pose.heading_rad]);
+        trace.numbers([velocity_mps.x, velocity_mps.y]);
         self.mover.trace(trace);
     }
 }
@@ -263,9 +255,8 @@ impl Mover {
     }
 
     fn trace(&self, trace: &mut Trace) {
-        trace.word(u64::from(self.touched));
-        trace.word(u64::from(self.crashed_with.unwrap_or(0)));
-        trace.word(u64::from(self.rest_ticks));
+        trace
+            .words([u32::from(self.touched), self.crashed_with.unwrap_or(0), self.rest_ticks].map(u64::from));
         trace.number(self.visible_fraction);
         self.rights.trace(trace);
         match &self.motion {

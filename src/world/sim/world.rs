@@ -390,8 +390,7 @@ impl World {
     pub fn trace(&self, trace: &mut Trace) {
         trace.word(self.ticks);
         self.ego.trace(trace);
-        trace.number(self.ego_station_m);
-        trace.number(self.ego_offset_m);
+        trace.numbers([self.ego_station_m, self.ego_offset_m]);
         trace.word(u64::from(self.red_runs));
         PassedLight::trace(self.ego_passed.as_ref(), trace);
         self.environment.trace(trace);
@@ -399,8 +398,7 @@ impl World {
         self.signals.trace(trace);
         trace.word(u64::from(self.next_id));
         self.ambient.trace(trace);
-        trace.word(self.weather_tick);
-        trace.word(self.seed);
+        trace.words([self.weather_tick, self.seed]);
         for user in &self.users {
             user.trace(trace);
         }

@@ -295,26 +295,17 @@ impl Driver {
 
     /// Feeds every bit that later ticks depend on to `trace`; ways follow from the draws.
     pub fn trace(&self, trace: &mut Trace) {
-        for value in [self.station_m, self.speed_mps, self.cruise_mps] {
-            trace.number(value);
-        }
+        trace.numbers([self.station_m, self.speed_mps, self.cruise_mps]);
         let leader = self.leader.unwrap_or(Leader::line(-1.0));
-        trace.number(leader.gap_m);
-        trace.number(leader.speed_mps);
+        trace.numbers([leader.gap_m, leader.speed_mps]);
         trace.word(u64::from(leader.crosswise));
-        trace.number(self.hold_m.unwrap_or(f64::INFINITY));
-        trace.number(self.insists_to_m);
-        trace.number(self.stopped_to_m);
-        trace.word(u64::from(self.waited_ticks));
-        trace.word(u64::from(self.aggression));
+        trace.numbers([self.hold_m.unwrap_or(f64::INFINITY), self.insists_to_m, self.stopped_to_m]);
+        trace.words([self.waited_ticks, self.aggression].map(u64::from));
         if let Some(change) = &self.change {
-            for value in [change.to_station_m, change.progress, change.duration_s] {
-                trace.number(value);
-            }
+            trace.numbers([change.to_station_m, change.progress, change.duration_s]);
         }
         trace.word(self.last_change.map_or(0, |side| side as u64 + 1));
-        trace.word(self.plan.len() as u64);
-        trace.word(u64::from(self.draws));
+        trace.words([self.plan.len() as u64, u64::from(self.draws)]);
     }
 }
 
