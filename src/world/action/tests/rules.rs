@@ -16,7 +16,7 @@ fn draws_are_short_and_independent_of_each_other() {
     let rules = RulesInForce::by_default(table.space());
     let road = &table.space().roads[0];
     let situation =
-        Situation { memory: &memory, road, rules: &rules, surroundings: &Plain, seed: 3, step: 4 };
+        Situation { memory: &memory, road, rules: &rules, surroundings: &Plain(0.0), seed: 3, step: 4 };
     for (row, offer) in table.offers(&situation).iter().enumerate() {
         assert_eq!(*offer, table.offer(&situation, row));
         let Offer::Legal(draw) = offer else { continue };
@@ -34,12 +34,12 @@ fn given_values_are_judged_by_the_same_rules() {
     let rules = RulesInForce::by_default(table.space());
     let road = &table.space().roads[0];
     let situation =
-        Situation { memory: &memory, road, rules: &rules, surroundings: &Plain, seed: 3, step: 4 };
+        Situation { memory: &memory, road, rules: &rules, surroundings: &Plain(0.0), seed: 3, step: 4 };
     let row = table.rows().iter().position(|row| row.label.starts_with("drive_ahead(lane: Current")).unwrap();
     let Offer::Legal(mut draw) = table.offer(&situation, row) else { panic!("must be legal") };
     for (name, value) in &mut draw.values {
         if &**name == "speed" {
-            *value = avastra_lang::model::Value::Number(19.0);
+            *value = Value::Number(19.0);
         }
     }
     let refusals = table.check(&situation, row, &draw.values).unwrap_err();
@@ -58,7 +58,7 @@ fn a_first_draw_lies_where_its_shares_say() {
     let rules = RulesInForce::by_default(table.space());
     let road = &table.space().roads[0];
     let situation =
-        Situation { memory: &memory, road, rules: &rules, surroundings: &Plain, seed: 3, step: 4 };
+        Situation { memory: &memory, road, rules: &rules, surroundings: &Plain(0.0), seed: 3, step: 4 };
     let row = table.rows().iter().position(|row| row.label.starts_with("pedestrian(from: Left")).unwrap();
     let drawn = |shares: &[f64]| {
         let Offer::Legal(draw) = &table.offers_at(&situation, shares)[row] else { panic!("must be legal") };

@@ -114,7 +114,7 @@ proptest! {
             for draw in 0..64 {
                 let memory = loose.initial_memory(seed + draw);
                 let situation =
-                    Situation { memory: &memory, road, rules: &rules, surroundings: &Plain, seed: seed + draw, step: 0 };
+                    Situation { memory: &memory, road, rules: &rules, surroundings: &Plain(0.0), seed: seed + draw, step: 0 };
                 let offer = table.offer(&situation, row.index);
                 prop_assert!(!(is_dead && matches!(offer, Offer::Legal(_))), "dead row drawn\n{}", text);
                 // Draws alone would not find every value, so a grid over the declared ranges is tried too.
@@ -151,7 +151,7 @@ proptest! {
                 let strict = ActionTable::new(space.clone());
                 let in_force = RulesInForce::new(space, &[], &[]).unwrap();
                 let situation = Situation {
-                    memory: &found.memory, road: &space.roads[0], rules: &in_force, surroundings: &Plain, seed, step: 0,
+                    memory: &found.memory, road: &space.roads[0], rules: &in_force, surroundings: &Plain(0.0), seed, step: 0,
                 };
                 let judged = strict.check(&situation, row.index, &found.values);
                 prop_assert!(judged.is_ok(), "{:?}\n{}", judged, text);
@@ -194,7 +194,7 @@ fn a_chain_of_equalities_is_solved_from_its_end() {
     let memory = space.initial_memory(0);
     for step in 0..8 {
         let situation =
-            Situation { memory: &memory, road, rules: &rules, surroundings: &Plain, seed: 0, step };
+            Situation { memory: &memory, road, rules: &rules, surroundings: &Plain(0.0), seed: 0, step };
         let offer = ActionTable::new(space.clone()).offer(&situation, row.index);
         assert!(matches!(offer, Offer::Legal(_)), "{offer:?}");
     }
@@ -216,7 +216,7 @@ fn shipped_rows_have_witnesses_that_run() {
                     witness(space, row, road).unwrap_or_else(|| panic!("{} on {}", row.label, road.name));
                 let memory = &found.memory;
                 let situation =
-                    Situation { memory, road, rules: &rules, surroundings: &Plain, seed: 0, step: 0 };
+                    Situation { memory, road, rules: &rules, surroundings: &Plain(0.0), seed: 0, step: 0 };
                 let judged = table.check(&situation, row.index, &found.values);
                 assert!(judged.is_ok(), "{} on {}: {judged:?}", row.label, road.name);
             }
