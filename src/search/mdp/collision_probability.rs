@@ -145,7 +145,7 @@ fn collision_probability(world: &World, lateral_margin_m: f64, is_hit: &dyn Fn(u
         // Places of the route that are farther along it than this cannot be the nearest.
         let reach_m = 2.0 * (position - world.ego().rear_axle.position).norm() + world.ego_offset_m().abs();
         let beside = world.scene().route.path.project_near(position, world.ego_station_m(), reach_m);
-        if beside.offset_m.abs() <= route_half_width_m(world, beside.station_m) {
+        if beside.offset_m.abs() <= world.scene().half_width_m(beside.station_m) {
             let ahead = beside.station_m >= world.ego_station_m();
             let safety_m = same_lane_safety_m(world, obstacle, ahead);
             most.add_longitudinal(obstacle.id, probability(safety_m, current_m));
@@ -156,13 +156,6 @@ fn collision_probability(world: &World, lateral_margin_m: f64, is_hit: &dyn Fn(u
         }
     }
     most.danger()
-}
-
-/// Half the width of the route's lane at a station of the route, m.
-fn route_half_width_m(world: &World, station_m: f64) -> f64 {
-    let scene = world.scene();
-    let here = scene.route.lane_at(station_m);
-    scene.map.lane(here.lane).width_at(station_m - here.from_m) / 2.0
 }
 
 fn same_lane_safety_m(world: &World, obstacle: &Obstacle, ahead: bool) -> f64 {

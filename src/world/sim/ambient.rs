@@ -45,7 +45,7 @@ const DRAWS_MAX: usize = 8;
 /// How many vehicles are wanted, and how many attempts were made.
 #[derive(Debug, Clone)]
 pub(super) struct Ambient {
-    wanted: u32,
+    pub wanted: u32,
     attempts: u64,
     next_id: u32,
 }
@@ -53,15 +53,6 @@ pub(super) struct Ambient {
 impl Ambient {
     pub fn new(wanted: u32) -> Ambient {
         Ambient { wanted: wanted.min(AMBIENT_MAX), attempts: 0, next_id: COMMANDED_MAX + 1 }
-    }
-
-    /// Whether `present` ambient vehicles are too few.
-    pub fn lacks(&self, present: usize) -> bool {
-        present < self.wanted as usize
-    }
-
-    pub fn wanted(&self) -> u32 {
-        self.wanted
     }
 
     /// One attempt at a newcomer. `begins`: before the first tick, when the ego vehicle has seen nothing.

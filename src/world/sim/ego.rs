@@ -172,8 +172,9 @@ impl Ego {
         let speed_mps = self.motion.speed_mps;
         let wanted_mps2 = pedal_acceleration_mps2(self.throttle_pct, self.brake_pct)
             .clamp(-car.deceleration_mps2_max, car.acceleration_mps2_max);
+        let wheel_curvature_per_m = libm::tan(steer_rad) / car.wheelbase_m;
         let (forward_mps2, curvature_per_m) =
-            within_friction(wanted_mps2, wheel_curvature_per_m(steer_rad), speed_mps, friction);
+            within_friction(wanted_mps2, wheel_curvature_per_m, speed_mps, friction);
 
         let faster_mps = (speed_mps + forward_mps2 * dt_s).min(SPEED_MPS_MAX);
         // A car that stops within the tick stays where it stopped.
@@ -231,11 +232,6 @@ fn outline_at(rear_axle: &Pose, forward: Vec2) -> OrientedBox {
     let car = &VehicleParameters::MKZ;
     let position = rear_axle.position + forward * car.rear_axle_to_centre_m();
     OrientedBox::new(Pose { position, ..*rear_axle }, car.length_m, car.width_m)
-}
-
-/// Curvature of the rear axle's way under an angle of the road wheels, 1/m.
-fn wheel_curvature_per_m(steer_rad: f64) -> f64 {
-    libm::tan(steer_rad) / VehicleParameters::MKZ.wheelbase_m
 }
 
 /// What the tyres give of a wanted acceleration and curvature.

@@ -153,7 +153,8 @@ impl Walker {
 
     /// Where it is at the end of a tick; `None` once it has left, which the ego vehicle does not see (`in_sight`).
     pub fn step(&mut self, this: &Obstacle, in_sight: bool, around: &Around) -> Option<Moved> {
-        if self.is_over() {
+        let is_over = if self.returns { self.walked_m <= 0.0 } else { self.walked_m >= self.end_m };
+        if is_over {
             return in_sight.then_some(Moved::at_rest(this));
         }
         if (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS) {
@@ -204,11 +205,6 @@ impl Walker {
         ]);
         trace.words([self.startle_ticks, self.stuck_ticks, u32::from(self.returns)].map(u64::from));
         trace.words([self.begins_tick, self.begins_tick_max, self.manner as u64]);
-    }
-
-    /// Whether it has come to the end of its walk, or back to the beginning.
-    fn is_over(&self) -> bool {
-        if self.returns { self.walked_m <= 0.0 } else { self.walked_m >= self.end_m }
     }
 
     /// Where it is now, with the velocity since it was at `this`.

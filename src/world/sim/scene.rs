@@ -51,6 +51,12 @@ impl Scene {
         }
     }
 
+    /// Half the width of the route's lane at a station of the route, m.
+    pub fn half_width_m(&self, station_m: f64) -> f64 {
+        let here = self.route.lane_at(station_m);
+        self.map.lane(here.lane).width_at(station_m - here.from_m) / 2.0
+    }
+
     /// The place at a fraction of all streets laid end to end, so that every metre is equally likely.
     pub(super) fn street_at(&self, fraction: f64) -> Option<(LaneIndex, f64)> {
         let at_m = fraction * self.streets.last()?.1;

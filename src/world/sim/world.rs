@@ -177,7 +177,7 @@ impl World {
             incidents: Vec::new(),
             scene,
         };
-        for _ in 0..world.ambient.wanted() {
+        for _ in 0..world.ambient.wanted {
             world.renew_ambient(true);
         }
         world
@@ -221,7 +221,7 @@ impl World {
         self.users = users;
         self.measure();
         self.ticks += 1;
-        if self.ambient.wanted() > 0 && self.ticks.is_multiple_of(RENEWAL_TICKS) {
+        if self.ambient.wanted > 0 && self.ticks.is_multiple_of(RENEWAL_TICKS) {
             self.renew_ambient(false);
         }
         if self.ticks.is_multiple_of(FRAME_TICKS) {
@@ -443,8 +443,7 @@ impl World {
     /// lane change it is in one of two lanes.
     pub fn is_astray(&self) -> bool {
         let (route, station_m) = (&self.scene.route, self.ego_station_m);
-        let here = route.lane_at(station_m);
-        let half_m = self.scene.map.lane(here.lane).width_at(station_m - here.from_m) / 2.0;
+        let half_m = self.scene.half_width_m(station_m);
         let changes = |change: &RouteLaneChange| (change.begin_m..change.latest_m).contains(&station_m);
         !self.ego.motion.touched && self.ego_offset_m.abs() > half_m && !route.changes.iter().any(changes)
     }
@@ -525,7 +524,7 @@ impl World {
         let is_gone = |user: &RoadUser| user.obstacle.is_ambient() && is_gone(&user.obstacle, &ego_outline);
         self.users.retain(|user| !is_gone(user));
         let present = self.obstacles().filter(|obstacle| obstacle.is_ambient()).count();
-        if !self.ambient.lacks(present) {
+        if present >= self.ambient.wanted as usize {
             return;
         }
         // A copy, because the attempt looks at the world.

@@ -145,11 +145,6 @@ impl Driver {
         }
     }
 
-    /// Whether its lane and the map have ended. A lane change is done first.
-    fn is_beyond_map(&self) -> bool {
-        self.change.is_none() && self.station_m >= self.way.path.length_m()
-    }
-
     /// Heading of the way where it is, rad.
     pub(super) fn lane_heading_rad(&self) -> f64 {
         self.way.path.heading_at(self.station_m)
@@ -181,7 +176,7 @@ impl Driver {
         }
         // A lane that ends under a lane change goes on straight until the change is done. So does one that
         // ends at the edge of the map while the vehicle is in sight.
-        if self.is_beyond_map() && !in_sight {
+        if self.change.is_none() && self.station_m >= self.way.path.length_m() && !in_sight {
             return None;
         }
         // A vehicle that stands keeps its place to the bit, even if its way was laid anew.

@@ -30,7 +30,6 @@ use crate::sim::junction::Area;
 use crate::sim::sense::SignalColour;
 use crate::sim::world::DT_S;
 use avastra_base::kinematics::{STANDING_MPS, braking_m};
-use avastra_road::LaneIndex;
 
 use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, LOOK_AHEAD_M, View};
 
@@ -209,10 +208,12 @@ impl Driver {
 
 /// The ego vehicle's passage along its route, as ambient vehicles expect it.
 fn ego_passage(area: &Area, around: &Around) -> Option<Passage> {
-    let begin_m = ego_lane_begin_m(area.other, around)?;
     let car = &VehicleParameters::MKZ;
     let (front_m, rear_m) = (car.front_m(around.ego_station_m), car.rear_m(around.ego_station_m));
-    let (from_m, to_m) = (begin_m + area.other_from_m, begin_m + area.other_to_m);
+    // A lane that it has left already does not count.
+    let mut lanes = around.scene.route.lanes.iter();
+    let lane = lanes.find(|part| part.lane == area.other && part.to_m > rear_m)?;
+    let (from_m, to_m) = (lane.from_m + area.other_from_m, lane.from_m + area.other_to_m);
     let is_red = |signal| around.signals.colour(&around.scene.map, signal, around.tick) == SignalColour::Red;
     let mut lines = around.scene.route.stop_lines.iter();
     let holds = lines.any(|line| (front_m - 1.0..from_m).contains(&line.station_m) && is_red(line.signal));
@@ -225,13 +226,6 @@ fn ego_passage(area: &Area, around: &Around) -> Option<Passage> {
         committed: !holds && around.ego.speed_mps > EGO_MOVES_MPS,
         holds,
     })
-}
-
-/// Station of the route at which a lane begins, m, if the ego vehicle has not left that lane yet.
-fn ego_lane_begin_m(lane: LaneIndex, around: &Around) -> Option<f64> {
-    let rear_m = VehicleParameters::MKZ.rear_m(around.ego_station_m);
-    let part = around.scene.route.lanes.iter().find(|part| part.lane == lane && part.to_m > rear_m)?;
-    Some(part.from_m)
 }
 
 #[cfg(test)]
