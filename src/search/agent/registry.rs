@@ -26,7 +26,7 @@ pub trait Agent: Send {
         &mut self,
         observation: &Observation,
         legal: ArrayView1<bool>,
-        branch: &dyn Branch,
+        branch: &Branch<'_>,
         rng: &mut Rng,
     ) -> Option<usize> {
         let _ = branch;
