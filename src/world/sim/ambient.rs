@@ -95,7 +95,7 @@ fn draw(around: &Around, nearest_m: f64, id: u32, rng: &mut Rng) -> Option<RoadU
         return None;
     }
     let way = Way::along(around.scene, &[lane], rng)?;
-    let driver = Driver::new(around.scene, way, station_m, cruise, Vec::new(), 1);
+    let driver = Driver::new(around.scene, way, station_m, cruise, Vec::new());
     let moved = driver.moved(&size);
     let mover = Mover::new(size, Motion::Drive(driver));
     let newcomer = RoadUser::new(around, id, body, colour, Verb::DriveAhead, mover, moved);

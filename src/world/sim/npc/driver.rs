@@ -92,16 +92,13 @@ pub(in crate::sim) struct View<'a> {
 
 impl Driver {
     /// A driver with its centre at a station of a way, at its cruising speed or what the bend there
-    /// allows.
-    ///
-    /// `plan` is in order; `draws` tells how many draws went into it.
+    /// allows. `plan` is in order.
     pub fn new(
         scene: &Scene,
         way: Arc<Way>,
         station_m: f64,
         cruise: Cruise,
         mut plan: Vec<Manoeuvre>,
-        draws: u32,
     ) -> Driver {
         plan.reverse();
         let (cruise_mps, limit_part) = match cruise {
@@ -125,7 +122,8 @@ impl Driver {
             last_change: None,
             plan,
             lane_changes: None,
-            draws,
+            // That of its way.
+            draws: 1,
         }
     }
 

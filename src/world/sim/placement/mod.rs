@@ -156,9 +156,7 @@ fn meets_route(around: &Around, mover: &Mover) -> bool {
 
 /// A driver at the speed that was asked for.
 fn commanded(asked: &Asked, way: Arc<Way>, station_m: f64, plan: Vec<Manoeuvre>) -> Driver {
-    // One draw went into it so far: that of its way.
-    let cruise = Cruise::Commanded(asked.request.speed_mps);
-    Driver::new(asked.around.scene, way, station_m, cruise, plan, 1)
+    Driver::new(asked.around.scene, way, station_m, Cruise::Commanded(asked.request.speed_mps), plan)
 }
 
 /// The newcomer, if there is room for it.
