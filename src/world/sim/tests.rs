@@ -37,6 +37,13 @@ fn drive(world: &mut World, speed_mps: f64, time_s: f64) -> Vec<Contact> {
     contacts
 }
 
+/// A world after a drive at a speed for a while.
+fn driven(scene: &Arc<Scene>, speed_mps: f64, time_s: f64) -> World {
+    let mut world = testing::world(scene);
+    drive(&mut world, speed_mps, time_s);
+    world
+}
+
 fn spawn(world: &mut World, request: SpawnRequest) -> Obstacle {
     let facts = world.survey(&request).expect("there is room");
     let id = world.apply(&Effect::Spawn(request)).expect("there is room").expect("a newcomer has an id");
@@ -51,8 +58,7 @@ fn y_m(world: &World, id: u32) -> f64 {
 
 #[test]
 fn ahead_and_then_into_the_lane_of_the_ego_vehicle() {
-    let mut world = testing::world(&testing::straight());
-    drive(&mut world, 8.0, 5.0);
+    let mut world = driven(&testing::straight(), 8.0, 5.0);
     let own = spawn(&mut world, request(Verb::DriveAhead, 50.0, 10.0));
     assert!((distance_m(&world.ego_outline(), &own.outline) - 50.0).abs() < 1e-6);
     assert!((own.velocity_mps.x - 10.0).abs() < 1e-9);
@@ -73,8 +79,7 @@ fn ahead_and_then_into_the_lane_of_the_ego_vehicle() {
 
 #[test]
 fn impossible_spawns_are_refused() {
-    let mut world = testing::world(&testing::straight());
-    drive(&mut world, 8.0, 5.0);
+    let world = driven(&testing::straight(), 8.0, 5.0);
     let ahead = request(Verb::DriveAhead, 50.0, 10.0);
     for speed_mps in [f64::NAN, f64::INFINITY, -0.1, 70.1, 1e300] {
         let refusal = world.survey(&SpawnRequest { speed_mps, ..ahead }).expect_err("no such speed");
@@ -94,8 +99,7 @@ fn impossible_spawns_are_refused() {
 
 #[test]
 fn refusals_say_why() {
-    let mut world = testing::world(&testing::straight());
-    drive(&mut world, 8.0, 5.0);
+    let mut world = driven(&testing::straight(), 8.0, 5.0);
     let refused =
         |world: &World, request: SpawnRequest| world.survey(&request).expect_err("it is impossible");
     let left = SpawnRequest { lane: LaneChoice::Left, ..request(Verb::DriveAhead, 12.0, 10.0) };
@@ -115,8 +119,7 @@ fn refusals_say_why() {
 #[test]
 fn overtakes_and_cuts_in() {
     for lane in [LaneChoice::Right, LaneChoice::Current] {
-        let mut world = testing::world(&testing::straight());
-        drive(&mut world, 8.0, 8.0);
+        let mut world = driven(&testing::straight(), 8.0, 8.0);
         let passing = SpawnRequest { lane, then: Then::Change, ..request(Verb::Overtake, 12.0, 14.0) };
         let passing = spawn(&mut world, passing);
         assert!(passing.outline.pose.position.x < world.ego_outline().pose.position.x - 12.0);
@@ -129,8 +132,7 @@ fn overtakes_and_cuts_in() {
 
 #[test]
 fn does_not_come_where_it_cannot_pass() {
-    let mut world = testing::world(&testing::crossing());
-    drive(&mut world, 8.0, 6.0);
+    let world = driven(&testing::crossing(), 8.0, 6.0);
     let refusal = world.survey(&request(Verb::Overtake, 15.0, 12.0)).expect_err("there is one lane");
     assert_eq!(refusal, "no lane beside it to change to");
     let refusal = world.survey(&request(Verb::Overtake, 15.0, 7.0)).expect_err("it is too slow");
@@ -140,8 +142,7 @@ fn does_not_come_where_it_cannot_pass() {
 #[test]
 fn comes_towards_in_the_inner_opposing_lane() {
     for then in [Then::Keep, Then::Change] {
-        let mut world = testing::world(&testing::straight());
-        drive(&mut world, 8.0, 5.0);
+        let mut world = driven(&testing::straight(), 8.0, 5.0);
         let towards = SpawnRequest { then, ..request(Verb::DriveOpposite, 50.0, 12.0) };
         let towards = spawn(&mut world, towards);
         assert!(towards.velocity_mps.x < -11.9);
@@ -174,8 +175,7 @@ fn crosses_when_the_ego_vehicle_is_there() {
 
 #[test]
 fn a_red_light_stops_and_refuses() {
-    let mut world = testing::world(&testing::crossing());
-    drive(&mut world, 12.0, 4.0);
+    let mut world = driven(&testing::crossing(), 12.0, 4.0);
     // The light of the ego vehicle is green until 12 s, so the other one's is red.
     while world.ego_station_m() < 145.0 {
         drive(&mut world, 12.0, 0.1);
@@ -194,8 +194,7 @@ fn a_red_light_stops_and_refuses() {
 
 #[test]
 fn a_pedestrian_run_over_is_one_contact() {
-    let mut world = testing::world(&testing::straight());
-    drive(&mut world, 15.0, 10.0);
+    let mut world = driven(&testing::straight(), 15.0, 10.0);
     let standing = spawn(&mut world, request(Verb::Stand, 40.0, 1.0));
     let before_mps = world.ego().speed_mps;
     let contacts = drive(&mut world, 15.0, 6.0);
@@ -242,8 +241,7 @@ fn a_pedestrian_meets_the_ego_vehicle() {
 
 #[test]
 fn a_pedestrian_steps_out_from_behind_a_parked_vehicle() {
-    let mut world = testing::world(&testing::straight());
-    drive(&mut world, 10.0, 6.0);
+    let mut world = driven(&testing::straight(), 10.0, 6.0);
     let hidden = SpawnRequest { cover: Some(Body::BoxTruck), ..request(Verb::Walk, 60.0, 1.4) };
     let facts = world.survey(&hidden).expect("there is room");
     let walker = world.apply(&Effect::Spawn(hidden)).expect("there is room").expect("it has an id");
@@ -419,8 +417,7 @@ fn an_unsignalled_crossing_flows() {
 
 #[test]
 fn no_vehicle_changes_lanes_across_a_median() {
-    let mut world = testing::world(&testing::divided());
-    drive(&mut world, 8.0, 5.0);
+    let world = driven(&testing::divided(), 8.0, 5.0);
     for (verb, lane) in [
         (Verb::DriveAhead, LaneChoice::Current),
         (Verb::DriveAhead, LaneChoice::Right),
@@ -456,8 +453,7 @@ fn a_crosser_that_cannot_go_on_does_not_vanish_in_sight() {
 
 #[test]
 fn a_vehicle_that_appears_in_plain_view_leaves_time_to_notice() {
-    let mut world = testing::world(&testing::straight());
-    drive(&mut world, 12.0, 10.0);
+    let mut world = driven(&testing::straight(), 12.0, 10.0);
     // Faster than the ego vehicle, so no brakes are needed; but it was not there a moment ago.
     let wish = request(Verb::DriveAhead, 10.0, 20.0);
     let facts = world.survey(&wish).expect("there is room");

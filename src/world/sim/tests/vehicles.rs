@@ -10,7 +10,7 @@ use crate::sim::{Control, DT_S, Scene, Start, TrafficProfile, World, body, testi
 use avastra_base::geometry::{OrientedBox, Path, Pose, Vec2};
 use avastra_lang::model::vocabulary::{Body, LaneChoice, Level, Phenomenon, Side, Then, Verb, Word};
 
-use super::{drive, hold, spawn, y_m};
+use super::{drive, driven, hold, spawn, y_m};
 
 #[test]
 fn a_bus_in_a_bend_keeps_its_tail_near_its_lane() {
@@ -39,8 +39,7 @@ fn a_bus_in_a_bend_keeps_its_tail_near_its_lane() {
 
 #[test]
 fn vehicles_that_touch_slide_to_rest_by_friction() {
-    let mut world = testing::world(&testing::straight());
-    drive(&mut world, 8.0, 3.0);
+    let mut world = driven(&testing::straight(), 8.0, 3.0);
     let (mut behind, mut ahead) =
         (request(Verb::DriveAhead, 30.0, 14.0), request(Verb::DriveAhead, 45.0, 14.0));
     behind.body = Body::SchoolBus;
@@ -93,8 +92,7 @@ fn a_lane_change_leads_past_what_stands_in_the_lane_before() {
 
 #[test]
 fn an_overtaker_that_keeps_its_lane_comes_back_to_it_well_ahead() {
-    let mut world = testing::world(&testing::straight());
-    drive(&mut world, 8.0, 8.0);
+    let mut world = driven(&testing::straight(), 8.0, 8.0);
     let passing = spawn(&mut world, request(Verb::Overtake, 12.0, 14.0));
     // Where its rear is before the ego vehicle's front when it begins to come back, m.
     let mut begins_m = None;
