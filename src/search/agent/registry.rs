@@ -26,10 +26,9 @@ pub trait Agent: Send {
         &mut self,
         observation: &Observation,
         legal: ArrayView1<bool>,
-        branch: &Branch<'_>,
+        _branch: &Branch<'_>,
         rng: &mut Rng,
     ) -> Option<usize> {
-        let _ = branch;
         self.choose(observation, legal, rng)
     }
 
@@ -40,22 +39,19 @@ pub trait Agent: Send {
     }
 
     /// A step begins: the seed for its draws, or `None` if they come from the episode's own.
-    fn draw_seed(&mut self, step: usize) -> Option<u64> {
-        let _ = step;
+    fn draw_seed(&mut self, _step: usize) -> Option<u64> {
         None
     }
 
     /// A step begins in an episode of that seed: where in their ranges the drawn values of the row shall lie, each in
     /// `[0, 1)`, by parameter; what is left out is drawn by chance.
-    fn draw_shares(&mut self, step: usize, seed: u64) -> &[f64] {
-        let _ = (step, seed);
+    fn draw_shares(&mut self, _step: usize, _seed: u64) -> &[f64] {
         &[]
     }
 
     /// The probability with which each row is chosen, shape `(rows,)`, where it depends on nothing but what is legal;
     /// `None` for an agent that knows no probabilities.
-    fn chances(&self, legal: ArrayView1<bool>) -> Option<Array1<f64>> {
-        let _ = legal;
+    fn chances(&self, _legal: ArrayView1<bool>) -> Option<Array1<f64>> {
         None
     }
 

@@ -10,14 +10,11 @@ use super::trajectory::{Lesson, Trajectory};
 /// step, `learn`.
 pub trait Trainable: Agent {
     /// The share of the training's episodes that are over, in `[0, 1)`; told before each episode.
-    fn progress(&mut self, over: f64) {
-        let _ = over;
-    }
+    fn progress(&mut self, _over: f64) {}
 
     /// The seed of the next episode's start, on the nth of the roads. `fresh` is a seed that no episode had
     /// before; an agent that returns to an old start gives that start's seed instead.
-    fn start_seed(&mut self, road: usize, fresh: u64) -> u64 {
-        let _ = road;
+    fn start_seed(&mut self, _road: usize, fresh: u64) -> u64 {
         fresh
     }
 
