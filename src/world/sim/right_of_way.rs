@@ -224,17 +224,17 @@ impl Rights {
         in_sight: bool,
         around: &Around,
     ) {
+        if this.distance_m > APPROACH_M {
+            return;
+        }
         match motion {
-            Motion::Drive(driver) if this.distance_m <= APPROACH_M => {
+            Motion::Drive(driver) => {
                 let stands = this.velocity_mps.norm() < STANDING_MPS;
                 let has_time = || in_sight && can_stop(around.ego.speed_mps, this.distance_m, ABRUPT_MPS2);
                 self.is_foreseen = stands && (self.is_foreseen || has_time());
                 self.watch_driver(this, driver, ego_passed, around);
             }
-            Motion::Walk(_) | Motion::Stand if this.distance_m <= APPROACH_M => {
-                self.watch_pedestrian(this, in_sight, around);
-            }
-            Motion::Drive(_) | Motion::Walk(_) | Motion::Stand => {}
+            Motion::Walk(_) | Motion::Stand => self.watch_pedestrian(this, in_sight, around),
         }
     }
 
@@ -341,7 +341,7 @@ impl Rights {
             }
         };
         let shares = strip.aside_m < CARRIAGEWAY_M
-            && strip.ahead_m > -this.outline.half_length_m - strip.length_m
+            && strip.ahead_m > -this.outline.half_length_m - VehicleParameters::MKZ.length_m
             && (strip.aside_m < BESIDE_M || is_on_road());
         if shares {
             let known = self.meeting.filter(|_| self.shares == Some(true)).map(|meeting| meeting.priority);
@@ -621,8 +621,6 @@ struct Strip {
     ahead_m: f64,
     /// From the strip that the ego vehicle drives on, m; negative in it.
     aside_m: f64,
-    /// Length of the ego vehicle, m.
-    length_m: f64,
 }
 
 impl Strip {
@@ -636,7 +634,6 @@ impl Strip {
             station_m: found.station_m,
             ahead_m: found.station_m - half_m - VehicleParameters::MKZ.front_m(around.ego_station_m),
             aside_m: (found.offset_m - ego.offset_m).abs() - half_m - around.ego_outline.half_width_m,
-            length_m: VehicleParameters::MKZ.length_m,
         }
     }
 
