@@ -24,8 +24,10 @@ pub trait Trainable: Agent {
     /// Choices made in training.
     fn steps(&self) -> u64;
 
-    /// The present share of random choices.
-    fn exploration_epsilon(&self) -> f64;
+    /// The present share of random choices: all of them in a search that follows no record.
+    fn exploration_epsilon(&self) -> f64 {
+        1.0
+    }
 
     /// What it has learned, ready to act for one episode on any start.
     fn actor(&self) -> Box<dyn Agent>;

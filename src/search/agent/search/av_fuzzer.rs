@@ -317,10 +317,6 @@ impl Trainable for AvFuzzer {
         self.saved.steps
     }
 
-    fn exploration_epsilon(&self) -> f64 {
-        1.0
-    }
-
     fn actor(&self) -> Box<dyn Agent> {
         Box::new(Scripts::new(self.saved.best.clone()))
     }
