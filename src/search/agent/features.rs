@@ -108,9 +108,7 @@ impl Features {
                     inputs.extend(words.iter().map(|&(_, one)| f32::from(u8::from(value == one))));
                 }
                 (Encoding::Scaled, Scale::Weather) => {
-                    let phenomena = ["rain", "fog", "wetness"];
-                    let value = |name| observation.get(variable(name).expect("the name is a variable's"));
-                    inputs.extend(phenomena.map(value));
+                    inputs.extend(["rain", "fog", "wetness"].map(|name| observation.named(name)));
                 }
             }
         }
