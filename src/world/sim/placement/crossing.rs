@@ -128,8 +128,7 @@ fn approach_m(asked: &Asked, way: &Way, meeting_m: f64, arrival_s: f64) -> Resul
     if way.stop_signs_m.iter().any(|line_m| beyond.contains(line_m)) {
         return Err("it would have had to stop at a sign".into());
     }
-    let behind =
-        way.stop_lines.iter().filter(|line| (front_m - BEYOND_LINE_M..front_m).contains(&line.station_m));
+    let behind = way.stop_lines.iter().filter(|line| beyond.contains(&line.station_m));
     passed_lines.extend(behind.map(|line| (line.signal, 0.0)));
     let is_green = |(signal, after_s): &(usize, f64)| {
         let tick = around.tick + (after_s / DT_S) as u64;

@@ -124,20 +124,17 @@ fn park(asked: &Asked, body: Body, way: &mut Crossing) -> Result<RoadUser, Strin
     let Asked { around, request, id, .. } = *asked;
     let size = request.cover_own.map_or_else(|| body::parameters(body), |own| own.shape);
     let (map, path) = (&around.scene.map, &around.scene.route.path);
-    let outward = |station_m: f64| {
-        let left = path.pose_at(station_m).left();
-        if request.side == Side::Left { left } else { -left }
-    };
     let inner_m = way.from.edge_m + PARKED_M;
     let station_m = way.station_m - BEFORE_M - size.length_m / 2.0;
     if station_m < 0.0 {
         return Err("there is no room to park".into());
     }
-    let position = path.pose_at(station_m).position + outward(station_m) * (inner_m + size.width_m / 2.0);
+    let here = path.pose_at(station_m);
+    let outward = if request.side == Side::Left { here.left() } else { -here.left() };
+    let position = here.position + outward * (inner_m + size.width_m / 2.0);
     // It stands in the direction of the lane beside it.
-    let beside = path.pose_at(station_m).position + outward(station_m) * (way.from.edge_m - PARKED_M);
-    let lane =
-        map.nearest(beside, path.pose_at(station_m).heading_rad, 1.0).ok_or("there is no room to park")?;
+    let beside = here.position + outward * (way.from.edge_m - PARKED_M);
+    let lane = map.nearest(beside, here.heading_rad, 1.0).ok_or("there is no room to park")?;
     let heading_rad = map.lane(lane.lane).centre.pose_at(lane.station_m).heading_rad;
     let pose = Pose { position, heading_rad };
     let outline = OrientedBox::new(pose, size.length_m, size.width_m);
