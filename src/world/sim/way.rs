@@ -292,21 +292,14 @@ mod tests {
     #[test]
     fn a_way_that_ends_at_the_edge_of_the_map_goes_on_straight() {
         let scene = testing::crossing();
-        let of = |road: &str, lane: i32| {
-            let at = |key: &avastra_road::LaneKey| key.road == road && key.lane == lane;
-            LaneIndex(scene.map.lanes.iter().position(|lane| at(&lane.key)).expect("it is there"))
+        let way = |road: &str, lane: i32| {
+            let lane = scene.map.place(road, lane, 100.0).expect("it is there").lane;
+            Way::along(&scene, &[lane], &mut rng::stream(1, rng::Stream::Traffic, 0)).expect("it is a lane")
         };
-        let way = |lane| {
-            Way::along(
-                &scene,
-                &[lane],
-                &mut avastra_base::rng::stream(1, avastra_base::rng::Stream::Traffic, 0),
-            )
-        };
-        let out = way(of("6", -1)).expect("it is a lane");
+        let out = way("6", -1);
         assert!(!out.open && out.end_m.is_none());
         // The second lane of the crossing street ends before the junction: whoever is in it must stop.
-        let bay = way(of("4", -2)).expect("it is a lane");
+        let bay = way("4", -2);
         let end_m = bay.end_m.expect("lanes lie beyond");
         assert!((end_m - bay.path.length_m()).abs() < 2.0 * BEYOND_STEP_M, "{end_m}");
     }

@@ -10,7 +10,7 @@ use crate::sim::{Contact, Scene, Start, World};
 use avastra_lang::model::vocabulary::{LaneChoice, Then, Verb};
 
 fn inside(map: &RoadMap, road: &str) -> LaneIndex {
-    LaneIndex(map.lanes.iter().position(|lane| lane.key.road == road).expect("it is there"))
+    map.place(road, -1, 10.0).expect("it is there").lane
 }
 
 #[test]
