@@ -81,7 +81,6 @@ fn episode(rng: &mut rng::Rng, steps: usize) -> Trajectory {
         row: rng::below(rng, ROWS as u32) as usize,
         reward: rng::normal(rng),
         hits: Vec::new(),
-        collided: false,
         crashes: Vec::new(),
     };
     Trajectory {

@@ -32,7 +32,7 @@ use avastra::action::{ActionTable, Effect, SpawnRequest};
 use avastra::ads::external::{ExternalSettings, Observation, Program, Target};
 use avastra::check::ReadError;
 use avastra::editor::{Files, Workspace, diagnostics};
-use avastra::mdp::{ProcSettings, collision_probability};
+use avastra::mdp::ProcKind;
 use avastra::model::Space;
 use avastra::model::vocabulary::{Body, Colour, LaneChoice, Level, Side, Then, TimeOfDay, Verb};
 use avastra::run::{Arena, Run, RunSettings};
@@ -200,20 +200,13 @@ struct Drive {
     world: World,
     driver: Box<dyn ads::Ads>,
     sensed: Sensed,
-    settings: ProcSettings,
     most: f64,
 }
 
 impl Drive {
     fn new(world: &World, scene: &Arc<Scene>, name: &str) -> Drive {
         let entry = ads::by_name(name).expect("it is registered");
-        Drive {
-            world: world.clone(),
-            driver: (entry.build)(scene, 1),
-            sensed: world.sensed(),
-            settings: ProcSettings::default(),
-            most: 0.0,
-        }
+        Drive { world: world.clone(), driver: (entry.build)(scene, 1), sensed: world.sensed(), most: 0.0 }
     }
 
     /// A whole tick: sensing, driving, moving, contacts, collision probability. Never inlined, so that
@@ -222,7 +215,7 @@ impl Drive {
     fn tick(&mut self) {
         self.world.sense(&mut self.sensed);
         self.world.tick(&self.driver.drive(&self.sensed));
-        self.most = self.most.max(collision_probability(&self.world, &self.settings, &|_| false).probability);
+        self.most = self.most.max(ProcKind::Avastra.danger(&self.world, &|_| false).probability);
     }
 }
 

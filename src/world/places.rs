@@ -62,9 +62,6 @@ pub fn judge_claims(loaded: &mut Loaded, scenes: &mut Scenes) {
     let claimed: BTreeSet<usize> = loaded.runs.claims.iter().flat_map(|claim| &claim.rows).copied().collect();
     let claimed: Vec<usize> = claimed.into_iter().collect();
     let all = without_place(&space, &loaded.runs, &claimed, scenes);
-    if all.is_empty() {
-        return;
-    }
     for Claim { span, rows } in loaded.runs.claims.clone() {
         let lost: Vec<&Lost<'_>> =
             all.iter().filter(|lost| rows.binary_search(&lost.row.index).is_ok()).collect();

@@ -14,7 +14,7 @@ use avastra_drivers::external::{Attached, Program};
 use avastra_lang::model::{Road, RulesInForce, Space};
 use avastra_lang::prove;
 use avastra_lang::syntax::listed;
-use avastra_search::agent::{Agent, Branch, Trial};
+use avastra_search::agent::{Agent, Trial};
 use avastra_search::mdp::ProcKind;
 use avastra_world::action::{ActionTable, Offer, Situation};
 use avastra_world::sim::{Scene, Start, TrafficProfile};
@@ -184,33 +184,26 @@ pub(crate) fn carry_out(
     if !legal.iter().any(|&is_legal| is_legal) {
         return Choice::Pass;
     }
-    let branch = Lookahead { offers: &offers, moment };
+    let branch = |row: usize| tried(&offers[row], moment);
     let row = agent.choose_ahead(moment.observation, legal, &branch, &mut exploration(moment));
     row.map_or(Choice::Pass, |row| Choice::of(row, offers.swap_remove(row)))
 }
 
-/// Carries offers out in copies of the moment's world, and judges the collisions as in an episode.
-struct Lookahead<'a> {
-    offers: &'a [Offer],
-    moment: &'a Moment<'a>,
-}
-
-impl Branch for Lookahead<'_> {
-    fn try_row(&self, row: usize) -> Trial {
-        let Offer::Legal(draw) = &self.offers[row] else { return Trial::default() };
-        let log = self.moment.look_ahead(draw.clone());
-        let step = self.moment.step;
-        let collided = log.collisions.iter().any(|collision| collision.step == step);
-        let counts = || {
-            let summary = EpisodeSummary::judged(self.moment.setup(), 0, &log);
-            summary.collisions.iter().any(|finding| finding.counted && finding.collision.step == step)
-        };
-        Trial {
-            proc: log.steps[step].proc,
-            collided,
-            counted: collided && counts(),
-            simulated_s: log.duration_s - log.steps[step].time_s,
-        }
+/// Carries an offer out in a copy of the moment's world, and judges the collisions as in an episode.
+fn tried(offer: &Offer, moment: &Moment) -> Trial {
+    let Offer::Legal(draw) = offer else { return Trial::default() };
+    let log = moment.look_ahead(draw.clone());
+    let step = moment.step;
+    let collided = log.collisions.iter().any(|collision| collision.step == step);
+    let counts = || {
+        let summary = EpisodeSummary::judged(moment.setup(), 0, &log);
+        summary.collisions.iter().any(|finding| finding.counted && finding.collision.step == step)
+    };
+    Trial {
+        proc: log.steps[step].proc,
+        collided,
+        counted: collided && counts(),
+        simulated_s: log.duration_s - log.steps[step].time_s,
     }
 }
 

@@ -308,7 +308,7 @@ fn experiences(
         let hits = findings().filter_map(makers).collect();
         let crashes = findings().filter(|finding| finding.counted).map(makers).collect();
         let Chosen { observation, legal, row, .. } = choice;
-        Experience { observation, legal, row, reward, hits, collided: outcome.collided, crashes }
+        Experience { observation, legal, row, reward, hits, crashes }
     };
     choices.into_iter().map(experience).collect()
 }

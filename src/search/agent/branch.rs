@@ -2,11 +2,9 @@
 //!
 //! `run` drives and judges the branches; an agent sees only their outcomes.
 
-/// The moment at which an agent is to choose, to be tried out in copies of the world.
-pub trait Branch {
-    /// Carries a legal row out and drives for one observation period.
-    fn try_row(&self, row: usize) -> Trial;
-}
+/// The moment at which an agent is to choose: carries a legal row out in a copy of the world and drives for one
+/// observation period.
+pub type Branch<'a> = dyn Fn(usize) -> Trial + 'a;
 
 /// The outcome of a row in a branch.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -1,6 +1,8 @@
 //! ε of ε-greedy exploration: how often a choice is random.
 
-use super::settings::{Requirement, SettingsError, count, require, unit, within};
+use core::ops::Bound::{Excluded, Included};
+
+use super::settings::{SettingsError, count, require, unit, within};
 
 /// How ε falls in a training, and what it is afterwards.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -49,10 +51,9 @@ impl ExplorationSettings {
             unit("evaluation_epsilon", self.evaluation_epsilon),
             count("exploration_steps", self.exploration_steps, 1_000_000_000),
         ])?;
-        require(self.exploration_share.map(|share| Requirement {
-            is_met: share > 0.0 && share <= 1.0,
-            ..within("exploration_share", share, 0.0..=1.0, "above 0, and at most 1")
-        }))
+        let above_0 = (Excluded(0.0), Included(1.0));
+        let share = |share: f64| within("exploration_share", share, above_0, "above 0, and at most 1");
+        require(self.exploration_share.map(share))
     }
 
     /// ε of training after so many steps, when a share of the training's episodes is over.

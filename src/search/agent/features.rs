@@ -67,7 +67,8 @@ enum Scale {
 /// A list of variables and how they are encoded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Features {
-    variables: Vec<usize>,
+    /// The variables that go in, by index.
+    pub(super) variables: Vec<usize>,
     encoding: Encoding,
     len: usize,
 }
@@ -95,11 +96,6 @@ impl Features {
         self.len
     }
 
-    /// The variables that go in, by index.
-    pub fn variables(&self) -> &[usize] {
-        &self.variables
-    }
-
     /// Network inputs, shape `(len,)`.
     pub fn encode(&self, observation: &Observation) -> Vec<f32> {
         let mut inputs = Vec::with_capacity(self.len);
@@ -112,9 +108,7 @@ impl Features {
                     inputs.extend(words.iter().map(|&(_, one)| f32::from(u8::from(value == one))));
                 }
                 (Encoding::Scaled, Scale::Weather) => {
-                    let phenomena = ["rain", "fog", "wetness"];
-                    let value = |name| observation.get(variable(name).expect("the name is a variable's"));
-                    inputs.extend(phenomena.map(value));
+                    inputs.extend(["rain", "fog", "wetness"].map(|name| observation.named(name)));
                 }
             }
         }

@@ -34,13 +34,13 @@ impl Agent for Greedy {
         &mut self,
         _: &Observation,
         legal: ArrayView1<bool>,
-        branch: &dyn Branch,
+        branch: &Branch<'_>,
         rng: &mut Rng,
     ) -> Option<usize> {
         let mut most = f64::NEG_INFINITY;
         let mut best = vec![false; legal.len()];
         for row in (0..legal.len()).filter(|&row| legal[row]) {
-            let trial = branch.try_row(row);
+            let trial = branch(row);
             self.branched_s += trial.simulated_s;
             let danger = danger(&trial);
             if danger > most {
@@ -76,15 +76,6 @@ mod tests {
     use avastra_base::rng::{Stream, stream};
     use ndarray::Array1;
 
-    /// A branch in which the outcome of each row is known.
-    struct Known(Vec<Trial>);
-
-    impl Branch for Known {
-        fn try_row(&self, row: usize) -> Trial {
-            self.0[row]
-        }
-    }
-
     fn trial(proc: f64, collided: bool, counted: bool) -> Trial {
         Trial { proc, collided, counted, simulated_s: 6.0 }
     }
@@ -98,7 +89,7 @@ mod tests {
             let mut seen = [0; 5];
             for _ in 0..100 {
                 agent.begin();
-                let branch = Known(trials.clone());
+                let branch = |row: usize| trials[row];
                 let row = agent.choose_ahead(&Observation::zeros(), legal.view(), &branch, &mut rng);
                 seen[row.unwrap()] += 1;
                 assert_eq!(agent.branched_s(), 24.0);

@@ -64,12 +64,12 @@ impl Learner {
     fn update(&mut self, rng: &mut Rng) -> f64 {
         let settings = self.policy.settings.clone();
         let samples = self.replay.sample(settings.batch_len, self.updates, rng);
-        let batch: Vec<&Transition> = samples.iter().map(|sample| self.replay.get(sample.index)).collect();
-        let weights: Vec<f32> = samples.iter().map(|sample| sample.weight).collect();
+        let batch: Vec<&Transition> = samples.iter().map(|&(index, _)| self.replay.get(index)).collect();
+        let weights: Vec<f32> = samples.iter().map(|&(_, weight)| weight).collect();
         let online = &mut self.policy.network;
         let (loss, td_errors) = improve(online, &self.target, &mut self.adam, &settings, &batch, &weights);
-        for (sample, td_error) in samples.iter().zip(td_errors) {
-            self.replay.update(sample.index, f64::from(td_error));
+        for (&(index, _), td_error) in samples.iter().zip(td_errors) {
+            self.replay.update(index, f64::from(td_error));
         }
         self.updates += 1;
         if self.updates.is_multiple_of(settings.target_period_updates) {

@@ -61,20 +61,15 @@ impl PaymentSettings {
         Ok(())
     }
 
-    /// Constants of the reward by the equation.
-    pub fn constants(&self) -> RewardSettings {
-        RewardSettings {
+    /// Constants of the reward; `None`: it comes from the space.
+    pub fn equation(&self) -> Option<RewardSettings> {
+        (self.reward == RewardSource::Equation).then_some(RewardSettings {
             collision: self.collision_reward,
             uncounted: self.uncounted_reward,
             safe_proc_max: self.safe_proc_max,
             bound_is_safe: self.bound_is_safe,
             safe: self.safe_reward,
-        }
-    }
-
-    /// Constants of the reward; `None`: it comes from the space.
-    pub fn equation(&self) -> Option<RewardSettings> {
-        (self.reward == RewardSource::Equation).then(|| self.constants())
+        })
     }
 
     /// The reward of each step of an episode, shape `(steps,)`, where a collision that counts pays R_col at the step

@@ -9,7 +9,6 @@ use avastra_base::rng;
 use avastra_base::rng::Rng;
 use avastra_lang::model::policy::PolicyRule;
 use avastra_lang::model::{EffectDef, Policy};
-use avastra_lang::syntax::nearest;
 use avastra_world::action::ActionTable;
 
 use super::decision::chosen_by;
@@ -19,7 +18,7 @@ use super::network::{Network, Shape};
 use super::quirks::Quirks;
 use super::random::any;
 use super::registry::Agent;
-use super::settings::SettingsError;
+use super::settings::{SettingsError, hint};
 
 /// What the agent sees and may do.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -66,8 +65,7 @@ impl Rows {
                 (None, None) => {
                     let actions = space.actions.iter().map(|action| action.name.as_str());
                     let groups = space.groups.iter().map(|group| group.name.as_str());
-                    let suggestion = nearest(name, actions.chain(groups));
-                    let hint = suggestion.map_or(String::new(), |name| format!(": did you mean `{name}`?"));
+                    let hint = hint(name, actions.chain(groups));
                     let message = format!("`actions`: the space has no action or group `{name}`{hint}");
                     return Err(SettingsError::Text(message));
                 }
@@ -155,7 +153,7 @@ impl QPolicy {
 
     /// The variables that the network sees, by index.
     pub fn variables(&self) -> &[usize] {
-        self.features.variables()
+        &self.features.variables
     }
 
     /// Q-values of a state, shape `(rows,)`.
@@ -191,14 +189,6 @@ impl QPolicy {
         self.quirks.chosen(row, self.rows.environment[row]);
     }
 
-    /// The row that the policy takes when it does not explore.
-    fn decide(&self, observation: &Observation, open: &[bool]) -> Option<usize> {
-        match &self.rules {
-            Some(rules) => chosen_by(rules, observation, open),
-            None => self.greedy(observation, open),
-        }
-    }
-
     /// The open row of the highest Q-value, the first of equals.
     pub fn greedy(&self, observation: &Observation, open: &[bool]) -> Option<usize> {
         best(self.q_values(observation).view(), open)
@@ -214,7 +204,11 @@ impl Agent for QPolicy {
     fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
         let open = self.open(legal);
         let explores = rng::unit(rng) < self.settings.exploration.evaluation_epsilon;
-        let row = if explores { any(&open, rng) } else { self.decide(observation, &open) }?;
+        let row = match &self.rules {
+            _ if explores => any(&open, rng),
+            Some(rules) => chosen_by(rules, observation, &open),
+            None => self.greedy(observation, &open),
+        }?;
         self.chosen(row);
         Some(row)
     }

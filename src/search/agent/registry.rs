@@ -26,10 +26,9 @@ pub trait Agent: Send {
         &mut self,
         observation: &Observation,
         legal: ArrayView1<bool>,
-        branch: &dyn Branch,
+        _branch: &Branch<'_>,
         rng: &mut Rng,
     ) -> Option<usize> {
-        let _ = branch;
         self.choose(observation, legal, rng)
     }
 
@@ -40,22 +39,19 @@ pub trait Agent: Send {
     }
 
     /// A step begins: the seed for its draws, or `None` if they come from the episode's own.
-    fn draw_seed(&mut self, step: usize) -> Option<u64> {
-        let _ = step;
+    fn draw_seed(&mut self, _step: usize) -> Option<u64> {
         None
     }
 
     /// A step begins in an episode of that seed: where in their ranges the drawn values of the row shall lie, each in
     /// `[0, 1)`, by parameter; what is left out is drawn by chance.
-    fn draw_shares(&mut self, step: usize, seed: u64) -> &[f64] {
-        let _ = (step, seed);
+    fn draw_shares(&mut self, _step: usize, _seed: u64) -> &[f64] {
         &[]
     }
 
     /// The probability with which each row is chosen, shape `(rows,)`, where it depends on nothing but what is legal;
     /// `None` for an agent that knows no probabilities.
-    fn chances(&self, legal: ArrayView1<bool>) -> Option<Array1<f64>> {
-        let _ = legal;
+    fn chances(&self, _legal: ArrayView1<bool>) -> Option<Array1<f64>> {
         None
     }
 
@@ -246,8 +242,7 @@ mod tests {
             if at + 1 < rows.len() {
                 return Experience::plain(row, -1.0, ROWS);
             }
-            let (hits, crashes) = (vec![0], vec![Some(0)]);
-            Experience { hits, collided: true, crashes, ..Experience::plain(row, 7.5, ROWS) }
+            Experience { hits: vec![0], crashes: vec![Some(0)], ..Experience::plain(row, 7.5, ROWS) }
         };
         Trajectory {
             closeness: Closeness { distance_m: 5.0 + rows[0] as f64, margin_m: 0.0 },

@@ -1,7 +1,8 @@
 //! How the settings of an agent are read, checked and recorded. Each agent's own stand beside it.
 
 use core::fmt::Display;
-use core::ops::RangeInclusive;
+use core::ops::Bound::{Excluded, Included};
+use core::ops::RangeBounds;
 use std::sync::Arc;
 
 use serde::Serialize;
@@ -51,16 +52,17 @@ pub enum SettingsError {
     Text(String),
     #[error("no preset `{name}` for this agent: it has {known}")]
     Preset { name: String, known: String },
-    #[error("no setting `{name}`{}", hint(suggestion))]
-    Unknown { name: String, suggestion: Option<String> },
+    #[error("no setting `{name}`{hint}")]
+    Unknown { name: String, hint: String },
     #[error("this agent has no setting `{name}`: it is one of {owners}")]
     Elsewhere { name: String, owners: String },
     #[error("`{name}` is {value}, but must be {wanted}")]
     Range { name: &'static str, value: String, wanted: &'static str },
 }
 
-fn hint(suggestion: &Option<String>) -> String {
-    suggestion.as_ref().map_or(String::new(), |name| format!(": did you mean `{name}`?"))
+/// The one of some names that is most like an unknown one, as the end of a message; empty if none is.
+pub(super) fn hint<'a>(unknown: &str, names: impl IntoIterator<Item = &'a str>) -> String {
+    nearest(unknown, names).map_or(String::new(), |name| format!(": did you mean `{name}`?"))
 }
 
 /// Does the same with the settings of whichever agent they are of.
@@ -203,8 +205,8 @@ fn no_setting(name: String, own: &Map<String, Value>) -> SettingsError {
     if !owners.is_empty() {
         return SettingsError::Elsewhere { name, owners: listed(&owners) };
     }
-    let suggestion = nearest(&name, own.keys().map(String::as_str)).map(str::to_owned);
-    SettingsError::Unknown { name, suggestion }
+    let hint = hint(&name, own.keys().map(String::as_str));
+    SettingsError::Unknown { name, hint }
 }
 
 /// What a setting must be, and whether it is.
@@ -219,7 +221,7 @@ pub(super) struct Requirement {
 pub(super) fn within<T: PartialOrd + Display>(
     name: &'static str,
     value: T,
-    range: RangeInclusive<T>,
+    range: impl RangeBounds<T>,
     wanted: &'static str,
 ) -> Requirement {
     Requirement { name, is_met: range.contains(&value), value: value.to_string(), wanted }
@@ -231,8 +233,7 @@ pub(super) fn unit(name: &'static str, value: f64) -> Requirement {
 }
 
 pub(super) fn positive(name: &'static str, value: f64) -> Requirement {
-    let is_met = value > 0.0 && value <= 1e6;
-    Requirement { is_met, ..within(name, value, 0.0..=1e6, "above 0, and at most 1e6") }
+    within(name, value, (Excluded(0.0), Included(1e6)), "above 0, and at most 1e6")
 }
 
 pub(super) fn count(name: &'static str, value: u64, most: u64) -> Requirement {

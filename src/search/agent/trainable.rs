@@ -10,14 +10,11 @@ use super::trajectory::{Lesson, Trajectory};
 /// step, `learn`.
 pub trait Trainable: Agent {
     /// The share of the training's episodes that are over, in `[0, 1)`; told before each episode.
-    fn progress(&mut self, over: f64) {
-        let _ = over;
-    }
+    fn progress(&mut self, _over: f64) {}
 
     /// The seed of the next episode's start, on the nth of the roads. `fresh` is a seed that no episode had
     /// before; an agent that returns to an old start gives that start's seed instead.
-    fn start_seed(&mut self, road: usize, fresh: u64) -> u64 {
-        let _ = road;
+    fn start_seed(&mut self, _road: usize, fresh: u64) -> u64 {
         fresh
     }
 
@@ -27,8 +24,10 @@ pub trait Trainable: Agent {
     /// Choices made in training.
     fn steps(&self) -> u64;
 
-    /// The present share of random choices.
-    fn exploration_epsilon(&self) -> f64;
+    /// The present share of random choices: all of them in a search that follows no record.
+    fn exploration_epsilon(&self) -> f64 {
+        1.0
+    }
 
     /// What it has learned, ready to act for one episode on any start.
     fn actor(&self) -> Box<dyn Agent>;

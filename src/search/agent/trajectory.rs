@@ -41,8 +41,6 @@ pub struct Experience {
     pub reward: f64,
     /// For each contact of this step: the index in `steps` of the choice that made the obstacle appear.
     pub hits: Vec<usize>,
-    /// Whether the ego vehicle touched any road user in this step.
-    pub collided: bool,
     /// For each collision of this step that counts: the index in `steps` of the choice that made the
     /// obstacle appear; `None` if no choice did.
     pub crashes: Vec<Option<usize>>,
@@ -68,7 +66,7 @@ impl Trajectory {
 impl Experience {
     pub fn plain(row: usize, reward: f64, rows: usize) -> Experience {
         let (observation, legal) = (Observation::zeros(), Array1::from_elem(rows, true));
-        Experience { observation, legal, row, reward, hits: Vec::new(), collided: false, crashes: Vec::new() }
+        Experience { observation, legal, row, reward, hits: Vec::new(), crashes: Vec::new() }
     }
 }
 

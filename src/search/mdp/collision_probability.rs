@@ -12,6 +12,16 @@ use avastra_world::sim::{Obstacle, World};
 
 use super::released_probability::released_probability;
 
+/// Braking of every vehicle, magnitude, m/s². Paper: 6 (Berkeley algorithm).
+const VEHICLE_DECEL_MPS2: f64 = 6.0;
+/// Braking of a pedestrian, m/s². DeepCollision's code: 1.5.
+const PEDESTRIAN_DECEL_MPS2: f64 = 1.5;
+/// `R_min`: the least gap between vehicles in one lane, m. Paper: 5.
+const GAP_M_MIN: f64 = 5.0;
+/// Added to the lateral safety distance, m. Paper: 0, which makes it 0 beside parallel traffic, so that such traffic is
+/// no danger; DeepCollision's and the published code: 5.
+const LATERAL_MARGIN_M: f64 = 5.0;
+
 /// The ways to compute ProC.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -19,18 +29,18 @@ pub enum ProcKind {
     /// Ours: the paper's equations, repaired, with a lateral margin.
     #[default]
     Avastra,
-    /// The paper's equations, repaired only where they cannot be computed: [`ProcSettings::paper`].
+    /// The paper's equations, repaired only where they cannot be computed.
     Paper,
     /// What the published package computes: [`super::released_probability`].
     Released,
 }
 
 impl ProcKind {
-    /// ProC of the ego vehicle at this moment; see [`collision_probability`].
+    /// ProC of the ego vehicle at this moment; see `collision_probability`.
     pub fn danger(self, world: &World, is_hit: &dyn Fn(u32) -> bool) -> Danger {
         match self {
-            ProcKind::Avastra => collision_probability(world, &ProcSettings::default(), is_hit),
-            ProcKind::Paper => collision_probability(world, &ProcSettings::paper(), is_hit),
+            ProcKind::Avastra => collision_probability(world, LATERAL_MARGIN_M, is_hit),
+            ProcKind::Paper => collision_probability(world, 0.0, is_hit),
             ProcKind::Released => released_probability(world, is_hit),
         }
     }
@@ -75,79 +85,35 @@ impl Most {
     }
 }
 
-/// Constants of ProC. `default()` is that of [`ProcKind::Avastra`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ProcSettings {
-    /// Braking of every vehicle, magnitude, m/s². Paper: 6 (Berkeley algorithm).
-    pub vehicle_decel_mps2: f64,
-    /// Braking of a pedestrian, m/s². DeepCollision's code: 1.5.
-    pub pedestrian_decel_mps2: f64,
-    /// `R_min`: the least gap between vehicles in one lane, m. Paper: 5.
-    pub gap_m_min: f64,
-    /// Added to the lateral safety distance, m. Paper: 0, which makes it 0 beside parallel traffic;
-    /// DeepCollision's and the published code: 5.
-    pub lateral_margin_m: f64,
-}
-
-impl Default for ProcSettings {
-    fn default() -> ProcSettings {
-        ProcSettings {
-            vehicle_decel_mps2: 6.0,
-            pedestrian_decel_mps2: 1.5,
-            gap_m_min: 5.0,
-            lateral_margin_m: 5.0,
-        }
-    }
-}
-
-impl ProcSettings {
-    /// As the paper prints it: no lateral margin, so that parallel traffic beside the ego vehicle is no danger.
-    pub fn paper() -> ProcSettings {
-        ProcSettings { lateral_margin_m: 0.0, ..ProcSettings::default() }
-    }
-}
-
 /// Longitudinal safety distance `LoSD` (m), Eq. 9, of a follower behind a leader.
 ///
-/// Speeds along the lane, at least 0. At least `gap_m_min`: a faster leader needs no more room.
-pub fn longitudinal_safety_distance_m(
+/// Speeds along the lane, at least 0. At least [`GAP_M_MIN`]: a faster leader needs no more room.
+fn longitudinal_safety_distance_m(
     follower_mps: f64,
     follower_decel_mps2: f64,
     leader_mps: f64,
     leader_decel_mps2: f64,
-    gap_m_min: f64,
 ) -> f64 {
     // The paper gives the deceleration as -6 m/s². Its magnitude is meant: with the sign, a faster
     // follower would need less room.
     let longer_m = braking_m(follower_mps, follower_decel_mps2) - braking_m(leader_mps, leader_decel_mps2);
-    longer_m.max(0.0) + gap_m_min
+    longer_m.max(0.0) + GAP_M_MIN
 }
 
 /// Safety distance (m) of two vehicles that drive towards each other: both must stop. Ours, after RSS;
 /// the paper has no such case and would subtract the oncoming speed.
-pub fn opposing_safety_distance_m(
-    ego_mps: f64,
-    ego_decel_mps2: f64,
-    other_mps: f64,
-    other_decel_mps2: f64,
-    gap_m_min: f64,
-) -> f64 {
-    braking_m(ego_mps, ego_decel_mps2) + braking_m(other_mps, other_decel_mps2) + gap_m_min
+fn opposing_safety_distance_m(ego_mps: f64, other_mps: f64, other_decel_mps2: f64) -> f64 {
+    braking_m(ego_mps, VEHICLE_DECEL_MPS2) + braking_m(other_mps, other_decel_mps2) + GAP_M_MIN
 }
 
 /// Lateral safety distance `LaSD` (m), Eq. 10: `(v sin β)² / (a sin β)`, which is `v² |sin β| / a`
 /// and so 0 in parallel traffic, plus a margin.
-pub fn lateral_safety_distance_m(
-    ego_mps: f64,
-    lane_angle_rad: f64,
-    ego_decel_mps2: f64,
-    margin_m: f64,
-) -> f64 {
-    ego_mps * ego_mps * libm::sin(lane_angle_rad).abs() / ego_decel_mps2 + margin_m
+fn lateral_safety_distance_m(ego_mps: f64, lane_angle_rad: f64, margin_m: f64) -> f64 {
+    ego_mps * ego_mps * libm::sin(lane_angle_rad).abs() / VEHICLE_DECEL_MPS2 + margin_m
 }
 
 /// How much of a safety distance is used up (Eqs. 14 and 15), in `[0, 1]`; 0 where none is needed.
-pub fn probability(safety_distance_m: f64, current_distance_m: f64) -> f64 {
+pub(super) fn probability(safety_distance_m: f64, current_distance_m: f64) -> f64 {
     if safety_distance_m <= 0.0 {
         return 0.0;
     }
@@ -155,7 +121,7 @@ pub fn probability(safety_distance_m: f64, current_distance_m: f64) -> f64 {
 }
 
 /// The probabilities of both dimensions as one, Eq. 16.
-pub fn combined(longitudinal: f64, lateral: f64) -> f64 {
+fn combined(longitudinal: f64, lateral: f64) -> f64 {
     let (most, least) = (longitudinal.max(lateral), longitudinal.min(lateral));
     most + (1.0 - most) * least
 }
@@ -168,10 +134,10 @@ pub fn combined(longitudinal: f64, lateral: f64) -> f64 {
 /// vehicle and of the obstacle's lane, or of the pedestrian. The greatest probability of each
 /// dimension counts, and Eq. 16 joins the two. Obstacles that the ego vehicle has hit already (`is_hit`)
 /// are left out.
-pub fn collision_probability(world: &World, settings: &ProcSettings, is_hit: &dyn Fn(u32) -> bool) -> Danger {
+fn collision_probability(world: &World, lateral_margin_m: f64, is_hit: &dyn Fn(u32) -> bool) -> Danger {
     let mut most = Most::default();
     for obstacle in world.obstacles_on_level() {
-        if is_hit(obstacle.id) || beyond_reach(world, obstacle, settings) {
+        if is_hit(obstacle.id) || beyond_reach(world, obstacle, lateral_margin_m) {
             continue;
         }
         let current_m = obstacle.distance_m;
@@ -179,62 +145,45 @@ pub fn collision_probability(world: &World, settings: &ProcSettings, is_hit: &dy
         // Places of the route that are farther along it than this cannot be the nearest.
         let reach_m = 2.0 * (position - world.ego().rear_axle.position).norm() + world.ego_offset_m().abs();
         let beside = world.scene().route.path.project_near(position, world.ego_station_m(), reach_m);
-        if beside.offset_m.abs() <= route_half_width_m(world, beside.station_m) {
+        if beside.offset_m.abs() <= world.scene().half_width_m(beside.station_m) {
             let ahead = beside.station_m >= world.ego_station_m();
-            let safety_m = same_lane_safety_m(world, obstacle, ahead, settings);
+            let safety_m = same_lane_safety_m(world, obstacle, ahead);
             most.add_longitudinal(obstacle.id, probability(safety_m, current_m));
         } else {
             let angle_rad = wrap_angle(obstacle.lane_heading_rad - world.ego().rear_axle.heading_rad);
-            let safety_m = lateral_safety_distance_m(
-                world.ego().speed_mps,
-                angle_rad,
-                settings.vehicle_decel_mps2,
-                settings.lateral_margin_m,
-            );
+            let safety_m = lateral_safety_distance_m(world.ego().speed_mps, angle_rad, lateral_margin_m);
             most.add_lateral(obstacle.id, probability(safety_m, current_m));
         }
     }
     most.danger()
 }
 
-/// Half the width of the route's lane at a station of the route, m.
-fn route_half_width_m(world: &World, station_m: f64) -> f64 {
-    let scene = world.scene();
-    let here = scene.route.lane_at(station_m);
-    scene.map.lane(here.lane).width_at(station_m - here.from_m) / 2.0
-}
-
-fn same_lane_safety_m(world: &World, obstacle: &Obstacle, ahead: bool, settings: &ProcSettings) -> f64 {
+fn same_lane_safety_m(world: &World, obstacle: &Obstacle, ahead: bool) -> f64 {
     let ego = world.ego();
     let along_mps = obstacle.velocity_mps.dot(&ego.rear_axle.forward());
-    let other_decel_mps2 = decel_mps2(obstacle, settings);
-    let (ego_mps, ego_decel_mps2) = (ego.speed_mps, settings.vehicle_decel_mps2);
-    let gap_m_min = settings.gap_m_min;
+    let (ego_mps, other_decel_mps2) = (ego.speed_mps, decel_mps2(obstacle));
     if ahead && along_mps < 0.0 {
-        opposing_safety_distance_m(ego_mps, ego_decel_mps2, -along_mps, other_decel_mps2, gap_m_min)
+        opposing_safety_distance_m(ego_mps, -along_mps, other_decel_mps2)
     } else if ahead {
-        longitudinal_safety_distance_m(ego_mps, ego_decel_mps2, along_mps, other_decel_mps2, gap_m_min)
+        longitudinal_safety_distance_m(ego_mps, VEHICLE_DECEL_MPS2, along_mps, other_decel_mps2)
     } else {
-        let follower_mps = along_mps.max(0.0);
-        longitudinal_safety_distance_m(follower_mps, other_decel_mps2, ego_mps, ego_decel_mps2, gap_m_min)
+        longitudinal_safety_distance_m(along_mps.max(0.0), other_decel_mps2, ego_mps, VEHICLE_DECEL_MPS2)
     }
 }
 
-fn decel_mps2(obstacle: &Obstacle, settings: &ProcSettings) -> f64 {
+fn decel_mps2(obstacle: &Obstacle) -> f64 {
     match obstacle.body {
-        Body::Pedestrian => settings.pedestrian_decel_mps2,
-        _ => settings.vehicle_decel_mps2,
+        Body::Pedestrian => PEDESTRIAN_DECEL_MPS2,
+        _ => VEHICLE_DECEL_MPS2,
     }
 }
 
 /// Whether every safety distance that could apply is shorter than the gap: then ProC is 0, and the
 /// costly projection is not needed.
-fn beyond_reach(world: &World, obstacle: &Obstacle, settings: &ProcSettings) -> bool {
+fn beyond_reach(world: &World, obstacle: &Obstacle, lateral_margin_m: f64) -> bool {
     let speed_mps = world.ego().speed_mps;
-    let other_m = obstacle.velocity_mps.norm_squared() / (2.0 * decel_mps2(obstacle, settings));
-    let longest_m = speed_mps * speed_mps / settings.vehicle_decel_mps2
-        + other_m
-        + settings.gap_m_min.max(settings.lateral_margin_m);
+    let other_m = obstacle.velocity_mps.norm_squared() / (2.0 * decel_mps2(obstacle));
+    let longest_m = speed_mps * speed_mps / VEHICLE_DECEL_MPS2 + other_m + GAP_M_MIN.max(lateral_margin_m);
     obstacle.distance_m > longest_m
 }
 
@@ -247,13 +196,13 @@ mod tests {
     fn safety_distances_match_worked_figures() {
         // Paper's constants at the speeds of RSS's usual table: 9.33, 21.33 and 5 m.
         for (follower, leader, expected) in [(14.0, 12.0, 9.333), (14.0, 0.0, 21.333), (20.0, 20.0, 5.0)] {
-            let safety_m = longitudinal_safety_distance_m(follower, 6.0, leader, 6.0, 5.0);
+            let safety_m = longitudinal_safety_distance_m(follower, 6.0, leader, 6.0);
             assert!((safety_m - expected).abs() < 1e-3, "{follower} behind {leader}: {safety_m}");
         }
-        assert!((opposing_safety_distance_m(12.0, 6.0, 6.0, 6.0, 5.0) - 20.0).abs() < 1e-12);
+        assert!((opposing_safety_distance_m(12.0, 6.0, 6.0) - 20.0).abs() < 1e-12);
         let right_angle = core::f64::consts::FRAC_PI_2;
-        assert!((lateral_safety_distance_m(15.0, right_angle, 6.0, 0.0) - 37.5).abs() < 1e-12);
-        assert_eq!(lateral_safety_distance_m(15.0, 0.0, 6.0, 0.0), 0.0);
+        assert!((lateral_safety_distance_m(15.0, right_angle, 0.0) - 37.5).abs() < 1e-12);
+        assert_eq!(lateral_safety_distance_m(15.0, 0.0, 0.0), 0.0);
     }
 
     #[test]
@@ -278,8 +227,8 @@ mod tests {
 
         #[test]
         fn a_faster_follower_needs_no_less_room(follower in 0.0_f64..30.0, more in 0.0_f64..10.0, leader in 0.0_f64..30.0) {
-            let slow = longitudinal_safety_distance_m(follower, 6.0, leader, 6.0, 5.0);
-            let fast = longitudinal_safety_distance_m(follower + more, 6.0, leader, 6.0, 5.0);
+            let slow = longitudinal_safety_distance_m(follower, 6.0, leader, 6.0);
+            let fast = longitudinal_safety_distance_m(follower + more, 6.0, leader, 6.0);
             prop_assert!(slow >= 5.0 && fast >= slow);
         }
     }

@@ -38,10 +38,6 @@ pub struct Criticality {
 impl Criticality {
     /// The most critical values of two periods.
     pub fn and(&self, other: &Criticality) -> Criticality {
-        let least = |a: Option<f64>, b: Option<f64>| match (a, b) {
-            (Some(a), Some(b)) => Some(a.min(b)),
-            (a, b) => a.or(b),
-        };
         Criticality {
             ttc_s: least(self.ttc_s, other.ttc_s),
             thw_s: least(self.thw_s, other.thw_s),
@@ -62,15 +58,14 @@ impl Criticality {
         for obstacle in world.obstacles_on_level().filter(|obstacle| !is_hit(obstacle.id)) {
             let seen = Seen::of(world, obstacle);
             if let Some(ttc_s) = time_to_collision_s(world, obstacle) {
-                self.ttc_s = Some(self.ttc_s.map_or(ttc_s, |least| least.min(ttc_s)));
+                self.ttc_s = least(self.ttc_s, Some(ttc_s));
                 if ttc_s > 0.0 {
                     self.required_mps2 = self.required_mps2.max(speed_mps / (2.0 * ttc_s));
                 }
             }
             if seen.is_ahead() {
                 if speed_mps > STANDING_MPS {
-                    let thw_s = seen.gap_m / speed_mps;
-                    self.thw_s = Some(self.thw_s.map_or(thw_s, |least| least.min(thw_s)));
+                    self.thw_s = least(self.thw_s, Some(seen.gap_m / speed_mps));
                 }
                 self.drac_mps2 =
                     self.drac_mps2.max(deceleration_to_avoid_mps2(speed_mps, seen.along_mps, seen.gap_m));
@@ -81,6 +76,10 @@ impl Criticality {
             self.rss_unsafe_s += FRAME_S;
         }
     }
+}
+
+fn least(a: Option<f64>, b: Option<f64>) -> Option<f64> {
+    a.into_iter().chain(b).reduce(f64::min)
 }
 
 /// Deceleration (m/s²) with which a follower comes down to the leader's speed just before the two touch;

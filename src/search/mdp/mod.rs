@@ -13,7 +13,7 @@ mod reward;
 mod state;
 
 pub use closeness::Closeness;
-pub use collision_probability::{Danger, ProcKind, ProcSettings, collision_probability};
+pub use collision_probability::{Danger, ProcKind};
 pub use criticality::{Criticality, Encroachment};
 pub use observation::{Observation, variable};
 pub use reward::{RewardSettings, StepOutcome, reward};

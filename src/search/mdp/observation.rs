@@ -52,6 +52,11 @@ impl Observation {
     pub fn get(&self, variable: usize) -> f32 {
         if variable < STATE_LEN { self.state[variable] } else { self.beyond[variable - STATE_LEN] }
     }
+
+    /// A variable by the paper's spelling, which must be that of one.
+    pub fn named(&self, name: &str) -> f32 {
+        self.get(variable(name).expect("it is a variable"))
+    }
 }
 
 /// Index of a variable by the paper's spelling, as [`Observation::get`] takes it.
@@ -120,8 +125,7 @@ mod tests {
         let mut observation = Observation::zeros();
         observation.state[18] = 7.0;
         observation.beyond[3] = 0.5;
-        let value = |name: &str| observation.get(variable(name).expect("it is a variable"));
-        assert_eq!((value("speed"), value("rain"), value("egoX")), (7.0, 0.5, 0.0));
+        assert_eq!(["speed", "rain", "egoX"].map(|name| observation.named(name)), [7.0, 0.5, 0.0]);
         assert_eq!(variable("speeed"), None);
     }
 }

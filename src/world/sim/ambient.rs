@@ -45,7 +45,7 @@ const DRAWS_MAX: usize = 8;
 /// How many vehicles are wanted, and how many attempts were made.
 #[derive(Debug, Clone)]
 pub(super) struct Ambient {
-    wanted: u32,
+    pub wanted: u32,
     attempts: u64,
     next_id: u32,
 }
@@ -53,15 +53,6 @@ pub(super) struct Ambient {
 impl Ambient {
     pub fn new(wanted: u32) -> Ambient {
         Ambient { wanted: wanted.min(AMBIENT_MAX), attempts: 0, next_id: COMMANDED_MAX + 1 }
-    }
-
-    /// Whether `present` ambient vehicles are too few.
-    pub fn lacks(&self, present: usize) -> bool {
-        present < self.wanted as usize
-    }
-
-    pub fn wanted(&self) -> u32 {
-        self.wanted
     }
 
     /// One attempt at a newcomer. `begins`: before the first tick, when the ego vehicle has seen nothing.
@@ -76,9 +67,7 @@ impl Ambient {
     }
 
     pub fn trace(&self, trace: &mut Trace) {
-        trace.word(u64::from(self.wanted));
-        trace.word(self.attempts);
-        trace.word(u64::from(self.next_id));
+        trace.words([u64::from(self.wanted), self.attempts, u64::from(self.next_id)]);
     }
 }
 
@@ -106,7 +95,7 @@ fn draw(around: &Around, nearest_m: f64, id: u32, rng: &mut Rng) -> Option<RoadU
         return None;
     }
     let way = Way::along(around.scene, &[lane], rng)?;
-    let driver = Driver::new(around.scene, way, station_m, cruise, Vec::new(), 1);
+    let driver = Driver::new(around.scene, way, station_m, cruise, Vec::new());
     let moved = driver.moved(&size);
     let mover = Mover::new(size, Motion::Drive(driver));
     let newcomer = RoadUser::new(around, id, body, colour, Verb::DriveAhead, mover, moved);

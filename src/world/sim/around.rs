@@ -89,11 +89,11 @@ impl Around<'_> {
         let beside = |point: Vec2| route.path.project_near(point, self.ego_station_m, LEVEL_REACH_M);
         let is_apart_at = |station_m, height_m| is_apart(route.height_at(map, station_m), height_m);
         if let Motion::Drive(driver) = &user.mover.motion {
-            let ahead = (0..LEVEL_STEPS).map(|step| driver.station_m() + f64::from(step) * LEVEL_STEP_M);
+            let ahead = (0..LEVEL_STEPS).map(|step| driver.station_m + f64::from(step) * LEVEL_STEP_M);
             for station_m in ahead {
-                let found = beside(driver.way().path.position_at(station_m));
+                let found = beside(driver.way.path.position_at(station_m));
                 if found.distance_m < LEVEL_ASIDE_M {
-                    return is_apart_at(found.station_m, driver.way().height_at(station_m));
+                    return is_apart_at(found.station_m, driver.way.height_at(station_m));
                 }
             }
         }

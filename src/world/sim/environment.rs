@@ -120,9 +120,7 @@ impl Environment {
     }
 
     pub fn trace(&self, trace: &mut Trace) {
-        for word in [self.time as u64, self.rain as u64, self.fog as u64, self.wetness as u64] {
-            trace.word(word);
-        }
+        trace.words([self.time as u64, self.rain as u64, self.fog as u64, self.wetness as u64]);
         trace.number(self.water_mm);
     }
 }

@@ -149,9 +149,7 @@ mod tests {
     fn a_crossing_is_an_area_on_either_lane_and_the_right_goes_first() {
         let map = testing::crossing().map.clone();
         let areas = ConflictAreas::new(&map);
-        let inside = |road: &str| {
-            LaneIndex(map.lanes.iter().position(|lane| lane.key.road == road).expect("it is there"))
-        };
+        let inside = |road: &str| map.place(road, -1, 10.0).expect("it is there").lane;
         let (east, north) = (inside("2"), inside("5"));
         let [of_east] = areas.of(east) else { panic!("{areas:?}") };
         let [of_north] = areas.of(north) else { panic!("{areas:?}") };

@@ -19,14 +19,25 @@ impl World {
         self.alone().moment_facts()
     }
 
-    /// As [`Around::light_changes_in_s`].
+    /// Time until the next traffic light on the route changes its colour, s, in steps of half a second and at most
+    /// `most_s`; `None` without a light within reach.
     pub fn light_changes_in_s(&self, most_s: f64) -> Option<f64> {
-        self.alone().light_changes_in_s(most_s)
+        const STEP_S: f64 = 0.5;
+        let around = self.alone();
+        let signal = around.on_route().signal?;
+        let colour = |later_s: f64| {
+            around.signals.colour(&around.scene.map, signal, around.tick + (later_s / DT_S).round() as u64)
+        };
+        let now = colour(0.0);
+        let mut steps = (1..=(most_s / STEP_S) as u32).map(|step| f64::from(step) * STEP_S);
+        Some(steps.find(|&later_s| colour(later_s) != now).unwrap_or(most_s))
     }
 
-    /// As [`Around::conflict_ahead_m`].
+    /// Distance along the route to the next place where another lane crosses or joins it, m.
     pub fn conflict_ahead_m(&self) -> Option<f64> {
-        self.alone().conflict_ahead_m()
+        let from_m = self.ego_station_m();
+        let mut ahead = self.scene().route.conflicts.iter().map(|conflict| conflict.station_m - from_m);
+        ahead.find(|&ahead_m| ahead_m >= 0.0)
     }
 }
 
@@ -57,25 +68,6 @@ impl Around<'_> {
     /// What the ego vehicle's place says.
     fn on_route(&self) -> OnRoute {
         OnRoute::at(&self.scene.map, &self.scene.route, self.ego_station_m)
-    }
-
-    /// Time until the next traffic light on the route changes its colour, s, in steps of half a second and at most
-    /// `most_s`; `None` without a light within reach.
-    pub fn light_changes_in_s(&self, most_s: f64) -> Option<f64> {
-        const STEP_S: f64 = 0.5;
-        let signal = self.on_route().signal?;
-        let colour = |later_s: f64| {
-            self.signals.colour(&self.scene.map, signal, self.tick + (later_s / DT_S).round() as u64)
-        };
-        let now = colour(0.0);
-        let steps = (1..=(most_s / STEP_S) as u32).map(|step| f64::from(step) * STEP_S);
-        Some(steps.into_iter().find(|&later_s| colour(later_s) != now).unwrap_or(most_s))
-    }
-
-    /// Distance along the route to the next place where another lane crosses or joins it, m.
-    pub fn conflict_ahead_m(&self) -> Option<f64> {
-        let ahead = self.scene.route.conflicts.iter().map(|conflict| conflict.station_m - self.ego_station_m);
-        ahead.into_iter().find(|&ahead_m| ahead_m >= 0.0)
     }
 
     /// What a traffic light shows; `None` without one.
@@ -117,7 +109,7 @@ pub(super) fn npc_facts(around: &Around, obstacle: &Obstacle, motion: &Motion) -
 
 /// The facts of a road user that drives.
 pub(super) fn driver_facts(around: &Around, obstacle: &Obstacle, driver: &Driver) -> NpcFacts {
-    let (scene, way, station_m) = (around.scene, driver.way(), driver.station_m());
+    let (scene, way, station_m) = (around.scene, &driver.way, driver.station_m);
     // Lane by lane: the first begins behind the station, the others follow each other.
     let mut begin_m = station_m;
     let ahead = way.lanes_from(station_m).map(|(lane, on_lane_m)| {

@@ -27,7 +27,7 @@ use super::around::{Around, Other};
 use super::road_user::{Moved, Obstacle};
 use super::sense::FRAME_TICKS;
 use super::trace::Trace;
-use super::world::DT_S;
+use super::world::{DT_S, ticks};
 
 /// Least time at the kerb before setting out, s (published package).
 const WAIT_S: f64 = 1.0;
@@ -153,7 +153,8 @@ impl Walker {
 
     /// Where it is at the end of a tick; `None` once it has left, which the ego vehicle does not see (`in_sight`).
     pub fn step(&mut self, this: &Obstacle, in_sight: bool, around: &Around) -> Option<Moved> {
-        if self.is_over() {
+        let is_over = if self.returns { self.walked_m <= 0.0 } else { self.walked_m >= self.end_m };
+        if is_over {
             return in_sight.then_some(Moved::at_rest(this));
         }
         if (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS) {
@@ -190,7 +191,7 @@ impl Walker {
     }
 
     pub fn trace(&self, trace: &mut Trace) {
-        for value in [
+        trace.numbers([
             self.from.position.x,
             self.from.position.y,
             self.from.heading_rad,
@@ -201,20 +202,9 @@ impl Walker {
             self.aside_m,
             self.pace_mps,
             self.wants_aside_m,
-        ] {
-            trace.number(value);
-        }
-        for count in [self.startle_ticks, self.stuck_ticks, u32::from(self.returns)] {
-            trace.word(u64::from(count));
-        }
-        trace.word(self.begins_tick);
-        trace.word(self.begins_tick_max);
-        trace.word(self.manner as u64);
-    }
-
-    /// Whether it has come to the end of its walk, or back to the beginning.
-    fn is_over(&self) -> bool {
-        if self.returns { self.walked_m <= 0.0 } else { self.walked_m >= self.end_m }
+        ]);
+        trace.words([self.startle_ticks, self.stuck_ticks, u32::from(self.returns)].map(u64::from));
+        trace.words([self.begins_tick, self.begins_tick_max, self.manner as u64]);
     }
 
     /// Where it is now, with the velocity since it was at `this`.
@@ -307,10 +297,6 @@ fn arrival_s(outline: &OrientedBox, vehicle: &OrientedBox, velocity_mps: Vec2) -
         return f64::INFINITY;
     }
     ahead_m / speed_mps
-}
-
-fn ticks(time_s: f64) -> u64 {
-    (time_s / DT_S + 0.5) as u64
 }
 
 #[cfg(test)]

@@ -177,7 +177,7 @@ impl PassedLight {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rights {
     /// The light that the road user passed last.
-    passed: Option<PassedLight>,
+    pub passed: Option<PassedLight>,
     /// Whether it and the ego vehicle are in one lane, or it is a pedestrian in the ego vehicle's way; `None` before
     /// the first look.
     shares: Option<bool>,
@@ -208,11 +208,6 @@ enum Place {
 }
 
 impl Rights {
-    /// The light that the road user passed last.
-    pub fn passed_light(&self) -> Option<&PassedLight> {
-        self.passed.as_ref()
-    }
-
     /// Notes the light of a stop line that the road user's front passes in this tick.
     pub fn pass(&mut self, way: &Way, from_m: f64, to_m: f64, around: &Around) {
         let colour = |signal| around.signals.colour(&around.scene.map, signal, around.tick);
@@ -229,17 +224,17 @@ impl Rights {
         in_sight: bool,
         around: &Around,
     ) {
+        if this.distance_m > APPROACH_M {
+            return;
+        }
         match motion {
-            Motion::Drive(driver) if this.distance_m <= APPROACH_M => {
+            Motion::Drive(driver) => {
                 let stands = this.velocity_mps.norm() < STANDING_MPS;
                 let has_time = || in_sight && can_stop(around.ego.speed_mps, this.distance_m, ABRUPT_MPS2);
                 self.is_foreseen = stands && (self.is_foreseen || has_time());
                 self.watch_driver(this, driver, ego_passed, around);
             }
-            Motion::Walk(_) | Motion::Stand if this.distance_m <= APPROACH_M => {
-                self.watch_pedestrian(this, in_sight, around);
-            }
-            Motion::Drive(_) | Motion::Walk(_) | Motion::Stand => {}
+            Motion::Walk(_) | Motion::Stand => self.watch_pedestrian(this, in_sight, around),
         }
     }
 
@@ -292,9 +287,7 @@ impl Rights {
                 Place::Area(ego, other) => (ego.0 as u64, other.0 as u64),
                 Place::Lane => (u64::MAX, u64::MAX),
             };
-            for word in [ego, other, priority as u64, tick] {
-                trace.word(word);
-            }
+            trace.words([ego, other, priority as u64, tick]);
         }
     }
 
@@ -348,7 +341,7 @@ impl Rights {
             }
         };
         let shares = strip.aside_m < CARRIAGEWAY_M
-            && strip.ahead_m > -this.outline.half_length_m - strip.length_m
+            && strip.ahead_m > -this.outline.half_length_m - VehicleParameters::MKZ.length_m
             && (strip.aside_m < BESIDE_M || is_on_road());
         if shares {
             let known = self.meeting.filter(|_| self.shares == Some(true)).map(|meeting| meeting.priority);
@@ -402,14 +395,14 @@ impl Crossing {
         let car = VehicleParameters::MKZ;
         let (front_m, rear_m) = (car.front_m(around.ego_station_m), car.rear_m(around.ego_station_m));
         let half_m = this.outline.half_length_m;
-        let (other_front_m, other_rear_m) = (driver.station_m() + half_m, driver.station_m() - half_m);
+        let (other_front_m, other_rear_m) = (driver.station_m + half_m, driver.station_m - half_m);
         // By rising begin: those that begin too far behind or ahead are left out at once.
-        let areas = around.scene.route_areas();
+        let areas = &around.scene.route_areas;
         let first = areas.partition_point(|found| found.area.from_m < rear_m - AREA_M);
         let last = areas.partition_point(|found| found.area.from_m < front_m + APPROACH_M);
         let mut best: Option<Crossing> = None;
         for RouteArea { lane, area } in areas[first..last].iter().filter(|found| found.area.to_m > rear_m) {
-            let Some(begin_m) = driver.way().lane_ahead_m(area.other, other_rear_m) else { continue };
+            let Some(begin_m) = driver.way.lane_ahead_m(area.other, other_rear_m) else { continue };
             let ego = Passage {
                 lane: *lane,
                 in_m: area.from_m - front_m,
@@ -463,22 +456,15 @@ impl Crossing {
             (true, true) => return by_rule,
             (ego_first, _) => ego_first,
         };
+        // The first has left the second, which goes before it, room to brake gently: it has given way. At a red light
+        // that excuses the second alone.
+        let given_way = |is_red: bool, first: Priority| if is_red { Priority::None } else { first };
         match by_rule {
-            // The first has left the second, which goes before it, room to brake gently: it has given way. At a red
-            // light that excuses the second alone.
             Priority::Other if ego_first && self.other.has_time_for(&self.ego) => {
-                if ego_red {
-                    Priority::None
-                } else {
-                    Priority::Ego
-                }
+                given_way(ego_red, Priority::Ego)
             }
             Priority::Ego if !ego_first && self.ego.has_time_for(&self.other) => {
-                if other_red {
-                    Priority::None
-                } else {
-                    Priority::Other
-                }
+                given_way(other_red, Priority::Other)
             }
             _ => by_rule,
         }
@@ -506,15 +492,15 @@ struct Side {
 impl Side {
     /// `None` if the ego vehicle is nowhere near the other's way.
     fn of(this: &Obstacle, driver: &Driver, around: &Around) -> Option<Side> {
-        let path = &driver.way().path;
+        let path = &driver.way.path;
         let here = this.outline.pose.position;
         let away = around.ego_outline.pose.position - here;
-        let guess_m = driver.station_m() + this.forward.dot(&away);
+        let guess_m = driver.station_m + this.forward.dot(&away);
         let ego = path.project_from(around.ego_outline.pose.position, guess_m)?;
         if ego.offset_m.abs() > ASIDE_M {
             return None;
         }
-        let other = path.project_from(here, driver.station_m())?;
+        let other = path.project_from(here, driver.station_m)?;
         let (ego_length_m, ego_width_m) = around.ego_outline.half_extent_m(around.ego_forward, ego.forward);
         let (other_length_m, other_width_m) = this.outline.half_extent_m(this.forward, other.forward);
         let across_m = other.offset_m - ego.offset_m;
@@ -635,8 +621,6 @@ struct Strip {
     ahead_m: f64,
     /// From the strip that the ego vehicle drives on, m; negative in it.
     aside_m: f64,
-    /// Length of the ego vehicle, m.
-    length_m: f64,
 }
 
 impl Strip {
@@ -650,7 +634,6 @@ impl Strip {
             station_m: found.station_m,
             ahead_m: found.station_m - half_m - VehicleParameters::MKZ.front_m(around.ego_station_m),
             aside_m: (found.offset_m - ego.offset_m).abs() - half_m - around.ego_outline.half_width_m,
-            length_m: VehicleParameters::MKZ.length_m,
         }
     }
 

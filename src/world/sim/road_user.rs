@@ -11,7 +11,7 @@ use avastra_road::is_apart;
 use super::ambient::COMMANDED_MAX;
 use super::around::Around;
 use super::body::BodyParameters;
-use super::npc::Driver;
+use super::npc::{Driver, View};
 use super::pedestrian::Walker;
 use super::right_of_way::{Rights, SIDEWAYS_MPS};
 use super::trace::Trace;
@@ -152,18 +152,10 @@ impl RoadUser {
     /// Every bit that later ticks depend on.
     pub fn trace(&self, trace: &mut Trace) {
         let Obstacle { id, body, colour, verb, outline, velocity_mps, spawned_tick, .. } = &self.obstacle;
-        trace.word(u64::from(*id));
-        trace.word(*spawned_tick);
-        for word in [*body as u64, *colour as u64, *verb as u64] {
-            trace.word(word);
-        }
+        trace.words([u64::from(*id), *spawned_tick, *body as u64, *colour as u64, *verb as u64]);
         let pose = &outline.pose;
-        for value in [pose.position.x, pose.position.y, pose.heading_rad] {
-            trace.number(value);
-        }
-        for value in velocity_mps.iter() {
-            trace.number(*value);
-        }
+        trace.numbers([pose.position.x, pose.position.y, pose.heading_rad]);
+        trace.numbers([velocity_mps.x, velocity_mps.y]);
         self.mover.trace(trace);
     }
 }
@@ -184,7 +176,7 @@ impl Mover {
     /// Height of the road on its way, m; `None` for what has no way.
     pub fn elevation_m(&self) -> Option<f64> {
         match &self.motion {
-            Motion::Drive(driver) => Some(driver.way().height_at(driver.station_m())),
+            Motion::Drive(driver) => Some(driver.way.height_at(driver.station_m)),
             Motion::Walk(_) | Motion::Stand => None,
         }
     }
@@ -222,11 +214,11 @@ impl Mover {
         match &mut self.motion {
             _ if self.crashed_with.is_some() => Some(slide(this, around)),
             Motion::Drive(driver) => {
-                let (way, before_m) = (Arc::as_ptr(driver.shared_way()), driver.station_m());
-                let moved = driver.step(this, &self.size, self.touched, in_sight, around);
-                if way == Arc::as_ptr(driver.shared_way()) {
+                let (way, before_m) = (Arc::as_ptr(&driver.way), driver.station_m);
+                let moved = driver.step(&View { this, size: &self.size, around }, self.touched, in_sight);
+                if way == Arc::as_ptr(&driver.way) {
                     let front_m = this.outline.half_length_m;
-                    self.rights.pass(driver.way(), before_m + front_m, driver.station_m() + front_m, around);
+                    self.rights.pass(&driver.way, before_m + front_m, driver.station_m + front_m, around);
                 }
                 moved
             }
@@ -263,9 +255,8 @@ impl Mover {
     }
 
     fn trace(&self, trace: &mut Trace) {
-        trace.word(u64::from(self.touched));
-        trace.word(u64::from(self.crashed_with.unwrap_or(0)));
-        trace.word(u64::from(self.rest_ticks));
+        trace
+            .words([u32::from(self.touched), self.crashed_with.unwrap_or(0), self.rest_ticks].map(u64::from));
         trace.number(self.visible_fraction);
         self.rights.trace(trace);
         match &self.motion {

@@ -16,9 +16,10 @@ pub struct Scene {
     pub map: Arc<RoadMap>,
     /// Where the ego vehicle is to go.
     pub route: Route,
-    areas: ConflictAreas,
-    route_areas: Vec<RouteArea>,
-    ways: Ways,
+    pub(super) areas: ConflictAreas,
+    /// Where the ways of others cross or join the route, by rising station.
+    pub(super) route_areas: Vec<RouteArea>,
+    pub(super) ways: Ways,
     foot_ways: FootWays,
     /// Lanes outside junctions, each with the sum of the lengths up to its end, m.
     streets: Vec<(LaneIndex, f64)>,
@@ -48,6 +49,12 @@ impl Scene {
             map,
             route,
         }
+    }
+
+    /// Half the width of the route's lane at a station of the route, m.
+    pub fn half_width_m(&self, station_m: f64) -> f64 {
+        let here = self.route.lane_at(station_m);
+        self.map.lane(here.lane).width_at(station_m - here.from_m) / 2.0
     }
 
     /// The place at a fraction of all streets laid end to end, so that every metre is equally likely.
@@ -84,19 +91,6 @@ impl Scene {
         }
         known.insert(station_m.to_bits(), way);
         way
-    }
-
-    pub(super) fn ways(&self) -> &Ways {
-        &self.ways
-    }
-
-    /// Where the ways of others cross or join the route, by rising station.
-    pub(super) fn route_areas(&self) -> &[RouteArea] {
-        &self.route_areas
-    }
-
-    pub(super) fn conflict_areas(&self) -> &ConflictAreas {
-        &self.areas
     }
 }
 

@@ -10,7 +10,7 @@ use avastra_road::RoadMap;
 
 use super::sense::SignalColour;
 use super::trace::Trace;
-use super::world::DT_S;
+use super::world::{DT_S, ticks};
 
 const GREEN_S: f64 = 12.0;
 const YELLOW_S: f64 = 3.0;
@@ -23,10 +23,6 @@ const GREEN_S_MIN: f64 = 5.0;
 const GREEN_TICKS: u64 = ticks(GREEN_S);
 const YELLOW_TICKS: u64 = ticks(YELLOW_S);
 const CHANGE_TICKS: u64 = ticks(YELLOW_S) + ticks(ALL_RED_S);
-
-const fn ticks(time_s: f64) -> u64 {
-    (time_s / DT_S + 0.5) as u64
-}
 
 /// How long each of some groups is green.
 fn green_ticks(groups: u64) -> u64 {
@@ -92,10 +88,8 @@ mod tests {
     fn one_group_at_a_time() {
         let map = testing::crossing().map.clone();
         let clock = SignalClock::new(0.0);
-        let colours = |time_s: f64| {
-            let tick = (time_s / DT_S + 0.5) as u64;
-            [clock.colour(&map, 0, tick), clock.colour(&map, 1, tick)]
-        };
+        let colours =
+            |time_s: f64| [clock.colour(&map, 0, ticks(time_s)), clock.colour(&map, 1, ticks(time_s))];
         use SignalColour::{Green, Red, Yellow};
         for (time_s, expected) in [
             (0.0, [Green, Red]),

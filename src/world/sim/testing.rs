@@ -27,18 +27,24 @@ const THROUGH: (i32, &str, f64, &str) =
 const INTO: &str = r#"<successor elementType="junction" elementId="9"/>"#;
 const OUT: &str = r#"<predecessor elementType="junction" elementId="9"/>"#;
 
-/// Links of a road inside a junction.
-fn joins(from: &str, to: &str) -> String {
+/// Links of a lane inside a junction.
+fn link(from: i32, to: i32) -> String {
+    format!(r#"<link><predecessor id="{from}"/><successor id="{to}"/></link>"#)
+}
+
+/// Links of a road inside a junction: from an end of one road to the start of another.
+fn joins((from, contact): (&str, &str), to: &str) -> String {
     format!(
-        r#"<predecessor elementType="road" elementId="{from}" contactPoint="end"/>
+        r#"<predecessor elementType="road" elementId="{from}" contactPoint="{contact}"/>
         <successor elementType="road" elementId="{to}" contactPoint="start"/>"#
     )
 }
 
-fn connection(incoming: &str, connecting: &str) -> String {
+/// A way from a road into a junction: through which road, entered at which end, and from which lane to which.
+fn connection(incoming: &str, connecting: &str, contact: &str, (from, to): (i32, i32)) -> String {
     format!(
-        r#"<connection id="{incoming}" incomingRoad="{incoming}" connectingRoad="{connecting}"
-        contactPoint="start"><laneLink from="-1" to="-1"/></connection>"#
+        r#"<connection id="{incoming}-{connecting}" incomingRoad="{incoming}" connectingRoad="{connecting}"
+        contactPoint="{contact}"><laneLink from="{from}" to="{to}"/></connection>"#
     )
 }
 
@@ -88,8 +94,13 @@ pub fn world(scene: &Arc<Scene>) -> World {
 
 /// Two lanes each way along +x for 600 m; the route runs on the inner one (y = -1.75) from x = 100 to x = 500.
 pub fn straight() -> Arc<Scene> {
-    let lanes = lanes(&[2, 1, -1, -2].map(plain));
-    scene(&street("1", [0.0, 0.0, 0.0, 600.0], "-1", "", &lanes, ""), ("1", -1, 100.0), ("1", -1, 500.0))
+    along_x(&[2, 1, -1, -2].map(plain), "")
+}
+
+/// A street of 600 m along +x with these lanes and what else stands in it; the route leads from x = 100 to x = 500.
+fn along_x(of: &[(i32, &str, f64, &str)], more: &str) -> Arc<Scene> {
+    let road = street("1", [0.0, 0.0, 0.0, 600.0], "-1", "", &lanes(of), more);
+    scene(&road, ("1", -1, 100.0), ("1", -1, 500.0))
 }
 
 /// The way of the ego vehicle (y = -1.75, from x = 100 to x = 500) is crossed from the right by a
@@ -111,10 +122,10 @@ pub fn crossing_of(ego: &str, other: &str) -> Arc<Scene> {
     let north = core::f64::consts::FRAC_PI_2;
     let roads = [
         street("1", [0.0, 0.0, 0.0, 290.0], "-1", INTO, &one, &ego),
-        street("2", [290.0, 0.0, 0.0, 20.0], "9", &joins("1", "3"), &through, ""),
+        street("2", [290.0, 0.0, 0.0, 20.0], "9", &joins(("1", "end"), "3"), &through, ""),
         street("3", [310.0, 0.0, 0.0, 290.0], "-1", OUT, &one, ""),
         street("4", [298.25, -300.0, north, 290.0], "-1", INTO, &two, &other),
-        street("5", [298.25, -10.0, north, 20.0], "9", &joins("4", "6"), &through, ""),
+        street("5", [298.25, -10.0, north, 20.0], "9", &joins(("4", "end"), "6"), &through, ""),
         street("6", [298.25, 10.0, north, 290.0], "-1", OUT, &one, ""),
     ]
     .concat();
@@ -123,8 +134,8 @@ pub fn crossing_of(ego: &str, other: &str) -> Arc<Scene> {
         <controller id="c1"><control signalId="other"/></controller>
         <junction id="9" name="crossing">{}{}<controller id="c0" sequence="0"/>
         <controller id="c1" sequence="1"/></junction>"#,
-        connection("1", "2"),
-        connection("4", "5")
+        connection("1", "2", "start", (-1, -1)),
+        connection("4", "5", "start", (-1, -1))
     );
     scene(&map, ("1", -1, 100.0), ("3", -1, 190.0))
 }
@@ -158,9 +169,8 @@ pub fn overpass(height_m: f64) -> Arc<Scene> {
 
 /// A street of 600 m along +x with a lane each way that climbs at 10 %; the route leads from x = 100 to x = 500.
 pub fn hill() -> Arc<Scene> {
-    let both = lanes(&[plain(1), plain(-1)]);
     let climbs = r#"<elevationProfile><elevation s="0" a="20" b="0.1"/></elevationProfile>"#;
-    scene(&street("1", [0.0, 0.0, 0.0, 600.0], "-1", "", &both, climbs), ("1", -1, 100.0), ("1", -1, 500.0))
+    along_x(&[1, -1].map(plain), climbs)
 }
 
 /// A street from west (road 1) to east (road 3) through a junction at the origin, with a lane each way, 200 m
@@ -169,32 +179,12 @@ pub fn hill() -> Arc<Scene> {
 /// south (through road 8). All have the same light.
 pub fn oncoming(heading: Heading) -> Arc<Scene> {
     let (both, one) = (lanes(&[plain(1), plain(-1)]), lanes(&[plain(-1)]));
-    let link = |id: i32, from: i32| {
-        let link = format!(r#"<link><predecessor id="{from}"/><successor id="{from}"/></link>"#);
-        format!(r#"<lane id="{id}" type="driving"><width a="3.5"/>{link}</lane>"#)
-    };
-    let through = format!(
-        r#"<laneSection s="0"><left>{}</left><right>{}</right></laneSection>"#,
-        link(1, 1),
-        link(-1, -1)
-    );
-    let turn = |from: i32| {
-        let link = format!(r#"<link><predecessor id="{from}"/><successor id="-1"/></link>"#);
-        format!(
-            r#"<laneSection s="0"><right><lane id="-1" type="driving"><width a="3.5"/>{link}</lane></right></laneSection>"#
-        )
-    };
+    let through = lanes(&[(1, "driving", 3.5, link(1, 1).as_str()), THROUGH]);
+    let turn = |from: i32| lanes(&[(-1, "driving", 3.5, link(from, -1).as_str())]);
+    let (pi, turned_m) = (core::f64::consts::PI, 5.0 * core::f64::consts::PI);
     let arc = |x_m: f64, heading_rad: f64| {
-        let length_m = 5.0 * core::f64::consts::PI;
         format!(
-            r#"<geometry s="0" x="{x_m}" y="0" hdg="{heading_rad}" length="{length_m}"><arc curvature="0.1"/></geometry>"#
-        )
-    };
-    let ends = |from: (&str, &str), to: &str| {
-        let (from, contact) = from;
-        format!(
-            r#"<predecessor elementType="road" elementId="{from}" contactPoint="{contact}"/>
-            <successor elementType="road" elementId="{to}" contactPoint="start"/>"#
+            r#"<geometry s="0" x="{x_m}" y="0" hdg="{heading_rad}" length="{turned_m}"><arc curvature="0.1"/></geometry>"#
         )
     };
     let light = |id: &str, s_m: f64, orientation: &str| {
@@ -202,24 +192,17 @@ pub fn oncoming(heading: Heading) -> Arc<Scene> {
             r#"<signals><signal id="{id}" s="{s_m}" t="0" orientation="{orientation}" dynamic="yes" type="1000001"/></signals>"#
         )
     };
-    let (pi, turned_m) = (core::f64::consts::PI, 5.0 * core::f64::consts::PI);
     let (north, south) = (pi / 2.0, -pi / 2.0);
     let roads = [
         street("1", [-210.0, 0.0, 0.0, 200.0], "-1", INTO, &both, &light("west", 198.0, "+")),
         street("3", [10.0, 0.0, 0.0, 200.0], "-1", OUT, &both, &light("east", 2.0, "-")),
         street("5", [0.0, 10.0, north, 190.0], "-1", OUT, &one, ""),
         street("6", [0.0, -10.0, south, 190.0], "-1", OUT, &one, ""),
-        street("2", [-10.0, 0.0, 0.0, 20.0], "9", &ends(("1", "end"), "3"), &through, ""),
-        road("7", turned_m, "9", &ends(("1", "end"), "5"), &arc(-10.0, 0.0), &turn(-1), ""),
-        road("8", turned_m, "9", &ends(("3", "start"), "6"), &arc(10.0, pi), &turn(1), ""),
+        street("2", [-10.0, 0.0, 0.0, 20.0], "9", &joins(("1", "end"), "3"), &through, ""),
+        road("7", turned_m, "9", &joins(("1", "end"), "5"), &arc(-10.0, 0.0), &turn(-1), ""),
+        road("8", turned_m, "9", &joins(("3", "start"), "6"), &arc(10.0, pi), &turn(1), ""),
     ]
     .concat();
-    let connection = |incoming: &str, connecting: &str, contact: &str, (from, to): (i32, i32)| {
-        format!(
-            r#"<connection id="{incoming}-{connecting}" incomingRoad="{incoming}" connectingRoad="{connecting}"
-            contactPoint="{contact}"><laneLink from="{from}" to="{to}"/></connection>"#
-        )
-    };
     let connections = [
         connection("1", "2", "start", (-1, -1)),
         connection("3", "2", "end", (1, 1)),
@@ -240,10 +223,8 @@ pub fn oncoming(heading: Heading) -> Arc<Scene> {
 
 /// As [`straight`], with a zebra crossing 6 m wide where the ego vehicle's front is after 70 m.
 pub fn zebra() -> Arc<Scene> {
-    let lanes = lanes(&[2, 1, -1, -2].map(plain));
     let zebra = r#"<objects><object type="crosswalk" id="zebra" s="172" t="0" length="6" width="16" hdg="0"/></objects>"#;
-    let road = street("1", [0.0, 0.0, 0.0, 600.0], "-1", "", &lanes, zebra);
-    scene(&road, ("1", -1, 100.0), ("1", -1, 500.0))
+    along_x(&[2, 1, -1, -2].map(plain), zebra)
 }
 
 /// Four one-lane streets through the origin, to the east, north, west and south, 200 m each way, that
@@ -257,9 +238,9 @@ pub fn four_arms() -> Arc<Scene> {
         let at = |from_m: f64, length_m: f64| [cos * from_m, sin * from_m, heading_rad, length_m];
         let [into, inside, out] = ["in", "through", "out"].map(|part| format!("{part}-{arm}"));
         roads += &street(&into, at(-210.0, 200.0), "-1", INTO, &one, "");
-        roads += &street(&inside, at(-10.0, 20.0), "9", &joins(&into, &out), &through, "");
+        roads += &street(&inside, at(-10.0, 20.0), "9", &joins((into.as_str(), "end"), &out), &through, "");
         roads += &street(&out, at(10.0, 200.0), "-1", OUT, &one, "");
-        connections += &connection(&into, &inside);
+        connections += &connection(&into, &inside, "start", (-1, -1));
     }
     let map = format!(r#"{roads}<junction id="9" name="middle">{connections}</junction>"#);
     scene(&map, ("in-e", -1, 110.0), ("out-e", -1, 150.0))
@@ -267,8 +248,7 @@ pub fn four_arms() -> Arc<Scene> {
 
 /// Two lanes to the east with a planted strip of 2 m between them; the route is on the left one.
 pub fn divided() -> Arc<Scene> {
-    let lanes = lanes(&[plain(-1), (-2, "median", 2.0, ""), plain(-3)]);
-    scene(&street("1", [0.0, 0.0, 0.0, 600.0], "-1", "", &lanes, ""), ("1", -1, 100.0), ("1", -1, 500.0))
+    along_x(&[plain(-1), (-2, "median", 2.0, ""), plain(-3)], "")
 }
 
 /// Road 2, from its surveyed start to its goal.

@@ -32,10 +32,16 @@ fn drive(world: &mut World, speed_mps: f64, time_s: f64) -> Vec<Contact> {
     let end_s = world.time_s() + time_s;
     let mut contacts = Vec::new();
     while world.time_s() < end_s - 1e-9 {
-        let control = hold(world, speed_mps);
-        contacts.extend_from_slice(world.tick(&control));
+        contacts.extend_from_slice(world.tick(&hold(world, speed_mps)));
     }
     contacts
+}
+
+/// A world after a drive at a speed for a while.
+fn driven(scene: &Arc<Scene>, speed_mps: f64, time_s: f64) -> World {
+    let mut world = testing::world(scene);
+    drive(&mut world, speed_mps, time_s);
+    world
 }
 
 fn spawn(world: &mut World, request: SpawnRequest) -> Obstacle {
@@ -52,8 +58,7 @@ fn y_m(world: &World, id: u32) -> f64 {
 
 #[test]
 fn ahead_and_then_into_the_lane_of_the_ego_vehicle() {
-    let mut world = testing::world(&testing::straight());
-    drive(&mut world, 8.0, 5.0);
+    let mut world = driven(&testing::straight(), 8.0, 5.0);
     let own = spawn(&mut world, request(Verb::DriveAhead, 50.0, 10.0));
     assert!((distance_m(&world.ego_outline(), &own.outline) - 50.0).abs() < 1e-6);
     assert!((own.velocity_mps.x - 10.0).abs() < 1e-9);
@@ -63,8 +68,7 @@ fn ahead_and_then_into_the_lane_of_the_ego_vehicle() {
     assert!((beside.outline.pose.position.y + 5.25).abs() < 1e-9);
     let mut sideways_mps: f64 = 0.0;
     for _ in 0..400 {
-        let control = hold(&world, 8.0);
-        world.tick(&control);
+        world.tick(&hold(&world, 8.0));
         let now = world.obstacle(beside.id).expect("it drives on");
         sideways_mps = sideways_mps.max(now.velocity_mps.y);
     }
@@ -75,8 +79,7 @@ fn ahead_and_then_into_the_lane_of_the_ego_vehicle() {
 
 #[test]
 fn impossible_spawns_are_refused() {
-    let mut world = testing::world(&testing::straight());
-    drive(&mut world, 8.0, 5.0);
+    let world = driven(&testing::straight(), 8.0, 5.0);
     let ahead = request(Verb::DriveAhead, 50.0, 10.0);
     for speed_mps in [f64::NAN, f64::INFINITY, -0.1, 70.1, 1e300] {
         let refusal = world.survey(&SpawnRequest { speed_mps, ..ahead }).expect_err("no such speed");
@@ -96,8 +99,7 @@ fn impossible_spawns_are_refused() {
 
 #[test]
 fn refusals_say_why() {
-    let mut world = testing::world(&testing::straight());
-    drive(&mut world, 8.0, 5.0);
+    let mut world = driven(&testing::straight(), 8.0, 5.0);
     let refused =
         |world: &World, request: SpawnRequest| world.survey(&request).expect_err("it is impossible");
     let left = SpawnRequest { lane: LaneChoice::Left, ..request(Verb::DriveAhead, 12.0, 10.0) };
@@ -117,8 +119,7 @@ fn refusals_say_why() {
 #[test]
 fn overtakes_and_cuts_in() {
     for lane in [LaneChoice::Right, LaneChoice::Current] {
-        let mut world = testing::world(&testing::straight());
-        drive(&mut world, 8.0, 8.0);
+        let mut world = driven(&testing::straight(), 8.0, 8.0);
         let passing = SpawnRequest { lane, then: Then::Change, ..request(Verb::Overtake, 12.0, 14.0) };
         let passing = spawn(&mut world, passing);
         assert!(passing.outline.pose.position.x < world.ego_outline().pose.position.x - 12.0);
@@ -131,8 +132,7 @@ fn overtakes_and_cuts_in() {
 
 #[test]
 fn does_not_come_where_it_cannot_pass() {
-    let mut world = testing::world(&testing::crossing());
-    drive(&mut world, 8.0, 6.0);
+    let world = driven(&testing::crossing(), 8.0, 6.0);
     let refusal = world.survey(&request(Verb::Overtake, 15.0, 12.0)).expect_err("there is one lane");
     assert_eq!(refusal, "no lane beside it to change to");
     let refusal = world.survey(&request(Verb::Overtake, 15.0, 7.0)).expect_err("it is too slow");
@@ -142,8 +142,7 @@ fn does_not_come_where_it_cannot_pass() {
 #[test]
 fn comes_towards_in_the_inner_opposing_lane() {
     for then in [Then::Keep, Then::Change] {
-        let mut world = testing::world(&testing::straight());
-        drive(&mut world, 8.0, 5.0);
+        let mut world = driven(&testing::straight(), 8.0, 5.0);
         let towards = SpawnRequest { then, ..request(Verb::DriveOpposite, 50.0, 12.0) };
         let towards = spawn(&mut world, towards);
         assert!(towards.velocity_mps.x < -11.9);
@@ -161,8 +160,7 @@ fn crosses_when_the_ego_vehicle_is_there() {
         let start = Start { signal_phase_s: 10.0, ..testing::start() };
         let mut world = World::new(testing::crossing(), &start);
         while world.ego_station_m() < begin_m {
-            let control = hold(&world, 13.5);
-            world.tick(&control);
+            world.tick(&hold(&world, 13.5));
         }
         let across = SpawnRequest { then, ..request(Verb::CrossRoad, 30.0, 10.0) };
         // Its light is green from 7 to 19 s.
@@ -177,8 +175,7 @@ fn crosses_when_the_ego_vehicle_is_there() {
 
 #[test]
 fn a_red_light_stops_and_refuses() {
-    let mut world = testing::world(&testing::crossing());
-    drive(&mut world, 12.0, 4.0);
+    let mut world = driven(&testing::crossing(), 12.0, 4.0);
     // The light of the ego vehicle is green until 12 s, so the other one's is red.
     while world.ego_station_m() < 145.0 {
         drive(&mut world, 12.0, 0.1);
@@ -197,8 +194,7 @@ fn a_red_light_stops_and_refuses() {
 
 #[test]
 fn a_pedestrian_run_over_is_one_contact() {
-    let mut world = testing::world(&testing::straight());
-    drive(&mut world, 15.0, 10.0);
+    let mut world = driven(&testing::straight(), 15.0, 10.0);
     let standing = spawn(&mut world, request(Verb::Stand, 40.0, 1.0));
     let before_mps = world.ego().speed_mps;
     let contacts = drive(&mut world, 15.0, 6.0);
@@ -245,8 +241,7 @@ fn a_pedestrian_meets_the_ego_vehicle() {
 
 #[test]
 fn a_pedestrian_steps_out_from_behind_a_parked_vehicle() {
-    let mut world = testing::world(&testing::straight());
-    drive(&mut world, 10.0, 6.0);
+    let mut world = driven(&testing::straight(), 10.0, 6.0);
     let hidden = SpawnRequest { cover: Some(Body::BoxTruck), ..request(Verb::Walk, 60.0, 1.4) };
     let facts = world.survey(&hidden).expect("there is room");
     let walker = world.apply(&Effect::Spawn(hidden)).expect("there is room").expect("it has an id");
@@ -325,25 +320,23 @@ fn busy_world(scene: &Arc<Scene>, seed: u64) -> World {
     world
 }
 
+fn scenes() -> [Arc<Scene>; 3] {
+    [testing::straight(), testing::crossing(), testing::corner()]
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
     #[test]
     fn drivers_do_not_run_into_each_other(seed in 0_u64..1000, road in 0..3) {
-        let scene = match road {
-            0 => testing::straight(),
-            1 => testing::crossing(),
-            _ => testing::corner(),
-        };
-        let mut world = busy_world(&scene, seed);
+        let mut world = busy_world(&scenes()[road as usize], seed);
         world.apply(&Effect::Sky(Phenomenon::Wetness, Level::Moderate)).expect("the sky obeys");
         let mut met = Vec::new();
         // The ego vehicle brakes: those behind must, too.
         for _ in 0..1000 {
             let speed_mps = if world.time_s() < 10.0 { 10.0 } else { 0.0 };
-            let control = hold(&world, speed_mps);
             let before: Vec<Obstacle> = world.obstacles().copied().collect();
-            world.tick(&control);
+            world.tick(&hold(&world, speed_mps));
             for was in before.iter().filter(|was| was.verb != Verb::Walk) {
                 let Some(now) = world.obstacle(was.id) else { continue };
                 let now_met = world.incidents().iter().map(|incident| (incident.obstacle, incident.other));
@@ -365,21 +358,15 @@ proptest! {
             }
         }
     }
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
     /// With all road users under way, in a changing sky: a clone of any moment drives on as its original.
     #[test]
     fn a_branch_of_any_moment_goes_on_alike(seed in 0_u64..1000, road in 0..3, moment in 1_u32..900, turn in 0..4) {
-        let scene = [testing::straight(), testing::crossing(), testing::corner()][road as usize].clone();
-        let mut world = busy_world(&scene, seed);
+        let mut world = busy_world(&scenes()[road as usize], seed);
         let level = Level::ALL[turn as usize];
         let sky = [Effect::Sky(Phenomenon::Rain, level), Effect::Sky(Phenomenon::Fog, Level::Light)];
         for _ in 0..moment {
-            let control = hold(&world, 9.0);
-            world.tick(&control);
+            world.tick(&hold(&world, 9.0));
         }
         let mut branch = world.clone();
         let go_on = |world: &mut World| {
@@ -392,8 +379,7 @@ proptest! {
                     // Some do not fit, which is no matter here.
                     let _refusal = world.apply(&Effect::Spawn(request(Verb::DriveAhead, 40.0, 10.0)));
                 }
-                let control = hold(world, 7.0);
-                met.extend_from_slice(world.tick(&control));
+                met.extend_from_slice(world.tick(&hold(world, 7.0)));
             }
             (met, digest(world), world.sensed())
         };
@@ -431,8 +417,7 @@ fn an_unsignalled_crossing_flows() {
 
 #[test]
 fn no_vehicle_changes_lanes_across_a_median() {
-    let mut world = testing::world(&testing::divided());
-    drive(&mut world, 8.0, 5.0);
+    let world = driven(&testing::divided(), 8.0, 5.0);
     for (verb, lane) in [
         (Verb::DriveAhead, LaneChoice::Current),
         (Verb::DriveAhead, LaneChoice::Right),
@@ -450,8 +435,7 @@ fn no_vehicle_changes_lanes_across_a_median() {
 fn a_crosser_that_cannot_go_on_does_not_vanish_in_sight() {
     let mut world = World::new(testing::crossing(), &Start { signal_phase_s: 10.0, ..testing::start() });
     while world.ego_station_m() < 150.0 {
-        let control = hold(&world, 15.0);
-        world.tick(&control);
+        world.tick(&hold(&world, 15.0));
     }
     let across = spawn(&mut world, request(Verb::CrossRoad, 25.0, 10.0));
     // The ego vehicle stops on the crossing and stays there.
@@ -469,8 +453,7 @@ fn a_crosser_that_cannot_go_on_does_not_vanish_in_sight() {
 
 #[test]
 fn a_vehicle_that_appears_in_plain_view_leaves_time_to_notice() {
-    let mut world = testing::world(&testing::straight());
-    drive(&mut world, 12.0, 10.0);
+    let mut world = driven(&testing::straight(), 12.0, 10.0);
     // Faster than the ego vehicle, so no brakes are needed; but it was not there a moment ago.
     let wish = request(Verb::DriveAhead, 10.0, 20.0);
     let facts = world.survey(&wish).expect("there is room");
@@ -506,8 +489,7 @@ fn ambient_traffic_is_there_and_comes_from_afar() {
     let mut known: Vec<u32> = world.obstacles().map(|obstacle| obstacle.id).collect();
     let mut newcomers = 0;
     while !world.arrived() {
-        let control = hold(&world, 7.0);
-        world.tick(&control);
+        world.tick(&hold(&world, 7.0));
         assert!(world.obstacles().len() <= 6);
         for obstacle in world.obstacles() {
             assert!(obstacle.is_ambient());
@@ -527,12 +509,11 @@ fn ambient_traffic_is_there_and_comes_from_afar() {
 #[test]
 fn drivers_seldom_run_into_each_other() {
     let mut met = 0;
-    for scene in [testing::straight(), testing::crossing(), testing::corner()] {
+    for scene in scenes() {
         for seed in 0..100 {
             let mut world = busy_world(&scene, seed);
             for _ in 0..1500 {
-                let control = hold(&world, 8.0);
-                world.tick(&control);
+                world.tick(&hold(&world, 8.0));
                 let drives = |id| world.obstacle(id).is_some_and(|obstacle| obstacle.verb != Verb::Walk);
                 let of_drivers = |incident: &&Incident| drives(incident.obstacle) && drives(incident.other);
                 met += world.incidents().iter().filter(of_drivers).count();

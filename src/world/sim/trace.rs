@@ -43,6 +43,16 @@ impl Trace {
         self.word((number + 0.0).to_bits());
     }
 
+    #[inline]
+    pub fn words(&mut self, words: impl IntoIterator<Item = u64>) {
+        words.into_iter().for_each(|word| self.word(word));
+    }
+
+    #[inline]
+    pub fn numbers(&mut self, numbers: impl IntoIterator<Item = f64>) {
+        numbers.into_iter().for_each(|number| self.number(number));
+    }
+
     /// SHA-256 over what the words up to now left.
     pub fn digest(&self) -> [u8; 32] {
         let mut hash = Sha256::new();
@@ -59,7 +69,7 @@ mod tests {
 
     fn digest(words: &[u64]) -> [u8; 32] {
         let mut trace = Trace::default();
-        words.iter().for_each(|word| trace.word(*word));
+        trace.words(words.iter().copied());
         trace.digest()
     }
 

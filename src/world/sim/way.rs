@@ -84,7 +84,7 @@ impl Way {
             beyond_m += map.lane(last).centre.length_m();
             chain.push(last);
         }
-        scene.ways().through(scene, chain)
+        scene.ways.through(scene, chain)
     }
 
     fn through(scene: &Scene, chain: &[LaneIndex]) -> Option<Way> {
@@ -108,7 +108,7 @@ impl Way {
             );
             let stops = lane.sign_lines.iter().filter(|line| line.kind == SignKind::Stop);
             stop_signs_m.extend(stops.map(|line| from_m + line.station_m));
-            let on_lane = scene.conflict_areas().of(*index).iter();
+            let on_lane = scene.areas.of(*index).iter();
             areas.extend(on_lane.map(|area| Area {
                 from_m: from_m + area.from_m,
                 to_m: from_m + area.to_m,
@@ -135,43 +135,6 @@ impl Way {
             open,
             end_m,
         })
-    }
-
-    /// Where the outline's centre of a body is that has driven to a station: both axles are on the way.
-    ///
-    /// The station is that of the rear axle plus the distance from there to the centre, so on a straight
-    /// way it is the centre's. In a bend the body is a chord of the way: its middle cuts the bend, and its
-    /// tail swings out less than if the body turned about its centre. A real rear axle cuts a bend farther;
-    /// its driver swings out before to stay in the lane, which is not modelled.
-    pub fn body_at(&self, station_m: f64, body: &BodyParameters) -> Pose {
-        let rear_m = station_m - body.rear_axle_m;
-        let rear = self.path.position_at(rear_m);
-        let wheelbase = self.path.position_at(rear_m + body.wheelbase_m) - rear;
-        let length_m = wheelbase.norm();
-        Pose {
-            position: rear + wheelbase * (body.rear_axle_m / length_m),
-            heading_rad: libm::atan2(wheelbase.y, wheelbase.x),
-        }
-    }
-
-    /// A path as a way without lanes.
-    #[cfg(test)]
-    pub fn of_path(path: Path) -> Way {
-        let speeds_mps_max = bend_speeds_mps(&path);
-        let (lanes, stop_lines, areas) = (Vec::new(), Vec::new(), Vec::new());
-        let stop_signs_m = Vec::new();
-        Way {
-            path,
-            lanes,
-            heights: Heights::default(),
-            lane_bits: 0,
-            stop_lines,
-            stop_signs_m,
-            areas,
-            speeds_mps_max,
-            open: false,
-            end_m: None,
-        }
     }
 
     /// Height of the road at a station, m.
@@ -232,6 +195,23 @@ impl Way {
         let after = self.lanes.partition_point(|part| part.from_m <= station_m - BEHIND_M).max(1);
         let rest: Vec<LaneIndex> = self.lanes[after - 1..].iter().map(|part| part.lane).collect();
         Some((Way::along(scene, &rest, rng)?, station_m - self.lanes[after - 1].from_m))
+    }
+}
+
+/// Where the outline's centre of a body is that has driven to a station of a way: both axles are on the way.
+///
+/// The station is that of the rear axle plus the distance from there to the centre, so on a straight
+/// way it is the centre's. In a bend the body is a chord of the way: its middle cuts the bend, and its
+/// tail swings out less than if the body turned about its centre. A real rear axle cuts a bend farther;
+/// its driver swings out before to stay in the lane, which is not modelled.
+pub(super) fn body_at(path: &Path, station_m: f64, body: &BodyParameters) -> Pose {
+    let rear_m = station_m - body.rear_axle_m;
+    let rear = path.position_at(rear_m);
+    let wheelbase = path.position_at(rear_m + body.wheelbase_m) - rear;
+    let length_m = wheelbase.norm();
+    Pose {
+        position: rear + wheelbase * (body.rear_axle_m / length_m),
+        heading_rad: libm::atan2(wheelbase.y, wheelbase.x),
     }
 }
 
@@ -312,21 +292,14 @@ mod tests {
     #[test]
     fn a_way_that_ends_at_the_edge_of_the_map_goes_on_straight() {
         let scene = testing::crossing();
-        let of = |road: &str, lane: i32| {
-            let at = |key: &avastra_road::LaneKey| key.road == road && key.lane == lane;
-            LaneIndex(scene.map.lanes.iter().position(|lane| at(&lane.key)).expect("it is there"))
+        let way = |road: &str, lane: i32| {
+            let lane = scene.map.place(road, lane, 100.0).expect("it is there").lane;
+            Way::along(&scene, &[lane], &mut rng::stream(1, rng::Stream::Traffic, 0)).expect("it is a lane")
         };
-        let way = |lane| {
-            Way::along(
-                &scene,
-                &[lane],
-                &mut avastra_base::rng::stream(1, avastra_base::rng::Stream::Traffic, 0),
-            )
-        };
-        let out = way(of("6", -1)).expect("it is a lane");
+        let out = way("6", -1);
         assert!(!out.open && out.end_m.is_none());
         // The second lane of the crossing street ends before the junction: whoever is in it must stop.
-        let bay = way(of("4", -2)).expect("it is a lane");
+        let bay = way("4", -2);
         let end_m = bay.end_m.expect("lanes lie beyond");
         assert!((end_m - bay.path.length_m()).abs() < 2.0 * BEYOND_STEP_M, "{end_m}");
     }

@@ -46,6 +46,11 @@ pub const ENGINE: &str = "plane/8";
 /// One physics step, s: 50 Hz.
 pub const DT_S: f64 = TICK_MS as f64 / 1000.0;
 
+/// The ticks of a time, to the nearest.
+pub(super) const fn ticks(time_s: f64) -> u64 {
+    (time_s / DT_S + 0.5) as u64
+}
+
 /// Commanded obstacles at a time. For the next one, the oldest that is out of sight leaves; in the published package the
 /// oldest leaves wherever it is.
 const OBSTACLES_MAX: usize = COMMANDED_MAX as usize;
@@ -172,7 +177,7 @@ impl World {
             incidents: Vec::new(),
             scene,
         };
-        for _ in 0..world.ambient.wanted() {
+        for _ in 0..world.ambient.wanted {
             world.renew_ambient(true);
         }
         world
@@ -216,7 +221,7 @@ impl World {
         self.users = users;
         self.measure();
         self.ticks += 1;
-        if self.ambient.wanted() > 0 && self.ticks.is_multiple_of(RENEWAL_TICKS) {
+        if self.ambient.wanted > 0 && self.ticks.is_multiple_of(RENEWAL_TICKS) {
             self.renew_ambient(false);
         }
         if self.ticks.is_multiple_of(FRAME_TICKS) {
@@ -385,8 +390,7 @@ impl World {
     pub fn trace(&self, trace: &mut Trace) {
         trace.word(self.ticks);
         self.ego.trace(trace);
-        trace.number(self.ego_station_m);
-        trace.number(self.ego_offset_m);
+        trace.numbers([self.ego_station_m, self.ego_offset_m]);
         trace.word(u64::from(self.red_runs));
         PassedLight::trace(self.ego_passed.as_ref(), trace);
         self.environment.trace(trace);
@@ -394,8 +398,7 @@ impl World {
         self.signals.trace(trace);
         trace.word(u64::from(self.next_id));
         self.ambient.trace(trace);
-        trace.word(self.weather_tick);
-        trace.word(self.seed);
+        trace.words([self.weather_tick, self.seed]);
         for user in &self.users {
             user.trace(trace);
         }
@@ -432,7 +435,7 @@ impl World {
     /// Whether the road user with an id is in a junction that it entered at a red light.
     pub fn runs_red(&self, id: u32) -> bool {
         let user = self.users.iter().find(|user| user.obstacle.id == id);
-        let passed = user.and_then(|user| Some((user.mover.rights.passed_light()?, &user.obstacle.outline)));
+        let passed = user.and_then(|user| Some((user.mover.rights.passed?, &user.obstacle.outline)));
         passed.is_some_and(|(passed, outline)| passed.is_being_run(&self.scene.map, outline))
     }
 
@@ -440,8 +443,7 @@ impl World {
     /// lane change it is in one of two lanes.
     pub fn is_astray(&self) -> bool {
         let (route, station_m) = (&self.scene.route, self.ego_station_m);
-        let here = route.lane_at(station_m);
-        let half_m = self.scene.map.lane(here.lane).width_at(station_m - here.from_m) / 2.0;
+        let half_m = self.scene.half_width_m(station_m);
         let changes = |change: &RouteLaneChange| (change.begin_m..change.latest_m).contains(&station_m);
         !self.ego.motion.touched && self.ego_offset_m.abs() > half_m && !route.changes.iter().any(changes)
     }
@@ -506,7 +508,7 @@ impl World {
         let commanded = self.users.iter().enumerate().filter(|(_, user)| !user.obstacle.is_ambient());
         let wanted = commanded.clone().count() + Effect::Spawn(*request).newcomers() as usize;
         let too_many = wanted.saturating_sub(OBSTACLES_MAX);
-        let around = self.around([&self.users, &[]]);
+        let around = self.alone();
         let is_hidden = |user: &RoadUser| {
             self.traffic.oldest_leaves_in_sight
                 || !around.is_in_sight(&user.obstacle, user.mover.visible_fraction)
@@ -522,12 +524,12 @@ impl World {
         let is_gone = |user: &RoadUser| user.obstacle.is_ambient() && is_gone(&user.obstacle, &ego_outline);
         self.users.retain(|user| !is_gone(user));
         let present = self.obstacles().filter(|obstacle| obstacle.is_ambient()).count();
-        if !self.ambient.lacks(present) {
+        if present >= self.ambient.wanted as usize {
             return;
         }
         // A copy, because the attempt looks at the world.
         let mut ambient = self.ambient.clone();
-        let newcomer = ambient.attempt(&self.around([&self.users, &[]]), begins);
+        let newcomer = ambient.attempt(&self.alone(), begins);
         self.users.extend(newcomer);
         self.ambient = ambient;
     }

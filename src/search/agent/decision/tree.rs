@@ -22,7 +22,8 @@ pub struct Visit {
 impl Visit {
     /// How much can be lost here: the highest Q-value less the lowest of the open rows (VIPER, Eq. 4).
     pub fn stake(&self) -> f64 {
-        let lowest = self.open_values().map(|(_, value)| value).fold(f64::INFINITY, f64::min);
+        let open = self.q_values.iter().zip(&self.open).filter(|(_, is_open)| **is_open);
+        let lowest = open.map(|(&value, _)| f64::from(value)).fold(f64::INFINITY, f64::min);
         f64::from(self.q_values[self.best]) - lowest
     }
 
@@ -32,11 +33,6 @@ impl Visit {
             Some(row) => f64::from(self.q_values[self.best] - self.q_values[row]),
             None => self.stake(),
         }
-    }
-
-    fn open_values(&self) -> impl Iterator<Item = (usize, f64)> {
-        let rows = self.q_values.iter().zip(&self.open).enumerate();
-        rows.filter(|(_, (_, is_open))| **is_open).map(|(row, (&value, _))| (row, f64::from(value)))
     }
 }
 
@@ -77,12 +73,10 @@ pub(super) fn grow(visits: &[Visit], variables: &[usize], bounds: Bounds) -> Tre
     let grower = Grower { visits, stakes, variables, bounds };
     let mut buds = vec![grower.bud((0..visits.len()).collect(), 0)];
     for _ in 1..bounds.leaves {
-        let gain = |bud: &Bud| bud.split.as_ref().map(|split| split.gain);
-        let best = (0..buds.len()).filter(|&at| buds[at].split.is_some()).fold(None, |best, at| match best {
-            Some(other) if gain(&buds[other]) >= gain(&buds[at]) => Some(other),
-            _ => Some(at),
-        });
-        let Some(at) = best else { break };
+        // Of equal gains the first counts.
+        let gain = |at: usize| Some((at, buds[at].split.as_ref()?.gain));
+        let gains = (0..buds.len()).rev().filter_map(gain);
+        let Some((at, _)) = gains.max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
         let Some(split) = buds[at].split.take() else { break };
         let (inside, outside): (Vec<usize>, Vec<usize>) =
             buds[at].visits.iter().partition(|&&visit| holds(&split.condition, &visits[visit].observation));

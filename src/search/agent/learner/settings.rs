@@ -16,7 +16,7 @@ use crate::agent::presets;
 use crate::agent::q_policy::{ChoiceSettings, QPolicy, Rows};
 use crate::agent::replay::{Replay, ReplaySettings};
 use crate::agent::settings::{
-    Configured, Requirement, SettingsError, changed, count, positive, record, require, unit, within,
+    Configured, SettingsError, changed, count, positive, record, require, unit, within,
 };
 use avastra_base::rng;
 use avastra_base::rng::Stream;
@@ -103,10 +103,7 @@ impl Configured for LearnerSettings {
         self.rules.check()?;
         require([
             unit("discount", self.discount),
-            Requirement {
-                is_met: (0.0..1.0).contains(&self.average_decay),
-                ..within("average_decay", self.average_decay, 0.0..=1.0, "at least 0, and below 1")
-            },
+            within("average_decay", self.average_decay, 0.0..1.0, "at least 0, and below 1"),
             positive("learning_rate", self.learning_rate),
             count("batch_len", self.batch_len as u64, 4096),
             count("n_step", self.n_step as u64, 100),

@@ -62,14 +62,6 @@ impl ReplaySettings {
     }
 }
 
-/// A transition that was drawn.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SampledTransition {
-    pub index: usize,
-    /// Importance weight, in `(0, 1]`, the largest of its batch being 1.
-    pub weight: f32,
-}
-
 /// The most recent transitions, up to a capacity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Replay {
@@ -146,26 +138,22 @@ impl Replay {
         self.next = (index + 1) % self.settings.replay_capacity;
     }
 
-    /// Draws a batch, one from each of `count` equal parts of the whole mass, with replacement.
+    /// Draws a batch, one from each of `count` equal parts of the whole mass, with replacement: the index of each
+    /// transition and its importance weight, in `(0, 1]`, the largest being 1.
     ///
     /// β, which depends on the updates so far, makes up for the uneven draw: 0 not at all, 1 in full. The buffer must
     /// not be empty.
-    pub fn sample(&self, count: usize, updates: u64, rng: &mut Rng) -> Vec<SampledTransition> {
+    pub fn sample(&self, count: usize, updates: u64, rng: &mut Rng) -> Vec<(usize, f32)> {
         let importance_exponent = self.settings.importance_exponent(updates);
         let part = self.tree.total() / count as f64;
-        let mut samples = Vec::with_capacity(count);
-        let mut weights = Vec::with_capacity(count);
-        for nth in 0..count {
+        let draw = |nth: usize| {
             let index = self.tree.find(part * (nth as f64 + rng::unit(rng)));
             let probability = self.tree.get(index) / self.tree.total();
-            weights.push(libm::pow(self.len() as f64 * probability, -importance_exponent));
-            samples.push(index);
-        }
-        let weight_max = weights.iter().copied().fold(0.0, f64::max);
-        let drawn = samples.into_iter().zip(weights);
-        drawn
-            .map(|(index, weight)| SampledTransition { index, weight: (weight / weight_max) as f32 })
-            .collect()
+            (index, libm::pow(self.len() as f64 * probability, -importance_exponent))
+        };
+        let drawn: Vec<(usize, f64)> = (0..count).map(draw).collect();
+        let weight_max = drawn.iter().map(|(_, weight)| *weight).fold(0.0, f64::max);
+        drawn.into_iter().map(|(index, weight)| (index, (weight / weight_max) as f32)).collect()
     }
 
     /// Sets a priority by a new TD error.
@@ -219,11 +207,10 @@ mod tests {
             for _ in 0..2000 {
                 let samples = replay.sample(10, 1, &mut rng);
                 let weight = |index: usize| libm::pow(5.0 * mass(index) / total, -0.5);
-                let most = samples.iter().map(|sample| weight(sample.index)).fold(0.0, f64::max);
-                for sample in samples {
-                    drawn[sample.index] += 1;
-                    let expected = weight(sample.index) / most;
-                    assert!((f64::from(sample.weight) - expected).abs() < 1e-6);
+                let most = samples.iter().map(|&(index, _)| weight(index)).fold(0.0, f64::max);
+                for (index, found) in samples {
+                    drawn[index] += 1;
+                    assert!((f64::from(found) - weight(index) / most).abs() < 1e-6);
                 }
             }
             for (index, &count) in drawn.iter().enumerate() {

@@ -208,14 +208,7 @@ impl Hunt {
             self.local = Some((around, 0));
             return queue;
         }
-        self.breed(settings, rows, rng)
-    }
-
-    fn breed(&mut self, settings: &AvFuzzerSettings, rows: usize, rng: &mut Rng) -> Vec<usize> {
-        self.population.select(rng);
-        let mut touched = self.population.cross(settings.crossover_probability, rng);
-        touched.extend(self.population.mutate(settings.mutation_probability, rows, rng));
-        touched.into_iter().collect()
+        self.population.breed(settings.crossover_probability, settings.mutation_probability, rows, rng)
     }
 
     /// A generation of the local search has been played: what is to be played next.
@@ -227,20 +220,19 @@ impl Hunt {
         rows: usize,
         rng: &mut Rng,
     ) -> Vec<usize> {
+        let (crossover, mutation) = (settings.crossover_probability, settings.mutation_probability);
         if generation + 1 >= settings.local_generations {
             let found = population.best().clone();
             let best = self.population.best_mut();
             if found.fitness > best.fitness {
                 *best = found;
             }
-            return self.breed(settings, rows, rng);
+            return self.population.breed(crossover, mutation, rows, rng);
         }
-        population.select(rng);
-        let probability = (settings.mutation_probability * settings.local_mutation_factor).min(1.0);
-        let mut touched = population.cross(settings.crossover_probability, rng);
-        touched.extend(population.mutate(probability, rows, rng));
+        let mutation = (mutation * settings.local_mutation_factor).min(1.0);
+        let queue = population.breed(crossover, mutation, rows, rng);
         self.local = Some((population, generation + 1));
-        touched.into_iter().collect()
+        queue
     }
 
     /// Begins anew with the random scripts that are least like all former ones.
@@ -323,10 +315,6 @@ impl Trainable for AvFuzzer {
 
     fn steps(&self) -> u64 {
         self.saved.steps
-    }
-
-    fn exploration_epsilon(&self) -> f64 {
-        1.0
     }
 
     fn actor(&self) -> Box<dyn Agent> {

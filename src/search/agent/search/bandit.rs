@@ -72,30 +72,6 @@ impl Configured for BanditSettings {
     }
 }
 
-impl BanditSettings {
-    /// A choice of the search: by the record for its share of the choices, else any legal row.
-    fn explore(
-        &self,
-        worth: &Worth,
-        situation: u32,
-        legal: ArrayView1<bool>,
-        rng: &mut Rng,
-    ) -> Option<usize> {
-        if rng::unit(rng) < self.record_share {
-            worth.best(situation, legal, self.prior_choices, Doubt::Try(self.doubt), rng)
-        } else {
-            any(legal, rng)
-        }
-    }
-
-    /// Enters an episode into the record; `made` has the situation and the row of each of its choices.
-    fn note(&self, worth: &mut Worth, made: impl Iterator<Item = (u32, usize)>, episode: &Trajectory) {
-        for ((situation, row), value) in made.zip(worths(episode, self.credit_discount)) {
-            worth.note(situation, row, value);
-        }
-    }
-}
-
 /// The bandit.
 pub struct Bandit {
     settings: BanditSettings,
@@ -133,10 +109,16 @@ impl Agent for Bandit {
         None
     }
 
+    /// By the record for its share of the choices, else any legal row.
     fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, _: &mut Rng) -> Option<usize> {
         let mut rng = rng::stream(self.fresh, Stream::Search, 1 + self.step as u64);
         let here = situation(observation);
-        let row = self.settings.explore(&self.saved.worth, here, legal, &mut rng)?;
+        let BanditSettings { record_share, prior_choices, doubt, .. } = self.settings;
+        let row = if rng::unit(&mut rng) < record_share {
+            self.saved.worth.best(here, legal, prior_choices, Doubt::Try(doubt), &mut rng)
+        } else {
+            any(legal, &mut rng)
+        }?;
         self.saved.steps += 1;
         self.made.push((here, row));
         Some(row)
@@ -151,7 +133,9 @@ impl Trainable for Bandit {
 
     fn learn(&mut self, episode: &Trajectory, _: &mut Rng) -> Lesson {
         assert_eq!(self.made.len(), episode.steps.len(), "each choice is an experience");
-        self.settings.note(&mut self.saved.worth, self.made.iter().copied(), episode);
+        for (&(here, row), value) in self.made.iter().zip(worths(episode, self.settings.credit_discount)) {
+            self.saved.worth.note(here, row, value);
+        }
         Lesson::default()
     }
 
@@ -174,8 +158,8 @@ impl Trainable for Bandit {
 
 /// Acts by the record alone.
 struct Recorded {
-    pub settings: BanditSettings,
-    pub worth: Worth,
+    settings: BanditSettings,
+    worth: Worth,
 }
 
 impl Agent for Recorded {

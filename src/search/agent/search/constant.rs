@@ -164,7 +164,7 @@ mod tests {
     /// An episode of two steps with so many counted collisions.
     fn episode(counted: usize) -> Trajectory {
         let quiet = Experience::plain(0, 0.0, 4);
-        let crashed = Experience { collided: counted > 0, crashes: vec![None; counted], ..quiet.clone() };
+        let crashed = Experience { crashes: vec![None; counted], ..quiet.clone() };
         Trajectory::plain(vec![quiet, crashed], 4)
     }
 

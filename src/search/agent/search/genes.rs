@@ -3,7 +3,7 @@
 use ndarray::ArrayView1;
 
 use crate::agent::random::any;
-use crate::mdp::{Observation, variable};
+use crate::mdp::Observation;
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 
@@ -40,5 +40,5 @@ pub fn seed(rng: &mut Rng) -> u64 {
 
 /// Position of the ego vehicle at the start of an episode, m: enough to tell roads apart.
 pub fn start_of(observation: &Observation) -> [f32; 2] {
-    ["egoX", "egoY"].map(|name| observation.get(variable(name).expect("it is a variable")))
+    ["egoX", "egoY"].map(|name| observation.named(name))
 }

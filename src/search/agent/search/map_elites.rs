@@ -192,10 +192,6 @@ impl Trainable for MapElites {
         self.saved.steps
     }
 
-    fn exploration_epsilon(&self) -> f64 {
-        1.0
-    }
-
     /// Plays the elites whose collisions counted, or all if there is none.
     fn actor(&self) -> Box<dyn Agent> {
         let elites = || self.saved.elites.iter().flat_map(BTreeMap::values);

@@ -88,8 +88,16 @@ impl Population {
             .fold(0, |best, index| if fitness(index) > fitness(best) { index } else { best })
     }
 
+    /// The next generation: selected, crossed and mutated with these probabilities. Gives the indices of the changed ones.
+    pub fn breed(&mut self, crossover: f64, mutation: f64, rows: usize, rng: &mut Rng) -> Vec<usize> {
+        self.select(rng);
+        let mut touched = self.cross(crossover, rng);
+        touched.extend(self.mutate(mutation, rows, rng));
+        touched.into_iter().collect()
+    }
+
     /// Roulette: as many as there are, each drawn with a probability in proportion to its fitness.
-    pub fn select(&mut self, rng: &mut Rng) {
+    fn select(&mut self, rng: &mut Rng) {
         // Published code: every individual has some chance.
         let weights: Vec<f64> = self.individuals.iter().map(|one| one.fitness.max(0.001)).collect();
         let total: f64 = weights.iter().sum();
@@ -108,7 +116,7 @@ impl Population {
 
     /// Crossover: in half as many tries as there are individuals, with a probability, swaps the gene of one
     /// step between two of them. Gives the indices of the changed ones.
-    pub fn cross(&mut self, probability: f64, rng: &mut Rng) -> BTreeSet<usize> {
+    fn cross(&mut self, probability: f64, rng: &mut Rng) -> BTreeSet<usize> {
         let mut touched = BTreeSet::new();
         let size = self.individuals.len() as u32;
         for _ in 0..size / 2 {
@@ -129,7 +137,7 @@ impl Population {
 
     /// Mutation: changes each individual with two thirds of a probability (published code). Gives the indices
     /// of the changed ones.
-    pub fn mutate(&mut self, probability: f64, rows: usize, rng: &mut Rng) -> BTreeSet<usize> {
+    fn mutate(&mut self, probability: f64, rows: usize, rng: &mut Rng) -> BTreeSet<usize> {
         let mut touched = BTreeSet::new();
         for (index, individual) in self.individuals.iter_mut().enumerate() {
             if rng::unit(rng) < probability && rng::below(rng, 3) < 2 {

@@ -1,11 +1,11 @@
 //! A coarse view of a moment: to a search, moments with the same number are alike. All bounds are ours.
 
-use crate::mdp::{Observation, variable};
+use crate::mdp::Observation;
 
 /// A kind of situation, to record what its choices led to: how fast, how far from a junction, where the
 /// nearest obstacle is, what weather.
 pub fn situation(observation: &Observation) -> u32 {
-    let value = |name| value(observation, name);
+    let value = |name| f64::from(observation.named(name));
     let speed = below(value("speed"), &[1.0, 5.0, 9.0]);
     let junction = below(value("junctionAhead"), &[1.0, 40.0]);
     ((speed * 3 + junction) * 4 + nearest(observation)) * 3 + weather(observation)
@@ -21,7 +21,7 @@ fn below(value: f64, bounds: &[f64]) -> u32 {
 
 /// Where the nearest obstacle is: 0 beyond 30 m, 1 in front, 2 beside, 3 behind.
 fn nearest(observation: &Observation) -> u32 {
-    let value = |name| value(observation, name);
+    let value = |name| f64::from(observation.named(name));
     let (ahead_m, left_m) = (value("nearestAhead"), value("nearestLeft"));
     if ahead_m * ahead_m + left_m * left_m > 30.0 * 30.0 {
         0
@@ -36,19 +36,14 @@ fn nearest(observation: &Observation) -> u32 {
 
 /// 0 dry, 1 wet, 2 fog.
 fn weather(observation: &Observation) -> u32 {
-    let is_some = |name| value(observation, name) as f32 > 0.3;
+    let is_some = |name| observation.named(name) > 0.3;
     if is_some("fog") { 2 } else { u32::from(is_some("wetness") || is_some("rain")) }
-}
-
-/// The value of a variable that is known to exist.
-fn value(observation: &Observation, name: &str) -> f64 {
-    f64::from(observation.get(variable(name).expect("it is a variable")))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mdp::STATE_LEN;
+    use crate::mdp::{STATE_LEN, variable};
 
     #[test]
     fn situations_are_numbered_without_gaps_and_differ_where_it_matters() {

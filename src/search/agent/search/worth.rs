@@ -79,12 +79,6 @@ impl Worth {
         self.own[situation as usize * self.rows + row].note(worth);
     }
 
-    /// What a row is expected to be worth.
-    fn expected(&self, situation: u32, row: usize, weight: f64) -> f64 {
-        let own = &self.own[situation as usize * self.rows + row];
-        own.mean(self.of_row[row].mean(self.all.mean(0.0, 1.0), weight), weight)
-    }
-
     /// The legal row of the highest expected worth after doubt; any of the highest if there are several.
     pub fn best(
         &self,
@@ -98,7 +92,8 @@ impl Worth {
         let mut best = Vec::new();
         for row in (0..self.rows).filter(|&row| legal[row]) {
             let own = &self.own[situation as usize * self.rows + row];
-            let value = self.expected(situation, row, weight) + doubt.shift(own, weight, rng);
+            let expected = own.mean(self.of_row[row].mean(self.all.mean(0.0, 1.0), weight), weight);
+            let value = expected + doubt.shift(own, weight, rng);
             if value > most {
                 best.clear();
                 most = value;

@@ -4,14 +4,13 @@
 mod promise;
 mod rules;
 mod sound;
-mod table;
 
 use std::path::Path;
 use std::sync::Arc;
 
 use crate::action::{ActionTable, SpawnFacts, SpawnRequest, Surroundings};
 use avastra_lang::check::{ReadError, load};
-use avastra_lang::model::MomentFacts;
+use avastra_lang::model::{MomentFacts, Value};
 use avastra_lang::syntax::{Style, render};
 
 /// The table of a shipped space on Road 2.
@@ -26,8 +25,9 @@ fn table(path: &str) -> ActionTable {
     ActionTable::new(loaded.space.unwrap())
 }
 
-/// A world in which everything fits, no gap is too small, and the gap is the distance asked for.
-struct Plain;
+/// A world, so many seconds after the start, in which everything fits, no gap is too small, and the gap is the distance
+/// asked for.
+struct Plain(f64);
 
 impl Surroundings for Plain {
     fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
@@ -35,13 +35,10 @@ impl Surroundings for Plain {
     }
 
     fn moment(&self) -> MomentFacts {
-        MomentFacts { ego_speed_mps: 10.0, ..MomentFacts::default() }
+        MomentFacts { ego_speed_mps: 10.0, elapsed_s: self.0, ..MomentFacts::default() }
     }
 }
 
-fn value_of(
-    values: &[(Arc<str>, avastra_lang::model::Value)],
-    name: &str,
-) -> Option<avastra_lang::model::Value> {
+fn value_of(values: &[(Arc<str>, Value)], name: &str) -> Option<Value> {
     values.iter().find(|(known, _)| &**known == name).map(|(_, value)| *value)
 }

@@ -18,12 +18,12 @@ use avastra_road::{Lane, LaneIndex, Neighbour, is_apart};
 use crate::sim::around::{Around, Other};
 use crate::sim::body::BodyParameters;
 use crate::sim::moment::{driver_facts, with_itself};
-use crate::sim::road_user::{Moved, Obstacle};
+use crate::sim::road_user::Moved;
 use crate::sim::traffic::TrafficProfile;
-use crate::sim::way::Way;
+use crate::sim::way::{Way, body_at};
 use crate::sim::world::DT_S;
 
-use super::driver::{Driver, SIDE_ROOM_M};
+use super::driver::{Driver, SIDE_ROOM_M, View};
 
 /// The sphere of LGSVL's check: its radius in half widths of the vehicle, and at most, m. Its centre is half a width
 /// beside the corner of the front.
@@ -79,11 +79,12 @@ impl Change {
 impl Driver {
     /// Begins the next lane change of the plan if it is due, or one for its own gain, there is a lane, and it
     /// is free.
-    pub(super) fn begin_change(&mut self, this: &Obstacle, size: &BodyParameters, around: &Around) {
+    pub(super) fn begin_change(&mut self, view: &View) {
+        let View { this, size, around } = *view;
         let Some(next) = self.plan.last() else {
-            let Some(side) = self.wants_side(this, size, around) else { return };
-            if let Some(begun) = self.change_to(side, this, size, around) {
-                self.set_out(begun, this, around);
+            let Some(side) = self.wants_side(view) else { return };
+            if let Some(begun) = self.change_to(side, view) {
+                self.set_out(begun, view);
             }
             return;
         };
@@ -105,42 +106,30 @@ impl Driver {
                 let to_m = way.path.project(this.outline.pose.position).station_m;
                 Some((way, to_m, None))
             }
-            Towards::To(side) => self.change_to(side, this, size, around),
-            Towards::Either => self
-                .change_to(Side::Left, this, size, around)
-                .or_else(|| self.change_to(Side::Right, this, size, around)),
+            Towards::To(side) => self.change_to(side, view),
+            Towards::Either => self.change_to(Side::Left, view).or_else(|| self.change_to(Side::Right, view)),
             Towards::Back => match self.last_change {
-                Some(Side::Left) => self.change_to(Side::Right, this, size, around),
-                Some(Side::Right) => self.change_to(Side::Left, this, size, around),
+                Some(Side::Left) => self.change_to(Side::Right, view),
+                Some(Side::Right) => self.change_to(Side::Left, view),
                 None => None,
             },
         };
         let Some(begun) = begun else { return };
-        self.set_out(begun, this, around);
+        self.set_out(begun, view);
         self.plan.pop();
     }
 
     /// Begins a change to a way, at the own station there.
-    fn set_out(
-        &mut self,
-        (to, to_station_m, side): (Arc<Way>, f64, Option<Side>),
-        this: &Obstacle,
-        around: &Around,
-    ) {
-        let aside_m = (to.path.pose_at(to_station_m).position - this.outline.pose.position).norm();
-        let duration_s = change_duration_s(aside_m, around.traffic);
+    fn set_out(&mut self, (to, to_station_m, side): (Arc<Way>, f64, Option<Side>), view: &View) {
+        let aside_m = (to.path.pose_at(to_station_m).position - view.this.outline.pose.position).norm();
+        let duration_s = change_duration_s(aside_m, view.around.traffic);
         self.change = Some(Change { to, to_station_m, progress: 0.0, duration_s });
         self.last_change = side;
     }
 
     /// The way in the neighbouring lane, if there is one and room in it, and the own station there.
-    fn change_to(
-        &mut self,
-        side: Side,
-        this: &Obstacle,
-        size: &BodyParameters,
-        around: &Around,
-    ) -> Option<(Arc<Way>, f64, Option<Side>)> {
+    fn change_to(&mut self, side: Side, view: &View) -> Option<(Arc<Way>, f64, Option<Side>)> {
+        let View { this, around, .. } = *view;
         let map = &around.scene.map;
         let (here, here_m) = self.way.lane_at(self.station_m);
         let target = lane_beside(around, here, side)?;
@@ -150,7 +139,7 @@ impl Driver {
         let room_m = map.change_room_m(here, on_road(side), here_m);
         if there.distance_m > CHANGE_M_MAX
             || room_m < change_length_m(self.speed_mps, there.distance_m, around.traffic)
-            || !self.may_enter(side, map.lane(target), there.station_m, this, size, around)
+            || !self.may_enter(side, map.lane(target), there.station_m, view)
         {
             return None;
         }
@@ -160,15 +149,8 @@ impl Driver {
     }
 
     /// Whether the profile's check of the other lane lets it change.
-    fn may_enter(
-        &self,
-        side: Side,
-        lane: &Lane,
-        station_m: f64,
-        this: &Obstacle,
-        size: &BodyParameters,
-        around: &Around,
-    ) -> bool {
+    fn may_enter(&self, side: Side, lane: &Lane, station_m: f64, view: &View) -> bool {
+        let View { this, size, around } = *view;
         if !around.traffic.change_by_sphere {
             return self.is_free(lane, station_m, size, around);
         }
@@ -206,7 +188,7 @@ impl Driver {
     /// Where it is after a tick in which it drove `way_m`, with the lane change under way moved on. `before`
     /// is where its centre was.
     pub(super) fn advance_change(&mut self, way_m: f64, before: Vec2, size: &BodyParameters) -> Moved {
-        let from = self.way.body_at(self.station_m, size);
+        let from = body_at(&self.way.path, self.station_m, size);
         // The velocity is measured, because in a bend the centre of a body is slower than its way, and
         // between two lanes it has neither lane's speed.
         let at = |pose: Pose, lane_heading_rad| Moved {
@@ -222,7 +204,7 @@ impl Driver {
         let guess_m = change.to_station_m + way_m;
         change.to_station_m =
             change.to.path.project_from(from.position, guess_m).map_or(guess_m, |found| found.station_m);
-        let to = change.to.body_at(change.to_station_m, size);
+        let to = body_at(&change.to.path, change.to_station_m, size);
         let to_lane_rad = change.to.path.heading_at(change.to_station_m);
         let progress_per_m = change.progress_per_m(self.speed_mps);
         change.progress += progress_per_m * way_m;

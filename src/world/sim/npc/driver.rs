@@ -21,7 +21,7 @@ use crate::sim::road_user::{Moved, Obstacle};
 use crate::sim::scene::Scene;
 use crate::sim::sense::FRAME_TICKS;
 use crate::sim::trace::Trace;
-use crate::sim::way::Way;
+use crate::sim::way::{Way, body_at};
 use crate::sim::world::DT_S;
 
 use super::change::{Change, Manoeuvre};
@@ -53,9 +53,10 @@ pub(in crate::sim) enum Cruise {
 
 #[derive(Debug, Clone)]
 pub(in crate::sim) struct Driver {
-    pub(super) way: Arc<Way>,
-    /// Station on the way: on a straight one, that of the outline's centre (see [`Way::body_at`]).
-    pub(super) station_m: f64,
+    /// The way that it follows now.
+    pub way: Arc<Way>,
+    /// Station on the way: on a straight one, that of the outline's centre (see [`body_at`]).
+    pub station_m: f64,
     pub speed_mps: f64,
     pub(super) cruise_mps: f64,
     /// Part of the limits that it drives at; `None` if its speed was asked for.
@@ -82,18 +83,22 @@ pub(in crate::sim) struct Driver {
     draws: u32,
 }
 
+/// What a driver decides by: itself as others see it, its body, and the world around it.
+pub(in crate::sim) struct View<'a> {
+    pub this: &'a Obstacle,
+    pub size: &'a BodyParameters,
+    pub around: &'a Around<'a>,
+}
+
 impl Driver {
     /// A driver with its centre at a station of a way, at its cruising speed or what the bend there
-    /// allows.
-    ///
-    /// `plan` is in order; `draws` tells how many draws went into it.
+    /// allows. `plan` is in order.
     pub fn new(
         scene: &Scene,
         way: Arc<Way>,
         station_m: f64,
         cruise: Cruise,
         mut plan: Vec<Manoeuvre>,
-        draws: u32,
     ) -> Driver {
         plan.reverse();
         let (cruise_mps, limit_part) = match cruise {
@@ -117,21 +122,9 @@ impl Driver {
             last_change: None,
             plan,
             lane_changes: None,
-            draws,
+            // That of its way.
+            draws: 1,
         }
-    }
-
-    /// The way it follows now.
-    pub fn way(&self) -> &Way {
-        &self.way
-    }
-
-    pub fn shared_way(&self) -> &Arc<Way> {
-        &self.way
-    }
-
-    pub fn station_m(&self) -> f64 {
-        self.station_m
     }
 
     pub fn is_changing_lanes(&self) -> bool {
@@ -140,7 +133,7 @@ impl Driver {
 
     /// Where it is before its first tick.
     pub fn moved(&self, size: &BodyParameters) -> Moved {
-        let pose = self.way.body_at(self.station_m, size);
+        let pose = body_at(&self.way.path, self.station_m, size);
         let forward = pose.forward();
         Moved {
             pose,
@@ -150,11 +143,6 @@ impl Driver {
         }
     }
 
-    /// Whether its lane and the map have ended. A lane change is done first.
-    fn is_beyond_map(&self) -> bool {
-        self.change.is_none() && self.station_m >= self.way.path.length_m()
-    }
-
     /// Heading of the way where it is, rad.
     pub(super) fn lane_heading_rad(&self) -> f64 {
         self.way.path.heading_at(self.station_m)
@@ -162,17 +150,11 @@ impl Driver {
 
     /// One tick; `None` if it leaves the world, which it does only while the ego vehicle does not see it
     /// (`in_sight`). One that has `touched` the ego vehicle only brakes.
-    pub fn step(
-        &mut self,
-        this: &Obstacle,
-        size: &BodyParameters,
-        touched: bool,
-        in_sight: bool,
-        around: &Around,
-    ) -> Option<Moved> {
+    pub fn step(&mut self, view: &View, touched: bool, in_sight: bool) -> Option<Moved> {
+        let View { this, size, around } = *view;
         let looks = !touched && (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS);
         if looks {
-            self.look(this, size, around);
+            self.look(view);
         }
         let braking_mps2 = around.braking_mps2(size, self.speed_mps);
         let acceleration_mps2 = if touched {
@@ -192,7 +174,7 @@ impl Driver {
         }
         // A lane that ends under a lane change goes on straight until the change is done. So does one that
         // ends at the edge of the map while the vehicle is in sight.
-        if self.is_beyond_map() && !in_sight {
+        if self.change.is_none() && self.station_m >= self.way.path.length_m() && !in_sight {
             return None;
         }
         // A vehicle that stands keeps its place to the bit, even if its way was laid anew.
@@ -203,7 +185,8 @@ impl Driver {
     }
 
     /// Prolongs the way, begins a lane change that is due, and finds what to follow and what to wait for.
-    fn look(&mut self, this: &Obstacle, size: &BodyParameters, around: &Around) {
+    fn look(&mut self, view: &View) {
+        let View { this, size, around } = *view;
         if self.way.ends_soon(self.station_m) {
             let mut rng = self.draw(this.id, around);
             if let Some((way, station_m)) = self.way.prolonged(around.scene, self.station_m, &mut rng) {
@@ -218,19 +201,19 @@ impl Driver {
             self.cruise_mps = part * self.way.limit_mps(around.scene, self.station_m);
         }
         if self.change.is_none() {
-            self.begin_change(this, size, around);
+            self.begin_change(view);
         }
         self.leader = if around.traffic.rays {
             self.take_temper(this.id, around);
-            self.ray_leader(this, size, around)
+            self.ray_leader(view)
         } else {
-            let beside = self.foresee(this, size, around);
-            let leader = self.find_leader(this, size, around);
+            let beside = self.foresee(view);
+            let leader = self.find_leader(view);
             let nearer = |a: &Leader, b: &Leader| a.gap_m.total_cmp(&b.gap_m);
             leader.into_iter().chain(beside).min_by(nearer)
         };
         let held = self.hold_m.is_some();
-        self.hold_m = self.find_hold_m(this, size, around);
+        self.hold_m = self.find_hold_m(view);
         if held && self.hold_m.is_none() && self.speed_mps < SETS_OUT_MPS {
             self.insists_to_m = self.junction_end_m(size);
         }
@@ -305,26 +288,17 @@ impl Driver {
 
     /// Feeds every bit that later ticks depend on to `trace`; ways follow from the draws.
     pub fn trace(&self, trace: &mut Trace) {
-        for value in [self.station_m, self.speed_mps, self.cruise_mps] {
-            trace.number(value);
-        }
+        trace.numbers([self.station_m, self.speed_mps, self.cruise_mps]);
         let leader = self.leader.unwrap_or(Leader::line(-1.0));
-        trace.number(leader.gap_m);
-        trace.number(leader.speed_mps);
+        trace.numbers([leader.gap_m, leader.speed_mps]);
         trace.word(u64::from(leader.crosswise));
-        trace.number(self.hold_m.unwrap_or(f64::INFINITY));
-        trace.number(self.insists_to_m);
-        trace.number(self.stopped_to_m);
-        trace.word(u64::from(self.waited_ticks));
-        trace.word(u64::from(self.aggression));
+        trace.numbers([self.hold_m.unwrap_or(f64::INFINITY), self.insists_to_m, self.stopped_to_m]);
+        trace.words([self.waited_ticks, self.aggression].map(u64::from));
         if let Some(change) = &self.change {
-            for value in [change.to_station_m, change.progress, change.duration_s] {
-                trace.number(value);
-            }
+            trace.numbers([change.to_station_m, change.progress, change.duration_s]);
         }
         trace.word(self.last_change.map_or(0, |side| side as u64 + 1));
-        trace.word(self.plan.len() as u64);
-        trace.word(u64::from(self.draws));
+        trace.words([self.plan.len() as u64, u64::from(self.draws)]);
     }
 }
 

@@ -8,13 +8,12 @@
 
 use core::cell::LazyCell;
 
-use crate::sim::around::Around;
-use crate::sim::body::BodyParameters;
 use crate::sim::road_user::Obstacle;
+use crate::sim::way::body_at;
 use avastra_base::geometry::{OrientedBox, Pose, distance_m};
 use avastra_road::is_apart;
 
-use super::driver::Driver;
+use super::driver::{Driver, View};
 use super::leader::Leader;
 
 /// Moments ahead that are looked at, s.
@@ -30,7 +29,8 @@ const STOP_M: f64 = 1.0;
 
 impl Driver {
     /// A vehicle that the own outline would soon meet, as a leader that stands there.
-    pub(super) fn foresee(&self, this: &Obstacle, size: &BodyParameters, around: &Around) -> Option<Leader> {
+    pub(super) fn foresee(&self, view: &View) -> Option<Leader> {
+        let View { this, size, around } = *view;
         let half_m = size.length_m / 2.0;
         let turns = |station_m: f64| around.scene.map.lane(self.way.lane_at(station_m).0).junction.is_some();
         if self.change.is_some() || !(turns(self.station_m + half_m) || turns(self.station_m - half_m)) {
@@ -46,7 +46,7 @@ impl Driver {
         // The own poses at those moments, worked out only if there is a vehicle to meet.
         let speed_mps = self.speed_mps.max(CREEP_MPS);
         let own = LazyCell::new(|| {
-            MOMENTS_S.map(|time_s| self.way.body_at(self.station_m + speed_mps * time_s, size))
+            MOMENTS_S.map(|time_s| body_at(&self.way.path, self.station_m + speed_mps * time_s, size))
         });
         let mut free_m = f64::INFINITY;
         if self.yields_to_ego && matters(around.ego_outline, around.ego_elevation_m, around.ego.speed_mps) {
@@ -61,7 +61,8 @@ impl Driver {
             {
                 continue;
             }
-            let other = |time_s| driver.way.body_at(driver.station_m + driver.speed_mps * time_s, body);
+            let other =
+                |time_s| body_at(&driver.way.path, driver.station_m + driver.speed_mps * time_s, body);
             free_m = free_m.min(free_way_m(this, &own, speed_mps, &obstacle.outline, other));
         }
         free_m.is_finite().then_some(Leader { gap_m: free_m + STOP_M, speed_mps: 0.0, crosswise: true })

@@ -7,12 +7,11 @@ use avastra_base::geometry::{Pose, smooth_step};
 use avastra_base::kinematics::{Following, STANDING_MPS, needed_mps2};
 use avastra_road::is_apart;
 
-use crate::sim::around::{Around, Other};
+use crate::sim::around::Other;
 use crate::sim::body::BodyParameters;
-use crate::sim::road_user::Obstacle;
 use crate::sim::way::Way;
 
-use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, LOOK_AHEAD_M, SIDE_ROOM_M};
+use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, LOOK_AHEAD_M, SIDE_ROOM_M, View};
 
 /// IDM: time gap, s. Ours.
 const TIME_GAP_S: f64 = 1.2;
@@ -56,12 +55,8 @@ impl Driver {
     }
 
     /// The nearest leader on the own way, or on the way to which it is changing.
-    pub(super) fn find_leader(
-        &self,
-        this: &Obstacle,
-        size: &BodyParameters,
-        around: &Around,
-    ) -> Option<Leader> {
+    pub(super) fn find_leader(&self, view: &View) -> Option<Leader> {
+        let View { this, size, around } = *view;
         let here = &this.outline.pose;
         let forward = this.forward;
         let reach_m = LOOK_AHEAD_M

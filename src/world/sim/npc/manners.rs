@@ -27,13 +27,11 @@ use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
 use crate::sim::junction::Area;
-use crate::sim::road_user::Obstacle;
 use crate::sim::sense::SignalColour;
 use crate::sim::world::DT_S;
 use avastra_base::kinematics::{STANDING_MPS, braking_m};
-use avastra_road::LaneIndex;
 
-use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, LOOK_AHEAD_M};
+use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, LOOK_AHEAD_M, View};
 
 /// Time at rest after which a driver no longer waits for vehicles that stand, s. Ours.
 const PATIENCE_S: f64 = 8.0;
@@ -118,20 +116,18 @@ fn waits(own: &Passage, other: &Passage, goes_first: bool, impatient: bool) -> b
 
 impl Driver {
     /// Station of the own way at which to wait now, m, if there is something to wait for.
-    pub(super) fn find_hold_m(&self, this: &Obstacle, size: &BodyParameters, around: &Around) -> Option<f64> {
-        let front_m = self.station_m + size.length_m / 2.0;
+    pub(super) fn find_hold_m(&self, view: &View) -> Option<f64> {
+        let length_m = view.size.length_m;
+        let front_m = self.station_m + length_m / 2.0;
         let reach_m = LOOK_AHEAD_M + braking_m(self.speed_mps, COMFORT_MPS2);
         let areas = &self.way.areas;
         let open = areas.partition_point(|area| area.from_m <= front_m);
         let near = |area: &&Area| area.from_m <= front_m + reach_m;
-        let waited_for = areas[open..]
-            .iter()
-            .take_while(near)
-            .position(|area| self.must_wait(area, this, size, around))?;
+        let waited_for = areas[open..].iter().take_while(near).position(|area| self.must_wait(area, view))?;
         // It must not wait in an earlier area either, unless its front is in that already.
         let mut hold_m = areas[open + waited_for].from_m;
         for area in areas[open..open + waited_for].iter().rev() {
-            if area.to_m > hold_m - HOLD_ROOM_M - GAP_M_MIN - size.length_m {
+            if area.to_m > hold_m - HOLD_ROOM_M - GAP_M_MIN - length_m {
                 hold_m = hold_m.min(area.from_m);
             }
         }
@@ -145,7 +141,7 @@ impl Driver {
         ahead.fold(f64::NEG_INFINITY, |end_m, area| end_m.max(area.to_m))
     }
 
-    fn must_wait(&self, area: &Area, this: &Obstacle, size: &BodyParameters, around: &Around) -> bool {
+    fn must_wait(&self, area: &Area, &View { this, size, around }: &View) -> bool {
         if self.would_stop_in(area, size) {
             return true;
         }
@@ -212,10 +208,12 @@ impl Driver {
 
 /// The ego vehicle's passage along its route, as ambient vehicles expect it.
 fn ego_passage(area: &Area, around: &Around) -> Option<Passage> {
-    let begin_m = ego_lane_begin_m(area.other, around)?;
     let car = &VehicleParameters::MKZ;
     let (front_m, rear_m) = (car.front_m(around.ego_station_m), car.rear_m(around.ego_station_m));
-    let (from_m, to_m) = (begin_m + area.other_from_m, begin_m + area.other_to_m);
+    // A lane that it has left already does not count.
+    let mut lanes = around.scene.route.lanes.iter();
+    let lane = lanes.find(|part| part.lane == area.other && part.to_m > rear_m)?;
+    let (from_m, to_m) = (lane.from_m + area.other_from_m, lane.from_m + area.other_to_m);
     let is_red = |signal| around.signals.colour(&around.scene.map, signal, around.tick) == SignalColour::Red;
     let mut lines = around.scene.route.stop_lines.iter();
     let holds = lines.any(|line| (front_m - 1.0..from_m).contains(&line.station_m) && is_red(line.signal));
@@ -228,13 +226,6 @@ fn ego_passage(area: &Area, around: &Around) -> Option<Passage> {
         committed: !holds && around.ego.speed_mps > EGO_MOVES_MPS,
         holds,
     })
-}
-
-/// Station of the route at which a lane begins, m, if the ego vehicle has not left that lane yet.
-fn ego_lane_begin_m(lane: LaneIndex, around: &Around) -> Option<f64> {
-    let rear_m = VehicleParameters::MKZ.rear_m(around.ego_station_m);
-    let part = around.scene.route.lanes.iter().find(|part| part.lane == lane && part.to_m > rear_m)?;
-    Some(part.from_m)
 }
 
 #[cfg(test)]

@@ -13,13 +13,10 @@ use avastra_lang::model::vocabulary::Side;
 use avastra_road::is_apart;
 
 use crate::sim::around;
-use crate::sim::around::Around;
-use crate::sim::body::BodyParameters;
-use crate::sim::road_user::Obstacle;
 use crate::sim::traffic::TrafficProfile;
 
 use super::change::lane_beside;
-use super::driver::{Driver, SIDE_ROOM_M};
+use super::driver::{Driver, SIDE_ROOM_M, View};
 use super::leader::following;
 
 /// Ticks between two considerations: a second.
@@ -45,15 +42,15 @@ struct Lane {
 
 impl Driver {
     /// The side to which MOBIL advises a change now.
-    pub(super) fn wants_side(&self, this: &Obstacle, size: &BodyParameters, around: &Around) -> Option<Side> {
+    pub(super) fn wants_side(&self, view: &View) -> Option<Side> {
+        let View { this, size, around } = *view;
         let profile = around.traffic;
         let is_due = (around.tick + u64::from(this.id)).is_multiple_of(CONSIDER_TICKS);
         if !profile.mobil || !self.is_ambient() || !is_due || self.speed_mps < CONSIDER_MPS_MIN {
             return None;
         }
         let (here, _) = self.way.lane_at(self.station_m);
-        let own =
-            self.lane_of(&self.way.path, |at_m| self.way.height_at(at_m), self.station_m, this, size, around);
+        let own = self.lane_of(&self.way.path, |at_m| self.way.height_at(at_m), self.station_m, view);
         let driver = Idm { acceleration_mps2: size.acceleration_mps2_max, wish_mps: self.cruise_mps };
         let mut best: Option<(f64, Side)> = None;
         for side in [Side::Right, Side::Left] {
@@ -61,7 +58,7 @@ impl Driver {
             let target = around.scene.map.lane(target);
             let station_m = target.centre.project(this.outline.pose.position).station_m;
             let height_m = |at_m| target.height_at(at_m);
-            let beside = self.lane_of(&target.centre, height_m, station_m, this, size, around);
+            let beside = self.lane_of(&target.centre, height_m, station_m, view);
             let gain_mps2 =
                 gain_mps2(&driver, self.speed_mps, size.length_m, own, beside, profile.politeness);
             let excess_mps2 = gain_mps2 - threshold_mps2(profile, side);
@@ -74,15 +71,8 @@ impl Driver {
 
     /// The nearest others in a lane, of which `height_m` gives the heights, in which the own centre would be at a
     /// station.
-    fn lane_of(
-        &self,
-        path: &Path,
-        height_m: impl Fn(f64) -> f64,
-        station_m: f64,
-        this: &Obstacle,
-        size: &BodyParameters,
-        around: &Around,
-    ) -> Lane {
+    fn lane_of(&self, path: &Path, height_m: impl Fn(f64) -> f64, station_m: f64, view: &View) -> Lane {
+        let View { this, size, around } = *view;
         let mut lane = Lane::default();
         for around::Other { outline, forward: heading, velocity_mps, elevation_m } in around.others() {
             let away = outline.pose.position - this.outline.pose.position;

@@ -20,4 +20,4 @@ mod red_light;
 mod stop_sign;
 
 pub(super) use change::{Manoeuvre, Towards, When, can_change, lane_beside};
-pub(super) use driver::{Cruise, Driver, choices};
+pub(super) use driver::{Cruise, Driver, View, choices};

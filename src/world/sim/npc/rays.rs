@@ -16,10 +16,9 @@ use avastra_road::{Turn, is_apart};
 
 use crate::sim::around::{Around, Other};
 use crate::sim::body::BodyParameters;
-use crate::sim::road_user::Obstacle;
 use crate::sim::world::DT_S;
 
-use super::driver::{Driver, choices};
+use super::driver::{Driver, View, choices};
 use super::leader::Leader;
 
 /// Aggression of the least gentle driver. LGSVL.
@@ -44,12 +43,8 @@ impl Driver {
     }
 
     /// What the rays meet within the stop distance.
-    pub(super) fn ray_leader(
-        &self,
-        this: &Obstacle,
-        size: &BodyParameters,
-        around: &Around,
-    ) -> Option<Leader> {
+    pub(super) fn ray_leader(&self, view: &View) -> Option<Leader> {
+        let View { this, size, around } = *view;
         let profile = around.traffic;
         let stop_m = self.stop_distance_m(size, around);
         let left = Vec2::new(-this.forward.y, this.forward.x);

@@ -1,12 +1,9 @@
 //! Crossing traffic: a rendezvous with the ego vehicle at a conflict of its route, on a leg whose signal will
 //! be green.
 
-use crate::action::SpawnRequest;
 use avastra_lang::model::vocabulary::{Side, Then};
 use avastra_road::{Conflict, LaneIndex};
 
-use crate::sim::around::Around;
-use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
 use crate::sim::npc::{Driver, Manoeuvre, Towards, When, can_change, choices, lane_beside};
 use crate::sim::sense::SignalColour;
@@ -14,7 +11,7 @@ use crate::sim::way::Way;
 use crate::sim::world::DT_S;
 
 use super::arrival::TIMING_M;
-use super::{Arrivals, commanded};
+use super::{Asked, commanded};
 
 /// How far beyond the asked distance a crossing may lie, m.
 const CROSSING_M: f64 = 60.0;
@@ -24,13 +21,8 @@ const BEYOND_LINE_M: f64 = 30.0;
 const STANDS_S: f64 = 1.0;
 const STOPS_MPS2: f64 = 2.0;
 
-pub(super) fn cross_road(
-    around: &Around,
-    arrivals: &Arrivals,
-    request: &SpawnRequest,
-    size: &BodyParameters,
-    id: u32,
-) -> Result<Driver, String> {
+pub(super) fn cross_road(asked: &Asked) -> Result<Driver, String> {
+    let Asked { around, arrivals, request, .. } = *asked;
     let front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
     let mut reason = None;
     for conflict in &around.scene.route.conflicts {
@@ -41,7 +33,7 @@ pub(super) fn cross_road(
         {
             continue;
         }
-        match rendezvous(around, request, size, id, conflict, arrivals.after_s(around, distance_m)) {
+        match rendezvous(asked, conflict, arrivals.after_s(around, distance_m)) {
             Ok(driver) => return Ok(driver),
             Err(why) => reason = Some(why),
         }
@@ -56,14 +48,8 @@ pub(super) fn cross_road(
 }
 
 /// A driver that reaches a conflict after `arrival_s`, when the ego vehicle does, if nothing is in its way.
-fn rendezvous(
-    around: &Around,
-    request: &SpawnRequest,
-    size: &BodyParameters,
-    id: u32,
-    conflict: &Conflict,
-    arrival_s: f64,
-) -> Result<Driver, String> {
+fn rendezvous(asked: &Asked, conflict: &Conflict, arrival_s: f64) -> Result<Driver, String> {
+    let Asked { around, request, size, id, .. } = *asked;
     let map = &around.scene.map;
     let needed_m = request.speed_mps * arrival_s + size.length_m;
     let mut lanes = vec![conflict.lane];
@@ -79,10 +65,10 @@ fn rendezvous(
     let way = Way::along(around.scene, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
     let meeting_m = way.lane_begin_m(conflict.lane).expect("the way was made through this lane")
         + conflict.lane_station_m;
-    let front_m = approach_m(around, request, size, &way, meeting_m, arrival_s)?;
+    let front_m = approach_m(asked, &way, meeting_m, arrival_s)?;
     let station_m = front_m - size.length_m / 2.0;
     if request.then == Then::Keep {
-        return Ok(commanded(around, request, way, station_m, Vec::new()));
+        return Ok(commanded(asked, way, station_m, Vec::new()));
     }
     // It starts beside its way and changes into it on the approach.
     let start = way.path.pose_at(station_m).position;
@@ -104,7 +90,7 @@ fn rendezvous(
     }
     let (first, station_m) = found.ok_or(reason)?;
     let change = Manoeuvre { when: When::Tick(around.tick), towards: Towards::Way(way) };
-    Ok(commanded(around, request, first, station_m, vec![change]))
+    Ok(commanded(asked, first, station_m, vec![change]))
 }
 
 /// Station at which a front has to start to be at the meeting point after `arrival_s`, m. It is found by
@@ -112,14 +98,8 @@ fn rendezvous(
 ///
 /// # Errors
 /// If the way begins nearer, a signal on it will not be green, or a stop sign leaves no time.
-fn approach_m(
-    around: &Around,
-    request: &SpawnRequest,
-    size: &BodyParameters,
-    way: &Way,
-    meeting_m: f64,
-    arrival_s: f64,
-) -> Result<f64, String> {
+fn approach_m(asked: &Asked, way: &Way, meeting_m: f64, arrival_s: f64) -> Result<f64, String> {
+    let Asked { around, request, size, .. } = *asked;
     let mut front_m = meeting_m;
     let mut left_s = arrival_s;
     let mut passed_lines: Vec<(usize, f64)> = Vec::new();
@@ -148,8 +128,7 @@ fn approach_m(
     if way.stop_signs_m.iter().any(|line_m| beyond.contains(line_m)) {
         return Err("it would have had to stop at a sign".into());
     }
-    let behind =
-        way.stop_lines.iter().filter(|line| (front_m - BEYOND_LINE_M..front_m).contains(&line.station_m));
+    let behind = way.stop_lines.iter().filter(|line| beyond.contains(&line.station_m));
     passed_lines.extend(behind.map(|line| (line.signal, 0.0)));
     let is_green = |(signal, after_s): &(usize, f64)| {
         let tick = around.tick + (after_s / DT_S) as u64;

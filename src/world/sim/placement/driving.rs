@@ -1,19 +1,17 @@
 //! Drivers that appear ahead, from behind or as oncoming traffic.
 
-use crate::action::SpawnRequest;
 use avastra_base::rng;
 use avastra_lang::model::vocabulary::{LaneChoice, Side, Then};
 use avastra_road::LaneIndex;
 
 use crate::sim::around::Around;
-use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
 use crate::sim::npc::{Driver, Manoeuvre, Towards, When, can_change, choices, lane_beside};
 use crate::sim::way::Way;
-use crate::sim::world::DT_S;
+use crate::sim::world::ticks;
 
 use super::lanes::{chosen_lane, lane_along, lane_before, opposing_lane};
-use super::{ahead_m, commanded};
+use super::{Asked, ahead_m, commanded};
 
 /// Time after which a vehicle ahead changes lanes, s.
 const CHANGE_AFTER_S: f64 = 1.0;
@@ -23,13 +21,9 @@ const CUT_IN_M: f64 = 5.0;
 /// Ours.
 const RETURN_M: f64 = 20.0;
 
-pub(super) fn drive_ahead(
-    around: &Around,
-    request: &SpawnRequest,
-    size: &BodyParameters,
-    id: u32,
-) -> Result<Driver, String> {
-    let station_m = ahead_m(around, request, size)?;
+pub(super) fn drive_ahead(asked: &Asked) -> Result<Driver, String> {
+    let Asked { around, request, id, .. } = *asked;
+    let station_m = ahead_m(asked)?;
     let lane = chosen_lane(around, station_m, request.lane)?;
     let mut rng = choices(around.seed, id, 0);
     let beside_ego = around.scene.route.path.pose_at(station_m).position;
@@ -49,10 +43,10 @@ pub(super) fn drive_ahead(
             return Err(no_change(around, lane).into());
         }
         let towards = Towards::To(sides[rng::below(&mut rng, sides.len() as u32) as usize]);
-        let when = When::Tick(around.tick + (CHANGE_AFTER_S / DT_S + 0.5) as u64);
+        let when = When::Tick(around.tick + ticks(CHANGE_AFTER_S));
         plan.push(Manoeuvre { when, towards });
     }
-    Ok(commanded(around, request, way, station_m, plan))
+    Ok(commanded(asked, way, station_m, plan))
 }
 
 /// Why a vehicle in this lane cannot change it.
@@ -63,12 +57,8 @@ fn no_change(around: &Around, lane: LaneIndex) -> &'static str {
     }
 }
 
-pub(super) fn overtake(
-    around: &Around,
-    request: &SpawnRequest,
-    size: &BodyParameters,
-    id: u32,
-) -> Result<Driver, String> {
+pub(super) fn overtake(asked: &Asked) -> Result<Driver, String> {
+    let Asked { around, request, size, id, .. } = *asked;
     if request.speed_mps <= around.ego.speed_mps {
         return Err("it would be no faster than the ego vehicle".into());
     }
@@ -105,16 +95,12 @@ pub(super) fn overtake(
     if request.lane == LaneChoice::Current && !passes(Side::Left) && !passes(Side::Right) {
         return Err(no_change(around, lane).into());
     }
-    Ok(commanded(around, request, way, station_m, plan))
+    Ok(commanded(asked, way, station_m, plan))
 }
 
-pub(super) fn drive_opposite(
-    around: &Around,
-    request: &SpawnRequest,
-    size: &BodyParameters,
-    id: u32,
-) -> Result<Driver, String> {
-    let station_m = ahead_m(around, request, size)?;
+pub(super) fn drive_opposite(asked: &Asked) -> Result<Driver, String> {
+    let Asked { around, request, id, .. } = *asked;
+    let station_m = ahead_m(asked)?;
     let map = &around.scene.map;
     let inner = lane_along(around, station_m, false, |lane| opposing_lane(around, lane, station_m))?;
     let mut rng = choices(around.seed, id, 0);
@@ -132,5 +118,5 @@ pub(super) fn drive_opposite(
     if request.then == Then::Change && !can_change(around, &way, station_m, Side::Left, request.speed_mps) {
         return Err("no room to change lanes before the junction".into());
     }
-    Ok(commanded(around, request, way, station_m, plan))
+    Ok(commanded(asked, way, station_m, plan))
 }

@@ -40,6 +40,15 @@ const DISTANCE_M_MAX: f64 = 1000.0;
 /// Least gap between a newcomer and any other road user, m.
 const ROOM_M: f64 = 0.5;
 
+/// What is asked of a moment: which road user shall appear, of which size, and with which id.
+struct Asked<'a> {
+    around: &'a Around<'a>,
+    arrivals: &'a Arrivals,
+    request: &'a SpawnRequest,
+    size: BodyParameters,
+    id: u32,
+}
+
 /// What a request makes appear.
 pub(super) struct Newcomers {
     pub asked: RoadUser,
@@ -59,17 +68,17 @@ pub(super) fn place(
 ) -> Result<Newcomers, String> {
     check(request)?;
     let size = request.own.map_or_else(|| body::parameters(request.body), |own| own.shape);
+    let asked = Asked { around, arrivals, request, size, id };
     let driver = match request.verb {
-        Verb::DriveAhead => drive_ahead(around, request, &size, id)?,
-        Verb::Overtake => overtake(around, request, &size, id)?,
-        Verb::DriveOpposite => drive_opposite(around, request, &size, id)?,
-        Verb::CrossRoad => cross_road(around, arrivals, request, &size, id)?,
-        Verb::Walk | Verb::Stand => return on_foot(around, arrivals, request, size, id),
+        Verb::DriveAhead => drive_ahead(&asked)?,
+        Verb::Overtake => overtake(&asked)?,
+        Verb::DriveOpposite => drive_opposite(&asked)?,
+        Verb::CrossRoad => cross_road(&asked)?,
+        Verb::Walk | Verb::Stand => return on_foot(&asked),
     };
     check_way(around, &driver, &size)?;
     let moved = driver.moved(&size);
-    let asked = finish(around, request, Mover::new(size, Motion::Drive(driver)), id, moved)?;
-    Ok(Newcomers { asked, cover: None })
+    Ok(Newcomers { asked: finish(&asked, Motion::Drive(driver), moved)?, cover: None })
 }
 
 /// Refuses what no road user could do. Requests of scripts come from outside, so nothing is taken for
@@ -142,31 +151,19 @@ fn meets_route(around: &Around, mover: &Mover) -> bool {
     let Motion::Drive(driver) = &mover.motion else { return false };
     let mut ahead =
         around.scene.route.conflicts.iter().filter(|conflict| conflict.station_m > around.ego_station_m);
-    ahead.any(|conflict| driver.way().lane_begin_m(conflict.lane).is_some())
+    ahead.any(|conflict| driver.way.lane_begin_m(conflict.lane).is_some())
 }
 
 /// A driver at the speed that was asked for.
-fn commanded(
-    around: &Around,
-    request: &SpawnRequest,
-    way: Arc<Way>,
-    station_m: f64,
-    plan: Vec<Manoeuvre>,
-) -> Driver {
-    // One draw went into it so far: that of its way.
-    Driver::new(around.scene, way, station_m, Cruise::Commanded(request.speed_mps), plan, 1)
+fn commanded(asked: &Asked, way: Arc<Way>, station_m: f64, plan: Vec<Manoeuvre>) -> Driver {
+    Driver::new(asked.around.scene, way, station_m, Cruise::Commanded(asked.request.speed_mps), plan)
 }
 
 /// The newcomer, if there is room for it.
-fn finish(
-    around: &Around,
-    request: &SpawnRequest,
-    mover: Mover,
-    id: u32,
-    moved: Moved,
-) -> Result<RoadUser, String> {
+fn finish(asked: &Asked, motion: Motion, moved: Moved) -> Result<RoadUser, String> {
+    let Asked { around, request, size, id, .. } = *asked;
     let SpawnRequest { body, colour, verb, .. } = *request;
-    let newcomer = RoadUser::new(around, id, body, colour, verb, mover, moved);
+    let newcomer = RoadUser::new(around, id, body, colour, verb, Mover::new(size, motion), moved);
     if newcomer.has_room(around, ROOM_M) { Ok(newcomer) } else { Err("another road user is there".into()) }
 }
 
@@ -184,7 +181,7 @@ fn check_way(around: &Around, driver: &Driver, size: &BodyParameters) -> Result<
 }
 
 /// Station on the route of a centre that lies `distance_m` before the ego vehicle's front.
-fn ahead_m(around: &Around, request: &SpawnRequest, size: &BodyParameters) -> Result<f64, String> {
+fn ahead_m(&Asked { around, request, size, .. }: &Asked) -> Result<f64, String> {
     let front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
     let station_m = front_m + request.distance_m + size.length_m / 2.0;
     if station_m > around.scene.route.path.length_m() {

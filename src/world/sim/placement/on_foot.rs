@@ -3,21 +3,19 @@
 
 use core::f64::consts::FRAC_PI_2;
 
-use crate::action::SpawnRequest;
 use avastra_base::geometry::{OrientedBox, Pose, Vec2, distance_m, wrap_angle};
 use avastra_lang::model::vocabulary::{Body, Side, Verb};
 use avastra_road::{FootWay, Kerb};
 
 use crate::sim::around::Around;
 use crate::sim::body;
-use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
 use crate::sim::npc::choices;
 use crate::sim::pedestrian::{Walk, Walker};
 use crate::sim::road_user::{Motion, Moved, Mover, Obstacle, RoadUser};
 use crate::sim::sense::visible_fraction;
 
-use super::{Arrivals, Newcomers, ROOM_M, ahead_m, finish};
+use super::{Asked, Newcomers, ROOM_M, ahead_m, finish};
 
 /// A crosswalk within this distance of the asked place is used, m. Ours.
 const CROSSWALK_M: f64 = 5.0;
@@ -41,31 +39,24 @@ struct Crossing {
 }
 
 /// A pedestrian who crosses the whole road, or who stands on the route.
-pub(super) fn on_foot(
-    around: &Around,
-    arrivals: &Arrivals,
-    request: &SpawnRequest,
-    size: BodyParameters,
-    id: u32,
-) -> Result<Newcomers, String> {
-    let asked_m = ahead_m(around, request, &size)?;
+pub(super) fn on_foot(asked: &Asked) -> Result<Newcomers, String> {
+    let Asked { around, request, .. } = *asked;
+    let asked_m = ahead_m(asked)?;
     if request.verb == Verb::Stand {
         let lane = around.scene.route.path.pose_at(asked_m);
         let turn_rad = if request.side == Side::Left { -FRAC_PI_2 } else { FRAC_PI_2 };
         let pose = Pose { heading_rad: wrap_angle(lane.heading_rad + turn_rad), ..lane };
-        let asked = finish(around, request, Mover::new(size, Motion::Stand), id, at(pose))?;
-        return Ok(Newcomers { asked, cover: None });
+        return Ok(Newcomers { asked: finish(asked, Motion::Stand, at(pose))?, cover: None });
     }
     let mut refusal = None;
     for station_m in stations(around, asked_m) {
         let found = crossing(around, request.side, station_m).and_then(|mut way| {
-            let cover =
-                request.cover.map(|body| park(around, request, body, id + 1, &mut way)).transpose()?;
-            let asked = walk(around, arrivals, request, size, id, &way)?;
+            let cover = request.cover.map(|body| park(asked, body, &mut way)).transpose()?;
+            let pedestrian = walk(asked, &way)?;
             if let Some(cover) = &cover {
-                check_cover(around, &asked, cover)?;
+                check_cover(around, &pedestrian, cover)?;
             }
-            Ok(Newcomers { asked, cover })
+            Ok(Newcomers { asked: pedestrian, cover })
         });
         match found {
             Ok(newcomers) => return Ok(newcomers),
@@ -105,14 +96,8 @@ fn crossing(around: &Around, side: Side, station_m: f64) -> Result<Crossing, Str
 }
 
 /// A pedestrian at the beginning of a way, if there is room.
-fn walk(
-    around: &Around,
-    arrivals: &Arrivals,
-    request: &SpawnRequest,
-    size: BodyParameters,
-    id: u32,
-    way: &Crossing,
-) -> Result<RoadUser, String> {
+fn walk(asked: &Asked, way: &Crossing) -> Result<RoadUser, String> {
+    let Asked { around, arrivals, request, id, .. } = *asked;
     let straight = way.to.place - way.from.place;
     let from = Pose { position: way.from.place, heading_rad: libm::atan2(straight.y, straight.x) };
     let way_m = way.from.way_m + way.to.way_m;
@@ -130,34 +115,26 @@ fn walk(
         meets_s: arrivals.after_s(around, way.station_m - front_m) - way.from.way_m / request.speed_mps,
     };
     let walker = Walker::new(walk, around.tick, &mut choices(around.seed, id, 0));
-    finish(around, request, Mover::new(size, Motion::Walk(walker)), id, at(from))
+    finish(asked, Motion::Walk(walker), at(from))
 }
 
 /// A vehicle that is parked beside the outermost lane, before a way over the road as the ego vehicle comes. The way
 /// then begins beside its front or rear, behind its outer half, where it hides whoever stands there.
-fn park(
-    around: &Around,
-    request: &SpawnRequest,
-    body: Body,
-    id: u32,
-    way: &mut Crossing,
-) -> Result<RoadUser, String> {
+fn park(asked: &Asked, body: Body, way: &mut Crossing) -> Result<RoadUser, String> {
+    let Asked { around, request, id, .. } = *asked;
     let size = request.cover_own.map_or_else(|| body::parameters(body), |own| own.shape);
     let (map, path) = (&around.scene.map, &around.scene.route.path);
-    let outward = |station_m: f64| {
-        let left = path.pose_at(station_m).left();
-        if request.side == Side::Left { left } else { -left }
-    };
     let inner_m = way.from.edge_m + PARKED_M;
     let station_m = way.station_m - BEFORE_M - size.length_m / 2.0;
     if station_m < 0.0 {
         return Err("there is no room to park".into());
     }
-    let position = path.pose_at(station_m).position + outward(station_m) * (inner_m + size.width_m / 2.0);
+    let here = path.pose_at(station_m);
+    let outward = if request.side == Side::Left { here.left() } else { -here.left() };
+    let position = here.position + outward * (inner_m + size.width_m / 2.0);
     // It stands in the direction of the lane beside it.
-    let beside = path.pose_at(station_m).position + outward(station_m) * (way.from.edge_m - PARKED_M);
-    let lane =
-        map.nearest(beside, path.pose_at(station_m).heading_rad, 1.0).ok_or("there is no room to park")?;
+    let beside = here.position + outward * (way.from.edge_m - PARKED_M);
+    let lane = map.nearest(beside, here.heading_rad, 1.0).ok_or("there is no room to park")?;
     let heading_rad = map.lane(lane.lane).centre.pose_at(lane.station_m).heading_rad;
     let pose = Pose { position, heading_rad };
     let outline = OrientedBox::new(pose, size.length_m, size.width_m);
@@ -178,7 +155,7 @@ fn park(
         return Err("there is no room at the kerb".into());
     }
     let mover = Mover::new(size, Motion::Stand);
-    let parked = RoadUser::new(around, id, body, request.colour, Verb::Stand, mover, at(pose));
+    let parked = RoadUser::new(around, id + 1, body, request.colour, Verb::Stand, mover, at(pose));
     if parked.has_room(around, ROOM_M) { Ok(parked) } else { Err("another road user is there".into()) }
 }
 

@@ -10,7 +10,7 @@ use crate::sim::{Contact, Scene, Start, World};
 use avastra_lang::model::vocabulary::{LaneChoice, Then, Verb};
 
 fn inside(map: &RoadMap, road: &str) -> LaneIndex {
-    LaneIndex(map.lanes.iter().position(|lane| lane.key.road == road).expect("it is there"))
+    map.place(road, -1, 10.0).expect("it is there").lane
 }
 
 #[test]
@@ -50,8 +50,7 @@ fn signs_decide_before_the_right_and_lights_before_signs() {
 /// Drives the route at a speed until a contact.
 fn contact(world: &mut World, speed_mps: f64) -> Contact {
     for _ in 0..3000 {
-        let control = hold(world, speed_mps);
-        if let Some(contact) = world.tick(&control).first() {
+        if let Some(contact) = world.tick(&hold(world, speed_mps)).first() {
             return *contact;
         }
     }
@@ -66,8 +65,7 @@ fn begin(scene: &Arc<Scene>, signal_phase_s: f64) -> World {
 /// Drives until the ego vehicle's front is at a station.
 fn drive_to(world: &mut World, front_m: f64, speed_mps: f64) {
     while VehicleParameters::MKZ.front_m(world.ego_station_m()) < front_m {
-        let control = hold(world, speed_mps);
-        assert_eq!(world.tick(&control), []);
+        assert_eq!(world.tick(&hold(world, speed_mps)), []);
     }
 }
 

@@ -19,8 +19,7 @@ fn what_passes_above_is_neither_seen_nor_met() {
         }
         let (mut contacts, mut sensed) = (0, 0);
         while world.ego_station_m() < 260.0 && world.time_s() < 60.0 {
-            let control = roll(&world);
-            contacts += world.tick(&control).len();
+            contacts += world.tick(&roll(&world)).len();
             let on_the_way = |object: &&SensedObject| object.pose.position.y < -5.0;
             sensed = sensed.max(world.sensed().objects.iter().filter(on_the_way).count());
         }
@@ -48,8 +47,7 @@ fn a_vehicle_up_the_hill_is_on_the_same_level() {
     assert!((above_m - 8.0).abs() < 0.1, "{above_m}");
     let mut contacts = 0;
     while world.time_s() < 20.0 {
-        let control = roll(&world);
-        contacts += world.tick(&control).len();
+        contacts += world.tick(&roll(&world)).len();
     }
     assert_eq!(contacts, 1, "it is in the way");
 }

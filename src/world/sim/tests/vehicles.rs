@@ -5,33 +5,33 @@ use std::sync::Arc;
 use crate::action::{Effect, SpawnRequest, Surroundings};
 use crate::sim::body::BodyParameters;
 use crate::sim::testing::request;
-use crate::sim::way::Way;
+use crate::sim::way::body_at;
 use crate::sim::{Control, DT_S, Scene, Start, TrafficProfile, World, body, testing};
 use avastra_base::geometry::{OrientedBox, Path, Pose, Vec2};
 use avastra_lang::model::vocabulary::{Body, LaneChoice, Level, Phenomenon, Side, Then, Verb, Word};
 
-use super::{drive, hold, spawn, y_m};
+use super::{drive, driven, hold, spawn, y_m};
 
 #[test]
 fn a_bus_in_a_bend_keeps_its_tail_near_its_lane() {
     // How far the outline reaches beyond the sides that the widest part of it has on a straight way, m.
-    let sweep_m = |radius_m: f64, pose_at: &dyn Fn(&Way, f64, &BodyParameters) -> Pose| -> f64 {
+    let sweep_m = |radius_m: f64, pose_at: fn(&Path, f64, &BodyParameters) -> Pose| -> f64 {
         let arc = (0..=200).map(|i| {
             let turn_rad = f64::from(i) / 200.0 * core::f64::consts::PI;
             let (sin, cos) = libm::sincos(turn_rad);
             (Vec2::new(radius_m * sin, radius_m * (1.0 - cos)), turn_rad, 1.0 / radius_m)
         });
-        let way = Way::of_path(Path::new(arc).expect("it is a path"));
+        let path = Path::new(arc).expect("it is a path");
         let bus = body::parameters(Body::SchoolBus);
-        let pose = pose_at(&way, way.path.length_m() / 2.0, &bus);
+        let pose = pose_at(&path, path.length_m() / 2.0, &bus);
         let outline = OrientedBox::new(pose, bus.length_m, bus.width_m);
         let centre = Vec2::new(0.0, radius_m);
         let far_m = outline.corners().iter().map(|corner| (corner - centre).norm()).fold(0.0, f64::max);
         far_m - radius_m - bus.width_m / 2.0
     };
     for (radius_m, most_m) in [(7.0, 1.25), (10.0, 1.0)] {
-        let about_its_centre = sweep_m(radius_m, &|way, station_m, _| way.path.pose_at(station_m));
-        let on_its_axles = sweep_m(radius_m, &|way, station_m, bus| way.body_at(station_m, bus));
+        let about_its_centre = sweep_m(radius_m, |path, station_m, _| path.pose_at(station_m));
+        let on_its_axles = sweep_m(radius_m, body_at);
         assert!(on_its_axles < most_m, "{on_its_axles}");
         assert!(on_its_axles < 0.8 * about_its_centre, "{on_its_axles} {about_its_centre}");
     }
@@ -39,8 +39,7 @@ fn a_bus_in_a_bend_keeps_its_tail_near_its_lane() {
 
 #[test]
 fn vehicles_that_touch_slide_to_rest_by_friction() {
-    let mut world = testing::world(&testing::straight());
-    drive(&mut world, 8.0, 3.0);
+    let mut world = driven(&testing::straight(), 8.0, 3.0);
     let (mut behind, mut ahead) =
         (request(Verb::DriveAhead, 30.0, 14.0), request(Verb::DriveAhead, 45.0, 14.0));
     behind.body = Body::SchoolBus;
@@ -51,8 +50,7 @@ fn vehicles_that_touch_slide_to_rest_by_friction() {
     let mut last = [behind, ahead];
     let mut crashes = 0;
     for _ in 0..500 {
-        let control = hold(&world, 0.0);
-        world.tick(&control);
+        world.tick(&hold(&world, 0.0));
         let met = world.incidents().len();
         crashes += met;
         for was in &mut last {
@@ -73,8 +71,7 @@ fn a_vehicle_that_is_asked_to_stand_stands_to_the_bit() {
     let mut world = testing::world(&testing::straight());
     let stands = spawn(&mut world, request(Verb::DriveAhead, 30.0, 0.0));
     for _ in 0..500 {
-        let control = hold(&world, 0.0);
-        world.tick(&control);
+        world.tick(&hold(&world, 0.0));
         let now = world.obstacle(stands.id).expect("it stands in sight");
         assert_eq!((now.outline, now.velocity_mps), (stands.outline, Vec2::zeros()));
     }
@@ -95,15 +92,13 @@ fn a_lane_change_leads_past_what_stands_in_the_lane_before() {
 
 #[test]
 fn an_overtaker_that_keeps_its_lane_comes_back_to_it_well_ahead() {
-    let mut world = testing::world(&testing::straight());
-    drive(&mut world, 8.0, 8.0);
+    let mut world = driven(&testing::straight(), 8.0, 8.0);
     let passing = spawn(&mut world, request(Verb::Overtake, 12.0, 14.0));
     // Where its rear is before the ego vehicle's front when it begins to come back, m.
     let mut begins_m = None;
     let mut most_aside_m: f64 = 0.0;
     for _ in 0..1200 {
-        let control = hold(&world, 8.0);
-        world.tick(&control);
+        world.tick(&hold(&world, 8.0));
         let now = world.obstacle(passing.id).expect("it drives on");
         most_aside_m = most_aside_m.max(-1.75 - now.outline.pose.position.y);
         if most_aside_m > 3.4 && now.velocity_mps.y > 0.1 {
@@ -170,8 +165,7 @@ fn released_vehicles_see_what_their_rays_meet_and_stop_at_once() {
         let mut hardest_mps2: f64 = 0.0;
         let mut was_mps = 12.0;
         for _ in 0..500 {
-            let control = hold(&world, 0.0);
-            world.tick(&control);
+            world.tick(&hold(&world, 0.0));
             let now_mps = world.obstacle(ahead.id).expect("it is in sight").velocity_mps.norm();
             hardest_mps2 = hardest_mps2.max((was_mps - now_mps) / DT_S);
             was_mps = now_mps;
@@ -231,8 +225,7 @@ fn ambient_vehicles_change_lanes_where_they_gain() {
             let mut world = World::new(testing::straight(), &start);
             let mut lanes = std::collections::BTreeMap::new();
             for _ in 0..3000 {
-                let control = hold(&world, 5.0);
-                world.tick(&control);
+                world.tick(&hold(&world, 5.0));
                 assert_eq!(world.incidents(), []);
                 for obstacle in world.obstacles() {
                     let lane = (obstacle.outline.pose.position.y / 3.5).floor() as i32;

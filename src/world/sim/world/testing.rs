@@ -20,10 +20,10 @@ impl World {
         let mut rng = choices(self.seed, self.next_id, 0);
         let way = Way::along(&self.scene, &lanes, &mut rng).expect("the lanes follow each other");
         let size = parameters(Body::Sedan);
-        let driver = Driver::new(&self.scene, way, station_m, Cruise::Commanded(speed_mps), Vec::new(), 1);
+        let driver = Driver::new(&self.scene, way, station_m, Cruise::Commanded(speed_mps), Vec::new());
         let moved = driver.moved(&size);
         let mover = Mover::new(size, Motion::Drive(driver));
-        let around = self.around([&self.users, &[]]);
+        let around = self.alone();
         let verb = Verb::CrossRoad;
         let user = RoadUser::new(&around, self.next_id, Body::Sedan, Colour::Red, verb, mover, moved);
         self.users.push(user);

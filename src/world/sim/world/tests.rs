@@ -39,8 +39,7 @@ fn a_wreck_has_priority_unless_it_came_to_lie_there_too_late() {
             ..Control::default()
         };
         while world.ego().speed_mps < 10.0 {
-            let control = drives(&world);
-            world.tick(&control);
+            world.tick(&drives(&world));
         }
         world.spawn(&testing::request(Verb::DriveAhead, distance_m, 0.1)).expect("there is room");
         let user = &mut world.users[0];
@@ -49,8 +48,7 @@ fn a_wreck_has_priority_unless_it_came_to_lie_there_too_late() {
         user.obstacle.velocity_mps = Vec2::zeros();
         user.mover.crash(9);
         loop {
-            let control = drives(&world);
-            if let Some(contact) = world.tick(&control).first() {
+            if let Some(contact) = world.tick(&drives(&world)).first() {
                 return contact.priority;
             }
             assert!(world.time_s() < 60.0);

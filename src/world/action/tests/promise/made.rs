@@ -283,23 +283,23 @@ impl Maker {
             }
             rules.push(Rule::Fog(moves));
         }
-        let begin = |any: bool, fixed: &str| if any { "any".to_owned() } else { fixed.to_owned() };
-        let any = [(); 4].map(|()| self.below(2) == 0);
-        let range = |maker: &mut Maker, max: u32| {
-            let (a, b) = (1 + maker.below(max), 1 + maker.below(max));
-            (a.min(b), a.max(b))
+        let [fog, wet, was, flag] =
+            ["None", "Light", "Near", "true"].map(|fixed| if self.below(2) == 0 { "any" } else { fixed });
+        let mut range = |max: u32, unit: &str| {
+            let (a, b) = (1 + self.below(max), 1 + self.below(max));
+            format!("{} {unit} .. {} {unit}", a.min(b), a.max(b))
         };
-        let (speed, distance, a, b) = (range(self, 16), range(self, 70), range(self, 70), range(self, 70));
+        let (speed, distance, a, b) = (range(16, "m/s"), range(70, "m"), range(70, "m"), range(70, "m"));
         let text = format!(
             "language 1
 enum Mode = Near | Far
 enum Level = None < Light < High
 enum Key = Front | Back
 enum Car = Sedan | SUV | Jeep
-state fog: Level = {}
-state wet: Key -> Level = {}
-state was: Mode = {}
-state flag: Bool = {}
+state fog: Level = {fog}
+state wet: Key -> Level = {wet}
+state was: Mode = {was}
+state flag: Bool = {flag}
 state count: Int = 0
 road corner {{ map: \"made_up.xodr\" start: lane 1/-1 at 10 m goal: lane 1/-1 at 90 m }}
 road slow {{ map: \"made_up.xodr\" start: lane 1/-1 at 10 m goal: lane 1/-1 at 90 m limit: 8 m/s }}
@@ -315,31 +315,17 @@ action thicken(each to: Level) {{ set fog = to }}
 action soak(each at: Key, any how: Level) {{ set wet[at] = how }}
 action turn(each on: Bool) {{ set flag = on }}
 action tick() {{ set count = count + 1 }}
-action ahead(each mode: Mode, any speed: Speed in {} m/s .. {} m/s, any distance: Length in {} m .. {} m, any car: Car) {{
+action ahead(each mode: Mode, any speed: Speed in {speed}, any distance: Length in {distance}, any car: Car) {{
   spawn car ahead distance {{ lane: Current, speed: speed, does: DriveAhead }}
   set was = mode
 }}
-action pair(any speed: Speed in {} m/s .. {} m/s, any a: Length in {} m .. {} m, any b: Length in {} m .. {} m) {{
+action pair(any speed: Speed in {speed}, any a: Length in {a}, any b: Length in {b}) {{
   spawn Sedan ahead a {{ lane: Current, speed: speed, does: DriveAhead }}
   spawn Jeep ahead b {{ lane: Current, speed: speed, does: DriveAhead }}
 }}
 group cars = ahead, pair
 episode {{ limit: {STEPS} steps }}
 ",
-            begin(any[0], "None"),
-            begin(any[1], "Light"),
-            begin(any[2], "Near"),
-            begin(any[3], "true"),
-            speed.0,
-            speed.1,
-            distance.0,
-            distance.1,
-            speed.0,
-            speed.1,
-            a.0,
-            a.1,
-            b.0,
-            b.1,
         );
         // The last one is dropped first.
         for at in (1..rules.len()).rev() {

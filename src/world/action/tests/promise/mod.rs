@@ -17,10 +17,10 @@ use std::collections::BTreeMap;
 
 use crate::action::tests::Plain;
 use crate::action::tests::sound::compiled;
-use crate::action::{ActionTable, Draw, Offer, Situation, SpawnFacts, SpawnRequest, Surroundings};
+use crate::action::{ActionTable, Draw, Offer, Situation};
 use avastra_base::rng;
 use avastra_base::rng::Stream;
-use avastra_lang::model::{Memory, MomentFacts, Row, RulesInForce, Space, Type, Value, code};
+use avastra_lang::model::{Memory, Row, RulesInForce, Space, Value, code};
 use avastra_lang::prove::{Realised, realise};
 
 use made::{Binds, Condition, EachStep, Level, Made, Maker, Number, ROADS, Rule};
@@ -265,19 +265,6 @@ fn audit(spaces: u64, draws: u32) -> Seen {
     seen
 }
 
-/// [`Plain`] so many seconds after the start.
-struct Later(f64);
-
-impl Surroundings for Later {
-    fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
-        Plain.survey(request)
-    }
-
-    fn moment(&self) -> MomentFacts {
-        MomentFacts { elapsed_s: self.0, ..Plain.moment() }
-    }
-}
-
 /// Plays random episodes on each road and judges every offer, and the states of every step.
 fn played(space: &std::sync::Arc<Space>, made: &Made, draws: u32, seen: &mut Seen) {
     let (realised, _) = realise(space);
@@ -301,7 +288,7 @@ fn played(space: &std::sync::Arc<Space>, made: &Made, draws: u32, seen: &mut See
                     memory: &memory,
                     road,
                     rules: &rules,
-                    surroundings: &Later(6.0 * step as f64),
+                    surroundings: &Plain(6.0 * step as f64),
                     seed: episode,
                     step,
                 };
@@ -375,15 +362,4 @@ fn random_spaces_keep_the_promise_at_length() {
     let seen = audit(300, DRAWS_MAX);
     println!("{seen:?}");
     assert!(seen.rows_realised >= 300 * 8 && seen.timed >= 60, "{seen:?}");
-}
-
-/// The types of the drawn values are those of the parameters.
-#[test]
-fn the_twin_knows_every_action() {
-    let made = Maker(rng::stream(0, Stream::Exploration, 77)).space();
-    let drawn = ["thicken", "soak", "turn", "tick", "ahead", "pair"];
-    let space = compiled(&made.text).space.expect("without rules it is sound");
-    let names: Vec<&str> = space.actions.iter().map(|action| action.name.as_str()).collect();
-    assert_eq!(names, drawn);
-    assert!(space.states.iter().all(|state| !matches!(state.ty, Type::Quantity(_))));
 }
