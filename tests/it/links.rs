@@ -462,7 +462,7 @@ fn forge<D: Units>(file: &Path, unit: i64, change: &str) {
     let database = rusqlite::Connection::open(file).expect("it is there");
     database.execute_batch(change).expect("the tables are as they were");
     database.execute("DELETE FROM seal WHERE unit = ?", [unit]).expect("it is writable");
-    D::layout().seal(&database, unit).expect("it is writable");
+    D::LAYOUT.seal(&database, unit).expect("it is writable");
 }
 
 /// Adds a part to an estimate that it does not keep, with an event whose scenario has this file name.
