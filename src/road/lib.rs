@@ -43,4 +43,4 @@ pub use map::{
 };
 pub use opendrive::well_formed;
 pub use proposal::{Proposal, propose};
-pub use route::{Conflict, Route, RouteLane, RouteLaneChange, RouteSignLine, RouteStopLine};
+pub use route::{Conflict, Route, RouteLane, RouteLaneChange};

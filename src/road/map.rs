@@ -94,7 +94,7 @@ pub enum Turn {
     UTurn,
 }
 
-/// Where a lane must stop for a signal.
+/// Where a lane or a route must stop for a signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StopLine {
     pub station_m: f64,
@@ -102,7 +102,7 @@ pub struct StopLine {
     pub signal: usize,
 }
 
-/// Where a lane must stop or give way because of a sign.
+/// Where a lane or a route must stop or give way because of a sign.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SignLine {
     pub station_m: f64,
