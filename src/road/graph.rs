@@ -201,31 +201,18 @@ impl<'a> Builder<'a> {
             }
         }
         let junctions = document.junctions.iter().enumerate().map(|(i, junction)| (junction.id.as_str(), i));
+        let empty = |junction: &JunctionElement| Junction {
+            id: junction.id.clone(),
+            name: junction.name.clone(),
+            groups: junction.controllers.len(),
+            ..Junction::default()
+        };
         let map = RoadMap {
             name: document.name.clone(),
-            file: None,
-            lanes: Vec::new(),
-            signals: Vec::new(),
-            signs: Vec::new(),
-            junctions: document
-                .junctions
-                .iter()
-                .map(|junction| Junction {
-                    id: junction.id.clone(),
-                    name: junction.name.clone(),
-                    lanes: Vec::new(),
-                    groups: junction.controllers.len(),
-                    idle_lights: 0,
-                })
-                .collect(),
-            crosswalks: Vec::new(),
-            strips: Vec::new(),
-            solids: Vec::new(),
-            has_levels: false,
+            junctions: document.junctions.iter().map(empty).collect(),
             warnings: document.warnings.clone(),
             warned_at: document.warned_at.clone(),
-            left_out: BTreeMap::new(),
-            grid: LaneGrid::default(),
+            ..RoadMap::default()
         };
         let (junctions, lanes) = (junctions.collect(), BTreeMap::new());
         Ok(Builder { document, map, roads, junctions, lanes, spent: Spent::new(document) })

@@ -154,7 +154,7 @@ pub enum SignKind {
     PriorityRoad,
 }
 
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Junction {
     pub id: String,
     pub name: String,
@@ -214,7 +214,7 @@ pub enum StripKind {
 }
 
 /// A whole map.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct RoadMap {
     pub name: String,
     /// The OpenDRIVE file that it was read from, if it was a file.
