@@ -121,7 +121,7 @@ fn vertices_max(document: &Document) -> usize {
 
 /// Whether a lane gets a centre line.
 fn is_sampled(lane: &LaneElement) -> bool {
-    lane.driving || lane.beside.is_some()
+    lane.undriven.is_none() || lane.beside.is_some()
 }
 
 /// The error for a map that is past a limit up to a road.

@@ -256,7 +256,7 @@ fn warn_of_idle_lights(builder: &mut Builder, placed: &Placed, held: &[Vec<(Lane
         let lanes = &road.sections[road.section_at(signal.s_m)].lanes;
         let is_named = |id: i32| signal.validity.iter().any(|(from, to)| (*from..=*to).contains(&id));
         let mut named = lanes.iter().filter(|lane| is_named(lane.id)).peekable();
-        let others_only = idle && named.peek().is_some() && named.all(|lane| !lane.driving);
+        let others_only = idle && named.peek().is_some() && named.all(|lane| lane.undriven.is_some());
         if signal.meaning == Meaning::OtherLight || others_only {
             builder.map.signals[index].for_vehicles = false;
             continue;

@@ -66,9 +66,7 @@ pub struct SectionElement {
 pub struct LaneElement {
     pub id: i32,
     pub line: u32,
-    /// Whether cars may drive on it, in one direction.
-    pub driving: bool,
-    /// Why no car drives on it; `None` for a driving lane.
+    /// Why no car drives on it, in one direction; `None` for a driving lane.
     pub undriven: Option<LeftOut>,
     /// What a lane that is no driving lane is to people on foot.
     pub beside: Option<StripKind>,

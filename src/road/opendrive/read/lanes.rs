@@ -68,21 +68,21 @@ impl Reader {
         }
         speeds.sort_by(|a, b| a.0.total_cmp(&b.0));
         let kind = lane.attribute("type").unwrap_or("none");
-        let (mut driving, for_vehicles, on_foot) = lane_type(kind);
-        let mut undriven = (!driving).then(|| LeftOut { what: format!("of type `{kind}`"), for_vehicles });
+        let (is_driving, for_vehicles, on_foot) = lane_type(kind);
+        let undriven = match lane.attribute("direction") {
+            _ if !is_driving => Some(format!("of type `{kind}`")),
+            Some(direction @ ("reversed" | "both")) => Some(format!("of direction `{direction}`")),
+            _ => None,
+        };
+        let undriven = undriven.map(|what| LeftOut { what, for_vehicles });
         // What is beside the road is left out without a warning.
-        if !driving && for_vehicles {
-            self.ignore(format!("lanes of type `{kind}`"));
+        if let Some(LeftOut { what, for_vehicles: true }) = &undriven {
+            self.ignore(format!("lanes {what}"));
         }
-        if let Some(direction @ ("reversed" | "both")) = lane.attribute("direction").filter(|_| driving) {
-            self.ignore(format!("lanes of direction `{direction}`"));
-            driving = false;
-            undriven = Some(LeftOut { what: format!("of direction `{direction}`"), for_vehicles });
-        }
-        let beside = on_foot.filter(|_| !driving);
+        let beside = on_foot.filter(|_| undriven.is_some());
         let widths = cubics(lane.children("width"), "sOffset")?;
         let borders = cubics(lane.children("border"), "sOffset")?;
-        if driving && widths.is_empty() && borders.is_empty() {
+        if undriven.is_none() && widths.is_empty() && borders.is_empty() {
             return Err(lane.wrong(format!("lane {id} has neither `width` nor `border`")));
         }
         let marks = lane.children("roadMark");
@@ -91,7 +91,6 @@ impl Reader {
         Ok(LaneElement {
             id,
             line: lane.line(),
-            driving,
             undriven,
             beside,
             widths,
