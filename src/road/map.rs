@@ -382,7 +382,7 @@ const MISFIT_RAD_PER_M: f64 = 0.1;
 
 impl Lane {
     /// Whether its traffic runs in the direction of the road's reference line.
-    pub(super) fn is_along(&self) -> bool {
+    pub fn is_along(&self) -> bool {
         self.road_stations_m[0] < self.road_stations_m[self.road_stations_m.len() - 1]
     }
 
