@@ -139,15 +139,10 @@ impl Source {
                     }
                     None => self.text(declared, "value"),
                 };
-                let Some(value) = value else {
-                    self.torn.insert(format!("${name}"));
-                    continue;
-                };
-                if parameter::check(self, declared, &value).is_none() {
-                    self.torn.insert(format!("${name}"));
-                    continue;
+                match value.filter(|value| parameter::check(self, declared, value).is_some()) {
+                    Some(value) => drop(self.parameters.insert(name.to_owned(), value)),
+                    None => self.tear(&format!("${name}")),
                 }
-                self.parameters.insert(name.to_owned(), value);
             }
         }
     }
