@@ -56,6 +56,22 @@ pub struct Other {
     pub changes: bool,
 }
 
+impl Other {
+    fn new(entity: &Entity, does: &'static str) -> Other {
+        Other {
+            name: entity.name.clone(),
+            shape: entity.body.clone(),
+            does,
+            is_behind: false,
+            gap_m: 0.0,
+            lane: None,
+            side: None,
+            speed_mps: 0.0,
+            changes: false,
+        }
+    }
+}
+
 impl Scene {
     /// Finds every place. `None` if something is refused.
     pub fn of(source: &mut Source, story: Story, files: &dyn Files) -> Option<Scene> {
@@ -148,7 +164,7 @@ impl Scene {
         placed: &[Placed],
     ) -> Option<()> {
         let mark = entity.position.as_ref().map_or(&entity.mark, |(mark, _)| mark);
-        let (ego, Placed { shape, beside, mps, .. }) = (&placed[0], other);
+        let (ego, Placed { beside, mps, .. }) = (&placed[0], other);
         let (front_m, back_m) = ego.ends_m();
         let (own_front_m, own_back_m) = other.ends_m();
         let ahead_m = match &entity.headway {
@@ -160,17 +176,7 @@ impl Scene {
         if let Some((mark, _)) = entity.headway.as_ref().filter(|_| behind_m >= 0.0) {
             return source.refuse_at(mark, "a distance to the ego vehicle is read of a vehicle ahead of it");
         }
-        let mut spawn = Other {
-            name: entity.name.clone(),
-            shape: shape.clone(),
-            does: "DriveAhead",
-            is_behind: false,
-            gap_m: ahead_m,
-            lane: None,
-            side: None,
-            speed_mps: *mps,
-            changes: false,
-        };
+        let mut spawn = Other { gap_m: ahead_m, speed_mps: *mps, ..Other::new(entity, "DriveAhead") };
         if !beside.is_along {
             if ahead_m < 0.0 {
                 return source.refuse_at(mark, "an oncoming vehicle is ahead of the ego vehicle");
@@ -309,17 +315,7 @@ impl Scene {
         }
         let half_m = entity.body.length_m / 2.0;
         let front_m = story.ego.body.middle_m + story.ego.body.length_m / 2.0;
-        let mut spawn = Other {
-            name: entity.name.clone(),
-            shape: entity.body.clone(),
-            does: "Stand",
-            is_behind: false,
-            gap_m: 0.0,
-            lane: None,
-            side: None,
-            speed_mps: 0.0,
-            changes: false,
-        };
+        let mut spawn = Other::new(entity, "Stand");
         let mps = speed(source, story, entity, 0)?;
         let Some(walk) = entity.walks.first() else {
             if mps != 0.0 {
