@@ -11,9 +11,8 @@ use avastra_lang::model::vocabulary::{Body, Level};
 
 use super::super::recording::Recording;
 use super::super::xml::Element;
-use super::Ego;
-use super::actions::{position, private, speed, teleport};
-use super::entity::{ahead_of_centre_m, bounding_box, build, vehicle_category};
+use super::actions::private;
+use super::entity::{bounding_box, build, vehicle_category};
 use super::environment::{sun, time};
 use super::{BENEATH_M, natural, property};
 
@@ -65,20 +64,8 @@ pub fn entity(recording: &Recording, actor: &Actor) -> Element {
     object.holding(vehicle.holding_all(build(actor)).holding(properties.holding_all(facts)))
 }
 
-/// The ego vehicle that ScenarioRunner does not drive: a program of its own does, or nothing.
-pub fn begins(recording: &Recording, ego: Ego) -> Option<Element> {
-    let actor = &recording.seen.ego;
-    let first = actor.samples[0];
-    let place = position(&first.pose.offset(ahead_of_centre_m(actor), 0.0));
-    let begins = Element::new("Private")
-        .with("entityRef", actor.name())
-        .holding(teleport(place))
-        .holding(speed(first.velocity_mps.norm()));
-    Some(if ego == Ego::Controller { begins.holding(controller()) } else { begins })
-}
-
-/// Another program drives.
-fn controller() -> Element {
+/// A program other than ScenarioRunner drives.
+pub fn controller() -> Element {
     let module = property(&("module".to_owned(), "external_control".to_owned()));
     let controller =
         Element::new("Controller").with("name", "ads").holding(Element::new("Properties").holding(module));

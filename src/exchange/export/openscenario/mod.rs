@@ -152,15 +152,16 @@ fn storyboard(recording: &Recording, style: Style, exact: &[&Actor]) -> Element 
     let mut init = Vec::new();
     let mut groups = Vec::new();
     for actor in recording.actors() {
-        let (begins, events) = match (version, style.others) {
-            (Version::Carla, _) if actor.id == 0 && style.ego != Ego::Trajectory => {
-                (carla::begins(recording, style.ego), Vec::new())
-            }
-            (Version::Carla, _) => natural(recording, actor, version),
-            (_, Others::Natural) if actor.id > 0 && exact.iter().all(|other| other.id != actor.id) => {
-                natural(recording, actor, version)
-            }
-            _ => (begins(recording, actor, style.ego), events(recording, actor, style)),
+        let is_exact = match version {
+            Version::Carla => actor.id == 0 && style.ego != Ego::Trajectory,
+            Version::V1_2 if style.others == Others::Exact => true,
+            Version::V1_2 => actor.id == 0 || exact.iter().any(|other| other.id == actor.id),
+        };
+        let (begins, events) = if is_exact {
+            (begins(recording, actor, style), events(recording, actor, style))
+        } else {
+            let natural = Natural::of(recording, actor, version);
+            (natural.init(actor), natural.events(actor))
         };
         init.extend(begins);
         if !events.is_empty() {
@@ -189,14 +190,8 @@ fn storyboard(recording: &Recording, style: Style, exact: &[&Actor]) -> Element 
         .holding(Element::new("StopTrigger").holding(end))
 }
 
-/// What a road user does at the start and later, in actions.
-fn natural(recording: &Recording, actor: &Actor, version: Version) -> (Option<Element>, Vec<Element>) {
-    let natural = Natural::of(recording, actor, version);
-    (natural.init(actor), natural.events(actor))
-}
-
 /// Where a road user is at the start, if it is there.
-fn begins(recording: &Recording, actor: &Actor, ego: Ego) -> Option<Element> {
+fn begins(recording: &Recording, actor: &Actor, style: Style) -> Option<Element> {
     if actor.first_tick() > 0 {
         return None;
     }
@@ -206,8 +201,11 @@ fn begins(recording: &Recording, actor: &Actor, ego: Ego) -> Option<Element> {
         .with("entityRef", actor.name())
         .holding(teleport(position(&place)))
         .holding(speed(first.velocity_mps.norm()));
-    let is_driven = actor.id == 0 && ego == Ego::Controller;
-    Some(if is_driven { private.holding(activation()).holding(destination(recording)) } else { private })
+    Some(match style.version {
+        _ if actor.id > 0 || style.ego != Ego::Controller => private,
+        Version::Carla => private.holding(carla::controller()),
+        Version::V1_2 => private.holding(activation()).holding(destination(recording)),
+    })
 }
 
 /// What a road user does as it was recorded; nothing if the player moves it.
