@@ -4,6 +4,7 @@
 //! first or second differences are taken, whichever are smaller, and written as variable-length integers: what moves
 //! smoothly costs a few bits a value. The page's `decode.js` reads it back.
 
+use avastra_base::geometry::Vec2;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use miniz_oxide::deflate::compress_to_vec_zlib;
@@ -38,6 +39,11 @@ impl Columns {
         smallest.iter().for_each(|value| push_varint(&mut self.bytes, *value));
         self.layouts.push(Layout(step, order as u8, whole.len()));
         self.layouts.len() - 1
+    }
+
+    /// Adds columns of x and y (m), and gives their numbers.
+    pub fn add_points(&mut self, step: f64, points: impl Iterator<Item = Vec2> + Clone) -> [usize; 2] {
+        [self.add(step, points.clone().map(|point| point.x)), self.add(step, points.map(|point| point.y))]
     }
 
     /// The header and all columns as text: base64 of a zlib stream of the header's length (four bytes, little end

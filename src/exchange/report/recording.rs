@@ -354,8 +354,7 @@ fn poses(actor: &Actor) -> Vec<Pose> {
 
 /// Columns of x and y (m) and of the heading (rad).
 pub(super) fn places(columns: &mut Columns, poses: &[Pose]) -> [usize; 3] {
-    let x = columns.add(PLACE_M, poses.iter().map(|pose| pose.position.x));
-    let y = columns.add(PLACE_M, poses.iter().map(|pose| pose.position.y));
+    let [x, y] = columns.add_points(PLACE_M, poses.iter().map(|pose| pose.position));
     [x, y, columns.add(HEADING_RAD, unwound(poses))]
 }
 
