@@ -100,17 +100,4 @@ mod tests {
         // 1000 equal bytes deflate to nearly nothing.
         assert!(columns.pack(&()).len() < 150);
     }
-
-    #[test]
-    fn varints_keep_signs_and_size() {
-        let bytes_of = |value| {
-            let mut bytes = Vec::new();
-            push_varint(&mut bytes, value);
-            bytes
-        };
-        assert_eq!(bytes_of(0), [0]);
-        assert_eq!(bytes_of(-1), [1]);
-        assert_eq!(bytes_of(63), [126]);
-        assert_eq!(bytes_of(-300), [0xd7, 0x04]);
-    }
 }
