@@ -186,6 +186,13 @@ pub struct ControllerElement {
     pub signals: Vec<(String, u32)>,
 }
 
+impl SignalElement {
+    /// Whether its validity names a lane.
+    pub fn names(&self, lane: i32) -> bool {
+        self.validity.iter().any(|(from, to)| (*from..=*to).contains(&lane))
+    }
+}
+
 impl RoadElement {
     /// Index of the section that holds a station.
     pub fn section_at(&self, s_m: f64) -> usize {
