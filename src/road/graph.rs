@@ -131,32 +131,22 @@ fn too_large(road: &RoadElement, what: &str) -> RoadError {
     wrong(road.line, message)
 }
 
-/// The work and size of the lanes so far, and their limits.
+/// The work and size of the lanes so far.
+#[derive(Default)]
 struct Spent {
     steps: Cell<u64>,
-    steps_max: u64,
     vertices: usize,
-    vertices_max: usize,
     length_m: f64,
 }
 
 impl Spent {
-    fn new(document: &Document) -> Spent {
-        Spent {
-            steps: Cell::new(0),
-            steps_max: STEPS_MAX + STEPS_A_ROAD * document.roads.len() as u64,
-            vertices: 0,
-            vertices_max: vertices_max(document),
-            length_m: 0.0,
-        }
-    }
-
     /// The centre line of a lane, or why the lane has none. Counts its work and size.
     ///
     /// # Errors
     /// If the map is past a limit.
     fn centre_line(
         &mut self,
+        document: &Document,
         road: &RoadElement,
         section: &SectionElement,
         lane: i32,
@@ -166,10 +156,10 @@ impl Spent {
             self.vertices += centre.path.points().len();
             self.length_m += centre.path.length_m();
         }
-        if self.steps.get() > self.steps_max {
+        if self.steps.get() > STEPS_MAX + STEPS_A_ROAD * document.roads.len() as u64 {
             return Err(too_large(road, "its lanes bend and widen too often"));
         }
-        if self.vertices > self.vertices_max {
+        if self.vertices > vertices_max(document) {
             return Err(too_large(road, "its curved lanes are too long"));
         }
         if self.length_m > LANES_M_MAX {
@@ -215,7 +205,7 @@ impl<'a> Builder<'a> {
             ..RoadMap::default()
         };
         let (junctions, lanes) = (junctions.collect(), BTreeMap::new());
-        Ok(Builder { document, map, roads, junctions, lanes, spent: Spent::new(document) })
+        Ok(Builder { document, map, roads, junctions, lanes, spent: Spent::default() })
     }
 
     pub fn warn(&mut self, line: u32, message: impl AsRef<str>) {
@@ -255,7 +245,7 @@ impl<'a> Builder<'a> {
                     }
                     let undrivable = |what: &str| LeftOut { what: what.to_owned(), for_vehicles: true };
                     let at = format!("lane {} of road `{}` at s {}", element.id, road.id, section.begin_m);
-                    let centre = match self.spent.centre_line(road, section, element.id)? {
+                    let centre = match self.spent.centre_line(self.document, road, section, element.id)? {
                         Ok(centre) => centre,
                         Err(NoCentreLine::Short) => {
                             self.map.left_out.insert(left_out, undrivable("without length"));
@@ -329,7 +319,7 @@ impl<'a> Builder<'a> {
             for section in &road.sections {
                 for element in &section.lanes {
                     let Some(kind) = element.beside else { continue };
-                    let found = self.spent.centre_line(road, section, element.id)?;
+                    let found = self.spent.centre_line(self.document, road, section, element.id)?;
                     let Ok(CentreLine { path, widths_m, .. }) = found else { continue };
                     self.map.strips.push(Strip { kind, bounds: path.bounds(), centre: path, widths_m });
                 }
