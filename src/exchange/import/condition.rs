@@ -8,12 +8,6 @@ use super::trigger::{Condition, Pair, Trigger, When};
 /// What holds from the beginning.
 const ALWAYS: &str = "elapsed >= 0 s";
 
-/// Where something is and how it moves along the way, as long as it keeps its speed.
-pub struct Kinematics {
-    pub station_m: f64,
-    pub mps: f64,
-}
-
 /// Whether a group of conditions holds from the beginning.
 pub fn is_always(all: &[Condition]) -> bool {
     all.iter().all(|condition| matches!(condition.kind, When::Always))
@@ -85,7 +79,7 @@ fn part(
             let of = named(source, mark, entity, placed)?;
             let there = ground.beside(source, mark, position)?;
             let station_m = there.station_m - within_m;
-            let Kinematics { station_m: from_m, mps } = of.kinematics();
+            let (from_m, mps) = (of.beside.station_m, of.along_mps());
             if (from_m - there.station_m).abs() <= *within_m {
                 return already(source, condition);
             }
@@ -167,7 +161,7 @@ fn meeting(
     if if pair.is_less { gap_m < metres } else { gap_m > metres } {
         return already(source, condition);
     }
-    let closing_mps = back.kinematics().mps - front.kinematics().mps;
+    let closing_mps = back.along_mps() - front.along_mps();
     let seconds = (gap_m - metres) / closing_mps;
     if closing_mps > 0.0 && pair.is_less || closing_mps < 0.0 && !pair.is_less {
         return at(source, mark, seconds);

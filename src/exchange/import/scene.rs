@@ -7,7 +7,6 @@ use avastra_road::RoadMap;
 
 use super::action::{Headway, Speed, Target};
 use super::body::Shape;
-use super::condition::Kinematics;
 use super::ground::{Beside, Ground};
 use super::position::{Heading, Position};
 use super::source::{Mark, Source};
@@ -401,9 +400,9 @@ impl Placed {
         (middle_m + self.shape.length_m / 2.0, middle_m - self.shape.length_m / 2.0)
     }
 
-    pub fn kinematics(&self) -> Kinematics {
-        let mps = if self.beside.is_along { self.mps } else { -self.mps };
-        Kinematics { station_m: self.beside.station_m, mps }
+    /// Its speed along the way, negative against it, m/s.
+    pub fn along_mps(&self) -> f64 {
+        if self.beside.is_along { self.mps } else { -self.mps }
     }
 }
 
