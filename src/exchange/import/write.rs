@@ -8,6 +8,7 @@ use avastra_lang::syntax::ast::FileId;
 use avastra_lang::syntax::format;
 
 use super::Imported;
+use super::body::Shape;
 use super::own::Own;
 use super::scene::{Other, Scene};
 
@@ -15,20 +16,12 @@ use super::scene::{Other, Scene};
 pub fn scenario(scene: &Scene, name: &str, notes: BTreeSet<String>) -> Imported {
     let mut text = head(&scene.description, name, &notes);
     let own = identifier(name);
-    let map = scene.map.rsplit(['/', '\\']).next().unwrap_or_default();
-    let _ = writeln!(
-        text,
-        "road {own}_road {{\n  map: {}\n  start: {}\n  goal: {}",
-        quoted(map),
-        scene.start,
-        scene.goal
-    );
+    let Scene { start, goal, .. } = scene;
+    let map = quoted(scene.map.rsplit(['/', '\\']).next().unwrap_or_default());
+    let ego_mps = number(scene.ego_mps);
+    let _ = writeln!(text, "road {own}_road {{\n  map: {map}\n  start: {start}\n  goal: {goal}");
     if scene.ego_mps > 0.0 {
-        let _ = writeln!(
-            text,
-            "  // the ego vehicle's speed in the file\n  limit: {} m/s",
-            number(scene.ego_mps)
-        );
+        let _ = writeln!(text, "  // the ego vehicle's speed in the file\n  limit: {ego_mps} m/s");
     }
     text += "}\n\n";
     if scene.weather.time.is_some() {
@@ -39,16 +32,11 @@ pub fn scenario(scene: &Scene, name: &str, notes: BTreeSet<String>) -> Imported 
         text += "state sky: Sky -> Level = None\n\n";
     }
     for (index, other) in scene.others.iter().enumerate() {
-        let shape = &other.shape;
-        let _ = writeln!(
-            text,
-            "body {} {{ like: {}, length: {} m, width: {} m, height: {} m }}",
-            body(index, other),
-            shape.like,
-            number(shape.length_m),
-            number(shape.width_m),
-            number(shape.height_m)
-        );
+        let Shape { like, length_m, width_m, height_m, .. } = &other.shape;
+        let [length, width, height] = [length_m, width_m, height_m].map(|metres| number(*metres));
+        let body = body(index, other);
+        let size = format!("length: {length} m, width: {width} m, height: {height} m");
+        let _ = writeln!(text, "body {body} {{ like: {like}, {size} }}");
     }
     if scene.others.is_empty() {
         text += "state begun: Bool = false\naction begin() { set begun = true }\n";
@@ -64,10 +52,10 @@ pub fn scenario(scene: &Scene, name: &str, notes: BTreeSet<String>) -> Imported 
     }
     // One step: its action happens at the beginning, or at the moment that it waits for.
     let step_ms = (scene.duration_s * 50.0).ceil().max(1.0) * 20.0;
+    let step = number(step_ms / 1000.0);
     let _ = writeln!(
         text,
-        "\nepisode {{\n  roads: [{own}_road]\n  step: {} s\n  stop: arrived\n  limit: 1 steps\n}}",
-        number(step_ms / 1000.0)
+        "\nepisode {{\n  roads: [{own}_road]\n  step: {step} s\n  stop: arrived\n  limit: 1 steps\n}}"
     );
     let mut start = scene.weather.time.map_or_else(String::new, |time| format!("time: {time}, "));
     if scene.weather.is_rough() {
@@ -77,8 +65,7 @@ pub fn scenario(scene: &Scene, name: &str, notes: BTreeSet<String>) -> Imported 
     let once = scene.once.as_ref().map_or_else(String::new, |once| format!(" once {once}"));
     let _ = writeln!(
         text,
-        "\nscenario {own} {{\n  road: {own}_road\n  start {{ {start}ego_speed: {} m/s }}\n  steps {{ 0: begin(){once} }}\n}}",
-        number(scene.ego_mps)
+        "\nscenario {own} {{\n  road: {own}_road\n  start {{ {start}ego_speed: {ego_mps} m/s }}\n  steps {{ 0: begin(){once} }}\n}}"
     );
     // A text that does not parse is refused when it is checked.
     let text = format(FileId(0), &text).unwrap_or(text);
