@@ -190,11 +190,8 @@ impl Drawing<'_> {
         }
         for (station_m, name, paint) in [(0.0, "start", "#1b7f3a"), (route.goal_m, "goal", "#111111")] {
             let at = route.path.pose_at(station_m);
-            let (x, y) = self.canvas.at(at.position);
-            let _ = writeln!(
-                self.canvas.svg,
-                r##"<circle cx="{x:.1}" cy="{y:.1}" r="6" fill="{paint}" stroke="#ffffff" stroke-width="1.5"/>"##
-            );
+            let style = format!(r##"fill="{paint}" stroke="#ffffff" stroke-width="1.5""##);
+            self.canvas.circle(at.position, "6", &style);
             let style = format!(r##"font-size="14" font-weight="bold" fill="{paint}""##);
             self.canvas.text(at.position + Vec2::new(8.0, 8.0) / self.canvas.px_per_m, name, &style);
         }
