@@ -74,13 +74,11 @@ impl Other {
 impl Scene {
     /// Finds every place. `None` if something is refused.
     pub fn of(source: &mut Source, story: Story, files: &dyn Files) -> Option<Scene> {
-        let text = match files.map(&story.map.1) {
-            Ok(text) => text,
-            Err(reason) => return source.refuse_at(&story.map.0, format!("`{}`: {reason}", story.map.1)),
-        };
-        let map = match RoadMap::from_opendrive("map", &text) {
+        let (mark, path) = &story.map;
+        let read = |text: String| RoadMap::from_opendrive("map", &text).map_err(|error| error.to_string());
+        let map = match files.map(path).and_then(read) {
             Ok(map) => map,
-            Err(error) => return source.refuse_at(&story.map.0, format!("`{}`: {error}", story.map.1)),
+            Err(reason) => return source.refuse_at(mark, format!("`{path}`: {reason}")),
         };
         let ground = Ground::of(source, &story, map)?;
         let (start, goal) = (lane_point(&ground.map, ground.start), lane_point(&ground.map, ground.goal));
@@ -89,7 +87,7 @@ impl Scene {
             return None;
         }
         let mut scene = Scene {
-            map: story.map.1.clone(),
+            map: path.clone(),
             description: story.description.clone(),
             start,
             goal,
