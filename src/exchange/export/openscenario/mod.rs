@@ -120,14 +120,9 @@ pub fn openscenario(recording: &Recording, map_file: &str, style: Style) -> Writ
 }
 
 fn header(recording: &Recording, style: Style, exact: &[&Actor]) -> Element {
-    let minor = match style.version {
-        Version::V1_2 => 2,
-        Version::Carla => 0,
-    };
-    let description = match recording.docs.iter().find(|line| !line.starts_with("Emitted by")) {
-        Some(line) => line,
-        None => &recording.name,
-    };
+    let minor = if style.version == Version::Carla { 0 } else { 2 };
+    let told = recording.docs.iter().find(|line| !line.starts_with("Emitted by"));
+    let description = told.unwrap_or(&recording.name);
     let header = Element::new("FileHeader")
         .with("revMajor", 1)
         .with("revMinor", minor)

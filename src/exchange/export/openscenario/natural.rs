@@ -5,8 +5,6 @@
 //! recorded one: a pedestrian that set out as the ego vehicle came near does so when it comes as near, and what the ego
 //! vehicle hit stops when it is hit.
 
-use core::fmt::Write as _;
-
 use avastra_base::geometry::{Pose, Vec2};
 use avastra_campaign::episode::Actor;
 use avastra_road::{LaneIndex, LanePlace, RoadMap};
@@ -78,13 +76,11 @@ fn turns_back(map: &RoadMap, way: &Driven) -> bool {
 
 /// What the file says of itself; `exact` are those that follow their recorded ways.
 pub fn caveat(exact: &[&Actor]) -> (String, String) {
-    let mut text = String::from("an approximation that does not carry the proof of the claims: ");
-    write!(
-        text,
-        "others drive by actions, with speeds within {SPEED_MPS} m/s and ways within {WAY_M} m of the "
-    )
-    .and_then(|()| write!(text, "recording as far as their actions alone decide, contacts aside"))
-    .expect("memory takes everything");
+    let mut text = format!(
+        "an approximation that does not carry the proof of the claims: others drive by actions, with speeds \
+         within {SPEED_MPS} m/s and ways within {WAY_M} m of the recording as far as their actions alone decide, \
+         contacts aside"
+    );
     if !exact.is_empty() {
         text += &format!("; as recorded: {}", names(exact));
     }
@@ -170,6 +166,7 @@ impl Natural {
     /// A pedestrian, or what drives beside the lanes.
     fn go_along_a_line(&mut self, recording: &Recording, actor: &Actor, poses: &[Pose]) {
         let name = actor.name();
+        let is_cut = touch(recording, actor).is_some();
         let sets_out = (1..poses.len()).find(|at| !is_standing(&poses[..=*at]));
         // The last tick in which it stands.
         let begin = sets_out.map_or(0, |at| moving_before(poses, at));
@@ -186,10 +183,7 @@ impl Natural {
         let event_name = format!("{name}_sets_out");
         let actions = vec![
             action(&format!("{name}_speed_1"), speed(first_mps)),
-            action(
-                &format!("{name}_goes"),
-                walk(self.version, &name, &line(moving, is_cut(recording, actor))),
-            ),
+            action(&format!("{name}_goes"), walk(self.version, &name, &line(moving, is_cut))),
         ];
         // A single speed needs no times after the first: the way ends where it stops.
         let stop = match changes {
@@ -206,7 +200,7 @@ impl Natural {
                 ..*change
             });
             self.change_speeds(actor, first_mps, &later.collect::<Vec<_>>());
-        } else if !changes.is_empty() || is_cut(recording, actor) {
+        } else if !changes.is_empty() || is_cut {
             let stands = action(&format!("{name}_stands"), speed(0.0));
             let over = vec![after_event(&format!("{name}_is_there"), &event_name)];
             self.events.push(event(&format!("{name}_arrives"), vec![stands], over));
@@ -283,10 +277,6 @@ fn touch(recording: &Recording, actor: &Actor) -> Option<usize> {
     let mut touches = recording.seen.touches.iter().filter(|touch| touch.id == actor.id);
     let touch = touches.next()?.tick.checked_sub(actor.first_tick())?;
     usize::try_from(touch).ok().filter(|touch| *touch < actor.samples.len())
-}
-
-fn is_cut(recording: &Recording, actor: &Actor) -> bool {
-    touch(recording, actor).is_some()
 }
 
 fn places(poses: &[Pose]) -> Vec<Vec2> {
