@@ -425,9 +425,8 @@ impl<'a> Builder<'a> {
             (false, true) => return Contact::End,
             _ => {}
         }
-        let at = |road: &RoadElement, contact| match contact {
-            Contact::Start => road.reference.at(0.0).position,
-            Contact::End => road.reference.at(road.length_m).position,
+        let at = |road: &RoadElement, contact: Contact| {
+            road.reference.at(if contact == Contact::Start { 0.0 } else { road.length_m }).position
         };
         let meeting = at(&self.document.roads[connecting], contact);
         let distance = |contact| (at(road, contact) - meeting).norm();
