@@ -345,7 +345,7 @@ fn lanes_of(builder: &Builder, road_index: usize, signal: &SignalElement) -> Vec
 }
 
 /// Notes on every lane the signs that hold for it, and on the lanes inside junctions what follows from them.
-pub fn set_precedence(document: &Document, map: &mut RoadMap) {
+pub fn set_precedence<'a>(document: &'a Document, map: &mut RoadMap) {
     for sign in &map.signs {
         for &(index, station_m) in sign.lanes.iter().filter(|_| sign.kind != SignKind::PriorityRoad) {
             let lane = &mut map.lanes[index.0];
@@ -360,7 +360,10 @@ pub fn set_precedence(document: &Document, map: &mut RoadMap) {
     let priority_signs = map.signs.iter().filter(|sign| sign.kind == SignKind::PriorityRoad);
     let on_priority_road: BTreeSet<LaneIndex> =
         priority_signs.flat_map(|sign| sign.lanes.iter().map(|(lane, _)| *lane)).collect();
-    let records: Vec<Records> = document.junctions.iter().map(Records::of).collect();
+    let named = |junction: &'a JunctionElement| -> Records<'a> {
+        junction.priorities.iter().map(|(high, low)| (high.as_str(), low.as_str())).unzip()
+    };
+    let records: Vec<Records> = document.junctions.iter().map(named).collect();
     let precedence = |lane: LaneIndex| {
         if map.stop_line_of(lane).is_some() {
             Precedence::Equal
@@ -379,21 +382,8 @@ pub fn set_precedence(document: &Document, map: &mut RoadMap) {
     }
 }
 
-/// The roads that the `priority` records of a junction name.
-struct Records<'a> {
-    high: BTreeSet<&'a str>,
-    low: BTreeSet<&'a str>,
-}
-
-impl<'a> Records<'a> {
-    fn of(junction: &'a JunctionElement) -> Records<'a> {
-        let records = &junction.priorities;
-        Records {
-            high: records.iter().map(|(high, _)| high.as_str()).collect(),
-            low: records.iter().map(|(_, low)| low.as_str()).collect(),
-        }
-    }
-}
+/// The roads that the `priority` records of a junction name: those that go first, and those that give way.
+type Records<'a> = (BTreeSet<&'a str>, BTreeSet<&'a str>);
 
 /// What the `priority` records of its junction say of a lane inside: they name its road or the road before it.
 fn recorded(records: &[Records], map: &RoadMap, index: LaneIndex) -> Precedence {
@@ -401,7 +391,7 @@ fn recorded(records: &[Records], map: &RoadMap, index: LaneIndex) -> Precedence 
     let Some(junction) = lane.junction else { return Precedence::Equal };
     let before = lane.predecessors.iter().map(|before| &map.lane(*before).key.road);
     let mut roads = core::iter::once(&lane.key.road).chain(before).map(String::as_str);
-    let Records { high, low } = &records[junction];
+    let (high, low) = &records[junction];
     if roads.clone().any(|road| low.contains(road)) {
         Precedence::Yield
     } else if roads.any(|road| high.contains(road)) {
