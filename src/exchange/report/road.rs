@@ -6,7 +6,7 @@
 
 use std::fmt::Write;
 
-use avastra_base::geometry::{Path, Vec2};
+use avastra_base::geometry::{Bounds, Path, Vec2};
 use avastra_road::{Junction, Lane, LaneIndex, Neighbour, RoadMap, Route};
 
 use super::canvas::{Canvas, escape, lane_edge, lane_outline};
@@ -24,7 +24,7 @@ const GROUP_PAINTS: [&str; 6] = ["#c2185b", "#1565c0", "#2e7d32", "#ef6c00", "#6
 
 /// Draws a map, and a route through it with its start, goal and lane changes.
 pub fn draw(map: &RoadMap, route: Option<&Route>) -> String {
-    let (south_west, north_east) = bounds(map);
+    let Bounds { least: south_west, most: north_east } = bounds(map);
     let size_m = north_east - south_west;
     let px_per_m = (LONGER_PX - 2.0 * MARGIN_PX) / size_m.x.max(size_m.y).max(1.0);
     let (width_px, height_px) =
@@ -54,14 +54,11 @@ pub fn draw(map: &RoadMap, route: Option<&Route>) -> String {
     svg
 }
 
-/// South-west and north-east corner of all that is drawn, m.
-fn bounds(map: &RoadMap) -> (Vec2, Vec2) {
+/// The box around all that is drawn. A map has at least one lane.
+fn bounds(map: &RoadMap) -> Bounds {
     let of_lanes = map.lanes.iter().flat_map(lane_outline);
-    let points = of_lanes.chain(map.crosswalks.iter().flat_map(|crosswalk| crosswalk.outline.clone()));
-    let both = points.fold(None, |found: Option<(Vec2, Vec2)>, point| {
-        Some(found.map_or((point, point), |(low, high)| (low.inf(&point), high.sup(&point))))
-    });
-    both.unwrap_or((Vec2::zeros(), Vec2::zeros()))
+    let of_crosswalks = map.crosswalks.iter().flat_map(|crosswalk| crosswalk.outline.iter().copied());
+    Bounds::around(&of_lanes.chain(of_crosswalks).collect::<Vec<_>>())
 }
 
 struct Drawing<'a> {
