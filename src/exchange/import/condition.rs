@@ -48,7 +48,7 @@ fn part(
         When::After(seconds) => Some(format!("elapsed >= {seconds:.2} s")),
         When::Headway { pair, seconds } => {
             let gap = gap(source, mark, pair, actor, placed)?;
-            let (of, mps) = if pair.of == actor.name { ("npc", actor.mps) } else { ("ego", placed[0].mps) };
+            let (of, mps) = if pair.of == actor.name() { ("npc", actor.mps) } else { ("ego", placed[0].mps) };
             if holds(pair, actor, placed, mps * seconds) {
                 return already(source, condition);
             }
@@ -65,7 +65,7 @@ fn part(
         }
         When::Distance { pair, metres } => {
             let names = [pair.of.as_str(), pair.to.as_str()];
-            if names.contains(&actor.name.as_str()) && names.contains(&placed[0].name.as_str()) {
+            if names.contains(&actor.name()) && names.contains(&placed[0].name()) {
                 let gap = gap(source, mark, pair, actor, placed)?;
                 if holds(pair, actor, placed, *metres) {
                     return already(source, condition);
@@ -83,7 +83,7 @@ fn part(
             if (from_m - there.station_m).abs() <= *within_m {
                 return already(source, condition);
             }
-            if entity == &placed[0].name {
+            if entity == placed[0].name() {
                 return Some(format!(
                     "ego.route_left <= {:.2} m",
                     (ground.route.goal_m - station_m).max(0.0)
@@ -114,7 +114,7 @@ fn sign(pair: &Pair) -> &'static str {
 fn gap(source: &mut Source, mark: &Mark, pair: &Pair, actor: &Placed, placed: &[Placed]) -> Option<String> {
     let ego = &placed[0];
     let names = [pair.of.as_str(), pair.to.as_str()];
-    if !(names.contains(&actor.name.as_str()) && names.contains(&ego.name.as_str())) {
+    if !(names.contains(&actor.name()) && names.contains(&ego.name())) {
         return source.refuse_at(mark, "it must ask about the ego vehicle and the one that acts");
     }
     if pair.is_free_space {
@@ -180,8 +180,13 @@ fn at(source: &mut Source, mark: &Mark, seconds: f64) -> Option<String> {
     Some(format!("elapsed >= {seconds:.2} s"))
 }
 
-fn named<'a>(source: &mut Source, mark: &Mark, name: &str, placed: &'a [Placed]) -> Option<&'a Placed> {
-    let found = placed.iter().find(|other| other.name == name && !source.is_torn(name));
+fn named<'a>(
+    source: &mut Source,
+    mark: &Mark,
+    name: &str,
+    placed: &'a [Placed<'a>],
+) -> Option<&'a Placed<'a>> {
+    let found = placed.iter().find(|other| other.name() == name && !source.is_torn(name));
     if found.is_none() && !source.is_torn(name) {
         source.refuse_at::<()>(mark, format!("`{name}` is no vehicle with a place"));
     }
