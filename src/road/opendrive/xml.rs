@@ -10,6 +10,7 @@ pub fn wrong(line: u32, message: impl Into<String>) -> RoadError {
 }
 
 /// Where each line of a text begins, so that a line number needs no new count.
+#[derive(Debug)]
 pub struct Lines(Vec<usize>);
 
 impl Lines {
@@ -18,8 +19,8 @@ impl Lines {
         Lines(core::iter::once(0).chain(after_breaks).collect())
     }
 
-    /// Counted from 1.
-    fn of(&self, at: usize) -> u32 {
+    /// The line of a byte, counted from 1.
+    pub fn of(&self, at: usize) -> u32 {
         u32::try_from(self.0.partition_point(|begin| *begin <= at)).unwrap_or(u32::MAX)
     }
 }
