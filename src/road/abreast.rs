@@ -124,10 +124,7 @@ impl RoadMap {
         let own = self.lane(lane);
         let side = if own.keeps_left { -1.0 } else { 1.0 };
         let aside_m = |beside: &Abreast| side * beside.lateral_m;
-        let within = |reach_m: f64| match own.keeps_left {
-            true => -reach_m..=BESIDE_M,
-            false => -BESIDE_M..=reach_m,
-        };
+        let within = |reach_m: f64| if own.keeps_left { -reach_m..=BESIDE_M } else { -BESIDE_M..=reach_m };
         let nearest_within = |reach_m: f64| {
             let opposite = self.abreast_towards(lane, station_m, &within(reach_m), false);
             let aside = opposite.into_iter().filter(|beside| aside_m(beside) > 0.0);

@@ -199,7 +199,7 @@ fn played(
         "tracks": mind.tracks(&mut columns), "plans": mind.plans(&mut columns),
         "signals": signals(&recorder), "skies": recorder.skies.iter().map(sky).collect::<Vec<_>>(),
     });
-    let main = counted.first().copied().or(if log.collisions.is_empty() { None } else { Some(0) });
+    let main = counted.first().copied().or((!log.collisions.is_empty()).then_some(0));
     let packed = columns.pack(&header);
     let main_counts = !counted.is_empty();
     let ground = ground(&setup.scene);

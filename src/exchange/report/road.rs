@@ -7,7 +7,7 @@
 use std::fmt::Write;
 
 use avastra_base::geometry::{Bounds, Path, Vec2};
-use avastra_road::{Junction, Lane, LaneIndex, Neighbour, RoadMap, Route};
+use avastra_road::{Lane, LaneIndex, Neighbour, RoadMap, Route};
 
 use super::canvas::{Canvas, escape, lane_edge, lane_outline};
 
@@ -133,7 +133,8 @@ impl Drawing<'_> {
 
     fn junctions(&mut self) {
         for junction in &self.map.junctions {
-            let outline = hull(junction_points(self.map, junction));
+            let inside = junction.lanes.iter().map(|lane| self.map.lane(*lane));
+            let outline = hull(inside.flat_map(lane_outline).collect());
             let style = r##"fill="none" stroke="#35629c" stroke-width="1" stroke-dasharray="7 4""##;
             self.canvas.polygon(&outline, style);
             // The name goes to the hull's northernmost corner, off the lanes.
@@ -268,10 +269,6 @@ fn group_paint(group: usize) -> &'static str {
 fn stretch(path: &Path, from_m: f64, to_m: f64) -> Vec<Vec2> {
     let part = path.part(from_m, to_m);
     part.iter().flat_map(Path::points).map(|point| point.position).collect()
-}
-
-fn junction_points(map: &RoadMap, junction: &Junction) -> Vec<Vec2> {
-    junction.lanes.iter().flat_map(|lane| lane_outline(map.lane(*lane))).collect()
 }
 
 /// Convex hull, counter-clockwise (Andrew's monotone chain).
