@@ -3,7 +3,7 @@
 use core::f64::consts::PI;
 
 use avastra_base::geometry::{Vec2, wrap_angle};
-use avastra_road::{LaneIndex, LanePlace, RoadError, RoadMap, Route, Side};
+use avastra_road::{LaneIndex, LanePlace, RoadMap, Route, Side};
 
 use super::position::{Heading, Position};
 use super::source::{Mark, Source};
@@ -172,9 +172,7 @@ fn lane_place(source: &mut Source, map: &RoadMap, mark: &Mark, position: &Positi
         Position::Lane { road, lane, s_m, offset_m, .. } => {
             let place = match map.place(road, *lane, *s_m) {
                 Ok(place) => place,
-                Err(RoadError::Map { message, .. } | RoadError::Route { message }) => {
-                    return source.refuse_at(mark, message);
-                }
+                Err(error) => return source.refuse_at(mark, error.to_string()),
             };
             let lane = map.lane(place.lane);
             // The file's offsets are to the left of the road's reference line.
