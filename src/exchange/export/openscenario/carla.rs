@@ -49,7 +49,7 @@ pub fn entity(recording: &Recording, actor: &Actor) -> Element {
     let object = Element::new("ScenarioObject").with("name", actor.name());
     let (model, _) = model(actor);
     let kind = if actor.id == 0 { "ego_vehicle" } else { "simulation" };
-    let properties = Element::new("Properties").holding(property(&("type".to_owned(), kind.to_owned())));
+    let properties = Element::new("Properties").holding(property("type", kind));
     let Some(category) = vehicle_category(actor.body) else {
         let pedestrian = Element::new("Pedestrian")
             .with("name", actor.name())
@@ -59,14 +59,14 @@ pub fn entity(recording: &Recording, actor: &Actor) -> Element {
         return object.holding(pedestrian.holding(bounding_box(actor)).holding(properties));
     };
     let facts = recording.facts.iter().cloned().chain([natural::caveat(&[])]);
-    let facts = facts.filter(|_| actor.id == 0).map(|fact| property(&fact));
+    let facts = facts.filter(|_| actor.id == 0).map(|(name, value)| property(&name, &value));
     let vehicle = Element::new("Vehicle").with("name", model).with("vehicleCategory", category);
     object.holding(vehicle.holding_all(build(actor)).holding(properties.holding_all(facts)))
 }
 
 /// A program other than ScenarioRunner drives.
 pub fn controller() -> Element {
-    let module = property(&("module".to_owned(), "external_control".to_owned()));
+    let module = property("module", "external_control");
     let controller =
         Element::new("Controller").with("name", "ads").holding(Element::new("Properties").holding(module));
     let off = |name| Element::new(name).with("active", false);

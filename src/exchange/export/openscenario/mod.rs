@@ -79,22 +79,17 @@ pub struct Written {
     pub left_out: Vec<String>,
 }
 
-/// Others that are exact in a natural version.
-fn exact(recording: &Recording, style: Style) -> Vec<&Actor> {
-    match (style.version, style.others) {
-        (Version::V1_2, Others::Natural) => natural::exact(recording),
-        // ScenarioRunner plans a route over the points of its way.
-        _ => Vec::new(),
-    }
-}
-
 /// Writes a recording. `map_file` is the path of the map from the file.
 pub fn openscenario(recording: &Recording, map_file: &str, style: Style) -> Written {
     let signals = (style.version != Version::Carla).then(|| signals(recording)).flatten();
     let network = Element::new("RoadNetwork")
         .holding(Element::new("LogicFile").with("filepath", map_file))
         .holding_all(signals);
-    let exact = exact(recording, style);
+    // Others that are exact in a natural version; ScenarioRunner plans a route over the points of their ways.
+    let exact = match (style.version, style.others) {
+        (Version::V1_2, Others::Natural) => natural::exact(recording),
+        _ => Vec::new(),
+    };
     let entities = recording.actors().map(|actor| match style.version {
         Version::Carla => carla::entity(recording, actor),
         Version::V1_2 => entity(actor, style.ego),
@@ -133,12 +128,12 @@ fn header(recording: &Recording, style: Style, exact: &[&Actor]) -> Element {
         return header;
     }
     let caveat = (style.others == Others::Natural).then(|| natural::caveat(exact));
-    header
-        .holding(Element::new("Properties").holding_all(recording.facts.iter().chain(&caveat).map(property)))
+    let facts = recording.facts.iter().chain(&caveat).map(|(name, value)| property(name, value));
+    header.holding(Element::new("Properties").holding_all(facts))
 }
 
 /// A fact about the file.
-fn property((name, value): &(String, String)) -> Element {
+fn property(name: &str, value: &str) -> Element {
     Element::new("Property").with("name", name).with("value", value)
 }
 
