@@ -264,14 +264,3 @@ impl RoadMap {
         room_m
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_change_at_the_limit_takes_fifty_metres_and_one_at_rest_the_least() {
-        assert!((comfortable_length_m(50.0 / 3.6, 3.3) - 49.5).abs() < 0.1);
-        assert_eq!(comfortable_length_m(0.0, 3.3), LENGTH_M_MIN);
-    }
-}
