@@ -87,22 +87,20 @@ impl<'a, 'input> Element<'a, 'input> {
 
     pub fn integer(&self, name: &str) -> Result<i32, RoadError> {
         let value = self.text(name)?;
-        value.parse().map_err(|_| {
-            self.wrong(format!("`{name}` of `{}` is `{value}`, which is no whole number", self.name()))
-        })
+        value.parse().map_err(|_| self.odd(name, value, "no whole number"))
     }
 
     fn parse_number(&self, name: &str, value: &str) -> Result<f64, RoadError> {
         match value.parse::<f64>() {
             Ok(number) if number.abs() <= NUMBER_MAX => Ok(number),
-            Ok(_) => Err(self.wrong(format!(
-                "`{name}` of `{}` is `{value}`, which is no number a road can have",
-                self.name()
-            ))),
-            Err(_) => {
-                Err(self.wrong(format!("`{name}` of `{}` is `{value}`, which is no number", self.name())))
-            }
+            Ok(_) => Err(self.odd(name, value, "no number a road can have")),
+            Err(_) => Err(self.odd(name, value, "no number")),
         }
+    }
+
+    /// An error at an attribute whose value is not what it must be.
+    fn odd(&self, name: &str, value: &str, what: &str) -> RoadError {
+        self.wrong(format!("`{name}` of `{}` is `{value}`, which is {what}", self.name()))
     }
 }
 
