@@ -528,18 +528,12 @@ impl<'a> Builder<'a> {
                     let same_direction = road.runs_along(left) == road.runs_along(right);
                     let gap_m = gap_m(road, section, left, right);
                     let neighbour = |lane| Some(Neighbour { lane, same_direction, gap_m });
-                    let of_left = &mut self.map.lanes[left_index.0];
-                    if road.runs_along(left) {
-                        of_left.right = neighbour(right_index);
-                    } else {
-                        of_left.left = neighbour(right_index);
-                    }
-                    let of_right = &mut self.map.lanes[right_index.0];
-                    if road.runs_along(right) {
-                        of_right.left = neighbour(left_index);
-                    } else {
-                        of_right.right = neighbour(left_index);
-                    }
+                    let lane = &mut self.map.lanes[left_index.0];
+                    let beside = if road.runs_along(left) { &mut lane.right } else { &mut lane.left };
+                    *beside = neighbour(right_index);
+                    let lane = &mut self.map.lanes[right_index.0];
+                    let beside = if road.runs_along(right) { &mut lane.left } else { &mut lane.right };
+                    *beside = neighbour(left_index);
                     if same_direction && road.junction.is_none() {
                         let [to_right, to_left] = permitted(road, section, left, right);
                         self.allow_changes(left_index, right_index, &to_right);
