@@ -150,8 +150,7 @@ fn storyboard(recording: &Recording, style: Style, exact: &[&Actor]) -> Element 
         let (begins, events) = if is_exact {
             (begins(recording, actor, style), events(recording, actor, style))
         } else {
-            let natural = Natural::of(recording, actor, version);
-            (natural.init(actor), natural.events(actor))
+            Natural::of(recording, actor, version).written(actor)
         };
         init.extend(begins);
         if !events.is_empty() {

@@ -107,35 +107,27 @@ impl Natural {
         natural
     }
 
-    /// Its entry in `Init`, if it is there from the beginning.
-    pub fn init(&self, actor: &Actor) -> Option<Element> {
-        let private = Element::new("Private").with("entityRef", actor.name());
+    /// Its entry in `Init`, if it is there from the beginning, and what it does later.
+    pub fn written(self, actor: &Actor) -> (Option<Element>, Vec<Element>) {
+        let name = actor.name();
+        let private = Element::new("Private").with("entityRef", &name);
         if actor.first_tick() == 0 {
-            let begins = private.holding(teleport(self.place.clone()));
-            return Some(begins.holding_all(self.from_the_first.iter().cloned()));
+            let begins = private.holding(teleport(self.place)).holding_all(self.from_the_first);
+            return (Some(begins), self.events);
         }
         // CARLA's ScenarioRunner makes everyone as the scenario begins.
         let waits = || private.holding(teleport(beneath(&self.pose, BENEATH_M)));
-        (self.version == Version::Carla).then(waits)
-    }
-
-    /// What it does later.
-    pub fn events(self, actor: &Actor) -> Vec<Element> {
-        let mut events = Vec::new();
-        if actor.first_tick() > 0 {
-            let name = actor.name();
-            let added = match self.version {
-                Version::Carla => teleport(self.place),
-                Version::V1_2 => of_entity(&name, Element::new("AddEntityAction").holding(self.place)),
-            };
-            let numbered = self.from_the_first.into_iter().enumerate();
-            let actions = core::iter::once(action(&format!("{name}_added"), added))
-                .chain(numbered.map(|(number, what)| action(&format!("{name}_begins_{}", number + 1), what)));
-            let event = format!("{name}_appears");
-            events.push(event_at(self.version, &event, actions.collect(), seconds(actor, 0)));
-        }
-        events.extend(self.events);
-        events
+        let waits = (self.version == Version::Carla).then(waits);
+        let added = match self.version {
+            Version::Carla => teleport(self.place),
+            Version::V1_2 => of_entity(&name, Element::new("AddEntityAction").holding(self.place)),
+        };
+        let numbered = self.from_the_first.into_iter().enumerate();
+        let actions = core::iter::once(action(&format!("{name}_added"), added))
+            .chain(numbered.map(|(number, what)| action(&format!("{name}_begins_{}", number + 1), what)));
+        let event = format!("{name}_appears");
+        let appears = event_at(self.version, &event, actions.collect(), seconds(actor, 0));
+        (waits, core::iter::once(appears).chain(self.events).collect())
     }
 
     /// A vehicle that drives in lanes.
