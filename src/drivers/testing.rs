@@ -5,7 +5,7 @@ use std::sync::Arc;
 use avastra_base::geometry::{OrientedBox, Pose, distance_m, unit_vector, wrap_angle};
 use avastra_lang::model::vocabulary::Body;
 use avastra_road::testing::{lanes, road, street};
-use avastra_road::{RoadMap, Route, RouteStopLine, Signal};
+use avastra_road::{RoadMap, Route, Signal, StopLine};
 use avastra_world::sim;
 use avastra_world::sim::{
     Conditions, Control, DT_S, EgoMotion, Scene, Sensed, SensedObject, SignalColour, VehicleParameters,
@@ -109,7 +109,7 @@ fn scene(pieces: &[(f64, f64, f64)]) -> Arc<Scene> {
     let start = map.place("1", -1, 0.0).expect("the road begins");
     let goal = map.place("1", -1, station_m - 40.0).expect("the road is long");
     let mut route = Route::find(&map, start, goal).expect("one lane leads there");
-    route.stop_lines.push(RouteStopLine { station_m: 100.0, signal: 0 });
+    route.stop_lines.push(StopLine { station_m: 100.0, signal: 0 });
     let position = route.path.pose_at(100.0).offset(10.0, -4.0).position;
     map.signals.push(Signal {
         id: "1".into(),

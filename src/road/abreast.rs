@@ -6,6 +6,7 @@
 //!
 //! [`Lane::changes_left_m`]: super::map::Lane::changes_left_m
 
+use core::f64::consts::PI;
 use core::ops::RangeInclusive;
 
 use avastra_base::geometry::wrap_angle;
@@ -82,7 +83,7 @@ impl RoadMap {
         // The edge of a lane is at most half the width of the widest lane away from the lane's centre.
         let half_m = self.grid.half_width_m();
         let centres_m = aside_m.start() - half_m..=aside_m.end() + half_m;
-        let heading_rad = pose.heading_rad + if same { 0.0 } else { core::f64::consts::PI };
+        let heading_rad = pose.heading_rad + if same { 0.0 } else { PI };
         let toward = (heading_rad, PARALLEL_RAD);
         for index in self.grid.beside(&pose, toward, ABREAST_M, centres_m) {
             let other = self.lane(index);
@@ -96,10 +97,7 @@ impl RoadMap {
             }
             let there = other.centre.pose_at(projection.station_m);
             let turn_rad = wrap_angle(there.heading_rad - pose.heading_rad).abs();
-            let is_wanted = match same {
-                true => turn_rad < PARALLEL_RAD,
-                false => turn_rad >= core::f64::consts::PI - PARALLEL_RAD,
-            };
+            let is_wanted = if same { turn_rad < PARALLEL_RAD } else { turn_rad >= PI - PARALLEL_RAD };
             if !is_wanted {
                 continue;
             }
@@ -126,10 +124,7 @@ impl RoadMap {
         let own = self.lane(lane);
         let side = if own.keeps_left { -1.0 } else { 1.0 };
         let aside_m = |beside: &Abreast| side * beside.lateral_m;
-        let within = |reach_m: f64| match own.keeps_left {
-            true => -reach_m..=BESIDE_M,
-            false => -BESIDE_M..=reach_m,
-        };
+        let within = |reach_m: f64| if own.keeps_left { -reach_m..=BESIDE_M } else { -BESIDE_M..=reach_m };
         let nearest_within = |reach_m: f64| {
             let opposite = self.abreast_towards(lane, station_m, &within(reach_m), false);
             let aside = opposite.into_iter().filter(|beside| aside_m(beside) > 0.0);

@@ -139,12 +139,11 @@ pub fn segment_crossing(a: Vec2, b: Vec2, c: Vec2, d: Vec2) -> Option<(f64, f64)
 
 /// Between which stations a path runs inside a polygon, m.
 pub fn spans_inside(path: &Path, outline: &[Vec2]) -> Vec<(f64, f64)> {
-    let edges = || outline.iter().zip(outline.iter().cycle().skip(1));
     let mut cuts_m = vec![0.0, path.length_m()];
     // A little larger because of rounding.
     let near = Bounds::around(outline).grown(1e-3);
     for pair in path.segments_near(&near) {
-        for (c, d) in edges() {
+        for (c, d) in edges(outline) {
             if let Some((x, _)) = segment_crossing(pair[0].position, pair[1].position, *c, *d) {
                 cuts_m.push(pair[0].station_m + (pair[1].station_m - pair[0].station_m) * x);
             }
@@ -154,21 +153,29 @@ pub fn spans_inside(path: &Path, outline: &[Vec2]) -> Vec<(f64, f64)> {
     let mut spans: Vec<(f64, f64)> = Vec::new();
     for pair in cuts_m.windows(2) {
         let middle = path.pose_at((pair[0] + pair[1]) / 2.0).position;
-        if pair[1] - pair[0] < 1e-6 || !holds(outline, middle) {
-            continue;
-        }
-        match spans.last_mut() {
-            Some(last) if pair[0] - last.1 < 1e-6 => last.1 = pair[1],
-            _ => spans.push((pair[0], pair[1])),
+        if pair[1] - pair[0] >= 1e-6 && holds(outline, middle) {
+            append(&mut spans, pair[0], pair[1]);
         }
     }
     spans
 }
 
+/// Adds a span behind all others; it becomes part of the last one if they touch.
+pub fn append(spans: &mut Vec<(f64, f64)>, from_m: f64, to_m: f64) {
+    match spans.last_mut() {
+        Some(last) if from_m - last.1 < 1e-6 => last.1 = to_m,
+        _ => spans.push((from_m, to_m)),
+    }
+}
+
+/// The edges of a polygon.
+pub fn edges(outline: &[Vec2]) -> impl Iterator<Item = (&Vec2, &Vec2)> {
+    outline.iter().zip(outline.iter().cycle().skip(1))
+}
+
 /// Whether a polygon holds a point (even-odd rule).
 pub fn holds(outline: &[Vec2], point: Vec2) -> bool {
-    let edges = outline.iter().zip(outline.iter().cycle().skip(1));
-    let crossed = edges.filter(|(a, b)| {
+    let crossed = edges(outline).filter(|(a, b)| {
         (a.y > point.y) != (b.y > point.y) && point.x < a.x + (b.x - a.x) * (point.y - a.y) / (b.y - a.y)
     });
     crossed.count() % 2 == 1

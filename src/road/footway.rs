@@ -6,7 +6,7 @@
 
 use avastra_base::geometry::{OrientedBox, Vec2};
 
-use super::conflict::holds;
+use super::conflict::{edges, holds};
 use super::map::{RoadMap, Strip, StripKind};
 
 /// The least free width on which a person can stand between lanes, m: AASHTO's narrowest refuge island, 6 feet.
@@ -79,8 +79,7 @@ impl RoadMap {
     /// longest side of its outline.
     pub fn crosswalk_at(&self, point: Vec2) -> Option<Vec2> {
         let crosswalk = self.crosswalks.iter().find(|crosswalk| holds(&crosswalk.outline, point))?;
-        let corners = &crosswalk.outline;
-        let sides = corners.iter().zip(corners.iter().cycle().skip(1)).map(|(a, b)| b - a);
+        let sides = edges(&crosswalk.outline).map(|(a, b)| b - a);
         let longest = sides.max_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()))?;
         let length_m = longest.norm();
         (length_m > 1e-6).then(|| longest / length_m)
@@ -111,10 +110,9 @@ impl RoadMap {
     /// Whether anything solid is within `room_m` of a point.
     pub fn is_solid(&self, point: Vec2, room_m: f64) -> bool {
         self.solids.iter().any(|solid| {
-            let corners = || solid.outline.iter().zip(solid.outline.iter().cycle().skip(1));
             solid.bounds.distance_m2_min(point) <= room_m * room_m
                 && (holds(&solid.outline, point)
-                    || corners().any(|(a, b)| distance_m2(point, *a, *b) < room_m * room_m))
+                    || edges(&solid.outline).any(|(a, b)| distance_m2(point, *a, *b) < room_m * room_m))
         })
     }
 

@@ -121,7 +121,7 @@ fn vertices_max(document: &Document) -> usize {
 
 /// Whether a lane gets a centre line.
 fn is_sampled(lane: &LaneElement) -> bool {
-    lane.driving || lane.beside.is_some()
+    lane.undriven.is_none() || lane.beside.is_some()
 }
 
 /// The error for a map that is past a limit up to a road.
@@ -131,32 +131,22 @@ fn too_large(road: &RoadElement, what: &str) -> RoadError {
     wrong(road.line, message)
 }
 
-/// The work and size of the lanes so far, and their limits.
+/// The work and size of the lanes so far.
+#[derive(Default)]
 struct Spent {
     steps: Cell<u64>,
-    steps_max: u64,
     vertices: usize,
-    vertices_max: usize,
     length_m: f64,
 }
 
 impl Spent {
-    fn new(document: &Document) -> Spent {
-        Spent {
-            steps: Cell::new(0),
-            steps_max: STEPS_MAX + STEPS_A_ROAD * document.roads.len() as u64,
-            vertices: 0,
-            vertices_max: vertices_max(document),
-            length_m: 0.0,
-        }
-    }
-
     /// The centre line of a lane, or why the lane has none. Counts its work and size.
     ///
     /// # Errors
     /// If the map is past a limit.
     fn centre_line(
         &mut self,
+        document: &Document,
         road: &RoadElement,
         section: &SectionElement,
         lane: i32,
@@ -166,10 +156,10 @@ impl Spent {
             self.vertices += centre.path.points().len();
             self.length_m += centre.path.length_m();
         }
-        if self.steps.get() > self.steps_max {
+        if self.steps.get() > STEPS_MAX + STEPS_A_ROAD * document.roads.len() as u64 {
             return Err(too_large(road, "its lanes bend and widen too often"));
         }
-        if self.vertices > self.vertices_max {
+        if self.vertices > vertices_max(document) {
             return Err(too_large(road, "its curved lanes are too long"));
         }
         if self.length_m > LANES_M_MAX {
@@ -201,34 +191,21 @@ impl<'a> Builder<'a> {
             }
         }
         let junctions = document.junctions.iter().enumerate().map(|(i, junction)| (junction.id.as_str(), i));
+        let empty = |junction: &JunctionElement| Junction {
+            id: junction.id.clone(),
+            name: junction.name.clone(),
+            groups: junction.controllers.len(),
+            ..Junction::default()
+        };
         let map = RoadMap {
             name: document.name.clone(),
-            file: None,
-            lanes: Vec::new(),
-            signals: Vec::new(),
-            signs: Vec::new(),
-            junctions: document
-                .junctions
-                .iter()
-                .map(|junction| Junction {
-                    id: junction.id.clone(),
-                    name: junction.name.clone(),
-                    lanes: Vec::new(),
-                    groups: junction.controllers.len(),
-                    idle_lights: 0,
-                })
-                .collect(),
-            crosswalks: Vec::new(),
-            strips: Vec::new(),
-            solids: Vec::new(),
-            has_levels: false,
+            junctions: document.junctions.iter().map(empty).collect(),
             warnings: document.warnings.clone(),
             warned_at: document.warned_at.clone(),
-            left_out: BTreeMap::new(),
-            grid: LaneGrid::default(),
+            ..RoadMap::default()
         };
         let (junctions, lanes) = (junctions.collect(), BTreeMap::new());
-        Ok(Builder { document, map, roads, junctions, lanes, spent: Spent::new(document) })
+        Ok(Builder { document, map, roads, junctions, lanes, spent: Spent::default() })
     }
 
     pub fn warn(&mut self, line: u32, message: impl AsRef<str>) {
@@ -268,7 +245,7 @@ impl<'a> Builder<'a> {
                     }
                     let undrivable = |what: &str| LeftOut { what: what.to_owned(), for_vehicles: true };
                     let at = format!("lane {} of road `{}` at s {}", element.id, road.id, section.begin_m);
-                    let centre = match self.spent.centre_line(road, section, element.id)? {
+                    let centre = match self.spent.centre_line(self.document, road, section, element.id)? {
                         Ok(centre) => centre,
                         Err(NoCentreLine::Short) => {
                             self.map.left_out.insert(left_out, undrivable("without length"));
@@ -342,7 +319,7 @@ impl<'a> Builder<'a> {
             for section in &road.sections {
                 for element in &section.lanes {
                     let Some(kind) = element.beside else { continue };
-                    let found = self.spent.centre_line(road, section, element.id)?;
+                    let found = self.spent.centre_line(self.document, road, section, element.id)?;
                     let Ok(CentreLine { path, widths_m, .. }) = found else { continue };
                     self.map.strips.push(Strip { kind, bounds: path.bounds(), centre: path, widths_m });
                 }
@@ -448,9 +425,8 @@ impl<'a> Builder<'a> {
             (false, true) => return Contact::End,
             _ => {}
         }
-        let at = |road: &RoadElement, contact| match contact {
-            Contact::Start => road.reference.at(0.0).position,
-            Contact::End => road.reference.at(road.length_m).position,
+        let at = |road: &RoadElement, contact: Contact| {
+            road.reference.at(if contact == Contact::Start { 0.0 } else { road.length_m }).position
         };
         let meeting = at(&self.document.roads[connecting], contact);
         let distance = |contact| (at(road, contact) - meeting).norm();
@@ -552,18 +528,12 @@ impl<'a> Builder<'a> {
                     let same_direction = road.runs_along(left) == road.runs_along(right);
                     let gap_m = gap_m(road, section, left, right);
                     let neighbour = |lane| Some(Neighbour { lane, same_direction, gap_m });
-                    let of_left = &mut self.map.lanes[left_index.0];
-                    if road.runs_along(left) {
-                        of_left.right = neighbour(right_index);
-                    } else {
-                        of_left.left = neighbour(right_index);
-                    }
-                    let of_right = &mut self.map.lanes[right_index.0];
-                    if road.runs_along(right) {
-                        of_right.left = neighbour(left_index);
-                    } else {
-                        of_right.right = neighbour(left_index);
-                    }
+                    let lane = &mut self.map.lanes[left_index.0];
+                    let beside = if road.runs_along(left) { &mut lane.right } else { &mut lane.left };
+                    *beside = neighbour(right_index);
+                    let lane = &mut self.map.lanes[right_index.0];
+                    let beside = if road.runs_along(right) { &mut lane.left } else { &mut lane.right };
+                    *beside = neighbour(left_index);
                     if same_direction && road.junction.is_none() {
                         let [to_right, to_left] = permitted(road, section, left, right);
                         self.allow_changes(left_index, right_index, &to_right);

@@ -5,7 +5,7 @@ use avastra_base::geometry::{Path, Vec2};
 use super::lane_change::{Place, Stretch};
 use super::map::{LanePlace, RoadMap};
 use super::route::{RouteLane, RouteLaneChange};
-use super::search::{Change, Move};
+use super::search::Move;
 
 /// Two lanes are joined over this length, m. Otherwise a millimetre between the end of one and the beginning of
 /// the next would become a segment across the road.
@@ -49,7 +49,7 @@ impl<'a> Joined<'a> {
                 let here_m = self.length_m;
                 self.lanes.push(RouteLane { lane: *next, from_m: here_m, enter_m: here_m, to_m: here_m });
             }
-            Move::Change(change) => self.change(change),
+            Move::Change { stretch, length_m } => self.change(stretch, *length_m),
         }
     }
 
@@ -84,20 +84,20 @@ impl<'a> Joined<'a> {
         self.points.push(point);
     }
 
-    fn change(&mut self, change: &Change) {
-        let (map, stretch) = (self.map, &change.stretch);
+    fn change(&mut self, stretch: &Stretch, length_m: f64) {
+        let map = self.map;
         self.advance(stretch.pairs[0].from_m);
         if self.points.is_empty() {
-            self.add_point(stretch.blend(map, change.length_m, 0.0));
+            self.add_point(stretch.blend(map, length_m, 0.0));
         }
         let begin_m = self.length_m;
-        let steps = (change.length_m / CHANGE_STEP_M).ceil().max(1.0) as u32;
+        let steps = (length_m / CHANGE_STEP_M).ceil().max(1.0) as u32;
         let mut shifts_m = vec![(begin_m, stretch.shift_m(map, stretch.place(0.0)))];
         let mut before = stretch.place(0.0);
         for i in 1..=steps {
             let fraction = f64::from(i) / f64::from(steps);
-            let place = stretch.place(change.length_m * fraction);
-            self.add_point(stretch.blend(map, change.length_m, fraction));
+            let place = stretch.place(length_m * fraction);
+            self.add_point(stretch.blend(map, length_m, fraction));
             self.pass(stretch, before, place, fraction);
             before = place;
             shifts_m.push((self.length_m, stretch.shift_m(map, place)));
@@ -105,7 +105,7 @@ impl<'a> Joined<'a> {
         let end_m = self.length_m;
         self.lane_station_m = stretch.target_station_m(map, before);
         self.last().from_m = end_m - self.lane_station_m;
-        let latest_m = shifts_beyond(map, stretch, change.length_m, end_m, &mut shifts_m);
+        let latest_m = shifts_beyond(map, stretch, length_m, end_m, &mut shifts_m);
         let lateral_m = stretch.shift_m(map, before);
         self.changes.push(RouteLaneChange { begin_m, end_m, latest_m, lateral_m, shifts_m });
     }

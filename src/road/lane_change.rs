@@ -5,6 +5,7 @@
 
 use avastra_base::geometry::{Pose, SMOOTH_STEP_BEND_MAX, Vec2, smooth_step, wrap_angle};
 
+use super::conflict::append;
 use super::map::{Lane, LaneIndex, RoadMap, Side};
 use super::opendrive::{Across, MarkRule, RoadElement, SectionElement};
 
@@ -92,13 +93,6 @@ fn wide([left, right]: &[Across; 2], section: &SectionElement, s_m: f64) -> bool
     let (right_centre, right_width) = right.at(s_m);
     let strip_m = left_centre.value - right_centre.value - (left_width.value + right_width.value) / 2.0;
     left_width.value >= WIDTH_M_MIN && right_width.value >= WIDTH_M_MIN && strip_m <= STRIP_M_MAX
-}
-
-fn append(parts: &mut Vec<(f64, f64)>, from_m: f64, to_m: f64) {
-    match parts.last_mut() {
-        Some(last) if from_m - last.1 < 1e-6 => last.1 = to_m,
-        _ => parts.push((from_m, to_m)),
-    }
 }
 
 /// Two chains of lanes side by side; a vehicle may change from one to the other everywhere.
@@ -268,16 +262,5 @@ impl RoadMap {
             }
         }
         room_m
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_change_at_the_limit_takes_fifty_metres_and_one_at_rest_the_least() {
-        assert!((comfortable_length_m(50.0 / 3.6, 3.3) - 49.5).abs() < 0.1);
-        assert_eq!(comfortable_length_m(0.0, 3.3), LENGTH_M_MIN);
     }
 }

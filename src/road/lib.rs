@@ -41,6 +41,6 @@ pub use map::{
     Crosswalk, Junction, Lane, LaneIndex, LaneKey, LanePlace, LeftOut, Neighbour, Precedence, RoadError,
     RoadMap, Side, Sign, SignKind, SignLine, Signal, Solid, StopLine, Strip, StripKind, Turn,
 };
-pub use opendrive::well_formed;
+pub use opendrive::{Lines, well_formed};
 pub use proposal::{Proposal, propose};
-pub use route::{Conflict, Route, RouteLane, RouteLaneChange, RouteSignLine, RouteStopLine};
+pub use route::{Conflict, Route, RouteLane, RouteLaneChange};

@@ -94,7 +94,7 @@ pub enum Turn {
     UTurn,
 }
 
-/// Where a lane must stop for a signal.
+/// Where a lane or a route must stop for a signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StopLine {
     pub station_m: f64,
@@ -102,7 +102,7 @@ pub struct StopLine {
     pub signal: usize,
 }
 
-/// Where a lane must stop or give way because of a sign.
+/// Where a lane or a route must stop or give way because of a sign.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SignLine {
     pub station_m: f64,
@@ -154,7 +154,7 @@ pub enum SignKind {
     PriorityRoad,
 }
 
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Junction {
     pub id: String,
     pub name: String,
@@ -214,7 +214,7 @@ pub enum StripKind {
 }
 
 /// A whole map.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct RoadMap {
     pub name: String,
     /// The OpenDRIVE file that it was read from, if it was a file.
@@ -382,7 +382,7 @@ const MISFIT_RAD_PER_M: f64 = 0.1;
 
 impl Lane {
     /// Whether its traffic runs in the direction of the road's reference line.
-    pub(super) fn is_along(&self) -> bool {
+    pub fn is_along(&self) -> bool {
         self.road_stations_m[0] < self.road_stations_m[self.road_stations_m.len() - 1]
     }
 

@@ -9,7 +9,7 @@ use super::graph::leap_m;
 use super::heights::is_apart;
 use super::join::Joined;
 use super::lane_change::LENGTH_M_MIN;
-use super::map::{LaneIndex, LanePlace, RoadError, RoadMap, SignKind};
+use super::map::{LaneIndex, LanePlace, RoadError, RoadMap, SignLine, StopLine};
 use super::search::{Move, cheapest_way};
 
 /// A way from a start to a goal along lane centres and from lane to lane.
@@ -23,9 +23,10 @@ pub struct Route {
     pub path: Path,
     /// Station of the goal, m.
     pub goal_m: f64,
-    pub stop_lines: Vec<RouteStopLine>,
-    /// Where a stop or yield sign holds for the route and no light does, by rising station.
-    pub sign_lines: Vec<RouteSignLine>,
+    /// The stop lines, with their stations on the route.
+    pub stop_lines: Vec<StopLine>,
+    /// Where a stop or yield sign holds for the route and no light does, by rising station on the route.
+    pub sign_lines: Vec<SignLine>,
     /// Where the path crosses zebra crossings: from, to, m.
     pub crosswalks_m: Vec<(f64, f64)>,
     /// Where other lanes cross or join the path inside junctions, by rising station.
@@ -62,19 +63,6 @@ pub struct RouteLaneChange {
     /// of the stretch on which the change is permitted.
     #[serde(skip)]
     pub(super) shifts_m: Vec<(f64, f64)>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RouteStopLine {
-    pub station_m: f64,
-    pub signal: usize,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RouteSignLine {
-    pub station_m: f64,
-    /// `Stop` or `Yield`.
-    pub kind: SignKind,
 }
 
 /// A crossing of the route with another lane inside a junction.
@@ -138,23 +126,22 @@ impl Route {
             latest_m = change.latest_m - (change.end_m - change.begin_m);
         }
         // The route uses only a part of a lane that it enters or leaves midway, and it has two ends.
-        let is_on = |lane: &RouteLane, station_m: f64| {
+        let station_on = |lane: &RouteLane, lane_station_m: f64| {
+            let station_m = lane.from_m + lane_station_m;
             let used = lane.enter_m - PART_M..=lane.to_m + PART_M;
-            used.contains(&station_m) && (0.0..=path.length_m()).contains(&station_m)
+            let is_on = used.contains(&station_m) && (0.0..=path.length_m()).contains(&station_m);
+            is_on.then_some(station_m)
         };
-        let stop_lines = lanes.iter().flat_map(|lane| {
-            let of_lane = map.lane(lane.lane).stop_lines.iter();
-            let on_route = of_lane
-                .map(|line| RouteStopLine { station_m: lane.from_m + line.station_m, signal: line.signal });
-            on_route.filter(|line| is_on(lane, line.station_m))
-        });
-        let sign_lines = lanes.iter().flat_map(|lane| {
-            let of_lane = map.lane(lane.lane).sign_lines.iter();
-            let on_route = of_lane
-                .map(|line| RouteSignLine { station_m: lane.from_m + line.station_m, kind: line.kind });
-            on_route.filter(|line| is_on(lane, line.station_m))
-        });
-        let (stop_lines, sign_lines) = (stop_lines.collect(), sign_lines.collect());
+        let (mut stop_lines, mut sign_lines) = (Vec::new(), Vec::new());
+        for part in &lanes {
+            let lane = map.lane(part.lane);
+            let stop =
+                |line: &StopLine| Some(StopLine { station_m: station_on(part, line.station_m)?, ..*line });
+            let sign =
+                |line: &SignLine| Some(SignLine { station_m: station_on(part, line.station_m)?, ..*line });
+            stop_lines.extend(lane.stop_lines.iter().filter_map(stop));
+            sign_lines.extend(lane.sign_lines.iter().filter_map(sign));
+        }
         let conflicts = conflicts(map, &lanes, &path);
         let crosswalks_m = Vec::new();
         let mut route =

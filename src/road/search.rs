@@ -21,15 +21,8 @@ const HURRIED_M: f64 = 200.0;
 pub enum Move {
     /// Drive on into a successor of the lane.
     Follow(LaneIndex),
-    Change(Change),
-}
-
-/// A lane change on a way.
-#[derive(Debug, Clone)]
-pub struct Change {
-    /// The stretch on which it is permitted; the change begins at its begin.
-    pub stretch: Stretch,
-    pub length_m: f64,
+    /// Change lanes over a length (m) from the beginning of the stretch on which it is permitted.
+    Change { stretch: Stretch, length_m: f64 },
 }
 
 /// A place from which the search goes on.
@@ -108,7 +101,7 @@ impl Search<'_> {
                 let cost_mm = self.labels[index].cost_mm + millimetres(penalty_m + passed_m);
                 let target = stretch.pairs[end.pair].target;
                 let station_m = stretch.target_station_m(map, end);
-                let change = Move::Change(Change { stretch: stretch.clone(), length_m });
+                let change = Move::Change { stretch: stretch.clone(), length_m };
                 self.push(target, station_m, cost_mm, Some((index, change)));
             }
         }

@@ -29,8 +29,10 @@ const HELD_MAX: usize = 1_000_000;
 /// # Errors
 /// If they hold for more lanes than a map may have.
 pub fn add_signals(builder: &mut Builder) -> Result<(), RoadError> {
-    let mut placed = place_signals(builder);
+    let placed = place_signals(builder);
     warn_of_controllers(builder, &placed);
+    // For each light, the lanes it holds for, with the station of the light on them, m.
+    let mut lights: Vec<Vec<(LaneIndex, f64)>> = vec![Vec::new(); placed.lights.len()];
     let mut held_lanes = 0;
     for (road_index, road) in builder.document.roads.iter().enumerate() {
         for (signal_index, signal) in road.signals.iter().enumerate() {
@@ -44,13 +46,12 @@ pub fn add_signals(builder: &mut Builder) -> Result<(), RoadError> {
                     return Err(wrong(signal.line, message));
                 }
                 match found {
-                    Found::Light(index) => placed.held[index].extend(held),
+                    Found::Light(index) => lights[index].extend(held),
                     Found::Sign(index) => builder.map.signs[index].lanes.extend(held),
                 }
             }
         }
     }
-    let lights: Vec<Vec<(LaneIndex, f64)>> = core::mem::take(&mut placed.held);
     set_groups(builder, &placed, &lights);
     let mut of_groups = GroupLines::new();
     for (index, held) in lights.iter().enumerate() {
@@ -76,8 +77,6 @@ struct Placed<'a> {
     by_id: BTreeMap<&'a str, Found>,
     /// For each light, its road and element.
     lights: Vec<(usize, &'a SignalElement)>,
-    /// For each light, the lanes it holds for, with the station of the light on them, m.
-    held: Vec<Vec<(LaneIndex, f64)>>,
 }
 
 impl Placed<'_> {
@@ -93,8 +92,7 @@ impl Placed<'_> {
 
 fn place_signals<'a>(builder: &mut Builder<'a>) -> Placed<'a> {
     let document = builder.document;
-    let mut placed =
-        Placed { own: BTreeMap::new(), by_id: BTreeMap::new(), lights: Vec::new(), held: Vec::new() };
+    let mut placed = Placed { own: BTreeMap::new(), by_id: BTreeMap::new(), lights: Vec::new() };
     // Ids that several signals have: the line of the second, and how many more there are.
     let mut doubled: BTreeMap<&str, (u32, usize)> = BTreeMap::new();
     for (road_index, road) in document.roads.iter().enumerate() {
@@ -116,18 +114,14 @@ fn place_signals<'a>(builder: &mut Builder<'a>) -> Placed<'a> {
                         lanes: Vec::new(),
                     });
                     placed.lights.push((road_index, signal));
-                    placed.held.push(Vec::new());
                     Found::Light(builder.map.signals.len() - 1)
                 }
             };
             placed.own.insert((road_index, place), found);
-            match placed.by_id.entry(signal.id.as_str()) {
-                Entry::Vacant(entry) => {
-                    entry.insert(found);
-                }
-                Entry::Occupied(_) => {
-                    doubled.entry(signal.id.as_str()).or_insert((signal.line, 0)).1 += 1;
-                }
+            if let Entry::Vacant(entry) = placed.by_id.entry(signal.id.as_str()) {
+                entry.insert(found);
+            } else {
+                doubled.entry(signal.id.as_str()).or_insert((signal.line, 0)).1 += 1;
             }
         }
     }
@@ -254,9 +248,8 @@ fn warn_of_idle_lights(builder: &mut Builder, placed: &Placed, held: &[Vec<(Lane
         let idle = held[index].is_empty();
         let road = &builder.document.roads[*road_index];
         let lanes = &road.sections[road.section_at(signal.s_m)].lanes;
-        let is_named = |id: i32| signal.validity.iter().any(|(from, to)| (*from..=*to).contains(&id));
-        let mut named = lanes.iter().filter(|lane| is_named(lane.id)).peekable();
-        let others_only = idle && named.peek().is_some() && named.all(|lane| !lane.driving);
+        let mut named = lanes.iter().filter(|lane| signal.names(lane.id)).peekable();
+        let others_only = idle && named.peek().is_some() && named.all(|lane| lane.undriven.is_some());
         if signal.meaning == Meaning::OtherLight || others_only {
             builder.map.signals[index].for_vehicles = false;
             continue;
@@ -312,9 +305,8 @@ fn add_stop_lines(
 fn lanes_of(builder: &Builder, road_index: usize, signal: &SignalElement) -> Vec<(LaneIndex, f64)> {
     let road = &builder.document.roads[road_index];
     let section_index = road.section_at(signal.s_m);
-    let named = |id: i32| {
-        signal.validity.is_empty() || signal.validity.iter().any(|(from, to)| (*from..=*to).contains(&id))
-    };
+    let is_sign = matches!(signal.meaning, Meaning::Sign(_));
+    let named = |id: i32| signal.validity.is_empty() || signal.names(id);
     let ids: Vec<i32> = road.sections[section_index].lanes.iter().map(|lane| lane.id).collect();
     let lanes = |wanted: &dyn Fn(i32) -> bool| -> Vec<LaneIndex> {
         let ids = ids.iter().filter(|id| wanted(**id));
@@ -341,11 +333,10 @@ fn lanes_of(builder: &Builder, road_index: usize, signal: &SignalElement) -> Vec
         let coming = lanes(&|id| !fits(id));
         if signal.validity.is_empty() && !coming.is_empty() {
             held = coming;
-        } else if !matches!(signal.meaning, Meaning::Sign(_)) {
+        } else if !is_sign {
             held = held.iter().flat_map(|lane| builder.map.lane(*lane).predecessors.clone()).collect();
         }
     }
-    let is_sign = matches!(signal.meaning, Meaning::Sign(_));
     let line = |lane: LaneIndex| {
         let inside = builder.map.lane(lane).junction.is_some();
         if inside && !is_sign { (lane, 0.0) } else { at_light(&lane) }
@@ -354,7 +345,7 @@ fn lanes_of(builder: &Builder, road_index: usize, signal: &SignalElement) -> Vec
 }
 
 /// Notes on every lane the signs that hold for it, and on the lanes inside junctions what follows from them.
-pub fn set_precedence(document: &Document, map: &mut RoadMap) {
+pub fn set_precedence<'a>(document: &'a Document, map: &mut RoadMap) {
     for sign in &map.signs {
         for &(index, station_m) in sign.lanes.iter().filter(|_| sign.kind != SignKind::PriorityRoad) {
             let lane = &mut map.lanes[index.0];
@@ -369,7 +360,10 @@ pub fn set_precedence(document: &Document, map: &mut RoadMap) {
     let priority_signs = map.signs.iter().filter(|sign| sign.kind == SignKind::PriorityRoad);
     let on_priority_road: BTreeSet<LaneIndex> =
         priority_signs.flat_map(|sign| sign.lanes.iter().map(|(lane, _)| *lane)).collect();
-    let records: Vec<Records> = document.junctions.iter().map(Records::of).collect();
+    let named = |junction: &'a JunctionElement| -> Records<'a> {
+        junction.priorities.iter().map(|(high, low)| (high.as_str(), low.as_str())).unzip()
+    };
+    let records: Vec<Records> = document.junctions.iter().map(named).collect();
     let precedence = |lane: LaneIndex| {
         if map.stop_line_of(lane).is_some() {
             Precedence::Equal
@@ -388,21 +382,8 @@ pub fn set_precedence(document: &Document, map: &mut RoadMap) {
     }
 }
 
-/// The roads that the `priority` records of a junction name.
-struct Records<'a> {
-    high: BTreeSet<&'a str>,
-    low: BTreeSet<&'a str>,
-}
-
-impl<'a> Records<'a> {
-    fn of(junction: &'a JunctionElement) -> Records<'a> {
-        let records = &junction.priorities;
-        Records {
-            high: records.iter().map(|(high, _)| high.as_str()).collect(),
-            low: records.iter().map(|(_, low)| low.as_str()).collect(),
-        }
-    }
-}
+/// The roads that the `priority` records of a junction name: those that go first, and those that give way.
+type Records<'a> = (BTreeSet<&'a str>, BTreeSet<&'a str>);
 
 /// What the `priority` records of its junction say of a lane inside: they name its road or the road before it.
 fn recorded(records: &[Records], map: &RoadMap, index: LaneIndex) -> Precedence {
@@ -410,7 +391,7 @@ fn recorded(records: &[Records], map: &RoadMap, index: LaneIndex) -> Precedence 
     let Some(junction) = lane.junction else { return Precedence::Equal };
     let before = lane.predecessors.iter().map(|before| &map.lane(*before).key.road);
     let mut roads = core::iter::once(&lane.key.road).chain(before).map(String::as_str);
-    let Records { high, low } = &records[junction];
+    let (high, low) = &records[junction];
     if roads.clone().any(|road| low.contains(road)) {
         Precedence::Yield
     } else if roads.any(|road| high.contains(road)) {

@@ -107,7 +107,7 @@ mod tests {
     use crate::testing::{CLEAR_DAY, object, straight};
     use avastra_base::geometry::Pose;
     use avastra_lang::model::vocabulary::Body;
-    use avastra_road::RouteSignLine;
+    use avastra_road::SignLine;
     use avastra_world::sim::{Conditions, EgoMotion};
     use core::f64::consts::FRAC_PI_2;
     use std::sync::Arc;
@@ -130,7 +130,7 @@ mod tests {
     #[test]
     fn a_stop_sign_holds_until_the_vehicle_has_stood_at_it() {
         let mut route = straight().route.clone();
-        let line = |station_m, kind| RouteSignLine { station_m, kind };
+        let line = |station_m, kind| SignLine { station_m, kind };
         route.sign_lines = vec![line(40.0, SignKind::Yield), line(80.0, SignKind::Stop)];
         let scene = Arc::new(Scene::new(straight().map.clone(), route));
         let mut signs = Signs::default();

@@ -31,15 +31,19 @@ const NUMBERS: usize = 10_000;
 
 /// The file's text; with the ego vehicle's own drive as an obstacle, if that is asked for.
 pub fn commonroad(recording: &Recording, with_ego: bool) -> String {
-    let mut numbers = Numbers { next: recording.map.lanes.len() + 1 };
     let map = &recording.map;
-    let limits: Vec<usize> = map.lanes.iter().map(|_| numbers.take()).collect();
+    let mut taken = map.lanes.len();
+    let mut next_id = || {
+        taken += 1;
+        taken
+    };
+    let limits: Vec<usize> = map.lanes.iter().map(|_| next_id()).collect();
     let lights: Vec<(usize, &Lights)> =
-        recording.seen.lights.iter().map(|lights| (numbers.take(), lights)).collect();
+        recording.seen.lights.iter().map(|lights| (next_id(), lights)).collect();
     let junctions: Vec<Element> =
-        (0..map.junctions.len()).filter_map(|junction| intersection(map, junction, &mut numbers)).collect();
-    let problem = planning_problem(recording, numbers.take());
-    let base = numbers.next.div_ceil(NUMBERS) * NUMBERS;
+        (0..map.junctions.len()).filter_map(|junction| intersection(map, junction, &mut next_id)).collect();
+    let problem = planning_problem(recording, next_id());
+    let base = next_id().div_ceil(NUMBERS) * NUMBERS;
     let actors = recording.actors().filter(|actor| with_ego || actor.id != 0);
     let lanelets =
         map.lanes.iter().enumerate().map(|(index, lane)| lanelet(map, index, lane, limits[index], &lights));
@@ -62,18 +66,6 @@ pub fn commonroad(recording: &Recording, with_ego: bool) -> String {
         .holding_all(actors.filter_map(|actor| obstacle(actor, base)))
         .holding(problem)
         .document()
-}
-
-/// Numbers that are not taken yet.
-struct Numbers {
-    next: usize,
-}
-
-impl Numbers {
-    fn take(&mut self) -> usize {
-        self.next += 1;
-        self.next - 1
-    }
 }
 
 /// A name in the form that the format asks for; ZAM is its country for what lies nowhere.
@@ -171,8 +163,8 @@ fn light(recording: &Recording, number: usize, lights: &Lights) -> Element {
         .holding(Element::text("active", true))
 }
 
-/// A junction: for each lane that leads to it, where it goes on. `None` if no lane does.
-fn intersection(map: &RoadMap, junction: usize, numbers: &mut Numbers) -> Option<Element> {
+/// A junction: for each lane that leads to it, where it goes on. `None` if no lane does. `next_id` gives the next free number.
+fn intersection(map: &RoadMap, junction: usize, next_id: &mut impl FnMut() -> usize) -> Option<Element> {
     let inside = &map.junctions[junction].lanes;
     let mut incoming: Vec<LaneIndex> =
         inside.iter().flat_map(|lane| map.lane(*lane).predecessors.iter().copied()).collect();
@@ -182,7 +174,7 @@ fn intersection(map: &RoadMap, junction: usize, numbers: &mut Numbers) -> Option
     if incoming.is_empty() {
         return None;
     }
-    let own = numbers.take();
+    let own = next_id();
     let arms: Vec<Element> = incoming
         .into_iter()
         .map(|lane| {
@@ -194,7 +186,7 @@ fn intersection(map: &RoadMap, junction: usize, numbers: &mut Numbers) -> Option
                     .collect()
             };
             Element::new("incoming")
-                .with("id", numbers.take())
+                .with("id", next_id())
                 .holding(reference("incomingLanelet", number_of(lane)))
                 .holding_all(onward("successorsRight", &[Turn::Right]))
                 .holding_all(onward("successorsStraight", &[Turn::Straight]))

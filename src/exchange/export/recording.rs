@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use avastra_campaign::episode::{Actor, EpisodeLog, Outcome, Recorder};
+use avastra_campaign::episode::{Actor, Recorder};
 use avastra_campaign::oracle::ClaimResult;
 use avastra_campaign::run::{RunError, Stage};
 use avastra_drivers::Selected;
 use avastra_lang::model::vocabulary::Word;
-use avastra_lang::model::{Claim, Scenario, Space};
+use avastra_lang::model::{Claim, Scenario};
 use avastra_road::{LaneIndex, LanePlace, RoadMap};
 use avastra_world::action::ActionTable;
 use avastra_world::sim::DT_S;
@@ -83,6 +83,7 @@ pub fn record(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Resul
         facts.push((SCENARIO_TEXT.to_owned(), text));
         facts.extend((!lacks.is_empty()).then(|| (SCENARIO_TEXT_LACKS.to_owned(), lacks.join("; "))));
     }
+    let named = |(id, own): (u32, usize)| (id, table.space().bodies[own].name.clone());
     Ok(Recording {
         name: scenario.name.clone(),
         docs: scenario.docs.clone(),
@@ -91,26 +92,9 @@ pub fn record(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Resul
         goal: road.goal,
         route: road.route.lanes.iter().map(|part| part.lane).collect(),
         seen,
-        own_bodies: own_bodies(table.space(), &log),
+        own_bodies: log.own_bodies().into_iter().map(named).collect(),
         facts,
     })
-}
-
-fn own_bodies(space: &Space, log: &EpisodeLog) -> BTreeMap<u32, String> {
-    let mut found = BTreeMap::new();
-    for step in &log.steps {
-        let Outcome::Done { draw, spawned, .. } = &step.outcome else { continue };
-        let mut ids = spawned.as_slice();
-        for effect in &draw.effects {
-            let (of_effect, rest) = ids.split_at((effect.newcomers() as usize).min(ids.len()));
-            if let Some(first) = of_effect.first() {
-                let named = effect.own_bodies(*first).map(|(id, own)| (id, space.bodies[own].name.clone()));
-                found.extend(named);
-            }
-            ids = rest;
-        }
-    }
-    found
 }
 
 /// Where a scenario comes from and what it claims.

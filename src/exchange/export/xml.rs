@@ -89,14 +89,4 @@ mod tests {
         let shown = [0.0, -0.0, -1e-9, 1.0, 100.0, 0.1 + 0.2, -2.5, 1_234.567_891_2].map(number);
         assert_eq!(shown, ["0", "0", "0", "1", "100", "0.3", "-2.5", "1234.567891"]);
     }
-
-    #[test]
-    fn what_would_be_markup_is_escaped() {
-        let root = Element::new("A").with("name", "a\"<b>&'c'").holding(Element::text("B", "1 < 2 & 3"));
-        let text = root.document();
-        let read = roxmltree::Document::parse(&text).unwrap();
-        assert_eq!(read.root_element().attribute("name"), Some("a\"<b>&'c'"));
-        assert_eq!(read.root_element().children().find_map(|child| child.text()), Some("\n  "));
-        assert!(text.contains("<B>1 &lt; 2 &amp; 3</B>"), "{text}");
-    }
 }

@@ -88,9 +88,9 @@ fn described(entry: Node, assigned: &BTreeMap<String, String>) -> Result<Shape, 
 
 /// The body of a `Vehicle` or `Pedestrian`, with values for the parameters of an entry of a catalogue.
 fn shape(node: Node, assigned: &BTreeMap<String, String>) -> Result<Shape, String> {
-    let category = |name: &str| node.attribute(name).unwrap_or("").to_owned();
+    let category = |name: &'static str| node.attribute(name).unwrap_or("");
     let like = match node.tag_name().name() {
-        "Vehicle" => match category("vehicleCategory").as_str() {
+        "Vehicle" => match category("vehicleCategory") {
             "car" => "Sedan",
             "van" => "SUV",
             "truck" => "BoxTruck",
@@ -99,7 +99,7 @@ fn shape(node: Node, assigned: &BTreeMap<String, String>) -> Result<Shape, Strin
             "bicycle" => "Bicycle",
             other => return Err(format!("no vehicle of the category `{other}` is known")),
         },
-        "Pedestrian" => match category("pedestrianCategory").as_str() {
+        "Pedestrian" => match category("pedestrianCategory") {
             "pedestrian" | "" => "Pedestrian",
             other => return Err(format!("no pedestrian of the category `{other}` is known")),
         },

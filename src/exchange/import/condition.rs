@@ -8,12 +8,6 @@ use super::trigger::{Condition, Pair, Trigger, When};
 /// What holds from the beginning.
 const ALWAYS: &str = "elapsed >= 0 s";
 
-/// Where something is and how it moves along the way, as long as it keeps its speed.
-pub struct Kinematics {
-    pub station_m: f64,
-    pub mps: f64,
-}
-
 /// Whether a group of conditions holds from the beginning.
 pub fn is_always(all: &[Condition]) -> bool {
     all.iter().all(|condition| matches!(condition.kind, When::Always))
@@ -54,7 +48,7 @@ fn part(
         When::After(seconds) => Some(format!("elapsed >= {seconds:.2} s")),
         When::Headway { pair, seconds } => {
             let gap = gap(source, mark, pair, actor, placed)?;
-            let (of, mps) = if pair.of == actor.name { ("npc", actor.mps) } else { ("ego", placed[0].mps) };
+            let (of, mps) = if pair.of == actor.name() { ("npc", actor.mps) } else { ("ego", placed[0].mps) };
             if holds(pair, actor, placed, mps * seconds) {
                 return already(source, condition);
             }
@@ -71,7 +65,7 @@ fn part(
         }
         When::Distance { pair, metres } => {
             let names = [pair.of.as_str(), pair.to.as_str()];
-            if names.contains(&actor.name.as_str()) && names.contains(&placed[0].name.as_str()) {
+            if names.contains(&actor.name()) && names.contains(&placed[0].name()) {
                 let gap = gap(source, mark, pair, actor, placed)?;
                 if holds(pair, actor, placed, *metres) {
                     return already(source, condition);
@@ -85,11 +79,11 @@ fn part(
             let of = named(source, mark, entity, placed)?;
             let there = ground.beside(source, mark, position)?;
             let station_m = there.station_m - within_m;
-            let Kinematics { station_m: from_m, mps } = of.kinematics();
+            let (from_m, mps) = (of.beside.station_m, of.along_mps());
             if (from_m - there.station_m).abs() <= *within_m {
                 return already(source, condition);
             }
-            if entity == &placed[0].name {
+            if entity == placed[0].name() {
                 return Some(format!(
                     "ego.route_left <= {:.2} m",
                     (ground.route.goal_m - station_m).max(0.0)
@@ -120,7 +114,7 @@ fn sign(pair: &Pair) -> &'static str {
 fn gap(source: &mut Source, mark: &Mark, pair: &Pair, actor: &Placed, placed: &[Placed]) -> Option<String> {
     let ego = &placed[0];
     let names = [pair.of.as_str(), pair.to.as_str()];
-    if !(names.contains(&actor.name.as_str()) && names.contains(&ego.name.as_str())) {
+    if !(names.contains(&actor.name()) && names.contains(&ego.name())) {
         return source.refuse_at(mark, "it must ask about the ego vehicle and the one that acts");
     }
     if pair.is_free_space {
@@ -167,7 +161,7 @@ fn meeting(
     if if pair.is_less { gap_m < metres } else { gap_m > metres } {
         return already(source, condition);
     }
-    let closing_mps = back.kinematics().mps - front.kinematics().mps;
+    let closing_mps = back.along_mps() - front.along_mps();
     let seconds = (gap_m - metres) / closing_mps;
     if closing_mps > 0.0 && pair.is_less || closing_mps < 0.0 && !pair.is_less {
         return at(source, mark, seconds);
@@ -186,8 +180,13 @@ fn at(source: &mut Source, mark: &Mark, seconds: f64) -> Option<String> {
     Some(format!("elapsed >= {seconds:.2} s"))
 }
 
-fn named<'a>(source: &mut Source, mark: &Mark, name: &str, placed: &'a [Placed]) -> Option<&'a Placed> {
-    let found = placed.iter().find(|other| other.name == name && !source.is_torn(name));
+fn named<'a>(
+    source: &mut Source,
+    mark: &Mark,
+    name: &str,
+    placed: &'a [Placed<'a>],
+) -> Option<&'a Placed<'a>> {
+    let found = placed.iter().find(|other| other.name() == name && !source.is_torn(name));
     if found.is_none() && !source.is_torn(name) {
         source.refuse_at::<()>(mark, format!("`{name}` is no vehicle with a place"));
     }

@@ -72,7 +72,8 @@ impl<'a> Reader<'a> {
             return self.factor();
         }
         if self.takes('(') {
-            return self.closed();
+            let value = self.sum()?;
+            return self.close().map(|()| value);
         }
         if self.takes('$') {
             let name = self.word(|letter| letter.is_alphanumeric() || letter == '_' || letter == '.');
@@ -89,9 +90,7 @@ impl<'a> Reader<'a> {
         }
         let first = self.sum()?;
         let second = if self.takes(',') { Some(self.sum()?) } else { None };
-        if !self.takes(')') {
-            return Err("a `)` is missing".to_owned());
-        }
+        self.close()?;
         match (name, second) {
             ("sqrt", None) => Ok(first.sqrt()),
             ("abs", None) => Ok(first.abs()),
@@ -106,21 +105,17 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn closed(&mut self) -> Result<f64, String> {
-        let value = self.sum()?;
-        if self.takes(')') { Ok(value) } else { Err("a `)` is missing".to_owned()) }
+    fn close(&mut self) -> Result<(), String> {
+        if self.takes(')') { Ok(()) } else { Err("a `)` is missing".to_owned()) }
     }
 
     fn literal(&mut self) -> Result<f64, String> {
         let rest = self.rest;
-        let mut end = rest.len();
-        for (at, letter) in rest.char_indices() {
-            let is_sign_of_exponent = matches!(letter, '+' | '-') && rest[..at].ends_with(['e', 'E']);
-            if !(letter.is_ascii_digit() || matches!(letter, '.' | 'e' | 'E') || is_sign_of_exponent) {
-                end = at;
-                break;
-            }
-        }
+        let belongs = |(at, letter): &(usize, char)| match letter {
+            '+' | '-' => rest[..*at].ends_with(['e', 'E']),
+            letter => letter.is_ascii_digit() || matches!(letter, '.' | 'e' | 'E'),
+        };
+        let end = rest.char_indices().find(|letter| !belongs(letter)).map_or(rest.len(), |(at, _)| at);
         self.rest = &rest[end..];
         rest[..end].parse().map_err(|_| format!("`{}` is no number", &rest[..end]))
     }
@@ -133,13 +128,9 @@ impl<'a> Reader<'a> {
     }
 
     fn takes(&mut self, letter: char) -> bool {
-        match self.rest.trim_start().strip_prefix(letter) {
-            Some(rest) => {
-                self.rest = rest;
-                true
-            }
-            None => false,
-        }
+        let rest = self.rest.trim_start().strip_prefix(letter);
+        self.rest = rest.unwrap_or(self.rest);
+        rest.is_some()
     }
 }
 

@@ -3,7 +3,7 @@
 use core::f64::consts::PI;
 
 use avastra_base::geometry::{Vec2, wrap_angle};
-use avastra_road::{Lane, LaneIndex, LanePlace, Neighbour, RoadError, RoadMap, Route};
+use avastra_road::{LaneIndex, LanePlace, RoadMap, Route, Side};
 
 use super::position::{Heading, Position};
 use super::source::{Mark, Source};
@@ -101,10 +101,10 @@ impl Ground {
         if is_it(here) {
             return Some(Beside { station_m, lanes_left: 0, is_along: true, offset_m });
         }
-        for (step, side) in [(1, left as fn(&Lane) -> Option<Neighbour>), (-1, right)] {
+        for (step, side) in [(1, Side::Left), (-1, Side::Right)] {
             let mut lane = here;
             for lanes in 1..=SIDE_MAX {
-                let Some(next) = side(self.map.lane(lane)) else { break };
+                let Some(next) = self.map.lane(lane).neighbour(side) else { break };
                 if is_it(next.lane) {
                     let lanes_left = lanes * step;
                     return Some(Beside { station_m, lanes_left, is_along: next.same_direction, offset_m });
@@ -166,28 +166,17 @@ impl Ground {
     }
 }
 
-fn left(lane: &Lane) -> Option<Neighbour> {
-    lane.left
-}
-
-fn right(lane: &Lane) -> Option<Neighbour> {
-    lane.right
-}
-
 /// The lane that a position names, and the place in it.
 fn lane_place(source: &mut Source, map: &RoadMap, mark: &Mark, position: &Position) -> Option<LanePlace> {
     match position {
         Position::Lane { road, lane, s_m, offset_m, .. } => {
             let place = match map.place(road, *lane, *s_m) {
                 Ok(place) => place,
-                Err(RoadError::Map { message, .. } | RoadError::Route { message }) => {
-                    return source.refuse_at(mark, message);
-                }
+                Err(error) => return source.refuse_at(mark, error.to_string()),
             };
             let lane = map.lane(place.lane);
-            let is_along = lane.road_station_m(lane.centre.length_m()) > lane.road_station_m(0.0);
             // The file's offsets are to the left of the road's reference line.
-            Some(LanePlace { offset_m: if is_along { *offset_m } else { -offset_m }, ..place })
+            Some(LanePlace { offset_m: if lane.is_along() { *offset_m } else { -offset_m }, ..place })
         }
         Position::World { x_m, y_m, heading_rad } => {
             let found = map.nearest(Vec2::new(*x_m, *y_m), *heading_rad, REACH_M);
@@ -213,10 +202,9 @@ fn faces_along(
             wrap_angle(rad - lane_rad).abs()
         }
         Position::Lane { heading: Heading::Relative(rad), .. } => {
-            let is_along = lane.road_station_m(lane.centre.length_m()) > lane.road_station_m(0.0);
             let rad = wrap_angle(*rad).abs();
             // Players differ in whether this counts from the road's direction or from that of a lane against it.
-            if is_along { rad } else { rad.min(PI - rad) }
+            if lane.is_along() { rad } else { rad.min(PI - rad) }
         }
         Position::RelativeLane { .. } => 0.0,
     };

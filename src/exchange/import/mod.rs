@@ -91,9 +91,10 @@ pub fn openscenario(
     if let Some(own) = is_as_written.then(|| own::read(&mut source, &document)).flatten() {
         return Ok(write::own(&own, name, source.notes()));
     }
-    let imported = story::read(&mut source, &document, ego, files)
-        .and_then(|story| Scene::of(&mut source, story, files))
-        .map(|scene| write::scenario(&scene, name, source.notes()));
+    let imported = story::read(&mut source, &document, ego, files).and_then(|story| {
+        let scene = Scene::of(&mut source, &story, files)?;
+        Some(write::scenario(&scene, &story, name, source.notes()))
+    });
     match (imported, source.refusals()) {
         (Some(imported), refusals) if refusals.is_empty() => Ok(imported),
         (_, refusals) => Err(refusals),

@@ -5,7 +5,7 @@
 
 use core::fmt::Write;
 
-use roxmltree::{Document, Node};
+use roxmltree::Document;
 
 use crate::export::{SCENARIO_TEXT, SCENARIO_TEXT_LACKS};
 use avastra_campaign::emit::quoted;
@@ -29,11 +29,9 @@ pub fn read(source: &mut Source, document: &Document) -> Option<Own> {
     let header =
         element(root, "FileHeader").filter(|header| header.attribute("author") == Some("avastra"))?;
     let properties = root.descendants().filter(|node| node.has_tag_name("Property"));
-    let fact = |property: Node<'_, '_>| {
-        Some((property.attribute("name")?.to_owned(), property.attribute("value")?.to_owned()))
-    };
-    let facts: Vec<(String, String)> = properties.filter_map(fact).collect();
-    let value = |name: &str| facts.iter().find(|(known, _)| known == name).map(|(_, value)| value.as_str());
+    let facts = properties.filter_map(|node| Some((node.attribute("name")?, node.attribute("value")?)));
+    let facts: Vec<(&str, &str)> = facts.collect();
+    let value = |name: &str| facts.iter().find(|(known, _)| *known == name).map(|(_, value)| *value);
     let scenario = value(SCENARIO_TEXT)?.trim_end().strip_suffix('}')?;
     let network = element(root, "RoadNetwork")?;
     let map = element(network, "LogicFile")?.attribute("filepath")?.to_owned();
@@ -64,9 +62,9 @@ pub fn read(source: &mut Source, document: &Document) -> Option<Own> {
 }
 
 /// A claim about the drive, as the language says it.
-fn claim((name, value): &(String, String)) -> Option<String> {
-    match name.as_str() {
-        "end" => ENDS.contains(&value.as_str()).then(|| format!("end == {value}")),
+fn claim(&(name, value): &(&str, &str)) -> Option<String> {
+    match name {
+        "end" => ENDS.contains(&value).then(|| format!("end == {value}")),
         "trace" => Some(format!("trace == {}", quoted(value))),
         _ => {
             let number: u32 = name.strip_prefix("collision npc_")?.parse().ok()?;

@@ -7,13 +7,11 @@ use avastra_road::RoadMap;
 
 use super::action::{Headway, Speed, Target};
 use super::body::Shape;
-use super::condition::Kinematics;
 use super::ground::{Beside, Ground};
 use super::position::{Heading, Position};
 use super::source::{Mark, Source};
 use super::story::{Change, Entity, Story};
 use super::trigger::{Condition, When};
-use super::weather::Weather;
 use super::{Files, condition};
 
 /// Vehicles keep to the middle of their lanes: a file's may be this far beside it, m.
@@ -27,15 +25,10 @@ const STRAIGHT_M: f64 = 0.5;
 const SETS_OUT_S: f64 = 9.0;
 
 pub struct Scene {
-    /// As the file names it.
-    pub map: String,
-    pub description: String,
     /// As the language writes places.
     pub start: String,
     pub goal: String,
     pub ego_mps: f64,
-    pub weather: Weather,
-    pub duration_s: f64,
     pub others: Vec<Other>,
     /// When the one vehicle that changes lanes may begin.
     pub change: Option<String>,
@@ -56,47 +49,46 @@ pub struct Other {
     pub changes: bool,
 }
 
+impl Other {
+    fn new(entity: &Entity, does: &'static str) -> Other {
+        Other {
+            name: entity.name.clone(),
+            shape: entity.body.clone(),
+            does,
+            is_behind: false,
+            gap_m: 0.0,
+            lane: None,
+            side: None,
+            speed_mps: 0.0,
+            changes: false,
+        }
+    }
+}
+
 impl Scene {
     /// Finds every place. `None` if something is refused.
-    pub fn of(source: &mut Source, story: Story, files: &dyn Files) -> Option<Scene> {
-        let text = match files.map(&story.map.1) {
-            Ok(text) => text,
-            Err(reason) => return source.refuse_at(&story.map.0, format!("`{}`: {reason}", story.map.1)),
-        };
-        let map = match RoadMap::from_opendrive("map", &text) {
+    pub fn of(source: &mut Source, story: &Story, files: &dyn Files) -> Option<Scene> {
+        let (mark, path) = &story.map;
+        let read = |text: String| RoadMap::from_opendrive("map", &text).map_err(|error| error.to_string());
+        let map = match files.map(path).and_then(read) {
             Ok(map) => map,
-            Err(error) => return source.refuse_at(&story.map.0, format!("`{}`: {error}", story.map.1)),
+            Err(reason) => return source.refuse_at(mark, format!("`{path}`: {reason}")),
         };
-        let ground = Ground::of(source, &story, map)?;
+        let ground = Ground::of(source, story, map)?;
         let (start, goal) = (lane_point(&ground.map, ground.start), lane_point(&ground.map, ground.goal));
-        let ego_mps = speed(source, &story, &story.ego, 0)?;
+        let ego_mps = speed(source, story, &story.ego, 0)?;
         if source.is_torn(&story.ego.name) {
             return None;
         }
-        let mut scene = Scene {
-            map: story.map.1.clone(),
-            description: story.description.clone(),
-            start,
-            goal,
-            ego_mps,
-            weather: story.weather.clone(),
-            duration_s: story.duration_s,
-            others: Vec::new(),
-            change: None,
-            once: None,
-        };
-        let mut placed: Vec<Placed> = vec![Placed {
-            name: story.ego.name.clone(),
-            shape: story.ego.body.clone(),
-            beside: Beside { station_m: 0.0, lanes_left: 0, is_along: true, offset_m: 0.0 },
-            mps: ego_mps,
-        }];
+        let mut scene = Scene { start, goal, ego_mps, others: Vec::new(), change: None, once: None };
+        let beside = Beside { station_m: 0.0, lanes_left: 0, is_along: true, offset_m: 0.0 };
+        let mut placed = vec![Placed { entity: &story.ego, beside, mps: ego_mps }];
         // A place may be relative to one that stands later in the file.
         let mut left: Vec<&Entity> = story.others.iter().collect();
         while !left.is_empty() {
             let is_known = |entity: &&Entity| match &entity.position {
                 Some((_, Position::RelativeLane { entity: of, .. })) => {
-                    placed.iter().any(|other| other.name == *of)
+                    placed.iter().any(|other| other.name() == of)
                 }
                 _ => true,
             };
@@ -122,17 +114,16 @@ impl Scene {
             }
             if is_walker {
                 if !source.is_torn(&entity.name) {
-                    scene.on_foot(source, &story, &ground, entity);
+                    scene.on_foot(source, story, &ground, entity);
                 }
                 continue;
             }
-            let found = source.about(&entity.name, |source| place(source, &story, &ground, entity, &placed));
+            let found = source.about(&entity.name, |source| place(source, story, &ground, entity, &placed));
             placed.extend(found);
         }
         for other in &placed[1..] {
-            let entity = story.others.iter().find(|entity| entity.name == other.name);
-            if let Some(entity) = entity.filter(|entity| !source.is_torn(&entity.name)) {
-                scene.vehicle(source, &ground, entity, other, &placed);
+            if !source.is_torn(other.name()) {
+                scene.vehicle(source, story, &ground, other, &placed);
             }
         }
         (!source.is_refused()).then_some(scene)
@@ -142,13 +133,14 @@ impl Scene {
     fn vehicle(
         &mut self,
         source: &mut Source,
+        story: &Story,
         ground: &Ground,
-        entity: &Entity,
         other: &Placed,
         placed: &[Placed],
     ) -> Option<()> {
+        let Placed { entity, beside, mps } = other;
         let mark = entity.position.as_ref().map_or(&entity.mark, |(mark, _)| mark);
-        let (ego, Placed { shape, beside, mps, .. }) = (&placed[0], other);
+        let ego = &placed[0];
         let (front_m, back_m) = ego.ends_m();
         let (own_front_m, own_back_m) = other.ends_m();
         let ahead_m = match &entity.headway {
@@ -160,17 +152,7 @@ impl Scene {
         if let Some((mark, _)) = entity.headway.as_ref().filter(|_| behind_m >= 0.0) {
             return source.refuse_at(mark, "a distance to the ego vehicle is read of a vehicle ahead of it");
         }
-        let mut spawn = Other {
-            name: entity.name.clone(),
-            shape: shape.clone(),
-            does: "DriveAhead",
-            is_behind: false,
-            gap_m: ahead_m,
-            lane: None,
-            side: None,
-            speed_mps: *mps,
-            changes: false,
-        };
+        let mut spawn = Other { gap_m: ahead_m, speed_mps: *mps, ..Other::new(entity, "DriveAhead") };
         if !beside.is_along {
             if ahead_m < 0.0 {
                 return source.refuse_at(mark, "an oncoming vehicle is ahead of the ego vehicle");
@@ -205,7 +187,7 @@ impl Scene {
             return source.refuse_at(&extra.mark, "a vehicle changes lanes once");
         }
         if let Some(change) = entity.changes.first() {
-            spawn.changes = self.lane_change(source, ground, change, other, placed)?;
+            spawn.changes = self.lane_change(source, story, ground, change, other, placed)?;
         }
         self.appears(source, mark, spawn)
     }
@@ -225,6 +207,7 @@ impl Scene {
     fn lane_change(
         &mut self,
         source: &mut Source,
+        story: &Story,
         ground: &Ground,
         change: &Change,
         other: &Placed,
@@ -233,7 +216,7 @@ impl Scene {
         let mark = &change.mark;
         let own = other.beside.lanes_left;
         let to = match &change.to {
-            Target::Beside(name, lanes) => match placed.iter().find(|other| other.name == *name) {
+            Target::Beside(name, lanes) => match placed.iter().find(|other| other.name() == name) {
                 Some(of) => of.beside.lanes_left + lanes,
                 None if source.is_torn(name) => return None,
                 None => return source.refuse_at(mark, format!("`{name}` is no vehicle with a place")),
@@ -262,8 +245,8 @@ impl Scene {
             times.fold(0.0, f64::max)
         };
         let soonest_s = change.when.iter().map(starts_s).reduce(f64::min).unwrap_or(0.0);
-        if soonest_s >= self.duration_s {
-            let (name, end_s) = (&other.name, self.duration_s);
+        if soonest_s >= story.duration_s {
+            let (name, end_s) = (other.name(), story.duration_s);
             let kept = format!("`{name}` keeps its lane: it would leave it after {soonest_s:.0} s");
             source.note(format!("{kept}, and {end_s:.0} s are played"));
             return Some(false);
@@ -309,17 +292,7 @@ impl Scene {
         }
         let half_m = entity.body.length_m / 2.0;
         let front_m = story.ego.body.middle_m + story.ego.body.length_m / 2.0;
-        let mut spawn = Other {
-            name: entity.name.clone(),
-            shape: entity.body.clone(),
-            does: "Stand",
-            is_behind: false,
-            gap_m: 0.0,
-            lane: None,
-            side: None,
-            speed_mps: 0.0,
-            changes: false,
-        };
+        let mut spawn = Other::new(entity, "Stand");
         let mps = speed(source, story, entity, 0)?;
         let Some(walk) = entity.walks.first() else {
             if mps != 0.0 {
@@ -390,34 +363,38 @@ impl Scene {
 }
 
 /// A vehicle with its place and speed at the beginning.
-pub struct Placed {
-    pub name: String,
-    pub shape: Shape,
+pub struct Placed<'a> {
+    pub entity: &'a Entity,
     pub beside: Beside,
     pub mps: f64,
 }
 
-impl Placed {
+impl Placed<'_> {
+    pub fn name(&self) -> &str {
+        &self.entity.name
+    }
+
     /// Stations of its front and its back, m.
     pub fn ends_m(&self) -> (f64, f64) {
         let sign = if self.beside.is_along { 1.0 } else { -1.0 };
-        let middle_m = self.beside.station_m + sign * self.shape.middle_m;
-        (middle_m + self.shape.length_m / 2.0, middle_m - self.shape.length_m / 2.0)
+        let Shape { length_m, middle_m, .. } = self.entity.body;
+        let middle_m = self.beside.station_m + sign * middle_m;
+        (middle_m + length_m / 2.0, middle_m - length_m / 2.0)
     }
 
-    pub fn kinematics(&self) -> Kinematics {
-        let mps = if self.beside.is_along { self.mps } else { -self.mps };
-        Kinematics { station_m: self.beside.station_m, mps }
+    /// Its speed along the way, negative against it, m/s.
+    pub fn along_mps(&self) -> f64 {
+        if self.beside.is_along { self.mps } else { -self.mps }
     }
 }
 
-fn place(
+fn place<'a>(
     source: &mut Source,
     story: &Story,
     ground: &Ground,
-    entity: &Entity,
+    entity: &'a Entity,
     placed: &[Placed],
-) -> Option<Placed> {
+) -> Option<Placed<'a>> {
     let Some((mark, position)) = &entity.position else {
         if source.is_torn(&entity.name) {
             return None;
@@ -426,7 +403,7 @@ fn place(
     };
     let beside = match position {
         Position::RelativeLane { entity: of, lanes, ahead_m, offset_m, heading } => {
-            let of = placed.iter().find(|other| other.name == *of)?;
+            let of = placed.iter().find(|other| other.name() == of)?;
             if !of.beside.is_along {
                 return source.refuse_at(mark, "a place relative to an oncoming vehicle is not read");
             }
@@ -446,7 +423,7 @@ fn place(
         return source.refuse_at(mark, reason);
     }
     let mps = speed(source, story, entity, 0)?;
-    Some(Placed { name: entity.name.clone(), shape: entity.body.clone(), beside, mps })
+    Some(Placed { entity, beside, mps })
 }
 
 /// The speed with which an entity begins, m/s; it must keep it, unless it is the ego vehicle.

@@ -4,6 +4,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use avastra_road::Lines;
 use roxmltree::Node;
 
 use super::Refusal;
@@ -26,8 +27,7 @@ pub struct Mark {
 /// The parameters that are in force, and what was found wrong and worth a note so far.
 #[derive(Debug)]
 pub struct Source {
-    /// Where each line of the text begins.
-    lines: Vec<usize>,
+    lines: Lines,
     /// The minor version of the file; 2 of 1.2.
     pub minor: i32,
     parameters: BTreeMap<String, String>,
@@ -43,9 +43,8 @@ pub struct Source {
 
 impl Source {
     pub fn new(text: &str, asked: &BTreeMap<String, String>) -> Source {
-        let after_breaks = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(at, _)| at + 1);
         Source {
-            lines: core::iter::once(0).chain(after_breaks).collect(),
+            lines: Lines::new(text),
             minor: 0,
             parameters: BTreeMap::new(),
             torn: BTreeSet::new(),
@@ -58,9 +57,7 @@ impl Source {
 
     /// Where an element stands.
     pub fn mark(&self, node: Node) -> Mark {
-        let line = self.lines.partition_point(|begin| *begin <= node.range().start);
-        let line = u32::try_from(line).unwrap_or(u32::MAX);
-        Mark { line, element: node.tag_name().name().to_owned() }
+        Mark { line: self.lines.of(node.range().start), element: node.tag_name().name().to_owned() }
     }
 
     /// Whether anything was refused.
@@ -139,15 +136,10 @@ impl Source {
                     }
                     None => self.text(declared, "value"),
                 };
-                let Some(value) = value else {
-                    self.torn.insert(format!("${name}"));
-                    continue;
-                };
-                if parameter::check(self, declared, &value).is_none() {
-                    self.torn.insert(format!("${name}"));
-                    continue;
+                match value.filter(|value| parameter::check(self, declared, value).is_some()) {
+                    Some(value) => drop(self.parameters.insert(name.to_owned(), value)),
+                    None => self.tear(&format!("${name}")),
                 }
-                self.parameters.insert(name.to_owned(), value);
             }
         }
     }

@@ -169,16 +169,22 @@ impl Cast {
         self.others.iter_mut().find(|entity| entity.name == name)
     }
 
+    /// Whether an entity has a name that an element asks for; refuses a name that none has.
+    fn knows(&mut self, source: &mut Source, node: Node, name: &str) -> bool {
+        let is_known = self.is_ego(name) || self.other(name).is_some();
+        if !is_known && !source.is_torn(name) {
+            source.refuse::<()>(node, format!("no entity is called `{name}`"));
+        }
+        is_known
+    }
+
     /// Actions of an entity at the beginning.
     fn start(&mut self, source: &mut Source, private: Node) {
         let Some(name) = source.text(private, "entityRef") else { return };
-        let is_ego = self.is_ego(&name);
-        if !is_ego && self.other(&name).is_none() {
-            if !source.is_torn(&name) {
-                source.refuse::<()>(private, format!("no entity is called `{name}`"));
-            }
+        if !self.knows(source, private, &name) {
             return;
         }
+        let is_ego = self.is_ego(&name);
         for action in elements(private, "PrivateAction").flat_map(children) {
             let distance = action.descendants().find(|node| node.has_tag_name("LongitudinalDistanceAction"));
             if let Some(distance) = distance.filter(|_| !is_ego)
@@ -213,14 +219,11 @@ impl Cast {
             let (mut names, mut is_read) = (Vec::new(), true);
             for actor in elements(actors, "EntityRef") {
                 let Some(name) = source.text(actor, "entityRef") else { continue };
-                if !self.is_ego(&name) && self.other(&name).is_none() {
-                    if !source.is_torn(&name) {
-                        source.refuse::<()>(actor, format!("no entity is called `{name}`"));
-                    }
+                if self.knows(source, actor, &name) {
+                    names.push(name);
+                } else {
                     is_read = false;
-                    continue;
                 }
-                names.push(name);
             }
             if names.is_empty() {
                 if is_read {

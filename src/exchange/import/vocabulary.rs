@@ -4,6 +4,8 @@
 //! Only elements that are read have a row. Nothing within others is looked at: they are refused as a whole where they matter
 //! (an action that is not read), or say nothing of what is taken over (`Performance`, `License`).
 
+use std::collections::BTreeMap;
+
 use roxmltree::Node;
 
 use super::source::children;
@@ -13,164 +15,134 @@ const ONE: &str = "?";
 /// Children of any name, for the same reason.
 const ANY: &str = "*";
 
-/// An element, its attributes and its children.
-const ELEMENTS: &[(&str, &str, &str)] = &[
-    (
-        "OpenSCENARIO",
-        "",
-        "FileHeader ParameterDeclarations VariableDeclarations MonitorDeclarations CatalogLocations RoadNetwork Entities Storyboard",
-    ),
-    ("FileHeader", "author date description revMajor revMinor", "License Properties"),
-    ("ParameterDeclarations", "", "ParameterDeclaration"),
-    ("ParameterDeclaration", "name parameterType value", "ConstraintGroup"),
-    ("ConstraintGroup", "", "ValueConstraint"),
-    ("ValueConstraint", "rule value", ""),
-    (
-        "CatalogLocations",
-        "",
-        "ControllerCatalog EnvironmentCatalog ManeuverCatalog MiscObjectCatalog PedestrianCatalog RouteCatalog TrajectoryCatalog VehicleCatalog",
-    ),
-    ("VehicleCatalog", "", "Directory"),
-    ("PedestrianCatalog", "", "Directory"),
-    ("Directory", "path", ""),
-    ("RoadNetwork", "", "LogicFile SceneGraphFile TrafficSignals UsedArea"),
-    ("LogicFile", "filepath", ""),
-    ("Entities", "", ANY),
-    (
-        "ScenarioObject",
-        "name",
-        "CatalogReference Vehicle Pedestrian MiscObject ExternalObjectReference ObjectController",
-    ),
-    ("CatalogReference", "catalogName entryName", "ParameterAssignments"),
-    ("ParameterAssignments", "", "ParameterAssignment"),
-    ("ParameterAssignment", "parameterRef value", ""),
-    (
-        "Vehicle",
-        "name vehicleCategory mass model3d role",
-        "ParameterDeclarations BoundingBox Performance Axles Properties Trailer TrailerCoupler TrailerHitch",
-    ),
-    (
-        "Pedestrian",
-        "name pedestrianCategory mass model model3d role",
-        "ParameterDeclarations BoundingBox Properties",
-    ),
-    ("BoundingBox", "", "Center Dimensions"),
-    ("Center", "x y z", ""),
-    ("Dimensions", "height length width", ""),
-    ("Storyboard", "", "Init Story StopTrigger"),
-    ("Init", "", "Actions"),
-    ("Actions", "", ANY),
-    ("Private", "entityRef", "PrivateAction"),
-    ("PrivateAction", "", ONE),
-    ("TeleportAction", "", "Position"),
-    ("Position", "", ONE),
-    ("LanePosition", "roadId laneId s offset", "Orientation"),
-    ("RelativeLanePosition", "entityRef dLane ds dsLane offset", "Orientation"),
-    ("WorldPosition", "x y z h p r", ""),
-    ("Orientation", "h p r type", ""),
-    ("LongitudinalAction", "", ONE),
-    ("SpeedAction", "", "SpeedActionDynamics SpeedActionTarget"),
-    ("SpeedActionDynamics", "dynamicsShape dynamicsDimension value followingMode", ""),
-    ("SpeedActionTarget", "", "AbsoluteTargetSpeed RelativeTargetSpeed"),
-    ("AbsoluteTargetSpeed", "value", ""),
-    ("RelativeTargetSpeed", "entityRef value speedTargetValueType continuous", ""),
-    (
-        "LongitudinalDistanceAction",
-        "entityRef distance timeGap freespace continuous displacement coordinateSystem",
-        "DynamicConstraints",
-    ),
-    ("LateralAction", "", ONE),
-    ("LaneChangeAction", "targetLaneOffset", "LaneChangeActionDynamics LaneChangeTarget"),
-    ("LaneChangeActionDynamics", "dynamicsShape dynamicsDimension value followingMode", ""),
-    ("LaneChangeTarget", "", "AbsoluteTargetLane RelativeTargetLane"),
-    ("AbsoluteTargetLane", "value", ""),
-    ("RelativeTargetLane", "entityRef value", ""),
-    ("RoutingAction", "", ONE),
-    (
-        "FollowTrajectoryAction",
-        "initialDistanceOffset",
-        "Trajectory TrajectoryRef CatalogReference TimeReference TrajectoryFollowingMode",
-    ),
-    ("TrajectoryRef", "", "Trajectory CatalogReference"),
-    ("Trajectory", "name closed", "ParameterDeclarations Shape"),
-    ("Shape", "", ONE),
-    ("Polyline", "", "Vertex"),
-    ("Vertex", "time", "Position"),
-    ("TimeReference", "", "None Timing"),
-    ("Timing", "domainAbsoluteRelative offset scale", ""),
-    ("TrajectoryFollowingMode", "followingMode", ""),
-    ("AssignRouteAction", "", "Route CatalogReference"),
-    ("Route", "name closed", "ParameterDeclarations Waypoint"),
-    ("Waypoint", "routeStrategy", "Position"),
-    ("AcquirePositionAction", "", "Position"),
-    ("VisibilityAction", "graphics sensors traffic", "SensorReferenceSet"),
-    ("ControllerAction", "", "ActivateControllerAction AssignControllerAction OverrideControllerValueAction"),
-    (
-        "ActivateControllerAction",
-        "controllerRef objectControllerRef longitudinal lateral animation lighting",
-        "",
-    ),
-    ("GlobalAction", "", ONE),
-    ("EnvironmentAction", "", "Environment CatalogReference"),
-    ("Environment", "name", "ParameterDeclarations TimeOfDay Weather RoadCondition"),
-    ("TimeOfDay", "animation dateTime", ""),
-    (
-        "Weather",
-        "atmosphericPressure cloudState fractionalCloudCover temperature",
-        "Sun Fog Precipitation Wind DomeImage",
-    ),
-    ("Precipitation", "intensity precipitationIntensity precipitationType", ""),
-    ("Fog", "visualRange", "BoundingBox"),
-    ("RoadCondition", "frictionScaleFactor wetness", "Properties"),
-    ("Story", "name", "ParameterDeclarations Act"),
-    ("Act", "name", "ManeuverGroup StartTrigger StopTrigger"),
-    ("ManeuverGroup", "name maximumExecutionCount", "Actors CatalogReference Maneuver"),
-    ("Actors", "selectTriggeringEntities", "EntityRef"),
-    ("EntityRef", "entityRef", ""),
-    ("Maneuver", "name", "ParameterDeclarations Event"),
-    ("Event", "name priority maximumExecutionCount", "Action StartTrigger"),
-    ("Action", "name", ONE),
-    ("StartTrigger", "", "ConditionGroup"),
-    ("StopTrigger", "", "ConditionGroup"),
-    ("ConditionGroup", "", "Condition"),
-    ("Condition", "name delay conditionEdge", "ByEntityCondition ByValueCondition"),
-    ("ByValueCondition", "", ONE),
-    ("SimulationTimeCondition", "value rule", ""),
-    ("StoryboardElementStateCondition", "storyboardElementType storyboardElementRef state", ""),
-    ("ByEntityCondition", "", "TriggeringEntities EntityCondition"),
-    ("TriggeringEntities", "triggeringEntitiesRule", "EntityRef"),
-    ("EntityCondition", "", ONE),
-    (
-        "TimeHeadwayCondition",
-        "entityRef value freespace rule alongRoute coordinateSystem relativeDistanceType routingAlgorithm",
-        "",
-    ),
-    (
-        "RelativeDistanceCondition",
-        "entityRef value freespace rule relativeDistanceType coordinateSystem routingAlgorithm",
-        "",
-    ),
-    (
-        "TimeToCollisionCondition",
-        "value freespace rule alongRoute coordinateSystem relativeDistanceType routingAlgorithm",
-        "TimeToCollisionConditionTarget",
-    ),
-    ("TimeToCollisionConditionTarget", "", "EntityRef Position"),
-    ("ReachPositionCondition", "tolerance", "Position"),
-];
+/// Each element with its attributes in brackets, and its children.
+const ELEMENTS: &str = "
+    OpenSCENARIO [] FileHeader ParameterDeclarations VariableDeclarations MonitorDeclarations CatalogLocations
+        RoadNetwork Entities Storyboard;
+    FileHeader [author date description revMajor revMinor] License Properties;
+    ParameterDeclarations [] ParameterDeclaration;
+    ParameterDeclaration [name parameterType value] ConstraintGroup;
+    ConstraintGroup [] ValueConstraint;
+    ValueConstraint [rule value];
+    CatalogLocations [] ControllerCatalog EnvironmentCatalog ManeuverCatalog MiscObjectCatalog
+        PedestrianCatalog RouteCatalog TrajectoryCatalog VehicleCatalog;
+    VehicleCatalog [] Directory;
+    PedestrianCatalog [] Directory;
+    Directory [path];
+    RoadNetwork [] LogicFile SceneGraphFile TrafficSignals UsedArea;
+    LogicFile [filepath];
+    Entities [] *;
+    ScenarioObject [name] CatalogReference Vehicle Pedestrian MiscObject ExternalObjectReference
+        ObjectController;
+    CatalogReference [catalogName entryName] ParameterAssignments;
+    ParameterAssignments [] ParameterAssignment;
+    ParameterAssignment [parameterRef value];
+    Vehicle [name vehicleCategory mass model3d role] ParameterDeclarations BoundingBox Performance Axles
+        Properties Trailer TrailerCoupler TrailerHitch;
+    Pedestrian [name pedestrianCategory mass model model3d role] ParameterDeclarations BoundingBox Properties;
+    BoundingBox [] Center Dimensions;
+    Center [x y z];
+    Dimensions [height length width];
+    Storyboard [] Init Story StopTrigger;
+    Init [] Actions;
+    Actions [] *;
+    Private [entityRef] PrivateAction;
+    PrivateAction [] ?;
+    TeleportAction [] Position;
+    Position [] ?;
+    LanePosition [roadId laneId s offset] Orientation;
+    RelativeLanePosition [entityRef dLane ds dsLane offset] Orientation;
+    WorldPosition [x y z h p r];
+    Orientation [h p r type];
+    LongitudinalAction [] ?;
+    SpeedAction [] SpeedActionDynamics SpeedActionTarget;
+    SpeedActionDynamics [dynamicsShape dynamicsDimension value followingMode];
+    SpeedActionTarget [] AbsoluteTargetSpeed RelativeTargetSpeed;
+    AbsoluteTargetSpeed [value];
+    RelativeTargetSpeed [entityRef value speedTargetValueType continuous];
+    LongitudinalDistanceAction [entityRef distance timeGap freespace continuous displacement coordinateSystem]
+        DynamicConstraints;
+    LateralAction [] ?;
+    LaneChangeAction [targetLaneOffset] LaneChangeActionDynamics LaneChangeTarget;
+    LaneChangeActionDynamics [dynamicsShape dynamicsDimension value followingMode];
+    LaneChangeTarget [] AbsoluteTargetLane RelativeTargetLane;
+    AbsoluteTargetLane [value];
+    RelativeTargetLane [entityRef value];
+    RoutingAction [] ?;
+    FollowTrajectoryAction [initialDistanceOffset] Trajectory TrajectoryRef CatalogReference TimeReference
+        TrajectoryFollowingMode;
+    TrajectoryRef [] Trajectory CatalogReference;
+    Trajectory [name closed] ParameterDeclarations Shape;
+    Shape [] ?;
+    Polyline [] Vertex;
+    Vertex [time] Position;
+    TimeReference [] None Timing;
+    Timing [domainAbsoluteRelative offset scale];
+    TrajectoryFollowingMode [followingMode];
+    AssignRouteAction [] Route CatalogReference;
+    Route [name closed] ParameterDeclarations Waypoint;
+    Waypoint [routeStrategy] Position;
+    AcquirePositionAction [] Position;
+    VisibilityAction [graphics sensors traffic] SensorReferenceSet;
+    ControllerAction [] ActivateControllerAction AssignControllerAction OverrideControllerValueAction;
+    ActivateControllerAction [controllerRef objectControllerRef longitudinal lateral animation lighting];
+    GlobalAction [] ?;
+    EnvironmentAction [] Environment CatalogReference;
+    Environment [name] ParameterDeclarations TimeOfDay Weather RoadCondition;
+    TimeOfDay [animation dateTime];
+    Weather [atmosphericPressure cloudState fractionalCloudCover temperature] Sun Fog Precipitation Wind
+        DomeImage;
+    Precipitation [intensity precipitationIntensity precipitationType];
+    Fog [visualRange] BoundingBox;
+    RoadCondition [frictionScaleFactor wetness] Properties;
+    Story [name] ParameterDeclarations Act;
+    Act [name] ManeuverGroup StartTrigger StopTrigger;
+    ManeuverGroup [name maximumExecutionCount] Actors CatalogReference Maneuver;
+    Actors [selectTriggeringEntities] EntityRef;
+    EntityRef [entityRef];
+    Maneuver [name] ParameterDeclarations Event;
+    Event [name priority maximumExecutionCount] Action StartTrigger;
+    Action [name] ?;
+    StartTrigger [] ConditionGroup;
+    StopTrigger [] ConditionGroup;
+    ConditionGroup [] Condition;
+    Condition [name delay conditionEdge] ByEntityCondition ByValueCondition;
+    ByValueCondition [] ?;
+    SimulationTimeCondition [value rule];
+    StoryboardElementStateCondition [storyboardElementType storyboardElementRef state];
+    ByEntityCondition [] TriggeringEntities EntityCondition;
+    TriggeringEntities [triggeringEntitiesRule] EntityRef;
+    EntityCondition [] ?;
+    TimeHeadwayCondition [entityRef value freespace rule alongRoute coordinateSystem relativeDistanceType
+        routingAlgorithm];
+    RelativeDistanceCondition [entityRef value freespace rule relativeDistanceType coordinateSystem
+        routingAlgorithm];
+    TimeToCollisionCondition [value freespace rule alongRoute coordinateSystem relativeDistanceType
+        routingAlgorithm] TimeToCollisionConditionTarget;
+    TimeToCollisionConditionTarget [] EntityRef Position;
+    ReachPositionCondition [tolerance] Position;
+";
+
+/// The attributes and the children of each element.
+fn rows() -> BTreeMap<&'static str, (&'static str, &'static str)> {
+    let row = |row: &'static str| {
+        let (name, rest) = row.split_once('[')?;
+        let (attributes, children) = rest.split_once(']')?;
+        Some((name.trim(), (attributes, children.trim())))
+    };
+    ELEMENTS.split(';').filter_map(row).collect()
+}
 
 /// Every element and attribute within one that no version has where it stands, with what is wrong.
 pub fn unknown<'a, 'input>(root: Node<'a, 'input>) -> Vec<(Node<'a, 'input>, String)> {
-    let mut unknown = Vec::new();
+    let (rows, mut unknown) = (rows(), Vec::new());
     let mut waiting = vec![root];
     while let Some(node) = waiting.pop() {
         let name = node.tag_name().name();
-        let Some((_, attributes, known)) = ELEMENTS.iter().find(|(element, ..)| *element == name) else {
-            continue;
-        };
+        let Some((attributes, known)) = rows.get(name) else { continue };
         // Attributes of a namespace belong to the schema (`xsi:noNamespaceSchemaLocation`).
         for attribute in node.attributes().filter(|attribute| attribute.namespace().is_none()) {
-            if !attributes.split(' ').any(|known| known == attribute.name()) {
+            if !attributes.split_whitespace().any(|known| known == attribute.name()) {
                 unknown.push((node, format!("it has no attribute `{}`", attribute.name())));
             }
         }
@@ -183,7 +155,7 @@ pub fn unknown<'a, 'input>(root: Node<'a, 'input>) -> Vec<(Node<'a, 'input>, Str
         }
         for child in children(node) {
             let child_name = child.tag_name().name();
-            if [ONE, ANY].contains(known) || known.split(' ').any(|known| known == child_name) {
+            if [ONE, ANY].contains(known) || known.split_whitespace().any(|known| known == child_name) {
                 waiting.push(child);
             } else {
                 unknown.push((child, format!("`{name}` has no such element")));
@@ -210,21 +182,19 @@ mod tests {
     #[test]
     fn every_row_is_reached_from_the_root() {
         let chosen: BTreeSet<&str> = CHOSEN.split_whitespace().collect();
+        let rows = rows();
         let mut waiting = vec!["OpenSCENARIO"];
         let mut reached = BTreeSet::new();
         while let Some(name) = waiting.pop() {
-            let Some((_, _, known)) = ELEMENTS.iter().find(|(element, ..)| *element == name) else {
-                continue;
-            };
+            let Some((_, known)) = rows.get(name) else { continue };
             if reached.insert(name) {
                 match [ONE, ANY].contains(known) {
                     true => waiting.extend(&chosen),
-                    false => waiting.extend(known.split(' ')),
+                    false => waiting.extend(known.split_whitespace()),
                 }
             }
         }
-        let missed: Vec<&str> =
-            ELEMENTS.iter().map(|(name, ..)| *name).filter(|name| !reached.contains(name)).collect();
+        let missed: Vec<&str> = rows.keys().copied().filter(|name| !reached.contains(name)).collect();
         assert_eq!(missed, [""; 0]);
         assert!(chosen.iter().all(|name| reached.contains(name)), "each that is chosen has a row");
     }

@@ -8,47 +8,36 @@ use avastra_lang::syntax::ast::FileId;
 use avastra_lang::syntax::format;
 
 use super::Imported;
+use super::body::Shape;
 use super::own::Own;
 use super::scene::{Other, Scene};
+use super::story::Story;
 
 /// The file: its space, with a body for each road user and one action that lets all of them appear, and the scenario.
-pub fn scenario(scene: &Scene, name: &str, notes: BTreeSet<String>) -> Imported {
-    let mut text = head(&scene.description, name, &notes);
+pub fn scenario(scene: &Scene, story: &Story, name: &str, notes: BTreeSet<String>) -> Imported {
+    let mut text = head(&story.description, name, &notes);
     let own = identifier(name);
-    let map = scene.map.rsplit(['/', '\\']).next().unwrap_or_default();
-    let _ = writeln!(
-        text,
-        "road {own}_road {{\n  map: {}\n  start: {}\n  goal: {}",
-        quoted(map),
-        scene.start,
-        scene.goal
-    );
+    let Scene { start, goal, .. } = scene;
+    let map = quoted(story.map.1.rsplit(['/', '\\']).next().unwrap_or_default());
+    let ego_mps = number(scene.ego_mps);
+    let _ = writeln!(text, "road {own}_road {{\n  map: {map}\n  start: {start}\n  goal: {goal}");
     if scene.ego_mps > 0.0 {
-        let _ = writeln!(
-            text,
-            "  // the ego vehicle's speed in the file\n  limit: {} m/s",
-            number(scene.ego_mps)
-        );
+        let _ = writeln!(text, "  // the ego vehicle's speed in the file\n  limit: {ego_mps} m/s");
     }
     text += "}\n\n";
-    if scene.weather.time.is_some() {
+    if story.weather.time.is_some() {
         text += "enum Time = Morning | Noon | Night\nstate time: Time = any\n\n";
     }
-    if scene.weather.is_rough() {
+    if story.weather.is_rough() {
         text += "enum Sky = Rain | Fog | Wetness\nenum Level = None < Light < Moderate < High\n";
         text += "state sky: Sky -> Level = None\n\n";
     }
     for (index, other) in scene.others.iter().enumerate() {
-        let shape = &other.shape;
-        let _ = writeln!(
-            text,
-            "body {} {{ like: {}, length: {} m, width: {} m, height: {} m }}",
-            body(index, other),
-            shape.like,
-            number(shape.length_m),
-            number(shape.width_m),
-            number(shape.height_m)
-        );
+        let Shape { like, length_m, width_m, height_m, .. } = &other.shape;
+        let [length, width, height] = [length_m, width_m, height_m].map(|metres| number(*metres));
+        let body = body(index, other);
+        let size = format!("length: {length} m, width: {width} m, height: {height} m");
+        let _ = writeln!(text, "body {body} {{ like: {like}, {size} }}");
     }
     if scene.others.is_empty() {
         text += "state begun: Bool = false\naction begin() { set begun = true }\n";
@@ -63,26 +52,25 @@ pub fn scenario(scene: &Scene, name: &str, notes: BTreeSet<String>) -> Imported 
         let _ = writeln!(text, "rule change_begins on begin during change: {change}");
     }
     // One step: its action happens at the beginning, or at the moment that it waits for.
-    let step_ms = (scene.duration_s * 50.0).ceil().max(1.0) * 20.0;
+    let step_ms = (story.duration_s * 50.0).ceil().max(1.0) * 20.0;
+    let step = number(step_ms / 1000.0);
     let _ = writeln!(
         text,
-        "\nepisode {{\n  roads: [{own}_road]\n  step: {} s\n  stop: arrived\n  limit: 1 steps\n}}",
-        number(step_ms / 1000.0)
+        "\nepisode {{\n  roads: [{own}_road]\n  step: {step} s\n  stop: arrived\n  limit: 1 steps\n}}"
     );
-    let mut start = scene.weather.time.map_or_else(String::new, |time| format!("time: {time}, "));
-    if scene.weather.is_rough() {
-        let [rain, fog, wetness] = scene.weather.sky.map(|level| level.unwrap_or("None"));
+    let mut start = story.weather.time.map_or_else(String::new, |time| format!("time: {time}, "));
+    if story.weather.is_rough() {
+        let [rain, fog, wetness] = story.weather.sky.map(|level| level.unwrap_or("None"));
         let _ = write!(start, "sky: {{ Rain: {rain}, Fog: {fog}, Wetness: {wetness} }}, ");
     }
     let once = scene.once.as_ref().map_or_else(String::new, |once| format!(" once {once}"));
     let _ = writeln!(
         text,
-        "\nscenario {own} {{\n  road: {own}_road\n  start {{ {start}ego_speed: {} m/s }}\n  steps {{ 0: begin(){once} }}\n}}",
-        number(scene.ego_mps)
+        "\nscenario {own} {{\n  road: {own}_road\n  start {{ {start}ego_speed: {ego_mps} m/s }}\n  steps {{ 0: begin(){once} }}\n}}"
     );
     // A text that does not parse is refused when it is checked.
     let text = format(FileId(0), &text).unwrap_or(text);
-    Imported { text, map: scene.map.clone(), notes }
+    Imported { text, map: story.map.1.clone(), notes }
 }
 
 /// The file of a scenario that the other file carries.

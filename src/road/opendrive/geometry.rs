@@ -160,13 +160,11 @@ impl ReferenceLine {
             let half_m = room_m
                 .min(ROUNDING_RADIUS_M * libm::tan(turn_rad.abs() / 2.0))
                 .min(ROUNDED_M_MAX / libm::tan(turn_rad.abs() / 4.0));
-            let rounding = (turn_rad.abs() < CORNER_RAD_MAX)
-                .then(|| rounding(before.at(at_m - half_m - before.begin_m), after.at(half_m)))
-                .flatten()
-                .map(|shape| {
-                    let from = before.at(at_m - half_m - before.begin_m);
-                    Piece::new(at_m - half_m, 2.0 * half_m, (from.position, from.heading_rad), shape)
-                });
+            let from = before.at(at_m - half_m - before.begin_m);
+            let can_be_rounded = turn_rad.abs() < CORNER_RAD_MAX;
+            let shape = can_be_rounded.then(|| rounding(from, after.at(half_m))).flatten();
+            let origin = (from.position, from.heading_rad);
+            let rounding = shape.map(|shape| Piece::new(at_m - half_m, 2.0 * half_m, origin, shape));
             let position = begin.position;
             let off_m = rounding.as_ref().map(|curve| (curve.at(half_m).position - position).norm());
             corners.push(Corner { at_m, position, turn_rad, off_m });

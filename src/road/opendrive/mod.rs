@@ -14,4 +14,4 @@ pub use elements::{
     ObjectKind, Orientation, Outline, RoadElement, RoadLink, SectionElement, SignalElement,
 };
 pub use read::{read, well_formed};
-pub use xml::wrong;
+pub use xml::{Lines, wrong};

@@ -10,6 +10,7 @@ pub fn wrong(line: u32, message: impl Into<String>) -> RoadError {
 }
 
 /// Where each line of a text begins, so that a line number needs no new count.
+#[derive(Debug)]
 pub struct Lines(Vec<usize>);
 
 impl Lines {
@@ -18,8 +19,8 @@ impl Lines {
         Lines(core::iter::once(0).chain(after_breaks).collect())
     }
 
-    /// Counted from 1.
-    fn of(&self, at: usize) -> u32 {
+    /// The line of a byte, counted from 1.
+    pub fn of(&self, at: usize) -> u32 {
         u32::try_from(self.0.partition_point(|begin| *begin <= at)).unwrap_or(u32::MAX)
     }
 }
@@ -86,22 +87,20 @@ impl<'a, 'input> Element<'a, 'input> {
 
     pub fn integer(&self, name: &str) -> Result<i32, RoadError> {
         let value = self.text(name)?;
-        value.parse().map_err(|_| {
-            self.wrong(format!("`{name}` of `{}` is `{value}`, which is no whole number", self.name()))
-        })
+        value.parse().map_err(|_| self.odd(name, value, "no whole number"))
     }
 
     fn parse_number(&self, name: &str, value: &str) -> Result<f64, RoadError> {
         match value.parse::<f64>() {
             Ok(number) if number.abs() <= NUMBER_MAX => Ok(number),
-            Ok(_) => Err(self.wrong(format!(
-                "`{name}` of `{}` is `{value}`, which is no number a road can have",
-                self.name()
-            ))),
-            Err(_) => {
-                Err(self.wrong(format!("`{name}` of `{}` is `{value}`, which is no number", self.name())))
-            }
+            Ok(_) => Err(self.odd(name, value, "no number a road can have")),
+            Err(_) => Err(self.odd(name, value, "no number")),
         }
+    }
+
+    /// An error at an attribute whose value is not what it must be.
+    fn odd(&self, name: &str, value: &str, what: &str) -> RoadError {
+        self.wrong(format!("`{name}` of `{}` is `{value}`, which is {what}", self.name()))
     }
 }
 

@@ -142,17 +142,3 @@ fn the_opposing_lane_is_that_of_a_search_of_all_lanes() {
     }
     assert!(found > 500 && missing > 100, "{found} {missing}");
 }
-
-#[test]
-fn the_ways_through_a_junction_are_its_connections() {
-    let map = corner();
-    for (index, junction) in map.junctions.iter().enumerate() {
-        let ways = map.connections(index);
-        assert_eq!(ways.len(), junction.lanes.len(), "each lane of this map connects one pair");
-        for way in &ways {
-            assert!(map.lane(way.from).successors.contains(&way.lanes[0]));
-            assert!(map.lane(way.lanes[0]).successors.contains(&way.to));
-            assert_eq!((map.lane(way.from).junction, map.lane(way.to).junction), (None, None));
-        }
-    }
-}

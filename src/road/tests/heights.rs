@@ -101,23 +101,3 @@ fn lanes_of_a_junction_that_pass_over_each_other_are_no_conflict() {
     assert_eq!(conflicts(0.0), ([1, 1], 1, 1));
     assert_eq!(conflicts(5.0), ([0, 0], 1, 0));
 }
-
-#[test]
-fn streets_that_cross_on_one_level_are_told_of() {
-    let told = |height_m: f64| {
-        let one = lanes(&[(-1, "driving", 3.5, "")]);
-        let across = [100.0, -50.0, core::f64::consts::FRAC_PI_2, 100.0];
-        let map = read(
-            &[
-                street("1", [0.0, 0.0, 0.0, 200.0], "-1", "", &one, ""),
-                street("2", across, "-1", "", &one, &height(height_m)),
-            ]
-            .concat(),
-        );
-        map.crossings_without_junction()
-    };
-    let warnings = told(0.0);
-    assert_eq!(warnings.len(), 1, "{warnings:?}");
-    assert!(warnings[0].starts_with("roads `1` and `2` cross at 101.8, -1.8"), "{warnings:?}");
-    assert!(told(6.0).is_empty());
-}

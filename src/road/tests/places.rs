@@ -75,23 +75,3 @@ fn a_route_may_begin_where_a_lane_ends() {
             < 1e-3
     );
 }
-
-#[test]
-fn a_way_may_need_a_lane_change_and_room_for_it() {
-    let map = corner();
-    let start = map.place("1", -2, 100.0).unwrap();
-    let goal = map.place("5", -3, 50.0).unwrap();
-    let route = Route::find(&map, start, goal).unwrap();
-    assert_eq!(route.changes.len(), 1, "{:?}", route.changes);
-    let change = &route.changes[0];
-    assert!(change.lateral_m > 3.0 && change.latest_m < change.begin_m + 100.0, "{change:?}");
-    for station_m in [change.begin_m, change.latest_m - 0.5] {
-        assert_eq!(map.lane(route.lane_at(station_m).lane).junction, None);
-    }
-    // 16 m before the goal there is no more room.
-    let late = map.place("5", -2, 34.0).unwrap();
-    let Err(RoadError::Route { message }) = Route::find(&map, late, goal) else { panic!() };
-    assert!(message.contains("there is no room"), "{message}");
-    let Err(RoadError::Route { message }) = Route::find(&map, goal, start) else { panic!() };
-    assert!(message.contains("no way"), "{message}");
-}

@@ -38,7 +38,7 @@
 use avastra_base::geometry::{OrientedBox, Vec2};
 use avastra_base::kinematics::{CAREFUL_BRAKING_MPS2, STANDING_MPS, WALKING_MPS, stopping_m};
 use avastra_lang::model::vocabulary::Priority;
-use avastra_road::{LaneIndex, RoadMap, Route, RouteLane, RouteStopLine};
+use avastra_road::{LaneIndex, RoadMap, Route, RouteLane, StopLine};
 
 use super::around::Around;
 use super::ego::VehicleParameters;
@@ -150,7 +150,7 @@ pub(super) struct PassedLight {
 impl PassedLight {
     /// The last of some stop lines that lies between two stations of a front, with its light at that moment.
     pub fn between(
-        lines: &[RouteStopLine],
+        lines: &[StopLine],
         from_m: f64,
         to_m: f64,
         colour: impl Fn(usize) -> SignalColour,

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use avastra_base::geometry::{Bounds, Path, Pose, Vec2};
 use avastra_base::rng;
 use avastra_base::rng::Rng;
-use avastra_road::{Heights, Lane, LaneIndex, RoadMap, RouteStopLine, SignKind};
+use avastra_road::{Heights, Lane, LaneIndex, RoadMap, SignKind, StopLine};
 
 use super::body::BodyParameters;
 use super::junction::Area;
@@ -44,7 +44,7 @@ pub(super) struct Way {
     /// One bit for each lane of the way, its index modulo 64: tells quickly of most lanes that they are not on the way.
     lane_bits: u64,
     /// By rising station.
-    pub stop_lines: Vec<RouteStopLine>,
+    pub stop_lines: Vec<StopLine>,
     /// Lines of stop signs, by rising station, m.
     pub stop_signs_m: Vec<f64>,
     /// Where others may cross or join, by rising station on the way.
@@ -101,11 +101,8 @@ impl Way {
             // Where lanes do not quite meet, the path bridges them.
             let from_m = end.map_or(0.0, |(to_m, tip)| to_m + (centre.points()[0].position - tip).norm());
             lanes.push(WayLane { lane: *index, from_m });
-            stop_lines.extend(
-                lane.stop_lines
-                    .iter()
-                    .map(|line| RouteStopLine { station_m: from_m + line.station_m, signal: line.signal }),
-            );
+            let lines = lane.stop_lines.iter();
+            stop_lines.extend(lines.map(|line| StopLine { station_m: from_m + line.station_m, ..*line }));
             let stops = lane.sign_lines.iter().filter(|line| line.kind == SignKind::Stop);
             stop_signs_m.extend(stops.map(|line| from_m + line.station_m));
             let on_lane = scene.areas.of(*index).iter();

@@ -157,8 +157,7 @@ fn world_position(pose: &Pose) -> Element {
 pub fn lane_position(map: &RoadMap, place: LanePlace) -> Element {
     let lane = map.lane(place.lane);
     // The standard's offset is to the left of the road's reference line, ours to that of traffic.
-    let along = lane.road_station_m(0.0) < lane.road_station_m(lane.centre.length_m());
-    let offset_m = if along { place.offset_m } else { -place.offset_m };
+    let offset_m = if lane.is_along() { place.offset_m } else { -place.offset_m };
     let position = Element::new("LanePosition")
         .with("roadId", &lane.key.road)
         .with("laneId", lane.key.lane)

@@ -11,9 +11,8 @@ use avastra_lang::model::vocabulary::{Body, Level};
 
 use super::super::recording::Recording;
 use super::super::xml::Element;
-use super::Ego;
-use super::actions::{position, private, speed, teleport};
-use super::entity::{ahead_of_centre_m, bounding_box, build, vehicle_category};
+use super::actions::private;
+use super::entity::{bounding_box, build, vehicle_category};
 use super::environment::{sun, time};
 use super::{BENEATH_M, natural, property};
 
@@ -50,7 +49,7 @@ pub fn entity(recording: &Recording, actor: &Actor) -> Element {
     let object = Element::new("ScenarioObject").with("name", actor.name());
     let (model, _) = model(actor);
     let kind = if actor.id == 0 { "ego_vehicle" } else { "simulation" };
-    let properties = Element::new("Properties").holding(property(&("type".to_owned(), kind.to_owned())));
+    let properties = Element::new("Properties").holding(property("type", kind));
     let Some(category) = vehicle_category(actor.body) else {
         let pedestrian = Element::new("Pedestrian")
             .with("name", actor.name())
@@ -60,26 +59,14 @@ pub fn entity(recording: &Recording, actor: &Actor) -> Element {
         return object.holding(pedestrian.holding(bounding_box(actor)).holding(properties));
     };
     let facts = recording.facts.iter().cloned().chain([natural::caveat(&[])]);
-    let facts = facts.filter(|_| actor.id == 0).map(|fact| property(&fact));
+    let facts = facts.filter(|_| actor.id == 0).map(|(name, value)| property(&name, &value));
     let vehicle = Element::new("Vehicle").with("name", model).with("vehicleCategory", category);
     object.holding(vehicle.holding_all(build(actor)).holding(properties.holding_all(facts)))
 }
 
-/// The ego vehicle that ScenarioRunner does not drive: a program of its own does, or nothing.
-pub fn begins(recording: &Recording, ego: Ego) -> Option<Element> {
-    let actor = &recording.seen.ego;
-    let first = actor.samples[0];
-    let place = position(&first.pose.offset(ahead_of_centre_m(actor), 0.0));
-    let begins = Element::new("Private")
-        .with("entityRef", actor.name())
-        .holding(teleport(place))
-        .holding(speed(first.velocity_mps.norm()));
-    Some(if ego == Ego::Controller { begins.holding(controller()) } else { begins })
-}
-
-/// Another program drives.
-fn controller() -> Element {
-    let module = property(&("module".to_owned(), "external_control".to_owned()));
+/// A program other than ScenarioRunner drives.
+pub fn controller() -> Element {
+    let module = property("module", "external_control");
     let controller =
         Element::new("Controller").with("name", "ads").holding(Element::new("Properties").holding(module));
     let off = |name| Element::new(name).with("active", false);

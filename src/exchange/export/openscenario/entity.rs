@@ -5,7 +5,7 @@ use avastra_lang::model::vocabulary::Body;
 use avastra_world::sim::VehicleParameters;
 
 use super::super::xml::Element;
-use super::Ego;
+use super::{Ego, property};
 
 /// Diameter of a wheel, and how far the wheels of an axle are apart as a part of the width: usual values, which matter to
 /// a picture alone.
@@ -69,8 +69,7 @@ pub fn build(actor: &Actor) -> [Element; 3] {
 
 /// esmini turns a road user late along a polyline unless it is told to turn evenly between the vertices; others ignore it.
 fn properties() -> Element {
-    let evenly = Element::new("Property").with("name", "plineInterpolation").with("value", "segment");
-    Element::new("Properties").holding(evenly)
+    Element::new("Properties").holding(property("plineInterpolation", "segment"))
 }
 
 pub fn bounding_box(actor: &Actor) -> Element {

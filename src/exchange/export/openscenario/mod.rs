@@ -79,22 +79,17 @@ pub struct Written {
     pub left_out: Vec<String>,
 }
 
-/// Others that are exact in a natural version.
-fn exact(recording: &Recording, style: Style) -> Vec<&Actor> {
-    match (style.version, style.others) {
-        (Version::V1_2, Others::Natural) => natural::exact(recording),
-        // ScenarioRunner plans a route over the points of its way.
-        _ => Vec::new(),
-    }
-}
-
 /// Writes a recording. `map_file` is the path of the map from the file.
 pub fn openscenario(recording: &Recording, map_file: &str, style: Style) -> Written {
     let signals = (style.version != Version::Carla).then(|| signals(recording)).flatten();
     let network = Element::new("RoadNetwork")
         .holding(Element::new("LogicFile").with("filepath", map_file))
         .holding_all(signals);
-    let exact = exact(recording, style);
+    // Others that are exact in a natural version; ScenarioRunner plans a route over the points of their ways.
+    let exact = match (style.version, style.others) {
+        (Version::V1_2, Others::Natural) => natural::exact(recording),
+        _ => Vec::new(),
+    };
     let entities = recording.actors().map(|actor| match style.version {
         Version::Carla => carla::entity(recording, actor),
         Version::V1_2 => entity(actor, style.ego),
@@ -120,14 +115,9 @@ pub fn openscenario(recording: &Recording, map_file: &str, style: Style) -> Writ
 }
 
 fn header(recording: &Recording, style: Style, exact: &[&Actor]) -> Element {
-    let minor = match style.version {
-        Version::V1_2 => 2,
-        Version::Carla => 0,
-    };
-    let description = match recording.docs.iter().find(|line| !line.starts_with("Emitted by")) {
-        Some(line) => line,
-        None => &recording.name,
-    };
+    let minor = if style.version == Version::Carla { 0 } else { 2 };
+    let told = recording.docs.iter().find(|line| !line.starts_with("Emitted by"));
+    let description = told.unwrap_or(&recording.name);
     let header = Element::new("FileHeader")
         .with("revMajor", 1)
         .with("revMinor", minor)
@@ -138,12 +128,12 @@ fn header(recording: &Recording, style: Style, exact: &[&Actor]) -> Element {
         return header;
     }
     let caveat = (style.others == Others::Natural).then(|| natural::caveat(exact));
-    header
-        .holding(Element::new("Properties").holding_all(recording.facts.iter().chain(&caveat).map(property)))
+    let facts = recording.facts.iter().chain(&caveat).map(|(name, value)| property(name, value));
+    header.holding(Element::new("Properties").holding_all(facts))
 }
 
 /// A fact about the file.
-fn property((name, value): &(String, String)) -> Element {
+fn property(name: &str, value: &str) -> Element {
     Element::new("Property").with("name", name).with("value", value)
 }
 
@@ -152,15 +142,15 @@ fn storyboard(recording: &Recording, style: Style, exact: &[&Actor]) -> Element 
     let mut init = Vec::new();
     let mut groups = Vec::new();
     for actor in recording.actors() {
-        let (begins, events) = match (version, style.others) {
-            (Version::Carla, _) if actor.id == 0 && style.ego != Ego::Trajectory => {
-                (carla::begins(recording, style.ego), Vec::new())
-            }
-            (Version::Carla, _) => natural(recording, actor, version),
-            (_, Others::Natural) if actor.id > 0 && exact.iter().all(|other| other.id != actor.id) => {
-                natural(recording, actor, version)
-            }
-            _ => (begins(recording, actor, style.ego), events(recording, actor, style)),
+        let is_exact = match version {
+            Version::Carla => actor.id == 0 && style.ego != Ego::Trajectory,
+            Version::V1_2 if style.others == Others::Exact => true,
+            Version::V1_2 => actor.id == 0 || exact.iter().any(|other| other.id == actor.id),
+        };
+        let (begins, events) = if is_exact {
+            (begins(recording, actor, style), events(recording, actor, style))
+        } else {
+            Natural::of(recording, actor, version).written(actor)
         };
         init.extend(begins);
         if !events.is_empty() {
@@ -189,14 +179,8 @@ fn storyboard(recording: &Recording, style: Style, exact: &[&Actor]) -> Element 
         .holding(Element::new("StopTrigger").holding(end))
 }
 
-/// What a road user does at the start and later, in actions.
-fn natural(recording: &Recording, actor: &Actor, version: Version) -> (Option<Element>, Vec<Element>) {
-    let natural = Natural::of(recording, actor, version);
-    (natural.init(actor), natural.events(actor))
-}
-
 /// Where a road user is at the start, if it is there.
-fn begins(recording: &Recording, actor: &Actor, ego: Ego) -> Option<Element> {
+fn begins(recording: &Recording, actor: &Actor, style: Style) -> Option<Element> {
     if actor.first_tick() > 0 {
         return None;
     }
@@ -206,8 +190,11 @@ fn begins(recording: &Recording, actor: &Actor, ego: Ego) -> Option<Element> {
         .with("entityRef", actor.name())
         .holding(teleport(position(&place)))
         .holding(speed(first.velocity_mps.norm()));
-    let is_driven = actor.id == 0 && ego == Ego::Controller;
-    Some(if is_driven { private.holding(activation()).holding(destination(recording)) } else { private })
+    Some(match style.version {
+        _ if actor.id > 0 || style.ego != Ego::Controller => private,
+        Version::Carla => private.holding(carla::controller()),
+        Version::V1_2 => private.holding(activation()).holding(destination(recording)),
+    })
 }
 
 /// What a road user does as it was recorded; nothing if the player moves it.

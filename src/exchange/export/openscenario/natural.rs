@@ -5,8 +5,6 @@
 //! recorded one: a pedestrian that set out as the ego vehicle came near does so when it comes as near, and what the ego
 //! vehicle hit stops when it is hit.
 
-use core::fmt::Write as _;
-
 use avastra_base::geometry::{Pose, Vec2};
 use avastra_campaign::episode::Actor;
 use avastra_road::{LaneIndex, LanePlace, RoadMap};
@@ -78,13 +76,11 @@ fn turns_back(map: &RoadMap, way: &Driven) -> bool {
 
 /// What the file says of itself; `exact` are those that follow their recorded ways.
 pub fn caveat(exact: &[&Actor]) -> (String, String) {
-    let mut text = String::from("an approximation that does not carry the proof of the claims: ");
-    write!(
-        text,
-        "others drive by actions, with speeds within {SPEED_MPS} m/s and ways within {WAY_M} m of the "
-    )
-    .and_then(|()| write!(text, "recording as far as their actions alone decide, contacts aside"))
-    .expect("memory takes everything");
+    let mut text = format!(
+        "an approximation that does not carry the proof of the claims: others drive by actions, with speeds \
+         within {SPEED_MPS} m/s and ways within {WAY_M} m of the recording as far as their actions alone decide, \
+         contacts aside"
+    );
     if !exact.is_empty() {
         text += &format!("; as recorded: {}", names(exact));
     }
@@ -111,35 +107,27 @@ impl Natural {
         natural
     }
 
-    /// Its entry in `Init`, if it is there from the beginning.
-    pub fn init(&self, actor: &Actor) -> Option<Element> {
-        let private = Element::new("Private").with("entityRef", actor.name());
+    /// Its entry in `Init`, if it is there from the beginning, and what it does later.
+    pub fn written(self, actor: &Actor) -> (Option<Element>, Vec<Element>) {
+        let name = actor.name();
+        let private = Element::new("Private").with("entityRef", &name);
         if actor.first_tick() == 0 {
-            let begins = private.holding(teleport(self.place.clone()));
-            return Some(begins.holding_all(self.from_the_first.iter().cloned()));
+            let begins = private.holding(teleport(self.place)).holding_all(self.from_the_first);
+            return (Some(begins), self.events);
         }
         // CARLA's ScenarioRunner makes everyone as the scenario begins.
         let waits = || private.holding(teleport(beneath(&self.pose, BENEATH_M)));
-        (self.version == Version::Carla).then(waits)
-    }
-
-    /// What it does later.
-    pub fn events(self, actor: &Actor) -> Vec<Element> {
-        let mut events = Vec::new();
-        if actor.first_tick() > 0 {
-            let name = actor.name();
-            let added = match self.version {
-                Version::Carla => teleport(self.place),
-                Version::V1_2 => of_entity(&name, Element::new("AddEntityAction").holding(self.place)),
-            };
-            let numbered = self.from_the_first.into_iter().enumerate();
-            let actions = core::iter::once(action(&format!("{name}_added"), added))
-                .chain(numbered.map(|(number, what)| action(&format!("{name}_begins_{}", number + 1), what)));
-            let event = format!("{name}_appears");
-            events.push(event_at(self.version, &event, actions.collect(), seconds(actor, 0)));
-        }
-        events.extend(self.events);
-        events
+        let waits = (self.version == Version::Carla).then(waits);
+        let added = match self.version {
+            Version::Carla => teleport(self.place),
+            Version::V1_2 => of_entity(&name, Element::new("AddEntityAction").holding(self.place)),
+        };
+        let numbered = self.from_the_first.into_iter().enumerate();
+        let actions = core::iter::once(action(&format!("{name}_added"), added))
+            .chain(numbered.map(|(number, what)| action(&format!("{name}_begins_{}", number + 1), what)));
+        let event = format!("{name}_appears");
+        let appears = event_at(self.version, &event, actions.collect(), seconds(actor, 0));
+        (waits, core::iter::once(appears).chain(self.events).collect())
     }
 
     /// A vehicle that drives in lanes.
@@ -170,6 +158,7 @@ impl Natural {
     /// A pedestrian, or what drives beside the lanes.
     fn go_along_a_line(&mut self, recording: &Recording, actor: &Actor, poses: &[Pose]) {
         let name = actor.name();
+        let is_cut = touch(recording, actor).is_some();
         let sets_out = (1..poses.len()).find(|at| !is_standing(&poses[..=*at]));
         // The last tick in which it stands.
         let begin = sets_out.map_or(0, |at| moving_before(poses, at));
@@ -186,10 +175,7 @@ impl Natural {
         let event_name = format!("{name}_sets_out");
         let actions = vec![
             action(&format!("{name}_speed_1"), speed(first_mps)),
-            action(
-                &format!("{name}_goes"),
-                walk(self.version, &name, &line(moving, is_cut(recording, actor))),
-            ),
+            action(&format!("{name}_goes"), walk(self.version, &name, &line(moving, is_cut))),
         ];
         // A single speed needs no times after the first: the way ends where it stops.
         let stop = match changes {
@@ -206,7 +192,7 @@ impl Natural {
                 ..*change
             });
             self.change_speeds(actor, first_mps, &later.collect::<Vec<_>>());
-        } else if !changes.is_empty() || is_cut(recording, actor) {
+        } else if !changes.is_empty() || is_cut {
             let stands = action(&format!("{name}_stands"), speed(0.0));
             let over = vec![after_event(&format!("{name}_is_there"), &event_name)];
             self.events.push(event(&format!("{name}_arrives"), vec![stands], over));
@@ -283,10 +269,6 @@ fn touch(recording: &Recording, actor: &Actor) -> Option<usize> {
     let mut touches = recording.seen.touches.iter().filter(|touch| touch.id == actor.id);
     let touch = touches.next()?.tick.checked_sub(actor.first_tick())?;
     usize::try_from(touch).ok().filter(|touch| *touch < actor.samples.len())
-}
-
-fn is_cut(recording: &Recording, actor: &Actor) -> bool {
-    touch(recording, actor).is_some()
 }
 
 fn places(poses: &[Pose]) -> Vec<Vec2> {

@@ -68,21 +68,21 @@ impl Reader {
         }
         speeds.sort_by(|a, b| a.0.total_cmp(&b.0));
         let kind = lane.attribute("type").unwrap_or("none");
-        let mut driving = is_driving(kind);
-        let for_vehicles = !BESIDE_THE_ROAD.contains(&kind);
-        let mut undriven = (!driving).then(|| LeftOut { what: format!("of type `{kind}`"), for_vehicles });
-        if !driving && for_vehicles {
-            self.ignore(format!("lanes of type `{kind}`"));
+        let (is_driving, for_vehicles, on_foot) = lane_type(kind);
+        let undriven = match lane.attribute("direction") {
+            _ if !is_driving => Some(format!("of type `{kind}`")),
+            Some(direction @ ("reversed" | "both")) => Some(format!("of direction `{direction}`")),
+            _ => None,
+        };
+        let undriven = undriven.map(|what| LeftOut { what, for_vehicles });
+        // What is beside the road is left out without a warning.
+        if let Some(LeftOut { what, for_vehicles: true }) = &undriven {
+            self.ignore(format!("lanes {what}"));
         }
-        if let Some(direction @ ("reversed" | "both")) = lane.attribute("direction").filter(|_| driving) {
-            self.ignore(format!("lanes of direction `{direction}`"));
-            driving = false;
-            undriven = Some(LeftOut { what: format!("of direction `{direction}`"), for_vehicles });
-        }
-        let beside = if driving { None } else { strip_kind(kind) };
+        let beside = on_foot.filter(|_| undriven.is_some());
         let widths = cubics(lane.children("width"), "sOffset")?;
         let borders = cubics(lane.children("border"), "sOffset")?;
-        if driving && widths.is_empty() && borders.is_empty() {
+        if undriven.is_none() && widths.is_empty() && borders.is_empty() {
             return Err(lane.wrong(format!("lane {id} has neither `width` nor `border`")));
         }
         let marks = lane.children("roadMark");
@@ -91,7 +91,6 @@ impl Reader {
         Ok(LaneElement {
             id,
             line: lane.line(),
-            driving,
             undriven,
             beside,
             widths,
@@ -104,52 +103,21 @@ impl Reader {
     }
 }
 
-/// What a lane that cars do not drive on is to people on foot; `None` for verges and medians, where they may
-/// stand but do not walk along.
-fn strip_kind(kind: &str) -> Option<StripKind> {
+/// What a type of lane is: whether vehicles of all kinds may use it in one direction, whether some kinds may, and what it is
+/// to people on foot where no car drives on it; `None` for verges and medians, where they may stand but do not walk along.
+fn lane_type(kind: &str) -> (bool, bool, Option<StripKind>) {
     match kind {
-        "sidewalk" | "walking" => Some(StripKind::Walkway),
-        "parking" | "stop" | "biking" | "bus" | "taxi" | "HOV" | "bidirectional" | "tram" | "rail" => {
-            Some(StripKind::Paved)
+        "driving" | "entry" | "exit" | "onRamp" | "offRamp" | "connectingRamp" | "slipLane" | "mwyEntry"
+        | "mwyExit" => (true, true, Some(StripKind::Paved)),
+        "bus" | "taxi" | "HOV" | "bidirectional" => (false, true, Some(StripKind::Paved)),
+        "parking" | "stop" | "biking" | "tram" | "rail" => (false, false, Some(StripKind::Paved)),
+        "sidewalk" | "walking" => (false, false, Some(StripKind::Walkway)),
+        "none" | "shoulder" | "border" | "curb" | "median" | "roadWorks" | "roadMarks" => {
+            (false, false, None)
         }
-        // A driving lane of another direction attribute.
-        _ => is_driving(kind).then_some(StripKind::Paved),
+        _ => (false, true, None),
     }
 }
-
-/// Whether vehicles of all kinds may use a lane of a type, in one direction.
-fn is_driving(kind: &str) -> bool {
-    matches!(
-        kind,
-        "driving"
-            | "entry"
-            | "exit"
-            | "onRamp"
-            | "offRamp"
-            | "connectingRamp"
-            | "slipLane"
-            | "mwyEntry"
-            | "mwyExit"
-    )
-}
-
-/// Types of lanes that no car drives on; they are left out without a warning.
-const BESIDE_THE_ROAD: [&str; 14] = [
-    "none",
-    "shoulder",
-    "border",
-    "curb",
-    "median",
-    "sidewalk",
-    "walking",
-    "biking",
-    "parking",
-    "stop",
-    "rail",
-    "tram",
-    "roadWorks",
-    "roadMarks",
-];
 
 /// A marking at the outer line of a lane. `laneChange` decides; without it, the paint does: a solid line and
 /// anything raised forbid a change, and a broken line beside a solid one permits a change from the broken side.

@@ -117,8 +117,7 @@ pub fn read(name: &str, text: &str) -> Result<Document, RoadError> {
     if root.name() != "OpenDRIVE" {
         return Err(root.wrong(format!("the root element is `{}`; `OpenDRIVE` is expected", root.name())));
     }
-    let mut reader =
-        Reader { warnings: Vec::new(), warned_at: Vec::new(), ignored: BTreeMap::new(), corners: 0 };
+    let mut reader = Reader::default();
     let header_name = root.child("header").and_then(|header| header.attribute("name")).unwrap_or("");
     let roads: Vec<_> = root.children("road").map(|road| reader.road(road)).collect::<Result<_, _>>()?;
     if roads.is_empty() {
@@ -140,6 +139,7 @@ pub fn read(name: &str, text: &str) -> Result<Document, RoadError> {
 }
 
 /// Reads elements and collects what it does not understand.
+#[derive(Default)]
 struct Reader {
     warnings: Vec<String>,
     /// The places in the plane that warnings are about: index of the warning, position.
@@ -178,9 +178,9 @@ impl Reader {
             )));
         }
         let junction = road.attribute("junction").filter(|id| !id.is_empty() && *id != "-1");
-        let link = |name: &str| match road.child("link").and_then(|link| link.child(name)) {
-            Some(link) => road_link(link).map(Some),
-            None => Ok(None),
+        let link = |name: &str| {
+            let link = road.child("link").and_then(|link| link.child(name));
+            link.map(road_link).transpose()
         };
         let (predecessor, successor) = (link("predecessor")?, link("successor")?);
         let mut speeds = Vec::new();
