@@ -152,18 +152,3 @@ fn fits(inside: &Layout, after: &[(usize, bool, &Layout)], room: usize) -> bool 
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn breaks_only_what_does_not_fit() {
-        let item = || Layout::text("x".repeat(30));
-        assert_eq!(Layout::listed("[", [item(), item()], "]").render(0, 0).lines().count(), 1);
-        let long = Layout::listed("[", [item(), item(), item(), item()], "]").render(0, 0);
-        assert_eq!(long.lines().count(), 6);
-        assert!(long.ends_with(",\n]"));
-        assert_eq!(Layout::listed("(", [], ")").render(0, 0), "()");
-    }
-}
