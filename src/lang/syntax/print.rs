@@ -359,7 +359,7 @@ impl Printer<'_> {
             self.words(" ");
             return self.arms(value);
         }
-        self.put(&Layout::group([Layout::nest([Layout::Line, expression(value)])]));
+        self.put(&Layout::group([Layout::nest([Layout::Line(" "), expression(value)])]));
     }
 
     fn arms(&mut self, value: &Expr) {
@@ -604,9 +604,9 @@ fn separated(head: &str, separator: &str, names: &[Name]) -> Layout {
     let mut inside = Vec::new();
     for (index, name) in names.iter().enumerate() {
         match (index, separator) {
-            (0, _) => inside.push(Layout::Line),
-            (_, ",") => inside.extend([Layout::text(","), Layout::Line]),
-            _ => inside.extend([Layout::Line, Layout::text(format!("{separator} "))]),
+            (0, _) => inside.push(Layout::Line(" ")),
+            (_, ",") => inside.extend([Layout::text(","), Layout::Line(" ")]),
+            _ => inside.extend([Layout::Line(" "), Layout::text(format!("{separator} "))]),
         }
         inside.push(Layout::text(&name.text));
     }
@@ -650,9 +650,10 @@ fn assigned(state: &Name, key: Option<&Expr>) -> Layout {
 
 fn effect(effect: &Effect) -> Layout {
     match &effect.kind {
-        EffectKind::Set { state, key, value } => {
-            Layout::group([assigned(state, key.as_ref()), Layout::nest([Layout::Line, expression(value)])])
-        }
+        EffectKind::Set { state, key, value } => Layout::group([
+            assigned(state, key.as_ref()),
+            Layout::nest([Layout::Line(" "), expression(value)]),
+        ]),
         EffectKind::Spawn { body, place, distance, cover, fields: entries } => {
             let place = match place {
                 Place::Ahead => " ahead ",
@@ -700,7 +701,7 @@ fn policy_line(line: &PolicyLine) -> Layout {
     };
     let mut actions = Vec::new();
     for (at, action) in line.actions.iter().enumerate() {
-        actions.extend([Layout::Line, Layout::text(if at == 0 { "" } else { "| " }), call(action)]);
+        actions.extend([Layout::Line(" "), Layout::text(if at == 0 { "" } else { "| " }), call(action)]);
     }
     Layout::group([condition, Layout::text(" =>"), Layout::nest(actions)])
 }
