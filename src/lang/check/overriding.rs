@@ -13,7 +13,7 @@ use crate::check::names::unknown;
 use crate::check::unused::names_of_expr;
 use crate::model::code;
 use crate::model::vocabulary::{Fact, Known, Word};
-use crate::syntax::ast::{EffectKind, Item, ItemKind, Name, RuleBody, Span, Use};
+use crate::syntax::ast::{Also, EffectKind, Group, Item, ItemKind, Name, Rule, RuleBody, Span, Use};
 use crate::syntax::{Diagnostic, nearest};
 
 /// A declaration that stands, and the index of its file.
@@ -156,24 +156,9 @@ fn keeps_something(
     has_lost: &dyn Fn(&BTreeSet<&str>) -> bool,
 ) -> bool {
     let gone = |name: &Name| left.contains(&name.text);
-    match &item.kind {
-        ItemKind::Group(group) if group.members.iter().any(gone) => {
-            let mut kept = group.clone();
-            kept.members.retain(|member| !gone(member));
-            let is_kept = !kept.members.is_empty();
-            if !is_kept {
-                left.insert(kept.name.text.clone());
-            }
-            item.to_mut().kind = ItemKind::Group(kept);
-            is_kept
-        }
-        ItemKind::Also(also) if also.on.iter().any(gone) => {
-            let mut kept = also.clone();
-            kept.on.retain(|target| !gone(target));
-            let is_kept = !kept.on.is_empty();
-            item.to_mut().kind = ItemKind::Also(kept);
-            is_kept
-        }
+    let names = match &item.kind {
+        ItemKind::Group(group) => &group.members,
+        ItemKind::Also(also) => &also.on,
         ItemKind::Rule(rule) => match &rule.body {
             RuleBody::Holds { on, during, condition } if on.is_empty() => {
                 let mut named = BTreeSet::new();
@@ -182,21 +167,28 @@ fn keeps_something(
                     // It binds what spawns, as a rule about the gap does.
                     Some(_) => drop(named.insert(Fact::SpawnGap.name())),
                 }
-                !has_lost(&named)
+                return !has_lost(&named);
             }
-            RuleBody::Holds { on, .. } if on.iter().any(gone) => {
-                let mut kept = rule.clone();
-                let RuleBody::Holds { on, .. } = &mut kept.body else { return true };
-                on.retain(|target| !gone(target));
-                let is_kept = !on.is_empty();
-                item.to_mut().kind = ItemKind::Rule(kept);
-                is_kept
-            }
-            RuleBody::Holds { .. } => true,
-            RuleBody::Moves { state, .. } => !has_lost(&BTreeSet::from([state.text.as_str()])),
+            RuleBody::Holds { on, .. } => on,
+            RuleBody::Moves { state, .. } => return !has_lost(&BTreeSet::from([state.text.as_str()])),
         },
-        _ => true,
+        _ => return true,
+    };
+    let kept: Vec<Name> = names.iter().filter(|name| !gone(name)).cloned().collect();
+    if kept.len() == names.len() {
+        return true;
     }
+    let is_kept = !kept.is_empty();
+    if let (ItemKind::Group(group), false) = (&item.kind, is_kept) {
+        left.insert(group.name.text.clone());
+    }
+    if let ItemKind::Group(Group { members: names, .. })
+    | ItemKind::Also(Also { on: names, .. })
+    | ItemKind::Rule(Rule { body: RuleBody::Holds { on: names, .. }, .. }) = &mut item.to_mut().kind
+    {
+        *names = kept;
+    }
+    is_kept
 }
 
 /// What decides which actions a rule without `on` binds: the states that steps set, and the gaps if an action spawns.
