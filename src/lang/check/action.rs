@@ -676,7 +676,7 @@ fn operations_of(effect: &EffectDef) -> usize {
 }
 
 /// Every word that the expression can have as its value.
-fn possible<W: Copy>(word: &WordExpr<W>) -> Vec<W> {
+pub(super) fn possible<W: Copy>(word: &WordExpr<W>) -> Vec<W> {
     match word {
         WordExpr::Fixed(word) => vec![*word],
         WordExpr::Of(_, words) => words.clone(),

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use crate::check::action::possible;
 use crate::check::checker::{Checker, docs};
 use crate::check::expression::Place;
 use crate::check::names::unknown;
@@ -11,7 +12,8 @@ use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::states_read;
 use crate::model::vocabulary::{CHANGE, Known, Site, Then, Verb};
 use crate::model::{
-    ActionDef, EffectDef, EnumIndex, Initial, RuleBinding, RuleBody, RuleDef, SetDef, Type, WordExpr, code,
+    ActionDef, EffectDef, EnumIndex, Initial, RuleBinding, RuleBody, RuleDef, SetDef, SpawnDef, Type,
+    WordExpr, code,
 };
 use crate::syntax::ast::ItemKind;
 use crate::syntax::{Diagnostic, ast, listed};
@@ -32,19 +34,10 @@ impl Checker {
         }
         let mut rules = Vec::new();
         for (item, declared) in self.declared("rule", items, ItemKind::as_rule).1 {
-            if let Some(body) = self.rule(declared) {
-                let name = declared.name.text.clone();
-                let span = declared.name.span;
-                let start = self.start_condition(&declared.body);
-                rules.push(RuleDef {
-                    name,
-                    docs: docs(item),
-                    optional: declared.optional,
-                    body,
-                    start,
-                    span,
-                });
-            }
+            let Some(body) = self.rule(declared) else { continue };
+            let (name, span) = (declared.name.text.clone(), declared.name.span);
+            let start = self.start_condition(&declared.body);
+            rules.push(RuleDef { name, docs: docs(item), optional: declared.optional, body, start, span });
         }
         rules
     }
@@ -131,7 +124,6 @@ impl Checker {
     ) -> Option<Expr> {
         let locals = locals(definition);
         let owner = Symbol::Action(definition.name.clone());
-        let spawns = definition.effects.iter().any(|effect| matches!(effect, EffectDef::Spawn(_)));
         let place = Place { locals: &locals, owner: Some(&owner), ..site };
         let condition = self.typed(condition, &place, Type::Bool)?;
         if during.is_some() && !changes_lanes(definition) && is_whole {
@@ -141,7 +133,7 @@ impl Checker {
             return self.reject(error.beside(definition.span, "changes no lanes").help(help));
         }
         self.warn_of_later(rule, definition, &condition, during);
-        if condition.known() == Known::Spawn && !spawns && is_whole {
+        if condition.known() == Known::Spawn && spawns(definition).next().is_none() && is_whole {
             let message =
                 format!("`{}` asks about a spawn, and `{}` has none", rule.name.text, definition.name);
             let error = Diagnostic::error(code::NO_SPAWN, message).at(condition.span, "needs a spawn");
@@ -173,12 +165,7 @@ impl Checker {
             expr.any(|kind| matches!(kind, ExprKind::Local(named) if *named == local))
         };
         let decides = |local: usize| {
-            action.effects.iter().any(|effect| match effect {
-                EffectDef::Spawn(spawn) => {
-                    matches!(&spawn.then, WordExpr::Of(then, _) if names(then, local))
-                }
-                EffectDef::Set(_) => false,
-            })
+            spawns(action).any(|spawn| matches!(&spawn.then, WordExpr::Of(then, _) if names(then, local)))
         };
         let mut locals = 0..action.parameters.len();
         let Some(local) = locals.find(|local| decides(*local) && names(condition, *local)) else { return };
@@ -429,17 +416,15 @@ impl Checker {
 
 /// Whether a road user of an action may be told to change lanes.
 fn changes_lanes(action: &ActionDef) -> bool {
-    let may_be = |then: &WordExpr<Then>| match then {
-        WordExpr::Fixed(word) => *word == Then::Change,
-        WordExpr::Of(_, words) => words.contains(&Then::Change),
-    };
-    let overtakes = |verb: &WordExpr<Verb>| match verb {
-        WordExpr::Fixed(word) => *word == Verb::Overtake,
-        WordExpr::Of(_, words) => words.contains(&Verb::Overtake),
-    };
-    action.effects.iter().any(|effect| match effect {
-        EffectDef::Spawn(spawn) => may_be(&spawn.then) || overtakes(&spawn.verb),
-        EffectDef::Set(_) => false,
+    spawns(action).any(|spawn| {
+        possible(&spawn.then).contains(&Then::Change) || possible(&spawn.verb).contains(&Verb::Overtake)
+    })
+}
+
+fn spawns(action: &ActionDef) -> impl Iterator<Item = &SpawnDef> {
+    action.effects.iter().filter_map(|effect| match effect {
+        EffectDef::Spawn(spawn) => Some(&**spawn),
+        EffectDef::Set(_) => None,
     })
 }
 
