@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::check::action::possible;
 use crate::check::checker::{Checker, docs};
-use crate::check::expression::Place;
+use crate::check::expression::{Place, enum_of};
 use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
@@ -291,10 +291,7 @@ impl Checker {
     ) -> Option<RuleBody> {
         let index = self.state_named(state);
         let definition = index.map(|index| self.states[index].clone());
-        let of = match definition.as_ref().map(|state| state.ty) {
-            Some(Type::Enum(of)) => Some(of.0),
-            _ => None,
-        };
+        let of = enum_of(definition.as_ref().map(|state| state.ty));
         let keys = definition.as_ref().and_then(|state| state.key);
         key.into_iter().for_each(|key| self.references.variant(key, keys.map(|of| of.0)));
         if of.is_none() {
