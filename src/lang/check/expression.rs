@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use crate::check::checker::Checker;
 use crate::check::declaration::HEIGHT_MAX;
 use crate::check::names::unknown;
+use crate::check::operator::Sides;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind};
@@ -122,7 +123,7 @@ impl Checker {
                 }
             }
             ast::ExprKind::Binary { op, op_span, left, right } => {
-                self.binary(*op, *op_span, left, right, place, span)
+                self.binary(*op, *op_span, Sides { left, right, span }, place)
             }
             ast::ExprKind::Field { base, field } => self.part(base, field, place, span),
             ast::ExprKind::Index { base, index } => self.index(base, index, place, span),
