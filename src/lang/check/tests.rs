@@ -477,7 +477,7 @@ fn overrides_stand_where_the_old_one_stood() {
 fn a_missing_use_can_be_added() {
     let mut loaded = load_files(&[("a.ava", "language 1\nlet far = wide + 1 m\n")]);
     suggest_uses(&mut loaded, &[("b.ava".to_owned(), "language 1\nlet wide = 3 m\n".to_owned())]);
-    assert_eq!(loaded.diagnostics[0].fixes[0].edits[0].text, "\nuse \"b.ava\"");
+    assert_eq!(loaded.diagnostics[0].fixes[0].text, "\nuse \"b.ava\"");
 }
 
 mod hostile {

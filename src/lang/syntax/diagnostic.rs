@@ -48,18 +48,12 @@ pub struct Diagnostic {
     pub fixes: Vec<Fix>,
 }
 
-/// A change of the source.
+/// A change of one place of the source.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fix {
     /// What the change does, as a command: ``write `drive_ahead` ``.
     pub title: String,
-    /// Edits that do not overlap.
-    pub edits: Vec<Edit>,
-}
-
-/// Replaces the text of a span; an empty span inserts.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Edit {
+    /// What is replaced; an empty span inserts.
     pub span: Span,
     pub text: String,
 }
@@ -114,7 +108,7 @@ impl Diagnostic {
 
     /// Adds a change of one place that removes the mistake.
     pub fn fix(mut self, title: impl Into<String>, span: Span, text: impl Into<String>) -> Self {
-        self.fixes.push(Fix { title: title.into(), edits: vec![Edit { span, text: text.into() }] });
+        self.fixes.push(Fix { title: title.into(), span, text: text.into() });
         self
     }
 
