@@ -53,10 +53,11 @@ impl Checker {
                 let error = error.at(declared.name.span, format!("at most {VARIANTS_MAX} are possible"));
                 self.report(error.help("make two enums of it, or take an `Int` with a range"));
             }
+            let variants = declared.variants.iter().take(VARIANTS_MAX);
             self.enums.push(EnumDef {
                 name: declared.name.text.clone(),
                 docs: docs(item),
-                variants: variants_of(declared),
+                variants: variants.map(|variant| variant.text.clone()).collect(),
                 ordered: declared.ordered,
                 odds: vec![1; declared.variants.len().min(VARIANTS_MAX)],
                 span: declared.name.span,
@@ -520,11 +521,6 @@ impl Checker {
         let words: Vec<Option<W>> = declared.variants.iter().map(word).collect();
         words.into_iter().collect()
     }
-}
-
-/// The names of the variants, at most [`VARIANTS_MAX`].
-fn variants_of(declared: &ast::Enum) -> Vec<String> {
-    declared.variants.iter().take(VARIANTS_MAX).map(|variant| variant.text.clone()).collect()
 }
 
 /// A word that the engine does not know.

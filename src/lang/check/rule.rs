@@ -80,8 +80,11 @@ impl Checker {
         if on.is_empty() {
             targets = match during {
                 None => self.targets_of_global(rule, condition)?,
-                // Every action whose road users might change lanes.
-                Some(_) => self.changers(),
+                Some(_) => {
+                    let may_change =
+                        |action: &usize| self.actions[*action].as_ref().is_some_and(changes_lanes);
+                    (0..self.actions.len()).filter(may_change).collect()
+                }
             };
         }
         targets.sort_unstable();
@@ -142,12 +145,6 @@ impl Checker {
             );
         }
         Some(condition)
-    }
-
-    /// The actions whose road users may be told to change lanes.
-    fn changers(&self) -> Vec<usize> {
-        let all = self.actions.iter().enumerate();
-        all.filter(|(_, action)| action.as_ref().is_some_and(changes_lanes)).map(|(index, _)| index).collect()
     }
 
     /// Warns of a rule that ties a later lane change to the moment of the draw.

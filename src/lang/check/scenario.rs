@@ -344,7 +344,7 @@ impl<'a> Reader<'a> {
     /// `once ego.junction_ahead <= 40 m after 1 s`.
     fn trigger(&mut self, step: &ast::Step) -> Option<Arc<Trigger>> {
         let once = step.once.as_ref().and_then(|once| {
-            let expr = self.take_all(condition(self.space, once))?;
+            let expr = condition(self.space, once).map_err(|errors| self.diagnostics.extend(errors)).ok()?;
             Some(Condition { expr, text: print_expr(once) })
         });
         let after_ticks = step.after.as_ref().map_or(Some(0), |after| self.after_ticks(after))?;
@@ -357,10 +357,6 @@ impl<'a> Reader<'a> {
         }
         let trigger = Trigger { once, after_ticks };
         (trigger.once.is_some() || trigger.after_ticks > 0).then(|| Arc::new(trigger))
-    }
-
-    fn take_all<T>(&mut self, value: Result<T, Vec<Diagnostic>>) -> Option<T> {
-        value.map_err(|errors| self.diagnostics.extend(errors)).ok()
     }
 
     fn after_ticks(&mut self, after: &ast::Expr) -> Option<u32> {

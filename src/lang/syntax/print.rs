@@ -123,11 +123,12 @@ impl Printer<'_> {
         }
     }
 
-    /// Prints an entry as a whole.
-    fn entry(&mut self, span: Span, layout: &Layout) {
+    /// Prints an entry as a whole, and what ends it.
+    fn entry(&mut self, span: Span, layout: &Layout, ending: &str) {
         self.comments_before(span.end);
         self.line(span.start);
         self.put(layout);
+        self.words(ending);
         self.trailing_comment(span.end);
     }
 
@@ -159,7 +160,7 @@ impl Printer<'_> {
     fn lines(&mut self, end: usize, entries: impl IntoIterator<Item = (Span, Layout)>) {
         self.block(end, |printer| {
             for (span, layout) in entries {
-                printer.entry(span, &layout);
+                printer.entry(span, &layout, "");
             }
         });
     }
@@ -423,7 +424,7 @@ impl Printer<'_> {
                             printer.value(value);
                         });
                     }
-                    _ => printer.entry(step.span, &effect(step)),
+                    _ => printer.entry(step.span, &effect(step), ""),
                 }
             }
         });
@@ -436,7 +437,7 @@ impl Printer<'_> {
         self.level += 1;
         self.opened = true;
         for each in params {
-            self.entry_with_comma(each.span, &param(each));
+            self.entry(each.span, &param(each), ",");
         }
         self.opened = false;
         self.comments_before(end);
@@ -444,14 +445,6 @@ impl Printer<'_> {
         self.limit = limit;
         self.plain_line(false);
         self.words(") ");
-    }
-
-    fn entry_with_comma(&mut self, span: Span, layout: &Layout) {
-        self.comments_before(span.end);
-        self.line(span.start);
-        self.put(layout);
-        self.words(",");
-        self.trailing_comment(span.end);
     }
 
     fn rule(&mut self, item: &Rule, span: Span) {
@@ -511,7 +504,7 @@ impl Printer<'_> {
                 }
             }
             for each in &item.expects {
-                printer.entry(each.span, &expect(each));
+                printer.entry(each.span, &expect(each), "");
             }
         });
     }
