@@ -38,14 +38,7 @@ pub enum Change {
 
 impl fmt::Display for Change {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Change::Added => "added",
-            Change::Removed => "removed",
-            Change::Moved => "moved",
-            Change::Tightened => "tightened",
-            Change::Loosened => "loosened",
-            Change::Changed => "changed",
-        })
+        f.pad(&format!("{self:?}").to_lowercase())
     }
 }
 
