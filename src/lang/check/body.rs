@@ -12,7 +12,6 @@ use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast, nearest};
 use avastra_base::units::{Dimension, quantity_short};
 
-/// Kilograms in a tonne.
 const KG_PER_T: f64 = 1000.0;
 
 impl BodyField {

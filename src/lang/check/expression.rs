@@ -30,7 +30,6 @@ impl Place<'_> {
     /// The condition of a rule.
     pub const RULE: Place<'static> = Place { locals: &[], owner: None, states: true, site: Site::Rule };
 
-    /// The fact of that name, if it is known here.
     fn fact(&self, name: &str) -> Option<Fact> {
         Fact::from_name(name).filter(|fact| self.site.knows(fact.known()))
     }

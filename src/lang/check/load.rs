@@ -335,7 +335,6 @@ struct MapReader<'a> {
     cache: &'a mut MapCache,
 }
 
-/// The text of a map, and its digest.
 struct MapText {
     text: String,
     digest: String,

@@ -73,7 +73,6 @@ impl Checker {
         Some(Expr { kind: ExprKind::Arithmetic(op, Box::new(left), Box::new(right)), ty, span })
     }
 
-    /// Reports that the two sides have different dimensions or types.
     fn mismatch(&mut self, what: &str, at: Span, left: &Expr, right: &Expr) {
         let (a, b) = (self.references.type_name(left.ty), self.references.type_name(right.ty));
         let code =

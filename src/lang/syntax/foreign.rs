@@ -40,7 +40,6 @@ const MARKS: &[&str] = &[
     "/=", "&", "|", "!", "=", ":", "^", "?", ";", "'", "#",
 ];
 
-/// The length of the longest mark.
 const MARK_LEN_MAX: usize = 3;
 
 /// The mark or word of another language at which the grammar failed, if it did so at one. `token` is where the next token

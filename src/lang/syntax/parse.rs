@@ -35,7 +35,6 @@ const DIAGNOSTICS_MAX: usize = 100;
 /// What is expected where nothing better is known.
 const DECLARATION: &str = "a declaration";
 
-/// The words that begin a declaration.
 fn declarations() -> impl Iterator<Item = &'static str> {
     DECLARATIONS.iter().map(|(word, _)| *word)
 }

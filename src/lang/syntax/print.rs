@@ -430,7 +430,6 @@ impl Printer<'_> {
         });
     }
 
-    /// Prints parameters, one a line.
     fn params(&mut self, params: &[ActionParam], end: usize) {
         let limit = std::mem::replace(&mut self.limit, self.source.len());
         self.words("(");
