@@ -37,7 +37,7 @@ pub(super) fn resolve<'a>(files: &'a [LoadedFile], order: &[usize]) -> (Vec<Cow<
                         let item = Item { docs: item.docs.clone(), kind: (**kind).clone(), span: item.span };
                         standing[place] = Standing { file, item: Cow::Owned(item) };
                     }
-                    Err(error) => diagnostics.push(*error),
+                    Err(error) => diagnostics.push(error),
                 },
                 _ => standing.push(Standing { file, item: Cow::Borrowed(item) }),
             }
@@ -216,7 +216,7 @@ fn find(
     file: usize,
     item: &Item,
     kind: &ItemKind,
-) -> Result<usize, Box<Diagnostic>> {
+) -> Result<usize, Diagnostic> {
     let name = |kind: &ItemKind| kind.name().map(|name| name.text.clone());
     let same_kind = |other: &ItemKind| core::mem::discriminant(other) == core::mem::discriminant(kind);
     let wanted = name(kind);
@@ -236,32 +236,27 @@ fn find(
             let is = other.item.kind.keyword();
             let note = format!("this is of another kind: `{is}`");
             let help = format!("write `override {is} {}`", wanted.as_deref().unwrap_or_default());
-            return Err(Box::new(error.beside(other.item.span, note).help(help)));
+            return Err(error.beside(other.item.span, note).help(help));
         }
         let alike = standing.iter().filter(|standing| same_kind(&standing.item.kind));
         let names: Vec<String> = alike.filter_map(|standing| name(&standing.item.kind)).collect();
         let near = wanted.as_deref().and_then(|wanted| nearest(wanted, names.iter().map(String::as_str)));
-        return Err(Box::new(match near {
+        return Err(match near {
             Some(near) => error.meant(span, near),
             None => error.help("leave out `override`, or `use` the file that declares it"),
-        }));
+        });
     };
     let old = &standing[place];
     let old_span = old.item.kind.name().map_or(old.item.span, |name| name.span);
     if old.file == file {
         let error = error(format!("{what} is declared in this very file")).at(span, "overridden here");
-        return Err(Box::new(
-            error
-                .beside(old_span, "declared here")
-                .help("change the declaration itself, and remove this one"),
-        ));
+        let error = error.beside(old_span, "declared here");
+        return Err(error.help("change the declaration itself, and remove this one"));
     }
     if !uses(files, file, old.file) {
         let error = error(format!("{what} is overridden by two files that do not know each other"));
         let error = error.at(span, "overridden here").beside(old_span, "and here");
-        return Err(Box::new(
-            error.help("let one of the two `use` the other: then its override is the last"),
-        ));
+        return Err(error.help("let one of the two `use` the other: then its override is the last"));
     }
     Ok(place)
 }

@@ -17,7 +17,7 @@ use crate::syntax::grammar::{Rule, is_plain_terminal};
 use crate::syntax::{Diagnostic, code};
 
 /// A node, or the mistake that keeps its whole declaration out of the tree.
-pub type Built<T> = Result<T, Box<Diagnostic>>;
+pub type Built<T> = Result<T, Diagnostic>;
 
 /// Builds the tree of one declaration.
 pub struct Builder {
@@ -81,18 +81,16 @@ impl Builder {
         let span = self.span(&pair);
         let quoted = pair.as_str();
         let inside = &quoted[1..quoted.len() - 1];
-        match unescape(inside) {
-            Ok(value) => Ok(Text::new(value, span)),
-            Err(at) => {
-                let start = span.start + 1 + at;
-                let width = inside[at..].chars().take(2).map(char::len_utf8).sum::<usize>();
-                Err(Box::new(
-                    Diagnostic::error(code::TEXT, "unknown escape in a text")
-                        .at(Span::new(self.file, start, start + width), "")
-                        .help("escapes are `\\\"`, `\\\\`, `\\n`, `\\t` and `\\u{…}` with a code point in hexadecimal"),
-                ))
-            }
-        }
+        let value = unescape(inside).map_err(|at| {
+            let start = span.start + 1 + at;
+            let width = inside[at..].chars().take(2).map(char::len_utf8).sum::<usize>();
+            Diagnostic::error(code::TEXT, "unknown escape in a text")
+                .at(Span::new(self.file, start, start + width), "")
+                .help(
+                    "escapes are `\\\"`, `\\\\`, `\\n`, `\\t` and `\\u{…}` with a code point in hexadecimal",
+                )
+        })?;
+        Ok(Text::new(value, span))
     }
 
     /// What an `item` declares.
@@ -297,22 +295,20 @@ impl Builder {
             if let Some(key) = key {
                 let error =
                     Diagnostic::error(code::MOVES, "only transitions are about a key").at(key.span, "");
-                return Err(Box::new(error.help("put the key into the condition: `sky[Rain] > None`")));
+                return Err(error.help("put the key into the condition: `sky[Rain] > None`"));
             }
             let condition = self.only_expression(body)?;
             return Ok(NamedRule { optional, name, body: RuleBody::Holds { on, during, condition } });
         }
         if let Some(during) = during {
             let error = Diagnostic::error(code::MOVES, "transitions are not about what road users do");
-            return Err(Box::new(error.at(during.span, "").help("write a condition: `during change: …`")));
+            return Err(error.at(during.span, "").help("write a condition: `during change: …`"));
         }
         let [state] = <[Name; 1]>::try_from(on).map_err(|on| {
             let place = on.get(1).map_or(Span { end: name.span.end, ..span }, |second| second.span);
-            Box::new(
-                Diagnostic::error(code::MOVES, "transitions are about exactly one state")
-                    .at(place, "")
-                    .help(format!("write `rule {} on time {{ Noon -> Night }}`", name.text)),
-            )
+            Diagnostic::error(code::MOVES, "transitions are about exactly one state")
+                .at(place, "")
+                .help(format!("write `rule {} on time {{ Noon -> Night }}`", name.text))
         })?;
         let moves = Parts::of(body).rest().map(|transition| {
             let span = self.span(&transition);

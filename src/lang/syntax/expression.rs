@@ -25,9 +25,9 @@ impl Builder {
         let above = self.operators_above.get();
         if above + operators > OPERATORS_MAX {
             let message = format!("an expression with more than {OPERATORS_MAX} operators in one another");
-            return Err(Box::new(Diagnostic::error(code::DEPTH, message).at(span, "").help(
-                "give a part of it a name, with `let` or `fn`; where it is long, join parts in brackets",
-            )));
+            let help =
+                "give a part of it a name, with `let` or `fn`; where it is long, join parts in brackets";
+            return Err(Diagnostic::error(code::DEPTH, message).at(span, "").help(help));
         }
         self.operators_above.set(above + operators);
         let built = build();
@@ -71,7 +71,7 @@ impl Builder {
                 ("comparisons do not chain", "write `a < b and b < c`")
             }
         };
-        Err(Box::new(Diagnostic::error(code::CHAIN, message).at(self.span(next), "second one").help(help)))
+        Err(Diagnostic::error(code::CHAIN, message).at(self.span(next), "second one").help(help))
     }
 
     fn prefixed(&self, tokens: &mut Tokens<'_>) -> Built<Expr> {
