@@ -213,13 +213,7 @@ fn expr() -> impl Strategy<Value = Expr> {
     ];
     leaf.prop_map(Expr::built).prop_recursive(4, 24, 3, |inner| {
         let boxed = || inner.clone().prop_map(Box::new);
-        let entry = (name(), inner.clone()).prop_map(|(name, value)| Field { name, value, span: Span::NONE });
         let arg = (proptest::option::of(name()), inner.clone()).prop_map(|(name, value)| Arg { name, value });
-        let arm = (prop::collection::vec(name(), 0..3), inner.clone()).prop_map(|(patterns, value)| Arm {
-            patterns,
-            value,
-            span: Span::NONE,
-        });
         prop_oneof![
             (any::<bool>(), boxed()).prop_map(|(not, operand)| ExprKind::Unary {
                 op: if not { UnaryOp::Not } else { UnaryOp::Negate },
@@ -231,17 +225,27 @@ fn expr() -> impl Strategy<Value = Expr> {
             (boxed(), name()).prop_map(|(base, field)| ExprKind::Field { base, field }),
             (boxed(), boxed()).prop_map(|(base, index)| ExprKind::Index { base, index }),
             prop::collection::vec(inner.clone(), 0..3).prop_map(ExprKind::List),
-            prop::collection::vec(entry, 0..3).prop_map(ExprKind::Record),
+            entries(inner.clone()).prop_map(ExprKind::Record),
             (name(), prop::collection::vec(arg, 0..3)).prop_map(|(name, args)| ExprKind::Call(Call {
                 name,
                 args,
                 span: Span::NONE
             })),
-            (boxed(), prop::collection::vec(arm, 0..3))
-                .prop_map(|(subject, arms)| ExprKind::Match { subject, arms }),
+            (boxed(), arms(inner.clone())).prop_map(|(subject, arms)| ExprKind::Match { subject, arms }),
         ]
         .prop_map(Expr::built)
     })
+}
+
+fn entries(value: impl Strategy<Value = Expr>) -> impl Strategy<Value = Vec<Field>> {
+    let entry = (name(), value).prop_map(|(name, value)| Field { name, value, span: Span::NONE });
+    prop::collection::vec(entry, 0..3)
+}
+
+fn arms(value: impl Strategy<Value = Expr>) -> impl Strategy<Value = Vec<Arm>> {
+    let patterns = prop::collection::vec(name(), 0..3);
+    let arm = (patterns, value).prop_map(|(patterns, value)| Arm { patterns, value, span: Span::NONE });
+    prop::collection::vec(arm, 0..3)
 }
 
 fn item() -> impl Strategy<Value = ItemKind> {
@@ -250,13 +254,7 @@ fn item() -> impl Strategy<Value = ItemKind> {
         value,
         span: Span::NONE,
     });
-    let arm = (prop::collection::vec(name(), 0..3), expr()).prop_map(|(patterns, value)| Arm {
-        patterns,
-        value,
-        span: Span::NONE,
-    });
-    let entry = || (name(), expr()).prop_map(|(name, value)| Field { name, value, span: Span::NONE });
-    let entries = || prop::collection::vec(entry(), 0..3);
+    let entries = || entries(expr());
     let scenario =
         (name(), name(), entries(), entries(), entries(), prop::option::of(expr()), prop::option::of(expr()))
             .prop_map(|(name, road, origin, start, drawn, once, after)| {
@@ -274,8 +272,7 @@ fn item() -> impl Strategy<Value = ItemKind> {
             .prop_map(|(name, value)| { ItemKind::Override(Box::new(ItemKind::Let(Let { name, value }))) }),
         (name(), expr()).prop_map(|(name, condition)| ItemKind::Verdict(Verdict { name, condition })),
         prop::collection::vec(case, 0..4).prop_map(ItemKind::Reward),
-        (name(), prop::collection::vec(arm, 0..3))
-            .prop_map(|(name, arms)| ItemKind::Odds(Odds { name, arms })),
+        (name(), arms(expr())).prop_map(|(name, arms)| ItemKind::Odds(Odds { name, arms })),
         ("\\PC{0,5}", proptest::option::of("[a-f0-9]{0,4}"), prop::collection::vec(name(), 0..3)).prop_map(
             |(path, digest, without)| {
                 let text = |value: String| Text::new(value, Span::NONE);
