@@ -504,6 +504,19 @@ impl Checker {
 
     /// The engine's word for each variant of an enum, for values that reach the world.
     pub(super) fn words<W: Word>(&mut self, kind: &str, ty: Type, span: Span) -> Option<Vec<W>> {
+        self.words_of(kind, ty, span, |_, variant, at| {
+            W::from_name(variant).ok_or_else(|| unknown_word::<W>(kind, variant, at))
+        })
+    }
+
+    /// What `known` says of each variant of an enum.
+    pub(super) fn words_of<T>(
+        &mut self,
+        kind: &str,
+        ty: Type,
+        span: Span,
+        known: impl Fn(&Checker, &str, Span) -> Result<T, Diagnostic>,
+    ) -> Option<Vec<T>> {
         let Type::Enum(of) = ty else {
             let name = self.references.type_name(ty);
             let message = format!("type mismatch: wanted a {kind}, found `{name}`");
@@ -511,14 +524,13 @@ impl Checker {
             return self.reject(error.at(span, format!("this is a `{name}`")));
         };
         let declared = self.enums[of.0].clone();
+        let label = format!("`{}` is used as a {kind} here", declared.name);
         let word = |variant: &String| {
-            W::from_name(variant).or_else(|| {
-                let error = unknown_word::<W>(kind, variant, declared.span);
-                self.reject(error.beside(span, format!("`{}` is used as a {kind} here", declared.name)))
-            })
+            let found = known(self, variant, declared.span);
+            self.take(found.map_err(|error| error.beside(span, label.clone())))
         };
         // Every unknown word is reported, not just the first.
-        let words: Vec<Option<W>> = declared.variants.iter().map(word).collect();
+        let words: Vec<Option<T>> = declared.variants.iter().map(word).collect();
         words.into_iter().collect()
     }
 }
