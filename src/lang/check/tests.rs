@@ -37,12 +37,10 @@ road corner {
 /// Loads files given as `(name, text)`; the first is the root.
 fn load_files(files: &[(&str, &str)]) -> Loaded {
     let map = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/roads/corner.xodr");
-    load(Path::new(files[0].0), &|path| {
-        if path.ends_with("corner.xodr") {
-            return Ok(std::fs::read_to_string(&map).unwrap());
-        }
-        let found = files.iter().find(|(name, _)| Path::new(name) == path);
-        found.map(|(_, text)| (*text).to_owned()).ok_or(ReadError("no such file".to_owned()))
+    load(Path::new(files[0].0), &|path| match files.iter().find(|(name, _)| Path::new(name) == path) {
+        Some((_, text)) => Ok((*text).to_owned()),
+        None if path.ends_with("corner.xodr") => Ok(std::fs::read_to_string(&map).unwrap()),
+        None => Err(ReadError("no such file".to_owned())),
     })
     .unwrap()
 }
@@ -356,12 +354,8 @@ fn digests_cover_everything_that_is_used() {
     let map = std::fs::read_to_string(map).unwrap();
     let load_at = |folder: &str, root: &str, part: &str, map: &str| {
         let files = [("s.ava", root), ("a.ava", ROOT), ("parts/b.ava", part), ("corner.xodr", map)];
-        let files = files.map(|(name, text)| (Path::new(folder).join(name), text.to_owned()));
-        let read = |path: &Path| {
-            let found = files.iter().find(|(name, _)| name == path);
-            found.map(|(_, text)| text.clone()).ok_or(ReadError("no such file".to_owned()))
-        };
-        load(&Path::new(folder).join("s.ava"), &read).unwrap()
+        let files = files.map(|(name, text)| (Path::new(folder).join(name).display().to_string(), text));
+        load_files(&files.each_ref().map(|(name, text)| (name.as_str(), *text)))
     };
     let space =
         load_at("", "language 1\nuse \"a.ava\"\nuse \"parts/b.ava\" digest \"sha256:0\"\n", PART, &map);
