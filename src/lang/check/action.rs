@@ -84,11 +84,9 @@ impl Checker {
             declared.effects.iter().filter(|effect| matches!(effect.kind, ast::EffectKind::Spawn { .. }));
         let spawns = spawns.count();
         if spawns > SPAWNS_MAX {
-            let error = Diagnostic::error(
-                code::TOO_MUCH,
-                format!("`{}` spawns {spawns} road users", declared.name.text),
-            )
-            .at(declared.name.span, format!("at most {SPAWNS_MAX} are possible"));
+            let message = format!("`{}` spawns {spawns} road users", declared.name.text);
+            let error = Diagnostic::error(code::TOO_MUCH, message)
+                .at(declared.name.span, format!("at most {SPAWNS_MAX} are possible"));
             return self.reject(error.help("make several actions of it"));
         }
         let owner = Symbol::Action(declared.name.text.clone());
@@ -269,10 +267,8 @@ impl Checker {
                     .collect();
                 let values: Vec<Value> = values.into_iter().collect::<Option<_>>()?;
                 if values.is_empty() {
-                    return self.reject(
-                        Diagnostic::error(code::EMPTY, "the list is empty")
-                            .at(within.span, "no value is left"),
-                    );
+                    let error = Diagnostic::error(code::EMPTY, "the list is empty");
+                    return self.reject(error.at(within.span, "no value is left"));
                 }
                 Some(Domain::Values(values))
             }

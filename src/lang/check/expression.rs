@@ -266,14 +266,11 @@ impl Checker {
                     0 => String::new(),
                     others => format!(" and of {others} other enums"),
                 };
-                let error = Diagnostic::error(
-                    code::AMBIGUOUS,
-                    format!("`{name}` is a variant of {}{others}", listed(&enums)),
-                );
-                let error = error.at(span, "which one is meant does not follow from here");
-                return self.reject(
-                    error.help("compare it with what has the wanted type, or rename one of the two"),
-                );
+                let message = format!("`{name}` is a variant of {}{others}", listed(&enums));
+                let error = Diagnostic::error(code::AMBIGUOUS, message)
+                    .at(span, "which one is meant does not follow from here")
+                    .help("compare it with what has the wanted type, or rename one of the two");
+                return self.reject(error);
             }
         };
         let index = self.enums[of].variants.iter().position(|variant| variant == name)?;
@@ -487,9 +484,8 @@ impl Checker {
                 if parameters.len() == 1 { "" } else { "s" },
                 call.args.len()
             );
-            return self.reject(
-                Diagnostic::error(code::ARGUMENTS, message).at(call.span, "").beside(header, "declared here"),
-            );
+            let error = Diagnostic::error(code::ARGUMENTS, message).at(call.span, "");
+            return self.reject(error.beside(header, "declared here"));
         }
         let mut arguments: Vec<Option<Expr>> = vec![None; parameters.len()];
         for (position, argument) in call.args.iter().enumerate() {

@@ -65,9 +65,8 @@ impl Checker {
             Arithmetic::Divide => a.per(b),
         };
         let Some(result) = result else {
-            return self.reject(
-                Diagnostic::error(code::UNIT_MISMATCH, "the dimension is out of range").at(span, ""),
-            );
+            let error = Diagnostic::error(code::UNIT_MISMATCH, "the dimension is out of range");
+            return self.reject(error.at(span, ""));
         };
         let ty = if both_whole && op != Arithmetic::Divide { Type::Int } else { Type::Quantity(result) };
         Some(Expr { kind: ExprKind::Arithmetic(op, Box::new(left), Box::new(right)), ty, span })
@@ -170,10 +169,8 @@ impl Checker {
                 let low = self.typed(low, place, ty);
                 let high = self.typed(high, place, ty);
                 if !is_number(ty) {
-                    return self.reject(
-                        Diagnostic::error(code::TYPE_MISMATCH, "a range holds numbers")
-                            .at(value.span, "not a number"),
-                    );
+                    let error = Diagnostic::error(code::TYPE_MISMATCH, "a range holds numbers");
+                    return self.reject(error.at(value.span, "not a number"));
                 }
                 ExprKind::InRange(value, Box::new(low?), Box::new(high?))
             }

@@ -364,24 +364,19 @@ impl<'a> Reader<'a> {
         let step_s = self.space.episode.step_s;
         let ticks = (after_s * 1000.0 / TICK_MS as f64).round();
         if !(0.0..step_s).contains(&after_s) {
-            let error =
-                Diagnostic::error(code::TRIGGER, format!("`after {after_s} s` is not within the step"));
-            return self.reject(
-                error
-                    .at(after.span, format!("a step lasts {step_s} s"))
-                    .help("write the action in a later step, and the rest of the time here"),
-            );
+            let message = format!("`after {after_s} s` is not within the step");
+            let error = Diagnostic::error(code::TRIGGER, message);
+            let error = error.at(after.span, format!("a step lasts {step_s} s"));
+            return self
+                .reject(error.help("write the action in a later step, and the rest of the time here"));
         }
         if (ticks * TICK_MS as f64 / 1000.0 - after_s).abs() > 1e-9 {
             let error = Diagnostic::error(code::TRIGGER, format!("nothing happens after {after_s} s"));
             // The end of the step belongs to the next one.
             let last = (step_s * 1000.0 / TICK_MS as f64).round() - 1.0;
             let near = ticks_s(ticks.min(last) as u32);
-            return self.reject(
-                error
-                    .at(after.span, format!("time passes in ticks of {TICK_MS} ms"))
-                    .help(format!("the nearest is {near} s")),
-            );
+            let error = error.at(after.span, format!("time passes in ticks of {TICK_MS} ms"));
+            return self.reject(error.help(format!("the nearest is {near} s")));
         }
         Some(ticks as u32)
     }
