@@ -108,18 +108,14 @@ pub fn fixes(analysis: &Analysis, from: usize, to: usize) -> Vec<Remedy> {
     let mut remedies = Vec::new();
     for diagnostic in analysis.loaded.diagnostics.iter().filter(touches) {
         let mistake = mistake(diagnostic, analysis);
-        'fixes: for fix in &diagnostic.fixes {
-            let mut changes = Changes::new();
-            for edit in &fix.edits {
-                let Some(path) = analysis.path(edit.span.file) else { continue 'fixes };
-                let change = Change { range: analysis.range(edit.span), text: edit.text.clone() };
-                changes.entry(path.to_owned()).or_default().push(change);
-            }
+        for fix in &diagnostic.fixes {
+            let Some(path) = analysis.path(fix.span.file) else { continue };
+            let change = Change { range: analysis.range(fix.span), text: fix.text.clone() };
             remedies.push(Remedy {
                 title: fix.title.clone(),
                 mistake: mistake.clone(),
                 is_preferred: diagnostic.fixes.len() == 1,
-                changes,
+                changes: Changes::from([(path.to_owned(), vec![change])]),
             });
         }
         remedies.extend(replacement(diagnostic, analysis, &mistake));

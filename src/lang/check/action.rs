@@ -84,11 +84,9 @@ impl Checker {
             declared.effects.iter().filter(|effect| matches!(effect.kind, ast::EffectKind::Spawn { .. }));
         let spawns = spawns.count();
         if spawns > SPAWNS_MAX {
-            let error = Diagnostic::error(
-                code::TOO_MUCH,
-                format!("`{}` spawns {spawns} road users", declared.name.text),
-            )
-            .at(declared.name.span, format!("at most {SPAWNS_MAX} are possible"));
+            let message = format!("`{}` spawns {spawns} road users", declared.name.text);
+            let error = Diagnostic::error(code::TOO_MUCH, message)
+                .at(declared.name.span, format!("at most {SPAWNS_MAX} are possible"));
             return self.reject(error.help("make several actions of it"));
         }
         let owner = Symbol::Action(declared.name.text.clone());
@@ -269,10 +267,8 @@ impl Checker {
                     .collect();
                 let values: Vec<Value> = values.into_iter().collect::<Option<_>>()?;
                 if values.is_empty() {
-                    return self.reject(
-                        Diagnostic::error(code::EMPTY, "the list is empty")
-                            .at(within.span, "no value is left"),
-                    );
+                    let error = Diagnostic::error(code::EMPTY, "the list is empty");
+                    return self.reject(error.at(within.span, "no value is left"));
                 }
                 Some(Domain::Values(values))
             }
@@ -449,25 +445,39 @@ impl Checker {
         }
     }
 
-    /// A word of the engine: either the word itself, or an expression of an enum whose variants are such words.
     fn word<W: Word>(&mut self, kind: &str, expr: &ast::Expr, place: &Place<'_>) -> Option<WordExpr<W>> {
+        let known = |_: &Checker, name: &str, span| {
+            W::from_name(name).ok_or_else(|| unknown_word::<W>(kind, name, span))
+        };
+        let note = |checker: &mut Checker, span, name: &str| checker.references.word_named::<W>(span, name);
+        self.word_or_enum(kind, expr, place, known, note)
+    }
+
+    /// A word: either the word itself, which is then noted, or an expression of an enum whose variants are such words.
+    pub(super) fn word_or_enum<T>(
+        &mut self,
+        kind: &str,
+        expr: &ast::Expr,
+        place: &Place<'_>,
+        known: impl Fn(&Checker, &str, Span) -> Result<T, Diagnostic>,
+        note: impl Fn(&mut Checker, Span, &str),
+    ) -> Option<WordExpr<T>> {
         if let ast::ExprKind::Name(name) = &expr.kind
             && self.is_bare_variant(expr, place)
         {
-            let word = W::from_name(name);
-            word.into_iter().for_each(|word| self.references.word(expr.span, word));
-            return word.map(WordExpr::Fixed).or_else(|| {
+            let word = known(self, name, expr.span).map_err(|error| {
                 let locals = place.locals.iter().map(|(local, _)| local.as_str());
-                self.reject(match nearest(name, locals) {
-                    Some(near) => Diagnostic::error(code::UNKNOWN, format!("unknown name `{name}`"))
-                        .at(expr.span, "not declared")
-                        .meant(expr.span, near),
-                    None => unknown_word::<W>(kind, name, expr.span),
+                nearest(name, locals).map_or(error, |near| {
+                    let error = Diagnostic::error(code::UNKNOWN, format!("unknown name `{name}`"));
+                    error.at(expr.span, "not declared").meant(expr.span, near)
                 })
             });
+            let word = self.take(word)?;
+            note(self, expr.span, name);
+            return Some(WordExpr::Fixed(word));
         }
         let expr = self.expr(expr, place, None)?;
-        let words = self.words::<W>(kind, expr.ty, expr.span)?;
+        let words = self.words_of(kind, expr.ty, expr.span, known)?;
         Some(WordExpr::Of(expr, words))
     }
 
@@ -676,7 +686,7 @@ fn operations_of(effect: &EffectDef) -> usize {
 }
 
 /// Every word that the expression can have as its value.
-fn possible<W: Copy>(word: &WordExpr<W>) -> Vec<W> {
+pub(super) fn possible<W: Copy>(word: &WordExpr<W>) -> Vec<W> {
     match word {
         WordExpr::Fixed(word) => vec![*word],
         WordExpr::Of(_, words) => words.clone(),

@@ -12,7 +12,6 @@ use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast, nearest};
 use avastra_base::units::{Dimension, quantity_short};
 
-/// Kilograms in a tonne.
 const KG_PER_T: f64 = 1000.0;
 
 impl BodyField {
@@ -112,43 +111,10 @@ impl Checker {
     /// What a spawn calls a body: a word of the engine, a body of the author's own, or an expression of an enum whose
     /// variants are such words.
     pub(super) fn body_word(&mut self, expr: &ast::Expr, place: &Place<'_>) -> Option<WordExpr<BodyWord>> {
-        if let ast::ExprKind::Name(name) = &expr.kind
-            && self.is_bare_variant(expr, place)
-        {
-            return match self.body_named(name) {
-                Some(word) => {
-                    self.note_body(expr.span, name);
-                    Some(WordExpr::Fixed(word))
-                }
-                None => {
-                    let locals = place.locals.iter().map(|(local, _)| local.as_str());
-                    let error = match nearest(name, locals) {
-                        Some(near) => Diagnostic::error(code::UNKNOWN, format!("unknown name `{name}`"))
-                            .at(expr.span, "not declared")
-                            .meant(expr.span, near),
-                        None => unknown_body(name, expr.span),
-                    };
-                    self.reject(error)
-                }
-            };
-        }
-        let expr = self.expr(expr, place, None)?;
-        let Type::Enum(of) = expr.ty else {
-            // It reports what the expression is instead.
-            self.words::<Body>("body", expr.ty, expr.span);
-            return None;
+        let known = |checker: &Checker, name: &str, span| {
+            checker.body_named(name).ok_or_else(|| unknown_body(name, span))
         };
-        let declared = self.enums[of.0].clone();
-        let mut words = Vec::new();
-        for variant in &declared.variants {
-            let word = self.body_named(variant);
-            if word.is_none() {
-                let label = format!("`{}` is used as a body here", declared.name);
-                self.report(unknown_body(variant, declared.span).beside(expr.span, label));
-            }
-            words.push(word);
-        }
-        Some(WordExpr::Of(expr, words.into_iter().collect::<Option<_>>()?))
+        self.word_or_enum("body", expr, place, known, Checker::note_body)
     }
 
     pub(super) fn body_named(&self, name: &str) -> Option<BodyWord> {

@@ -349,7 +349,7 @@ impl Checker {
         let mut first = Vec::new();
         for (item, declared) in each(items, pick) {
             let name = item.kind.name().expect("only declarations with a name are asked for");
-            match self.take(names.declare(kind, name, first.len())) {
+            match self.take(names.declare(kind, name)) {
                 Some(()) => first.push((item, declared)),
                 None => drop(self.doubles.insert(item.span)),
             }

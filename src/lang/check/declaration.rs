@@ -53,10 +53,11 @@ impl Checker {
                 let error = error.at(declared.name.span, format!("at most {VARIANTS_MAX} are possible"));
                 self.report(error.help("make two enums of it, or take an `Int` with a range"));
             }
+            let variants = declared.variants.iter().take(VARIANTS_MAX);
             self.enums.push(EnumDef {
                 name: declared.name.text.clone(),
                 docs: docs(item),
-                variants: variants_of(declared),
+                variants: variants.map(|variant| variant.text.clone()).collect(),
                 ordered: declared.ordered,
                 odds: vec![1; declared.variants.len().min(VARIANTS_MAX)],
                 span: declared.name.span,
@@ -94,14 +95,7 @@ impl Checker {
     /// The odds of each action.
     pub(super) fn action_odds(&mut self, declared: &ast::Odds) -> Vec<u32> {
         self.references.word(declared.name.span, SpaceClaim::Actions);
-        let mut odds: Vec<Option<u32>> = vec![None; self.actions.len()];
-        for arm in &declared.arms {
-            let value = self.odds_of(&arm.value, ACTION_ODDS_MAX).unwrap_or(1);
-            let named = self.all_targets(&arm.patterns);
-            let taken = if arm.patterns.is_empty() { (0..odds.len()).collect() } else { named };
-            self.share_out(arm, value, &taken, &mut odds);
-        }
-        let odds: Vec<u32> = odds.into_iter().map(|odds| odds.unwrap_or(1)).collect();
+        let odds = self.shares(declared, self.actions.len(), ACTION_ODDS_MAX, Checker::all_targets);
         if !odds.is_empty() && odds.iter().all(|odds| *odds == 0) {
             let error = Diagnostic::error(code::EMPTY, "no action is ever drawn")
                 .at(declared.name.span, "all its odds are 0");
@@ -110,17 +104,31 @@ impl Checker {
         odds
     }
 
-    /// Gives a line's odds to what has none yet of what it takes.
-    fn share_out(&mut self, arm: &ast::Arm, value: u32, taken: &[usize], odds: &mut [Option<u32>]) {
-        // An unknown name was reported.
-        let sound = arm.patterns.is_empty() || !taken.is_empty();
-        if sound && !taken.iter().any(|index| odds[*index].is_none()) {
-            let error = Diagnostic::error(code::NEVER_REACHED, "these odds never count");
-            self.report(error.at(arm.span, "the lines before it say it all").help("remove the line"));
+    /// The odds of so many things; `named` gives those of them that a line names. A line counts for what has no odds yet.
+    fn shares(
+        &mut self,
+        declared: &ast::Odds,
+        count: usize,
+        most: u32,
+        named: impl Fn(&mut Checker, &[ast::Name]) -> Vec<usize>,
+    ) -> Vec<u32> {
+        let mut odds: Vec<Option<u32>> = vec![None; count];
+        for arm in &declared.arms {
+            let value = self.odds_of(&arm.value, most).unwrap_or(1);
+            let is_rest = arm.patterns.is_empty();
+            let taken = if is_rest { (0..count).collect() } else { named(self, &arm.patterns) };
+            // An unknown name was reported.
+            let sound = is_rest || !taken.is_empty();
+            if sound && !taken.iter().any(|index| odds[*index].is_none()) {
+                let error = Diagnostic::error(code::NEVER_REACHED, "these odds never count");
+                self.report(error.at(arm.span, "the lines before it say it all").help("remove the line"));
+            }
+            for index in taken {
+                odds[index] = odds[index].or(Some(value));
+            }
         }
-        for index in taken {
-            odds[*index] = odds[*index].or(Some(value));
-        }
+        // What is not named is as likely as before.
+        odds.into_iter().map(|odds| odds.unwrap_or(1)).collect()
     }
 
     /// The enum, and the odds of each of its variants.
@@ -134,19 +142,9 @@ impl Checker {
             let error = self.unknown("enum", &declared.name.text, declared.name.span, self.enum_names.all());
             return self.reject(error);
         };
-        let mut odds: Vec<Option<u32>> = vec![None; self.enums[of].variants.len()];
-        for arm in &declared.arms {
-            let value = self.odds_of(&arm.value, ODDS_MAX).unwrap_or(1);
-            let named: Vec<Option<usize>> =
-                arm.patterns.iter().map(|pattern| self.variant(pattern, of)).collect();
-            let taken: Vec<usize> = match arm.patterns.is_empty() {
-                true => (0..odds.len()).collect(),
-                false => named.into_iter().flatten().collect(),
-            };
-            self.share_out(arm, value, &taken, &mut odds);
-        }
-        // Variants that are not named are as likely as before.
-        let odds: Vec<u32> = odds.into_iter().map(|odds| odds.unwrap_or(1)).collect();
+        let odds = self.shares(declared, self.enums[of].variants.len(), ODDS_MAX, |checker, names| {
+            names.iter().filter_map(|name| checker.variant(name, of)).collect()
+        });
         if odds.iter().all(|odds| *odds == 0) {
             let message = format!("no `{}` is ever drawn", declared.name.text);
             let error = Diagnostic::error(code::EMPTY, message).at(declared.name.span, "all its odds are 0");
@@ -506,6 +504,19 @@ impl Checker {
 
     /// The engine's word for each variant of an enum, for values that reach the world.
     pub(super) fn words<W: Word>(&mut self, kind: &str, ty: Type, span: Span) -> Option<Vec<W>> {
+        self.words_of(kind, ty, span, |_, variant, at| {
+            W::from_name(variant).ok_or_else(|| unknown_word::<W>(kind, variant, at))
+        })
+    }
+
+    /// What `known` says of each variant of an enum.
+    pub(super) fn words_of<T>(
+        &mut self,
+        kind: &str,
+        ty: Type,
+        span: Span,
+        known: impl Fn(&Checker, &str, Span) -> Result<T, Diagnostic>,
+    ) -> Option<Vec<T>> {
         let Type::Enum(of) = ty else {
             let name = self.references.type_name(ty);
             let message = format!("type mismatch: wanted a {kind}, found `{name}`");
@@ -513,21 +524,15 @@ impl Checker {
             return self.reject(error.at(span, format!("this is a `{name}`")));
         };
         let declared = self.enums[of.0].clone();
+        let label = format!("`{}` is used as a {kind} here", declared.name);
         let word = |variant: &String| {
-            W::from_name(variant).or_else(|| {
-                let error = unknown_word::<W>(kind, variant, declared.span);
-                self.reject(error.beside(span, format!("`{}` is used as a {kind} here", declared.name)))
-            })
+            let found = known(self, variant, declared.span);
+            self.take(found.map_err(|error| error.beside(span, label.clone())))
         };
         // Every unknown word is reported, not just the first.
-        let words: Vec<Option<W>> = declared.variants.iter().map(word).collect();
+        let words: Vec<Option<T>> = declared.variants.iter().map(word).collect();
         words.into_iter().collect()
     }
-}
-
-/// The names of the variants, at most [`VARIANTS_MAX`].
-fn variants_of(declared: &ast::Enum) -> Vec<String> {
-    declared.variants.iter().take(VARIANTS_MAX).map(|variant| variant.text.clone()).collect()
 }
 
 /// A word that the engine does not know.

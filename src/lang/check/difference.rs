@@ -38,14 +38,7 @@ pub enum Change {
 
 impl fmt::Display for Change {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Change::Added => "added",
-            Change::Removed => "removed",
-            Change::Moved => "moved",
-            Change::Tightened => "tightened",
-            Change::Loosened => "loosened",
-            Change::Changed => "changed",
-        })
+        f.pad(&format!("{self:?}").to_lowercase())
     }
 }
 
@@ -57,35 +50,11 @@ pub fn differences(old: &Loaded, new: &Loaded) -> Option<Vec<Difference>> {
     if old.space.meaning.digest() == new.space.meaning.digest() {
         return Some(Vec::new());
     }
-    let pairs = Pairs::of(old.space, new.space);
-    let mut found = declarations(&old, &new, &pairs);
+    let mut found = declarations(&old, &new);
     found.extend(order(&old, &new));
-    found.extend(rows(old.space, new.space, &pairs));
-    found.extend(reaches(old.space, new.space, &pairs));
+    found.extend(rows(&old, &new));
+    found.extend(reaches(&old, &new));
     Some(found)
-}
-
-/// The rows of two spaces by their labels.
-struct Pairs<'a> {
-    old: BTreeMap<&'a str, &'a Row>,
-    new: BTreeMap<&'a str, &'a Row>,
-}
-
-impl<'a> Pairs<'a> {
-    fn of(old: &'a Space, new: &'a Space) -> Pairs<'a> {
-        // If several rows have one label, the first counts.
-        let by_label =
-            |space: &'a Space| space.rows.iter().rev().map(|row| (row.label.as_str(), row)).collect();
-        Pairs { old: by_label(old), new: by_label(new) }
-    }
-
-    fn now(&self, row: &Row) -> Option<&'a Row> {
-        self.new.get(row.label.as_str()).copied()
-    }
-
-    fn before(&self, row: &Row) -> Option<&'a Row> {
-        self.old.get(row.label.as_str()).copied()
-    }
 }
 
 fn difference(change: Change, subject: impl Into<String>, detail: impl Into<String>) -> Difference {
@@ -98,6 +67,8 @@ struct Side<'a> {
     /// The text of each declaration that the digest covers, by its title. Effects of every step, and further effects of an
     /// action, may stand in several places: they are joined into one text.
     texts: BTreeMap<&'a str, String>,
+    /// The rows by their labels. If several have one label, the first counts.
+    rows: BTreeMap<&'a str, &'a Row>,
 }
 
 impl<'a> Side<'a> {
@@ -108,7 +79,13 @@ impl<'a> Side<'a> {
             known.push_str(text);
             known.push('\n');
         }
-        Side { space, texts }
+        let rows = space.rows.iter().rev().map(|row| (row.label.as_str(), row)).collect();
+        Side { space, texts, rows }
+    }
+
+    /// The row that has the label of a row of the other space.
+    fn row(&self, other: &Row) -> Option<&'a Row> {
+        self.rows.get(other.label.as_str()).copied()
     }
 
     /// The index of the rule with this title.
@@ -119,7 +96,7 @@ impl<'a> Side<'a> {
 }
 
 /// Differences between declarations: rules are compared by what they forbid where that is known, all others by their text.
-fn declarations(old: &Side<'_>, new: &Side<'_>, pairs: &Pairs<'_>) -> Vec<Difference> {
+fn declarations(old: &Side<'_>, new: &Side<'_>) -> Vec<Difference> {
     let mut found = Vec::new();
     for (&title, text) in &old.texts {
         let Some(other) = new.texts.get(title) else {
@@ -128,8 +105,7 @@ fn declarations(old: &Side<'_>, new: &Side<'_>, pairs: &Pairs<'_>) -> Vec<Differ
         };
         match (old.rule(title), new.rule(title)) {
             (Some(rule), Some(same)) => {
-                let texts = (text.as_str(), other.as_str());
-                found.extend(of_rule((old.space, rule), (new.space, same), title, texts, pairs));
+                found.extend(of_rule(old, new, [rule, same], title, (text, other)));
             }
             _ if text != other => found.push(difference(Change::Changed, title, changed_lines(text, other))),
             _ => {}
@@ -175,14 +151,14 @@ fn changed_lines(old: &str, new: &str) -> String {
 /// Changes of a rule that both spaces have: whether it is optional, and what it forbids. Another text is always told. A rule
 /// with the same text may forbid something else because of a function or a constant.
 fn of_rule(
-    old: (&Space, usize),
-    new: (&Space, usize),
+    old: &Side<'_>,
+    new: &Side<'_>,
+    [rule, same]: [usize; 2],
     title: &str,
     (before, after): (&str, &str),
-    pairs: &Pairs<'_>,
 ) -> Vec<Difference> {
     let mut found = Vec::new();
-    let (was_optional, is_optional) = (old.0.rules[old.1].optional, new.0.rules[new.1].optional);
+    let (was_optional, is_optional) = (old.space.rules[rule].optional, new.space.rules[same].optional);
     if was_optional != is_optional {
         let (change, detail) = match is_optional {
             true => (Change::Loosened, "it is optional now"),
@@ -193,7 +169,7 @@ fn of_rule(
     let mandatory = |text: &str| text.strip_prefix("optional ").unwrap_or(text).to_owned();
     let (before, after) = (mandatory(before), mandatory(after));
     let written = (before != after).then(|| changed_lines(&before, &after));
-    match (compared(old, new, pairs), written) {
+    match (compared(old, new, [rule, same]), written) {
         (Some((change, detail)), None) => found.push(difference(change, title, detail)),
         (Some((change, detail)), Some(written)) => {
             found.push(difference(change, title, format!("{detail}; {written}")));
@@ -205,18 +181,18 @@ fn of_rule(
 }
 
 /// Whether a rule forbids more or less than before, by its moves or by what it leaves of each range.
-fn compared(old: (&Space, usize), new: (&Space, usize), pairs: &Pairs<'_>) -> Option<(Change, String)> {
+fn compared(old: &Side<'_>, new: &Side<'_>, [rule, same]: [usize; 2]) -> Option<(Change, String)> {
     let mut turns = Turns::default();
     if let (
         RuleBody::Moves { state, allowed: before, .. },
         RuleBody::Moves { state: other, allowed: after, .. },
-    ) = (&old.0.rules[old.1].body, &new.0.rules[new.1].body)
+    ) = (&old.space.rules[rule].body, &new.space.rules[same].body)
     {
         let variants = |space: &Space, state: usize| match space.states[state].ty {
             Type::Enum(of) => space.enums[of.0].variants.clone(),
             Type::Bool | Type::Int | Type::Quantity(_) => Vec::new(),
         };
-        let (names, others) = (variants(old.0, *state), variants(new.0, *other));
+        let (names, others) = (variants(old.space, *state), variants(new.space, *other));
         for (from, from_name) in names.iter().enumerate() {
             for (to, to_name) in names.iter().enumerate() {
                 let find = |name: &String| others.iter().position(|other| other == name);
@@ -231,20 +207,20 @@ fn compared(old: (&Space, usize), new: (&Space, usize), pairs: &Pairs<'_>) -> Op
         }
     } else {
         let binds = |row: &Row, rule: usize| row.rules.binary_search(&rule).is_ok();
-        for row in old.0.rows.iter().filter(|row| binds(row, old.1)) {
-            let Some(other) = pairs.now(row) else { continue };
-            let unbound = !binds(other, new.1);
-            if unbound {
+        for row in old.space.rows.iter().filter(|row| binds(row, rule)) {
+            let Some(other) = new.row(row) else { continue };
+            if !binds(other, same) {
                 turns.looser.push(format!("binds `{}` no longer", row.label));
                 continue;
             }
-            for (road, same) in shared_roads(old.0, new.0) {
-                let (before, after) = (left(old, row, road), left(new, other, same));
-                turns.judge(&before, &after, &road.name);
+            for (was, is) in shared_roads(old.space, new.space) {
+                let (was, is) = (&old.space.roads[was], &new.space.roads[is]);
+                let (before, after) = (left(old.space, rule, row, was), left(new.space, same, other, is));
+                turns.judge(&before, &after, &was.name);
             }
         }
-        for row in new.0.rows.iter().filter(|row| binds(row, new.1)) {
-            if pairs.before(row).is_some_and(|known| !binds(known, old.1)) {
+        for row in new.space.rows.iter().filter(|row| binds(row, same)) {
+            if old.row(row).is_some_and(|known| !binds(known, rule)) {
                 turns.tighter.push(format!("binds `{}`", row.label));
             }
         }
@@ -256,7 +232,7 @@ fn compared(old: (&Space, usize), new: (&Space, usize), pairs: &Pairs<'_>) -> Op
 type Ranges = Vec<(String, Interval)>;
 
 /// What one rule alone leaves of each range of a row; `None` if it leaves nothing.
-fn left((space, rule): (&Space, usize), row: &Row, road: &Road) -> Option<Ranges> {
+fn left(space: &Space, rule: usize, row: &Row, road: &Road) -> Option<Ranges> {
     let alone = RulesInForce::only(space, rule);
     let settled = RowRules { space, row, road: Some(&road.facts), in_force: &alone }.settle()?;
     let drawn = space.actions[row.action].parameters.iter().zip(settled).filter(|(p, _)| !p.axis);
@@ -317,23 +293,24 @@ impl Turns {
     }
 }
 
-fn shared_roads<'a>(old: &'a Space, new: &'a Space) -> Vec<(&'a Road, &'a Road)> {
-    let same = |road: &'a Road| Some((road, new.roads.iter().find(|other| other.name == road.name)?));
-    old.roads.iter().filter_map(same).collect()
+/// The roads that both spaces have: the index in the old one, and in the new one.
+fn shared_roads(old: &Space, new: &Space) -> Vec<(usize, usize)> {
+    let now = |road: &Road| new.roads.iter().position(|other| other.name == road.name);
+    old.roads.iter().enumerate().filter_map(|(index, road)| Some((index, now(road)?))).collect()
 }
 
-fn rows(old: &Space, new: &Space, pairs: &Pairs<'_>) -> Vec<Difference> {
+fn rows(old: &Side<'_>, new: &Side<'_>) -> Vec<Difference> {
     let subject = |row: &Row| format!("row `{}`", row.label);
     let mut found = Vec::new();
     let mut moved = 0;
-    for row in &old.rows {
-        match pairs.now(row) {
+    for row in &old.space.rows {
+        match new.row(row) {
             None => found.push(difference(Change::Removed, subject(row), format!("it was {}", row.index))),
             Some(now) if now.index != row.index => moved += 1,
             Some(_) => {}
         }
     }
-    let added = new.rows.iter().filter(|row| pairs.before(row).is_none());
+    let added = new.space.rows.iter().filter(|row| old.row(row).is_none());
     found.extend(added.map(|row| difference(Change::Added, subject(row), format!("it is {}", row.index))));
     if moved > 0 {
         let detail = "a policy learned on the old table does not fit the new one";
@@ -343,27 +320,24 @@ fn rows(old: &Space, new: &Space, pairs: &Pairs<'_>) -> Vec<Difference> {
 }
 
 /// Differences in what all rules together leave of the ranges.
-fn reaches(old: &Space, new: &Space, pairs: &Pairs<'_>) -> Vec<Difference> {
+fn reaches(old: &Side<'_>, new: &Side<'_>) -> Vec<Difference> {
     let mut found: Vec<Difference> = Vec::new();
     let mut told: BTreeSet<(Change, usize, String)> = BTreeSet::new();
-    let shared: Vec<(usize, usize, &Road)> = old
-        .roads
-        .iter()
-        .enumerate()
-        .filter_map(|(index, road)| {
-            Some((index, new.roads.iter().position(|known| known.name == road.name)?, road))
-        })
-        .collect();
-    for row in &old.rows {
-        let Some(other) = pairs.now(row) else { continue };
-        for &(index, same, road) in &shared {
-            let action = &old.actions[row.action].name;
+    let shared = shared_roads(old.space, new.space);
+    for row in &old.space.rows {
+        let Some(other) = new.row(row) else { continue };
+        for &(index, same) in &shared {
+            let action = &old.space.actions[row.action].name;
             let mut turns = Turns::default();
             let ranges = |reach: &Reach| match reach {
                 Reach::Open(ranges) => Some(ranges.iter().map(|(name, i)| (name.to_string(), *i)).collect()),
                 Reach::Dead { .. } => None,
             };
-            turns.judge(&ranges(&row.roads[index]), &ranges(&other.roads[same]), &road.name);
+            turns.judge(
+                &ranges(&row.roads[index]),
+                &ranges(&other.roads[same]),
+                &old.space.roads[index].name,
+            );
             let Some((change, detail)) = turns.in_words() else { continue };
             if told.insert((change, row.action, detail.clone())) {
                 found.push(difference(change, format!("draws of `{action}`"), detail));

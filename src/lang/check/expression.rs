@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use crate::check::checker::Checker;
 use crate::check::declaration::HEIGHT_MAX;
 use crate::check::names::unknown;
+use crate::check::operator::Sides;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind};
@@ -29,7 +30,6 @@ impl Place<'_> {
     /// The condition of a rule.
     pub const RULE: Place<'static> = Place { locals: &[], owner: None, states: true, site: Site::Rule };
 
-    /// The fact of that name, if it is known here.
     fn fact(&self, name: &str) -> Option<Fact> {
         Fact::from_name(name).filter(|fact| self.site.knows(fact.known()))
     }
@@ -122,7 +122,7 @@ impl Checker {
                 }
             }
             ast::ExprKind::Binary { op, op_span, left, right } => {
-                self.binary(*op, *op_span, left, right, place, span)
+                self.binary(*op, *op_span, Sides { left, right, span }, place)
             }
             ast::ExprKind::Field { base, field } => self.part(base, field, place, span),
             ast::ExprKind::Index { base, index } => self.index(base, index, place, span),
@@ -249,22 +249,14 @@ impl Checker {
         hint: Option<Type>,
     ) -> Option<Expr> {
         let owners = self.references.owners(name).to_vec();
-        let wanted = match hint {
-            Some(Type::Enum(of)) => Some(of.0),
-            _ => None,
-        };
+        let wanted = enum_of(hint);
         let of = match (wanted, owners.as_slice()) {
             (Some(of), owners) if owners.contains(&of) => of,
             (_, [of]) => *of,
             (_, []) => {
                 self.note_broken(name, span, place);
-                let error = match self.lacking(name, place) {
-                    Some(note) => {
-                        let message = format!("`{name}` cannot be used here");
-                        Diagnostic::error(code::NOT_HERE, message).at(span, "not in this place").note(note)
-                    }
-                    None => self.unknown_name(name, span, place, wanted),
-                };
+                let error = self.not_here(name, span, place);
+                let error = error.unwrap_or_else(|| self.unknown_name(name, span, place, wanted));
                 return self.reject(error);
             }
             (_, owners) => {
@@ -274,14 +266,11 @@ impl Checker {
                     0 => String::new(),
                     others => format!(" and of {others} other enums"),
                 };
-                let error = Diagnostic::error(
-                    code::AMBIGUOUS,
-                    format!("`{name}` is a variant of {}{others}", listed(&enums)),
-                );
-                let error = error.at(span, "which one is meant does not follow from here");
-                return self.reject(
-                    error.help("compare it with what has the wanted type, or rename one of the two"),
-                );
+                let message = format!("`{name}` is a variant of {}{others}", listed(&enums));
+                let error = Diagnostic::error(code::AMBIGUOUS, message)
+                    .at(span, "which one is meant does not follow from here")
+                    .help("compare it with what has the wanted type, or rename one of the two");
+                return self.reject(error);
             }
         };
         let index = self.enums[of].variants.iter().position(|variant| variant == name)?;
@@ -312,6 +301,13 @@ impl Checker {
         let others = [Symbol::Constant, Symbol::State].map(|symbol| symbol(name.to_owned()));
         parameter.into_iter().chain(others).for_each(|symbol| self.references.uses(span, symbol));
         self.references.word_named::<Fact>(span, name);
+    }
+
+    /// The diagnostic for a name that exists and cannot be used here; `None` if there is no such name.
+    fn not_here(&self, name: &str, span: Span, place: &Place<'_>) -> Option<Diagnostic> {
+        let reason = self.lacking(name, place)?;
+        let error = Diagnostic::error(code::NOT_HERE, format!("`{name}` cannot be used here"));
+        Some(error.at(span, "not in this place").note(reason))
     }
 
     /// Why a name that exists cannot be used here; `None` if there is no such name.
@@ -431,15 +427,10 @@ impl Checker {
             let maps =
                 || self.states.iter().filter(|state| state.key.is_some()).map(|state| state.name.as_str());
             let error = match &base.kind {
-                ast::ExprKind::Name(name) => match self.lacking(name, place) {
-                    Some(note) => {
-                        let message = format!("`{name}` cannot be used here");
-                        Diagnostic::error(code::NOT_HERE, message)
-                            .at(base.span, "not in this place")
-                            .note(note)
-                    }
-                    None => self.unknown("map", name, base.span, maps()),
-                },
+                ast::ExprKind::Name(name) => {
+                    let error = self.not_here(name, base.span, place);
+                    error.unwrap_or_else(|| self.unknown("map", name, base.span, maps()))
+                }
                 _ => Diagnostic::error(code::TYPE_MISMATCH, "only a state can have a key")
                     .at(base.span, "not a state"),
             };
@@ -493,9 +484,8 @@ impl Checker {
                 if parameters.len() == 1 { "" } else { "s" },
                 call.args.len()
             );
-            return self.reject(
-                Diagnostic::error(code::ARGUMENTS, message).at(call.span, "").beside(header, "declared here"),
-            );
+            let error = Diagnostic::error(code::ARGUMENTS, message).at(call.span, "");
+            return self.reject(error.beside(header, "declared here"));
         }
         let mut arguments: Vec<Option<Expr>> = vec![None; parameters.len()];
         for (position, argument) in call.args.iter().enumerate() {
@@ -530,10 +520,7 @@ impl Checker {
         span: Span,
     ) -> Option<Expr> {
         let subject = self.expr(subject, place, None);
-        let of = match subject.as_ref().map(|subject| subject.ty) {
-            Some(Type::Enum(of)) => Some(of.0),
-            _ => None,
-        };
+        let of = enum_of(subject.as_ref().map(|subject| subject.ty));
         arms.iter().flat_map(|arm| &arm.patterns).for_each(|pattern| self.references.variant(pattern, of));
         if subject.as_ref().is_none_or(|subject| matches!(subject.ty, Type::Quantity(_))) {
             arms.iter().for_each(|arm| self.look_at(&arm.value, place, hint));
@@ -554,13 +541,7 @@ impl Checker {
         let mut ty = hint;
         for (index, arm) in arms.iter().enumerate() {
             self.cover(arm, index, &variants, &mut arm_of);
-            let body = self.expr(&arm.value, place, ty);
-            let body = match (body, ty) {
-                (Some(body), Some(ty)) if index > 0 || hint.is_some() => self.fit(body, ty),
-                (body, _) => body,
-            };
-            ty = ty.or(body.as_ref().map(|body| body.ty));
-            bodies.push(body);
+            bodies.push(self.arm_value(&arm.value, place, &mut ty));
         }
         let missing: Vec<&str> = (0..variants.len())
             .filter(|variant| arm_of[*variant].is_none())
@@ -611,14 +592,7 @@ impl Checker {
                 let error = Diagnostic::error(code::NEVER_REACHED, "this arm is never reached");
                 self.report(error.at(arm.span, "earlier arms take everything it names").help("remove it"));
             }
-            let body = self.expr(&arm.value, place, ty);
-            let body = match (body, ty) {
-                (Some(body), Some(ty)) => self.fit(body, ty),
-                (body, None) => body,
-                (None, Some(_)) => None,
-            };
-            ty = ty.or(body.as_ref().map(|body| body.ty));
-            let Some(body) = body else {
+            let Some(body) = self.arm_value(&arm.value, place, &mut ty) else {
                 sound = false;
                 continue;
             };
@@ -657,6 +631,13 @@ impl Checker {
             return self.reject(too_large());
         }
         Some(chain)
+    }
+
+    /// The value of an arm, of type `ty` if that is known already; else it gives the type of the arms after it.
+    fn arm_value(&mut self, value: &ast::Expr, place: &Place<'_>, ty: &mut Option<Type>) -> Option<Expr> {
+        let found = self.expr(value, place, *ty)?;
+        let wanted = *ty.get_or_insert(found.ty);
+        self.fit(found, wanted)
     }
 
     /// Notes which variants an arm takes, and reports the arm if it takes none.
@@ -751,6 +732,14 @@ pub(super) fn is_beyond_states(number: Rational) -> bool {
     let is_within =
         |number: Option<Rational>| number.is_some_and(|number| Rational::from_f64(STATE_MAX) >= Some(number));
     !(is_within(Some(number)) && is_within(number.checked_neg()))
+}
+
+/// The index of a type's enum.
+pub(super) fn enum_of(ty: Option<Type>) -> Option<usize> {
+    match ty {
+        Some(Type::Enum(of)) => Some(of.0),
+        _ => None,
+    }
 }
 
 pub(super) fn is_number(ty: Type) -> bool {

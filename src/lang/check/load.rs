@@ -112,13 +112,12 @@ pub fn load_with(root: &Path, read: &ReadFile<'_>, cache: &mut MapCache) -> Resu
     // A file that does not parse lacks declarations, and their uses would be reported as unknown. So it is
     // checked for the names alone, and the checker's diagnostics are dropped.
     let is_whole = !diagnostics.iter().any(Diagnostic::is_error);
-    let folders = files.iter().map(|file| folder(&file.path)).collect();
-    let mut maps = MapReader { read, folders, texts: BTreeMap::new(), cache };
+    let mut maps = MapReader { read, files: &files, texts: BTreeMap::new(), cache };
     if is_whole {
-        maps.parse(&files);
-        diagnostics.extend(check_digests(&files, &mut maps));
+        maps.parse();
+        diagnostics.extend(check_digests(&mut maps));
     }
-    let checked = check_space(&files, &order, &mut maps, is_whole);
+    let checked = check_space(&order, &mut maps, is_whole);
     let Checked { space, runs, diagnostics: found, mut references } = checked;
     files.iter().for_each(|file| scenario_names::note(&file.tree, &mut references));
     references.settle(&sources);
@@ -185,7 +184,8 @@ pub fn files_used(root: &Path, read: &ReadFile<'_>) -> Vec<PathBuf> {
     files.into_iter().map(|file| file.path).collect()
 }
 
-fn check_space(files: &[LoadedFile], order: &[usize], maps: &mut MapReader<'_>, is_whole: bool) -> Checked {
+fn check_space(order: &[usize], maps: &mut MapReader<'_>, is_whole: bool) -> Checked {
+    let files = maps.files;
     let declares = |file: &LoadedFile| {
         let declares = |item: &ast::Item| match &item.kind {
             ItemKind::Language(_) | ItemKind::Scenario(_) | ItemKind::Policy(_) => false,
@@ -203,7 +203,7 @@ fn check_space(files: &[LoadedFile], order: &[usize], maps: &mut MapReader<'_>, 
         file: FileId(u32::try_from(index).expect("a file's id is its position")),
         path: root.path.clone(),
         // Without a meaning a map could not be read; then there is no space either.
-        meaning: is_whole.then(|| maps.meaning(files, &root.path)).flatten().unwrap_or_default(),
+        meaning: is_whole.then(|| maps.meaning(&root.path)).flatten().unwrap_or_default(),
         docs: root.tree.docs.iter().map(|doc| doc.text.clone()).collect(),
     };
     let (standing, mut diagnostics) = overriding::resolve(files, order);
@@ -216,13 +216,13 @@ fn check_space(files: &[LoadedFile], order: &[usize], maps: &mut MapReader<'_>, 
 }
 
 /// Compares every `use … digest` with what was read.
-fn check_digests(files: &[LoadedFile], maps: &mut MapReader<'_>) -> Vec<Diagnostic> {
+fn check_digests(maps: &mut MapReader<'_>) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
-    for file in files {
+    for file in maps.files {
         for used in uses(file) {
             let Some(wanted) = &used.digest else { continue };
             // What cannot be read is reported where it is named.
-            let Some(found) = maps.meaning(files, &used_path(file, used)) else { continue };
+            let Some(found) = maps.meaning(&used_path(file, used)) else { continue };
             if found.is_sealed_by(&wanted.value) {
                 continue;
             }
@@ -330,13 +330,11 @@ impl<'a> Loader<'a> {
 
 struct MapReader<'a> {
     read: &'a ReadFile<'a>,
-    /// Folder of each file, by [`FileId`].
-    folders: Vec<PathBuf>,
+    files: &'a [LoadedFile],
     texts: BTreeMap<PathBuf, Result<MapText, ReadError>>,
     cache: &'a mut MapCache,
 }
 
-/// The text of a map, and its digest.
 struct MapText {
     text: String,
     digest: String,
@@ -356,11 +354,9 @@ impl MapReader<'_> {
     }
 
     /// Parses the maps that the files name and that are not known yet, some at a time: they take longer than all the rest.
-    fn parse(&mut self, files: &[LoadedFile]) {
-        let mut paths: Vec<PathBuf> = files
-            .iter()
-            .flat_map(|file| maps_named(file).map(|(written, _)| path_from(file, written)))
-            .collect();
+    fn parse(&mut self) {
+        let of_file = |file| maps_named(file).map(move |(written, _)| path_from(file, written));
+        let mut paths: Vec<PathBuf> = self.files.iter().flat_map(of_file).collect();
         paths.sort_unstable();
         paths.dedup();
         for path in &paths {
@@ -389,16 +385,15 @@ impl MapReader<'_> {
     }
 
     /// What a file means with all that it uses, as far as all could be read.
-    fn meaning(&mut self, files: &[LoadedFile], path: &Path) -> Option<Meaning> {
-        meaning(files, path, &mut |map| self.text(map).as_ref().ok().map(|map| map.digest.clone()))
+    fn meaning(&mut self, path: &Path) -> Option<Meaning> {
+        meaning(self.files, path, &mut |map| self.text(map).as_ref().ok().map(|map| map.digest.clone()))
     }
 }
 
 impl Maps for MapReader<'_> {
     fn map(&mut self, name: &ast::Text) -> Result<(PathBuf, Arc<RoadMap>), String> {
         let FileId(file) = name.span.file;
-        let folder = self.folders.get(file as usize).cloned().unwrap_or_default();
-        let path = normal(&folder.join(&name.value));
+        let path = path_from(&self.files[file as usize], &name.value);
         let read = self.read;
         let found = self.texts.entry(path.clone()).or_insert_with(|| MapText::read(&path, read));
         let map = found.as_ref().map_err(ToString::to_string)?;

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::check::load::Loaded;
 use crate::model::code;
 use crate::syntax::ast::{File, FileId, ItemKind, Span};
-use crate::syntax::{Diagnostic, parse};
+use crate::syntax::{Fix, parse};
 
 /// Adds to the diagnostic of an unknown name which nearby file declares it, and a fix that uses that file.
 ///
@@ -29,18 +29,12 @@ pub fn suggest_uses(loaded: &mut Loaded, nearby: &[(String, String)]) {
         let meant = meant_by(&diagnostic.message);
         let declaring = trees.iter().find(|(path, tree)| !is_root(path) && declares_as(tree, &name, meant));
         if let Some((path, _)) = declaring {
-            suggest(diagnostic, &name, path, place);
+            let title = format!("add `use \"{path}\"`");
+            // A declaration with exactly this name is likelier to be meant than a similar name.
+            diagnostic.help = Some(format!("`{name}` is declared in `{path}`: {title}"));
+            diagnostic.fixes = vec![Fix { title, span: place, text: format!("\nuse \"{path}\"") }];
         }
     }
-}
-
-fn suggest(diagnostic: &mut Diagnostic, name: &str, path: &str, place: Span) {
-    let title = format!("add `use \"{path}\"`");
-    // A declaration with exactly this name is likelier to be meant than a similar name.
-    diagnostic.help = Some(format!("`{name}` is declared in `{path}`: {title}"));
-    diagnostic.fixes.clear();
-    let with_fix = diagnostic.clone().fix(title, place, format!("\nuse \"{path}\""));
-    *diagnostic = with_fix;
 }
 
 /// The place after the last `use`, or after `language`.

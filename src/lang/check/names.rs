@@ -16,25 +16,21 @@ pub(super) struct Names {
 }
 
 impl Names {
-    /// Records a declaration.
+    /// Records a declaration, with the next index.
     ///
     /// # Errors
     /// If the name is taken.
-    pub fn declare(&mut self, kind: &str, name: &Name, index: usize) -> Result<(), Diagnostic> {
+    pub fn declare(&mut self, kind: &str, name: &Name) -> Result<(), Diagnostic> {
         if let Some((_, first)) = self.found.get(&name.text) {
             let help = match first.file == name.span.file {
                 true => "rename or remove one of them",
                 false => "rename one of them, or write `override` before the later one to replace the other",
             };
-            return Err(Diagnostic::error(
-                code::DUPLICATE,
-                format!("the {kind} `{}` is declared twice", name.text),
-            )
-            .at(name.span, "again here")
-            .beside(*first, "first here")
-            .help(help));
+            let message = format!("the {kind} `{}` is declared twice", name.text);
+            let error = Diagnostic::error(code::DUPLICATE, message).at(name.span, "again here");
+            return Err(error.beside(*first, "first here").help(help));
         }
-        self.found.insert(name.text.clone(), (index, name.span));
+        self.found.insert(name.text.clone(), (self.by_index.len(), name.span));
         self.by_index.push(name.text.clone());
         Ok(())
     }

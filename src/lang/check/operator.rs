@@ -13,24 +13,31 @@ use crate::syntax::ast::{BinaryOp, Span};
 use crate::syntax::{Diagnostic, ast, one_of};
 use avastra_base::units::Rational;
 
+/// Two expressions with an operator between them.
+#[derive(Clone, Copy)]
+pub(super) struct Sides<'a> {
+    pub left: &'a ast::Expr,
+    pub right: &'a ast::Expr,
+    /// That of the whole.
+    pub span: Span,
+}
+
 impl Checker {
-    /// Two sides and what joins them.
     pub(super) fn binary(
         &mut self,
         op: BinaryOp,
         op_span: Span,
-        left: &ast::Expr,
-        right: &ast::Expr,
+        sides: Sides<'_>,
         place: &Place<'_>,
-        span: Span,
     ) -> Option<Expr> {
+        let Sides { left, right, span } = sides;
         let logic: fn(Box<Expr>, Box<Expr>) -> ExprKind = match op {
             BinaryOp::Implies => ExprKind::Implies,
             BinaryOp::Or => ExprKind::Or,
             BinaryOp::And => ExprKind::And,
-            BinaryOp::In => return self.membership(left, right, place, span),
-            BinaryOp::Compare(op) => return self.comparison(op, left, right, place, span),
-            BinaryOp::Arithmetic(op) => return self.arithmetic(op, op_span, left, right, place, span),
+            BinaryOp::In => return self.membership(sides, place),
+            BinaryOp::Compare(op) => return self.comparison(op, sides, place),
+            BinaryOp::Arithmetic(op) => return self.arithmetic(op, op_span, sides, place),
         };
         // Both sides are looked at, so that mistakes in both are reported.
         let left = self.typed(left, place, Type::Bool);
@@ -38,18 +45,9 @@ impl Checker {
         Some(Expr { kind: logic(Box::new(left?), Box::new(right?)), ty: Type::Bool, span })
     }
 
-    fn arithmetic(
-        &mut self,
-        op: Arithmetic,
-        op_span: Span,
-        left: &ast::Expr,
-        right: &ast::Expr,
-        place: &Place<'_>,
-        span: Span,
-    ) -> Option<Expr> {
-        let left = self.numeric(left, place);
-        let right = self.numeric(right, place);
-        let (left, right) = (left?, right?);
+    fn arithmetic(&mut self, op: Arithmetic, at: Span, of: Sides<'_>, place: &Place<'_>) -> Option<Expr> {
+        let (left, right) = (self.numeric(of.left, place), self.numeric(of.right, place));
+        let (left, right, span) = (left?, right?, of.span);
         let (a, b) = (dimension(left.ty), dimension(right.ty));
         if op == Arithmetic::Divide && right.kind == ExprKind::Number(Rational::ZERO) {
             let error = Diagnostic::error(code::NUMBER, "a division by 0 has no value");
@@ -60,22 +58,20 @@ impl Checker {
             Arithmetic::Add | Arithmetic::Subtract if a == b => Some(a),
             Arithmetic::Add | Arithmetic::Subtract => {
                 let verb = if op == Arithmetic::Add { "added" } else { "subtracted" };
-                self.mismatch(&format!("cannot be {verb}"), op_span, &left, &right);
+                self.mismatch(&format!("cannot be {verb}"), at, &left, &right);
                 return None;
             }
             Arithmetic::Multiply => a.times(b),
             Arithmetic::Divide => a.per(b),
         };
         let Some(result) = result else {
-            return self.reject(
-                Diagnostic::error(code::UNIT_MISMATCH, "the dimension is out of range").at(span, ""),
-            );
+            let error = Diagnostic::error(code::UNIT_MISMATCH, "the dimension is out of range");
+            return self.reject(error.at(span, ""));
         };
         let ty = if both_whole && op != Arithmetic::Divide { Type::Int } else { Type::Quantity(result) };
         Some(Expr { kind: ExprKind::Arithmetic(op, Box::new(left), Box::new(right)), ty, span })
     }
 
-    /// Reports that the two sides have different dimensions or types.
     fn mismatch(&mut self, what: &str, at: Span, left: &Expr, right: &Expr) {
         let (a, b) = (self.references.type_name(left.ty), self.references.type_name(right.ty));
         let code =
@@ -84,16 +80,11 @@ impl Checker {
         self.report(error.beside(left.span, article(&a)).beside(right.span, article(&b)));
     }
 
-    fn comparison(
-        &mut self,
-        op: Comparison,
-        left: &ast::Expr,
-        right: &ast::Expr,
-        place: &Place<'_>,
-        span: Span,
-    ) -> Option<Expr> {
-        let is_road = [self.names_road(left, place), self.names_road(right, place)];
-        if let Some(road) = beside_word(left, right, is_road) {
+    fn comparison(&mut self, op: Comparison, sides: Sides<'_>, place: &Place<'_>) -> Option<Expr> {
+        let Sides { left, right, span } = sides;
+        let beside_road = self.names_road(left, place).then_some(right);
+        let beside_road = beside_road.or_else(|| self.names_road(right, place).then_some(left));
+        if let Some(road) = beside_road {
             if op.orders() {
                 self.note_roads(core::slice::from_ref(road));
                 let help = "write `road == corner`, or `road in [corner, boulevard]`";
@@ -153,13 +144,7 @@ impl Checker {
         Some((left?, right?))
     }
 
-    fn membership(
-        &mut self,
-        left: &ast::Expr,
-        right: &ast::Expr,
-        place: &Place<'_>,
-        span: Span,
-    ) -> Option<Expr> {
+    fn membership(&mut self, Sides { left, right, span }: Sides<'_>, place: &Place<'_>) -> Option<Expr> {
         if let ast::ExprKind::List(items) = &right.kind
             && items.is_empty()
         {
@@ -184,10 +169,8 @@ impl Checker {
                 let low = self.typed(low, place, ty);
                 let high = self.typed(high, place, ty);
                 if !is_number(ty) {
-                    return self.reject(
-                        Diagnostic::error(code::TYPE_MISMATCH, "a range holds numbers")
-                            .at(value.span, "not a number"),
-                    );
+                    let error = Diagnostic::error(code::TYPE_MISMATCH, "a range holds numbers");
+                    return self.reject(error.at(value.span, "not a number"));
                 }
                 ExprKind::InRange(value, Box::new(low?), Box::new(high?))
             }
@@ -321,9 +304,9 @@ impl Checker {
         }
     }
 
-    /// Whether the expression is the word `road`.
+    /// Whether the expression is the word `road`, and no parameter, constant or state of that name hides it.
     fn names_road(&self, expr: &ast::Expr, place: &Place<'_>) -> bool {
-        self.names(expr, "road", place)
+        matches!(&expr.kind, ast::ExprKind::Name(name) if name == "road") && self.is_bare_variant(expr, place)
     }
 
     /// The fact that is compared with words, if the expression names one, which is then noted.
@@ -342,20 +325,6 @@ impl Checker {
             }
             _ => None,
         }
-    }
-
-    /// Whether the expression is a word, and no parameter, constant or state of that name hides it.
-    fn names(&self, expr: &ast::Expr, word: &str, place: &Place<'_>) -> bool {
-        matches!(&expr.kind, ast::ExprKind::Name(name) if name == word) && self.is_bare_variant(expr, place)
-    }
-}
-
-/// If one side is a word of the language, the other side.
-fn beside_word<'a>(left: &'a ast::Expr, right: &'a ast::Expr, is_word: [bool; 2]) -> Option<&'a ast::Expr> {
-    match is_word {
-        [true, _] => Some(right),
-        [_, true] => Some(left),
-        [false, false] => None,
     }
 }
 

@@ -13,7 +13,7 @@ use crate::check::names::unknown;
 use crate::check::unused::names_of_expr;
 use crate::model::code;
 use crate::model::vocabulary::{Fact, Known, Word};
-use crate::syntax::ast::{EffectKind, Item, ItemKind, Name, RuleBody, Span, Use};
+use crate::syntax::ast::{Also, EffectKind, Group, Item, ItemKind, Name, Rule, RuleBody, Span, Use};
 use crate::syntax::{Diagnostic, nearest};
 
 /// A declaration that stands, and the index of its file.
@@ -37,7 +37,7 @@ pub(super) fn resolve<'a>(files: &'a [LoadedFile], order: &[usize]) -> (Vec<Cow<
                         let item = Item { docs: item.docs.clone(), kind: (**kind).clone(), span: item.span };
                         standing[place] = Standing { file, item: Cow::Owned(item) };
                     }
-                    Err(error) => diagnostics.push(*error),
+                    Err(error) => diagnostics.push(error),
                 },
                 _ => standing.push(Standing { file, item: Cow::Borrowed(item) }),
             }
@@ -156,24 +156,9 @@ fn keeps_something(
     has_lost: &dyn Fn(&BTreeSet<&str>) -> bool,
 ) -> bool {
     let gone = |name: &Name| left.contains(&name.text);
-    match &item.kind {
-        ItemKind::Group(group) if group.members.iter().any(gone) => {
-            let mut kept = group.clone();
-            kept.members.retain(|member| !gone(member));
-            let is_kept = !kept.members.is_empty();
-            if !is_kept {
-                left.insert(kept.name.text.clone());
-            }
-            item.to_mut().kind = ItemKind::Group(kept);
-            is_kept
-        }
-        ItemKind::Also(also) if also.on.iter().any(gone) => {
-            let mut kept = also.clone();
-            kept.on.retain(|target| !gone(target));
-            let is_kept = !kept.on.is_empty();
-            item.to_mut().kind = ItemKind::Also(kept);
-            is_kept
-        }
+    let names = match &item.kind {
+        ItemKind::Group(group) => &group.members,
+        ItemKind::Also(also) => &also.on,
         ItemKind::Rule(rule) => match &rule.body {
             RuleBody::Holds { on, during, condition } if on.is_empty() => {
                 let mut named = BTreeSet::new();
@@ -182,21 +167,28 @@ fn keeps_something(
                     // It binds what spawns, as a rule about the gap does.
                     Some(_) => drop(named.insert(Fact::SpawnGap.name())),
                 }
-                !has_lost(&named)
+                return !has_lost(&named);
             }
-            RuleBody::Holds { on, .. } if on.iter().any(gone) => {
-                let mut kept = rule.clone();
-                let RuleBody::Holds { on, .. } = &mut kept.body else { return true };
-                on.retain(|target| !gone(target));
-                let is_kept = !on.is_empty();
-                item.to_mut().kind = ItemKind::Rule(kept);
-                is_kept
-            }
-            RuleBody::Holds { .. } => true,
-            RuleBody::Moves { state, .. } => !has_lost(&BTreeSet::from([state.text.as_str()])),
+            RuleBody::Holds { on, .. } => on,
+            RuleBody::Moves { state, .. } => return !has_lost(&BTreeSet::from([state.text.as_str()])),
         },
-        _ => true,
+        _ => return true,
+    };
+    let kept: Vec<Name> = names.iter().filter(|name| !gone(name)).cloned().collect();
+    if kept.len() == names.len() {
+        return true;
     }
+    let is_kept = !kept.is_empty();
+    if let (ItemKind::Group(group), false) = (&item.kind, is_kept) {
+        left.insert(group.name.text.clone());
+    }
+    if let ItemKind::Group(Group { members: names, .. })
+    | ItemKind::Also(Also { on: names, .. })
+    | ItemKind::Rule(Rule { body: RuleBody::Holds { on: names, .. }, .. }) = &mut item.to_mut().kind
+    {
+        *names = kept;
+    }
+    is_kept
 }
 
 /// What decides which actions a rule without `on` binds: the states that steps set, and the gaps if an action spawns.
@@ -224,7 +216,7 @@ fn find(
     file: usize,
     item: &Item,
     kind: &ItemKind,
-) -> Result<usize, Box<Diagnostic>> {
+) -> Result<usize, Diagnostic> {
     let name = |kind: &ItemKind| kind.name().map(|name| name.text.clone());
     let same_kind = |other: &ItemKind| core::mem::discriminant(other) == core::mem::discriminant(kind);
     let wanted = name(kind);
@@ -244,32 +236,27 @@ fn find(
             let is = other.item.kind.keyword();
             let note = format!("this is of another kind: `{is}`");
             let help = format!("write `override {is} {}`", wanted.as_deref().unwrap_or_default());
-            return Err(Box::new(error.beside(other.item.span, note).help(help)));
+            return Err(error.beside(other.item.span, note).help(help));
         }
         let alike = standing.iter().filter(|standing| same_kind(&standing.item.kind));
         let names: Vec<String> = alike.filter_map(|standing| name(&standing.item.kind)).collect();
         let near = wanted.as_deref().and_then(|wanted| nearest(wanted, names.iter().map(String::as_str)));
-        return Err(Box::new(match near {
+        return Err(match near {
             Some(near) => error.meant(span, near),
             None => error.help("leave out `override`, or `use` the file that declares it"),
-        }));
+        });
     };
     let old = &standing[place];
     let old_span = old.item.kind.name().map_or(old.item.span, |name| name.span);
     if old.file == file {
         let error = error(format!("{what} is declared in this very file")).at(span, "overridden here");
-        return Err(Box::new(
-            error
-                .beside(old_span, "declared here")
-                .help("change the declaration itself, and remove this one"),
-        ));
+        let error = error.beside(old_span, "declared here");
+        return Err(error.help("change the declaration itself, and remove this one"));
     }
     if !uses(files, file, old.file) {
         let error = error(format!("{what} is overridden by two files that do not know each other"));
         let error = error.at(span, "overridden here").beside(old_span, "and here");
-        return Err(Box::new(
-            error.help("let one of the two `use` the other: then its override is the last"),
-        ));
+        return Err(error.help("let one of the two `use` the other: then its override is the last"));
     }
     Ok(place)
 }

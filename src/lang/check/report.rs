@@ -24,8 +24,8 @@ pub(super) trait Report {
     /// Reports every name that stands twice.
     fn once<'a>(&mut self, kind: &str, names: impl IntoIterator<Item = &'a Name>) {
         let mut known = Names::default();
-        for (index, name) in names.into_iter().enumerate() {
-            self.take(known.declare(kind, name, index));
+        for name in names {
+            self.take(known.declare(kind, name));
         }
     }
 

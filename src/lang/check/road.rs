@@ -56,10 +56,8 @@ impl Checker {
         });
         let (map, start, goal) = (map?, start?, goal?);
         let ast::ExprKind::Text(path) = &map.kind else {
-            return self.reject(
-                Diagnostic::error(code::TYPE_MISMATCH, "`map` needs a path in quotes")
-                    .at(map.span, "not a text"),
-            );
+            let error = Diagnostic::error(code::TYPE_MISMATCH, "`map` needs a path in quotes");
+            return self.reject(error.at(map.span, "not a text"));
         };
         let (map_path, map) = match maps.map(&ast::Text::new(path.clone(), map.span)) {
             Ok(found) => found,
@@ -163,9 +161,8 @@ impl Checker {
         let station = self.fit(station_expr, Type::Quantity(Dimension::LENGTH))?;
         let station_m = self.fold_number(&station)?.to_f64();
         let Ok(lane_id) = lane.text.parse::<i32>() else {
-            return self.reject(
-                Diagnostic::error(code::NO_ROUTE, "the lane's number is too large").at(lane.span, ""),
-            );
+            let error = Diagnostic::error(code::NO_ROUTE, "the lane's number is too large");
+            return self.reject(error.at(lane.span, ""));
         };
         match map.place(&road.value, lane_id, station_m) {
             Ok(place) => Some(place),

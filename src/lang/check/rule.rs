@@ -2,8 +2,9 @@
 
 use std::collections::BTreeSet;
 
+use crate::check::action::possible;
 use crate::check::checker::{Checker, docs};
-use crate::check::expression::Place;
+use crate::check::expression::{Place, enum_of};
 use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
@@ -11,7 +12,8 @@ use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::states_read;
 use crate::model::vocabulary::{CHANGE, Known, Site, Then, Verb};
 use crate::model::{
-    ActionDef, EffectDef, EnumIndex, Initial, RuleBinding, RuleBody, RuleDef, SetDef, Type, WordExpr, code,
+    ActionDef, EffectDef, EnumIndex, Initial, RuleBinding, RuleBody, RuleDef, SetDef, SpawnDef, Type,
+    WordExpr, code,
 };
 use crate::syntax::ast::ItemKind;
 use crate::syntax::{Diagnostic, ast, listed};
@@ -32,19 +34,10 @@ impl Checker {
         }
         let mut rules = Vec::new();
         for (item, declared) in self.declared("rule", items, ItemKind::as_rule).1 {
-            if let Some(body) = self.rule(declared) {
-                let name = declared.name.text.clone();
-                let span = declared.name.span;
-                let start = self.start_condition(&declared.body);
-                rules.push(RuleDef {
-                    name,
-                    docs: docs(item),
-                    optional: declared.optional,
-                    body,
-                    start,
-                    span,
-                });
-            }
+            let Some(body) = self.rule(declared) else { continue };
+            let (name, span) = (declared.name.text.clone(), declared.name.span);
+            let start = self.start_condition(&declared.body);
+            rules.push(RuleDef { name, docs: docs(item), optional: declared.optional, body, start, span });
         }
         rules
     }
@@ -87,8 +80,11 @@ impl Checker {
         if on.is_empty() {
             targets = match during {
                 None => self.targets_of_global(rule, condition)?,
-                // Every action whose road users might change lanes.
-                Some(_) => self.changers(),
+                Some(_) => {
+                    let may_change =
+                        |action: &usize| self.actions[*action].as_ref().is_some_and(changes_lanes);
+                    (0..self.actions.len()).filter(may_change).collect()
+                }
             };
         }
         targets.sort_unstable();
@@ -131,7 +127,6 @@ impl Checker {
     ) -> Option<Expr> {
         let locals = locals(definition);
         let owner = Symbol::Action(definition.name.clone());
-        let spawns = definition.effects.iter().any(|effect| matches!(effect, EffectDef::Spawn(_)));
         let place = Place { locals: &locals, owner: Some(&owner), ..site };
         let condition = self.typed(condition, &place, Type::Bool)?;
         if during.is_some() && !changes_lanes(definition) && is_whole {
@@ -141,7 +136,7 @@ impl Checker {
             return self.reject(error.beside(definition.span, "changes no lanes").help(help));
         }
         self.warn_of_later(rule, definition, &condition, during);
-        if condition.known() == Known::Spawn && !spawns && is_whole {
+        if condition.known() == Known::Spawn && spawns(definition).next().is_none() && is_whole {
             let message =
                 format!("`{}` asks about a spawn, and `{}` has none", rule.name.text, definition.name);
             let error = Diagnostic::error(code::NO_SPAWN, message).at(condition.span, "needs a spawn");
@@ -150,12 +145,6 @@ impl Checker {
             );
         }
         Some(condition)
-    }
-
-    /// The actions whose road users may be told to change lanes.
-    fn changers(&self) -> Vec<usize> {
-        let all = self.actions.iter().enumerate();
-        all.filter(|(_, action)| action.as_ref().is_some_and(changes_lanes)).map(|(index, _)| index).collect()
     }
 
     /// Warns of a rule that ties a later lane change to the moment of the draw.
@@ -173,12 +162,7 @@ impl Checker {
             expr.any(|kind| matches!(kind, ExprKind::Local(named) if *named == local))
         };
         let decides = |local: usize| {
-            action.effects.iter().any(|effect| match effect {
-                EffectDef::Spawn(spawn) => {
-                    matches!(&spawn.then, WordExpr::Of(then, _) if names(then, local))
-                }
-                EffectDef::Set(_) => false,
-            })
+            spawns(action).any(|spawn| matches!(&spawn.then, WordExpr::Of(then, _) if names(then, local)))
         };
         let mut locals = 0..action.parameters.len();
         let Some(local) = locals.find(|local| decides(*local) && names(condition, *local)) else { return };
@@ -304,10 +288,7 @@ impl Checker {
     ) -> Option<RuleBody> {
         let index = self.state_named(state);
         let definition = index.map(|index| self.states[index].clone());
-        let of = match definition.as_ref().map(|state| state.ty) {
-            Some(Type::Enum(of)) => Some(of.0),
-            _ => None,
-        };
+        let of = enum_of(definition.as_ref().map(|state| state.ty));
         let keys = definition.as_ref().and_then(|state| state.key);
         key.into_iter().for_each(|key| self.references.variant(key, keys.map(|of| of.0)));
         if of.is_none() {
@@ -429,17 +410,15 @@ impl Checker {
 
 /// Whether a road user of an action may be told to change lanes.
 fn changes_lanes(action: &ActionDef) -> bool {
-    let may_be = |then: &WordExpr<Then>| match then {
-        WordExpr::Fixed(word) => *word == Then::Change,
-        WordExpr::Of(_, words) => words.contains(&Then::Change),
-    };
-    let overtakes = |verb: &WordExpr<Verb>| match verb {
-        WordExpr::Fixed(word) => *word == Verb::Overtake,
-        WordExpr::Of(_, words) => words.contains(&Verb::Overtake),
-    };
-    action.effects.iter().any(|effect| match effect {
-        EffectDef::Spawn(spawn) => may_be(&spawn.then) || overtakes(&spawn.verb),
-        EffectDef::Set(_) => false,
+    spawns(action).any(|spawn| {
+        possible(&spawn.then).contains(&Then::Change) || possible(&spawn.verb).contains(&Verb::Overtake)
+    })
+}
+
+fn spawns(action: &ActionDef) -> impl Iterator<Item = &SpawnDef> {
+    action.effects.iter().filter_map(|effect| match effect {
+        EffectDef::Spawn(spawn) => Some(&**spawn),
+        EffectDef::Set(_) => None,
     })
 }
 

@@ -344,7 +344,7 @@ impl<'a> Reader<'a> {
     /// `once ego.junction_ahead <= 40 m after 1 s`.
     fn trigger(&mut self, step: &ast::Step) -> Option<Arc<Trigger>> {
         let once = step.once.as_ref().and_then(|once| {
-            let expr = self.take_all(condition(self.space, once))?;
+            let expr = condition(self.space, once).map_err(|errors| self.diagnostics.extend(errors)).ok()?;
             Some(Condition { expr, text: print_expr(once) })
         });
         let after_ticks = step.after.as_ref().map_or(Some(0), |after| self.after_ticks(after))?;
@@ -359,33 +359,24 @@ impl<'a> Reader<'a> {
         (trigger.once.is_some() || trigger.after_ticks > 0).then(|| Arc::new(trigger))
     }
 
-    fn take_all<T>(&mut self, value: Result<T, Vec<Diagnostic>>) -> Option<T> {
-        value.map_err(|errors| self.diagnostics.extend(errors)).ok()
-    }
-
     fn after_ticks(&mut self, after: &ast::Expr) -> Option<u32> {
         let after_s = self.take(number(after, Dimension::DURATION))?;
         let step_s = self.space.episode.step_s;
         let ticks = (after_s * 1000.0 / TICK_MS as f64).round();
         if !(0.0..step_s).contains(&after_s) {
-            let error =
-                Diagnostic::error(code::TRIGGER, format!("`after {after_s} s` is not within the step"));
-            return self.reject(
-                error
-                    .at(after.span, format!("a step lasts {step_s} s"))
-                    .help("write the action in a later step, and the rest of the time here"),
-            );
+            let message = format!("`after {after_s} s` is not within the step");
+            let error = Diagnostic::error(code::TRIGGER, message);
+            let error = error.at(after.span, format!("a step lasts {step_s} s"));
+            return self
+                .reject(error.help("write the action in a later step, and the rest of the time here"));
         }
         if (ticks * TICK_MS as f64 / 1000.0 - after_s).abs() > 1e-9 {
             let error = Diagnostic::error(code::TRIGGER, format!("nothing happens after {after_s} s"));
             // The end of the step belongs to the next one.
             let last = (step_s * 1000.0 / TICK_MS as f64).round() - 1.0;
             let near = ticks_s(ticks.min(last) as u32);
-            return self.reject(
-                error
-                    .at(after.span, format!("time passes in ticks of {TICK_MS} ms"))
-                    .help(format!("the nearest is {near} s")),
-            );
+            let error = error.at(after.span, format!("time passes in ticks of {TICK_MS} ms"));
+            return self.reject(error.help(format!("the nearest is {near} s")));
         }
         Some(ticks as u32)
     }

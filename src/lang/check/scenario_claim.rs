@@ -168,21 +168,17 @@ impl Reader<'_> {
                 (ClauseKind::At, _) if timed => {
                     let found = self.take(figure(&clause.value, Dimension::DURATION))?;
                     if found.value < 0.0 {
-                        let error =
-                            Diagnostic::error(code::UNKNOWN_CLAIM, "no time of an episode is negative");
-                        return self.reject(
-                            error.at(clause.value.span, "before its beginning").help("count from 0 s"),
-                        );
+                        let message = "no time of an episode is negative";
+                        let error = Diagnostic::error(code::UNKNOWN_CLAIM, message);
+                        let error = error.at(clause.value.span, "before its beginning");
+                        return self.reject(error.help("count from 0 s"));
                     }
                     time = Some(found);
                 }
                 _ => {
                     let error = Diagnostic::error(code::UNKNOWN_CLAIM, "unknown clause of this claim");
-                    return self.reject(
-                        error
-                            .at(clause.span, "")
-                            .help("write `collision with npc#2 at 14.22 s`; obstacles are numbered from 1"),
-                    );
+                    let help = "write `collision with npc#2 at 14.22 s`; obstacles are numbered from 1";
+                    return self.reject(error.at(clause.span, "").help(help));
                 }
             }
         }

@@ -16,9 +16,9 @@ use crate::syntax::{Diagnostic, ast};
 /// All mistakes in it.
 pub(super) fn condition(space: &Space, written: &ast::Expr) -> Result<Expr, Vec<Diagnostic>> {
     let mut function_names = Names::default();
-    for (index, function) in space.functions.iter().enumerate() {
+    for function in &space.functions {
         let name = Name::new(function.name.clone(), function.span);
-        function_names.declare("function", &name, index).expect("a space has each name once");
+        function_names.declare("function", &name).expect("a space has each name once");
     }
     let signature = |function: &FnDef| (function.parameters.clone(), function.result, function.span);
     let mut checker = Checker {

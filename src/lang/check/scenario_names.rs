@@ -3,6 +3,7 @@
 //! Every place in them takes one kind of name and literal values only, so the names are known from the
 //! declarations alone: a scenario over a broken space, or a policy with a broken seal, has them all the same.
 
+use crate::check::expression::enum_of;
 use crate::check::references::{References, Symbol};
 use crate::model::Type;
 use crate::model::vocabulary::{Fact, ScenarioClaim, StartField, WAIT};
@@ -123,11 +124,7 @@ impl Notes<'_> {
     }
 
     fn variant(&mut self, name: &Name, ty: Option<Type>) {
-        let of = match ty {
-            Some(Type::Enum(of)) => Some(of.0),
-            _ => None,
-        };
-        self.references.variant(name, of);
+        self.references.variant(name, enum_of(ty));
     }
 
     /// `collision`, `counted`, `end == arrived`, `proc == [0.5]`.

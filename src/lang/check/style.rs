@@ -19,41 +19,29 @@ pub(super) fn report(own: &[&ast::Item]) -> Vec<Diagnostic> {
 /// Types and their variants begin with a capital letter, everything else is in small letters: so a
 /// reader knows a variant from a parameter.
 fn names(kind: &ItemKind, into: &mut Vec<Diagnostic>) {
-    match kind {
-        ItemKind::Enum(declared) => {
-            for name in core::iter::once(&declared.name).chain(&declared.variants) {
-                if name.text.starts_with(|first: char| first.is_ascii_lowercase()) {
-                    into.push(named(
-                        name,
-                        "types and variants begin with a capital letter",
-                        capital(&name.text),
-                    ));
-                }
-            }
-        }
-        ItemKind::Body(declared) => {
-            let name = &declared.name;
-            if name.text.starts_with(|first: char| first.is_ascii_lowercase()) {
-                into.push(named(name, "bodies begin with a capital letter", capital(&name.text)));
-            }
-        }
+    let inside: Vec<&Name> = match kind {
         // It bears the name of an enum.
-        ItemKind::Odds(_) => {}
-        _ => {
-            let params: Vec<&Name> = match kind {
-                ItemKind::Fn(declared) => declared.params.iter().map(|param| &param.name).collect(),
-                ItemKind::Action(declared) => declared.params.iter().map(|param| &param.name).collect(),
-                _ => Vec::new(),
-            };
-            for name in kind.name().into_iter().chain(params) {
-                if name.text.contains(|c: char| c.is_ascii_uppercase()) {
-                    into.push(named(
-                        name,
-                        "names other than types and variants are in small letters",
-                        small(&name.text),
-                    ));
-                }
+        ItemKind::Odds(_) => return,
+        ItemKind::Enum(declared) => declared.variants.iter().collect(),
+        ItemKind::Fn(declared) => declared.params.iter().map(|param| &param.name).collect(),
+        ItemKind::Action(declared) => declared.params.iter().map(|param| &param.name).collect(),
+        _ => Vec::new(),
+    };
+    let capitals = match kind {
+        ItemKind::Enum(_) => Some("types and variants begin with a capital letter"),
+        ItemKind::Body(_) => Some("bodies begin with a capital letter"),
+        _ => None,
+    };
+    for name in kind.name().into_iter().chain(inside) {
+        match capitals {
+            Some(rule) if name.text.starts_with(|first: char| first.is_ascii_lowercase()) => {
+                into.push(named(name, rule, capital(&name.text)));
             }
+            None if name.text.contains(|c: char| c.is_ascii_uppercase()) => {
+                let rule = "names other than types and variants are in small letters";
+                into.push(named(name, rule, small(&name.text)));
+            }
+            _ => {}
         }
     }
 }
@@ -91,26 +79,15 @@ fn small(name: &str) -> String {
 
 /// `x == true`, wherever a condition stands.
 fn conditions(kind: &ItemKind, into: &mut Vec<Diagnostic>) {
-    match kind {
-        ItemKind::Rule(declared) => {
-            if let ast::RuleBody::Holds { condition, .. } = &declared.body {
-                compared(condition, into);
-            }
-        }
-        ItemKind::Verdict(declared) => compared(&declared.condition, into),
-        ItemKind::Fn(declared) => compared(&declared.body, into),
-        ItemKind::Reward(cases) => {
-            cases.iter().filter_map(|case| case.condition.as_ref()).for_each(|c| compared(c, into));
-        }
-        ItemKind::Action(declared) => {
-            declared
-                .params
-                .iter()
-                .filter_map(|param| param.condition.as_ref())
-                .for_each(|c| compared(c, into));
-        }
-        _ => {}
-    }
+    let conditions: Vec<&Expr> = match kind {
+        ItemKind::Rule(ast::Rule { body: ast::RuleBody::Holds { condition, .. }, .. }) => vec![condition],
+        ItemKind::Verdict(declared) => vec![&declared.condition],
+        ItemKind::Fn(declared) => vec![&declared.body],
+        ItemKind::Reward(cases) => cases.iter().filter_map(|case| case.condition.as_ref()).collect(),
+        ItemKind::Action(declared) => declared.params.iter().filter_map(|p| p.condition.as_ref()).collect(),
+        _ => Vec::new(),
+    };
+    conditions.into_iter().for_each(|condition| compared(condition, into));
 }
 
 fn compared(expr: &Expr, into: &mut Vec<Diagnostic>) {

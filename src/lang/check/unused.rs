@@ -69,28 +69,32 @@ pub(super) fn report(own: &[&ast::Item], all: &[&ast::Item]) -> Vec<Diagnostic> 
 
 /// Collects the names that a declaration uses; not the names that it declares.
 fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
+    let mut names: Vec<&Name> = Vec::new();
+    let mut exprs: Vec<&ast::Expr> = Vec::new();
+    let mut effects: &[ast::Effect] = &[];
+    let mut fields: Vec<&ast::Field> = Vec::new();
     match kind {
         ItemKind::State(declared) => {
-            names_of_type(&declared.ty, used);
+            names.extend(names_of_type(&declared.ty));
             match &declared.initial {
                 ast::Initial::Any => {}
-                ast::Initial::Value(value) => names_of_expr(value, used),
+                ast::Initial::Value(value) => exprs.push(value),
                 ast::Initial::Keys(keys) => {
-                    used.extend(keys.iter().filter_map(|key| Some(key.key.as_ref()?.text.as_str())));
-                    keys.iter().filter_map(|key| key.value.as_ref()).for_each(|v| names_of_expr(v, used));
+                    names.extend(keys.iter().filter_map(|key| key.key.as_ref()));
+                    exprs.extend(keys.iter().filter_map(|key| key.value.as_ref()));
                 }
             }
         }
-        ItemKind::Let(declared) => names_of_expr(&declared.value, used),
+        ItemKind::Let(declared) => exprs.push(&declared.value),
         ItemKind::Fn(declared) => {
-            declared.params.iter().for_each(|param| names_of_type(&param.ty, used));
-            names_of_type(&declared.result, used);
-            names_of_expr(&declared.body, used);
+            let types = declared.params.iter().map(|param| &param.ty).chain([&declared.result]);
+            names.extend(types.flat_map(names_of_type));
+            exprs.push(&declared.body);
         }
         ItemKind::Action(declared) => {
             for param in &declared.params {
-                names_of_type(&param.ty, used);
-                param.within.iter().for_each(|within| names_of_expr(within, used));
+                names.extend(names_of_type(&param.ty));
+                exprs.extend(&param.within);
                 // A parameter that only its own `where` names is unused.
                 if let Some(condition) = &param.condition {
                     let mut inside = BTreeSet::new();
@@ -99,40 +103,34 @@ fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
                     used.extend(inside);
                 }
             }
-            declared.effects.iter().for_each(|effect| names_of_effect(effect, used));
+            effects = &declared.effects;
         }
-        ItemKind::Group(declared) => used.extend(declared.members.iter().map(|name| name.text.as_str())),
+        ItemKind::Group(declared) => names.extend(&declared.members),
         ItemKind::Also(declared) => {
-            used.extend(declared.on.iter().map(|name| name.text.as_str()));
-            declared.effects.iter().for_each(|effect| names_of_effect(effect, used));
+            names.extend(&declared.on);
+            effects = &declared.effects;
         }
-        ItemKind::EachStep(effects) => effects.iter().for_each(|effect| names_of_effect(effect, used)),
+        ItemKind::EachStep(declared) => effects = declared,
         ItemKind::Rule(declared) => match &declared.body {
             ast::RuleBody::Holds { on, condition, .. } => {
-                used.extend(on.iter().map(|name| name.text.as_str()));
-                names_of_expr(condition, used);
+                names.extend(on);
+                exprs.push(condition);
             }
             ast::RuleBody::Moves { state, key, moves } => {
-                used.extend([state].into_iter().chain(key).map(|name| name.text.as_str()));
-                for line in moves {
-                    used.insert(&line.from.text);
-                    used.extend(line.to.iter().map(|name| name.text.as_str()));
-                }
+                names.extend([state].into_iter().chain(key));
+                names.extend(moves.iter().flat_map(|line| line.to.iter().chain([&line.from])));
             }
         },
-        ItemKind::Body(block) | ItemKind::Road(block) => names_of_fields(&block.fields, used),
-        ItemKind::Episode(fields) => names_of_fields(fields, used),
+        ItemKind::Body(block) | ItemKind::Road(block) => fields.extend(&block.fields),
+        ItemKind::Episode(declared) => fields.extend(declared),
         ItemKind::Reward(cases) => {
-            for case in cases {
-                case.condition.iter().for_each(|condition| names_of_expr(condition, used));
-                names_of_expr(&case.value, used);
-            }
+            exprs.extend(cases.iter().flat_map(|case| case.condition.iter().chain([&case.value])));
         }
-        ItemKind::Verdict(declared) => names_of_expr(&declared.condition, used),
-        ItemKind::Expect(expect) => names_of_expr(&expect.claim, used),
+        ItemKind::Verdict(declared) => exprs.push(&declared.condition),
+        ItemKind::Expect(expect) => exprs.push(&expect.claim),
         ItemKind::Odds(declared) => {
-            used.insert(&declared.name.text);
-            declared.arms.iter().for_each(|arm| names_of_expr(&arm.value, used));
+            names.push(&declared.name);
+            exprs.extend(declared.arms.iter().map(|arm| &arm.value));
         }
         ItemKind::Override(inner) => names_of_item(inner, used),
         ItemKind::Language(_)
@@ -141,33 +139,28 @@ fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
         | ItemKind::Scenario(_)
         | ItemKind::Policy(_) => {}
     }
+    for effect in effects {
+        match &effect.kind {
+            ast::EffectKind::Set { state, key, value } => {
+                names.push(state);
+                exprs.extend(key.iter().chain([value]));
+            }
+            ast::EffectKind::Spawn { body, distance, cover, fields: of_spawn, .. } => {
+                exprs.extend([body, distance].into_iter().chain(cover));
+                fields.extend(of_spawn);
+            }
+        }
+    }
+    used.extend(names.into_iter().map(|name| name.text.as_str()));
+    exprs.extend(fields.into_iter().map(|field| &field.value));
+    exprs.into_iter().for_each(|expr| names_of_expr(expr, used));
 }
 
-fn names_of_type<'a>(ty: &'a ast::Type, used: &mut BTreeSet<&'a str>) {
+fn names_of_type(ty: &ast::Type) -> Vec<&Name> {
     match &ty.kind {
-        ast::TypeKind::Named(name) => {
-            used.insert(&name.text);
-        }
-        ast::TypeKind::Map { key, value } => used.extend([key.text.as_str(), value.text.as_str()]),
+        ast::TypeKind::Named(name) => vec![name],
+        ast::TypeKind::Map { key, value } => vec![key, value],
     }
-}
-
-fn names_of_effect<'a>(effect: &'a ast::Effect, used: &mut BTreeSet<&'a str>) {
-    match &effect.kind {
-        ast::EffectKind::Set { state, key, value } => {
-            used.insert(&state.text);
-            key.iter().for_each(|key| names_of_expr(key, used));
-            names_of_expr(value, used);
-        }
-        ast::EffectKind::Spawn { body, distance, cover, fields, .. } => {
-            [body, distance].into_iter().chain(cover).for_each(|expr| names_of_expr(expr, used));
-            names_of_fields(fields, used);
-        }
-    }
-}
-
-fn names_of_fields<'a>(fields: &'a [ast::Field], used: &mut BTreeSet<&'a str>) {
-    fields.iter().for_each(|field| names_of_expr(&field.value, used));
 }
 
 /// Collects every name in an expression.

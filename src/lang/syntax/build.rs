@@ -17,7 +17,7 @@ use crate::syntax::grammar::{Rule, is_plain_terminal};
 use crate::syntax::{Diagnostic, code};
 
 /// A node, or the mistake that keeps its whole declaration out of the tree.
-pub type Built<T> = Result<T, Box<Diagnostic>>;
+pub type Built<T> = Result<T, Diagnostic>;
 
 /// Builds the tree of one declaration.
 pub struct Builder {
@@ -81,18 +81,16 @@ impl Builder {
         let span = self.span(&pair);
         let quoted = pair.as_str();
         let inside = &quoted[1..quoted.len() - 1];
-        match unescape(inside) {
-            Ok(value) => Ok(Text::new(value, span)),
-            Err(at) => {
-                let start = span.start + 1 + at;
-                let width = inside[at..].chars().take(2).map(char::len_utf8).sum::<usize>();
-                Err(Box::new(
-                    Diagnostic::error(code::TEXT, "unknown escape in a text")
-                        .at(Span::new(self.file, start, start + width), "")
-                        .help("escapes are `\\\"`, `\\\\`, `\\n`, `\\t` and `\\u{…}` with a code point in hexadecimal"),
-                ))
-            }
-        }
+        let value = unescape(inside).map_err(|at| {
+            let start = span.start + 1 + at;
+            let width = inside[at..].chars().take(2).map(char::len_utf8).sum::<usize>();
+            Diagnostic::error(code::TEXT, "unknown escape in a text")
+                .at(Span::new(self.file, start, start + width), "")
+                .help(
+                    "escapes are `\\\"`, `\\\\`, `\\n`, `\\t` and `\\u{…}` with a code point in hexadecimal",
+                )
+        })?;
+        Ok(Text::new(value, span))
     }
 
     /// What an `item` declares.
@@ -117,10 +115,7 @@ impl Builder {
             Rule::enumeration => ItemKind::Enum(self.enumeration(parts)),
             Rule::odds => {
                 let name = self.name(parts.next());
-                ItemKind::Odds(Odds {
-                    name,
-                    arms: parts.rest().map(|arm| self.arm(arm)).collect::<Built<_>>()?,
-                })
+                ItemKind::Odds(Odds { name, arms: self.all(parts, Builder::arm)? })
             }
             Rule::state => {
                 let name = self.name(parts.next());
@@ -128,8 +123,7 @@ impl Builder {
                 let initial = match parts.next() {
                     any if any.as_rule() == Rule::drawn_initially => Initial::Any,
                     keys if keys.as_rule() == Rule::initial_keys => {
-                        let keys = Parts::of(keys).rest().map(|key| self.initial_key(key));
-                        Initial::Keys(keys.collect::<Built<_>>()?)
+                        Initial::Keys(self.all(Parts::of(keys), Builder::initial_key)?)
                     }
                     value => Initial::Value(self.expression(value)?),
                 };
@@ -147,11 +141,11 @@ impl Builder {
             }
             Rule::also => {
                 let on = self.names(parts.next());
-                ItemKind::Also(Also { on, effects: self.effects(parts)? })
+                ItemKind::Also(Also { on, effects: self.all(parts, Builder::effect)? })
             }
             Rule::each_step => {
                 parts.take(Rule::kw_each);
-                ItemKind::EachStep(self.effects(parts)?)
+                ItemKind::EachStep(self.all(parts, Builder::effect)?)
             }
             Rule::named_rule => ItemKind::Rule(self.rule(parts, span)?),
             Rule::body => {
@@ -163,9 +157,7 @@ impl Builder {
                 ItemKind::Road(Block { name, fields: self.fields(parts.next())? })
             }
             Rule::episode => ItemKind::Episode(self.fields(parts.next())?),
-            Rule::reward => {
-                ItemKind::Reward(parts.rest().map(|case| self.reward_case(case)).collect::<Built<_>>()?)
-            }
+            Rule::reward => ItemKind::Reward(self.all(parts, Builder::reward_case)?),
             Rule::verdict => {
                 let name = self.name(parts.next());
                 ItemKind::Verdict(Verdict { name, condition: self.expression(parts.next())? })
@@ -232,12 +224,16 @@ impl Builder {
         while let Some(param) = parts.take(Rule::action_param) {
             params.push(self.action_param(param)?);
         }
-        Ok(Action { name, params, effects: self.effects(parts)? })
+        Ok(Action { name, params, effects: self.all(parts, Builder::effect)? })
     }
 
-    /// All effects that are left.
-    fn effects(&self, parts: Parts<'_>) -> Built<Vec<Effect>> {
-        parts.rest().map(|effect| self.effect(effect)).collect()
+    /// All parts that are left, each built in the same way.
+    pub fn all<'i, T>(
+        &self,
+        parts: Parts<'i>,
+        build: fn(&Builder, Pair<'i, Rule>) -> Built<T>,
+    ) -> Built<Vec<T>> {
+        parts.0.map(|part| build(self, part)).collect()
     }
 
     fn action_param(&self, pair: Pair<'_, Rule>) -> Built<ActionParam> {
@@ -299,22 +295,20 @@ impl Builder {
             if let Some(key) = key {
                 let error =
                     Diagnostic::error(code::MOVES, "only transitions are about a key").at(key.span, "");
-                return Err(Box::new(error.help("put the key into the condition: `sky[Rain] > None`")));
+                return Err(error.help("put the key into the condition: `sky[Rain] > None`"));
             }
             let condition = self.only_expression(body)?;
             return Ok(NamedRule { optional, name, body: RuleBody::Holds { on, during, condition } });
         }
         if let Some(during) = during {
             let error = Diagnostic::error(code::MOVES, "transitions are not about what road users do");
-            return Err(Box::new(error.at(during.span, "").help("write a condition: `during change: …`")));
+            return Err(error.at(during.span, "").help("write a condition: `during change: …`"));
         }
         let [state] = <[Name; 1]>::try_from(on).map_err(|on| {
             let place = on.get(1).map_or(Span { end: name.span.end, ..span }, |second| second.span);
-            Box::new(
-                Diagnostic::error(code::MOVES, "transitions are about exactly one state")
-                    .at(place, "")
-                    .help(format!("write `rule {} on time {{ Noon -> Night }}`", name.text)),
-            )
+            Diagnostic::error(code::MOVES, "transitions are about exactly one state")
+                .at(place, "")
+                .help(format!("write `rule {} on time {{ Noon -> Night }}`", name.text))
         })?;
         let moves = Parts::of(body).rest().map(|transition| {
             let span = self.span(&transition);
@@ -338,8 +332,7 @@ impl Builder {
 
     fn expect(&self, mut parts: Parts<'_>, span: Span) -> Built<Expect> {
         let claim = self.expression(parts.next())?;
-        let clauses = parts.rest().map(|clause| self.clause(clause)).collect::<Built<_>>()?;
-        Ok(Expect { claim, clauses, span })
+        Ok(Expect { claim, clauses: self.all(parts, Builder::clause)?, span })
     }
 
     fn clause(&self, pair: Pair<'_, Rule>) -> Built<Clause> {
@@ -354,7 +347,7 @@ impl Builder {
     }
 
     pub fn fields(&self, pair: Pair<'_, Rule>) -> Built<Vec<Field>> {
-        Parts::of(pair).rest().map(|field| self.field(field)).collect()
+        self.all(Parts::of(pair), Builder::field)
     }
 
     fn field(&self, pair: Pair<'_, Rule>) -> Built<Field> {
@@ -374,7 +367,7 @@ impl Builder {
         let origin = self.section(&mut parts, Rule::origin)?;
         let road = self.name(Parts::of(parts.next()).next());
         let start = self.section(&mut parts, Rule::start)?;
-        let steps = Parts::of(parts.next()).rest().map(|step| self.step(step)).collect::<Built<_>>()?;
+        let steps = self.all(Parts::of(parts.next()), Builder::step)?;
         let expects = parts.rest().map(|expect| {
             let span = self.span(&expect);
             self.expect(Parts::of(expect), span)
@@ -403,9 +396,8 @@ impl Builder {
         let origin = self.section(&mut parts, Rule::origin)?;
         let net = self.section(&mut parts, Rule::net)?;
         let claims = self.section(&mut parts, Rule::claims)?;
-        let rules = parts.take(Rule::policy_rules).map_or(Ok(Vec::new()), |rules| {
-            Parts::of(rules).rest().map(|line| self.policy_line(line)).collect()
-        })?;
+        let rules = parts.take(Rule::policy_rules);
+        let rules = rules.map_or(Ok(Vec::new()), |rules| self.all(Parts::of(rules), Builder::policy_line))?;
         Ok(Policy { name, origin, net, claims, rules })
     }
 
@@ -416,8 +408,7 @@ impl Builder {
             Some(_) => None,
             None => Some(self.expression(parts.next())?),
         };
-        let actions = parts.rest().map(|call| self.call(call)).collect::<Built<_>>()?;
-        Ok(PolicyLine { condition, actions, span })
+        Ok(PolicyLine { condition, actions: self.all(parts, Builder::call)?, span })
     }
 }
 

@@ -48,18 +48,12 @@ pub struct Diagnostic {
     pub fixes: Vec<Fix>,
 }
 
-/// A change of the source.
+/// A change of one place of the source.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fix {
     /// What the change does, as a command: ``write `drive_ahead` ``.
     pub title: String,
-    /// Edits that do not overlap.
-    pub edits: Vec<Edit>,
-}
-
-/// Replaces the text of a span; an empty span inserts.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Edit {
+    /// What is replaced; an empty span inserts.
     pub span: Span,
     pub text: String,
 }
@@ -114,7 +108,7 @@ impl Diagnostic {
 
     /// Adds a change of one place that removes the mistake.
     pub fn fix(mut self, title: impl Into<String>, span: Span, text: impl Into<String>) -> Self {
-        self.fixes.push(Fix { title: title.into(), edits: vec![Edit { span, text: text.into() }] });
+        self.fixes.push(Fix { title: title.into(), span, text: text.into() });
         self
     }
 
@@ -369,23 +363,7 @@ pub(crate) fn enumerated<S: AsRef<str>>(words: &[S], conjunction: &str) -> Strin
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn shows_places_notes_and_help() {
-        let mut sources = Sources::new();
-        let file = sources.add("a.ava", "language 1\nlet x = 12 m + 3 s\n");
-        let diagnostic = Diagnostic::error("AV0201", "a length and a duration cannot be added")
-            .at(Span::new(file, 24, 25), "here")
-            .beside(Span::new(file, 19, 23), "a length")
-            .note("units are types")
-            .help("divide one by a speed");
-        let plain = render(&diagnostic, &sources, Style::Plain);
-        assert!(plain.starts_with("error[AV0201]: a length and a duration cannot be added\n"), "{plain}");
-        assert!(plain.contains("a.ava:2:14"), "{plain}");
-        assert!(plain.contains("= units are types"), "{plain}");
-        assert!(plain.contains("= help: divide one by a speed"), "{plain}");
-        assert!(render(&diagnostic, &sources, Style::Human).contains('\u{1b}'));
-    }
+    use crate::syntax::record;
 
     #[test]
     fn nothing_acts_on_a_terminal() {
@@ -399,6 +377,7 @@ mod tests {
             .at(Span::new(file, 4, 5), "\u{1b}[8m here")
             .note("\u{1b}c")
             .help("\u{1b}c");
+        assert!(render(&diagnostic, &sources, Style::Human).contains("\u{1b}["), "colours");
         let plain = render(&diagnostic, &sources, Style::Plain);
         assert!(!plain.contains(|c: char| c.is_control() && c != '\n'), "{plain:?}");
         for drawn in ["[2J odd", "]0;name", "[8m here", "[31m "] {
@@ -413,6 +392,7 @@ mod tests {
         for span in [Span::new(file, 1, 3), Span::new(file, 90, 7), Span::new(FileId(9), 0, 4), Span::NONE] {
             let diagnostic = Diagnostic::warning("AV0001", "odd").at(span, "x");
             assert!(render(&diagnostic, &sources, Style::Plain).contains("odd"));
+            assert_eq!(record(&diagnostic, &sources).message, "odd");
         }
     }
 }

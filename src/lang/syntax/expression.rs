@@ -25,9 +25,9 @@ impl Builder {
         let above = self.operators_above.get();
         if above + operators > OPERATORS_MAX {
             let message = format!("an expression with more than {OPERATORS_MAX} operators in one another");
-            return Err(Box::new(Diagnostic::error(code::DEPTH, message).at(span, "").help(
-                "give a part of it a name, with `let` or `fn`; where it is long, join parts in brackets",
-            )));
+            let help =
+                "give a part of it a name, with `let` or `fn`; where it is long, join parts in brackets";
+            return Err(Diagnostic::error(code::DEPTH, message).at(span, "").help(help));
         }
         self.operators_above.set(above + operators);
         let built = build();
@@ -71,7 +71,7 @@ impl Builder {
                 ("comparisons do not chain", "write `a < b and b < c`")
             }
         };
-        Err(Box::new(Diagnostic::error(code::CHAIN, message).at(self.span(next), "second one").help(help)))
+        Err(Diagnostic::error(code::CHAIN, message).at(self.span(next), "second one").help(help))
     }
 
     fn prefixed(&self, tokens: &mut Tokens<'_>) -> Built<Expr> {
@@ -117,9 +117,7 @@ impl Builder {
             Rule::boolean => ExprKind::Bool(pair.as_str() == "true"),
             Rule::name => ExprKind::Name(pair.as_str().to_owned()),
             Rule::parenthesised => return self.expression(Parts::of(pair).next()),
-            Rule::list => ExprKind::List(
-                Parts::of(pair).rest().map(|item| self.expression(item)).collect::<Built<_>>()?,
-            ),
+            Rule::list => ExprKind::List(self.all(Parts::of(pair), Builder::expression)?),
             Rule::record => ExprKind::Record(self.fields(Parts::of(pair).next())?),
             Rule::call => ExprKind::Call(self.call(pair)?),
             Rule::match_expression => self.match_expression(pair)?,
@@ -149,8 +147,7 @@ impl Builder {
     fn match_expression(&self, pair: Pair<'_, Rule>) -> Built<ExprKind> {
         let mut parts = Parts::of(pair);
         let subject = Box::new(self.expression(parts.next())?);
-        let arms = parts.rest().map(|arm| self.arm(arm));
-        Ok(ExprKind::Match { subject, arms: arms.collect::<Built<_>>()? })
+        Ok(ExprKind::Match { subject, arms: self.all(parts, Builder::arm)? })
     }
 
     pub fn arm(&self, pair: Pair<'_, Rule>) -> Built<Arm> {

@@ -11,19 +11,15 @@ pub const INDENT: usize = 2;
 #[derive(Debug, Clone)]
 pub enum Layout {
     Text(String),
-    /// A blank, or a line break in a broken group.
-    Line,
-    /// Nothing, or a line break in a broken group.
-    Break,
+    /// This text, or a line break in a broken group.
+    Line(&'static str),
     /// Nothing, or this text in a broken group.
     IfBroken(&'static str),
-    /// This text, or nothing in a broken group.
-    IfFlat(&'static str),
     /// Parts, one after the other.
     Row(Vec<Layout>),
     /// A part, one level of indentation deeper.
     Nest(Box<Layout>),
-    /// On one line if it fits; otherwise every `Line` and `Break` directly in it breaks.
+    /// On one line if it fits; otherwise every `Line` directly in it breaks.
     Group(Box<Layout>),
 }
 
@@ -49,16 +45,16 @@ impl Layout {
         let mut inside = Vec::new();
         for item in items {
             if !inside.is_empty() {
-                inside.extend([Layout::text(","), Layout::Line]);
+                inside.extend([Layout::text(","), Layout::Line(" ")]);
             }
             inside.push(item);
         }
         if inside.is_empty() {
             return Layout::text(format!("{open}{close}"));
         }
-        inside.insert(0, Layout::Break);
+        inside.insert(0, Layout::Line(""));
         inside.push(Layout::IfBroken(","));
-        Layout::group([Layout::text(open), Layout::nest(inside), Layout::Break, Layout::text(close)])
+        Layout::group([Layout::text(open), Layout::nest(inside), Layout::Line(""), Layout::text(close)])
     }
 
     /// The text on one line, however long.
@@ -86,21 +82,17 @@ fn lay_out(layout: &Layout, out: &mut String, indent: usize, column: usize, widt
                 out.push_str(text);
                 column += text.chars().count();
             }
-            Layout::Line | Layout::Break if broken => {
+            Layout::Line(_) if broken => {
                 out.push('\n');
                 out.extend(std::iter::repeat_n(' ', indent));
                 column = indent;
             }
-            Layout::Line => {
-                out.push(' ');
-                column += 1;
+            Layout::Line(flat) => {
+                out.push_str(flat);
+                column += flat.len();
             }
             Layout::IfBroken(text) if broken => out.push_str(text),
-            Layout::IfFlat(text) if !broken => {
-                out.push_str(text);
-                column += text.len();
-            }
-            Layout::Break | Layout::IfBroken(_) | Layout::IfFlat(_) => {}
+            Layout::IfBroken(_) => {}
             Layout::Row(parts) => todo.extend(parts.iter().rev().map(|part| (indent, broken, part))),
             Layout::Nest(inside) => todo.push((indent + INDENT, broken, inside)),
             Layout::Group(inside) => {
@@ -128,11 +120,10 @@ fn fits(inside: &Layout, after: &[(usize, bool, &Layout)], room: usize) -> bool 
         };
         let taken = match next {
             Layout::Text(text) => text.chars().count(),
-            Layout::Line | Layout::Break if broken => return true,
-            Layout::Line => 1,
+            Layout::Line(_) if broken => return true,
+            Layout::Line(flat) => flat.len(),
             Layout::IfBroken(text) if broken => text.len(),
-            Layout::IfFlat(text) if !broken => text.len(),
-            Layout::Break | Layout::IfBroken(_) | Layout::IfFlat(_) => 0,
+            Layout::IfBroken(_) => 0,
             Layout::Row(parts) => {
                 todo.extend(parts.iter().rev().map(|part| (broken, part)));
                 0
@@ -150,20 +141,5 @@ fn fits(inside: &Layout, after: &[(usize, bool, &Layout)], room: usize) -> bool 
             Some(rest) => left = rest,
             None => return false,
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn breaks_only_what_does_not_fit() {
-        let item = || Layout::text("x".repeat(30));
-        assert_eq!(Layout::listed("[", [item(), item()], "]").render(0, 0).lines().count(), 1);
-        let long = Layout::listed("[", [item(), item(), item(), item()], "]").render(0, 0);
-        assert_eq!(long.lines().count(), 6);
-        assert!(long.ends_with(",\n]"));
-        assert_eq!(Layout::listed("(", [], ")").render(0, 0), "()");
     }
 }

@@ -9,7 +9,7 @@ use pest::error::{ErrorVariant, InputLocation};
 use pest::iterators::Pair;
 
 use crate::syntax::ast::{Doc, Field, File, FileId, Item, Span};
-use crate::syntax::build::{Builder, end_of};
+use crate::syntax::build::{Builder, Built, end_of};
 use crate::syntax::diagnostic::{enumerated, one_of};
 use crate::syntax::foreign::{Failure, foreign, foreign_declaration};
 use crate::syntax::grammar::{AvaParser, NAME, Rule, VARIANT, continues_expression, words};
@@ -35,7 +35,6 @@ const DIAGNOSTICS_MAX: usize = 100;
 /// What is expected where nothing better is known.
 const DECLARATION: &str = "a declaration";
 
-/// The words that begin a declaration.
 fn declarations() -> impl Iterator<Item = &'static str> {
     DECLARATIONS.iter().map(|(word, _)| *word)
 }
@@ -111,7 +110,7 @@ impl Reader<'_> {
             match part.as_rule() {
                 Rule::item => match self.item(part, previous.1) {
                     Ok(item) => items.push(item),
-                    Err(mistake) => mistakes.push(*mistake),
+                    Err(mistake) => mistakes.push(mistake),
                 },
                 Rule::skipped => mistakes.extend(self.explain(span.0, span.1, previous)),
                 _ => {}
@@ -123,7 +122,7 @@ impl Reader<'_> {
         (File { docs, items, span: Span::new(self.file, 0, self.text.len()) }, mistakes)
     }
 
-    fn item(&self, pair: Pair<'_, Rule>, previous_end: usize) -> Result<Item, Box<Diagnostic>> {
+    fn item(&self, pair: Pair<'_, Rule>, previous_end: usize) -> Built<Item> {
         let builder = Builder::new(self.file);
         let span = builder.span(&pair);
         let docs = self.docs(previous_end, span.start, Comment::is_item_doc);

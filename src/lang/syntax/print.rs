@@ -6,9 +6,9 @@
 //! before it. One blank line between entries is kept; more are not.
 
 use crate::syntax::ast::{
-    Action, ActionParam, ClauseKind, Doc, Effect, EffectKind, Expect, Expr, ExprKind, Field, File, Initial,
-    InitialKey, Item, ItemKind, Name, ParamMode, Place, Policy, PolicyLine, Rule, RuleBody, Scenario, Span,
-    Step, Type, TypeKind,
+    Action, ActionParam, Case, ClauseKind, Doc, Effect, EffectKind, Expect, Expr, ExprKind, Field, File,
+    Initial, InitialKey, Item, ItemKind, Move, Name, ParamMode, Place, Policy, PolicyLine, Rule, RuleBody,
+    Scenario, Span, Step, Type, TypeKind,
 };
 use crate::syntax::layout::{INDENT, Layout, WIDTH};
 use crate::syntax::print_expression::{
@@ -123,11 +123,12 @@ impl Printer<'_> {
         }
     }
 
-    /// Prints an entry as a whole.
-    fn entry(&mut self, span: Span, layout: &Layout) {
+    /// Prints an entry as a whole, and what ends it.
+    fn entry(&mut self, span: Span, layout: &Layout, ending: &str) {
         self.comments_before(span.end);
         self.line(span.start);
         self.put(layout);
+        self.words(ending);
         self.trailing_comment(span.end);
     }
 
@@ -153,6 +154,26 @@ impl Printer<'_> {
         self.limit = limit;
         self.plain_line(false);
         self.out.push('}');
+    }
+
+    /// Prints entries in braces, one a line.
+    fn lines(&mut self, end: usize, entries: impl IntoIterator<Item = (Span, Layout)>) {
+        self.block(end, |printer| {
+            for (span, layout) in entries {
+                printer.entry(span, &layout, "");
+            }
+        });
+    }
+
+    /// Prints entries in braces, on one line if they fit and none has a comment of its own; gives whether it is one line.
+    fn braced(&mut self, span: Span, entries: Vec<(Span, Layout)>) -> bool {
+        let layout = braced(entries.iter().map(|(_, entry)| entry.clone()));
+        let is_one_line = !self.comment_between(span.start, span.end) && self.fits(&layout);
+        match is_one_line {
+            true => self.words(&layout.flat()),
+            false => self.lines(span.end, entries),
+        }
+        is_one_line
     }
 
     /// Prints a layout from the current column on.
@@ -222,18 +243,17 @@ impl Printer<'_> {
             }
             ItemKind::Odds(item) => {
                 self.words(&format!("odds {} ", item.name.text));
-                self.block(span.end, |printer| {
-                    for line in &item.arms {
-                        printer.entry(line.span, &arm(line));
-                    }
-                });
+                self.lines(span.end, item.arms.iter().map(|line| (line.span, arm(line))));
             }
             ItemKind::State(item) => {
                 self.words(&format!("state {}: {} =", item.name.text, type_text(&item.ty)));
                 match &item.initial {
                     Initial::Any => self.words(" any"),
                     Initial::Value(value) => self.value(value),
-                    Initial::Keys(keys) => self.initial_keys(keys, span),
+                    Initial::Keys(keys) => {
+                        self.words(" ");
+                        self.braced(span, keys.iter().map(|key| (key.span, initial_key(key))).collect());
+                    }
                 }
             }
             ItemKind::Let(item) => {
@@ -257,36 +277,29 @@ impl Printer<'_> {
                 self.list(&head, ",", &item.members, span);
             }
             ItemKind::Also(item) => {
-                self.sets(&format!("on {} also ", names(&item.on)), &item.effects, span);
+                self.sets(&format!("on {} also ", names(&item.on, ", ")), &item.effects, span);
             }
             ItemKind::EachStep(effects) => self.sets("each step ", effects, span),
             ItemKind::Rule(item) => self.rule(item, span),
             ItemKind::Body(item) => {
                 self.words(&format!("body {} ", item.name.text));
-                let layout = fields(&item.fields);
-                match self.comment_between(span.start, span.end) || !self.fits(&layout) {
-                    true => self.field_lines(&item.fields, span.end),
-                    false => self.words(&layout.flat()),
-                }
+                self.braced(span, field_entries(&item.fields).collect());
             }
             ItemKind::Road(item) => {
                 self.words(&format!("road {} ", item.name.text));
-                self.field_lines(&item.fields, span.end);
+                self.lines(span.end, field_entries(&item.fields));
             }
             ItemKind::Episode(entries) => {
                 self.words("episode ");
-                self.field_lines(entries, span.end);
+                self.lines(span.end, field_entries(entries));
             }
             ItemKind::Reward(cases) => {
                 self.words("reward ");
-                self.block(span.end, |printer| {
-                    for case in cases {
-                        let condition =
-                            case.condition.as_ref().map_or(Layout::text("_"), expression_on_new_line);
-                        let layout = [condition, Layout::text(" => "), expression(&case.value)];
-                        printer.entry(case.span, &Layout::row(layout));
-                    }
-                });
+                let line = |case: &Case| {
+                    let condition = case.condition.as_ref().map_or(Layout::text("_"), expression_on_new_line);
+                    Layout::row([condition, Layout::text(" => "), expression(&case.value)])
+                };
+                self.lines(span.end, cases.iter().map(|case| (case.span, line(case))));
             }
             ItemKind::Verdict(item) => {
                 self.words(&format!("verdict {}:", item.name.text));
@@ -334,20 +347,6 @@ impl Printer<'_> {
         self.level -= 1;
     }
 
-    /// The values of keys, on one line if they fit and no key has a comment of its own.
-    fn initial_keys(&mut self, keys: &[InitialKey], span: Span) {
-        let layout = Layout::row([Layout::text(" "), braced(keys.iter().map(initial_key))]);
-        if !self.comment_between(span.start, span.end) && self.fits(&layout) {
-            return self.words(&layout.flat());
-        }
-        self.words(" ");
-        self.block(span.end, |printer| {
-            for key in keys {
-                printer.entry(key.span, &initial_key(key));
-            }
-        });
-    }
-
     fn words(&mut self, words: &str) {
         self.out.push_str(words);
     }
@@ -359,7 +358,7 @@ impl Printer<'_> {
             self.words(" ");
             return self.arms(value);
         }
-        self.put(&Layout::group([Layout::nest([Layout::Line, expression(value)])]));
+        self.put(&Layout::group([Layout::nest([Layout::Line(" "), expression(value)])]));
     }
 
     fn arms(&mut self, value: &Expr) {
@@ -381,20 +380,11 @@ impl Printer<'_> {
 
     fn action(&mut self, item: &Action, span: Span) {
         self.words(&format!("action {}", item.name.text));
-        let params = || item.params.iter().map(param);
-        let head = Layout::row([Layout::listed("(", params(), ")"), Layout::text(" ")]);
+        let head = Layout::row([Layout::listed("(", item.params.iter().map(param), ")"), Layout::text(" ")]);
         let body_start = item.params.last().map_or(span.start, |last| last.span.end);
         let commented = self.comment_between(span.start, body_start);
-        let only_sets = match item.effects.as_slice() {
-            [only] if matches!(only.kind, EffectKind::Set { .. }) => Some(only),
-            _ => None,
-        };
-        if let (Some(only), false) = (only_sets, self.comment_between(span.start, span.end)) {
-            let layout = [head.clone(), Layout::text("{ "), effect(only), Layout::text(" }")];
-            let layout = Layout::row(layout);
-            if self.fits(&layout) {
-                return self.words(&layout.flat());
-            }
+        if self.one_set(&head, &item.effects, span) {
+            return;
         }
         let brace = Layout::row([head.clone(), Layout::text("{")]);
         if !commented && self.fits(&brace) {
@@ -405,17 +395,22 @@ impl Printer<'_> {
         self.effects(&item.effects, span);
     }
 
-    /// `head { set … }`: on one line if it is one effect that fits and has no comment.
     fn sets(&mut self, head: &str, effects: &[Effect], span: Span) {
-        if let ([only], false) = (effects, self.comment_between(span.start, span.end)) {
-            let layout =
-                Layout::row([Layout::text(head), Layout::text("{ "), effect(only), Layout::text(" }")]);
-            if self.fits(&layout) {
-                return self.words(&layout.flat());
-            }
+        if !self.one_set(&Layout::text(head), effects, span) {
+            self.words(head);
+            self.effects(effects, span);
         }
-        self.words(head);
-        self.effects(effects, span);
+    }
+
+    /// Prints `head { set … }` if it is one `set`, fits on the line and has no comment; gives whether it was printed.
+    fn one_set(&mut self, head: &Layout, effects: &[Effect], span: Span) -> bool {
+        let [only @ Effect { kind: EffectKind::Set { .. }, .. }] = effects else { return false };
+        let layout = Layout::row([head.clone(), Layout::text("{ "), effect(only), Layout::text(" }")]);
+        let is_printed = !self.comment_between(span.start, span.end) && self.fits(&layout);
+        if is_printed {
+            self.words(&layout.flat());
+        }
+        is_printed
     }
 
     /// Effects in braces, one a line.
@@ -429,20 +424,19 @@ impl Printer<'_> {
                             printer.value(value);
                         });
                     }
-                    _ => printer.entry(step.span, &effect(step)),
+                    _ => printer.entry(step.span, &effect(step), ""),
                 }
             }
         });
     }
 
-    /// Prints parameters, one a line.
     fn params(&mut self, params: &[ActionParam], end: usize) {
         let limit = std::mem::replace(&mut self.limit, self.source.len());
         self.words("(");
         self.level += 1;
         self.opened = true;
         for each in params {
-            self.entry_with_comma(each.span, &param(each));
+            self.entry(each.span, &param(each), ",");
         }
         self.opened = false;
         self.comments_before(end);
@@ -450,14 +444,6 @@ impl Printer<'_> {
         self.limit = limit;
         self.plain_line(false);
         self.words(") ");
-    }
-
-    fn entry_with_comma(&mut self, span: Span, layout: &Layout) {
-        self.comments_before(span.end);
-        self.line(span.start);
-        self.put(layout);
-        self.words(",");
-        self.trailing_comment(span.end);
     }
 
     fn rule(&mut self, item: &Rule, span: Span) {
@@ -468,7 +454,7 @@ impl Printer<'_> {
         match &item.body {
             RuleBody::Holds { on, during, condition } => {
                 if !on.is_empty() {
-                    self.words(&format!(" on {}", names(on)));
+                    self.words(&format!(" on {}", names(on, ", ")));
                 }
                 if let Some(during) = during {
                     self.words(&format!(" during {}", during.text));
@@ -479,40 +465,23 @@ impl Printer<'_> {
             RuleBody::Moves { state, key, moves } => {
                 let key = key.as_ref().map_or(String::new(), |key| format!("[{}]", key.text));
                 self.words(&format!(" on {}{key} ", state.text));
-                self.block(span.end, |printer| {
-                    for step in moves {
-                        let to = step.to.iter().map(|name| name.text.as_str()).collect::<Vec<_>>();
-                        let layout = Layout::text(format!("{} -> {}", step.from.text, to.join(" | ")));
-                        printer.entry(step.span, &layout);
-                    }
-                });
+                let line =
+                    |step: &Move| Layout::text(format!("{} -> {}", step.from.text, names(&step.to, " | ")));
+                self.lines(span.end, moves.iter().map(|step| (step.span, line(step))));
             }
         }
-    }
-
-    /// `{`, one field a line, `}`.
-    fn field_lines(&mut self, entries: &[Field], end: usize) {
-        self.block(end, |printer| {
-            for entry in entries {
-                printer.entry(entry.span, &field(entry));
-            }
-        });
     }
 
     /// `origin { … }` in a block: on one line if it fits, absent if it is empty.
     fn section(&mut self, keyword: &str, entries: &[Field]) {
         let (Some(first), Some(last)) = (entries.first(), entries.last()) else { return };
-        let (start, end) = (first.span.start, last.span.end);
+        let span = first.span.to(last.span);
         // Comments before the first field, or inside it, move above the section.
         self.comments_before(first.span.end);
         self.plain_line(false);
         self.words(&format!("{keyword} "));
-        let layout = fields(entries);
-        if !self.comment_between(start, end) && self.fits(&layout) {
-            self.words(&layout.flat());
-            self.trailing_comment(end);
-        } else {
-            self.field_lines(entries, end);
+        if self.braced(span, field_entries(entries).collect()) {
+            self.trailing_comment(span.end);
         }
     }
 
@@ -527,18 +496,14 @@ impl Printer<'_> {
             printer.section("start", &item.start);
             printer.plain_line(false);
             printer.words("steps ");
-            if item.steps.is_empty() {
-                printer.words("{}");
-            } else {
-                let end = item.steps.last().map_or(0, |last| last.span.end);
-                printer.block(end, |printer| {
-                    for each in &item.steps {
-                        printer.entry(each.span, &step(each));
-                    }
-                });
+            match item.steps.last() {
+                None => printer.words("{}"),
+                Some(last) => {
+                    printer.lines(last.span.end, item.steps.iter().map(|each| (each.span, step(each))));
+                }
             }
             for each in &item.expects {
-                printer.entry(each.span, &expect(each));
+                printer.entry(each.span, &expect(each), "");
             }
         });
     }
@@ -549,17 +514,10 @@ impl Printer<'_> {
             printer.section("origin", &item.origin);
             printer.section("net", &item.net);
             printer.section("claims", &item.claims);
-            if item.rules.is_empty() {
-                return;
-            }
+            let Some(last) = item.rules.last() else { return };
             printer.plain_line(false);
             printer.words("rules ");
-            let end = item.rules.last().map_or(0, |last| last.span.end);
-            printer.block(end, |printer| {
-                for each in &item.rules {
-                    printer.entry(each.span, &policy_line(each));
-                }
-            });
+            printer.lines(last.span.end, item.rules.iter().map(|each| (each.span, policy_line(each))));
         });
     }
 }
@@ -568,7 +526,11 @@ impl Printer<'_> {
 fn one_line(kind: &ItemKind) -> bool {
     let plain = |value: &Expr| !matches!(value.kind, ExprKind::Match { .. });
     match kind.plain() {
-        ItemKind::Language(_) | ItemKind::Use(_) | ItemKind::Enum(_) | ItemKind::Group(_) => true,
+        ItemKind::Language(_)
+        | ItemKind::Use(_)
+        | ItemKind::Enum(_)
+        | ItemKind::Group(_)
+        | ItemKind::Expect(_) => true,
         ItemKind::State(item) => match &item.initial {
             Initial::Any => true,
             Initial::Value(value) => plain(value),
@@ -580,23 +542,16 @@ fn one_line(kind: &ItemKind) -> bool {
             matches!(&item.body, RuleBody::Holds { condition, .. } if plain(condition))
         }
         ItemKind::Verdict(item) => plain(&item.condition),
-        ItemKind::Expect(_) => true,
-        ItemKind::Action(_)
-        | ItemKind::Also(_)
-        | ItemKind::EachStep(_)
-        | ItemKind::Odds(_)
-        | ItemKind::Body(_)
-        | ItemKind::Road(_)
-        | ItemKind::Episode(_)
-        | ItemKind::Reward(_)
-        | ItemKind::Scenario(_)
-        | ItemKind::Override(_)
-        | ItemKind::Policy(_) => false,
+        _ => false,
     }
 }
 
-fn names(names: &[Name]) -> String {
-    names.iter().map(|name| name.text.as_str()).collect::<Vec<_>>().join(", ")
+fn names(names: &[Name], separator: &str) -> String {
+    names.iter().map(|name| name.text.as_str()).collect::<Vec<_>>().join(separator)
+}
+
+fn field_entries(fields: &[Field]) -> impl Iterator<Item = (Span, Layout)> {
+    fields.iter().map(|entry| (entry.span, field(entry)))
 }
 
 /// `head A | B`, or one name a line.
@@ -604,9 +559,9 @@ fn separated(head: &str, separator: &str, names: &[Name]) -> Layout {
     let mut inside = Vec::new();
     for (index, name) in names.iter().enumerate() {
         match (index, separator) {
-            (0, _) => inside.push(Layout::Line),
-            (_, ",") => inside.extend([Layout::text(","), Layout::Line]),
-            _ => inside.extend([Layout::Line, Layout::text(format!("{separator} "))]),
+            (0, _) => inside.push(Layout::Line(" ")),
+            (_, ",") => inside.extend([Layout::text(","), Layout::Line(" ")]),
+            _ => inside.extend([Layout::Line(" "), Layout::text(format!("{separator} "))]),
         }
         inside.push(Layout::text(&name.text));
     }
@@ -650,9 +605,10 @@ fn assigned(state: &Name, key: Option<&Expr>) -> Layout {
 
 fn effect(effect: &Effect) -> Layout {
     match &effect.kind {
-        EffectKind::Set { state, key, value } => {
-            Layout::group([assigned(state, key.as_ref()), Layout::nest([Layout::Line, expression(value)])])
-        }
+        EffectKind::Set { state, key, value } => Layout::group([
+            assigned(state, key.as_ref()),
+            Layout::nest([Layout::Line(" "), expression(value)]),
+        ]),
         EffectKind::Spawn { body, place, distance, cover, fields: entries } => {
             let place = match place {
                 Place::Ahead => " ahead ",
@@ -700,7 +656,7 @@ fn policy_line(line: &PolicyLine) -> Layout {
     };
     let mut actions = Vec::new();
     for (at, action) in line.actions.iter().enumerate() {
-        actions.extend([Layout::Line, Layout::text(if at == 0 { "" } else { "| " }), call(action)]);
+        actions.extend([Layout::Line(" "), Layout::text(if at == 0 { "" } else { "| " }), call(action)]);
     }
     Layout::group([condition, Layout::text(" =>"), Layout::nest(actions)])
 }

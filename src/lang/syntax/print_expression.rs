@@ -69,14 +69,16 @@ fn binary(op: BinaryOp, left: &Expr, right: &Expr) -> Layout {
             within(right, right_least),
         ]);
     }
-    let mut rest = vec![Layout::Line, Layout::text(format!("{} ", op.symbol())), within(right, right_least)];
+    let link = |op: BinaryOp, right: &Expr| {
+        [Layout::Line(" "), Layout::text(format!("{} ", op.symbol())), within(right, right_least)]
+    };
+    let mut rest = Vec::from(link(op, right));
     let mut first = left;
     while let ExprKind::Binary { op: earlier, left, right, .. } = &first.kind {
         if operator.grouping() == Grouping::Right || Operator::Binary(*earlier).level() != operator.level() {
             break;
         }
-        let link = [Layout::Line, Layout::text(format!("{} ", earlier.symbol())), within(right, right_least)];
-        rest.splice(0..0, link);
+        rest.splice(0..0, link(*earlier, right));
         first = left;
     }
     Layout::group([within(first, left_least), Layout::nest(rest)])
@@ -106,15 +108,12 @@ pub fn field(field: &Field) -> Layout {
 pub fn braced(entries: impl Iterator<Item = Layout>) -> Layout {
     let mut inside = Vec::new();
     for entry in entries {
-        if !inside.is_empty() {
-            inside.push(Layout::IfFlat(","));
-        }
-        inside.extend([Layout::Line, entry]);
+        inside.extend([Layout::Line(if inside.is_empty() { " " } else { ", " }), entry]);
     }
     if inside.is_empty() {
         return Layout::text("{}");
     }
-    Layout::group([Layout::text("{"), Layout::nest(inside), Layout::Line, Layout::text("}")])
+    Layout::group([Layout::text("{"), Layout::nest(inside), Layout::Line(" "), Layout::text("}")])
 }
 
 pub fn arm(arm: &Arm) -> Layout {

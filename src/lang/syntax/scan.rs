@@ -140,7 +140,6 @@ impl Scanner<'_> {
         self.line_blank = false;
     }
 
-    /// Passes a word or a number.
     fn word(&mut self) {
         let start = self.at;
         let rest = &self.text[start..];
@@ -168,7 +167,6 @@ impl Scanner<'_> {
         }
     }
 
-    /// Reports a text that is too long to be read.
     fn check_length(&mut self) {
         if self.tokens <= TOKENS_MAX || self.found.is_too_large {
             return;

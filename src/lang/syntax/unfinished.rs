@@ -177,35 +177,3 @@ fn read(text: &str) -> Result<Option<ItemKind>, (usize, Vec<Rule>)> {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_grammar_says_what_fits() {
-        let at_end = |text: &str| unfinished(text, text.len());
-        assert_eq!(at_end("action a(").keywords, ["each", "any"]);
-        assert_eq!(at_end("action a(each x: Side ").keywords, ["in", "where"]);
-        assert_eq!(at_end("use \"a.ava\" wi").keywords, ["digest", "without"]);
-        let found = at_end("rule r on all: pace ");
-        assert!(found.continues_expression && found.begins_declaration && found.tree.is_none());
-        assert!(at_end("rule r on all: pace // no").tree.is_none());
-    }
-
-    #[test]
-    fn what_breaks_off_has_a_tree() {
-        let named = |text: &str| unfinished(text, text.len()).tree.expect("a name fits here");
-        for text in [
-            "rule r on ",
-            "scenario s { road: corner steps { 0: cross(from: Left) with { ",
-            "action a(each x: Side) {\n  spawn ",
-            "policy p { rules { when far > 3 ",
-            "road r { map: \"roads/",
-        ] {
-            assert!(serde_json::to_string(&named(text)).unwrap().contains(HERE), "{text}");
-        }
-        let found = unfinished("let a = 1\nlet b = fo|ar", 20);
-        assert_eq!((found.start, found.tree.is_some()), (18, true));
-    }
-}

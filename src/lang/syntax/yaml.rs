@@ -130,7 +130,6 @@ const LAYOUT: &[Said] = &[
     ),
 ];
 
-/// The message for a word that is not among those that are known.
 fn no_such(name: &str, known: &str) -> String {
     let known = known.trim_start_matches("one of ").split([',', ' ']).map(|name| name.trim_matches('`'));
     // Of two names, the reader says "`a` or `b`".

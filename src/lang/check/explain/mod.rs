@@ -47,8 +47,7 @@ impl Page {
 
     /// The first paragraph, on one line.
     pub fn summary(&self) -> String {
-        let paragraphs = self.text.split("\n\n");
-        paragraphs.skip(1).take(1).collect::<String>().replace('\n', " ")
+        self.text.split("\n\n").nth(1).unwrap_or_default().replace('\n', " ")
     }
 
     /// The source under a heading: `Wrong` or `Right`.

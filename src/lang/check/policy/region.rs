@@ -172,15 +172,11 @@ mod tests {
     }
 
     #[test]
-    fn halves_cover_the_whole() {
+    fn words_and_ends_of_variables_count() {
         let all = Region::all();
         let low = all.and(&condition("ego_speed", Comparison::LessEqual, 5.0));
-        let high = all.and(&condition("ego_speed", Comparison::Greater, 5.0));
-        let open = all.and(&condition("ego_speed", Comparison::Less, 5.0));
         let night = all.and(&condition("time", Comparison::Equal, 20.0));
         let day = all.and(&condition("time", Comparison::NotEqual, 20.0));
-        assert!(all.is_covered(&[low.clone(), high.clone()]));
-        assert!(!all.is_covered(&[open.clone(), high.clone()]));
         assert!(all.is_covered(&[
             night.clone(),
             low.clone(),
