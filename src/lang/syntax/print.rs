@@ -526,11 +526,7 @@ impl Printer<'_> {
 fn one_line(kind: &ItemKind) -> bool {
     let plain = |value: &Expr| !matches!(value.kind, ExprKind::Match { .. });
     match kind.plain() {
-        ItemKind::Language(_)
-        | ItemKind::Use(_)
-        | ItemKind::Enum(_)
-        | ItemKind::Group(_)
-        | ItemKind::Expect(_) => true,
+        ItemKind::Language(_) | ItemKind::Use(_) | ItemKind::Enum(_) | ItemKind::Group(_) => true,
         ItemKind::State(item) => match &item.initial {
             Initial::Any => true,
             Initial::Value(value) => plain(value),
@@ -542,7 +538,18 @@ fn one_line(kind: &ItemKind) -> bool {
             matches!(&item.body, RuleBody::Holds { condition, .. } if plain(condition))
         }
         ItemKind::Verdict(item) => plain(&item.condition),
-        _ => false,
+        ItemKind::Expect(_) => true,
+        ItemKind::Action(_)
+        | ItemKind::Also(_)
+        | ItemKind::EachStep(_)
+        | ItemKind::Odds(_)
+        | ItemKind::Body(_)
+        | ItemKind::Road(_)
+        | ItemKind::Episode(_)
+        | ItemKind::Reward(_)
+        | ItemKind::Scenario(_)
+        | ItemKind::Override(_)
+        | ItemKind::Policy(_) => false,
     }
 }
 
