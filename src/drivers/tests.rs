@@ -1,62 +1,19 @@
-//! Every entry of the registry: it drives, repeats itself, and a copy goes on as the original.
+//! Every entry of the registry: it repeats itself, a copy goes on as the original; and drives of them on hand-made roads.
+//! That all arrive in every weather is tested with the shipped roads (`tests/it/drives`).
 
 use core::f64::consts::PI;
 use std::sync::Arc;
 
 use avastra_base::geometry::Pose;
-use avastra_lang::model::vocabulary::{Body, Level, TimeOfDay, Word};
+use avastra_lang::model::vocabulary::Body;
 use avastra_road::testing::{lanes as lanes_of, street};
 use avastra_world::sim::testing::overpass;
-use avastra_world::sim::{DT_S, Scene, SignalColour, Start, TrafficProfile, VehicleParameters, World};
+use avastra_world::sim::{DT_S, Scene, SignalColour, VehicleParameters, World};
 
 use super::driver::Ads;
 use super::registry::{REGISTRY, by_name};
 use super::status::Reason;
-use super::testing::{Rig, corner, object, straight};
-
-/// The world after a drive without obstacles, the farthest that the ego vehicle was beside the route, m, and its
-/// greatest speed as a part of the limit.
-fn drive_alone(scene: &Arc<Scene>, ads: &mut dyn Ads, start: &Start) -> (World, f64, f64) {
-    let mut world = World::new(Arc::clone(scene), start);
-    let mut sensed = world.sensed();
-    let (mut offset_m_max, mut over_limit_max) = (0.0_f64, 0.0_f64);
-    while !world.arrived() && world.time_s() < 240.0 {
-        world.sense(&mut sensed);
-        world.tick(&ads.drive(&sensed));
-        offset_m_max = offset_m_max.max(world.ego_offset_m().abs());
-        let lane = scene.route.lane_at(world.ego_station_m()).lane;
-        over_limit_max = over_limit_max.max(world.ego().speed_mps / scene.map.lane(lane).speed_limit_mps);
-    }
-    (world, offset_m_max, over_limit_max)
-}
-
-#[test]
-fn all_drive_the_corner_in_any_weather() {
-    let scene = corner();
-    for entry in REGISTRY {
-        for seed in 0..24_u64 {
-            let level = |shift: u64| Level::ALL[((seed + shift) % 4) as usize];
-            let start = Start {
-                ego_mps: avastra_lang::model::START_MPS,
-                time: TimeOfDay::ALL[(seed % 3) as usize],
-                rain: level(0),
-                fog: level(seed / 4),
-                wetness: level(seed / 3),
-                signal_phase_s: seed as f64 * 3.7,
-                seed,
-                ambient: 0,
-                traffic: TrafficProfile::default(),
-            };
-            let mut ads = (entry.build)(&scene, seed);
-            let (world, offset_m_max, over_limit_max) = drive_alone(&scene, ads.as_mut(), &start);
-            let drive = format!("{} {seed}: {offset_m_max} m aside at most", entry.name);
-            assert!(world.arrived(), "{drive}, at {} m", world.ego_station_m());
-            assert_eq!(world.red_runs(), 0, "{drive}");
-            assert!(over_limit_max < 1.05, "{drive}, {over_limit_max} of the limit");
-            assert!(offset_m_max < 0.6, "{drive}");
-        }
-    }
-}
+use super::testing::{Rig, object, straight};
 
 #[test]
 fn nothing_slows_down_for_traffic_on_a_bridge() {
