@@ -3,45 +3,15 @@
 use std::sync::Arc;
 
 use crate::status::{Manoeuvre, Reason};
-use crate::testing::{Rig, object, straight, two_lanes, winding};
-use avastra_base::geometry::{Pose, Vec2};
+use crate::testing::{Rig, object, straight, two_lanes};
+use avastra_base::geometry::Pose;
 use avastra_lang::model::vocabulary::Body;
-use avastra_road::RouteLaneChange;
 use avastra_world::sim::{DT_S, Scene, SignalColour};
 
 use super::{Modular, ModularConfig, Module};
 
 fn rig(scene: &Arc<Scene>, seed: u64) -> Rig {
     Rig::new(scene, Box::new(Modular::new(scene, &ModularConfig::default(), seed)), 0.0)
-}
-
-#[test]
-fn it_keeps_its_lane_round_bends() {
-    let scene = winding();
-    for seed in 0..3 {
-        let mut rig = rig(&scene, seed);
-        let mut ticks = 0;
-        while rig.station_m() < scene.route.goal_m {
-            rig.tick();
-            ticks += 1;
-            assert!(ticks < 50 * 60, "it arrives within a minute");
-        }
-        assert!(rig.offset_m_max < 0.6, "{}", rig.offset_m_max);
-    }
-}
-
-#[test]
-fn it_stops_at_red_and_goes_on_at_green() {
-    let scene = straight();
-    let mut rig = rig(&scene, 1);
-    rig.sensed.signals[0] = SignalColour::Red;
-    rig.run(30.0);
-    let front_m = rig.station_m() + 3.705;
-    assert!(rig.sensed.ego.speed_mps < 0.01 && (97.0..100.0).contains(&front_m), "{front_m}");
-    assert_eq!(rig.ads.status().reason.to_string(), "red light");
-    rig.sensed.signals[0] = SignalColour::Green;
-    rig.run(10.0);
-    assert!(rig.sensed.ego.speed_mps > 9.0);
 }
 
 #[test]
@@ -380,27 +350,6 @@ fn changing(open_m: f64) -> Rig {
 }
 
 #[test]
-fn it_changes_lanes_where_the_gap_is_safe() {
-    let mut free = changing(200.0);
-    let mut changed = false;
-    for _ in 0..1500 {
-        free.tick();
-        changed |= free.ads.status().manoeuvre == Manoeuvre::LaneChange;
-    }
-    let y_m = free.sensed.ego.rear_axle.position.y;
-    assert!(changed && (y_m + 1.75).abs() < 0.3, "{y_m}");
-
-    // A faster car comes from behind: first it passes, then the lane change begins.
-    let mut passed = changing(300.0);
-    passed.sensed.objects.push(object(1, Body::Sedan, Pose::new(-15.0, -1.75, 0.0), 13.0));
-    passed.run(1.0);
-    assert!((passed.sensed.ego.rear_axle.position.y + 5.25).abs() < 0.3);
-    passed.run(20.0);
-    assert!((passed.sensed.ego.rear_axle.position.y + 1.75).abs() < 0.3);
-    assert!(passed.gap_m_min > 1.0, "{}", passed.gap_m_min);
-}
-
-#[test]
 fn it_breaks_off_a_lane_change_that_is_no_longer_safe() {
     let mut rig = changing(300.0);
     while rig.sensed.ego.rear_axle.position.y < -5.2 {
@@ -418,24 +367,4 @@ fn it_breaks_off_a_lane_change_that_is_no_longer_safe() {
     assert!(farthest_m < -3.5 && rig.gap_m_min > 0.3, "{farthest_m} {}", rig.gap_m_min);
     rig.run(20.0);
     assert!((rig.sensed.ego.rear_axle.position.y + 1.75).abs() < 0.3, "it changes once the car has passed");
-}
-
-#[test]
-fn it_waits_for_a_gap_where_a_change_is_just_possible() {
-    let mut rig = changing(100.0);
-    let queue = |i: u32| object(i + 1, Body::Sedan, Pose::new(f64::from(i) * 8.0, -1.75, 0.0), 0.0);
-    rig.sensed.objects = (0..14).map(queue).collect();
-    rig.run(30.0);
-    let place = rig.sensed.ego.rear_axle.position;
-    let wait_m = rig.scene.route.changes[0].latest_m - RouteLaneChange::LENGTH_M_MIN;
-    assert!((place.y + 5.25).abs() < 0.3 && (wait_m - 6.0..wait_m + 0.5).contains(&place.x), "{place}");
-    let status = rig.ads.status();
-    assert_eq!((status.manoeuvre, status.reason), (Manoeuvre::AwaitGap, Reason::LaneChange));
-    // The queue moves off; behind it there is room.
-    for object in &mut rig.sensed.objects {
-        object.velocity_mps = Vec2::new(9.0, 0.0);
-    }
-    rig.run(40.0);
-    assert!((rig.sensed.ego.rear_axle.position.y + 1.75).abs() < 0.3);
-    assert!(rig.gap_m_min > 0.8, "{}", rig.gap_m_min);
 }

@@ -203,19 +203,13 @@ impl<M: Model> Ads for Reference<M> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::testing::{Rig, object, two_lanes};
-    use crate::{CarefulHuman, by_name};
+    use crate::testing::{Rig, SOURCE_Y_M, TARGET_Y_M, object, two_lanes};
     use avastra_base::geometry::Pose;
     use avastra_lang::model::vocabulary::Body;
 
-    const SOURCE_Y_M: f64 = -5.25;
-    const TARGET_Y_M: f64 = -1.75;
-
     /// How far a careful human has moved to its side after 2 s, while a faster vehicle comes from behind, m.
     fn moved_aside_m(takes_over: bool) -> f64 {
-        let scene = two_lanes(300.0);
-        let mut rig = Rig::new(&scene, Box::new(Reference::new(&scene, CarefulHuman)), 8.0);
+        let mut rig = Rig::driven_by("cc", &two_lanes(300.0), 0, 8.0);
         rig.sensed.objects = vec![object(1, Body::Sedan, Pose::new(-15.0, TARGET_Y_M, 0.0), 13.0)];
         if takes_over {
             // Its first thought is to change lanes, because it has seen nothing yet.
@@ -223,7 +217,7 @@ mod tests {
             rig.ads.take_over(&rig.sensed);
         }
         rig.run(2.0);
-        rig.sensed.ego.rear_axle.position.y - SOURCE_Y_M
+        rig.place().y - SOURCE_Y_M
     }
 
     #[test]
@@ -235,10 +229,8 @@ mod tests {
 
     #[test]
     fn one_that_takes_over_knows_the_lane_that_it_is_in() {
-        let scene = two_lanes(300.0);
         for name in ["cc", "fsm", "rss", "r157"] {
-            let entry = by_name(name).expect("it is registered");
-            let mut rig = Rig::new(&scene, (entry.build)(&scene, 0), 0.8);
+            let mut rig = Rig::driven_by(name, &two_lanes(300.0), 0, 0.8);
             // Another driver has changed lanes, and creeps towards a person that stands in the target lane.
             rig.sensed.ego.rear_axle = Pose::new(150.0, TARGET_Y_M, 0.0);
             rig.sensed.objects = vec![object(1, Body::Pedestrian, Pose::new(160.0, TARGET_Y_M, 0.0), 0.0)];

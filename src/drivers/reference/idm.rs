@@ -359,75 +359,22 @@ fn model_mps2(speed_mps: f64, allowed_mps: f64, ahead: Option<(f64, f64)>) -> f6
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Rig, object, two_lanes};
-    use avastra_lang::model::vocabulary::Body;
-    use avastra_road::RouteLaneChange;
-
-    const SOURCE_Y_M: f64 = -5.25;
-    const TARGET_Y_M: f64 = -1.75;
-
-    fn rig(open_m: f64) -> Rig {
-        let scene = two_lanes(open_m);
-        let ads = Box::new(Idm::new(&scene));
-        Rig::new(&scene, ads, 8.0)
-    }
-
-    fn place(rig: &Rig) -> Vec2 {
-        rig.sensed.ego.rear_axle.position
-    }
+    use crate::testing::{Rig, TARGET_Y_M, two_lanes};
 
     #[test]
     fn on_a_free_road_it_changes_as_planned() {
-        let mut rig = rig(200.0);
+        let mut rig = Rig::driven_by("idm", &two_lanes(200.0), 1, 8.0);
         rig.run(30.0);
-        assert!((place(&rig).y - TARGET_Y_M).abs() < 0.1, "{:?}", place(&rig));
+        assert!((rig.place().y - TARGET_Y_M).abs() < 0.1, "{:?}", rig.place());
         assert!(rig.offset_m_max < 0.3, "{} m off the path", rig.offset_m_max);
     }
 
     #[test]
     fn it_goes_on_with_a_change_that_another_driver_has_begun() {
-        let mut rig = rig(300.0);
+        let mut rig = Rig::driven_by("idm", &two_lanes(300.0), 1, 8.0);
         rig.sensed.ego.rear_axle = Pose::new(40.0, -4.0, 0.0);
-        let mut lowest_m = f64::INFINITY;
-        for _ in 0..400 {
-            rig.tick();
-            lowest_m = lowest_m.min(place(&rig).y);
-        }
+        let lowest_m = rig.run_least(8.0, |rig| rig.place().y);
         assert!(lowest_m > -4.05, "back towards the source lane: {lowest_m}");
-        assert!((place(&rig).y - TARGET_Y_M).abs() < 0.1, "{:?}", place(&rig));
-    }
-
-    #[test]
-    fn it_does_not_cut_in_and_waits_where_a_change_is_just_possible() {
-        let mut rig = rig(100.0);
-        // A queue stands beside all that is left of the way.
-        rig.sensed.objects = (0..14)
-            .map(|i| object(i + 1, Body::Sedan, Pose::new(f64::from(i) * 8.0, TARGET_Y_M, 0.0), 0.0))
-            .collect();
-        rig.run(30.0);
-        let waits = place(&rig);
-        assert!((waits.y - SOURCE_Y_M).abs() < 0.1, "{waits:?}");
-        let wait_m = rig.scene.route.changes[0].latest_m - RouteLaneChange::LENGTH_M_MIN;
-        assert!(waits.x <= wait_m + 0.1 && waits.x > wait_m - 4.0, "{waits:?} against {wait_m}");
-        assert_eq!(rig.ads.status().reason, Reason::LaneChange);
-        assert!(rig.gap_m_min > 1.0, "{}", rig.gap_m_min);
-        // The queue moves off; behind it there is room.
-        for object in &mut rig.sensed.objects {
-            object.velocity_mps = Vec2::new(9.0, 0.0);
-        }
-        rig.run(40.0);
-        assert!((place(&rig).y - TARGET_Y_M).abs() < 0.1 && place(&rig).x > 150.0, "{:?}", place(&rig));
-        assert!(rig.gap_m_min > 1.0, "{}", rig.gap_m_min);
-    }
-
-    #[test]
-    fn it_lets_a_faster_vehicle_pass_first() {
-        let mut rig = rig(300.0);
-        rig.sensed.objects = vec![object(1, Body::Sedan, Pose::new(-15.0, TARGET_Y_M, 0.0), 13.0)];
-        rig.run(1.0);
-        assert!((place(&rig).y - SOURCE_Y_M).abs() < 0.05, "{:?}", place(&rig));
-        rig.run(20.0);
-        assert!((place(&rig).y - TARGET_Y_M).abs() < 0.1, "{:?}", place(&rig));
-        assert!(rig.gap_m_min > 1.0, "{}", rig.gap_m_min);
+        assert!((rig.place().y - TARGET_Y_M).abs() < 0.1, "{:?}", rig.place());
     }
 }
