@@ -203,7 +203,7 @@ impl Rig {
     }
 
     /// Runs; returns the least of a value after each tick.
-    pub fn run_least(&mut self, duration_s: f64, value: impl Fn(&Rig) -> f64) -> f64 {
+    pub fn run_least(&mut self, duration_s: f64, mut value: impl FnMut(&Rig) -> f64) -> f64 {
         (0..(duration_s / DT_S) as usize).fold(f64::INFINITY, |least, _| {
             self.tick();
             least.min(value(self))
