@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::link::Broken;
-use super::schema::{Bounds, InRange, Schema, fields_schema, inside, length_beyond, value_beyond};
+use super::schema::{Bounds, Schema, fields_schema, inside, length_beyond, value_beyond};
 use super::words::words;
 
 /// An acceleration beyond this, m/s², is no plan but the output of a formula, for example of a car-following model at a small
@@ -49,9 +49,7 @@ macro_rules! message {
                     ],
                 )
             }
-        }
 
-        impl InRange for $name {
             fn out_of_range(&self, at: &str) -> Option<Broken> {
                 let _ = at;
                 $( if let Some(found) = checked!(&self.$field, &inside(at, stringify!($field)) $(, $low, $high)? $(=> $least, $most)?) { return Some(found); } )*
@@ -77,13 +75,13 @@ macro_rules! bounds {
 
 macro_rules! checked {
     ($value:expr, $at:expr) => {
-        InRange::out_of_range($value, $at)
+        Schema::out_of_range($value, $at)
     };
     ($value:expr, $at:expr, $low:literal, $high:literal) => {
         value_beyond(*$value, $at, $low as f64, $high as f64)
     };
     ($value:expr, $at:expr => $least:literal, $most:expr) => {
-        length_beyond($value, $at, $least, $most).or_else(|| InRange::out_of_range($value, $at))
+        length_beyond($value, $at, $least, $most).or_else(|| Schema::out_of_range($value, $at))
     };
 }
 
@@ -94,12 +92,6 @@ macro_rules! schemas_of_words {
             impl Schema for $name {
                 fn schema() -> serde_json::Value {
                     serde_json::json!({ "enum": $name::ALL.map($name::name) })
-                }
-            }
-
-            impl InRange for $name {
-                fn out_of_range(&self, _at: &str) -> Option<Broken> {
-                    None
                 }
             }
         )*
