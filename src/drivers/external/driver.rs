@@ -26,6 +26,7 @@ use super::settings::OnTimeout;
 const LOST_S: f64 = 2.0;
 
 /// An external driving system in one episode.
+#[derive(Clone)]
 pub struct External {
     program: Arc<Program>,
     scene: Arc<Scene>,
@@ -36,8 +37,7 @@ pub struct External {
     follower: Follower,
     /// What was asked so far, the `reset` first, and what came of it.
     exchanges: Vec<Exchange>,
-    /// The process that answers, with the number of exchanges that it took part in.
-    live: Option<(Session, usize)>,
+    live: Live,
     /// Answers that are not yet obeyed, with the tick from which on they are.
     coming: VecDeque<(u64, Arc<Answer>)>,
     obeyed: Option<Arc<Answer>>,
@@ -56,25 +56,13 @@ struct Exchange {
     outcome: Outcome,
 }
 
-impl Clone for External {
-    fn clone(&self) -> External {
-        External {
-            program: Arc::clone(&self.program),
-            scene: Arc::clone(&self.scene),
-            seed: self.seed,
-            map: Arc::clone(&self.map),
-            observer: self.observer.clone(),
-            follower: self.follower.clone(),
-            exchanges: self.exchanges.clone(),
-            live: None,
-            coming: self.coming.clone(),
-            obeyed: self.obeyed.clone(),
-            asked_tick: self.asked_tick,
-            answered_tick: self.answered_tick,
-            touched: self.touched,
-            failure: self.failure.clone(),
-            status: self.status.clone(),
-        }
+/// The process that answers, with the number of exchanges that it took part in. A copy has none.
+#[derive(Default)]
+struct Live(Option<(Session, usize)>);
+
+impl Clone for Live {
+    fn clone(&self) -> Live {
+        Live(None)
     }
 }
 
@@ -89,7 +77,7 @@ impl External {
             observer: (!question::is_truth(program.settings())).then(observer),
             follower: Follower::new(scene),
             exchanges: Vec::new(),
-            live: None,
+            live: Live::default(),
             coming: VecDeque::new(),
             obeyed: None,
             asked_tick: None,
@@ -152,7 +140,7 @@ impl External {
         };
         if let Outcome::Failed(failure) = &outcome {
             self.failure = Some(Arc::clone(failure));
-            self.live = None;
+            self.live = Live::default();
         }
         self.exchanges.push(Exchange { key, question, outcome: outcome.clone() });
         self.failure.is_none().then_some(outcome)
@@ -160,13 +148,13 @@ impl External {
 
     /// Asks a process, which first is shown all that it has missed of the episode.
     fn asked(&mut self, question: &str, step: Option<(u64, u64)>) -> Result<Outcome, Failure> {
-        let up_to_date = self.live.take().filter(|(_, seen)| *seen == self.exchanges.len());
+        let up_to_date = self.live.0.take().filter(|(_, seen)| *seen == self.exchanges.len());
         let mut session = match up_to_date {
             Some((session, _)) => session,
             None => self.caught_up()?,
         };
         let outcome = self.answer(&mut session, question, step)?;
-        self.live = Some((session, self.exchanges.len() + 1));
+        self.live = Live(Some((session, self.exchanges.len() + 1)));
         Ok(outcome)
     }
 
@@ -331,7 +319,7 @@ impl Ads for External {
 
 impl Drop for External {
     fn drop(&mut self) {
-        if let Some((mut session, _)) = self.live.take() {
+        if let Some((mut session, _)) = self.live.0.take() {
             let t_us = question::micros(self.asked_tick.unwrap_or(0) as f64 * DT_S);
             session.tell(&Question::Event(Event { kind: "end".to_owned(), t_us }).line());
             self.program.give_back(session);
