@@ -15,7 +15,7 @@ use avastra_world::sim::{Control, DT_S, Scene, Sensed};
 
 use super::finding::{Failure, FailureKind, Problem, harmless};
 use super::follow::Follower;
-use super::message::{Answer, Event, Question};
+use super::message::{Answer, Event, Observation, Question};
 use super::program::{MapLine, Program};
 use super::question;
 use super::record::{Conversation, Key, Outcome};
@@ -74,7 +74,7 @@ impl External {
             scene: Arc::clone(scene),
             seed,
             map: program.map_line(&scene.map),
-            observer: (!question::is_truth(program.settings())).then(observer),
+            observer: (program.settings().observation == Observation::Perceived).then(observer),
             follower: Follower::new(scene),
             exchanges: Vec::new(),
             live: Live::default(),

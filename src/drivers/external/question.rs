@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
+use crate::driver::Ads;
 use crate::modular::Modular;
+use crate::status::PerceivedObject;
 use avastra_base::geometry::{Pose, Vec2, unit_vector, wrap_angle};
 use avastra_lang::model::vocabulary::Body;
 use avastra_road::{Lane, LaneIndex, Neighbour, Precedence, RoadMap, Side, SignKind, Turn};
@@ -10,9 +12,9 @@ use avastra_world::sim::{DT_S, EgoMotion, Scene, Sensed, SignalColour, VehiclePa
 
 use super::message::{
     Class, ConditionsMessage, CrosswalkMessage, EgoMessage, Goal, Init, LaneMessage, LaneSign, LaneStop,
-    Light, Map, NeighborMessage, ObjectMessage, Observation, PROTOCOL, Point, PrecedenceWord, Reset,
-    RouteChange, RouteMessage, RouteSign, RouteStop, RouteStretch, SignWord, SignalPlace, SignalState, Start,
-    Step, TurnWord, Vehicle,
+    Light, Map, NeighborMessage, ObjectMessage, PROTOCOL, Point, PrecedenceWord, Reset, RouteChange,
+    RouteMessage, RouteSign, RouteStop, RouteStretch, SignWord, SignalPlace, SignalState, Start, Step,
+    TurnWord, Vehicle,
 };
 use super::settings::ExternalSettings;
 
@@ -265,19 +267,13 @@ pub fn step(
         t_us,
         ego: ego(scene, &sensed.ego, &localized, position_std, route_m),
         objects: match observer {
-            Some(observer) => perceived(observer),
+            Some(observer) => observer.status().perceived.iter().map(believed).collect(),
             None => sensed
                 .objects
                 .iter()
                 .map(|object| ObjectMessage {
                     visible: number(object.visible_fraction),
-                    ..thing(
-                        object.id,
-                        object.body,
-                        &object.pose,
-                        object.velocity_mps,
-                        [object.length_m, object.width_m, object.height_m],
-                    )
+                    ..believed(&PerceivedObject::as_it_is(object))
                 })
                 .collect(),
         },
@@ -294,7 +290,6 @@ pub fn step(
 
 /// Where the driving system is shown its rear axle to be.
 pub fn pose(sensed: &Sensed, observer: Option<&Modular>) -> Pose {
-    use crate::driver::Ads;
     observer.and_then(|observer| observer.status().localized).unwrap_or(sensed.ego.rear_axle)
 }
 
@@ -321,21 +316,11 @@ fn ego(scene: &Scene, motion: &EgoMotion, pose: &Pose, position_std: f64, route_
     }
 }
 
-/// The objects as `modular` believes them to be now, under the numbers of its tracks.
-fn perceived(observer: &Modular) -> Vec<ObjectMessage> {
-    use crate::driver::Ads;
-    let objects = observer.status().perceived.iter();
-    let message = |object: &crate::PerceivedObject| {
-        let size_m = [object.length_m, object.width_m, object.height_m];
-        thing(object.track, object.body, &object.pose, object.velocity_mps, size_m)
-    };
-    objects.map(message).collect()
-}
-
-fn thing(id: u32, body: Body, pose: &Pose, velocity_mps: Vec2, size_m: [f64; 3]) -> ObjectMessage {
+/// An object as it is believed to be now, under the number of its track.
+fn believed(object: &PerceivedObject) -> ObjectMessage {
     ObjectMessage {
-        id: id.into(),
-        class: match body {
+        id: object.track.into(),
+        class: match object.body {
             Body::Pedestrian => Class::Pedestrian,
             Body::SchoolBus => Class::Bus,
             Body::BoxTruck => Class::Truck,
@@ -343,14 +328,14 @@ fn thing(id: u32, body: Body, pose: &Pose, velocity_mps: Vec2, size_m: [f64; 3])
             Body::Motorcycle => Class::Motorcycle,
             Body::Bicycle => Class::Cyclist,
         },
-        x: number(pose.position.x),
-        y: number(pose.position.y),
-        heading: number(wrap_angle(pose.heading_rad)),
-        vx: number(velocity_mps.x),
-        vy: number(velocity_mps.y),
-        length: number(size_m[0]),
-        width: number(size_m[1]),
-        height: number(size_m[2]),
+        x: number(object.pose.position.x),
+        y: number(object.pose.position.y),
+        heading: number(wrap_angle(object.pose.heading_rad)),
+        vx: number(object.velocity_mps.x),
+        vy: number(object.velocity_mps.y),
+        length: number(object.length_m),
+        width: number(object.width_m),
+        height: number(object.height_m),
         visible: 1.0,
     }
 }
@@ -361,9 +346,4 @@ fn light(colour: SignalColour) -> Light {
         SignalColour::Yellow => Light::Yellow,
         SignalColour::Green => Light::Green,
     }
-}
-
-/// Whether a message shows the truth.
-pub fn is_truth(settings: &ExternalSettings) -> bool {
-    settings.observation == Observation::Truth
 }
