@@ -468,9 +468,8 @@ mod tests {
     }
 
     /// The hypotheses of one car on the corner's map after some frames in which it went on.
-    fn hypotheses(config: &PredictionConfig, pose: Pose, speed_mps: f64) -> Vec<Forecast> {
-        let scene = corner();
-        let mut prediction = Prediction::new(config, true, &scene, None);
+    fn hypotheses(pose: Pose, speed_mps: f64) -> Vec<Forecast> {
+        let mut prediction = prediction(&corner());
         let track = Track::for_tests(1, Body::Sedan, pose, pose.forward() * speed_mps);
         prediction.update(&[track], 0.0, 0.0, pose.position);
         prediction.forecasts().to_vec()
@@ -494,10 +493,9 @@ mod tests {
     #[test]
     fn a_fork_has_a_hypothesis_for_each_way_and_slow_vehicles_turn_more_often() {
         let (lane, straight, _) = fork();
-        let config = PredictionConfig::default();
         let before = lane.centre.pose_at(lane.centre.length_m() - 10.0);
         let turns = |speed_mps: f64| {
-            let found = hypotheses(&config, before, speed_mps);
+            let found = hypotheses(before, speed_mps);
             assert!((2..=3).contains(&found.len()), "{}", found.len());
             let sum: f64 = found.iter().map(|forecast| forecast.probability).sum();
             assert!((sum - 1.0).abs() < 1e-9, "{sum}");
@@ -508,15 +506,13 @@ mod tests {
         };
         let (slow, fast) = (turns(5.0), turns(9.0));
         assert!(slow > 0.15 && fast < slow, "{slow} and {fast}");
-        let one = hypotheses(&PredictionConfig { hypotheses_max: 1, ..config }, before, 5.0);
-        assert_eq!((one.len(), one[0].probability), (1, 1.0));
     }
 
     #[test]
     fn inside_a_junction_heading_and_place_tell_the_way_of_a_vehicle() {
         let (_, _, left) = fork();
         let pose = left.centre.pose_at(0.6 * left.centre.length_m());
-        let found = hypotheses(&PredictionConfig::default(), pose, 5.0);
+        let found = hypotheses(pose, 5.0);
         let end = found[0].positions[2];
         assert!(found[0].probability > 0.8, "{}", found[0].probability);
         let off_m = left
@@ -577,21 +573,6 @@ mod tests {
         assert!(along.len() == 1 && (along[0].positions[STEPS].y + 4.0).abs() < 1e-9);
         let across = walker(-4.0, north_rad, Vec2::new(0.3, 1.2), 1);
         assert!(across.len() == 1 && across[0].positions[STEPS].y > 5.0);
-    }
-
-    #[test]
-    fn a_frozen_prediction_keeps_every_object_where_it_is() {
-        let config = PredictionConfig { frozen: true, ..PredictionConfig::default() };
-        let mut prediction = Prediction::new(&config, true, &winding(), None);
-        let at = Pose::new(20.0, -1.75, 0.0);
-        prediction.update(
-            &[Track::for_tests(1, Body::Sedan, at, Vec2::new(8.0, 0.0))],
-            0.0,
-            0.0,
-            Vec2::zeros(),
-        );
-        let forecast = &prediction.forecasts()[0];
-        assert!(!forecast.moving && forecast.positions.iter().all(|position| *position == at.position));
     }
 
     #[test]
