@@ -144,7 +144,7 @@ fn is_clear(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::modular::prediction::Prediction;
+    use crate::modular::prediction::forecasts_of;
     use crate::modular::tracking::Track;
     use crate::testing::two_lanes;
     use avastra_base::geometry::{Pose, Vec2};
@@ -159,22 +159,13 @@ mod tests {
         let front = gap_ahead_m.map(|gap_m| VehicleParameters::MKZ.front_m(100.0) + gap_m + half_m);
         let rear = gap_behind_m.map(|gap_m| VehicleParameters::MKZ.rear_m(100.0) - gap_m - half_m);
         let heading_rad = if other_mps < 0.0 { core::f64::consts::PI } else { 0.0 };
-        let tracks: Vec<Track> = front
-            .into_iter()
-            .chain(rear)
-            .zip(1..)
-            .map(|(x_m, id)| {
-                Track::for_tests(
-                    id,
-                    Body::Sedan,
-                    Pose::new(x_m, -1.75, heading_rad),
-                    Vec2::new(other_mps, 0.0),
-                )
-            })
-            .collect();
-        let mut prediction = Prediction::new(&Default::default(), true, &scene, None);
-        prediction.update(&tracks, 0.0, 0.0, Vec2::zeros());
-        is_clear(&config, &guide, &|_| 3.5, 100.0, 10.0, prediction.forecasts())
+        let car = |(x_m, id): (f64, u32)| {
+            let pose = Pose::new(x_m, -1.75, heading_rad);
+            Track::for_tests(id, Body::Sedan, pose, Vec2::new(other_mps, 0.0))
+        };
+        let tracks: Vec<Track> = front.into_iter().chain(rear).zip(1..).map(car).collect();
+        let forecasts = forecasts_of(&scene, &tracks, Vec2::zeros());
+        is_clear(&config, &guide, &|_| 3.5, 100.0, 10.0, &forecasts)
     }
 
     #[test]

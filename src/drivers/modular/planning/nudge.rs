@@ -316,7 +316,7 @@ impl Standing<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::modular::prediction::Prediction;
+    use crate::modular::prediction::forecasts_of;
     use crate::modular::tracking::Track;
     use crate::testing::straight;
     use avastra_base::geometry::{Pose, Vec2};
@@ -331,7 +331,6 @@ mod tests {
         let scene = straight();
         let config = PlanningConfig::default();
         let guide = Guide::new(&scene, &config.speed_rules());
-        let mut prediction = Prediction::new(&Default::default(), true, &scene, None);
         let tracks: Vec<Track> = places
             .iter()
             .zip(1..)
@@ -339,8 +338,8 @@ mod tests {
                 Track::for_tests(id, *body, Pose::new(*x_m, *y_m, 0.0), Vec2::zeros())
             })
             .collect();
-        prediction.update(&tracks, 0.0, 0.0, Vec2::zeros());
-        plan.update(&config, &scene, &guide, station_m, 8.0, prediction.forecasts());
+        let forecasts = forecasts_of(&scene, &tracks, Vec2::zeros());
+        plan.update(&config, &scene, &guide, station_m, 8.0, &forecasts);
         plan
     }
 

@@ -269,6 +269,8 @@ fn hides(guide: &Guide, forecast: &Forecast, station_m: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::modular::prediction::forecasts_of;
+    use crate::modular::tracking::Track;
     use crate::testing::{CLEAR_DAY, straight};
     use avastra_lang::model::vocabulary::Body;
 
@@ -318,12 +320,9 @@ mod tests {
     fn a_vehicle_beside_a_lane_hides_it_and_one_on_it_does_not() {
         let scene = straight();
         let at = |x_m: f64, y_m: f64| {
-            let mut prediction =
-                crate::modular::prediction::Prediction::new(&Default::default(), true, &scene, None);
-            let pose = Pose { position: Vec2::new(x_m, y_m), heading_rad: 0.0 };
-            let track = crate::modular::tracking::Track::for_tests(1, Body::SchoolBus, pose, Vec2::zeros());
-            prediction.update(&[track], 0.0, 0.0, Vec2::zeros());
-            oncoming().hidden_from_m(Vec2::new(96.0, -2.0), prediction.forecasts())
+            let track = Track::for_tests(1, Body::SchoolBus, Pose::new(x_m, y_m, 0.0), Vec2::zeros());
+            let forecasts = forecasts_of(&scene, &[track], Vec2::zeros());
+            oncoming().hidden_from_m(Vec2::new(96.0, -2.0), &forecasts)
         };
         assert!(at(112.0, -0.5) < 80.0, "waits to turn left opposite");
         assert!(at(112.0, 2.0).is_infinite(), "comes itself");

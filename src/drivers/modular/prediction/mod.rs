@@ -410,6 +410,14 @@ fn aligned(config: &PredictionConfig, map: &RoadMap, place: LanePlace, heading_r
     wrap_angle(heading_rad - lane_rad).abs() <= config.off_lane_rad
 }
 
+/// What the default settings predict at once of these tracks, for an ego vehicle at a place.
+#[cfg(test)]
+pub fn forecasts_of(scene: &Arc<Scene>, tracks: &[Track], ego: Vec2) -> Vec<Forecast> {
+    let mut prediction = Prediction::new(&PredictionConfig::default(), true, scene, None);
+    prediction.update(tracks, 0.0, 0.0, ego);
+    prediction.forecasts
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -424,16 +432,14 @@ mod tests {
     #[test]
     fn vehicles_are_predicted_round_bends() {
         let scene = winding();
-        let mut prediction = prediction(&scene);
         let path = &scene.route.path;
         let pose = path.pose_at(110.0);
         let track = Track::for_tests(1, Body::Sedan, pose, pose.forward() * 6.0);
-        prediction.update(&[track], 0.0, 0.0, Vec2::new(0.0, 0.0));
+        let predicted = |ego| forecasts_of(&scene, &[track], ego)[0].positions;
         // Beyond 80 m from the ego vehicle it is taken to go straight on; near by, round the bend.
         let straight_on = pose.position + pose.forward() * 48.0;
-        assert!((prediction.forecasts()[0].positions[STEPS] - straight_on).norm() < 1e-9);
-        prediction.update(&[track], 0.0, 0.0, pose.position);
-        for (step, position) in prediction.forecasts()[0].positions.iter().enumerate() {
+        assert!((predicted(Vec2::zeros())[STEPS] - straight_on).norm() < 1e-9);
+        for (step, position) in predicted(pose.position).iter().enumerate() {
             let beside = path.project(*position);
             assert!(beside.distance_m < 0.1, "{beside:?} at step {step}");
             assert!((beside.station_m - 110.0 - 3.0 * step as f64).abs() < 0.1, "{beside:?}");
@@ -469,10 +475,8 @@ mod tests {
 
     /// The hypotheses of one car on the corner's map after some frames in which it went on.
     fn hypotheses(pose: Pose, speed_mps: f64) -> Vec<Forecast> {
-        let mut prediction = prediction(&corner());
         let track = Track::for_tests(1, Body::Sedan, pose, pose.forward() * speed_mps);
-        prediction.update(&[track], 0.0, 0.0, pose.position);
-        prediction.forecasts().to_vec()
+        forecasts_of(&corner(), &[track], pose.position)
     }
 
     /// A lane of the corner's map before a junction from which one may go straight on or turn left, with
@@ -596,8 +600,7 @@ mod tests {
 
     #[test]
     fn standing_things_stay_and_walkers_walk() {
-        let scene = winding();
-        let mut prediction = prediction(&scene);
+        let mut prediction = prediction(&winding());
         let at = Pose::new(20.0, -5.0, 0.0);
         let tracks = [
             Track::for_tests(1, Body::Pedestrian, at, Vec2::new(0.0, 0.1)),
