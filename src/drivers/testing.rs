@@ -148,6 +148,12 @@ pub fn object(id: u32, body: Body, pose: Pose, speed_mps: f64) -> SensedObject {
     }
 }
 
+/// What is sensed on a clear day at a pose and a speed, where there are no lights.
+pub fn sensed(rear_axle: Pose, speed_mps: f64, objects: Vec<SensedObject>) -> Sensed {
+    let ego = EgoMotion::straight(rear_axle, speed_mps);
+    Sensed { time_s: 0.0, ego, objects, signals: vec![], conditions: CLEAR_DAY }
+}
+
 /// A driver on a road with scripted objects.
 pub struct Rig {
     pub scene: Arc<Scene>,
@@ -162,17 +168,11 @@ pub struct Rig {
 
 impl Rig {
     pub fn new(scene: &Arc<Scene>, ads: Box<dyn Ads>, speed_mps: f64) -> Rig {
-        let sensed = Sensed {
-            time_s: 0.0,
-            ego: EgoMotion::straight(scene.route.path.pose_at(0.0), speed_mps),
-            objects: vec![],
-            signals: vec![SignalColour::Green],
-            conditions: CLEAR_DAY,
-        };
+        let signals = vec![SignalColour::Green];
         Rig {
             scene: Arc::clone(scene),
             ads,
-            sensed,
+            sensed: Sensed { signals, ..sensed(scene.route.path.pose_at(0.0), speed_mps, vec![]) },
             pedals_mps2: 0.0,
             gap_m_min: f64::INFINITY,
             offset_m_max: 0.0,

@@ -86,15 +86,13 @@ fn range_m(object: &SensedObject, conditions: &Conditions, night_factor: f64) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{CLEAR_DAY, object};
+    use crate::testing::{CLEAR_DAY, object, sensed};
     use avastra_base::geometry::Pose;
     use avastra_lang::model::vocabulary::Body;
-    use avastra_world::sim::EgoMotion;
 
     /// The numbers of the looks, from 1, after which the object is known.
     fn known_after(seen: SensedObject, conditions: Conditions, night_factor: f64) -> Vec<usize> {
-        let ego = EgoMotion::straight(Pose::new(0.0, 0.0, 0.0), 10.0);
-        let sensed = Sensed { time_s: 0.0, ego, objects: vec![seen], signals: vec![], conditions };
+        let sensed = Sensed { conditions, ..sensed(Pose::new(0.0, 0.0, 0.0), 10.0, vec![seen]) };
         let mut sight = Sight::new(night_factor);
         let look = |_: &usize| {
             sight.look(&sensed);

@@ -78,13 +78,14 @@ impl Localization {
 mod tests {
     use super::*;
     use crate::modular::{ModularConfig, Module};
+    use crate::testing;
     use crate::testing::CLEAR_DAY;
-    use avastra_world::sim::{Conditions, EgoMotion};
+    use avastra_world::sim::Conditions;
 
     fn sensed(speed_mps: f64, conditions: Conditions) -> Sensed {
-        let ego =
-            EgoMotion { yaw_rate_radps: 0.1, ..EgoMotion::straight(Pose::new(3.0, 4.0, 0.0), speed_mps) };
-        Sensed { time_s: 0.0, ego, objects: vec![], signals: vec![], conditions }
+        let mut sensed = testing::sensed(Pose::new(3.0, 4.0, 0.0), speed_mps, vec![]);
+        (sensed.ego.yaw_rate_radps, sensed.conditions) = (0.1, conditions);
+        sensed
     }
 
     /// Root mean square of the error across the way at rest, m.

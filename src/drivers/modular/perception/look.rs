@@ -248,12 +248,11 @@ fn measure(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{CLEAR_DAY, object};
-    use avastra_world::sim::EgoMotion;
+    use crate::testing;
+    use crate::testing::object;
 
-    fn sensed(objects: Vec<SensedObject>) -> Sensed {
-        let ego = EgoMotion::straight(Pose::new(0.0, 0.0, 0.0), 0.0);
-        Sensed { time_s: 0.0, ego, objects, signals: vec![], conditions: CLEAR_DAY }
+    fn sensed(object: SensedObject) -> Sensed {
+        testing::sensed(Pose::new(0.0, 0.0, 0.0), 0.0, vec![object])
     }
 
     fn at(body: Body, distance_m: f64) -> SensedObject {
@@ -264,7 +263,7 @@ mod tests {
     fn seen(config: &PerceptionConfig, limited: bool, object: SensedObject) -> Vec<Detection> {
         let config = PerceptionConfig { ghosts_per_s: 0.0, ..*config };
         let mut perception = Perception::new(&config, limited, 3);
-        let sensed = sensed(vec![object]);
+        let sensed = sensed(object);
         (0..400).flat_map(|_| perception.look(&sensed, &sensed.ego.rear_axle).to_vec()).collect()
     }
 
@@ -303,7 +302,7 @@ mod tests {
         let config = PerceptionConfig { split_share: 0.3, ..PerceptionConfig::default() };
         let bus = at(Body::SchoolBus, 20.0);
         let mut perception = Perception::new(&config, true, 3);
-        let sensed = sensed(vec![bus]);
+        let sensed = sensed(bus);
         let (mut twice, frames) = (0, 2000);
         for _ in 0..frames {
             let found = perception.look(&sensed, &sensed.ego.rear_axle);
@@ -331,7 +330,7 @@ mod tests {
                 ..PerceptionConfig::default()
             };
             let mut perception = Perception::new(&config, true, 5);
-            let sensed = sensed(vec![at(Body::Sedan, 5.0)]);
+            let sensed = sensed(at(Body::Sedan, 5.0));
             let (mut misses, mut runs, mut before) = (0_u32, 0_u32, true);
             for _ in 0..20_000 {
                 let found = !perception.look(&sensed, &sensed.ego.rear_axle).is_empty();
@@ -354,7 +353,7 @@ mod tests {
             let of_seed = |seed: u64| {
                 let config = PerceptionConfig { ghosts_per_s: 0.0, ..config };
                 let mut perception = Perception::new(&config, true, seed);
-                let sensed = sensed(vec![at(Body::Sedan, distance_m)]);
+                let sensed = sensed(at(Body::Sedan, distance_m));
                 let found = |_: &u32| perception.look(&sensed, &sensed.ego.rear_axle).is_empty();
                 (0..frames).filter(found).count()
             };
