@@ -49,7 +49,7 @@ impl Manoeuvre {
     pub(super) fn renumbered(self, number: impl Fn(u32) -> u32) -> Manoeuvre {
         match self {
             Manoeuvre::Nudge(id) => Manoeuvre::Nudge(number(id)),
-            Manoeuvre::LaneFollow | Manoeuvre::LaneChange | Manoeuvre::AwaitGap => self,
+            other => other,
         }
     }
 }
@@ -168,20 +168,7 @@ impl Reason {
             Reason::Follow(id) => Reason::Follow(number(id)),
             Reason::Yield(id) => Reason::Yield(number(id)),
             Reason::Emergency(id) => Reason::Emergency(number(id)),
-            Reason::Start
-            | Reason::Cruise
-            | Reason::RedLight
-            | Reason::StopSign
-            | Reason::LaneChange
-            | Reason::Crosswalk
-            | Reason::Approach
-            | Reason::Creep
-            | Reason::Sight
-            | Reason::KeepClear
-            | Reason::Degraded
-            | Reason::Contact
-            | Reason::Reported
-            | Reason::Fallback => self,
+            other => other,
         }
     }
 }

@@ -30,13 +30,9 @@ pub struct Localization {
     spread: Option<f64>,
 }
 
-fn draws(seed: u64) -> Rng {
-    rng::stream(seed, Stream::Localization, 0)
-}
-
 impl Localization {
     pub fn new(config: &LocalizationConfig, seed: u64) -> Localization {
-        let mut rng = draws(seed);
+        let mut rng = rng::stream(seed, Stream::Localization, 0);
         let errors = core::array::from_fn(|_| rng::normal(&mut rng));
         let keep = libm::exp(-DT_S / config.correlation_s);
         Localization { config: *config, rng, errors, keep, renew: (1.0 - keep * keep).sqrt(), spread: None }

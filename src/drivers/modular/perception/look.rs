@@ -47,11 +47,6 @@ struct Watched {
     frame: u64,
 }
 
-/// The luck of an object.
-fn draws(seed: u64, id: u32) -> Rng {
-    rng::stream(seed, Stream::Perception, u64::from(id))
-}
-
 impl Perception {
     pub fn new(config: &PerceptionConfig, limited: bool, seed: u64) -> Perception {
         Perception {
@@ -120,7 +115,7 @@ impl Perception {
 
     fn watch(&mut self, id: u32) -> usize {
         let index = self.watched.iter().position(|watched| watched.id == id).unwrap_or_else(|| {
-            let mut rng = draws(self.seed, id);
+            let mut rng = rng::stream(self.seed, Stream::Perception, u64::from(id));
             let size_factor = 1.0 + self.config.size_sigma * rng::normal(&mut rng).clamp(-3.0, 3.0);
             self.watched.push(Watched {
                 id,
