@@ -81,7 +81,7 @@ impl Modular {
         let station_m = self.helm.station_m();
         if let Some(since_s) = self.watchdog.looks(sensed.time_s) {
             self.tracking.resume(since_s);
-            self.tracking.delay(self.watchdog.load_frames(sensed.objects.len()));
+            self.tracking.delay(self.watchdog.config.load_frames(sensed.objects.len()));
             let near_m = self.tracking.hold_m();
             let may_be_taken = |place: Vec2| {
                 (place - localized.position).norm() <= near_m && !sees_empty(place, sensed, localized)
@@ -92,8 +92,7 @@ impl Modular {
             self.tracking.update(detections, may_be_taken);
         }
         let lights = self.lights.look(sensed, station_m);
-        let (tracks, age_s) =
-            (self.tracking.published(), self.tracking.age_s() + self.watchdog.perception_s());
+        let (tracks, age_s) = (self.tracking.published(), self.tracking.age_s() + self.watchdog.perception_s);
         self.prediction.see_lights(lights);
         self.prediction.update(tracks, age_s, sensed.time_s, localized.position);
         if let Some(since_s) = self.watchdog.plans(sensed.time_s) {
@@ -175,7 +174,7 @@ impl Ads for Modular {
         if self.helm.looks() {
             self.cycle(sensed, &localized);
         }
-        let since_s = self.watchdog.trajectory_s();
+        let since_s = self.watchdog.trajectory_s;
         let control = self.controller.follow(&self.planner, since_s, &localized, station_m, &sensed.ego);
         let control = self.emergency.brake(control, sensed.ego.speed_mps, self.brake_mps2_max);
         if let Some(id) = self.emergency.braking_for() {

@@ -24,7 +24,7 @@ use avastra_road::{LaneIndex, RoadMap};
 use avastra_world::sim::{Conditions, Scene, VehicleParameters};
 
 use super::super::config::{PerceptionConfig, PlanningConfig};
-use super::super::perception::{surely_seen_m, vehicle_surely_seen_m};
+use super::super::perception::surely_seen_m;
 use super::super::prediction::Forecast;
 use super::rights::{Meeting, RouteRights};
 use super::speed::Constraint;
@@ -144,10 +144,8 @@ impl SightBound {
             Some((known, seen)) if same(known) => *seen,
             _ => {
                 // What the planner is told of its sensors, not what a planted fault makes of them.
-                let sensors = PerceptionConfig::default();
-                let allowed_mps = stoppable_mps(config, surely_seen_m(&sensors, conditions));
-                let vehicle_m = vehicle_surely_seen_m(&sensors, conditions);
-                let seen = Seen { allowed_mps, vehicle_m };
+                let (pedestrian_m, vehicle_m) = surely_seen_m(&PerceptionConfig::default(), conditions);
+                let seen = Seen { allowed_mps: stoppable_mps(config, pedestrian_m), vehicle_m };
                 self.known = Some((*conditions, seen));
                 seen
             }
