@@ -44,7 +44,6 @@ const SAFE_MPS2: f64 = 2.0;
 #[derive(Debug, Clone)]
 pub struct Idm {
     scene: Arc<Scene>,
-    guide: Arc<Guide>,
     changes: RouteChanges,
     /// A glance aside, newer than what it is shown, left no gap: no lane change begins.
     is_beset: bool,
@@ -107,11 +106,9 @@ impl Ahead {
 
 impl Idm {
     pub fn new(scene: &Arc<Scene>) -> Idm {
-        let changes = RouteChanges::new(scene);
         Idm {
             scene: Arc::clone(scene),
-            guide: Arc::new(changes.guide(&SpeedRules::TOWN)),
-            changes,
+            changes: RouteChanges::new(scene, SpeedRules::TOWN),
             is_beset: false,
             steering: Steering::usual(),
             helm: Helm::default(),
@@ -124,7 +121,7 @@ impl Idm {
     fn acceleration_mps2(&self, sensed: &Sensed, station_m: f64) -> (f64, Reason) {
         let speed_mps = sensed.ego.speed_mps;
         let front_m = VehicleParameters::MKZ.front_m(station_m);
-        let allowed_mps = self.guide.allowed_mps(station_m, speed_mps);
+        let allowed_mps = self.guide().allowed_mps(station_m, speed_mps);
         let mut wanted = (model_mps2(speed_mps, allowed_mps, None), Reason::Cruise);
         for ahead in &self.ahead {
             let gap = Some((ahead.gap_m(front_m), ahead.speed_mps));
@@ -165,7 +162,6 @@ impl Idm {
         let has_gap = || self.has_gap(&sensed.objects, sensed.ego.speed_mps, station_m, change.lateral_m);
         if is_over && station_m >= change.begin_m && !self.is_beset && has_gap() {
             self.changes.begin(station_m);
-            self.guide = Arc::new(self.changes.guide(&SpeedRules::TOWN));
         }
     }
 
@@ -175,7 +171,7 @@ impl Idm {
         let front_m = VehicleParameters::MKZ.front_m(station_m);
         let rear_m = front_m - VehicleParameters::MKZ.length_m;
         objects.iter().all(|object| {
-            let Some((span, along_mps)) = in_lane(&self.guide, object, lateral_m, front_m) else {
+            let Some((span, along_mps)) = in_lane(self.guide(), object, lateral_m, front_m) else {
                 return true;
             };
             let along_mps = along_mps.max(0.0);
@@ -227,7 +223,7 @@ impl Idm {
         let taken = |beside: &Beside| beside.taken(forward, object.length_m, object.width_m, HALF_WAY_M);
         let reach_m = HALF_WAY_M + (object.length_m + object.width_m) / 2.0;
         let (beside, mut tracer) =
-            self.guide.trace(object.pose.position, rear_m - 10.0, front_m + RANGE_M, reach_m);
+            self.guide().trace(object.pose.position, rear_m - 10.0, front_m + RANGE_M, reach_m);
         if let Some(span) = taken(&beside) {
             // It is on the way now; once its middle is behind the front, the ego vehicle is past it.
             return (span.middle_m() > front_m - BESIDE_M).then(|| Ahead {
@@ -240,7 +236,7 @@ impl Idm {
         if object.velocity_mps == Vec2::zeros() {
             return None;
         }
-        let front = self.guide.pose_at(front_m).position;
+        let front = self.guide().pose_at(front_m).position;
         for &Reach { time_s, from_m: ego_from_m, to_m: ego_to_m } in reaches {
             let position = object.pose.position + object.velocity_mps * time_s;
             let within_m = GUIDE_STRETCH_MAX * (ego_to_m - front_m) + reach_m;
@@ -280,12 +276,12 @@ impl Idm {
         if self.helm.is_first() {
             self.find_place(pose);
         }
-        let station_m = self.helm.locate(&self.guide, pose.position).station_m;
+        let station_m = self.helm.locate(self.changes.guide(), pose.position).station_m;
         self.look(sensed, station_m);
         let (model_mps2, model_reason) = self.acceleration_mps2(sensed, station_m);
         let (wanted_mps2, reason) = decide(model_mps2, model_reason);
         let acceleration_mps2 = held_mps2(sensed.ego.speed_mps, wanted_mps2, 0.0);
-        let steer_rad = self.steering.steer_rad(&self.guide, pose, station_m, &sensed.ego);
+        let steer_rad = self.steering.steer_rad(self.guide(), pose, station_m, &sensed.ego);
         self.status.localized = Some(*pose);
         self.status.reason = reason;
         self.helm.command(Control::towards(acceleration_mps2, steer_rad), &sensed.ego, &mut self.status)
@@ -302,14 +298,13 @@ impl Idm {
     /// source lane: it would steer back to it, and what stands ahead of it would stand beside its way.
     pub(super) fn find_place(&mut self, rear_axle: &Pose) {
         while let Some(change) = self.changes.next() {
-            let beside = self.guide.locate(rear_axle.position, None);
+            let beside = self.guide().locate(rear_axle.position, None);
             let is_aside = beside.offset_m * change.lateral_m.signum() > WANDER_M;
             if beside.station_m < change.begin_m || !is_aside {
                 return;
             }
             let begun_m = change.begun_m(beside.station_m, beside.offset_m);
             self.changes.begin(begun_m);
-            self.guide = Arc::new(self.changes.guide(&SpeedRules::TOWN));
         }
     }
 
@@ -318,15 +313,14 @@ impl Idm {
         let Some((last, ..)) = self.changes.begun().last() else { return };
         let (mut changes, mut helm) = (self.changes.clone(), self.helm);
         changes.take_back(last);
-        let guide = changes.guide(&SpeedRules::TOWN);
-        if helm.locate(&guide, rear_axle.position).offset_m.abs() <= WANDER_M {
-            (self.changes, self.guide) = (changes, Arc::new(guide));
+        if helm.locate(changes.guide(), rear_axle.position).offset_m.abs() <= WANDER_M {
+            self.changes = changes;
         }
     }
 
     /// The route that it drives on.
     pub(super) fn guide(&self) -> &Guide {
-        &self.guide
+        self.changes.guide()
     }
 }
 
