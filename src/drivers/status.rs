@@ -149,6 +149,23 @@ pub enum Reason {
 }
 
 impl Status {
+    /// Replaces what is perceived by objects without forecasts; the buffers of forecasts are kept.
+    pub(super) fn perceive(&mut self, objects: impl Iterator<Item = PerceivedObject>) {
+        let mut count = 0;
+        for mut object in objects {
+            match self.perceived.get_mut(count) {
+                Some(place) => {
+                    object.predicted = core::mem::take(&mut place.predicted);
+                    object.predicted.clear();
+                    *place = object;
+                }
+                None => self.perceived.push(object),
+            }
+            count += 1;
+        }
+        self.perceived.truncate(count);
+    }
+
     /// Why it drives as it does now, in words.
     pub fn reason_text(&self) -> String {
         self.reason.in_words(self.reported.as_deref())

@@ -273,10 +273,7 @@ impl External {
                     self.status.detected.clone_from(&observer.status().detected);
                 }
             }
-            None => {
-                self.status.perceived.clear();
-                self.status.perceived.extend(sensed.objects.iter().map(PerceivedObject::as_it_is));
-            }
+            None => self.status.perceive(sensed.objects.iter().map(PerceivedObject::as_it_is)),
         }
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::driver::Ads;
 use crate::kit::{HOLD_MPS2, Helm, Point, Sight, Signs, Steering, Stop, crosswalks, lights};
-use crate::status::{Manoeuvre, Reason, Status};
+use crate::status::{Manoeuvre, PerceivedObject, Reason, Status};
 use avastra_world::sim::{Control, DT_S, Scene, Sensed, VehicleParameters};
 
 use super::lateral::{Lanes, Lateral};
@@ -130,7 +130,7 @@ impl Frenet {
             guide.pose_at(point.station_m).offset(0.0, offset_m).position
         }));
         self.status.localized = Some(sensed.ego.rear_axle);
-        self.sight.report(&mut self.status.perceived);
+        self.status.perceive(self.sight.known().iter().map(PerceivedObject::as_it_is));
         for seen in &mut self.status.perceived {
             let other = self.others.iter().find(|other| Some(other.id) == seen.id);
             seen.predicted.extend(other.into_iter().flat_map(|other| other.predicted));

@@ -4,8 +4,6 @@
 
 use avastra_world::sim::{Conditions, FRAME_S, Sensed, SensedObject};
 
-use crate::status::PerceivedObject;
-
 /// How far vehicles and lights are seen, m. Ours, as in `scenarios/ads/default.yaml`.
 pub const RANGE_M: f64 = 120.0;
 /// How far pedestrians are seen by day, m. Ours, as in `scenarios/ads/default.yaml`.
@@ -53,23 +51,6 @@ impl Sight {
     /// What the driver knows: each object as it should be now. Its distance is that of the look.
     pub fn known(&self) -> &[SensedObject] {
         &self.known
-    }
-
-    /// Writes what the driver knows into its status, without forecasts; buffers are kept.
-    pub fn report(&self, perceived: &mut Vec<PerceivedObject>) {
-        perceived.truncate(self.known.len());
-        for (index, object) in self.known.iter().enumerate() {
-            let mut predicted = perceived
-                .get_mut(index)
-                .map(|before| core::mem::take(&mut before.predicted))
-                .unwrap_or_default();
-            predicted.clear();
-            let seen = PerceivedObject { predicted, ..PerceivedObject::as_it_is(object) };
-            match perceived.get_mut(index) {
-                Some(place) => *place = seen,
-                None => perceived.push(seen),
-            }
-        }
     }
 }
 

@@ -119,33 +119,23 @@ impl Modular {
     /// Writes perceptions and plan into the status; its buffers are reused.
     fn report(&mut self) {
         let forecasts = self.prediction.forecasts();
-        let perceived = &mut self.status.perceived;
         // Of the hypotheses of one object only the most probable is reported; it comes first.
         let first = |index: &usize| *index == 0 || forecasts[index - 1].id != forecasts[*index].id;
-        let objects = (0..forecasts.len()).filter(first);
-        perceived.truncate(objects.clone().count());
-        for (index, forecast) in objects.map(|index| &forecasts[index]).enumerate() {
+        let reported = || (0..forecasts.len()).filter(first).map(move |index| &forecasts[index]);
+        self.status.perceive(reported().map(|forecast| PerceivedObject {
+            id: (forecast.truth < GHOST_ID_MIN).then_some(forecast.truth),
+            track: forecast.id,
+            body: forecast.body,
+            pose: Pose { position: forecast.positions[0], heading_rad: forecast.heading_rad },
+            velocity_mps: forecast.velocity_mps,
+            length_m: forecast.length_m,
+            width_m: forecast.width_m,
+            height_m: forecast.height_m,
+            predicted: Vec::new(),
+        }));
+        for (object, forecast) in self.status.perceived.iter_mut().zip(reported()) {
             debug_assert!(forecast.probability > 0.0, "a future that cannot happen is no hypothesis");
-            let pose = Pose { position: forecast.positions[0], heading_rad: forecast.heading_rad };
-            let mut predicted =
-                perceived.get_mut(index).map_or_else(Vec::new, |o| core::mem::take(&mut o.predicted));
-            predicted.clear();
-            predicted.extend_from_slice(&forecast.positions[1..]);
-            let object = PerceivedObject {
-                id: (forecast.truth < GHOST_ID_MIN).then_some(forecast.truth),
-                track: forecast.id,
-                body: forecast.body,
-                pose,
-                velocity_mps: forecast.velocity_mps,
-                length_m: forecast.length_m,
-                width_m: forecast.width_m,
-                height_m: forecast.height_m,
-                predicted,
-            };
-            match perceived.get_mut(index) {
-                Some(slot) => *slot = object,
-                None => perceived.push(object),
-            }
+            object.predicted.extend_from_slice(&forecast.positions[1..]);
         }
         let (guide, lateral) = (self.planner.guide(), self.planner.lateral());
         self.status.planned.clear();

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::driver::Ads;
 use crate::kit::{Helm, RouteChanges, Sight, Signs, SpeedRules, Stop, held_mps2, lights};
-use crate::status::{Manoeuvre, Reason, Status};
+use crate::status::{Manoeuvre, PerceivedObject, Reason, Status};
 use avastra_world::sim::{Control, DT_S, FRAME_S, Scene, Sensed, VehicleParameters};
 
 use super::assistance::{Pedals, Target, is_free, line_mps2};
@@ -61,7 +61,7 @@ impl Reactive {
         let wait = self.changes.wait_m().map(|station_m| Stop { station_m, reason: Reason::LaneChange });
         let stops = lights(&self.scene, sensed, front_m).chain(sign).chain(wait);
         self.stop = stops.min_by(|a, b| a.station_m.total_cmp(&b.station_m));
-        self.sight.report(&mut self.status.perceived);
+        self.status.perceive(self.sight.known().iter().map(PerceivedObject::as_it_is));
         self.status.localized = Some(sensed.ego.rear_axle);
     }
 

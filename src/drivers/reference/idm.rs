@@ -147,12 +147,13 @@ impl Idm {
         ahead.clear();
         ahead.extend(self.lights(sensed, front_m));
         ahead.extend(self.sign(sensed, front_m));
-        let objects = sensed.objects.iter().filter(|object| object.distance_m < RANGE_M);
+        let objects = || sensed.objects.iter().filter(|object| object.distance_m < RANGE_M);
         let reaches = Reach::of_moments(sensed.ego.speed_mps, front_m);
-        ahead.extend(objects.filter_map(|object| self.ahead(sensed, object, front_m, &reaches)));
+        ahead.extend(objects().filter_map(|object| self.ahead(sensed, object, front_m, &reaches)));
         ahead.extend(self.last_chance());
         self.ahead = ahead;
-        self.report(sensed);
+        // It drives by the truth.
+        self.status.perceive(objects().map(PerceivedObject::as_it_is));
     }
 
     /// Begins the next lane change if it is time and there is a gap.
@@ -256,14 +257,6 @@ impl Idm {
             }
         }
         None
-    }
-
-    /// Writes the truth it drives by into the status; buffers are reused.
-    fn report(&mut self, sensed: &Sensed) {
-        let perceived = &mut self.status.perceived;
-        perceived.clear();
-        let in_sight = sensed.objects.iter().filter(|object| object.distance_m < RANGE_M);
-        perceived.extend(in_sight.map(PerceivedObject::as_it_is));
     }
 
     /// Drives the route, but with the acceleration (m/s²) and reason that `decide` makes of the model's.
