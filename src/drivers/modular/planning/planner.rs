@@ -301,19 +301,15 @@ impl Planner {
     fn first_contact(&self, start: &Point) -> Option<(usize, f64, f64)> {
         let vehicle = VehicleParameters::MKZ;
         let (rear_m, front_m) = (vehicle.rear_m(start.station_m), vehicle.front_m(start.station_m));
-        let mut first: Option<(usize, f64, f64)> = None;
-        for (index, claim) in self.claims.iter().enumerate() {
+        let contacts = self.claims.iter().enumerate().filter_map(|(index, claim)| {
             let beside = claim.is_now() && claim.spans[0].from_m < front_m && claim.spans[0].to_m > rear_m;
             if beside || !claim.binds(&self.config) || self.is_crept_to(claim) {
-                continue;
+                return None;
             }
-            if let Some((time_s, near_m)) = self.trajectory.meets(claim, CHECK_S)
-                && first.is_none_or(|(_, first_s, _)| time_s < first_s)
-            {
-                first = Some((index, time_s, near_m));
-            }
-        }
-        first
+            let (time_s, near_m) = self.trajectory.meets(claim, CHECK_S)?;
+            Some((index, time_s, near_m))
+        });
+        contacts.min_by(|(_, a_s, _), (_, b_s, _)| a_s.total_cmp(b_s))
     }
 
     fn roll(&mut self, start: Point) {

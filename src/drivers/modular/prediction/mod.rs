@@ -334,15 +334,12 @@ fn leaves_lane(config: &PredictionConfig, course: &Course, lateral_mps: f64) -> 
 
 /// The next vehicle ahead on a course.
 fn leader(road: &Road, course: &Course, id: u32, length_m: f64) -> Option<Leader> {
-    let mut nearest: Option<Leader> = None;
-    for other in road.placed.iter().filter(|other| other.id != id) {
-        let Some(ahead_m) = course.ahead_m(road.map, other.place) else { continue };
+    let ahead = road.placed.iter().filter(|other| other.id != id).filter_map(|other| {
+        let ahead_m = course.ahead_m(road.map, other.place).filter(|ahead_m| *ahead_m > 0.0)?;
         let gap_m = ahead_m - (length_m + other.length_m) / 2.0;
-        if ahead_m > 0.0 && nearest.is_none_or(|leader| gap_m < leader.gap_m) {
-            nearest = Some(Leader { gap_m, speed_mps: other.speed_mps });
-        }
-    }
-    nearest
+        Some(Leader { gap_m, speed_mps: other.speed_mps })
+    });
+    ahead.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))
 }
 
 /// How far the centre of a vehicle may go before its front is at a stop line whose light is known to be
