@@ -78,7 +78,7 @@ impl Lateral {
     /// Werling's cost at a speed.
     pub fn cost(&self, speed_mps: f64) -> f64 {
         let speed_mps = speed_mps.max(1.0);
-        lateral_cost(self.curve.squared_jerk(speed_mps), self.curve.length_m() / speed_mps, self.deviation_m)
+        lateral_cost(self.curve.squared_jerk(speed_mps), self.curve.length_m / speed_mps, self.deviation_m)
     }
 }
 

@@ -106,7 +106,7 @@ impl Modular {
                 conditions: &sensed.conditions,
             });
         }
-        let (guide, lateral) = (self.planner.guide(), self.planner.lateral());
+        let (guide, lateral) = (self.planner.guide(), &self.planner.lateral);
         self.emergency.look(tracks, age_s, guide, lateral, station_m, &sensed.ego);
         self.report();
     }
@@ -137,9 +137,9 @@ impl Modular {
             debug_assert!(forecast.probability > 0.0, "a future that cannot happen is no hypothesis");
             object.predicted.extend_from_slice(&forecast.positions[1..]);
         }
-        let (guide, lateral) = (self.planner.guide(), self.planner.lateral());
+        let (guide, lateral) = (self.planner.guide(), &self.planner.lateral);
         self.status.planned.clear();
-        self.status.planned.extend(self.planner.trajectory().points.iter().map(|point| {
+        self.status.planned.extend(self.planner.trajectory.points.iter().map(|point| {
             let offset_m = lateral.aside(point.station_m).offset_m;
             // Most plans lie on the guide, and a place beside it takes trigonometry.
             if offset_m == 0.0 {
@@ -148,8 +148,8 @@ impl Modular {
                 guide.pose_at(point.station_m).offset(0.0, offset_m).position
             }
         }));
-        self.status.reason = self.planner.reason().renumbered(|id| self.truth_of(id));
-        self.status.manoeuvre = self.planner.manoeuvre().renumbered(|id| self.truth_of(id));
+        self.status.reason = self.planner.trajectory.reason.renumbered(|id| self.truth_of(id));
+        self.status.manoeuvre = self.planner.manoeuvre.renumbered(|id| self.truth_of(id));
     }
 }
 

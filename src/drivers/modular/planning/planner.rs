@@ -49,15 +49,16 @@ pub struct Planner {
     weaknesses: Weaknesses,
     scene: Arc<Scene>,
     junctions: Arc<Junctions>,
-    lateral: LateralPlan,
+    /// Where beside the guide the path lies.
+    pub lateral: LateralPlan,
     changes: LaneChanges,
     lights: Lights,
     standing: Standing,
     rights: RouteRights,
     stages: Stages,
     sight: SightBound,
-    manoeuvre: Manoeuvre,
-    trajectory: Trajectory,
+    pub manoeuvre: Manoeuvre,
+    pub trajectory: Trajectory,
     claims: Vec<Claim>,
     constraints: Vec<Constraint>,
     decisions: Decisions,
@@ -107,19 +108,6 @@ impl Planner {
     /// The guide along the lanes that are driven now; replaced when a lane change begins.
     pub fn guide(&self) -> &Guide {
         self.changes.route.guide()
-    }
-
-    /// Where beside the guide the path lies.
-    pub fn lateral(&self) -> &LateralPlan {
-        &self.lateral
-    }
-
-    pub fn trajectory(&self) -> &Trajectory {
-        &self.trajectory
-    }
-
-    pub fn manoeuvre(&self) -> Manoeuvre {
-        self.manoeuvre
     }
 
     pub fn plan(&mut self, outlook: &Outlook) {
@@ -280,7 +268,7 @@ impl Planner {
             self.roll(start);
         }
         let Some((_, braking_for_s, _)) = self.first_contact(&start) else { return };
-        let braking_reason = self.reason();
+        let braking_reason = self.trajectory.reason;
         let all = core::mem::take(&mut self.constraints);
         let others = all[..planned].iter().filter(|constraint| !constraint.is_yielding());
         self.constraints.extend(others);
@@ -315,11 +303,6 @@ impl Planner {
     fn roll(&mut self, start: Point) {
         let (guide, trajectory) = (self.changes.route.guide(), &mut self.trajectory);
         speed::roll(&self.config, guide, start, &self.constraints, &self.claims, trajectory);
-    }
-
-    /// Why the present plan does what it does.
-    pub fn reason(&self) -> Reason {
-        self.trajectory.reason
     }
 
     /// The constraint that keeps the vehicle behind a road user, if there is room left before it.
