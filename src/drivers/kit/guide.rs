@@ -172,8 +172,7 @@ impl Guide {
 
     /// The pose at a station; beyond the ends the route goes on straight.
     pub fn pose_at(&self, station_m: f64) -> Pose {
-        let (index, fraction) = self.segment(station_m);
-        let (a, b) = (&self.samples[index], &self.samples[index + 1]);
+        let (a, b, fraction) = self.segment(station_m);
         let turn_rad = wrap_angle(b.heading_rad - a.heading_rad) * fraction.clamp(0.0, 1.0);
         Pose {
             position: a.position + (b.position - a.position) * fraction,
@@ -183,22 +182,19 @@ impl Guide {
 
     /// The position of [`Guide::pose_at`], without the work for its heading.
     pub fn position_at(&self, station_m: f64) -> Vec2 {
-        let (index, fraction) = self.segment(station_m);
-        let (a, b) = (&self.samples[index], &self.samples[index + 1]);
+        let (a, b, fraction) = self.segment(station_m);
         a.position + (b.position - a.position) * fraction
     }
 
     /// 1/m, positive to the left.
     pub fn curvature_at(&self, station_m: f64) -> f64 {
-        let (index, fraction) = self.segment(station_m);
-        let (a, b) = (&self.samples[index], &self.samples[index + 1]);
+        let (a, b, fraction) = self.segment(station_m);
         a.curvature_per_m + (b.curvature_per_m - a.curvature_per_m) * fraction.clamp(0.0, 1.0)
     }
 
     /// Speed that limits and curves, here and ahead, allow, m/s.
     pub fn speed_mps_max(&self, station_m: f64) -> f64 {
-        let (index, fraction) = self.segment(station_m);
-        let (a, b) = (&self.samples[index], &self.samples[index + 1]);
+        let (a, b, fraction) = self.segment(station_m);
         a.speed_mps_max + (b.speed_mps_max - a.speed_mps_max) * fraction.clamp(0.0, 1.0)
     }
 
@@ -318,10 +314,10 @@ impl Guide {
         ((station_m / SPACING_M) as u32 as usize).min(self.samples.len() - 1)
     }
 
-    /// Segment and fraction of it; the fraction leaves `[0, 1]` beyond the ends.
-    fn segment(&self, station_m: f64) -> (usize, f64) {
+    /// The samples around a station and the fraction of the way between them, which leaves `[0, 1]` beyond the ends.
+    fn segment(&self, station_m: f64) -> (&Sample, &Sample, f64) {
         let index = self.index(station_m).min(self.samples.len() - 2);
-        (index, station_m / SPACING_M - index as f64)
+        (&self.samples[index], &self.samples[index + 1], station_m / SPACING_M - index as f64)
     }
 }
 

@@ -261,16 +261,14 @@ impl Standing<'_> {
             let beside = self.guide.project(position, station_m, station_m + HORIZON_M);
             let (length_m, width_m) = (forecast.length_m, forecast.width_m);
             let (_, across_m) = extent_m(forecast.forward, beside.forward, (length_m, width_m));
-            let reach_m = Self::HALF_WAY_M + self.config.lateral_buffer_m;
-            let span = beside.taken(forecast.forward, length_m, width_m, 2.0 * reach_m)?;
+            let span = beside.taken(forecast.forward, length_m, width_m, 2.0 * self.clear_m())?;
             let (right_m, left_m) = (beside.offset_m - across_m / 2.0, beside.offset_m + across_m / 2.0);
             (span.to_m > self.front_m()).then_some(Edge { id: forecast.id, span, right_m, left_m })
         })
     }
 
     fn is_in_the_way(&self, edge: &Edge) -> bool {
-        let reach_m = Self::HALF_WAY_M + self.config.lateral_buffer_m;
-        edge.right_m < reach_m && edge.left_m > -reach_m
+        edge.right_m < self.clear_m() && edge.left_m > -self.clear_m()
     }
 
     /// The nearest that is in the way and wholly ahead.
