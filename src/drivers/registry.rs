@@ -54,7 +54,7 @@ pub const REGISTRY: &[Entry] = &[
     Entry {
         name: "fsm",
         summary: "reference driver: fuzzy safety model of UN R157",
-        build: |scene, _seed| Box::new(Reference::new(scene, FuzzySafety::default())),
+        build: |scene, _seed| Box::new(Reference::new(scene, FuzzySafety)),
     },
     Entry {
         name: "rss",
