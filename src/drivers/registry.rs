@@ -29,7 +29,7 @@ pub const REGISTRY: &[Entry] = &[
     Entry {
         name: "modular",
         summary: "localisation, perception, prediction, planning and control after Apollo 7.0",
-        build: |scene, seed| Box::new(Modular::new(scene, &ModularConfig::default(), seed)),
+        build: |scene, seed| Box::new(Modular::new(scene, &ModularConfig::default(), seed, None)),
     },
     Entry {
         name: "frenet",

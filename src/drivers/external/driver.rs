@@ -68,7 +68,7 @@ impl Clone for Live {
 
 impl External {
     pub fn new(program: &Arc<Program>, scene: &Arc<Scene>, seed: u64) -> External {
-        let observer = || Box::new(Modular::new(scene, &ModularConfig::default(), seed));
+        let observer = || Box::new(Modular::new(scene, &ModularConfig::default(), seed, None));
         External {
             program: Arc::clone(program),
             scene: Arc::clone(scene),

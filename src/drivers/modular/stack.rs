@@ -44,13 +44,8 @@ pub struct Modular {
 }
 
 impl Modular {
-    /// With these settings; the seed feeds its sensor errors.
-    pub fn new(scene: &Arc<Scene>, config: &ModularConfig, seed: u64) -> Modular {
-        Modular::with_foresight(scene, config, seed, None)
-    }
-
-    /// As [`Modular::new`], with a recording of the future for a perfect prediction.
-    pub fn with_foresight(
+    /// With these settings, and a recording of the future for a perfect prediction; the seed feeds its sensor errors.
+    pub fn new(
         scene: &Arc<Scene>,
         config: &ModularConfig,
         seed: u64,

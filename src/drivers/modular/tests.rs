@@ -13,7 +13,7 @@ use super::{Modular, ModularConfig, Weaknesses};
 /// A vehicle of these settings on a straight road.
 fn rig_with(config: &ModularConfig, seed: u64, speed_mps: f64) -> Rig {
     let scene = straight();
-    Rig::new(&scene, Box::new(Modular::new(&scene, config, seed)), speed_mps)
+    Rig::new(&scene, Box::new(Modular::new(&scene, config, seed, None)), speed_mps)
 }
 
 /// As [`rig_with`], at rest and without emergency braking, which would make up for what is tested.

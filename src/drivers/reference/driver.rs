@@ -20,8 +20,7 @@ use avastra_world::sim::{
 
 use super::encounter::Encounter;
 use super::idm::Idm;
-use super::model::Model;
-use super::reflex::Reflex;
+use super::reflex::{Braking, Reflex};
 
 /// Comfortable deceleration for other road users, m/s² (what Treiber's page of the
 /// IDM uses).
@@ -35,6 +34,15 @@ const TOWARDS_MPS_MIN: f64 = 0.05;
 /// farther away than one can see in the fog.
 pub fn in_sight(object: &SensedObject, conditions: &Conditions) -> bool {
     object.visible_fraction >= SEEN_PART_MIN && object.distance_m <= conditions.visibility_m
+}
+
+/// A published model of how a careful driver brakes.
+pub trait Model: Clone + Send + 'static {
+    /// Times and slopes of its reaction.
+    fn braking(&self) -> Braking;
+
+    /// The deceleration that it wants because of a road user, m/s²; 0 is no risk.
+    fn demand_mps2(&self, encounter: &Encounter) -> f64;
 }
 
 /// A driver of the model `M`.

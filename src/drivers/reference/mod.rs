@@ -9,7 +9,6 @@ mod encounter;
 mod evasion;
 mod giving_way;
 mod idm;
-mod model;
 mod r157;
 mod reflex;
 mod rss;

@@ -95,7 +95,7 @@ impl Reflex {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reference::model::Model;
+    use crate::reference::driver::Model;
     use crate::reference::r157::CarefulHuman;
     use avastra_base::kinematics::CAREFUL_BRAKING_MPS2;
 

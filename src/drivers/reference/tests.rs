@@ -1,7 +1,7 @@
 //! The published cut-in grid, recomputed from the equations.
 
+use super::driver::Model;
 use super::encounter::Encounter;
-use super::model::Model;
 use super::r157::{CarefulHuman, FuzzySafety, MinimalPerformance};
 use super::reflex::{Braking, Reflex};
 use super::rss::Rss;

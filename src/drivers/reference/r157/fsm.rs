@@ -8,8 +8,8 @@
 
 use avastra_base::kinematics::{CAREFUL_JERK_MPS3, CAREFUL_REACTION_S, braking_m};
 
+use crate::reference::driver::Model;
 use crate::reference::encounter::Encounter;
-use crate::reference::model::Model;
 use crate::reference::reflex::Braking;
 
 /// Own comfortable and hard braking, m/s².
