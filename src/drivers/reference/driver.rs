@@ -57,21 +57,14 @@ pub struct Reference<M> {
     looks: VecDeque<Vec<SensedObject>>,
     /// What the route's driver is shown; kept for its buffers.
     shown: Option<Sensed>,
-    watched: BTreeMap<u32, Watched>,
+    /// The encounters of the last look by object.
+    watched: BTreeMap<u32, Encounter>,
     helm: Helm,
     /// What the model gave in the last tick, m/s².
     braking_mps2: f64,
     /// Whether it looks aside before a lane change. What it sees a reaction time late is enough to drive by, but not where
     /// it has just taken over, has seen nothing yet, and would change lanes blindly.
     looks_aside: bool,
-}
-
-/// What is remembered of a road user from look to look.
-#[derive(Debug, Clone, Copy)]
-struct Watched {
-    other_mps: f64,
-    side_gap_m: f64,
-    aside_m: f64,
 }
 
 impl<M: Model> Reference<M> {
@@ -106,7 +99,14 @@ impl<M: Model> Reference<M> {
             let ego = &sensed.ego;
             let found = Encounter::seen(guide, object, front_m, ego.speed_mps, ego.acceleration_mps2);
             let Some(mut encounter) = found else { continue };
-            watched.insert(object.id, remember(self.watched.get(&object.id), &mut encounter));
+            if let Some(before) = self.watched.get(&object.id) {
+                encounter.other_mps2 = (encounter.other_mps - before.other_mps) / FRAME_S;
+                if encounter.towards_mps > TOWARDS_MPS_MIN {
+                    let nearer_m = (before.side_gap_m - encounter.side_gap_m).max(0.0);
+                    encounter.aside_m = before.aside_m + nearer_m;
+                }
+            }
+            watched.insert(object.id, encounter);
             let demand_mps2 = self.model.demand_mps2(&encounter);
             if demand_mps2 > self.demand.map_or(0.0, |(most_mps2, _)| most_mps2) {
                 self.demand = Some((demand_mps2, object.id));
@@ -139,18 +139,6 @@ impl<M: Model> Reference<M> {
         }));
         shown
     }
-}
-
-/// Completes an encounter by what was seen of it before; returns what to remember of it now.
-fn remember(before: Option<&Watched>, encounter: &mut Encounter) -> Watched {
-    if let Some(before) = before {
-        encounter.other_mps2 = (encounter.other_mps - before.other_mps) / FRAME_S;
-        if encounter.towards_mps > TOWARDS_MPS_MIN {
-            encounter.aside_m = before.aside_m + (before.side_gap_m - encounter.side_gap_m).max(0.0);
-        }
-    }
-    let Encounter { other_mps, side_gap_m, aside_m, .. } = *encounter;
-    Watched { other_mps, side_gap_m, aside_m }
 }
 
 /// A driving system that can say how hard it would brake by its model alone.
