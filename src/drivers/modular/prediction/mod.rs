@@ -87,7 +87,7 @@ pub struct Forecast {
 }
 
 /// What prediction remembers of an object from frame to frame.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 struct Memory {
     id: u32,
     place: Option<LanePlace>,
@@ -241,16 +241,7 @@ impl Prediction {
 
     fn memory_of(&mut self, id: u32) -> usize {
         let index = self.memories.iter().position(|memory| memory.id == id).unwrap_or_else(|| {
-            self.memories.push(Memory {
-                id,
-                place: None,
-                lateral_mps: 0.0,
-                drifting_s: 0.0,
-                speed_mps: None,
-                acceleration_mps2: 0.0,
-                stood_s: 0.0,
-                seen: true,
-            });
+            self.memories.push(Memory { id, ..Memory::default() });
             self.memories.len() - 1
         });
         self.memories[index].seen = true;
