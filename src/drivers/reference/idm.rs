@@ -99,6 +99,11 @@ impl Ahead {
         Ahead { near_m, age_s: 0.0, speed_mps: 0.0, reason }
     }
 
+    /// A line to stop at, as something that stands a little behind it.
+    fn at_line(line_m: f64, reason: Reason) -> Ahead {
+        Ahead::standing(line_m - LINE_GAP_M + MODEL.gap_m_min, reason)
+    }
+
     fn gap_m(&self, front_m: f64) -> f64 {
         self.near_m + self.speed_mps * self.age_s - front_m
     }
@@ -146,11 +151,14 @@ impl Idm {
         let mut ahead = core::mem::take(&mut self.ahead);
         ahead.clear();
         ahead.extend(self.lights(sensed, front_m));
-        ahead.extend(self.sign(sensed, front_m));
+        let sign = self.signs.next_stop(&self.scene, front_m, sensed.ego.speed_mps);
+        ahead.extend(sign.map(|stop| Ahead::at_line(stop.station_m, stop.reason)));
         let objects = || sensed.objects.iter().filter(|object| object.distance_m < RANGE_M);
         let reaches = Reach::of_moments(sensed.ego.speed_mps, front_m);
         ahead.extend(objects().filter_map(|object| self.ahead(sensed, object, front_m, &reaches)));
-        ahead.extend(self.last_chance());
+        // Where it must wait for a gap.
+        let wait_m = self.changes.wait_m();
+        ahead.extend(wait_m.map(|wait_m| Ahead::standing(wait_m + MODEL.gap_m_min, Reason::LaneChange)));
         self.ahead = ahead;
         // It drives by the truth.
         self.status.perceive(objects().map(PerceivedObject::as_it_is));
@@ -187,12 +195,7 @@ impl Idm {
         })
     }
 
-    /// Where it must wait for a gap, as something that stands there.
-    fn last_chance(&self) -> Option<Ahead> {
-        Some(Ahead::standing(self.changes.wait_m()? + MODEL.gap_m_min, Reason::LaneChange))
-    }
-
-    /// Lights that it stops for, as things that stand a little behind their line.
+    /// Lights that it stops for.
     fn lights<'a>(&'a self, sensed: &'a Sensed, front_m: f64) -> impl Iterator<Item = Ahead> + 'a {
         let speed_mps = sensed.ego.speed_mps;
         self.scene.route.stop_lines.iter().filter_map(move |line| {
@@ -200,15 +203,8 @@ impl Idm {
             let stops = sensed.signals[line.signal] != SignalColour::Green
                 && (-LINE_GAP_M..RANGE_M).contains(&distance_m)
                 && needed_mps2(speed_mps, distance_m.max(0.1)) <= LIGHT_MPS2;
-            let near_m = line.station_m - LINE_GAP_M + MODEL.gap_m_min;
-            stops.then_some(Ahead::standing(near_m, Reason::RedLight))
+            stops.then_some(Ahead::at_line(line.station_m, Reason::RedLight))
         })
-    }
-
-    /// The stop sign that it stops for, as something that stands a little behind its line.
-    fn sign(&mut self, sensed: &Sensed, front_m: f64) -> Option<Ahead> {
-        let stop = self.signs.next_stop(&self.scene, front_m, sensed.ego.speed_mps)?;
-        Some(Ahead::standing(stop.station_m - LINE_GAP_M + MODEL.gap_m_min, stop.reason))
     }
 
     /// What a road user means for the ego vehicle: a leader, something in the way, or something that crosses it.

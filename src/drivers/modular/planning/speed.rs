@@ -182,7 +182,8 @@ pub fn roll(
     for (index, slot) in trajectory.points.iter_mut().enumerate() {
         let time_s = index as f64 * POINT_S;
         *slot = point;
-        let mut wanted_mps2 = free_mps2(config, guide, &point);
+        let allowed_mps = guide.allowed_mps(point.station_m, point.speed_mps);
+        let mut wanted_mps2 = smaller(speed_mps2(point.speed_mps, allowed_mps), config.acceleration_mps2_max);
         let mut floor_mps2 = -config.deceleration_mps2_max;
         let mut reason = Reason::Cruise;
         for constraint in constraints {
@@ -203,12 +204,6 @@ pub fn roll(
             .clamp(-config.jerk_mps3_down * POINT_S, config.jerk_mps3_up * POINT_S);
         point = point.after(point.acceleration_mps2 + change_mps2);
     }
-}
-
-/// Acceleration on a free road.
-fn free_mps2(config: &PlanningConfig, guide: &Guide, point: &Point) -> f64 {
-    let allowed_mps = guide.allowed_mps(point.station_m, point.speed_mps);
-    smaller(speed_mps2(point.speed_mps, allowed_mps), config.acceleration_mps2_max)
 }
 
 /// Acceleration that stops the vehicle in `room_m`: coming nearer, it is the braking parabola of
