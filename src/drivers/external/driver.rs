@@ -108,36 +108,28 @@ impl External {
         self.touched = sensed.ego.touched;
         lines.push_str(&Question::Step(Box::new(step)).line());
         let before = self.exchanges[self.exchanges.len() - 1].key;
-        match self.exchange(lines.into(), before, Some((seq, t_us))) {
-            Some(Outcome::Answer(answer)) => {
-                let (_, latency) = self.program.settings().ticks();
-                self.coming.push_back((tick + latency, answer));
-                self.answered_tick = tick;
-            }
-            Some(Outcome::Ready | Outcome::Missed | Outcome::Failed(_)) | None => {}
+        if let Some(Outcome::Answer(answer)) = self.exchange(lines.into(), before, Some((seq, t_us))) {
+            let (_, latency) = self.program.settings().ticks();
+            self.coming.push_back((tick + latency, answer));
+            self.answered_tick = tick;
         }
     }
 
     /// One question, answered from what is known or by a process. `None` after a failure.
     fn exchange(&mut self, question: Arc<str>, before: Key, step: Option<(u64, u64)>) -> Option<Outcome> {
         let key = before.then(&question);
-        let outcome = match self.program.known(key) {
-            Some(outcome) => outcome,
-            None => {
-                let outcome =
-                    self.asked(&question, step).unwrap_or_else(|failure| Outcome::Failed(failure.into()));
-                if matches!(&outcome, Outcome::Answer(answer) if answer.is_extreme()) {
-                    self.program.cut_off();
-                }
-                // That no process may be started is no answer.
-                let is_absent =
-                    matches!(&outcome, Outcome::Failed(found) if found.kind() == FailureKind::Absent);
-                if !is_absent {
-                    self.program.learn(key, outcome.clone());
-                }
-                outcome
+        let outcome = self.program.known(key).unwrap_or_else(|| {
+            let outcome =
+                self.asked(&question, step).unwrap_or_else(|failure| Outcome::Failed(failure.into()));
+            if matches!(&outcome, Outcome::Answer(answer) if answer.is_extreme()) {
+                self.program.cut_off();
             }
-        };
+            // That no process may be started is no answer.
+            if !matches!(&outcome, Outcome::Failed(found) if found.kind() == FailureKind::Absent) {
+                self.program.learn(key, outcome.clone());
+            }
+            outcome
+        });
         if let Outcome::Failed(failure) = &outcome {
             self.failure = Some(Arc::clone(failure));
             self.live = Live::default();
@@ -239,14 +231,11 @@ impl External {
     fn report(&mut self, answer: &Answer) {
         self.status.planned.clear();
         let internal = answer.internal();
-        let plan = internal.and_then(|internal| internal.planned.as_ref());
-        match (plan, answer) {
-            (Some(plan), _) => self.status.planned.extend(plan.iter().map(|[x, y]| Vec2::new(*x, *y))),
-            (None, Answer::Trajectory(trajectory)) => {
-                let points = trajectory.points.iter().map(|point| Vec2::new(point.x, point.y));
-                self.status.planned.extend(points);
-            }
-            (None, _) => {}
+        if let Some(plan) = internal.and_then(|internal| internal.planned.as_ref()) {
+            self.status.planned.extend(plan.iter().map(|[x, y]| Vec2::new(*x, *y)));
+        } else if let Answer::Trajectory(trajectory) = answer {
+            let points = trajectory.points.iter().map(|point| Vec2::new(point.x, point.y));
+            self.status.planned.extend(points);
         }
         self.status.reason = Reason::Reported;
         let reason = internal.and_then(|internal| internal.reason.as_deref());
@@ -267,12 +256,11 @@ impl External {
             self.status.localized = Some(*pose);
         }
         match &self.observer {
-            Some(observer) => {
-                if is_asked {
-                    self.status.perceived.clone_from(&observer.status().perceived);
-                    self.status.detected.clone_from(&observer.status().detected);
-                }
+            Some(observer) if is_asked => {
+                self.status.perceived.clone_from(&observer.status().perceived);
+                self.status.detected.clone_from(&observer.status().detected);
             }
+            Some(_) => {}
             None => self.status.perceive(sensed.objects.iter().map(PerceivedObject::as_it_is)),
         }
     }

@@ -85,10 +85,8 @@ impl<M: Model> Reference<M> {
 
     /// Looks at every object in sight: sets what the model demands and what the route's driver learns.
     fn look(&mut self, sensed: &Sensed, station_m: f64) {
-        let mut seen = match self.looks.len() > self.delay_frames() {
-            true => self.looks.pop_front().unwrap_or_default(),
-            false => Vec::new(),
-        };
+        let is_full = self.looks.len() > self.delay_frames();
+        let mut seen = self.looks.pop_front_if(|_| is_full).unwrap_or_default();
         seen.clear();
         seen.extend(sensed.objects.iter().filter(|object| in_sight(object, &sensed.conditions)));
         let front_m = VehicleParameters::MKZ.front_m(station_m);
