@@ -170,8 +170,10 @@ impl<M: Model> Ads for Reference<M> {
         let now_mps2 = self.reflex.step(demand_mps2, DT_S);
         self.braking_mps2 = now_mps2;
         // The models mean what the car does, which follows the pedal with a lag.
+        let mut later = self.reflex;
+        let later_mps2 = later.step(demand_mps2, DT_S);
         let lag_s = VehicleParameters::MKZ.pedal_lag_s;
-        let braking_mps2 = now_mps2 + (self.reflex.after(demand_mps2, DT_S) - now_mps2) * (lag_s / DT_S);
+        let braking_mps2 = now_mps2 + (later_mps2 - now_mps2) * (lag_s / DT_S);
         let control = self.route.drive_with(&shown, |model_mps2, reason| {
             let for_others = matches!(reason, Reason::Stop(_) | Reason::Follow(_) | Reason::Yield(_));
             let route_mps2 = if for_others { model_mps2.max(-COMFORTABLE_MPS2) } else { model_mps2 };

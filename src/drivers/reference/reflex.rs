@@ -84,12 +84,6 @@ impl Reflex {
         };
         self.deceleration_mps2
     }
-
-    /// The deceleration a little later, if the demand stays, m/s².
-    pub fn after(&self, demand_mps2: f64, ahead_s: f64) -> f64 {
-        let mut later = *self;
-        later.step(demand_mps2, ahead_s)
-    }
 }
 
 #[cfg(test)]

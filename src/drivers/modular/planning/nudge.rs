@@ -184,7 +184,8 @@ impl LateralPlan {
             return;
         }
         if let Some(edge) = standing.nearest().filter(|edge| standing.is_vehicle(edge.id)) {
-            let lane_m = lane_width_m(scene, edge.span.from_m);
+            let on = scene.route.lane_at(edge.span.from_m);
+            let lane_m = scene.map.lane(on.lane).width_at(edge.span.from_m - on.from_m);
             self.bump = self.row_from(&standing, edge, lane_m).and_then(|(edge, offset_m)| {
                 Bump::past(&edge, offset_m, station_m, speed_mps)
                     .filter(|bump| standing.leave_room_for(bump, &self.row))
@@ -211,12 +212,6 @@ impl LateralPlan {
         }
         Some((edge, offset_m))
     }
-}
-
-/// Width of the route's lane at a station, m.
-fn lane_width_m(scene: &Scene, station_m: f64) -> f64 {
-    let on = scene.route.lane_at(station_m);
-    scene.map.lane(on.lane).width_at(station_m - on.from_m)
 }
 
 impl Bump {
