@@ -29,7 +29,7 @@ pub const REGISTRY: &[Entry] = &[
     Entry {
         name: "modular",
         summary: "localisation, perception, prediction, planning and control after Apollo 7.0",
-        build: |scene, seed| Box::new(Modular::new(scene, &ModularConfig::default(), seed)),
+        build: |scene, seed| Box::new(Modular::new(scene, &ModularConfig::default(), seed, None)),
     },
     Entry {
         name: "frenet",
@@ -54,7 +54,7 @@ pub const REGISTRY: &[Entry] = &[
     Entry {
         name: "fsm",
         summary: "reference driver: fuzzy safety model of UN R157",
-        build: |scene, _seed| Box::new(Reference::new(scene, FuzzySafety::default())),
+        build: |scene, _seed| Box::new(Reference::new(scene, FuzzySafety)),
     },
     Entry {
         name: "rss",

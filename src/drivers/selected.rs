@@ -110,9 +110,7 @@ impl Selected {
         let own_seed =
             self.noise.map_or(seed, |number| rng::child_seed(seed, Stream::Noise, u64::from(number)));
         let first: Box<dyn Ads> = match (&self.kind, &self.profile) {
-            (_, Some(profile)) => {
-                Box::new(Modular::with_foresight(scene, profile, own_seed, self.foresight.clone()))
-            }
+            (_, Some(profile)) => Box::new(Modular::new(scene, profile, own_seed, self.foresight.clone())),
             (Kind::Ours(entry), None) => (entry.build)(scene, own_seed),
             (Kind::External(program), None) => Box::new(External::new(program, scene, own_seed)),
         };

@@ -49,7 +49,7 @@ impl Manoeuvre {
     pub(super) fn renumbered(self, number: impl Fn(u32) -> u32) -> Manoeuvre {
         match self {
             Manoeuvre::Nudge(id) => Manoeuvre::Nudge(number(id)),
-            Manoeuvre::LaneFollow | Manoeuvre::LaneChange | Manoeuvre::AwaitGap => self,
+            other => other,
         }
     }
 }
@@ -149,6 +149,23 @@ pub enum Reason {
 }
 
 impl Status {
+    /// Replaces what is perceived by objects without forecasts; the buffers of forecasts are kept.
+    pub(super) fn perceive(&mut self, objects: impl Iterator<Item = PerceivedObject>) {
+        let mut count = 0;
+        for mut object in objects {
+            match self.perceived.get_mut(count) {
+                Some(place) => {
+                    object.predicted = core::mem::take(&mut place.predicted);
+                    object.predicted.clear();
+                    *place = object;
+                }
+                None => self.perceived.push(object),
+            }
+            count += 1;
+        }
+        self.perceived.truncate(count);
+    }
+
     /// Why it drives as it does now, in words.
     pub fn reason_text(&self) -> String {
         self.reason.in_words(self.reported.as_deref())
@@ -168,20 +185,7 @@ impl Reason {
             Reason::Follow(id) => Reason::Follow(number(id)),
             Reason::Yield(id) => Reason::Yield(number(id)),
             Reason::Emergency(id) => Reason::Emergency(number(id)),
-            Reason::Start
-            | Reason::Cruise
-            | Reason::RedLight
-            | Reason::StopSign
-            | Reason::LaneChange
-            | Reason::Crosswalk
-            | Reason::Approach
-            | Reason::Creep
-            | Reason::Sight
-            | Reason::KeepClear
-            | Reason::Degraded
-            | Reason::Contact
-            | Reason::Reported
-            | Reason::Fallback => self,
+            other => other,
         }
     }
 }

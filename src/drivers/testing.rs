@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use avastra_base::geometry::{OrientedBox, Pose, distance_m, unit_vector, wrap_angle};
+use avastra_base::geometry::{OrientedBox, Pose, Vec2, distance_m, unit_vector, wrap_angle};
 use avastra_lang::model::vocabulary::Body;
 use avastra_road::testing::{lanes, road, street};
 use avastra_road::{RoadMap, Route, Signal, StopLine};
@@ -13,6 +13,7 @@ use avastra_world::sim::{
 };
 
 use super::driver::Ads;
+use super::registry::by_name;
 
 pub use avastra_world::sim::testing::corner;
 
@@ -24,9 +25,12 @@ pub fn straight() -> Arc<Scene> {
     scene(&[(600.0, 0.0, 0.0)])
 }
 
-/// A one-way road of two lanes along +x, 400 m long. The route starts in the right-hand lane, at
-/// y = -5.25 m, and has its goal after 350 m in the left-hand one, at y = -1.75 m. A solid line closes
-/// the way between them after `open_m`.
+/// Where the lanes of [`two_lanes`] are in which its route starts and ends, m.
+pub const SOURCE_Y_M: f64 = -5.25;
+pub const TARGET_Y_M: f64 = -1.75;
+
+/// A one-way road of two lanes along +x, 400 m long. The route starts in the right-hand lane, and has its goal after
+/// 350 m in the left-hand one. A solid line closes the way between them after `open_m`.
 pub fn two_lanes(open_m: f64) -> Arc<Scene> {
     let mark = format!(r#"<roadMark sOffset="0" type="broken"/><roadMark sOffset="{open_m}" type="solid"/>"#);
     let lanes = lanes(&[(-1, "driving", 3.5, &mark), (-2, "driving", 3.5, "")]);
@@ -144,6 +148,12 @@ pub fn object(id: u32, body: Body, pose: Pose, speed_mps: f64) -> SensedObject {
     }
 }
 
+/// What is sensed on a clear day at a pose and a speed, where there are no lights.
+pub fn sensed(rear_axle: Pose, speed_mps: f64, objects: Vec<SensedObject>) -> Sensed {
+    let ego = EgoMotion::straight(rear_axle, speed_mps);
+    Sensed { time_s: 0.0, ego, objects, signals: vec![], conditions: CLEAR_DAY }
+}
+
 /// A driver on a road with scripted objects.
 pub struct Rig {
     pub scene: Arc<Scene>,
@@ -158,31 +168,51 @@ pub struct Rig {
 
 impl Rig {
     pub fn new(scene: &Arc<Scene>, ads: Box<dyn Ads>, speed_mps: f64) -> Rig {
-        let sensed = Sensed {
-            time_s: 0.0,
-            ego: EgoMotion::straight(scene.route.path.pose_at(0.0), speed_mps),
-            objects: vec![],
-            signals: vec![SignalColour::Green],
-            conditions: CLEAR_DAY,
-        };
+        let signals = vec![SignalColour::Green];
         Rig {
             scene: Arc::clone(scene),
             ads,
-            sensed,
+            sensed: Sensed { signals, ..sensed(scene.route.path.pose_at(0.0), speed_mps, vec![]) },
             pedals_mps2: 0.0,
             gap_m_min: f64::INFINITY,
             offset_m_max: 0.0,
         }
     }
 
+    /// With a driver of the registry.
+    pub fn driven_by(name: &str, scene: &Arc<Scene>, seed: u64, speed_mps: f64) -> Rig {
+        let entry = by_name(name).expect("it is registered");
+        Rig::new(scene, (entry.build)(scene, seed), speed_mps)
+    }
+
+    /// Where the rear axle is.
+    pub fn place(&self) -> Vec2 {
+        self.sensed.ego.rear_axle.position
+    }
+
+    pub fn speed_mps(&self) -> f64 {
+        self.sensed.ego.speed_mps
+    }
+
     pub fn station_m(&self) -> f64 {
-        self.scene.route.path.project(self.sensed.ego.rear_axle.position).station_m
+        self.scene.route.path.project(self.place()).station_m
     }
 
     pub fn run(&mut self, duration_s: f64) {
-        for _ in 0..(duration_s / DT_S) as usize {
+        self.run_least(duration_s, |_| 0.0);
+    }
+
+    /// Runs; returns the least of a value after each tick.
+    pub fn run_least(&mut self, duration_s: f64, mut value: impl FnMut(&Rig) -> f64) -> f64 {
+        (0..(duration_s / DT_S) as usize).fold(f64::INFINITY, |least, _| {
             self.tick();
-        }
+            least.min(value(self))
+        })
+    }
+
+    /// Runs; returns whether something held after any tick.
+    pub fn run_any(&mut self, duration_s: f64, holds: impl Fn(&Rig) -> bool) -> bool {
+        self.run_least(duration_s, |rig| if holds(rig) { 0.0 } else { 1.0 }) == 0.0
     }
 
     /// Brings the distances to the objects up to date.

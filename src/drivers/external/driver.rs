@@ -15,7 +15,7 @@ use avastra_world::sim::{Control, DT_S, Scene, Sensed};
 
 use super::finding::{Failure, FailureKind, Problem, harmless};
 use super::follow::Follower;
-use super::message::{Answer, Event, Question};
+use super::message::{Answer, Event, Observation, Question};
 use super::program::{MapLine, Program};
 use super::question;
 use super::record::{Conversation, Key, Outcome};
@@ -26,6 +26,7 @@ use super::settings::OnTimeout;
 const LOST_S: f64 = 2.0;
 
 /// An external driving system in one episode.
+#[derive(Clone)]
 pub struct External {
     program: Arc<Program>,
     scene: Arc<Scene>,
@@ -36,8 +37,7 @@ pub struct External {
     follower: Follower,
     /// What was asked so far, the `reset` first, and what came of it.
     exchanges: Vec<Exchange>,
-    /// The process that answers, with the number of exchanges that it took part in.
-    live: Option<(Session, usize)>,
+    live: Live,
     /// Answers that are not yet obeyed, with the tick from which on they are.
     coming: VecDeque<(u64, Arc<Answer>)>,
     obeyed: Option<Arc<Answer>>,
@@ -56,40 +56,28 @@ struct Exchange {
     outcome: Outcome,
 }
 
-impl Clone for External {
-    fn clone(&self) -> External {
-        External {
-            program: Arc::clone(&self.program),
-            scene: Arc::clone(&self.scene),
-            seed: self.seed,
-            map: Arc::clone(&self.map),
-            observer: self.observer.clone(),
-            follower: self.follower.clone(),
-            exchanges: self.exchanges.clone(),
-            live: None,
-            coming: self.coming.clone(),
-            obeyed: self.obeyed.clone(),
-            asked_tick: self.asked_tick,
-            answered_tick: self.answered_tick,
-            touched: self.touched,
-            failure: self.failure.clone(),
-            status: self.status.clone(),
-        }
+/// The process that answers, with the number of exchanges that it took part in. A copy has none.
+#[derive(Default)]
+struct Live(Option<(Session, usize)>);
+
+impl Clone for Live {
+    fn clone(&self) -> Live {
+        Live(None)
     }
 }
 
 impl External {
     pub fn new(program: &Arc<Program>, scene: &Arc<Scene>, seed: u64) -> External {
-        let observer = || Box::new(Modular::new(scene, &ModularConfig::default(), seed));
+        let observer = || Box::new(Modular::new(scene, &ModularConfig::default(), seed, None));
         External {
             program: Arc::clone(program),
             scene: Arc::clone(scene),
             seed,
             map: program.map_line(&scene.map),
-            observer: (!question::is_truth(program.settings())).then(observer),
+            observer: (program.settings().observation == Observation::Perceived).then(observer),
             follower: Follower::new(scene),
             exchanges: Vec::new(),
-            live: None,
+            live: Live::default(),
             coming: VecDeque::new(),
             obeyed: None,
             asked_tick: None,
@@ -120,39 +108,31 @@ impl External {
         self.touched = sensed.ego.touched;
         lines.push_str(&Question::Step(Box::new(step)).line());
         let before = self.exchanges[self.exchanges.len() - 1].key;
-        match self.exchange(lines.into(), before, Some((seq, t_us))) {
-            Some(Outcome::Answer(answer)) => {
-                let (_, latency) = self.program.settings().ticks();
-                self.coming.push_back((tick + latency, answer));
-                self.answered_tick = tick;
-            }
-            Some(Outcome::Ready | Outcome::Missed | Outcome::Failed(_)) | None => {}
+        if let Some(Outcome::Answer(answer)) = self.exchange(lines.into(), before, Some((seq, t_us))) {
+            let (_, latency) = self.program.settings().ticks();
+            self.coming.push_back((tick + latency, answer));
+            self.answered_tick = tick;
         }
     }
 
     /// One question, answered from what is known or by a process. `None` after a failure.
     fn exchange(&mut self, question: Arc<str>, before: Key, step: Option<(u64, u64)>) -> Option<Outcome> {
         let key = before.then(&question);
-        let outcome = match self.program.known(key) {
-            Some(outcome) => outcome,
-            None => {
-                let outcome =
-                    self.asked(&question, step).unwrap_or_else(|failure| Outcome::Failed(failure.into()));
-                if matches!(&outcome, Outcome::Answer(answer) if answer.is_extreme()) {
-                    self.program.cut_off();
-                }
-                // That no process may be started is no answer.
-                let is_absent =
-                    matches!(&outcome, Outcome::Failed(found) if found.kind() == FailureKind::Absent);
-                if !is_absent {
-                    self.program.learn(key, outcome.clone());
-                }
-                outcome
+        let outcome = self.program.known(key).unwrap_or_else(|| {
+            let outcome =
+                self.asked(&question, step).unwrap_or_else(|failure| Outcome::Failed(failure.into()));
+            if matches!(&outcome, Outcome::Answer(answer) if answer.is_extreme()) {
+                self.program.cut_off();
             }
-        };
+            // That no process may be started is no answer.
+            if !matches!(&outcome, Outcome::Failed(found) if found.kind() == FailureKind::Absent) {
+                self.program.learn(key, outcome.clone());
+            }
+            outcome
+        });
         if let Outcome::Failed(failure) = &outcome {
             self.failure = Some(Arc::clone(failure));
-            self.live = None;
+            self.live = Live::default();
         }
         self.exchanges.push(Exchange { key, question, outcome: outcome.clone() });
         self.failure.is_none().then_some(outcome)
@@ -160,13 +140,13 @@ impl External {
 
     /// Asks a process, which first is shown all that it has missed of the episode.
     fn asked(&mut self, question: &str, step: Option<(u64, u64)>) -> Result<Outcome, Failure> {
-        let up_to_date = self.live.take().filter(|(_, seen)| *seen == self.exchanges.len());
+        let up_to_date = self.live.0.take().filter(|(_, seen)| *seen == self.exchanges.len());
         let mut session = match up_to_date {
             Some((session, _)) => session,
             None => self.caught_up()?,
         };
         let outcome = self.answer(&mut session, question, step)?;
-        self.live = Some((session, self.exchanges.len() + 1));
+        self.live = Live(Some((session, self.exchanges.len() + 1)));
         Ok(outcome)
     }
 
@@ -251,14 +231,11 @@ impl External {
     fn report(&mut self, answer: &Answer) {
         self.status.planned.clear();
         let internal = answer.internal();
-        let plan = internal.and_then(|internal| internal.planned.as_ref());
-        match (plan, answer) {
-            (Some(plan), _) => self.status.planned.extend(plan.iter().map(|[x, y]| Vec2::new(*x, *y))),
-            (None, Answer::Trajectory(trajectory)) => {
-                let points = trajectory.points.iter().map(|point| Vec2::new(point.x, point.y));
-                self.status.planned.extend(points);
-            }
-            (None, _) => {}
+        if let Some(plan) = internal.and_then(|internal| internal.planned.as_ref()) {
+            self.status.planned.extend(plan.iter().map(|[x, y]| Vec2::new(*x, *y)));
+        } else if let Answer::Trajectory(trajectory) = answer {
+            let points = trajectory.points.iter().map(|point| Vec2::new(point.x, point.y));
+            self.status.planned.extend(points);
         }
         self.status.reason = Reason::Reported;
         let reason = internal.and_then(|internal| internal.reason.as_deref());
@@ -279,16 +256,12 @@ impl External {
             self.status.localized = Some(*pose);
         }
         match &self.observer {
-            Some(observer) => {
-                if is_asked {
-                    self.status.perceived.clone_from(&observer.status().perceived);
-                    self.status.detected.clone_from(&observer.status().detected);
-                }
+            Some(observer) if is_asked => {
+                self.status.perceived.clone_from(&observer.status().perceived);
+                self.status.detected.clone_from(&observer.status().detected);
             }
-            None => {
-                self.status.perceived.clear();
-                self.status.perceived.extend(sensed.objects.iter().map(PerceivedObject::as_it_is));
-            }
+            Some(_) => {}
+            None => self.status.perceive(sensed.objects.iter().map(PerceivedObject::as_it_is)),
         }
     }
 }
@@ -331,7 +304,7 @@ impl Ads for External {
 
 impl Drop for External {
     fn drop(&mut self) {
-        if let Some((mut session, _)) = self.live.take() {
+        if let Some((mut session, _)) = self.live.0.take() {
             let t_us = question::micros(self.asked_tick.unwrap_or(0) as f64 * DT_S);
             session.tell(&Question::Event(Event { kind: "end".to_owned(), t_us }).line());
             self.program.give_back(session);

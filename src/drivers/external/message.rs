@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::link::Broken;
-use super::schema::{Bounds, InRange, Schema, fields_schema, inside, length_beyond, value_beyond};
+use super::schema::{Bounds, Schema, fields_schema, inside, length_beyond, value_beyond};
+use super::words::words;
 
 /// An acceleration beyond this, m/s², is no plan but the output of a formula, for example of a car-following model at a small
 /// gap.
@@ -48,9 +49,7 @@ macro_rules! message {
                     ],
                 )
             }
-        }
 
-        impl InRange for $name {
             fn out_of_range(&self, at: &str) -> Option<Broken> {
                 let _ = at;
                 $( if let Some(found) = checked!(&self.$field, &inside(at, stringify!($field)) $(, $low, $high)? $(=> $least, $most)?) { return Some(found); } )*
@@ -76,64 +75,40 @@ macro_rules! bounds {
 
 macro_rules! checked {
     ($value:expr, $at:expr) => {
-        InRange::out_of_range($value, $at)
+        Schema::out_of_range($value, $at)
     };
     ($value:expr, $at:expr, $low:literal, $high:literal) => {
         value_beyond(*$value, $at, $low as f64, $high as f64)
     };
     ($value:expr, $at:expr => $least:literal, $most:expr) => {
-        length_beyond($value, $at, $least, $most).or_else(|| InRange::out_of_range($value, $at))
+        length_beyond($value, $at, $least, $most).or_else(|| Schema::out_of_range($value, $at))
     };
 }
 
-/// A closed set of words.
-macro_rules! words {
-    ($(#[doc = $about:literal])* pub enum $name:ident { $($(#[$attribute:meta])* $variant:ident = $word:literal),* $(,)? }) => {
-        $(#[doc = $about])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-        pub enum $name {
-            $($(#[$attribute])* #[serde(rename = $word)] $variant,)*
-        }
-
-        impl Schema for $name {
-            fn schema() -> serde_json::Value {
-                serde_json::json!({ "enum": [$($word),*] })
+/// Schemas of closed sets of words.
+macro_rules! schemas_of_words {
+    ($($name:ident),* $(,)?) => {
+        $(
+            impl Schema for $name {
+                fn schema() -> serde_json::Value {
+                    serde_json::json!({ "enum": $name::ALL.map($name::name) })
+                }
             }
-        }
-
-        impl InRange for $name {
-            fn out_of_range(&self, _at: &str) -> Option<Broken> {
-                None
-            }
-        }
+        )*
     };
 }
+
+schemas_of_words!(Observation, AnswerKind, Class, Light, TurnWord, SignWord, PrecedenceWord);
 
 words! {
     /// What a driving system is shown.
-    pub enum Observation { Perceived = "perceived", Truth = "truth" }
-}
-
-#[allow(clippy::derivable_impls, reason = "the macro that makes the enum knows no default")]
-impl Default for Observation {
-    fn default() -> Observation {
-        Observation::Perceived
-    }
+    #[derive(Default)]
+    pub enum Observation { #[default] Perceived = "perceived", Truth = "truth" }
 }
 
 words! {
     /// The kinds of answers to a step.
     pub enum AnswerKind { Control = "control", Trajectory = "trajectory", Acceleration = "acceleration" }
-}
-
-impl AnswerKind {
-    pub fn name(self) -> &'static str {
-        match self {
-            AnswerKind::Control => "control",
-            AnswerKind::Trajectory => "trajectory",
-            AnswerKind::Acceleration => "acceleration",
-        }
-    }
 }
 
 words! {

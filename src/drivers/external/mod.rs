@@ -16,6 +16,7 @@ mod record;
 mod schema;
 mod session;
 mod settings;
+mod words;
 
 pub use driver::External;
 pub use finding::{Failure, FailureKind, Problem};

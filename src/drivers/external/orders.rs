@@ -11,6 +11,7 @@ use super::message::{Event, Question};
 use super::program::Program;
 use super::question;
 use super::session::Session;
+use super::settings::Timeouts;
 
 /// Tries each order with the first moment of an episode, until one fails. Returns what was tried, in words. No process may be
 /// waiting for an episode, because the first order needs one that has seen none.
@@ -99,9 +100,7 @@ struct Lines {
     later_step: String,
     end: String,
     later_event: String,
-    map_s: f64,
-    reset_s: f64,
-    step_s: f64,
+    limits: Timeouts,
 }
 
 impl Lines {
@@ -109,7 +108,6 @@ impl Lines {
         let route_m = Follower::new(scene).locate(&sensed.ego.rear_axle);
         let step = Question::Step(Box::new(question::step(scene, sensed, None, (0, 0), route_m))).line();
         let event = |kind: &str| Question::Event(Event { kind: kind.to_owned(), t_us: 0 }).line();
-        let timeouts = &program.settings().timeouts;
         Lines {
             map: program.map_line(&scene.map).line.clone(),
             reset: Question::Reset(question::reset(scene, sensed, seed)).line(),
@@ -120,24 +118,22 @@ impl Lines {
             step,
             end: event("end"),
             later_event: event("something_later"),
-            map_s: timeouts.map_s,
-            reset_s: timeouts.reset_s,
-            step_s: timeouts.step_s,
+            limits: program.settings().timeouts,
         }
     }
 
     fn map(&self, session: &mut Session) -> Result<(), Failure> {
-        session.ready(&self.map, "map", self.map_s)
+        session.ready(&self.map, "map", self.limits.map_s)
     }
 
     fn reset(&self, session: &mut Session) -> Result<(), Failure> {
-        session.ready(&self.reset, "reset", self.reset_s)
+        session.ready(&self.reset, "reset", self.limits.reset_s)
     }
 
     fn step(&self, session: &mut Session, line: &str) -> Result<(), Failure> {
-        match session.step(line, (0, 0), self.step_s)? {
+        match session.step(line, (0, 0), self.limits.step_s)? {
             Some(_) => Ok(()),
-            None => Err(session.too_late(0, self.step_s)),
+            None => Err(session.too_late(0, self.limits.step_s)),
         }
     }
 }

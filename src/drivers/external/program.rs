@@ -84,15 +84,11 @@ impl Program {
     }
 
     fn with(settings: ExternalSettings, identity: Option<Identity>, may_start: bool) -> Arc<Program> {
-        let known = OnceLock::new();
-        if let Some(identity) = identity {
-            known.get_or_init(|| identity);
-        }
         Arc::new(Program {
             init: question::init(&settings),
             settings,
             may_start,
-            identity: known,
+            identity: identity.map_or_else(OnceLock::new, OnceLock::from),
             idle: Mutex::default(),
             known: Mutex::default(),
             maps: Mutex::default(),

@@ -2,17 +2,19 @@
 
 use std::path::Path;
 
+use crate::driver::Ads;
 use crate::modular::Modular;
+use crate::status::PerceivedObject;
 use avastra_base::geometry::{Pose, Vec2, unit_vector, wrap_angle};
 use avastra_lang::model::vocabulary::Body;
-use avastra_road::{Lane, LaneIndex, Neighbour, Precedence, RoadMap, Side, SignKind, Turn};
+use avastra_road::{LaneIndex, Neighbour, Precedence, RoadMap, Side, SignKind, Turn};
 use avastra_world::sim::{DT_S, EgoMotion, Scene, Sensed, SignalColour, VehicleParameters};
 
 use super::message::{
     Class, ConditionsMessage, CrosswalkMessage, EgoMessage, Goal, Init, LaneMessage, LaneSign, LaneStop,
-    Light, Map, NeighborMessage, ObjectMessage, Observation, PROTOCOL, Point, PrecedenceWord, Reset,
-    RouteChange, RouteMessage, RouteSign, RouteStop, RouteStretch, SignWord, SignalPlace, SignalState, Start,
-    Step, TurnWord, Vehicle,
+    Light, Map, NeighborMessage, ObjectMessage, PROTOCOL, Point, PrecedenceWord, Reset, RouteChange,
+    RouteMessage, RouteSign, RouteStop, RouteStretch, SignWord, SignalPlace, SignalState, Start, Step,
+    TurnWord, Vehicle,
 };
 use super::settings::ExternalSettings;
 
@@ -32,6 +34,11 @@ const SEED_BITS: u32 = 53;
 /// A number as a message has it: to the micrometre, and finite.
 fn number(value: f64) -> f64 {
     if value.is_finite() { (value * 1e6).round() / 1e6 + 0.0 } else { 1e9_f64.copysign(value) }
+}
+
+/// A message for each of the items.
+fn each<T, M>(items: &[T], message: impl Fn(&T) -> M) -> Vec<M> {
+    items.iter().map(message).collect()
 }
 
 fn point(position: Vec2) -> Point {
@@ -80,16 +87,15 @@ pub fn map(map: &RoadMap, opendrive: Option<&Path>) -> Map {
         x: number(signal.position.x),
         y: number(signal.position.y),
     });
-    let crosswalks = map.crosswalks.iter().map(|crosswalk| CrosswalkMessage {
-        id: crosswalk.id.clone(),
-        outline: crosswalk.outline.iter().map(|corner| point(*corner)).collect(),
-    });
     Map {
         id: map.name.clone(),
         opendrive: opendrive.map(|path| path.display().to_string()),
         lanes: lanes.collect(),
         signals: signals.collect(),
-        crosswalks: crosswalks.collect(),
+        crosswalks: each(&map.crosswalks, |crosswalk| CrosswalkMessage {
+            id: crosswalk.id.clone(),
+            outline: each(&crosswalk.outline, |corner| point(*corner)),
+        }),
     }
 }
 
@@ -103,9 +109,9 @@ fn lane(map: &RoadMap, index: LaneIndex) -> LaneMessage {
             let aside_m = part * lane.width_at(*station_m) / 2.0;
             point(lane.centre.pose_at(*station_m).offset(0.0, aside_m).position)
         };
-        stations.iter().map(at).collect()
+        each(&stations, at)
     };
-    let ids = |lanes: &[LaneIndex]| lanes.iter().map(|lane| lane_id(map, *lane)).collect();
+    let ids = |lanes: &[LaneIndex]| each(lanes, |lane| lane_id(map, *lane));
     let neighbour = |found: Option<Neighbour>| {
         found.map(|found| NeighborMessage {
             id: lane_id(map, found.lane),
@@ -113,13 +119,11 @@ fn lane(map: &RoadMap, index: LaneIndex) -> LaneMessage {
             gap: number(found.gap_m),
         })
     };
-    let changes = |lane: &Lane, side| {
-        lane.changes_m(side).iter().map(|(from, to)| [number(*from), number(*to)]).collect()
-    };
+    let changes = |side| each(lane.changes_m(side), |(from, to)| [number(*from), number(*to)]);
     LaneMessage {
         id: lane_id(map, index),
         length: number(length_m),
-        s: stations.iter().map(|station_m| number(*station_m)).collect(),
+        s: each(&stations, |station_m| number(*station_m)),
         centerline: beside(0.0),
         left: beside(1.0),
         right: beside(-1.0),
@@ -135,13 +139,12 @@ fn lane(map: &RoadMap, index: LaneIndex) -> LaneMessage {
         predecessors: ids(&lane.predecessors),
         left_neighbor: neighbour(lane.left),
         right_neighbor: neighbour(lane.right),
-        changes_left: changes(lane, Side::Left),
-        changes_right: changes(lane, Side::Right),
-        stop_lines: lane
-            .stop_lines
-            .iter()
-            .map(|line| LaneStop { s: number(line.station_m), signal: map.signals[line.signal].id.clone() })
-            .collect(),
+        changes_left: changes(Side::Left),
+        changes_right: changes(Side::Right),
+        stop_lines: each(&lane.stop_lines, |line| LaneStop {
+            s: number(line.station_m),
+            signal: map.signals[line.signal].id.clone(),
+        }),
         signs: lane
             .sign_lines
             .iter()
@@ -199,36 +202,24 @@ pub fn reset(scene: &Scene, sensed: &Sensed, seed: u64) -> Reset {
             route_s: number(route.goal_m),
         },
         route: RouteMessage {
-            lanes: route
-                .lanes
-                .iter()
-                .map(|lane| RouteStretch {
-                    id: lane_id(map, lane.lane),
-                    from: number(lane.enter_m),
-                    to: number(lane.to_m),
-                })
-                .collect(),
+            lanes: each(&route.lanes, |lane| RouteStretch {
+                id: lane_id(map, lane.lane),
+                from: number(lane.enter_m),
+                to: number(lane.to_m),
+            }),
             length: number(length_m),
             spacing: PATH_SPACING_M,
             path: stations.map(place).collect(),
-            changes: route
-                .changes
-                .iter()
-                .map(|change| RouteChange {
-                    from: number(change.begin_m),
-                    to: number(change.end_m),
-                    latest: number(change.latest_m),
-                    lateral: number(change.lateral_m),
-                })
-                .collect(),
-            stop_lines: route
-                .stop_lines
-                .iter()
-                .map(|line| RouteStop {
-                    route_s: number(line.station_m),
-                    signal: map.signals[line.signal].id.clone(),
-                })
-                .collect(),
+            changes: each(&route.changes, |change| RouteChange {
+                from: number(change.begin_m),
+                to: number(change.end_m),
+                latest: number(change.latest_m),
+                lateral: number(change.lateral_m),
+            }),
+            stop_lines: each(&route.stop_lines, |line| RouteStop {
+                route_s: number(line.station_m),
+                signal: map.signals[line.signal].id.clone(),
+            }),
             signs: route
                 .sign_lines
                 .iter()
@@ -236,7 +227,7 @@ pub fn reset(scene: &Scene, sensed: &Sensed, seed: u64) -> Reset {
                     Some(RouteSign { route_s: number(line.station_m), kind: sign(line.kind)? })
                 })
                 .collect(),
-            crosswalks: route.crosswalks_m.iter().map(|(from, to)| [number(*from), number(*to)]).collect(),
+            crosswalks: each(&route.crosswalks_m, |(from, to)| [number(*from), number(*to)]),
         },
     }
 }
@@ -265,21 +256,11 @@ pub fn step(
         t_us,
         ego: ego(scene, &sensed.ego, &localized, position_std, route_m),
         objects: match observer {
-            Some(observer) => perceived(observer),
-            None => sensed
-                .objects
-                .iter()
-                .map(|object| ObjectMessage {
-                    visible: number(object.visible_fraction),
-                    ..thing(
-                        object.id,
-                        object.body,
-                        &object.pose,
-                        object.velocity_mps,
-                        [object.length_m, object.width_m, object.height_m],
-                    )
-                })
-                .collect(),
+            Some(observer) => each(&observer.status().perceived, believed),
+            None => each(&sensed.objects, |object| ObjectMessage {
+                visible: number(object.visible_fraction),
+                ..believed(&PerceivedObject::as_it_is(object))
+            }),
         },
         signals: signals.collect(),
         conditions: ConditionsMessage {
@@ -294,7 +275,6 @@ pub fn step(
 
 /// Where the driving system is shown its rear axle to be.
 pub fn pose(sensed: &Sensed, observer: Option<&Modular>) -> Pose {
-    use crate::driver::Ads;
     observer.and_then(|observer| observer.status().localized).unwrap_or(sensed.ego.rear_axle)
 }
 
@@ -321,21 +301,11 @@ fn ego(scene: &Scene, motion: &EgoMotion, pose: &Pose, position_std: f64, route_
     }
 }
 
-/// The objects as `modular` believes them to be now, under the numbers of its tracks.
-fn perceived(observer: &Modular) -> Vec<ObjectMessage> {
-    use crate::driver::Ads;
-    let objects = observer.status().perceived.iter();
-    let message = |object: &crate::PerceivedObject| {
-        let size_m = [object.length_m, object.width_m, object.height_m];
-        thing(object.track, object.body, &object.pose, object.velocity_mps, size_m)
-    };
-    objects.map(message).collect()
-}
-
-fn thing(id: u32, body: Body, pose: &Pose, velocity_mps: Vec2, size_m: [f64; 3]) -> ObjectMessage {
+/// An object as it is believed to be now, under the number of its track.
+fn believed(object: &PerceivedObject) -> ObjectMessage {
     ObjectMessage {
-        id: id.into(),
-        class: match body {
+        id: object.track.into(),
+        class: match object.body {
             Body::Pedestrian => Class::Pedestrian,
             Body::SchoolBus => Class::Bus,
             Body::BoxTruck => Class::Truck,
@@ -343,14 +313,14 @@ fn thing(id: u32, body: Body, pose: &Pose, velocity_mps: Vec2, size_m: [f64; 3])
             Body::Motorcycle => Class::Motorcycle,
             Body::Bicycle => Class::Cyclist,
         },
-        x: number(pose.position.x),
-        y: number(pose.position.y),
-        heading: number(wrap_angle(pose.heading_rad)),
-        vx: number(velocity_mps.x),
-        vy: number(velocity_mps.y),
-        length: number(size_m[0]),
-        width: number(size_m[1]),
-        height: number(size_m[2]),
+        x: number(object.pose.position.x),
+        y: number(object.pose.position.y),
+        heading: number(wrap_angle(object.pose.heading_rad)),
+        vx: number(object.velocity_mps.x),
+        vy: number(object.velocity_mps.y),
+        length: number(object.length_m),
+        width: number(object.width_m),
+        height: number(object.height_m),
         visible: 1.0,
     }
 }
@@ -361,9 +331,4 @@ fn light(colour: SignalColour) -> Light {
         SignalColour::Yellow => Light::Yellow,
         SignalColour::Green => Light::Green,
     }
-}
-
-/// Whether a message shows the truth.
-pub fn is_truth(settings: &ExternalSettings) -> bool {
-    settings.observation == Observation::Truth
 }

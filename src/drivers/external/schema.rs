@@ -10,15 +10,14 @@ use super::link::Broken;
 /// Integers are at most this, 2^53 - 1: every language reads them exactly.
 const INTEGER_MAX: u64 = (1 << 53) - 1;
 
-/// A type that has a JSON Schema.
+/// A type that has a JSON Schema, and whose values may be out of range or too long.
 pub trait Schema {
     fn schema() -> Value;
-}
 
-/// A value that may be out of its range, or too long.
-pub trait InRange {
     /// The first part that is out of its range or too long; `at` is the path to the value.
-    fn out_of_range(&self, at: &str) -> Option<Broken>;
+    fn out_of_range(&self, _at: &str) -> Option<Broken> {
+        None
+    }
 }
 
 /// A text or a list.
@@ -64,37 +63,29 @@ pub fn length_beyond(value: &impl Long, at: &str, least: usize, most: usize) -> 
     (!(least..=most).contains(&found)).then(|| Broken { problem: Problem::WrongShape, detail: detail() })
 }
 
-macro_rules! plain {
-    ($($type:ty => $schema:expr),* $(,)?) => {
-        $(
-            impl Schema for $type {
-                fn schema() -> Value {
-                    $schema
-                }
-            }
-
-            impl InRange for $type {
-                fn out_of_range(&self, _at: &str) -> Option<Broken> {
-                    None
-                }
-            }
-        )*
-    };
+impl Schema for f64 {
+    fn schema() -> Value {
+        json!({ "type": "number" })
+    }
 }
 
-plain! {
-    f64 => json!({ "type": "number" }),
-    bool => json!({ "type": "boolean" }),
-    String => json!({ "type": "string" }),
+impl Schema for bool {
+    fn schema() -> Value {
+        json!({ "type": "boolean" })
+    }
+}
+
+impl Schema for String {
+    fn schema() -> Value {
+        json!({ "type": "string" })
+    }
 }
 
 impl Schema for u64 {
     fn schema() -> Value {
         json!({ "type": "integer", "minimum": 0, "maximum": INTEGER_MAX })
     }
-}
 
-impl InRange for u64 {
     fn out_of_range(&self, at: &str) -> Option<Broken> {
         let detail = || format!("`{at}` is {self}; integers are at most {INTEGER_MAX}");
         (*self > INTEGER_MAX).then(|| Broken { problem: Problem::OutOfRange, detail: detail() })
@@ -105,9 +96,7 @@ impl<T: Schema> Schema for Vec<T> {
     fn schema() -> Value {
         json!({ "type": "array", "items": T::schema() })
     }
-}
 
-impl<T: InRange> InRange for Vec<T> {
     fn out_of_range(&self, at: &str) -> Option<Broken> {
         self.iter().enumerate().find_map(|(index, item)| item.out_of_range(&format!("{at}[{index}]")))
     }
@@ -117,9 +106,7 @@ impl<T: Schema, const N: usize> Schema for [T; N] {
     fn schema() -> Value {
         json!({ "type": "array", "items": T::schema(), "minItems": N, "maxItems": N })
     }
-}
 
-impl<T: InRange, const N: usize> InRange for [T; N] {
     fn out_of_range(&self, at: &str) -> Option<Broken> {
         self.iter().find_map(|item| item.out_of_range(at))
     }
@@ -129,9 +116,7 @@ impl<T: Schema> Schema for Option<T> {
     fn schema() -> Value {
         json!({ "anyOf": [T::schema(), { "type": "null" }] })
     }
-}
 
-impl<T: InRange> InRange for Option<T> {
     fn out_of_range(&self, at: &str) -> Option<Broken> {
         self.as_ref()?.out_of_range(at)
     }

@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::finding::{Failure, Problem, harmless};
 use super::link::{Broken, Deadline, Link};
 use super::message::{Answer, AnswerKind, Close, ERROR_CHARS_MAX, Init, PROTOCOL, Question, Ready};
-use super::schema::InRange;
+use super::schema::Schema;
 use super::settings::ExternalSettings;
 
 /// A trajectory reaches at least this far beyond its step, µs.

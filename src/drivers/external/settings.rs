@@ -114,8 +114,7 @@ impl From<Target> for Written {
     fn from(target: Target) -> Written {
         match target {
             Target::Program(words) => Written::List(words),
-            Target::Tcp(address) => Written::Text(format!("tcp:{address}")),
-            Target::Unix(path) => Written::Text(format!("unix:{}", path.display())),
+            Target::Tcp(_) | Target::Unix(_) => Written::Text(target.text()),
         }
     }
 }
@@ -251,23 +250,21 @@ impl ExternalSettings {
         })
     }
 
-    /// From one line of JSON, as scenarios record it.
+    /// These settings, if every time is in its range.
     ///
     /// # Errors
-    /// What is wrong with the line.
+    /// The first that is not.
     pub fn checked(self) -> Result<ExternalSettings, ExternalError> {
-        let in_ticks = |name, found: f64, low: f64, high: f64| {
-            let ticks = found / DT_S;
-            let fits = (low..=high).contains(&found) && (ticks - ticks.round()).abs() < 1e-6;
-            let more = ", in whole ticks of 0.02";
-            if fits {
-                Ok(())
-            } else {
-                Err(ExternalError::Range { name, found: found.to_string(), low, high, more })
-            }
+        let wrong = |name, found: f64, low, high, more| {
+            Err(ExternalError::Range { name, found: found.to_string(), low, high, more })
         };
-        in_ticks("period", self.period_s, DT_S, 1.0)?;
-        in_ticks("latency", self.latency_s, 0.0, 2.0)?;
+        let in_ticks = [("period", self.period_s, DT_S, 1.0), ("latency", self.latency_s, 0.0, 2.0)];
+        for (name, found, low, high) in in_ticks {
+            let ticks = found / DT_S;
+            if !(low..=high).contains(&found) || (ticks - ticks.round()).abs() >= 1e-6 {
+                return wrong(name, found, low, high, ", in whole ticks of 0.02");
+            }
+        }
         let Timeouts { init_s, map_s, reset_s, step_s, close_s } = self.timeouts;
         let limits = [
             ("timeouts.init", init_s),
@@ -277,9 +274,8 @@ impl ExternalSettings {
             ("timeouts.close", close_s),
         ];
         for (name, found) in limits {
-            let (low, high) = (0.001, 3600.0);
-            if !(low..=high).contains(&found) {
-                return Err(ExternalError::Range { name, found: found.to_string(), low, high, more: "" });
+            if !(0.001..=3600.0).contains(&found) {
+                return wrong(name, found, 0.001, 3600.0, "");
             }
         }
         Ok(self)

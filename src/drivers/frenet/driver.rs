@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use crate::driver::Ads;
 use crate::kit::{HOLD_MPS2, Helm, Point, Sight, Signs, Steering, Stop, crosswalks, lights};
-use crate::status::{Manoeuvre, Reason, Status};
-use avastra_world::sim::{Control, DT_S, Scene, Sensed, VehicleParameters};
+use crate::status::{Manoeuvre, PerceivedObject, Reason, Status};
+use avastra_world::sim::{Control, FRAME_S, Scene, Sensed, VehicleParameters};
 
 use super::lateral::{Lanes, Lateral};
 use super::proposal::{MODEL, Outlook, Proposal, SPEED_PARTS, STEP_S, STEPS};
@@ -33,9 +33,8 @@ pub struct Frenet {
     steering: Arc<Steering>,
     sight: Sight,
     signs: Signs,
-    /// The plan that is driven, and for how many ticks it has been; `None` before the first look.
+    /// The plan of the last look, which is driven; `None` before the first.
     plan: Option<Proposal>,
-    since_ticks: u64,
     helm: Helm,
     others: Vec<Other>,
     stops: Vec<Stop>,
@@ -54,7 +53,6 @@ impl Frenet {
             sight: Sight::new(1.0),
             signs: Signs::default(),
             plan: None,
-            since_ticks: 0,
             helm: Helm::default(),
             others: Vec::new(),
             stops: Vec::new(),
@@ -94,13 +92,12 @@ impl Frenet {
         let plan = chosen(&outlook, &self.proposals, now);
         self.report(sensed, &plan, station_m);
         self.plan = Some(plan);
-        self.since_ticks = 0;
     }
 
     /// Where the new plan begins: at the speed that is driven, with the acceleration that was planned.
     fn start(&self, sensed: &Sensed, station_m: f64) -> Point {
         let speed_mps = sensed.ego.speed_mps;
-        let planned = self.plan.as_ref().map(|plan| planned_at(plan, self.since_ticks as f64 * DT_S));
+        let planned = self.plan.as_ref().map(|plan| planned_at(plan, FRAME_S));
         let acceleration_mps2 = match planned {
             Some(planned) if (planned.speed_mps - speed_mps).abs() < LOST_MPS => planned.acceleration_mps2,
             _ => sensed.ego.acceleration_mps2,
@@ -130,7 +127,7 @@ impl Frenet {
             guide.pose_at(point.station_m).offset(0.0, offset_m).position
         }));
         self.status.localized = Some(sensed.ego.rear_axle);
-        self.sight.report(&mut self.status.perceived);
+        self.status.perceive(self.sight.known().iter().map(PerceivedObject::as_it_is));
         for seen in &mut self.status.perceived {
             let other = self.others.iter().find(|other| Some(other.id) == seen.id);
             seen.predicted.extend(other.into_iter().flat_map(|other| other.predicted));
@@ -178,7 +175,7 @@ impl Ads for Frenet {
             self.cycle(sensed, station_m, beside.offset_m);
         }
         let plan = self.plan.as_ref().expect("the first tick plans");
-        let since_s = self.since_ticks as f64 * DT_S;
+        let since_s = self.helm.since_look_s();
         let (here, ahead) = (planned_at(plan, since_s), planned_at(plan, since_s + PREVIEW_S));
         let mut acceleration_mps2 = ahead.acceleration_mps2 + SPEED_GAIN * (here.speed_mps - ego.speed_mps);
         if ego.speed_mps < REST_MPS && plan.progress_m() < CREEP_M {
@@ -187,7 +184,6 @@ impl Ads for Frenet {
         let aside = |at_m: f64| plan.lateral.aside(at_m);
         let steer_rad =
             self.steering.steer_aside_rad(self.lanes.guide(), &aside, &ego.rear_axle, station_m, ego);
-        self.since_ticks += 1;
         self.helm.command(Control::towards(acceleration_mps2, steer_rad), ego, &mut self.status)
     }
 

@@ -78,7 +78,7 @@ impl Lateral {
     /// Werling's cost at a speed.
     pub fn cost(&self, speed_mps: f64) -> f64 {
         let speed_mps = speed_mps.max(1.0);
-        lateral_cost(self.curve.squared_jerk(speed_mps), self.curve.length_m() / speed_mps, self.deviation_m)
+        lateral_cost(self.curve.squared_jerk(speed_mps), self.curve.length_m / speed_mps, self.deviation_m)
     }
 }
 
@@ -86,20 +86,18 @@ impl Lateral {
 #[derive(Debug, Clone)]
 pub struct Lanes {
     scene: Arc<Scene>,
-    guide: Arc<Guide>,
     /// Those that have begun are behind the vehicle.
     changes: RouteChanges,
 }
 
 impl Lanes {
     pub fn new(scene: &Arc<Scene>) -> Lanes {
-        let changes = RouteChanges::new(scene);
-        Lanes { scene: Arc::clone(scene), guide: Arc::new(changes.guide(&SpeedRules::TOWN)), changes }
+        Lanes { scene: Arc::clone(scene), changes: RouteChanges::new(scene, SpeedRules::TOWN) }
     }
 
     /// Along the lane that the vehicle is in.
     pub fn guide(&self) -> &Arc<Guide> {
-        &self.guide
+        self.changes.guide()
     }
 
     /// The speed limit at a station, or the cruising speed if it is lower, m/s.
@@ -124,10 +122,9 @@ impl Lanes {
         if !lateral.changes_lane() || offset_m / lateral_m < 0.5 {
             return lateral;
         }
+        let before = self.guide().pose_at(station_m).position;
         self.changes.begin(f64::NEG_INFINITY);
-        let before = self.guide.pose_at(station_m).position;
-        self.guide = Arc::new(self.changes.guide(&SpeedRules::TOWN));
-        let left_m = -self.guide.project(before, station_m - 5.0, station_m + 5.0).offset_m;
+        let left_m = -self.guide().project(before, station_m - 5.0, station_m + 5.0).offset_m;
         let curve = lateral.curve.beside(left_m);
         Lateral { goal: Goal::Middle, goal_m: 0.0, curve, deviation_m: 0.0, ..lateral }
     }

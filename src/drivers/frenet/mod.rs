@@ -15,8 +15,6 @@ mod driver;
 mod lateral;
 mod polynomial;
 mod proposal;
-#[cfg(test)]
-mod tests;
 mod traffic;
 
 pub use driver::Frenet;

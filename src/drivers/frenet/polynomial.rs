@@ -13,7 +13,7 @@ use crate::kit::Aside;
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Quintic {
     terms: [f64; 6],
-    length_m: f64,
+    pub length_m: f64,
 }
 
 impl Quintic {
@@ -46,10 +46,6 @@ impl Quintic {
         self
     }
 
-    pub fn length_m(&self) -> f64 {
-        self.length_m
-    }
-
     /// Integral of the squared jerk at a constant speed, m²/s⁵.
     pub fn squared_jerk(&self, speed_mps: f64) -> f64 {
         let l = self.length_m;
@@ -68,7 +64,7 @@ pub struct Quartic {
     start_mps2: f64,
     jerk: f64,
     snap: f64,
-    time_s: f64,
+    pub time_s: f64,
 }
 
 impl Quartic {
@@ -92,10 +88,6 @@ impl Quartic {
     pub fn squared_jerk(&self) -> f64 {
         let (t, jerk, snap) = (self.time_s, self.jerk, self.snap);
         t * (jerk * jerk + t * (jerk * snap + t * snap * snap / 3.0))
-    }
-
-    pub fn time_s(&self) -> f64 {
-        self.time_s
     }
 }
 

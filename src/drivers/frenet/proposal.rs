@@ -94,7 +94,7 @@ impl Outlook<'_> {
             let sampled = [1.0, 1.5, 2.0].map(|factor| {
                 Quartic::to_speed(speed_mps, from_mps2, part * self.limit_mps, factor * quickest_s)
             });
-            let cost = |profile: &Quartic| COST_JERK * profile.squared_jerk() + COST_TIME * profile.time_s();
+            let cost = |profile: &Quartic| COST_JERK * profile.squared_jerk() + COST_TIME * profile.time_s;
             sampled.into_iter().min_by(|a, b| cost(a).total_cmp(&cost(b))).expect("three were sampled")
         })
     }
@@ -124,7 +124,7 @@ impl Outlook<'_> {
         self.judged(Proposal {
             cost: lateral.cost(self.start.speed_mps)
                 + COST_JERK * profile.squared_jerk()
-                + COST_TIME * profile.time_s(),
+                + COST_TIME * profile.time_s,
             lateral,
             points,
             reason: reason.1,

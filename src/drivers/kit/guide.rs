@@ -172,8 +172,7 @@ impl Guide {
 
     /// The pose at a station; beyond the ends the route goes on straight.
     pub fn pose_at(&self, station_m: f64) -> Pose {
-        let (index, fraction) = self.segment(station_m);
-        let (a, b) = (&self.samples[index], &self.samples[index + 1]);
+        let (a, b, fraction) = self.segment(station_m);
         let turn_rad = wrap_angle(b.heading_rad - a.heading_rad) * fraction.clamp(0.0, 1.0);
         Pose {
             position: a.position + (b.position - a.position) * fraction,
@@ -183,22 +182,19 @@ impl Guide {
 
     /// The position of [`Guide::pose_at`], without the work for its heading.
     pub fn position_at(&self, station_m: f64) -> Vec2 {
-        let (index, fraction) = self.segment(station_m);
-        let (a, b) = (&self.samples[index], &self.samples[index + 1]);
+        let (a, b, fraction) = self.segment(station_m);
         a.position + (b.position - a.position) * fraction
     }
 
     /// 1/m, positive to the left.
     pub fn curvature_at(&self, station_m: f64) -> f64 {
-        let (index, fraction) = self.segment(station_m);
-        let (a, b) = (&self.samples[index], &self.samples[index + 1]);
+        let (a, b, fraction) = self.segment(station_m);
         a.curvature_per_m + (b.curvature_per_m - a.curvature_per_m) * fraction.clamp(0.0, 1.0)
     }
 
     /// Speed that limits and curves, here and ahead, allow, m/s.
     pub fn speed_mps_max(&self, station_m: f64) -> f64 {
-        let (index, fraction) = self.segment(station_m);
-        let (a, b) = (&self.samples[index], &self.samples[index + 1]);
+        let (a, b, fraction) = self.segment(station_m);
         a.speed_mps_max + (b.speed_mps_max - a.speed_mps_max) * fraction.clamp(0.0, 1.0)
     }
 
@@ -318,10 +314,10 @@ impl Guide {
         ((station_m / SPACING_M) as u32 as usize).min(self.samples.len() - 1)
     }
 
-    /// Segment and fraction of it; the fraction leaves `[0, 1]` beyond the ends.
-    fn segment(&self, station_m: f64) -> (usize, f64) {
+    /// The samples around a station and the fraction of the way between them, which leaves `[0, 1]` beyond the ends.
+    fn segment(&self, station_m: f64) -> (&Sample, &Sample, f64) {
         let index = self.index(station_m).min(self.samples.len() - 2);
-        (index, station_m / SPACING_M - index as f64)
+        (&self.samples[index], &self.samples[index + 1], station_m / SPACING_M - index as f64)
     }
 }
 
@@ -376,13 +372,10 @@ mod tests {
     use super::*;
     use crate::testing::{ring, winding};
 
-    const RULES: SpeedRules =
-        SpeedRules { cruise_mps: 11.0, lateral_acceleration_mps2_max: 2.0, slowdown_mps2: 1.5 };
-
     #[test]
     fn places_and_projections_agree_with_the_path() {
         let scene = winding();
-        let guide = Guide::new(&scene, &RULES);
+        let guide = Guide::new(&scene, &SpeedRules::TOWN);
         for index in 0..370 {
             let station_m = f64::from(index) + 0.3;
             let on_path = scene.route.path.pose_at(station_m);
@@ -395,7 +388,7 @@ mod tests {
 
     #[test]
     fn a_drive_begins_where_the_route_begins_even_if_it_comes_there_again() {
-        let guide = Guide::new(&ring(), &RULES);
+        let guide = Guide::new(&ring(), &SpeedRules::TOWN);
         let start = guide.pose_at(0.0);
         for (ahead_m, left_m) in [(0.0, 0.0), (0.3, 0.2), (0.2, -0.4), (1.0, 0.1)] {
             let place = guide.locate(start.offset(ahead_m, left_m).position, None);
@@ -407,7 +400,7 @@ mod tests {
 
     #[test]
     fn a_moving_point_is_followed_as_if_searched_anew() {
-        let guide = Guide::new(&winding(), &RULES);
+        let guide = Guide::new(&winding(), &SpeedRules::TOWN);
         let (from_m, to_m, reach_m) = (20.0, 330.0, 5.0);
         let (mut near, mut far) = (0, 0);
         for case in 0..400 {
@@ -442,8 +435,8 @@ mod tests {
 
     #[test]
     fn curves_are_foreseen() {
-        let guide = Guide::new(&winding(), &RULES);
-        assert_eq!(guide.speed_mps_max(50.0), 11.0);
+        let guide = Guide::new(&winding(), &SpeedRules::TOWN);
+        assert_eq!(guide.speed_mps_max(50.0), SpeedRules::TOWN.cruise_mps);
         // √(2 · 15 + …): the route lies 1.75 m outside the left-hand bend's line of 15 m.
         assert!((guide.speed_mps_max(135.0) - (2.0_f64 * 16.75).sqrt()).abs() < 0.1);
         for index in 0..700 {

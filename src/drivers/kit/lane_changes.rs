@@ -9,22 +9,26 @@ use avastra_world::sim::{Scene, VehicleParameters};
 
 use super::guide::{Guide, SpeedRules};
 
-/// Which changes of the route have begun, and where.
+/// Which changes of the route have begun, and where; and the guide that follows from it.
 #[derive(Debug, Clone)]
 pub struct RouteChanges {
     scene: Arc<Scene>,
+    rules: SpeedRules,
     /// Where each change begins, m; infinite while it has not.
     begins_m: Vec<f64>,
+    guide: Arc<Guide>,
 }
 
 impl RouteChanges {
-    pub fn new(scene: &Arc<Scene>) -> RouteChanges {
-        RouteChanges { scene: Arc::clone(scene), begins_m: vec![f64::INFINITY; scene.route.changes.len()] }
+    pub fn new(scene: &Arc<Scene>, rules: SpeedRules) -> RouteChanges {
+        let begins_m = vec![f64::INFINITY; scene.route.changes.len()];
+        let guide = Arc::new(Guide::with_changes(scene, &rules, &begins_m));
+        RouteChanges { scene: Arc::clone(scene), rules, begins_m, guide }
     }
 
-    /// The guide along the lanes that are to be driven now.
-    pub fn guide(&self, rules: &SpeedRules) -> Guide {
-        Guide::with_changes(&self.scene, rules, &self.begins_m)
+    /// The guide along the lanes that are to be driven now; replaced when a change begins or is taken back.
+    pub fn guide(&self) -> &Arc<Guide> {
+        &self.guide
     }
 
     /// The next change, which has not begun yet.
@@ -40,7 +44,7 @@ impl RouteChanges {
     /// Begins the next change at a station, m; minus infinity for one that is over.
     pub fn begin(&mut self, station_m: f64) {
         if let Some(index) = self.next_index() {
-            self.begins_m[index] = station_m;
+            self.set(index, station_m);
         }
     }
 
@@ -63,7 +67,12 @@ impl RouteChanges {
 
     /// Takes back the change of a number, which has begun.
     pub fn take_back(&mut self, index: usize) {
-        self.begins_m[index] = f64::INFINITY;
+        self.set(index, f64::INFINITY);
+    }
+
+    fn set(&mut self, index: usize, begin_m: f64) {
+        self.begins_m[index] = begin_m;
+        self.guide = Arc::new(Guide::with_changes(&self.scene, &self.rules, &self.begins_m));
     }
 
     /// Where the front of the vehicle must wait for the next change, m: a short one is still possible there.

@@ -7,7 +7,7 @@
 //! | `sight` | a simple perception: range, darkness, fog, confirmation and delay |
 //! | `corridor` | who is in the vehicle's way or in a lane beside it, and what to call it |
 //! | `stops` | where lights, stop signs and crosswalks make it stop |
-//! | `lane_changes` | the route's lane changes: the next one, when it is due, where to wait for it |
+//! | `lane_changes` | the route's lane changes and the guide along them: the next one, when it is due, where to wait for it |
 //! | `speed` | towards an allowed speed, at rest, and at the limit of the brakes |
 //! | `point`, `pedals` | a point of a plan, and Apollo's cascade from it to an acceleration |
 //! | `steering` | a steering controller (LQR) along a guide or beside it |

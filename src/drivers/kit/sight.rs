@@ -4,8 +4,6 @@
 
 use avastra_world::sim::{Conditions, FRAME_S, Sensed, SensedObject};
 
-use crate::status::PerceivedObject;
-
 /// How far vehicles and lights are seen, m. Ours, as in `scenarios/ads/default.yaml`.
 pub const RANGE_M: f64 = 120.0;
 /// How far pedestrians are seen by day, m. Ours, as in `scenarios/ads/default.yaml`.
@@ -54,23 +52,6 @@ impl Sight {
     pub fn known(&self) -> &[SensedObject] {
         &self.known
     }
-
-    /// Writes what the driver knows into its status, without forecasts; buffers are kept.
-    pub fn report(&self, perceived: &mut Vec<PerceivedObject>) {
-        perceived.truncate(self.known.len());
-        for (index, object) in self.known.iter().enumerate() {
-            let mut predicted = perceived
-                .get_mut(index)
-                .map(|before| core::mem::take(&mut before.predicted))
-                .unwrap_or_default();
-            predicted.clear();
-            let seen = PerceivedObject { predicted, ..PerceivedObject::as_it_is(object) };
-            match perceived.get_mut(index) {
-                Some(place) => *place = seen,
-                None => perceived.push(seen),
-            }
-        }
-    }
 }
 
 /// How far an object of its kind is seen, m: no farther than the fog allows.
@@ -86,15 +67,13 @@ fn range_m(object: &SensedObject, conditions: &Conditions, night_factor: f64) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{CLEAR_DAY, object};
+    use crate::testing::{CLEAR_DAY, object, sensed};
     use avastra_base::geometry::Pose;
     use avastra_lang::model::vocabulary::Body;
-    use avastra_world::sim::EgoMotion;
 
     /// The numbers of the looks, from 1, after which the object is known.
     fn known_after(seen: SensedObject, conditions: Conditions, night_factor: f64) -> Vec<usize> {
-        let ego = EgoMotion::straight(Pose::new(0.0, 0.0, 0.0), 10.0);
-        let sensed = Sensed { time_s: 0.0, ego, objects: vec![seen], signals: vec![], conditions };
+        let sensed = Sensed { conditions, ..sensed(Pose::new(0.0, 0.0, 0.0), 10.0, vec![seen]) };
         let mut sight = Sight::new(night_factor);
         let look = |_: &usize| {
             sight.look(&sensed);

@@ -104,11 +104,11 @@ fn can_stop(distance_m: f64, speed_mps: f64, deceleration_mps2: f64) -> bool {
 mod tests {
     use super::*;
     use crate::kit::SpeedRules;
-    use crate::testing::{CLEAR_DAY, object, straight};
+    use crate::testing::{CLEAR_DAY, object, sensed, straight};
     use avastra_base::geometry::Pose;
     use avastra_lang::model::vocabulary::Body;
     use avastra_road::SignLine;
-    use avastra_world::sim::{Conditions, EgoMotion};
+    use avastra_world::sim::Conditions;
     use core::f64::consts::FRAC_PI_2;
     use std::sync::Arc;
 
@@ -116,9 +116,9 @@ mod tests {
     fn lights_hold_until_they_are_too_near_or_too_far() {
         let scene = straight();
         let stops = |colour, gap_m: f64, visibility_m| {
-            let ego = EgoMotion::straight(Pose::new(0.0, 0.0, 0.0), 10.0);
             let conditions = Conditions { visibility_m, ..CLEAR_DAY };
-            let sensed = Sensed { time_s: 0.0, ego, objects: vec![], signals: vec![colour], conditions };
+            let before = sensed(Pose::new(0.0, 0.0, 0.0), 10.0, vec![]);
+            let sensed = Sensed { signals: vec![colour], conditions, ..before };
             lights(&scene, &sensed, 100.0 - gap_m).count() == 1
         };
         assert!(!stops(SignalColour::Green, 40.0, 1e4));

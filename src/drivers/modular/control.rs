@@ -40,12 +40,12 @@ impl Controller {
         let actuators = &self.config.actuators;
         let (brake_mps2_max, throttle_mps2_max) = (actuators.brake_mps2_max, actuators.throttle_mps2_max);
         let lag_s = actuators.steer_lag_s;
-        let plan = [since_s, since_s + self.pedals.preview_s()].map(|time_s| planner.trajectory().at(time_s));
+        let plan = [since_s, since_s + self.pedals.preview_s()].map(|time_s| planner.trajectory.at(time_s));
         let acceleration_mps2 = self
             .pedals
             .acceleration_mps2(plan, station_m, motion.speed_mps)
             .clamp(-brake_mps2_max, throttle_mps2_max);
-        let aside = |at_m: f64| planner.lateral().aside(at_m);
+        let aside = |at_m: f64| planner.lateral.aside(at_m);
         let wanted_rad = self.steering.steer_aside_rad(planner.guide(), &aside, localized, station_m, motion);
         self.steer_rad += (wanted_rad - self.steer_rad) * (DT_S / (lag_s + DT_S));
         Control::towards(acceleration_mps2, self.steer_rad)

@@ -77,32 +77,13 @@ impl Course {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use avastra_base::geometry::{OrientedBox, Pose};
-    use avastra_lang::model::vocabulary::{Body, Colour, Verb};
 
     #[test]
     fn what_was_recorded_is_foreseen() {
         let mut foresight = Foresight::default();
-        for tick in 0..200_u64 {
-            let x_m = (tick as f64 * avastra_world::sim::DT_S) * (tick as f64 * avastra_world::sim::DT_S);
-            foresight.record(
-                tick,
-                core::iter::once(&Obstacle {
-                    id: 4,
-                    body: Body::Sedan,
-                    colour: Colour::Red,
-                    verb: Verb::DriveAhead,
-                    outline: OrientedBox::new(Pose::new(x_m, 0.0, 0.0), 4.8, 1.85),
-                    height_m: 1.45,
-                    forward: Vec2::new(1.0, 0.0),
-                    lane_heading_rad: 0.0,
-                    velocity_mps: Vec2::zeros(),
-                    elevation_m: 0.0,
-                    is_apart: false,
-                    distance_m: 5.0,
-                    spawned_tick: 0,
-                }),
-            );
+        for frame in 0..40_u64 {
+            let time_s = frame as f64 * FRAME_S;
+            foresight.note(4, frame, Vec2::new(time_s * time_s, 0.0));
         }
         let mut positions = [Vec2::zeros(); 4];
         assert!(foresight.positions(4, 1.0, Vec2::new(1.5, 7.0), 0.5, &mut positions));

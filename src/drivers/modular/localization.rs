@@ -30,13 +30,9 @@ pub struct Localization {
     spread: Option<f64>,
 }
 
-fn draws(seed: u64) -> Rng {
-    rng::stream(seed, Stream::Localization, 0)
-}
-
 impl Localization {
     pub fn new(config: &LocalizationConfig, seed: u64) -> Localization {
-        let mut rng = draws(seed);
+        let mut rng = rng::stream(seed, Stream::Localization, 0);
         let errors = core::array::from_fn(|_| rng::normal(&mut rng));
         let keep = libm::exp(-DT_S / config.correlation_s);
         Localization { config: *config, rng, errors, keep, renew: (1.0 - keep * keep).sqrt(), spread: None }
@@ -78,13 +74,14 @@ impl Localization {
 mod tests {
     use super::*;
     use crate::modular::{ModularConfig, Module};
+    use crate::testing;
     use crate::testing::CLEAR_DAY;
-    use avastra_world::sim::{Conditions, EgoMotion};
+    use avastra_world::sim::Conditions;
 
     fn sensed(speed_mps: f64, conditions: Conditions) -> Sensed {
-        let ego =
-            EgoMotion { yaw_rate_radps: 0.1, ..EgoMotion::straight(Pose::new(3.0, 4.0, 0.0), speed_mps) };
-        Sensed { time_s: 0.0, ego, objects: vec![], signals: vec![], conditions }
+        let mut sensed = testing::sensed(Pose::new(3.0, 4.0, 0.0), speed_mps, vec![]);
+        (sensed.ego.yaw_rate_radps, sensed.conditions) = (0.1, conditions);
+        sensed
     }
 
     /// Root mean square of the error across the way at rest, m.

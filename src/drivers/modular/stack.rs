@@ -44,13 +44,8 @@ pub struct Modular {
 }
 
 impl Modular {
-    /// With these settings; the seed feeds its sensor errors.
-    pub fn new(scene: &Arc<Scene>, config: &ModularConfig, seed: u64) -> Modular {
-        Modular::with_foresight(scene, config, seed, None)
-    }
-
-    /// As [`Modular::new`], with a recording of the future for a perfect prediction.
-    pub fn with_foresight(
+    /// With these settings, and a recording of the future for a perfect prediction; the seed feeds its sensor errors.
+    pub fn new(
         scene: &Arc<Scene>,
         config: &ModularConfig,
         seed: u64,
@@ -81,7 +76,7 @@ impl Modular {
         let station_m = self.helm.station_m();
         if let Some(since_s) = self.watchdog.looks(sensed.time_s) {
             self.tracking.resume(since_s);
-            self.tracking.delay(self.watchdog.load_frames(sensed.objects.len()));
+            self.tracking.delay(self.watchdog.config.load_frames(sensed.objects.len()));
             let near_m = self.tracking.hold_m();
             let may_be_taken = |place: Vec2| {
                 (place - localized.position).norm() <= near_m && !sees_empty(place, sensed, localized)
@@ -92,8 +87,7 @@ impl Modular {
             self.tracking.update(detections, may_be_taken);
         }
         let lights = self.lights.look(sensed, station_m);
-        let (tracks, age_s) =
-            (self.tracking.published(), self.tracking.age_s() + self.watchdog.perception_s());
+        let (tracks, age_s) = (self.tracking.published(), self.tracking.age_s() + self.watchdog.perception_s);
         self.prediction.see_lights(lights);
         self.prediction.update(tracks, age_s, sensed.time_s, localized.position);
         if let Some(since_s) = self.watchdog.plans(sensed.time_s) {
@@ -107,7 +101,7 @@ impl Modular {
                 conditions: &sensed.conditions,
             });
         }
-        let (guide, lateral) = (self.planner.guide(), self.planner.lateral());
+        let (guide, lateral) = (self.planner.guide(), &self.planner.lateral);
         self.emergency.look(tracks, age_s, guide, lateral, station_m, &sensed.ego);
         self.report();
     }
@@ -120,37 +114,27 @@ impl Modular {
     /// Writes perceptions and plan into the status; its buffers are reused.
     fn report(&mut self) {
         let forecasts = self.prediction.forecasts();
-        let perceived = &mut self.status.perceived;
         // Of the hypotheses of one object only the most probable is reported; it comes first.
         let first = |index: &usize| *index == 0 || forecasts[index - 1].id != forecasts[*index].id;
-        let objects = (0..forecasts.len()).filter(first);
-        perceived.truncate(objects.clone().count());
-        for (index, forecast) in objects.map(|index| &forecasts[index]).enumerate() {
+        let reported = || (0..forecasts.len()).filter(first).map(move |index| &forecasts[index]);
+        self.status.perceive(reported().map(|forecast| PerceivedObject {
+            id: (forecast.truth < GHOST_ID_MIN).then_some(forecast.truth),
+            track: forecast.id,
+            body: forecast.body,
+            pose: Pose { position: forecast.positions[0], heading_rad: forecast.heading_rad },
+            velocity_mps: forecast.velocity_mps,
+            length_m: forecast.length_m,
+            width_m: forecast.width_m,
+            height_m: forecast.height_m,
+            predicted: Vec::new(),
+        }));
+        for (object, forecast) in self.status.perceived.iter_mut().zip(reported()) {
             debug_assert!(forecast.probability > 0.0, "a future that cannot happen is no hypothesis");
-            let pose = Pose { position: forecast.positions[0], heading_rad: forecast.heading_rad };
-            let mut predicted =
-                perceived.get_mut(index).map_or_else(Vec::new, |o| core::mem::take(&mut o.predicted));
-            predicted.clear();
-            predicted.extend_from_slice(&forecast.positions[1..]);
-            let object = PerceivedObject {
-                id: (forecast.truth < GHOST_ID_MIN).then_some(forecast.truth),
-                track: forecast.id,
-                body: forecast.body,
-                pose,
-                velocity_mps: forecast.velocity_mps,
-                length_m: forecast.length_m,
-                width_m: forecast.width_m,
-                height_m: forecast.height_m,
-                predicted,
-            };
-            match perceived.get_mut(index) {
-                Some(slot) => *slot = object,
-                None => perceived.push(object),
-            }
+            object.predicted.extend_from_slice(&forecast.positions[1..]);
         }
-        let (guide, lateral) = (self.planner.guide(), self.planner.lateral());
+        let (guide, lateral) = (self.planner.guide(), &self.planner.lateral);
         self.status.planned.clear();
-        self.status.planned.extend(self.planner.trajectory().points.iter().map(|point| {
+        self.status.planned.extend(self.planner.trajectory.points.iter().map(|point| {
             let offset_m = lateral.aside(point.station_m).offset_m;
             // Most plans lie on the guide, and a place beside it takes trigonometry.
             if offset_m == 0.0 {
@@ -159,8 +143,8 @@ impl Modular {
                 guide.pose_at(point.station_m).offset(0.0, offset_m).position
             }
         }));
-        self.status.reason = self.planner.reason().renumbered(|id| self.truth_of(id));
-        self.status.manoeuvre = self.planner.manoeuvre().renumbered(|id| self.truth_of(id));
+        self.status.reason = self.planner.trajectory.reason.renumbered(|id| self.truth_of(id));
+        self.status.manoeuvre = self.planner.manoeuvre.renumbered(|id| self.truth_of(id));
     }
 }
 
@@ -175,7 +159,7 @@ impl Ads for Modular {
         if self.helm.looks() {
             self.cycle(sensed, &localized);
         }
-        let since_s = self.watchdog.trajectory_s();
+        let since_s = self.watchdog.trajectory_s;
         let control = self.controller.follow(&self.planner, since_s, &localized, station_m, &sensed.ego);
         let control = self.emergency.brake(control, sensed.ego.speed_mps, self.brake_mps2_max);
         if let Some(id) = self.emergency.braking_for() {

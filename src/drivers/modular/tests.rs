@@ -1,80 +1,37 @@
 //! Closed loop on hand-made roads: the parts together.
 
-use std::sync::Arc;
+use core::f64::consts::FRAC_PI_2;
 
 use crate::status::{Manoeuvre, Reason};
-use crate::testing::{Rig, object, straight, two_lanes, winding};
-use avastra_base::geometry::{Pose, Vec2};
+use crate::testing::{Rig, TARGET_Y_M, object, straight, two_lanes};
+use avastra_base::geometry::Pose;
 use avastra_lang::model::vocabulary::Body;
-use avastra_road::RouteLaneChange;
-use avastra_world::sim::{DT_S, Scene, SignalColour};
+use avastra_world::sim::{DT_S, SignalColour, VehicleParameters};
 
-use super::{Modular, ModularConfig, Module};
+use super::{Modular, ModularConfig, Weaknesses};
 
-fn rig(scene: &Arc<Scene>, seed: u64) -> Rig {
-    Rig::new(scene, Box::new(Modular::new(scene, &ModularConfig::default(), seed)), 0.0)
-}
-
-#[test]
-fn it_keeps_its_lane_round_bends() {
-    let scene = winding();
-    for seed in 0..3 {
-        let mut rig = rig(&scene, seed);
-        let mut ticks = 0;
-        while rig.station_m() < scene.route.goal_m {
-            rig.tick();
-            ticks += 1;
-            assert!(ticks < 50 * 60, "it arrives within a minute");
-        }
-        assert!(rig.offset_m_max < 0.6, "{}", rig.offset_m_max);
-    }
-}
-
-#[test]
-fn it_stops_at_red_and_goes_on_at_green() {
+/// A vehicle of these settings on a straight road.
+fn rig_with(config: &ModularConfig, seed: u64, speed_mps: f64) -> Rig {
     let scene = straight();
-    let mut rig = rig(&scene, 1);
-    rig.sensed.signals[0] = SignalColour::Red;
-    rig.run(30.0);
-    let front_m = rig.station_m() + 3.705;
-    assert!(rig.sensed.ego.speed_mps < 0.01 && (97.0..100.0).contains(&front_m), "{front_m}");
-    assert_eq!(rig.ads.status().reason.to_string(), "red light");
-    rig.sensed.signals[0] = SignalColour::Green;
-    rig.run(10.0);
-    assert!(rig.sensed.ego.speed_mps > 9.0);
+    Rig::new(&scene, Box::new(Modular::new(&scene, config, seed, None)), speed_mps)
 }
 
-#[test]
-fn it_stops_behind_what_stands() {
-    let scene = straight();
-    for (body, seed) in [(Body::Sedan, 1), (Body::BoxTruck, 2), (Body::SchoolBus, 3)] {
-        let mut rig = rig(&scene, seed);
-        rig.sensed.objects.push(object(1, body, Pose::new(150.0, -1.75, 0.0), 0.0));
-        rig.run(40.0);
-        // It may creep on for a moment when the track is lost and begun anew.
-        let (speed_mps, reason) = (rig.sensed.ego.speed_mps, rig.ads.status().reason);
-        assert!(speed_mps < 1.0, "{body:?}: {speed_mps} m/s, {reason}");
-        assert!((2.0..9.0).contains(&rig.gap_m_min), "{}", rig.gap_m_min);
-    }
+/// As [`rig_with`], at rest and without emergency braking, which would make up for what is tested.
+fn rig_of(config: &ModularConfig, seed: u64) -> Rig {
+    let mut config = *config;
+    config.emergency.enabled = false;
+    rig_with(&config, seed, 0.0)
 }
 
-#[test]
-fn it_gives_way_to_a_pedestrian_and_goes_on() {
-    let scene = straight();
-    for seed in 0..10 {
-        let mut rig = rig(&scene, seed);
-        rig.run(10.0);
-        let ahead_m = rig.station_m() + 3.7 + 40.0;
-        let heading_rad = core::f64::consts::FRAC_PI_2;
-        rig.sensed.objects.push(object(1, Body::Pedestrian, Pose::new(ahead_m, -5.75, heading_rad), 1.2));
-        let mut slowest_mps = f64::INFINITY;
-        for _ in 0..700 {
-            rig.tick();
-            slowest_mps = rig.sensed.ego.speed_mps.min(slowest_mps);
-        }
-        assert!(rig.gap_m_min > 1.0, "{}", rig.gap_m_min);
-        assert!(rig.sensed.ego.speed_mps > 8.0, "it goes on");
-    }
+fn front_m(rig: &Rig) -> f64 {
+    VehicleParameters::MKZ.front_m(rig.station_m())
+}
+
+/// A car that stands in the lane this far before the bumper.
+fn put_wall(rig: &mut Rig, ahead_m: f64) {
+    let pose = Pose::new(front_m(rig) + ahead_m + 2.4, -1.75, 0.0);
+    rig.sensed.objects.push(object(1, Body::Sedan, pose, 0.0));
+    rig.gap_m_min = f64::INFINITY;
 }
 
 /// The default settings with the changes that the closure makes.
@@ -84,32 +41,48 @@ fn config(change: impl Fn(&mut ModularConfig)) -> ModularConfig {
     config
 }
 
-/// A vehicle of these settings without emergency braking, which would make up for what is tested.
-fn rig_of(scene: &Arc<Scene>, config: &ModularConfig, seed: u64) -> Rig {
-    let mut config = *config;
-    config.emergency.enabled = false;
-    Rig::new(scene, Box::new(Modular::new(scene, &config, seed)), 0.0)
+#[test]
+fn it_stops_behind_what_stands() {
+    for (body, seed) in [(Body::Sedan, 1), (Body::BoxTruck, 2), (Body::SchoolBus, 3)] {
+        let mut rig = rig_with(&ModularConfig::default(), seed, 0.0);
+        rig.sensed.objects.push(object(1, body, Pose::new(150.0, -1.75, 0.0), 0.0));
+        rig.run(40.0);
+        // It may creep on for a moment when the track is lost and begun anew.
+        assert!(rig.speed_mps() < 1.0, "{body:?}: {} m/s, {}", rig.speed_mps(), rig.ads.status().reason);
+        assert!((2.0..9.0).contains(&rig.gap_m_min), "{}", rig.gap_m_min);
+    }
+}
+
+#[test]
+fn it_gives_way_to_a_pedestrian_and_goes_on() {
+    for seed in 0..10 {
+        let mut rig = rig_with(&ModularConfig::default(), seed, 0.0);
+        rig.run(10.0);
+        let from = Pose::new(rig.station_m() + 3.7 + 40.0, -5.75, FRAC_PI_2);
+        rig.sensed.objects.push(object(1, Body::Pedestrian, from, 1.2));
+        rig.run(14.0);
+        assert!(rig.gap_m_min > 1.0, "{}", rig.gap_m_min);
+        assert!(rig.speed_mps() > 8.0, "it goes on");
+    }
 }
 
 #[test]
 fn a_late_module_is_braked_for_until_it_is_back() {
-    let scene = straight();
     let slowest_mps = |watchdog: bool, hang_s: f64| {
         let config = config(|config| {
             config.latency.perception_hang_s = hang_s;
             config.latency.hang_every_s = 14.0;
             config.latency.watchdog = watchdog;
         });
-        let mut rig = rig_of(&scene, &config, 1);
+        let mut rig = rig_of(&config, 1);
         rig.run(13.0);
-        let (mut slowest_mps, mut degraded) = (f64::INFINITY, false);
-        for _ in 0..250 {
-            rig.tick();
-            slowest_mps = rig.sensed.ego.speed_mps.min(slowest_mps);
+        let mut degraded = false;
+        let slowest_mps = rig.run_least(5.0, |rig| {
             degraded |= rig.ads.status().reason == Reason::Degraded;
-        }
+            rig.speed_mps()
+        });
         rig.run(6.0);
-        assert!(rig.sensed.ego.speed_mps > 9.0, "it goes on");
+        assert!(rig.speed_mps() > 9.0, "it goes on");
         (slowest_mps, degraded)
     };
     let (braked, free) = (slowest_mps(true, 1.5), slowest_mps(false, 1.5));
@@ -119,31 +92,28 @@ fn a_late_module_is_braked_for_until_it_is_back() {
 
 #[test]
 fn after_a_contact_it_brakes_to_rest_and_stays() {
-    let scene = straight();
     for stops in [true, false] {
         let config = config(|config| config.emergency.stops_after_contact = stops);
-        let mut rig = Rig::new(&scene, Box::new(Modular::new(&scene, &config, 1)), 0.0);
+        let mut rig = rig_with(&config, 1, 0.0);
         rig.run(10.0);
         rig.sensed.ego.touched = true;
         rig.run(3.0);
-        assert_eq!(rig.sensed.ego.speed_mps < 0.01, stops, "{}", rig.sensed.ego.speed_mps);
+        assert_eq!(rig.speed_mps() < 0.01, stops, "{}", rig.speed_mps());
         assert_eq!(rig.ads.status().reason == Reason::Contact, stops);
         rig.run(10.0);
-        assert_eq!(rig.sensed.ego.speed_mps < 0.01, stops);
+        assert_eq!(rig.speed_mps() < 0.01, stops);
     }
 }
 
 #[test]
 fn no_red_light_is_passed_whenever_it_turns_yellow() {
-    let scene = straight();
-    let line_m = scene.route.stop_lines[0].station_m;
-    let front_m = |rig: &Rig| rig.station_m() + 3.705;
+    let line_m = straight().route.stop_lines[0].station_m;
     let (mut stopped, mut passed) = (0, 0);
     for late_red_passed in [true, false] {
         for half_metres in 20..80 {
             let yellow_m = line_m - f64::from(half_metres) / 2.0;
             let config = config(|config| config.weaknesses.late_red_passed = late_red_passed);
-            let mut rig = Rig::new(&scene, Box::new(Modular::new(&scene, &config, 1)), 11.0);
+            let mut rig = rig_with(&config, 1, 11.0);
             let mut since_yellow_s: f64 = 0.0;
             for _ in 0..600 {
                 let before_m = front_m(&rig);
@@ -161,7 +131,7 @@ fn no_red_light_is_passed_whenever_it_turns_yellow() {
                 assert!(!passes || !is_red || excused, "yellow {half_metres} half metres before");
                 passed += u32::from(passes);
             }
-            stopped += u32::from(rig.sensed.ego.speed_mps < 0.1);
+            stopped += u32::from(rig.speed_mps() < 0.1);
         }
     }
     assert!(stopped > 40 && passed > 10, "{stopped} {passed}");
@@ -169,69 +139,54 @@ fn no_red_light_is_passed_whenever_it_turns_yellow() {
 
 #[test]
 fn emergency_braking_stops_for_what_the_plan_ignores() {
-    let scene = straight();
     let end = |enabled: bool| {
         let config = config(|config| {
             config.emergency.enabled = enabled;
-            config.weaknesses = super::Weaknesses::NONE;
+            config.weaknesses = Weaknesses::NONE;
             config.weaknesses.bounded_jerk = true;
             config.weaknesses.gentle_fallback = true;
         });
-        let mut rig = Rig::new(&scene, Box::new(Modular::new(&scene, &config, 1)), 0.0);
+        let mut rig = rig_with(&config, 1, 0.0);
         rig.run(12.0);
-        rig.gap_m_min = f64::INFINITY;
-        let x_m = rig.station_m() + 3.705 + 18.0 + 2.4;
-        rig.sensed.objects.push(object(1, Body::Sedan, Pose::new(x_m, -1.75, 0.0), 0.0));
+        put_wall(&mut rig, 18.0);
         let mut braked = false;
-        while rig.sensed.ego.speed_mps > 0.1 && rig.gap_m_min > 0.0 {
+        while rig.speed_mps() > 0.1 && rig.gap_m_min > 0.0 {
             rig.tick();
             rig.measure();
             braked |= rig.ads.status().reason == Reason::Emergency(1);
         }
-        (rig.gap_m_min, rig.sensed.ego.speed_mps, braked)
+        (rig.gap_m_min, rig.speed_mps(), braked)
     };
     let (with, without) = (end(true), end(false));
     assert!(with.2 && !without.2, "{with:?} and {without:?}");
     assert!(with.0 > without.0 || with.1 < without.1 - 1.0, "{with:?} and {without:?}");
 }
 
-/// Smallest gap to a car that crosses from the right, timed to meet the ego vehicle, m.
-fn gap_to_a_crosser(config: &ModularConfig, seed: u64) -> f64 {
-    let scene = straight();
-    let mut rig = rig_of(&scene, config, seed);
-    rig.run(10.0);
-    let (meeting_m, speed_mps) = (rig.station_m() + 60.0, 10.0);
-    let arrival_s = 60.0 / rig.sensed.ego.speed_mps;
-    let from = Pose::new(meeting_m, -1.75 - speed_mps * arrival_s, core::f64::consts::FRAC_PI_2);
-    rig.sensed.objects.push(object(1, Body::Sedan, from, speed_mps));
-    rig.run(12.0);
-    rig.gap_m_min
-}
-
 #[test]
 fn it_gives_way_to_a_car_that_crosses() {
-    let deaf = config(|config| config.planning.never_yields = true);
     for seed in 0..5 {
-        assert!(gap_to_a_crosser(&ModularConfig::default(), seed) > 1.0);
-        assert!(gap_to_a_crosser(&deaf, seed) < 1.0);
-        assert!(gap_to_a_crosser(&deaf.idealised(Module::Planning), seed) > 1.0);
+        let mut rig = rig_of(&ModularConfig::default(), seed);
+        rig.run(10.0);
+        // It comes from the right, timed to meet the ego vehicle.
+        let (meeting_m, speed_mps, arrival_s) = (rig.station_m() + 60.0, 10.0, 60.0 / rig.speed_mps());
+        let from = Pose::new(meeting_m, -1.75 - speed_mps * arrival_s, FRAC_PI_2);
+        rig.sensed.objects.push(object(1, Body::Sedan, from, speed_mps));
+        rig.run(12.0);
+        assert!(rig.gap_m_min > 1.0, "{}", rig.gap_m_min);
     }
 }
 
 /// A car suddenly stands `ahead_m` before the bumper of a vehicle at cruising speed. Returns the gap that is
 /// left, m, and the speed at contact if there is one, m/s.
 fn sudden_wall(config: &ModularConfig, ahead_m: f64) -> (f64, f64) {
-    let scene = straight();
-    let mut rig = rig_of(&scene, config, 1);
+    let mut rig = rig_of(config, 1);
     rig.run(12.0);
-    rig.gap_m_min = f64::INFINITY;
-    let x_m = rig.station_m() + 3.705 + ahead_m + 2.4;
-    rig.sensed.objects.push(object(1, Body::Sedan, Pose::new(x_m, -1.75, 0.0), 0.0));
+    put_wall(&mut rig, ahead_m);
     for _ in 0..500 {
         rig.tick();
         rig.measure();
         if rig.gap_m_min <= 0.0 {
-            return (0.0, rig.sensed.ego.speed_mps);
+            return (0.0, rig.speed_mps());
         }
     }
     (rig.gap_m_min, 0.0)
@@ -255,30 +210,14 @@ fn gentle_fallback_brakes_at_four_where_no_plan_keeps_clear() {
     assert!(faster_mps.iter().all(|mps| *mps > -0.1), "{faster_mps:?}");
 }
 
-#[test]
-fn weak_brakes_hit_what_idealised_control_stops_for() {
-    let faulty = config(|config| {
-        config.weaknesses.bounded_jerk = false;
-        config.control.actuators.brake_mps2_max = 2.0;
-    });
-    assert!(sudden_wall(&faulty, 26.0).1 > 3.0);
-    assert_eq!(sudden_wall(&faulty.idealised(Module::Control), 26.0).1, 0.0);
-}
-
 /// Least gap, m, to a car that stands in the lane behind another, at the lane's edge, that is passed.
 fn gap_behind_a_parked_car(config: &ModularConfig) -> f64 {
-    let scene = straight();
-    let mut rig = rig_of(&scene, config, 1);
+    let mut rig = rig_of(config, 1);
     rig.run(8.0);
     let parked_m = rig.station_m() + 60.0;
     rig.sensed.objects.push(object(1, Body::Sedan, Pose::new(parked_m, -3.65, 0.0), 0.0));
     rig.sensed.objects.push(object(2, Body::Sedan, Pose::new(parked_m + 28.0, -1.75, 0.0), 0.0));
-    let mut nudged = false;
-    for _ in 0..1000 {
-        rig.tick();
-        nudged |= rig.ads.status().manoeuvre == Manoeuvre::Nudge(1);
-    }
-    assert!(nudged);
+    assert!(rig.run_any(20.0, |rig| rig.ads.status().manoeuvre == Manoeuvre::Nudge(1)));
     rig.measure();
     rig.sensed.objects[1].distance_m
 }
@@ -293,26 +232,24 @@ fn closest_static_only_sees_only_the_closest_of_what_stands() {
 
 #[test]
 fn it_passes_a_parked_car_within_its_lane() {
-    let scene = straight();
-    let mut rig = rig_of(&scene, &ModularConfig::default(), 2);
+    let mut rig = rig_of(&ModularConfig::default(), 2);
     rig.sensed.objects.push(object(1, Body::Sedan, Pose::new(200.0, -3.65, 0.0), 0.0));
     let mut slowest_mps = f64::INFINITY;
     while rig.station_m() < 260.0 {
         rig.tick();
         if rig.station_m() > 120.0 {
-            slowest_mps = slowest_mps.min(rig.sensed.ego.speed_mps);
+            slowest_mps = slowest_mps.min(rig.speed_mps());
         }
     }
     assert!(slowest_mps > 7.0 && rig.gap_m_min > 0.05, "{slowest_mps} m/s, {} m", rig.gap_m_min);
-    assert!((rig.sensed.ego.rear_axle.position.y + 1.75).abs() < 0.2, "it is back in the middle");
+    assert!((rig.place().y + 1.75).abs() < 0.2, "it is back in the middle");
 }
 
 #[test]
 fn creeps_to_standing_pedestrian_creeps_into_a_pedestrian_who_stands() {
     let mended = config(|config| config.weaknesses.creeps_to_standing_pedestrian = false);
     let gap_m = |config: &ModularConfig| {
-        let scene = straight();
-        let mut rig = rig_of(&scene, config, 1);
+        let mut rig = rig_of(config, 1);
         rig.sensed.objects.push(object(1, Body::Pedestrian, Pose::new(80.0, -1.75, 0.0), 0.0));
         rig.run(30.0);
         rig.gap_m_min
@@ -325,18 +262,12 @@ fn creeps_to_standing_pedestrian_creeps_into_a_pedestrian_who_stands() {
 fn late_red_passed_passes_a_light_that_turns_red_late() {
     let mended = config(|config| config.weaknesses.late_red_passed = false);
     let slowest_mps = |config: &ModularConfig| {
-        let scene = straight();
-        let mut rig = rig_of(&scene, config, 1);
-        while rig.station_m() + 3.705 < 84.0 {
+        let mut rig = rig_of(config, 1);
+        while front_m(&rig) < 84.0 {
             rig.tick();
         }
         rig.sensed.signals[0] = SignalColour::Red;
-        let mut slowest_mps = f64::INFINITY;
-        for _ in 0..150 {
-            rig.tick();
-            slowest_mps = rig.sensed.ego.speed_mps.min(slowest_mps);
-        }
-        slowest_mps
+        rig.run_least(3.0, Rig::speed_mps)
     };
     assert!(slowest_mps(&ModularConfig::default()) > 9.0);
     assert!(slowest_mps(&mended) < 5.0, "{}", slowest_mps(&mended));
@@ -344,20 +275,18 @@ fn late_red_passed_passes_a_light_that_turns_red_late() {
 
 /// A car crosses slowly, the ego vehicle stands and yields; then the car accelerates. Least gap, m.
 fn gap_to_one_that_accelerates(config: &ModularConfig, seed: u64) -> f64 {
-    let scene = straight();
-    let mut rig = rig_of(&scene, config, seed);
+    let mut rig = rig_of(config, seed);
     rig.run(10.0);
-    let meeting_m = rig.station_m() + 45.0;
-    let from = Pose::new(meeting_m, -13.75, core::f64::consts::FRAC_PI_2);
+    let from = Pose::new(rig.station_m() + 45.0, -13.75, FRAC_PI_2);
     rig.sensed.objects.push(object(1, Body::Sedan, from, 1.2));
     for _ in 0..1000 {
         rig.tick();
         let car = &mut rig.sensed.objects[0];
         if car.pose.position.y > -7.0 {
-            car.velocity_mps.y = (car.velocity_mps.y + 3.0 * avastra_world::sim::DT_S).min(10.0);
+            car.velocity_mps.y = (car.velocity_mps.y + 3.0 * DT_S).min(10.0);
         }
     }
-    assert!(rig.sensed.ego.speed_mps > 8.0, "it goes on");
+    assert!(rig.speed_mps() > 8.0, "it goes on");
     rig.gap_m_min
 }
 
@@ -372,70 +301,18 @@ fn it_stays_where_it_yields_when_the_other_accelerates() {
     }
 }
 
-/// The vehicle on the two-lane road, whose route changes from y = -5.25 m to y = -1.75 m.
-fn changing(open_m: f64) -> Rig {
-    let scene = two_lanes(open_m);
-    let ads = Box::new(Modular::new(&scene, &ModularConfig::default(), 1));
-    Rig::new(&scene, ads, 8.0)
-}
-
-#[test]
-fn it_changes_lanes_where_the_gap_is_safe() {
-    let mut free = changing(200.0);
-    let mut changed = false;
-    for _ in 0..1500 {
-        free.tick();
-        changed |= free.ads.status().manoeuvre == Manoeuvre::LaneChange;
-    }
-    let y_m = free.sensed.ego.rear_axle.position.y;
-    assert!(changed && (y_m + 1.75).abs() < 0.3, "{y_m}");
-
-    // A faster car comes from behind: first it passes, then the lane change begins.
-    let mut passed = changing(300.0);
-    passed.sensed.objects.push(object(1, Body::Sedan, Pose::new(-15.0, -1.75, 0.0), 13.0));
-    passed.run(1.0);
-    assert!((passed.sensed.ego.rear_axle.position.y + 5.25).abs() < 0.3);
-    passed.run(20.0);
-    assert!((passed.sensed.ego.rear_axle.position.y + 1.75).abs() < 0.3);
-    assert!(passed.gap_m_min > 1.0, "{}", passed.gap_m_min);
-}
-
 #[test]
 fn it_breaks_off_a_lane_change_that_is_no_longer_safe() {
-    let mut rig = changing(300.0);
-    while rig.sensed.ego.rear_axle.position.y < -5.2 {
+    let mut rig = Rig::driven_by("modular", &two_lanes(300.0), 1, 8.0);
+    while rig.place().y < -5.2 {
         rig.tick();
     }
     assert_eq!(rig.ads.status().manoeuvre, Manoeuvre::LaneChange);
     // A faster car that was not seen before is beside.
-    let x_m = rig.sensed.ego.rear_axle.position.x;
-    rig.sensed.objects.push(object(1, Body::Sedan, Pose::new(x_m - 6.0, -1.75, 0.0), 14.0));
-    let mut farthest_m = f64::NEG_INFINITY;
-    for _ in 0..150 {
-        rig.tick();
-        farthest_m = rig.sensed.ego.rear_axle.position.y.max(farthest_m);
-    }
+    let beside = Pose::new(rig.place().x - 6.0, TARGET_Y_M, 0.0);
+    rig.sensed.objects.push(object(1, Body::Sedan, beside, 14.0));
+    let farthest_m = -rig.run_least(3.0, |rig| -rig.place().y);
     assert!(farthest_m < -3.5 && rig.gap_m_min > 0.3, "{farthest_m} {}", rig.gap_m_min);
     rig.run(20.0);
-    assert!((rig.sensed.ego.rear_axle.position.y + 1.75).abs() < 0.3, "it changes once the car has passed");
-}
-
-#[test]
-fn it_waits_for_a_gap_where_a_change_is_just_possible() {
-    let mut rig = changing(100.0);
-    let queue = |i: u32| object(i + 1, Body::Sedan, Pose::new(f64::from(i) * 8.0, -1.75, 0.0), 0.0);
-    rig.sensed.objects = (0..14).map(queue).collect();
-    rig.run(30.0);
-    let place = rig.sensed.ego.rear_axle.position;
-    let wait_m = rig.scene.route.changes[0].latest_m - RouteLaneChange::LENGTH_M_MIN;
-    assert!((place.y + 5.25).abs() < 0.3 && (wait_m - 6.0..wait_m + 0.5).contains(&place.x), "{place}");
-    let status = rig.ads.status();
-    assert_eq!((status.manoeuvre, status.reason), (Manoeuvre::AwaitGap, Reason::LaneChange));
-    // The queue moves off; behind it there is room.
-    for object in &mut rig.sensed.objects {
-        object.velocity_mps = Vec2::new(9.0, 0.0);
-    }
-    rig.run(40.0);
-    assert!((rig.sensed.ego.rear_axle.position.y + 1.75).abs() < 0.3);
-    assert!(rig.gap_m_min > 0.8, "{}", rig.gap_m_min);
+    assert!((rig.place().y - TARGET_Y_M).abs() < 0.3, "it changes once the car has passed");
 }

@@ -10,21 +10,16 @@ use super::config::LatencyConfig;
 
 #[derive(Debug, Clone)]
 pub struct Watchdog {
-    config: LatencyConfig,
+    pub config: LatencyConfig,
     /// Age of the last pose, of the last look and of the last plan, s.
     localization_s: f64,
-    perception_s: f64,
-    trajectory_s: f64,
+    pub perception_s: f64,
+    pub trajectory_s: f64,
 }
 
 impl Watchdog {
     pub fn new(config: &LatencyConfig) -> Watchdog {
         Watchdog { config: *config, localization_s: 0.0, perception_s: 0.0, trajectory_s: 0.0 }
-    }
-
-    /// How many frames later perception is with so many objects within reach.
-    pub fn load_frames(&self, objects: usize) -> usize {
-        self.config.load_frames(objects)
     }
 
     /// Whether localisation gives a pose at a moment of the drive; to be asked once a tick.
@@ -47,16 +42,6 @@ impl Watchdog {
     pub fn plans(&mut self, time_s: f64) -> Option<f64> {
         let works = !self.hangs(self.config.planning_hang_s, time_s);
         works.then(|| core::mem::take(&mut self.trajectory_s))
-    }
-
-    /// Age of the last look, s.
-    pub fn perception_s(&self) -> f64 {
-        self.perception_s
-    }
-
-    /// Age of the plan, s.
-    pub fn trajectory_s(&self) -> f64 {
-        self.trajectory_s
     }
 
     /// Whether something is too old to drive by.

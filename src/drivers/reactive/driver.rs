@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use crate::driver::Ads;
-use crate::kit::{Guide, Helm, RouteChanges, Sight, Signs, SpeedRules, Stop, held_mps2, lights};
-use crate::status::{Manoeuvre, Reason, Status};
+use crate::kit::{Helm, RouteChanges, Sight, Signs, SpeedRules, Stop, held_mps2, lights};
+use crate::status::{Manoeuvre, PerceivedObject, Reason, Status};
 use avastra_world::sim::{Control, DT_S, FRAME_S, Scene, Sensed, VehicleParameters};
 
 use super::assistance::{Pedals, Target, is_free, line_mps2};
@@ -21,7 +21,6 @@ const START_MPS2: f64 = 0.1;
 #[derive(Debug, Clone)]
 pub struct Reactive {
     scene: Arc<Scene>,
-    guide: Arc<Guide>,
     changes: RouteChanges,
     /// For how long the lane of the next change has been free, s.
     free_s: f64,
@@ -37,11 +36,9 @@ pub struct Reactive {
 
 impl Reactive {
     pub fn new(scene: &Arc<Scene>) -> Reactive {
-        let changes = RouteChanges::new(scene);
         Reactive {
             scene: Arc::clone(scene),
-            guide: Arc::new(changes.guide(&SpeedRules::TOWN)),
-            changes,
+            changes: RouteChanges::new(scene, SpeedRules::TOWN),
             free_s: 0.0,
             sight: Sight::new(NIGHT_FACTOR),
             signs: Signs::default(),
@@ -57,14 +54,14 @@ impl Reactive {
         self.sight.look(sensed);
         self.change_lanes(station_m, sensed.ego.speed_mps);
         let front_m = VehicleParameters::MKZ.front_m(station_m);
-        let seen = |object| Target::seen(&self.guide, object, &sensed.ego, front_m);
+        let seen = |object| Target::seen(self.changes.guide(), object, &sensed.ego, front_m);
         self.targets.clear();
         self.targets.extend(self.sight.known().iter().filter_map(seen));
         let sign = self.signs.next_stop(&self.scene, front_m, sensed.ego.speed_mps);
         let wait = self.changes.wait_m().map(|station_m| Stop { station_m, reason: Reason::LaneChange });
         let stops = lights(&self.scene, sensed, front_m).chain(sign).chain(wait);
         self.stop = stops.min_by(|a, b| a.station_m.total_cmp(&b.station_m));
-        self.sight.report(&mut self.status.perceived);
+        self.status.perceive(self.sight.known().iter().map(PerceivedObject::as_it_is));
         self.status.localized = Some(sensed.ego.rear_axle);
     }
 
@@ -75,11 +72,11 @@ impl Reactive {
             None => Manoeuvre::LaneFollow,
             Some(lateral_m) => {
                 let front_m = VehicleParameters::MKZ.front_m(station_m);
-                let is_free = is_free(&self.guide, self.sight.known(), lateral_m, front_m, speed_mps);
+                let is_free =
+                    is_free(self.changes.guide(), self.sight.known(), lateral_m, front_m, speed_mps);
                 self.free_s = if is_free { self.free_s + FRAME_S } else { 0.0 };
                 if self.free_s > FREE_S {
                     self.changes.begin(station_m);
-                    self.guide = Arc::new(self.changes.guide(&SpeedRules::TOWN));
                 }
                 Manoeuvre::AwaitGap
             }
@@ -88,7 +85,7 @@ impl Reactive {
 
     /// The acceleration for this tick, m/s².
     fn acceleration_mps2(&mut self, speed_mps: f64, station_m: f64) -> f64 {
-        let allowed_mps = self.guide.allowed_mps(station_m, speed_mps);
+        let allowed_mps = self.changes.guide().allowed_mps(station_m, speed_mps);
         let (mut acceleration_mps2, mut reason) = self.pedals.step(speed_mps, allowed_mps, &self.targets);
         let front_m = VehicleParameters::MKZ.front_m(station_m);
         let line_mps2 =
@@ -105,7 +102,7 @@ impl Reactive {
 impl Ads for Reactive {
     fn drive(&mut self, sensed: &Sensed) -> Control {
         let ego = &sensed.ego;
-        let station_m = self.helm.locate(&self.guide, ego.rear_axle.position).station_m;
+        let station_m = self.helm.locate(self.changes.guide(), ego.rear_axle.position).station_m;
         if self.helm.looks() {
             self.look(sensed, station_m);
         }
@@ -114,7 +111,7 @@ impl Ads for Reactive {
         for target in &mut self.targets {
             target.gap_m += (target.along_mps - ego.speed_mps) * DT_S;
         }
-        let steer_rad = stanley::steer_rad(&self.guide, station_m, ego);
+        let steer_rad = stanley::steer_rad(self.changes.guide(), station_m, ego);
         self.helm.command(Control::towards(acceleration_mps2, steer_rad), ego, &mut self.status)
     }
 

@@ -8,7 +8,5 @@
 mod assistance;
 mod driver;
 mod stanley;
-#[cfg(test)]
-mod tests;
 
 pub use driver::Reactive;

@@ -20,8 +20,7 @@ use avastra_world::sim::{
 
 use super::encounter::Encounter;
 use super::idm::Idm;
-use super::model::Model;
-use super::reflex::Reflex;
+use super::reflex::{Braking, Reflex};
 
 /// Comfortable deceleration for other road users, m/s² (what Treiber's page of the
 /// IDM uses).
@@ -37,6 +36,15 @@ pub fn in_sight(object: &SensedObject, conditions: &Conditions) -> bool {
     object.visible_fraction >= SEEN_PART_MIN && object.distance_m <= conditions.visibility_m
 }
 
+/// A published model of how a careful driver brakes.
+pub trait Model: Clone + Send + 'static {
+    /// Times and slopes of its reaction.
+    fn braking(&self) -> Braking;
+
+    /// The deceleration that it wants because of a road user, m/s²; 0 is no risk.
+    fn demand_mps2(&self, encounter: &Encounter) -> f64;
+}
+
 /// A driver of the model `M`.
 #[derive(Debug, Clone)]
 pub struct Reference<M> {
@@ -49,21 +57,14 @@ pub struct Reference<M> {
     looks: VecDeque<Vec<SensedObject>>,
     /// What the route's driver is shown; kept for its buffers.
     shown: Option<Sensed>,
-    watched: BTreeMap<u32, Watched>,
+    /// The encounters of the last look by object.
+    watched: BTreeMap<u32, Encounter>,
     helm: Helm,
     /// What the model gave in the last tick, m/s².
     braking_mps2: f64,
     /// Whether it looks aside before a lane change. What it sees a reaction time late is enough to drive by, but not where
     /// it has just taken over, has seen nothing yet, and would change lanes blindly.
     looks_aside: bool,
-}
-
-/// What is remembered of a road user from look to look.
-#[derive(Debug, Clone, Copy)]
-struct Watched {
-    other_mps: f64,
-    side_gap_m: f64,
-    aside_m: f64,
 }
 
 impl<M: Model> Reference<M> {
@@ -84,10 +85,8 @@ impl<M: Model> Reference<M> {
 
     /// Looks at every object in sight: sets what the model demands and what the route's driver learns.
     fn look(&mut self, sensed: &Sensed, station_m: f64) {
-        let mut seen = match self.looks.len() > self.delay_frames() {
-            true => self.looks.pop_front().unwrap_or_default(),
-            false => Vec::new(),
-        };
+        let is_full = self.looks.len() > self.delay_frames();
+        let mut seen = self.looks.pop_front_if(|_| is_full).unwrap_or_default();
         seen.clear();
         seen.extend(sensed.objects.iter().filter(|object| in_sight(object, &sensed.conditions)));
         let front_m = VehicleParameters::MKZ.front_m(station_m);
@@ -98,7 +97,14 @@ impl<M: Model> Reference<M> {
             let ego = &sensed.ego;
             let found = Encounter::seen(guide, object, front_m, ego.speed_mps, ego.acceleration_mps2);
             let Some(mut encounter) = found else { continue };
-            watched.insert(object.id, remember(self.watched.get(&object.id), &mut encounter));
+            if let Some(before) = self.watched.get(&object.id) {
+                encounter.other_mps2 = (encounter.other_mps - before.other_mps) / FRAME_S;
+                if encounter.towards_mps > TOWARDS_MPS_MIN {
+                    let nearer_m = (before.side_gap_m - encounter.side_gap_m).max(0.0);
+                    encounter.aside_m = before.aside_m + nearer_m;
+                }
+            }
+            watched.insert(object.id, encounter);
             let demand_mps2 = self.model.demand_mps2(&encounter);
             if demand_mps2 > self.demand.map_or(0.0, |(most_mps2, _)| most_mps2) {
                 self.demand = Some((demand_mps2, object.id));
@@ -133,18 +139,6 @@ impl<M: Model> Reference<M> {
     }
 }
 
-/// Completes an encounter by what was seen of it before; returns what to remember of it now.
-fn remember(before: Option<&Watched>, encounter: &mut Encounter) -> Watched {
-    if let Some(before) = before {
-        encounter.other_mps2 = (encounter.other_mps - before.other_mps) / FRAME_S;
-        if encounter.towards_mps > TOWARDS_MPS_MIN {
-            encounter.aside_m = before.aside_m + (before.side_gap_m - encounter.side_gap_m).max(0.0);
-        }
-    }
-    let Encounter { other_mps, side_gap_m, aside_m, .. } = *encounter;
-    Watched { other_mps, side_gap_m, aside_m }
-}
-
 /// A driving system that can say how hard it would brake by its model alone.
 pub trait Careful: Ads {
     /// Deceleration that the model gave in the last tick, m/s²; 0 before it reacts.
@@ -176,8 +170,10 @@ impl<M: Model> Ads for Reference<M> {
         let now_mps2 = self.reflex.step(demand_mps2, DT_S);
         self.braking_mps2 = now_mps2;
         // The models mean what the car does, which follows the pedal with a lag.
+        let mut later = self.reflex;
+        let later_mps2 = later.step(demand_mps2, DT_S);
         let lag_s = VehicleParameters::MKZ.pedal_lag_s;
-        let braking_mps2 = now_mps2 + (self.reflex.after(demand_mps2, DT_S) - now_mps2) * (lag_s / DT_S);
+        let braking_mps2 = now_mps2 + (later_mps2 - now_mps2) * (lag_s / DT_S);
         let control = self.route.drive_with(&shown, |model_mps2, reason| {
             let for_others = matches!(reason, Reason::Stop(_) | Reason::Follow(_) | Reason::Yield(_));
             let route_mps2 = if for_others { model_mps2.max(-COMFORTABLE_MPS2) } else { model_mps2 };
@@ -203,19 +199,13 @@ impl<M: Model> Ads for Reference<M> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::testing::{Rig, object, two_lanes};
-    use crate::{CarefulHuman, by_name};
+    use crate::testing::{Rig, SOURCE_Y_M, TARGET_Y_M, object, two_lanes};
     use avastra_base::geometry::Pose;
     use avastra_lang::model::vocabulary::Body;
 
-    const SOURCE_Y_M: f64 = -5.25;
-    const TARGET_Y_M: f64 = -1.75;
-
     /// How far a careful human has moved to its side after 2 s, while a faster vehicle comes from behind, m.
     fn moved_aside_m(takes_over: bool) -> f64 {
-        let scene = two_lanes(300.0);
-        let mut rig = Rig::new(&scene, Box::new(Reference::new(&scene, CarefulHuman)), 8.0);
+        let mut rig = Rig::driven_by("cc", &two_lanes(300.0), 0, 8.0);
         rig.sensed.objects = vec![object(1, Body::Sedan, Pose::new(-15.0, TARGET_Y_M, 0.0), 13.0)];
         if takes_over {
             // Its first thought is to change lanes, because it has seen nothing yet.
@@ -223,7 +213,7 @@ mod tests {
             rig.ads.take_over(&rig.sensed);
         }
         rig.run(2.0);
-        rig.sensed.ego.rear_axle.position.y - SOURCE_Y_M
+        rig.place().y - SOURCE_Y_M
     }
 
     #[test]
@@ -235,10 +225,8 @@ mod tests {
 
     #[test]
     fn one_that_takes_over_knows_the_lane_that_it_is_in() {
-        let scene = two_lanes(300.0);
         for name in ["cc", "fsm", "rss", "r157"] {
-            let entry = by_name(name).expect("it is registered");
-            let mut rig = Rig::new(&scene, (entry.build)(&scene, 0), 0.8);
+            let mut rig = Rig::driven_by(name, &two_lanes(300.0), 0, 0.8);
             // Another driver has changed lanes, and creeps towards a person that stands in the target lane.
             rig.sensed.ego.rear_axle = Pose::new(150.0, TARGET_Y_M, 0.0);
             rig.sensed.objects = vec![object(1, Body::Pedestrian, Pose::new(160.0, TARGET_Y_M, 0.0), 0.0)];

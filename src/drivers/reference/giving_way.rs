@@ -52,11 +52,10 @@ fn gap_m(map: &RoadMap, place: &LanePlace, at: &Conflict, object: &SensedObject)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{CLEAR_DAY, object};
+    use crate::testing::{object, sensed};
     use avastra_base::geometry::Pose;
     use avastra_lang::model::vocabulary::Body;
-    use avastra_world::sim::testing;
-    use avastra_world::sim::{EgoMotion, SignalColour};
+    use avastra_world::sim::{SignalColour, testing};
     use core::f64::consts::FRAC_PI_2;
 
     #[test]
@@ -66,13 +65,8 @@ mod tests {
             // To the north through x = 300, where the way of the ego vehicle is at y = -1.75.
             let pose = Pose::new(300.0, -1.75 - to_middle_m, FRAC_PI_2);
             let other = object(1, Body::Sedan, pose, speed_mps);
-            let sensed = Sensed {
-                time_s: 0.0,
-                ego: EgoMotion::straight(Pose::new(260.0, -1.75, 0.0), 10.0),
-                objects: vec![other],
-                signals: vec![SignalColour::Green; scene.map.signals.len()],
-                conditions: CLEAR_DAY,
-            };
+            let signals = vec![SignalColour::Green; scene.map.signals.len()];
+            let sensed = Sensed { signals, ..sensed(Pose::new(260.0, -1.75, 0.0), 10.0, vec![other]) };
             goes_before(&scene, &sensed, &other, 164.0)
         };
         let (none, yields, priority) = ("274", "205", "306");

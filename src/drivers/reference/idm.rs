@@ -44,7 +44,6 @@ const SAFE_MPS2: f64 = 2.0;
 #[derive(Debug, Clone)]
 pub struct Idm {
     scene: Arc<Scene>,
-    guide: Arc<Guide>,
     changes: RouteChanges,
     /// A glance aside, newer than what it is shown, left no gap: no lane change begins.
     is_beset: bool,
@@ -100,6 +99,11 @@ impl Ahead {
         Ahead { near_m, age_s: 0.0, speed_mps: 0.0, reason }
     }
 
+    /// A line to stop at, as something that stands a little behind it.
+    fn at_line(line_m: f64, reason: Reason) -> Ahead {
+        Ahead::standing(line_m - LINE_GAP_M + MODEL.gap_m_min, reason)
+    }
+
     fn gap_m(&self, front_m: f64) -> f64 {
         self.near_m + self.speed_mps * self.age_s - front_m
     }
@@ -107,11 +111,9 @@ impl Ahead {
 
 impl Idm {
     pub fn new(scene: &Arc<Scene>) -> Idm {
-        let changes = RouteChanges::new(scene);
         Idm {
             scene: Arc::clone(scene),
-            guide: Arc::new(changes.guide(&SpeedRules::TOWN)),
-            changes,
+            changes: RouteChanges::new(scene, SpeedRules::TOWN),
             is_beset: false,
             steering: Steering::usual(),
             helm: Helm::default(),
@@ -124,7 +126,7 @@ impl Idm {
     fn acceleration_mps2(&self, sensed: &Sensed, station_m: f64) -> (f64, Reason) {
         let speed_mps = sensed.ego.speed_mps;
         let front_m = VehicleParameters::MKZ.front_m(station_m);
-        let allowed_mps = self.guide.allowed_mps(station_m, speed_mps);
+        let allowed_mps = self.guide().allowed_mps(station_m, speed_mps);
         let mut wanted = (model_mps2(speed_mps, allowed_mps, None), Reason::Cruise);
         for ahead in &self.ahead {
             let gap = Some((ahead.gap_m(front_m), ahead.speed_mps));
@@ -149,13 +151,17 @@ impl Idm {
         let mut ahead = core::mem::take(&mut self.ahead);
         ahead.clear();
         ahead.extend(self.lights(sensed, front_m));
-        ahead.extend(self.sign(sensed, front_m));
-        let objects = sensed.objects.iter().filter(|object| object.distance_m < RANGE_M);
+        let sign = self.signs.next_stop(&self.scene, front_m, sensed.ego.speed_mps);
+        ahead.extend(sign.map(|stop| Ahead::at_line(stop.station_m, stop.reason)));
+        let objects = || sensed.objects.iter().filter(|object| object.distance_m < RANGE_M);
         let reaches = Reach::of_moments(sensed.ego.speed_mps, front_m);
-        ahead.extend(objects.filter_map(|object| self.ahead(sensed, object, front_m, &reaches)));
-        ahead.extend(self.last_chance());
+        ahead.extend(objects().filter_map(|object| self.ahead(sensed, object, front_m, &reaches)));
+        // Where it must wait for a gap.
+        let wait_m = self.changes.wait_m();
+        ahead.extend(wait_m.map(|wait_m| Ahead::standing(wait_m + MODEL.gap_m_min, Reason::LaneChange)));
         self.ahead = ahead;
-        self.report(sensed);
+        // It drives by the truth.
+        self.status.perceive(objects().map(PerceivedObject::as_it_is));
     }
 
     /// Begins the next lane change if it is time and there is a gap.
@@ -165,7 +171,6 @@ impl Idm {
         let has_gap = || self.has_gap(&sensed.objects, sensed.ego.speed_mps, station_m, change.lateral_m);
         if is_over && station_m >= change.begin_m && !self.is_beset && has_gap() {
             self.changes.begin(station_m);
-            self.guide = Arc::new(self.changes.guide(&SpeedRules::TOWN));
         }
     }
 
@@ -175,7 +180,7 @@ impl Idm {
         let front_m = VehicleParameters::MKZ.front_m(station_m);
         let rear_m = front_m - VehicleParameters::MKZ.length_m;
         objects.iter().all(|object| {
-            let Some((span, along_mps)) = in_lane(&self.guide, object, lateral_m, front_m) else {
+            let Some((span, along_mps)) = in_lane(self.guide(), object, lateral_m, front_m) else {
                 return true;
             };
             let along_mps = along_mps.max(0.0);
@@ -190,12 +195,7 @@ impl Idm {
         })
     }
 
-    /// Where it must wait for a gap, as something that stands there.
-    fn last_chance(&self) -> Option<Ahead> {
-        Some(Ahead::standing(self.changes.wait_m()? + MODEL.gap_m_min, Reason::LaneChange))
-    }
-
-    /// Lights that it stops for, as things that stand a little behind their line.
+    /// Lights that it stops for.
     fn lights<'a>(&'a self, sensed: &'a Sensed, front_m: f64) -> impl Iterator<Item = Ahead> + 'a {
         let speed_mps = sensed.ego.speed_mps;
         self.scene.route.stop_lines.iter().filter_map(move |line| {
@@ -203,15 +203,8 @@ impl Idm {
             let stops = sensed.signals[line.signal] != SignalColour::Green
                 && (-LINE_GAP_M..RANGE_M).contains(&distance_m)
                 && needed_mps2(speed_mps, distance_m.max(0.1)) <= LIGHT_MPS2;
-            let near_m = line.station_m - LINE_GAP_M + MODEL.gap_m_min;
-            stops.then_some(Ahead::standing(near_m, Reason::RedLight))
+            stops.then_some(Ahead::at_line(line.station_m, Reason::RedLight))
         })
-    }
-
-    /// The stop sign that it stops for, as something that stands a little behind its line.
-    fn sign(&mut self, sensed: &Sensed, front_m: f64) -> Option<Ahead> {
-        let stop = self.signs.next_stop(&self.scene, front_m, sensed.ego.speed_mps)?;
-        Some(Ahead::standing(stop.station_m - LINE_GAP_M + MODEL.gap_m_min, stop.reason))
     }
 
     /// What a road user means for the ego vehicle: a leader, something in the way, or something that crosses it.
@@ -227,7 +220,7 @@ impl Idm {
         let taken = |beside: &Beside| beside.taken(forward, object.length_m, object.width_m, HALF_WAY_M);
         let reach_m = HALF_WAY_M + (object.length_m + object.width_m) / 2.0;
         let (beside, mut tracer) =
-            self.guide.trace(object.pose.position, rear_m - 10.0, front_m + RANGE_M, reach_m);
+            self.guide().trace(object.pose.position, rear_m - 10.0, front_m + RANGE_M, reach_m);
         if let Some(span) = taken(&beside) {
             // It is on the way now; once its middle is behind the front, the ego vehicle is past it.
             return (span.middle_m() > front_m - BESIDE_M).then(|| Ahead {
@@ -240,7 +233,7 @@ impl Idm {
         if object.velocity_mps == Vec2::zeros() {
             return None;
         }
-        let front = self.guide.pose_at(front_m).position;
+        let front = self.guide().pose_at(front_m).position;
         for &Reach { time_s, from_m: ego_from_m, to_m: ego_to_m } in reaches {
             let position = object.pose.position + object.velocity_mps * time_s;
             let within_m = GUIDE_STRETCH_MAX * (ego_to_m - front_m) + reach_m;
@@ -262,14 +255,6 @@ impl Idm {
         None
     }
 
-    /// Writes the truth it drives by into the status; buffers are reused.
-    fn report(&mut self, sensed: &Sensed) {
-        let perceived = &mut self.status.perceived;
-        perceived.clear();
-        let in_sight = sensed.objects.iter().filter(|object| object.distance_m < RANGE_M);
-        perceived.extend(in_sight.map(PerceivedObject::as_it_is));
-    }
-
     /// Drives the route, but with the acceleration (m/s²) and reason that `decide` makes of the model's.
     pub(super) fn drive_with(
         &mut self,
@@ -280,12 +265,12 @@ impl Idm {
         if self.helm.is_first() {
             self.find_place(pose);
         }
-        let station_m = self.helm.locate(&self.guide, pose.position).station_m;
+        let station_m = self.helm.locate(self.changes.guide(), pose.position).station_m;
         self.look(sensed, station_m);
         let (model_mps2, model_reason) = self.acceleration_mps2(sensed, station_m);
         let (wanted_mps2, reason) = decide(model_mps2, model_reason);
         let acceleration_mps2 = held_mps2(sensed.ego.speed_mps, wanted_mps2, 0.0);
-        let steer_rad = self.steering.steer_rad(&self.guide, pose, station_m, &sensed.ego);
+        let steer_rad = self.steering.steer_rad(self.guide(), pose, station_m, &sensed.ego);
         self.status.localized = Some(*pose);
         self.status.reason = reason;
         self.helm.command(Control::towards(acceleration_mps2, steer_rad), &sensed.ego, &mut self.status)
@@ -302,14 +287,13 @@ impl Idm {
     /// source lane: it would steer back to it, and what stands ahead of it would stand beside its way.
     pub(super) fn find_place(&mut self, rear_axle: &Pose) {
         while let Some(change) = self.changes.next() {
-            let beside = self.guide.locate(rear_axle.position, None);
+            let beside = self.guide().locate(rear_axle.position, None);
             let is_aside = beside.offset_m * change.lateral_m.signum() > WANDER_M;
             if beside.station_m < change.begin_m || !is_aside {
                 return;
             }
             let begun_m = change.begun_m(beside.station_m, beside.offset_m);
             self.changes.begin(begun_m);
-            self.guide = Arc::new(self.changes.guide(&SpeedRules::TOWN));
         }
     }
 
@@ -318,15 +302,14 @@ impl Idm {
         let Some((last, ..)) = self.changes.begun().last() else { return };
         let (mut changes, mut helm) = (self.changes.clone(), self.helm);
         changes.take_back(last);
-        let guide = changes.guide(&SpeedRules::TOWN);
-        if helm.locate(&guide, rear_axle.position).offset_m.abs() <= WANDER_M {
-            (self.changes, self.guide) = (changes, Arc::new(guide));
+        if helm.locate(changes.guide(), rear_axle.position).offset_m.abs() <= WANDER_M {
+            self.changes = changes;
         }
     }
 
     /// The route that it drives on.
     pub(super) fn guide(&self) -> &Guide {
-        &self.guide
+        self.changes.guide()
     }
 }
 
@@ -359,75 +342,22 @@ fn model_mps2(speed_mps: f64, allowed_mps: f64, ahead: Option<(f64, f64)>) -> f6
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Rig, object, two_lanes};
-    use avastra_lang::model::vocabulary::Body;
-    use avastra_road::RouteLaneChange;
-
-    const SOURCE_Y_M: f64 = -5.25;
-    const TARGET_Y_M: f64 = -1.75;
-
-    fn rig(open_m: f64) -> Rig {
-        let scene = two_lanes(open_m);
-        let ads = Box::new(Idm::new(&scene));
-        Rig::new(&scene, ads, 8.0)
-    }
-
-    fn place(rig: &Rig) -> Vec2 {
-        rig.sensed.ego.rear_axle.position
-    }
+    use crate::testing::{Rig, TARGET_Y_M, two_lanes};
 
     #[test]
     fn on_a_free_road_it_changes_as_planned() {
-        let mut rig = rig(200.0);
+        let mut rig = Rig::driven_by("idm", &two_lanes(200.0), 1, 8.0);
         rig.run(30.0);
-        assert!((place(&rig).y - TARGET_Y_M).abs() < 0.1, "{:?}", place(&rig));
+        assert!((rig.place().y - TARGET_Y_M).abs() < 0.1, "{:?}", rig.place());
         assert!(rig.offset_m_max < 0.3, "{} m off the path", rig.offset_m_max);
     }
 
     #[test]
     fn it_goes_on_with_a_change_that_another_driver_has_begun() {
-        let mut rig = rig(300.0);
+        let mut rig = Rig::driven_by("idm", &two_lanes(300.0), 1, 8.0);
         rig.sensed.ego.rear_axle = Pose::new(40.0, -4.0, 0.0);
-        let mut lowest_m = f64::INFINITY;
-        for _ in 0..400 {
-            rig.tick();
-            lowest_m = lowest_m.min(place(&rig).y);
-        }
+        let lowest_m = rig.run_least(8.0, |rig| rig.place().y);
         assert!(lowest_m > -4.05, "back towards the source lane: {lowest_m}");
-        assert!((place(&rig).y - TARGET_Y_M).abs() < 0.1, "{:?}", place(&rig));
-    }
-
-    #[test]
-    fn it_does_not_cut_in_and_waits_where_a_change_is_just_possible() {
-        let mut rig = rig(100.0);
-        // A queue stands beside all that is left of the way.
-        rig.sensed.objects = (0..14)
-            .map(|i| object(i + 1, Body::Sedan, Pose::new(f64::from(i) * 8.0, TARGET_Y_M, 0.0), 0.0))
-            .collect();
-        rig.run(30.0);
-        let waits = place(&rig);
-        assert!((waits.y - SOURCE_Y_M).abs() < 0.1, "{waits:?}");
-        let wait_m = rig.scene.route.changes[0].latest_m - RouteLaneChange::LENGTH_M_MIN;
-        assert!(waits.x <= wait_m + 0.1 && waits.x > wait_m - 4.0, "{waits:?} against {wait_m}");
-        assert_eq!(rig.ads.status().reason, Reason::LaneChange);
-        assert!(rig.gap_m_min > 1.0, "{}", rig.gap_m_min);
-        // The queue moves off; behind it there is room.
-        for object in &mut rig.sensed.objects {
-            object.velocity_mps = Vec2::new(9.0, 0.0);
-        }
-        rig.run(40.0);
-        assert!((place(&rig).y - TARGET_Y_M).abs() < 0.1 && place(&rig).x > 150.0, "{:?}", place(&rig));
-        assert!(rig.gap_m_min > 1.0, "{}", rig.gap_m_min);
-    }
-
-    #[test]
-    fn it_lets_a_faster_vehicle_pass_first() {
-        let mut rig = rig(300.0);
-        rig.sensed.objects = vec![object(1, Body::Sedan, Pose::new(-15.0, TARGET_Y_M, 0.0), 13.0)];
-        rig.run(1.0);
-        assert!((place(&rig).y - SOURCE_Y_M).abs() < 0.05, "{:?}", place(&rig));
-        rig.run(20.0);
-        assert!((place(&rig).y - TARGET_Y_M).abs() < 0.1, "{:?}", place(&rig));
-        assert!(rig.gap_m_min > 1.0, "{}", rig.gap_m_min);
+        assert!((rig.place().y - TARGET_Y_M).abs() < 0.1, "{:?}", rig.place());
     }
 }

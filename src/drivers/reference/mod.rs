@@ -9,7 +9,6 @@ mod encounter;
 mod evasion;
 mod giving_way;
 mod idm;
-mod model;
 mod r157;
 mod reflex;
 mod rss;
@@ -26,7 +25,7 @@ pub use rss::Rss;
 pub fn careful(name: &str, scene: &Arc<Scene>) -> Option<Box<dyn Careful>> {
     match name {
         "cc" => Some(Box::new(Reference::new(scene, CarefulHuman))),
-        "fsm" => Some(Box::new(Reference::new(scene, FuzzySafety::default()))),
+        "fsm" => Some(Box::new(Reference::new(scene, FuzzySafety))),
         "rss" => Some(Box::new(Reference::new(scene, Rss::default()))),
         "r157" => Some(Box::new(Reference::new(scene, MinimalPerformance))),
         _ => None,

@@ -84,18 +84,12 @@ impl Reflex {
         };
         self.deceleration_mps2
     }
-
-    /// The deceleration a little later, if the demand stays, m/s².
-    pub fn after(&self, demand_mps2: f64, ahead_s: f64) -> f64 {
-        let mut later = *self;
-        later.step(demand_mps2, ahead_s)
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reference::model::Model;
+    use crate::reference::driver::Model;
     use crate::reference::r157::CarefulHuman;
     use avastra_base::kinematics::CAREFUL_BRAKING_MPS2;
 

@@ -7,8 +7,8 @@
 
 use avastra_base::kinematics::{CAREFUL_JERK_MPS3, CAREFUL_REACTION_S, braking_m};
 
+use super::driver::Model;
 use super::encounter::Encounter;
-use super::model::Model;
 use super::reflex::Braking;
 
 /// Parameters of the safe distances.

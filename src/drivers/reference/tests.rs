@@ -1,7 +1,7 @@
 //! The published cut-in grid, recomputed from the equations.
 
+use super::driver::Model;
 use super::encounter::Encounter;
-use super::model::Model;
 use super::r157::{CarefulHuman, FuzzySafety, MinimalPerformance};
 use super::reflex::{Braking, Reflex};
 use super::rss::Rss;
@@ -61,9 +61,9 @@ fn crashes(model: &impl Model, braking: Braking, cut_in: CutIn) -> bool {
 /// Which models crash: FSM, RSS, the regulation's minimum, the careful human. The published grid reads the
 /// regulation so that the human notices a cut-in when it is in the way, without evaluation.
 fn grid(cut_in: CutIn) -> [bool; 4] {
-    let (fsm, rss) = (FuzzySafety::default(), Rss::default());
+    let rss = Rss::default();
     [
-        crashes(&fsm, fsm.braking(), cut_in),
+        crashes(&FuzzySafety, FuzzySafety.braking(), cut_in),
         crashes(&rss, rss.braking(), cut_in),
         crashes(&MinimalPerformance, MinimalPerformance.braking(), cut_in),
         crashes(&CarefulHuman, Braking { evaluation_s: 0.0, ..CarefulHuman.braking() }, cut_in),

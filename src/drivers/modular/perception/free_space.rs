@@ -33,22 +33,14 @@ pub fn sees_empty(place: Vec2, sensed: &Sensed, localized: &Pose) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{CLEAR_DAY, object};
+    use crate::testing::{object, sensed};
     use avastra_lang::model::vocabulary::Body;
-    use avastra_world::sim::EgoMotion;
 
     #[test]
     fn a_place_is_empty_if_nothing_stands_on_it_or_before_it() {
         let seen_empty = |bodies: &[(Body, f64)], localized: Pose, place: Vec2| {
             let objects = bodies.iter().map(|(body, x_m)| object(1, *body, Pose::new(*x_m, 0.0, 0.0), 0.0));
-            let ego = EgoMotion::straight(Pose::new(0.0, 0.0, 0.0), 0.0);
-            let sensed = Sensed {
-                time_s: 0.0,
-                ego,
-                objects: objects.collect(),
-                signals: vec![],
-                conditions: CLEAR_DAY,
-            };
+            let sensed = sensed(Pose::new(0.0, 0.0, 0.0), 0.0, objects.collect());
             sees_empty(place, &sensed, &localized)
         };
         let (right, place) = (Pose::new(0.0, 0.0, 0.0), Vec2::new(12.0, 0.0));

@@ -34,14 +34,10 @@ struct Ghost {
     rest_s: f64,
 }
 
-/// No object has the id 0, so nothing else draws from this stream.
-fn draws(seed: u64) -> Rng {
-    rng::stream(seed, Stream::Perception, 0)
-}
-
 impl Ghosts {
     pub fn new(seed: u64) -> Ghosts {
-        Ghosts { rng: draws(seed), begun: 0, alive: Vec::new() }
+        // No object has the id 0, so nothing else draws from this stream.
+        Ghosts { rng: rng::stream(seed, Stream::Perception, 0), begun: 0, alive: Vec::new() }
     }
 
     /// Moves on by a frame; adds a detection of each ghost to `detections`.

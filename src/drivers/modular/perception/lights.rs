@@ -78,9 +78,9 @@ fn hides(object: &SensedObject, eye: Vec2, lamp: Vec2, distance_m: f64) -> bool 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{CLEAR_DAY, corner, object};
+    use crate::testing::{CLEAR_DAY, corner, object, sensed};
     use avastra_lang::model::vocabulary::Body;
-    use avastra_world::sim::{Conditions, EgoMotion};
+    use avastra_world::sim::Conditions;
 
     /// What is known of the corner's first light from `before_m` before its line.
     fn read(
@@ -93,7 +93,6 @@ mod tests {
         let line = scene.route.stop_lines[0];
         let station_m = line.station_m - before_m;
         let rear_axle = scene.route.path.pose_at(station_m);
-        let ego = EgoMotion::straight(rear_axle, 0.0);
         let lamp = scene.map.signals[line.signal].position;
         let objects = truck_m.map(|away_m| {
             let mut pose = rear_axle;
@@ -101,7 +100,8 @@ mod tests {
             object(1, Body::BoxTruck, pose, 0.0)
         });
         let signals = vec![SignalColour::Green; scene.map.signals.len()];
-        let sensed = Sensed { time_s: 0.0, ego, objects: objects.into_iter().collect(), signals, conditions };
+        let around = sensed(rear_axle, 0.0, objects.into_iter().collect());
+        let sensed = Sensed { signals, conditions, ..around };
         reader.look(&sensed, station_m)[0]
     }
 

@@ -11,4 +11,4 @@ pub use detection::Detection;
 pub use free_space::sees_empty;
 pub use lights::LightReader;
 pub use look::Perception;
-pub use ranges::{surely_seen_m, vehicle_surely_seen_m};
+pub use ranges::surely_seen_m;

@@ -70,21 +70,17 @@ impl Ranges {
     }
 }
 
-/// Distance at which a pedestrian in plain view is detected in nearly every frame, m.
-pub fn surely_seen_m(config: &PerceptionConfig, conditions: &Conditions) -> f64 {
+/// Distances at which a pedestrian and a vehicle in plain view are detected in nearly every frame, m.
+pub fn surely_seen_m(config: &PerceptionConfig, conditions: &Conditions) -> (f64, f64) {
     let ranges = Ranges::in_conditions(config, true, conditions);
-    surely_m(config, ranges.lidar_pedestrian_m, ranges.camera_pedestrian_m)
-}
-
-/// The same for a vehicle.
-pub fn vehicle_surely_seen_m(config: &PerceptionConfig, conditions: &Conditions) -> f64 {
-    let ranges = Ranges::in_conditions(config, true, conditions);
-    surely_m(config, ranges.lidar_vehicle_m, ranges.camera_vehicle_m)
-}
-
-/// Two widths of the fall of the chance before the place where it is one half.
-fn surely_m(config: &PerceptionConfig, lidar_m: f64, camera_m: f64) -> f64 {
-    (0.8 - 2.0 * 0.08) * (lidar_m + config.camera_weight * (camera_m - lidar_m))
+    // Two widths of the fall of the chance before the place where it is one half.
+    let surely_m = |lidar_m: f64, camera_m: f64| {
+        (0.8 - 2.0 * 0.08) * (lidar_m + config.camera_weight * (camera_m - lidar_m))
+    };
+    (
+        surely_m(ranges.lidar_pedestrian_m, ranges.camera_pedestrian_m),
+        surely_m(ranges.lidar_vehicle_m, ranges.camera_vehicle_m),
+    )
 }
 
 /// Distance at which something of full contrast is lost, m: the meteorological optical range, and less

@@ -15,16 +15,11 @@ use super::trajectory::Point;
 
 #[derive(Debug, Clone, Default)]
 pub struct Decisions {
-    taken: Vec<Taken>,
+    /// What is done about each object.
+    taken: Vec<(u32, Stance)>,
     /// Buffers of a cycle: the regions of all claims, and the same with the remembered sides.
     regions: Vec<Region>,
     held: Vec<Region>,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct Taken {
-    id: u32,
-    stance: Stance,
 }
 
 /// What a cycle's decisions are taken from.
@@ -83,16 +78,16 @@ impl Decisions {
     pub fn remember(&mut self, claims: &[Claim]) {
         self.taken.clear();
         for claim in claims.iter().filter(|claim| claim.stance != Stance::Open) {
-            match self.taken.iter_mut().find(|taken| taken.id == claim.id) {
-                Some(taken) if claim.stance == Stance::Yield => taken.stance = Stance::Yield,
+            match self.taken.iter_mut().find(|(id, _)| *id == claim.id) {
+                Some((_, stance)) if claim.stance == Stance::Yield => *stance = Stance::Yield,
                 Some(_) => {}
-                None => self.taken.push(Taken { id: claim.id, stance: claim.stance }),
+                None => self.taken.push((claim.id, claim.stance)),
             }
         }
     }
 
     fn remembered(&self, id: u32) -> Stance {
-        self.taken.iter().find(|taken| taken.id == id).map_or(Stance::Open, |taken| taken.stance)
+        self.taken.iter().find(|taken| taken.0 == id).map_or(Stance::Open, |taken| taken.1)
     }
 }
 
@@ -159,8 +154,7 @@ mod tests {
         assert_eq!(decided(Some(0.3), &later), [Stance::Yield, Stance::Overtake]);
         assert_eq!(decided(Some(1.0), &later), [Stance::Yield, Stance::Yield]);
         // Nothing is remembered of what is gone.
-        let mut decisions =
-            Decisions { taken: vec![Taken { id: 1, stance: Stance::Yield }], ..Decisions::default() };
+        let mut decisions = Decisions { taken: vec![(1, Stance::Yield)], ..Decisions::default() };
         decisions.remember(&[]);
         assert_eq!(decisions.remembered(1), Stance::Open);
     }

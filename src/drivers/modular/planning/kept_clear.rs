@@ -112,7 +112,7 @@ pub fn can_stop(
 mod tests {
     use super::*;
     use crate::modular::planning::nudge::LateralPlan;
-    use crate::modular::prediction::Prediction;
+    use crate::modular::prediction::forecasts_of;
     use crate::modular::tracking::Track;
     use crate::testing::straight;
     use avastra_base::geometry::{Pose, Vec2};
@@ -121,10 +121,8 @@ mod tests {
     const START: Point = Point { station_m: 40.0, speed_mps: 8.0, acceleration_mps2: 0.0 };
 
     fn forecast(scene: &std::sync::Arc<Scene>, body: Body, at: Vec2, velocity_mps: Vec2) -> Forecast {
-        let mut prediction = Prediction::new(&Default::default(), true, scene, None);
         let track = Track::for_tests(1, body, Pose { position: at, heading_rad: 0.0 }, velocity_mps);
-        prediction.update(&[track], 0.0, 0.0, Vec2::zeros());
-        prediction.forecasts()[0].clone()
+        forecasts_of(scene, &[track], Vec2::zeros()).remove(0)
     }
 
     /// Whether a pedestrian at an offset from the path (m), walking to the left, stops the vehicle before a

@@ -39,25 +39,18 @@ pub struct LaneChanges {
 }
 
 impl LaneChanges {
-    pub fn new(scene: &Arc<Scene>) -> LaneChanges {
-        LaneChanges { route: RouteChanges::new(scene), clear_s: 0.0 }
+    pub fn new(config: &PlanningConfig, scene: &Arc<Scene>) -> LaneChanges {
+        LaneChanges { route: RouteChanges::new(scene, config.speed_rules()), clear_s: 0.0 }
     }
 
-    /// Begins the next change if it is due and its lane is clear; `true` if that changes the guide.
-    pub fn seek(
-        &mut self,
-        config: &PlanningConfig,
-        guide: &Guide,
-        station_m: f64,
-        speed_mps: f64,
-        forecasts: &[Forecast],
-    ) -> bool {
-        let Some(change) = self.route.next() else { return false };
+    /// Begins the next change if it is due and its lane is clear.
+    pub fn seek(&mut self, config: &PlanningConfig, station_m: f64, speed_mps: f64, forecasts: &[Forecast]) {
+        let Some(change) = self.route.next() else { return };
         let soon = station_m >= change.begin_m - speed_mps * CLEAR_S && !self.route.is_under_way(station_m);
         let lateral_m = |_| change.lateral_m;
-        if !soon || !is_clear(config, guide, &lateral_m, station_m, speed_mps, forecasts) {
+        if !soon || !is_clear(config, self.route.guide(), &lateral_m, station_m, speed_mps, forecasts) {
             self.clear_s = 0.0;
-            return false;
+            return;
         }
         let begins = self.route.due(station_m).is_some() && self.clear_s >= CLEAR_S;
         self.clear_s += FRAME_S;
@@ -65,7 +58,6 @@ impl LaneChanges {
             self.route.begin(station_m);
             self.clear_s = 0.0;
         }
-        begins
     }
 
     /// Breaks off the change that is under way if it must and can be. Returns how far beside the source lane the
@@ -73,7 +65,6 @@ impl LaneChanges {
     pub fn break_off(
         &mut self,
         config: &PlanningConfig,
-        guide: &Guide,
         station_m: f64,
         speed_mps: f64,
         forecasts: &[Forecast],
@@ -94,7 +85,7 @@ impl LaneChanges {
         let left_m = |at_m: f64| {
             change.postponed_offset_m(at_m, LONG_AGO_M) - change.postponed_offset_m(at_m, begin_m)
         };
-        if is_clear(&gaps, guide, &left_m, station_m, speed_mps, forecasts) {
+        if is_clear(&gaps, self.route.guide(), &left_m, station_m, speed_mps, forecasts) {
             return None;
         }
         let done_m = |at_m: f64| change.postponed_offset_m(at_m, begin_m) - change.source_offset_m(at_m);
@@ -144,7 +135,7 @@ fn is_clear(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::modular::prediction::Prediction;
+    use crate::modular::prediction::forecasts_of;
     use crate::modular::tracking::Track;
     use crate::testing::two_lanes;
     use avastra_base::geometry::{Pose, Vec2};
@@ -154,27 +145,18 @@ mod tests {
     fn clear(gap_ahead_m: Option<f64>, gap_behind_m: Option<f64>, other_mps: f64) -> bool {
         let scene = two_lanes(300.0);
         let config = PlanningConfig::default();
-        let guide = RouteChanges::new(&scene).guide(&config.speed_rules());
+        let changes = LaneChanges::new(&config, &scene);
         let half_m = 4.7 / 2.0;
         let front = gap_ahead_m.map(|gap_m| VehicleParameters::MKZ.front_m(100.0) + gap_m + half_m);
         let rear = gap_behind_m.map(|gap_m| VehicleParameters::MKZ.rear_m(100.0) - gap_m - half_m);
         let heading_rad = if other_mps < 0.0 { core::f64::consts::PI } else { 0.0 };
-        let tracks: Vec<Track> = front
-            .into_iter()
-            .chain(rear)
-            .zip(1..)
-            .map(|(x_m, id)| {
-                Track::for_tests(
-                    id,
-                    Body::Sedan,
-                    Pose::new(x_m, -1.75, heading_rad),
-                    Vec2::new(other_mps, 0.0),
-                )
-            })
-            .collect();
-        let mut prediction = Prediction::new(&Default::default(), true, &scene, None);
-        prediction.update(&tracks, 0.0, 0.0, Vec2::zeros());
-        is_clear(&config, &guide, &|_| 3.5, 100.0, 10.0, prediction.forecasts())
+        let car = |(x_m, id): (f64, u32)| {
+            let pose = Pose::new(x_m, -1.75, heading_rad);
+            Track::for_tests(id, Body::Sedan, pose, Vec2::new(other_mps, 0.0))
+        };
+        let tracks: Vec<Track> = front.into_iter().chain(rear).zip(1..).map(car).collect();
+        let forecasts = forecasts_of(&scene, &tracks, Vec2::zeros());
+        is_clear(&config, changes.route.guide(), &|_| 3.5, 100.0, 10.0, &forecasts)
     }
 
     #[test]

@@ -95,17 +95,30 @@ mod tests {
     /// The line of the test road, m.
     const LINE_M: f64 = 100.0;
 
-    /// Whether a light lets the vehicle go on with its front this far over the line, from moment to
-    /// moment.
+    fn usual() -> Lights {
+        Lights::new(&PlanningConfig::default(), &straight())
+    }
+
+    /// Where a light makes the vehicle stop with its front this far over the line, m, speed and acceleration; `None` if it
+    /// lets it go on.
+    fn stop_m(
+        lights: &mut Lights,
+        over_m: f64,
+        (speed_mps, acceleration_mps2): (f64, f64),
+        colour: SignalColour,
+    ) -> Option<f64> {
+        let mut constraints = Vec::new();
+        let station_m = LINE_M + over_m - VehicleParameters::MKZ.front_m(0.0);
+        let start = Point { station_m, speed_mps, acceleration_mps2 };
+        lights.constrain(&start, &[Some(colour)], &mut constraints);
+        constraints.first().map(Constraint::stop_m)
+    }
+
+    /// Whether a light lets the vehicle go on, from moment to moment.
     fn goes_on(moments: &[(f64, f64, SignalColour)]) -> Vec<bool> {
-        let mut lights = Lights::new(&PlanningConfig::default(), &straight());
-        let front_m = VehicleParameters::MKZ.front_m(0.0);
+        let mut lights = usual();
         let goes_on = |&(over_m, speed_mps, colour): &(f64, f64, SignalColour)| {
-            let mut constraints = Vec::new();
-            let station_m = LINE_M + over_m - front_m;
-            let start = Point { station_m, speed_mps, acceleration_mps2: 0.0 };
-            lights.constrain(&start, &[Some(colour)], &mut constraints);
-            constraints.is_empty()
+            stop_m(&mut lights, over_m, (speed_mps, 0.0), colour).is_none()
         };
         moments.iter().map(goes_on).collect()
     }
@@ -124,35 +137,18 @@ mod tests {
         use SignalColour::Red;
         assert_eq!(goes_on(&[(-10.0, 11.0, Red), (-5.0, 11.0, Red), (1.0, 11.0, Red)]), [true; 3]);
         assert_eq!(goes_on(&[(-10.0, 11.0, Red), (-4.0, 2.0, Red)]), [true, false], "slowed down by others");
+        // A vehicle that brakes already can stop for a light nearer by.
+        let stops = |acceleration_mps2| stop_m(&mut usual(), -9.5, (7.0, acceleration_mps2), Red).is_some();
+        assert!(!stops(0.0) && stops(-2.5));
     }
 
     #[test]
     fn what_stands_at_the_line_stays_there_until_the_light_is_green() {
-        let mut lights = Lights::new(&PlanningConfig::default(), &straight());
-        let front_m = VehicleParameters::MKZ.front_m(0.0);
-        let mut stop_m = |before_m: f64, speed_mps: f64, colour| {
-            let station_m = LINE_M - before_m - front_m;
-            let mut constraints = Vec::new();
-            let start = Point { station_m, speed_mps, acceleration_mps2: 0.0 };
-            lights.constrain(&start, &[Some(colour)], &mut constraints);
-            constraints.first().map(Constraint::stop_m)
-        };
-        assert_eq!(stop_m(3.0, 1.0, SignalColour::Red), Some(LINE_M - 1.0));
-        assert_eq!(stop_m(1.5, 0.0, SignalColour::Red), Some(LINE_M - 1.5));
-        assert_eq!(stop_m(2.4, 0.0, SignalColour::Red), Some(LINE_M - 2.4), "its position drifts");
-        assert_eq!(stop_m(2.4, 0.0, SignalColour::Green), None);
-    }
-
-    #[test]
-    fn a_vehicle_that_brakes_already_can_stop_for_a_light_nearer_by() {
-        let stops = |acceleration_mps2: f64| {
-            let mut lights = Lights::new(&PlanningConfig::default(), &straight());
-            let station_m = LINE_M - 9.5 - VehicleParameters::MKZ.front_m(0.0);
-            let start = Point { station_m, speed_mps: 7.0, acceleration_mps2 };
-            let mut constraints = Vec::new();
-            lights.constrain(&start, &[Some(SignalColour::Yellow)], &mut constraints);
-            !constraints.is_empty()
-        };
-        assert!(!stops(0.0) && stops(-2.5));
+        let mut lights = usual();
+        let mut stop_m = |over_m, speed_mps, colour| stop_m(&mut lights, over_m, (speed_mps, 0.0), colour);
+        assert_eq!(stop_m(-3.0, 1.0, SignalColour::Red), Some(LINE_M - 1.0));
+        assert_eq!(stop_m(-1.5, 0.0, SignalColour::Red), Some(LINE_M - 1.5));
+        assert_eq!(stop_m(-2.4, 0.0, SignalColour::Red), Some(LINE_M - 2.4), "its position drifts");
+        assert_eq!(stop_m(-2.4, 0.0, SignalColour::Green), None);
     }
 }

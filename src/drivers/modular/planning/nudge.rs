@@ -184,7 +184,8 @@ impl LateralPlan {
             return;
         }
         if let Some(edge) = standing.nearest().filter(|edge| standing.is_vehicle(edge.id)) {
-            let lane_m = lane_width_m(scene, edge.span.from_m);
+            let on = scene.route.lane_at(edge.span.from_m);
+            let lane_m = scene.map.lane(on.lane).width_at(edge.span.from_m - on.from_m);
             self.bump = self.row_from(&standing, edge, lane_m).and_then(|(edge, offset_m)| {
                 Bump::past(&edge, offset_m, station_m, speed_mps)
                     .filter(|bump| standing.leave_room_for(bump, &self.row))
@@ -211,12 +212,6 @@ impl LateralPlan {
         }
         Some((edge, offset_m))
     }
-}
-
-/// Width of the route's lane at a station, m.
-fn lane_width_m(scene: &Scene, station_m: f64) -> f64 {
-    let on = scene.route.lane_at(station_m);
-    scene.map.lane(on.lane).width_at(station_m - on.from_m)
 }
 
 impl Bump {
@@ -261,16 +256,14 @@ impl Standing<'_> {
             let beside = self.guide.project(position, station_m, station_m + HORIZON_M);
             let (length_m, width_m) = (forecast.length_m, forecast.width_m);
             let (_, across_m) = extent_m(forecast.forward, beside.forward, (length_m, width_m));
-            let reach_m = Self::HALF_WAY_M + self.config.lateral_buffer_m;
-            let span = beside.taken(forecast.forward, length_m, width_m, 2.0 * reach_m)?;
+            let span = beside.taken(forecast.forward, length_m, width_m, 2.0 * self.clear_m())?;
             let (right_m, left_m) = (beside.offset_m - across_m / 2.0, beside.offset_m + across_m / 2.0);
             (span.to_m > self.front_m()).then_some(Edge { id: forecast.id, span, right_m, left_m })
         })
     }
 
     fn is_in_the_way(&self, edge: &Edge) -> bool {
-        let reach_m = Self::HALF_WAY_M + self.config.lateral_buffer_m;
-        edge.right_m < reach_m && edge.left_m > -reach_m
+        edge.right_m < self.clear_m() && edge.left_m > -self.clear_m()
     }
 
     /// The nearest that is in the way and wholly ahead.
@@ -316,7 +309,7 @@ impl Standing<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::modular::prediction::Prediction;
+    use crate::modular::prediction::forecasts_of;
     use crate::modular::tracking::Track;
     use crate::testing::straight;
     use avastra_base::geometry::{Pose, Vec2};
@@ -331,7 +324,6 @@ mod tests {
         let scene = straight();
         let config = PlanningConfig::default();
         let guide = Guide::new(&scene, &config.speed_rules());
-        let mut prediction = Prediction::new(&Default::default(), true, &scene, None);
         let tracks: Vec<Track> = places
             .iter()
             .zip(1..)
@@ -339,8 +331,8 @@ mod tests {
                 Track::for_tests(id, *body, Pose::new(*x_m, *y_m, 0.0), Vec2::zeros())
             })
             .collect();
-        prediction.update(&tracks, 0.0, 0.0, Vec2::zeros());
-        plan.update(&config, &scene, &guide, station_m, 8.0, prediction.forecasts());
+        let forecasts = forecasts_of(&scene, &tracks, Vec2::zeros());
+        plan.update(&config, &scene, &guide, station_m, 8.0, &forecasts);
         plan
     }
 

@@ -48,17 +48,17 @@ pub struct Planner {
     config: PlanningConfig,
     weaknesses: Weaknesses,
     scene: Arc<Scene>,
-    guide: Arc<Guide>,
     junctions: Arc<Junctions>,
-    lateral: LateralPlan,
+    /// Where beside the guide the path lies.
+    pub lateral: LateralPlan,
     changes: LaneChanges,
     lights: Lights,
     standing: Standing,
     rights: RouteRights,
     stages: Stages,
     sight: SightBound,
-    manoeuvre: Manoeuvre,
-    trajectory: Trajectory,
+    pub manoeuvre: Manoeuvre,
+    pub trajectory: Trajectory,
     claims: Vec<Claim>,
     constraints: Vec<Constraint>,
     decisions: Decisions,
@@ -84,17 +84,15 @@ impl Planner {
     pub fn new(config: &ModularConfig, scene: &Arc<Scene>, junctions: &Arc<Junctions>) -> Planner {
         let weaknesses = config.weaknesses;
         let config = without_absent(&config.planning, &weaknesses);
-        let changes = LaneChanges::new(scene);
         let rights = RouteRights::of(&config, scene);
         Planner {
-            guide: Arc::new(changes.route.guide(&config.speed_rules())),
+            changes: LaneChanges::new(&config, scene),
             lights: Lights::new(&config, scene),
             config,
             weaknesses,
             scene: Arc::clone(scene),
             junctions: Arc::clone(junctions),
             lateral: LateralPlan::default(),
-            changes,
             standing: Standing::default(),
             stages: Stages::new(&config, scene, junctions, &rights),
             sight: SightBound::new(scene, &rights),
@@ -108,21 +106,8 @@ impl Planner {
     }
 
     /// The guide along the lanes that are driven now; replaced when a lane change begins.
-    pub fn guide(&self) -> &Arc<Guide> {
-        &self.guide
-    }
-
-    /// Where beside the guide the path lies.
-    pub fn lateral(&self) -> &LateralPlan {
-        &self.lateral
-    }
-
-    pub fn trajectory(&self) -> &Trajectory {
-        &self.trajectory
-    }
-
-    pub fn manoeuvre(&self) -> Manoeuvre {
-        self.manoeuvre
+    pub fn guide(&self) -> &Guide {
+        self.changes.route.guide()
     }
 
     pub fn plan(&mut self, outlook: &Outlook) {
@@ -130,7 +115,7 @@ impl Planner {
         // Going on from the planned and not from the measured acceleration keeps the jerk bounded.
         let acceleration_mps2 = self.trajectory.at(since_s).acceleration_mps2;
         self.choose_path(outlook);
-        let beside = self.guide.locate(outlook.localized.position, Some(station_m));
+        let beside = self.guide().locate(outlook.localized.position, Some(station_m));
         let off_m = beside.offset_m - self.lateral.aside(station_m).offset_m;
         let start = Point { station_m, speed_mps, acceleration_mps2 };
         if off_m.abs() > self.config.lost_offset_m {
@@ -148,19 +133,15 @@ impl Planner {
     fn choose_path(&mut self, outlook: &Outlook) {
         let &Outlook { station_m, speed_mps, forecasts, .. } = outlook;
         self.standing.update(forecasts);
-        let (config, guide) = (&self.config, &self.guide);
-        if let Some((off_m, slope)) = self.changes.break_off(config, guide, station_m, speed_mps, forecasts) {
+        if let Some((off_m, slope)) = self.changes.break_off(&self.config, station_m, speed_mps, forecasts) {
             self.lateral.return_from(station_m, speed_mps, off_m, slope);
-            self.guide = Arc::new(self.changes.route.guide(&config.speed_rules()));
-        } else if !self.lateral.is_returning()
-            && self.changes.seek(config, guide, station_m, speed_mps, forecasts)
-        {
-            self.guide = Arc::new(self.changes.route.guide(&config.speed_rules()));
+        } else if !self.lateral.is_returning() {
+            self.changes.seek(&self.config, station_m, speed_mps, forecasts);
         }
         self.manoeuvre = if self.changes.route.is_under_way(station_m) {
             Manoeuvre::LaneChange
         } else {
-            let (config, scene, guide) = (&self.config, &self.scene, &self.guide);
+            let (config, scene, guide) = (&self.config, &self.scene, self.changes.route.guide());
             self.lateral.update(config, scene, guide, station_m, speed_mps, forecasts);
             match (self.lateral.passing(), self.changes.route.due(station_m)) {
                 (Some((id, _)), _) => Manoeuvre::Nudge(id),
@@ -177,7 +158,7 @@ impl Planner {
         constraints.clear();
         self.lights.constrain(start, outlook.lights, constraints);
         self.changes.constrain(constraints);
-        let (config, scene, guide) = (&self.config, &self.scene, &self.guide);
+        let (config, scene, guide) = (&self.config, &self.scene, self.changes.route.guide());
         kept_clear::crosswalks(config, scene, guide, start, forecasts, &self.standing, constraints);
         let ahead = station_m..station_m + HORIZON_M;
         let mut claims = core::mem::take(&mut self.claims);
@@ -193,10 +174,10 @@ impl Planner {
         if self.weaknesses.closest_static_only {
             self.keep_closest_static(station_m);
         }
-        let (config, constraints) = (&self.config, &mut self.constraints);
+        let (config, guide, constraints) = (&self.config, self.changes.route.guide(), &mut self.constraints);
         kept_clear::keep_clear(config, &self.junctions, start, &self.claims, constraints);
         self.stages.constrain(config, &self.weaknesses, start, &self.claims, constraints);
-        self.sight.constrain(config, &self.guide, start, outlook.conditions, forecasts, constraints);
+        self.sight.constrain(config, guide, start, outlook.conditions, forecasts, constraints);
     }
 
     /// Whether the plan reacts to a claim at all.
@@ -241,7 +222,7 @@ impl Planner {
         }
         let situation = Situation {
             config: &self.config,
-            guide: &self.guide,
+            guide: self.changes.route.guide(),
             start,
             stop_m,
             hysteresis: !self.weaknesses.decides_anew,
@@ -287,7 +268,7 @@ impl Planner {
             self.roll(start);
         }
         let Some((_, braking_for_s, _)) = self.first_contact(&start) else { return };
-        let braking_reason = self.reason();
+        let braking_reason = self.trajectory.reason;
         let all = core::mem::take(&mut self.constraints);
         let others = all[..planned].iter().filter(|constraint| !constraint.is_yielding());
         self.constraints.extend(others);
@@ -308,29 +289,20 @@ impl Planner {
     fn first_contact(&self, start: &Point) -> Option<(usize, f64, f64)> {
         let vehicle = VehicleParameters::MKZ;
         let (rear_m, front_m) = (vehicle.rear_m(start.station_m), vehicle.front_m(start.station_m));
-        let mut first: Option<(usize, f64, f64)> = None;
-        for (index, claim) in self.claims.iter().enumerate() {
+        let contacts = self.claims.iter().enumerate().filter_map(|(index, claim)| {
             let beside = claim.is_now() && claim.spans[0].from_m < front_m && claim.spans[0].to_m > rear_m;
             if beside || !claim.binds(&self.config) || self.is_crept_to(claim) {
-                continue;
+                return None;
             }
-            if let Some((time_s, near_m)) = self.trajectory.meets(claim, CHECK_S)
-                && first.is_none_or(|(_, first_s, _)| time_s < first_s)
-            {
-                first = Some((index, time_s, near_m));
-            }
-        }
-        first
+            let (time_s, near_m) = self.trajectory.meets(claim, CHECK_S)?;
+            Some((index, time_s, near_m))
+        });
+        contacts.min_by(|(_, a_s, _), (_, b_s, _)| a_s.total_cmp(b_s))
     }
 
     fn roll(&mut self, start: Point) {
-        let trajectory = &mut self.trajectory;
-        speed::roll(&self.config, &self.guide, start, &self.constraints, &self.claims, trajectory);
-    }
-
-    /// Why the present plan does what it does.
-    pub fn reason(&self) -> Reason {
-        self.trajectory.reason
+        let (guide, trajectory) = (self.changes.route.guide(), &mut self.trajectory);
+        speed::roll(&self.config, guide, start, &self.constraints, &self.claims, trajectory);
     }
 
     /// The constraint that keeps the vehicle behind a road user, if there is room left before it.

@@ -67,19 +67,12 @@ impl RouteRights {
     /// Whether what a road user would do on the way takes the ego vehicle's right of way.
     pub fn owes_way(&self, claim: &Claim) -> bool {
         let entry = claim.spans[claim.first];
-        let near = self.meetings.iter().filter(|meeting| {
+        let mut near = self.meetings.iter().filter(|meeting| {
             let along = entry.from_m - NEAR_M..entry.to_m + NEAR_M;
             along.contains(&meeting.station_m)
                 && meeting.cosine * claim.cosine + meeting.sine * claim.sine > SAME_COSINE
         });
-        let mut is_any = false;
-        for meeting in near {
-            if !meeting.ego_first {
-                return false;
-            }
-            is_any = true;
-        }
-        is_any
+        near.next().is_some_and(|first| first.ego_first && near.all(|meeting| meeting.ego_first))
     }
 }
 
@@ -88,7 +81,7 @@ fn goes_first(scene: &Scene, own: LaneIndex, other: LaneIndex) -> bool {
 }
 
 /// Whether both lanes have a light, and the two are of different groups.
-pub fn never_green_together(scene: &Scene, own: LaneIndex, other: LaneIndex) -> bool {
+fn never_green_together(scene: &Scene, own: LaneIndex, other: LaneIndex) -> bool {
     let group = |lane: LaneIndex| {
         let line = scene.map.stop_line_of(lane)?;
         let signal = &scene.map.signals[line.signal];

@@ -24,7 +24,7 @@ use avastra_road::{LaneIndex, RoadMap};
 use avastra_world::sim::{Conditions, Scene, VehicleParameters};
 
 use super::super::config::{PerceptionConfig, PlanningConfig};
-use super::super::perception::{surely_seen_m, vehicle_surely_seen_m};
+use super::super::perception::surely_seen_m;
 use super::super::prediction::Forecast;
 use super::rights::{Meeting, RouteRights};
 use super::speed::Constraint;
@@ -144,10 +144,8 @@ impl SightBound {
             Some((known, seen)) if same(known) => *seen,
             _ => {
                 // What the planner is told of its sensors, not what a planted fault makes of them.
-                let sensors = PerceptionConfig::default();
-                let allowed_mps = stoppable_mps(config, surely_seen_m(&sensors, conditions));
-                let vehicle_m = vehicle_surely_seen_m(&sensors, conditions);
-                let seen = Seen { allowed_mps, vehicle_m };
+                let (pedestrian_m, vehicle_m) = surely_seen_m(&PerceptionConfig::default(), conditions);
+                let seen = Seen { allowed_mps: stoppable_mps(config, pedestrian_m), vehicle_m };
                 self.known = Some((*conditions, seen));
                 seen
             }
@@ -269,6 +267,8 @@ fn hides(guide: &Guide, forecast: &Forecast, station_m: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::modular::prediction::forecasts_of;
+    use crate::modular::tracking::Track;
     use crate::testing::{CLEAR_DAY, straight};
     use avastra_lang::model::vocabulary::Body;
 
@@ -318,12 +318,9 @@ mod tests {
     fn a_vehicle_beside_a_lane_hides_it_and_one_on_it_does_not() {
         let scene = straight();
         let at = |x_m: f64, y_m: f64| {
-            let mut prediction =
-                crate::modular::prediction::Prediction::new(&Default::default(), true, &scene, None);
-            let pose = Pose { position: Vec2::new(x_m, y_m), heading_rad: 0.0 };
-            let track = crate::modular::tracking::Track::for_tests(1, Body::SchoolBus, pose, Vec2::zeros());
-            prediction.update(&[track], 0.0, 0.0, Vec2::zeros());
-            oncoming().hidden_from_m(Vec2::new(96.0, -2.0), prediction.forecasts())
+            let track = Track::for_tests(1, Body::SchoolBus, Pose::new(x_m, y_m, 0.0), Vec2::zeros());
+            let forecasts = forecasts_of(&scene, &[track], Vec2::zeros());
+            oncoming().hidden_from_m(Vec2::new(96.0, -2.0), &forecasts)
         };
         assert!(at(112.0, -0.5) < 80.0, "waits to turn left opposite");
         assert!(at(112.0, 2.0).is_infinite(), "comes itself");

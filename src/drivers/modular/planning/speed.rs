@@ -48,6 +48,21 @@ struct Bound {
     emergency: bool,
 }
 
+impl Bound {
+    fn gentle(acceleration_mps2: f64) -> Bound {
+        Bound { acceleration_mps2, emergency: false }
+    }
+
+    /// What is planned, or the braking that is needed (magnitude), where that is an emergency.
+    fn of(config: &PlanningConfig, planned_mps2: f64, needed_mps2: f64) -> Bound {
+        if needed_mps2 > config.deceleration_mps2_max {
+            Bound { acceleration_mps2: smaller(planned_mps2, -needed_mps2), emergency: true }
+        } else {
+            Bound::gentle(planned_mps2)
+        }
+    }
+}
+
 impl Constraint {
     /// A line to stop at, with nothing behind it to hit.
     pub fn line(reason: Reason, stop_m: f64) -> Constraint {
@@ -102,25 +117,17 @@ impl Constraint {
             Kind::Fence { stop_m, touch_m, .. } => {
                 let hardest_mps2 = touch_m
                     .map_or(0.0, |touch_m| braking_mps2(speed_mps, touch_m - EMERGENCY_GAP_M - front_m));
-                let emergency = hardest_mps2 > config.deceleration_mps2_max;
-                let planned = fence_mps2(config, speed_mps, stop_m - front_m);
-                Some(Bound {
-                    acceleration_mps2: if emergency { smaller(planned, -hardest_mps2) } else { planned },
-                    emergency,
-                })
+                Some(Bound::of(config, fence_mps2(config, speed_mps, stop_m - front_m), hardest_mps2))
             }
             Kind::Creep { stop_m, speed_mps: creep_mps } => {
                 let creeping_mps2 = speed_mps2(speed_mps, *creep_mps);
-                let acceleration_mps2 =
-                    larger(fence_mps2(config, speed_mps, stop_m - front_m), creeping_mps2);
-                Some(Bound { acceleration_mps2, emergency: false })
+                Some(Bound::gentle(larger(fence_mps2(config, speed_mps, stop_m - front_m), creeping_mps2)))
             }
             Kind::Limit { from_m, to_m, speed_mps: limit_mps } => {
                 if front_m > *to_m || front_m < *from_m - speed_mps * PREVIEW_S {
                     return None;
                 }
-                let slowing_mps2 = larger(speed_mps2(speed_mps, *limit_mps), -config.comfortable_mps2);
-                Some(Bound { acceleration_mps2: slowing_mps2, emergency: false })
+                Some(Bound::gentle(larger(speed_mps2(speed_mps, *limit_mps), -config.comfortable_mps2)))
             }
             Kind::Leader(index) => leader_bound(config, &claims[*index], time_s, front_m, speed_mps),
         }
@@ -156,17 +163,10 @@ fn leader_bound(
     let gap_m = near_m - front_m;
     let planned_mps2 = leader_mps2(config, speed_mps, along_mps, gap_m);
     if time_s < claim.entry_s() {
-        return Some(Bound {
-            acceleration_mps2: larger(planned_mps2, -config.comfortable_mps2),
-            emergency: false,
-        });
+        return Some(Bound::gentle(larger(planned_mps2, -config.comfortable_mps2)));
     }
     let hardest_mps2 = braking_mps2(larger(speed_mps - along_mps, 0.0), gap_m - EMERGENCY_GAP_M);
-    let emergency = hardest_mps2 > config.deceleration_mps2_max;
-    Some(Bound {
-        acceleration_mps2: if emergency { smaller(planned_mps2, -hardest_mps2) } else { planned_mps2 },
-        emergency,
-    })
+    Some(Bound::of(config, planned_mps2, hardest_mps2))
 }
 
 /// Rolls the law forward from `start` into `trajectory`.
@@ -182,7 +182,8 @@ pub fn roll(
     for (index, slot) in trajectory.points.iter_mut().enumerate() {
         let time_s = index as f64 * POINT_S;
         *slot = point;
-        let mut wanted_mps2 = free_mps2(config, guide, &point);
+        let allowed_mps = guide.allowed_mps(point.station_m, point.speed_mps);
+        let mut wanted_mps2 = smaller(speed_mps2(point.speed_mps, allowed_mps), config.acceleration_mps2_max);
         let mut floor_mps2 = -config.deceleration_mps2_max;
         let mut reason = Reason::Cruise;
         for constraint in constraints {
@@ -203,12 +204,6 @@ pub fn roll(
             .clamp(-config.jerk_mps3_down * POINT_S, config.jerk_mps3_up * POINT_S);
         point = point.after(point.acceleration_mps2 + change_mps2);
     }
-}
-
-/// Acceleration on a free road.
-fn free_mps2(config: &PlanningConfig, guide: &Guide, point: &Point) -> f64 {
-    let allowed_mps = guide.allowed_mps(point.station_m, point.speed_mps);
-    smaller(speed_mps2(point.speed_mps, allowed_mps), config.acceleration_mps2_max)
 }
 
 /// Acceleration that stops the vehicle in `room_m`: coming nearer, it is the braking parabola of

@@ -144,7 +144,6 @@ impl Passage {
     }
 
     fn constrain(&self, config: &PlanningConfig, start: &Point, constraints: &mut Vec<Constraint>) {
-        let hold = |reason| Constraint::line(reason, self.hold_m);
         let stop = Constraint::line(Reason::StopSign, self.line_m - config.stop_line_gap_m);
         match self.stage {
             Stage::Approach => {
@@ -160,7 +159,7 @@ impl Passage {
             Stage::Creep => {
                 let from_m = f64::NEG_INFINITY;
                 constraints.push(Constraint::limit(Reason::Creep, from_m, self.hold_m, config.approach_mps));
-                constraints.push(hold(Reason::Creep));
+                constraints.push(Constraint::line(Reason::Creep, self.hold_m));
             }
             Stage::Go => {}
         }

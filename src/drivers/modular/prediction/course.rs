@@ -142,23 +142,13 @@ fn bend_braking_mps2(map: &RoadMap, lane: LaneIndex, speed_mps: f64, ahead_m: f6
 
 /// The successor at whose end the heading has changed least; of several that are equal, the first.
 pub fn straightest_successor(map: &RoadMap, lane: LaneIndex) -> Option<LaneIndex> {
-    let successors = &map.lane(lane).successors;
-    if successors.len() < 2 {
-        return successors.first().copied();
-    }
     let end_rad = |lane: LaneIndex| {
         let points = map.lane(lane).centre.points();
         points[points.len() - 1].heading_rad
     };
-    let here_rad = end_rad(lane);
-    let mut best: Option<(LaneIndex, f64)> = None;
-    for &successor in successors {
-        let turn_rad = wrap_angle(end_rad(successor) - here_rad).abs();
-        if best.is_none_or(|(_, least_rad)| turn_rad < least_rad) {
-            best = Some((successor, turn_rad));
-        }
-    }
-    best.map(|(successor, _)| successor)
+    let turn_rad = |successor: &LaneIndex| wrap_angle(end_rad(*successor) - end_rad(lane)).abs();
+    let successors = map.lane(lane).successors.iter().copied();
+    successors.min_by(|a, b| turn_rad(a).total_cmp(&turn_rad(b)))
 }
 
 impl Course {

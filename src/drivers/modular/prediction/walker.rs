@@ -35,42 +35,44 @@ pub fn predict(
     several: bool,
     forecasts: &mut Vec<Forecast>,
 ) {
+    let sets_out = sets_out(map, &mut forecast, stood_s).filter(|_| several);
+    if let Some(sets_out) = &sets_out {
+        forecast.probability = 1.0 - sets_out.probability;
+    }
+    forecasts.push(forecast);
+    forecasts.extend(sets_out);
+}
+
+/// The hypothesis that a pedestrian who stands at the kerb sets out. One who walks along the carriageway is made to stay
+/// beside it.
+fn sets_out(map: &RoadMap, forecast: &mut Forecast, stood_s: f64) -> Option<Forecast> {
     let position = forecast.positions[0];
-    let Some(place) = map.nearest(position, forecast.heading_rad, KERB_M) else {
-        forecasts.push(forecast);
-        return;
-    };
+    let place = map.nearest(position, forecast.heading_rad, KERB_M)?;
     let lane = map.lane(place.lane);
     let along = lane.centre.pose_at(place.station_m).forward();
     let beyond_m = place.offset_m.abs() - lane.width_at(place.station_m) / 2.0;
     if beyond_m <= 0.0 {
         // On the carriageway there is nothing to wait for.
-        forecasts.push(forecast);
-        return;
+        return None;
     }
     let across = Vec2::new(along.y, -along.x) * place.offset_m.signum();
     if forecast.moving {
         let velocity_mps = forecast.velocity_mps;
         if velocity_mps.dot(&across).abs() < ACROSS_MPS {
-            let along_mps = along * velocity_mps.dot(&along);
-            walk(&mut forecast, along_mps, 0.0);
+            walk(forecast, along * velocity_mps.dot(&along), 0.0);
         }
-        forecasts.push(forecast);
-        return;
+        return None;
     }
     let facing = unit_vector(forecast.heading_rad).dot(&across) >= FACING_COSINE;
     let chance = if is_near_crosswalk(map, position) { SETS_OUT_AT_CROSSWALK } else { SETS_OUT };
     let chance = chance * libm::exp2(-stood_s / WAITED_S);
-    if !several || !facing || chance < PROBABILITY_MIN {
-        forecasts.push(forecast);
-        return;
+    if !facing || chance < PROBABILITY_MIN {
+        return None;
     }
-    let mut sets_out =
-        Forecast { probability: chance, moving: true, velocity_mps: across * WALK_MPS, ..forecast.clone() };
-    walk(&mut sets_out, across * WALK_MPS, SETS_OUT_AFTER_S);
-    forecast.probability = 1.0 - chance;
-    forecasts.push(forecast);
-    forecasts.push(sets_out);
+    let velocity_mps = across * WALK_MPS;
+    let mut sets_out = Forecast { probability: chance, moving: true, velocity_mps, ..forecast.clone() };
+    walk(&mut sets_out, velocity_mps, SETS_OUT_AFTER_S);
+    Some(sets_out)
 }
 
 /// Walks at a velocity from a moment on.

@@ -16,8 +16,8 @@ use avastra_base::kinematics::{
     WANDER_M,
 };
 
+use crate::reference::driver::Model;
 use crate::reference::encounter::Encounter;
-use crate::reference::model::Model;
 use crate::reference::reflex::Braking;
 
 /// Critical time to collision and critical time headway, s.

@@ -8,67 +8,50 @@
 
 use avastra_base::kinematics::{CAREFUL_JERK_MPS3, CAREFUL_REACTION_S, braking_m};
 
+use crate::reference::driver::Model;
 use crate::reference::encounter::Encounter;
-use crate::reference::model::Model;
 use crate::reference::reflex::Braking;
 
-/// Parameters of the surrogates.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FuzzySafety {
-    pub reaction_s: f64,
-    /// Own comfortable and hard braking, m/s².
-    pub braking_mps2_min: f64,
-    pub braking_mps2_max: f64,
-    /// Braking that the leader may show, m/s².
-    pub leader_mps2: f64,
-    /// Distance at rest, m.
-    pub margin_m: f64,
-    /// Margin that is added to the safe distance, m.
-    pub safe_margin_m: f64,
+/// Own comfortable and hard braking, m/s².
+const BRAKING_MPS2_MIN: f64 = 4.0;
+const BRAKING_MPS2_MAX: f64 = 6.0;
+/// Braking that the leader may show, m/s².
+const LEADER_MPS2: f64 = 7.0;
+/// Distance at rest, m, and margin that is added to the safe distance, m.
+const MARGIN_M: f64 = 2.0;
+const SAFE_MARGIN_M: f64 = 2.0;
+
+/// The driver: brakes by the surrogates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FuzzySafety;
+
+/// Proactive fuzzy surrogate in `[0, 1]`: what if the leader brakes hard?
+fn proactive(gap_m: f64, rear_mps: f64, leader_mps: f64) -> f64 {
+    let common_m = rear_mps * CAREFUL_REACTION_S - braking_m(leader_mps, LEADER_MPS2);
+    let safe_m = common_m + braking_m(rear_mps, BRAKING_MPS2_MIN) + SAFE_MARGIN_M;
+    let unsafe_m = common_m + braking_m(rear_mps, BRAKING_MPS2_MAX);
+    between(gap_m - MARGIN_M, safe_m, unsafe_m)
 }
 
-impl Default for FuzzySafety {
-    fn default() -> FuzzySafety {
-        FuzzySafety {
-            reaction_s: CAREFUL_REACTION_S,
-            braking_mps2_min: 4.0,
-            braking_mps2_max: 6.0,
-            leader_mps2: 7.0,
-            margin_m: 2.0,
-            safe_margin_m: 2.0,
-        }
+/// Critical fuzzy surrogate in `[0, 1]`: what if nothing changes?
+fn critical(gap_m: f64, rear_mps: f64, rear_mps2: f64, leader_mps: f64) -> f64 {
+    if rear_mps <= leader_mps {
+        return 0.0;
     }
-}
-
-impl FuzzySafety {
-    /// Proactive fuzzy surrogate in `[0, 1]`: what if the leader brakes hard?
-    fn proactive(&self, gap_m: f64, rear_mps: f64, leader_mps: f64) -> f64 {
-        let common_m = rear_mps * self.reaction_s - braking_m(leader_mps, self.leader_mps2);
-        let safe_m = common_m + braking_m(rear_mps, self.braking_mps2_min) + self.safe_margin_m;
-        let unsafe_m = common_m + braking_m(rear_mps, self.braking_mps2_max);
-        between(gap_m - self.margin_m, safe_m, unsafe_m)
+    let rear_mps2 = rear_mps2.max(-BRAKING_MPS2_MIN);
+    let closing_mps = rear_mps - leader_mps;
+    let after_mps = closing_mps + rear_mps2 * CAREFUL_REACTION_S;
+    if after_mps < 0.0 {
+        // It is slower than the leader before the reaction is over, because it brakes already.
+        let closed_m = braking_m(closing_mps, rear_mps2.abs());
+        return if gap_m < closed_m { 1.0 } else { 0.0 };
     }
-
-    /// Critical fuzzy surrogate in `[0, 1]`: what if nothing changes?
-    fn critical(&self, gap_m: f64, rear_mps: f64, rear_mps2: f64, leader_mps: f64) -> f64 {
-        if rear_mps <= leader_mps {
-            return 0.0;
-        }
-        let rear_mps2 = rear_mps2.max(-self.braking_mps2_min);
-        let closing_mps = rear_mps - leader_mps;
-        let after_mps = closing_mps + rear_mps2 * self.reaction_s;
-        if after_mps < 0.0 {
-            // It is slower than the leader before the reaction is over, because it brakes already.
-            let closed_m = braking_m(closing_mps, rear_mps2.abs());
-            return if gap_m < closed_m { 1.0 } else { 0.0 };
-        }
-        let reaction_m = (closing_mps + rear_mps2 * self.reaction_s / 2.0) * self.reaction_s;
-        between(
-            gap_m,
-            reaction_m + braking_m(after_mps, self.braking_mps2_min),
-            reaction_m + braking_m(after_mps, self.braking_mps2_max),
-        )
-    }
+    let reaction_m = (closing_mps + rear_mps2 * CAREFUL_REACTION_S / 2.0) * CAREFUL_REACTION_S;
+    between(
+        gap_m,
+        reaction_m + braking_m(after_mps, BRAKING_MPS2_MIN),
+        reaction_m + braking_m(after_mps, BRAKING_MPS2_MAX),
+    )
 }
 
 /// 0 at the safe distance and beyond, 1 at the unsafe one and below, linear between.
@@ -86,7 +69,7 @@ impl Model for FuzzySafety {
     fn braking(&self) -> Braking {
         Braking {
             evaluation_s: 0.0,
-            reaction_s: self.reaction_s,
+            reaction_s: CAREFUL_REACTION_S,
             release_mps2: 0.0,
             jerk_mps3: CAREFUL_JERK_MPS3,
             // 0.774 g as published, with g = 9.81 m/s². No demand is above 6 m/s².
@@ -98,14 +81,14 @@ impl Model for FuzzySafety {
         if encounter.is_beside() || !comes_in_time(encounter) {
             return 0.0;
         }
-        let stopping_s = self.reaction_s + encounter.own_mps / self.braking_mps2_min;
+        let stopping_s = CAREFUL_REACTION_S + encounter.own_mps / BRAKING_MPS2_MIN;
         let gap_m = encounter.gap_m - (-encounter.other_mps).max(0.0) * stopping_s;
         let leader_mps = encounter.other_mps.max(0.0);
-        let critical = self.critical(gap_m, encounter.own_mps, encounter.own_mps2, leader_mps);
+        let critical = critical(gap_m, encounter.own_mps, encounter.own_mps2, leader_mps);
         if critical > 0.0 {
-            critical * (self.braking_mps2_max - self.braking_mps2_min) + self.braking_mps2_min
+            critical * (BRAKING_MPS2_MAX - BRAKING_MPS2_MIN) + BRAKING_MPS2_MIN
         } else {
-            self.proactive(gap_m, encounter.own_mps, leader_mps) * self.braking_mps2_min
+            proactive(gap_m, encounter.own_mps, leader_mps) * BRAKING_MPS2_MIN
         }
     }
 }
@@ -134,21 +117,20 @@ mod tests {
 
     #[test]
     fn surrogates_are_one_zero_and_linear_between() {
-        let model = FuzzySafety::default();
         let (rear_mps, leader_mps) = (20.0, 15.0);
         // u τ + u²/2b - u_l²/14, the margins added.
         let safe_m = 2.0 + 15.0 + 50.0 - 225.0 / 14.0 + 2.0;
         let unsafe_m = 2.0 + 15.0 + 400.0 / 12.0 - 225.0 / 14.0;
-        assert_eq!(model.proactive(safe_m, rear_mps, leader_mps), 0.0);
-        assert_eq!(model.proactive(unsafe_m, rear_mps, leader_mps), 1.0);
-        let middle = model.proactive((safe_m + unsafe_m) / 2.0, rear_mps, leader_mps);
+        assert_eq!(proactive(safe_m, rear_mps, leader_mps), 0.0);
+        assert_eq!(proactive(unsafe_m, rear_mps, leader_mps), 1.0);
+        let middle = proactive((safe_m + unsafe_m) / 2.0, rear_mps, leader_mps);
         assert!((middle - 0.5).abs() < 1e-12);
         // Δv τ + Δv²/2b.
-        assert_eq!(model.critical(3.75 + 25.0 / 8.0, rear_mps, 0.0, leader_mps), 0.0);
-        assert_eq!(model.critical(3.75 + 25.0 / 12.0, rear_mps, 0.0, leader_mps), 1.0);
-        assert_eq!(model.critical(1.0, 15.0, 0.0, 15.0), 0.0);
+        assert_eq!(critical(3.75 + 25.0 / 8.0, rear_mps, 0.0, leader_mps), 0.0);
+        assert_eq!(critical(3.75 + 25.0 / 12.0, rear_mps, 0.0, leader_mps), 1.0);
+        assert_eq!(critical(1.0, 15.0, 0.0, 15.0), 0.0);
         // Braking at 4 already: slower than the leader within the reaction, after 2²/8 m.
-        assert_eq!(model.critical(1.2, 17.0, -6.0, 15.0), 0.0);
-        assert_eq!(model.critical(0.4, 17.0, -6.0, 15.0), 1.0);
+        assert_eq!(critical(1.2, 17.0, -6.0, 15.0), 0.0);
+        assert_eq!(critical(0.4, 17.0, -6.0, 15.0), 1.0);
     }
 }

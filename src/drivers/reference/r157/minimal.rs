@@ -10,8 +10,8 @@
 use avastra_base::kinematics::{CUT_IN_BRAKING_MPS2, CUT_IN_RESPONSE_S};
 use avastra_world::sim::FRAME_S;
 
+use crate::reference::driver::Model;
 use crate::reference::encounter::Encounter;
-use crate::reference::model::Model;
 use crate::reference::reflex::Braking;
 
 /// Side gap of two cars of 1.9 m at which one is 0.3 m into the other's lane of 3.5 m, m: the reading of
