@@ -94,26 +94,17 @@ pub(crate) fn with_dead(space: &Space, realisable: &Realisable) -> Vec<Row> {
 
 /// A row without values on a road, and the rules that leave it none.
 fn dead(space: &Space, row: &Row, road: &Road, in_force: &RulesInForce, left: &Left) -> Reach {
-    let mut conflict = in_force.clone();
-    for rule in in_force.on_row(row) {
-        if effort::is_spent() {
-            break;
-        }
-        let fewer = conflict.except(rule);
-        let rules = RowRules { space, row, road: Some(&road.facts), in_force: &fewer };
-        let search = Search { rules, left, moment: None };
-        if search.memories().0.iter().all(|memory| search.at(memory) == Found::Never) {
-            conflict = fewer;
-        }
-    }
-    let rules: Vec<usize> = conflict.on_row(row).collect();
-    let names: Vec<&str> = rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
-    let rules_on_row = RowRules { space, row, road: Some(&road.facts), in_force };
-    let search = Search { rules: rules_on_row, left, moment: None };
+    let on_row = RowRules { space, row, road: Some(&road.facts), in_force };
+    let rules = on_row.conflict(&|fewer| {
+        let search = Search { rules: fewer, left, moment: None };
+        search.memories().0.iter().all(|memory| search.at(memory) == Found::Never)
+    });
+    let search = Search { rules: on_row, left, moment: None };
     let place = match search.reads_any() {
         true => " in states to which an episode comes in time",
         false => "",
     };
+    let names: Vec<&str> = rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
     let reason = match names.as_slice() {
         [] => "its own ranges and conditions leave no value".to_owned(),
         names => format!("no values obey {}{place} (road `{}`)", listed(names), road.name),

@@ -214,19 +214,9 @@ fn asks_about(body: &RuleBody, from: Known) -> bool {
 
 /// The rules that leave a row undecided: without any one of the others it is undecided still.
 fn to_blame(space: &Space, row: &Row, road: &Road) -> Vec<usize> {
-    let left = Left::new(BOXES_MAX);
-    let mut in_force = RulesInForce::by_default(space);
-    for rule in in_force.clone().on_row(row) {
-        if effort::is_spent() {
-            break;
-        }
-        let fewer = in_force.except(rule);
-        let rules = RowRules { space, row, road: Some(&road.facts), in_force: &fewer };
-        if is_unknown(rules, &left) {
-            in_force = fewer;
-        }
-    }
-    in_force.on_row(row).collect()
+    let (in_force, left) = (RulesInForce::by_default(space), Left::new(BOXES_MAX));
+    let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };
+    rules.conflict(&|fewer| is_unknown(fewer, &left))
 }
 
 /// The rules on a row that are in force by default, in words.
