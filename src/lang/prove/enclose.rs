@@ -42,8 +42,12 @@ pub(crate) struct Known<'a> {
 }
 
 /// The numbers of the bits that are set: the variants of [`Values::Variants`].
-pub(crate) fn bits(set: u128) -> impl Iterator<Item = usize> {
-    (0..VARIANTS_MAX).filter(move |bit| set >> bit & 1 == 1)
+pub(crate) fn bits(mut set: u128) -> impl Iterator<Item = usize> {
+    core::iter::from_fn(move || {
+        let bit = (set != 0).then(|| set.trailing_zeros() as usize)?;
+        set &= set - 1;
+        Some(bit)
+    })
 }
 
 impl Values {
@@ -88,6 +92,17 @@ impl Values {
         }
     }
 
+    /// The values one by one; numbers stay together.
+    pub fn each(self) -> Vec<Values> {
+        match self {
+            Values::Variants(set) => bits(set).map(|bit| Values::Variants(1 << bit)).collect(),
+            Values::Truth { may_hold: true, may_fail: true } => {
+                vec![Values::truth(false), Values::truth(true)]
+            }
+            Values::Truth { .. } | Values::Number(_) => vec![self],
+        }
+    }
+
     /// Everything in either.
     pub fn union(self, other: Values) -> Values {
         match (self, other) {
@@ -114,7 +129,7 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
         ExprKind::CellAt(first, key) => {
             let keys = values(key).variants();
             effort::spend(keys.count_ones() as usize);
-            let chosen = positions(keys).map(|key| known.cells[first + key]);
+            let chosen = bits(keys).map(|key| known.cells[first + key]);
             chosen.reduce(Values::union).unwrap_or(Values::Variants(0))
         }
         ExprKind::Fact(fact) => match known.case.and_then(|case| case.number(*fact)) {
@@ -155,7 +170,7 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
         ExprKind::InLanes(inner, lanes) => match known.road {
             None => Values::UNKNOWN_TRUTH,
             Some(road) => {
-                let inside = positions(values(inner).variants()).map(|v| road.has_lane(lanes[v]));
+                let inside = bits(values(inner).variants()).map(|v| road.has_lane(lanes[v]));
                 let (may_hold, may_fail) =
                     inside.fold((false, false), |(hold, fail), inside| (hold || inside, fail || !inside));
                 Values::Truth { may_hold, may_fail }
@@ -179,7 +194,7 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
                 taken |= bit;
                 is_first
             };
-            let arms_taken = positions(values(subject).variants()).map(|variant| arm_of[variant]);
+            let arms_taken = bits(values(subject).variants()).map(|variant| arm_of[variant]);
             let chosen = arms_taken.filter(is_first).map(|arm| values(&arms[arm]));
             chosen.reduce(Values::union).unwrap_or_else(|| values(&arms[0]))
         }
@@ -218,15 +233,6 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
         | Fact::SafetyGap => Interval::NOT_NEGATIVE,
         Fact::Proc => between(0.0, 1.0),
         Fact::Collision | Fact::Repeated | Fact::Sudden | Fact::Struck | Fact::Avoidable => return None,
-    })
-}
-
-fn positions(set: u128) -> impl Iterator<Item = usize> {
-    let mut left = set;
-    core::iter::from_fn(move || {
-        let position = (left != 0).then(|| left.trailing_zeros() as usize)?;
-        left &= left - 1;
-        Some(position)
     })
 }
 

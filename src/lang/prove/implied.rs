@@ -3,7 +3,7 @@
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Demand, RowRules};
 use crate::model::{Road, RoadFacts, Row, RuleBody, RulesInForce, Space, code, effort};
-use crate::prove::enclose::{Known, Values, bits, enclose};
+use crate::prove::enclose::{Known, Values, enclose};
 use crate::prove::moment::always_holds;
 use crate::syntax::{Diagnostic, listed};
 
@@ -216,23 +216,11 @@ enum Named {
 }
 
 impl Named {
-    /// Its words or truths, one by one; empty for a number.
+    /// Its words or truths, one by one; numbers stay together.
     fn values(self, known: &Known<'_>) -> Vec<Values> {
-        let whole = match self {
-            Named::Local(local) => known.locals[local],
-            Named::Cell(cell) => known.cells[cell],
-        };
-        match whole {
-            Values::Number(_) => Vec::new(),
-            Values::Truth { may_hold, may_fail } => {
-                let truths = [(true, may_hold), (false, may_fail)];
-                truths
-                    .into_iter()
-                    .filter(|(_, may_be)| *may_be)
-                    .map(|(truth, _)| Values::truth(truth))
-                    .collect()
-            }
-            Values::Variants(set) => bits(set).map(|at| Values::Variants(1 << at)).collect(),
+        match self {
+            Named::Local(local) => known.locals[local].each(),
+            Named::Cell(cell) => known.cells[cell].each(),
         }
     }
 }

@@ -378,7 +378,7 @@ impl<'a> States<'a> {
             if !sets.iter().any(names) {
                 continue;
             }
-            let parts = points(chosen[0][local]);
+            let parts = chosen[0][local].each();
             if chosen.len() * parts.len() > PARTS_MAX {
                 continue;
             }
@@ -416,7 +416,7 @@ impl<'a> States<'a> {
     fn parts(&self, cells: &Cells) -> Vec<Cells> {
         let mut parts = vec![cells.clone()];
         for cell in &self.followed {
-            let values = points(cells[*cell]);
+            let values = cells[*cell].each();
             // A single value splits nothing.
             if values.len() == 1 || parts.len() * values.len() > PARTS_MAX {
                 continue;
@@ -492,15 +492,6 @@ fn may_move(allowed: &[Vec<bool>], from: Values, to: Values) -> (bool, bool) {
     let (Values::Variants(from), Values::Variants(to)) = (from, to) else { return (true, true) };
     let pairs = bits(from).flat_map(|from| bits(to).map(move |to| allowed[from][to]));
     pairs.fold((false, false), |(may, may_not), allowed| (may || allowed, may_not || !allowed))
-}
-
-/// A set of values as single values; numbers stay together.
-fn points(values: Values) -> Vec<Values> {
-    match values {
-        Values::Variants(set) => bits(set).map(|bit| Values::Variants(1 << bit)).collect(),
-        Values::Truth { may_hold: true, may_fail: true } => vec![Values::truth(false), Values::truth(true)],
-        Values::Truth { .. } | Values::Number(_) => vec![values],
-    }
 }
 
 /// The cells on which timed rules depend: those that they read; those that decide whether what every step does
