@@ -41,6 +41,19 @@ pub use witness::{Witness, witness};
 use crate::model::{Space, effort};
 use crate::syntax::Diagnostic;
 
+/// Each of these again with each of the values, which vary fastest; `put` puts a value in.
+fn product<T: Clone, V: Copy>(all: &[T], values: &[V], put: impl Fn(&mut T, V)) -> Vec<T> {
+    let mut longer = Vec::with_capacity(all.len() * values.len());
+    for one in all {
+        for value in values {
+            let mut one = one.clone();
+            put(&mut one, *value);
+            longer.push(one);
+        }
+    }
+    longer
+}
+
 /// Errors, warnings and remarks about a space whose names and types are right.
 pub(crate) fn report(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> {
     let proofs: [&dyn Fn() -> Vec<Diagnostic>; 12] = [

@@ -17,6 +17,7 @@ use crate::model::{
 };
 use crate::prove::enclose::{Known, Values, bits, enclose};
 use crate::prove::moment::Case;
+use crate::prove::product;
 use crate::prove::reach::declared;
 use crate::syntax::{Diagnostic, listed};
 use avastra_base::units::Rational;
@@ -382,16 +383,7 @@ impl<'a> States<'a> {
             if chosen.len() * parts.len() > PARTS_MAX {
                 continue;
             }
-            let with = |locals: &Vec<Values>| {
-                let locals = locals.clone();
-                let one = |part: &Values| {
-                    let mut locals = locals.clone();
-                    locals[local] = *part;
-                    locals
-                };
-                parts.iter().map(one).collect::<Vec<_>>()
-            };
-            chosen = chosen.iter().flat_map(with).collect();
+            chosen = product(&chosen, &parts, |locals, part| locals[local] = part);
         }
         chosen
     }
@@ -422,16 +414,7 @@ impl<'a> States<'a> {
                 continue;
             }
             effort::spend(parts.len() * values.len() * cells.len());
-            let with = |part: &Cells| {
-                let part = part.clone();
-                let one = |value: &Values| {
-                    let mut part = part.clone();
-                    part[*cell] = *value;
-                    part
-                };
-                values.iter().map(one).collect::<Vec<_>>()
-            };
-            parts = parts.iter().flat_map(with).collect();
+            parts = product(&parts, &values, |part, value| part[*cell] = value);
         }
         parts
     }

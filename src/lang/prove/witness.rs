@@ -21,6 +21,7 @@ use crate::model::{
 };
 use crate::prove::enclose::{Known, Values};
 use crate::prove::moment::{Case, may_hold_together, newcomers};
+use crate::prove::product;
 use crate::prove::reach::declared;
 use crate::prove::sums::oppose;
 use avastra_base::units::Rational;
@@ -374,14 +375,12 @@ impl Search<'_> {
             let room = (MEMORIES_MAX / memories.len()).max(1);
             is_complete &= values.len() <= room;
             is_complete &= !matches!(state.ty, Type::Int | Type::Quantity(_));
-            if values.len().min(room) == 1 {
+            let tried = &values[..values.len().min(room)];
+            if tried.len() == 1 {
                 continue;
             }
-            effort::spend(memories.len() * values.len().min(room) * memories[0].cells.len());
-            let longer = memories
-                .iter()
-                .flat_map(|memory| values.iter().take(room).map(move |value| memory.with(cell, *value)));
-            memories = longer.collect();
+            effort::spend(memories.len() * tried.len() * memories[0].cells.len());
+            memories = product(&memories, tried, |memory, value| memory.cells[cell] = value);
         }
         (memories, is_complete)
     }
@@ -449,14 +448,7 @@ pub(super) fn choices(action: &ActionDef, values: &[Value]) -> Vec<Vec<Value>> {
                 different.push(*value);
             }
         }
-        let longer = chosen.iter().flat_map(|locals| {
-            different.iter().map(move |value| {
-                let mut locals = locals.clone();
-                locals[local] = *value;
-                locals
-            })
-        });
-        chosen = longer.collect();
+        chosen = product(&chosen, &different, |locals, value| locals[local] = value);
     }
     chosen
 }
