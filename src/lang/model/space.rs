@@ -200,6 +200,14 @@ impl ActionDef {
         })
     }
 
+    /// Its spawns, in the order in which they happen.
+    pub(crate) fn spawns(&self) -> impl Iterator<Item = &SpawnDef> {
+        self.effects.iter().filter_map(|effect| match effect {
+            EffectDef::Spawn(spawn) => Some(&**spawn),
+            EffectDef::Set(_) => None,
+        })
+    }
+
     /// The values of the parameters that are drawn, given those of all, as declared.
     pub fn drawn_of(&self, values: &[Value]) -> Vec<(Arc<str>, Value)> {
         let drawn = self.parameters.iter().zip(values).filter(|(parameter, _)| !parameter.axis);

@@ -7,8 +7,7 @@
 use crate::model::rules::{Demand, RowRules};
 use crate::model::vocabulary::{Known, Verb, Word};
 use crate::model::{
-    EffectDef, Facts, Memory, Reach, Road, Row, RulesInForce, Space, SpawnDef, Value, code, effort, evaluate,
-    locals,
+    Facts, Memory, Reach, Road, Row, RulesInForce, Space, SpawnDef, Value, code, effort, evaluate, locals,
 };
 use crate::prove::witness::{Left, Search, Witness};
 use crate::syntax::Diagnostic;
@@ -26,8 +25,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     for (index, action) in space.actions.iter().enumerate() {
         let left = Left::new(BOXES_MAX / space.actions.len());
-        for effect in &action.effects {
-            let EffectDef::Spawn(spawn) = effect else { continue };
+        for spawn in action.spawns() {
             let mut rows = space.rows_of(index).iter().take_while(|_| !effort::is_spent());
             let found = rows.find_map(|row| {
                 let roads = space.roads.iter().zip(&row.roads);

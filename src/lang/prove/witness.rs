@@ -15,7 +15,7 @@ use std::sync::Arc;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Before, Candidate, Choose, Demand, Nearest, Room, RowRules, cells_read};
 use crate::model::{
-    ActionDef, Domain, EffectDef, End, Facts, Initial, Interval, Memory, Parameter, Road, Row, RulesInForce,
+    ActionDef, Domain, End, Facts, Initial, Interval, Memory, Parameter, Road, Row, RulesInForce,
     SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, SetDef, Space, SpawnFacts, StateDef, Type, Value, WorldFacts, effort,
     evaluate, locals, rounded_into, spawn_out_of_bounds,
 };
@@ -283,8 +283,7 @@ impl Search<'_> {
         let facts = Facts { road: self.rules.road, ..Facts::new(values, after) };
         let number = |expr: &Expr| evaluate(expr, &space.functions, &facts).number();
         let mut spawns = Vec::new();
-        for effect in &action.effects {
-            let EffectDef::Spawn(spawn) = effect else { continue };
+        for spawn in action.spawns() {
             let speed_mps = rounded_into(number(&spawn.speed), SPAWN_SPEED_MPS);
             let distance_m = rounded_into(number(&spawn.distance), SPAWN_DISTANCE_M);
             if spawn_out_of_bounds(speed_mps, distance_m).is_some() {
@@ -393,26 +392,20 @@ impl Search<'_> {
     /// The cells whose values before the step decide a rule or an effect of the row.
     fn read(&self) -> BTreeSet<usize> {
         let states = &self.rules.space.states;
-        let mut found = BTreeSet::new();
+        let (mut found, mut moved) = (BTreeSet::new(), Vec::new());
         let mut named = |expr: &Expr| found.extend(cells_read(expr, states));
         for set in self.rules.space.sets(Some(self.rules.row.action)) {
             set.key.iter().chain([&set.value]).for_each(&mut named);
         }
-        for effect in &self.action().effects {
-            if let EffectDef::Spawn(spawn) = effect {
-                [&spawn.speed, &spawn.distance].into_iter().for_each(&mut named);
-            }
+        for spawn in self.action().spawns() {
+            [&spawn.speed, &spawn.distance].into_iter().for_each(&mut named);
         }
         for (_, demand) in self.rules.demands() {
             match demand {
                 Demand::Holds(condition) => named(condition),
-                Demand::Moves { .. } => {}
+                Demand::Moves { cell, .. } => moved.push(cell),
             }
         }
-        let moved = self.rules.demands().filter_map(|(_, demand)| match demand {
-            Demand::Moves { cell, .. } => Some(cell),
-            Demand::Holds(_) => None,
-        });
         found.extend(moved);
         found
     }
