@@ -176,21 +176,15 @@ impl Space {
 
     /// Draws a value of a type. The checker allows `any` states only for finite types.
     fn draw(&self, ty: Type, rng: &mut Rng) -> Value {
-        match ty {
-            Type::Bool => Value::Bool(rng::below(rng, 2) == 1),
-            Type::Enum(of) => {
-                let odds = &self.enums[of.0].odds;
-                let mut ticket = rng::below(rng, odds.iter().sum());
-                let drawn = odds.iter().position(|odds| match ticket.checked_sub(*odds) {
-                    Some(rest) => {
-                        ticket = rest;
-                        false
-                    }
-                    None => true,
-                });
-                Value::Variant(of, drawn.expect("the ticket is below the sum of the odds"))
+        let values = self.drawn_values(ty);
+        let mut ticket = rng::below(rng, values.iter().map(|(odds, _)| odds).sum());
+        let drawn = values.iter().find(|(odds, _)| match ticket.checked_sub(*odds) {
+            Some(rest) => {
+                ticket = rest;
+                false
             }
-            Type::Int | Type::Quantity(_) => Value::Number(0.0),
-        }
+            None => true,
+        });
+        drawn.expect("the ticket is below the sum of the odds").1
     }
 }
