@@ -68,16 +68,16 @@ pub(super) fn polynomials<'c>(
         found: Vec::new(),
     };
     let action = unknowns.rules.row.action;
-    let mut after_effects = None;
+    let mut are_effects_read = false;
     for clause in clauses {
         if effort::is_spent() {
             return None;
         }
-        if clause.reads_effects && after_effects.is_none() {
+        if clause.reads_effects && !are_effects_read {
             for set in space.sets(Some(action)) {
                 reader.apply(set, &locals)?;
             }
-            after_effects = Some(());
+            are_effects_read = true;
         }
         let condition = match clause.source {
             Source::Where(parameter) => space.actions[action].parameters[parameter].condition.as_ref(),
@@ -112,16 +112,15 @@ impl Reader<'_> {
     fn apply(&mut self, set: &SetDef, locals: &[Form]) -> Option<()> {
         let SetDef { state, key, value, .. } = set;
         let value = self.read(value, locals)?;
-        let key = match key {
-            Some(key) => Some(self.read(key, locals)?),
-            None => None,
-        };
         let state = &self.states[*state];
         let cells = state.first_cell..state.first_cell + state.cells;
-        match key {
-            None => self.cells[cells].fill(value),
-            Some(Form::Known(key)) => self.cells[state.first_cell + key.variant()] = value,
-            Some(_) => {
+        let Some(key) = key else {
+            self.cells[cells].fill(value);
+            return Some(());
+        };
+        match self.read(key, locals)? {
+            Form::Known(key) => self.cells[state.first_cell + key.variant()] = value,
+            Form::Numbers(_) | Form::Open => {
                 for cell in cells {
                     self.cells[cell] = join([self.cells[cell].clone(), value.clone()])?;
                 }
@@ -192,24 +191,9 @@ impl Reader<'_> {
                     _ => self.compared(&left, &right)?,
                 }
             }
-            ExprKind::And(left, right) => match self.read(left, locals)? {
-                Form::Known(value) if !value.truth() => Form::Known(value),
-                left => {
-                    self.read(right, locals).map(|right| if left == Form::Open { left } else { right })?
-                }
-            },
-            ExprKind::Or(left, right) => match self.read(left, locals)? {
-                Form::Known(value) if value.truth() => Form::Known(value),
-                left => {
-                    self.read(right, locals).map(|right| if left == Form::Open { left } else { right })?
-                }
-            },
-            ExprKind::Implies(left, right) => match self.read(left, locals)? {
-                Form::Known(value) if !value.truth() => Form::Known(Value::Bool(true)),
-                left => {
-                    self.read(right, locals).map(|right| if left == Form::Open { left } else { right })?
-                }
-            },
+            ExprKind::And(left, right) => self.read_both(left, right, locals, (false, false))?,
+            ExprKind::Or(left, right) => self.read_both(left, right, locals, (true, true))?,
+            ExprKind::Implies(left, right) => self.read_both(left, right, locals, (false, true))?,
             ExprKind::InRange(inner, low, high) => {
                 let inner = self.read(inner, locals)?;
                 for end in [low, high] {
@@ -244,6 +228,21 @@ impl Reader<'_> {
                 }
             },
         })
+    }
+
+    /// Two truths of which the left one may decide: whether it does, and what is true then, are given.
+    fn read_both(
+        &mut self,
+        left: &Expr,
+        right: &Expr,
+        locals: &[Form],
+        (deciding, decided): (bool, bool),
+    ) -> Option<Form> {
+        match self.read(left, locals)? {
+            Form::Known(value) if value.truth() == deciding => Some(Form::Known(Value::Bool(decided))),
+            Form::Open => self.read(right, locals).map(|_| Form::Open),
+            Form::Known(_) | Form::Numbers(_) => self.read(right, locals),
+        }
     }
 
     /// Notes where two numbers may be equal.
