@@ -41,6 +41,17 @@ pub use witness::{Witness, witness};
 use crate::model::{Space, effort};
 use crate::syntax::Diagnostic;
 
+/// The different ones among these, in their order.
+fn distinct<T: PartialEq>(all: impl IntoIterator<Item = T>) -> Vec<T> {
+    let mut found = Vec::new();
+    for one in all {
+        if !found.contains(&one) {
+            found.push(one);
+        }
+    }
+    found
+}
+
 /// Each of these again with each of the values, which vary fastest; `put` puts a value in.
 fn product<T: Clone, V: Copy>(all: &[T], values: &[V], put: impl Fn(&mut T, V)) -> Vec<T> {
     let mut longer = Vec::with_capacity(all.len() * values.len());

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use crate::model::rules::RowRules;
 use crate::model::{Domain, Interval, Parameter, Reach, Road, Row, RulesInForce, Space, Value, code};
+use crate::prove::distinct;
 use crate::prove::enclose::Values;
 use crate::prove::reach::declared;
 use crate::syntax::{Diagnostic, enumerated, listed};
@@ -47,7 +48,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
                 continue;
             }
             let mut sets: Vec<(Vec<usize>, Vec<Value>)> = Vec::new();
-            for value in distinct(values) {
+            for value in distinct(values.iter().copied()) {
                 let Some(rules) = search.forbidding(&open, (local, parameter), value) else { continue };
                 match sets.iter_mut().find(|(known, _)| *known == rules) {
                     Some((_, values)) => values.push(value),
@@ -121,16 +122,6 @@ impl Search<'_> {
         locals[local] = Values::point(value);
         rules.narrow(locals, &self.cells, None).is_some()
     }
-}
-
-fn distinct(values: &[Value]) -> Vec<Value> {
-    let mut found: Vec<Value> = Vec::new();
-    for value in values {
-        if !found.contains(value) {
-            found.push(*value);
-        }
-    }
-    found
 }
 
 fn remark(space: &Space, parameter: &Parameter, values: &[Value], rules: &[usize]) -> Diagnostic {

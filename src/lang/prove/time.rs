@@ -10,15 +10,15 @@ use core::ops::RangeInclusive;
 use std::collections::BTreeSet;
 
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::rules::Demand;
+use crate::model::rules::{Demand, cells_read};
 use crate::model::{
     Initial, Interval, Reach, Road, Row, RuleBody, RuleDef, RulesInForce, STATE_MAX, SetDef, Space, Type,
     code, effort,
 };
 use crate::prove::enclose::{Known, Values, bits, enclose};
 use crate::prove::moment::Case;
-use crate::prove::product;
 use crate::prove::reach::declared;
+use crate::prove::{distinct, product};
 use crate::syntax::{Diagnostic, listed};
 use avastra_base::units::Rational;
 
@@ -109,22 +109,16 @@ fn warning(space: &Space, optional: &RuleDef, broken: &BrokenByTime) -> Diagnost
 
 fn error(space: &Space, broken: &BrokenByTime) -> Diagnostic {
     let rule = &space.rules[broken.index];
-    let unknown = || format!("whether rule `{}` lasts as time passes is not known", rule.name);
     let (message, label) = match &broken.how {
         How::At(step, time_s, states) => (
             format!("time alone breaks rule `{}`", rule.name),
             format!("does not hold at step {step} ({time_s} s) where {states}, if that step has no action"),
         ),
-        How::TooMany => (unknown(), "too many states to follow from step to step".to_owned()),
-        How::TooLong(step) => (unknown(), format!("the states were followed to step {step} alone")),
+        How::TooMany => (broken.words(), "too many states to follow from step to step".to_owned()),
+        How::TooLong(step) => (broken.words(), format!("the states were followed to step {step} alone")),
     };
-    let mut cells: Vec<String> = Vec::new();
-    for cell in rule.start.iter().flat_map(|start| cells_read(space, start)) {
-        let name = space.cell_name(cell);
-        if !cells.contains(&name) {
-            cells.push(name);
-        }
-    }
+    let read = rule.start.iter().flat_map(|start| cells_read(start, &space.states));
+    let cells = distinct(read.map(|cell| space.cell_name(cell)));
     let help = match &broken.how {
         How::At(..) => format!(
             "let `each step {{ … }}` set {} in time, counting the steps in a state of its own; or bind the rule to \
@@ -431,9 +425,8 @@ impl<'a> States<'a> {
 
     fn broken(&self, index: usize, step: u64, state: usize) -> BrokenByTime {
         let rule = &self.space.rules[index];
-        let mut read = rule.start.as_ref().map_or_else(Vec::new, |start| cells_read(self.space, start));
-        read.sort_unstable();
-        read.dedup();
+        let states = &self.space.states;
+        let read: BTreeSet<usize> = rule.start.iter().flat_map(|start| cells_read(start, states)).collect();
         let words = |cell: &usize| {
             let (name, values) = (self.space.cell_name(*cell), self.met[state][*cell]);
             format!("`{name}` is {}", self.shown(values, self.space.state_of(*cell).ty))
@@ -484,7 +477,7 @@ fn followed(space: &Space, in_force: &RulesInForce, timed: &[usize]) -> Vec<usiz
     for rule in in_force.all() {
         match (&space.rules[rule].start, &space.rules[rule].body) {
             (Some(start), _) => {
-                let read = cells_read(space, start);
+                let read = cells_read(start, &space.states);
                 if timed.contains(&rule) || read.iter().any(|cell| space.may_set_each_step(*cell)) {
                     found.extend(read);
                 }
@@ -511,13 +504,9 @@ fn followed(space: &Space, in_force: &RulesInForce, timed: &[usize]) -> Vec<usiz
         }
         for set in sets.iter().filter(|set| space.sets_cell(set, cell)) {
             for part in set.key.iter().chain([&set.value]) {
-                found.extend(cells_read(space, part).into_iter().filter(|read| seen.insert(*read)));
+                found.extend(cells_read(part, &space.states).into_iter().filter(|read| seen.insert(*read)));
             }
         }
     }
     found
-}
-
-fn cells_read(space: &Space, expr: &Expr) -> Vec<usize> {
-    crate::model::rules::cells_read(expr, &space.states)
 }

@@ -21,9 +21,9 @@ use crate::model::{
 };
 use crate::prove::enclose::{Known, Values};
 use crate::prove::moment::{Case, may_hold_together, newcomers};
-use crate::prove::product;
 use crate::prove::reach::declared;
 use crate::prove::sums::oppose;
+use crate::prove::{distinct, product};
 use avastra_base::units::Rational;
 
 /// The most boxes of ranges looked at for one choice of the listed values and one memory.
@@ -489,11 +489,5 @@ fn all_values(space: &Space, ty: Type, first: Value) -> Vec<Value> {
         Type::Bool => values.extend([false, true].map(Value::Bool)),
         Type::Int | Type::Quantity(_) => {}
     }
-    let mut kept: Vec<Value> = Vec::new();
-    for value in values {
-        if !kept.contains(&value) {
-            kept.push(value);
-        }
-    }
-    kept
+    distinct(values)
 }
