@@ -64,16 +64,12 @@ impl RunsIn {
 pub fn realise(space: &Space) -> (Realisable, RunsIn) {
     let left = Left::new(BOXES_MAX);
     let in_force = RulesInForce::by_default(space);
-    let mut realisable = vec![vec![Realised::NotSearched; space.roads.len()]; space.rows.len()];
-    let mut runs_in = RunsIn { states: Vec::new(), found: vec![Vec::new(); space.rows.len()] };
+    let mut realisable = vec![vec![Realised::Never; space.roads.len()]; space.rows.len()];
+    let found = vec![vec![None; space.roads.len()]; space.rows.len()];
+    let mut runs_in = RunsIn { states: Vec::new(), found };
     for (index, road) in space.roads.iter().enumerate() {
         let on_road = OnRoad { space, road, in_force: &in_force, left: &left };
-        let OfRoad { found, runs_in: places, states } = on_road.rows(index);
-        for (row, (found, state)) in found.into_iter().zip(places).enumerate() {
-            realisable[row][index] = found;
-            runs_in.found[row].push(state);
-        }
-        runs_in.states.push(states);
+        on_road.rows(index, &mut realisable, &mut runs_in);
     }
     (realisable, runs_in)
 }
@@ -112,14 +108,6 @@ fn dead(space: &Space, row: &Row, road: &Road, in_force: &RulesInForce, left: &L
     Reach::Dead { rules, reason }
 }
 
-/// What is found of each row on a road.
-struct OfRoad {
-    found: Vec<Realised>,
-    /// The state in which it runs, by position in `states`.
-    runs_in: Vec<Option<usize>>,
-    states: Vec<Memory>,
-}
-
 /// The rows of a space on one of its roads.
 struct OnRoad<'a> {
     space: &'a Space,
@@ -150,15 +138,13 @@ impl<'a> OnRoad<'a> {
         !asked.about_time || self.search(asked.row, Some(moment)).may_run(&self.space.cells_unknown())
     }
 
-    /// What is found of each row.
-    fn rows(&self, index: usize) -> OfRoad {
+    /// Writes down what is found of each row that is not dead on the road, whose index is given.
+    fn rows(&self, index: usize, realisable: &mut Realisable, runs_in: &mut RunsIn) {
         let is_open = |row: &&Row| matches!(row.roads[index], Reach::Open(_));
         let open: Vec<Asked<'_>> =
             self.space.rows.iter().filter(is_open).map(|row| self.asked(row)).collect();
         let sets = |asked: &&Asked<'_>| self.space.actions[asked.row.action].sets().next().is_some();
         let movers: Vec<Asked<'_>> = open.iter().filter(sets).copied().collect();
-        let mut found = vec![Realised::Never; self.space.rows.len()];
-        let mut runs_in = vec![None; self.space.rows.len()];
         let mut pending = open;
         let mut way = Way::begin(self, &movers);
         for step in 0..u64::from(self.space.episode.step_limit) {
@@ -169,8 +155,8 @@ impl<'a> OnRoad<'a> {
                 }
                 let state = way.runs(self, asked, step, &moment);
                 if state.is_some() {
-                    found[asked.row.index] = Realised::Runs;
-                    runs_in[asked.row.index] = state;
+                    realisable[asked.row.index][index] = Realised::Runs;
+                    runs_in.found[asked.row.index][index] = state;
                 }
                 state.is_none()
             });
@@ -186,9 +172,9 @@ impl<'a> OnRoad<'a> {
             }
         }
         for asked in pending {
-            found[asked.row.index] = self.elsewhere(&asked, way.is_complete);
+            realisable[asked.row.index][index] = self.elsewhere(&asked, way.is_complete);
         }
-        OfRoad { found, runs_in, states: way.states.into_iter().map(|met| met.memory).collect() }
+        runs_in.states.push(way.states.into_iter().map(|met| met.memory).collect());
     }
 
     /// What there is of a row that did not run in any state that was followed.
