@@ -3,7 +3,8 @@
 use crate::model::expr::Comparison;
 use crate::model::rules::RowRules;
 use crate::model::{Domain, End, Interval, Parameter, Reach, RulesInForce, Space, code, effort};
-use crate::syntax::{Diagnostic, listed};
+use crate::prove::rule_names;
+use crate::syntax::Diagnostic;
 use avastra_base::units::Rational;
 
 /// One remark for each range on each road that rules cut below half. Cuts with the same parameter, rules
@@ -53,11 +54,10 @@ struct Cut<'a> {
 
 impl Cut<'_> {
     fn remark(self, space: &Space) -> Diagnostic {
-        let names: Vec<&str> = self.rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
         let message = format!(
             "{} {} {:.0} % of the range of `{}` on `{}`",
-            listed(&names),
-            if names.len() == 1 { "leaves" } else { "leave" },
+            rule_names(space, &self.rules),
+            if self.rules.len() == 1 { "leaves" } else { "leave" },
             self.percent,
             self.parameter.name,
             self.road,

@@ -5,6 +5,7 @@ use crate::model::rules::{Demand, RowRules};
 use crate::model::{Road, RoadFacts, Row, RuleBody, RulesInForce, Space, code, effort};
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::prove::moment::always_holds;
+use crate::prove::rule_names;
 use crate::syntax::{Diagnostic, listed};
 
 /// Limit on rows times rules for the whole report; rules beyond it are not looked at.
@@ -62,8 +63,7 @@ fn warning(space: &Space, rule: usize, reasons: &[usize]) -> Diagnostic {
             .at(definition.span, label)
             .help("remove it, or say what it should forbid");
     }
-    let names: Vec<&str> = reasons.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
-    let message = format!("rule `{}` follows from {}", definition.name, listed(&names));
+    let message = format!("rule `{}` follows from {}", definition.name, rule_names(space, reasons));
     let warning = Diagnostic::warning(code::IMPLIED, message).at(definition.span, "forbids nothing more");
     let warning = reasons
         .iter()

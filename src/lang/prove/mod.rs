@@ -39,7 +39,12 @@ pub use time::{BrokenByTime, lasts};
 pub use witness::{Witness, witness};
 
 use crate::model::{Space, effort};
-use crate::syntax::Diagnostic;
+use crate::syntax::{Diagnostic, listed};
+
+/// The names of rules, as a list in words.
+fn rule_names(space: &Space, rules: &[usize]) -> String {
+    listed(&rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect::<Vec<_>>())
+}
 
 /// The different ones among these, in their order.
 fn distinct<T: PartialEq>(all: impl IntoIterator<Item = T>) -> Vec<T> {

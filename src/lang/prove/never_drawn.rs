@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use crate::model::rules::RowRules;
 use crate::model::{Domain, Interval, Parameter, Reach, Road, Row, RulesInForce, Space, Value, code};
-use crate::prove::distinct;
 use crate::prove::enclose::Values;
 use crate::prove::reach::declared;
-use crate::syntax::{Diagnostic, enumerated, listed};
+use crate::prove::{distinct, rule_names};
+use crate::syntax::{Diagnostic, enumerated};
 
 /// A remark names this many values and one more; of longer lists the others are counted.
 const NAMED_MAX: usize = 5;
@@ -133,9 +133,8 @@ fn remark(space: &Space, parameter: &Parameter, values: &[Value], rules: &[usize
         shown.push(format!("{} others", values.len() - NAMED_MAX));
     }
     let shown = enumerated(&shown, "or");
-    let names: Vec<&str> = rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
-    let verb = if names.len() == 1 { "lets" } else { "let" };
-    let message = format!("{} never {verb} `{}` be {shown}", listed(&names), parameter.name);
+    let verb = if rules.len() == 1 { "lets" } else { "let" };
+    let message = format!("{} never {verb} `{}` be {shown}", rule_names(space, rules), parameter.name);
     let remark = Diagnostic::remark(code::CUT, message).at(parameter.span, "");
     rules.iter().fold(remark, |remark, rule| remark.beside(space.rules[*rule].span, "by this rule")).help(
         "if that is meant, all is well; else list the values that are wanted (`in [..]`), or loosen the rule",

@@ -11,8 +11,8 @@ use crate::model::rules::RowRules;
 use crate::model::vocabulary::Fact;
 use crate::model::{Memory, Reach, Road, Row, RulesInForce, Space, Value, effort};
 use crate::prove::moment::Case;
+use crate::prove::rule_names;
 use crate::prove::witness::{Found, Left, Search};
-use crate::syntax::listed;
 
 /// The most boxes of ranges that the searches of all rows look at; most rows need one for each road.
 const BOXES_MAX: usize = 20_000;
@@ -100,10 +100,9 @@ fn dead(space: &Space, row: &Row, road: &Road, in_force: &RulesInForce, left: &L
         true => " in states to which an episode comes in time",
         false => "",
     };
-    let names: Vec<&str> = rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
-    let reason = match names.as_slice() {
-        [] => "its own ranges and conditions leave no value".to_owned(),
-        names => format!("no values obey {}{place} (road `{}`)", listed(names), road.name),
+    let reason = match rules.is_empty() {
+        true => "its own ranges and conditions leave no value".to_owned(),
+        false => format!("no values obey {}{place} (road `{}`)", rule_names(space, &rules), road.name),
     };
     Reach::Dead { rules, reason }
 }

@@ -10,8 +10,8 @@ use crate::model::{ActionDef, Road, Row, RuleBody, RuleDef, RulesInForce, Space,
 use crate::prove::clock::never_enabled;
 use crate::prove::reach::numbers;
 use crate::prove::realise::{Realisable, Realised, is_about_time};
-use crate::prove::spawn_bounds;
 use crate::prove::witness::{Found, Left, Search};
+use crate::prove::{rule_names, spawn_bounds};
 use crate::syntax::{Diagnostic, listed};
 
 /// The most boxes of ranges that are looked at to find the rules which leave a row undecided.
@@ -223,8 +223,4 @@ fn to_blame(space: &Space, row: &Row, road: &Road) -> Vec<usize> {
 fn names(space: &Space, row: &Row) -> String {
     let rules: Vec<usize> = RulesInForce::by_default(space).on_row(row).collect();
     rule_names(space, &rules)
-}
-
-fn rule_names(space: &Space, rules: &[usize]) -> String {
-    listed(&rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect::<Vec<_>>())
 }
