@@ -44,10 +44,9 @@ impl Sweep {
     /// The box after a part of the motion.
     pub fn at(&self, fraction: f64) -> OrientedBox {
         let start = &self.start.pose;
-        let turn_rad = wrap_angle(self.end.heading_rad - start.heading_rad);
         let pose = Pose {
-            position: start.position + (self.end.position - start.position) * fraction,
-            heading_rad: wrap_angle(start.heading_rad + turn_rad * fraction),
+            position: start.position + self.displacement() * fraction,
+            heading_rad: wrap_angle(start.heading_rad + self.turn_rad() * fraction),
         };
         OrientedBox { pose, ..self.start }
     }
@@ -55,9 +54,8 @@ impl Sweep {
     /// Velocity of the point of the box that is at `point` when `fraction` of the motion is done, in m per
     /// whole motion.
     pub fn rate_m(&self, fraction: f64, point: Vec2) -> Vec2 {
-        let turn_rad = wrap_angle(self.end.heading_rad - self.start.pose.heading_rad);
         let arm = point - self.at(fraction).pose.position;
-        self.displacement() + Vec2::new(-arm.y, arm.x) * turn_rad
+        self.displacement() + Vec2::new(-arm.y, arm.x) * self.turn_rad()
     }
 
     /// Farthest that any point of the box moves, m.
@@ -69,15 +67,18 @@ impl Sweep {
         self.end.position - self.start.pose.position
     }
 
+    fn turn_rad(&self) -> f64 {
+        wrap_angle(self.end.heading_rad - self.start.pose.heading_rad)
+    }
+
     /// Farthest that a corner gets from where the centre began, the displacement not counted, m.
     fn reach_m(&self) -> f64 {
-        let turn_rad = wrap_angle(self.end.heading_rad - self.start.pose.heading_rad);
-        (self.start.half_length_m + self.start.half_width_m) * (1.0 + turn_rad.abs())
+        (self.start.half_length_m + self.start.half_width_m) * (1.0 + self.turn_rad().abs())
     }
 
     /// Farthest that a corner travels by turning alone, m.
     fn turning_m(&self) -> f64 {
-        wrap_angle(self.end.heading_rad - self.start.pose.heading_rad).abs() * self.start.radius_m()
+        self.turn_rad().abs() * self.start.radius_m()
     }
 }
 
@@ -97,19 +98,13 @@ fn clearance(a: &OrientedBox, b: &OrientedBox) -> Clearance {
         let touch = overlap_point(&a, &b);
         return Clearance { distance_m: 0.0, on_first: touch, on_second: touch };
     }
+    let of_first = a.corners().map(|corner| (corner, b.nearest(corner)));
+    let of_second = b.corners().map(|corner| (a.nearest(corner), corner));
     let mut best = (f64::INFINITY, Vec2::zeros(), Vec2::zeros());
-    for corner in a.corners() {
-        let on_second = b.nearest(corner);
-        let squared = (on_second - corner).norm_squared();
+    for (on_first, on_second) in of_first.into_iter().chain(of_second) {
+        let squared = (on_second - on_first).norm_squared();
         if squared < best.0 {
-            best = (squared, corner, on_second);
-        }
-    }
-    for corner in b.corners() {
-        let on_first = a.nearest(corner);
-        let squared = (on_first - corner).norm_squared();
-        if squared < best.0 {
-            best = (squared, on_first, corner);
+            best = (squared, on_first, on_second);
         }
     }
     Clearance { distance_m: best.0.sqrt(), on_first: best.1, on_second: best.2 }
