@@ -3,7 +3,7 @@
 use crate::rng;
 use crate::rng::Rng;
 
-use crate::statistics::bisect;
+use crate::statistics::{Z, bisect};
 
 /// An interval that covers the true value in 95 of 100 samples.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -81,8 +81,6 @@ pub fn wilson(count: u32, trials: u32) -> (f64, f64) {
     if trials == 0 {
         return (0.0, 1.0);
     }
-    // 97.5 % quantile of the normal distribution.
-    const Z: f64 = 1.959_963_984_540_054;
     let (n, p) = (f64::from(trials), f64::from(count) / f64::from(trials));
     let centre = p + Z * Z / (2.0 * n);
     let half = Z * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt();
@@ -223,12 +221,11 @@ pub fn paired_difference([both, first_only, second_only]: [u64; 3], pairs: u64) 
 pub fn poisson(count: u64) -> Interval {
     // Ten standard deviations and some more: far enough on both sides.
     let far = count as f64 + 10.0 * (count as f64).sqrt() + 20.0;
-    let at_most = |events: u64, mean: f64| poisson_at_most(events, mean);
     let low = match count.checked_sub(1) {
         None => 0.0,
-        Some(fewer) => bisect(0.0, far, |mean| 1.0 - at_most(fewer, mean) >= 0.025),
+        Some(fewer) => bisect(0.0, far, |mean| 1.0 - poisson_at_most(fewer, mean) >= 0.025),
     };
-    Interval { low, high: Some(bisect(0.0, far, |mean| at_most(count, mean) <= 0.025)) }
+    Interval { low, high: Some(bisect(0.0, far, |mean| poisson_at_most(count, mean) <= 0.025)) }
 }
 
 /// Probability that a Poisson variable is at most `count`.
