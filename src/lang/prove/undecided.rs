@@ -158,7 +158,7 @@ fn error(space: &Space, many: &[Unknown<'_>]) -> Diagnostic {
     };
     let error = error.note(format!("no values were found{obeyed}, and no proof that there are none"));
     error.help(match () {
-        () if rules.iter().any(|rule| asks_about(&rule.body, Known::Spawn)) => {
+        () if ask(&rules, Known::Spawn) => {
             "a newcomer is taken to appear as far away and as fast as its spawn asks: let the rule allow that"
         }
         () if are_of_states(&rules) => {
@@ -170,12 +170,11 @@ fn error(space: &Space, many: &[Unknown<'_>]) -> Diagnostic {
 
 /// What is not known of rules that leave rows undecided.
 fn why(rules: &[&RuleDef]) -> &'static str {
-    let ask = |from: Known| rules.iter().any(|rule| asks_about(&rule.body, from));
     match () {
-        () if ask(Known::Spawn) => "not found to hold for a newcomer",
-        () if ask(Known::World) => "not found to hold at a moment",
+        () if ask(rules, Known::Spawn) => "not found to hold for a newcomer",
+        () if ask(rules, Known::World) => "not found to hold at a moment",
         () if are_of_states(rules) => "not met in the states that were followed",
-        () if rules.iter().any(|rule| has_powers(&rule.body)) => "too complicated to be solved",
+        () if have_powers(rules) => "too complicated to be solved",
         () => "not solved for so many numbers",
     }
 }
@@ -184,17 +183,11 @@ fn why(rules: &[&RuleDef]) -> &'static str {
 fn are_of_states(rules: &[&RuleDef]) -> bool {
     let is_state = |kind: &ExprKind| matches!(kind, ExprKind::Cell(_) | ExprKind::CellAt(..));
     let is_drawn = |kind: &ExprKind| matches!(kind, ExprKind::Local(_));
-    !rules.is_empty()
-        && rules.iter().all(|rule| {
-            let RuleBody::Holds(bindings) = &rule.body else { return false };
-            bindings.iter().any(|binding| binding.condition.any(is_state))
-                && !bindings.iter().any(|binding| binding.condition.any(is_drawn))
-        })
+    !rules.is_empty() && rules.iter().all(|rule| has(rule, is_state) && !has(rule, is_drawn))
 }
 
 /// Whether a rule has more than sums of numbers, each times a constant.
-fn has_powers(body: &RuleBody) -> bool {
-    let RuleBody::Holds(bindings) = body else { return false };
+fn have_powers(rules: &[&RuleDef]) -> bool {
     let is_fixed = |expr: &Expr| matches!(expr.kind, ExprKind::Number(_));
     let is_power = |kind: &ExprKind| match kind {
         ExprKind::Arithmetic(Arithmetic::Multiply, left, right) => !is_fixed(left) && !is_fixed(right),
@@ -202,14 +195,19 @@ fn has_powers(body: &RuleBody) -> bool {
         ExprKind::Call(..) => true,
         _ => false,
     };
-    bindings.iter().any(|binding| binding.condition.any(is_power))
+    rules.iter().any(|rule| has(rule, is_power))
 }
 
 /// Whether a rule asks for a fact that is known from then on.
-fn asks_about(body: &RuleBody, from: Known) -> bool {
-    let RuleBody::Holds(bindings) = body else { return false };
+fn ask(rules: &[&RuleDef], from: Known) -> bool {
     let asks = |kind: &ExprKind| matches!(kind, ExprKind::Fact(fact) if fact.known() == from);
-    bindings.iter().any(|binding| binding.condition.any(asks))
+    rules.iter().any(|rule| has(rule, asks))
+}
+
+/// Whether a part of the condition that a rule demands passes the test, for some action.
+fn has(rule: &RuleDef, test: impl Fn(&ExprKind) -> bool) -> bool {
+    let RuleBody::Holds(bindings) = &rule.body else { return false };
+    bindings.iter().any(|binding| binding.condition.any(&test))
 }
 
 /// The rules that leave a row undecided: without any one of the others it is undecided still.
