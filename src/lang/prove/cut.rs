@@ -75,14 +75,18 @@ impl Cut<'_> {
 
 /// How much of a range is left, in percent; `None` if it is half or more, or a single value.
 fn kept_percent(domain: &Domain, kept: &Interval) -> Option<f64> {
-    let (Domain::Range(low, high), End::At(from, _), End::At(to, _)) = (domain, kept.low, kept.high) else {
-        return None;
-    };
-    let (whole, left) = (high.checked_sub(*low)?, to.checked_sub(from)?);
-    let share = left.checked_div(whole)?;
+    let share = kept_share(domain, kept)?;
     let half = Rational::new(1, 2).expect("2 is not 0");
     // A single value comes from an equality, so it is meant.
     (share > Rational::ZERO && share < half).then(|| share.to_f64() * 100.0)
+}
+
+/// The share of a range that is left; `None` if the domain is a list or a single number.
+fn kept_share(domain: &Domain, kept: &Interval) -> Option<Rational> {
+    let (Domain::Range(low, high), End::At(from, _), End::At(to, _)) = (domain, kept.low, kept.high) else {
+        return None;
+    };
+    to.checked_sub(from)?.checked_div(high.checked_sub(*low)?)
 }
 
 /// The rules in force that bound the parameter; none if any rule sets it by an equality.
@@ -122,8 +126,11 @@ pub fn removals(space: &Space, rule: usize) -> Vec<Removal> {
             let settled = rules.settle();
             for bound in rules.bounds().filter(|bound| bound.rule.is_some()) {
                 let parameter = &action.parameters[bound.local];
-                let kept = settled.as_ref().map(|settled| settled[bound.local].interval());
-                let Some(percent) = removed_percent(&parameter.domain, kept) else { continue };
+                // Where the rule leaves no row, it leaves as much as a single number: nothing.
+                let nothing = Interval::point(Rational::ZERO);
+                let kept = settled.as_ref().map_or(nothing, |settled| settled[bound.local].interval());
+                let Some(share) = kept_share(&parameter.domain, &kept) else { continue };
+                let percent = 100.0 - share.to_f64() * 100.0;
                 let same =
                     |known: &&mut Removal| known.parameter == *parameter.name && known.road == road.name;
                 match found.iter_mut().find(same) {
@@ -142,17 +149,4 @@ pub fn removals(space: &Space, rule: usize) -> Vec<Removal> {
         }
     }
     found
-}
-
-/// How much of a range is removed, in percent; `None` if the domain is a list or a single number. `kept` is
-/// `None` if nothing is left.
-fn removed_percent(domain: &Domain, kept: Option<Interval>) -> Option<f64> {
-    let Domain::Range(low, high) = domain else { return None };
-    let whole = high.checked_sub(*low).filter(|whole| *whole > Rational::ZERO)?;
-    let left = match kept.map(|kept| (kept.low, kept.high)) {
-        Some((End::At(from, _), End::At(to, _))) => to.checked_sub(from)?,
-        Some(_) => return None,
-        None => Rational::ZERO,
-    };
-    Some(100.0 - left.checked_div(whole)?.to_f64() * 100.0)
 }
