@@ -3,7 +3,7 @@
 use crate::model::effort;
 use crate::model::eval::{Facts, evaluate};
 use crate::model::expr::ExprKind;
-use crate::model::rules::RulesInForce;
+use crate::model::rules::{Combinations, RulesInForce};
 use crate::model::space::{Initial, Road, RoadFacts, RuleBody, SetDef, Space, StateDef, StateMeaning};
 use crate::model::value::{Memory, Type, Value};
 use crate::model::vocabulary::{Level, TimeOfDay};
@@ -38,24 +38,11 @@ impl Space {
         count_max: usize,
     ) -> (Vec<Memory>, bool) {
         let begun = self.initial_memory(0);
-        let open: Vec<(usize, Vec<(u32, Value)>)> = self
-            .open_cells()
-            .into_iter()
-            .map(|cell| (cell, self.drawn_values(self.state_of(cell).ty)))
-            .collect();
-        // Memories are numbered, the last cell varying fastest, so that none is made beyond `count_max`.
+        // The last cell varies fastest. None is made beyond `count_max`.
+        let starts = Combinations::of(self, &begun, self.open_cells().into_iter().rev());
         let all = self.start_count();
         let are_all = all <= count_max;
-        let numbered = |number: usize| {
-            effort::spend(begun.cells.len());
-            let (mut left, mut memory) = (number, begun.clone());
-            for (cell, values) in open.iter().rev() {
-                memory.cells[*cell] = values[left % values.len()].1;
-                left /= values.len();
-            }
-            memory
-        };
-        let mut memories: Vec<Memory> = (0..all.min(count_max)).map(numbered).collect();
+        let mut memories: Vec<Memory> = (0..all.min(count_max)).map(|number| starts.get(number).1).collect();
         memories.retain(|memory| self.broken_start(memory, &road.facts, rules).is_none());
         if memories.is_empty() {
             memories.extend(self.memory_at_start(road, rules, 0));

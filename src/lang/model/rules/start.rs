@@ -166,11 +166,42 @@ struct Group {
     cells: Vec<usize>,
 }
 
+/// Memories that differ in some cells alone, by number: one for each combination of the values that are drawn for these
+/// cells. Those of the first cell vary fastest.
+pub(crate) struct Combinations<'a> {
+    memory: &'a Memory,
+    /// The cells, each with its values and their odds.
+    cells: Vec<(usize, Vec<(u32, Value)>)>,
+}
+
+impl<'a> Combinations<'a> {
+    pub fn of(space: &Space, memory: &'a Memory, cells: impl Iterator<Item = usize>) -> Combinations<'a> {
+        let cells = cells.map(|cell| (cell, space.drawn_values(space.state_of(cell).ty)));
+        Combinations { memory, cells: cells.collect() }
+    }
+
+    /// At most `usize::MAX`.
+    pub fn count(&self) -> usize {
+        self.cells.iter().map(|(_, values)| values.len()).fold(1, usize::saturating_mul)
+    }
+
+    /// The odds of a combination, relative to the others, and the memory with it.
+    pub fn get(&self, mut number: usize) -> (f64, Memory) {
+        effort::spend(self.memory.cells.len());
+        let (mut odds, mut memory) = (1.0, self.memory.clone());
+        for (cell, values) in &self.cells {
+            let (of_value, value) = values[number % values.len()];
+            number /= values.len();
+            odds *= f64::from(of_value);
+            memory.cells[*cell] = value;
+        }
+        (odds, memory)
+    }
+}
+
 /// The legal combinations of the open cells that a group of rules reads.
 struct Starts<'a> {
-    memory: &'a Memory,
-    /// The open cells, each with its values and their odds.
-    cells: Vec<(usize, Vec<(u32, Value)>)>,
+    all: Combinations<'a>,
     /// Numbers of the combinations that obey the rules.
     legal: Vec<usize>,
 }
@@ -188,47 +219,26 @@ impl<'a> Starts<'a> {
             let cells = space.rules[index].start.iter().flat_map(|start| cells_read(start, &space.states));
             NoStart { road, rule, index, cells: cells.collect(), is_too_large }
         };
-        let mut cells = Vec::new();
         let open: BTreeSet<usize> = open.iter().copied().collect();
-        for cell in group.cells.iter().filter(|cell| open.contains(cell)) {
-            cells.push((*cell, space.drawn_values(space.state_of(*cell).ty)));
+        let cells = group.cells.iter().copied().filter(|cell| open.contains(cell));
+        let all = Combinations::of(space, memory, cells);
+        if all.count() > COMBINATIONS_MAX {
+            return Err(no_start(group.rules[0], true));
         }
-        let combinations = cells.iter().map(|(_, values)| values.len()).try_fold(1, usize::checked_mul);
-        let combinations = combinations.filter(|combinations| *combinations <= COMBINATIONS_MAX);
-        let mut starts = Starts { memory, cells, legal: Vec::new() };
-        starts.legal = match combinations {
-            Some(combinations) => (0..combinations).collect(),
-            None => return Err(no_start(group.rules[0], true)),
-        };
+        let mut legal: Vec<usize> = (0..all.count()).collect();
         for rule in &group.rules {
-            let mut legal = core::mem::take(&mut starts.legal);
             legal.retain(|number| {
-                !effort::is_spent()
-                    && space.stands(*rule, &starts.combination(*number).1, Some(&road.facts), Some(0))
+                !effort::is_spent() && space.stands(*rule, &all.get(*number).1, Some(&road.facts), Some(0))
             });
             if legal.is_empty() {
                 return Err(no_start(*rule, false));
             }
-            starts.legal = legal;
         }
-        Ok(starts)
-    }
-
-    /// The odds of a combination, relative to the others, and the memory with it.
-    fn combination(&self, mut number: usize) -> (f64, Memory) {
-        effort::spend(self.memory.cells.len());
-        let (mut odds, mut memory) = (1.0, self.memory.clone());
-        for (cell, values) in &self.cells {
-            let (of_value, value) = values[number % values.len()];
-            number /= values.len();
-            odds *= f64::from(of_value);
-            memory.cells[*cell] = value;
-        }
-        (odds, memory)
+        Ok(Starts { all, legal })
     }
 
     fn draw(&self, rng: &mut Rng) -> Memory {
-        let odds: Vec<f64> = self.legal.iter().map(|number| self.combination(*number).0).collect();
+        let odds: Vec<f64> = self.legal.iter().map(|number| self.all.get(*number).0).collect();
         let mut ticket = rng::unit(rng) * odds.iter().sum::<f64>();
         let mut drawn = self.legal.iter().zip(odds);
         let found = drawn.find(|(_, odds)| {
@@ -236,7 +246,7 @@ impl<'a> Starts<'a> {
             ticket < 0.0
         });
         let number = found.map(|(number, _)| number).or(self.legal.last());
-        self.combination(*number.expect("no rule left nothing")).1
+        self.all.get(*number.expect("no rule left nothing")).1
     }
 }
 
