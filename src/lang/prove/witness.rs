@@ -56,12 +56,9 @@ pub fn witness(space: &Space, row: &Row, road: &Road) -> Option<Witness> {
     let in_force = RulesInForce::by_default(space);
     let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };
     let search = Search { rules, left: &Left::new(BOXES_IN_ALL_MAX), moment: None };
-    search.memories().0.into_iter().find_map(|memory| match search.at(&memory) {
-        Found::Runs(values) => {
-            let values = search.action().drawn_of(&values);
-            Some(Witness { values, memory })
-        }
-        Found::Never | Found::Unknown => None,
+    search.memories().0.into_iter().find_map(|memory| {
+        let Found::Runs(values) = search.at(&memory) else { return None };
+        Some(Witness { values: search.action().drawn_of(&values), memory })
     })
 }
 
@@ -134,15 +131,14 @@ pub(super) type Wish<'a> = dyn Fn(&[Value], &Memory) -> bool + 'a;
 impl Search<'_> {
     /// The first values that run and fulfil the wish.
     pub fn find(&self, wish: &Wish<'_>) -> Option<Witness> {
-        let action = self.action();
-        let choices = choices(action, &locals(action, self.rules.row, &[]));
+        let choices = self.choices();
         for memory in self.memories().0 {
             for chosen in &choices {
                 if self.left.is_spent() || effort::is_spent() {
                     return None;
                 }
                 if let Some(values) = self.numbers(chosen, &memory, wish) {
-                    return Some(Witness { values: action.drawn_of(&values), memory });
+                    return Some(Witness { values: self.action().drawn_of(&values), memory });
                 }
             }
         }
@@ -166,9 +162,7 @@ impl Search<'_> {
             return Found::Unknown;
         }
         // What is left to try are rules about the gap of the spawn, and its bounds.
-        let action = self.action();
-        let mut chosen = choices(action, &locals(action, self.rules.row, &[])).into_iter();
-        let found = chosen.find_map(|chosen| self.numbers(&chosen, memory, &|_, _| true));
+        let found = self.choices().iter().find_map(|chosen| self.numbers(chosen, memory, &|_, _| true));
         found.map_or(Found::Unknown, Found::Runs)
     }
 
@@ -224,6 +218,25 @@ impl Search<'_> {
         None
     }
 
+    /// Every choice of the listed values, the first values first; what is a range holds a placeholder.
+    fn choices(&self) -> Vec<Vec<Value>> {
+        let action = self.action();
+        let mut chosen = vec![locals(action, self.rules.row, &[])];
+        for (local, parameter) in action.parameters.iter().enumerate().filter(|(_, p)| !p.axis) {
+            let Domain::Values(values) = &parameter.domain else { continue };
+            let room = (CHOICES_MAX / chosen.len()).max(1);
+            // A value that is likelier stands in the list more than once; one time is enough here.
+            let mut different: Vec<Value> = Vec::new();
+            for value in values {
+                if different.len() < room && !different.contains(value) {
+                    different.push(*value);
+                }
+            }
+            chosen = product(&chosen, &different, |locals, value| locals[local] = value);
+        }
+        chosen
+    }
+
     /// What is chosen from lists, and the whole ranges of the open numbers.
     fn ranges(&self, chosen: &[Value], open: &[usize]) -> Vec<Values> {
         let mut ranges = points(chosen);
@@ -267,8 +280,11 @@ impl Search<'_> {
 
     /// Whether these values run in an empty world, and fulfil the wish.
     fn runs(&self, values: &[Value], before: &Memory, wish: &Wish<'_>) -> bool {
-        let after = || self.rules.space.memory_after(self.rules.row.action, values, before);
-        self.runs_in_empty(values, before) && wish(values, &after())
+        self.runs_in_empty(values, before) && wish(values, &self.after(values, before))
+    }
+
+    fn after(&self, values: &[Value], before: &Memory) -> Memory {
+        self.rules.space.memory_after(self.rules.row.action, values, before)
     }
 
     /// Whether these values run in an empty world, as far as that can be told.
@@ -279,7 +295,7 @@ impl Search<'_> {
         if !action.parameters.iter().zip(values).all(in_domain) {
             return false;
         }
-        let after = &space.memory_after(self.rules.row.action, values, before);
+        let after = &self.after(values, before);
         let facts = Facts { road: self.rules.road, ..Facts::new(values, after) };
         let number = |expr: &Expr| evaluate(expr, &space.functions, &facts).number();
         let mut spawns = Vec::new();
@@ -313,23 +329,20 @@ impl Search<'_> {
         }
         self.left.take_box();
         let names = |expr: &Expr, local: usize| expr.any(|kind| *kind == ExprKind::Local(local));
-        let decides = |local: usize| {
-            sets.iter()
-                .any(|set| names(&set.value, local) || set.key.as_ref().is_some_and(|key| names(key, local)))
-        };
+        let parts = || sets.iter().flat_map(|set| set.key.iter().chain([&set.value]));
         let open: Vec<usize> = action.drawn_numbers().collect();
-        let mut is_complete = !open.iter().any(|local| decides(*local));
+        let mut is_complete = !open.iter().any(|local| parts().any(|part| names(part, *local)));
         let mut after = Vec::new();
-        let chosen = choices(action, &locals(action, self.rules.row, &[]));
-        is_complete &= chosen.len() < CHOICES_MAX;
-        for chosen in chosen {
+        let choices = self.choices();
+        is_complete &= choices.len() < CHOICES_MAX;
+        for chosen in choices {
             if effort::is_spent() {
                 break;
             }
             let before = Before { memory, world: None, tries: &self.left.tries };
             match self.rules.solve(chosen, &open, before, &mut Share(SHARES[0])) {
                 Ok(values) => {
-                    let led_to = self.rules.space.memory_after(self.rules.row.action, &values, memory);
+                    let led_to = self.after(&values, memory);
                     // An effect without a value is refused.
                     let is_kept = led_to.cells().iter().all(|value| value.is_kept());
                     let candidate =
@@ -426,24 +439,6 @@ fn followed(memory: &Memory) -> Vec<Values> {
         _ => Values::point(*value),
     };
     memory.cells().iter().map(cell).collect()
-}
-
-/// Every choice of the listed values, the first values first; what is a range stays as it is.
-pub(super) fn choices(action: &ActionDef, values: &[Value]) -> Vec<Vec<Value>> {
-    let mut chosen = vec![values.to_vec()];
-    for (local, parameter) in action.parameters.iter().enumerate().filter(|(_, p)| !p.axis) {
-        let Domain::Values(values) = &parameter.domain else { continue };
-        let room = (CHOICES_MAX / chosen.len()).max(1);
-        // A value that is likelier stands in the list more than once; one time is enough here.
-        let mut different: Vec<Value> = Vec::new();
-        for value in values {
-            if different.len() < room && !different.contains(value) {
-                different.push(*value);
-            }
-        }
-        chosen = product(&chosen, &different, |locals, value| locals[local] = value);
-    }
-    chosen
 }
 
 /// The box cut in two across its widest range; nothing if every range is a point.
