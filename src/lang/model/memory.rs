@@ -109,11 +109,11 @@ impl Space {
     }
 
     /// The memory after a step without an action. If the effects of every step would break a rule in force that
-    /// stands for all states or orders their changes, or give a state no value, they do not happen. `step` is its number, if it is known.
+    /// stands for all states or orders their changes, or give a state no value, they do not happen. `step` is its number.
     pub fn memory_after_wait(
         &self,
         before: &Memory,
-        step: Option<u64>,
+        step: u64,
         road: Option<&RoadFacts>,
         rules: &RulesInForce,
     ) -> Memory {

@@ -335,7 +335,7 @@ impl Way {
         for state in &now {
             let Met { memory, is_waited_for, .. } = &self.states[*state];
             let (memory, is_waited_for) = (memory.clone(), *is_waited_for);
-            let waited = space.memory_after_wait(&memory, Some(step), Some(&road.facts), in_force);
+            let waited = space.memory_after_wait(&memory, step, Some(&road.facts), in_force);
             let waited = self.number(waited, step + 1, is_waited_for, movers);
             self.now.extend(waited);
             for position in core::mem::take(&mut self.states[*state].open) {

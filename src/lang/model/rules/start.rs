@@ -81,23 +81,13 @@ impl Space {
         road: &RoadFacts,
         rules: &RulesInForce,
     ) -> Option<usize> {
-        rules.all().find(|rule| !self.stands(*rule, memory, Some(road), Some(0)))
+        rules.all().find(|rule| !self.stands(*rule, memory, Some(road), 0))
     }
 
     /// Whether the states obey what a rule says about them where no action is judged: at the start, and after a step
-    /// without an action. Where the step is not known, a rule that asks for it is taken to be obeyed.
-    pub(crate) fn stands(
-        &self,
-        rule: usize,
-        memory: &Memory,
-        road: Option<&RoadFacts>,
-        step: Option<u64>,
-    ) -> bool {
+    /// without an action.
+    pub(crate) fn stands(&self, rule: usize, memory: &Memory, road: Option<&RoadFacts>, step: u64) -> bool {
         let Some(condition) = &self.rules[rule].start else { return true };
-        let step = match step {
-            None if condition.asks_the_world() => return true,
-            step => step.unwrap_or(0),
-        };
         let elapsed_s = self.episode.time_s(step);
         let moment = MomentFacts { elapsed_s, ..MomentFacts::default() };
         let world = WorldFacts { moment, step, ..WorldFacts::default() };
@@ -228,7 +218,7 @@ impl<'a> Starts<'a> {
         let mut legal: Vec<usize> = (0..all.count()).collect();
         for rule in &group.rules {
             legal.retain(|number| {
-                !effort::is_spent() && space.stands(*rule, &all.get(*number).1, Some(&road.facts), Some(0))
+                !effort::is_spent() && space.stands(*rule, &all.get(*number).1, Some(&road.facts), 0)
             });
             if legal.is_empty() {
                 return Err(no_start(*rule, false));
