@@ -91,7 +91,13 @@ impl Interval {
     }
 
     pub fn add(&self, other: &Interval) -> Interval {
-        Interval { low: add_ends(self.low, other.low), high: add_ends(self.high, other.high) }
+        let sum = |a: End, b: End| match (a, b) {
+            (End::At(x, x_in), End::At(y, y_in)) => {
+                x.checked_add(y).map_or(End::Unbounded, |sum| End::At(sum, x_in && y_in))
+            }
+            _ => End::Unbounded,
+        };
+        Interval { low: sum(self.low, other.low), high: sum(self.high, other.high) }
     }
 
     pub fn neg(&self) -> Interval {
@@ -187,20 +193,13 @@ impl Interval {
 
     /// As [`Interval::shown`], rounded to so many decimals.
     pub fn shown_to(&self, decimals: u32, ty: Type, unit: Option<&Unit>) -> String {
-        match (unit, ty) {
-            (Some(unit), _) => {
-                let factor = unit.factor().to_f64();
-                let number = |value: Rational| rounded(value.to_f64() / factor, decimals);
-                format!("{} {}", self.written(number), unit.word)
-            }
-            (None, Type::Quantity(dimension)) => {
-                let number = self.written(|value| rounded(value.to_f64(), decimals));
-                format!("{number} {}", dimension.si_unit()).trim_end().to_owned()
-            }
-            (None, Type::Int | Type::Bool | Type::Enum(_)) => {
-                self.written(|value| rounded(value.to_f64(), decimals))
-            }
-        }
+        let (factor, word) = match (unit, ty) {
+            (Some(unit), _) => (unit.factor().to_f64(), unit.word.to_owned()),
+            (None, Type::Quantity(dimension)) => (1.0, dimension.si_unit()),
+            (None, Type::Int | Type::Bool | Type::Enum(_)) => (1.0, String::new()),
+        };
+        let number = self.written(|value| rounded(value.to_f64() / factor, decimals));
+        format!("{number} {word}").trim_end().to_owned()
     }
 
     /// The fewest decimals, at least three, that tell the different ends of intervals apart.
@@ -246,15 +245,6 @@ impl Interval {
             (End::At(high, _), End::At(low, _)) => high <= low,
             _ => false,
         }
-    }
-}
-
-fn add_ends(a: End, b: End) -> End {
-    match (a, b) {
-        (End::At(x, x_in), End::At(y, y_in)) => {
-            x.checked_add(y).map_or(End::Unbounded, |sum| End::At(sum, x_in && y_in))
-        }
-        _ => End::Unbounded,
     }
 }
 
