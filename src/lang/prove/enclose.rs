@@ -141,10 +141,7 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
             let locals: Vec<Values> = arguments.iter().map(values).collect();
             enclose(&known.functions[*function].body, &Known { locals: &locals, ..*known })
         }
-        ExprKind::Not(inner) => {
-            let inner = values(inner);
-            Values::Truth { may_hold: inner.may_fail(), may_fail: inner.may_hold() }
-        }
+        ExprKind::Not(inner) => not(values(inner)),
         ExprKind::Negate(inner) => Values::Number(values(inner).interval().neg()),
         ExprKind::Arithmetic(Arithmetic::Subtract, left, right) if is_same(left, right) => {
             Values::Number(Interval::point(Rational::ZERO))
@@ -155,10 +152,7 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
         ExprKind::Compare(op, left, right) => compare_parts(*op, left, right, known),
         ExprKind::And(left, right) => and(values(left), values(right)),
         ExprKind::Or(left, right) => or(values(left), values(right)),
-        ExprKind::Implies(left, right) => {
-            let left = values(left);
-            or(Values::Truth { may_hold: left.may_fail(), may_fail: left.may_hold() }, values(right))
-        }
+        ExprKind::Implies(left, right) => or(not(values(left)), values(right)),
         ExprKind::InRange(inner, low, high) => {
             let compared = |op, end: &Expr| compare_parts(op, inner, end, known);
             and(compared(Comparison::GreaterEqual, low), compared(Comparison::LessEqual, high))
@@ -234,6 +228,10 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
         Fact::Proc => between(0.0, 1.0),
         Fact::Collision | Fact::Repeated | Fact::Sudden | Fact::Struck | Fact::Avoidable => return None,
     })
+}
+
+fn not(inner: Values) -> Values {
+    Values::Truth { may_hold: inner.may_fail(), may_fail: inner.may_hold() }
 }
 
 fn and(left: Values, right: Values) -> Values {

@@ -282,10 +282,8 @@ impl<'a> States<'a> {
 
     /// Whether all rules that stand for all states may hold at a moment, and whether one may fail.
     fn stands(&self, cells: &[Values], case: &Case) -> (bool, bool) {
-        let standing = self.in_force.all().filter(|rule| self.space.rules[*rule].start.is_some());
-        standing
-            .map(|rule| self.condition(rule, cells, case))
-            .fold((true, false), |(hold, fail), found| (hold && found.may_hold(), fail || found.may_fail()))
+        let found = self.in_force.all().map(|rule| self.condition(rule, cells, case));
+        found.fold((true, false), |(hold, fail), found| (hold && found.may_hold(), fail || found.may_fail()))
     }
 
     /// As [`States::stands`], with the moves that every step would make.
@@ -309,6 +307,7 @@ impl<'a> States<'a> {
         found
     }
 
+    /// What a rule says of a state, if it stands for all states; any other rule holds.
     fn condition(&self, rule: usize, cells: &[Values], case: &Case) -> Values {
         let condition = self.space.rules[rule].start.as_ref();
         condition.map_or(Values::truth(true), |condition| enclose(condition, &self.known(&[], cells, case)))
@@ -443,9 +442,8 @@ impl<'a> States<'a> {
     fn shown(&self, values: Values, ty: Type) -> String {
         match (values, ty) {
             (Values::Variants(set), Type::Enum(of)) => {
-                let variants = self.space.enums[of.0].variants.iter().enumerate();
-                let named = variants.filter(|(variant, _)| set >> variant & 1 == 1);
-                named.map(|(_, name)| name.as_str()).collect::<Vec<_>>().join(" or ")
+                let variants = &self.space.enums[of.0].variants;
+                bits(set).map(|variant| variants[variant].as_str()).collect::<Vec<_>>().join(" or ")
             }
             (Values::Truth { may_hold: true, may_fail: false }, _) => "true".to_owned(),
             (Values::Truth { may_hold: false, .. }, _) => "false".to_owned(),
