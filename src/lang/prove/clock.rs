@@ -26,10 +26,7 @@ struct Graph<'a> {
 pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     let begins = begins(space);
-    for (index, rule) in space.rules.iter().enumerate() {
-        if effort::is_spent() {
-            break;
-        }
+    for (index, rule) in space.rules.iter().enumerate().take_while(|_| !effort::is_spent()) {
         let Some(graph) = graph(space, index, &begins) else { continue };
         let RuleBody::Moves { state, cell, .. } = &rule.body else { continue };
         let moved = space.cell_name(*cell);

@@ -13,10 +13,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let in_force = RulesInForce::by_default(space);
     let mut found: Vec<Cut<'_>> = Vec::new();
     for row in &space.rows {
-        for (road, reach) in space.roads.iter().zip(&row.roads) {
-            if effort::is_spent() {
-                break;
-            }
+        for (road, reach) in space.roads.iter().zip(&row.roads).take_while(|_| !effort::is_spent()) {
             let Reach::Open(ranges) = reach else { continue };
             effort::spend(ranges.len() * (1 + found.len()));
             for (name, kept) in ranges {

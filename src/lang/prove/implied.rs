@@ -24,10 +24,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     let mut work = WORK_MAX;
     let mut kept = RulesInForce::by_default(space);
-    for rule in (0..space.rules.len()).rev() {
-        if effort::is_spent() {
-            break;
-        }
+    for rule in (0..space.rules.len()).rev().take_while(|_| !effort::is_spent()) {
         let others = kept.except(rule);
         if !follows(space, rule, &others, &mut work) {
             if is_idle_on_the_roads(space, rule, &mut work) {
@@ -36,10 +33,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
             continue;
         }
         let mut reasons = others.clone();
-        for other in others.all() {
-            if effort::is_spent() {
-                break;
-            }
+        for other in others.all().take_while(|_| !effort::is_spent()) {
             let fewer = reasons.except(other);
             if follows(space, rule, &fewer, &mut work) {
                 reasons = fewer;

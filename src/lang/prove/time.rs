@@ -82,10 +82,8 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
                 found.push(broken);
             }
         }
-        for rule in (0..space.rules.len()).filter(|rule| space.rules[*rule].optional) {
-            if effort::is_spent() {
-                break;
-            }
+        let optional = (0..space.rules.len()).filter(|rule| space.rules[*rule].optional);
+        for rule in optional.take_while(|_| !effort::is_spent()) {
             let is_open =
                 space.rules[rule].binds_start() && !with_optional.iter().any(|(known, _)| *known == rule);
             let broken = if is_open { lasts(space, road, &in_force.with(rule)).err() } else { None };

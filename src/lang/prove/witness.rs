@@ -335,10 +335,7 @@ impl Search<'_> {
         let mut after = Vec::new();
         let choices = self.choices();
         is_complete &= choices.len() < CHOICES_MAX;
-        for chosen in choices {
-            if effort::is_spent() {
-                break;
-            }
+        for chosen in choices.into_iter().take_while(|_| !effort::is_spent()) {
             let before = Before { memory, world: None, tries: &self.left.tries };
             match self.rules.solve(chosen, &open, before, &mut Share(SHARES[0])) {
                 Ok(values) => {

@@ -42,10 +42,7 @@ pub(crate) fn bounds(actions: &[ActionDef], rules: &[RuleDef]) -> Vec<Vec<Bound>
         for condition in action.parameters.iter().filter_map(|parameter| parameter.condition.as_ref()) {
             collect(condition, None, &mut Vec::new(), &mut found);
         }
-        for &rule in &binding[index] {
-            if effort::is_spent() {
-                break;
-            }
+        for &rule in binding[index].iter().take_while(|_| !effort::is_spent()) {
             if let Some(Demand::Holds(condition)) = rules[rule].body.demand(index) {
                 collect(condition, Some(rule), &mut Vec::new(), &mut found);
             }
