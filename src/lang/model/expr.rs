@@ -119,6 +119,13 @@ impl Expr {
         }
     }
 
+    /// What `of` gives for the expression and the parts inside it, where it gives something.
+    pub fn filter_map<T>(&self, of: impl Fn(&ExprKind) -> Option<T>) -> Vec<T> {
+        let mut found = Vec::new();
+        self.walk(&mut |part| found.extend(of(&part.kind)));
+        found
+    }
+
     /// Number of its operations, names and literals; those of called functions do not count.
     pub fn operations(&self) -> usize {
         let mut count = 0;

@@ -5,7 +5,7 @@ use crate::model::rules::{Demand, RowRules};
 use crate::model::{Road, RoadFacts, Row, RuleBody, RulesInForce, Space, code, effort};
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::prove::moment::always_holds;
-use crate::prove::rule_names;
+use crate::prove::{distinct, rule_names};
 use crate::syntax::{Diagnostic, listed};
 
 /// Limit on rows times rules for the whole report; rules beyond it are not looked at.
@@ -168,17 +168,11 @@ fn holds(
 /// interval analysis does not see that `time == Night or time != Night` always holds. Also `false` if there are too many
 /// combinations, or the work left does not suffice.
 fn always_holds_split(condition: &Expr, known: &Known<'_>, work: &mut usize) -> bool {
-    let mut named: Vec<Named> = Vec::new();
-    condition.walk(&mut |part| {
-        let name = match part.kind {
-            ExprKind::Local(local) => Named::Local(local),
-            ExprKind::Cell(cell) => Named::Cell(cell),
-            _ => return,
-        };
-        if !named.contains(&name) {
-            named.push(name);
-        }
-    });
+    let mut named = distinct(condition.filter_map(|kind| match kind {
+        ExprKind::Local(local) => Some(Named::Local(*local)),
+        ExprKind::Cell(cell) => Some(Named::Cell(*cell)),
+        _ => None,
+    }));
     named.retain(|name| name.values(known).len() > 1);
     let counts = named.iter().map(|name| name.values(known).len());
     let combinations = counts.fold(1_usize, usize::saturating_mul);

@@ -108,11 +108,8 @@ fn collect(condition: &Expr, rule: Option<usize>, guards: &mut Vec<Expr>, into: 
 
 /// The parameters that an expression names.
 pub fn locals(expr: &Expr) -> Vec<usize> {
-    let mut found = Vec::new();
-    expr.walk(&mut |part| {
-        if let ExprKind::Local(local) = part.kind {
-            found.push(local);
-        }
-    });
-    found
+    expr.filter_map(|kind| match kind {
+        ExprKind::Local(local) => Some(*local),
+        _ => None,
+    })
 }
