@@ -29,9 +29,8 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
             let mut rows = space.rows_of(index).iter().take_while(|_| !effort::is_spent());
             let found = rows.find_map(|row| {
                 let roads = space.roads.iter().zip(&row.roads);
-                let open = roads.filter(|(_, reach)| matches!(reach, Reach::Open(_)));
-                open.map(|(road, _)| road)
-                    .find_map(|road| Some((row, road, unfair(space, row, road, spawn, &left)?)))
+                let mut open = roads.filter(|(_, reach)| matches!(reach, Reach::Open(_)));
+                open.find_map(|(road, _)| Some((row, road, unfair(space, row, road, spawn, &left)?)))
             });
             if let Some((row, road, found)) = found {
                 diagnostics.push(remark(space, row, road, spawn, &found));
@@ -43,13 +42,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
 
 /// Values with which a row spawns within the stopping distance on a road; `None` if none are found, or if a
 /// rule asks the world, about the gap or the speed of the ego vehicle, and so decides by itself.
-pub(super) fn unfair(
-    space: &Space,
-    row: &Row,
-    road: &Road,
-    spawn: &SpawnDef,
-    left: &Left,
-) -> Option<Witness> {
+fn unfair(space: &Space, row: &Row, road: &Road, spawn: &SpawnDef, left: &Left) -> Option<Witness> {
     let in_force = RulesInForce::by_default(space);
     let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };
     let asks = |demand| matches!(demand, Demand::Holds(condition) if condition.known() > Known::Road);
