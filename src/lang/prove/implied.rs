@@ -2,7 +2,7 @@
 
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Demand, RowRules};
-use crate::model::{Road, RoadFacts, Row, RuleBody, RulesInForce, Space, code, effort};
+use crate::model::{Road, Row, RuleBody, RulesInForce, Space, code, effort};
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::prove::moment::always_holds;
 use crate::prove::{distinct, rule_names};
@@ -96,8 +96,8 @@ fn is_idle_on_the_roads(space: &Space, rule: usize, work: &mut usize) -> bool {
         return false;
     }
     let holds_on = |road: &Road| {
-        let facts = Some(&road.facts);
-        bound.iter().all(|row| holds(space, row, rule, &none, facts, work))
+        let on_road = |row| RowRules { space, row, road: Some(&road.facts), in_force: &none };
+        bound.iter().copied().all(|row| holds(on_road(row), rule, work))
     };
     space.roads.iter().all(holds_on) && start_holds(space, rule, &none)
 }
@@ -123,8 +123,8 @@ fn follows(space: &Space, rule: usize, others: &RulesInForce, work: &mut usize) 
             })
         }
         RuleBody::During(_) | RuleBody::Holds(_) => {
-            bound.iter().all(|row| holds(space, row, rule, others, None, work))
-                && start_holds(space, rule, others)
+            let on_any = |row| RowRules { space, row, road: None, in_force: others };
+            bound.into_iter().all(|row| holds(on_any(row), rule, work)) && start_holds(space, rule, others)
         }
     }
 }
@@ -144,23 +144,16 @@ fn start_holds(space: &Space, rule: usize, others: &RulesInForce) -> bool {
     })
 }
 
-/// Whether the rule holds for a row and every value that `others` leave, on a road or on any.
-fn holds(
-    space: &Space,
-    row: &Row,
-    rule: usize,
-    others: &RulesInForce,
-    road: Option<&RoadFacts>,
-    work: &mut usize,
-) -> bool {
+/// Whether the rule holds for a row and every value that the other rules leave.
+fn holds(others: RowRules<'_>, rule: usize, work: &mut usize) -> bool {
+    let RowRules { space, row, .. } = others;
     let body = &space.rules[rule].body;
     let demanded = body.demand(row.action).and_then(Demand::condition);
     let Some(condition) = demanded.or_else(|| body.during(row.action)) else { return false };
-    let rules = RowRules { space, row, road, in_force: others };
     // If the other rules leave the row no value, the row says nothing about this rule.
-    let Some(locals) = rules.settle() else { return false };
+    let Some(locals) = others.settle() else { return false };
     let after = space.cells_after(row.action, &locals, &space.cells_unknown());
-    let known = rules.known(&locals, &after);
+    let known = others.known(&locals, &after);
     always_holds(condition, &known, &space.episode) || always_holds_split(condition, &known, work)
 }
 
