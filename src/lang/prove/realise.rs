@@ -145,7 +145,7 @@ impl<'a> OnRoad<'a> {
         let sets = |asked: &&Asked<'_>| self.space.actions[asked.row.action].sets().next().is_some();
         let movers: Vec<Asked<'_>> = open.iter().filter(sets).copied().collect();
         let mut pending = open;
-        let mut way = Way::begin(self, &movers);
+        let mut way = Way::begin(self, movers.len());
         for step in 0..u64::from(self.space.episode.step_limit) {
             let moment = Case::of_steps(&self.space.episode, step..=step, false);
             pending.retain_mut(|asked| {
@@ -231,6 +231,8 @@ struct Way {
     now: BTreeSet<usize>,
     /// Whether no state was left out.
     is_complete: bool,
+    /// The number of rows that set states.
+    movers: usize,
 }
 
 /// A state that was met.
@@ -261,24 +263,18 @@ fn digest(memory: &Memory) -> u64 {
 }
 
 impl Way {
-    fn begin(on_road: &OnRoad<'_>, movers: &[Asked<'_>]) -> Way {
+    fn begin(on_road: &OnRoad<'_>, movers: usize) -> Way {
         let (starts, are_all) = on_road.space.initial_memories(on_road.road, on_road.in_force, STATES_MAX);
-        let mut way = Way { states: Vec::new(), now: BTreeSet::new(), is_complete: are_all };
+        let mut way = Way { states: Vec::new(), now: BTreeSet::new(), is_complete: are_all, movers };
         for (nth, start) in starts.into_iter().enumerate() {
-            let start = way.number(start, 0, nth == 0, movers);
+            let start = way.number(start, 0, nth == 0);
             way.now.extend(start);
         }
         way
     }
 
     /// The number of a state; `None` if there are too many.
-    fn number(
-        &mut self,
-        memory: Memory,
-        since: u64,
-        is_waited_for: bool,
-        movers: &[Asked<'_>],
-    ) -> Option<usize> {
+    fn number(&mut self, memory: Memory, since: u64, is_waited_for: bool) -> Option<usize> {
         effort::spend(self.states.len() + memory.cells().len());
         let digest = digest(&memory);
         let is_it = |known: &Met| known.digest == digest && known.memory == memory;
@@ -290,8 +286,8 @@ impl Way {
             self.is_complete = false;
             return None;
         }
-        effort::spend(movers.len());
-        let open = (0..movers.len()).collect();
+        effort::spend(self.movers);
+        let open = (0..self.movers).collect();
         self.states.push(Met { memory, digest, since, is_waited_for, led_to: BTreeSet::new(), open });
         Some(self.states.len() - 1)
     }
@@ -336,7 +332,7 @@ impl Way {
             let Met { memory, is_waited_for, .. } = &self.states[*state];
             let (memory, is_waited_for) = (memory.clone(), *is_waited_for);
             let waited = space.memory_after_wait(&memory, step, Some(&road.facts), in_force);
-            let waited = self.number(waited, step + 1, is_waited_for, movers);
+            let waited = self.number(waited, step + 1, is_waited_for);
             self.now.extend(waited);
             for position in core::mem::take(&mut self.states[*state].open) {
                 if effort::is_spent() {
@@ -353,7 +349,7 @@ impl Way {
                 let (led_to, are_all) = search.successors(&memory);
                 self.is_complete &= are_all;
                 let led_to: Vec<usize> =
-                    led_to.into_iter().filter_map(|to| self.number(to, step + 1, false, movers)).collect();
+                    led_to.into_iter().filter_map(|to| self.number(to, step + 1, false)).collect();
                 match mover.about_time {
                     true => self.now.extend(led_to),
                     false => self.states[*state].led_to.extend(led_to),
