@@ -15,9 +15,9 @@ use std::sync::Arc;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Before, Candidate, Choose, Demand, Nearest, Room, RowRules, cells_read};
 use crate::model::{
-    ActionDef, Domain, End, Facts, Initial, Interval, Memory, Parameter, Road, Row, RulesInForce,
-    SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, SetDef, Space, SpawnFacts, StateDef, Type, Value, WorldFacts, effort,
-    evaluate, locals, rounded_into, spawn_out_of_bounds,
+    ActionDef, Domain, End, Facts, Interval, Memory, Parameter, Road, Row, RulesInForce, SPAWN_DISTANCE_M,
+    SPAWN_SPEED_MPS, SetDef, Space, SpawnFacts, Type, Value, WorldFacts, effort, evaluate, locals,
+    rounded_into, spawn_out_of_bounds,
 };
 use crate::prove::enclose::{Known, Values};
 use crate::prove::moment::{Case, may_hold_together, newcomers};
@@ -372,12 +372,15 @@ impl Search<'_> {
     /// row read. Gives also whether there can be no other.
     pub fn memories(&self) -> (Vec<Memory>, bool) {
         let space = self.rules.space;
-        let begun = space
-            .states
-            .iter()
-            .flat_map(|state| (0..state.cells).map(move |cell| initial(space, state, cell)));
-        let mut is_complete = true;
-        let mut memories = vec![Memory { cells: begun.collect() }];
+        let mut begun = space.initial_memory(0);
+        // A cell that is drawn has the first value of its type.
+        for cell in space.open_cells() {
+            begun.cells[cell] = match space.state_of(cell).ty {
+                Type::Enum(of) => Value::Variant(of, 0),
+                Type::Bool | Type::Int | Type::Quantity(_) => Value::Bool(false),
+            };
+        }
+        let (mut memories, mut is_complete) = (vec![begun], true);
         for cell in self.read() {
             let state = space.state_of(cell);
             let values = all_values(space, state.ty, memories[0].cells[cell]);
@@ -460,17 +463,6 @@ fn halves(narrowed: &[Values], open: &[usize]) -> Vec<Vec<Values>> {
         half(Interval { low: interval.low, high: End::At(middle, true) }),
         half(Interval { low: End::At(middle, true), high: interval.high }),
     ]
-}
-
-/// The value that a cell of a state begins with; the first of its type if it is drawn.
-fn initial(space: &Space, state: &StateDef, cell: usize) -> Value {
-    match &state.initial[cell] {
-        Initial::Value(expr) => evaluate(expr, &space.functions, &Facts::new(&[], &Memory::default())),
-        Initial::Any => match state.ty {
-            Type::Enum(of) => Value::Variant(of, 0),
-            Type::Bool | Type::Int | Type::Quantity(_) => Value::Bool(false),
-        },
-    }
 }
 
 /// All values of a finite type, `first` before the others.
