@@ -138,34 +138,33 @@ fn error(space: &Space, broken: &BrokenByTime) -> Diagnostic {
 /// # Errors
 /// The first rule that a step without an action may break.
 pub fn lasts(space: &Space, road: &Road, in_force: &RulesInForce) -> Result<(), BrokenByTime> {
-    let timed: Vec<usize> = in_force.all().filter(|rule| is_timed(space, *rule)).collect();
-    let Some(first) = timed.first() else { return Ok(()) };
-    let mut states = States::new(space, road, in_force, &timed);
+    // Rules that hold from the first moment on and ask for the time.
+    let is_timed = |rule: &usize| space.rules[*rule].start.as_ref().is_some_and(Expr::asks_the_world);
+    let timed: Vec<usize> = in_force.all().filter(is_timed).collect();
+    let Some(&first) = timed.first() else { return Ok(()) };
+    let followed = followed(space, in_force, &timed);
+    let (met, moves) = (Vec::new(), Vec::new());
+    let mut states = States { space, road, in_force, timed, followed, met, moves, work: 0 };
     let mut now = states.begin();
     let last = u64::from(space.episode.step_limit).saturating_sub(1);
     for step in 0..=last {
         let mut next = BTreeSet::new();
         for state in &now {
-            if let Err(rule) = states.go_on(*state, step..=step, &timed, &mut next) {
+            if let Err(rule) = states.go_on(*state, step..=step, &mut next) {
                 return Err(states.broken(rule, step, *state));
             }
         }
         if states.is_too_large() {
             let how = if states.met.len() > STATES_MAX { How::TooMany } else { How::TooLong(step) };
-            let (road, rule) = (road.name.clone(), space.rules[*first].name.clone());
-            return Err(BrokenByTime { road, rule, index: *first, how });
+            let (road, rule) = (road.name.clone(), space.rules[first].name.clone());
+            return Err(BrokenByTime { road, rule, index: first, how });
         }
-        if next == now && states.stay_within(&now, step..=last, &timed) {
+        if next == now && states.stay_within(&now, step..=last) {
             break;
         }
         now = next;
     }
     Ok(())
-}
-
-/// Whether a rule holds from the first moment on and asks for the time.
-fn is_timed(space: &Space, rule: usize) -> bool {
-    space.rules[rule].start.as_ref().is_some_and(Expr::asks_the_world)
 }
 
 /// All values of every cell; of those that no timed rule depends on, every value that there is.
@@ -183,24 +182,17 @@ struct States<'a> {
     space: &'a Space,
     road: &'a Road,
     in_force: &'a RulesInForce,
-    /// The cells on which timed rules depend.
+    /// The rules that time may break.
+    timed: Vec<usize>,
+    /// The cells on which these depend.
     followed: Vec<usize>,
-    /// For each cell whether it is one of them.
-    is_followed: Vec<bool>,
     met: Vec<Cells>,
     /// By state: what rows make of it, and what every step makes of it.
     moves: Vec<Option<(Vec<Move>, Vec<usize>)>>,
     work: usize,
 }
 
-impl<'a> States<'a> {
-    fn new(space: &'a Space, road: &'a Road, in_force: &'a RulesInForce, timed: &[usize]) -> States<'a> {
-        let followed = followed(space, in_force, timed);
-        let mut is_followed = vec![false; space.states.iter().map(|state| state.cells).sum()];
-        followed.iter().for_each(|cell| is_followed[*cell] = true);
-        States { space, road, in_force, followed, is_followed, met: Vec::new(), moves: Vec::new(), work: 0 }
-    }
-
+impl States<'_> {
     fn is_too_large(&self) -> bool {
         self.met.len() > STATES_MAX || self.work > WORK_MAX || effort::is_spent()
     }
@@ -227,9 +219,9 @@ impl<'a> States<'a> {
 
     /// Whether all these steps lead from these states to these alone, and break no timed rule there: then no episode is
     /// too long to be followed.
-    fn stay_within(&mut self, now: &BTreeSet<usize>, steps: RangeInclusive<u64>, timed: &[usize]) -> bool {
+    fn stay_within(&mut self, now: &BTreeSet<usize>, steps: RangeInclusive<u64>) -> bool {
         let mut next = BTreeSet::new();
-        let keeps = |state: &usize| self.go_on(*state, steps.clone(), timed, &mut next).is_ok();
+        let keeps = |state: &usize| self.go_on(*state, steps.clone(), &mut next).is_ok();
         now.iter().all(keeps) && next.is_subset(now) && !self.is_too_large()
     }
 
@@ -238,7 +230,6 @@ impl<'a> States<'a> {
         &mut self,
         state: usize,
         steps: RangeInclusive<u64>,
-        timed: &[usize],
         next: &mut BTreeSet<usize>,
     ) -> Result<(), usize> {
         if self.is_too_large() {
@@ -263,7 +254,7 @@ impl<'a> States<'a> {
             }
             if may_fail {
                 let fails = |rule: &&usize| self.condition(**rule, &self.met[state], &at_begin).may_fail();
-                broken = broken.or(timed.iter().find(fails).copied());
+                broken = broken.or(self.timed.iter().find(fails).copied());
                 next.insert(state);
             }
         }
@@ -346,12 +337,12 @@ impl<'a> States<'a> {
                 continue;
             }
             let set = self.space.cells_set(row.action, &declared(self.space, row));
-            if !set.iter().any(|cell| self.is_followed[*cell]) {
+            if !self.followed.iter().any(|cell| set.contains(cell)) {
                 continue;
             }
             for locals in self.choices(row) {
                 let after = self.space.cells_after(row.action, &locals, &self.met[state]);
-                for part in self.parts(&self.of_followed(after)) {
+                for part in self.parts(&self.of_followed(&after)) {
                     let (row, to, locals) = (row.index, self.number(part), locals.clone());
                     moves.push(Move { row, locals, to });
                 }
@@ -381,18 +372,14 @@ impl<'a> States<'a> {
 
     fn waits_of(&mut self, state: usize) -> Vec<usize> {
         let after = self.space.cells_after_wait(&self.met[state]);
-        self.parts(&self.of_followed(after)).into_iter().map(|part| self.number(part)).collect()
+        self.parts(&self.of_followed(&after)).into_iter().map(|part| self.number(part)).collect()
     }
 
     /// The cells that are not followed forgotten.
-    fn of_followed(&self, mut cells: Cells) -> Cells {
-        let unknown = self.space.cells_unknown();
-        for (cell, values) in cells.iter_mut().enumerate() {
-            if !self.is_followed[cell] {
-                *values = unknown[cell];
-            }
-        }
-        cells
+    fn of_followed(&self, cells: &[Values]) -> Cells {
+        let mut kept = self.space.cells_unknown();
+        self.followed.iter().for_each(|cell| kept[*cell] = cells[*cell]);
+        kept
     }
 
     /// A set of states as states of single values, as far as these can be listed.
