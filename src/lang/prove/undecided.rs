@@ -29,14 +29,13 @@ pub(super) fn report(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> 
         return diagnostics;
     }
     for (action, definition) in space.actions.iter().enumerate() {
-        let rows = || space.rows_of(action).iter();
         let is_unreached = |row: &&Row| {
             let found = &realisable[row.index];
             found.contains(&Realised::Unreached)
                 && found.iter().all(|found| matches!(found, Realised::Unreached | Realised::Never))
                 && !told.contains(&row.index)
         };
-        let unreached: Vec<&Row> = rows().filter(is_unreached).collect();
+        let unreached: Vec<&Row> = space.rows_of(action).iter().filter(is_unreached).collect();
         let Some(first) = unreached.first() else { continue };
         let message = format!("`{}` is never enabled", first.label);
         let warning =
@@ -52,7 +51,8 @@ pub(super) fn report(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> 
                 "begin in such a state, or add an action that leads to one",
             ),
         };
-        let note = format!("it would obey {} only {only}", names(space, first));
+        let obeyed: Vec<usize> = in_force.on_row(first).collect();
+        let note = format!("it would obey {} only {only}", rule_names(space, &obeyed));
         diagnostics.push(warning.note(note).help(help));
     }
     diagnostics
@@ -215,10 +215,4 @@ fn to_blame(space: &Space, row: &Row, road: &Road) -> Vec<usize> {
     let (in_force, left) = (RulesInForce::by_default(space), Left::new(BOXES_MAX));
     let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };
     rules.conflict(&|fewer| is_unknown(fewer, &left))
-}
-
-/// The rules on a row that are in force by default, in words.
-fn names(space: &Space, row: &Row) -> String {
-    let rules: Vec<usize> = RulesInForce::by_default(space).on_row(row).collect();
-    rule_names(space, &rules)
 }
