@@ -2,8 +2,8 @@
 
 use crate::model::expr::Comparison;
 use crate::model::rules::RowRules;
-use crate::model::{Domain, End, Interval, Parameter, Reach, RulesInForce, Space, code, effort};
-use crate::prove::rule_names;
+use crate::model::{Domain, End, Interval, Parameter, RulesInForce, Space, code, effort};
+use crate::prove::{OpenRow, open_rows, rule_names};
 use crate::syntax::Diagnostic;
 use avastra_base::units::Rational;
 
@@ -12,28 +12,25 @@ use avastra_base::units::Rational;
 pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let in_force = RulesInForce::by_default(space);
     let mut found: Vec<Cut<'_>> = Vec::new();
-    for row in &space.rows {
-        for (road, reach) in space.roads.iter().zip(&row.roads).take_while(|_| !effort::is_spent()) {
-            let Reach::Open(ranges) = reach else { continue };
-            effort::spend(ranges.len() * (1 + found.len()));
-            for (name, kept) in ranges {
-                let action = &space.actions[row.action];
-                let parameter = action.parameters.iter().find(|parameter| parameter.name == *name);
-                let Some(parameter) = parameter else { continue };
-                let Some(percent) = kept_percent(&parameter.domain, kept) else { continue };
-                let rules = cutting_rules(space, &in_force, row.action, parameter);
-                if rules.is_empty() {
-                    continue;
-                }
-                let cut = Cut { parameter, kept: *kept, percent, rules, road: &road.name };
-                let alike = |known: &&mut Cut<'_>| {
-                    known.parameter.name == cut.parameter.name
-                        && (known.road, known.kept, &known.rules) == (cut.road, cut.kept, &cut.rules)
-                        && known.parameter.domain == cut.parameter.domain
-                };
-                if found.iter_mut().find(alike).is_none() {
-                    found.push(cut);
-                }
+    for OpenRow { row, road, ranges } in open_rows(space, &space.rows).take_while(|_| !effort::is_spent()) {
+        effort::spend(ranges.len() * (1 + found.len()));
+        for (name, kept) in ranges {
+            let action = &space.actions[row.action];
+            let parameter = action.parameters.iter().find(|parameter| parameter.name == *name);
+            let Some(parameter) = parameter else { continue };
+            let Some(percent) = kept_percent(&parameter.domain, kept) else { continue };
+            let rules = cutting_rules(space, &in_force, row.action, parameter);
+            if rules.is_empty() {
+                continue;
+            }
+            let cut = Cut { parameter, kept: *kept, percent, rules, road: &road.name };
+            let alike = |known: &Cut<'_>| {
+                known.parameter.name == cut.parameter.name
+                    && (known.road, known.kept, &known.rules) == (cut.road, cut.kept, &cut.rules)
+                    && known.parameter.domain == cut.parameter.domain
+            };
+            if !found.iter().any(alike) {
+                found.push(cut);
             }
         }
     }

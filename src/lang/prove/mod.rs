@@ -38,8 +38,26 @@ pub use realise::{Realisable, Realised, RunsIn, realise};
 pub use time::{BrokenByTime, lasts};
 pub use witness::{Witness, witness};
 
-use crate::model::{Space, effort};
+use std::sync::Arc;
+
+use crate::model::{Interval, Reach, Road, Row, Space, effort};
 use crate::syntax::{Diagnostic, listed};
+
+/// A row on a road where it may run, with the ranges that rules leave to its numbers.
+struct OpenRow<'a> {
+    row: &'a Row,
+    road: &'a Road,
+    ranges: &'a [(Arc<str>, Interval)],
+}
+
+/// These rows on each road where they may run.
+fn open_rows<'a>(space: &'a Space, rows: &'a [Row]) -> impl Iterator<Item = OpenRow<'a>> {
+    let all = rows.iter().flat_map(move |row| space.roads.iter().zip(&row.roads).map(move |on| (row, on)));
+    all.filter_map(|(row, (road, reach))| match reach {
+        Reach::Open(ranges) => Some(OpenRow { row, road, ranges }),
+        Reach::Dead { .. } => None,
+    })
+}
 
 /// The names of rules, as a list in words.
 fn rule_names(space: &Space, rules: &[usize]) -> String {

@@ -1,13 +1,12 @@
 //! Listed values that rules forbid in every row on every road. Most are meant; some are a mistake in the rule.
 
 use core::cell::Cell;
-use std::sync::Arc;
 
 use crate::model::rules::RowRules;
-use crate::model::{Domain, Interval, Parameter, Reach, Road, Row, RulesInForce, Space, Value, code};
+use crate::model::{Domain, Parameter, RulesInForce, Space, Value, code};
 use crate::prove::enclose::Values;
 use crate::prove::reach::declared;
-use crate::prove::{distinct, rule_names};
+use crate::prove::{OpenRow, distinct, open_rows, rule_names};
 use crate::syntax::{Diagnostic, enumerated};
 
 /// A remark names this many values and one more; of longer lists the others are counted.
@@ -34,14 +33,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     };
     let mut remarks = Vec::new();
     for (index, action) in space.actions.iter().enumerate() {
-        let rows = space.rows_of(index).iter();
-        let places = rows.flat_map(|row| space.roads.iter().zip(&row.roads).map(move |on| (row, on)));
-        let open: Vec<Place<'_>> = places
-            .filter_map(|(row, (road, reach))| match reach {
-                Reach::Open(ranges) => Some(Place { row, road, ranges }),
-                Reach::Dead { .. } => None,
-            })
-            .collect();
+        let open: Vec<OpenRow<'_>> = open_rows(space, space.rows_of(index)).collect();
         for (local, parameter) in action.parameters.iter().enumerate().filter(|(_, one)| !one.axis) {
             let Domain::Values(values) = &parameter.domain else { continue };
             if values.len() > VALUES_MAX || values.len() * open.len() > LOOKS_MAX {
@@ -65,13 +57,6 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     remarks
 }
 
-/// A row on a road where it may run, with the ranges that rules leave to its numbers.
-struct Place<'a> {
-    row: &'a Row,
-    road: &'a Road,
-    ranges: &'a [(Arc<str>, Interval)],
-}
-
 struct Search<'a> {
     space: &'a Space,
     default: RulesInForce,
@@ -86,11 +71,11 @@ impl Search<'_> {
     /// or if they leave it nowhere.
     fn forbidding(
         &self,
-        open: &[Place<'_>],
+        open: &[OpenRow<'_>],
         (local, parameter): (usize, &Parameter),
         value: Value,
     ) -> Option<Vec<usize>> {
-        let within = |place: &Place<'_>| {
+        let within = |place: &OpenRow<'_>| {
             let range = place.ranges.iter().find(|(name, _)| *name == parameter.name);
             match (range, Values::point(value)) {
                 (Some((_, range)), Values::Number(point)) => !range.intersect(&point).is_empty(),
@@ -110,7 +95,7 @@ impl Search<'_> {
         (!rules.is_empty()).then_some(rules)
     }
 
-    fn rules_on<'a>(&'a self, place: &'a Place<'_>, in_force: &'a RulesInForce) -> RowRules<'a> {
+    fn rules_on<'a>(&'a self, place: &'a OpenRow<'_>, in_force: &'a RulesInForce) -> RowRules<'a> {
         RowRules { space: self.space, row: place.row, road: Some(&place.road.facts), in_force }
     }
 

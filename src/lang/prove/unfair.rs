@@ -7,9 +7,10 @@
 use crate::model::rules::{Demand, RowRules};
 use crate::model::vocabulary::{Known, Verb, Word};
 use crate::model::{
-    Facts, Memory, Reach, Road, Row, RulesInForce, Space, SpawnDef, Value, code, effort, evaluate, locals,
+    Facts, Memory, Road, Row, RulesInForce, Space, SpawnDef, Value, code, effort, evaluate, locals,
 };
 use crate::prove::witness::{Left, Search, Witness};
+use crate::prove::{OpenRow, open_rows};
 use crate::syntax::Diagnostic;
 use avastra_base::kinematics::{CAREFUL_BRAKING_MPS2, CAREFUL_DELAY_S, stopping_m};
 use avastra_base::units::{Dimension, quantity, quantity_in, unit_of_all};
@@ -26,15 +27,11 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     for (index, action) in space.actions.iter().enumerate() {
         let left = Left::new(BOXES_MAX / space.actions.len());
         for spawn in action.spawns() {
-            let mut rows = space.rows_of(index).iter().take_while(|_| !effort::is_spent());
-            let found = rows.find_map(|row| {
-                let roads = space.roads.iter().zip(&row.roads);
-                let mut open = roads.filter(|(_, reach)| matches!(reach, Reach::Open(_)));
-                open.find_map(|(road, _)| Some((row, road, unfair(space, row, road, spawn, &left)?)))
-            });
-            if let Some((row, road, found)) = found {
-                diagnostics.push(remark(space, row, road, spawn, &found));
-            }
+            let mut open = open_rows(space, space.rows_of(index)).take_while(|_| !effort::is_spent());
+            diagnostics.extend(open.find_map(|OpenRow { row, road, .. }| {
+                let found = unfair(space, row, road, spawn, &left)?;
+                Some(remark(space, row, road, spawn, &found))
+            }));
         }
     }
     diagnostics
