@@ -120,7 +120,7 @@ pub fn removals(space: &Space, rule: usize) -> Vec<Removal> {
             let settled = rules.settle();
             for bound in rules.bounds().filter(|bound| bound.rule.is_some()) {
                 let parameter = &action.parameters[bound.local];
-                // Where the rule leaves no row, it leaves as much as a single number: nothing.
+                // If the rule leaves no value at all, nothing of the range is left: a point has no width.
                 let nothing = Interval::point(Rational::ZERO);
                 let kept = settled.as_ref().map_or(nothing, |settled| settled[bound.local].interval());
                 let Some(share) = kept_share(&parameter.domain, &kept) else { continue };

@@ -230,7 +230,7 @@ impl Reader<'_> {
         })
     }
 
-    /// Two truths of which the left one may decide: whether it does, and what is true then, are given.
+    /// Reads two truths. If the left one is known to be `deciding`, the result is `decided`, and the right one is not read.
     fn read_both(
         &mut self,
         left: &Expr,
