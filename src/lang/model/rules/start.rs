@@ -68,10 +68,49 @@ impl Space {
         }
         let mut rng = rng::stream(seed, Stream::Reset, 1);
         for group in self.groups(rules) {
-            let left = Starts::of(self, &group, &memory, open, road)?;
-            memory = left.draw(&mut rng);
+            memory = self.drawn_again(&group, &memory, open, road, &mut rng)?;
         }
         Ok(memory)
+    }
+
+    /// The memory with those open cells drawn again that a group of rules reads, from all combinations that obey the rules.
+    fn drawn_again(
+        &self,
+        group: &Group,
+        memory: &Memory,
+        open: &[usize],
+        road: &Road,
+        rng: &mut Rng,
+    ) -> Result<Memory, NoStart> {
+        let no_start = |index: usize, is_too_large| {
+            let (road, rule) = (road.name.clone(), self.rules[index].name.clone());
+            let cells = self.rules[index].start.iter().flat_map(|start| cells_read(start, &self.states));
+            NoStart { road, rule, index, cells: cells.collect(), is_too_large }
+        };
+        let open: BTreeSet<usize> = open.iter().copied().collect();
+        let cells = group.cells.iter().copied().filter(|cell| open.contains(cell));
+        let all = Combinations::of(self, memory, cells);
+        if all.count() > COMBINATIONS_MAX {
+            return Err(no_start(group.rules[0], true));
+        }
+        // The numbers of the combinations that obey the rules.
+        let mut legal: Vec<usize> = (0..all.count()).collect();
+        for rule in &group.rules {
+            legal.retain(|number| {
+                !effort::is_spent() && self.stands(*rule, &all.get(*number).1, Some(&road.facts), 0)
+            });
+            if legal.is_empty() {
+                return Err(no_start(*rule, false));
+            }
+        }
+        let odds: Vec<f64> = legal.iter().map(|number| all.get(*number).0).collect();
+        let mut ticket = rng::unit(rng) * odds.iter().sum::<f64>();
+        let found = legal.iter().zip(odds).find(|(_, odds)| {
+            ticket -= odds;
+            ticket < 0.0
+        });
+        let number = found.map(|(number, _)| number).or(legal.last());
+        Ok(all.get(*number.expect("no rule left nothing")).1)
     }
 
     /// The first rule in force that a start breaks on a road, by index.
@@ -186,57 +225,6 @@ impl<'a> Combinations<'a> {
             memory.cells[*cell] = value;
         }
         (odds, memory)
-    }
-}
-
-/// The legal combinations of the open cells that a group of rules reads.
-struct Starts<'a> {
-    all: Combinations<'a>,
-    /// Numbers of the combinations that obey the rules.
-    legal: Vec<usize>,
-}
-
-impl<'a> Starts<'a> {
-    fn of(
-        space: &Space,
-        group: &Group,
-        memory: &'a Memory,
-        open: &[usize],
-        road: &Road,
-    ) -> Result<Starts<'a>, NoStart> {
-        let no_start = |index: usize, is_too_large| {
-            let (road, rule) = (road.name.clone(), space.rules[index].name.clone());
-            let cells = space.rules[index].start.iter().flat_map(|start| cells_read(start, &space.states));
-            NoStart { road, rule, index, cells: cells.collect(), is_too_large }
-        };
-        let open: BTreeSet<usize> = open.iter().copied().collect();
-        let cells = group.cells.iter().copied().filter(|cell| open.contains(cell));
-        let all = Combinations::of(space, memory, cells);
-        if all.count() > COMBINATIONS_MAX {
-            return Err(no_start(group.rules[0], true));
-        }
-        let mut legal: Vec<usize> = (0..all.count()).collect();
-        for rule in &group.rules {
-            legal.retain(|number| {
-                !effort::is_spent() && space.stands(*rule, &all.get(*number).1, Some(&road.facts), 0)
-            });
-            if legal.is_empty() {
-                return Err(no_start(*rule, false));
-            }
-        }
-        Ok(Starts { all, legal })
-    }
-
-    fn draw(&self, rng: &mut Rng) -> Memory {
-        let odds: Vec<f64> = self.legal.iter().map(|number| self.all.get(*number).0).collect();
-        let mut ticket = rng::unit(rng) * odds.iter().sum::<f64>();
-        let mut drawn = self.legal.iter().zip(odds);
-        let found = drawn.find(|(_, odds)| {
-            ticket -= odds;
-            ticket < 0.0
-        });
-        let number = found.map(|(number, _)| number).or(self.legal.last());
-        self.all.get(*number.expect("no rule left nothing")).1
     }
 }
 
