@@ -33,41 +33,26 @@ struct Quotient {
     below: Polynomial,
 }
 
-/// The numbers to be drawn by index, with their places in polynomials; and everything known.
-pub(super) struct Unknowns<'a> {
-    pub rules: RowRules<'a>,
-    /// Locals that are open, in the order of their places.
-    pub open: &'a [usize],
-    /// Values of all parameters and the memory before; the values of open ones do not count.
-    pub facts: Facts<'a>,
-}
-
-/// The polynomials that decide these clauses; `None` if an expression is too complicated.
+/// The polynomials that decide these clauses; `None` if an expression is too complicated. `open` are the locals that are
+/// still to be drawn, in the order of their places in polynomials. `facts` has values of all parameters and the memory
+/// before; the values of open parameters do not count.
 pub(super) fn polynomials<'c>(
-    unknowns: &Unknowns<'_>,
+    rules: RowRules<'_>,
+    open: &[usize],
+    facts: Facts<'_>,
     clauses: impl Iterator<Item = &'c Clause>,
 ) -> Option<Vec<Polynomial>> {
-    let space = unknowns.rules.space;
-    effort::spend(unknowns.facts.locals.len() + unknowns.facts.memory.cells().len());
-    let locals: Vec<Form> = unknowns
-        .facts
-        .locals
-        .iter()
-        .enumerate()
-        .map(|(local, value)| match unknowns.open.iter().position(|open| *open == local) {
-            Some(place) => Form::Numbers(vec![Quotient::whole(Polynomial::number(place))]),
-            None => Form::Known(*value),
-        })
-        .collect();
-    let cells = unknowns.facts.memory.cells().iter().map(|value| Form::Known(*value)).collect();
-    let mut reader = Reader {
-        functions: &space.functions,
-        states: &space.states,
-        facts: unknowns.facts,
-        cells,
-        found: Vec::new(),
+    let space = rules.space;
+    effort::spend(facts.locals.len() + facts.memory.cells().len());
+    let form = |(local, value): (usize, &Value)| match open.iter().position(|open| *open == local) {
+        Some(place) => Form::Numbers(vec![Quotient::whole(Polynomial::number(place))]),
+        None => Form::Known(*value),
     };
-    let action = unknowns.rules.row.action;
+    let locals: Vec<Form> = facts.locals.iter().enumerate().map(form).collect();
+    let cells = facts.memory.cells().iter().map(|value| Form::Known(*value)).collect();
+    let (functions, states) = (&space.functions, &space.states);
+    let mut reader = Reader { functions, states, facts, cells, found: Vec::new() };
+    let action = rules.row.action;
     let mut are_effects_read = false;
     for clause in clauses {
         if effort::is_spent() {
@@ -89,7 +74,7 @@ pub(super) fn polynomials<'c>(
         };
         let is_asked = |condition: &&Expr| match condition.known() {
             Known::Road => true,
-            Known::World => unknowns.facts.world.is_some(),
+            Known::World => facts.world.is_some(),
             Known::Spawn | Known::Step | Known::Judgement => false,
         };
         if let Some(condition) = condition.filter(is_asked) {
