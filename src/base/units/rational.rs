@@ -270,12 +270,8 @@ fn divide_rounding_once(top: u128, bottom: u128) -> f64 {
     }
     // 55 significant bits: 53 to keep, one to decide, one sticky; `as f64` rounds ties to even.
     let rounded = ((quotient as u64) << 1 | u64::from(sticky)) as f64;
-    scale_by_power_of_two(rounded, exponent - 1)
-}
-
-/// `value · 2^exponent`; exact, because the exponents of an i128 fraction stay far from f64's ends.
-fn scale_by_power_of_two(value: f64, exponent: i32) -> f64 {
-    value * f64::from_bits(((1023 + exponent) as u64) << 52)
+    // Times a power of two: exact, because the exponents of an i128 fraction stay far from f64's ends.
+    rounded * f64::from_bits(((1023 + exponent - 1) as u64) << 52)
 }
 
 #[cfg(test)]
