@@ -142,7 +142,8 @@ impl Space {
 
     /// Whether an effect sets a cell, as far as its key is written out.
     pub(crate) fn sets_cell(&self, set: &SetDef, cell: usize) -> bool {
-        let position = self.states[set.state].position_of(cell);
+        let state = &self.states[set.state];
+        let position = cell.checked_sub(state.first_cell).filter(|position| *position < state.cells);
         position.is_some_and(|position| match set.key.as_ref().map(|key| &key.kind) {
             Some(ExprKind::Variant(_, key)) => *key == position,
             _ => true,

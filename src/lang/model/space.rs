@@ -406,13 +406,6 @@ impl RoadFacts {
     }
 }
 
-impl StateDef {
-    /// The position of a cell among the cells of this state.
-    pub(crate) fn position_of(&self, cell: usize) -> Option<usize> {
-        cell.checked_sub(self.first_cell).filter(|position| *position < self.cells)
-    }
-}
-
 impl Space {
     /// All that a step sets, in the order in which it happens: by its action, by `on … also`, and by every step. Without
     /// an action only the last is left.
