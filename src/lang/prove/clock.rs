@@ -36,7 +36,10 @@ pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
         let name = |value: usize| variants[value].as_str();
         let reached = graph.reached();
         let all = u128::MAX >> (128 - variants.len());
-        let stuck: Vec<&str> = bits(reached).filter(|from| graph.is_stuck(*from)).map(name).collect();
+        // The only move allowed from such a value is back to itself.
+        let moves = |from: usize| graph.allowed[from].iter().enumerate();
+        let is_stuck = |from: &usize| moves(*from).all(|(to, allowed)| *allowed == (to == *from));
+        let stuck: Vec<&str> = bits(reached).filter(is_stuck).map(name).collect();
         if !stuck.is_empty() && variants.len() > 1 && graph.rows.len() > 1 {
             let message = format!("`{moved}` can never leave {}", listed(&stuck));
             // The rule says so itself, so it may well be meant.
@@ -180,11 +183,6 @@ impl<'a> Graph<'a> {
             }
             reached = next;
         }
-    }
-
-    /// Whether the only move allowed from this value is back to itself.
-    fn is_stuck(&self, from: usize) -> bool {
-        self.allowed[from].iter().enumerate().all(|(to, allowed)| *allowed == (to == from))
     }
 
     /// The shortest way, found breadth first, over rows that always set the same value.

@@ -147,7 +147,13 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
             Values::Number(Interval::point(Rational::ZERO))
         }
         ExprKind::Arithmetic(op, left, right) => {
-            Values::Number(arithmetic(*op, &values(left).interval(), &values(right).interval()))
+            let (left, right) = (values(left).interval(), values(right).interval());
+            Values::Number(match op {
+                Arithmetic::Add => left.add(&right),
+                Arithmetic::Subtract => left.add(&right.neg()),
+                Arithmetic::Multiply => left.mul(&right),
+                Arithmetic::Divide => left.div(&right),
+            })
         }
         ExprKind::Compare(op, left, right) => compare_parts(*op, left, right, known),
         ExprKind::And(left, right) => and(values(left), values(right)),
@@ -245,15 +251,6 @@ fn or(left: Values, right: Values) -> Values {
     Values::Truth {
         may_hold: left.may_hold() || right.may_hold(),
         may_fail: left.may_fail() && right.may_fail(),
-    }
-}
-
-fn arithmetic(op: Arithmetic, left: &Interval, right: &Interval) -> Interval {
-    match op {
-        Arithmetic::Add => left.add(right),
-        Arithmetic::Subtract => left.add(&right.neg()),
-        Arithmetic::Multiply => left.mul(right),
-        Arithmetic::Divide => left.div(right),
     }
 }
 

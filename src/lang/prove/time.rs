@@ -279,9 +279,10 @@ impl States<'_> {
     fn stands_after(&self, from: &[Values], to: &[Values], case: &Case) -> (bool, bool) {
         let mut found = self.stands(to, case);
         // What every step does does not happen either where a number would leave what a state may be.
+        let most = STATE_MAX as i64;
+        let kept = Interval::closed(Rational::integer(-most), Rational::integer(most));
         for cell in &self.followed {
             if let Values::Number(number) = to[*cell] {
-                let kept = state_range();
                 found =
                     (found.0 && !number.intersect(&kept).is_empty(), found.1 || number.hull(&kept) != kept);
             }
@@ -435,14 +436,6 @@ impl States<'_> {
             (Values::Number(interval), ty) => interval.shown(ty, interval.unit(ty)),
             (Values::Truth { .. } | Values::Variants(_), _) => "unknown".to_owned(),
         }
-    }
-}
-
-/// The numbers that a state may have.
-fn state_range() -> Interval {
-    match Rational::from_f64(STATE_MAX) {
-        Some(most) => Interval::closed(most.checked_neg().unwrap_or(Rational::ZERO), most),
-        None => Interval::ALL,
     }
 }
 

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use crate::model::expr::{Arithmetic, Expr, ExprKind};
 use crate::model::rules::RowRules;
 use crate::model::vocabulary::Known;
-use crate::model::{ActionDef, Road, Row, RuleBody, RuleDef, RulesInForce, Space, code, effort};
+use crate::model::{ActionDef, Row, RuleBody, RuleDef, RulesInForce, Space, code, effort};
 use crate::prove::clock::never_enabled;
 use crate::prove::reach::numbers;
 use crate::prove::realise::{Realisable, Realised, is_about_time};
@@ -110,17 +110,21 @@ struct Unknown<'a> {
 
 /// One error for each set of rules that leaves rows undecided, whichever actions they belong to.
 fn report_unknown(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> {
+    let in_force = RulesInForce::by_default(space);
     let mut together: Vec<Vec<Unknown<'_>>> = Vec::new();
     for (index, action) in space.actions.iter().enumerate() {
         let mut of_action: Vec<Unknown<'_>> = Vec::new();
         for (number, road) in space.roads.iter().enumerate() {
-            let is_unknown = |row: &&Row| realisable[row.index][number] == Realised::Unknown;
-            let rows: Vec<&Row> = space.rows_of(index).iter().filter(is_unknown).collect();
+            let is_undecided = |row: &&Row| realisable[row.index][number] == Realised::Unknown;
+            let rows: Vec<&Row> = space.rows_of(index).iter().filter(is_undecided).collect();
             match of_action.iter_mut().find(|known| known.rows == rows) {
                 _ if rows.is_empty() => {}
                 Some(known) => known.roads.push(&road.name),
                 None => {
-                    let rules = to_blame(space, rows[0], road);
+                    // Without any one of the other rules the row is undecided still.
+                    let (row, left) = (rows[0], Left::new(BOXES_MAX));
+                    let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };
+                    let rules = rules.conflict(&|fewer| is_unknown(fewer, &left));
                     of_action.push(Unknown { action, rows, roads: vec![&road.name], rules });
                 }
             }
@@ -208,11 +212,4 @@ fn ask(rules: &[&RuleDef], from: Known) -> bool {
 fn has(rule: &RuleDef, test: impl Fn(&ExprKind) -> bool) -> bool {
     let RuleBody::Holds(bindings) = &rule.body else { return false };
     bindings.iter().any(|binding| binding.condition.any(&test))
-}
-
-/// The rules that leave a row undecided: without any one of the others it is undecided still.
-fn to_blame(space: &Space, row: &Row, road: &Road) -> Vec<usize> {
-    let (in_force, left) = (RulesInForce::by_default(space), Left::new(BOXES_MAX));
-    let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };
-    rules.conflict(&|fewer| is_unknown(fewer, &left))
 }
