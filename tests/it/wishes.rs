@@ -86,7 +86,7 @@ fn every_second_step_is_slow() {
     let table = wish("slow_every_second_step");
     let space = table.space();
     let (cold, rules) = (space.initial_memory(0), RulesInForce::by_default(space));
-    let hot = space.memory_after_wait(&cold, Some(1), Some(&space.roads[0].facts), &rules);
+    let hot = space.memory_after_wait(&cold, 1, Some(&space.roads[0].facts), &rules);
     let speeds = |memory: &Memory| -> Vec<f64> {
         draws(&table, 0, 0, memory, 40).iter().map(|draw| number(draw, "speed")).collect()
     };

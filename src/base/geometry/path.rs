@@ -312,11 +312,8 @@ impl Path {
             return None;
         }
         let inner = self.points.iter().filter(|p| p.station_m > from_m + 1e-6 && p.station_m < to_m - 1e-6);
-        Path::new(
-            core::iter::once(end(from_m))
-                .chain(inner.map(|p| (p.position, p.heading_rad, p.curvature_per_m)))
-                .chain(core::iter::once(end(to_m))),
-        )
+        let inner = inner.map(|p| (p.position, p.heading_rad, p.curvature_per_m));
+        Path::new([end(from_m)].into_iter().chain(inner).chain([end(to_m)]))
     }
 
     /// This path followed by others; each is expected to begin where the one before ends.

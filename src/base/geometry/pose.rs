@@ -107,9 +107,7 @@ impl Pose {
 
     /// The pose `ahead_m` forward and `left_m` to the left, with the same heading.
     pub fn offset(&self, ahead_m: f64, left_m: f64) -> Pose {
-        let forward = self.forward();
-        let left = Vec2::new(-forward.y, forward.x);
-        Pose { position: self.position + forward * ahead_m + left * left_m, heading_rad: self.heading_rad }
+        Pose { position: self.to_world(Vec2::new(ahead_m, left_m)), heading_rad: self.heading_rad }
     }
 
     /// A world point in this frame: x ahead, y to the left (m).

@@ -3,7 +3,7 @@
 use crate::rng;
 use crate::rng::Rng;
 
-use crate::statistics::bisect;
+use crate::statistics::{Z, bisect};
 
 /// An interval that covers the true value in 95 of 100 samples.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -81,8 +81,6 @@ pub fn wilson(count: u32, trials: u32) -> (f64, f64) {
     if trials == 0 {
         return (0.0, 1.0);
     }
-    // 97.5 % quantile of the normal distribution.
-    const Z: f64 = 1.959_963_984_540_054;
     let (n, p) = (f64::from(trials), f64::from(count) / f64::from(trials));
     let centre = p + Z * Z / (2.0 * n);
     let half = Z * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt();
@@ -223,12 +221,11 @@ pub fn paired_difference([both, first_only, second_only]: [u64; 3], pairs: u64) 
 pub fn poisson(count: u64) -> Interval {
     // Ten standard deviations and some more: far enough on both sides.
     let far = count as f64 + 10.0 * (count as f64).sqrt() + 20.0;
-    let at_most = |events: u64, mean: f64| poisson_at_most(events, mean);
     let low = match count.checked_sub(1) {
         None => 0.0,
-        Some(fewer) => bisect(0.0, far, |mean| 1.0 - at_most(fewer, mean) >= 0.025),
+        Some(fewer) => bisect(0.0, far, |mean| 1.0 - poisson_at_most(fewer, mean) >= 0.025),
     };
-    Interval { low, high: Some(bisect(0.0, far, |mean| at_most(count, mean) <= 0.025)) }
+    Interval { low, high: Some(bisect(0.0, far, |mean| poisson_at_most(count, mean) <= 0.025)) }
 }
 
 /// Probability that a Poisson variable is at most `count`.
@@ -279,6 +276,12 @@ mod tests {
     use super::*;
     use crate::rng::{Stream, stream};
 
+    fn assert_near(found: Interval, ends: [f64; 2], within: f64) {
+        let is_near = |found: f64, end: f64| (found - end).abs() < within;
+        let [low, high] = ends;
+        assert!(is_near(found.low, low) && is_near(found.high.unwrap(), high), "{found:?} is not {ends:?}");
+    }
+
     /// `scipy.stats.t.ppf(0.975, n)`.
     #[test]
     fn quantiles_are_students() {
@@ -301,12 +304,8 @@ mod tests {
     #[test]
     fn a_mean_has_its_interval() {
         let found = mean(&[3.0, 5.0, 4.0, 8.0, 6.0]).unwrap();
-        let Interval { low, high } = found.interval.unwrap();
         assert_eq!(found.mean, 5.2);
-        assert!(
-            (low - 2.81161161190002).abs() < 1e-9 && (high.unwrap() - 7.588388388099981).abs() < 1e-9,
-            "{low} {high:?}"
-        );
+        assert_near(found.interval.unwrap(), [2.81161161190002, 7.588388388099981], 1e-9);
         assert_eq!(mean(&[4.0]).unwrap().interval, None);
         assert_eq!(mean(&[0.0, 0.0, 0.0]).unwrap().interval, None);
         assert_eq!(mean(&[]), None);
@@ -323,9 +322,7 @@ mod tests {
             (1, 2, 0.01257911709342505, 0.987420882906575),
         ];
         for (count, trials, low, high) in known {
-            let found = binomial(count, trials);
-            let wrong = (found.low - low).abs().max((found.high.unwrap() - high).abs());
-            assert!(wrong < 1e-9, "{count} of {trials}: {found:?}");
+            assert_near(binomial(count, trials), [low, high], 1e-9);
         }
         assert_eq!(binomial(0, 0), Interval { low: 0.0, high: Some(1.0) });
     }
@@ -341,8 +338,7 @@ mod tests {
         }
         // Two events of weight 1 and ten of weight 0.1 among 1,000.
         let found = weighted(3.0 / 1e3, 2.1 / 1e6, 1.0 / 1e3, 0.05);
-        assert!((found.low - 0.000865837810245).abs() < 1e-9, "{found:?}");
-        assert!((found.high.unwrap() - 0.00811776904705).abs() < 1e-9, "{found:?}");
+        assert_near(found, [0.000865837810245, 0.00811776904705], 1e-9);
         // A narrower miss makes a wider interval.
         assert!(weighted(3.0 / 1e3, 2.1 / 1e6, 1.0 / 1e3, 0.01).low < found.low);
     }
@@ -357,10 +353,7 @@ mod tests {
         ] {
             let (found, interval) = paired_difference(counts, pairs);
             assert!((found - (counts[2] as f64 - counts[1] as f64) / pairs as f64).abs() < 1e-12);
-            assert!(
-                (interval.low - low).abs() < 5e-5 && (interval.high.unwrap() - high).abs() < 5e-5,
-                "{interval:?}"
-            );
+            assert_near(interval, [low, high], 5e-5);
         }
     }
 
@@ -403,8 +396,8 @@ mod tests {
             (0, 20, 0.0, 0.1611),
             (1, 29, 0.0061, 0.1718),
         ] {
-            let found = wilson(count, trials);
-            assert!((found.0 - low).abs() < 5e-5 && (found.1 - high).abs() < 5e-5, "{count}: {found:?}");
+            let (found_low, found_high) = wilson(count, trials);
+            assert_near(Interval { low: found_low, high: Some(found_high) }, [low, high], 5e-5);
         }
         assert_eq!(wilson(20, 20), (1.0 - wilson(0, 20).1, 1.0));
         assert_eq!(wilson(0, 0), (0.0, 1.0));

@@ -23,6 +23,9 @@ pub use intervals::{
 pub use ranks::{PairedTest, RankTest, holm, mann_whitney, sign_test, signed_ranks, superiority};
 pub use survival::{Lifetime, restricted_mean};
 
+/// Normal quantile of a two-sided 95 %.
+const Z: f64 = 1.959_963_984_540_054;
+
 /// Where `is_above` turns true, by bisection; it must be false at `low` and true at `high`.
 pub fn bisect(mut low: f64, mut high: f64, is_above: impl Fn(f64) -> bool) -> f64 {
     // 200 halvings exhaust an f64, wherever the two begin.

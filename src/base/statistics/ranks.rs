@@ -1,11 +1,9 @@
 //! Two samples compared by ranks alone, without any assumption about their distributions.
 
-use crate::statistics::{Interval, bisect};
+use crate::statistics::{Interval, Z, bisect};
 
 /// Samples up to this size are compared exactly. Ours: for larger ones the normal approximation is as good.
 const EXACT_MAX: usize = 30;
-/// Normal quantile of a two-sided 95 %.
-const Z: f64 = 1.959963984540054;
 
 /// Outcome of a two-sided Mann–Whitney U test (1947).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]

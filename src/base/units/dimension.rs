@@ -37,21 +37,20 @@ impl Dimension {
 
     /// The dimension of a product; `None` beyond exponents of ±127.
     pub fn times(self, other: Dimension) -> Option<Dimension> {
-        Some(Dimension {
-            metres: self.metres.checked_add(other.metres)?,
-            seconds: self.seconds.checked_add(other.seconds)?,
-            radians: self.radians.checked_add(other.radians)?,
-            kilograms: self.kilograms.checked_add(other.kilograms)?,
-        })
+        self.with(other, i8::checked_add)
     }
 
     /// The dimension of a quotient; `None` beyond exponents of ±127.
     pub fn per(self, other: Dimension) -> Option<Dimension> {
+        self.with(other, i8::checked_sub)
+    }
+
+    fn with(self, other: Dimension, power: fn(i8, i8) -> Option<i8>) -> Option<Dimension> {
         Some(Dimension {
-            metres: self.metres.checked_sub(other.metres)?,
-            seconds: self.seconds.checked_sub(other.seconds)?,
-            radians: self.radians.checked_sub(other.radians)?,
-            kilograms: self.kilograms.checked_sub(other.kilograms)?,
+            metres: power(self.metres, other.metres)?,
+            seconds: power(self.seconds, other.seconds)?,
+            radians: power(self.radians, other.radians)?,
+            kilograms: power(self.kilograms, other.kilograms)?,
         })
     }
 

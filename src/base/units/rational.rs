@@ -40,25 +40,17 @@ impl Rational {
 
     /// Reads `12`, `-0.5` or `20.625`: digits with at most one point.
     pub fn from_decimal(text: &str) -> Option<Rational> {
-        let (negative, digits) = match text.strip_prefix('-') {
-            Some(rest) => (true, rest),
-            None => (false, text),
-        };
-        let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
-        if whole.is_empty() {
+        let unsigned = text.strip_prefix('-').unwrap_or(text);
+        let (whole, fraction) = unsigned.split_once('.').unwrap_or((unsigned, ""));
+        // Zeros at the end of a fraction change nothing, but would use up range.
+        let fraction = fraction.trim_end_matches('0');
+        let digits = [whole, fraction].concat();
+        if whole.is_empty() || !digits.bytes().all(|digit| digit.is_ascii_digit()) {
             return None;
         }
-        let (mut numerator, mut denominator) = (0_i128, 1_i128);
-        // Zeros at the end of a fraction change nothing, but would use up range.
-        for (digit, fractional) in
-            whole.chars().map(|c| (c, false)).chain(fraction.trim_end_matches('0').chars().map(|c| (c, true)))
-        {
-            numerator = numerator.checked_mul(10)?.checked_add(i128::from(digit.to_digit(10)?))?;
-            if fractional {
-                denominator = denominator.checked_mul(10)?;
-            }
-        }
-        Rational::new(if negative { -numerator } else { numerator }, denominator)
+        let numerator: i128 = digits.parse().ok()?;
+        let denominator = 10_i128.checked_pow(u32::try_from(fraction.len()).ok()?)?;
+        Rational::new(if text.starts_with('-') { -numerator } else { numerator }, denominator)
     }
 
     /// Reads a number as files write it: `12`, `0.50` or `1e-9`.
@@ -184,7 +176,7 @@ impl Rational {
 
     /// The value, if it is whole and fits.
     pub fn to_i64(self) -> Option<i64> {
-        if self.is_integer() { i64::try_from(self.numerator).ok() } else { None }
+        i64::try_from(self.numerator).ok().filter(|_| self.is_integer())
     }
 
     pub fn signum(self) -> i32 {
@@ -279,12 +271,8 @@ fn divide_rounding_once(top: u128, bottom: u128) -> f64 {
     }
     // 55 significant bits: 53 to keep, one to decide, one sticky; `as f64` rounds ties to even.
     let rounded = ((quotient as u64) << 1 | u64::from(sticky)) as f64;
-    scale_by_power_of_two(rounded, exponent - 1)
-}
-
-/// `value · 2^exponent`; exact, because the exponents of an i128 fraction stay far from f64's ends.
-fn scale_by_power_of_two(value: f64, exponent: i32) -> f64 {
-    value * f64::from_bits(((1023 + exponent) as u64) << 52)
+    // Times a power of two: exact, because the exponents of an i128 fraction stay far from f64's ends.
+    rounded * f64::from_bits(((1023 + exponent - 1) as u64) << 52)
 }
 
 #[cfg(test)]

@@ -331,7 +331,7 @@ impl<'a> Reader<'a> {
         let is_timed = in_force.all().any(asks_for_step);
         for number in steps {
             let before = &history[history.len() - 1].1;
-            let after = self.space.memory_after_wait(before, Some(number), road, in_force);
+            let after = self.space.memory_after_wait(before, number, road, in_force);
             if after != *before {
                 history.push((number, after));
             } else if !is_timed {

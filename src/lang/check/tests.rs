@@ -258,7 +258,7 @@ rule never_soaked: sky[Wetness] <= Moderate
     assert_eq!(after.cells()[cell("count")], Value::Number(10.0));
     assert_eq!(after.cells()[cell("rest")], Value::Number(1.0));
     let (road, rules) = (&space.roads[0].facts, RulesInForce::by_default(&space));
-    let wait = |memory: &Memory| space.memory_after_wait(memory, Some(1), Some(road), &rules);
+    let wait = |memory: &Memory| space.memory_after_wait(memory, 1, Some(road), &rules);
     let waited = wait(&after);
     assert_eq!(waited.cells()[cell("rest")], Value::Number(0.0));
     assert_eq!(waited.cells()[cell("sky") + 2].variant(), 2);

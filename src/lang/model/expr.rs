@@ -58,6 +58,17 @@ pub enum ExprKind {
     },
 }
 
+impl ExprKind {
+    /// From when on the fact is known that it is itself; [`Known::Road`] if it is none.
+    fn known(&self) -> Known {
+        match self {
+            ExprKind::Fact(fact) => fact.known(),
+            ExprKind::IsWord(fact, _) | ExprKind::IsBody(fact, _) => fact.known(),
+            _ => Known::Road,
+        }
+    }
+}
+
 impl Expr {
     /// Calls `visit` for this expression and everything inside it; bodies of called functions are
     /// not entered, because they know only their arguments.
@@ -108,6 +119,13 @@ impl Expr {
         }
     }
 
+    /// What `of` gives for the expression and the parts inside it, where it gives something.
+    pub fn filter_map<T>(&self, of: impl Fn(&ExprKind) -> Option<T>) -> Vec<T> {
+        let mut found = Vec::new();
+        self.walk(&mut |part| found.extend(of(&part.kind)));
+        found
+    }
+
     /// Number of its operations, names and literals; those of called functions do not count.
     pub fn operations(&self) -> usize {
         let mut count = 0;
@@ -132,42 +150,25 @@ impl Expr {
     /// From when on all facts are known that the expression names; [`Known::Road`] if it names none.
     pub fn known(&self) -> Known {
         let mut latest = Known::Road;
-        self.walk(&mut |expr| match &expr.kind {
-            ExprKind::Fact(fact) => latest = latest.max(fact.known()),
-            ExprKind::IsWord(fact, _) | ExprKind::IsBody(fact, _) => latest = latest.max(fact.known()),
-            _ => {}
-        });
+        self.walk(&mut |expr| latest = latest.max(expr.kind.known()));
         latest
     }
 
     /// Whether it asks about the moment in the world ([`Known::World`]).
     pub fn asks_the_world(&self) -> bool {
-        self.any(|kind| match kind {
-            ExprKind::Fact(fact) => fact.known() == Known::World,
-            ExprKind::IsWord(fact, _) => fact.known() == Known::World,
-            _ => false,
-        })
+        self.any(|kind| kind.known() == Known::World)
     }
 
     /// Whether the start of an episode answers all that it asks: when `step` and `elapsed` are 0.
     pub(crate) fn is_known_at_start(&self) -> bool {
-        !self.any(|kind| match kind {
-            ExprKind::Fact(Fact::StepNumber | Fact::Elapsed) => false,
-            ExprKind::Fact(fact) => fact.known() > Known::Road,
-            ExprKind::IsWord(fact, _) | ExprKind::IsBody(fact, _) => fact.known() > Known::Road,
-            _ => false,
-        })
+        let is_at_start = |kind: &ExprKind| matches!(kind, ExprKind::Fact(Fact::StepNumber | Fact::Elapsed));
+        !self.any(|kind| kind.known() > Known::Road && !is_at_start(kind))
     }
 
     /// Whether it asks about the moment, or about more of a spawn than its gaps.
     pub(crate) fn asks_about_moment(&self) -> bool {
-        let about_npc = |kind: &ExprKind| match kind {
-            ExprKind::Fact(fact) => {
-                fact.known() == Known::Spawn && !matches!(fact, Fact::SpawnGap | Fact::SafetyGap)
-            }
-            _ => false,
-        };
-        self.asks_the_world() || self.any(about_npc)
+        let is_gap = |kind: &ExprKind| matches!(kind, ExprKind::Fact(Fact::SpawnGap | Fact::SafetyGap));
+        self.asks_the_world() || self.any(|kind| kind.known() == Known::Spawn && !is_gap(kind))
     }
 
     pub fn reads_memory(&self) -> bool {

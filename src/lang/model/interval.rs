@@ -17,6 +17,16 @@ pub enum End {
     At(Rational, bool),
 }
 
+impl End {
+    /// The end at another number; unbounded if that one does not fit.
+    fn map(self, other: impl FnOnce(Rational) -> Option<Rational>) -> End {
+        match self {
+            End::At(value, closed) => other(value).map_or(End::Unbounded, |value| End::At(value, closed)),
+            End::Unbounded => End::Unbounded,
+        }
+    }
+}
+
 /// All numbers between two ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Interval {
@@ -37,14 +47,8 @@ impl Interval {
     }
 
     pub fn is_empty(&self) -> bool {
-        match (self.low, self.high) {
-            (End::At(low, low_in), End::At(high, high_in)) => match low.cmp(&high) {
-                Ordering::Less => false,
-                Ordering::Equal => !(low_in && high_in),
-                Ordering::Greater => true,
-            },
-            _ => false,
-        }
+        // Its high end lies below its low end, or both are one place that does not belong to it.
+        self.is_below(self)
     }
 
     /// The one number of the interval, if it has just one.
@@ -87,17 +91,18 @@ impl Interval {
     }
 
     pub fn add(&self, other: &Interval) -> Interval {
-        Interval { low: add_ends(self.low, other.low), high: add_ends(self.high, other.high) }
+        let sum = |a: End, b: End| match (a, b) {
+            (End::At(x, x_in), End::At(y, y_in)) => {
+                x.checked_add(y).map_or(End::Unbounded, |sum| End::At(sum, x_in && y_in))
+            }
+            _ => End::Unbounded,
+        };
+        Interval { low: sum(self.low, other.low), high: sum(self.high, other.high) }
     }
 
     pub fn neg(&self) -> Interval {
-        let flip = |end: End| match end {
-            End::At(value, closed) => {
-                value.checked_neg().map_or(End::Unbounded, |value| End::At(value, closed))
-            }
-            End::Unbounded => End::Unbounded,
-        };
-        Interval { low: flip(self.high), high: flip(self.low) }
+        let [low, high] = [self.high, self.low].map(|end| end.map(Rational::checked_neg));
+        Interval { low, high }
     }
 
     pub fn mul(&self, other: &Interval) -> Interval {
@@ -124,7 +129,8 @@ impl Interval {
                 // If 0 belongs to one interval, the product 0 is reached, whatever the other end is.
                 let zero_of = |end_in: bool, end: Rational| end_in && end == Rational::ZERO;
                 let closed = (x_in && y_in) || zero_of(x_in, x) || zero_of(y_in, y);
-                let corner = Interval { low: End::At(value, closed), high: End::At(value, closed) };
+                let end = End::At(value, closed);
+                let corner = Interval { low: end, high: end };
                 product = Some(product.map_or(corner, |so_far| so_far.hull(&corner)));
             }
         }
@@ -148,12 +154,7 @@ impl Interval {
     }
 
     fn scale(&self, factor: Rational) -> Interval {
-        let end = |end: End| match end {
-            End::At(value, closed) => {
-                value.checked_mul(factor).map_or(End::Unbounded, |v| End::At(v, closed))
-            }
-            End::Unbounded => End::Unbounded,
-        };
+        let end = |end: End| end.map(|value| value.checked_mul(factor));
         match factor.signum() {
             1 => Interval { low: end(self.low), high: end(self.high) },
             _ => Interval { low: end(self.high), high: end(self.low) },
@@ -171,14 +172,18 @@ impl Interval {
         self.contains(low.floor()) || next.is_none_or(|next| self.contains(next))
     }
 
+    /// The numbers at its ends; none where it is unbounded.
+    fn ends(&self) -> impl Iterator<Item = f64> {
+        [self.low, self.high].into_iter().filter_map(|end| match end {
+            End::At(value, _) => Some(value.to_f64()),
+            End::Unbounded => None,
+        })
+    }
+
     /// The unit in which people read its ends, if it is not SI's: see [`unit_of_all`].
     pub fn unit(&self, ty: Type) -> Option<&'static Unit> {
         let Type::Quantity(dimension) = ty else { return None };
-        let ends = [self.low, self.high].into_iter().filter_map(|end| match end {
-            End::At(value, _) => Some(value.to_f64()),
-            End::Unbounded => None,
-        });
-        unit_of_all(&ends.collect::<Vec<_>>(), dimension)
+        unit_of_all(&self.ends().collect::<Vec<_>>(), dimension)
     }
 
     /// The interval in a unit, in that of SI without one, rounded to three decimals: `20 .. 50 km/h`.
@@ -188,31 +193,18 @@ impl Interval {
 
     /// As [`Interval::shown`], rounded to so many decimals.
     pub fn shown_to(&self, decimals: u32, ty: Type, unit: Option<&Unit>) -> String {
-        match (unit, ty) {
-            (Some(unit), _) => {
-                let factor = unit.factor().to_f64();
-                let number = |value: Rational| rounded(value.to_f64() / factor, decimals);
-                format!("{} {}", self.written(number), unit.word)
-            }
-            (None, Type::Quantity(dimension)) => {
-                let number = self.written(|value| rounded(value.to_f64(), decimals));
-                format!("{number} {}", dimension.si_unit()).trim_end().to_owned()
-            }
-            (None, Type::Int | Type::Bool | Type::Enum(_)) => {
-                self.written(|value| rounded(value.to_f64(), decimals))
-            }
-        }
+        let (factor, word) = match (unit, ty) {
+            (Some(unit), _) => (unit.factor().to_f64(), unit.word.to_owned()),
+            (None, Type::Quantity(dimension)) => (1.0, dimension.si_unit()),
+            (None, Type::Int | Type::Bool | Type::Enum(_)) => (1.0, String::new()),
+        };
+        let number = self.written(|value| rounded(value.to_f64() / factor, decimals));
+        format!("{number} {word}").trim_end().to_owned()
     }
 
     /// The fewest decimals, at least three, that tell the different ends of intervals apart.
     pub fn decimals_of(intervals: &[Interval]) -> u32 {
-        let ends = intervals.iter().flat_map(|interval| [interval.low, interval.high]);
-        let mut ends: Vec<f64> = ends
-            .filter_map(|end| match end {
-                End::At(value, _) => Some(value.to_f64()),
-                End::Unbounded => None,
-            })
-            .collect();
+        let mut ends: Vec<f64> = intervals.iter().flat_map(Interval::ends).collect();
         ends.sort_by(f64::total_cmp);
         let decimals = |decimals: &u32| {
             let shown = |pair: &[f64]| {
@@ -253,15 +245,6 @@ impl Interval {
             (End::At(high, _), End::At(low, _)) => high <= low,
             _ => false,
         }
-    }
-}
-
-fn add_ends(a: End, b: End) -> End {
-    match (a, b) {
-        (End::At(x, x_in), End::At(y, y_in)) => {
-            x.checked_add(y).map_or(End::Unbounded, |sum| End::At(sum, x_in && y_in))
-        }
-        _ => End::Unbounded,
     }
 }
 

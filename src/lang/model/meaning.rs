@@ -20,31 +20,21 @@ const NAMED_MAX: usize = 6;
 pub struct Meaning {
     /// `sha256:…`
     digest: String,
-    declarations: Vec<Declaration>,
-}
-
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct Declaration {
-    /// For example ``rule `npc_gap` ``.
-    title: String,
-    /// Its canonical text, which the digest covers.
-    text: String,
-    mark: String,
+    /// The title of each (for example ``rule `npc_gap` ``) and its canonical text, which the digest covers.
+    declarations: Vec<(String, String)>,
 }
 
 impl Meaning {
     /// The meaning of declarations, each with its title and its canonical text. Their order counts.
     pub fn new(declarations: Vec<(String, String)>) -> Meaning {
         let whole: Vec<&str> = declarations.iter().map(|(_, text)| text.as_str()).collect();
-        let digest = digest(whole.join("\n").as_bytes());
-        let declaration = |(title, text): (String, String)| Declaration { mark: mark(&text), title, text };
-        Meaning { digest, declarations: declarations.into_iter().map(declaration).collect() }
+        Meaning { digest: digest(whole.join("\n").as_bytes()), declarations }
     }
 
     /// The title and the canonical text of each declaration. The digest is that of these texts in this order, so two
     /// meanings have one digest if and only if they have the same texts in the same order.
     pub fn declarations(&self) -> impl Iterator<Item = (&str, &str)> {
-        self.declarations.iter().map(|declaration| (declaration.title.as_str(), declaration.text.as_str()))
+        self.declarations.iter().map(|(title, text)| (title.as_str(), text.as_str()))
     }
 
     /// `sha256:…`
@@ -54,8 +44,11 @@ impl Meaning {
 
     /// What a file keeps of the space that it was made in: the digest, and after a blank the marks.
     pub fn seal(&self) -> String {
-        let marks: String = self.declarations.iter().map(|declaration| declaration.mark.as_str()).collect();
-        format!("{} {marks}", self.digest).trim_end().to_owned()
+        format!("{} {}", self.digest, self.marks()).trim_end().to_owned()
+    }
+
+    fn marks(&self) -> String {
+        self.declarations.iter().map(|(_, text)| mark(text)).collect()
     }
 
     /// Whether a seal, or a digest alone, is of this meaning.
@@ -72,8 +65,8 @@ impl Meaning {
             *before.entry(&marks[at * MARK_LETTERS..][..MARK_LETTERS]).or_default() += 1;
         }
         let mut differ: Vec<&str> = Vec::new();
-        for Declaration { title, mark, .. } in &self.declarations {
-            match before.get_mut(mark.as_str()).filter(|left| **left > 0) {
+        for (title, text) in &self.declarations {
+            match before.get_mut(mark(text).as_str()).filter(|left| **left > 0) {
                 Some(left) => *left -= 1,
                 None => differ.push(title),
             }
@@ -93,8 +86,7 @@ impl Meaning {
         }
         if parts.is_empty() {
             // A mark is short, and may stay as it was; then the digest alone tells of a change.
-            let now: String = self.declarations.iter().map(|declaration| declaration.mark.as_str()).collect();
-            parts.push(match now == marks {
+            parts.push(match self.marks() == marks {
                 true => "no declaration is seen to differ: the digest itself may have been edited".to_owned(),
                 false => "the declarations are the same, their order is not".to_owned(),
             });

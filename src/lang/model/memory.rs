@@ -3,7 +3,7 @@
 use crate::model::effort;
 use crate::model::eval::{Facts, evaluate};
 use crate::model::expr::ExprKind;
-use crate::model::rules::RulesInForce;
+use crate::model::rules::{Combinations, RulesInForce};
 use crate::model::space::{Initial, Road, RoadFacts, RuleBody, SetDef, Space, StateDef, StateMeaning};
 use crate::model::value::{Memory, Type, Value};
 use crate::model::vocabulary::{Level, TimeOfDay};
@@ -38,24 +38,11 @@ impl Space {
         count_max: usize,
     ) -> (Vec<Memory>, bool) {
         let begun = self.initial_memory(0);
-        let open: Vec<(usize, Vec<(u32, Value)>)> = self
-            .open_cells()
-            .into_iter()
-            .map(|cell| (cell, self.drawn_values(self.state_of(cell).ty)))
-            .collect();
-        // Memories are numbered, the last cell varying fastest, so that none is made beyond `count_max`.
+        // The last cell varies fastest. None is made beyond `count_max`.
+        let starts = Combinations::of(self, &begun, self.open_cells().into_iter().rev());
         let all = self.start_count();
         let are_all = all <= count_max;
-        let numbered = |number: usize| {
-            effort::spend(begun.cells.len());
-            let (mut left, mut memory) = (number, begun.clone());
-            for (cell, values) in open.iter().rev() {
-                memory.cells[*cell] = values[left % values.len()].1;
-                left /= values.len();
-            }
-            memory
-        };
-        let mut memories: Vec<Memory> = (0..all.min(count_max)).map(numbered).collect();
+        let mut memories: Vec<Memory> = (0..all.min(count_max)).map(|number| starts.get(number).1).collect();
         memories.retain(|memory| self.broken_start(memory, &road.facts, rules).is_none());
         if memories.is_empty() {
             memories.extend(self.memory_at_start(road, rules, 0));
@@ -122,11 +109,11 @@ impl Space {
     }
 
     /// The memory after a step without an action. If the effects of every step would break a rule in force that
-    /// stands for all states or orders their changes, or give a state no value, they do not happen. `step` is its number, if it is known.
+    /// stands for all states or orders their changes, or give a state no value, they do not happen. `step` is its number.
     pub fn memory_after_wait(
         &self,
         before: &Memory,
-        step: Option<u64>,
+        step: u64,
         road: Option<&RoadFacts>,
         rules: &RulesInForce,
     ) -> Memory {
@@ -155,7 +142,8 @@ impl Space {
 
     /// Whether an effect sets a cell, as far as its key is written out.
     pub(crate) fn sets_cell(&self, set: &SetDef, cell: usize) -> bool {
-        let position = self.states[set.state].position_of(cell);
+        let state = &self.states[set.state];
+        let position = cell.checked_sub(state.first_cell).filter(|position| *position < state.cells);
         position.is_some_and(|position| match set.key.as_ref().map(|key| &key.kind) {
             Some(ExprKind::Variant(_, key)) => *key == position,
             _ => true,
@@ -176,21 +164,15 @@ impl Space {
 
     /// Draws a value of a type. The checker allows `any` states only for finite types.
     fn draw(&self, ty: Type, rng: &mut Rng) -> Value {
-        match ty {
-            Type::Bool => Value::Bool(rng::below(rng, 2) == 1),
-            Type::Enum(of) => {
-                let odds = &self.enums[of.0].odds;
-                let mut ticket = rng::below(rng, odds.iter().sum());
-                let drawn = odds.iter().position(|odds| match ticket.checked_sub(*odds) {
-                    Some(rest) => {
-                        ticket = rest;
-                        false
-                    }
-                    None => true,
-                });
-                Value::Variant(of, drawn.expect("the ticket is below the sum of the odds"))
+        let values = self.drawn_values(ty);
+        let mut ticket = rng::below(rng, values.iter().map(|(odds, _)| odds).sum());
+        let drawn = values.iter().find(|(odds, _)| match ticket.checked_sub(*odds) {
+            Some(rest) => {
+                ticket = rest;
+                false
             }
-            Type::Int | Type::Quantity(_) => Value::Number(0.0),
-        }
+            None => true,
+        });
+        drawn.expect("the ticket is below the sum of the odds").1
     }
 }

@@ -91,15 +91,11 @@ pub struct Condition {
 impl Trigger {
     /// The numbers of the road users that the condition asks about.
     pub fn road_users(&self) -> Vec<u32> {
-        let mut found = Vec::new();
-        if let Some(condition) = &self.once {
-            condition.expr.walk(&mut |part| {
-                if let ExprKind::OfRoadUser(id, _) = part.kind {
-                    found.push(id);
-                }
-            });
-        }
-        found
+        let number = |kind: &ExprKind| match kind {
+            ExprKind::OfRoadUser(id, _) => Some(*id),
+            _ => None,
+        };
+        self.once.iter().flat_map(|condition| condition.expr.filter_map(number)).collect()
     }
 
     /// The trigger as a file spells it.

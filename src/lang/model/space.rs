@@ -200,6 +200,14 @@ impl ActionDef {
         })
     }
 
+    /// Its spawns, in the order in which they happen.
+    pub(crate) fn spawns(&self) -> impl Iterator<Item = &SpawnDef> {
+        self.effects.iter().filter_map(|effect| match effect {
+            EffectDef::Spawn(spawn) => Some(&**spawn),
+            EffectDef::Set(_) => None,
+        })
+    }
+
     /// The values of the parameters that are drawn, given those of all, as declared.
     pub fn drawn_of(&self, values: &[Value]) -> Vec<(Arc<str>, Value)> {
         let drawn = self.parameters.iter().zip(values).filter(|(parameter, _)| !parameter.axis);
@@ -395,13 +403,6 @@ pub struct RoadFacts {
 impl RoadFacts {
     pub fn has_lane(&self, lane: LaneChoice) -> bool {
         self.lanes[lane as usize]
-    }
-}
-
-impl StateDef {
-    /// The position of a cell among the cells of this state.
-    pub(crate) fn position_of(&self, cell: usize) -> Option<usize> {
-        cell.checked_sub(self.first_cell).filter(|position| *position < self.cells)
     }
 }
 

@@ -34,11 +34,12 @@ pub trait Word: Copy + PartialEq + 'static {
 /// Declares an enum of words. A row is the variant, its spelling if that differs, and its sentence if the
 /// sentence of the kind is not enough.
 macro_rules! words {
-    ($(#[$doc:meta])* $kind:ident $each:literal: $($word:ident $($spelling:literal)? $(= $own:literal)?),+ $(,)?) => {
+    ($(#[$mark:meta])* $kind:ident $each:literal:
+     $($(#[$of_word:meta])* $word:ident $($spelling:literal)? $(= $own:literal)?),+ $(,)?) => {
         #[doc = $each]
-        $(#[$doc])*
+        $(#[$mark])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
-        pub enum $kind { $($(#[doc = $own])? $word),+ }
+        pub enum $kind { $($(#[doc = $own])? $(#[$of_word])* $word),+ }
 
         impl Word for $kind {
             const ALL: &'static [$kind] = &[$($kind::$word),+];
@@ -397,15 +398,19 @@ words! {
 }
 
 words! {
+    #[derive(Default)]
     Light "What the next traffic light shows.":
     Red = "The next traffic light is red.",
     Yellow = "The next traffic light is yellow.",
     Green = "The next traffic light is green.",
+    #[default]
     None = "No traffic light within 100 m.",
 }
 
 words! {
+    #[derive(Default)]
     RoadKind "Where the ego vehicle drives.":
+    #[default]
     OneWay = "On a street without lanes in the other direction.",
     TwoWay = "On a street with lanes in both directions.",
     NearJunction = "At most 20 m before a junction.",
@@ -414,36 +419,17 @@ words! {
 
 words! {
     /// As far as the two meet: whoever has priority may count on the other to give way.
+    #[derive(Default)]
     Priority "Which of the ego vehicle and a road user has priority over the other.":
     Ego "ego" = "The ego vehicle: the road user had to give way.",
     Other "other" = "The road user: the ego vehicle had to give way.",
+    #[default]
     None "none" = "Neither, or both owed each other care.",
 }
 
 words! {
     /// The paper's "lane-change" group.
     Then "Whether a vehicle keeps its lane or changes it.": Keep, Change
-}
-
-#[allow(clippy::derivable_impls, reason = "the macro has no place for the mark of a default")]
-impl Default for Light {
-    fn default() -> Light {
-        Light::None
-    }
-}
-
-#[allow(clippy::derivable_impls, reason = "the macro has no place for the mark of a default")]
-impl Default for RoadKind {
-    fn default() -> RoadKind {
-        RoadKind::OneWay
-    }
-}
-
-#[allow(clippy::derivable_impls, reason = "the macro has no place for the mark of a default")]
-impl Default for Priority {
-    fn default() -> Priority {
-        Priority::None
-    }
 }
 
 impl Level {

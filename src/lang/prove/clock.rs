@@ -26,36 +26,35 @@ struct Graph<'a> {
 pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     let begins = begins(space);
-    for (index, rule) in space.rules.iter().enumerate() {
-        if effort::is_spent() {
-            break;
-        }
+    for (index, rule) in space.rules.iter().enumerate().take_while(|_| !effort::is_spent()) {
         let Some(graph) = graph(space, index, &begins) else { continue };
         let RuleBody::Moves { state, cell, .. } = &rule.body else { continue };
         let moved = space.cell_name(*cell);
         let state = &space.states[*state];
         let Type::Enum(of) = state.ty else { continue };
         let variants = &space.enums[of.0].variants;
-        let names = |set: u128| -> Vec<&str> { bits(set).map(|value| variants[value].as_str()).collect() };
+        let name = |value: usize| variants[value].as_str();
         let reached = graph.reached();
         let all = u128::MAX >> (128 - variants.len());
-        let stuck: u128 = bits(reached).filter(|from| graph.is_stuck(*from)).map(|value| 1 << value).sum();
-        if stuck != 0 && variants.len() > 1 && graph.rows.len() > 1 {
-            let names = names(stuck);
-            let message = format!("`{moved}` can never leave {}", listed(&names));
+        // The only move allowed from such a value is back to itself.
+        let moves = |from: usize| graph.allowed[from].iter().enumerate();
+        let is_stuck = |from: &usize| moves(*from).all(|(to, allowed)| *allowed == (to == *from));
+        let stuck: Vec<&str> = bits(reached).filter(is_stuck).map(name).collect();
+        if !stuck.is_empty() && variants.len() > 1 && graph.rows.len() > 1 {
+            let message = format!("`{moved}` can never leave {}", listed(&stuck));
             // The rule says so itself, so it may well be meant.
             let remark = Diagnostic::remark(code::STUCK, message)
                 .at(rule.span, "allows no move from there to another value")
-                .help(format!("add `{} -> …` with another value, if an episode should go on", names[0]));
+                .help(format!("add `{} -> …` with another value, if an episode should go on", stuck[0]));
             diagnostics.push(remark);
         }
         // A value that no move leads to was reported with the rule itself.
         let led_to =
             |value: &usize| (0..variants.len()).any(|from| from != *value && graph.allowed[from][*value]);
-        let unreached: u128 = bits(all & !reached).filter(led_to).map(|value| 1 << value).sum();
-        if unreached != 0 {
-            let begin = names(graph.begin);
-            let message = format!("`{moved}` never comes to {}", listed(&names(unreached)));
+        let unreached: Vec<&str> = bits(all & !reached).filter(led_to).map(name).collect();
+        if !unreached.is_empty() {
+            let begin: Vec<&str> = bits(graph.begin).map(name).collect();
+            let message = format!("`{moved}` never comes to {}", listed(&unreached));
             let warning = Diagnostic::warning(code::UNREACHABLE, message)
                 .at(rule.span, format!("no actions lead there from {}", listed(&begin)))
                 .beside(state.span, "begins here");
@@ -184,11 +183,6 @@ impl<'a> Graph<'a> {
             }
             reached = next;
         }
-    }
-
-    /// Whether the only move allowed from this value is back to itself.
-    fn is_stuck(&self, from: usize) -> bool {
-        self.allowed[from].iter().enumerate().all(|(to, allowed)| *allowed == (to == from))
     }
 
     /// The shortest way, found breadth first, over rows that always set the same value.

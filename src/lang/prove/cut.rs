@@ -2,8 +2,9 @@
 
 use crate::model::expr::Comparison;
 use crate::model::rules::RowRules;
-use crate::model::{Domain, End, Interval, Parameter, Reach, RulesInForce, Space, code, effort};
-use crate::syntax::{Diagnostic, listed};
+use crate::model::{Domain, End, Interval, Parameter, RulesInForce, Space, code, effort};
+use crate::prove::{OpenRow, open_rows, rule_names};
+use crate::syntax::Diagnostic;
 use avastra_base::units::Rational;
 
 /// One remark for each range on each road that rules cut below half. Cuts with the same parameter, rules
@@ -11,31 +12,25 @@ use avastra_base::units::Rational;
 pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let in_force = RulesInForce::by_default(space);
     let mut found: Vec<Cut<'_>> = Vec::new();
-    for row in &space.rows {
-        for (road, reach) in space.roads.iter().zip(&row.roads) {
-            if effort::is_spent() {
-                break;
+    for OpenRow { row, road, ranges } in open_rows(space, &space.rows).take_while(|_| !effort::is_spent()) {
+        effort::spend(ranges.len() * (1 + found.len()));
+        for (name, kept) in ranges {
+            let action = &space.actions[row.action];
+            let parameter = action.parameters.iter().find(|parameter| parameter.name == *name);
+            let Some(parameter) = parameter else { continue };
+            let Some(percent) = kept_percent(&parameter.domain, kept) else { continue };
+            let rules = cutting_rules(space, &in_force, row.action, parameter);
+            if rules.is_empty() {
+                continue;
             }
-            let Reach::Open(ranges) = reach else { continue };
-            effort::spend(ranges.len() * (1 + found.len()));
-            for (name, kept) in ranges {
-                let action = &space.actions[row.action];
-                let parameter = action.parameters.iter().find(|parameter| parameter.name == *name);
-                let Some(parameter) = parameter else { continue };
-                let Some(percent) = kept_percent(&parameter.domain, kept) else { continue };
-                let rules = cutting_rules(space, &in_force, row.action, parameter);
-                if rules.is_empty() {
-                    continue;
-                }
-                let cut = Cut { parameter, kept: *kept, percent, rules, road: &road.name };
-                let alike = |known: &&mut Cut<'_>| {
-                    known.parameter.name == cut.parameter.name
-                        && (known.road, known.kept, &known.rules) == (cut.road, cut.kept, &cut.rules)
-                        && known.parameter.domain == cut.parameter.domain
-                };
-                if found.iter_mut().find(alike).is_none() {
-                    found.push(cut);
-                }
+            let cut = Cut { parameter, kept: *kept, percent, rules, road: &road.name };
+            let alike = |known: &Cut<'_>| {
+                known.parameter.name == cut.parameter.name
+                    && (known.road, known.kept, &known.rules) == (cut.road, cut.kept, &cut.rules)
+                    && known.parameter.domain == cut.parameter.domain
+            };
+            if !found.iter().any(alike) {
+                found.push(cut);
             }
         }
     }
@@ -53,11 +48,10 @@ struct Cut<'a> {
 
 impl Cut<'_> {
     fn remark(self, space: &Space) -> Diagnostic {
-        let names: Vec<&str> = self.rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
         let message = format!(
             "{} {} {:.0} % of the range of `{}` on `{}`",
-            listed(&names),
-            if names.len() == 1 { "leaves" } else { "leave" },
+            rule_names(space, &self.rules),
+            if self.rules.len() == 1 { "leaves" } else { "leave" },
             self.percent,
             self.parameter.name,
             self.road,
@@ -75,14 +69,18 @@ impl Cut<'_> {
 
 /// How much of a range is left, in percent; `None` if it is half or more, or a single value.
 fn kept_percent(domain: &Domain, kept: &Interval) -> Option<f64> {
-    let (Domain::Range(low, high), End::At(from, _), End::At(to, _)) = (domain, kept.low, kept.high) else {
-        return None;
-    };
-    let (whole, left) = (high.checked_sub(*low)?, to.checked_sub(from)?);
-    let share = left.checked_div(whole)?;
+    let share = kept_share(domain, kept)?;
     let half = Rational::new(1, 2).expect("2 is not 0");
     // A single value comes from an equality, so it is meant.
     (share > Rational::ZERO && share < half).then(|| share.to_f64() * 100.0)
+}
+
+/// The share of a range that is left; `None` if the domain is a list or a single number.
+fn kept_share(domain: &Domain, kept: &Interval) -> Option<Rational> {
+    let (Domain::Range(low, high), End::At(from, _), End::At(to, _)) = (domain, kept.low, kept.high) else {
+        return None;
+    };
+    to.checked_sub(from)?.checked_div(high.checked_sub(*low)?)
 }
 
 /// The rules in force that bound the parameter; none if any rule sets it by an equality.
@@ -122,8 +120,11 @@ pub fn removals(space: &Space, rule: usize) -> Vec<Removal> {
             let settled = rules.settle();
             for bound in rules.bounds().filter(|bound| bound.rule.is_some()) {
                 let parameter = &action.parameters[bound.local];
-                let kept = settled.as_ref().map(|settled| settled[bound.local].interval());
-                let Some(percent) = removed_percent(&parameter.domain, kept) else { continue };
+                // If the rule leaves no value at all, nothing of the range is left: a point has no width.
+                let nothing = Interval::point(Rational::ZERO);
+                let kept = settled.as_ref().map_or(nothing, |settled| settled[bound.local].interval());
+                let Some(share) = kept_share(&parameter.domain, &kept) else { continue };
+                let percent = 100.0 - share.to_f64() * 100.0;
                 let same =
                     |known: &&mut Removal| known.parameter == *parameter.name && known.road == road.name;
                 match found.iter_mut().find(same) {
@@ -142,17 +143,4 @@ pub fn removals(space: &Space, rule: usize) -> Vec<Removal> {
         }
     }
     found
-}
-
-/// How much of a range is removed, in percent; `None` if the domain is a list or a single number. `kept` is
-/// `None` if nothing is left.
-fn removed_percent(domain: &Domain, kept: Option<Interval>) -> Option<f64> {
-    let Domain::Range(low, high) = domain else { return None };
-    let whole = high.checked_sub(*low).filter(|whole| *whole > Rational::ZERO)?;
-    let left = match kept.map(|kept| (kept.low, kept.high)) {
-        Some((End::At(from, _), End::At(to, _))) => to.checked_sub(from)?,
-        Some(_) => return None,
-        None => Rational::ZERO,
-    };
-    Some(100.0 - left.checked_div(whole)?.to_f64() * 100.0)
 }

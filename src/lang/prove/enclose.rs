@@ -45,8 +45,12 @@ pub(crate) struct Known<'a> {
 }
 
 /// The numbers of the bits that are set: the variants of [`Values::Variants`].
-pub(crate) fn bits(set: u128) -> impl Iterator<Item = usize> {
-    (0..VARIANTS_MAX).filter(move |bit| set >> bit & 1 == 1)
+pub(crate) fn bits(mut set: u128) -> impl Iterator<Item = usize> {
+    core::iter::from_fn(move || {
+        let bit = (set != 0).then(|| set.trailing_zeros() as usize)?;
+        set &= set - 1;
+        Some(bit)
+    })
 }
 
 impl Values {
@@ -91,6 +95,17 @@ impl Values {
         }
     }
 
+    /// The values one by one; numbers stay together.
+    pub fn each(self) -> Vec<Values> {
+        match self {
+            Values::Variants(set) => bits(set).map(|bit| Values::Variants(1 << bit)).collect(),
+            Values::Truth { may_hold: true, may_fail: true } => {
+                vec![Values::truth(false), Values::truth(true)]
+            }
+            Values::Truth { .. } | Values::Number(_) => vec![self],
+        }
+    }
+
     /// Everything in either.
     pub fn union(self, other: Values) -> Values {
         match (self, other) {
@@ -117,7 +132,7 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
         ExprKind::CellAt(first, key) => {
             let keys = values(key).variants();
             effort::spend(keys.count_ones() as usize);
-            let chosen = positions(keys).map(|key| known.cells[first + key]);
+            let chosen = bits(keys).map(|key| known.cells[first + key]);
             chosen.reduce(Values::union).unwrap_or(Values::Variants(0))
         }
         ExprKind::Fact(fact) => match known.case.and_then(|case| case.number(*fact)) {
@@ -129,24 +144,27 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
             let locals: Vec<Values> = arguments.iter().map(values).collect();
             enclose(&known.functions[*function].body, &Known { locals: &locals, ..*known })
         }
-        ExprKind::Not(inner) => {
-            let inner = values(inner);
-            Values::Truth { may_hold: inner.may_fail(), may_fail: inner.may_hold() }
-        }
+        ExprKind::Not(inner) => not(values(inner)),
         ExprKind::Negate(inner) => Values::Number(values(inner).interval().neg()),
         ExprKind::Arithmetic(Arithmetic::Subtract, left, right) if is_same(left, right) => {
             Values::Number(Interval::point(Rational::ZERO))
         }
         ExprKind::Arithmetic(op, left, right) => {
-            Values::Number(arithmetic(*op, &values(left).interval(), &values(right).interval()))
+            let (left, right) = (values(left).interval(), values(right).interval());
+            if matches!(op, Arithmetic::Multiply | Arithmetic::Divide) {
+                effort::spend(PRODUCT_STEPS);
+            }
+            Values::Number(match op {
+                Arithmetic::Add => left.add(&right),
+                Arithmetic::Subtract => left.add(&right.neg()),
+                Arithmetic::Multiply => left.mul(&right),
+                Arithmetic::Divide => left.div(&right),
+            })
         }
         ExprKind::Compare(op, left, right) => compare_parts(*op, left, right, known),
         ExprKind::And(left, right) => and(values(left), values(right)),
         ExprKind::Or(left, right) => or(values(left), values(right)),
-        ExprKind::Implies(left, right) => {
-            let left = values(left);
-            or(Values::Truth { may_hold: left.may_fail(), may_fail: left.may_hold() }, values(right))
-        }
+        ExprKind::Implies(left, right) => or(not(values(left)), values(right)),
         ExprKind::InRange(inner, low, high) => {
             let compared = |op, end: &Expr| compare_parts(op, inner, end, known);
             and(compared(Comparison::GreaterEqual, low), compared(Comparison::LessEqual, high))
@@ -158,7 +176,7 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
         ExprKind::InLanes(inner, lanes) => match known.road {
             None => Values::UNKNOWN_TRUTH,
             Some(road) => {
-                let inside = positions(values(inner).variants()).map(|v| road.has_lane(lanes[v]));
+                let inside = bits(values(inner).variants()).map(|v| road.has_lane(lanes[v]));
                 let (may_hold, may_fail) =
                     inside.fold((false, false), |(hold, fail), inside| (hold || inside, fail || !inside));
                 Values::Truth { may_hold, may_fail }
@@ -182,7 +200,7 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
                 taken |= bit;
                 is_first
             };
-            let arms_taken = positions(values(subject).variants()).map(|variant| arm_of[variant]);
+            let arms_taken = bits(values(subject).variants()).map(|variant| arm_of[variant]);
             let chosen = arms_taken.filter(is_first).map(|arm| values(&arms[arm]));
             chosen.reduce(Values::union).unwrap_or_else(|| values(&arms[0]))
         }
@@ -224,13 +242,8 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
     })
 }
 
-fn positions(set: u128) -> impl Iterator<Item = usize> {
-    let mut left = set;
-    core::iter::from_fn(move || {
-        let position = (left != 0).then(|| left.trailing_zeros() as usize)?;
-        left &= left - 1;
-        Some(position)
-    })
+fn not(inner: Values) -> Values {
+    Values::Truth { may_hold: inner.may_fail(), may_fail: inner.may_hold() }
 }
 
 fn and(left: Values, right: Values) -> Values {
@@ -244,17 +257,6 @@ fn or(left: Values, right: Values) -> Values {
     Values::Truth {
         may_hold: left.may_hold() || right.may_hold(),
         may_fail: left.may_fail() && right.may_fail(),
-    }
-}
-
-fn arithmetic(op: Arithmetic, left: &Interval, right: &Interval) -> Interval {
-    match op {
-        Arithmetic::Add => left.add(right),
-        Arithmetic::Subtract => left.add(&right.neg()),
-        Arithmetic::Multiply | Arithmetic::Divide => {
-            effort::spend(PRODUCT_STEPS);
-            if op == Arithmetic::Multiply { left.mul(right) } else { left.div(right) }
-        }
     }
 }
 

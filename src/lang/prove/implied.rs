@@ -2,9 +2,10 @@
 
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Demand, RowRules};
-use crate::model::{Road, RoadFacts, Row, RuleBody, RulesInForce, Space, code, effort};
-use crate::prove::enclose::{Known, Values, bits, enclose};
+use crate::model::{Road, Row, RuleBody, RulesInForce, Space, code, effort};
+use crate::prove::enclose::{Known, Values, enclose};
 use crate::prove::moment::always_holds;
+use crate::prove::{distinct, rule_names};
 use crate::syntax::{Diagnostic, listed};
 
 /// Limit on rows times rules for the whole report; rules beyond it are not looked at.
@@ -23,10 +24,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     let mut work = WORK_MAX;
     let mut kept = RulesInForce::by_default(space);
-    for rule in (0..space.rules.len()).rev() {
-        if effort::is_spent() {
-            break;
-        }
+    for rule in (0..space.rules.len()).rev().take_while(|_| !effort::is_spent()) {
         let others = kept.except(rule);
         if !follows(space, rule, &others, &mut work) {
             if is_idle_on_the_roads(space, rule, &mut work) {
@@ -35,10 +33,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
             continue;
         }
         let mut reasons = others.clone();
-        for other in others.all() {
-            if effort::is_spent() {
-                break;
-            }
+        for other in others.all().take_while(|_| !effort::is_spent()) {
             let fewer = reasons.except(other);
             if follows(space, rule, &fewer, &mut work) {
                 reasons = fewer;
@@ -62,8 +57,7 @@ fn warning(space: &Space, rule: usize, reasons: &[usize]) -> Diagnostic {
             .at(definition.span, label)
             .help("remove it, or say what it should forbid");
     }
-    let names: Vec<&str> = reasons.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
-    let message = format!("rule `{}` follows from {}", definition.name, listed(&names));
+    let message = format!("rule `{}` follows from {}", definition.name, rule_names(space, reasons));
     let warning = Diagnostic::warning(code::IMPLIED, message).at(definition.span, "forbids nothing more");
     let warning = reasons
         .iter()
@@ -102,8 +96,8 @@ fn is_idle_on_the_roads(space: &Space, rule: usize, work: &mut usize) -> bool {
         return false;
     }
     let holds_on = |road: &Road| {
-        let facts = Some(&road.facts);
-        bound.iter().all(|row| holds(space, row, rule, &none, facts, work))
+        let on_road = |row| RowRules { space, row, road: Some(&road.facts), in_force: &none };
+        bound.iter().copied().all(|row| holds(on_road(row), rule, work))
     };
     space.roads.iter().all(holds_on) && start_holds(space, rule, &none)
 }
@@ -129,8 +123,8 @@ fn follows(space: &Space, rule: usize, others: &RulesInForce, work: &mut usize) 
             })
         }
         RuleBody::During(_) | RuleBody::Holds(_) => {
-            bound.iter().all(|row| holds(space, row, rule, others, None, work))
-                && start_holds(space, rule, others)
+            let on_any = |row| RowRules { space, row, road: None, in_force: others };
+            bound.into_iter().all(|row| holds(on_any(row), rule, work)) && start_holds(space, rule, others)
         }
     }
 }
@@ -150,23 +144,16 @@ fn start_holds(space: &Space, rule: usize, others: &RulesInForce) -> bool {
     })
 }
 
-/// Whether the rule holds for a row and every value that `others` leave, on a road or on any.
-fn holds(
-    space: &Space,
-    row: &Row,
-    rule: usize,
-    others: &RulesInForce,
-    road: Option<&RoadFacts>,
-    work: &mut usize,
-) -> bool {
+/// Whether the rule holds for a row and every value that the other rules leave.
+fn holds(others: RowRules<'_>, rule: usize, work: &mut usize) -> bool {
+    let RowRules { space, row, .. } = others;
     let body = &space.rules[rule].body;
     let demanded = body.demand(row.action).and_then(Demand::condition);
     let Some(condition) = demanded.or_else(|| body.during(row.action)) else { return false };
-    let rules = RowRules { space, row, road, in_force: others };
     // If the other rules leave the row no value, the row says nothing about this rule.
-    let Some(locals) = rules.settle() else { return false };
+    let Some(locals) = others.settle() else { return false };
     let after = space.cells_after(row.action, &locals, &space.cells_unknown());
-    let known = rules.known(&locals, &after);
+    let known = others.known(&locals, &after);
     always_holds(condition, &known, &space.episode) || always_holds_split(condition, &known, work)
 }
 
@@ -174,17 +161,11 @@ fn holds(
 /// interval analysis does not see that `time == Night or time != Night` always holds. Also `false` if there are too many
 /// combinations, or the work left does not suffice.
 fn always_holds_split(condition: &Expr, known: &Known<'_>, work: &mut usize) -> bool {
-    let mut named: Vec<Named> = Vec::new();
-    condition.walk(&mut |part| {
-        let name = match part.kind {
-            ExprKind::Local(local) => Named::Local(local),
-            ExprKind::Cell(cell) => Named::Cell(cell),
-            _ => return,
-        };
-        if !named.contains(&name) {
-            named.push(name);
-        }
-    });
+    let mut named = distinct(condition.filter_map(|kind| match kind {
+        ExprKind::Local(local) => Some(Named::Local(*local)),
+        ExprKind::Cell(cell) => Some(Named::Cell(*cell)),
+        _ => None,
+    }));
     named.retain(|name| name.values(known).len() > 1);
     let counts = named.iter().map(|name| name.values(known).len());
     let combinations = counts.fold(1_usize, usize::saturating_mul);
@@ -216,23 +197,11 @@ enum Named {
 }
 
 impl Named {
-    /// Its words or truths, one by one; empty for a number.
+    /// Its words or truths, one by one; numbers stay together.
     fn values(self, known: &Known<'_>) -> Vec<Values> {
-        let whole = match self {
-            Named::Local(local) => known.locals[local],
-            Named::Cell(cell) => known.cells[cell],
-        };
-        match whole {
-            Values::Number(_) => Vec::new(),
-            Values::Truth { may_hold, may_fail } => {
-                let truths = [(true, may_hold), (false, may_fail)];
-                truths
-                    .into_iter()
-                    .filter(|(_, may_be)| *may_be)
-                    .map(|(truth, _)| Values::truth(truth))
-                    .collect()
-            }
-            Values::Variants(set) => bits(set).map(|at| Values::Variants(1 << at)).collect(),
+        match self {
+            Named::Local(local) => known.locals[local].each(),
+            Named::Cell(cell) => known.cells[cell].each(),
         }
     }
 }

@@ -38,8 +38,55 @@ pub use realise::{Realisable, Realised, RunsIn, realise};
 pub use time::{BrokenByTime, lasts};
 pub use witness::{Witness, witness};
 
-use crate::model::{Space, effort};
-use crate::syntax::Diagnostic;
+use std::sync::Arc;
+
+use crate::model::{Interval, Reach, Road, Row, Space, effort};
+use crate::syntax::{Diagnostic, listed};
+
+/// A row on a road where it may run, with the ranges that rules leave to its numbers.
+struct OpenRow<'a> {
+    row: &'a Row,
+    road: &'a Road,
+    ranges: &'a [(Arc<str>, Interval)],
+}
+
+/// These rows on each road where they may run.
+fn open_rows<'a>(space: &'a Space, rows: &'a [Row]) -> impl Iterator<Item = OpenRow<'a>> {
+    let all = rows.iter().flat_map(move |row| space.roads.iter().zip(&row.roads).map(move |on| (row, on)));
+    all.filter_map(|(row, (road, reach))| match reach {
+        Reach::Open(ranges) => Some(OpenRow { row, road, ranges }),
+        Reach::Dead { .. } => None,
+    })
+}
+
+/// The names of rules, as a list in words.
+fn rule_names(space: &Space, rules: &[usize]) -> String {
+    listed(&rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect::<Vec<_>>())
+}
+
+/// The different ones among these, in their order.
+fn distinct<T: PartialEq>(all: impl IntoIterator<Item = T>) -> Vec<T> {
+    let mut found = Vec::new();
+    for one in all {
+        if !found.contains(&one) {
+            found.push(one);
+        }
+    }
+    found
+}
+
+/// Each of these again with each of the values, which vary fastest; `put` puts a value in.
+fn product<T: Clone, V: Copy>(all: &[T], values: &[V], put: impl Fn(&mut T, V)) -> Vec<T> {
+    let mut longer = Vec::with_capacity(all.len() * values.len());
+    for one in all {
+        for value in values {
+            let mut one = one.clone();
+            put(&mut one, *value);
+            longer.push(one);
+        }
+    }
+    longer
+}
 
 /// Errors, warnings and remarks about a space whose names and types are right.
 pub(crate) fn report(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> {

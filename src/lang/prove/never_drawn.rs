@@ -1,13 +1,13 @@
 //! Listed values that rules forbid in every row on every road. Most are meant; some are a mistake in the rule.
 
 use core::cell::Cell;
-use std::sync::Arc;
 
 use crate::model::rules::RowRules;
-use crate::model::{Domain, Interval, Parameter, Reach, Road, Row, RulesInForce, Space, Value, code};
+use crate::model::{Domain, Parameter, RulesInForce, Space, Value, code};
 use crate::prove::enclose::Values;
 use crate::prove::reach::declared;
-use crate::syntax::{Diagnostic, enumerated, listed};
+use crate::prove::{OpenRow, distinct, open_rows, rule_names};
+use crate::syntax::{Diagnostic, enumerated};
 
 /// A remark names this many values and one more; of longer lists the others are counted.
 const NAMED_MAX: usize = 5;
@@ -33,21 +33,14 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     };
     let mut remarks = Vec::new();
     for (index, action) in space.actions.iter().enumerate() {
-        let rows = space.rows_of(index).iter();
-        let places = rows.flat_map(|row| space.roads.iter().zip(&row.roads).map(move |on| (row, on)));
-        let open: Vec<Place<'_>> = places
-            .filter_map(|(row, (road, reach))| match reach {
-                Reach::Open(ranges) => Some(Place { row, road, ranges }),
-                Reach::Dead { .. } => None,
-            })
-            .collect();
+        let open: Vec<OpenRow<'_>> = open_rows(space, space.rows_of(index)).collect();
         for (local, parameter) in action.parameters.iter().enumerate().filter(|(_, one)| !one.axis) {
             let Domain::Values(values) = &parameter.domain else { continue };
             if values.len() > VALUES_MAX || values.len() * open.len() > LOOKS_MAX {
                 continue;
             }
             let mut sets: Vec<(Vec<usize>, Vec<Value>)> = Vec::new();
-            for value in distinct(values) {
+            for value in distinct(values.iter().copied()) {
                 let Some(rules) = search.forbidding(&open, (local, parameter), value) else { continue };
                 match sets.iter_mut().find(|(known, _)| *known == rules) {
                     Some((_, values)) => values.push(value),
@@ -64,13 +57,6 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     remarks
 }
 
-/// A row on a road where it may run, with the ranges that rules leave to its numbers.
-struct Place<'a> {
-    row: &'a Row,
-    road: &'a Road,
-    ranges: &'a [(Arc<str>, Interval)],
-}
-
 struct Search<'a> {
     space: &'a Space,
     default: RulesInForce,
@@ -85,11 +71,11 @@ impl Search<'_> {
     /// or if they leave it nowhere.
     fn forbidding(
         &self,
-        open: &[Place<'_>],
+        open: &[OpenRow<'_>],
         (local, parameter): (usize, &Parameter),
         value: Value,
     ) -> Option<Vec<usize>> {
-        let within = |place: &Place<'_>| {
+        let within = |place: &OpenRow<'_>| {
             let range = place.ranges.iter().find(|(name, _)| *name == parameter.name);
             match (range, Values::point(value)) {
                 (Some((_, range)), Values::Number(point)) => !range.intersect(&point).is_empty(),
@@ -109,7 +95,7 @@ impl Search<'_> {
         (!rules.is_empty()).then_some(rules)
     }
 
-    fn rules_on<'a>(&'a self, place: &'a Place<'_>, in_force: &'a RulesInForce) -> RowRules<'a> {
+    fn rules_on<'a>(&'a self, place: &'a OpenRow<'_>, in_force: &'a RulesInForce) -> RowRules<'a> {
         RowRules { space: self.space, row: place.row, road: Some(&place.road.facts), in_force }
     }
 
@@ -123,16 +109,6 @@ impl Search<'_> {
     }
 }
 
-fn distinct(values: &[Value]) -> Vec<Value> {
-    let mut found: Vec<Value> = Vec::new();
-    for value in values {
-        if !found.contains(value) {
-            found.push(*value);
-        }
-    }
-    found
-}
-
 fn remark(space: &Space, parameter: &Parameter, values: &[Value], rules: &[usize]) -> Diagnostic {
     let unit = parameter.unit();
     let mut shown: Vec<String> =
@@ -142,9 +118,8 @@ fn remark(space: &Space, parameter: &Parameter, values: &[Value], rules: &[usize
         shown.push(format!("{} others", values.len() - NAMED_MAX));
     }
     let shown = enumerated(&shown, "or");
-    let names: Vec<&str> = rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
-    let verb = if names.len() == 1 { "lets" } else { "let" };
-    let message = format!("{} never {verb} `{}` be {shown}", listed(&names), parameter.name);
+    let verb = if rules.len() == 1 { "lets" } else { "let" };
+    let message = format!("{} never {verb} `{}` be {shown}", rule_names(space, rules), parameter.name);
     let remark = Diagnostic::remark(code::CUT, message).at(parameter.span, "");
     rules.iter().fold(remark, |remark, rule| remark.beside(space.rules[*rule].span, "by this rule")).help(
         "if that is meant, all is well; else list the values that are wanted (`in [..]`), or loosen the rule",

@@ -11,8 +11,8 @@ use crate::model::rules::RowRules;
 use crate::model::vocabulary::Fact;
 use crate::model::{Memory, Reach, Road, Row, RulesInForce, Space, effort};
 use crate::prove::moment::Case;
+use crate::prove::rule_names;
 use crate::prove::witness::{Found, Left, Search};
-use crate::syntax::listed;
 
 /// The most boxes of ranges that the searches of all rows look at; most rows need one for each road.
 const BOXES_MAX: usize = 20_000;
@@ -64,16 +64,12 @@ impl RunsIn {
 pub fn realise(space: &Space) -> (Realisable, RunsIn) {
     let left = Left::new(BOXES_MAX);
     let in_force = RulesInForce::by_default(space);
-    let mut realisable = vec![vec![Realised::NotSearched; space.roads.len()]; space.rows.len()];
-    let mut runs_in = RunsIn { states: Vec::new(), found: vec![Vec::new(); space.rows.len()] };
+    let mut realisable = vec![vec![Realised::Never; space.roads.len()]; space.rows.len()];
+    let found = vec![vec![None; space.roads.len()]; space.rows.len()];
+    let mut runs_in = RunsIn { states: Vec::new(), found };
     for (index, road) in space.roads.iter().enumerate() {
         let on_road = OnRoad { space, road, in_force: &in_force, left: &left };
-        let OfRoad { found, runs_in: places, states } = on_road.rows(index);
-        for (row, (found, state)) in found.into_iter().zip(places).enumerate() {
-            realisable[row][index] = found;
-            runs_in.found[row].push(state);
-        }
-        runs_in.states.push(states);
+        on_road.rows(index, &mut realisable, &mut runs_in);
     }
     (realisable, runs_in)
 }
@@ -94,39 +90,21 @@ pub(crate) fn with_dead(space: &Space, realisable: &Realisable) -> Vec<Row> {
 
 /// A row without values on a road, and the rules that leave it none.
 fn dead(space: &Space, row: &Row, road: &Road, in_force: &RulesInForce, left: &Left) -> Reach {
-    let mut conflict = in_force.clone();
-    for rule in in_force.on_row(row) {
-        if effort::is_spent() {
-            break;
-        }
-        let fewer = conflict.except(rule);
-        let rules = RowRules { space, row, road: Some(&road.facts), in_force: &fewer };
-        let search = Search { rules, left, moment: None };
-        if search.memories().0.iter().all(|memory| search.at(memory) == Found::Never) {
-            conflict = fewer;
-        }
-    }
-    let rules: Vec<usize> = conflict.on_row(row).collect();
-    let names: Vec<&str> = rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
-    let rules_on_row = RowRules { space, row, road: Some(&road.facts), in_force };
-    let search = Search { rules: rules_on_row, left, moment: None };
+    let on_row = RowRules { space, row, road: Some(&road.facts), in_force };
+    let rules = on_row.conflict(&|fewer| {
+        let search = Search { rules: fewer, left, moment: None };
+        search.memories().0.iter().all(|memory| search.at(memory) == Found::Never)
+    });
+    let search = Search { rules: on_row, left, moment: None };
     let place = match search.reads_any() {
         true => " in states to which an episode comes in time",
         false => "",
     };
-    let reason = match names.as_slice() {
-        [] => "its own ranges and conditions leave no value".to_owned(),
-        names => format!("no values obey {}{place} (road `{}`)", listed(names), road.name),
+    let reason = match rules.is_empty() {
+        true => "its own ranges and conditions leave no value".to_owned(),
+        false => format!("no values obey {}{place} (road `{}`)", rule_names(space, &rules), road.name),
     };
     Reach::Dead { rules, reason }
-}
-
-/// What is found of each row on a road.
-struct OfRoad {
-    found: Vec<Realised>,
-    /// The state in which it runs, by position in `states`.
-    runs_in: Vec<Option<usize>>,
-    states: Vec<Memory>,
 }
 
 /// The rows of a space on one of its roads.
@@ -159,17 +137,15 @@ impl<'a> OnRoad<'a> {
         !asked.about_time || self.search(asked.row, Some(moment)).may_run(&self.space.cells_unknown())
     }
 
-    /// What is found of each row.
-    fn rows(&self, index: usize) -> OfRoad {
+    /// Writes down what is found of each row that is not dead on the road, whose index is given.
+    fn rows(&self, index: usize, realisable: &mut Realisable, runs_in: &mut RunsIn) {
         let is_open = |row: &&Row| matches!(row.roads[index], Reach::Open(_));
         let open: Vec<Asked<'_>> =
             self.space.rows.iter().filter(is_open).map(|row| self.asked(row)).collect();
         let sets = |asked: &&Asked<'_>| self.space.actions[asked.row.action].sets().next().is_some();
         let movers: Vec<Asked<'_>> = open.iter().filter(sets).copied().collect();
-        let mut found = vec![Realised::Never; self.space.rows.len()];
-        let mut runs_in = vec![None; self.space.rows.len()];
         let mut pending = open;
-        let mut way = Way::begin(self, &movers);
+        let mut way = Way::begin(self, movers.len());
         for step in 0..u64::from(self.space.episode.step_limit) {
             let moment = Case::of_steps(&self.space.episode, step..=step, false);
             pending.retain_mut(|asked| {
@@ -178,8 +154,8 @@ impl<'a> OnRoad<'a> {
                 }
                 let state = way.runs(self, asked, step, &moment);
                 if state.is_some() {
-                    found[asked.row.index] = Realised::Runs;
-                    runs_in[asked.row.index] = state;
+                    realisable[asked.row.index][index] = Realised::Runs;
+                    runs_in.found[asked.row.index][index] = state;
                 }
                 state.is_none()
             });
@@ -195,9 +171,9 @@ impl<'a> OnRoad<'a> {
             }
         }
         for asked in pending {
-            found[asked.row.index] = self.elsewhere(&asked, way.is_complete);
+            realisable[asked.row.index][index] = self.elsewhere(&asked, way.is_complete);
         }
-        OfRoad { found, runs_in, states: way.states.into_iter().map(|met| met.memory).collect() }
+        runs_in.states.push(way.states.into_iter().map(|met| met.memory).collect());
     }
 
     /// What there is of a row that did not run in any state that was followed.
@@ -255,6 +231,8 @@ struct Way {
     now: BTreeSet<usize>,
     /// Whether no state was left out.
     is_complete: bool,
+    /// The number of rows that set states.
+    movers: usize,
 }
 
 /// A state that was met.
@@ -280,24 +258,18 @@ fn digest(memory: &Memory) -> u64 {
 }
 
 impl Way {
-    fn begin(on_road: &OnRoad<'_>, movers: &[Asked<'_>]) -> Way {
+    fn begin(on_road: &OnRoad<'_>, movers: usize) -> Way {
         let (starts, are_all) = on_road.space.initial_memories(on_road.road, on_road.in_force, STATES_MAX);
-        let mut way = Way { states: Vec::new(), now: BTreeSet::new(), is_complete: are_all };
+        let mut way = Way { states: Vec::new(), now: BTreeSet::new(), is_complete: are_all, movers };
         for (nth, start) in starts.into_iter().enumerate() {
-            let start = way.number(start, 0, nth == 0, movers);
+            let start = way.number(start, 0, nth == 0);
             way.now.extend(start);
         }
         way
     }
 
     /// The number of a state; `None` if there are too many.
-    fn number(
-        &mut self,
-        memory: Memory,
-        since: u64,
-        is_waited_for: bool,
-        movers: &[Asked<'_>],
-    ) -> Option<usize> {
+    fn number(&mut self, memory: Memory, since: u64, is_waited_for: bool) -> Option<usize> {
         effort::spend(self.states.len() + memory.cells().len());
         let digest = digest(&memory);
         let is_it = |known: &Met| known.digest == digest && known.memory == memory;
@@ -309,8 +281,8 @@ impl Way {
             self.is_complete = false;
             return None;
         }
-        effort::spend(movers.len());
-        let open = (0..movers.len()).collect();
+        effort::spend(self.movers);
+        let open = (0..self.movers).collect();
         self.states.push(Met { memory, digest, since, is_waited_for, led_to: BTreeSet::new(), open });
         Some(self.states.len() - 1)
     }
@@ -354,8 +326,8 @@ impl Way {
         for state in &now {
             let Met { memory, is_waited_for, .. } = &self.states[*state];
             let (memory, is_waited_for) = (memory.clone(), *is_waited_for);
-            let waited = space.memory_after_wait(&memory, Some(step), Some(&road.facts), in_force);
-            let waited = self.number(waited, step + 1, is_waited_for, movers);
+            let waited = space.memory_after_wait(&memory, step, Some(&road.facts), in_force);
+            let waited = self.number(waited, step + 1, is_waited_for);
             self.now.extend(waited);
             for position in core::mem::take(&mut self.states[*state].open) {
                 if effort::is_spent() {
@@ -372,7 +344,7 @@ impl Way {
                 let (led_to, are_all) = search.successors(&memory);
                 self.is_complete &= are_all;
                 let led_to: Vec<usize> =
-                    led_to.into_iter().filter_map(|to| self.number(to, step + 1, false, movers)).collect();
+                    led_to.into_iter().filter_map(|to| self.number(to, step + 1, false)).collect();
                 match mover.about_time {
                     true => self.now.extend(led_to),
                     false => self.states[*state].led_to.extend(led_to),

@@ -1,7 +1,7 @@
 //! Rules under which no episode can begin.
 
 use crate::model::{Initial, NoStart, RulesInForce, Space, code, effort};
-use crate::syntax::ast::Span;
+use crate::prove::distinct;
 use crate::syntax::{Diagnostic, listed};
 
 /// One error for each rule that leaves no states to begin with on some roads; a road shows its first one alone. One
@@ -49,21 +49,14 @@ fn error(space: &Space, no_start: &NoStart, roads: &[&str]) -> Diagnostic {
         true => error.at(rule.span, "the states that it shares with other rules have too many combinations"),
         false => error.at(rule.span, "holds from the start on"),
     };
-    let initial = |cell: usize| {
-        let state = space.state_of(cell);
-        (state, &state.initial[cell - state.first_cell])
-    };
     // Cells of a map may share what they begin with.
-    let mut begun: Vec<(Span, &str)> = Vec::new();
-    for cell in &no_start.cells {
-        let at = match initial(*cell) {
-            (_, Initial::Value(expr)) => (expr.span, "begins so"),
-            (state, Initial::Any) => (state.span, "is drawn"),
-        };
-        if !begun.contains(&at) {
-            begun.push(at);
+    let begun = distinct(no_start.cells.iter().map(|cell| {
+        let state = space.state_of(*cell);
+        match &state.initial[*cell - state.first_cell] {
+            Initial::Value(expr) => (expr.span, "begins so"),
+            Initial::Any => (state.span, "is drawn"),
         }
-    }
+    }));
     let error = begun.into_iter().fold(error, |error, (span, how)| error.beside(span, how));
     let mut names: Vec<String> = no_start.cells.iter().map(|cell| space.cell_name(*cell)).collect();
     names.dedup();

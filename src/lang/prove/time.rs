@@ -10,7 +10,7 @@ use core::ops::RangeInclusive;
 use std::collections::BTreeSet;
 
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::rules::Demand;
+use crate::model::rules::{Demand, cells_read};
 use crate::model::{
     Initial, Interval, Reach, Road, Row, RuleBody, RuleDef, RulesInForce, STATE_MAX, SetDef, Space, Type,
     code, effort,
@@ -18,6 +18,7 @@ use crate::model::{
 use crate::prove::enclose::{Known, Values, bits, enclose};
 use crate::prove::moment::Case;
 use crate::prove::reach::declared;
+use crate::prove::{distinct, product};
 use crate::syntax::{Diagnostic, listed};
 use avastra_base::units::Rational;
 
@@ -81,10 +82,8 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
                 found.push(broken);
             }
         }
-        for rule in (0..space.rules.len()).filter(|rule| space.rules[*rule].optional) {
-            if effort::is_spent() {
-                break;
-            }
+        let optional = (0..space.rules.len()).filter(|rule| space.rules[*rule].optional);
+        for rule in optional.take_while(|_| !effort::is_spent()) {
             let is_open =
                 space.rules[rule].binds_start() && !with_optional.iter().any(|(known, _)| *known == rule);
             let broken = if is_open { lasts(space, road, &in_force.with(rule)).err() } else { None };
@@ -108,22 +107,16 @@ fn warning(space: &Space, optional: &RuleDef, broken: &BrokenByTime) -> Diagnost
 
 fn error(space: &Space, broken: &BrokenByTime) -> Diagnostic {
     let rule = &space.rules[broken.index];
-    let unknown = || format!("whether rule `{}` lasts as time passes is not known", rule.name);
     let (message, label) = match &broken.how {
         How::At(step, time_s, states) => (
             format!("time alone breaks rule `{}`", rule.name),
             format!("does not hold at step {step} ({time_s} s) where {states}, if that step has no action"),
         ),
-        How::TooMany => (unknown(), "too many states to follow from step to step".to_owned()),
-        How::TooLong(step) => (unknown(), format!("the states were followed to step {step} alone")),
+        How::TooMany => (broken.words(), "too many states to follow from step to step".to_owned()),
+        How::TooLong(step) => (broken.words(), format!("the states were followed to step {step} alone")),
     };
-    let mut cells: Vec<String> = Vec::new();
-    for cell in rule.start.iter().flat_map(|start| cells_read(space, start)) {
-        let name = space.cell_name(cell);
-        if !cells.contains(&name) {
-            cells.push(name);
-        }
-    }
+    let read = rule.start.iter().flat_map(|start| cells_read(start, &space.states));
+    let cells = distinct(read.map(|cell| space.cell_name(cell)));
     let help = match &broken.how {
         How::At(..) => format!(
             "let `each step {{ … }}` set {} in time, counting the steps in a state of its own; or bind the rule to \
@@ -145,34 +138,33 @@ fn error(space: &Space, broken: &BrokenByTime) -> Diagnostic {
 /// # Errors
 /// The first rule that a step without an action may break.
 pub fn lasts(space: &Space, road: &Road, in_force: &RulesInForce) -> Result<(), BrokenByTime> {
-    let timed: Vec<usize> = in_force.all().filter(|rule| is_timed(space, *rule)).collect();
-    let Some(first) = timed.first() else { return Ok(()) };
-    let mut states = States::new(space, road, in_force, &timed);
+    // Rules that hold from the first moment on and ask for the time.
+    let is_timed = |rule: &usize| space.rules[*rule].start.as_ref().is_some_and(Expr::asks_the_world);
+    let timed: Vec<usize> = in_force.all().filter(is_timed).collect();
+    let Some(&first) = timed.first() else { return Ok(()) };
+    let followed = followed(space, in_force, &timed);
+    let (met, moves) = (Vec::new(), Vec::new());
+    let mut states = States { space, road, in_force, timed, followed, met, moves, work: 0 };
     let mut now = states.begin();
     let last = u64::from(space.episode.step_limit).saturating_sub(1);
     for step in 0..=last {
         let mut next = BTreeSet::new();
         for state in &now {
-            if let Err(rule) = states.go_on(*state, step..=step, &timed, &mut next) {
+            if let Err(rule) = states.go_on(*state, step..=step, &mut next) {
                 return Err(states.broken(rule, step, *state));
             }
         }
         if states.is_too_large() {
             let how = if states.met.len() > STATES_MAX { How::TooMany } else { How::TooLong(step) };
-            let (road, rule) = (road.name.clone(), space.rules[*first].name.clone());
-            return Err(BrokenByTime { road, rule, index: *first, how });
+            let (road, rule) = (road.name.clone(), space.rules[first].name.clone());
+            return Err(BrokenByTime { road, rule, index: first, how });
         }
-        if next == now && states.stay_within(&now, step..=last, &timed) {
+        if next == now && states.stay_within(&now, step..=last) {
             break;
         }
         now = next;
     }
     Ok(())
-}
-
-/// Whether a rule holds from the first moment on and asks for the time.
-fn is_timed(space: &Space, rule: usize) -> bool {
-    space.rules[rule].start.as_ref().is_some_and(Expr::asks_the_world)
 }
 
 /// All values of every cell; of those that no timed rule depends on, every value that there is.
@@ -190,24 +182,17 @@ struct States<'a> {
     space: &'a Space,
     road: &'a Road,
     in_force: &'a RulesInForce,
-    /// The cells on which timed rules depend.
+    /// The rules that time may break.
+    timed: Vec<usize>,
+    /// The cells on which these depend.
     followed: Vec<usize>,
-    /// For each cell whether it is one of them.
-    is_followed: Vec<bool>,
     met: Vec<Cells>,
     /// By state: what rows make of it, and what every step makes of it.
     moves: Vec<Option<(Vec<Move>, Vec<usize>)>>,
     work: usize,
 }
 
-impl<'a> States<'a> {
-    fn new(space: &'a Space, road: &'a Road, in_force: &'a RulesInForce, timed: &[usize]) -> States<'a> {
-        let followed = followed(space, in_force, timed);
-        let mut is_followed = vec![false; space.states.iter().map(|state| state.cells).sum()];
-        followed.iter().for_each(|cell| is_followed[*cell] = true);
-        States { space, road, in_force, followed, is_followed, met: Vec::new(), moves: Vec::new(), work: 0 }
-    }
-
+impl States<'_> {
     fn is_too_large(&self) -> bool {
         self.met.len() > STATES_MAX || self.work > WORK_MAX || effort::is_spent()
     }
@@ -234,9 +219,9 @@ impl<'a> States<'a> {
 
     /// Whether all these steps lead from these states to these alone, and break no timed rule there: then no episode is
     /// too long to be followed.
-    fn stay_within(&mut self, now: &BTreeSet<usize>, steps: RangeInclusive<u64>, timed: &[usize]) -> bool {
+    fn stay_within(&mut self, now: &BTreeSet<usize>, steps: RangeInclusive<u64>) -> bool {
         let mut next = BTreeSet::new();
-        let keeps = |state: &usize| self.go_on(*state, steps.clone(), timed, &mut next).is_ok();
+        let keeps = |state: &usize| self.go_on(*state, steps.clone(), &mut next).is_ok();
         now.iter().all(keeps) && next.is_subset(now) && !self.is_too_large()
     }
 
@@ -245,7 +230,6 @@ impl<'a> States<'a> {
         &mut self,
         state: usize,
         steps: RangeInclusive<u64>,
-        timed: &[usize],
         next: &mut BTreeSet<usize>,
     ) -> Result<(), usize> {
         if self.is_too_large() {
@@ -270,7 +254,7 @@ impl<'a> States<'a> {
             }
             if may_fail {
                 let fails = |rule: &&usize| self.condition(**rule, &self.met[state], &at_begin).may_fail();
-                broken = broken.or(timed.iter().find(fails).copied());
+                broken = broken.or(self.timed.iter().find(fails).copied());
                 next.insert(state);
             }
         }
@@ -287,19 +271,18 @@ impl<'a> States<'a> {
 
     /// Whether all rules that stand for all states may hold at a moment, and whether one may fail.
     fn stands(&self, cells: &[Values], case: &Case) -> (bool, bool) {
-        let standing = self.in_force.all().filter(|rule| self.space.rules[*rule].start.is_some());
-        standing
-            .map(|rule| self.condition(rule, cells, case))
-            .fold((true, false), |(hold, fail), found| (hold && found.may_hold(), fail || found.may_fail()))
+        let found = self.in_force.all().map(|rule| self.condition(rule, cells, case));
+        found.fold((true, false), |(hold, fail), found| (hold && found.may_hold(), fail || found.may_fail()))
     }
 
     /// As [`States::stands`], with the moves that every step would make.
     fn stands_after(&self, from: &[Values], to: &[Values], case: &Case) -> (bool, bool) {
         let mut found = self.stands(to, case);
         // What every step does does not happen either where a number would leave what a state may be.
+        let most = STATE_MAX as i64;
+        let kept = Interval::closed(Rational::integer(-most), Rational::integer(most));
         for cell in &self.followed {
             if let Values::Number(number) = to[*cell] {
-                let kept = state_range();
                 found =
                     (found.0 && !number.intersect(&kept).is_empty(), found.1 || number.hull(&kept) != kept);
             }
@@ -314,6 +297,7 @@ impl<'a> States<'a> {
         found
     }
 
+    /// What a rule says of a state, if it stands for all states; any other rule holds.
     fn condition(&self, rule: usize, cells: &[Values], case: &Case) -> Values {
         let condition = self.space.rules[rule].start.as_ref();
         condition.map_or(Values::truth(true), |condition| enclose(condition, &self.known(&[], cells, case)))
@@ -354,12 +338,12 @@ impl<'a> States<'a> {
                 continue;
             }
             let set = self.space.cells_set(row.action, &declared(self.space, row));
-            if !set.iter().any(|cell| self.is_followed[*cell]) {
+            if !self.followed.iter().any(|cell| set.contains(cell)) {
                 continue;
             }
             for locals in self.choices(row) {
                 let after = self.space.cells_after(row.action, &locals, &self.met[state]);
-                for part in self.parts(&self.of_followed(after)) {
+                for part in self.parts(&self.of_followed(&after)) {
                     let (row, to, locals) = (row.index, self.number(part), locals.clone());
                     moves.push(Move { row, locals, to });
                 }
@@ -378,60 +362,38 @@ impl<'a> States<'a> {
             if !sets.iter().any(names) {
                 continue;
             }
-            let parts = points(chosen[0][local]);
+            let parts = chosen[0][local].each();
             if chosen.len() * parts.len() > PARTS_MAX {
                 continue;
             }
-            let with = |locals: &Vec<Values>| {
-                let locals = locals.clone();
-                let one = |part: &Values| {
-                    let mut locals = locals.clone();
-                    locals[local] = *part;
-                    locals
-                };
-                parts.iter().map(one).collect::<Vec<_>>()
-            };
-            chosen = chosen.iter().flat_map(with).collect();
+            chosen = product(&chosen, &parts, |locals, part| locals[local] = part);
         }
         chosen
     }
 
     fn waits_of(&mut self, state: usize) -> Vec<usize> {
         let after = self.space.cells_after_wait(&self.met[state]);
-        self.parts(&self.of_followed(after)).into_iter().map(|part| self.number(part)).collect()
+        self.parts(&self.of_followed(&after)).into_iter().map(|part| self.number(part)).collect()
     }
 
     /// The cells that are not followed forgotten.
-    fn of_followed(&self, mut cells: Cells) -> Cells {
-        let unknown = self.space.cells_unknown();
-        for (cell, values) in cells.iter_mut().enumerate() {
-            if !self.is_followed[cell] {
-                *values = unknown[cell];
-            }
-        }
-        cells
+    fn of_followed(&self, cells: &[Values]) -> Cells {
+        let mut kept = self.space.cells_unknown();
+        self.followed.iter().for_each(|cell| kept[*cell] = cells[*cell]);
+        kept
     }
 
     /// A set of states as states of single values, as far as these can be listed.
     fn parts(&self, cells: &Cells) -> Vec<Cells> {
         let mut parts = vec![cells.clone()];
         for cell in &self.followed {
-            let values = points(cells[*cell]);
+            let values = cells[*cell].each();
             // A single value splits nothing.
             if values.len() == 1 || parts.len() * values.len() > PARTS_MAX {
                 continue;
             }
             effort::spend(parts.len() * values.len() * cells.len());
-            let with = |part: &Cells| {
-                let part = part.clone();
-                let one = |value: &Values| {
-                    let mut part = part.clone();
-                    part[*cell] = *value;
-                    part
-                };
-                values.iter().map(one).collect::<Vec<_>>()
-            };
-            parts = parts.iter().flat_map(with).collect();
+            parts = product(&parts, &values, |part, value| part[*cell] = value);
         }
         parts
     }
@@ -448,9 +410,8 @@ impl<'a> States<'a> {
 
     fn broken(&self, index: usize, step: u64, state: usize) -> BrokenByTime {
         let rule = &self.space.rules[index];
-        let mut read = rule.start.as_ref().map_or_else(Vec::new, |start| cells_read(self.space, start));
-        read.sort_unstable();
-        read.dedup();
+        let states = &self.space.states;
+        let read: BTreeSet<usize> = rule.start.iter().flat_map(|start| cells_read(start, states)).collect();
         let words = |cell: &usize| {
             let (name, values) = (self.space.cell_name(*cell), self.met[state][*cell]);
             format!("`{name}` is {}", self.shown(values, self.space.state_of(*cell).ty))
@@ -467,23 +428,14 @@ impl<'a> States<'a> {
     fn shown(&self, values: Values, ty: Type) -> String {
         match (values, ty) {
             (Values::Variants(set), Type::Enum(of)) => {
-                let variants = self.space.enums[of.0].variants.iter().enumerate();
-                let named = variants.filter(|(variant, _)| set >> variant & 1 == 1);
-                named.map(|(_, name)| name.as_str()).collect::<Vec<_>>().join(" or ")
+                let variants = &self.space.enums[of.0].variants;
+                bits(set).map(|variant| variants[variant].as_str()).collect::<Vec<_>>().join(" or ")
             }
             (Values::Truth { may_hold: true, may_fail: false }, _) => "true".to_owned(),
             (Values::Truth { may_hold: false, .. }, _) => "false".to_owned(),
             (Values::Number(interval), ty) => interval.shown(ty, interval.unit(ty)),
             (Values::Truth { .. } | Values::Variants(_), _) => "unknown".to_owned(),
         }
-    }
-}
-
-/// The numbers that a state may have.
-fn state_range() -> Interval {
-    match Rational::from_f64(STATE_MAX) {
-        Some(most) => Interval::closed(most.checked_neg().unwrap_or(Rational::ZERO), most),
-        None => Interval::ALL,
     }
 }
 
@@ -494,15 +446,6 @@ fn may_move(allowed: &[Vec<bool>], from: Values, to: Values) -> (bool, bool) {
     pairs.fold((false, false), |(may, may_not), allowed| (may || allowed, may_not || !allowed))
 }
 
-/// A set of values as single values; numbers stay together.
-fn points(values: Values) -> Vec<Values> {
-    match values {
-        Values::Variants(set) => bits(set).map(|bit| Values::Variants(1 << bit)).collect(),
-        Values::Truth { may_hold: true, may_fail: true } => vec![Values::truth(false), Values::truth(true)],
-        Values::Truth { .. } | Values::Number(_) => vec![values],
-    }
-}
-
 /// The cells on which timed rules depend: those that they read; those that decide whether what every step does
 /// happens; and those from which one of these is set.
 fn followed(space: &Space, in_force: &RulesInForce, timed: &[usize]) -> Vec<usize> {
@@ -510,7 +453,7 @@ fn followed(space: &Space, in_force: &RulesInForce, timed: &[usize]) -> Vec<usiz
     for rule in in_force.all() {
         match (&space.rules[rule].start, &space.rules[rule].body) {
             (Some(start), _) => {
-                let read = cells_read(space, start);
+                let read = cells_read(start, &space.states);
                 if timed.contains(&rule) || read.iter().any(|cell| space.may_set_each_step(*cell)) {
                     found.extend(read);
                 }
@@ -537,13 +480,9 @@ fn followed(space: &Space, in_force: &RulesInForce, timed: &[usize]) -> Vec<usiz
         }
         for set in sets.iter().filter(|set| space.sets_cell(set, cell)) {
             for part in set.key.iter().chain([&set.value]) {
-                found.extend(cells_read(space, part).into_iter().filter(|read| seen.insert(*read)));
+                found.extend(cells_read(part, &space.states).into_iter().filter(|read| seen.insert(*read)));
             }
         }
     }
     found
-}
-
-fn cells_read(space: &Space, expr: &Expr) -> Vec<usize> {
-    crate::model::rules::cells_read(expr, &space.states)
 }

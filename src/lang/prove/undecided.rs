@@ -6,12 +6,12 @@ use std::collections::BTreeSet;
 use crate::model::expr::{Arithmetic, Expr, ExprKind};
 use crate::model::rules::RowRules;
 use crate::model::vocabulary::Known;
-use crate::model::{ActionDef, Road, Row, RuleBody, RuleDef, RulesInForce, Space, code, effort};
+use crate::model::{ActionDef, Row, RuleBody, RuleDef, RulesInForce, Space, code, effort};
 use crate::prove::clock::never_enabled;
 use crate::prove::reach::numbers;
 use crate::prove::realise::{Realisable, Realised, is_about_time};
-use crate::prove::spawn_bounds;
 use crate::prove::witness::{Found, Left, Search};
+use crate::prove::{rule_names, spawn_bounds};
 use crate::syntax::{Diagnostic, listed};
 
 /// The most boxes of ranges that are looked at to find the rules which leave a row undecided.
@@ -29,14 +29,13 @@ pub(super) fn report(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> 
         return diagnostics;
     }
     for (action, definition) in space.actions.iter().enumerate() {
-        let rows = || space.rows_of(action).iter();
         let is_unreached = |row: &&Row| {
             let found = &realisable[row.index];
             found.contains(&Realised::Unreached)
                 && found.iter().all(|found| matches!(found, Realised::Unreached | Realised::Never))
                 && !told.contains(&row.index)
         };
-        let unreached: Vec<&Row> = rows().filter(is_unreached).collect();
+        let unreached: Vec<&Row> = space.rows_of(action).iter().filter(is_unreached).collect();
         let Some(first) = unreached.first() else { continue };
         let message = format!("`{}` is never enabled", first.label);
         let warning =
@@ -52,7 +51,8 @@ pub(super) fn report(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> 
                 "begin in such a state, or add an action that leads to one",
             ),
         };
-        let note = format!("it would obey {} only {only}", names(space, first));
+        let obeyed: Vec<usize> = in_force.on_row(first).collect();
+        let note = format!("it would obey {} only {only}", rule_names(space, &obeyed));
         diagnostics.push(warning.note(note).help(help));
     }
     diagnostics
@@ -110,17 +110,21 @@ struct Unknown<'a> {
 
 /// One error for each set of rules that leaves rows undecided, whichever actions they belong to.
 fn report_unknown(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> {
+    let in_force = RulesInForce::by_default(space);
     let mut together: Vec<Vec<Unknown<'_>>> = Vec::new();
     for (index, action) in space.actions.iter().enumerate() {
         let mut of_action: Vec<Unknown<'_>> = Vec::new();
         for (number, road) in space.roads.iter().enumerate() {
-            let is_unknown = |row: &&Row| realisable[row.index][number] == Realised::Unknown;
-            let rows: Vec<&Row> = space.rows_of(index).iter().filter(is_unknown).collect();
+            let is_undecided = |row: &&Row| realisable[row.index][number] == Realised::Unknown;
+            let rows: Vec<&Row> = space.rows_of(index).iter().filter(is_undecided).collect();
             match of_action.iter_mut().find(|known| known.rows == rows) {
                 _ if rows.is_empty() => {}
                 Some(known) => known.roads.push(&road.name),
                 None => {
-                    let rules = to_blame(space, rows[0], road);
+                    // Without any one of the other rules the row is undecided still.
+                    let (row, left) = (rows[0], Left::new(BOXES_MAX));
+                    let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };
+                    let rules = rules.conflict(&|fewer| is_unknown(fewer, &left));
                     of_action.push(Unknown { action, rows, roads: vec![&road.name], rules });
                 }
             }
@@ -158,7 +162,7 @@ fn error(space: &Space, many: &[Unknown<'_>]) -> Diagnostic {
     };
     let error = error.note(format!("no values were found{obeyed}, and no proof that there are none"));
     error.help(match () {
-        () if rules.iter().any(|rule| asks_about(&rule.body, Known::Spawn)) => {
+        () if ask(&rules, Known::Spawn) => {
             "a newcomer is taken to appear as far away and as fast as its spawn asks: let the rule allow that"
         }
         () if are_of_states(&rules) => {
@@ -170,12 +174,11 @@ fn error(space: &Space, many: &[Unknown<'_>]) -> Diagnostic {
 
 /// What is not known of rules that leave rows undecided.
 fn why(rules: &[&RuleDef]) -> &'static str {
-    let ask = |from: Known| rules.iter().any(|rule| asks_about(&rule.body, from));
     match () {
-        () if ask(Known::Spawn) => "not found to hold for a newcomer",
-        () if ask(Known::World) => "not found to hold at a moment",
+        () if ask(rules, Known::Spawn) => "not found to hold for a newcomer",
+        () if ask(rules, Known::World) => "not found to hold at a moment",
         () if are_of_states(rules) => "not met in the states that were followed",
-        () if rules.iter().any(|rule| has_powers(&rule.body)) => "too complicated to be solved",
+        () if have_powers(rules) => "too complicated to be solved",
         () => "not solved for so many numbers",
     }
 }
@@ -184,17 +187,11 @@ fn why(rules: &[&RuleDef]) -> &'static str {
 fn are_of_states(rules: &[&RuleDef]) -> bool {
     let is_state = |kind: &ExprKind| matches!(kind, ExprKind::Cell(_) | ExprKind::CellAt(..));
     let is_drawn = |kind: &ExprKind| matches!(kind, ExprKind::Local(_));
-    !rules.is_empty()
-        && rules.iter().all(|rule| {
-            let RuleBody::Holds(bindings) = &rule.body else { return false };
-            bindings.iter().any(|binding| binding.condition.any(is_state))
-                && !bindings.iter().any(|binding| binding.condition.any(is_drawn))
-        })
+    !rules.is_empty() && rules.iter().all(|rule| has(rule, is_state) && !has(rule, is_drawn))
 }
 
 /// Whether a rule has more than sums of numbers, each times a constant.
-fn has_powers(body: &RuleBody) -> bool {
-    let RuleBody::Holds(bindings) = body else { return false };
+fn have_powers(rules: &[&RuleDef]) -> bool {
     let is_fixed = |expr: &Expr| matches!(expr.kind, ExprKind::Number(_));
     let is_power = |kind: &ExprKind| match kind {
         ExprKind::Arithmetic(Arithmetic::Multiply, left, right) => !is_fixed(left) && !is_fixed(right),
@@ -202,39 +199,17 @@ fn has_powers(body: &RuleBody) -> bool {
         ExprKind::Call(..) => true,
         _ => false,
     };
-    bindings.iter().any(|binding| binding.condition.any(is_power))
+    rules.iter().any(|rule| has(rule, is_power))
 }
 
 /// Whether a rule asks for a fact that is known from then on.
-fn asks_about(body: &RuleBody, from: Known) -> bool {
-    let RuleBody::Holds(bindings) = body else { return false };
+fn ask(rules: &[&RuleDef], from: Known) -> bool {
     let asks = |kind: &ExprKind| matches!(kind, ExprKind::Fact(fact) if fact.known() == from);
-    bindings.iter().any(|binding| binding.condition.any(asks))
+    rules.iter().any(|rule| has(rule, asks))
 }
 
-/// The rules that leave a row undecided: without any one of the others it is undecided still.
-fn to_blame(space: &Space, row: &Row, road: &Road) -> Vec<usize> {
-    let left = Left::new(BOXES_MAX);
-    let mut in_force = RulesInForce::by_default(space);
-    for rule in in_force.clone().on_row(row) {
-        if effort::is_spent() {
-            break;
-        }
-        let fewer = in_force.except(rule);
-        let rules = RowRules { space, row, road: Some(&road.facts), in_force: &fewer };
-        if is_unknown(rules, &left) {
-            in_force = fewer;
-        }
-    }
-    in_force.on_row(row).collect()
-}
-
-/// The rules on a row that are in force by default, in words.
-fn names(space: &Space, row: &Row) -> String {
-    let rules: Vec<usize> = RulesInForce::by_default(space).on_row(row).collect();
-    rule_names(space, &rules)
-}
-
-fn rule_names(space: &Space, rules: &[usize]) -> String {
-    listed(&rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect::<Vec<_>>())
+/// Whether a part of the condition that a rule demands passes the test, for some action.
+fn has(rule: &RuleDef, test: impl Fn(&ExprKind) -> bool) -> bool {
+    let RuleBody::Holds(bindings) = &rule.body else { return false };
+    bindings.iter().any(|binding| binding.condition.any(&test))
 }

@@ -7,10 +7,10 @@
 use crate::model::rules::{Demand, RowRules};
 use crate::model::vocabulary::{Known, Verb, Word};
 use crate::model::{
-    EffectDef, Facts, Memory, Reach, Road, Row, RulesInForce, Space, SpawnDef, Value, code, effort, evaluate,
-    locals,
+    Facts, Memory, Road, Row, RulesInForce, Space, SpawnDef, Value, code, effort, evaluate, locals,
 };
 use crate::prove::witness::{Left, Search, Witness};
+use crate::prove::{OpenRow, open_rows};
 use crate::syntax::Diagnostic;
 use avastra_base::kinematics::{CAREFUL_BRAKING_MPS2, CAREFUL_DELAY_S, stopping_m};
 use avastra_base::units::{Dimension, quantity, quantity_in, unit_of_all};
@@ -26,18 +26,12 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     for (index, action) in space.actions.iter().enumerate() {
         let left = Left::new(BOXES_MAX / space.actions.len());
-        for effect in &action.effects {
-            let EffectDef::Spawn(spawn) = effect else { continue };
-            let mut rows = space.rows_of(index).iter().take_while(|_| !effort::is_spent());
-            let found = rows.find_map(|row| {
-                let roads = space.roads.iter().zip(&row.roads);
-                let open = roads.filter(|(_, reach)| matches!(reach, Reach::Open(_)));
-                open.map(|(road, _)| road)
-                    .find_map(|road| Some((row, road, unfair(space, row, road, spawn, &left)?)))
-            });
-            if let Some((row, road, found)) = found {
-                diagnostics.push(remark(space, row, road, spawn, &found));
-            }
+        for spawn in action.spawns() {
+            let mut open = open_rows(space, space.rows_of(index)).take_while(|_| !effort::is_spent());
+            diagnostics.extend(open.find_map(|OpenRow { row, road, .. }| {
+                let found = unfair(space, row, road, spawn, &left)?;
+                Some(remark(space, row, road, spawn, &found))
+            }));
         }
     }
     diagnostics
@@ -45,13 +39,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
 
 /// Values with which a row spawns within the stopping distance on a road; `None` if none are found, or if a
 /// rule asks the world, about the gap or the speed of the ego vehicle, and so decides by itself.
-pub(super) fn unfair(
-    space: &Space,
-    row: &Row,
-    road: &Road,
-    spawn: &SpawnDef,
-    left: &Left,
-) -> Option<Witness> {
+fn unfair(space: &Space, row: &Row, road: &Road, spawn: &SpawnDef, left: &Left) -> Option<Witness> {
     let in_force = RulesInForce::by_default(space);
     let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };
     let asks = |demand| matches!(demand, Demand::Holds(condition) if condition.known() > Known::Road);

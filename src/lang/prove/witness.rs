@@ -15,14 +15,15 @@ use std::sync::Arc;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Before, Candidate, Choose, Demand, Nearest, Room, RowRules, cells_read};
 use crate::model::{
-    ActionDef, Domain, EffectDef, End, Facts, Initial, Interval, Memory, Parameter, Road, Row, RulesInForce,
-    SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, SetDef, Space, SpawnFacts, StateDef, Type, Value, WorldFacts, effort,
-    evaluate, locals, rounded_into, spawn_out_of_bounds,
+    ActionDef, Domain, End, Facts, Interval, Memory, Parameter, Road, Row, RulesInForce, SPAWN_DISTANCE_M,
+    SPAWN_SPEED_MPS, SetDef, Space, SpawnFacts, Type, Value, WorldFacts, effort, evaluate, locals,
+    rounded_into, spawn_out_of_bounds,
 };
 use crate::prove::enclose::{Known, Values};
 use crate::prove::moment::{Case, may_hold_together, newcomers};
 use crate::prove::reach::declared;
 use crate::prove::sums::oppose;
+use crate::prove::{distinct, product};
 use avastra_base::units::Rational;
 
 /// The most boxes of ranges looked at for one choice of the listed values and one memory.
@@ -55,12 +56,9 @@ pub fn witness(space: &Space, row: &Row, road: &Road) -> Option<Witness> {
     let in_force = RulesInForce::by_default(space);
     let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };
     let search = Search { rules, left: &Left::new(BOXES_IN_ALL_MAX), moment: None };
-    search.memories().0.into_iter().find_map(|memory| match search.at(&memory) {
-        Found::Runs(values) => {
-            let values = search.action().drawn_of(&values);
-            Some(Witness { values, memory })
-        }
-        Found::Never | Found::Unknown => None,
+    search.memories().0.into_iter().find_map(|memory| {
+        let Found::Runs(values) = search.at(&memory) else { return None };
+        Some(Witness { values: search.action().drawn_of(&values), memory })
     })
 }
 
@@ -133,15 +131,14 @@ pub(super) type Wish<'a> = dyn Fn(&[Value], &Memory) -> bool + 'a;
 impl Search<'_> {
     /// The first values that run and fulfil the wish.
     pub fn find(&self, wish: &Wish<'_>) -> Option<Witness> {
-        let action = self.action();
-        let choices = choices(action, &locals(action, self.rules.row, &[]));
+        let choices = self.choices();
         for memory in self.memories().0 {
             for chosen in &choices {
                 if self.left.is_spent() || effort::is_spent() {
                     return None;
                 }
                 if let Some(values) = self.numbers(chosen, &memory, wish) {
-                    return Some(Witness { values: action.drawn_of(&values), memory });
+                    return Some(Witness { values: self.action().drawn_of(&values), memory });
                 }
             }
         }
@@ -165,9 +162,7 @@ impl Search<'_> {
             return Found::Unknown;
         }
         // What is left to try are rules about the gap of the spawn, and its bounds.
-        let action = self.action();
-        let mut chosen = choices(action, &locals(action, self.rules.row, &[])).into_iter();
-        let found = chosen.find_map(|chosen| self.numbers(&chosen, memory, &|_, _| true));
+        let found = self.choices().iter().find_map(|chosen| self.numbers(chosen, memory, &|_, _| true));
         found.map_or(Found::Unknown, Found::Runs)
     }
 
@@ -223,6 +218,25 @@ impl Search<'_> {
         None
     }
 
+    /// Every choice of the listed values, the first values first; what is a range holds a placeholder.
+    fn choices(&self) -> Vec<Vec<Value>> {
+        let action = self.action();
+        let mut chosen = vec![locals(action, self.rules.row, &[])];
+        for (local, parameter) in action.parameters.iter().enumerate().filter(|(_, p)| !p.axis) {
+            let Domain::Values(values) = &parameter.domain else { continue };
+            let room = (CHOICES_MAX / chosen.len()).max(1);
+            // A value that is likelier stands in the list more than once; one time is enough here.
+            let mut different: Vec<Value> = Vec::new();
+            for value in values {
+                if different.len() < room && !different.contains(value) {
+                    different.push(*value);
+                }
+            }
+            chosen = product(&chosen, &different, |locals, value| locals[local] = value);
+        }
+        chosen
+    }
+
     /// What is chosen from lists, and the whole ranges of the open numbers.
     fn ranges(&self, chosen: &[Value], open: &[usize]) -> Vec<Values> {
         let mut ranges = points(chosen);
@@ -266,8 +280,11 @@ impl Search<'_> {
 
     /// Whether these values run in an empty world, and fulfil the wish.
     fn runs(&self, values: &[Value], before: &Memory, wish: &Wish<'_>) -> bool {
-        let after = || self.rules.space.memory_after(self.rules.row.action, values, before);
-        self.runs_in_empty(values, before) && wish(values, &after())
+        self.runs_in_empty(values, before) && wish(values, &self.after(values, before))
+    }
+
+    fn after(&self, values: &[Value], before: &Memory) -> Memory {
+        self.rules.space.memory_after(self.rules.row.action, values, before)
     }
 
     /// Whether these values run in an empty world, as far as that can be told.
@@ -278,12 +295,11 @@ impl Search<'_> {
         if !action.parameters.iter().zip(values).all(in_domain) {
             return false;
         }
-        let after = &space.memory_after(self.rules.row.action, values, before);
+        let after = &self.after(values, before);
         let facts = Facts { road: self.rules.road, ..Facts::new(values, after) };
         let number = |expr: &Expr| evaluate(expr, &space.functions, &facts).number();
         let mut spawns = Vec::new();
-        for effect in &action.effects {
-            let EffectDef::Spawn(spawn) = effect else { continue };
+        for spawn in action.spawns() {
             let speed_mps = rounded_into(number(&spawn.speed), SPAWN_SPEED_MPS);
             let distance_m = rounded_into(number(&spawn.distance), SPAWN_DISTANCE_M);
             if spawn_out_of_bounds(speed_mps, distance_m).is_some() {
@@ -313,23 +329,17 @@ impl Search<'_> {
         }
         self.left.take_box();
         let names = |expr: &Expr, local: usize| expr.any(|kind| *kind == ExprKind::Local(local));
-        let decides = |local: usize| {
-            sets.iter()
-                .any(|set| names(&set.value, local) || set.key.as_ref().is_some_and(|key| names(key, local)))
-        };
+        let parts = || sets.iter().flat_map(|set| set.key.iter().chain([&set.value]));
         let open: Vec<usize> = action.drawn_numbers().collect();
-        let mut is_complete = !open.iter().any(|local| decides(*local));
+        let mut is_complete = !open.iter().any(|local| parts().any(|part| names(part, *local)));
         let mut after = Vec::new();
-        let chosen = choices(action, &locals(action, self.rules.row, &[]));
-        is_complete &= chosen.len() < CHOICES_MAX;
-        for chosen in chosen {
-            if effort::is_spent() {
-                break;
-            }
+        let choices = self.choices();
+        is_complete &= choices.len() < CHOICES_MAX;
+        for chosen in choices.into_iter().take_while(|_| !effort::is_spent()) {
             let before = Before { memory, world: None, tries: &self.left.tries };
             match self.rules.solve(chosen, &open, before, &mut Share(SHARES[0])) {
                 Ok(values) => {
-                    let led_to = self.rules.space.memory_after(self.rules.row.action, &values, memory);
+                    let led_to = self.after(&values, memory);
                     // An effect without a value is refused.
                     let is_kept = led_to.cells().iter().all(|value| value.is_kept());
                     let candidate =
@@ -362,26 +372,27 @@ impl Search<'_> {
     /// row read. Gives also whether there can be no other.
     pub fn memories(&self) -> (Vec<Memory>, bool) {
         let space = self.rules.space;
-        let begun = space
-            .states
-            .iter()
-            .flat_map(|state| (0..state.cells).map(move |cell| initial(space, state, cell)));
-        let mut is_complete = true;
-        let mut memories = vec![Memory { cells: begun.collect() }];
+        let mut begun = space.initial_memory(0);
+        // A cell that is drawn has the first value of its type.
+        for cell in space.open_cells() {
+            begun.cells[cell] = match space.state_of(cell).ty {
+                Type::Enum(of) => Value::Variant(of, 0),
+                Type::Bool | Type::Int | Type::Quantity(_) => Value::Bool(false),
+            };
+        }
+        let (mut memories, mut is_complete) = (vec![begun], true);
         for cell in self.read() {
             let state = space.state_of(cell);
             let values = all_values(space, state.ty, memories[0].cells[cell]);
             let room = (MEMORIES_MAX / memories.len()).max(1);
             is_complete &= values.len() <= room;
             is_complete &= !matches!(state.ty, Type::Int | Type::Quantity(_));
-            if values.len().min(room) == 1 {
+            let tried = &values[..values.len().min(room)];
+            if tried.len() == 1 {
                 continue;
             }
-            effort::spend(memories.len() * values.len().min(room) * memories[0].cells.len());
-            let longer = memories
-                .iter()
-                .flat_map(|memory| values.iter().take(room).map(move |value| memory.with(cell, *value)));
-            memories = longer.collect();
+            effort::spend(memories.len() * tried.len() * memories[0].cells.len());
+            memories = product(&memories, tried, |memory, value| memory.cells[cell] = value);
         }
         (memories, is_complete)
     }
@@ -394,26 +405,20 @@ impl Search<'_> {
     /// The cells whose values before the step decide a rule or an effect of the row.
     fn read(&self) -> BTreeSet<usize> {
         let states = &self.rules.space.states;
-        let mut found = BTreeSet::new();
+        let (mut found, mut moved) = (BTreeSet::new(), Vec::new());
         let mut named = |expr: &Expr| found.extend(cells_read(expr, states));
         for set in self.rules.space.sets(Some(self.rules.row.action)).take_while(|_| !effort::is_spent()) {
             set.key.iter().chain([&set.value]).for_each(&mut named);
         }
-        for effect in &self.action().effects {
-            if let EffectDef::Spawn(spawn) = effect {
-                [&spawn.speed, &spawn.distance].into_iter().for_each(&mut named);
-            }
+        for spawn in self.action().spawns() {
+            [&spawn.speed, &spawn.distance].into_iter().for_each(&mut named);
         }
         for (_, demand) in self.rules.demands() {
             match demand {
                 Demand::Holds(condition) => named(condition),
-                Demand::Moves { .. } => {}
+                Demand::Moves { cell, .. } => moved.push(cell),
             }
         }
-        let moved = self.rules.demands().filter_map(|(_, demand)| match demand {
-            Demand::Moves { cell, .. } => Some(cell),
-            Demand::Holds(_) => None,
-        });
         found.extend(moved);
         found
     }
@@ -434,31 +439,6 @@ fn followed(memory: &Memory) -> Vec<Values> {
         _ => Values::point(*value),
     };
     memory.cells().iter().map(cell).collect()
-}
-
-/// Every choice of the listed values, the first values first; what is a range stays as it is.
-pub(super) fn choices(action: &ActionDef, values: &[Value]) -> Vec<Vec<Value>> {
-    let mut chosen = vec![values.to_vec()];
-    for (local, parameter) in action.parameters.iter().enumerate().filter(|(_, p)| !p.axis) {
-        let Domain::Values(values) = &parameter.domain else { continue };
-        let room = (CHOICES_MAX / chosen.len()).max(1);
-        // A value that is likelier stands in the list more than once; one time is enough here.
-        let mut different: Vec<Value> = Vec::new();
-        for value in values {
-            if different.len() < room && !different.contains(value) {
-                different.push(*value);
-            }
-        }
-        let longer = chosen.iter().flat_map(|locals| {
-            different.iter().map(move |value| {
-                let mut locals = locals.clone();
-                locals[local] = *value;
-                locals
-            })
-        });
-        chosen = longer.collect();
-    }
-    chosen
 }
 
 /// The box cut in two across its widest range; nothing if every range is a point.
@@ -485,17 +465,6 @@ fn halves(narrowed: &[Values], open: &[usize]) -> Vec<Vec<Values>> {
     ]
 }
 
-/// The value that a cell of a state begins with; the first of its type if it is drawn.
-fn initial(space: &Space, state: &StateDef, cell: usize) -> Value {
-    match &state.initial[cell] {
-        Initial::Value(expr) => evaluate(expr, &space.functions, &Facts::new(&[], &Memory::default())),
-        Initial::Any => match state.ty {
-            Type::Enum(of) => Value::Variant(of, 0),
-            Type::Bool | Type::Int | Type::Quantity(_) => Value::Bool(false),
-        },
-    }
-}
-
 /// All values of a finite type, `first` before the others.
 fn all_values(space: &Space, ty: Type, first: Value) -> Vec<Value> {
     let mut values = vec![first];
@@ -504,11 +473,5 @@ fn all_values(space: &Space, ty: Type, first: Value) -> Vec<Value> {
         Type::Bool => values.extend([false, true].map(Value::Bool)),
         Type::Int | Type::Quantity(_) => {}
     }
-    let mut kept: Vec<Value> = Vec::new();
-    for value in values {
-        if !kept.contains(&value) {
-            kept.push(value);
-        }
-    }
-    kept
+    distinct(values)
 }

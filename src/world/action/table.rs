@@ -125,7 +125,7 @@ impl ActionTable {
         road: &Road,
         rules: &RulesInForce,
     ) -> (Vec<Effect>, Memory) {
-        let after = self.space.memory_after_wait(memory, Some(step), Some(&road.facts), rules);
+        let after = self.space.memory_after_wait(memory, step, Some(&road.facts), rules);
         (Effect::of_change(&self.space, memory, &after), after)
     }
 

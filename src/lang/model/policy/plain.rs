@@ -49,6 +49,8 @@ pub(crate) fn record(fields: &[Field]) -> Result<Map<String, Value>, (Span, &'st
 }
 
 fn data(expr: &Expr) -> Result<Value, (Span, &'static str)> {
+    // Read by the library that wrote it, so that numbers come back exactly.
+    let number = |text: &str| serde_json::from_str(text).map_err(|_| (expr.span, "no number"));
     let wrong = (expr.span, "wanted a text, a number, a list or a record");
     match &expr.kind {
         ExprKind::Name(name) if name == NONE => Ok(Value::Null),
@@ -56,14 +58,9 @@ fn data(expr: &Expr) -> Result<Value, (Span, &'static str)> {
         ExprKind::Text(text) => Ok(Value::String(text.clone())),
         ExprKind::List(items) => Ok(Value::Array(items.iter().map(data).collect::<Result<_, _>>()?)),
         ExprKind::Record(fields) => Ok(Value::Object(record(fields)?)),
-        ExprKind::Number(number) if number.unit.is_none() => {
-            // Read by the library that wrote it, so that numbers come back exactly.
-            serde_json::from_str(&number.digits).map_err(|_| (expr.span, "no number"))
-        }
+        ExprKind::Number(read) if read.unit.is_none() => number(&read.digits),
         ExprKind::Unary { op: UnaryOp::Negate, operand } => match &operand.kind {
-            ExprKind::Number(number) if number.unit.is_none() => {
-                serde_json::from_str(&format!("-{}", number.digits)).map_err(|_| (expr.span, "no number"))
-            }
+            ExprKind::Number(read) if read.unit.is_none() => number(&format!("-{}", read.digits)),
             _ => Err(wrong),
         },
         _ => Err(wrong),

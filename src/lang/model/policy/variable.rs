@@ -4,7 +4,7 @@
 //! are ours, in the spelling of the language; the paper's stand beside them.
 
 use avastra_base::units;
-use avastra_base::units::{Dimension, Rational};
+use avastra_base::units::{Dimension, Rational, Unit};
 
 /// One variable.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,22 +26,17 @@ pub enum VariableKind {
 impl Variable {
     /// Dimension of the variable's numbers.
     pub fn dimension(&self) -> Dimension {
-        match self.kind {
-            VariableKind::Quantity { unit, .. } => {
-                units::unit(unit).map_or(Dimension::RATIO, |unit| unit.dimension)
-            }
-            VariableKind::Words { .. } => Dimension::RATIO,
-        }
+        self.unit().map_or(Dimension::RATIO, |unit| unit.dimension)
     }
 
     /// The value of one of its units in SI.
     pub fn factor(&self) -> Rational {
-        match self.kind {
-            VariableKind::Quantity { unit, .. } => {
-                units::unit(unit).map_or(Rational::ONE, units::Unit::factor)
-            }
-            VariableKind::Words { .. } => Rational::ONE,
-        }
+        self.unit().map_or(Rational::ONE, Unit::factor)
+    }
+
+    fn unit(&self) -> Option<&'static Unit> {
+        let VariableKind::Quantity { unit, .. } = self.kind else { return None };
+        units::unit(unit)
     }
 
     /// The word for a value of an observation; `None` for a quantity.

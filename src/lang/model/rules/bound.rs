@@ -42,10 +42,7 @@ pub(crate) fn bounds(actions: &[ActionDef], rules: &[RuleDef]) -> Vec<Vec<Bound>
         for condition in action.parameters.iter().filter_map(|parameter| parameter.condition.as_ref()) {
             collect(condition, None, &mut Vec::new(), &mut found);
         }
-        for &rule in &binding[index] {
-            if effort::is_spent() {
-                break;
-            }
+        for &rule in binding[index].iter().take_while(|_| !effort::is_spent()) {
             if let Some(Demand::Holds(condition)) = rules[rule].body.demand(index) {
                 collect(condition, Some(rule), &mut Vec::new(), &mut found);
             }
@@ -111,11 +108,8 @@ fn collect(condition: &Expr, rule: Option<usize>, guards: &mut Vec<Expr>, into: 
 
 /// The parameters that an expression names.
 pub fn locals(expr: &Expr) -> Vec<usize> {
-    let mut found = Vec::new();
-    expr.walk(&mut |part| {
-        if let ExprKind::Local(local) = part.kind {
-            found.push(local);
-        }
-    });
-    found
+    expr.filter_map(|kind| match kind {
+        ExprKind::Local(local) => Some(*local),
+        _ => None,
+    })
 }

@@ -100,10 +100,8 @@ fn add_effects(sets: &[&SetDef], states: &[StateDef], read: Vec<usize>, needs: &
 
 /// The states that an expression names, by index.
 pub(crate) fn states_read(expr: &Expr, states: &[StateDef]) -> Vec<usize> {
-    let mut found = Vec::new();
-    expr.walk(&mut |part| {
-        let (ExprKind::Cell(cell) | ExprKind::CellAt(cell, _)) = part.kind else { return };
-        found.push(state_at(cell, states));
-    });
-    found
+    expr.filter_map(|kind| match kind {
+        ExprKind::Cell(cell) | ExprKind::CellAt(cell, _) => Some(state_at(*cell, states)),
+        _ => None,
+    })
 }

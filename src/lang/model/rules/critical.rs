@@ -33,51 +33,36 @@ struct Quotient {
     below: Polynomial,
 }
 
-/// The numbers to be drawn by index, with their places in polynomials; and everything known.
-pub(super) struct Unknowns<'a> {
-    pub rules: RowRules<'a>,
-    /// Locals that are open, in the order of their places.
-    pub open: &'a [usize],
-    /// Values of all parameters and the memory before; the values of open ones do not count.
-    pub facts: Facts<'a>,
-}
-
-/// The polynomials that decide these clauses; `None` if an expression is too complicated.
+/// The polynomials that decide these clauses; `None` if an expression is too complicated. `open` are the locals that are
+/// still to be drawn, in the order of their places in polynomials. `facts` has values of all parameters and the memory
+/// before; the values of open parameters do not count.
 pub(super) fn polynomials<'c>(
-    unknowns: &Unknowns<'_>,
+    rules: RowRules<'_>,
+    open: &[usize],
+    facts: Facts<'_>,
     clauses: impl Iterator<Item = &'c Clause>,
 ) -> Option<Vec<Polynomial>> {
-    let space = unknowns.rules.space;
-    effort::spend(unknowns.facts.locals.len() + unknowns.facts.memory.cells().len());
-    let locals: Vec<Form> = unknowns
-        .facts
-        .locals
-        .iter()
-        .enumerate()
-        .map(|(local, value)| match unknowns.open.iter().position(|open| *open == local) {
-            Some(place) => Form::Numbers(vec![Quotient::whole(Polynomial::number(place))]),
-            None => Form::Known(*value),
-        })
-        .collect();
-    let cells = unknowns.facts.memory.cells().iter().map(|value| Form::Known(*value)).collect();
-    let mut reader = Reader {
-        functions: &space.functions,
-        states: &space.states,
-        facts: unknowns.facts,
-        cells,
-        found: Vec::new(),
+    let space = rules.space;
+    effort::spend(facts.locals.len() + facts.memory.cells().len());
+    let form = |(local, value): (usize, &Value)| match open.iter().position(|open| *open == local) {
+        Some(place) => Form::Numbers(vec![Quotient::whole(Polynomial::number(place))]),
+        None => Form::Known(*value),
     };
-    let action = unknowns.rules.row.action;
-    let mut after_effects = None;
+    let locals: Vec<Form> = facts.locals.iter().enumerate().map(form).collect();
+    let cells = facts.memory.cells().iter().map(|value| Form::Known(*value)).collect();
+    let (functions, states) = (&space.functions, &space.states);
+    let mut reader = Reader { functions, states, facts, cells, found: Vec::new() };
+    let action = rules.row.action;
+    let mut are_effects_read = false;
     for clause in clauses {
         if effort::is_spent() {
             return None;
         }
-        if clause.reads_effects && after_effects.is_none() {
+        if clause.reads_effects && !are_effects_read {
             for set in space.sets(Some(action)) {
                 reader.apply(set, &locals)?;
             }
-            after_effects = Some(());
+            are_effects_read = true;
         }
         let condition = match clause.source {
             Source::Where(parameter) => space.actions[action].parameters[parameter].condition.as_ref(),
@@ -89,7 +74,7 @@ pub(super) fn polynomials<'c>(
         };
         let is_asked = |condition: &&Expr| match condition.known() {
             Known::Road => true,
-            Known::World => unknowns.facts.world.is_some(),
+            Known::World => facts.world.is_some(),
             Known::Spawn | Known::Step | Known::Judgement => false,
         };
         if let Some(condition) = condition.filter(is_asked) {
@@ -112,16 +97,15 @@ impl Reader<'_> {
     fn apply(&mut self, set: &SetDef, locals: &[Form]) -> Option<()> {
         let SetDef { state, key, value, .. } = set;
         let value = self.read(value, locals)?;
-        let key = match key {
-            Some(key) => Some(self.read(key, locals)?),
-            None => None,
-        };
         let state = &self.states[*state];
         let cells = state.first_cell..state.first_cell + state.cells;
-        match key {
-            None => self.cells[cells].fill(value),
-            Some(Form::Known(key)) => self.cells[state.first_cell + key.variant()] = value,
-            Some(_) => {
+        let Some(key) = key else {
+            self.cells[cells].fill(value);
+            return Some(());
+        };
+        match self.read(key, locals)? {
+            Form::Known(key) => self.cells[state.first_cell + key.variant()] = value,
+            Form::Numbers(_) | Form::Open => {
                 for cell in cells {
                     self.cells[cell] = join([self.cells[cell].clone(), value.clone()])?;
                 }
@@ -192,24 +176,9 @@ impl Reader<'_> {
                     _ => self.compared(&left, &right)?,
                 }
             }
-            ExprKind::And(left, right) => match self.read(left, locals)? {
-                Form::Known(value) if !value.truth() => Form::Known(value),
-                left => {
-                    self.read(right, locals).map(|right| if left == Form::Open { left } else { right })?
-                }
-            },
-            ExprKind::Or(left, right) => match self.read(left, locals)? {
-                Form::Known(value) if value.truth() => Form::Known(value),
-                left => {
-                    self.read(right, locals).map(|right| if left == Form::Open { left } else { right })?
-                }
-            },
-            ExprKind::Implies(left, right) => match self.read(left, locals)? {
-                Form::Known(value) if !value.truth() => Form::Known(Value::Bool(true)),
-                left => {
-                    self.read(right, locals).map(|right| if left == Form::Open { left } else { right })?
-                }
-            },
+            ExprKind::And(left, right) => self.read_both(left, right, locals, (false, false))?,
+            ExprKind::Or(left, right) => self.read_both(left, right, locals, (true, true))?,
+            ExprKind::Implies(left, right) => self.read_both(left, right, locals, (false, true))?,
             ExprKind::InRange(inner, low, high) => {
                 let inner = self.read(inner, locals)?;
                 for end in [low, high] {
@@ -244,6 +213,21 @@ impl Reader<'_> {
                 }
             },
         })
+    }
+
+    /// Reads two truths. If the left one is known to be `deciding`, the result is `decided`, and the right one is not read.
+    fn read_both(
+        &mut self,
+        left: &Expr,
+        right: &Expr,
+        locals: &[Form],
+        (deciding, decided): (bool, bool),
+    ) -> Option<Form> {
+        match self.read(left, locals)? {
+            Form::Known(value) if value.truth() == deciding => Some(Form::Known(Value::Bool(decided))),
+            Form::Open => self.read(right, locals).map(|_| Form::Open),
+            Form::Known(_) | Form::Numbers(_) => self.read(right, locals),
+        }
     }
 
     /// Notes where two numbers may be equal.

@@ -40,7 +40,7 @@ pub use room::Room;
 pub use solve::{Before, Choose, Nearest, TRIES_MAX, Unsolved};
 
 pub use start::NoStart;
-pub(crate) use start::{cells_read, state_at};
+pub(crate) use start::{Combinations, cells_read, state_at};
 
 use crate::model::effort;
 use crate::model::expr::Expr;

@@ -21,7 +21,7 @@ use std::rc::Rc;
 use crate::model::effort;
 use crate::model::eval::{Facts, WorldFacts, evaluate};
 use crate::model::expr::{Comparison, ExprKind};
-use crate::model::rules::critical::{Unknowns, polynomials};
+use crate::model::rules::critical::polynomials;
 use crate::model::rules::polynomial::{NUMBERS_MAX, Polynomial, project};
 use crate::model::rules::{Candidate, Clause, Room, RowRules, RulesInForce};
 use crate::model::space::{ActionDef, Domain};
@@ -363,9 +363,8 @@ impl<'a> Solver<'a> {
     /// not found.
     fn changes_in_one(&self, local: usize, clauses: &[usize]) -> Option<Vec<f64>> {
         let (low, high) = self.action().parameters[local].domain.ends();
-        let open = [local];
-        let unknowns = Unknowns { rules: self.rules, open: &open, facts: self.facts() };
-        let found = polynomials(&unknowns, clauses.iter().map(|clause| self.clause(*clause)))?;
+        let clauses = clauses.iter().map(|clause| self.clause(*clause));
+        let found = polynomials(self.rules, &[local], self.facts(), clauses)?;
         Some(found.iter().flat_map(|polynomial| polynomial.turns(0, low, high)).collect())
     }
 
@@ -483,9 +482,9 @@ impl<'a> Solver<'a> {
         if open.len() > NUMBERS_MAX {
             return None;
         }
-        let unknowns = Unknowns { rules: self.rules, open, facts: self.facts() };
         let clauses = self.rules.clauses().map(|index| self.clause(index));
-        let mut found = polynomials(&unknowns, clauses.filter(|clause| clause.needs_any(open)))?;
+        let clauses = clauses.filter(|clause| clause.needs_any(open));
+        let mut found = polynomials(self.rules, open, self.facts(), clauses)?;
         for (place, local) in open.iter().enumerate().skip(1) {
             let (low, high) = self.action().parameters[*local].domain.ends();
             for end in [low, high] {

@@ -68,10 +68,49 @@ impl Space {
         }
         let mut rng = rng::stream(seed, Stream::Reset, 1);
         for group in self.groups(rules) {
-            let left = Starts::of(self, &group, &memory, open, road)?;
-            memory = left.draw(&mut rng);
+            memory = self.drawn_again(&group, &memory, open, road, &mut rng)?;
         }
         Ok(memory)
+    }
+
+    /// The memory with those open cells drawn again that a group of rules reads, from all combinations that obey the rules.
+    fn drawn_again(
+        &self,
+        group: &Group,
+        memory: &Memory,
+        open: &[usize],
+        road: &Road,
+        rng: &mut Rng,
+    ) -> Result<Memory, NoStart> {
+        let no_start = |index: usize, is_too_large| {
+            let (road, rule) = (road.name.clone(), self.rules[index].name.clone());
+            let cells = self.rules[index].start.iter().flat_map(|start| cells_read(start, &self.states));
+            NoStart { road, rule, index, cells: cells.collect(), is_too_large }
+        };
+        let open: BTreeSet<usize> = open.iter().copied().collect();
+        let cells = group.cells.iter().copied().filter(|cell| open.contains(cell));
+        let all = Combinations::of(self, memory, cells);
+        if all.count() > COMBINATIONS_MAX {
+            return Err(no_start(group.rules[0], true));
+        }
+        // The numbers of the combinations that obey the rules.
+        let mut legal: Vec<usize> = (0..all.count()).collect();
+        for rule in &group.rules {
+            legal.retain(|number| {
+                !effort::is_spent() && self.stands(*rule, &all.get(*number).1, Some(&road.facts), 0)
+            });
+            if legal.is_empty() {
+                return Err(no_start(*rule, false));
+            }
+        }
+        let odds: Vec<f64> = legal.iter().map(|number| all.get(*number).0).collect();
+        let mut ticket = rng::unit(rng) * odds.iter().sum::<f64>();
+        let found = legal.iter().zip(odds).find(|(_, odds)| {
+            ticket -= odds;
+            ticket < 0.0
+        });
+        let number = found.map(|(number, _)| number).or(legal.last());
+        Ok(all.get(*number.expect("no rule left nothing")).1)
     }
 
     /// The first rule in force that a start breaks on a road, by index.
@@ -81,23 +120,13 @@ impl Space {
         road: &RoadFacts,
         rules: &RulesInForce,
     ) -> Option<usize> {
-        rules.all().find(|rule| !self.stands(*rule, memory, Some(road), Some(0)))
+        rules.all().find(|rule| !self.stands(*rule, memory, Some(road), 0))
     }
 
     /// Whether the states obey what a rule says about them where no action is judged: at the start, and after a step
-    /// without an action. Where the step is not known, a rule that asks for it is taken to be obeyed.
-    pub(crate) fn stands(
-        &self,
-        rule: usize,
-        memory: &Memory,
-        road: Option<&RoadFacts>,
-        step: Option<u64>,
-    ) -> bool {
+    /// without an action.
+    pub(crate) fn stands(&self, rule: usize, memory: &Memory, road: Option<&RoadFacts>, step: u64) -> bool {
         let Some(condition) = &self.rules[rule].start else { return true };
-        let step = match step {
-            None if condition.asks_the_world() => return true,
-            step => step.unwrap_or(0),
-        };
         let elapsed_s = self.episode.time_s(step);
         let moment = MomentFacts { elapsed_s, ..MomentFacts::default() };
         let world = WorldFacts { moment, step, ..WorldFacts::default() };
@@ -166,56 +195,27 @@ struct Group {
     cells: Vec<usize>,
 }
 
-/// The legal combinations of the open cells that a group of rules reads.
-struct Starts<'a> {
+/// Memories that differ in some cells alone, by number: one for each combination of the values that are drawn for these
+/// cells. Those of the first cell vary fastest.
+pub(crate) struct Combinations<'a> {
     memory: &'a Memory,
-    /// The open cells, each with its values and their odds.
+    /// The cells, each with its values and their odds.
     cells: Vec<(usize, Vec<(u32, Value)>)>,
-    /// Numbers of the combinations that obey the rules.
-    legal: Vec<usize>,
 }
 
-impl<'a> Starts<'a> {
-    fn of(
-        space: &Space,
-        group: &Group,
-        memory: &'a Memory,
-        open: &[usize],
-        road: &Road,
-    ) -> Result<Starts<'a>, NoStart> {
-        let no_start = |index: usize, is_too_large| {
-            let (road, rule) = (road.name.clone(), space.rules[index].name.clone());
-            let cells = space.rules[index].start.iter().flat_map(|start| cells_read(start, &space.states));
-            NoStart { road, rule, index, cells: cells.collect(), is_too_large }
-        };
-        let mut cells = Vec::new();
-        let open: BTreeSet<usize> = open.iter().copied().collect();
-        for cell in group.cells.iter().filter(|cell| open.contains(cell)) {
-            cells.push((*cell, space.drawn_values(space.state_of(*cell).ty)));
-        }
-        let combinations = cells.iter().map(|(_, values)| values.len()).try_fold(1, usize::checked_mul);
-        let combinations = combinations.filter(|combinations| *combinations <= COMBINATIONS_MAX);
-        let mut starts = Starts { memory, cells, legal: Vec::new() };
-        starts.legal = match combinations {
-            Some(combinations) => (0..combinations).collect(),
-            None => return Err(no_start(group.rules[0], true)),
-        };
-        for rule in &group.rules {
-            let mut legal = core::mem::take(&mut starts.legal);
-            legal.retain(|number| {
-                !effort::is_spent()
-                    && space.stands(*rule, &starts.combination(*number).1, Some(&road.facts), Some(0))
-            });
-            if legal.is_empty() {
-                return Err(no_start(*rule, false));
-            }
-            starts.legal = legal;
-        }
-        Ok(starts)
+impl<'a> Combinations<'a> {
+    pub fn of(space: &Space, memory: &'a Memory, cells: impl Iterator<Item = usize>) -> Combinations<'a> {
+        let cells = cells.map(|cell| (cell, space.drawn_values(space.state_of(cell).ty)));
+        Combinations { memory, cells: cells.collect() }
+    }
+
+    /// At most `usize::MAX`.
+    pub fn count(&self) -> usize {
+        self.cells.iter().map(|(_, values)| values.len()).fold(1, usize::saturating_mul)
     }
 
     /// The odds of a combination, relative to the others, and the memory with it.
-    fn combination(&self, mut number: usize) -> (f64, Memory) {
+    pub fn get(&self, mut number: usize) -> (f64, Memory) {
         effort::spend(self.memory.cells.len());
         let (mut odds, mut memory) = (1.0, self.memory.clone());
         for (cell, values) in &self.cells {
@@ -225,18 +225,6 @@ impl<'a> Starts<'a> {
             memory.cells[*cell] = value;
         }
         (odds, memory)
-    }
-
-    fn draw(&self, rng: &mut Rng) -> Memory {
-        let odds: Vec<f64> = self.legal.iter().map(|number| self.combination(*number).0).collect();
-        let mut ticket = rng::unit(rng) * odds.iter().sum::<f64>();
-        let mut drawn = self.legal.iter().zip(odds);
-        let found = drawn.find(|(_, odds)| {
-            ticket -= odds;
-            ticket < 0.0
-        });
-        let number = found.map(|(number, _)| number).or(self.legal.last());
-        self.combination(*number.expect("no rule left nothing")).1
     }
 }
 
