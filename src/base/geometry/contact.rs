@@ -397,5 +397,44 @@ mod tests {
             prop_assert!((a.nearest(found.on_first) - found.on_first).norm() < 1e-9, "{found:?}");
             prop_assert!((b.nearest(found.on_second) - found.on_second).norm() < 1e-9, "{found:?}");
         }
+
+        #[test]
+        fn a_first_contact_is_a_contact_and_the_first(
+            a in any_box(), b in any_box(), dx_m in -6.0_f64..6.0, dy_m in -6.0_f64..6.0, turn_rad in -0.3_f64..0.3,
+        ) {
+            let moving = Sweep {
+                start: a,
+                end: Pose::new(a.pose.position.x + dx_m, a.pose.position.y + dy_m, wrap_angle(a.pose.heading_rad + turn_rad)),
+            };
+            let still = Sweep { start: b, end: b.pose };
+            // The naive twin: a thousand small steps.
+            let naive = (0..=1000).map(|i| f64::from(i) / 1000.0).find(|&f| parry_distance_m(&moving.at(f), &b) <= 0.0);
+            match (first_contact(&moving, &still), naive) {
+                (None, naive) => prop_assert_eq!(naive, None),
+                (Some(first), Some(naive)) => prop_assert!(first.fraction <= naive + 1e-9, "{first:?} after {naive}"),
+                // A graze between two of the small steps.
+                (Some(first), None) => {
+                    prop_assert!(parry_distance_m(&moving.at(first.fraction), &b) <= 2.0 * CONTACT_M, "{first:?}");
+                }
+            }
+        }
+    }
+
+    fn car(x_m: f64, y_m: f64, heading_rad: f64) -> OrientedBox {
+        OrientedBox::new(Pose::new(x_m, y_m, heading_rad), 4.0, 2.0)
+    }
+
+    #[test]
+    fn a_fast_crossing_is_not_missed() {
+        // In one motion the second box passes wholly through the first.
+        let still = Sweep { start: car(0.0, 0.0, 0.0), end: Pose::new(0.0, 0.0, 0.0) };
+        let fast = Sweep {
+            start: car(0.0, -50.0, core::f64::consts::FRAC_PI_2),
+            end: Pose::new(0.0, 50.0, core::f64::consts::FRAC_PI_2),
+        };
+        let contact = first_contact(&still, &fast).expect("it passes through");
+        // Its front touches at y = -1, that is after 47 of 100 m.
+        assert!((contact.fraction - 0.47).abs() < 1e-5, "{contact:?}");
+        assert!((contact.point.y + 1.0).abs() < 1e-3, "{contact:?}");
     }
 }
