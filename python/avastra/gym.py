@@ -69,12 +69,16 @@ class Env(gymnasium.Env):
 
     def reset(self, *, seed: Optional[int] = None,
               options: Optional[Dict[str, Any]] = None) -> Tuple[Any, Dict[str, Any]]:
+        """Begins an episode. `info` has its `seed` and the `action_mask`, shape (rows,), of its first step; there are no options."""
+        if options:
+            raise ValueError(f"no option `{next(iter(options))}`: `reset` takes `seed` alone")
         super().reset(seed=seed)
         seed = _drawn(self.np_random) if seed is None else int(seed)
         observation, self._legal = self.episodes.reset(seed)
         return self._shown(observation), {"seed": seed, "action_mask": self._legal.copy()}
 
     def step(self, action: Any) -> Tuple[Any, float, bool, bool, Dict[str, Any]]:
+        """Drives one step with a row of the table (0 to rows - 1); the module says what an illegal row does and what `info` has."""
         observation, reward, end, info = self.episodes.step(int(action))
         self._legal = info["action_mask"]
         terminated = _is_terminal(end)
@@ -132,6 +136,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
     def reset(self, *, seed: Union[int, Sequence[Optional[int]], None] = None,
               options: Optional[Dict[str, Any]] = None) -> Tuple[Any, Dict[str, Any]]:
+        """Begins an episode in every world, or in those that the option `reset_mask`, shape (worlds,), marks."""
         which = np.ones(self.num_envs, dtype=bool)
         if options and "reset_mask" in options:
             which = np.asarray(options["reset_mask"], dtype=bool)
@@ -145,6 +150,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         return self._shown(), infos
 
     def step(self, actions: Any) -> Tuple[Any, np.ndarray, np.ndarray, np.ndarray, Dict[str, Any]]:
+        """Drives one step in every world, each with its row; those whose episodes have ended begin anew as the mode says."""
         begin: List[int] = np.flatnonzero(self._has_ended).tolist()
         if self.autoreset_mode == AutoresetMode.DISABLED and begin:
             raise EpisodeError(f"the episodes of worlds {begin} have ended: reset them with `reset_mask`")

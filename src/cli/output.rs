@@ -51,6 +51,7 @@ pub enum Telling {
 }
 
 impl Output {
+    #[expect(clippy::disallowed_methods, reason = "whether a user wants colours is said in the environment")]
     pub fn new(arguments: &OutputArguments) -> Output {
         let colour = match arguments.color {
             When::Always => true,
@@ -265,6 +266,7 @@ fn drawn(text: &str) {
 }
 
 /// Whether stderr is a terminal that can do more than print one line after another.
+#[expect(clippy::disallowed_methods, reason = "which terminal it is stands in the environment")]
 fn is_on_screen() -> bool {
     std::io::stderr().is_terminal() && std::env::var_os("TERM").is_none_or(|name| name != "dumb")
 }

@@ -116,7 +116,7 @@ impl Episodes {
         };
         let reward = match reward {
             "space" => None,
-            "judged" => Some(preset.payment.constants()),
+            "judged" => preset.payment.equation(),
             other => return Err(PyValueError::new_err(format!("no reward `{other}`: `space` or `judged`"))),
         };
         let conditions = Conditions {

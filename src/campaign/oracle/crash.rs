@@ -12,7 +12,7 @@ use avastra_drivers::external::FailureKind;
 use avastra_drivers::{Foresight, Selected};
 
 use super::avoidable::judge;
-use super::facts::counted_at_need;
+use super::counted::counted_at_need;
 use crate::episode::at_fault;
 
 /// What became of a collision in another play.

@@ -5,7 +5,7 @@ mod avoidable;
 mod cause;
 mod crash;
 mod evidence;
-mod facts;
+mod counted;
 mod hazard;
 mod measured;
 mod mechanisms;
@@ -20,11 +20,11 @@ pub use avoidable::{
     AvoidabilitySettings, DrivenPlace, Judgement, ReferenceDrive, judge, judge_one, judge_with_drives,
 };
 pub use cause::{NoModules, diagnose, fate};
+pub use counted::{counted, counted_at_need, counts, facts};
 pub use crash::{Fate, Regression, regression};
 pub use evidence::{
     Chance, Comparison, Diagnosis, Evidence, ModuleFinding, PairFinding, Verdict, WeaknessFinding,
 };
-pub use facts::{counted, counted_at_need, counts, facts};
 pub use measured::Measure;
 pub use mechanisms::{
     MechanismShare, Mechanisms, Share, WithoutMechanism, mechanism_shares, mechanisms, placebo,

@@ -15,7 +15,7 @@ use avastra_world::action::ActionTable;
 use avastra_world::sim::Start;
 
 use super::avoidable::{Judgement, judge};
-use super::facts::counts;
+use super::counted::counts;
 
 /// Most rounds of all passes. Each round makes something smaller or plainer; most crashes need two.
 const ROUNDS_MAX: usize = 8;

@@ -63,7 +63,7 @@ impl Cut<'_> {
         self.rules
             .iter()
             .fold(remark, |remark, rule| remark.beside(space.rules[*rule].span, "by this rule"))
-            .help("if that is meant, all is well; else narrow the range or loosen the rule")
+            .help("if you intended this, change nothing; otherwise narrow the range or relax the rule")
     }
 }
 

@@ -122,6 +122,6 @@ fn remark(space: &Space, parameter: &Parameter, values: &[Value], rules: &[usize
     let message = format!("{} never {verb} `{}` be {shown}", rule_names(space, rules), parameter.name);
     let remark = Diagnostic::remark(code::CUT, message).at(parameter.span, "");
     rules.iter().fold(remark, |remark, rule| remark.beside(space.rules[*rule].span, "by this rule")).help(
-        "if that is meant, all is well; else list the values that are wanted (`in [..]`), or loosen the rule",
+        "if you intended this, change nothing; otherwise list the values that you want (`in [..]`), or relax the rule",
     )
 }
