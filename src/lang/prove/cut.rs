@@ -4,11 +4,10 @@ use crate::model::expr::Comparison;
 use crate::model::rules::RowRules;
 use crate::model::{Domain, End, Interval, Parameter, RulesInForce, Space, code, effort};
 use crate::prove::{OpenRow, open_rows, rule_names};
-use crate::syntax::Diagnostic;
+use crate::syntax::{Diagnostic, listed};
 use avastra_base::units::Rational;
 
-/// One remark for each range on each road that rules cut below half. Cuts with the same parameter, rules
-/// and remaining range are reported once.
+/// One remark for each range that rules cut below half, with all roads on which the same rules leave the same.
 pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let in_force = RulesInForce::by_default(space);
     let mut found: Vec<Cut<'_>> = Vec::new();
@@ -23,14 +22,15 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
             if rules.is_empty() {
                 continue;
             }
-            let cut = Cut { parameter, kept: *kept, percent, rules, road: &road.name };
-            let alike = |known: &Cut<'_>| {
-                known.parameter.name == cut.parameter.name
-                    && (known.road, known.kept, &known.rules) == (cut.road, cut.kept, &cut.rules)
-                    && known.parameter.domain == cut.parameter.domain
+            let is_alike = |known: &&mut Cut<'_>| {
+                (known.kept, &known.rules) == (*kept, &rules)
+                    && known.parameter.name == parameter.name
+                    && known.parameter.domain == parameter.domain
             };
-            if !found.iter().any(alike) {
-                found.push(cut);
+            match found.iter_mut().find(is_alike) {
+                Some(known) if known.roads.contains(&road.name.as_str()) => {}
+                Some(known) => known.roads.push(&road.name),
+                None => found.push(Cut { parameter, kept: *kept, percent, rules, roads: vec![&road.name] }),
             }
         }
     }
@@ -43,18 +43,18 @@ struct Cut<'a> {
     /// Share of the declared range that is left.
     percent: f64,
     rules: Vec<usize>,
-    road: &'a str,
+    roads: Vec<&'a str>,
 }
 
 impl Cut<'_> {
     fn remark(self, space: &Space) -> Diagnostic {
         let message = format!(
-            "{} {} {:.0} % of the range of `{}` on `{}`",
+            "{} {} {:.0} % of the range of `{}` on {}",
             rule_names(space, &self.rules),
             if self.rules.len() == 1 { "leaves" } else { "leave" },
             self.percent,
             self.parameter.name,
-            self.road,
+            listed(&self.roads),
         );
         let remark = Diagnostic::remark(code::CUT, message).at(
             self.parameter.span,
