@@ -133,6 +133,7 @@ fn crowded(scene: &Arc<Scene>) -> World {
                     speed_mps: if verb == Verb::Walk { 1.2 } else { 9.0 },
                     distance_m,
                     cover: None,
+                    bearer: None,
                     own: None,
                     cover_own: None,
                 };

@@ -4,8 +4,8 @@
 use avastra_lang::check::{Declaration, References, Symbol};
 use avastra_lang::model::Type;
 use avastra_lang::model::vocabulary::{
-    CHANGE, EpisodeField, RoadField, ScenarioClaim, Site, SpaceClaim, SpawnField, StartField, StopReason,
-    WAIT, Word, parts_of, things,
+    CHANGE, EpisodeField, OrderField, RoadField, ScenarioClaim, Site, SpaceClaim, SpawnField, StartField,
+    StopReason, WAIT, Word, parts_of, things,
 };
 use avastra_lang::syntax::ast::{
     Action, ActionParam, Arm, BinaryOp, Call, Effect, EffectKind, Expr, ExprKind, Field, Initial, ItemKind,
@@ -29,6 +29,8 @@ pub enum Kind {
     Units,
     Actions,
     Groups,
+    /// Names that spawns give.
+    RoadUsers,
     States,
     Roads,
     Rules,
@@ -248,8 +250,13 @@ impl<'a> Place<'a> {
                 let key = key.as_ref().and_then(|key| self.within(key, of_key, None));
                 key.or_else(|| self.within(value, known.and_then(|state| state.ty), None))
             }
+            EffectKind::Order { who, .. } if is_here(who) => Some(vec![Kind::RoadUsers]),
+            EffectKind::Order { fields, .. } => fields.iter().find_map(|field| match is_here(&field.name) {
+                true => Some(unused::<OrderField>(fields)),
+                false => self.within(&field.value, None, None),
+            }),
             EffectKind::Spawn { body, distance, cover, fields, .. } => {
-                let mut bodies = [Some(body), cover.as_ref()].into_iter().flatten();
+                let mut bodies = [Some(body), cover.as_deref()].into_iter().flatten();
                 bodies
                     .find_map(|body| self.word_or_value(Kind::Bodies, body, None))
                     .or_else(|| self.within(distance, None, None))

@@ -54,7 +54,7 @@ fn kind(symbol: &Symbol) -> Option<NameKind> {
     Some(match symbol {
         Symbol::Enum(_) | Symbol::Body(_) => NameKind::Enum,
         Symbol::Variant(..) => NameKind::Variant,
-        Symbol::State(_) | Symbol::Constant(_) => NameKind::Variable,
+        Symbol::State(_) | Symbol::Constant(_) | Symbol::RoadUser(_) => NameKind::Variable,
         Symbol::Function(_) => NameKind::Function,
         Symbol::Argument(..) | Symbol::Parameter(..) => NameKind::Parameter,
         Symbol::Action(_) => NameKind::Action,

@@ -2,8 +2,8 @@
 //! engine's words in `model::vocabulary`.
 
 use avastra_lang::model::vocabulary::{
-    Body, Colour, EpisodeField, LaneChoice, RoadField, Side, Site, SpawnField, StartField, TYPES, Then, Verb,
-    Word,
+    Body, Colour, EpisodeField, LaneChoice, OrderField, RoadField, Side, Site, SpawnField, StartField, TYPES,
+    Then, Verb, Word,
 };
 use avastra_lang::model::{ENDS, MODULES};
 
@@ -49,9 +49,10 @@ pub fn claim_words(claim: &str) -> &'static [&'static str] {
     }
 }
 
-/// What a field of a block means: of a spawn, a road, an episode or a start.
+/// What a field of a block means: of a spawn, an order, a road, an episode or a start.
 pub fn field(word: &str) -> Option<&'static str> {
-    let blocks = [of::<SpawnField>(), of::<RoadField>(), of::<EpisodeField>(), of::<StartField>()];
+    let blocks =
+        [of::<SpawnField>(), of::<OrderField>(), of::<RoadField>(), of::<EpisodeField>(), of::<StartField>()];
     blocks.iter().find_map(|fields| meaning(fields, word))
 }
 

@@ -29,6 +29,7 @@ fn walks_ahead(side: Side, distance_m: f64, speed_mps: f64, cover: Option<Body>)
         own: None,
         cover_own: None,
         cover,
+        bearer: None,
     }
 }
 

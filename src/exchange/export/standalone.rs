@@ -12,7 +12,7 @@ use avastra_campaign::episode::{EpisodeLog, Outcome};
 use avastra_lang::model::body::parameters;
 use avastra_lang::model::vocabulary::{Body, Phenomenon, Verb, Word};
 use avastra_lang::model::{BodyDef, Memory, Road, SPAWN_SPEED_MPS, Scenario, Space, ticks_s};
-use avastra_world::action::{Effect, SpawnRequest};
+use avastra_world::action::{Effect, OrderRequest, SpawnRequest};
 
 /// The scenario in an exported file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -108,6 +108,11 @@ impl<'a> Actions<'a> {
             Effect::Time(time) => format!("set time = {}", time.name()),
             Effect::Sky(phenomenon, level) => format!("set sky[{}] = {}", phenomenon.name(), level.name()),
             Effect::Spawn(request) => self.spawn(space, request),
+            Effect::Order(OrderRequest { who, speed_mps, rate_mps2 }) => {
+                let rate = rate_mps2.map(|rate| format!(", rate: {} m/s^2", decimal(rate, false)));
+                let (name, speed) = (&space.bearers[*who], decimal(*speed_mps, false));
+                format!("order {name} {{ speed: {speed} m/s{} }}", rate.unwrap_or_default())
+            }
         }
     }
 
@@ -122,6 +127,7 @@ impl<'a> Actions<'a> {
         let body = name(request.body, request.own.map(|own| own.index));
         let cover = request.cover.map(|cover| name(cover, request.cover_own.map(|own| own.index)));
         let cover = cover.map_or_else(String::new, |cover| format!(" from behind {cover}"));
+        let name = request.bearer.map_or_else(String::new, |who| format!(" as {}", space.bearers[who]));
         let direction = if request.verb == Verb::Overtake { "behind" } else { "ahead" };
         let mut fields = vec![format!("does: {}", request.verb.name())];
         if matches!(request.verb, Verb::DriveAhead | Verb::Overtake) {
@@ -138,7 +144,7 @@ impl<'a> Actions<'a> {
         }
         fields.push(format!("colour: {}", request.colour.name()));
         let distance = decimal(request.distance_m, false);
-        format!("spawn {body} {direction} {distance} m{cover} {{ {} }}", fields.join(", "))
+        format!("spawn {body}{name} {direction} {distance} m{cover} {{ {} }}", fields.join(", "))
     }
 
     /// Their declarations. A space has at least one action.

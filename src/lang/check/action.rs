@@ -10,10 +10,12 @@ use crate::check::report::{Report, field};
 use crate::check::rule::locals;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::rules_by_action;
-use crate::model::vocabulary::{Colour, LaneChoice, Side, Site, SpaceClaim, SpawnField, Then, Verb, Word};
+use crate::model::vocabulary::{
+    Colour, Fact, LaneChoice, OrderField, Side, Site, SpaceClaim, SpawnField, Then, Verb, Word,
+};
 use crate::model::{
-    ActionDef, BodyWord, Domain, EffectDef, GroupDef, Parameter, RuleDef, SetDef, SpawnDef, Type, Value,
-    WordExpr, code,
+    ActionDef, BodyWord, Domain, EffectDef, GroupDef, OrderDef, Parameter, RuleDef, SetDef, SpawnDef, Type,
+    Value, WordExpr, code,
 };
 use crate::prove::product_size;
 use crate::syntax::ast::{ItemKind, ParamMode, Span};
@@ -52,6 +54,8 @@ impl Checker {
     pub(super) fn declare_actions(&mut self, items: &[&ast::Item]) {
         let (names, actions) = self.declared("action", items, ItemKind::as_action);
         self.action_names = names;
+        // Any action may order what any other spawns.
+        actions.iter().for_each(|(_, declared)| self.declare_bearers(declared));
         for (item, declared) in actions {
             let (action, is_whole) = self.action(item, declared).unzip();
             if is_whole == Some(false) {
@@ -321,7 +325,11 @@ impl Checker {
                 let value = self.typed(value, place, ty)?;
                 Some(EffectDef::Set(Box::new(SetDef { state: index, key, value, span: effect.span })))
             }
-            ast::EffectKind::Spawn { body, place: side, distance, cover, fields } => {
+            ast::EffectKind::Order { who, fields } => {
+                let order = self.order(who, fields, place, effect.span)?;
+                Some(EffectDef::Order(Box::new(order)))
+            }
+            ast::EffectKind::Spawn { body, bearer, place: side, distance, cover, fields } => {
                 let behind = *side == ast::Place::Behind;
                 let cover = cover.as_ref().map(|cover| self.body_word(cover, place));
                 let spawn = self.spawn(body, behind, distance, fields, place, effect.span)?;
@@ -330,7 +338,9 @@ impl Checker {
                     None => None,
                 };
                 self.check_cover(cover.as_ref(), &spawn.verb, effect.span);
-                Some(EffectDef::Spawn(Box::new(SpawnDef { cover, ..spawn })))
+                let bearer =
+                    bearer.as_ref().and_then(|name| self.bearers.iter().position(|one| *one == name.text));
+                Some(EffectDef::Spawn(Box::new(SpawnDef { cover, bearer, ..spawn })))
             }
         }
     }
@@ -399,8 +409,54 @@ impl Checker {
             distance: distance?,
             behind,
             cover: None,
+            bearer: None,
             span,
         })
+    }
+
+    /// Notes the names that an action gives to what it spawns.
+    fn declare_bearers(&mut self, declared: &ast::Action) {
+        for effect in &declared.effects {
+            let ast::EffectKind::Spawn { bearer: Some(name), .. } = &effect.kind else { continue };
+            if Fact::ALL.iter().any(|fact| fact.name().split('.').next() == Some(name.text.as_str())) {
+                let message = format!("`{}` cannot be the name of a road user", name.text);
+                let error = Diagnostic::error(code::NOT_HERE, message);
+                self.report(error.at(name.span, "the engine's own word").help("choose another name"));
+            } else if !self.bearers.contains(&name.text) {
+                self.bearers.push(name.text.clone());
+            }
+        }
+    }
+
+    fn order(
+        &mut self,
+        who: &ast::Name,
+        fields: &[ast::Field],
+        place: &Place<'_>,
+        span: Span,
+    ) -> Option<OrderDef> {
+        self.references.uses(who.span, Symbol::RoadUser(who.text.clone()));
+        let bearer = self.bearers.iter().position(|name| *name == who.text);
+        if bearer.is_none() {
+            let mut error =
+                self.unknown("road user", &who.text, who.span, self.bearers.iter().map(String::as_str));
+            let name_it = || format!("name it where it appears: `spawn … as {} ahead …`", who.text);
+            error.help = error.help.or_else(|| Some(name_it()));
+            self.report(error);
+        }
+        self.note_fields::<OrderField>(fields, place);
+        let fields = self.fields_known(fields);
+        let speed = match field(&fields, OrderField::Speed) {
+            Some(value) => self.typed(value, place, Type::Quantity(Dimension::SPEED)),
+            None => self.missing_field(OrderField::Speed, span, "the order does not say how fast".to_owned()),
+        };
+        let rate = field(&fields, OrderField::Rate);
+        let rate = rate.map(|value| self.typed(value, place, Type::Quantity(Dimension::ACCEL)));
+        let rate = match rate {
+            Some(rate) => Some(rate?),
+            None => None,
+        };
+        Some(OrderDef { who: bearer?, speed: speed?, rate, span })
     }
 
     /// Reports a cover that is no vehicle, and one for a road user that does not walk.
@@ -554,7 +610,7 @@ impl Checker {
         let found = effects.iter().filter_map(|effect| self.effect(effect, &place));
         let sets = found.filter_map(|effect| match effect {
             EffectDef::Set(set) => Some(*set),
-            EffectDef::Spawn(_) => None,
+            EffectDef::Spawn(_) | EffectDef::Order(_) => None,
         });
         sets.collect()
     }
@@ -677,11 +733,11 @@ impl Checker {
     }
 }
 
-/// The operations of an effect. A spawn counts as one, because the rules about it cost far more.
+/// The operations of an effect. A spawn and an order count as one, because the rules about it cost far more.
 fn operations_of(effect: &EffectDef) -> usize {
     match effect {
         EffectDef::Set(set) => 1 + set.key.iter().chain([&set.value]).map(Expr::operations).sum::<usize>(),
-        EffectDef::Spawn(_) => 1,
+        EffectDef::Spawn(_) | EffectDef::Order(_) => 1,
     }
 }
 

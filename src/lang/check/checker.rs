@@ -43,6 +43,8 @@ pub(super) struct Checker {
     /// Positions in `states`, by name.
     pub(super) state_places: BTreeMap<String, usize>,
     pub(super) bodies: Vec<BodyDef>,
+    /// Names that the spawns of all actions give.
+    pub(super) bearers: Vec<String>,
     /// Each constant is folded to a literal; `None` stands for a broken one.
     pub(super) constants: Vec<(String, Option<Expr>)>,
     /// Positions in `constants`, by name.
@@ -171,6 +173,7 @@ pub(super) fn space(
         enums: core::mem::take(&mut checker.enums),
         states: core::mem::take(&mut checker.states),
         bodies: core::mem::take(&mut checker.bodies),
+        bearers: core::mem::take(&mut checker.bearers),
         functions: core::mem::take(&mut checker.functions),
         actions,
         groups: core::mem::take(&mut checker.groups),

@@ -205,6 +205,7 @@ fn touched<'a>(items: impl Iterator<Item = &'a Item>) -> BTreeSet<String> {
         .flat_map(|effect| match &effect.kind {
             EffectKind::Set { state, .. } => vec![state.text.clone()],
             EffectKind::Spawn { .. } => gaps.clone(),
+            EffectKind::Order { .. } => Vec::new(),
         })
         .collect()
 }

@@ -33,6 +33,8 @@ pub enum Symbol {
     /// An action and its parameter.
     Parameter(String, String),
     Group(String),
+    /// A name that spawns give to a road user.
+    RoadUser(String),
     Rule(String),
     Body(String),
     Road(String),
@@ -249,6 +251,7 @@ impl Symbol {
             | Symbol::Action(name)
             | Symbol::Parameter(_, name)
             | Symbol::Group(name)
+            | Symbol::RoadUser(name)
             | Symbol::Rule(name)
             | Symbol::Body(name)
             | Symbol::Road(name)
@@ -395,6 +398,19 @@ impl References {
                 let is_axis = |p: &ast::ActionParam| p.mode == ParamMode::Each;
                 let parts = of.params.iter().map(|p| (Some(&p.name), parameter(&p.name), p.span, is_axis(p)));
                 self.declare(item, Symbol::Action, parts.collect());
+                for effect in &of.effects {
+                    let ast::EffectKind::Spawn { bearer: Some(name), .. } = &effect.kind else { continue };
+                    let declaration = Declaration {
+                        span: effect.span,
+                        docs: docs(item),
+                        parts: Vec::new(),
+                        axis: false,
+                        ty: None,
+                        key: None,
+                        overrides: matches!(item.kind, ItemKind::Override(_)),
+                    };
+                    self.insert(name, Symbol::RoadUser(name.text.clone()), declaration);
+                }
             }
             ItemKind::Group(of) => {
                 let member = |name: &Name| Symbol::Action(name.text.clone());

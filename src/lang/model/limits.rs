@@ -17,6 +17,9 @@ pub const SPEED_MPS_MAX: f64 = 70.0;
 /// Speeds at which anything may be spawned, m/s.
 pub const SPAWN_SPEED_MPS: RangeInclusive<f64> = 0.0..=SPEED_MPS_MAX;
 
+/// Rates at which a road user may be told to change its speed, m/s². The most is more than tyres give.
+pub const ORDER_RATE_MPS2: RangeInclusive<f64> = 0.1..=15.0;
+
 /// More than tyres give the ego vehicle, forwards or backwards, m/s².
 pub const EGO_ACCELERATION_MPS2_MAX: f64 = 10.0;
 
@@ -51,12 +54,24 @@ pub fn rounded_into(figure: f64, bounds: RangeInclusive<f64>) -> f64 {
 /// Why the world must not be asked for a spawn with these figures, whatever the rules say; `None` if it
 /// may. NaN is out of bounds, too.
 pub fn spawn_out_of_bounds(speed_mps: f64, distance_m: f64) -> Option<String> {
-    let figures =
-        [("speed", speed_mps, "m/s", SPAWN_SPEED_MPS), ("distance", distance_m, "m", SPAWN_DISTANCE_M)];
-    let (what, value, unit, range) =
-        figures.into_iter().find(|(_, value, _, range)| !range.contains(value))?;
+    let distance = ("distance", distance_m, "m", SPAWN_DISTANCE_M);
+    out_of_bounds("spawn", [("speed", speed_mps, "m/s", SPAWN_SPEED_MPS), distance])
+}
+
+/// The same of an order.
+pub fn order_out_of_bounds(speed_mps: f64, rate_mps2: Option<f64>) -> Option<String> {
+    let rate = rate_mps2.map(|rate_mps2| ("rate", rate_mps2, "m/s^2", ORDER_RATE_MPS2));
+    out_of_bounds("order", [("speed", speed_mps, "m/s", SPAWN_SPEED_MPS)].into_iter().chain(rate))
+}
+
+fn out_of_bounds(
+    whose: &str,
+    figures: impl IntoIterator<Item = (&'static str, f64, &'static str, RangeInclusive<f64>)>,
+) -> Option<String> {
+    let is_out = |(_, value, _, range): &(_, f64, _, RangeInclusive<f64>)| !range.contains(value);
+    let (what, value, unit, range) = figures.into_iter().find(is_out)?;
     let (low, high) = range.into_inner();
-    Some(format!("the spawn's {what} is {value} {unit}, possible is {low} .. {high} {unit}"))
+    Some(format!("the {whose}'s {what} is {value} {unit}, possible is {low} .. {high} {unit}"))
 }
 
 #[cfg(test)]

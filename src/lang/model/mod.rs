@@ -30,8 +30,9 @@ pub use eval::{
 };
 pub use interval::{End, Interval};
 pub use limits::{
-    AMBIENT_MAX, COMMANDED_MAX, EGO_ACCELERATION_MPS2_MAX, LIMIT_PART_MAX, SIGNAL_PHASE_S, SPAWN_DISTANCE_M,
-    SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, TICK_MS, rounded_into, spawn_out_of_bounds,
+    AMBIENT_MAX, COMMANDED_MAX, EGO_ACCELERATION_MPS2_MAX, LIMIT_PART_MAX, ORDER_RATE_MPS2, SIGNAL_PHASE_S,
+    SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, TICK_MS, order_out_of_bounds, rounded_into,
+    spawn_out_of_bounds,
 };
 pub use meaning::Meaning;
 pub(crate) use on_route::stretches;
@@ -46,8 +47,8 @@ pub use scenario::{
 };
 pub use space::{
     ActionDef, BodyDef, BodyWord, COUNTED, Domain, EffectDef, EnumDef, EpisodeDef, FnDef, GroupDef, Initial,
-    Parameter, RewardCase, Road, RoadFacts, RuleBinding, RuleBody, RuleDef, SetDef, Space, SpawnDef,
-    StateDef, StateMeaning, VerdictDef, WordExpr,
+    OrderDef, Parameter, RewardCase, Road, RoadFacts, RuleBinding, RuleBody, RuleDef, SetDef, Space,
+    SpawnDef, StateDef, StateMeaning, VerdictDef, WordExpr,
 };
 pub(crate) use value::STATE_MAX;
 pub use value::{EnumIndex, Memory, Type, Value};

@@ -35,6 +35,8 @@ pub struct Space {
     pub enums: Vec<EnumDef>,
     pub states: Vec<StateDef>,
     pub bodies: Vec<BodyDef>,
+    /// Names that spawns give to road users, each once.
+    pub bearers: Vec<String>,
     pub functions: Vec<FnDef>,
     pub actions: Vec<ActionDef>,
     pub groups: Vec<GroupDef>,
@@ -196,7 +198,7 @@ impl ActionDef {
     pub(crate) fn sets(&self) -> impl Iterator<Item = &SetDef> {
         self.effects.iter().filter_map(|effect| match effect {
             EffectDef::Set(set) => Some(&**set),
-            EffectDef::Spawn(_) => None,
+            EffectDef::Spawn(_) | EffectDef::Order(_) => None,
         })
     }
 
@@ -204,7 +206,15 @@ impl ActionDef {
     pub(crate) fn spawns(&self) -> impl Iterator<Item = &SpawnDef> {
         self.effects.iter().filter_map(|effect| match effect {
             EffectDef::Spawn(spawn) => Some(&**spawn),
-            EffectDef::Set(_) => None,
+            EffectDef::Set(_) | EffectDef::Order(_) => None,
+        })
+    }
+
+    /// What it orders named road users to do.
+    pub(crate) fn orders(&self) -> impl Iterator<Item = &OrderDef> {
+        self.effects.iter().filter_map(|effect| match effect {
+            EffectDef::Order(order) => Some(&**order),
+            EffectDef::Set(_) | EffectDef::Spawn(_) => None,
         })
     }
 
@@ -254,6 +264,7 @@ impl Domain {
 pub enum EffectDef {
     Set(Box<SetDef>),
     Spawn(Box<SpawnDef>),
+    Order(Box<OrderDef>),
 }
 
 /// How a state changes: all its cells, or only the cell of a key.
@@ -283,6 +294,20 @@ pub struct SpawnDef {
     pub behind: bool,
     /// The parked vehicle from behind which a pedestrian steps.
     pub cover: Option<WordExpr<BodyWord>>,
+    /// The name that it bears from then on, by index in `Space::bearers`.
+    pub bearer: Option<usize>,
+    pub span: Span,
+}
+
+/// What the latest bearer of a name is told to do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OrderDef {
+    /// The name, by index in `Space::bearers`.
+    pub who: usize,
+    /// m/s.
+    pub speed: Expr,
+    /// m/s²; without it the driver goes over to the speed as it would by itself.
+    pub rate: Option<Expr>,
     pub span: Span,
 }
 

@@ -303,6 +303,12 @@ words! {
 }
 
 words! {
+    OrderField "A field of `order`.":
+    Speed "speed" = "The speed that the road user goes over to.",
+    Rate "rate" = "How fast it gains or loses speed for that, as far as its body and the road allow.",
+}
+
+words! {
     /// A scenario's `start` also has a field for each state.
     StartField "A field of `start` in a scenario.":
     SignalPhase "signal_phase" = "Where the cycle of the signals begins, in seconds.",

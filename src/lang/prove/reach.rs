@@ -11,8 +11,8 @@ use crate::model::expr::Expr;
 use crate::model::rules::{self, Bound, Demand, RowRules, allowed, rules_by_action};
 use crate::model::vocabulary::Word;
 use crate::model::{
-    ActionDef, Domain, EffectDef, Facts, Interval, Memory, Parameter, Reach, Road, Row, RuleBody,
-    RulesInForce, Space, Value, WordExpr, code, evaluate, locals,
+    ActionDef, Domain, Facts, Interval, Memory, Parameter, Reach, Road, Row, RuleBody, RulesInForce, Space,
+    Value, WordExpr, code, evaluate, locals,
 };
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::prove::moment::{Case, may_hold_together, newcomers, ranges_named};
@@ -128,10 +128,9 @@ impl Pace {
 
 /// The axes, by their places among the parameters, that decide what [`RowRules::reach`] says of a row.
 fn deciding_axes(space: &Space, action: usize) -> Vec<usize> {
-    let ActionDef { parameters, effects, .. } = &space.actions[action];
+    let parameters = &space.actions[action].parameters;
     let mut of_spawns: Vec<usize> = Vec::new();
-    for effect in effects {
-        let EffectDef::Spawn(spawn) = effect else { continue };
+    for spawn in space.actions[action].spawns() {
         let verb = match &spawn.verb {
             WordExpr::Fixed(_) => None,
             WordExpr::Of(expr, _) => Some(expr),

@@ -111,6 +111,10 @@ impl<'a> RowText<'a> {
                 format!("set {} {key:?} {:?}", set.state, self.reduced(&set.value))
             }
             EffectDef::Spawn(spawn) => spawn_form(spawn, &|expr| self.reduced(expr)),
+            EffectDef::Order(order) => {
+                let rate = order.rate.as_ref().map(|rate| self.reduced(rate).kind);
+                format!("order {} {:?} {rate:?}", order.who, self.reduced(&order.speed).kind)
+            }
         });
         effects.collect::<Vec<_>>().join("\n")
     }
@@ -152,7 +156,7 @@ fn spawn_form(spawn: &SpawnDef, reduced: &impl Fn(&Expr) -> Expr) -> String {
         }
     }
     format!(
-        "spawn {} {} {} {} {} {} {:?} {:?} {} {}",
+        "spawn {} {} {} {} {} {} {:?} {:?} {} {} {:?}",
         word(&spawn.body, reduced),
         word(&spawn.colour, reduced),
         word(&spawn.verb, reduced),
@@ -163,6 +167,7 @@ fn spawn_form(spawn: &SpawnDef, reduced: &impl Fn(&Expr) -> Expr) -> String {
         reduced(&spawn.distance).kind,
         spawn.behind,
         spawn.cover.as_ref().map_or(String::new(), |cover| word(cover, reduced)),
+        spawn.bearer,
     )
 }
 

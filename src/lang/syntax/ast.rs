@@ -317,7 +317,17 @@ pub enum EffectKind {
     Set { state: Name, key: Option<Expr>, value: Expr },
     /// `spawn vehicle ahead distance { speed: speed }`.
     /// With a `cover`: `spawn Pedestrian ahead distance from behind SUV { … }`.
-    Spawn { body: Expr, place: Place, distance: Expr, cover: Option<Expr>, fields: Vec<Field> },
+    /// With a name for its `bearer`: `spawn BoxTruck as truck ahead distance { … }`.
+    Spawn {
+        body: Expr,
+        bearer: Option<Name>,
+        place: Place,
+        distance: Expr,
+        cover: Option<Box<Expr>>,
+        fields: Vec<Field>,
+    },
+    /// `order truck { speed: 0 m/s }`.
+    Order { who: Name, fields: Vec<Field> },
 }
 
 /// Whether a road user appears ahead of the ego vehicle or behind it, along its route.

@@ -257,15 +257,19 @@ impl Builder {
 
     fn effect(&self, pair: Pair<'_, Rule>) -> Built<Effect> {
         let span = self.span(&pair);
-        let effect = pair.into_inner().next().expect("an effect is `set` or `spawn`");
-        let sets = effect.as_rule() == Rule::set;
+        let effect = pair.into_inner().next().expect("an effect is `set`, `spawn` or `order`");
+        let rule = effect.as_rule();
         let mut parts = Parts::of(effect);
-        let kind = if sets {
+        let kind = if rule == Rule::order {
+            let who = self.name(parts.next());
+            EffectKind::Order { who, fields: self.fields(parts.next())? }
+        } else if rule == Rule::set {
             let state = self.name(parts.next());
             let key = parts.take(Rule::key).map(|key| self.only_expression(key)).transpose()?;
             EffectKind::Set { state, key, value: self.expression(parts.next())? }
         } else {
             let body = self.expression(parts.next())?;
+            let bearer = parts.take(Rule::bearer).map(|bearer| self.name(Parts::of(bearer).next()));
             let place = match parts.next().as_rule() {
                 Rule::kw_ahead => Place::Ahead,
                 _ => Place::Behind,
@@ -274,10 +278,11 @@ impl Builder {
             let cover = parts.take(Rule::cover).map(|cover| {
                 let mut parts = Parts::of(cover);
                 parts.take(Rule::kw_behind);
-                self.expression(parts.next())
+                self.expression(parts.next()).map(Box::new)
             });
             let cover = cover.transpose()?;
-            EffectKind::Spawn { body, place, distance, cover, fields: self.fields(parts.next())? }
+            let fields = self.fields(parts.next())?;
+            EffectKind::Spawn { body, bearer, place, distance, cover, fields }
         };
         Ok(Effect { kind, span })
     }

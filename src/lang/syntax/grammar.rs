@@ -65,7 +65,7 @@ pub fn role(rule: Rule) -> Role {
         Rule::type_name => Role::Said("a type"),
         Rule::function_param => Role::Said("a parameter"),
         Rule::action_param => Role::Said("a parameter like `each to: Time`"),
-        Rule::effect | Rule::set | Rule::spawn => Role::Said("an effect like `set time = to`"),
+        Rule::effect | Rule::set | Rule::spawn | Rule::order => Role::Said("an effect like `set time = to`"),
         Rule::transition => Role::Said("a transition like `Noon -> Night`"),
         Rule::field | Rule::field_name => Role::Said("a field like `speed: 5 m/s`"),
         Rule::fields | Rule::open_brace | Rule::initial_keys | Rule::moves => Role::Said("`{`"),
@@ -99,6 +99,8 @@ pub fn role(rule: Rule) -> Role {
         Rule::kw_where | Rule::condition => Role::Said("`where`"),
         Rule::kw_set => Role::Said("`set`"),
         Rule::kw_spawn => Role::Said("`spawn`"),
+        Rule::kw_as | Rule::bearer => Role::Said("`as`"),
+        Rule::kw_order => Role::Said("`order`"),
         Rule::kw_ahead => Role::Said("`ahead`"),
         Rule::kw_behind => Role::Said("`behind`"),
         Rule::kw_on | Rule::targets => Role::Said("`on`"),
@@ -209,7 +211,7 @@ pub fn continues_expression(rule: Rule) -> bool {
 pub fn opening_words(rule: Rule) -> Vec<&'static str> {
     match rule {
         Rule::action_param => vec!["each", "any"],
-        Rule::effect => vec!["set", "spawn"],
+        Rule::effect => vec!["set", "spawn", "order"],
         Rule::clause => vec!["with", "at", "by"],
         Rule::named_rule => vec!["optional", "rule"],
         Rule::policy_line => vec!["when"],

@@ -45,6 +45,14 @@ pub const CLAUSES: &[Keyword] = &[
     ("where", "A condition on a parameter and those before it."),
     ("set", "Changes a state: `set sky[Rain] = High`."),
     ("spawn", "Lets a road user appear: `spawn vehicle ahead 20 m { speed: speed, does: DriveAhead }`."),
+    (
+        "as",
+        "A name for what is spawned, by which orders find it: `spawn BoxTruck as truck ahead 40 m { … }`.",
+    ),
+    (
+        "order",
+        "Tells a named road user that is there what to do: `order truck { speed: 0 m/s, rate: 4 m/s^2 }`.",
+    ),
     ("also", "More effects for actions, after their own: `on vehicles also { set count = count + 1 }`."),
     ("step", "With `each`, effects at the end of every step: `each step { set age = age + 1 }`."),
     ("ahead", "Before the ego vehicle, along its route."),

@@ -616,13 +616,17 @@ fn effect(effect: &Effect) -> Layout {
             assigned(state, key.as_ref()),
             Layout::nest([Layout::Line(" "), expression(value)]),
         ]),
-        EffectKind::Spawn { body, place, distance, cover, fields: entries } => {
+        EffectKind::Order { who, fields: entries } => {
+            Layout::row([Layout::text(format!("order {} ", who.text)), fields(entries)])
+        }
+        EffectKind::Spawn { body, bearer, place, distance, cover, fields: entries } => {
             let place = match place {
                 Place::Ahead => " ahead ",
                 Place::Behind => " behind ",
             };
-            let mut parts =
-                vec![Layout::text("spawn "), expression(body), Layout::text(place), expression(distance)];
+            let mut parts = vec![Layout::text("spawn "), expression(body)];
+            parts.extend(bearer.iter().map(|name| Layout::text(format!(" as {}", name.text))));
+            parts.extend([Layout::text(place), expression(distance)]);
             if let Some(cover) = cover {
                 parts.extend([Layout::text(" from behind "), expression(cover)]);
             }

@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use crate::action::table::{Draw, Refusal, Situation};
-use crate::action::{Effect, LaneChangeRules, SpawnRequest};
+use crate::action::{Effect, LaneChangeRules, OrderRequest, SpawnRequest};
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 use avastra_lang::model::body::OwnBody;
@@ -13,9 +13,9 @@ use avastra_lang::model::rules::{
     Before, Candidate, Choose, Clause, Nearest, Room, RowRules, TRIES_MAX, Unsolved,
 };
 use avastra_lang::model::{
-    ActionDef, BodyWord, Domain, EffectDef, Facts, Memory, MomentFacts, Parameter, SPAWN_DISTANCE_M,
-    SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value, WorldFacts, evaluate, locals, rounded_into,
-    spawn_out_of_bounds,
+    ActionDef, BodyWord, Domain, EffectDef, Facts, Memory, MomentFacts, ORDER_RATE_MPS2, OrderDef, Parameter,
+    SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value, WorldFacts, evaluate, locals,
+    order_out_of_bounds, rounded_into, spawn_out_of_bounds,
 };
 
 /// Draws of one row in a step before the row is refused. Every draw obeys what can be known before; a further one
@@ -137,16 +137,23 @@ impl<'a> Judge<'a> {
         let mut effects = self.effects(values, &after);
         let mut refusals = Vec::new();
         let mut spawns = Vec::new();
-        for effect in &effects {
+        for (nth, effect) in effects.iter().enumerate() {
             if refusals.len() >= refusals_max {
                 return Err(refusals);
             }
-            let Effect::Spawn(request) = effect else {
-                let refusal =
-                    self.situation.surroundings.weather_refusal().map(|reason| refuse(None, reason));
-                // One reason is enough for an action that sets several.
-                refusals.extend(refusal.filter(|refusal| !refusals.contains(refusal)));
-                continue;
+            let request = match effect {
+                Effect::Spawn(request) => request,
+                Effect::Order(order) => {
+                    refusals.extend(self.order_refusal(order, &effects[..nth]));
+                    continue;
+                }
+                Effect::Time(_) | Effect::Sky(..) => {
+                    let refusal =
+                        self.situation.surroundings.weather_refusal().map(|reason| refuse(None, reason));
+                    // One reason is enough for an action that sets several.
+                    refusals.extend(refusal.filter(|refusal| !refusals.contains(refusal)));
+                    continue;
+                }
             };
             if let Some(reason) = spawn_out_of_bounds(request.speed_mps, request.distance_m) {
                 refusals.push(refuse(None, reason));
@@ -215,6 +222,7 @@ impl<'a> Judge<'a> {
                     }
                 }
                 EffectDef::Spawn(spawn) => effects.push(Effect::Spawn(self.request(spawn, locals, after))),
+                EffectDef::Order(order) => effects.push(Effect::Order(self.order(order, locals, after))),
             }
         }
         effects
@@ -241,7 +249,30 @@ impl<'a> Judge<'a> {
             speed_mps: rounded_into(evaluate(&spawn.speed, functions, &facts).number(), SPAWN_SPEED_MPS),
             distance_m: rounded_into(evaluate(&spawn.distance, functions, &facts).number(), SPAWN_DISTANCE_M),
             cover: cover.map(|cover| cover.like),
+            bearer: spawn.bearer,
         }
+    }
+
+    fn order(&self, order: &OrderDef, locals: &[Value], after: &Memory) -> OrderRequest {
+        let facts = self.facts(locals, after);
+        let number = |expr: &Expr| evaluate(expr, &self.row.space.functions, &facts).number();
+        OrderRequest {
+            who: order.who,
+            speed_mps: rounded_into(number(&order.speed), SPAWN_SPEED_MPS),
+            rate_mps2: order.rate.as_ref().map(|rate| rounded_into(number(rate), ORDER_RATE_MPS2)),
+        }
+    }
+
+    /// Why an order cannot be given after the effects before it. Whoever they let appear under that name is there.
+    fn order_refusal(&self, order: &OrderRequest, before: &[Effect]) -> Option<Refusal> {
+        let appears = |effect: &Effect| matches!(effect, Effect::Spawn(request) if request.bearer == Some(order.who) && request.body.is_vehicle());
+        let out = order_out_of_bounds(order.speed_mps, order.rate_mps2);
+        out.or_else(|| {
+            let surroundings = self.situation.surroundings;
+            let reason = (!before.iter().any(appears)).then(|| surroundings.order_refusal(order))??;
+            Some(format!("cannot order `{}`: {reason}", self.row.space.bearers[order.who]))
+        })
+        .map(|reason| refuse(None, reason))
     }
 
     /// What the world says before it is asked about spawns.

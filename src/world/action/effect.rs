@@ -17,6 +17,18 @@ pub enum Effect {
     /// Sets one phenomenon and leaves the others.
     Sky(Phenomenon, Level),
     Spawn(SpawnRequest),
+    Order(OrderRequest),
+}
+
+/// What the latest bearer of a name is told to do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OrderRequest {
+    /// The name, by its index in the space.
+    pub who: usize,
+    /// m/s.
+    pub speed_mps: f64,
+    /// How fast it goes over to that speed, m/s², as far as its body and the road allow. `None`: as it drives by itself.
+    pub rate_mps2: Option<f64>,
 }
 
 /// A road user that is to appear.
@@ -40,6 +52,8 @@ pub struct SpawnRequest {
     pub cover_own: Option<OwnBody>,
     /// A vehicle that is parked with it, so that it steps out from behind; for `Walk` alone.
     pub cover: Option<Body>,
+    /// The name that it bears, by its index in the space.
+    pub bearer: Option<usize>,
 }
 
 impl Effect {
@@ -68,7 +82,7 @@ impl Effect {
     pub fn own_bodies(&self, first: u32) -> impl Iterator<Item = (u32, usize)> {
         let own = match self {
             Effect::Spawn(request) => [request.own, request.cover_own],
-            Effect::Time(_) | Effect::Sky(..) => [None, None],
+            Effect::Time(_) | Effect::Sky(..) | Effect::Order(_) => [None, None],
         };
         (first..).zip(own).filter_map(|(id, own)| Some((id, own?.index)))
     }
@@ -77,7 +91,7 @@ impl Effect {
     pub fn newcomers(&self) -> u32 {
         match self {
             Effect::Spawn(request) => 1 + u32::from(request.cover.is_some()),
-            Effect::Time(_) | Effect::Sky(..) => 0,
+            Effect::Time(_) | Effect::Sky(..) | Effect::Order(_) => 0,
         }
     }
 }
@@ -125,6 +139,11 @@ pub trait Surroundings {
     /// Surroundings for many questions about this moment, which find once what the questions have in common; `None` if
     /// nothing is gained by that.
     fn for_many(&self) -> Option<Box<dyn Surroundings + '_>> {
+        None
+    }
+
+    /// Why an order cannot be given now, in words that complete "cannot order `NAME`: …".
+    fn order_refusal(&self, _order: &OrderRequest) -> Option<String> {
         None
     }
 

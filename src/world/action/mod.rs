@@ -26,7 +26,7 @@ mod table;
 pub use audit::{Audit, Enforcement, RuleAudit, audit};
 pub use avastra_lang::model::SpawnFacts;
 pub use count::Count;
-pub use effect::{Effect, LaneChangeRules, SpawnRequest, Surroundings};
+pub use effect::{Effect, LaneChangeRules, OrderRequest, SpawnRequest, Surroundings};
 pub use file::{AxisRecord, DrawRecord, RoadRecord, RowRecord, RuleRecord, TableFile};
 pub use table::{ActionTable, Draw, Offer, Refusal, Situation};
 

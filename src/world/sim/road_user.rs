@@ -83,6 +83,8 @@ pub(super) struct Mover {
     pub visible_fraction: f64,
     /// Which of the two has priority: it or the ego vehicle.
     pub rights: Rights,
+    /// The name that its action gave it, by index in the space.
+    pub bearer: Option<usize>,
 }
 
 #[derive(Debug, Clone)]
@@ -170,6 +172,7 @@ impl Mover {
             rest_ticks: 0,
             visible_fraction: 1.0,
             rights: Rights::default(),
+            bearer: None,
         }
     }
 
@@ -258,6 +261,10 @@ impl Mover {
         trace
             .words([u32::from(self.touched), self.crashed_with.unwrap_or(0), self.rest_ticks].map(u64::from));
         trace.number(self.visible_fraction);
+        // Nothing is fed for what has no name, as before there were names.
+        if let Some(bearer) = self.bearer {
+            trace.word(bearer as u64);
+        }
         self.rights.trace(trace);
         match &self.motion {
             Motion::Drive(driver) => driver.trace(trace),

@@ -85,6 +85,7 @@ pub fn request(verb: Verb, distance_m: f64, speed_mps: f64) -> SpawnRequest {
         own: None,
         cover_own: None,
         cover: None,
+        bearer: None,
     }
 }
 

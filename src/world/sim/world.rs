@@ -10,7 +10,7 @@ mod tests;
 
 use std::sync::Arc;
 
-use crate::action::{Effect, LaneChangeRules, SpawnRequest};
+use crate::action::{Effect, LaneChangeRules, OrderRequest, SpawnRequest};
 use avastra_base::geometry::{Frame, OrientedBox, Pose, Sweep, Vec2};
 use avastra_base::rng;
 use avastra_base::rng::Stream;
@@ -235,12 +235,14 @@ impl World {
     /// Carries out an effect.
     ///
     /// # Errors
-    /// Why a spawn is impossible; the world is then unchanged. The id of the newcomer otherwise.
+    /// Why a spawn or an order is impossible; the world is then unchanged. Otherwise the id of the newcomer, if there is
+    /// one.
     pub fn apply(&mut self, effect: &Effect) -> Result<Option<u32>, String> {
         match effect {
             Effect::Time(time) => self.environment.time = *time,
             Effect::Sky(phenomenon, level) => self.environment.set(*phenomenon, *level),
             Effect::Spawn(request) => return self.spawn(request).map(Some),
+            Effect::Order(order) => return self.order(order).map(|()| None),
         }
         self.weather_tick = self.ticks + (self.traffic.weather_rest_s / DT_S).round() as u64;
         self.conditions = self.environment.conditions(self.ego.motion.speed_mps);
@@ -496,11 +498,37 @@ impl World {
         for index in leave.into_iter().rev() {
             self.users.remove(index);
         }
+        let mut asked = placed.asked;
+        asked.mover.bearer = request.bearer;
         let id = self.next_id;
         self.next_id += 1 + u32::from(placed.cover.is_some());
-        self.users.extend([placed.asked].into_iter().chain(placed.cover));
+        self.users.extend([asked].into_iter().chain(placed.cover));
         self.look();
         Ok(id)
+    }
+
+    /// The index of the road user that an order is for, which drives.
+    ///
+    /// # Errors
+    /// Why it cannot be ordered, in words that complete "cannot order `NAME`: …".
+    fn ordered(&self, order: &OrderRequest) -> Result<usize, String> {
+        // A name means its latest bearer.
+        let index = self.users.iter().rposition(|user| user.mover.bearer == Some(order.who));
+        let index = index.ok_or("no road user of that name is there")?;
+        let mover = &self.users[index].mover;
+        match mover.motion {
+            _ if mover.is_wreck() => Err("it is a wreck".to_owned()),
+            Motion::Drive(_) => Ok(index),
+            Motion::Walk(_) | Motion::Stand => Err("it is on foot".to_owned()),
+        }
+    }
+
+    fn order(&mut self, order: &OrderRequest) -> Result<(), String> {
+        let index = self.ordered(order)?;
+        if let Motion::Drive(driver) = &mut self.users[index].mover.motion {
+            driver.order(order.speed_mps, order.rate_mps2);
+        }
+        Ok(())
     }
 
     /// Indices of the commanded obstacles that leave for new ones, if there are as many as there may be.
@@ -513,7 +541,9 @@ impl World {
             self.traffic.oldest_leaves_in_sight
                 || !around.is_in_sight(&user.obstacle, user.mover.visible_fraction)
         };
-        let hidden = commanded.filter(|(_, user)| too_many > 0 && is_hidden(user));
+        // What has a name is still wanted.
+        let is_spare = |user: &RoadUser| user.mover.bearer.is_none() && is_hidden(user);
+        let hidden = commanded.filter(|(_, user)| too_many > 0 && is_spare(user));
         let oldest: Vec<usize> = hidden.take(too_many).map(|(index, _)| index).collect();
         if oldest.len() < too_many { Err("ten road users are there already".into()) } else { Ok(oldest) }
     }

@@ -59,6 +59,8 @@ pub(in crate::sim) struct Driver {
     pub station_m: f64,
     pub speed_mps: f64,
     pub(super) cruise_mps: f64,
+    /// How fast it goes over to `cruise_mps`, m/s², if it was ordered so.
+    ordered_mps2: Option<f64>,
     /// Part of the limits that it drives at; `None` if its speed was asked for.
     limit_part: Option<f64>,
     pub(super) yields_to_ego: bool,
@@ -110,6 +112,7 @@ impl Driver {
             way,
             station_m,
             cruise_mps,
+            ordered_mps2: None,
             limit_part,
             yields_to_ego: false,
             aggression: 0,
@@ -129,6 +132,11 @@ impl Driver {
 
     pub fn is_changing_lanes(&self) -> bool {
         self.change.is_some()
+    }
+
+    /// From now on it wants to drive at this speed, m/s, and goes over to it at a rate, m/s², or as it would by itself.
+    pub fn order(&mut self, speed_mps: f64, rate_mps2: Option<f64>) {
+        (self.cruise_mps, self.ordered_mps2) = (speed_mps, rate_mps2);
     }
 
     /// Where it is before its first tick.
@@ -235,11 +243,16 @@ impl Driver {
             self.hold_m.map(|hold_m| hold_m - front_m),
         ];
         let line_ahead_m = line_ahead_m.into_iter().flatten().fold(f64::INFINITY, f64::min);
-        if around.traffic.rays {
+        let is_free = self.leader.is_none() && line_ahead_m == f64::INFINITY;
+        if around.traffic.rays && !(is_free && self.ordered_mps2.is_some()) {
             return self.tending_mps2(size, around, wish_mps, line_ahead_m);
         }
         // To be too fast is no emergency.
-        let free_mps2 = if wish_mps < CRAWL_MPS {
+        let free_mps2 = if let Some(rate_mps2) = self.ordered_mps2 {
+            let braking_mps2 =
+                if bend_mps < self.cruise_mps { rate_mps2.max(COMFORT_MPS2) } else { rate_mps2 };
+            ((wish_mps - self.speed_mps) / DT_S).clamp(-braking_mps2, rate_mps2)
+        } else if wish_mps < CRAWL_MPS {
             ((wish_mps - self.speed_mps) / DT_S).clamp(-COMFORT_MPS2, size.acceleration_mps2_max)
         } else {
             following(size.acceleration_mps2_max).free_mps2(self.speed_mps, wish_mps).max(-COMFORT_MPS2)
@@ -270,9 +283,9 @@ impl Driver {
         f64::from(self.waited_ticks) * DT_S >= GIVE_UP_S
     }
 
-    /// Whether it was asked to stand.
+    /// Whether it was asked to stand, and does.
     pub fn is_parked(&self) -> bool {
-        self.cruise_mps == 0.0
+        self.cruise_mps == 0.0 && self.speed_mps == 0.0
     }
 
     /// Whether no action commanded it.
@@ -294,6 +307,9 @@ impl Driver {
         trace.word(u64::from(leader.crosswise));
         trace.numbers([self.hold_m.unwrap_or(f64::INFINITY), self.insists_to_m, self.stopped_to_m]);
         trace.words([self.waited_ticks, self.aggression].map(u64::from));
+        if let Some(rate_mps2) = self.ordered_mps2 {
+            trace.number(rate_mps2);
+        }
         if let Some(change) = &self.change {
             trace.numbers([change.to_station_m, change.progress, change.duration_s]);
         }

@@ -2,7 +2,7 @@
 
 use std::cell::OnceCell;
 
-use crate::action::{SpawnFacts, SpawnRequest, Surroundings};
+use crate::action::{OrderRequest, SpawnFacts, SpawnRequest, Surroundings};
 use crate::sim::placement;
 use crate::sim::placement::Arrivals;
 use avastra_lang::model::MomentFacts;
@@ -35,6 +35,10 @@ impl Surroundings for World {
         Some(Box::new(self.at_this_moment()))
     }
 
+    fn order_refusal(&self, order: &OrderRequest) -> Option<String> {
+        self.ordered(order).err()
+    }
+
     fn weather_refusal(&self) -> Option<String> {
         let left_s = self.weather_tick.saturating_sub(self.ticks) as f64 * DT_S;
         (left_s > 0.0).then(|| format!("this traffic profile keeps the weather for {left_s} s more"))
@@ -51,6 +55,10 @@ impl Surroundings for Survey<'_> {
 
     fn moment(&self) -> MomentFacts {
         *self.moment.get_or_init(|| self.world.moment_facts())
+    }
+
+    fn order_refusal(&self, order: &OrderRequest) -> Option<String> {
+        self.world.order_refusal(order)
     }
 
     fn weather_refusal(&self) -> Option<String> {
