@@ -16,6 +16,7 @@ use crate::model::{
 };
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::prove::moment::{Case, may_hold_together, newcomers, ranges_named};
+use crate::prove::product;
 use crate::syntax::{Diagnostic, listed};
 use avastra_base::units::Unit;
 
@@ -184,24 +185,11 @@ fn products(space: &Space, action: &ActionDef) -> Vec<Vec<Value>> {
             (Domain::Values(values), true) => values.as_slice(),
             _ => &[Value::Bool(false)],
         };
-        let mut longer = Vec::with_capacity(rows.len() * values.len());
-        for row in &rows {
-            for value in values {
-                let mut locals = row.clone();
-                locals.push(*value);
-                let kept = match (&parameter.condition, parameter.axis) {
-                    (Some(condition), true) => {
-                        evaluate(condition, &space.functions, &Facts::new(&locals, &Memory::default()))
-                            .truth()
-                    }
-                    _ => true,
-                };
-                if kept {
-                    longer.push(locals);
-                }
-            }
+        rows = product(&rows, values, Vec::push);
+        if let Some(condition) = parameter.condition.as_ref().filter(|_| parameter.axis) {
+            let none = Memory::default();
+            rows.retain(|locals| evaluate(condition, &space.functions, &Facts::new(locals, &none)).truth());
         }
-        rows = longer;
     }
     rows
 }
