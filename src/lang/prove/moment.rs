@@ -12,11 +12,10 @@ use crate::model::expr::{Comparison, Expr, ExprKind};
 use crate::model::rules::RowRules;
 use crate::model::vocabulary::{Fact, Known as From, Light, RoadKind, Verb, Word, WordFact};
 use crate::model::{
-    ActionDef, EffectDef, End, EpisodeDef, Interval, LIMIT_PART_MAX, NEAR_JUNCTION_M, RoadFacts, Row,
-    RuleBody, RulesInForce, SPAWN_SPEED_MPS, SPEED_MPS_MAX, Space, SpawnDef, Stretch, Type, WordExpr, code,
-    effort,
+    ActionDef, End, EpisodeDef, Interval, LIMIT_PART_MAX, NEAR_JUNCTION_M, RoadFacts, Row, RuleBody,
+    RulesInForce, SPAWN_SPEED_MPS, SPEED_MPS_MAX, Space, SpawnDef, Stretch, Type, WordExpr, code, effort,
 };
-use crate::prove::enclose::{Known, enclose, fact_range};
+use crate::prove::enclose::{Known, bits, enclose, fact_range};
 use crate::prove::sums::oppose;
 use crate::syntax::Diagnostic;
 use avastra_base::units::Rational;
@@ -122,11 +121,7 @@ const NO_ROAD_USER_M: i64 = 100;
 /// without newcomers, that of the moment. The world lets nothing appear faster than it was asked to be. Where `lands` is set, it also appears at the distance that was asked for, as far as its verb means a place on
 /// the route: so it is where the road is straight and free.
 pub(super) fn newcomers(action: &ActionDef, known: &Known<'_>, lands: bool) -> Vec<Case> {
-    let spawns = action.effects.iter().filter_map(|effect| match effect {
-        EffectDef::Spawn(spawn) => Some(&**spawn),
-        EffectDef::Set(_) => None,
-    });
-    let newcomers: Vec<Case> = spawns.map(|spawn| newcomer(spawn, known, lands)).collect();
+    let newcomers: Vec<Case> = action.spawns().map(|spawn| newcomer(spawn, known, lands)).collect();
     match newcomers.is_empty() {
         true => vec![known.case.cloned().unwrap_or_default()],
         false => newcomers,
@@ -137,13 +132,7 @@ fn newcomer(spawn: &SpawnDef, known: &Known<'_>, lands: bool) -> Case {
     let verbs = match &spawn.verb {
         WordExpr::Fixed(verb) => vec![*verb],
         WordExpr::Of(expr, words) => {
-            let may_be = enclose(expr, known).variants();
-            words
-                .iter()
-                .enumerate()
-                .filter(|(word, _)| may_be >> word & 1 == 1)
-                .map(|(_, verb)| *verb)
-                .collect()
+            bits(enclose(expr, known).variants()).map(|variant| words[variant]).collect()
         }
     };
     let Case { mut numbers, words, not_words } = known.case.cloned().unwrap_or_default();
