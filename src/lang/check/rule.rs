@@ -12,8 +12,7 @@ use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::states_read;
 use crate::model::vocabulary::{CHANGE, Known, Site, Then, Verb};
 use crate::model::{
-    ActionDef, EffectDef, EnumIndex, Initial, RuleBinding, RuleBody, RuleDef, SetDef, SpawnDef, Type,
-    WordExpr, code,
+    ActionDef, EnumIndex, Initial, RuleBinding, RuleBody, RuleDef, SetDef, Type, WordExpr, code,
 };
 use crate::syntax::ast::ItemKind;
 use crate::syntax::{Diagnostic, ast, listed};
@@ -25,12 +24,9 @@ impl Checker {
     pub(super) fn rules(&mut self, items: &[&ast::Item]) -> Vec<RuleDef> {
         self.setters = vec![Vec::new(); self.states.len()];
         for (index, action) in self.actions.iter().enumerate() {
-            for effect in action.iter().flat_map(|action| &action.effects) {
-                match effect {
-                    EffectDef::Set(set) => self.setters[set.state].push(index),
-                    EffectDef::Spawn(_) => self.spawners.push(index),
-                }
-            }
+            let Some(action) = action else { continue };
+            action.sets().for_each(|set| self.setters[set.state].push(index));
+            self.spawners.extend(action.spawns().map(|_| index));
         }
         let mut rules = Vec::new();
         for (item, declared) in self.declared("rule", items, ItemKind::as_rule).1 {
@@ -136,7 +132,7 @@ impl Checker {
             return self.reject(error.beside(definition.span, "changes no lanes").help(help));
         }
         self.warn_of_later(rule, definition, &condition, during);
-        if condition.known() == Known::Spawn && spawns(definition).next().is_none() && is_whole {
+        if condition.known() == Known::Spawn && definition.spawns().next().is_none() && is_whole {
             let message =
                 format!("`{}` asks about a spawn, and `{}` has none", rule.name.text, definition.name);
             let error = Diagnostic::error(code::NO_SPAWN, message).at(condition.span, "needs a spawn");
@@ -162,7 +158,7 @@ impl Checker {
             expr.any(|kind| matches!(kind, ExprKind::Local(named) if *named == local))
         };
         let decides = |local: usize| {
-            spawns(action).any(|spawn| matches!(&spawn.then, WordExpr::Of(then, _) if names(then, local)))
+            action.spawns().any(|spawn| matches!(&spawn.then, WordExpr::Of(then, _) if names(then, local)))
         };
         let mut locals = 0..action.parameters.len();
         let Some(local) = locals.find(|local| decides(*local) && names(condition, *local)) else { return };
@@ -410,15 +406,8 @@ impl Checker {
 
 /// Whether a road user of an action may be told to change lanes.
 fn changes_lanes(action: &ActionDef) -> bool {
-    spawns(action).any(|spawn| {
+    action.spawns().any(|spawn| {
         possible(&spawn.then).contains(&Then::Change) || possible(&spawn.verb).contains(&Verb::Overtake)
-    })
-}
-
-fn spawns(action: &ActionDef) -> impl Iterator<Item = &SpawnDef> {
-    action.effects.iter().filter_map(|effect| match effect {
-        EffectDef::Spawn(spawn) => Some(&**spawn),
-        EffectDef::Set(_) => None,
     })
 }
 

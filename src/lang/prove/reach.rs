@@ -11,8 +11,8 @@ use crate::model::expr::Expr;
 use crate::model::rules::{self, Bound, Demand, RowRules, allowed, rules_by_action};
 use crate::model::vocabulary::Word;
 use crate::model::{
-    ActionDef, Domain, EffectDef, Facts, Interval, Memory, Parameter, Reach, Road, Row, RuleBody,
-    RulesInForce, Space, Value, WordExpr, code, evaluate, locals,
+    ActionDef, Domain, Facts, Interval, Memory, Parameter, Reach, Road, Row, RuleBody, RulesInForce, Space,
+    Value, WordExpr, code, evaluate, locals,
 };
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::prove::moment::{Case, may_hold_together, newcomers, ranges_named};
@@ -129,21 +129,20 @@ impl Pace {
 
 /// The axes, by their places among the parameters, that decide what [`RowRules::reach`] says of a row.
 fn deciding_axes(space: &Space, action: usize) -> Vec<usize> {
-    let ActionDef { parameters, effects, .. } = &space.actions[action];
-    let mut of_spawns: Vec<usize> = Vec::new();
-    for effect in effects {
-        let EffectDef::Spawn(spawn) = effect else { continue };
+    let definition = &space.actions[action];
+    let of_spawns = definition.spawns().flat_map(|spawn| {
         let verb = match &spawn.verb {
             WordExpr::Fixed(_) => None,
             WordExpr::Of(expr, _) => Some(expr),
         };
-        of_spawns.extend([&spawn.speed, &spawn.distance].into_iter().chain(verb).flat_map(rules::locals));
-    }
+        [&spawn.speed, &spawn.distance].into_iter().chain(verb).flat_map(rules::locals)
+    });
+    let of_spawns: Vec<usize> = of_spawns.collect();
     let decides = |local: &usize| {
         let is_named = space.clauses[action].iter().any(|clause| clause.needs(*local));
-        parameters[*local].axis && (is_named || of_spawns.contains(local))
+        definition.parameters[*local].axis && (is_named || of_spawns.contains(local))
     };
-    (0..parameters.len()).filter(decides).collect()
+    (0..definition.parameters.len()).filter(decides).collect()
 }
 
 /// All values that an expression of the row's action may have by the parameters' own ranges and
