@@ -16,8 +16,8 @@ use crate::model::{
 };
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::prove::moment::{Case, may_hold_together, newcomers, ranges_named};
-use crate::prove::product;
-use crate::syntax::{Diagnostic, listed};
+use crate::prove::{distinct, product, rule_names};
+use crate::syntax::Diagnostic;
 use avastra_base::units::Unit;
 
 /// Each row allows all proofs together this many more steps for each road, counting up to `ROADS_MAX` roads. A row under a
@@ -324,11 +324,7 @@ impl<'a> RowRules<'a> {
         match (parts.as_slice(), without_figures.as_slice()) {
             (_, []) => {}
             ([], [only]) => parts.push(self.without_figures(only)),
-            _ => {
-                let names: Vec<&str> =
-                    rules.iter().map(|rule| self.space.rules[*rule].name.as_str()).collect();
-                parts.push(format!("{} cannot hold together", listed(&names)));
-            }
+            _ => parts.push(format!("{} cannot hold together", rule_names(self.space, rules))),
         }
         let conditions: Vec<&Expr> = rules
             .iter()
@@ -472,8 +468,7 @@ const REASONS_MAX: usize = 3;
 /// One error for several actions that the same rules leave no row.
 fn error_of_many(space: &Space, gone: &[Gone<'_>]) -> Diagnostic {
     let rules = gone[0].rules;
-    let names: Vec<&str> = rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
-    let leave = if names.len() == 1 { "leaves" } else { "leave" };
+    let leave = if rules.len() == 1 { "leaves" } else { "leave" };
     let mut named: Vec<String> = gone.iter().take(ACTIONS_MAX).map(Gone::what).collect();
     if gone.len() > ACTIONS_MAX {
         named.push(format!("{} other actions", gone.len() - ACTIONS_MAX));
@@ -483,19 +478,14 @@ fn error_of_many(space: &Space, gone: &[Gone<'_>]) -> Diagnostic {
     let message = format!("{what} can never run on {}", any_road(space));
     let error = Diagnostic::error(code::DEAD, message).at(
         space.rules[rules[0]].span,
-        format!("{} {leave} {} actions no value", listed(&names), gone.len()),
+        format!("{} {leave} {} actions no value", rule_names(space, rules), gone.len()),
     );
     let error =
         rules[1..].iter().fold(error, |error, rule| error.beside(space.rules[*rule].span, "and this rule"));
     let shown = gone.iter().take(ACTIONS_MAX);
     let error = shown.fold(error, |error, one| error.beside(one.action.span, numbers(&one.rows)));
-    let mut reasons: Vec<&str> = Vec::new();
-    for one in gone {
-        if !reasons.contains(&one.reason) {
-            reasons.push(one.reason);
-        }
-    }
-    let error = reasons.iter().take(REASONS_MAX).fold(error, |error, reason| error.note(*reason));
+    let reasons = distinct(gone.iter().map(|one| one.reason)).into_iter();
+    let error = reasons.take(REASONS_MAX).fold(error, |error, reason| error.note(reason));
     error.help(HELP)
 }
 
@@ -515,8 +505,8 @@ fn report_masked(space: &Space, action: &ActionDef, left: &[&Row]) -> Vec<Diagno
         let Some(Reach::Dead { rules, reason }) = masked.first().map(|row| &row.roads[index]) else {
             continue;
         };
-        let names: Vec<&str> = rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
-        let message = format!("`{}` is masked on `{}` by {}", action.name, road.name, listed(&names));
+        let by = rule_names(space, rules);
+        let message = format!("`{}` is masked on `{}` by {by}", action.name, road.name);
         let remark = Diagnostic::remark(code::MASKED, message).at(action.span, numbers(&masked));
         diagnostics.push(remark.note(reason.clone()));
     }
