@@ -506,6 +506,15 @@ fn a_missing_use_can_be_added() {
     assert_eq!(loaded.diagnostics[0].fixes[0].text, "\nuse \"b.ava\"");
 }
 
+/// Such a call was dropped without a word, and its rule with it.
+#[test]
+fn an_argument_is_given_once() {
+    for call in ["less(x: distance, x: 3 m)", "less(y: distance, 3 m)"] {
+        let text = format!("fn less(x: Length, y: Length) -> Bool = x < y\nrule g on ahead: {call}\n");
+        assert_eq!(codes(&based(&text)), ["AV0102"], "{call}");
+    }
+}
+
 mod hostile {
     use proptest::prelude::*;
 
