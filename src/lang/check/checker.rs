@@ -250,22 +250,11 @@ impl Checker {
         self.diagnostics.iter().any(Diagnostic::is_error)
     }
 
-    /// The diagnostics in the order of the text. A rule is checked for each of its actions, so equal diagnostics
-    /// are kept once.
-    fn finish(self, space: Option<Space>, runs_in: RunsIn) -> Checked {
-        let mut kept: Vec<Diagnostic> = Vec::new();
-        // What is equal says the same of the same place.
-        let mut known: BTreeMap<(Option<Span>, String), Vec<usize>> = BTreeMap::new();
-        for diagnostic in self.diagnostics {
-            let alike = known.entry((diagnostic.place(), diagnostic.message.clone())).or_default();
-            if !alike.iter().any(|index| kept[*index] == diagnostic) {
-                alike.push(kept.len());
-                kept.push(diagnostic);
-            }
-        }
-        kept.sort_by_key(Diagnostic::place);
+    /// Puts the diagnostics into the order of the text.
+    fn finish(mut self, space: Option<Space>, runs_in: RunsIn) -> Checked {
+        self.diagnostics.sort_by_key(Diagnostic::place);
         let runs = Runs { claims: self.claims, runs_in };
-        Checked { space, runs, diagnostics: kept, references: self.references }
+        Checked { space, runs, diagnostics: self.diagnostics, references: self.references }
     }
 
     /// Looks at what is broken already, for its names alone: no mistake is reported.
