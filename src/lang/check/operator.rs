@@ -259,22 +259,11 @@ impl Checker {
 
     /// A body beside `hit` or `near`: of the engine, or of the author's own.
     fn body_of(&mut self, word: &ast::Expr) -> Option<BodyWord> {
-        let known = match &word.kind {
-            ast::ExprKind::Name(name) => self.body_named(name).map(|body| (name, body)),
-            _ => None,
-        };
-        let Some((name, body)) = known else {
-            let own = self.bodies.iter().map(|body| body.name.clone()).collect::<Vec<_>>();
-            return match &word.kind {
-                ast::ExprKind::Name(name) => {
-                    let names = Body::names().chain(own.iter().map(String::as_str));
-                    self.reject(unknown("body", name, word.span, names))
-                }
-                _ => {
-                    let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted the name of a body");
-                    self.reject(error.at(word.span, "not a name"))
-                }
-            };
+        let name = self.name_of(word, "the name of a body")?;
+        let Some(body) = self.body_named(name) else {
+            let names = Body::names().chain(self.bodies.iter().map(|body| body.name.as_str()));
+            let error = unknown("body", name, word.span, names);
+            return self.reject(error);
         };
         self.note_body(word.span, name);
         Some(body)
@@ -283,16 +272,12 @@ impl Checker {
     fn word_of(&mut self, fact: WordFact, word: &ast::Expr) -> Option<String> {
         let words = fact.words();
         let names = || words.iter().map(|(name, _)| *name);
-        let ast::ExprKind::Name(name) = &word.kind else {
-            let names: Vec<&str> = names().collect();
-            let message = format!("wanted {}", one_of(&names));
-            return self.reject(Diagnostic::error(code::TYPE_MISMATCH, message).at(word.span, "not a name"));
-        };
-        let Some((known, meaning)) = words.iter().find(|(known, _)| known == name) else {
+        let name = self.name_of(word, &one_of(&names().collect::<Vec<_>>()))?;
+        let Some((known, meaning)) = words.iter().find(|(known, _)| *known == name) else {
             return self.reject(unknown(fact.name(), name, word.span, names()));
         };
         self.references.note(word.span, Symbol::Engine(known, meaning), false);
-        Some(name.clone())
+        Some(name.to_owned())
     }
 
     /// Notes the names among the expressions as roads.

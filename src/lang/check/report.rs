@@ -21,6 +21,15 @@ pub(super) trait Report {
         value.map_err(|error| self.report(error)).ok()
     }
 
+    /// The name that an expression is. Reports anything else; `wanted` says of what, for example `a rule`.
+    fn name_of<'a>(&mut self, expr: &'a ast::Expr, wanted: &str) -> Option<&'a str> {
+        let ast::ExprKind::Name(name) = &expr.kind else {
+            let error = Diagnostic::error(code::TYPE_MISMATCH, format!("wanted {wanted}"));
+            return self.reject(error.at(expr.span, "not a name"));
+        };
+        Some(name)
+    }
+
     /// Reports every name that stands twice.
     fn once<'a>(&mut self, kind: &str, names: impl IntoIterator<Item = &'a Name>) {
         let mut known = Names::default();

@@ -120,17 +120,11 @@ impl<'a> Reader<'a> {
         };
         let mut names = Vec::new();
         for item in items {
-            match &item.kind {
-                ast::ExprKind::Name(name) if self.space.rules.iter().any(|rule| rule.name == *name) => {
-                    names.push(name.clone());
-                }
-                ast::ExprKind::Name(name) => {
-                    let rules = self.space.rules.iter().map(|rule| rule.name.as_str());
-                    self.report(unknown("rule", name, item.span, rules));
-                }
-                _ => self.report(
-                    Diagnostic::error(code::TYPE_MISMATCH, "wanted a rule").at(item.span, "not a name"),
-                ),
+            let Some(name) = self.name_of(item, "a rule") else { continue };
+            let rules = self.space.rules.iter().map(|rule| rule.name.as_str());
+            match rules.clone().any(|rule| rule == name) {
+                true => names.push(name.to_owned()),
+                false => self.report(unknown("rule", name, item.span, rules)),
             }
         }
         names

@@ -85,14 +85,9 @@ impl Reader<'_> {
 
     /// `ego`, `other` or `none`.
     fn priority(&mut self, value: &ast::Expr) -> Option<Priority> {
-        let ast::ExprKind::Name(name) = &value.kind else {
-            let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted `ego`, `other` or `none`");
-            return self.reject(error.at(value.span, "not a name"));
-        };
-        let Some(priority) = Priority::from_name(name) else {
-            return self.reject(unknown("priority", name, value.span, Priority::names()));
-        };
-        Some(priority)
+        let name = self.name_of(value, "`ego`, `other` or `none`")?;
+        let error = || unknown("priority", name, value.span, Priority::names());
+        self.take(Priority::from_name(name).ok_or_else(error))
     }
 
     /// `perception`, or `[tracking, planning]`.
@@ -114,14 +109,11 @@ impl Reader<'_> {
     ) -> Option<Vec<String>> {
         let mut words = Vec::new();
         for item in items {
-            let ast::ExprKind::Name(name) = &item.kind else {
-                let error = Diagnostic::error(code::TYPE_MISMATCH, format!("wanted {wanted}"));
-                return self.reject(error.at(item.span, "not a name"));
-            };
-            if !known.contains(&name.as_str()) {
+            let name = self.name_of(item, wanted)?;
+            if !known.contains(&name) {
                 return self.reject(unknown(what, name, item.span, known.iter().copied()));
             }
-            words.push(name.clone());
+            words.push(name.to_owned());
         }
         Some(words)
     }
