@@ -5,7 +5,7 @@ use crate::check::checker::Checker;
 use crate::check::expression::{Place, SEEN_BY, article, dimension, fits, is_number, unknown_here};
 use crate::check::names::unknown;
 use crate::check::references::Symbol;
-use crate::check::report::Report;
+use crate::check::report::{Report, all_of};
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::vocabulary::{Body, Known, LaneChoice, Word, WordFact};
 use crate::model::{BodyWord, Type, code};
@@ -175,9 +175,8 @@ impl Checker {
                 ExprKind::InRange(value, Box::new(low?), Box::new(high?))
             }
             ast::ExprKind::List(items) => {
-                let items: Vec<Option<Expr>> = items.iter().map(|item| self.typed(item, place, ty)).collect();
-                let items: Option<Vec<Expr>> = items.into_iter().collect();
-                ExprKind::InList(value, items?)
+                let items = items.iter().map(|item| self.typed(item, place, ty));
+                ExprKind::InList(value, all_of(items)?)
             }
             ast::ExprKind::Field { base, field }
                 if field.text == "lanes"
@@ -223,9 +222,7 @@ impl Checker {
                 self.reject(error.at(name.span, "not a name").help("write `road == corner`"))
             }
         };
-        // Every unknown road is reported, not just the first.
-        let roads: Vec<Option<String>> = names.iter().map(road).collect();
-        let roads = roads.into_iter().collect::<Option<_>>()?;
+        let roads = all_of(names.iter().map(road))?;
         Some(Expr { kind: ExprKind::OnRoad(roads), ty: Type::Bool, span })
     }
 
@@ -247,13 +244,11 @@ impl Checker {
             return self.reject(error.at(span, who));
         }
         if matches!(fact, WordFact::Hit | WordFact::Near) {
-            let found: Vec<Option<BodyWord>> = words.iter().map(|word| self.body_of(word)).collect();
-            let kind = ExprKind::IsBody(fact, found.into_iter().collect::<Option<_>>()?);
-            return Some(Expr { kind, ty: Type::Bool, span });
+            let bodies = all_of(words.iter().map(|word| self.body_of(word)))?;
+            return Some(Expr { kind: ExprKind::IsBody(fact, bodies), ty: Type::Bool, span });
         }
-        // Every unknown word is reported, not just the first.
-        let found: Vec<Option<String>> = words.iter().map(|word| self.word_of(fact, word)).collect();
-        let kind = ExprKind::IsWord(fact, found.into_iter().collect::<Option<_>>()?);
+        let words = all_of(words.iter().map(|word| self.word_of(fact, word)))?;
+        let kind = ExprKind::IsWord(fact, words);
         Some(Expr { kind, ty: Type::Bool, span })
     }
 

@@ -93,6 +93,12 @@ pub(super) trait Report {
     }
 }
 
+/// All of them, or `None` if one is missing. Each is looked at, so that every mistake is reported and not just the first.
+pub(super) fn all_of<T>(found: impl Iterator<Item = Option<T>>) -> Option<Vec<T>> {
+    let found: Vec<Option<T>> = found.collect();
+    found.into_iter().collect()
+}
+
 /// The value of the first field of that name.
 pub(super) fn field<'a, W: Word>(fields: &[(W, &'a ast::Expr)], wanted: W) -> Option<&'a ast::Expr> {
     fields.iter().find(|(field, _)| *field == wanted).map(|(_, value)| *value)
