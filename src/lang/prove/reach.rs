@@ -195,17 +195,22 @@ fn products(space: &Space, action: &ActionDef) -> Vec<Vec<Value>> {
 
 impl<'a> RowRules<'a> {
     pub(crate) fn reach(self) -> Reach {
-        let parameters = &self.space.actions[self.row.action].parameters;
-        if let Some(locals) = self.settle() {
-            let drawn = parameters.iter().zip(locals).filter(|(parameter, _)| !parameter.axis);
-            let ranges = drawn.filter_map(|(parameter, values)| match values {
-                Values::Number(interval) => Some((parameter.name.clone(), interval)),
-                Values::Truth { .. } | Values::Variants(_) => None,
-            });
-            return Reach::Open(ranges.collect());
+        if let Some(ranges) = self.ranges() {
+            return Reach::Open(ranges);
         }
         let rules = self.conflict(&|fewer| fewer.settle().is_none());
         Reach::Dead { reason: self.reason(&rules), rules }
+    }
+
+    /// The ranges that the rules in force leave to the drawn numbers; `None` if they leave no values.
+    pub(crate) fn ranges(self) -> Option<Vec<(Arc<str>, Interval)>> {
+        let parameters = self.space.actions[self.row.action].parameters.iter();
+        let drawn = parameters.zip(self.settle()?).filter(|(parameter, _)| !parameter.axis);
+        let ranges = drawn.filter_map(|(parameter, values)| match values {
+            Values::Number(interval) => Some((parameter.name.clone(), interval)),
+            Values::Truth { .. } | Values::Variants(_) => None,
+        });
+        Some(ranges.collect())
     }
 
     /// Rules that forbid something together, of which none can be spared; `forbid` says whether some still do.
