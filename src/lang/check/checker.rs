@@ -19,7 +19,7 @@ use crate::model::{
     ActionDef, BodyDef, EnumDef, FnDef, GroupDef, Meaning, SetDef, Space, StateDef, Type, Value, code,
 };
 use crate::prove;
-use crate::prove::{Known, RunsIn, Values, enclose, product_size};
+use crate::prove::{Known, RunsIn, enclose, product_size};
 use crate::syntax::ast::{FileId, ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
 use avastra_base::units::Rational;
@@ -378,18 +378,7 @@ impl Checker {
             return None;
         }
         let known = Known { functions: &self.functions, locals: &[], cells: &[], road: None, case: None };
-        let folded = match enclose(expr, &known) {
-            Values::Number(interval) => interval.single().map(ExprKind::Number),
-            Values::Variants(set) => match expr.ty {
-                Type::Enum(of) if set.is_power_of_two() => {
-                    Some(ExprKind::Variant(of, set.trailing_zeros() as usize))
-                }
-                _ => None,
-            },
-            Values::Truth { may_hold, may_fail } if may_hold != may_fail => Some(ExprKind::Bool(may_hold)),
-            Values::Truth { .. } => None,
-        };
-        folded.or_else(|| {
+        enclose(expr, &known).literal(expr.ty).or_else(|| {
             let error = Diagnostic::error(code::NUMBER, "the value cannot be computed exactly");
             self.reject(error.at(expr.span, "too large, or a division by 0"))
         })

@@ -31,7 +31,7 @@ mod witness;
 
 pub(crate) use clock::{forbids, next_rows, shortest_way};
 pub use cut::{Removal, removals};
-pub(crate) use enclose::{Known, VARIANTS_MAX, Values, enclose};
+pub(crate) use enclose::{Known, VARIANTS_MAX, enclose};
 pub(crate) use reach::{product_size, rows};
 pub(crate) use realise::with_dead;
 pub use realise::{Realisable, Realised, RunsIn, realise};
