@@ -9,6 +9,7 @@ use avastra_campaign::emit;
 use avastra_campaign::episode::{EpisodeLog, Outcome};
 use avastra_campaign::oracle::{self, ClaimResult};
 use avastra_campaign::run::{Asked, EpisodeSummary, RunError, Stage, recorded_traffic};
+use avastra_lang::model::vocabulary::Word;
 use avastra_lang::model::{Avoidability, Claim, Scenario};
 use avastra_lang::syntax::ast::{self, ClauseKind, Doc, Expect, ExprKind, FileId, Span};
 use avastra_world::action::ActionTable;
@@ -272,7 +273,7 @@ fn claim_edits(
 
 fn about(expect: &Expect) -> About<'_> {
     let kind = match &expect.claim.kind {
-        ExprKind::Name(name) if Avoidability::ALL.iter().any(|class| class.name() == name) => "avoidable",
+        ExprKind::Name(name) if Avoidability::from_name(name).is_some() => "avoidable",
         ExprKind::Name(name) => name,
         ExprKind::Binary { left, .. } => match &left.kind {
             ExprKind::Name(name) => name,

@@ -95,7 +95,7 @@ fn every_word_of_the_language_is_on_the_page() {
         UNITS.iter().map(|unit| unit.word).collect(),
         ENDS.to_vec(),
         MODULES.to_vec(),
-        Avoidability::ALL.map(Avoidability::name).to_vec(),
+        Avoidability::names().collect(),
         vec![COUNTED, ROAD_LANES.0, WAIT.0],
         Fact::names().chain(WordFact::names()).collect(),
         Light::names().chain(RoadKind::names()).collect(),

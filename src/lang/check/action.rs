@@ -6,7 +6,7 @@ use crate::check::checker::{Checker, docs, each, literal};
 use crate::check::declaration::unknown_word;
 use crate::check::expression::{NUMBER_MAX, Place, is_beyond_states, is_number};
 use crate::check::references::Symbol;
-use crate::check::report::{Report, field};
+use crate::check::report::{Report, all_of, field};
 use crate::check::rule::locals;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::rules_by_action;
@@ -262,14 +262,10 @@ impl Checker {
                 }
             }
             ast::ExprKind::List(items) => {
-                let values: Vec<Option<Value>> = items
-                    .iter()
-                    .map(|item| {
-                        let item = self.typed(item, &place, ty)?;
-                        literal(&self.fold(&item)?)
-                    })
-                    .collect();
-                let values: Vec<Value> = values.into_iter().collect::<Option<_>>()?;
+                let values = all_of(items.iter().map(|item| {
+                    let item = self.typed(item, &place, ty)?;
+                    literal(&self.fold(&item)?)
+                }))?;
                 if values.is_empty() {
                     let error = Diagnostic::error(code::EMPTY, "the list is empty");
                     return self.reject(error.at(within.span, "no value is left"));

@@ -83,10 +83,9 @@ impl Checker {
 
     /// The body of the engine that an expression names.
     fn engine_body(&mut self, expr: &ast::Expr) -> Option<Body> {
-        let ast::ExprKind::Name(name) = &expr.kind else {
+        let Some(name) = self.name_of(expr, "a body of the engine") else {
             self.look_at(expr, &Place::default(), None);
-            let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted a body of the engine");
-            return self.reject(error.at(expr.span, "not a name"));
+            return None;
         };
         let found = Body::from_name(name);
         found.into_iter().for_each(|body| self.references.word(expr.span, body));

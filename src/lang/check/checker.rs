@@ -19,7 +19,7 @@ use crate::model::{
     ActionDef, BodyDef, EnumDef, FnDef, GroupDef, Meaning, SetDef, Space, StateDef, Type, Value, code,
 };
 use crate::prove;
-use crate::prove::{Known, RunsIn, Values, enclose, product_size};
+use crate::prove::{Known, RunsIn, enclose, product_size};
 use crate::syntax::ast::{FileId, ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
 use avastra_base::units::Rational;
@@ -253,22 +253,11 @@ impl Checker {
         self.diagnostics.iter().any(Diagnostic::is_error)
     }
 
-    /// The diagnostics in the order of the text. A rule is checked for each of its actions, so equal diagnostics
-    /// are kept once.
-    fn finish(self, space: Option<Space>, runs_in: RunsIn) -> Checked {
-        let mut kept: Vec<Diagnostic> = Vec::new();
-        // What is equal says the same of the same place.
-        let mut known: BTreeMap<(Option<Span>, String), Vec<usize>> = BTreeMap::new();
-        for diagnostic in self.diagnostics {
-            let alike = known.entry((diagnostic.place(), diagnostic.message.clone())).or_default();
-            if !alike.iter().any(|index| kept[*index] == diagnostic) {
-                alike.push(kept.len());
-                kept.push(diagnostic);
-            }
-        }
-        kept.sort_by_key(Diagnostic::place);
+    /// Puts the diagnostics into the order of the text.
+    fn finish(mut self, space: Option<Space>, runs_in: RunsIn) -> Checked {
+        self.diagnostics.sort_by_key(Diagnostic::place);
         let runs = Runs { claims: self.claims, runs_in };
-        Checked { space, runs, diagnostics: kept, references: self.references }
+        Checked { space, runs, diagnostics: self.diagnostics, references: self.references }
     }
 
     /// Looks at what is broken already, for its names alone: no mistake is reported.
@@ -392,18 +381,7 @@ impl Checker {
             return None;
         }
         let known = Known { functions: &self.functions, locals: &[], cells: &[], road: None, case: None };
-        let folded = match enclose(expr, &known) {
-            Values::Number(interval) => interval.single().map(ExprKind::Number),
-            Values::Variants(set) => match expr.ty {
-                Type::Enum(of) if set.is_power_of_two() => {
-                    Some(ExprKind::Variant(of, set.trailing_zeros() as usize))
-                }
-                _ => None,
-            },
-            Values::Truth { may_hold, may_fail } if may_hold != may_fail => Some(ExprKind::Bool(may_hold)),
-            Values::Truth { .. } => None,
-        };
-        folded.or_else(|| {
+        enclose(expr, &known).literal(expr.ty).or_else(|| {
             let error = Diagnostic::error(code::NUMBER, "the value cannot be computed exactly");
             self.reject(error.at(expr.span, "too large, or a division by 0"))
         })

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use crate::check::checker::{Checker, Signature, docs, each};
 use crate::check::expression::{NUMBER_MAX, Place, is_beyond_states};
 use crate::check::references::Symbol;
-use crate::check::report::Report;
+use crate::check::report::{Report, all_of};
 use crate::check::rule::names_in;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::vocabulary::{Level, Phenomenon, SpaceClaim, TimeOfDay, Word, WorldState};
@@ -529,9 +529,7 @@ impl Checker {
             let found = known(self, variant, declared.span);
             self.take(found.map_err(|error| error.beside(span, label.clone())))
         };
-        // Every unknown word is reported, not just the first.
-        let words: Vec<Option<T>> = declared.variants.iter().map(word).collect();
-        words.into_iter().collect()
+        all_of(declared.variants.iter().map(word))
     }
 }
 
@@ -547,11 +545,8 @@ pub(super) fn unknown_word<W: Word>(kind: &str, word: &str, span: Span) -> Diagn
 }
 
 fn calls_of(body: &Expr) -> Vec<usize> {
-    let mut calls = Vec::new();
-    body.walk(&mut |expr| {
-        if let ExprKind::Call(callee, _) = expr.kind {
-            calls.push(callee);
-        }
-    });
-    calls
+    body.filter_map(|kind| match kind {
+        ExprKind::Call(callee, _) => Some(*callee),
+        _ => None,
+    })
 }

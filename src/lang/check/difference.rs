@@ -6,11 +6,11 @@
 
 use core::fmt;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use crate::check::load::Loaded;
 use crate::model::rules::RowRules;
-use crate::model::{Interval, Reach, Road, Row, RuleBody, RulesInForce, Space, Type};
-use crate::prove::Values;
+use crate::model::{Interval, Road, Row, RuleBody, RulesInForce, Space, Type};
 
 /// One difference; its parts together make a sentence.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -216,7 +216,7 @@ fn compared(old: &Side<'_>, new: &Side<'_>, [rule, same]: [usize; 2]) -> Option<
             for (was, is) in shared_roads(old.space, new.space) {
                 let (was, is) = (&old.space.roads[was], &new.space.roads[is]);
                 let (before, after) = (left(old.space, rule, row, was), left(new.space, same, other, is));
-                turns.judge(&before, &after, &was.name);
+                turns.judge(before.as_deref(), after.as_deref(), &was.name);
             }
         }
         for row in new.space.rows.iter().filter(|row| binds(row, same)) {
@@ -229,18 +229,12 @@ fn compared(old: &Side<'_>, new: &Side<'_>, [rule, same]: [usize; 2]) -> Option<
 }
 
 /// A range for each name.
-type Ranges = Vec<(String, Interval)>;
+type Ranges = [(Arc<str>, Interval)];
 
 /// What one rule alone leaves of each range of a row; `None` if it leaves nothing.
-fn left(space: &Space, rule: usize, row: &Row, road: &Road) -> Option<Ranges> {
+fn left(space: &Space, rule: usize, row: &Row, road: &Road) -> Option<Vec<(Arc<str>, Interval)>> {
     let alone = RulesInForce::only(space, rule);
-    let settled = RowRules { space, row, road: Some(&road.facts), in_force: &alone }.settle()?;
-    let drawn = space.actions[row.action].parameters.iter().zip(settled).filter(|(p, _)| !p.axis);
-    let ranges = drawn.filter_map(|(parameter, values)| match values {
-        Values::Number(interval) => Some((parameter.name.to_string(), interval)),
-        Values::Truth { .. } | Values::Variants(_) => None,
-    });
-    Some(ranges.collect())
+    RowRules { space, row, road: Some(&road.facts), in_force: &alone }.ranges()
 }
 
 /// How something forbids more than before, and how less.
@@ -272,7 +266,7 @@ impl Turns {
     }
 
     /// Compares what is left of each range on a road; `None` if nothing is.
-    fn judge(&mut self, before: &Option<Ranges>, after: &Option<Ranges>, road: &str) {
+    fn judge(&mut self, before: Option<&Ranges>, after: Option<&Ranges>, road: &str) {
         let (before, after) = match (before, after) {
             (None, None) => return,
             (None, Some(_)) => return self.looser.push(format!("no longer forbids everything on {road}")),
@@ -329,15 +323,8 @@ fn reaches(old: &Side<'_>, new: &Side<'_>) -> Vec<Difference> {
         for &(index, same) in &shared {
             let action = &old.space.actions[row.action].name;
             let mut turns = Turns::default();
-            let ranges = |reach: &Reach| match reach {
-                Reach::Open(ranges) => Some(ranges.iter().map(|(name, i)| (name.to_string(), *i)).collect()),
-                Reach::Dead { .. } => None,
-            };
-            turns.judge(
-                &ranges(&row.roads[index]),
-                &ranges(&other.roads[same]),
-                &old.space.roads[index].name,
-            );
+            let (before, after) = (row.roads[index].ranges(), other.roads[same].ranges());
+            turns.judge(before, after, &old.space.roads[index].name);
             let Some((change, detail)) = turns.in_words() else { continue };
             if told.insert((change, row.action, detail.clone())) {
                 found.push(difference(change, format!("draws of `{action}`"), detail));

@@ -487,19 +487,13 @@ impl Checker {
             let error = Diagnostic::error(code::ARGUMENTS, message).at(call.span, "");
             return self.reject(error.beside(header, "declared here"));
         }
+        let names: Vec<&str> = parameters.iter().map(|(parameter, _)| parameter.as_str()).collect();
+        let mut given = vec![None; parameters.len()];
         let mut arguments: Vec<Option<Expr>> = vec![None; parameters.len()];
         for (position, argument) in call.args.iter().enumerate() {
-            let slot = match &argument.name {
-                None => position,
-                Some(name) => match parameters.iter().position(|(parameter, _)| *parameter == name.text) {
-                    Some(slot) => slot,
-                    None => {
-                        self.look_at_arguments(&call.args[position..], place);
-                        let names = parameters.iter().map(|(parameter, _)| parameter.as_str());
-                        let error = unknown("argument", &name.text, name.span, names);
-                        return self.reject(error);
-                    }
-                },
+            let Some(slot) = self.slot(call, position, &names, &mut given) else {
+                self.look_at_arguments(&call.args[position..], place);
+                return None;
             };
             arguments[slot] = self.typed(&argument.value, place, parameters[slot].1);
         }

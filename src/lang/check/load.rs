@@ -146,20 +146,22 @@ pub fn load_with(root: &Path, read: &ReadFile<'_>, cache: &mut MapCache) -> Resu
     Ok(Loaded { sources, diagnostics, remarks, files, references, space, scenario, policy, runs })
 }
 
-/// Diagnostics that say the same of the same place become one, which shows the other places of all.
+/// Diagnostics that say the same of the same place become one, which shows the other places of all. A rule, for example,
+/// is checked for each of its actions.
 fn merged(diagnostics: Vec<Diagnostic>) -> Vec<Diagnostic> {
     let mut merged: Vec<Diagnostic> = Vec::new();
-    let mut known: BTreeMap<(Option<Span>, String), usize> = BTreeMap::new();
+    let mut known: BTreeMap<(Option<Span>, String), Vec<usize>> = BTreeMap::new();
     for found in diagnostics {
         let says = |one: &Diagnostic| (one.code, one.notes.clone(), one.help.clone(), one.fixes.clone());
-        match known.get(&(found.place(), found.message.clone())) {
-            Some(&index) if says(&merged[index]) == says(&found) => {
-                let labels = &mut merged[index].labels;
+        let alike = known.entry((found.place(), found.message.clone())).or_default();
+        match alike.iter().find(|index| says(&merged[**index]) == says(&found)) {
+            Some(index) => {
+                let labels = &mut merged[*index].labels;
                 let new: Vec<_> = found.labels.into_iter().filter(|label| !labels.contains(label)).collect();
                 labels.extend(new);
             }
-            _ => {
-                known.insert((found.place(), found.message.clone()), merged.len());
+            None => {
+                alike.push(merged.len());
                 merged.push(found);
             }
         }

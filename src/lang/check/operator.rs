@@ -5,7 +5,7 @@ use crate::check::checker::Checker;
 use crate::check::expression::{Place, SEEN_BY, article, dimension, fits, is_number, unknown_here};
 use crate::check::names::unknown;
 use crate::check::references::Symbol;
-use crate::check::report::Report;
+use crate::check::report::{Report, all_of};
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::vocabulary::{Body, Known, LaneChoice, Word, WordFact};
 use crate::model::{BodyWord, Type, code};
@@ -175,9 +175,8 @@ impl Checker {
                 ExprKind::InRange(value, Box::new(low?), Box::new(high?))
             }
             ast::ExprKind::List(items) => {
-                let items: Vec<Option<Expr>> = items.iter().map(|item| self.typed(item, place, ty)).collect();
-                let items: Option<Vec<Expr>> = items.into_iter().collect();
-                ExprKind::InList(value, items?)
+                let items = items.iter().map(|item| self.typed(item, place, ty));
+                ExprKind::InList(value, all_of(items)?)
             }
             ast::ExprKind::Field { base, field }
                 if field.text == "lanes"
@@ -223,9 +222,7 @@ impl Checker {
                 self.reject(error.at(name.span, "not a name").help("write `road == corner`"))
             }
         };
-        // Every unknown road is reported, not just the first.
-        let roads: Vec<Option<String>> = names.iter().map(road).collect();
-        let roads = roads.into_iter().collect::<Option<_>>()?;
+        let roads = all_of(names.iter().map(road))?;
         Some(Expr { kind: ExprKind::OnRoad(roads), ty: Type::Bool, span })
     }
 
@@ -247,34 +244,21 @@ impl Checker {
             return self.reject(error.at(span, who));
         }
         if matches!(fact, WordFact::Hit | WordFact::Near) {
-            let found: Vec<Option<BodyWord>> = words.iter().map(|word| self.body_of(word)).collect();
-            let kind = ExprKind::IsBody(fact, found.into_iter().collect::<Option<_>>()?);
-            return Some(Expr { kind, ty: Type::Bool, span });
+            let bodies = all_of(words.iter().map(|word| self.body_of(word)))?;
+            return Some(Expr { kind: ExprKind::IsBody(fact, bodies), ty: Type::Bool, span });
         }
-        // Every unknown word is reported, not just the first.
-        let found: Vec<Option<String>> = words.iter().map(|word| self.word_of(fact, word)).collect();
-        let kind = ExprKind::IsWord(fact, found.into_iter().collect::<Option<_>>()?);
+        let words = all_of(words.iter().map(|word| self.word_of(fact, word)))?;
+        let kind = ExprKind::IsWord(fact, words);
         Some(Expr { kind, ty: Type::Bool, span })
     }
 
     /// A body beside `hit` or `near`: of the engine, or of the author's own.
     fn body_of(&mut self, word: &ast::Expr) -> Option<BodyWord> {
-        let known = match &word.kind {
-            ast::ExprKind::Name(name) => self.body_named(name).map(|body| (name, body)),
-            _ => None,
-        };
-        let Some((name, body)) = known else {
-            let own = self.bodies.iter().map(|body| body.name.clone()).collect::<Vec<_>>();
-            return match &word.kind {
-                ast::ExprKind::Name(name) => {
-                    let names = Body::names().chain(own.iter().map(String::as_str));
-                    self.reject(unknown("body", name, word.span, names))
-                }
-                _ => {
-                    let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted the name of a body");
-                    self.reject(error.at(word.span, "not a name"))
-                }
-            };
+        let name = self.name_of(word, "the name of a body")?;
+        let Some(body) = self.body_named(name) else {
+            let names = Body::names().chain(self.bodies.iter().map(|body| body.name.as_str()));
+            let error = unknown("body", name, word.span, names);
+            return self.reject(error);
         };
         self.note_body(word.span, name);
         Some(body)
@@ -283,16 +267,12 @@ impl Checker {
     fn word_of(&mut self, fact: WordFact, word: &ast::Expr) -> Option<String> {
         let words = fact.words();
         let names = || words.iter().map(|(name, _)| *name);
-        let ast::ExprKind::Name(name) = &word.kind else {
-            let names: Vec<&str> = names().collect();
-            let message = format!("wanted {}", one_of(&names));
-            return self.reject(Diagnostic::error(code::TYPE_MISMATCH, message).at(word.span, "not a name"));
-        };
-        let Some((known, meaning)) = words.iter().find(|(known, _)| known == name) else {
+        let name = self.name_of(word, &one_of(&names().collect::<Vec<_>>()))?;
+        let Some((known, meaning)) = words.iter().find(|(known, _)| *known == name) else {
             return self.reject(unknown(fact.name(), name, word.span, names()));
         };
         self.references.note(word.span, Symbol::Engine(known, meaning), false);
-        Some(name.clone())
+        Some(name.to_owned())
     }
 
     /// Notes the names among the expressions as roads.

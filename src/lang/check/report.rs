@@ -21,6 +21,15 @@ pub(super) trait Report {
         value.map_err(|error| self.report(error)).ok()
     }
 
+    /// The name that an expression is. Reports anything else; `wanted` says of what, for example `a rule`.
+    fn name_of<'a>(&mut self, expr: &'a ast::Expr, wanted: &str) -> Option<&'a str> {
+        let ast::ExprKind::Name(name) = &expr.kind else {
+            let error = Diagnostic::error(code::TYPE_MISMATCH, format!("wanted {wanted}"));
+            return self.reject(error.at(expr.span, "not a name"));
+        };
+        Some(name)
+    }
+
     /// Reports every name that stands twice.
     fn once<'a>(&mut self, kind: &str, names: impl IntoIterator<Item = &'a Name>) {
         let mut known = Names::default();
@@ -48,11 +57,46 @@ pub(super) trait Report {
         known
     }
 
+    /// The slot of an argument: that of its name, else that of its position. Reports an argument without one, and one
+    /// whose slot is `given` already.
+    fn slot(
+        &mut self,
+        call: &ast::Call,
+        position: usize,
+        names: &[&str],
+        given: &mut [Option<Span>],
+    ) -> Option<usize> {
+        let ast::Arg { name, value } = &call.args[position];
+        let found = match name {
+            Some(name) => names.iter().position(|known| *known == name.text),
+            None => Some(position).filter(|position| *position < names.len()),
+        };
+        let Some(slot) = found else {
+            return self.reject(match name {
+                Some(name) => unknown("argument", &name.text, name.span, names.iter().copied()),
+                None => {
+                    let message = format!("`{}` takes {} arguments", call.name.text, names.len());
+                    Diagnostic::error(code::ARGUMENTS, message).at(value.span, "one too many")
+                }
+            });
+        };
+        let Some(first) = given[slot].replace(value.span) else { return Some(slot) };
+        let message = format!("`{}` is given twice", names[slot]);
+        let error = Diagnostic::error(code::DUPLICATE, message).at(value.span, "again here");
+        self.reject(error.beside(first, "first here").help("remove one of them"))
+    }
+
     /// Reports that a block lacks a field which it needs.
     fn missing_field<T>(&mut self, field: impl Word, span: Span, message: String) -> Option<T> {
         let error = Diagnostic::error(code::MISSING_FIELD, message);
         self.reject(error.at(span, format!("`{}: …` is missing", field.name())))
     }
+}
+
+/// All of them, or `None` if one is missing. Each is looked at, so that every mistake is reported and not just the first.
+pub(super) fn all_of<T>(found: impl Iterator<Item = Option<T>>) -> Option<Vec<T>> {
+    let found: Vec<Option<T>> = found.collect();
+    found.into_iter().collect()
 }
 
 /// The value of the first field of that name.

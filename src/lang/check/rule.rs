@@ -12,7 +12,7 @@ use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::states_read;
 use crate::model::vocabulary::{CHANGE, Known, Site, Then, Verb};
 use crate::model::{
-    ActionDef, EffectDef, EnumIndex, Initial, RuleBinding, RuleBody, RuleDef, SetDef, Type, WordExpr, code,
+    ActionDef, EnumIndex, Initial, RuleBinding, RuleBody, RuleDef, SetDef, Type, WordExpr, code,
 };
 use crate::syntax::ast::ItemKind;
 use crate::syntax::{Diagnostic, ast, listed};
@@ -24,13 +24,9 @@ impl Checker {
     pub(super) fn rules(&mut self, items: &[&ast::Item]) -> Vec<RuleDef> {
         self.setters = vec![Vec::new(); self.states.len()];
         for (index, action) in self.actions.iter().enumerate() {
-            for effect in action.iter().flat_map(|action| &action.effects) {
-                match effect {
-                    EffectDef::Set(set) => self.setters[set.state].push(index),
-                    EffectDef::Spawn(_) => self.spawners.push(index),
-                    EffectDef::Order(_) => {}
-                }
-            }
+            let Some(action) = action else { continue };
+            action.sets().for_each(|set| self.setters[set.state].push(index));
+            self.spawners.extend(action.spawns().map(|_| index));
         }
         let mut rules = Vec::new();
         for (item, declared) in self.declared("rule", items, ItemKind::as_rule).1 {

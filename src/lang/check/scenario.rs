@@ -120,17 +120,11 @@ impl<'a> Reader<'a> {
         };
         let mut names = Vec::new();
         for item in items {
-            match &item.kind {
-                ast::ExprKind::Name(name) if self.space.rules.iter().any(|rule| rule.name == *name) => {
-                    names.push(name.clone());
-                }
-                ast::ExprKind::Name(name) => {
-                    let rules = self.space.rules.iter().map(|rule| rule.name.as_str());
-                    self.report(unknown("rule", name, item.span, rules));
-                }
-                _ => self.report(
-                    Diagnostic::error(code::TYPE_MISMATCH, "wanted a rule").at(item.span, "not a name"),
-                ),
+            let Some(name) = self.name_of(item, "a rule") else { continue };
+            let rules = self.space.rules.iter().map(|rule| rule.name.as_str());
+            match rules.clone().any(|rule| rule == name) {
+                true => names.push(name.to_owned()),
+                false => self.report(unknown("rule", name, item.span, rules)),
             }
         }
         names
@@ -398,33 +392,14 @@ impl<'a> Reader<'a> {
         };
         let axes: Vec<&Parameter> = space.actions[action].parameters.iter().filter(|p| p.axis).collect();
         let mut values: Vec<Option<Value>> = vec![None; axes.len()];
-        let mut given: Vec<Option<ast::Span>> = vec![None; axes.len()];
+        let names: Vec<&str> = axes.iter().map(|axis| &*axis.name).collect();
+        let mut given = vec![None; axes.len()];
         let mut sound = true;
         for (position, argument) in call.args.iter().enumerate() {
-            let slot = match &argument.name {
-                None => Some(position).filter(|position| *position < axes.len()),
-                Some(name) => axes.iter().position(|axis| *axis.name == *name.text),
-            };
-            let Some(slot) = slot else {
-                self.report(match &argument.name {
-                    Some(name) => {
-                        unknown("argument", &name.text, name.span, axes.iter().map(|axis| &*axis.name))
-                    }
-                    None => {
-                        let message = format!("`{}` takes {} arguments", call.name.text, axes.len());
-                        Diagnostic::error(code::ARGUMENTS, message).at(argument.value.span, "one too many")
-                    }
-                });
+            let Some(slot) = self.slot(call, position, &names, &mut given) else {
                 sound = false;
                 continue;
             };
-            if let Some(first) = given[slot].replace(argument.value.span) {
-                let message = format!("`{}` is given twice", axes[slot].name);
-                let error = Diagnostic::error(code::DUPLICATE, message).at(argument.value.span, "again here");
-                self.report(error.beside(first, "first here").help("remove one of them"));
-                sound = false;
-                continue;
-            }
             values[slot] = self.take(value(space, &argument.value, axes[slot].ty));
             sound &= values[slot].is_some();
         }

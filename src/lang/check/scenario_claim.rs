@@ -5,8 +5,8 @@ use crate::check::report::Report;
 use crate::check::scenario::Reader;
 use crate::check::scenario_value::figure;
 use crate::model::code;
-use crate::model::scenario::{Avoidability, Claim, DRIVERS, ENDS, Figure, MODULES, Obstacle, ObstacleKind};
-use crate::model::vocabulary::{Fact, Priority, ScenarioClaim, Word};
+use crate::model::scenario::{Claim, DRIVERS, ENDS, Figure, MODULES, Obstacle};
+use crate::model::vocabulary::{Avoidability, Fact, ObstacleKind, Priority, ScenarioClaim, Word};
 use crate::syntax::ast::{BinaryOp, ClauseKind, Comparison};
 use crate::syntax::{Diagnostic, ast, listed};
 use avastra_base::units::Dimension;
@@ -34,8 +34,7 @@ impl Reader<'_> {
                 let (obstacle, _) = self.clauses(&expect.clauses, false)?;
                 Some(Claim::Minimal { obstacle })
             }
-            ast::ExprKind::Name(name) if Avoidability::ALL.iter().any(|class| class.name() == name) => {
-                let class = Avoidability::ALL.into_iter().find(|class| class.name() == name)?;
+            ast::ExprKind::Name(name) if let Some(class) = Avoidability::from_name(name) => {
                 self.avoidability(class, expect)
             }
             ast::ExprKind::Binary { op: BinaryOp::Compare(Comparison::Equal), left, right, .. } => {
@@ -86,14 +85,9 @@ impl Reader<'_> {
 
     /// `ego`, `other` or `none`.
     fn priority(&mut self, value: &ast::Expr) -> Option<Priority> {
-        let ast::ExprKind::Name(name) = &value.kind else {
-            let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted `ego`, `other` or `none`");
-            return self.reject(error.at(value.span, "not a name"));
-        };
-        let Some(priority) = Priority::from_name(name) else {
-            return self.reject(unknown("priority", name, value.span, Priority::names()));
-        };
-        Some(priority)
+        let name = self.name_of(value, "`ego`, `other` or `none`")?;
+        let error = || unknown("priority", name, value.span, Priority::names());
+        self.take(Priority::from_name(name).ok_or_else(error))
     }
 
     /// `perception`, or `[tracking, planning]`.
@@ -115,14 +109,11 @@ impl Reader<'_> {
     ) -> Option<Vec<String>> {
         let mut words = Vec::new();
         for item in items {
-            let ast::ExprKind::Name(name) = &item.kind else {
-                let error = Diagnostic::error(code::TYPE_MISMATCH, format!("wanted {wanted}"));
-                return self.reject(error.at(item.span, "not a name"));
-            };
-            if !known.contains(&name.as_str()) {
+            let name = self.name_of(item, wanted)?;
+            if !known.contains(&name) {
                 return self.reject(unknown(what, name, item.span, known.iter().copied()));
             }
-            words.push(name.clone());
+            words.push(name.to_owned());
         }
         Some(words)
     }
@@ -158,9 +149,8 @@ impl Reader<'_> {
                 (ClauseKind::With, ast::ExprKind::Numbered { name, number })
                     if number.parse::<u32>().is_ok_and(|number| number > 0) =>
                 {
-                    let kind = ObstacleKind::ALL.into_iter().find(|kind| kind.name() == name.text);
-                    let Some(kind) = kind else {
-                        let words = ObstacleKind::ALL.map(ObstacleKind::name);
+                    let Some(kind) = ObstacleKind::from_name(&name.text) else {
+                        let words = ObstacleKind::names();
                         return self.reject(unknown("road user", &name.text, name.span, words));
                     };
                     obstacle = number.parse().ok().map(|number| Obstacle { kind, number });

@@ -42,8 +42,8 @@ pub use row::locals;
 pub use row::{Reach, Row};
 pub use rules::{NoStart, RulesInForce, UnknownRule};
 pub use scenario::{
-    Avoidability, Claim, DRIVERS, ENDS, Figure, MODULES, Obstacle, ObstacleKind, Origin, Scenario,
-    ScenarioStart, ScenarioStep, Trigger, ticks_s,
+    Claim, DRIVERS, ENDS, Figure, MODULES, Obstacle, Origin, Scenario, ScenarioStart, ScenarioStep, Trigger,
+    ticks_s,
 };
 pub use space::{
     ActionDef, BodyDef, BodyWord, COUNTED, Domain, EffectDef, EnumDef, EpisodeDef, FnDef, GroupDef, Initial,
@@ -52,3 +52,4 @@ pub use space::{
 };
 pub(crate) use value::STATE_MAX;
 pub use value::{EnumIndex, Memory, Type, Value};
+pub use vocabulary::{Avoidability, ObstacleKind};

@@ -31,6 +31,16 @@ pub enum Reach {
     Dead { rules: Vec<usize>, reason: String },
 }
 
+impl Reach {
+    /// The ranges that the rules leave to the drawn numbers; `None` if the row is dead.
+    pub fn ranges(&self) -> Option<&[(Arc<str>, Interval)]> {
+        match self {
+            Reach::Open(ranges) => Some(ranges),
+            Reach::Dead { .. } => None,
+        }
+    }
+}
+
 /// Values of all parameters of an action: the axes of the row, and the drawn values. A parameter that is
 /// not drawn yet holds a placeholder.
 pub fn locals(action: &ActionDef, row: &Row, drawn: &[(Arc<str>, Value)]) -> Vec<Value> {

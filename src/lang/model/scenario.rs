@@ -7,7 +7,7 @@ use crate::model::expr::{Expr, ExprKind};
 use crate::model::limits::TICK_MS;
 use crate::model::space::COUNTED;
 use crate::model::value::{Memory, Value};
-use crate::model::vocabulary::Priority;
+use crate::model::vocabulary::{Avoidability, ObstacleKind, Priority, Word};
 
 /// One timeline over a space.
 #[derive(Debug, Clone, PartialEq)]
@@ -167,32 +167,6 @@ impl Scenario {
     }
 }
 
-/// Whether careful drivers avoid a collision.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Avoidability {
-    /// A careful reference driver avoids it.
-    Avoidable,
-    /// No careful driver avoids it, but an evasive manoeuvre without any delay does.
-    BeyondReference,
-    /// Nothing that was tried avoids it.
-    Unavoidable,
-}
-
-impl Avoidability {
-    pub const ALL: [Avoidability; 3] =
-        [Avoidability::Avoidable, Avoidability::BeyondReference, Avoidability::Unavoidable];
-
-    /// The word for it in scenarios.
-    pub fn name(self) -> &'static str {
-        match self {
-            Avoidability::Avoidable => "avoidable",
-            Avoidability::BeyondReference => "beyond_reference",
-            Avoidability::Unavoidable => "unavoidable",
-        }
-    }
-}
-
 /// The modules of a driving system that can be at fault, in the words of `expect cause == …`.
 pub const MODULES: [&str; 8] =
     ["localization", "perception", "tracking", "prediction", "planning", "latency", "control", "emergency"];
@@ -259,26 +233,7 @@ pub struct Obstacle {
     pub number: u32,
 }
 
-/// What a claim says of the body of a road user.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ObstacleKind {
-    /// Nothing.
-    Npc,
-    Pedestrian,
-    Vehicle,
-}
-
 impl ObstacleKind {
-    pub const ALL: [ObstacleKind; 3] = [ObstacleKind::Npc, ObstacleKind::Pedestrian, ObstacleKind::Vehicle];
-
-    pub fn name(self) -> &'static str {
-        match self {
-            ObstacleKind::Npc => "npc",
-            ObstacleKind::Pedestrian => "pedestrian",
-            ObstacleKind::Vehicle => "vehicle",
-        }
-    }
-
     /// Whether the word fits a road user.
     pub fn fits(self, is_vehicle: bool) -> bool {
         match self {

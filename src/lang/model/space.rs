@@ -9,7 +9,7 @@ use crate::model::expr::Expr;
 use crate::model::interval::Interval;
 use crate::model::meaning::Meaning;
 use crate::model::on_route::Stretch;
-use crate::model::row::{Reach, Row};
+use crate::model::row::Row;
 use crate::model::rules::{Bound, Clause};
 use crate::model::value::{EnumIndex, Type, Value};
 use crate::model::vocabulary::{
@@ -449,13 +449,8 @@ impl Space {
     /// What the rules leave of a parameter's range on a road, over all rows of its action that can run
     /// there; `None` if none can, or the parameter has no range.
     pub fn range_on(&self, action: usize, parameter: &Parameter, road: usize) -> Option<Interval> {
-        let reaches = self.rows_of(action).iter().map(|row| &row.roads[road]);
-        let kept = reaches.filter_map(|reach| match reach {
-            Reach::Open(ranges) => {
-                ranges.iter().find(|(name, _)| *name == parameter.name).map(|(_, interval)| *interval)
-            }
-            Reach::Dead { .. } => None,
-        });
+        let ranges = self.rows_of(action).iter().filter_map(|row| row.roads[road].ranges()).flatten();
+        let kept = ranges.filter(|(name, _)| *name == parameter.name).map(|(_, interval)| *interval);
         kept.reduce(|all, interval| all.hull(&interval))
     }
 

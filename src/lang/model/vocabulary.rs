@@ -434,6 +434,23 @@ words! {
 }
 
 words! {
+    Avoidability "Whether careful drivers avoid a collision.":
+    #[serde(rename = "avoidable")]
+    Avoidable "avoidable" = "A careful reference driver avoids it.",
+    #[serde(rename = "beyond_reference")]
+    BeyondReference "beyond_reference" = "No careful driver avoids it, but an evasive manoeuvre without any delay does.",
+    #[serde(rename = "unavoidable")]
+    Unavoidable "unavoidable" = "Nothing that was tried avoids it.",
+}
+
+words! {
+    ObstacleKind "What a claim says of the body of a road user.":
+    Npc "npc" = "Nothing.",
+    Pedestrian "pedestrian",
+    Vehicle "vehicle",
+}
+
+words! {
     /// The paper's "lane-change" group.
     Then "Whether a vehicle keeps its lane or changes it.": Keep, Change
 }

@@ -8,7 +8,7 @@ use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::vocabulary::Fact;
 use crate::model::{
     AMBIENT_MAX, COMMANDED_MAX, EGO_ACCELERATION_MPS2_MAX, FnDef, Interval, JUNCTION_AHEAD_M_MAX, RoadFacts,
-    SPEED_MPS_MAX, Value,
+    SPEED_MPS_MAX, Type, Value,
 };
 use crate::prove::moment::Case;
 use crate::prove::sums::{difference, is_same, lacks_value};
@@ -92,6 +92,20 @@ impl Values {
             Values::Variants(set) => set,
             Values::Truth { may_hold, may_fail } => u128::from(may_fail) | u128::from(may_hold) << 1,
             Values::Number(_) => 0,
+        }
+    }
+
+    /// The only value, as a literal of this type; `None` if there are several.
+    pub fn literal(self, ty: Type) -> Option<ExprKind> {
+        match (self, ty) {
+            (Values::Number(interval), _) => interval.single().map(ExprKind::Number),
+            (Values::Variants(set), Type::Enum(of)) if set.is_power_of_two() => {
+                Some(ExprKind::Variant(of, set.trailing_zeros() as usize))
+            }
+            (Values::Truth { may_hold, may_fail }, _) if may_hold != may_fail => {
+                Some(ExprKind::Bool(may_hold))
+            }
+            (Values::Truth { .. } | Values::Variants(_), _) => None,
         }
     }
 
@@ -317,7 +331,7 @@ fn compare(op: Comparison, left: Values, right: Values) -> Values {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Facts, Memory, Type, evaluate};
+    use crate::model::{Facts, Memory, evaluate};
     use crate::syntax::ast::{FileId, Span};
     use proptest::prelude::*;
 

@@ -31,7 +31,7 @@ mod witness;
 
 pub(crate) use clock::{forbids, next_rows, shortest_way};
 pub use cut::{Removal, removals};
-pub(crate) use enclose::{Known, VARIANTS_MAX, Values, enclose};
+pub(crate) use enclose::{Known, VARIANTS_MAX, enclose};
 pub(crate) use reach::{product_size, rows};
 pub(crate) use realise::with_dead;
 pub use realise::{Realisable, Realised, RunsIn, realise};
@@ -40,7 +40,7 @@ pub use witness::{Witness, witness};
 
 use std::sync::Arc;
 
-use crate::model::{Interval, Reach, Road, Row, Space, effort};
+use crate::model::{Interval, Road, Row, Space, effort};
 use crate::syntax::{Diagnostic, listed};
 
 /// A row on a road where it may run, with the ranges that rules leave to its numbers.
@@ -53,10 +53,7 @@ struct OpenRow<'a> {
 /// These rows on each road where they may run.
 fn open_rows<'a>(space: &'a Space, rows: &'a [Row]) -> impl Iterator<Item = OpenRow<'a>> {
     let all = rows.iter().flat_map(move |row| space.roads.iter().zip(&row.roads).map(move |on| (row, on)));
-    all.filter_map(|(row, (road, reach))| match reach {
-        Reach::Open(ranges) => Some(OpenRow { row, road, ranges }),
-        Reach::Dead { .. } => None,
-    })
+    all.filter_map(|(row, (road, reach))| Some(OpenRow { row, road, ranges: reach.ranges()? }))
 }
 
 /// The names of rules, as a list in words.

@@ -15,7 +15,7 @@ use crate::model::{
     ActionDef, End, EpisodeDef, Interval, LIMIT_PART_MAX, NEAR_JUNCTION_M, RoadFacts, Row, RuleBody,
     RulesInForce, SPAWN_SPEED_MPS, SPEED_MPS_MAX, Space, SpawnDef, Stretch, Type, WordExpr, code, effort,
 };
-use crate::prove::enclose::{Known, enclose, fact_range};
+use crate::prove::enclose::{Known, bits, enclose, fact_range};
 use crate::prove::sums::oppose;
 use crate::syntax::Diagnostic;
 use avastra_base::units::Rational;
@@ -132,13 +132,7 @@ fn newcomer(spawn: &SpawnDef, known: &Known<'_>, lands: bool) -> Case {
     let verbs = match &spawn.verb {
         WordExpr::Fixed(verb) => vec![*verb],
         WordExpr::Of(expr, words) => {
-            let may_be = enclose(expr, known).variants();
-            words
-                .iter()
-                .enumerate()
-                .filter(|(word, _)| may_be >> word & 1 == 1)
-                .map(|(_, verb)| *verb)
-                .collect()
+            bits(enclose(expr, known).variants()).map(|variant| words[variant]).collect()
         }
     };
     let Case { mut numbers, words, not_words } = known.case.cloned().unwrap_or_default();

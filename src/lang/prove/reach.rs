@@ -16,7 +16,8 @@ use crate::model::{
 };
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::prove::moment::{Case, may_hold_together, newcomers, ranges_named};
-use crate::syntax::{Diagnostic, listed};
+use crate::prove::{distinct, product, rule_names};
+use crate::syntax::Diagnostic;
 use avastra_base::units::Unit;
 
 /// Each row allows all proofs together this many more steps for each road, counting up to `ROADS_MAX` roads. A row under a
@@ -128,20 +129,20 @@ impl Pace {
 
 /// The axes, by their places among the parameters, that decide what [`RowRules::reach`] says of a row.
 fn deciding_axes(space: &Space, action: usize) -> Vec<usize> {
-    let parameters = &space.actions[action].parameters;
-    let mut of_spawns: Vec<usize> = Vec::new();
-    for spawn in space.actions[action].spawns() {
+    let definition = &space.actions[action];
+    let of_spawns = definition.spawns().flat_map(|spawn| {
         let verb = match &spawn.verb {
             WordExpr::Fixed(_) => None,
             WordExpr::Of(expr, _) => Some(expr),
         };
-        of_spawns.extend([&spawn.speed, &spawn.distance].into_iter().chain(verb).flat_map(rules::locals));
-    }
+        [&spawn.speed, &spawn.distance].into_iter().chain(verb).flat_map(rules::locals)
+    });
+    let of_spawns: Vec<usize> = of_spawns.collect();
     let decides = |local: &usize| {
         let is_named = space.clauses[action].iter().any(|clause| clause.needs(*local));
-        parameters[*local].axis && (is_named || of_spawns.contains(local))
+        definition.parameters[*local].axis && (is_named || of_spawns.contains(local))
     };
-    (0..parameters.len()).filter(decides).collect()
+    (0..definition.parameters.len()).filter(decides).collect()
 }
 
 /// All values that an expression of the row's action may have by the parameters' own ranges and
@@ -183,41 +184,33 @@ fn products(space: &Space, action: &ActionDef) -> Vec<Vec<Value>> {
             (Domain::Values(values), true) => values.as_slice(),
             _ => &[Value::Bool(false)],
         };
-        let mut longer = Vec::with_capacity(rows.len() * values.len());
-        for row in &rows {
-            for value in values {
-                let mut locals = row.clone();
-                locals.push(*value);
-                let kept = match (&parameter.condition, parameter.axis) {
-                    (Some(condition), true) => {
-                        evaluate(condition, &space.functions, &Facts::new(&locals, &Memory::default()))
-                            .truth()
-                    }
-                    _ => true,
-                };
-                if kept {
-                    longer.push(locals);
-                }
-            }
+        rows = product(&rows, values, Vec::push);
+        if let Some(condition) = parameter.condition.as_ref().filter(|_| parameter.axis) {
+            let none = Memory::default();
+            rows.retain(|locals| evaluate(condition, &space.functions, &Facts::new(locals, &none)).truth());
         }
-        rows = longer;
     }
     rows
 }
 
 impl<'a> RowRules<'a> {
     pub(crate) fn reach(self) -> Reach {
-        let parameters = &self.space.actions[self.row.action].parameters;
-        if let Some(locals) = self.settle() {
-            let drawn = parameters.iter().zip(locals).filter(|(parameter, _)| !parameter.axis);
-            let ranges = drawn.filter_map(|(parameter, values)| match values {
-                Values::Number(interval) => Some((parameter.name.clone(), interval)),
-                Values::Truth { .. } | Values::Variants(_) => None,
-            });
-            return Reach::Open(ranges.collect());
+        if let Some(ranges) = self.ranges() {
+            return Reach::Open(ranges);
         }
         let rules = self.conflict(&|fewer| fewer.settle().is_none());
         Reach::Dead { reason: self.reason(&rules), rules }
+    }
+
+    /// The ranges that the rules in force leave to the drawn numbers; `None` if they leave no values.
+    pub(crate) fn ranges(self) -> Option<Vec<(Arc<str>, Interval)>> {
+        let parameters = self.space.actions[self.row.action].parameters.iter();
+        let drawn = parameters.zip(self.settle()?).filter(|(parameter, _)| !parameter.axis);
+        let ranges = drawn.filter_map(|(parameter, values)| match values {
+            Values::Number(interval) => Some((parameter.name.clone(), interval)),
+            Values::Truth { .. } | Values::Variants(_) => None,
+        });
+        Some(ranges.collect())
     }
 
     /// Rules that forbid something together, of which none can be spared; `forbid` says whether some still do.
@@ -336,11 +329,7 @@ impl<'a> RowRules<'a> {
         match (parts.as_slice(), without_figures.as_slice()) {
             (_, []) => {}
             ([], [only]) => parts.push(self.without_figures(only)),
-            _ => {
-                let names: Vec<&str> =
-                    rules.iter().map(|rule| self.space.rules[*rule].name.as_str()).collect();
-                parts.push(format!("{} cannot hold together", listed(&names)));
-            }
+            _ => parts.push(format!("{} cannot hold together", rule_names(self.space, rules))),
         }
         let conditions: Vec<&Expr> = rules
             .iter()
@@ -484,8 +473,7 @@ const REASONS_MAX: usize = 3;
 /// One error for several actions that the same rules leave no row.
 fn error_of_many(space: &Space, gone: &[Gone<'_>]) -> Diagnostic {
     let rules = gone[0].rules;
-    let names: Vec<&str> = rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
-    let leave = if names.len() == 1 { "leaves" } else { "leave" };
+    let leave = if rules.len() == 1 { "leaves" } else { "leave" };
     let mut named: Vec<String> = gone.iter().take(ACTIONS_MAX).map(Gone::what).collect();
     if gone.len() > ACTIONS_MAX {
         named.push(format!("{} other actions", gone.len() - ACTIONS_MAX));
@@ -495,19 +483,14 @@ fn error_of_many(space: &Space, gone: &[Gone<'_>]) -> Diagnostic {
     let message = format!("{what} can never run on {}", any_road(space));
     let error = Diagnostic::error(code::DEAD, message).at(
         space.rules[rules[0]].span,
-        format!("{} {leave} {} actions no value", listed(&names), gone.len()),
+        format!("{} {leave} {} actions no value", rule_names(space, rules), gone.len()),
     );
     let error =
         rules[1..].iter().fold(error, |error, rule| error.beside(space.rules[*rule].span, "and this rule"));
     let shown = gone.iter().take(ACTIONS_MAX);
     let error = shown.fold(error, |error, one| error.beside(one.action.span, numbers(&one.rows)));
-    let mut reasons: Vec<&str> = Vec::new();
-    for one in gone {
-        if !reasons.contains(&one.reason) {
-            reasons.push(one.reason);
-        }
-    }
-    let error = reasons.iter().take(REASONS_MAX).fold(error, |error, reason| error.note(*reason));
+    let reasons = distinct(gone.iter().map(|one| one.reason)).into_iter();
+    let error = reasons.take(REASONS_MAX).fold(error, |error, reason| error.note(reason));
     error.help(HELP)
 }
 
@@ -527,8 +510,8 @@ fn report_masked(space: &Space, action: &ActionDef, left: &[&Row]) -> Vec<Diagno
         let Some(Reach::Dead { rules, reason }) = masked.first().map(|row| &row.roads[index]) else {
             continue;
         };
-        let names: Vec<&str> = rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
-        let message = format!("`{}` is masked on `{}` by {}", action.name, road.name, listed(&names));
+        let by = rule_names(space, rules);
+        let message = format!("`{}` is masked on `{}` by {by}", action.name, road.name);
         let remark = Diagnostic::remark(code::MASKED, message).at(action.span, numbers(&masked));
         diagnostics.push(remark.note(reason.clone()));
     }

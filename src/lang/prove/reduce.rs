@@ -2,7 +2,7 @@
 
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::{FnDef, Type, effort};
-use crate::prove::enclose::{Known, Values, enclose};
+use crate::prove::enclose::{Known, enclose};
 use crate::syntax::ast::Span;
 
 /// Steps for the copy of one operation. Copies are kept and written as text, so the limit of steps also bounds memory.
@@ -88,15 +88,7 @@ fn fold(expr: Expr) -> Expr {
         return expr;
     }
     let known = Known { functions: &[], locals: &[], cells: &[], road: None, case: None };
-    let kind = match (enclose(&expr, &known), expr.ty) {
-        (Values::Number(interval), _) => interval.single().map(ExprKind::Number),
-        (Values::Variants(set), Type::Enum(of)) if set.is_power_of_two() => {
-            Some(ExprKind::Variant(of, set.trailing_zeros() as usize))
-        }
-        (Values::Truth { may_hold, may_fail }, _) if may_hold != may_fail => Some(ExprKind::Bool(may_hold)),
-        _ => None,
-    };
-    match kind {
+    match enclose(&expr, &known).literal(expr.ty) {
         Some(kind) => Expr { kind, ..expr },
         None => expr,
     }

@@ -1,7 +1,8 @@
 //! Comparisons as sums: what two sides share is cancelled, and comparisons of the same facts are held against each other.
 
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
-use crate::model::{End, Interval, Type, effort};
+use crate::model::rules::allowed;
+use crate::model::{Interval, Type, effort};
 use crate::prove::enclose::{Known, enclose};
 use avastra_base::units::Rational;
 
@@ -162,15 +163,12 @@ fn is_fixed(term: &Expr) -> bool {
 
 /// What a comparison with a limit leaves of the left side; `None` if that is everything.
 fn leaves(op: Comparison, limit: Rational, is_exact: bool) -> Option<Interval> {
-    let end = |is_closed| End::At(limit, is_closed);
-    Some(match op {
-        Comparison::Less => Interval { low: End::Unbounded, high: end(false) },
-        Comparison::LessEqual => Interval { low: End::Unbounded, high: end(true) },
-        Comparison::Greater => Interval { low: end(false), high: End::Unbounded },
-        Comparison::GreaterEqual => Interval { low: end(true), high: End::Unbounded },
-        Comparison::Equal if is_exact => Interval::point(limit),
-        Comparison::Equal | Comparison::NotEqual => return None,
-    })
+    let is_told = match op {
+        Comparison::Less | Comparison::LessEqual | Comparison::Greater | Comparison::GreaterEqual => true,
+        Comparison::Equal => is_exact,
+        Comparison::NotEqual => false,
+    };
+    is_told.then(|| allowed(op, &Interval::point(limit)))
 }
 
 /// Whether a sum has surely no value, because of a division by 0. Differences that only exact numbers make 0 are not

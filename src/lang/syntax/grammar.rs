@@ -2,6 +2,10 @@
 //!
 //! `parse`, `build` and `expression` use `Rule`; nothing outside `syntax` does.
 
+use pest::Parser;
+use pest::error::{ErrorVariant, InputLocation};
+use pest::iterators::Pairs;
+
 use crate::syntax::ast::{Arithmetic, BinaryOp, Comparison, UnaryOp};
 use crate::syntax::keyword::keywords;
 use crate::syntax::operator::Operator;
@@ -10,6 +14,20 @@ use crate::syntax::operator::Operator;
 #[derive(pest_derive::Parser)]
 #[grammar = "../../grammar/ava.pest"]
 pub struct AvaParser;
+
+/// Reads one declaration.
+///
+/// # Errors
+/// The byte at which the reading fails, and what was expected there.
+pub fn lone_item(text: &str) -> Result<Pairs<'_, Rule>, (usize, Vec<Rule>)> {
+    AvaParser::parse(Rule::lone_item, text).map_err(|error| {
+        let (InputLocation::Pos(at) | InputLocation::Span((at, _))) = error.location;
+        match error.variant {
+            ErrorVariant::ParsingError { positives, .. } => (at, positives),
+            ErrorVariant::CustomError { .. } => (at, Vec::new()),
+        }
+    })
+}
 
 /// What an author calls a name.
 pub const NAME: &str = "a name";

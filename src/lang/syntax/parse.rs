@@ -5,14 +5,13 @@
 //! read alone, for a message of its own. The tree holds everything that could be read.
 
 use pest::Parser;
-use pest::error::{ErrorVariant, InputLocation};
 use pest::iterators::Pair;
 
 use crate::syntax::ast::{Doc, Field, File, FileId, Item, Span};
 use crate::syntax::build::{Builder, Built, end_of};
 use crate::syntax::diagnostic::{enumerated, one_of};
 use crate::syntax::foreign::{Failure, foreign, foreign_declaration};
-use crate::syntax::grammar::{AvaParser, NAME, Rule, VARIANT, continues_expression, words};
+use crate::syntax::grammar::{AvaParser, NAME, Rule, VARIANT, continues_expression, lone_item, words};
 use crate::syntax::keyword::{CLAUSES, DECLARATIONS, OPERATORS};
 use crate::syntax::scan::{Comment, Scan, scan};
 use crate::syntax::{Diagnostic, code, nearest};
@@ -172,21 +171,14 @@ impl Reader<'_> {
 
     /// Where the reading of one declaration fails, and what was expected there, in the author's words.
     fn failure(&self, start: usize, end: usize) -> Failure {
-        let beyond = |at| Failure { at, expected: vec![DECLARATION], continues: false };
-        match AvaParser::parse(Rule::lone_item, &self.text[start..end]) {
+        match lone_item(&self.text[start..end]) {
             // The slice can be read alone, so the mistake comes after it: point at its end.
-            Ok(_) => beyond(end),
-            Err(error) => {
-                let (InputLocation::Pos(at) | InputLocation::Span((at, _))) = error.location;
-                match error.variant {
-                    ErrorVariant::ParsingError { positives, .. } => Failure {
-                        at: start + at,
-                        expected: in_words(&positives),
-                        continues: positives.iter().any(|rule| continues_expression(*rule)),
-                    },
-                    ErrorVariant::CustomError { .. } => beyond(start + at),
-                }
-            }
+            Ok(_) => Failure { at: end, expected: vec![DECLARATION], continues: false },
+            Err((at, rules)) => Failure {
+                at: start + at,
+                expected: in_words(&rules),
+                continues: rules.iter().any(|rule| continues_expression(*rule)),
+            },
         }
     }
 

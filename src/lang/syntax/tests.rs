@@ -338,24 +338,4 @@ proptest! {
         let once = format(FileId(0), &text).unwrap();
         prop_assert_eq!(format(FileId(0), &once).unwrap(), once);
     }
-
-    #[test]
-    fn any_bytes_are_read_to_their_end(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
-        let text = String::from_utf8_lossy(&bytes);
-        rendered(&text);
-        rendered(&format!("language 1\n{text}"));
-    }
-
-    /// Words of the language in any order reach farther into the grammar than bytes do.
-    #[test]
-    fn any_words_are_read_to_their_end(words in prop::collection::vec(prop::sample::select(&WORDS[..]), 0..60)) {
-        rendered(&format!("language 1\n{}", words.join(" ")));
-        rendered(&words.join(""));
-    }
 }
-
-const WORDS: [&str; 40] = [
-    "action", "a", "(", ")", "{", "}", "[", "]", ":", ",", "=", "==", "=>", "->", "|", "<", "..", "-", "+",
-    "not", "and", "implies", "in", "match", "_", "each", "any", "set", "spawn", "ahead", "rule", "on", "12",
-    "m", "\"t\"", "\n", "\nlet", "// c\n", "lane", "scenario",
-];

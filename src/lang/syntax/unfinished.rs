@@ -5,11 +5,10 @@
 //! not parse, one of the tokens is added that pest says would go on. Text behind the place is ignored.
 
 use pest::Parser;
-use pest::error::{ErrorVariant, InputLocation};
 
 use crate::syntax::ast::{FileId, ItemKind};
 use crate::syntax::build::Builder;
-use crate::syntax::grammar::{AvaParser, Rule, continues_expression, opening_words};
+use crate::syntax::grammar::{AvaParser, Rule, continues_expression, lone_item, opening_words};
 use crate::syntax::scan::scan;
 use crate::syntax::{Diagnostic, code};
 
@@ -161,19 +160,8 @@ fn ended(mut text: String) -> Option<ItemKind> {
 /// Reads one declaration. `Ok(None)` if it parses, and its tree cannot be built.
 ///
 /// # Errors
-/// The byte at which the reading fails, and what was expected there.
+/// As [`lone_item`].
 fn read(text: &str) -> Result<Option<ItemKind>, (usize, Vec<Rule>)> {
-    match AvaParser::parse(Rule::lone_item, text) {
-        Ok(mut pairs) => {
-            let item = pairs.next().and_then(|whole| whole.into_inner().next());
-            Ok(item.and_then(|item| Builder::new(FileId::default()).item(item).ok()))
-        }
-        Err(error) => {
-            let (InputLocation::Pos(at) | InputLocation::Span((at, _))) = error.location;
-            match error.variant {
-                ErrorVariant::ParsingError { positives, .. } => Err((at, positives)),
-                ErrorVariant::CustomError { .. } => Err((at, Vec::new())),
-            }
-        }
-    }
+    let item = lone_item(text)?.next().and_then(|whole| whole.into_inner().next());
+    Ok(item.and_then(|item| Builder::new(FileId::default()).item(item).ok()))
 }

@@ -6,8 +6,8 @@
 use crate::model::{End, Interval};
 use avastra_base::units::Rational;
 
-use crate::model::expr::Comparison;
 use crate::model::policy::{Condition, VARIABLES, VariableKind};
+use crate::model::rules::allowed;
 
 /// A box: the values that are left of each variable, in the order of [`VARIABLES`].
 #[derive(Debug, Clone, PartialEq)]
@@ -113,17 +113,7 @@ impl Side {
             }
             (Side::Numbers(interval), _) => {
                 let Some(value) = Rational::from_f64(condition.value) else { return *self };
-                let below = |closed| Interval { low: End::Unbounded, high: End::At(value, closed) };
-                let above = |closed| Interval { low: End::At(value, closed), high: End::Unbounded };
-                let wanted = match condition.comparison {
-                    Comparison::Less => below(false),
-                    Comparison::LessEqual => below(true),
-                    Comparison::Greater => above(false),
-                    Comparison::GreaterEqual => above(true),
-                    Comparison::Equal => Interval::point(value),
-                    // The checker of lines allows `!=` only for words.
-                    Comparison::NotEqual => Interval::ALL,
-                };
+                let wanted = allowed(condition.comparison, &Interval::point(value));
                 Side::Numbers(interval.intersect(&wanted))
             }
             (Side::Words(_), VariableKind::Quantity { .. }) => *self,
@@ -164,6 +154,7 @@ const NOTHING: Interval = Interval { low: End::At(Rational::ONE, true), high: En
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::expr::Comparison;
     use crate::model::policy::variable_index;
     use proptest::prelude::*;
 

@@ -135,10 +135,8 @@ impl Reader<'_> {
                 }
             },
             ExprKind::Call(function, arguments) => {
-                let mut given = Vec::with_capacity(arguments.len());
-                for argument in arguments {
-                    given.push(self.read(argument, locals)?);
-                }
+                let given = arguments.iter().map(|argument| self.read(argument, locals));
+                let given: Vec<Form> = given.collect::<Option<_>>()?;
                 let body = &self.functions[*function].body;
                 // A function knows nothing but its arguments.
                 let known = given.iter().map(|form| match form {
@@ -205,11 +203,8 @@ impl Reader<'_> {
             ExprKind::Match { subject, arm_of, arms } => match self.read(subject, locals)? {
                 Form::Known(value) => self.read(&arms[arm_of[value.variant()]], locals)?,
                 _ => {
-                    let mut forms = Vec::with_capacity(arms.len());
-                    for arm in arms {
-                        forms.push(self.read(arm, locals)?);
-                    }
-                    join(forms)?
+                    let forms = arms.iter().map(|arm| self.read(arm, locals));
+                    join(forms.collect::<Option<Vec<Form>>>()?)?
                 }
             },
         })
