@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use crate::action::tests::Plain;
-use crate::action::{ActionTable, Offer, Situation};
+use crate::action::{ActionTable, Situation};
 use avastra_lang::check::{Loaded, ReadError, load};
 use avastra_lang::model::{Reach, RulesInForce};
 use avastra_lang::prove::witness;
@@ -56,7 +56,7 @@ fn a_chain_of_equalities_is_solved_from_its_end() {
         let situation =
             Situation { memory: &memory, road, rules: &rules, surroundings: &Plain(0.0), seed: 0, step };
         let offer = ActionTable::new(space.clone()).offer(&situation, row.index);
-        assert!(matches!(offer, Offer::Legal(_)), "{offer:?}");
+        assert!(offer.is_ok(), "{offer:?}");
     }
 }
 

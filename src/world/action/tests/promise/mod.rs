@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 use crate::action::tests::Plain;
 use crate::action::tests::witnesses::compiled;
-use crate::action::{ActionTable, Draw, Offer, Situation};
+use crate::action::{ActionTable, Draw, Situation};
 use avastra_base::rng;
 use avastra_base::rng::Stream;
 use avastra_lang::model::{Domain, Memory, Reach, Row, RulesInForce, Space, Value, code};
@@ -353,8 +353,7 @@ fn played(space: &Arc<Space>, made: &Made, found: &[Diagnostic], draws: u32, see
                     tried(&table, &situation, row, found, made);
                 }
                 let mut legal = Vec::new();
-                for offer in table.offers(&situation) {
-                    let Offer::Legal(draw) = offer else { continue };
+                for draw in table.offers(&situation).into_iter().filter_map(Result::ok) {
                     count += 1;
                     let row = &space.rows[draw.row];
                     let after = before.after(space, row, &draw, made.each_step);
