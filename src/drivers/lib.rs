@@ -41,7 +41,6 @@ mod reactive;
 mod reference;
 mod registry;
 mod selected;
-mod settings;
 mod status;
 #[cfg(test)]
 mod testing;
