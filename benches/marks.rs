@@ -107,9 +107,7 @@ fn crowded(scene: &Arc<Scene>) -> World {
     let start = Start {
         ego_mps: avastra::model::START_MPS,
         time: TimeOfDay::Noon,
-        rain: Level::None,
-        fog: Level::None,
-        wetness: Level::None,
+        sky: [Level::None; 3],
         signal_phase_s: 0.0,
         seed: 1,
         ambient: 0,

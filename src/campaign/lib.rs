@@ -11,7 +11,7 @@
 //! use avastra_campaign::run::Arena;
 //! use avastra_drivers::{Selected, by_name};
 //! use avastra_lang::check::{ReadError, load};
-//! use avastra_world::action::{ActionTable, Offer};
+//! use avastra_world::action::ActionTable;
 //!
 //! let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()));
 //! let space = load(Path::new("../../scenarios/avastra45.ava"), &read)?.space.expect("it has no mistakes");
@@ -20,12 +20,8 @@
 //!
 //! // The episode of seed 1: at each step the last legal row is carried out.
 //! let mut last_legal = |moment: &Moment| {
-//!     let offers = arena.table().offers(moment.situation).into_iter().rev();
-//!     let mut legal = offers.filter_map(|offer| match offer {
-//!         Offer::Legal(draw) => Some(draw),
-//!         Offer::Refused(_) => None,
-//!     });
-//!     legal.next().map_or(Choice::Pass, Choice::Act)
+//!     let mut offers = arena.table().offers(moment.situation).into_iter().rev();
+//!     offers.find_map(Result::ok).map_or(Choice::Pass, Choice::Act)
 //! };
 //! let log = episode::run(&arena.setup(0, 1), &mut last_legal, &mut |_, _, _| {});
 //!

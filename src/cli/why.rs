@@ -7,7 +7,7 @@ use avastra_campaign::emit;
 use avastra_campaign::run::road_named;
 use avastra_lang::check::state_argument::legal_memory_from;
 use avastra_lang::model::{Memory, RuleBody, RulesInForce, Space, StateDef};
-use avastra_world::action::{ActionTable, Offer, Refusal, Situation};
+use avastra_world::action::{ActionTable, Refusal, Situation};
 use avastra_world::sim::{Scene, Start, World};
 
 use super::arguments::TableArguments;
@@ -64,8 +64,8 @@ pub fn why(
         output.say(&format!("  bound by {}{state}", space.rules[rule].name));
     }
     let (verdict, rule, reason) = match offer {
-        Offer::Legal(draw) => (format!("legal, for example {}", emit::action_text(table, &draw)), None, None),
-        Offer::Refused(Refusal { rule, reason }) => {
+        Ok(draw) => (format!("legal, for example {}", emit::action_text(table, &draw)), None, None),
+        Err(Refusal { rule, reason }) => {
             let by = rule.as_ref().map_or(String::new(), |rule| format!("rule `{rule}` says no: "));
             (format!("not legal: {by}{reason}"), rule, Some(reason))
         }

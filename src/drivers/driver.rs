@@ -13,6 +13,11 @@ pub trait Ads: CloneAds + Send {
     /// What it believes, wants and commands at the moment.
     fn status(&self) -> &Status;
 
+    /// Deceleration that a careful driver's model alone gave in the last tick, m/s²; 0 before it reacts, and for others.
+    fn braking_mps2(&self) -> f64 {
+        0.0
+    }
+
     /// From now on it drives where up to now another one drove and it watched. A reference driver then begins no lane
     /// change that the other has not begun either, before it has looked for a gap itself.
     fn take_over(&mut self, sensed: &Sensed) {

@@ -41,7 +41,6 @@ mod reactive;
 mod reference;
 mod registry;
 mod selected;
-mod settings;
 mod status;
 #[cfg(test)]
 mod testing;
@@ -52,9 +51,7 @@ pub use driver::Ads;
 pub use frenet::Frenet;
 pub use modular::{ConfigError, Foresight, Modular, ModularConfig, Module, Weaknesses};
 pub use reactive::Reactive;
-pub use reference::{
-    Careful, CarefulHuman, Evasion, FuzzySafety, Idm, MinimalPerformance, Reference, Rss, careful, in_sight,
-};
+pub use reference::{CarefulHuman, Evasion, FuzzySafety, Idm, MinimalPerformance, Reference, Rss, in_sight};
 pub use registry::{Entry, REGISTRY, by_name};
 pub use selected::{EXTERNAL, NoSettings, Selected};
 pub use status::{GHOST_ID_MIN, Manoeuvre, PerceivedObject, Reason, Status};

@@ -11,7 +11,7 @@
 //!
 //! use avastra_lang::check::{ReadError, load};
 //! use avastra_lang::model::RulesInForce;
-//! use avastra_world::action::{ActionTable, Offer, Situation};
+//! use avastra_world::action::{ActionTable, Situation};
 //! use avastra_world::sim::{Control, Scene, Start, World};
 //!
 //! let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()));
@@ -26,7 +26,7 @@
 //! let before = world.clone();
 //! let situation = Situation { memory: &memory, road, rules: &rules, surroundings: &before, seed: 1, step: 0 };
 //! let row = table.rows().iter().find(|row| row.label == "fog(how: High)").expect("it is declared");
-//! let Offer::Legal(draw) = table.offer(&situation, row.index) else { panic!("no rule is about fog") };
+//! let draw = table.offer(&situation, row.index).expect("no rule is about fog");
 //! for effect in &draw.effects {
 //!     world.apply(effect)?;
 //! }

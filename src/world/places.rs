@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use crate::action::{ActionTable, Count, Offer, Situation, Surroundings};
+use crate::action::{ActionTable, Count, Situation, Surroundings};
 use crate::sim::{Scene, Start, World};
 use avastra_lang::check::{Claim, Loaded, Runs};
 use avastra_lang::model::{EffectDef, Memory, Road, Row, RulesInForce, Space, code};
@@ -134,15 +134,15 @@ impl Lost<'_> {
     ) -> bool {
         let reason = match table.offer(situation, self.row.index) {
             // Each spawn was judged alone: the first of an action may stand in the way of its second.
-            Offer::Legal(draw) if draw.effects.len() > 1 => {
+            Ok(draw) if draw.effects.len() > 1 => {
                 let mut world = world.clone();
                 match draw.effects.iter().try_for_each(|effect| world.apply(effect).map(drop)) {
                     Ok(()) => return true,
                     Err(reason) => reason,
                 }
             }
-            Offer::Legal(_) => return true,
-            Offer::Refused(refusal) => refusal.in_words(),
+            Ok(_) => return true,
+            Err(refusal) => refusal.in_words(),
         };
         Count::add(self.refusals.entry(road).or_default(), &reason);
         false

@@ -3,7 +3,6 @@
 
 use std::sync::atomic::AtomicBool;
 
-use avastra::action::Offer;
 use avastra::agent::{Entry, Kind, Settings};
 use avastra::episode::Choice;
 use avastra::run::{EpisodeSummary, Run, RunSettings};
@@ -94,10 +93,7 @@ fn a_branch_shows_what_then_comes_to_pass() {
         &setup,
         &mut |moment| {
             let offers = run.table().offers(moment.situation);
-            let mut draws = offers.into_iter().filter_map(|offer| match offer {
-                Offer::Legal(draw) => Some(draw),
-                Offer::Refused(_) => None,
-            });
+            let mut draws = offers.into_iter().filter_map(Result::ok);
             let Some(draw) = draws.nth(moment.step % 3) else { return Choice::Pass };
             // Other rows are tried in a branch as well; they leave no trace in the episode.
             draws.take(2).for_each(|other| drop(moment.look_ahead(other)));

@@ -78,9 +78,7 @@ pub fn start(seed: u64) -> Start {
     Start {
         ego_mps: avastra::model::START_MPS,
         time,
-        rain: pick(3),
-        fog: pick(12),
-        wetness: pick(5),
+        sky: [3, 12, 5].map(pick),
         signal_phase_s,
         seed,
         ambient: 0,

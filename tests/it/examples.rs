@@ -1,6 +1,6 @@
 //! The shipped examples: each is short, works when copied, and draws what it says.
 
-use avastra::action::{ActionTable, Draw, Effect, Offer, SpawnRequest};
+use avastra::action::{ActionTable, Draw, Effect, SpawnRequest};
 use avastra::check::state_argument::memory_from;
 use avastra::episode::{Choice, EpisodeLog, Moment, Outcome, StepLog};
 use avastra::model::vocabulary::{Body, Level, Side, TimeOfDay};
@@ -137,11 +137,9 @@ fn played(name: &str, rows: &str, episodes: usize) -> Vec<EpisodeLog> {
     let play = |number: usize| {
         let mut choose = |moment: &Moment<'_>| {
             let mut rng = avastra::rng::stream(number as u64, avastra::rng::Stream::Draw, moment.step as u64);
-            let legal = run.table().offers(moment.situation).into_iter().filter_map(|offer| match offer {
-                Offer::Legal(draw) if run.table().rows()[draw.row].label.starts_with(rows) => Some(draw),
-                Offer::Legal(_) | Offer::Refused(_) => None,
-            });
-            let mut legal: Vec<Draw> = legal.collect();
+            let legal = run.table().offers(moment.situation).into_iter().filter_map(Result::ok);
+            let is_played = |draw: &Draw| run.table().rows()[draw.row].label.starts_with(rows);
+            let mut legal: Vec<Draw> = legal.filter(is_played).collect();
             match legal.is_empty() || avastra::rng::below(&mut rng, 4) == 0 {
                 true => Choice::Pass,
                 false => {

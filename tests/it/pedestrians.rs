@@ -74,9 +74,7 @@ fn walks(scene: &Arc<Scene>, side: Side, covers: &[Option<Body>]) -> usize {
     let start = Start {
         ego_mps: avastra::model::START_MPS,
         time: TimeOfDay::Noon,
-        rain: Level::None,
-        fog: Level::None,
-        wetness: Level::None,
+        sky: [Level::None; 3],
         signal_phase_s: 3.0,
         seed: 5,
         ambient: 0,

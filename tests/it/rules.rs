@@ -10,8 +10,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use avastra::action::{
-    ActionTable, Draw, Effect, Enforcement, Offer, Refusal, Situation, SpawnFacts, SpawnRequest,
-    Surroundings, audit,
+    ActionTable, Draw, Effect, Enforcement, Refusal, Situation, SpawnFacts, SpawnRequest, Surroundings, audit,
 };
 use avastra::check::load;
 use avastra::check::state_argument::memory_from;
@@ -67,14 +66,7 @@ fn broken(episodes: u32, without: &[&str]) -> [bool; 5] {
 
 /// Draws any legal row, from a random stream of the test's own.
 fn drawn(table: &ActionTable, moment: &Moment, number: usize) -> Option<Draw> {
-    let legal: Vec<Draw> = table
-        .offers(moment.situation)
-        .into_iter()
-        .filter_map(|offer| match offer {
-            Offer::Legal(draw) => Some(draw),
-            Offer::Refused(_) => None,
-        })
-        .collect();
+    let legal: Vec<Draw> = table.offers(moment.situation).into_iter().filter_map(Result::ok).collect();
     let mut rng = rng::stream(number as u64, Stream::Exploration, moment.step as u64);
     let nth = rng::below(&mut rng, legal.len().max(1) as u32) as usize;
     legal.into_iter().nth(nth)

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use avastra::action::{ActionTable, Draw, Effect, Offer, Situation};
+use avastra::action::{ActionTable, Draw, Effect, Situation};
 use avastra::check::state_argument::memory_from;
 use avastra::emit::{Provenance, unclaimed};
 use avastra::episode::{Choice, Moment, Outcome, Script};
@@ -38,10 +38,7 @@ pub fn draws(table: &ActionTable, row: usize, road: usize, memory: &Memory, seed
             seed,
             step: 0,
         };
-        match table.offer(&situation, row) {
-            Offer::Legal(draw) => Some(draw),
-            Offer::Refused(_) => None,
-        }
+        table.offer(&situation, row).ok()
     };
     (0..seeds).filter_map(offer).collect()
 }
@@ -229,14 +226,11 @@ fn pedestrians_come_only_while_the_ego_vehicle_drives() {
             let speed_mps = moment.situation.surroundings.moment().ego_speed_mps;
             let offers = rows.map(|row| table.offer(moment.situation, row));
             for offer in &offers {
-                let Offer::Refused(refusal) = offer else { continue };
+                let Err(refusal) = offer else { continue };
                 let refused = refusal.rule.as_deref() == Some("only_while_driving");
                 assert!(!refused || speed_mps < 8.0, "{refusal:?} at {speed_mps} m/s");
             }
-            let legal = offers.into_iter().find_map(|offer| match offer {
-                Offer::Legal(draw) => Some(draw),
-                Offer::Refused(_) => None,
-            });
+            let legal = offers.into_iter().find_map(Result::ok);
             assert!(legal.is_none() || speed_mps >= 8.0, "{legal:?} at {speed_mps} m/s");
             slow += usize::from(speed_mps < 8.0);
             walked += usize::from(legal.is_some());
@@ -259,8 +253,8 @@ fn no_vehicle_appears_near_a_junction() {
             let mut legal = None;
             for offer in table.offers(moment.situation) {
                 match offer {
-                    Offer::Refused(refusal) => refused.extend(refusal.rule),
-                    Offer::Legal(draw) => {
+                    Err(refusal) => refused.extend(refusal.rule),
+                    Ok(draw) => {
                         for effect in &draw.effects {
                             let Effect::Spawn(request) = effect else { continue };
                             if !request.body.is_vehicle() {
@@ -296,7 +290,7 @@ fn near_misses_of_pedestrians_weigh_double() {
         let mut choose = |moment: &Moment| {
             let offers = table.offers(moment.situation).into_iter().enumerate();
             let legal = offers.filter_map(|(row, offer)| match offer {
-                Offer::Legal(draw) if pedestrians.contains(&row) == (number % 2 == 0) => Some(draw),
+                Ok(draw) if pedestrians.contains(&row) == (number % 2 == 0) => Some(draw),
                 _ => None,
             });
             let spawns = |draw: &Draw| draw.effects.iter().any(|effect| matches!(effect, Effect::Spawn(_)));

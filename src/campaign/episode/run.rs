@@ -94,17 +94,14 @@ impl Choice {
     /// The choice of a row as it is offered.
     pub fn of(row: usize, offer: Offer) -> Choice {
         match offer {
-            Offer::Legal(draw) => Choice::Act(draw),
-            Offer::Refused(Refusal { rule, reason }) => Choice::Refused { row, rule, reason },
+            Ok(draw) => Choice::Act(draw),
+            Err(Refusal { rule, reason }) => Choice::Refused { row, rule, reason },
         }
     }
 
     /// The choice of a row with given values. Of several refusals the first counts.
     pub fn judged(row: usize, judged: Result<Draw, Vec<Refusal>>) -> Choice {
-        match judged {
-            Ok(draw) => Choice::Act(draw),
-            Err(mut refusals) => Choice::of(row, Offer::Refused(refusals.swap_remove(0))),
-        }
+        Choice::of(row, judged.map_err(|mut refusals| refusals.swap_remove(0)))
     }
 }
 

@@ -177,10 +177,7 @@ fn considered(
     let situation = Situation::of(&moment.situation.surroundings.moment());
     // Where nothing appears by itself, only what an action makes appear can be hit: no event belongs to other rows.
     let ambient = moment.setup().start.ambient;
-    let may_matter = |offer: &Offer| match offer {
-        Offer::Legal(draw) => ambient > 0 || draw.makes_appear(),
-        Offer::Refused(_) => false,
-    };
+    let may_matter = |offer: &Offer| offer.as_ref().is_ok_and(|draw| ambient > 0 || draw.makes_appear());
     let matters: Vec<bool> = offers.iter().map(may_matter).collect();
     let count = matters.iter().filter(|&&matters| matters).count();
     let weighed = |row: usize| {
@@ -196,7 +193,7 @@ fn considered(
         // Every row draws, so that the plan for one does not shift the draws of another.
         let ticket = rng::unit(rng);
         let (considered, share) = weighed(row);
-        if let Offer::Legal(draw) = offer
+        if let Ok(draw) = offer
             && ticket < share
         {
             trials.push((considered, draw.clone()));

@@ -31,7 +31,7 @@ use crate::episode::{Choice, EpisodeLog, Moment, Script, Setup};
 use avastra_base::geometry::{OrientedBox, Pose, wrap_angle};
 use avastra_base::kinematics::GRAVITY_MPS2;
 use avastra_drivers as ads;
-use avastra_drivers::{Ads, Careful, Evasion};
+use avastra_drivers::{Ads, Evasion};
 use avastra_lang::model::Avoidability;
 use avastra_lang::model::vocabulary::Priority;
 use avastra_world::sim::{
@@ -181,10 +181,7 @@ pub fn judge_one(recording: &[World], contact: &Contact, met: OrientedBox) -> Ju
     let avoids = |name: &&str| case.avoids(reference(name, &recording[from]).as_mut());
     let careful = names(CAREFUL.into_iter().filter(avoids));
     let reported = names(REPORTED.into_iter().filter(avoids));
-    let brakes_in_time = |name: &&str| {
-        ads::careful(name, recording[from].scene())
-            .is_some_and(|mut driver| to_the_letter.brakes(driver.as_mut()))
-    };
+    let brakes_in_time = |name: &&str| to_the_letter.brakes(reference(name, &recording[from]).as_mut());
     let r157_letter = names(CAREFUL.into_iter().filter(brakes_in_time));
     let evasion = if careful.is_empty() { case.evasion() } else { None };
     let class = if !careful.is_empty() {
@@ -265,7 +262,7 @@ impl<'a> Case<'a> {
 
     /// Whether a driver's model avoids the collision to the letter of UN R157: by braking on the recorded path,
     /// from the recorded speed. After the recorded contact the driver drives on by itself.
-    fn brakes(&self, driver: &mut dyn Careful) -> bool {
+    fn brakes(&self, driver: &mut dyn Ads) -> bool {
         self.show(driver);
         let recording = &self.recording[self.from..];
         let mut world = recording[0].clone();

@@ -143,7 +143,7 @@ pub fn choose(agent: &mut dyn Agent, moment: &Moment) -> (Choice, Array1<bool>) 
     let table = moment.setup().table;
     let offer = |row| table.offer(&situation, row);
     let all = Array1::from_elem(table.rows().len(), true);
-    if !(0..all.len()).any(|row| matches!(offer(row), Offer::Legal(_))) {
+    if !(0..all.len()).any(|row| offer(row).is_ok()) {
         return (Choice::Pass, all);
     }
     let mut rng = exploration(moment);
@@ -171,7 +171,7 @@ fn exploration(moment: &Moment) -> Rng {
 
 /// Which of the offers are legal, shape `(rows,)`.
 pub(crate) fn legal(offers: &[Offer]) -> Array1<bool> {
-    offers.iter().map(|offer| matches!(offer, Offer::Legal(_))).collect()
+    offers.iter().map(Result::is_ok).collect()
 }
 
 /// The agent's choice among the offers.
@@ -191,7 +191,7 @@ pub(crate) fn carry_out(
 
 /// Carries an offer out in a copy of the moment's world, and judges the collisions as in an episode.
 fn tried(offer: &Offer, moment: &Moment) -> Trial {
-    let Offer::Legal(draw) = offer else { return Trial::default() };
+    let Ok(draw) = offer else { return Trial::default() };
     let log = moment.look_ahead(draw.clone());
     let step = moment.step;
     let collided = log.collisions.iter().any(|collision| collision.step == step);

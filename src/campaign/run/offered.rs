@@ -29,8 +29,8 @@ impl Offered {
         self.rows.resize_with(offers.len(), RowOffers::default);
         for (row, offer) in self.rows.iter_mut().zip(offers) {
             match offer {
-                Offer::Legal(_) => row.legal += 1,
-                Offer::Refused(refusal) => row.refused.push(refusal.clone()),
+                Ok(_) => row.legal += 1,
+                Err(refusal) => row.refused.push(refusal.clone()),
             }
         }
     }

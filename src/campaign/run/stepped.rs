@@ -90,7 +90,7 @@ impl Stepped {
     pub fn step(&mut self, row: Option<usize>) -> Result<(), StepError> {
         self.can_step(row)?;
         let mut offers = std::mem::take(&mut self.offers);
-        let is_any_legal = offers.iter().any(|offer| matches!(offer, Offer::Legal(_)));
+        let is_any_legal = offers.iter().any(Result::is_ok);
         let choice = match row.filter(|_| is_any_legal) {
             Some(row) => Choice::of(row, offers.swap_remove(row)),
             None => Choice::Pass,

@@ -179,16 +179,11 @@ impl<'a> Trials<'a> {
     }
 
     fn cell(&self, road: usize, row: usize, moments: &[Moment]) -> Cell {
-        let legal: Vec<(&Moment, &Draw)> = moments
-            .iter()
-            .filter_map(|moment| match &moment.offers[row] {
-                Offer::Legal(draw) => Some((moment, draw)),
-                Offer::Refused(_) => None,
-            })
-            .collect();
+        let legal: Vec<(&Moment, &Draw)> =
+            moments.iter().filter_map(|moment| Some((moment, moment.offers[row].as_ref().ok()?))).collect();
         let mut refusals = Vec::new();
         for moment in moments {
-            if let Offer::Refused(refusal) = &moment.offers[row] {
+            if let Err(refusal) = &moment.offers[row] {
                 Count::add(&mut refusals, &refusal.in_words());
             }
         }

@@ -19,91 +19,56 @@ words! {
     }
 }
 
-words! {
-    /// What exactly is wrong.
-    pub enum Problem {
-        Exited = "exited",
-        Closed = "closed",
-        NotStarted = "not_started",
-        NotReached = "not_reached",
-        NoAnswer = "no_answer",
-        NotJson = "not_json",
-        TooLong = "too_long",
-        WrongType = "wrong_type",
-        WrongShape = "wrong_shape",
-        NotFinite = "not_finite",
-        OutOfRange = "out_of_range",
-        WrongSeq = "wrong_seq",
-        Twice = "twice",
-        WrongProtocol = "wrong_protocol",
-        Stderr = "stderr",
-        Reported = "reported",
-        OtherAnswer = "other_answer",
-        NoProcess = "no_process",
-        GivenUp = "given_up",
-    }
+/// Declares the problems: each with its name, its kind, and what the author of the driving
+/// system can do about it.
+macro_rules! problems {
+    ($($problem:ident = $name:tt: $kind:ident, $advice:literal;)+) => {
+        words! {
+            /// What exactly is wrong.
+            pub enum Problem { $($problem = $name,)+ }
+        }
+
+        impl Problem {
+            pub fn kind(self) -> FailureKind {
+                match self { $(Problem::$problem => FailureKind::$kind,)+ }
+            }
+
+            /// What the author of the driving system can do about it.
+            pub fn advice(self) -> &'static str {
+                match self { $(Problem::$problem => $advice,)+ }
+            }
+        }
+    };
 }
 
-impl Problem {
-    pub fn kind(self) -> FailureKind {
-        match self {
-            Problem::Exited | Problem::Closed | Problem::NotStarted | Problem::NotReached => {
-                FailureKind::Crash
-            }
-            Problem::NoAnswer => FailureKind::Timeout,
-            Problem::NotJson
-            | Problem::TooLong
-            | Problem::WrongType
-            | Problem::WrongShape
-            | Problem::NotFinite
-            | Problem::OutOfRange
-            | Problem::WrongSeq
-            | Problem::Twice
-            | Problem::WrongProtocol => FailureKind::Protocol,
-            Problem::Stderr => FailureKind::Flood,
-            Problem::Reported => FailureKind::Error,
-            Problem::OtherAnswer => FailureKind::Nondeterministic,
-            Problem::NoProcess | Problem::GivenUp => FailureKind::Absent,
-        }
-    }
-
-    /// What the author of the driving system can do about it.
-    pub fn advice(self) -> &'static str {
-        match self {
-            Problem::Exited | Problem::Closed => {
-                "read its standard error; the program must run until `close` or the end of its input"
-            }
-            Problem::NotStarted => {
-                "try the command by hand in the same folder; there is no shell, so no `~`, `*`, `|` or variables"
-            }
-            Problem::NotReached => {
-                "avastra connects and starts nothing: start the program that listens there first"
-            }
-            Problem::NoAnswer => {
-                "flush standard output after each line; if the program needs longer, raise `timeouts` in its profile"
-            }
-            Problem::NotJson => {
-                "print nothing but messages on standard output: send prints, also those of libraries, to standard error"
-            }
-            Problem::TooLong => "a line has at most 1 MiB: send fewer points",
-            Problem::WrongType | Problem::WrongShape | Problem::OutOfRange => {
-                "compare the message with PROTOCOL.md or `avastra ads schema`"
-            }
-            Problem::NotFinite => {
-                "test for NaN before answering; in Python, `json.dumps(…, allow_nan=False)` finds the place"
-            }
-            Problem::WrongSeq => "repeat the `seq` of the step in its answer",
-            Problem::Twice => "answer each step once, and no `event`",
-            Problem::WrongProtocol => "this avastra speaks avastra-ads/1",
-            Problem::Stderr => "print less: 64 MiB in an episode are a flood",
-            Problem::Reported => "the program says so itself",
-            Problem::OtherAnswer => {
-                "forget everything at `reset`, seed all that is random from it, and use no clock"
-            }
-            Problem::NoProcess => "answers are recorded for one way only: give the program with `--ads`",
-            Problem::GivenUp => "see that the program runs and answers `init`, then play what is left",
-        }
-    }
+problems! {
+    Exited = "exited": Crash,
+        "read its standard error; the program must run until `close` or the end of its input";
+    Closed = "closed": Crash,
+        "read its standard error; the program must run until `close` or the end of its input";
+    NotStarted = "not_started": Crash,
+        "try the command by hand in the same folder; there is no shell, so no `~`, `*`, `|` or variables";
+    NotReached = "not_reached": Crash,
+        "avastra connects and starts nothing: start the program that listens there first";
+    NoAnswer = "no_answer": Timeout,
+        "flush standard output after each line; if the program needs longer, raise `timeouts` in its profile";
+    NotJson = "not_json": Protocol,
+        "print nothing but messages on standard output: send prints, also those of libraries, to standard error";
+    TooLong = "too_long": Protocol, "a line has at most 1 MiB: send fewer points";
+    WrongType = "wrong_type": Protocol, "compare the message with PROTOCOL.md or `avastra ads schema`";
+    WrongShape = "wrong_shape": Protocol, "compare the message with PROTOCOL.md or `avastra ads schema`";
+    NotFinite = "not_finite": Protocol,
+        "test for NaN before answering; in Python, `json.dumps(…, allow_nan=False)` finds the place";
+    OutOfRange = "out_of_range": Protocol, "compare the message with PROTOCOL.md or `avastra ads schema`";
+    WrongSeq = "wrong_seq": Protocol, "repeat the `seq` of the step in its answer";
+    Twice = "twice": Protocol, "answer each step once, and no `event`";
+    WrongProtocol = "wrong_protocol": Protocol, "this avastra speaks avastra-ads/1";
+    Stderr = "stderr": Flood, "print less: 64 MiB in an episode are a flood";
+    Reported = "reported": Error, "the program says so itself";
+    OtherAnswer = "other_answer": Nondeterministic,
+        "forget everything at `reset`, seed all that is random from it, and use no clock";
+    NoProcess = "no_process": Absent, "answers are recorded for one way only: give the program with `--ads`";
+    GivenUp = "given_up": Absent, "see that the program runs and answers `init`, then play what is left";
 }
 
 /// Characters of a line of standard error that a message shows.

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use avastra_lang::model::digest_text;
+use avastra_lang::model::{digest, digest_text};
 
 use super::finding::Failure;
 use super::message::Answer;
@@ -158,7 +158,7 @@ impl Attached {
         let ExternalSettings { observation, answer, period_s, latency_s, on_timeout, .. } = &self.settings;
         let essence =
             serde_json::json!([self.identity, observation, answer, period_s, latency_s, on_timeout]);
-        digest_text(&Sha256::digest(essence.to_string().as_bytes()).into())
+        digest(essence.to_string().as_bytes())
     }
 
     /// Its name and version, or what was started.

@@ -85,28 +85,11 @@ impl Session {
         if stage == "reset" {
             self.link.begin_episode();
         }
-        self.link.send(line);
-        let deadline = Deadline::after(limit_s);
-        let result = loop {
-            let line = match self.link.line(deadline) {
-                Ok(line) => line,
-                Err(broken) => break Err(told(broken, stage, limit_s)),
-            };
-            match read(&line, "ready") {
-                Ok(Answer::Ready(_)) => break Ok(()),
-                // The answer to a step that was missed.
-                Ok(answer) if self.missed && answer.seq().is_some() => {}
-                Ok(answer) if answer.seq().is_some() && answer.seq() == self.answered => {
-                    break Err(twice(self.answered));
-                }
-                Ok(_) => break Err(wrong_type(&line, "ready")),
-                Err(broken) => break Err(broken),
-            }
-        };
+        let found = self.ask(line, "ready", None, limit_s);
         if stage == "reset" {
             (self.answered, self.missed) = (None, false);
         }
-        result.map_err(|broken| failed(&mut self.link, broken, stage))
+        found.map(drop).map_err(|broken| failed(&mut self.link, told(broken, stage, limit_s), stage))
     }
 
     /// Asks a step. `None` is an answer that did not come in time.
@@ -119,37 +102,40 @@ impl Session {
         (seq, t_us): (u64, u64),
         limit_s: f64,
     ) -> Result<Option<Answer>, Failure> {
-        self.link.send(line);
-        let deadline = Deadline::after(limit_s);
-        let wanted = self.identity.answer.name();
-        let result = loop {
-            let line = match self.link.line(deadline) {
-                Ok(line) => line,
-                Err(Broken { problem: Problem::NoAnswer, .. }) => {
-                    self.missed = true;
-                    break Ok(None);
-                }
-                Err(broken) => break Err(broken),
-            };
-            let answer = match read(&line, wanted) {
-                Ok(answer) => answer,
-                Err(broken) => break Err(broken),
-            };
-            match answer.seq() {
-                Some(found) if found == seq => {
-                    self.answered = Some(seq);
-                    break judged(answer, t_us).map(Some);
-                }
-                Some(found) if Some(found) == self.answered => break Err(twice(self.answered)),
-                Some(found) if found < seq && self.missed => {}
-                Some(found) => {
-                    let detail = format!("`seq` is {found}, asked was {seq}");
-                    break Err(Broken { problem: Problem::WrongSeq, detail });
-                }
-                None => break Err(wrong_type(&line, wanted)),
+        let result = match self.ask(line, self.identity.answer.name(), Some(seq), limit_s) {
+            Ok(answer) => {
+                self.answered = Some(seq);
+                judged(answer, t_us).map(Some)
             }
+            Err(Broken { problem: Problem::NoAnswer, .. }) => {
+                self.missed = true;
+                Ok(None)
+            }
+            Err(broken) => Err(broken),
         };
         result.map_err(|broken| failed(&mut self.link, broken, format!("step {seq}")))
+    }
+
+    /// Sends a line and waits for its answer: that of a type, and to the step `seq` if the line is one.
+    fn ask(&mut self, line: &str, wanted: &str, seq: Option<u64>, limit_s: f64) -> Result<Answer, Broken> {
+        self.link.send(line);
+        let deadline = Deadline::after(limit_s);
+        loop {
+            let line = self.link.line(deadline)?;
+            let answer = read(&line, wanted)?;
+            match (answer.seq(), seq) {
+                (found, asked) if found == asked => return Ok(answer),
+                // The answer to a step that was missed.
+                (Some(_), None) if self.missed => {}
+                (Some(found), _) if Some(found) == self.answered => return Err(twice(found)),
+                (Some(found), Some(asked)) if found < asked && self.missed => {}
+                (Some(found), Some(asked)) => {
+                    let detail = format!("`seq` is {found}, asked was {asked}");
+                    return Err(Broken { problem: Problem::WrongSeq, detail });
+                }
+                _ => return Err(wrong_type(&line, wanted)),
+            }
+        }
     }
 
     /// The finding that a step was not answered in time; the driving system is killed.
@@ -195,9 +181,8 @@ fn in_time(limit: &str, limit_s: f64) -> String {
     format!("no answer within {limit_s} s (`timeouts.{limit}`)")
 }
 
-fn twice(seq: Option<u64>) -> Broken {
-    let detail = format!("a second answer to step {}", seq.unwrap_or_default());
-    Broken { problem: Problem::Twice, detail }
+fn twice(seq: u64) -> Broken {
+    Broken { problem: Problem::Twice, detail: format!("a second answer to step {seq}") }
 }
 
 fn wrong_type(line: &[u8], wanted: &str) -> Broken {

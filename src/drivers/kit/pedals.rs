@@ -3,7 +3,7 @@
 //! Apollo's cascade: the station error becomes a wanted speed, the speed error an acceleration, to which the plan's
 //! own acceleration is added, read a little ahead.
 
-use crate::settings::section;
+use avastra_world::section;
 use avastra_world::sim::DT_S;
 
 use super::point::Point;

@@ -8,8 +8,8 @@ use std::sync::{Arc, LazyLock};
 
 use nalgebra::{Matrix4, Vector4};
 
-use crate::settings::section;
 use avastra_base::geometry::{Pose, wrap_angle};
+use avastra_world::section;
 use avastra_world::sim::{DT_S, EgoMotion, VehicleParameters};
 
 use super::guide::Guide;

@@ -139,18 +139,6 @@ impl<M: Model> Reference<M> {
     }
 }
 
-/// A driving system that can say how hard it would brake by its model alone.
-pub trait Careful: Ads {
-    /// Deceleration that the model gave in the last tick, m/s²; 0 before it reacts.
-    fn braking_mps2(&self) -> f64;
-}
-
-impl<M: Model> Careful for Reference<M> {
-    fn braking_mps2(&self) -> f64 {
-        self.braking_mps2
-    }
-}
-
 impl<M: Model> Ads for Reference<M> {
     fn drive(&mut self, sensed: &Sensed) -> Control {
         if self.helm.is_first() {
@@ -189,6 +177,10 @@ impl<M: Model> Ads for Reference<M> {
 
     fn status(&self) -> &Status {
         self.route.status()
+    }
+
+    fn braking_mps2(&self) -> f64 {
+        self.braking_mps2
     }
 
     fn take_over(&mut self, sensed: &Sensed) {

@@ -230,13 +230,11 @@ fn origin_text(scenario: &Scenario, seed: u64, is_external: bool) -> String {
 
 fn start_text(log: &EpisodeLog) -> String {
     let start = &log.start;
+    let [rain, fog, wetness] = start.sky.map(|level| level.name());
     format!(
-        "start {{ time: {}, sky: {{ Rain: {}, Fog: {}, Wetness: {} }}, ego_speed: {} m/s, \
+        "start {{ time: {}, sky: {{ Rain: {rain}, Fog: {fog}, Wetness: {wetness} }}, ego_speed: {} m/s, \
          signal_phase: {} s, ambient: {}, traffic_seed: {} }}",
         start.time.name(),
-        start.rain.name(),
-        start.fog.name(),
-        start.wetness.name(),
         decimal(start.ego_mps, false),
         decimal(start.signal_phase_s, false),
         start.ambient,

@@ -230,8 +230,8 @@ fn offered(offers: &[Offer]) -> Value {
     let mut masked: BTreeMap<String, Vec<usize>> = BTreeMap::new();
     for (row, offer) in offers.iter().enumerate() {
         match offer {
-            Offer::Legal(_) => legal.push(row),
-            Offer::Refused(refusal) => {
+            Ok(_) => legal.push(row),
+            Err(refusal) => {
                 let words = refusal_in_words(refusal.rule.as_deref(), &refusal.reason);
                 masked.entry(words).or_default().push(row);
             }

@@ -25,12 +25,8 @@ pub struct Situation<'a> {
     pub step: u64,
 }
 
-/// What choosing a row would do now.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Offer {
-    Legal(Draw),
-    Refused(Refusal),
-}
+/// What choosing a legal row would do now, or why the row is refused.
+pub type Offer = Result<Draw, Refusal>;
 
 /// A row with its drawn values.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,19 +98,12 @@ impl ActionTable {
         let kept = situation.surroundings.for_many();
         let surroundings = kept.as_deref().unwrap_or(situation.surroundings);
         let situation = Situation { surroundings, ..*situation };
-        (0..self.rows().len()).map(|row| self.drawn(&situation, row, shares)).collect()
+        (0..self.rows().len()).map(|row| Judge::new(&self.space, &situation, row).draw(shares)).collect()
     }
 
     /// The offer of one row: the same as in [`ActionTable::offers`].
     pub fn offer(&self, situation: &Situation<'_>, row: usize) -> Offer {
-        self.drawn(situation, row, &[])
-    }
-
-    fn drawn(&self, situation: &Situation<'_>, row: usize, shares: &[f64]) -> Offer {
-        match Judge::new(&self.space, situation, row).draw(shares) {
-            Ok(draw) => Offer::Legal(draw),
-            Err(refusal) => Offer::Refused(refusal),
-        }
+        Judge::new(&self.space, situation, row).draw(&[])
     }
 
     /// What a step without an action does: to the world, and the memory after it.

@@ -66,9 +66,8 @@ const FRICTION_MIN: f64 = 0.05;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Environment {
     pub time: TimeOfDay,
-    pub rain: Level,
-    pub fog: Level,
-    pub wetness: Level,
+    /// Of rain, fog and wetness.
+    pub sky: [Level; 3],
     water_mm: f64,
     /// The friction on a road with that water.
     grip: Grip,
@@ -77,28 +76,25 @@ pub(super) struct Environment {
 impl Environment {
     /// The road is as wet as the higher of the levels of rain and wetness: an episode does not begin with
     /// the first drop.
-    pub fn new(time: TimeOfDay, [rain, fog, wetness]: [Level; 3]) -> Environment {
+    pub fn new(time: TimeOfDay, sky: [Level; 3]) -> Environment {
+        let [rain, _, wetness] = sky;
         let water_mm = WATER_MM[wetness.max(rain) as usize];
-        Environment { time, rain, fog, wetness, water_mm, grip: Grip::under(water_mm) }
+        Environment { time, sky, water_mm, grip: Grip::under(water_mm) }
     }
 
     /// Sets a level from now on. A level of wetness adds water at once, but none takes water away: it
     /// drains and dries (see [`Environment::pass`]).
     pub fn set(&mut self, phenomenon: Phenomenon, level: Level) {
-        match phenomenon {
-            Phenomenon::Rain => self.rain = level,
-            Phenomenon::Fog => self.fog = level,
-            Phenomenon::Wetness => {
-                self.wetness = level;
-                self.water_mm = self.water_mm.max(WATER_MM[level as usize]);
-                self.grip = Grip::under(self.water_mm);
-            }
+        self.sky[phenomenon as usize] = level;
+        if phenomenon == Phenomenon::Wetness {
+            self.water_mm = self.water_mm.max(WATER_MM[level as usize]);
+            self.grip = Grip::under(self.water_mm);
         }
     }
 
     /// Lets it rain, drain and dry for a while that is short against [`DRAIN_S`].
     pub fn pass(&mut self, time_s: f64) {
-        let rain_mmph = RAIN_MMPH[self.rain as usize];
+        let rain_mmph = RAIN_MMPH[self.sky[Phenomenon::Rain as usize] as usize];
         let gain_mmps = (rain_mmph - DRYING_MMPH) / S_PER_H - self.water_mm / DRAIN_S;
         self.water_mm = (self.water_mm + gain_mmps * time_s).max(0.0);
         self.grip = Grip::under(self.water_mm);
@@ -110,17 +106,19 @@ impl Environment {
 
     /// What holds for an ego vehicle at a speed.
     pub fn conditions(&self, ego_mps: f64) -> Conditions {
+        let [rain, fog, _] = self.sky;
         Conditions {
             light: LIGHT[self.time as usize],
-            rain_mmph: RAIN_MMPH[self.rain as usize],
-            visibility_m: VISIBILITY_M[self.fog as usize],
+            rain_mmph: RAIN_MMPH[rain as usize],
+            visibility_m: VISIBILITY_M[fog as usize],
             water_mm: self.water_mm,
             friction: self.grip.friction(ego_mps),
         }
     }
 
     pub fn trace(&self, trace: &mut Trace) {
-        trace.words([self.time as u64, self.rain as u64, self.fog as u64, self.wetness as u64]);
+        trace.word(self.time as u64);
+        trace.words(self.sky.map(|level| level as u64));
         trace.number(self.water_mm);
     }
 }

@@ -36,6 +36,8 @@ mod road_user;
 mod safety;
 mod scene;
 mod sense;
+#[macro_use]
+mod settings;
 mod signals;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;

@@ -131,7 +131,7 @@ mod tests {
     use std::path::Path;
     use std::sync::Arc;
 
-    use crate::action::{ActionTable, Offer, Situation};
+    use crate::action::{ActionTable, Situation};
     use crate::sim::{Control, DT_S, Scene, World, testing};
     use avastra_lang::check::{ReadError, load};
     use avastra_lang::model::vocabulary::{Light, RoadKind, Verb};
@@ -205,7 +205,7 @@ mod tests {
             let situation =
                 Situation { memory: &memory, road, rules: &rules, surroundings: &world, seed: 1, step: 0 };
             for row in space.rows.iter().filter(is_changer) {
-                let Offer::Legal(draw) = table.offer(&situation, row.index) else { continue };
+                let Ok(draw) = table.offer(&situation, row.index) else { continue };
                 let rules = draw.lane_changes.as_ref().expect("the rule binds it");
                 for binds in [true, false] {
                     let mut world = world.clone();

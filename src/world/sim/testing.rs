@@ -53,9 +53,7 @@ pub fn start() -> Start {
     Start {
         ego_mps: START_MPS,
         time: TimeOfDay::Noon,
-        rain: Level::None,
-        fog: Level::None,
-        wetness: Level::None,
+        sky: [Level::None; 3],
         signal_phase_s: 0.0,
         seed: 7,
         ambient: 0,

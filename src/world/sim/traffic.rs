@@ -7,30 +7,7 @@
 use avastra_lang::model::{LIMIT_PART_MAX, digest};
 use avastra_lang::syntax::{listed, yaml_mistake};
 
-/// The struct, its `Default`, and the range of each number.
-macro_rules! profile {
-    ($(#[$about:meta])* pub struct $profile:ident {
-        $($(#[$doc:meta])* $name:ident: $kind:ty = $default:expr $(, $low:literal..=$high:expr)?;)*
-    }) => {
-        $(#[$about])*
-        #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-        #[serde(deny_unknown_fields, default)]
-        pub struct $profile {
-            $($(#[$doc])* pub $name: $kind,)*
-        }
-
-        impl Default for $profile {
-            fn default() -> $profile {
-                $profile { $($name: $default,)* }
-            }
-        }
-
-        /// Least and greatest value of every number.
-        const RANGES: &[(&str, f64, f64)] = &[$($((stringify!($name), $low, $high),)?)*];
-    };
-}
-
-profile! {
+section! {
     /// How other vehicles drive.
     pub struct TrafficProfile {
         /// Whether ambient vehicles yield to the ego vehicle at junctions. Commanded ones never do: see `npc::manners`.
@@ -144,7 +121,7 @@ impl TrafficProfile {
     /// If a number is out of its range.
     fn check(&self) -> Result<(), TrafficError> {
         let numbers = serde_json::to_value(self).expect("a profile is plain data");
-        for &(key, low, high) in RANGES {
+        for &(key, low, high) in TrafficProfile::RANGES {
             // NaN and infinity have no JSON.
             let value = numbers[key].as_f64().unwrap_or(f64::NAN);
             if !(low..=high).contains(&value) {

@@ -81,9 +81,8 @@ pub struct Start {
     /// Speed of the ego vehicle, m/s.
     pub ego_mps: f64,
     pub time: TimeOfDay,
-    pub rain: Level,
-    pub fog: Level,
-    pub wetness: Level,
+    /// Levels of rain, fog and wetness.
+    pub sky: [Level; 3],
     /// Time in the signals' cycle at which the episode begins, s.
     pub signal_phase_s: f64,
     /// Seed of the choices of other road users.
@@ -100,13 +99,11 @@ impl Start {
         let mut rng = rng::stream(seed, Stream::Reset, 1);
         // A multiple of 1/64 s is a short decimal in a file.
         let signal_phase_s = (rng::between(&mut rng, 0.0, PHASES_S) * 64.0).floor() / 64.0;
-        let (time, [rain, fog, wetness]) = space.weather(memory);
+        let (time, sky) = space.weather(memory);
         Start {
             ego_mps: START_MPS,
             time,
-            rain,
-            fog,
-            wetness,
+            sky,
             signal_phase_s,
             seed,
             ambient: 0,
@@ -155,7 +152,7 @@ impl World {
 
     /// The beginning of an episode that begins elsewhere on the route, at another speed.
     pub fn with_ego_at(scene: Arc<Scene>, start: &Start, station_m: f64, speed_mps: f64) -> World {
-        let environment = Environment::new(start.time, [start.rain, start.fog, start.wetness]);
+        let environment = Environment::new(start.time, start.sky);
         let mut world = World {
             ticks: 0,
             ego: Ego::new(scene.route.path.pose_at(station_m), speed_mps),
@@ -333,7 +330,7 @@ impl World {
 
     /// Levels of rain, fog and wetness.
     pub fn sky(&self) -> [Level; 3] {
-        [self.environment.rain, self.environment.fog, self.environment.wetness]
+        self.environment.sky
     }
 
     /// Light, weather and grip.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::kit::{PedalsConfig, SpeedRules, SteeringConfig};
-use crate::settings::section;
+use avastra_world::section;
 
 section! {
     /// Where objects will be.

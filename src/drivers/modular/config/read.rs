@@ -1,10 +1,9 @@
 //! Profiles: a configuration from text, and its mistakes in the author's words.
 
 use serde_json::{Map, Value};
-use sha2::{Digest, Sha256};
 
 use crate::kit::{PedalsConfig, SteeringConfig};
-use avastra_lang::model::digest_text;
+use avastra_lang::model::digest;
 use avastra_lang::syntax::{nearest, yaml_mistake};
 
 use super::ModularConfig;
@@ -79,7 +78,7 @@ impl ModularConfig {
     /// Digest of all settings, `sha256:` and 64 digits. Profiles with equal settings have equal digests.
     pub fn digest(&self) -> String {
         let text = serde_json::to_string(self).expect("a configuration is plain data");
-        digest_text(&Sha256::digest(text.as_bytes()).into())
+        digest(text.as_bytes())
     }
 }
 

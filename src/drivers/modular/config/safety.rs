@@ -1,6 +1,6 @@
 //! Settings of the last line: emergency braking.
 
-use crate::settings::section;
+use avastra_world::section;
 
 section! {
     /// Emergency braking, independent of prediction and planning.

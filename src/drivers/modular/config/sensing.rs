@@ -1,6 +1,6 @@
 //! Settings of the parts that find out what is: localisation, perception, tracking.
 
-use crate::settings::section;
+use avastra_world::section;
 
 section! {
     /// Pose error of RTK and LiDAR map matching.

@@ -1,6 +1,6 @@
 //! Settings of time: how late modules are, and what watches that.
 
-use crate::settings::section;
+use avastra_world::section;
 use avastra_world::sim::FRAME_S;
 
 section! {

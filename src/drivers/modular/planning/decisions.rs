@@ -17,9 +17,8 @@ use super::trajectory::Point;
 pub struct Decisions {
     /// What is done about each object.
     taken: Vec<(u32, Stance)>,
-    /// Buffers of a cycle: the regions of all claims, and the same with the remembered sides.
+    /// Buffer of a cycle: the regions of all claims.
     regions: Vec<Region>,
-    held: Vec<Region>,
 }
 
 /// What a cycle's decisions are taken from.
@@ -39,27 +38,24 @@ impl Decisions {
         let config = situation.config;
         let front_m = VehicleParameters::MKZ.front_m(situation.start.station_m);
         self.regions.clear();
-        self.held.clear();
         let mut remembered = false;
         let mut contested = false;
         for (index, claim) in claims.iter().enumerate() {
             let binds = claim.binds(config);
-            let Some(region) = Region::new(config, claim, index, binds, front_m) else { continue };
-            let open = binds && claim.is_contested(config);
-            contested |= open;
-            let stance = if open { self.remembered(claim.id) } else { Stance::Open };
-            remembered |= stance != Stance::Open;
+            let Some(mut region) = Region::new(config, claim, index, binds, front_m) else { continue };
+            if binds && claim.is_contested(config) {
+                contested = true;
+                region.remembered = self.remembered(claim.id);
+                remembered |= region.remembered != Stance::Open;
+            }
             self.regions.push(region);
-            self.held.push(region.held(stance));
         }
         if !contested {
             return;
         }
-        let cheapest =
-            |regions| Profile::cheapest(config, situation.guide, &situation.start, situation.stop_m, regions);
-        let free = cheapest(&self.regions);
+        let free = Profile::cheapest(situation, &self.regions, false);
         let chosen = if remembered && situation.hysteresis {
-            let kept = cheapest(&self.held);
+            let kept = Profile::cheapest(situation, &self.regions, true);
             if free.cost < kept.cost * (1.0 - config.decision_margin) { free } else { kept }
         } else {
             free

@@ -49,9 +49,7 @@ pub fn crosswalks(
             let velocity_mps = walker.velocity_mps;
             let left_mps = beside.forward.x * velocity_mps.y - beside.forward.y * velocity_mps.x;
             let away_mps = left_mps * beside.offset_m.signum();
-            let on = scene.route.lane_at(from_m);
-            let beside_lane = off_m > scene.map.lane(on.lane).width_at(from_m - on.from_m) / 2.0;
-            if beside_lane && standing.time_s(walker.id) > CROSSWALK_PATIENCE_S {
+            if off_m > scene.half_width_m(from_m) && standing.time_s(walker.id) > CROSSWALK_PATIENCE_S {
                 return false;
             }
             let comes = away_mps < -ACROSS_MPS;

@@ -16,7 +16,7 @@ use avastra_world::sim::VehicleParameters;
 
 use super::super::config::PlanningConfig;
 use super::claim::{Claim, Role, Stance};
-use super::trajectory::Point;
+use super::decisions::Situation;
 
 /// Time between columns, s. Apollo's DP `unit_t`: 1.0; `total_time`: 7.0.
 const UNIT_S: f64 = 1.0;
@@ -59,8 +59,8 @@ pub struct Region {
     /// Whether the vehicle must stay on one side of it, or else how probable it is.
     binds: bool,
     probability: f64,
-    /// The side on which it must stay, if that is given.
-    held: Stance,
+    /// The side on which it stayed in the last cycle, if any.
+    pub remembered: Stance,
 }
 
 impl Region {
@@ -85,7 +85,7 @@ impl Region {
             room_m: if goes_along { config.dp_safe_distance_m } else { config.yield_gap_m },
             binds,
             probability: claim.probability,
-            held: Stance::Open,
+            remembered: Stance::Open,
         };
         for (time_s, span) in claim.steps() {
             let first = rounded_up((time_s - buffer_s) / UNIT_S);
@@ -118,20 +118,16 @@ impl Region {
         }
     }
 
-    /// As this region, with the side of it given.
-    pub fn held(self, stance: Stance) -> Region {
-        Region { held: stance, ..self }
-    }
-
     fn is_active(&self, column: usize) -> bool {
         self.near[column] >= 1.0
     }
 
-    /// Cost of a moment at a place, and whether the place is above the region.
+    /// Cost of a moment at a place, and whether the place is above the region. With `is_kept` the other side than the
+    /// remembered one is wrong.
     ///
     /// Apollo's obstacle cost: the square of what is missing to the safe distance, below and above. Ours: the
     /// same for what is missing to the safe time before and after it, and inside what does not bind.
-    fn cost(&self, config: &PlanningConfig, column: usize, place_m: f64) -> (f64, bool) {
+    fn cost(&self, config: &PlanningConfig, column: usize, place_m: f64, is_kept: bool) -> (f64, bool) {
         let (low_m, high_m) = (self.low_m[column], self.high_m[column]);
         let share = if self.binds { OBSTACLE_COST } else { self.probability * OBSTACLE_COST };
         let (below, above) = (place_m <= low_m, place_m >= high_m);
@@ -143,8 +139,9 @@ impl Region {
             (true, ..) if self.binds => return (INSIDE_COST, place_m > (low_m + high_m) / 2.0),
             (true, ..) => config.dp_safe_distance_m,
         };
-        let is_wrong = below && self.held == Stance::Overtake || above && self.held == Stance::Yield;
-        let wrong = if is_wrong { INSIDE_COST } else { 0.0 };
+        let is_other =
+            below && self.remembered == Stance::Overtake || above && self.remembered == Stance::Yield;
+        let wrong = if is_kept && is_other { INSIDE_COST } else { 0.0 };
         (wrong + share * larger(missing_m, 0.0) * larger(missing_m, 0.0), above)
     }
 }
@@ -187,21 +184,18 @@ struct Search<'a> {
     guide: &'a Guide,
     front_m: f64,
     regions: &'a [Region],
+    /// Whether the remembered sides are kept.
+    is_kept: bool,
 }
 
 impl Profile {
-    /// The cheapest way from `start` on which the front bumper stays before `stop_m` (a station), or as near
-    /// behind it as braking allows.
-    pub fn cheapest(
-        config: &PlanningConfig,
-        guide: &Guide,
-        start: &Point,
-        stop_m: f64,
-        regions: &[Region],
-    ) -> Profile {
+    /// The cheapest way from the start on which the front bumper stays before the stop, or as near behind it as braking
+    /// allows; with the remembered sides of all regions or without.
+    pub fn cheapest(situation: &Situation, regions: &[Region], is_kept: bool) -> Profile {
+        let &Situation { config, guide, start, stop_m, .. } = situation;
         let front_m = VehicleParameters::MKZ.front_m(start.station_m);
         let regions = &regions[..regions.len().min(REGIONS_MAX)];
-        let search = Search { config, guide, front_m, regions };
+        let search = Search { config, guide, front_m, regions, is_kept };
         let braking_m = braking_m(start.speed_mps, config.deceleration_mps2_max);
         let last_m = (stop_m - front_m).max(braking_m + ROW_M);
         let end = (last_m / ROW_M).min((ROWS - 1) as f64) as usize + 1;
@@ -293,7 +287,7 @@ impl Search<'_> {
             limit_mps: self.guide.speed_mps_max(self.front_m + way_m - VehicleParameters::MKZ.front_m(0.0)),
         };
         for (bit, region) in self.regions.iter().enumerate() {
-            let (cost, above) = region.cost(self.config, column, way_m);
+            let (cost, above) = region.cost(self.config, column, way_m, self.is_kept);
             place.cost += cost;
             place.above |= u32::from(above) << bit;
         }

@@ -3,7 +3,7 @@
 
 mod promise;
 mod rules;
-mod sound;
+mod witnesses;
 
 use std::path::Path;
 use std::sync::Arc;

@@ -4,7 +4,7 @@
 //! road and a kinematic floor, because IDM alone assumes brakes without limit. Ten times a second,
 //! which is their reaction time, drivers look for a leader (`leader`, `foresight`), for a reason to wait
 //! at a junction (`manners`) and for the occasion of their next lane change (`change`); in every tick
-//! they slow down for bends, stop at red lights (`red_light`) and stop signs (`stop_sign`) and follow. What else they do to the ego
+//! they slow down for bends, stop at red lights and stop signs (`stop_line`) and follow. What else they do to the ego
 //! vehicle is the scenario's business.
 
 use std::sync::Arc;

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | in what order a driver decides and moves | `driver` |
 //! | which vehicle it follows, and how close | `leader`; in tight turns `foresight` |
-//! | where it stops for a red or yellow light, or a sign | `red_light`, `stop_sign` |
+//! | where it stops for a red or yellow light, or a sign | `stop_line` |
 //! | which vehicles it waits for at a junction, and for how long | `manners` |
 //! | when and how it changes lanes | `change`; for its own gain `mobil` |
 //! | what it sees and does under the profile `released` | `rays` |
@@ -16,8 +16,7 @@ mod leader;
 mod manners;
 mod mobil;
 mod rays;
-mod red_light;
-mod stop_sign;
+mod stop_line;
 
 pub(super) use change::{Manoeuvre, Towards, When, can_change, lane_beside};
 pub(super) use driver::{Cruise, Driver, View, choices};

@@ -1,15 +1,16 @@
-//! How a section of the configuration is written down: each setting once, with default and range.
+//! How settings are written down: each once, with default and range. Driving systems write theirs so, too.
 
-/// A section: its struct, its `Default` and the ranges of its numbers.
+/// A section of settings: its struct, its `Default` and the ranges of its numbers.
 ///
 /// `name: type = default, low..=high;` is a number, `name: bool = default;` a switch.
+#[macro_export]
 macro_rules! section {
     (
         $(#[$about:meta])*
         pub struct $section:ident {
             $(
                 $(#[$doc:meta])*
-                $name:ident: $kind:ty = $default:expr $(, $low:literal..=$high:literal)?;
+                $name:ident: $kind:ty = $default:expr $(, $low:literal..=$high:expr)?;
             )*
         }
     ) => {
@@ -28,10 +29,8 @@ macro_rules! section {
 
         impl $section {
             /// Least and greatest value of every number.
-            pub(in crate) const RANGES: &[(&str, f64, f64)] =
+            pub(crate) const RANGES: &[(&str, f64, f64)] =
                 &[$($((stringify!($name), $low, $high),)?)*];
         }
     };
 }
-
-pub(super) use section;
