@@ -86,7 +86,7 @@ struct Played<C: Cut> {
 
 impl<C: Cut> Played<C> {
     fn file(&self) -> PathBuf {
-        self.path.join(format!("{}.db", C::KIND.file))
+        C::KIND.database(&self.path)
     }
 
     fn text(&self) -> String {
@@ -282,8 +282,8 @@ fn bring_together<C: Cut>(
     (partial, outside): (&Path, &Outside),
     text: &str,
 ) -> Result<(), Failure> {
-    write(&partial.join(format!("{}.yaml", C::KIND.file)), text)?;
-    let file = partial.join(format!("{}.db", C::KIND.file));
+    write(&C::KIND.settings(partial), text)?;
+    let file = C::KIND.database(partial);
     let mut into = C::Database::open(&file, text).map_err(|error| Failure::file("open", &file, error))?;
     for path in directories {
         let _held = run_directory::hold(path)?;

@@ -23,9 +23,11 @@ use super::interrupt::stop_on_interrupt;
 use super::output::{Output, plural};
 use super::parallel::jobs;
 use super::progress::now;
-use super::run_directory::{Held, Resumed};
+use super::run_directory::Resumed;
 use super::timing::Times;
 use super::{load, merge, results, run_directory, shard};
+
+type Directory = run_directory::Directory<StudySettings>;
 
 impl Campaign for StudySettings {
     const KIND: Kind = Kind {
@@ -107,8 +109,8 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
             shard::keep(&held.path, shard)?;
             let settings = study.settings().clone();
             let attached = settings.external.clone();
-            let text = run_directory::begin(&held.path, settings, &study.table().space().path, attached)?;
-            ((study, held, text), reused)
+            let directory = Directory::begin(held, settings, &study.table().space().path, attached)?;
+            ((study, directory), reused)
         }
     };
     play_all(output, begun, &reused, arguments.jobs)
@@ -117,38 +119,34 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
 /// Plays the jobs that a directory still lacks, and says what all of them came to.
 fn play_all(
     output: &Output,
-    (study, held, settings): (Study, Held, String),
+    (study, mut directory): (Study, Directory),
     reused: &[Reused],
     asked_jobs: Option<u32>,
 ) -> Result<(), Failure> {
-    let path = held.path.clone();
+    let path = directory.path.clone();
     let stop = stop_on_interrupt();
-    let file = path.join("study.db");
-    let unread = |error| Failure::file("read", &file, error);
-    let unwritten = |error| Failure::file("write", &file, error);
-    let mut database: StudyDatabase = run_directory::open_to_go_on(output, &file, &settings)?;
     let share = Share::of(&path, study.settings())?;
     let all = study.settings().jobs();
-    let lacking = |database: &StudyDatabase| share.lacking(study.settings(), database).map_err(unread);
     output.tell(&format!("{}, into {}", heading(&study), path.display()));
     let mut times = Times::read(&path)?;
-    for Reused { directory, played } in reused {
-        let lacking: Vec<&Job> = lacking(&database)?.into_iter().map(|job| &all[job]).collect();
+    for Reused { directory: other, played } in reused {
+        let lacking = share.lacking(study.settings(), &directory)?;
+        let lacking: Vec<&Job> = lacking.into_iter().map(|job| &all[job]).collect();
         let new: Vec<_> = played.iter().filter(|(job, _)| lacking.contains(&job)).collect();
         for (_, cells) in &new {
             times.add(cells);
-            database.add(cells).map_err(unwritten)?;
+            directory.write(|database| database.add(cells))?;
         }
         times.write(&path)?;
         let count = plural(new.iter().map(|(_, cells)| cells.len()).sum(), "cell");
-        output.tell(&format!("{count} taken over from {}", directory.display()));
+        output.tell(&format!("{count} taken over from {}", other.display()));
     }
-    let left = lacking(&database)?;
+    let left = share.lacking(study.settings(), &directory)?;
     let todo: Vec<Job> = left.iter().map(|&job| all[job].clone()).collect();
 
     // Each job has a process, or a connection, of its own: these are only to see that they can be had.
     let external = study.settings().external.as_ref().filter(|_| !todo.is_empty());
-    run_directory::refuse_to_play(&path, "study", external.is_none_or(|attached| !attached.is_recorded))?;
+    directory.refuse_to_play(external.is_none_or(|attached| !attached.is_recorded))?;
     let probe = external.map(|attached| Program::new(attached.settings.clone()));
     let jobs = jobs(asked_jobs, probe.as_ref())?;
     drop(probe);
@@ -160,18 +158,18 @@ fn play_all(
         }
         Event::Done(cells) => {
             times.add(&cells);
-            database.add(&cells).map_err(unwritten)?;
+            directory.write(|database| database.add(&cells))?;
             times.write(&path)
         }
     })?;
     drop(progress);
-    let is_over = lacking(&database)?.is_empty();
+    let is_over = share.lacking(study.settings(), &directory)?.is_empty();
     if is_over {
         times.write(&path)?;
-        database = settled(study.settings(), database, &file)?;
+        directory = settled(study.settings(), directory)?;
     }
 
-    let cells = times.on(database.cells().map_err(unread)?);
+    let cells = times.on(directory.read(StudyDatabase::cells)?);
     let failed = FailedCell::among(&cells);
     let timing = timing(&cells);
     if !failed.is_empty() {
@@ -190,7 +188,7 @@ fn play_all(
     output.result(
         serde_json::json!({ "directory": path, "results": results, "failures": failed, "timing": timing }),
     );
-    share.end::<StudySettings>(output, path, is_over, None)
+    share.end(output, directory, is_over, None)
 }
 
 /// Another study's directory, with the jobs that it has played of this one.
@@ -311,15 +309,14 @@ pub fn wanted(
     Ok((file, table, settings))
 }
 
-/// The rest of an interrupted study, with the text of its settings. With `is_played`, nothing of it is left to play, and no
-/// program is started.
-fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Study, Held, String), Failure> {
+/// The rest of an interrupted study. With `is_played`, nothing of it is left to play, and no program is started.
+fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Study, Directory), Failure> {
     let Resumed { settings, text, table, held } = run_directory::resume(output, path, is_played)?;
     let study = Study::new(table, settings).map_err(|error| match error {
         StudyError::Agent { error: error @ RunError::OtherProgram { .. }, .. } => error.into(),
         error => Failure::usage(error),
     })?;
-    Ok((study, held, text))
+    Ok((study, Directory::open_to_go_on(output, held, &text)?))
 }
 
 fn heading(study: &Study) -> String {
