@@ -63,6 +63,12 @@ pub trait Campaign: Serialize + DeserializeOwned {
 
     /// What the settings name outside of the directory.
     fn outside(&mut self) -> Outside<'_>;
+
+    /// These settings; for a dry run with an external driving system that is not started.
+    fn started_unless(mut self, is_dry_run: bool) -> Self {
+        self.outside().external.iter_mut().for_each(|attached| attached.is_recorded |= is_dry_run);
+        self
+    }
 }
 
 /// What settings name outside of their directory, by paths from there.

@@ -340,10 +340,7 @@ fn wanted(output: &Output, arguments: &EstimateArguments) -> Result<(Estimate, S
         stopping: Stopping { precision: arguments.precision, hours: arguments.hours },
         run: conditions::settings(table.space(), conditions, &conditions.agent, under_test, episodes)?,
     };
-    let settings = match arguments.shard.dry_run {
-        true => EstimateSettings { run: settings.run.unstarted(), ..settings },
-        false => settings,
-    };
+    let settings = settings.started_unless(arguments.shard.dry_run);
     Ok((Estimate::new(table, settings).map_err(Failure::usage)?, shard))
 }
 

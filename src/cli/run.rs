@@ -45,12 +45,8 @@ impl Campaign for RunSettings {
     type Database = Database;
 
     fn outside(&mut self) -> Outside<'_> {
-        Outside {
-            space: &mut self.space,
-            space_digest: &self.space_digest,
-            external: &mut self.external,
-            policy: Some(&mut self.policy),
-        }
+        let RunSettings { space, space_digest, external, policy, .. } = self;
+        Outside { space, space_digest, external, policy: Some(policy) }
     }
 }
 
@@ -191,7 +187,7 @@ fn wanted(output: &Output, arguments: &RunArguments) -> Result<Wanted, Failure> 
     let under_test = load::named(&arguments.under_test.ads)?;
     let settings = conditions::settings(space, &arguments.conditions, agent, under_test, arguments.episodes)?;
     let settings = RunSettings { causes: arguments.causes, ..settings };
-    let settings = if arguments.shard.dry_run { settings.unstarted() } else { settings };
+    let settings = settings.started_unless(arguments.shard.dry_run);
     let run = ready(table, settings, policy.as_ref(), arguments.face)?;
     Ok(Wanted { run, policy, face: arguments.face, shard })
 }

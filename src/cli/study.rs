@@ -40,12 +40,8 @@ impl Campaign for StudySettings {
     type Database = StudyDatabase;
 
     fn outside(&mut self) -> Outside<'_> {
-        Outside {
-            space: &mut self.space,
-            space_digest: &self.space_digest,
-            external: &mut self.external,
-            policy: None,
-        }
+        let StudySettings { space, space_digest, external, .. } = self;
+        Outside { space, space_digest, external, policy: None }
     }
 }
 
@@ -273,8 +269,8 @@ fn failed_text(directory: &Path, cells: &[FailedCell]) -> String {
 fn begun(output: &Output, path: &Path, arguments: &StudyArguments) -> Result<Study, Failure> {
     let (_, table, settings) = wanted(output, path, arguments.ads.as_deref())?;
     let settings = if arguments.quick { settings.quick() } else { settings };
-    let settings = if arguments.shard.dry_run { settings.unstarted() } else { settings };
-    Study::new(table, settings).map_err(|error| Failure::file("use", path, error))
+    Study::new(table, settings.started_unless(arguments.shard.dry_run))
+        .map_err(|error| Failure::file("use", path, error))
 }
 
 /// What a study's file says, and asks for in full.

@@ -47,12 +47,8 @@ impl Campaign for TrainSettings {
     type Database = Database;
 
     fn outside(&mut self) -> Outside<'_> {
-        Outside {
-            space: &mut self.space,
-            space_digest: &self.space_digest,
-            external: &mut self.external,
-            policy: None,
-        }
+        let TrainSettings { space, space_digest, external, .. } = self;
+        Outside { space, space_digest, external, policy: None }
     }
 }
 
