@@ -74,7 +74,7 @@ pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Fa
                 let texts = (&*heading(&estimate), &*planned_text(settings, settings.all_parts().len()));
                 return shard::planned(output, out, settings, texts, shard);
             }
-            let (space, attached) = (&estimate.run().space().path, estimate.run().attached());
+            let (space, attached) = (&estimate.run().space().path, estimate.run().arena().attached());
             let (held, _) = run_directory::create(out, shard, space, false)?;
             let directory = Directory::begin(held, settings.clone(), space, attached)?;
             (estimate, directory)
@@ -94,7 +94,7 @@ fn play_all(
     directory.restore(output)?;
     let share = Share::of(&path, estimate.settings())?;
     output.tell(&format!("{}, into {}", heading(&estimate), path.display()));
-    let jobs = jobs(asked_jobs, estimate.run().program())?;
+    let jobs = jobs(asked_jobs, estimate.run().arena().program())?;
     let Some(pilot) = piloted(output, &estimate, &mut directory, jobs, &stop)? else {
         return share.end(output, directory, false, None);
     };
@@ -151,7 +151,7 @@ fn play_all(
     output.say(&estimate_text(&results, is_unfinished, share.shard));
     let critical = load::sources_in(&path.join("critical"))?;
     output.say(&critical_text(&path, &critical));
-    let is_reproducible = is_reproducible(output, estimate.run().program());
+    let is_reproducible = is_reproducible(output, estimate.run().arena().program());
     output.result(serde_json::json!({
         "directory": path, "results": results, "critical": critical, "reproducible": is_reproducible,
     }));
@@ -269,7 +269,7 @@ fn settled_with(
 
 /// Whether its driving system can drive other episodes than those that were played.
 fn is_started(estimate: &Estimate) -> bool {
-    estimate.run().program().is_none_or(|program| program.can_start())
+    estimate.run().arena().program().is_none_or(|program| program.can_start())
 }
 
 /// What the pilot of an estimate saw: kept, or played now. `None` if it was stopped; nothing for a method without one.
@@ -381,7 +381,7 @@ fn compare(
     let mut progress = Progress::new(output, comparison.event.noun(), numbers.len() as u64, 0);
     let mut pairs = Vec::new();
     // Whichever has a program serves so many at a time.
-    let program = comparison.first.program().or(comparison.second.program());
+    let program = comparison.first.arena().program().or(comparison.second.arena().program());
     let jobs = jobs(arguments.jobs, program)?;
     compared(&comparison, &numbers, jobs, &stop, &mut |pair| {
         progress.episode(usize::from(pair.first.happened) + usize::from(pair.second.happened));
@@ -398,7 +398,7 @@ fn compare(
     let results = ComparisonResults::new(comparison.event, &pairs).expect("there is at least one episode");
     output.say(&comparison_text(&results, sides));
     let sides_repeat =
-        [&comparison.first, &comparison.second].map(|run| is_reproducible(output, run.program()));
+        [&comparison.first, &comparison.second].map(|run| is_reproducible(output, run.arena().program()));
     let is_reproducible = sides_repeat == [true; 2];
     output.result(serde_json::json!({ "sides": sides, "results": results, "reproducible": is_reproducible }));
     Ok(())
@@ -415,7 +415,7 @@ fn heading(estimate: &Estimate) -> String {
         estimate.run().space().path.display(),
         settings.event.in_words(),
         settings.run.agent,
-        estimate.run().ads_name(),
+        estimate.run().arena().ads_name(),
         plural(settings.parts as usize, "part"),
         plural(settings.run.episodes as usize, "episode"),
         settings.run.roads.join(", "),

@@ -99,16 +99,17 @@ fn play_all(
     mut directory: Directory,
     asked_jobs: Option<u32>,
 ) -> Result<Totals, Failure> {
+    let program = run.arena().program();
     let share = Share::of(&directory.path, run.settings())?;
     // Items are episodes, by their numbers.
     let todo = share.lacking(run.settings(), &directory)?;
     if !todo.is_empty() {
-        directory.refuse_to_play(run.program().is_none_or(|program| program.can_start()))?;
+        directory.refuse_to_play(program.is_none_or(|program| program.can_start()))?;
     }
 
     let stop = stop_on_interrupt();
     let started = now();
-    let jobs = jobs(asked_jobs, run.program())?;
+    let jobs = jobs(asked_jobs, program)?;
     let mut progress = share.progress(output, "counted", &todo);
     let mut driven: Option<(usize, Arc<Conversation>)> = None;
     play(&run, &todo, jobs, &stop, &mut |summary, log| {
@@ -149,19 +150,19 @@ fn play_all(
         let place = format!("; each is in {}/failures", directory.path.display());
         output.say(&failures_text(&failures, &place));
     }
-    if let Some(program) = run.program()
+    if let Some(program) = program
         && let Some((number, first)) = driven
         && !stop.load(Ordering::Relaxed)
     {
         program.spot_check(&first, || run.episode(number).conversation);
     }
-    let is_reproducible = is_reproducible(output, run.program());
-    cut_off(run.program()).iter().for_each(|note| output.warn(note));
+    let is_reproducible = is_reproducible(output, program);
+    cut_off(program).iter().for_each(|note| output.warn(note));
     output.result(serde_json::json!({
         "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups, "never": never,
         "critical": critical, "failures": failures, "reproducible": is_reproducible,
     }));
-    share.end(output, directory, is_over, run.program())?;
+    share.end(output, directory, is_over, program)?;
     Ok(totals)
 }
 
@@ -211,7 +212,7 @@ fn begun(output: &Output, arguments: &RunArguments, wanted: Wanted) -> Result<(R
         _ => None,
     };
     let settings = RunSettings { policy: reference, ..run.settings().clone() };
-    let directory = Directory::begin(held, settings, &run.space().path, run.attached())?;
+    let directory = Directory::begin(held, settings, &run.space().path, run.arena().attached())?;
     Ok((run, directory))
 }
 
@@ -238,7 +239,7 @@ fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Run, Direct
     if !is_played {
         for (episode, path) in directory.restore(output)? {
             // The database has the text of a scenario, but not the answers beside it: the program is asked for them again.
-            if run.program().is_some() {
+            if run.arena().program().is_some() {
                 write_answers(&path, &run.episode(episode as usize))?;
             }
         }
@@ -301,7 +302,7 @@ fn heading(run: &Run, arguments: &RunArguments) -> String {
         let name = arguments.conditions.traffic.as_deref().or(record.settings.shipped_as());
         format!(", traffic {}", name.unwrap_or("of a profile of its own"))
     });
-    let ads = run.ads_name();
+    let ads = run.arena().ads_name();
     let profile = load::profile_path(&arguments.under_test.ads)
         .map_or(String::new(), |path| format!(" with {}", path.display()));
     format!(
