@@ -8,7 +8,7 @@ use avastra_campaign::emit;
 use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::run::{
     Database, DatabaseError, EpisodeSummary, Group, Numbered, PolicyReference, RefusalCount, Run,
-    RunSettings, Shard, Totals, play,
+    RunSettings, Totals, play,
 };
 use avastra_drivers::external::{Conversation, Problem};
 use avastra_lang::model::Policy;
@@ -68,18 +68,11 @@ impl Cut for RunSettings {
 
 /// Plays the episodes of a new run, or those that an interrupted one still lacks.
 pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
-    let (run, directory) = match &arguments.resume {
-        Some(path) => resumed(output, path, false)?,
-        None => {
-            let wanted = wanted(output, arguments)?;
-            if arguments.shard.dry_run {
-                let (run, out) = (&wanted.run, arguments.out.as_deref());
-                let texts = (&*heading(run, arguments), &*plural(run.episodes(), "episode"));
-                return shard::planned(output, out, run.settings(), texts, wanted.shard);
-            }
-            begun(output, arguments, wanted)?
-        }
+    let begun = match &arguments.resume {
+        Some(path) => Some(resumed(output, path, false)?),
+        None => begun(output, arguments)?,
     };
+    let Some((run, directory)) = begun else { return Ok(()) };
     output.tell(&format!("{}, into {}", heading(&run, arguments), directory.path.display()));
     let found = play_all(output, run, directory, arguments.jobs)?;
     if arguments.fail_on_collision && found.counted > 0 {
@@ -166,16 +159,10 @@ fn play_all(
     Ok(totals)
 }
 
-/// What the command line asks for.
-struct Wanted {
-    run: Run,
-    /// With its own table.
-    policy: Option<(ActionTable, Policy)>,
-    face: Face,
-    shard: Shard,
-}
-
-fn wanted(output: &Output, arguments: &RunArguments) -> Result<Wanted, Failure> {
+/// A new run in a directory of its own; for a dry run only says what would be played.
+fn begun(output: &Output, arguments: &RunArguments) -> Result<Option<(Run, Directory)>, Failure> {
+    let (out, face) = (arguments.out.as_deref(), arguments.face);
+    // With its own table.
     let policy = arguments.policy.as_ref().map(|path| load::policy(output, path)).transpose()?;
     let table = match (&arguments.file, &policy) {
         (Some(file), _) => load::table(output, file)?,
@@ -189,15 +176,12 @@ fn wanted(output: &Output, arguments: &RunArguments) -> Result<Wanted, Failure> 
     let settings = conditions::settings(space, &arguments.conditions, agent, under_test, arguments.episodes)?;
     let settings = RunSettings { causes: arguments.causes, ..settings };
     let settings = settings.started_unless(arguments.shard.dry_run);
-    let run = ready(table, settings, policy.as_ref(), arguments.face)?;
-    Ok(Wanted { run, policy, face: arguments.face, shard })
-}
-
-/// A new run in a directory of its own.
-fn begun(output: &Output, arguments: &RunArguments, wanted: Wanted) -> Result<(Run, Directory), Failure> {
-    let Wanted { run, policy, face, shard } = wanted;
-    let (out, space) = (arguments.out.as_deref(), &run.space().path);
-    let (held, copy) = run_directory::create(out, shard, space, arguments.self_contained)?;
+    let run = ready(table, settings, policy.as_ref(), face)?;
+    if arguments.shard.dry_run {
+        let texts = (&*heading(&run, arguments), &*plural(run.episodes(), "episode"));
+        return shard::planned(output, out, run.settings(), texts, shard).map(|()| None);
+    }
+    let (held, copy) = run_directory::create(out, shard, &run.space().path, arguments.self_contained)?;
     let run = if arguments.self_contained {
         ready(load::table(output, &copy)?, run.settings().clone(), policy.as_ref(), face)?
     } else {
@@ -213,7 +197,7 @@ fn begun(output: &Output, arguments: &RunArguments, wanted: Wanted) -> Result<(R
     };
     let settings = RunSettings { policy: reference, ..run.settings().clone() };
     let directory = Directory::begin(held, settings, &run.space().path, run.arena().attached())?;
-    Ok((run, directory))
+    Ok(Some((run, directory)))
 }
 
 /// The rest of an interrupted run. With `is_played`, nothing of it is left to play, and no program is started.
