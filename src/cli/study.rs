@@ -15,7 +15,7 @@ use avastra_lang::syntax::listed;
 use avastra_world::action::ActionTable;
 
 use super::arguments::{StudyArguments, StudyCommand};
-use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, settled};
+use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, costs, settled};
 use super::error::Failure;
 use super::files::{remove, write};
 use super::findings::kinds_text;
@@ -84,24 +84,20 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
         }
         None => {
             let file = arguments.file.as_ref().expect("clap asks for it where there is no `--resume`");
-            let shard = shard::asked(output, arguments.shard.shard)?;
-            let study = begun(output, file, arguments)?;
+            let (out, shard) = (arguments.out.as_deref(), shard::asked(output, arguments.shard.shard)?);
+            let (_, table, settings) = wanted(output, file, arguments.ads.as_deref())?;
+            let settings = if arguments.quick { settings.quick() } else { settings };
+            let study = Study::new(table, settings.started_unless(arguments.shard.dry_run))
+                .map_err(|error| Failure::file("use", file, error))?;
             if arguments.shard.dry_run {
-                let (jobs, settings) = (study.settings().jobs(), study.settings());
-                let episodes = jobs.iter().map(|job| settings.episodes(job)).sum::<u64>() as usize;
-                let episodes = plural(episodes, "episode");
-                let what = format!("{} trainings or repetitions, {episodes} together", jobs.len());
-                return shard::planned(
-                    output,
-                    arguments.out.as_deref(),
-                    settings,
-                    (&heading(&study), &what),
-                    shard,
-                );
+                let costs = costs(&study.settings().work());
+                let episodes = plural(costs.iter().sum::<u64>() as usize, "episode");
+                let what = format!("{} trainings or repetitions, {episodes} together", costs.len());
+                return shard::planned(output, out, study.settings(), (&heading(&study), &what), shard);
             }
             // A driving system that was not started has no name to compare.
             let reused = played_elsewhere(&arguments.reuse, &study)?;
-            let held = run_directory::create_empty(arguments.out.as_deref())?;
+            let held = run_directory::create_empty(out)?;
             shard::keep(&held.path, shard)?;
             let settings = study.settings().clone();
             let attached = settings.external.clone();
@@ -263,14 +259,6 @@ fn failed_text(directory: &Path, cells: &[FailedCell]) -> String {
         directory.join("study.db").display()
     ));
     text
-}
-
-/// A new study, from its file.
-fn begun(output: &Output, path: &Path, arguments: &StudyArguments) -> Result<Study, Failure> {
-    let (_, table, settings) = wanted(output, path, arguments.ads.as_deref())?;
-    let settings = if arguments.quick { settings.quick() } else { settings };
-    Study::new(table, settings.started_unless(arguments.shard.dry_run))
-        .map_err(|error| Failure::file("use", path, error))
 }
 
 /// What a study's file says, and asks for in full.
