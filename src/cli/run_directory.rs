@@ -22,7 +22,7 @@ use avastra_lang::syntax::{ast, print};
 use avastra_world::action::ActionTable;
 use avastra_world::sim::ENGINE;
 
-use super::campaign::{Campaign, KINDS, Kind};
+use super::campaign::{Campaign, KINDS, Kind, Outside};
 use super::error::Failure;
 use super::files::{folder, make, make_first, write, write_answers};
 use super::load;
@@ -118,8 +118,6 @@ pub fn from_record(directory: &Path, attached: Attached) -> Attached {
 struct Begun {
     avastra: String,
     engine: String,
-    space: PathBuf,
-    space_digest: String,
 }
 
 /// A directory that is gone on with.
@@ -175,18 +173,17 @@ pub fn resume<C: Campaign>(
         None => {}
     }
     let (mut settings, text) = settings_of::<C>(directory)?;
-    let begun: Begun = serde_yaml::from_str(&text).expect("it was read so before");
-    let table = load::table(output, &directory.join(&begun.space))?;
+    let Outside { space, space_digest, external, .. } = settings.outside();
+    let table = load::table(output, &directory.join(space.as_str()))?;
     let meaning = &table.space().meaning;
-    if !meaning.is_sealed_by(&begun.space_digest) {
-        let differences = meaning.differences(&begun.space_digest);
+    if !meaning.is_sealed_by(space_digest) {
+        let differences = meaning.differences(space_digest);
         let differences = differences.map_or_else(String::new, |found| format!(" ({found})"));
         return Err(Failure::usage(format!(
             "`{}` has changed since the {what} was begun{differences}: begin a new one",
             table.space().path.display()
         )));
     }
-    let external = settings.outside().external;
     *external = external
         .take()
         .map(|attached| Attached { is_recorded: is_played, ..from_record(directory, attached) });
