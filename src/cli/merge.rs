@@ -445,15 +445,8 @@ impl Way<'_> {
 
     /// The driving system is not started here, so its working directory need not exist on this machine.
     fn external(&self, external: Option<Attached>) -> Result<Option<Attached>, Failure> {
-        let moved = |external| {
-            let attached = run_directory::from_record(self.from, external);
-            let is_absent = attached.settings.working_directory.as_ref().is_some_and(|place| !place.is_dir());
-            match is_absent {
-                true => run_directory::to_record_absent(self.to, attached),
-                false => run_directory::to_record(self.to, attached),
-            }
-        };
-        external.map(moved).transpose()
+        let moved = external.map(|external| run_directory::from_record(self.from, external));
+        moved.map(|attached| run_directory::to_record(self.to, attached)).transpose()
     }
 
     /// Settings as they stand in the other directory.

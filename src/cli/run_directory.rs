@@ -86,23 +86,15 @@ pub fn hold(path: &Path) -> Result<Held, Failure> {
 }
 
 /// An external driving system as settings in `directory` record it: its working directory is one from there, so that the
-/// same program is started wherever the run is resumed from.
-///
-/// # Errors
-/// If one of the two folders does not exist.
-pub fn to_record(directory: &Path, attached: Attached) -> Result<Attached, Failure> {
-    let folder = attached.settings.working_directory.as_deref().unwrap_or(Path::new("."));
-    let working_directory = Some(PathBuf::from(load::relative(directory, folder)?));
-    Ok(Attached { settings: ExternalSettings { working_directory, ..attached.settings }, ..attached })
-}
-
-/// The same if the working directory is missing: the relative path follows from the names alone.
+/// same program is started wherever the run is resumed from. If it is missing on this machine, the path follows from the names
+/// alone.
 ///
 /// # Errors
 /// If this process has no folder that it works in.
-pub fn to_record_absent(directory: &Path, attached: Attached) -> Result<Attached, Failure> {
+pub fn to_record(directory: &Path, attached: Attached) -> Result<Attached, Failure> {
     let folder = attached.settings.working_directory.as_deref().unwrap_or(Path::new("."));
-    let between = load::path_between(&pack::absolute(directory)?, &pack::absolute(folder)?)?;
+    let by_names = || load::path_between(&pack::absolute(directory)?, &pack::absolute(folder)?);
+    let between = load::relative(directory, folder).or_else(|_| by_names())?;
     let working_directory = Some(PathBuf::from(between));
     Ok(Attached { settings: ExternalSettings { working_directory, ..attached.settings }, ..attached })
 }
