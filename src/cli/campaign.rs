@@ -20,6 +20,7 @@ use super::error::Failure;
 use super::findings::unfinished;
 use super::output::Output;
 use super::progress::Progress;
+use super::run_directory::Directory;
 use super::shard;
 
 /// All kinds. One directory holds one of them; the first that it holds counts.
@@ -40,6 +41,18 @@ pub struct Kind {
     pub merge: Option<Merge>,
 }
 
+impl Kind {
+    /// The file of the settings in a directory.
+    pub fn settings(&self, directory: &Path) -> PathBuf {
+        directory.join(format!("{}.yaml", self.file))
+    }
+
+    /// The file of the database in a directory.
+    pub fn database(&self, directory: &Path) -> PathBuf {
+        directory.join(format!("{}.db", self.file))
+    }
+}
+
 /// Brings the shards in these directories together; without a new directory, only says what is missing.
 pub type Merge = fn(&Output, &[PathBuf], Option<&Path>) -> Result<(), Failure>;
 
@@ -50,6 +63,12 @@ pub trait Campaign: Serialize + DeserializeOwned {
 
     /// What the settings name outside of the directory.
     fn outside(&mut self) -> Outside<'_>;
+
+    /// These settings; for a dry run with an external driving system that is not started.
+    fn started_unless(mut self, is_dry_run: bool) -> Self {
+        self.outside().external.iter_mut().for_each(|attached| attached.is_recorded |= is_dry_run);
+        self
+    }
 }
 
 /// What settings name outside of their directory, by paths from there.
@@ -116,8 +135,9 @@ impl Share {
     }
 
     /// Those of its items that are not played.
-    pub fn lacking<C: Cut>(&self, settings: &C, database: &C::Database) -> Result<Vec<usize>, DatabaseError> {
-        let played = settings.numbered(database)?.into_iter().map(|(_, place)| place).collect();
+    pub fn lacking<C: Cut>(&self, settings: &C, directory: &Directory<C>) -> Result<Vec<usize>, Failure> {
+        let played = directory.read(|database| settings.numbered(database))?;
+        let played = played.into_iter().map(|(_, place)| place).collect();
         Ok(self.own.iter().copied().filter(|&item| !self.work[item].is_in(&played)).collect())
     }
 
@@ -132,12 +152,12 @@ impl Share {
     pub fn end<C: Cut>(
         &self,
         output: &Output,
-        directory: PathBuf,
+        directory: Directory<C>,
         is_over: bool,
         program: Option<&Arc<Program>>,
     ) -> Result<(), Failure> {
         if !is_over {
-            return Err(unfinished(C::KIND.command, directory, program));
+            return Err(unfinished(C::KIND.command, directory.path, program));
         }
         if !self.shard.is_whole() {
             output.say(&shard::next_step(self.shard));
@@ -146,10 +166,10 @@ impl Share {
     }
 }
 
-/// Settles a database in which all is played; `file` is where it is.
-pub fn settled<C: Cut>(settings: &C, database: C::Database, file: &Path) -> Result<C::Database, Failure> {
-    let units = settings.numbered(&database).map_err(|error| Failure::file("read", file, error))?;
-    database.settle(file, &units).map_err(|error| Failure::file("write", file, error))
+/// Settles the database of a directory in which all is played.
+pub fn settled<C: Cut>(settings: &C, directory: Directory<C>) -> Result<Directory<C>, Failure> {
+    let units = directory.read(|database| settings.numbered(database))?;
+    directory.settle(&units)
 }
 
 /// Units that have the same numbers in every file.

@@ -19,11 +19,10 @@ use super::files::{remove, write};
 use super::findings::is_reproducible;
 use super::interrupt::stop_on_interrupt;
 use super::output::{Output, plural};
-use super::pack::pack_space;
 use super::parallel::jobs;
 use super::progress::{Progress, Working};
 use super::run::{critical_text, cut_short};
-use super::run_directory::{Held, Player, Resumed, written};
+use super::run_directory::{Player, Resumed, written};
 use super::{conditions, load, merge, run_directory, shard};
 
 /// Episodes of a part, if a command line gives no number.
@@ -31,6 +30,8 @@ const EPISODES: u32 = 50;
 
 /// Episodes on each road in which two driving systems are compared, if a command line gives no number.
 const EPISODES_OF_TWO: u32 = 250;
+
+type Directory = run_directory::Directory<EstimateSettings>;
 
 impl Campaign for EstimateSettings {
     const KIND: Kind = Kind {
@@ -68,12 +69,15 @@ pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Fa
         Some(path) => resumed(output, path, false)?,
         None => {
             let (estimate, shard) = wanted(output, arguments)?;
+            let (settings, out) = (estimate.settings(), arguments.out.as_deref());
             if arguments.shard.dry_run {
-                let settings = estimate.settings();
                 let texts = (&*heading(&estimate), &*planned_text(settings, settings.all_parts().len()));
-                return shard::planned(output, arguments.out.as_deref(), settings, texts, shard);
+                return shard::planned(output, out, settings, texts, shard);
             }
-            begun(arguments, estimate, shard)?
+            let (space, attached) = (&estimate.run().space().path, estimate.run().arena().attached());
+            let (held, _) = run_directory::create(out, shard, space, false)?;
+            let directory = Directory::begin(held, settings.clone(), space, attached)?;
+            (estimate, directory)
         }
     };
     play_all(output, begun, arguments.jobs)
@@ -82,27 +86,24 @@ pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Fa
 /// Plays the parts that a directory still lacks, and says what all of them came to.
 fn play_all(
     output: &Output,
-    (estimate, held, settings): (Estimate, Held, String),
+    (estimate, mut directory): (Estimate, Directory),
     asked_jobs: Option<u32>,
 ) -> Result<(), Failure> {
-    let path = held.path.clone();
-    let file = path.join("estimate.db");
+    let path = directory.path.clone();
     let stop = stop_on_interrupt();
-    let mut database: EstimateDatabase = run_directory::open_to_go_on(output, &file, &settings)?;
-    let unread = |error| Failure::file("read", &file, error);
-    run_directory::restore(output, "estimate", &written(&path, database.scenarios().map_err(unread)?))?;
+    directory.restore(output)?;
     let share = Share::of(&path, estimate.settings())?;
     output.tell(&format!("{}, into {}", heading(&estimate), path.display()));
-    let jobs = jobs(asked_jobs, estimate.run().program())?;
-    let Some(pilot) = piloted(output, &estimate, (&mut database, &file), jobs, &stop)? else {
-        return share.end::<EstimateSettings>(output, path, false, None);
+    let jobs = jobs(asked_jobs, estimate.run().arena().program())?;
+    let Some(pilot) = piloted(output, &estimate, &mut directory, jobs, &stop)? else {
+        return share.end(output, directory, false, None);
     };
     let plan = Plan::of(&pilot, 0.0);
 
     let labels: Vec<String> = estimate.run().table().rows().iter().map(|row| row.label.clone()).collect();
     let all = estimate.settings().all_parts();
-    let lacking = |database: &EstimateDatabase| share.lacking(estimate.settings(), database).map_err(unread);
-    let mut progress = share.progress(output, estimate.settings().event.noun(), &lacking(&database)?);
+    let lacking = share.lacking(estimate.settings(), &directory)?;
+    let mut progress = share.progress(output, estimate.settings().event.noun(), &lacking);
     // A shard cannot know when all of them together are precise enough: it plays all of its parts, and the looks are taken
     // when they are merged.
     let looks = match share.shard.is_whole() {
@@ -114,9 +115,9 @@ fn play_all(
         let at = |items: &[usize]| -> Vec<Part> {
             items.iter().map(|&part| all[part]).filter(|part| part.number < look).collect()
         };
-        let (wanted, todo) = (at(&share.own), at(&lacking(&database)?));
+        let (wanted, todo) = (at(&share.own), at(&share.lacking(estimate.settings(), &directory)?));
         if !todo.is_empty() {
-            run_directory::refuse_to_play(&path, "estimate", is_started(&estimate))?;
+            directory.refuse_to_play(is_started(&estimate))?;
         }
         play_parts(&estimate, &todo, &plan, jobs, &stop, &mut |played| {
             // Such a part says nothing, and is not kept: with a repaired system the estimate can go on.
@@ -128,9 +129,10 @@ fn play_all(
             for number in 0..played.record.episodes {
                 progress.episode(usize::from(number < played.record.events));
             }
-            database.add(&estimate, &played, &scenarios).map_err(|error| Failure::file("write", &file, error))
+            directory.write(|database| database.add(&estimate, &played, &scenarios))
         })?;
-        let looked = at_look(estimate.settings(), &database, &pilot, &labels, look).map_err(unread)?;
+        let looked =
+            directory.read(|database| at_look(estimate.settings(), database, &pilot, &labels, look))?;
         let is_unfinished = looked.parts.len() < wanted.len();
         let is_over = is_unfinished || looked.is_enough;
         results = Some((looked.results, looked.parts, is_unfinished));
@@ -142,18 +144,18 @@ fn play_all(
 
     let (results, kept, is_unfinished) = results.expect("every estimate looks once");
     if !is_unfinished {
-        settled_with(estimate.settings(), database, &path, &kept)?;
+        directory = settled_with(estimate.settings(), directory, &kept)?;
     }
     let text = serde_json::to_string_pretty(&results).expect("results have string keys only");
     write(&path.join("results.json"), &format!("{text}\n"))?;
     output.say(&estimate_text(&results, is_unfinished, share.shard));
     let critical = load::sources_in(&path.join("critical"))?;
     output.say(&critical_text(&path, &critical));
-    let is_reproducible = is_reproducible(output, estimate.run().program());
+    let is_reproducible = is_reproducible(output, estimate.run().arena().program());
     output.result(serde_json::json!({
         "directory": path, "results": results, "critical": critical, "reproducible": is_reproducible,
     }));
-    share.end::<EstimateSettings>(output, path, !is_unfinished, None)
+    share.end(output, directory, !is_unfinished, None)
 }
 
 /// An estimate's results up to a look.
@@ -250,51 +252,48 @@ const ROWS_MAX: usize = 1_000_000;
 /// Settles the database with these parts alone; what was found in others goes, too.
 fn settled_with(
     settings: &EstimateSettings,
-    database: EstimateDatabase,
-    directory: &Path,
+    directory: Directory,
     parts: &[Part],
-) -> Result<EstimateDatabase, Failure> {
-    let file = directory.join("estimate.db");
-    let unread = |error| Failure::file("read", &file, error);
+) -> Result<Directory, Failure> {
     let wanted: BTreeSet<i64> = parts.iter().map(|part| settings.place(*part)).chain([PILOT]).collect();
-    let mut scenarios = database.scenarios().map_err(unread)?;
+    let mut scenarios = directory.read(Units::scenarios)?;
     scenarios.retain(|scenario| !wanted.contains(&scenario.unit));
-    for (scenario, _) in written(directory, scenarios) {
+    for (scenario, _) in written(&directory.path, scenarios) {
         remove(&load::answers_path(&scenario))?;
         remove(&scenario)?;
     }
-    let mut kept = as_they_are(&database).map_err(unread)?;
+    let mut kept = directory.read(as_they_are)?;
     kept.retain(|(number, _)| wanted.contains(number));
-    database.settle(&file, &kept).map_err(|error| Failure::file("write", &file, error))
+    directory.settle(&kept)
 }
 
 /// Whether its driving system can drive other episodes than those that were played.
 fn is_started(estimate: &Estimate) -> bool {
-    estimate.run().program().is_none_or(|program| program.can_start())
+    estimate.run().arena().program().is_none_or(|program| program.can_start())
 }
 
 /// What the pilot of an estimate saw: kept, or played now. `None` if it was stopped; nothing for a method without one.
 fn piloted(
     output: &Output,
     estimate: &Estimate,
-    (database, file): (&mut EstimateDatabase, &Path),
+    directory: &mut Directory,
     jobs: usize,
     stop: &AtomicBool,
 ) -> Result<Option<Pilot>, Failure> {
     if estimate.settings().method != Method::Probe {
         return Ok(Some(Pilot::default()));
     }
-    let kept = database.pilot().map_err(|error| Failure::file("read", file, error))?;
+    let kept = directory.read(EstimateDatabase::pilot)?;
     if kept.is_some() {
         return Ok(kept);
     }
-    run_directory::refuse_to_play(file.parent().unwrap_or(file), "estimate", is_started(estimate))?;
+    directory.refuse_to_play(is_started(estimate))?;
     let found = {
         let _working = Working::new(output, "a pilot learns which rows are dangerous");
         pilot(estimate, jobs, stop)
     };
     if let Some(pilot) = &found {
-        database.keep_pilot(pilot).map_err(|error| Failure::file("write", file, error))?;
+        directory.write(|database| database.keep_pilot(pilot))?;
     }
     Ok(found)
 }
@@ -341,33 +340,15 @@ fn wanted(output: &Output, arguments: &EstimateArguments) -> Result<(Estimate, S
         stopping: Stopping { precision: arguments.precision, hours: arguments.hours },
         run: conditions::settings(table.space(), conditions, &conditions.agent, under_test, episodes)?,
     };
-    let settings = match arguments.shard.dry_run {
-        true => EstimateSettings { run: settings.run.unstarted(), ..settings },
-        false => settings,
-    };
+    let settings = settings.started_unless(arguments.shard.dry_run);
     Ok((Estimate::new(table, settings).map_err(Failure::usage)?, shard))
 }
 
-/// A new estimate in a directory of its own, with the text of its settings.
-fn begun(
-    arguments: &EstimateArguments,
-    estimate: Estimate,
-    shard: Shard,
-) -> Result<(Estimate, Held, String), Failure> {
-    let held = run_directory::create(arguments.out.as_deref())?;
-    shard::keep(&held.path, shard)?;
-    // As in a run: its scenarios can be looked at even if the author changes the space.
-    pack_space(&estimate.run().space().path, &held.path)?;
-    let (space, attached) = (&estimate.run().space().path, estimate.run().attached());
-    let text = run_directory::begin(&held.path, estimate.settings().clone(), space, attached)?;
-    Ok((estimate, held, text))
-}
-
-/// The rest of an interrupted estimate, with the text of its settings.
-/// With `is_played`, nothing of it is left to play, and no program is started.
-fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Estimate, Held, String), Failure> {
+/// The rest of an interrupted estimate. With `is_played`, nothing of it is left to play, and no program is started.
+fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Estimate, Directory), Failure> {
     let Resumed { settings, text, table, held } = run_directory::resume(output, path, is_played)?;
-    Ok((Estimate::new(table, settings).map_err(Failure::usage)?, held, text))
+    let estimate = Estimate::new(table, settings).map_err(Failure::usage)?;
+    Ok((estimate, Directory::open_to_go_on(output, held, &text)?))
 }
 
 /// Plays two driving systems in the same episodes.
@@ -400,7 +381,7 @@ fn compare(
     let mut progress = Progress::new(output, comparison.event.noun(), numbers.len() as u64, 0);
     let mut pairs = Vec::new();
     // Whichever has a program serves so many at a time.
-    let program = comparison.first.program().or(comparison.second.program());
+    let program = comparison.first.arena().program().or(comparison.second.arena().program());
     let jobs = jobs(arguments.jobs, program)?;
     compared(&comparison, &numbers, jobs, &stop, &mut |pair| {
         progress.episode(usize::from(pair.first.happened) + usize::from(pair.second.happened));
@@ -417,7 +398,7 @@ fn compare(
     let results = ComparisonResults::new(comparison.event, &pairs).expect("there is at least one episode");
     output.say(&comparison_text(&results, sides));
     let sides_repeat =
-        [&comparison.first, &comparison.second].map(|run| is_reproducible(output, run.program()));
+        [&comparison.first, &comparison.second].map(|run| is_reproducible(output, run.arena().program()));
     let is_reproducible = sides_repeat == [true; 2];
     output.result(serde_json::json!({ "sides": sides, "results": results, "reproducible": is_reproducible }));
     Ok(())
@@ -434,7 +415,7 @@ fn heading(estimate: &Estimate) -> String {
         estimate.run().space().path.display(),
         settings.event.in_words(),
         settings.run.agent,
-        estimate.run().ads_name(),
+        estimate.run().arena().ads_name(),
         plural(settings.parts as usize, "part"),
         plural(settings.run.episodes as usize, "episode"),
         settings.run.roads.join(", "),

@@ -249,15 +249,15 @@ pub fn under_test(ads: &str, config: Option<&Path>, command: Option<&str>) -> Re
     Ok(UnderTest { ads: ads.to_owned(), profile: settings.as_ref().map(Profile::new), external: None })
 }
 
-/// What `--ads` gives.
+/// What `--ads` gives: the name of a driving system of avastra, or else a profile or a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Driver<'a> {
-    /// A driving system of avastra.
-    Name(&'a str),
+pub struct Driver<'a> {
+    /// That name; with a profile or a command the default one.
+    pub ads: &'a str,
     /// A profile of `modular`, or of an external one.
-    Profile(&'a Path),
+    pub profile: Option<&'a Path>,
     /// What starts or reaches an external one.
-    Command(&'a str),
+    pub command: Option<&'a str>,
 }
 
 /// What a text after `--ads` gives: an address; a profile, which ends like YAML; a command, which has a blank or a path; else a
@@ -266,17 +266,18 @@ pub enum Driver<'a> {
 /// # Errors
 /// If it is a lone word and no name: a program of the search path that is started by a slip would be none that was meant.
 pub fn driver(text: &str) -> Result<Driver<'_>, Failure> {
+    let given = Driver { ads: run::DEFAULT_ADS, profile: None, command: None };
     let is_address = text.starts_with("tcp:") || text.starts_with("unix:");
     let has_blank = text.contains(char::is_whitespace);
     // `python3 drive.py --profile fast.yaml` is a command.
     if !is_address && is_yaml(text) && (!has_blank || Path::new(text).is_file()) {
-        return Ok(Driver::Profile(Path::new(text)));
+        return Ok(Driver { profile: Some(Path::new(text)), ..given });
     }
     if is_address || has_blank || text.contains(std::path::is_separator) {
-        return Ok(Driver::Command(text));
+        return Ok(Driver { command: Some(text), ..given });
     }
     match driving_system(text) {
-        Ok(_) => Ok(Driver::Name(text)),
+        Ok(_) => Ok(Driver { ads: text, ..given }),
         Err(RunError::Ads { name, known }) => {
             let names = REGISTRY.iter().map(|entry| entry.name);
             let near = nearest(&name, names).map_or(String::new(), |near| format!("did you mean `{near}`? "));
@@ -291,19 +292,13 @@ pub fn driver(text: &str) -> Result<Driver<'_>, Failure> {
 
 /// The path of the profile that a text after `--ads` gives, if it gives one.
 pub fn profile_path(text: &str) -> Option<&Path> {
-    match driver(text) {
-        Ok(Driver::Profile(path)) => Some(path),
-        _ => None,
-    }
+    driver(text).ok()?.profile
 }
 
 /// The driving system under test that `--ads` gives.
 pub fn named(text: &str) -> Result<UnderTest, Failure> {
-    match driver(text)? {
-        Driver::Name(name) => under_test(name, None, None),
-        Driver::Profile(path) => under_test(run::DEFAULT_ADS, Some(path), None),
-        Driver::Command(command) => under_test(run::DEFAULT_ADS, None, Some(command)),
-    }
+    let Driver { ads, profile, command } = driver(text)?;
+    under_test(ads, profile, command)
 }
 
 /// The driving system that scenarios are to be played with, in place of the recorded one, if `--ads` is given. An external one
@@ -313,15 +308,14 @@ pub fn named(text: &str) -> Result<UnderTest, Failure> {
 /// As [`named`], and if an external one does not start.
 pub fn asked(text: Option<&str>) -> Result<Asked, Failure> {
     let Some(text) = text else { return Ok(Asked::default()) };
-    let (config, command) = match driver(text)? {
-        Driver::Name(name) => return Ok(Asked { ads: Some(name.to_owned()), ..Asked::default() }),
-        Driver::Profile(path) => (Some(path), None),
-        Driver::Command(command) => (None, Some(command)),
-    };
-    if let Some(settings) = external(config, command)? {
+    let given = driver(text)?;
+    if let Some(settings) = external(given.profile, given.command)? {
         return Ok(Asked { external: Some(run::started(&settings)?), ..Asked::default() });
     }
-    Ok(Asked { profile: config.map(profile).transpose()?, ..Asked::default() })
+    match given.profile {
+        Some(path) => Ok(Asked { profile: Some(profile(path)?), ..Asked::default() }),
+        None => Ok(Asked { ads: Some(given.ads.to_owned()), ..Asked::default() }),
+    }
 }
 
 /// Whether a text that may be a name or a file is a file: it ends like YAML.
@@ -517,15 +511,16 @@ mod tests {
         fn is(text: &str) -> Result<Driver<'_>, String> {
             driver(text).map_err(|error| error.to_string())
         }
+        let none = Driver { ads: run::DEFAULT_ADS, profile: None, command: None };
         for entry in REGISTRY {
-            assert_eq!(is(entry.name).unwrap(), Driver::Name(entry.name));
+            assert_eq!(is(entry.name).unwrap(), Driver { ads: entry.name, ..none });
         }
         for profile in ["car.yaml", "ads/car.yml", "/nowhere/car.yaml"] {
-            assert_eq!(is(profile).unwrap(), Driver::Profile(Path::new(profile)));
+            assert_eq!(is(profile).unwrap(), Driver { profile: Some(Path::new(profile)), ..none });
         }
         for command in ["./planner", "python3 drive.py", "run --with car.yaml", "tcp:a:1", "unix:/tmp/a.yaml"]
         {
-            assert_eq!(is(command).unwrap(), Driver::Command(command));
+            assert_eq!(is(command).unwrap(), Driver { command: Some(command), ..none });
         }
         let slip = is("modualr").unwrap_err();
         assert!(slip.contains("did you mean `modular`?") && slip.contains("`./modualr`"), "{slip}");

@@ -86,7 +86,7 @@ struct Played<C: Cut> {
 
 impl<C: Cut> Played<C> {
     fn file(&self) -> PathBuf {
-        self.path.join(format!("{}.db", C::KIND.file))
+        C::KIND.database(&self.path)
     }
 
     fn text(&self) -> String {
@@ -126,19 +126,9 @@ impl<C: Cut> Played<C> {
 /// Brings the shards of one kind together. Without `out`, only says what is missing.
 pub fn merged<C: Cut>(output: &Output, directories: &[PathBuf], out: Option<&Path>) -> Result<(), Failure> {
     let outside = Outside::of::<C>(&directories[0])?;
-    let unusable = |file: &Path, error| Failure::file("open", file, error);
     let Some(out) = out else {
-        // A shard whose database is torn is one to be played again.
-        let torn = |file: &Path, error: DatabaseError| {
-            let is_torn = error.is_torn();
-            let failure = unusable(file, error);
-            if is_torn {
-                output.warn(&failure.to_string());
-            }
-            if is_torn { Ok(()) } else { Err(failure) }
-        };
         // Paths in settings are made to lead from one place, to be compared; any place serves.
-        let survey = Survey::of::<C>(directories, (Path::new("."), &outside), &torn)?;
+        let survey = Survey::of::<C>(directories, (Path::new("."), &outside), Some(output))?;
         match survey.missing.is_empty() {
             true => output.aside("nothing is missing"),
             false => output.say(&survey.named()),
@@ -148,14 +138,12 @@ pub fn merged<C: Cut>(output: &Output, directories: &[PathBuf], out: Option<&Pat
         return Ok(());
     };
     let partial = begin_partial(out)?;
-    let brought =
-        Survey::of::<C>(directories, (&partial, &outside), &|file, error| Err(unusable(file, error)))
-            .and_then(|survey| {
-                survey.complete()?;
-                bring_together::<C>(output, directories, (&partial, &outside), &survey.settings)?;
-                publish::<C>(output, out, (&partial, &outside), &survey.settings)?;
-                Ok(survey.shards)
-            });
+    let brought = Survey::of::<C>(directories, (&partial, &outside), None).and_then(|survey| {
+        survey.complete()?;
+        bring_together::<C>(output, directories, (&partial, &outside), &survey.settings)?;
+        publish::<C>(output, out, (&partial, &outside), &survey.settings)?;
+        Ok(survey.shards)
+    });
     if brought.is_err() && partial.exists() {
         discard(&partial)?;
     }
@@ -177,12 +165,12 @@ struct Survey {
 }
 
 impl Survey {
-    /// Looks at all directories; `to` is the merged one, or one beside it. `unusable` says what to do about a database that
-    /// cannot be used.
+    /// Looks at all directories; `to` is the merged one, or one beside it. A shard whose database is torn is to be played again:
+    /// with an output this is said, without one it is an error.
     fn of<C: Cut>(
         directories: &[PathBuf],
         (to, outside): (&Path, &Outside),
-        unusable: &dyn Fn(&Path, DatabaseError) -> Result<(), Failure>,
+        output: Option<&Output>,
     ) -> Result<Survey, Failure> {
         let mut wanted: Option<(String, Vec<Item>)> = None;
         let mut have: BTreeSet<i64> = BTreeSet::new();
@@ -190,7 +178,14 @@ impl Survey {
         for path in directories {
             // One after another: there may be more shards than files that a process may have open.
             let mut played = Played::<C>::read(path, to, outside)?;
-            played.open().or_else(|error| unusable(&played.file(), error))?;
+            if let Err(error) = played.open() {
+                let told = output.filter(|_| error.is_torn());
+                let failure = Failure::file("open", &played.file(), error);
+                match told {
+                    Some(output) => output.warn(&failure.to_string()),
+                    None => return Err(failure),
+                }
+            }
             let text = played.text();
             let (first, _) = wanted.get_or_insert_with(|| (text.clone(), played.settings.work()));
             if let Some(what) = settings_differences(first, &text) {
@@ -282,8 +277,8 @@ fn bring_together<C: Cut>(
     (partial, outside): (&Path, &Outside),
     text: &str,
 ) -> Result<(), Failure> {
-    write(&partial.join(format!("{}.yaml", C::KIND.file)), text)?;
-    let file = partial.join(format!("{}.db", C::KIND.file));
+    write(&C::KIND.settings(partial), text)?;
+    let file = C::KIND.database(partial);
     let mut into = C::Database::open(&file, text).map_err(|error| Failure::file("open", &file, error))?;
     for path in directories {
         let _held = run_directory::hold(path)?;
@@ -450,15 +445,8 @@ impl Way<'_> {
 
     /// The driving system is not started here, so its working directory need not exist on this machine.
     fn external(&self, external: Option<Attached>) -> Result<Option<Attached>, Failure> {
-        let moved = |external| {
-            let attached = run_directory::from_record(self.from, external);
-            let is_absent = attached.settings.working_directory.as_ref().is_some_and(|place| !place.is_dir());
-            match is_absent {
-                true => run_directory::to_record_absent(self.to, attached),
-                false => run_directory::to_record(self.to, attached),
-            }
-        };
-        external.map(moved).transpose()
+        let moved = external.map(|external| run_directory::from_record(self.from, external));
+        moved.map(|attached| run_directory::to_record(self.to, attached)).transpose()
     }
 
     /// Settings as they stand in the other directory.

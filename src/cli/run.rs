@@ -8,12 +8,12 @@ use avastra_campaign::emit;
 use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::run::{
     Database, DatabaseError, EpisodeSummary, Group, Numbered, PolicyReference, RefusalCount, Run,
-    RunSettings, Shard, Totals, play,
+    RunSettings, Totals, play,
 };
 use avastra_drivers::external::{Conversation, Problem};
 use avastra_lang::model::Policy;
 use avastra_search::agent::Face;
-use avastra_world::action::ActionTable;
+use avastra_world::action::{ActionTable, Draw};
 
 use super::arguments::RunArguments;
 use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, settled};
@@ -23,15 +23,16 @@ use super::findings::{cut_off, failures_text, is_reproducible};
 use super::interrupt::stop_on_interrupt;
 use super::never::Never;
 use super::output::{Output, plural};
-use super::pack::pack_space;
 use super::parallel::jobs;
 use super::policy::acting;
 use super::progress::now;
-use super::run_directory::{Player, Resumed, RunDirectory};
+use super::run_directory::{Player, Resumed};
 use super::{compile, conditions, load, merge, run_directory, shard};
 
 /// Largest number of critical scenarios, groups and refusal reasons that the summary lists.
 const NAMED_MAX: usize = 10;
+
+type Directory = run_directory::Directory<RunSettings>;
 
 impl Campaign for RunSettings {
     const KIND: Kind = Kind {
@@ -44,12 +45,8 @@ impl Campaign for RunSettings {
     type Database = Database;
 
     fn outside(&mut self) -> Outside<'_> {
-        Outside {
-            space: &mut self.space,
-            space_digest: &self.space_digest,
-            external: &mut self.external,
-            policy: Some(&mut self.policy),
-        }
+        let RunSettings { space, space_digest, external, policy, .. } = self;
+        Outside { space, space_digest, external, policy: Some(policy) }
     }
 }
 
@@ -71,18 +68,11 @@ impl Cut for RunSettings {
 
 /// Plays the episodes of a new run, or those that an interrupted one still lacks.
 pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
-    let (run, directory) = match &arguments.resume {
-        Some(path) => resumed(output, path, false)?,
-        None => {
-            let wanted = wanted(output, arguments)?;
-            if arguments.shard.dry_run {
-                let (run, out) = (&wanted.run, arguments.out.as_deref());
-                let texts = (&*heading(run, arguments), &*plural(run.episodes(), "episode"));
-                return shard::planned(output, out, run.settings(), texts, wanted.shard);
-            }
-            begun(output, arguments, wanted)?
-        }
+    let begun = match &arguments.resume {
+        Some(path) => Some(resumed(output, path, false)?),
+        None => begun(output, arguments)?,
     };
+    let Some((run, directory)) = begun else { return Ok(()) };
     output.tell(&format!("{}, into {}", heading(&run, arguments), directory.path.display()));
     let found = play_all(output, run, directory, arguments.jobs)?;
     if arguments.fail_on_collision && found.counted > 0 {
@@ -99,23 +89,20 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
 fn play_all(
     output: &Output,
     run: Run,
-    mut directory: RunDirectory,
+    mut directory: Directory,
     asked_jobs: Option<u32>,
 ) -> Result<Totals, Failure> {
-    let path = directory.path.clone();
-    let unread = |error| Failure::file("read", &path, error);
-    let share = Share::of(&path, run.settings())?;
-    let lacking = |database: &Database| share.lacking(run.settings(), database).map_err(unread);
+    let program = run.arena().program();
+    let share = Share::of(&directory.path, run.settings())?;
     // Items are episodes, by their numbers.
-    let todo = lacking(&directory.database)?;
+    let todo = share.lacking(run.settings(), &directory)?;
     if !todo.is_empty() {
-        let is_started = run.program().is_none_or(|program| program.can_start());
-        run_directory::refuse_to_play(&path, "run", is_started)?;
+        directory.refuse_to_play(program.is_none_or(|program| program.can_start()))?;
     }
 
     let stop = stop_on_interrupt();
     let started = now();
-    let jobs = jobs(asked_jobs, run.program())?;
+    let jobs = jobs(asked_jobs, program)?;
     let mut progress = share.progress(output, "counted", &todo);
     let mut driven: Option<(usize, Arc<Conversation>)> = None;
     play(&run, &todo, jobs, &stop, &mut |summary, log| {
@@ -132,56 +119,50 @@ fn play_all(
         Ok::<_, Failure>(())
     })?;
     drop(progress);
-    let is_over = lacking(&directory.database)?.is_empty();
+    let is_over = share.lacking(run.settings(), &directory)?.is_empty();
     if is_over {
-        directory.database = settled(run.settings(), directory.database, &path.join("run.db"))?;
+        directory = settled(run.settings(), directory)?;
     }
 
-    let totals = directory.database.totals().map_err(unread)?;
-    let refusals = directory.database.refusals().map_err(unread)?;
+    let totals = directory.read(Database::totals)?;
+    let refusals = directory.read(Database::refusals)?;
     output.say(&totals_text(&totals, started.elapsed().as_secs_f64(), todo.len()));
     if !refusals.is_empty() {
         output.say(&refusals_text(&refusals));
     }
-    let groups = directory.database.groups().map_err(unread)?;
+    let groups = directory.read(Database::groups)?;
     if !groups.is_empty() {
         output.say(&groups_text(&groups));
     }
-    let never = Never::new(run.table(), &directory.database.rows().map_err(unread)?);
+    let never = Never::new(run.table(), &directory.read(Database::rows)?);
     output.say(&never.in_words(output.verbose));
     let critical = load::sources_in(&directory.path.join("critical"))?;
     output.say(&critical_text(&directory.path, &critical));
-    let failures = directory.database.failures().map_err(unread)?;
+    let failures = directory.read(Database::failures)?;
     if !failures.is_empty() {
         let place = format!("; each is in {}/failures", directory.path.display());
         output.say(&failures_text(&failures, &place));
     }
-    if let Some(program) = run.program()
+    if let Some(program) = program
         && let Some((number, first)) = driven
         && !stop.load(Ordering::Relaxed)
     {
         program.spot_check(&first, || run.episode(number).conversation);
     }
-    let is_reproducible = is_reproducible(output, run.program());
-    cut_off(run.program()).iter().for_each(|note| output.warn(note));
+    let is_reproducible = is_reproducible(output, program);
+    cut_off(program).iter().for_each(|note| output.warn(note));
     output.result(serde_json::json!({
         "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups, "never": never,
         "critical": critical, "failures": failures, "reproducible": is_reproducible,
     }));
-    share.end::<RunSettings>(output, directory.path, is_over, run.program())?;
+    share.end(output, directory, is_over, program)?;
     Ok(totals)
 }
 
-/// What the command line asks for.
-struct Wanted {
-    run: Run,
-    /// With its own table.
-    policy: Option<(ActionTable, Policy)>,
-    face: Face,
-    shard: Shard,
-}
-
-fn wanted(output: &Output, arguments: &RunArguments) -> Result<Wanted, Failure> {
+/// A new run in a directory of its own; for a dry run only says what would be played.
+fn begun(output: &Output, arguments: &RunArguments) -> Result<Option<(Run, Directory)>, Failure> {
+    let (out, face) = (arguments.out.as_deref(), arguments.face);
+    // With its own table.
     let policy = arguments.policy.as_ref().map(|path| load::policy(output, path)).transpose()?;
     let table = match (&arguments.file, &policy) {
         (Some(file), _) => load::table(output, file)?,
@@ -194,38 +175,33 @@ fn wanted(output: &Output, arguments: &RunArguments) -> Result<Wanted, Failure> 
     let under_test = load::named(&arguments.under_test.ads)?;
     let settings = conditions::settings(space, &arguments.conditions, agent, under_test, arguments.episodes)?;
     let settings = RunSettings { causes: arguments.causes, ..settings };
-    let settings = if arguments.shard.dry_run { settings.unstarted() } else { settings };
-    let run = ready(table, settings, policy.as_ref(), arguments.face)?;
-    Ok(Wanted { run, policy, face: arguments.face, shard })
-}
-
-/// A new run in a directory of its own.
-fn begun(output: &Output, arguments: &RunArguments, wanted: Wanted) -> Result<(Run, RunDirectory), Failure> {
-    let Wanted { run, policy, face, shard } = wanted;
-    let held = run_directory::create(arguments.out.as_deref())?;
-    let path = &held.path;
-    shard::keep(path, shard)?;
-    // In this copy, scenarios can be looked at as they were recorded, even if the author changes the space.
-    let folder = if arguments.self_contained { path.join("critical") } else { path.clone() };
-    let copy = pack_space(&run.space().path, &folder)?;
+    let settings = settings.started_unless(arguments.shard.dry_run);
+    let run = ready(table, settings, policy.as_ref(), face)?;
+    if arguments.shard.dry_run {
+        let texts = (&*heading(&run, arguments), &*plural(run.episodes(), "episode"));
+        return shard::planned(output, out, run.settings(), texts, shard).map(|()| None);
+    }
+    let (held, copy) = run_directory::create(out, shard, &run.space().path, arguments.self_contained)?;
     let run = if arguments.self_contained {
         ready(load::table(output, &copy)?, run.settings().clone(), policy.as_ref(), face)?
     } else {
         run
     };
     let reference = match (&arguments.policy, &policy) {
-        (Some(file), Some((_, policy))) => {
-            Some(PolicyReference { file: load::relative(path, file)?, digest: policy.digest.clone(), face })
-        }
+        (Some(file), Some((_, policy))) => Some(PolicyReference {
+            file: load::relative(&held.path, file)?,
+            digest: policy.digest.clone(),
+            face,
+        }),
         _ => None,
     };
     let settings = RunSettings { policy: reference, ..run.settings().clone() };
-    let text = run_directory::begin(path, settings, &run.space().path, run.attached())?;
-    Ok((run, RunDirectory::open(held, &text)?))
+    let directory = Directory::begin(held, settings, &run.space().path, run.arena().attached())?;
+    Ok(Some((run, directory)))
 }
 
 /// The rest of an interrupted run. With `is_played`, nothing of it is left to play, and no program is started.
-fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Run, RunDirectory), Failure> {
+fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Run, Directory), Failure> {
     let resumed = run_directory::resume::<RunSettings>(output, path, is_played)?;
     let Resumed { settings, text, table, held } = resumed;
     let policy = match &settings.policy {
@@ -243,9 +219,14 @@ fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Run, RunDir
     };
     let face = settings.policy.as_ref().map_or(Face::Network, |reference| reference.face);
     let run = ready(table, settings, policy.as_ref(), face)?;
-    let directory = RunDirectory::open_to_go_on(output, held, &text)?;
+    let directory = Directory::open_to_go_on(output, held, &text)?;
     if !is_played {
-        restore(output, &run, &directory)?;
+        for (episode, path) in directory.restore(output)? {
+            // The database has the text of a scenario, but not the answers beside it: the program is asked for them again.
+            if run.arena().program().is_some() {
+                write_answers(&path, &run.episode(episode as usize))?;
+            }
+        }
     }
     Ok((run, directory))
 }
@@ -282,7 +263,7 @@ fn ready(
 /// Writes what an episode found. The scenario comes first, so every episode in the database has its file.
 fn keep(
     run: &Run,
-    directory: &mut RunDirectory,
+    directory: &mut Directory,
     summary: &EpisodeSummary,
     log: &EpisodeLog,
 ) -> Result<(), Failure> {
@@ -291,27 +272,8 @@ fn keep(
     let is_critical = summary.counted() > 0;
     let scenario = is_critical.then(|| directory.write_critical(&player, (log, summary))).transpose()?;
     directory.write_failure(&player, (log, summary))?;
-    directory
-        .database
-        .add(summary, log, |draw| emit::action_text(run.table(), draw), scenario.as_deref())
-        .map_err(|error| Failure::file("write", &directory.path.join("run.db"), error))
-}
-
-/// Writes missing scenarios again, with the answers of an external driving system, and names those that were edited.
-fn restore(output: &Output, run: &Run, directory: &RunDirectory) -> Result<(), Failure> {
-    let scenarios = directory.scenarios()?;
-    let episodes: Vec<usize> = scenarios.iter().map(|written| written.unit as usize).collect();
-    let files = run_directory::written(&directory.path, scenarios);
-    let restored = run_directory::restore(output, "run", &files)?;
-    if run.program().is_some() {
-        // The database has the text of a scenario, but not the answers beside it: the program is asked for them again.
-        for (episode, (path, _)) in episodes.into_iter().zip(&files) {
-            if restored.contains(path) {
-                write_answers(path, &run.episode(episode))?;
-            }
-        }
-    }
-    Ok(())
+    let in_words = |draw: &Draw| emit::action_text(run.table(), draw);
+    directory.write(|database| database.add(summary, log, in_words, scenario.as_deref()))
 }
 
 fn heading(run: &Run, arguments: &RunArguments) -> String {
@@ -324,7 +286,7 @@ fn heading(run: &Run, arguments: &RunArguments) -> String {
         let name = arguments.conditions.traffic.as_deref().or(record.settings.shipped_as());
         format!(", traffic {}", name.unwrap_or("of a profile of its own"))
     });
-    let ads = run.ads_name();
+    let ads = run.arena().ads_name();
     let profile = load::profile_path(&arguments.under_test.ads)
         .map_or(String::new(), |path| format!(" with {}", path.display()));
     format!(

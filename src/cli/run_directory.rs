@@ -14,13 +14,15 @@ use std::path::{Path, PathBuf};
 use avastra_campaign::emit;
 use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::files;
-use avastra_campaign::run::{Database, EpisodeSummary, Units, VERSION, WrittenScenario};
+use avastra_campaign::run::{
+    DatabaseError, EpisodeSummary, Numbered, Shard, Units, VERSION, WrittenScenario,
+};
 use avastra_drivers::external::{Attached, ExternalSettings};
 use avastra_lang::syntax::{ast, print};
 use avastra_world::action::ActionTable;
 use avastra_world::sim::ENGINE;
 
-use super::campaign::{Campaign, KINDS, Kind};
+use super::campaign::{Campaign, KINDS, Kind, Outside};
 use super::error::Failure;
 use super::files::{folder, make, make_first, write, write_answers};
 use super::load;
@@ -37,10 +39,10 @@ pub struct Held {
     _lock: Option<File>,
 }
 
-/// A run directory on disk.
-pub struct RunDirectory {
+/// The directory of a campaign, with its database.
+pub struct Directory<C: Campaign> {
     pub path: PathBuf,
-    pub database: Database,
+    pub database: C::Database,
     _held: Held,
 }
 
@@ -55,11 +57,19 @@ pub fn create_empty(out: Option<&Path>) -> Result<Held, Failure> {
     }
 }
 
-/// Makes a run directory, with `critical/` for its scenarios.
-pub fn create(out: Option<&Path>) -> Result<Held, Failure> {
+/// Makes a directory for scenarios, with a copy of their space, and returns the path of the copy, too. In the copy, they can be
+/// looked at as they were recorded, even if the author changes the space. It is self-contained if it lies beside them.
+pub fn create(
+    out: Option<&Path>,
+    shard: Shard,
+    space: &Path,
+    is_self_contained: bool,
+) -> Result<(Held, PathBuf), Failure> {
     let held = create_empty(out)?;
-    folder(&held.path, "critical")?;
-    Ok(held)
+    let critical = folder(&held.path, "critical")?;
+    shard::keep(&held.path, shard)?;
+    let copy = pack::pack_space(space, if is_self_contained { &critical } else { &held.path })?;
+    Ok((held, copy))
 }
 
 /// Takes a directory for this process alone.
@@ -75,40 +85,16 @@ pub fn hold(path: &Path) -> Result<Held, Failure> {
     Ok(Held { path: path.to_owned(), _lock: lock })
 }
 
-/// Writes the settings with the space and the driving system as they are from the directory, and returns their text. They come
-/// before the database: from then on the campaign can be resumed.
-pub fn begin<C: Campaign>(
-    directory: &Path,
-    mut settings: C,
-    space: &Path,
-    attached: Option<Attached>,
-) -> Result<String, Failure> {
-    let outside = settings.outside();
-    *outside.space = load::relative(directory, space)?;
-    *outside.external = attached.map(|attached| to_record(directory, attached)).transpose()?;
-    let text = serde_yaml::to_string(&settings).expect("settings are plain strings and numbers");
-    write(&directory.join(format!("{}.yaml", C::KIND.file)), &text)?;
-    Ok(text)
-}
-
 /// An external driving system as settings in `directory` record it: its working directory is one from there, so that the
-/// same program is started wherever the run is resumed from.
-///
-/// # Errors
-/// If one of the two folders does not exist.
-pub fn to_record(directory: &Path, attached: Attached) -> Result<Attached, Failure> {
-    let folder = attached.settings.working_directory.as_deref().unwrap_or(Path::new("."));
-    let working_directory = Some(PathBuf::from(load::relative(directory, folder)?));
-    Ok(Attached { settings: ExternalSettings { working_directory, ..attached.settings }, ..attached })
-}
-
-/// The same if the working directory is missing: the relative path follows from the names alone.
+/// same program is started wherever the run is resumed from. If it is missing on this machine, the path follows from the names
+/// alone.
 ///
 /// # Errors
 /// If this process has no folder that it works in.
-pub fn to_record_absent(directory: &Path, attached: Attached) -> Result<Attached, Failure> {
+pub fn to_record(directory: &Path, attached: Attached) -> Result<Attached, Failure> {
     let folder = attached.settings.working_directory.as_deref().unwrap_or(Path::new("."));
-    let between = load::path_between(&pack::absolute(directory)?, &pack::absolute(folder)?)?;
+    let by_names = || load::path_between(&pack::absolute(directory)?, &pack::absolute(folder)?);
+    let between = load::relative(directory, folder).or_else(|_| by_names())?;
     let working_directory = Some(PathBuf::from(between));
     Ok(Attached { settings: ExternalSettings { working_directory, ..attached.settings }, ..attached })
 }
@@ -124,8 +110,6 @@ pub fn from_record(directory: &Path, attached: Attached) -> Attached {
 struct Begun {
     avastra: String,
     engine: String,
-    space: PathBuf,
-    space_digest: String,
 }
 
 /// A directory that is gone on with.
@@ -145,7 +129,7 @@ pub fn resume<C: Campaign>(
     is_played: bool,
 ) -> Result<Resumed<C>, Failure> {
     let Kind { file: kind, what, .. } = C::KIND;
-    let path = directory.join(format!("{kind}.yaml"));
+    let path = C::KIND.settings(directory);
     if let Some(Kind { what: found, command, .. }) =
         what_was_begun(directory).filter(|found| found.what != what)
     {
@@ -163,7 +147,7 @@ pub fn resume<C: Campaign>(
     let held = hold(directory)?;
     tidy(directory)?;
     // The scenarios of a run whose database is lost cannot be told from new ones.
-    let database = directory.join(format!("{kind}.db"));
+    let database = C::KIND.database(directory);
     let left = load::sources_in(&directory.join("critical")).unwrap_or_default();
     // A kill may leave an empty file before anything is in it.
     let lost = match std::fs::metadata(&database) {
@@ -181,18 +165,17 @@ pub fn resume<C: Campaign>(
         None => {}
     }
     let (mut settings, text) = settings_of::<C>(directory)?;
-    let begun: Begun = serde_yaml::from_str(&text).expect("it was read so before");
-    let table = load::table(output, &directory.join(&begun.space))?;
+    let Outside { space, space_digest, external, .. } = settings.outside();
+    let table = load::table(output, &directory.join(space.as_str()))?;
     let meaning = &table.space().meaning;
-    if !meaning.is_sealed_by(&begun.space_digest) {
-        let differences = meaning.differences(&begun.space_digest);
+    if !meaning.is_sealed_by(space_digest) {
+        let differences = meaning.differences(space_digest);
         let differences = differences.map_or_else(String::new, |found| format!(" ({found})"));
         return Err(Failure::usage(format!(
             "`{}` has changed since the {what} was begun{differences}: begin a new one",
             table.space().path.display()
         )));
     }
-    let external = settings.outside().external;
     *external = external
         .take()
         .map(|attached| Attached { is_recorded: is_played, ..from_record(directory, attached) });
@@ -213,22 +196,9 @@ fn tidy(directory: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Refuses to play the rest of a directory whose driving system was not started because nothing seemed to be left to play.
-pub fn refuse_to_play(directory: &Path, command: &str, is_started: bool) -> Result<(), Failure> {
-    if is_started {
-        return Ok(());
-    }
-    let directory = directory.display();
-    Err(Failure::usage(format!(
-        "`{directory}` is not played to the end, and no program that a file names is started for that: look at its \
-         settings, then go on with `avastra {command} --resume {directory}`"
-    )))
-}
-
 /// The settings of a directory and their text, if they were written by this version of avastra.
 pub fn settings_of<C: Campaign>(directory: &Path) -> Result<(C, String), Failure> {
-    let Kind { file: kind, what, .. } = C::KIND;
-    let path = directory.join(format!("{kind}.yaml"));
+    let (what, path) = (C::KIND.what, C::KIND.settings(directory));
     let text = load::text(&path)?;
     // Settings of another version may have other fields: this comes first.
     let begun: Begun = load::parsed(&path, &text)?;
@@ -277,27 +247,6 @@ fn is_gone(path: &Path) -> bool {
     std::fs::symlink_metadata(path).is_err_and(|error| error.kind() == ErrorKind::NotFound)
 }
 
-/// Writes missing scenarios again, and names those that were edited. `what` is the kind of the directory, in a word. Returns
-/// the files that were written.
-pub fn restore(output: &Output, what: &str, written: &[WrittenFile]) -> Result<Vec<PathBuf>, Failure> {
-    let mut restored = Vec::new();
-    for (path, text) in written.iter().filter(|(path, _)| is_gone(path)) {
-        write(path, text)?;
-        output.tell(&format!("{}: was missing, is written again", path.display()));
-        restored.push(path.clone());
-    }
-    let edited: Vec<String> =
-        written.iter().filter(|file| is_edited(file)).map(|(path, _)| path.display().to_string()).collect();
-    if !edited.is_empty() {
-        let files = if edited.len() == 1 { "it" } else { "them" };
-        output.tell(&format!(
-            "edited since the {what} wrote {files}: {}; delete {files} and resume again to get {files} back",
-            edited.join(", ")
-        ));
-    }
-    Ok(restored)
-}
-
 /// Remarks for a page about scenarios that were edited or are missing.
 pub fn remarks_on(written: &[WrittenFile]) -> Vec<String> {
     let edited = written.iter().filter(|file| is_edited(file));
@@ -307,18 +256,6 @@ pub fn remarks_on(written: &[WrittenFile]) -> Vec<String> {
         format!("{} gone from `critical`: `--resume` writes what is missing again", plural(gone, "scenario"))
     });
     edited.chain(gone).collect()
-}
-
-/// Opens the database of a directory that is resumed. Units whose rows were changed are named and dropped, so that they are
-/// played again.
-pub fn open_to_go_on<D: Units>(output: &Output, file: &Path, settings: &str) -> Result<D, Failure> {
-    let (database, damaged) =
-        D::open_and_drop(file, settings).map_err(|error| Failure::file("open", file, error))?;
-    if !damaged.is_empty() {
-        let changed = changed::<D>(file, &damaged);
-        output.warn(&format!("{changed}: each such {} is played again", D::LAYOUT.unit));
-    }
-    Ok(database)
 }
 
 /// Opens the database of a directory to read it. Units whose rows were changed are left out, and a remark says so.
@@ -342,24 +279,101 @@ fn changed<D: Units>(file: &Path, damaged: &[i64]) -> String {
     format!("`{file}`: the rows of {}{more} were changed since they were written", named.join(", "))
 }
 
-impl RunDirectory {
-    /// A directory with its database; `settings` is the text of `run.yaml`.
-    pub fn open(held: Held, settings: &str) -> Result<RunDirectory, Failure> {
-        let file = held.path.join("run.db");
+impl<C: Campaign> Directory<C> {
+    /// Begins a campaign: writes its settings, with the space and the driving system as they are from the directory, and then
+    /// its database. Once the settings are there, it can be resumed.
+    pub fn begin(
+        held: Held,
+        mut settings: C,
+        space: &Path,
+        attached: Option<Attached>,
+    ) -> Result<Directory<C>, Failure> {
+        let outside = settings.outside();
+        *outside.space = load::relative(&held.path, space)?;
+        *outside.external = attached.map(|attached| to_record(&held.path, attached)).transpose()?;
+        let text = serde_yaml::to_string(&settings).expect("settings are plain strings and numbers");
+        write(&C::KIND.settings(&held.path), &text)?;
+        Directory::open(held, &text)
+    }
+
+    /// Opens its database; `settings` is the text of its settings.
+    pub fn open(held: Held, settings: &str) -> Result<Directory<C>, Failure> {
+        let file = C::KIND.database(&held.path);
         let database =
-            Database::open(&file, settings).map_err(|error| Failure::file("open", &file, error))?;
-        Ok(RunDirectory { path: held.path.clone(), database, _held: held })
+            C::Database::open(&file, settings).map_err(|error| Failure::file("open", &file, error))?;
+        Ok(Directory { path: held.path.clone(), database, _held: held })
     }
 
-    /// The directory of a run that is resumed. Damaged episodes are dropped, so that they are played again.
-    pub fn open_to_go_on(output: &Output, held: Held, settings: &str) -> Result<RunDirectory, Failure> {
-        let database = open_to_go_on(output, &held.path.join("run.db"), settings)?;
-        Ok(RunDirectory { path: held.path.clone(), database, _held: held })
+    /// As [`Directory::open`], but units whose rows were changed are named and dropped, so that they are played again.
+    pub fn open_to_go_on(output: &Output, held: Held, settings: &str) -> Result<Directory<C>, Failure> {
+        let file = C::KIND.database(&held.path);
+        let (database, damaged) = C::Database::open_and_drop(&file, settings)
+            .map_err(|error| Failure::file("open", &file, error))?;
+        if !damaged.is_empty() {
+            let changed = changed::<C::Database>(&file, &damaged);
+            output.warn(&format!("{changed}: each such {} is played again", C::Database::LAYOUT.unit));
+        }
+        Ok(Directory { path: held.path.clone(), database, _held: held })
     }
 
-    /// The scenarios that were written.
-    pub fn scenarios(&self) -> Result<Vec<WrittenScenario>, Failure> {
-        self.database.scenarios().map_err(|error| Failure::file("read", &self.path, error))
+    /// Asks the database.
+    pub fn read<T>(&self, ask: impl FnOnce(&C::Database) -> Result<T, DatabaseError>) -> Result<T, Failure> {
+        // A message about a run or a training names its folder.
+        let named = if C::KIND.file == "run" { self.path.clone() } else { C::KIND.database(&self.path) };
+        ask(&self.database).map_err(|error| Failure::file("read", &named, error))
+    }
+
+    /// Changes the database.
+    pub fn write(
+        &mut self,
+        change: impl FnOnce(&mut C::Database) -> Result<(), DatabaseError>,
+    ) -> Result<(), Failure> {
+        let file = C::KIND.database(&self.path);
+        change(&mut self.database).map_err(|error| Failure::file("write", &file, error))
+    }
+
+    /// Writes the database anew with these units, as [`Units::settle`].
+    pub fn settle(self, units: &[Numbered]) -> Result<Directory<C>, Failure> {
+        let Directory { path, database, _held } = self;
+        let file = C::KIND.database(&path);
+        let database = database.settle(&file, units).map_err(|error| Failure::file("write", &file, error))?;
+        Ok(Directory { path, database, _held })
+    }
+
+    /// Refuses to play the rest if the driving system was not started because nothing seemed to be left to play.
+    pub fn refuse_to_play(&self, is_started: bool) -> Result<(), Failure> {
+        if is_started {
+            return Ok(());
+        }
+        let (directory, command) = (self.path.display(), C::KIND.command);
+        Err(Failure::usage(format!(
+            "`{directory}` is not played to the end, and no program that a file names is started for that: look at its \
+             settings, then go on with `avastra {command} --resume {directory}`"
+        )))
+    }
+
+    /// Writes missing scenarios again, and names those that were edited. Returns the files that were written, each with its
+    /// unit.
+    pub fn restore(&self, output: &Output) -> Result<Vec<(i64, PathBuf)>, Failure> {
+        let scenarios = self.read(Units::scenarios)?;
+        let units: Vec<i64> = scenarios.iter().map(|found| found.unit).collect();
+        let written = written(&self.path, scenarios);
+        let mut restored = Vec::new();
+        for (unit, (path, text)) in units.into_iter().zip(&written).filter(|(_, (path, _))| is_gone(path)) {
+            write(path, text)?;
+            output.tell(&format!("{}: was missing, is written again", path.display()));
+            restored.push((unit, path.clone()));
+        }
+        let edited = written.iter().filter(|file| is_edited(file));
+        let edited: Vec<String> = edited.map(|(path, _)| path.display().to_string()).collect();
+        if !edited.is_empty() {
+            let (what, files) = (C::KIND.what, if edited.len() == 1 { "it" } else { "them" });
+            output.tell(&format!(
+                "edited since the {what} wrote {files}: {}; delete {files} and resume again to get {files} back",
+                edited.join(", ")
+            ));
+        }
+        Ok(restored)
     }
 
     /// Writes an episode that an external driving system failed in: `failures/ROAD_NNNN.txt` says how, and a scenario of

@@ -15,7 +15,7 @@ use avastra_lang::syntax::listed;
 use avastra_world::action::ActionTable;
 
 use super::arguments::{StudyArguments, StudyCommand};
-use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, settled};
+use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, costs, settled};
 use super::error::Failure;
 use super::files::{remove, write};
 use super::findings::kinds_text;
@@ -23,9 +23,11 @@ use super::interrupt::stop_on_interrupt;
 use super::output::{Output, plural};
 use super::parallel::jobs;
 use super::progress::now;
-use super::run_directory::{Held, Resumed};
+use super::run_directory::Resumed;
 use super::timing::Times;
 use super::{load, merge, results, run_directory, shard};
+
+type Directory = run_directory::Directory<StudySettings>;
 
 impl Campaign for StudySettings {
     const KIND: Kind = Kind {
@@ -38,12 +40,8 @@ impl Campaign for StudySettings {
     type Database = StudyDatabase;
 
     fn outside(&mut self) -> Outside<'_> {
-        Outside {
-            space: &mut self.space,
-            space_digest: &self.space_digest,
-            external: &mut self.external,
-            policy: None,
-        }
+        let StudySettings { space, space_digest, external, .. } = self;
+        Outside { space, space_digest, external, policy: None }
     }
 }
 
@@ -86,29 +84,25 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
         }
         None => {
             let file = arguments.file.as_ref().expect("clap asks for it where there is no `--resume`");
-            let shard = shard::asked(output, arguments.shard.shard)?;
-            let study = begun(output, file, arguments)?;
+            let (out, shard) = (arguments.out.as_deref(), shard::asked(output, arguments.shard.shard)?);
+            let (_, table, settings) = wanted(output, file, arguments.ads.as_deref())?;
+            let settings = if arguments.quick { settings.quick() } else { settings };
+            let study = Study::new(table, settings.started_unless(arguments.shard.dry_run))
+                .map_err(|error| Failure::file("use", file, error))?;
             if arguments.shard.dry_run {
-                let (jobs, settings) = (study.settings().jobs(), study.settings());
-                let episodes = jobs.iter().map(|job| settings.episodes(job)).sum::<u64>() as usize;
-                let episodes = plural(episodes, "episode");
-                let what = format!("{} trainings or repetitions, {episodes} together", jobs.len());
-                return shard::planned(
-                    output,
-                    arguments.out.as_deref(),
-                    settings,
-                    (&heading(&study), &what),
-                    shard,
-                );
+                let costs = costs(&study.settings().work());
+                let episodes = plural(costs.iter().sum::<u64>() as usize, "episode");
+                let what = format!("{} trainings or repetitions, {episodes} together", costs.len());
+                return shard::planned(output, out, study.settings(), (&heading(&study), &what), shard);
             }
             // A driving system that was not started has no name to compare.
             let reused = played_elsewhere(&arguments.reuse, &study)?;
-            let held = run_directory::create_empty(arguments.out.as_deref())?;
+            let held = run_directory::create_empty(out)?;
             shard::keep(&held.path, shard)?;
             let settings = study.settings().clone();
             let attached = settings.external.clone();
-            let text = run_directory::begin(&held.path, settings, &study.table().space().path, attached)?;
-            ((study, held, text), reused)
+            let directory = Directory::begin(held, settings, &study.table().space().path, attached)?;
+            ((study, directory), reused)
         }
     };
     play_all(output, begun, &reused, arguments.jobs)
@@ -117,38 +111,34 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
 /// Plays the jobs that a directory still lacks, and says what all of them came to.
 fn play_all(
     output: &Output,
-    (study, held, settings): (Study, Held, String),
+    (study, mut directory): (Study, Directory),
     reused: &[Reused],
     asked_jobs: Option<u32>,
 ) -> Result<(), Failure> {
-    let path = held.path.clone();
+    let path = directory.path.clone();
     let stop = stop_on_interrupt();
-    let file = path.join("study.db");
-    let unread = |error| Failure::file("read", &file, error);
-    let unwritten = |error| Failure::file("write", &file, error);
-    let mut database: StudyDatabase = run_directory::open_to_go_on(output, &file, &settings)?;
     let share = Share::of(&path, study.settings())?;
     let all = study.settings().jobs();
-    let lacking = |database: &StudyDatabase| share.lacking(study.settings(), database).map_err(unread);
     output.tell(&format!("{}, into {}", heading(&study), path.display()));
     let mut times = Times::read(&path)?;
-    for Reused { directory, played } in reused {
-        let lacking: Vec<&Job> = lacking(&database)?.into_iter().map(|job| &all[job]).collect();
+    for Reused { directory: other, played } in reused {
+        let lacking = share.lacking(study.settings(), &directory)?;
+        let lacking: Vec<&Job> = lacking.into_iter().map(|job| &all[job]).collect();
         let new: Vec<_> = played.iter().filter(|(job, _)| lacking.contains(&job)).collect();
         for (_, cells) in &new {
             times.add(cells);
-            database.add(cells).map_err(unwritten)?;
+            directory.write(|database| database.add(cells))?;
         }
         times.write(&path)?;
         let count = plural(new.iter().map(|(_, cells)| cells.len()).sum(), "cell");
-        output.tell(&format!("{count} taken over from {}", directory.display()));
+        output.tell(&format!("{count} taken over from {}", other.display()));
     }
-    let left = lacking(&database)?;
+    let left = share.lacking(study.settings(), &directory)?;
     let todo: Vec<Job> = left.iter().map(|&job| all[job].clone()).collect();
 
     // Each job has a process, or a connection, of its own: these are only to see that they can be had.
     let external = study.settings().external.as_ref().filter(|_| !todo.is_empty());
-    run_directory::refuse_to_play(&path, "study", external.is_none_or(|attached| !attached.is_recorded))?;
+    directory.refuse_to_play(external.is_none_or(|attached| !attached.is_recorded))?;
     let probe = external.map(|attached| Program::new(attached.settings.clone()));
     let jobs = jobs(asked_jobs, probe.as_ref())?;
     drop(probe);
@@ -160,18 +150,18 @@ fn play_all(
         }
         Event::Done(cells) => {
             times.add(&cells);
-            database.add(&cells).map_err(unwritten)?;
+            directory.write(|database| database.add(&cells))?;
             times.write(&path)
         }
     })?;
     drop(progress);
-    let is_over = lacking(&database)?.is_empty();
+    let is_over = share.lacking(study.settings(), &directory)?.is_empty();
     if is_over {
         times.write(&path)?;
-        database = settled(study.settings(), database, &file)?;
+        directory = settled(study.settings(), directory)?;
     }
 
-    let cells = times.on(database.cells().map_err(unread)?);
+    let cells = times.on(directory.read(StudyDatabase::cells)?);
     let failed = FailedCell::among(&cells);
     let timing = timing(&cells);
     if !failed.is_empty() {
@@ -190,7 +180,7 @@ fn play_all(
     output.result(
         serde_json::json!({ "directory": path, "results": results, "failures": failed, "timing": timing }),
     );
-    share.end::<StudySettings>(output, path, is_over, None)
+    share.end(output, directory, is_over, None)
 }
 
 /// Another study's directory, with the jobs that it has played of this one.
@@ -271,14 +261,6 @@ fn failed_text(directory: &Path, cells: &[FailedCell]) -> String {
     text
 }
 
-/// A new study, from its file.
-fn begun(output: &Output, path: &Path, arguments: &StudyArguments) -> Result<Study, Failure> {
-    let (_, table, settings) = wanted(output, path, arguments.ads.as_deref())?;
-    let settings = if arguments.quick { settings.quick() } else { settings };
-    let settings = if arguments.shard.dry_run { settings.unstarted() } else { settings };
-    Study::new(table, settings).map_err(|error| Failure::file("use", path, error))
-}
-
 /// What a study's file says, and asks for in full.
 pub fn wanted(
     output: &Output,
@@ -311,15 +293,14 @@ pub fn wanted(
     Ok((file, table, settings))
 }
 
-/// The rest of an interrupted study, with the text of its settings. With `is_played`, nothing of it is left to play, and no
-/// program is started.
-fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Study, Held, String), Failure> {
+/// The rest of an interrupted study. With `is_played`, nothing of it is left to play, and no program is started.
+fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Study, Directory), Failure> {
     let Resumed { settings, text, table, held } = run_directory::resume(output, path, is_played)?;
     let study = Study::new(table, settings).map_err(|error| match error {
         StudyError::Agent { error: error @ RunError::OtherProgram { .. }, .. } => error.into(),
         error => Failure::usage(error),
     })?;
-    Ok((study, held, text))
+    Ok((study, Directory::open_to_go_on(output, held, &text)?))
 }
 
 fn heading(study: &Study) -> String {

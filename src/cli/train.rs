@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use avastra_campaign::emit;
-use avastra_campaign::run::{Database, RunSettings, TrafficRecord, Units};
+use avastra_campaign::run::{Database, RunSettings, Shard, TrafficRecord};
 use avastra_campaign::train::{Evaluation, TrainSettings, TrainedEpisode, Training, evaluate, rounded};
 use avastra_drivers::external::Attached;
 use avastra_lang::model::policy::{PolicyClaims, PolicyOrigin};
@@ -22,17 +22,18 @@ use super::findings::{cut_off, failures_text, is_reproducible, kinds_text, unfin
 use super::interrupt::stop_on_interrupt;
 use super::load::UnderTest;
 use super::output::{Output, plural};
-use super::pack::pack_space;
 use super::policy::distil::{self, rules_text};
 use super::progress::{TrainingProgress, Working};
 use super::run::groups_text;
-use super::run_directory::{Player, Resumed, RunDirectory};
+use super::run_directory::{Player, Resumed};
 use super::{load, run_directory};
 
 /// Episodes between two checkpoints: at most so many are played again after a kill.
 const CHECKPOINT_EPISODES: usize = 25;
 /// Episodes on each road that the finished policy is judged by: the paper's number.
 const EVALUATION_EPISODES: u64 = 15;
+
+type Directory = run_directory::Directory<TrainSettings>;
 
 impl Campaign for TrainSettings {
     const KIND: campaign::Kind = campaign::Kind {
@@ -46,12 +47,8 @@ impl Campaign for TrainSettings {
     type Database = Database;
 
     fn outside(&mut self) -> Outside<'_> {
-        Outside {
-            space: &mut self.space,
-            space_digest: &self.space_digest,
-            external: &mut self.external,
-            policy: None,
-        }
+        let TrainSettings { space, space_digest, external, .. } = self;
+        Outside { space, space_digest, external, policy: None }
     }
 }
 
@@ -82,7 +79,7 @@ pub fn train(output: &Output, arguments: &TrainArguments) -> Result<(), Failure>
 }
 
 /// A new training, from the command line.
-fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDirectory), Failure> {
+fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, Directory), Failure> {
     let file = arguments.file.as_ref().expect("clap asks for it where there is no `--resume`");
     let table = load::table(output, file)?;
     let hyperparameters = settings(arguments)?;
@@ -102,16 +99,14 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
     };
     let settings = TrainSettings::new(conditions, hyperparameters);
     let mut training = Training::new(table, settings)?;
-    let held = run_directory::create(arguments.out.as_deref())?;
-    let path = &held.path;
-    let folder = if arguments.self_contained { path.join("critical") } else { path.clone() };
-    let copy = pack_space(&training.table().space().path, &folder)?;
+    let (out, space) = (arguments.out.as_deref(), &training.table().space().path);
+    let (held, copy) = run_directory::create(out, Shard::WHOLE, space, arguments.self_contained)?;
     if arguments.self_contained {
         training = Training::new(load::table(output, &copy)?, training.settings().clone())?;
     }
     let (space, attached) = (&training.table().space().path, training.arena().attached());
-    let text = run_directory::begin(path, training.settings().clone(), space, attached)?;
-    Ok((training, RunDirectory::open(held, &text)?))
+    let directory = Directory::begin(held, training.settings().clone(), space, attached)?;
+    Ok((training, directory))
 }
 
 /// The agent's settings: the preset that is asked for, as the configuration file changes it.
@@ -134,9 +129,9 @@ fn settings(arguments: &TrainArguments) -> Result<Settings, Failure> {
 }
 
 /// The rest of an interrupted training.
-fn resumed(output: &Output, path: &Path) -> Result<(Training, RunDirectory), Failure> {
+fn resumed(output: &Output, path: &Path) -> Result<(Training, Directory), Failure> {
     let Resumed { settings, text, table, held } = run_directory::resume(output, path, false)?;
-    let mut directory = RunDirectory::open(held, &text)?;
+    let mut directory = Directory::open(held, &text)?;
     let checkpoint =
         directory.database.return_to_checkpoint().map_err(|error| Failure::file("resume", path, error))?;
     let training = match checkpoint {
@@ -144,8 +139,7 @@ fn resumed(output: &Output, path: &Path) -> Result<(Training, RunDirectory), Fai
         Some(checkpoint) => Training::resumed(table, settings, checkpoint.episodes, &checkpoint.learner)?,
     };
     // Only scenarios up to the checkpoint are restored; later episodes are played again.
-    let written = run_directory::written(path, directory.scenarios()?);
-    run_directory::restore(output, "training", &written)?;
+    directory.restore(output)?;
     Ok((training, directory))
 }
 
@@ -153,7 +147,7 @@ fn resumed(output: &Output, path: &Path) -> Result<(Training, RunDirectory), Fai
 /// the end, and when the user stops.
 fn keep(
     training: &Training,
-    directory: &mut RunDirectory,
+    directory: &mut Directory,
     trained: &TrainedEpisode,
     stop: &AtomicBool,
 ) -> Result<(), Failure> {
@@ -174,13 +168,11 @@ fn keep(
     let checkpoint = is_due.then(|| training.agent().save());
     let in_words = |draw: &Draw| emit::action_text(training.table(), draw);
     directory
-        .database
-        .add_trained(trained, checkpoint.as_deref(), in_words, scenario.as_deref())
-        .map_err(|error| Failure::file("write", &directory.path.join("run.db"), error))
+        .write(|database| database.add_trained(trained, checkpoint.as_deref(), in_words, scenario.as_deref()))
 }
 
 /// Evaluates the policy, writes it, and prints the result of the training.
-fn finish(output: &Output, training: &Training, mut directory: RunDirectory) -> Result<(), Failure> {
+fn finish(output: &Output, training: &Training, mut directory: Directory) -> Result<(), Failure> {
     let settings = training.settings();
     let test = (EVALUATION_EPISODES, settings.seed);
     let working = Working::new(output, "playing what it learned");
@@ -194,9 +186,8 @@ fn finish(output: &Output, training: &Training, mut directory: RunDirectory) -> 
         Ok::<_, Failure>((path, policy))
     });
     let kept = kept.transpose()?;
-    let read = |error| Failure::file("read", &directory.path, error);
-    let totals = directory.database.totals().map_err(read)?;
-    let simulated_h = directory.database.trained_s().map_err(read)? / 3600.0;
+    let totals = directory.read(Database::totals)?;
+    let simulated_h = directory.read(Database::trained_s)? / 3600.0;
     output.say(&format!(
         "\n{} in {simulated_h:.1} h of simulated time: {}, {} counted in {}",
         plural(totals.episodes as usize, "episode"),
@@ -210,7 +201,7 @@ fn finish(output: &Output, training: &Training, mut directory: RunDirectory) -> 
         plural(evaluation.counted as usize, "collision"),
         plural(evaluation.colliding as usize, "episode"),
     ));
-    let groups = directory.database.groups().map_err(read)?;
+    let groups = directory.read(Database::groups)?;
     if !groups.is_empty() {
         output.say(&groups_text(&groups));
     }
@@ -224,7 +215,7 @@ fn finish(output: &Output, training: &Training, mut directory: RunDirectory) -> 
         }
         None => output.say(&search_text(&directory.path)?),
     }
-    let failures = directory.database.failures().map_err(read)?;
+    let failures = directory.read(Database::failures)?;
     if !failures.is_empty() {
         let place = format!(" in the training; each is in {}/failures", directory.path.display());
         output.say(&failures_text(&failures, &place));
@@ -253,12 +244,10 @@ fn finish(output: &Output, training: &Training, mut directory: RunDirectory) -> 
     });
     let results = serde_json::json!({ "simulated_h": simulated_h, "rules": rules, "evaluation": evaluation });
     let text = serde_json::to_string_pretty(&results).expect("results have string keys only");
-    let file = directory.path.join("run.db");
-    let unwritten = |error| Failure::file("write", &file, error);
-    directory.database.keep_results(&text).map_err(unwritten)?;
+    directory.write(|database| database.keep_results(&text))?;
     // A kill leaves free pages behind where episodes are played again, so the bytes would tell of it.
-    let units = as_they_are(&directory.database).map_err(unwritten)?;
-    directory.database = directory.database.settle(&file, &units).map_err(unwritten)?;
+    let units = directory.read(as_they_are)?;
+    let directory = directory.settle(&units)?;
     write(&directory.path.join("results.json"), &format!("{text}\n"))?;
     output.result(serde_json::json!({
         "reproducible": is_reproducible,

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use avastra_campaign::emit::{self, Provenance};
-use avastra_campaign::run::{Arena, DEFAULT_ADS, driving_system};
+use avastra_campaign::run::{Arena, driving_system};
 use avastra_campaign::trial::{Cell, TrialSettings, Trials};
 use avastra_exchange::report;
 use avastra_lang::syntax;
@@ -14,7 +14,7 @@ use super::compile::TableResult;
 use super::conditions::roads_or_all;
 use super::error::Failure;
 use super::files::{make, write};
-use super::load::{self, Driver};
+use super::load;
 use super::output::Output;
 use super::progress::Pieces;
 
@@ -25,18 +25,15 @@ const DRIVES: u32 = 8;
 pub fn trials(output: &Output, arguments: &TableArguments, table: ActionTable) -> Result<(), Failure> {
     let roads = roads_or_all(arguments.road.as_slice(), table.space());
     let wanted = &arguments.trials;
-    let ads = match load::driver(&wanted.ads)? {
-        Driver::Name(name) => driving_system(name)?,
-        Driver::Profile(path) => {
-            let of_modular = driving_system(DEFAULT_ADS)?.with_profile(load::profile(path)?);
-            of_modular.expect("the default driving system has settings")
-        }
-        Driver::Command(command) => {
-            return Err(Failure::usage(format!(
-                "`{command}` cannot try rows: name a driving system of avastra"
-            )));
-        }
-    };
+    let given = load::driver(&wanted.ads)?;
+    if let Some(command) = given.command {
+        let message = format!("`{command}` cannot try rows: name a driving system of avastra");
+        return Err(Failure::usage(message));
+    }
+    let mut ads = driving_system(given.ads)?;
+    if let Some(path) = given.profile {
+        ads = ads.with_profile(load::profile(path)?).expect("the default driving system has settings");
+    }
     let arena = Arena::new(table, &roads, ads, &[], &[])?;
     let settings = TrialSettings { drives: DRIVES, tries: wanted.tries, seed: wanted.seed };
     let trials = Trials::new(&arena, settings);

@@ -227,7 +227,7 @@ impl Episodes {
     fn close(&self, py: Python<'_>) {
         py.detach(|| {
             *self.now() = None;
-            if let Some(program) = self.run.program() {
+            if let Some(program) = self.run.arena().program() {
                 // How it ends is of no interest any more.
                 let _ = program.close();
             }
@@ -237,7 +237,7 @@ impl Episodes {
     fn __repr__(&self) -> String {
         let settings = self.run.settings();
         let road = settings.roads.join(", ");
-        format!("<avastra.Episodes on {road} against {}>", self.run.ads_name())
+        format!("<avastra.Episodes on {road} against {}>", self.run.arena().ads_name())
     }
 }
 

@@ -12,7 +12,6 @@ use crate::oracle;
 use crate::oracle::AvoidabilitySettings;
 use avastra_base::rng;
 use avastra_base::rng::Stream;
-use avastra_drivers::external::{Attached, Program};
 use avastra_lang::model::Space;
 use avastra_search::agent::{Agent, Kind, QPolicy};
 use avastra_world::action::ActionTable;
@@ -87,19 +86,9 @@ impl Run {
         &self.settings
     }
 
-    /// The driving system under test: its name here, or what an external one calls itself.
-    pub fn ads_name(&self) -> String {
-        self.arena.ads_name()
-    }
-
-    /// The external driving system under test, if it is one.
-    pub fn program(&self) -> Option<&Arc<Program>> {
-        self.arena.program()
-    }
-
-    /// What identifies an external driving system.
-    pub fn attached(&self) -> Option<Attached> {
-        self.arena.attached()
+    /// Where its episodes are played.
+    pub fn arena(&self) -> &Arena {
+        &self.arena
     }
 
     /// Number of episodes on all roads together.

@@ -85,12 +85,6 @@ impl RunSettings {
             avoidability: AvoidabilitySettings::default(),
         }
     }
-
-    /// These settings with an external driving system that is not started, because nothing is to be played.
-    pub fn unstarted(mut self) -> RunSettings {
-        self.external.iter_mut().for_each(|attached| attached.is_recorded = true);
-        self
-    }
 }
 
 /// The policy file that a run plays.

@@ -33,7 +33,7 @@ impl Study {
             }
             for &road in &job.roads {
                 let run = study.evaluation(job, 0, &study.settings.roads[road]).map_err(refuse)?;
-                attached = run.attached();
+                attached = run.arena().attached();
             }
         }
         // The jobs, and a later `--resume`, must meet the same driving system. One that was not started has no identity to add.

@@ -233,12 +233,6 @@ impl StudySettings {
         }
         self
     }
-
-    /// These settings with an external driving system that is not started, because nothing is to be played.
-    pub fn unstarted(mut self) -> StudySettings {
-        self.external.iter_mut().for_each(|attached| attached.is_recorded = true);
-        self
-    }
 }
 
 /// One agent's settings in full.

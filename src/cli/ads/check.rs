@@ -11,7 +11,7 @@ use crate::cli::arguments::AdsCheckArguments;
 use crate::cli::error::Failure;
 use crate::cli::files::{Scratch, make_way, write_new};
 use crate::cli::findings::cut_off;
-use crate::cli::load::{self, Driver};
+use crate::cli::load;
 use crate::cli::new::SHIPPED;
 use crate::cli::output::Output;
 use crate::cli::progress::now;
@@ -56,15 +56,10 @@ struct Speed {
 /// Runs all checks; the first that fails ends them.
 pub fn check(output: &Output, arguments: &AdsCheckArguments) -> Result<(), Failure> {
     let given = load::driver(&arguments.ads)?;
-    let settings = match given {
-        Driver::Profile(path) => load::external(Some(path), None)?,
-        Driver::Command(command) => load::external(None, Some(command))?,
-        Driver::Name(_) => None,
-    };
-    let settings = settings.ok_or_else(|| {
-        let is = match given {
-            Driver::Profile(_) => "has no `ads` block, so it is a profile of `modular`",
-            _ => "is a driving system of avastra",
+    let settings = load::external(given.profile, given.command)?.ok_or_else(|| {
+        let is = match given.profile {
+            Some(_) => "has no `ads` block, so it is a profile of `modular`",
+            None => "is a driving system of avastra",
         };
         Failure::usage(format!("`{}` {is}: check one of your own", arguments.ads))
     })?;
