@@ -5,7 +5,7 @@ use avastra_lang::check::{Declaration, References, Symbol};
 use avastra_lang::model::Type;
 use avastra_lang::model::vocabulary::{
     CHANGE, EpisodeField, OrderField, RoadField, ScenarioClaim, Site, SpaceClaim, SpawnField, StartField,
-    StopReason, WAIT, Word, parts_of, things,
+    StopReason, THERE, WAIT, Word, parts_of, things,
 };
 use avastra_lang::syntax::ast::{
     Action, ActionParam, Arm, BinaryOp, Call, Effect, EffectKind, Expr, ExprKind, Field, Initial, ItemKind,
@@ -418,8 +418,14 @@ impl<'a> Place<'a> {
                 number.unit.as_ref().is_some_and(is_here).then(|| vec![Kind::Units, Kind::Operators])
             }
             ExprKind::Field { base, field } if is_here(field) => {
-                let thing = name_of(base).filter(|thing| things().contains(thing));
-                Some(thing.map(|thing| Kind::Words(parts_of(thing))).into_iter().collect())
+                let name = name_of(base)?;
+                let is_named = self.references.declaration(&Symbol::RoadUser(name.to_owned())).is_some();
+                let parts = match things().contains(&name) {
+                    true => parts_of(name),
+                    false if is_named => parts_of("npc").into_iter().chain([THERE]).collect(),
+                    false => return Some(Vec::new()),
+                };
+                Some(vec![Kind::Words(parts)])
             }
             ExprKind::Unary { operand, .. } => self.within(operand, whole, part),
             ExprKind::Binary { op, left, right, .. } => self

@@ -243,6 +243,44 @@ fn pedestrians_come_only_while_the_ego_vehicle_drives() {
 }
 
 #[test]
+fn the_second_truck_brakes() {
+    let table = wish("second_truck_brakes");
+    let [trucks, brakes] = [row(&table, "trucks()"), row(&table, "middle_brakes()")];
+    let run = run_of(table.space().clone(), 1, 6, &[]);
+    let mut braked = 0;
+    for episode in 0..run.episodes() {
+        let mut begun: Option<(f64, f64)> = None;
+        let mut choose = |moment: &Moment| match moment.step {
+            0 => table.offer(moment.situation, trucks).map_or(Choice::Pass, Choice::Act),
+            _ => match table.offer(moment.situation, brakes) {
+                Ok(draw) if begun.is_none() => {
+                    let facts = moment.situation.surroundings.moment();
+                    assert!(facts.nearest_gap_m <= 40.0);
+                    begun = Some((number(&draw, "rate"), facts.elapsed_s));
+                    Choice::Act(draw)
+                }
+                _ => Choice::Pass,
+            },
+        };
+        // Time and speed of the middle truck, the second to appear.
+        let mut speeds: Vec<(f64, f64)> = Vec::new();
+        let log = run.play(episode, &mut choose, &mut |world, _, contacts| {
+            let truck = world.obstacle(2).filter(|_| contacts.is_empty());
+            speeds.extend(truck.map(|truck| (world.time_s(), truck.velocity_mps.norm())));
+        });
+        assert_replays(&run, episode, &log);
+        let Some((rate_mps2, begun_s)) = begun else { continue };
+        let before_mps = speeds.iter().rfind(|(at_s, _)| *at_s <= begun_s).expect("it was there").1;
+        for (at_s, speed_mps) in speeds.iter().filter(|(at_s, _)| (begun_s..begun_s + 1.5).contains(at_s)) {
+            let wanted_mps = (before_mps - rate_mps2 * (at_s - begun_s)).max(0.0);
+            assert!((speed_mps - wanted_mps).abs() <= 1e-6, "{speed_mps} at {at_s} s, not {wanted_mps}");
+        }
+        braked += 1;
+    }
+    assert!(braked > 0, "no truck braked");
+}
+
+#[test]
 fn no_vehicle_appears_near_a_junction() {
     let table = example("away_from_junctions");
     let run = run_of(table.space().clone(), 1, 4, &[]);

@@ -423,10 +423,12 @@ impl Play {
     /// Whether the condition of a trigger holds now.
     fn holds(&self, condition: &Expr, trigger: &Trigger, setup: &Setup) -> bool {
         let users = trigger.road_users().into_iter();
+        let bearers = trigger.bearers().into_iter();
         let world = WorldFacts {
             moment: self.world.moment_facts(),
             step: self.steps.len() as u64,
             road_users: users.filter_map(|id| Some((id, self.world.npc_facts(id)?))).collect(),
+            bearers: bearers.filter_map(|who| Some((who, self.world.bearer_facts(who)?))).collect(),
             ..WorldFacts::default()
         };
         let facts =

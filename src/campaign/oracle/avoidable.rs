@@ -8,6 +8,11 @@
 //! If none of the careful drivers avoids the collision,
 //! evasive manoeuvres that begin at the onset without any delay are tried.
 //!
+//! If none of the careful drivers avoids it from there, and the ego vehicle slowed down to walking pace since, the question is
+//! asked once more from its slowest moment: a vehicle that has dealt with the hazard and then creeps on into what stands
+//! before it could have stayed. If another road user shoved the ego vehicle, so that most of its way to the contact was
+//! the shove's, the question begins when a careful driver has reacted to the shove: before it there was nothing to avoid.
+//!
 //! Where the ego vehicle had to give way, a driver that takes over before the ego vehicle has begun a lane change begins
 //! none without a look aside: the question is whether staying in the lane would have avoided the collision. Where another
 //! vehicle ran into the rear of an ego vehicle that had priority, no driver goes faster than the ego vehicle did: a
@@ -29,11 +34,11 @@ use std::collections::VecDeque;
 use crate::episode;
 use crate::episode::{Choice, EpisodeLog, Moment, Script, Setup};
 use avastra_base::geometry::{OrientedBox, Pose, wrap_angle};
-use avastra_base::kinematics::GRAVITY_MPS2;
+use avastra_base::kinematics::{CAREFUL_REACTION_S, GRAVITY_MPS2, WALKING_MPS};
 use avastra_drivers as ads;
 use avastra_drivers::{Ads, Evasion};
-use avastra_lang::model::Avoidability;
 use avastra_lang::model::vocabulary::Priority;
+use avastra_lang::model::{Avoidability, EGO_ACCELERATION_MPS2_MAX};
 use avastra_world::sim::{
     Contact, Control, DT_S, EgoMotion, FRAME_TICKS, VehicleParameters, World, pedals_for,
 };
@@ -53,6 +58,9 @@ const REWIND_S: f64 = 8.0;
 const WATCH_S: f64 = 2.0;
 /// How long after the recorded contact nothing must happen, s. Ours.
 const AFTER_S: f64 = 4.0;
+
+/// An ego vehicle that gains speed faster than this was shoved, m/s². Ours: twice what tyres give.
+const SHOVE_MPS2: f64 = 2.0 * EGO_ACCELERATION_MPS2_MAX;
 
 /// How verdicts are reached. Every run and study records it, so that one that was judged otherwise can be told apart;
 /// nothing else is possible.
@@ -173,14 +181,22 @@ pub fn judge_one(recording: &[World], contact: &Contact, met: OrientedBox) -> Ju
     // No driver can react to what was never in sight: the takeover is then at the last moment.
     let onset = onset(recording, contact.obstacle, met).unwrap_or(Onset { first: last, conflict: last });
     let earliest = (last + 1).saturating_sub(ticks(REWIND_S));
+    let reacts = shoved(recording, met).map(|shove| (shove + ticks(CAREFUL_REACTION_S)).min(last));
+    let earliest = earliest.max(reacts.unwrap_or(0));
     let from = onset.first.min(last_chance(recording, contact, met).unwrap_or(last)).max(earliest);
-    let case = Case::new(recording, from, contact);
+    let mut case = Case::new(recording, from, contact);
     // The letter keeps the recorded path and speed, whoever had to give way.
     let to_the_letter =
         Case { from: onset.conflict.max(earliest), speed_mps_max: f64::INFINITY, looks_anew: false, ..case };
-    let avoids = |name: &&str| case.avoids(reference(name, &recording[from]).as_mut());
-    let careful = names(CAREFUL.into_iter().filter(avoids));
-    let reported = names(REPORTED.into_iter().filter(avoids));
+    let mut careful = case.avoided_by(&CAREFUL);
+    if careful.is_empty()
+        && let Some(slowest) = crept_from(recording, from)
+    {
+        let again = Case { from: slowest, ..case };
+        careful = again.avoided_by(&CAREFUL);
+        case = if careful.is_empty() { case } else { again };
+    }
+    let reported = case.avoided_by(&REPORTED);
     let brakes_in_time = |name: &&str| to_the_letter.brakes(reference(name, &recording[from]).as_mut());
     let r157_letter = names(CAREFUL.into_iter().filter(brakes_in_time));
     let evasion = if careful.is_empty() { case.evasion() } else { None };
@@ -191,8 +207,35 @@ pub fn judge_one(recording: &[World], contact: &Contact, met: OrientedBox) -> Ju
     } else {
         Avoidability::Unavoidable
     };
-    let onset_s = recording[from].time_s();
+    let onset_s = recording[case.from].time_s();
     Judgement { class, onset_s, avoided_by: [careful, reported].concat(), r157_letter, evasion }
+}
+
+/// The last moment at which the ego vehicle was slowest since `from`, if it slowed down to walking pace.
+fn crept_from(recording: &[World], from: usize) -> Option<usize> {
+    let speed_mps = |index: &usize| recording[*index].ego().speed_mps;
+    // The last of equal moments, because it is the nearest to what went wrong.
+    let slowest = (from + 1..recording.len()).rev().min_by(|a, b| speed_mps(a).total_cmp(&speed_mps(b)))?;
+    (speed_mps(&slowest) < WALKING_MPS).then_some(slowest)
+}
+
+/// The moment after the last shove from another road user that gave the ego vehicle more than half of its way to the
+/// contact; `met` is its outline there.
+fn shoved(recording: &[World], met: OrientedBox) -> Option<usize> {
+    let mut way_m = 0.0;
+    let mut next = met.pose.position;
+    for (index, pair) in recording.windows(2).enumerate().rev() {
+        let here = pair[1].ego_outline().pose.position;
+        way_m += (next - here).norm();
+        next = here;
+        let [before_mps, after_mps] = [&pair[0], &pair[1]].map(|world| world.ego().speed_mps);
+        // More than the tyres give.
+        if after_mps - before_mps > SHOVE_MPS2 * DT_S {
+            let own_m = before_mps * (recording.len() - index) as f64 * DT_S;
+            return (own_m < way_m / 2.0).then_some(index + 1);
+        }
+    }
+    None
 }
 
 fn names<'a>(drivers: impl Iterator<Item = &'a str>) -> Vec<String> {
@@ -226,6 +269,12 @@ impl<'a> Case<'a> {
         };
         let looks_anew = contact.priority == Priority::Other;
         Case { recording, from, obstacle: contact.obstacle, looks_anew, speed_mps_max }
+    }
+
+    /// Those of the reference drivers that avoid the collision.
+    fn avoided_by(&self, drivers: &[&'static str]) -> Vec<String> {
+        let avoids = |name: &&str| self.avoids(reference(name, &self.recording[self.from]).as_mut());
+        names(drivers.iter().copied().filter(avoids))
     }
 
     /// Whether a driver that watches first avoids the collision.

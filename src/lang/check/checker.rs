@@ -241,7 +241,7 @@ impl Checker {
         space.clauses = clauses(&space);
         space.rows = prove::rows(&space);
         let (realisable, runs_in) = prove::realise(&space);
-        space.rows = prove::with_dead(&space, &realisable);
+        prove::mark_dead(&mut space, &realisable);
         self.expects(own, &space, &realisable);
         self.diagnostics.extend(unused::report(own, items));
         self.diagnostics.extend(style::report(own));

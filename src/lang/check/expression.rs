@@ -9,7 +9,9 @@ use crate::check::operator::Sides;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::vocabulary::{Fact, Known, ROAD_LANES, Site, Word, WordFact, parts_of, thing_of, things};
+use crate::model::vocabulary::{
+    Fact, Known, ROAD_LANES, Site, THERE, Word, WordFact, parts_of, thing_of, things,
+};
 use crate::model::{EnumIndex, STATE_MAX, StateDef, Type, code};
 use crate::syntax::ast::{Span, UnaryOp};
 use crate::syntax::{Diagnostic, ast, listed, nearest, one_of};
@@ -346,6 +348,12 @@ impl Checker {
         if let ast::ExprKind::Numbered { name, number } = &base.kind {
             return self.part_of_road_user((name, number, base.span), part, place, span);
         }
+        if let ast::ExprKind::Name(name) = &base.kind
+            && let Some(who) = self.bearers.iter().position(|bearer| bearer == name)
+        {
+            self.references.uses(base.span, Symbol::RoadUser(name.clone()));
+            return self.part_of_bearer(who, part, place, span);
+        }
         self.note_part(base, part);
         let things = things();
         let thing = match &base.kind {
@@ -402,6 +410,31 @@ impl Checker {
         };
         self.references.note(part.span, Symbol::Engine(fact.name(), fact.meaning()), false);
         Some(Expr { kind: ExprKind::OfRoadUser(id, fact), ty: fact.ty(), span })
+    }
+
+    /// `truck.gap`: a fact about a road user by its name.
+    fn part_of_bearer(
+        &mut self,
+        who: usize,
+        part: &ast::Name,
+        place: &Place<'_>,
+        span: Span,
+    ) -> Option<Expr> {
+        if !place.site.knows(Known::World) || place.site == Site::Change {
+            let error = Diagnostic::error(code::NOT_HERE, "no road user is looked up here");
+            let error = error.at(span, "about one that is there at a moment");
+            return self.reject(error.help("ask for it in a rule, or in the `where` of a drawn parameter"));
+        }
+        if part.text == THERE.0 {
+            self.references.note(part.span, Symbol::Engine(THERE.0, THERE.1), false);
+            return Some(Expr { kind: ExprKind::IsThere(who), ty: Type::Bool, span });
+        }
+        let Some(fact) = Fact::from_name(&format!("npc.{}", part.text)) else {
+            let parts = parts_of("npc").into_iter().map(|(part, _)| part).chain([THERE.0]);
+            return self.reject(unknown("fact of a road user", &part.text, part.span, parts));
+        };
+        self.references.note(part.span, Symbol::Engine(fact.name(), fact.meaning()), false);
+        Some(Expr { kind: ExprKind::OfBearer(who, fact), ty: fact.ty(), span })
     }
 
     /// Notes the `limit` of `road.limit`.

@@ -45,6 +45,8 @@ pub struct WorldFacts {
     pub spawns: Vec<SpawnFacts>,
     /// Those that are asked for by number and are there.
     pub road_users: Vec<(u32, NpcFacts)>,
+    /// Those that are asked for by name and are there.
+    pub bearers: Vec<(usize, NpcFacts)>,
 }
 
 /// What can be asked about the ego vehicle and its surroundings at a moment.
@@ -139,10 +141,10 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
         ExprKind::Fact(fact) => fact_value(*fact, facts),
         ExprKind::OfRoadUser(id, fact) => {
             let mut users = facts.world.into_iter().flat_map(|world| &world.road_users);
-            let npc = users.find(|(known, _)| known == id).map(|(_, npc)| *npc);
-            let spawn = npc.map(|npc| SpawnFacts { npc, ..SpawnFacts::default() });
-            fact_value(*fact, &Facts { spawn, ..*facts })
+            fact_of(users.find(|(known, _)| known == id).map(|(_, npc)| *npc), *fact, facts)
         }
+        ExprKind::OfBearer(who, fact) => fact_of(bearer(*who, facts), *fact, facts),
+        ExprKind::IsThere(who) => Value::Bool(bearer(*who, facts).is_some()),
         ExprKind::Call(function, arguments) => {
             let body = &functions[*function].body;
             let mut few = [Value::Bool(false); FEW];
@@ -186,6 +188,17 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
         }
         ExprKind::Match { subject, arm_of, arms } => value(&arms[arm_of[value(subject).variant()]]),
     }
+}
+
+fn bearer(who: usize, facts: &Facts<'_>) -> Option<NpcFacts> {
+    let mut bearers = facts.world.into_iter().flat_map(|world| &world.bearers);
+    bearers.find(|(known, _)| *known == who).map(|(_, npc)| *npc)
+}
+
+/// A fact about a road user that may be there.
+fn fact_of(npc: Option<NpcFacts>, fact: Fact, facts: &Facts<'_>) -> Value {
+    let spawn = npc.map(|npc| SpawnFacts { npc, ..SpawnFacts::default() });
+    fact_value(fact, &Facts { spawn, ..*facts })
 }
 
 fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {

@@ -29,6 +29,10 @@ pub enum ExprKind {
     Fact(Fact),
     /// `npc#2.speed`: a fact about the road user with that number. NaN while it is not there.
     OfRoadUser(u32, Fact),
+    /// `truck.speed`: a fact about the latest bearer of a name, by index in `Space::bearers`. NaN while none is there.
+    OfBearer(usize, Fact),
+    /// `truck.there`: whether there is a bearer of that name.
+    IsThere(usize),
     /// A function by its index in `Space::functions`.
     Call(usize, Vec<Expr>),
     Not(Box<Expr>),
@@ -64,6 +68,7 @@ impl ExprKind {
         match self {
             ExprKind::Fact(fact) => fact.known(),
             ExprKind::IsWord(fact, _) | ExprKind::IsBody(fact, _) => fact.known(),
+            ExprKind::OfBearer(..) | ExprKind::IsThere(_) => Known::World,
             _ => Known::Road,
         }
     }
@@ -89,6 +94,8 @@ impl Expr {
             | ExprKind::IsWord(..)
             | ExprKind::IsBody(..)
             | ExprKind::OfRoadUser(..)
+            | ExprKind::OfBearer(..)
+            | ExprKind::IsThere(_)
             | ExprKind::Fact(_) => {}
             ExprKind::CellAt(_, inner)
             | ExprKind::Not(inner)
@@ -169,6 +176,14 @@ impl Expr {
     pub(crate) fn asks_about_moment(&self) -> bool {
         let is_gap = |kind: &ExprKind| matches!(kind, ExprKind::Fact(Fact::SpawnGap | Fact::SafetyGap));
         self.asks_the_world() || self.any(|kind| kind.known() == Known::Spawn && !is_gap(kind))
+    }
+
+    /// The names of road users that it asks about, by index in `Space::bearers`.
+    pub fn bearers(&self) -> Vec<usize> {
+        self.filter_map(|kind| match kind {
+            ExprKind::OfBearer(who, _) | ExprKind::IsThere(who) => Some(*who),
+            _ => None,
+        })
     }
 
     pub fn reads_memory(&self) -> bool {

@@ -98,6 +98,11 @@ impl Trigger {
         self.once.iter().flat_map(|condition| condition.expr.filter_map(number)).collect()
     }
 
+    /// The names of road users that the condition asks about, by index in `Space::bearers`.
+    pub fn bearers(&self) -> Vec<usize> {
+        self.once.iter().flat_map(|condition| condition.expr.bearers()).collect()
+    }
+
     /// The trigger as a file spells it.
     pub fn text(&self) -> String {
         let once = self.once.as_ref().map(|once| format!("once {}", once.text));

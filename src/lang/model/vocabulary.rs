@@ -220,6 +220,9 @@ pub const CHANGE: (&str, &str) = (
 pub const ROAD_LANES: (&str, &str) =
     ("road.lanes", "The lanes in the ego vehicle's direction: `lane in road.lanes`.");
 
+/// `truck.there`: what may be asked of a named road user beside the facts of `npc`.
+pub const THERE: (&str, &str) = ("there", "Whether a road user of that name is there.");
+
 word_facts! {
     EgoLight "ego.light" Light, World = "The next traffic light within 100 m: `ego.light == Red`, `ego.light in [Yellow, Red]`.";
     EgoRoad "ego.road" RoadKind, World = "Where the ego vehicle drives: `ego.road == InJunction`.";

@@ -153,7 +153,8 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
             Some(piece) => Values::Number(piece),
             None => fact_values(*fact, known),
         },
-        ExprKind::OfRoadUser(_, fact) => fact_values(*fact, known),
+        ExprKind::OfRoadUser(_, fact) | ExprKind::OfBearer(_, fact) => fact_values(*fact, known),
+        ExprKind::IsThere(_) => Values::UNKNOWN_TRUTH,
         ExprKind::Call(function, arguments) => {
             let locals: Vec<Values> = arguments.iter().map(values).collect();
             enclose(&known.functions[*function].body, &Known { locals: &locals, ..*known })
@@ -281,6 +282,10 @@ fn compare_parts(op: Comparison, left: &Expr, right: &Expr, known: &Known<'_>) -
         return Values::truth(op == Comparison::NotEqual);
     }
     let apart = compare(op, enclose(left, known), enclose(right, known));
+    // While no bearer is there, a comparison with it does not hold, but `!=` does.
+    if [left, right].iter().any(|side| side.any(|kind| matches!(kind, ExprKind::OfBearer(..)))) {
+        return apart.union(Values::truth(op == Comparison::NotEqual));
+    }
     if !(apart.may_hold() && apart.may_fail()) {
         return apart;
     }

@@ -33,7 +33,7 @@ pub(crate) use clock::{forbids, next_rows, shortest_way};
 pub use cut::{Removal, removals};
 pub(crate) use enclose::{Known, VARIANTS_MAX, enclose};
 pub(crate) use reach::{product_size, rows};
-pub(crate) use realise::with_dead;
+pub(crate) use realise::mark_dead;
 pub use realise::{Realisable, Realised, RunsIn, realise};
 pub use time::{BrokenByTime, lasts};
 pub use witness::{Witness, witness};

@@ -25,9 +25,6 @@ use avastra_base::units::Unit;
 const STEPS_A_ROW: u64 = 100;
 const ROADS_MAX: u64 = 4;
 
-/// The proofs after this one need at least so many steps.
-const STEPS_OF_LATER_PROOFS: u64 = 5_000_000;
-
 /// The steps to come are foreseen each time that so many more rows of an action are proved.
 const ROWS_OF_A_SAMPLE: u64 = 256;
 
@@ -121,8 +118,9 @@ impl Pace {
         self.proved += 1;
         self.spent += steps;
         if self.proved.is_multiple_of(ROWS_OF_A_SAMPLE) {
-            let each = (self.spent / self.proved).saturating_sub(granted);
-            effort::foresee(each * self.count.saturating_sub(self.proved) + STEPS_OF_LATER_PROOFS);
+            // The proofs after this one take at least half as many steps.
+            let each = (self.spent * 3 / 2 / self.proved).saturating_sub(granted);
+            effort::foresee(each * self.count.saturating_sub(self.proved));
         }
     }
 }

@@ -74,18 +74,20 @@ pub fn realise(space: &Space) -> (Realisable, RunsIn) {
     (realisable, runs_in)
 }
 
-/// The rows with those marked as dead for which no values exist.
-pub(crate) fn with_dead(space: &Space, realisable: &Realisable) -> Vec<Row> {
+/// Marks the rows as dead for which no values exist.
+pub(crate) fn mark_dead(space: &mut Space, realisable: &Realisable) {
     let (in_force, left) = (RulesInForce::by_default(space), Left::new(BOXES_MAX));
-    let mut rows = space.rows.clone();
-    for (row, found) in rows.iter_mut().zip(realisable) {
+    let mut found: Vec<(usize, usize, Reach)> = Vec::new();
+    for (row, realised) in space.rows.iter().zip(realisable) {
         for (index, road) in space.roads.iter().enumerate() {
-            if found[index] == Realised::Never && matches!(row.roads[index], Reach::Open(_)) {
-                row.roads[index] = dead(space, &space.rows[row.index], road, &in_force, &left);
+            if realised[index] == Realised::Never && matches!(row.roads[index], Reach::Open(_)) {
+                found.push((row.index, index, dead(space, row, road, &in_force, &left)));
             }
         }
     }
-    rows
+    for (row, road, reach) in found {
+        space.rows[row].roads[road] = reach;
+    }
 }
 
 /// A row without values on a road, and the rules that leave it none.

@@ -31,7 +31,9 @@ pub(super) fn reduce(expr: &Expr, functions: &[FnDef], locals: &[Expr]) -> Expr 
         | ExprKind::Variant(..)
         | ExprKind::Cell(_)
         | ExprKind::Fact(_)
-        | ExprKind::OfRoadUser(..) => expr.kind.clone(),
+        | ExprKind::OfRoadUser(..)
+        | ExprKind::OfBearer(..)
+        | ExprKind::IsThere(_) => expr.kind.clone(),
         ExprKind::CellAt(first, key) => {
             let key = inner(key);
             match key.kind {
@@ -78,6 +80,8 @@ fn fold(expr: Expr) -> Expr {
                 | ExprKind::CellAt(..)
                 | ExprKind::Fact(_)
                 | ExprKind::OfRoadUser(..)
+                | ExprKind::OfBearer(..)
+                | ExprKind::IsThere(_)
                 | ExprKind::InLanes(..)
                 | ExprKind::OnRoad(_)
                 | ExprKind::IsWord(..)

@@ -98,7 +98,7 @@ pub(super) fn is_same(left: &Expr, right: &Expr) -> bool {
 fn may_lack_a_value(expr: &Expr) -> bool {
     expr.any(|kind| {
         let divides = matches!(kind, ExprKind::Arithmetic(Arithmetic::Divide, ..));
-        divides || matches!(kind, ExprKind::Call(..) | ExprKind::OfRoadUser(..))
+        divides || matches!(kind, ExprKind::Call(..) | ExprKind::OfRoadUser(..) | ExprKind::OfBearer(..))
     })
 }
 

@@ -13,8 +13,8 @@ use avastra_lang::model::rules::{
     Before, Candidate, Choose, Clause, Nearest, Room, RowRules, TRIES_MAX, Unsolved,
 };
 use avastra_lang::model::{
-    ActionDef, BodyWord, Domain, EffectDef, Facts, Memory, MomentFacts, ORDER_RATE_MPS2, OrderDef, Parameter,
-    SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value, WorldFacts, evaluate, locals,
+    ActionDef, BodyWord, Domain, EffectDef, Facts, Memory, MomentFacts, NpcFacts, ORDER_RATE_MPS2, OrderDef,
+    Parameter, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value, WorldFacts, evaluate, locals,
     order_out_of_bounds, rounded_into, spawn_out_of_bounds,
 };
 
@@ -30,6 +30,8 @@ pub(super) struct Judge<'a> {
     situation: &'a Situation<'a>,
     /// Filled in if a rule or a `where` asks for it.
     moment: MomentFacts,
+    /// The named road users that a rule or a `where` asks about, and that are there.
+    bearers: Vec<(usize, NpcFacts)>,
 }
 
 impl<'a> Judge<'a> {
@@ -38,12 +40,18 @@ impl<'a> Judge<'a> {
         let action = &space.actions[row.action];
         let row = RowRules { space, row, road: Some(&situation.road.facts), in_force: situation.rules };
         let wheres = action.parameters.iter().filter_map(|parameter| parameter.condition.as_ref());
-        let mut asked = wheres.chain(row.demands().filter_map(|(_, demand)| demand.condition()));
-        let moment = match asked.any(Expr::asks_the_world) {
-            true => situation.surroundings.moment(),
-            false => MomentFacts::default(),
+        let asked = wheres.chain(row.demands().filter_map(|(_, demand)| demand.condition()));
+        let asking: Vec<&Expr> = asked.filter(|condition| condition.asks_the_world()).collect();
+        let moment = match asking.is_empty() {
+            true => MomentFacts::default(),
+            false => situation.surroundings.moment(),
         };
-        Judge { row, action, situation, moment }
+        let mut bearers: Vec<usize> = asking.iter().flat_map(|condition| condition.bearers()).collect();
+        bearers.sort_unstable();
+        bearers.dedup();
+        let facts = |who: usize| Some((who, situation.surroundings.bearer(who)?));
+        let bearers = bearers.into_iter().filter_map(facts).collect();
+        Judge { row, action, situation, moment, bearers }
     }
 
     /// Draws until all rules hold. `shares` places the values of the first try: for each parameter, where in its range
@@ -277,7 +285,8 @@ impl<'a> Judge<'a> {
 
     /// What the world says before it is asked about spawns.
     fn world(&self) -> WorldFacts {
-        WorldFacts { moment: self.moment, step: self.situation.step, ..WorldFacts::default() }
+        let bearers = self.bearers.clone();
+        WorldFacts { moment: self.moment, step: self.situation.step, bearers, ..WorldFacts::default() }
     }
 
     /// Why there are no values, in words.

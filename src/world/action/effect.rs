@@ -142,6 +142,11 @@ pub trait Surroundings {
         None
     }
 
+    /// What can be asked about the latest bearer of a name, if one is there.
+    fn bearer(&self, _who: usize) -> Option<NpcFacts> {
+        None
+    }
+
     /// Why an order cannot be given now, in words that complete "cannot order `NAME`: …".
     fn order_refusal(&self, _order: &OrderRequest) -> Option<String> {
         None

@@ -319,6 +319,16 @@ impl World {
         Some(npc_facts(&self.alone(), &user.obstacle, &user.mover.motion))
     }
 
+    /// What can be asked about the latest bearer of a name, if one is there.
+    pub fn bearer_facts(&self, who: usize) -> Option<NpcFacts> {
+        self.npc_facts(self.users[self.bearer(who)?].obstacle.id)
+    }
+
+    /// The index of the latest bearer of a name.
+    fn bearer(&self, who: usize) -> Option<usize> {
+        self.users.iter().rposition(|user| user.mover.bearer == Some(who))
+    }
+
     /// Contacts among obstacles that began in the tick before.
     pub fn incidents(&self) -> &[Incident] {
         &self.incidents
@@ -509,9 +519,7 @@ impl World {
     /// # Errors
     /// Why it cannot be ordered, in words that complete "cannot order `NAME`: …".
     fn ordered(&self, order: &OrderRequest) -> Result<usize, String> {
-        // A name means its latest bearer.
-        let index = self.users.iter().rposition(|user| user.mover.bearer == Some(order.who));
-        let index = index.ok_or("no road user of that name is there")?;
+        let index = self.bearer(order.who).ok_or("no road user of that name is there")?;
         let mover = &self.users[index].mover;
         match mover.motion {
             _ if mover.is_wreck() => Err("it is a wreck".to_owned()),

@@ -122,6 +122,8 @@ impl Reader<'_> {
             | ExprKind::Variant(..)
             | ExprKind::Fact(_)
             | ExprKind::OfRoadUser(..)
+            | ExprKind::OfBearer(..)
+            | ExprKind::IsThere(_)
             | ExprKind::OnRoad(_)
             | ExprKind::IsWord(..)
             | ExprKind::IsBody(..) => Form::Known(evaluate(expr, self.functions, &self.facts)),

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::action::{Effect, SpawnRequest, Surroundings};
+use crate::action::{Effect, OrderRequest, SpawnRequest, Surroundings};
 use crate::sim::body::BodyParameters;
 use crate::sim::testing::request;
 use crate::sim::way::body_at;
@@ -76,6 +76,72 @@ fn a_vehicle_that_is_asked_to_stand_stands_to_the_bit() {
         assert_eq!((now.outline, now.velocity_mps), (stands.outline, Vec2::zeros()));
     }
     assert!(world.is_blocked(), "it will not go");
+}
+
+/// Speeds and ways of ordered changes of speed against closed forms: within a tick and 5 cm.
+#[test]
+fn an_order_changes_speed_at_its_rate() {
+    let named = SpawnRequest { bearer: Some(7), ..request(Verb::DriveAhead, 60.0, 12.0) };
+    for (speed_mps, rate_mps2) in [(0.0, 3.0), (4.0, 1.5), (0.0, 6.0), (14.0, 0.5)] {
+        let mut world = driven(&testing::straight(), 8.0, 1.0);
+        let user = spawn(&mut world, named);
+        let order = OrderRequest { who: 7, speed_mps, rate_mps2: Some(rate_mps2) };
+        world.apply(&Effect::Order(order)).expect("it is there and drives");
+        let from_m = user.outline.pose.position.x;
+        let (mut ticks, mut now) = (0, user);
+        while (now.velocity_mps.norm() - speed_mps).abs() > 1e-9 {
+            world.tick(&hold(&world, 2.0));
+            now = *world.obstacle(user.id).expect("it stays on the road");
+            ticks += 1;
+            assert!(ticks < 3_000, "{now:?}");
+        }
+        let change_mps: f64 = speed_mps - 12.0;
+        let wanted_s = change_mps.abs() / rate_mps2;
+        assert!((f64::from(ticks) * DT_S - wanted_s).abs() <= DT_S, "{ticks} ticks, {wanted_s} s");
+        let way_m = now.outline.pose.position.x - from_m;
+        let wanted_m = (speed_mps * speed_mps - 144.0).abs() / (2.0 * rate_mps2);
+        assert!((way_m - wanted_m).abs() <= 0.05 + 12.0 * DT_S, "{way_m} m, {wanted_m} m");
+        // It keeps the speed that it was told to keep.
+        drive(&mut world, 0.0, 2.0);
+        let later = world.obstacle(user.id).expect("it stays on the road");
+        assert!((later.velocity_mps.norm() - speed_mps).abs() < 1e-9, "{later:?}");
+    }
+}
+
+#[test]
+fn an_order_is_for_the_latest_bearer_and_no_wreck_obeys() {
+    let mut world = driven(&testing::straight(), 8.0, 1.0);
+    let order = OrderRequest { who: 0, speed_mps: 3.0, rate_mps2: None };
+    assert_eq!(world.order_refusal(&order).as_deref(), Some("no road user of that name is there"));
+    let named = |distance_m| SpawnRequest { bearer: Some(0), ..request(Verb::DriveAhead, distance_m, 9.0) };
+    let [first, second] = [90.0, 60.0].map(|distance_m| spawn(&mut world, named(distance_m)).id);
+    world.apply(&Effect::Order(order)).expect("it is there");
+    drive(&mut world, 2.0, 6.0);
+    let speed_mps = |world: &World, id| world.obstacle(id).expect("it is there").velocity_mps.norm();
+    assert!((speed_mps(&world, second) - 3.0).abs() < 0.1 && speed_mps(&world, first) > 8.9);
+    // The ego vehicle runs into it: a wreck only brakes.
+    while world.tick(&hold(&world, 12.0)).is_empty() {}
+    assert_eq!(world.order_refusal(&order).as_deref(), Some("it is a wreck"));
+    let walker = SpawnRequest { bearer: Some(0), ..request(Verb::Stand, 40.0, 1.0) };
+    spawn(&mut world, walker);
+    assert_eq!(world.order_refusal(&order).as_deref(), Some("it is on foot"));
+}
+
+#[test]
+fn what_has_a_name_makes_no_room() {
+    let mut world = driven(&testing::straight(), 8.0, 1.0);
+    let named = |who| SpawnRequest { bearer: Some(who), ..request(Verb::DriveOpposite, 30.0, 9.0) };
+    let mut appeared = 0;
+    while appeared < 10 {
+        appeared += usize::from(world.apply(&Effect::Spawn(named(appeared))).is_ok());
+        drive(&mut world, 8.0, 1.0);
+        assert!(world.ticks() < 5_000, "{appeared} appeared");
+        if world.obstacles().len() < appeared {
+            return; // One drove off the map: there is room without anybody's leaving for it.
+        }
+    }
+    let more = request(Verb::DriveOpposite, 30.0, 9.0);
+    assert_eq!(world.survey(&more).err().as_deref(), Some("ten road users are there already"));
 }
 
 #[test]

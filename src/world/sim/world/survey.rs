@@ -5,7 +5,7 @@ use std::cell::OnceCell;
 use crate::action::{OrderRequest, SpawnFacts, SpawnRequest, Surroundings};
 use crate::sim::placement;
 use crate::sim::placement::Arrivals;
-use avastra_lang::model::MomentFacts;
+use avastra_lang::model::{MomentFacts, NpcFacts};
 
 use super::{DT_S, World};
 
@@ -35,6 +35,10 @@ impl Surroundings for World {
         Some(Box::new(self.at_this_moment()))
     }
 
+    fn bearer(&self, who: usize) -> Option<NpcFacts> {
+        self.bearer_facts(who)
+    }
+
     fn order_refusal(&self, order: &OrderRequest) -> Option<String> {
         self.ordered(order).err()
     }
@@ -55,6 +59,10 @@ impl Surroundings for Survey<'_> {
 
     fn moment(&self) -> MomentFacts {
         *self.moment.get_or_init(|| self.world.moment_facts())
+    }
+
+    fn bearer(&self, who: usize) -> Option<NpcFacts> {
+        self.world.bearer_facts(who)
     }
 
     fn order_refusal(&self, order: &OrderRequest) -> Option<String> {
