@@ -101,7 +101,7 @@ fn already(source: &mut Source, condition: &Condition) -> Option<String> {
     if condition.is_rising {
         let reason =
             "it holds from the beginning, so `rising` never comes: with `conditionEdge=\"none\"` it is read";
-        return source.refuse_at(&condition.mark, reason);
+        return source.refuse(&condition.mark, reason);
     }
     Some(ALWAYS.to_owned())
 }
@@ -115,7 +115,7 @@ fn gap(source: &mut Source, mark: &Mark, pair: &Pair, actor: &Placed, placed: &[
     let ego = &placed[0];
     let names = [pair.of.as_str(), pair.to.as_str()];
     if !(names.contains(&actor.name()) && names.contains(&ego.name())) {
-        return source.refuse_at(mark, "it must ask about the ego vehicle and the one that acts");
+        return source.refuse(mark, "it must ask about the ego vehicle and the one that acts");
     }
     if pair.is_free_space {
         return Some("npc.gap".to_owned());
@@ -166,13 +166,13 @@ fn meeting(
     if closing_mps > 0.0 && pair.is_less || closing_mps < 0.0 && !pair.is_less {
         return at(source, mark, seconds);
     }
-    source.refuse_at(mark, "at the speeds of the beginning this never comes")
+    source.refuse(mark, "at the speeds of the beginning this never comes")
 }
 
 /// A moment that follows from speeds and distances.
 fn at(source: &mut Source, mark: &Mark, seconds: f64) -> Option<String> {
     if !(0.0..1e4).contains(&seconds) {
-        return source.refuse_at(mark, "at the speeds of the beginning this never comes");
+        return source.refuse(mark, "at the speeds of the beginning this never comes");
     }
     source.note(
         "a condition between others is asked at the time at which it comes true if they keep their speeds",
@@ -188,7 +188,7 @@ fn named<'a>(
 ) -> Option<&'a Placed<'a>> {
     let found = placed.iter().find(|other| other.name() == name && !source.is_torn(name));
     if found.is_none() && !source.is_torn(name) {
-        source.refuse_at::<()>(mark, format!("`{name}` is no vehicle with a place"));
+        source.refuse::<()>(mark, format!("`{name}` is no vehicle with a place"));
     }
     found
 }

@@ -150,9 +150,7 @@ impl Cast {
                 return None;
             }
             let names: Vec<String> = entities.iter().map(|entity| format!("`{}`", entity.name)).collect();
-            if names.is_empty() {
-                return source.refuse(root, "no entity can be read");
-            }
+            source.refuse_if(names.is_empty(), root, "no entity can be read")?;
             let reason =
                 format!("which entity is the ego vehicle? Name it with `--ego`: {}", names.join(", "));
             return source.refuse(root, reason);
