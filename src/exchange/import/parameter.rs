@@ -26,9 +26,7 @@ pub fn check(source: &mut Source, declared: Node, value: &str) -> Option<()> {
             None => return Some(()),
         }
     }
-    if is_excluded {
-        source.refuse::<()>(declared, format!("its constraints exclude the value `{value}`"));
-    }
+    source.refuse_if(is_excluded, declared, format!("its constraints exclude the value `{value}`"));
     Some(())
 }
 

@@ -170,9 +170,7 @@ impl Cast {
     /// Whether an entity has a name that an element asks for; refuses a name that none has.
     fn knows(&mut self, source: &mut Source, node: Node, name: &str) -> bool {
         let is_known = self.is_ego(name) || self.other(name).is_some();
-        if !is_known && !source.is_torn(name) {
-            source.refuse::<()>(node, format!("no entity is called `{name}`"));
-        }
+        source.refuse_if(!is_known && !source.is_torn(name), node, format!("no entity is called `{name}`"));
         is_known
     }
 
@@ -224,9 +222,7 @@ impl Cast {
                 }
             }
             if names.is_empty() {
-                if is_read {
-                    source.refuse::<()>(actors, "it names nobody who acts");
-                }
+                source.refuse_if(is_read, actors, "it names nobody who acts");
                 continue;
             }
             for manoeuvre in elements(group, "Maneuver") {
