@@ -5,14 +5,15 @@ use avastra_campaign::emit::lane_point;
 use avastra_lang::model::{SPAWN_DISTANCE_M, SPAWN_SPEED_MPS};
 use avastra_road::RoadMap;
 
+use super::Files;
 use super::action::{Headway, Speed, Target};
 use super::body::Shape;
+use super::condition::{Waiting, is_always};
 use super::ground::{Beside, Ground};
 use super::position::{Heading, Position};
 use super::source::{Mark, Source};
 use super::story::{Change, Entity, Story};
 use super::trigger::{Condition, When};
-use super::{Files, condition};
 
 /// Vehicles keep to the middle of their lanes: a file's may be this far beside it, m.
 const OFFSET_M_MAX: f64 = 0.3;
@@ -82,14 +83,13 @@ impl Scene {
         }
         let mut scene = Scene { start, goal, ego_mps, others: Vec::new(), change: None, once: None };
         let beside = Beside { station_m: 0.0, lanes_left: 0, is_along: true, offset_m: 0.0 };
-        let mut placed = vec![Placed { entity: &story.ego, beside, mps: ego_mps }];
+        let placed = vec![Placed { entity: &story.ego, beside, mps: ego_mps }];
+        let mut setting = Setting { story, ground, placed };
         // A place may be relative to one that stands later in the file.
         let mut left: Vec<&Entity> = story.others.iter().collect();
         while !left.is_empty() {
             let is_known = |entity: &&Entity| match &entity.position {
-                Some((_, Position::RelativeLane { entity: of, .. })) => {
-                    placed.iter().any(|other| other.name() == of)
-                }
+                Some((_, Position::RelativeLane { entity: of, .. })) => setting.find(of).is_some(),
                 _ => true,
             };
             let Some(at) = left.iter().position(is_known) else {
@@ -114,33 +114,26 @@ impl Scene {
             }
             if is_walker {
                 if !source.is_torn(&entity.name) {
-                    scene.on_foot(source, story, &ground, entity);
+                    scene.on_foot(source, &setting, entity);
                 }
                 continue;
             }
-            let found = source.about(&entity.name, |source| place(source, story, &ground, entity, &placed));
-            placed.extend(found);
+            let found = source.about(&entity.name, |source| setting.place(source, entity));
+            setting.placed.extend(found);
         }
-        for other in &placed[1..] {
+        for other in &setting.placed[1..] {
             if !source.is_torn(other.name()) {
-                scene.vehicle(source, story, &ground, other, &placed);
+                scene.vehicle(source, &setting, other);
             }
         }
         (!source.is_refused()).then_some(scene)
     }
 
     /// A vehicle before, behind or against the ego vehicle.
-    fn vehicle(
-        &mut self,
-        source: &mut Source,
-        story: &Story,
-        ground: &Ground,
-        other: &Placed,
-        placed: &[Placed],
-    ) -> Option<()> {
+    fn vehicle(&mut self, source: &mut Source, setting: &Setting, other: &Placed) -> Option<()> {
         let Placed { entity, beside, mps } = other;
         let mark = entity.position.as_ref().map_or(&entity.mark, |(mark, _)| mark);
-        let ego = &placed[0];
+        let ego = setting.ego();
         let (front_m, back_m) = ego.ends_m();
         let (own_front_m, own_back_m) = other.ends_m();
         let ahead_m = match &entity.headway {
@@ -181,7 +174,7 @@ impl Scene {
             return source.refuse(&extra.mark, "a vehicle changes lanes once");
         }
         if let Some(change) = entity.changes.first() {
-            spawn.changes = self.lane_change(source, story, ground, change, other, placed)?;
+            spawn.changes = self.lane_change(source, setting, change, other)?;
         }
         self.appears(source, mark, spawn)
     }
@@ -201,16 +194,15 @@ impl Scene {
     fn lane_change(
         &mut self,
         source: &mut Source,
-        story: &Story,
-        ground: &Ground,
+        setting: &Setting,
         change: &Change,
         other: &Placed,
-        placed: &[Placed],
     ) -> Option<bool> {
+        let Setting { story, ground, .. } = setting;
         let mark = &change.mark;
         let own = other.beside.lanes_left;
         let to = match &change.to {
-            Target::Beside(name, lanes) => match placed.iter().find(|other| other.name() == name) {
+            Target::Beside(name, lanes) => match setting.find(name) {
                 Some(of) => of.beside.lanes_left + lanes,
                 None if source.is_torn(name) => return None,
                 None => return source.refuse(mark, format!("`{name}` is no vehicle with a place")),
@@ -258,7 +250,7 @@ impl Scene {
             return source.refuse(mark, "a vehicle beside the ego vehicle's lane changes into it alone");
         }
         source.refuse_if(self.change.is_some(), mark, "one vehicle of a scenario changes lanes")?;
-        let when = condition::text(source, ground, &change.when, other, placed)?;
+        let when = Waiting { actor: other, setting }.text(source, &change.when)?;
         source.note(
             "a lane change takes as long as the engine's drivers need, and waits until the lane is free",
         );
@@ -267,13 +259,8 @@ impl Scene {
     }
 
     /// A pedestrian that stands in the ego vehicle's lane, or crosses its way.
-    fn on_foot(
-        &mut self,
-        source: &mut Source,
-        story: &Story,
-        ground: &Ground,
-        entity: &Entity,
-    ) -> Option<()> {
+    fn on_foot(&mut self, source: &mut Source, setting: &Setting, entity: &Entity) -> Option<()> {
+        let Setting { story, ground, .. } = setting;
         let Some((mark, position)) = &entity.position else {
             return source.refuse(&entity.mark, "the file does not say where it begins");
         };
@@ -361,42 +348,57 @@ impl Placed<'_> {
     }
 }
 
-fn place<'a>(
-    source: &mut Source,
-    story: &Story,
-    ground: &Ground,
-    entity: &'a Entity,
-    placed: &[Placed],
-) -> Option<Placed<'a>> {
-    let Some((mark, position)) = &entity.position else {
-        if source.is_torn(&entity.name) {
-            return None;
-        }
-        return source.refuse(&entity.mark, "the file does not say where it begins");
-    };
-    let beside = match position {
-        Position::RelativeLane { entity: of, lanes, ahead_m, offset_m, heading } => {
-            let of = placed.iter().find(|other| other.name() == of)?;
-            if !of.beside.is_along {
-                return source.refuse(mark, "a place relative to an oncoming vehicle is not read");
-            }
-            let lanes_left = of.beside.lanes_left + lanes;
-            let station_m = of.beside.station_m + ahead_m;
-            if station_m >= ground.route.path.length_m() {
-                return source.refuse(mark, "it lies beyond the end of the ego vehicle's way");
-            }
-            ground.faces_on(source, mark, station_m, *heading)?;
-            Beside { station_m, lanes_left, is_along: true, offset_m: *offset_m }
-        }
-        _ => ground.vehicle(source, mark, position)?,
-    };
-    if beside.offset_m.abs() > OFFSET_M_MAX {
-        let reason =
-            format!("{:.2} m beside the middle of its lane: vehicles keep to the middle", beside.offset_m);
-        return source.refuse(mark, reason);
+/// The story on its map, with the vehicles that have a place: the ego vehicle is the first.
+pub struct Setting<'a> {
+    pub story: &'a Story,
+    pub ground: Ground,
+    pub placed: Vec<Placed<'a>>,
+}
+
+impl<'a> Setting<'a> {
+    pub fn ego(&self) -> &Placed<'a> {
+        &self.placed[0]
     }
-    let mps = speed(source, story, entity, 0)?;
-    Some(Placed { entity, beside, mps })
+
+    /// The vehicle of a name, if it has a place.
+    pub fn find(&self, name: &str) -> Option<&Placed<'a>> {
+        self.placed.iter().find(|other| other.name() == name)
+    }
+
+    /// A place for one more.
+    fn place(&self, source: &mut Source, entity: &'a Entity) -> Option<Placed<'a>> {
+        let Some((mark, position)) = &entity.position else {
+            if source.is_torn(&entity.name) {
+                return None;
+            }
+            return source.refuse(&entity.mark, "the file does not say where it begins");
+        };
+        let beside = match position {
+            Position::RelativeLane { entity: of, lanes, ahead_m, offset_m, heading } => {
+                let of = self.find(of)?;
+                if !of.beside.is_along {
+                    return source.refuse(mark, "a place relative to an oncoming vehicle is not read");
+                }
+                let lanes_left = of.beside.lanes_left + lanes;
+                let station_m = of.beside.station_m + ahead_m;
+                if station_m >= self.ground.route.path.length_m() {
+                    return source.refuse(mark, "it lies beyond the end of the ego vehicle's way");
+                }
+                self.ground.faces_on(source, mark, station_m, *heading)?;
+                Beside { station_m, lanes_left, is_along: true, offset_m: *offset_m }
+            }
+            _ => self.ground.vehicle(source, mark, position)?,
+        };
+        if beside.offset_m.abs() > OFFSET_M_MAX {
+            let reason = format!(
+                "{:.2} m beside the middle of its lane: vehicles keep to the middle",
+                beside.offset_m
+            );
+            return source.refuse(mark, reason);
+        }
+        let mps = speed(source, self.story, entity, 0)?;
+        Some(Placed { entity, beside, mps })
+    }
 }
 
 /// The speed with which an entity begins, m/s; it must keep it, unless it is the ego vehicle.
@@ -412,7 +414,7 @@ fn speed(source: &mut Source, story: &Story, entity: &Entity, depth: usize) -> O
         };
         source.refuse_if(wanted > *SPAWN_SPEED_MPS.end(), &paced.mark, too_fast(wanted))?;
         source.refuse_if(wanted < 0.0, &paced.mark, "no vehicle drives backwards")?;
-        let at_begin = paced.when.is_empty() || paced.when.iter().any(|all| condition::is_always(all));
+        let at_begin = paced.when.is_empty() || paced.when.iter().any(|all| is_always(all));
         if at_begin && paced.at_once {
             mps = wanted;
         } else if (wanted - mps).abs() > 1e-9 && !is_ego {
