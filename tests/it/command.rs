@@ -34,12 +34,25 @@ pub fn outcome(command: &mut Command) -> (i32, String, String) {
     (status, text(output.stdout), text(output.stderr))
 }
 
+/// What a command prints that ends well.
+#[track_caller]
+pub fn done(arguments: &[&str]) -> String {
+    let (status, stdout, stderr) = outcome(&mut avastra(arguments));
+    assert_eq!(status, 0, "{arguments:?}: {stdout}{stderr}");
+    stdout
+}
+
+/// A command ends with status 1, and says why.
+#[track_caller]
+pub fn fails(arguments: &[&str], reason: &str) {
+    let (status, stdout, stderr) = outcome(&mut avastra(arguments));
+    assert!(status == 1 && stderr.contains(reason), "{arguments:?}: {status}: {stdout}{stderr}");
+}
+
 #[test]
 fn a_misspelt_command_is_told_the_nearest() {
     for (word, meant) in [("rn", "run"), ("chek", "check"), ("tran", "train")] {
-        let (status, _, stderr) = outcome(&mut avastra(&[word]));
-        assert_eq!(status, 1, "{stderr}");
-        assert!(stderr.contains(&format!("exists: '{meant}'")), "{stderr}");
+        fails(&[word], &format!("exists: '{meant}'"));
     }
 }
 
@@ -50,8 +63,7 @@ fn a_command_or_an_option_that_was_is_told_its_new_name() {
         (&["explain-policy", "a.ava"], "`explain-policy` is now `policy explain`"),
         (&["run", "a.ava", "--ads-config", "car.yaml"], "`--ads-config` is now `--ads FILE`"),
     ] {
-        let (status, _, stderr) = outcome(&mut avastra(words));
-        assert!(status == 1 && stderr.contains(now), "{stderr}");
+        fails(words, now);
     }
 }
 
@@ -66,9 +78,7 @@ fn a_picture_shows_sidewalks() {
     );
     let file = scratch.path().join("street.ava");
     std::fs::write(&file, scenario).expect("it is writable");
-    let (status, svg, stderr) =
-        outcome(&mut avastra(&["render", &file.display().to_string(), "--at", "1", "--out", "-"]));
-    assert_eq!(status, 0, "{stderr}");
+    let svg = done(&["render", &file.display().to_string(), "--at", "1", "--out", "-"]);
     assert_eq!(svg.matches("fill=\"#dcd7cf\"").count(), 2, "one on each side");
 }
 
@@ -95,8 +105,7 @@ fn a_run_says_what_it_refused_and_how_much_traffic_there_was() {
     let space = ["run", "scenarios/avastra45.ava", "--format", "plain"];
     let settings =
         ["--agent", "random-raw", "--episodes", "2", "--seed", "3", "--ambient", "4", "--out", &out];
-    let (status, stdout, stderr) = outcome(&mut avastra(&[&space[..], &settings[..]].concat()));
-    assert_eq!(status, 0, "{stderr}");
+    let stdout = done(&[&space[..], &settings[..]].concat());
     assert!(stdout.contains("refused: "), "{stdout}");
     assert!(stdout.contains(" × "), "{stdout}");
     let settings = std::fs::read_to_string(scratch.path().join("run/run.yaml")).expect("it is written");
@@ -155,9 +164,7 @@ fn what_does_not_exist_is_named_with_what_does() {
         (&["render", space, "--at", "2", "9.5"], "separated by commas, as in `--at 2,9.5`"),
     ];
     for (arguments, hint) in cases {
-        let (status, _, stderr) = outcome(&mut avastra(arguments));
-        assert_eq!(status, 1, "{arguments:?}: {stderr}");
-        assert!(stderr.contains(hint), "{arguments:?}: {stderr}");
+        fails(arguments, hint);
     }
 }
 
@@ -226,8 +233,7 @@ fn what_is_no_plain_file_is_written_to_and_never_replaced() {
     std::os::unix::fs::symlink("/dev/null", &to_device).expect("links can be made");
     for link in [to_file, to_device] {
         let out = link.to_str().expect("the path is text");
-        let (status, _, stderr) = outcome(&mut avastra(&["compile", "scenarios/avastra45.ava", "-o", out]));
-        assert_eq!(status, 0, "{stderr}");
+        done(&["compile", "scenarios/avastra45.ava", "-o", out]);
         assert!(link.is_symlink(), "{out} was replaced");
     }
     assert!(std::fs::read_to_string(&kept).expect("it is readable").len() > 1000, "the link was followed");
@@ -309,10 +315,8 @@ fn shipped_files_are_sound_and_formatted() {
         .map(|path| path.display().to_string())
         .collect();
     let files: Vec<&str> = files.iter().map(String::as_str).collect();
-    let (status, _, stderr) = outcome(&mut avastra(&[&["check", "--strict"], &files[..]].concat()));
-    assert_eq!(status, 0, "{stderr}");
-    let (status, stdout, _) = outcome(&mut avastra(&[&["fmt", "--check"], &files[..]].concat()));
-    assert_eq!(status, 0, "{stdout}");
+    done(&[&["check", "--strict"], &files[..]].concat());
+    done(&[&["fmt", "--check"], &files[..]].concat());
 }
 
 #[test]

@@ -7,7 +7,7 @@ use std::process::Stdio;
 use std::time::Duration;
 
 use crate::cases::root;
-use crate::command::{avastra, outcome};
+use crate::command::{avastra, done, fails, outcome};
 use crate::report::index_of;
 use crate::world::FLICKER;
 
@@ -63,8 +63,7 @@ fn names_that_are_no_text_are_refused_before_anything_is_played() {
         assert!(stdout.lines().all(|line| serde_json::from_str::<serde_json::Value>(line).is_ok()));
     }
     // One that is found in a folder is named; nothing of the folder is played.
-    let (status, _, stderr) = outcome(&mut avastra(&["test", &scratch.0.path().display().to_string()]));
-    assert!(status == 1 && stderr.contains("the path is not UTF-8"), "{stderr}");
+    fails(&["test", &scratch.0.path().display().to_string()], "the path is not UTF-8");
     let inside = scratch.0.path().join(OsStr::from_bytes(b"run\xfe"));
     std::fs::create_dir(&inside).expect("it is writable");
     let space = root().join(SPACE);
@@ -272,8 +271,7 @@ fn a_link_to_nothing_is_not_replaced() {
     let scratch = Scratch::new();
     let link = scratch.path("link.yaml");
     std::os::unix::fs::symlink(scratch.path("nothing"), &link).expect("links can be made");
-    let (status, _, stderr) = outcome(&mut avastra(&["compile", SPACE, "-o", &link.display().to_string()]));
-    assert!(status == 1 && stderr.contains("a link to a file that does not exist"), "{stderr}");
+    fails(&["compile", SPACE, "-o", &link.display().to_string()], "a link to a file that does not exist");
     assert!(link.is_symlink());
 }
 
@@ -282,8 +280,7 @@ fn scenarios_that_are_gone_or_edited_are_noticed() {
     let scratch = Scratch::new();
     let out = scratch.text("run");
     let settings = ["--ads", FLICKER, "--road", "corner", "--episodes", "12", "--seed", "5", "--out", &out];
-    let (status, _, stderr) = outcome(&mut avastra(&[&["run", SPACE], &settings[..]].concat()));
-    assert_eq!(status, 0, "{stderr}");
+    done(&[&["run", SPACE], &settings[..]].concat());
     let critical = std::fs::read_dir(scratch.path("run/critical")).expect("it is there").flatten();
     let mut files: Vec<PathBuf> = critical.map(|entry| entry.path()).collect();
     files.sort();
@@ -291,8 +288,7 @@ fn scenarios_that_are_gone_or_edited_are_noticed() {
     let written = std::fs::read(gone).expect("it is readable");
     std::fs::remove_file(gone).expect("it is there");
     edit(edited, "language 1", "// mine\nlanguage 1");
-    let (status, stdout, stderr) = outcome(&mut avastra(&["run", "--resume", &out]));
-    assert_eq!(status, 0, "{stderr}");
+    let stdout = done(&["run", "--resume", &out]);
     assert!(stdout.contains("was missing, is written again"), "{stdout}");
     assert!(stdout.contains("edited since the run wrote it"), "{stdout}");
     assert_eq!(std::fs::read(gone).expect("it is back"), written);

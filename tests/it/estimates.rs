@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use crate::cases::expect_snapshot;
-use crate::command::{avastra, outcome};
+use crate::command::{avastra, done, fails, outcome};
 use crate::report::index_of;
 
 const SPACE: &str = "scenarios/avastra45.ava";
@@ -60,8 +60,7 @@ fn an_estimate_depends_on_its_settings_alone() {
 
         // Gone on with, on two threads.
         cut(&directory);
-        let (status, _, stderr) = outcome(&mut avastra(&["estimate", "--jobs", "2", "--resume", &out]));
-        assert_eq!(status, 0, "{stderr}");
+        done(&["estimate", "--jobs", "2", "--resume", &out]);
         assert_eq!(kept(&directory), whole, "{method}");
     }
     // What was tried out beside the episodes replays like any episode: it has their seeds and a script of its own.
@@ -135,16 +134,14 @@ fn an_estimate_stops_at_a_look_and_stays_stopped() {
     let mut asked = arguments("count", "10", "8", &out);
     // Twenty episodes, those of the first look, take longer than this.
     asked.extend(["--hours", "0.3", "--jobs", "2"]);
-    let (status, stdout, stderr) = outcome(&mut avastra(&asked));
-    assert_eq!(status, 0, "{stderr}");
+    let stdout = done(&asked);
     let results = result(&stdout)["results"].clone();
     // Three looks, at 2, 4 and 8 parts, share the 5 %.
     assert_eq!(results["missing"].as_f64(), Some(0.05));
     assert!((results["missing_at_look"].as_f64().expect("it is there") - 0.05 / 3.0).abs() < 1e-12);
     assert!(results["parts"].as_u64() < results["parts_wanted"].as_u64(), "{results}");
     // Gone on with, it has nothing left to do.
-    let (status, stdout, stderr) = outcome(&mut avastra(&["estimate", "--resume", &out, "--format", "json"]));
-    assert_eq!(status, 0, "{stderr}");
+    let stdout = done(&["estimate", "--resume", &out, "--format", "json"]);
     assert_eq!(result(&stdout)["results"], results);
 }
 
@@ -158,8 +155,7 @@ fn two_driving_systems_are_told_apart_in_the_same_episodes() {
             &["--jobs", jobs, "--format", "json"],
         ]
         .concat();
-        let (status, stdout, stderr) = outcome(&mut avastra(&arguments));
-        assert_eq!(status, 0, "{stderr}");
+        let stdout = done(&arguments);
         result(&stdout)["results"].clone()
     };
     let same = compare(["reactive", "reactive"], "1");
@@ -181,8 +177,6 @@ fn requests_that_cannot_be_met_are_refused() {
         (&["estimate", SPACE, "--than", "nobody"], "no driving system `nobody`"),
     ];
     for (arguments, reason) in cases {
-        let (status, _, stderr) = outcome(&mut avastra(arguments));
-        assert_eq!(status, 1, "{arguments:?}");
-        assert!(stderr.contains(reason), "{arguments:?}: {stderr}");
+        fails(arguments, reason);
     }
 }

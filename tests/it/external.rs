@@ -12,7 +12,7 @@ use assert_cmd::cargo::cargo_bin;
 use serde_json::Value;
 
 use crate::cases::root;
-use crate::command::{avastra, outcome};
+use crate::command::{avastra, done, fails, outcome};
 
 const SPACE: &str = "scenarios/avastra45.ava";
 
@@ -92,8 +92,7 @@ fn every_misbehaviour_is_a_finding_and_leaves_nothing_behind() {
         assert!(told.contains(kind) && told.contains(problem), "{how}: {told}");
         // The finding replays, from the recorded answers and without the program.
         let scenario = folder.join(format!("run/failures/{name}.ava")).display().to_string();
-        let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &scenario]));
-        assert_eq!(status, 0, "{how}: {stdout}{stderr}");
+        done(&["replay", &scenario]);
         if how == "crash-at-reset" {
             // A failure before the first step leaves a scenario, too, which passes once the crash is mended.
             let well = profile(&folder, &[], "1", "");
@@ -219,9 +218,7 @@ fn what_cannot_be_started_is_an_error_with_its_reason() {
         ("./planner 'unclosed", "not closed"),
     ] {
         let all = ["run", SPACE, "--ads", command, "--episodes", "1"];
-        let (status, _, stderr) = outcome(&mut avastra(&all));
-        assert_eq!(status, 1, "{command}");
-        assert!(stderr.contains(word), "{command}: {stderr}");
+        fails(&all, word);
     }
 }
 
@@ -261,8 +258,7 @@ fn threads_and_processes_change_nothing_and_crashes_replay_with_and_without_the_
     assert!(!scenarios.is_empty(), "who drives on whatever is in the way collides");
     let path = one.join("critical").join(&scenarios[0]).display().to_string();
     for more in [&[][..], &["--ads", &config]] {
-        let (status, stdout, stderr) = outcome(&mut avastra(&[&["replay", &path][..], more].concat()));
-        assert_eq!(status, 0, "{more:?}: {stdout}{stderr}");
+        let stdout = done(&[&["replay", &path][..], more].concat());
         assert!(stdout.contains("confirmed"), "{more:?}: {stdout}");
     }
     // Who dies on the way has not been cured of the crash.
@@ -274,24 +270,19 @@ fn threads_and_processes_change_nothing_and_crashes_replay_with_and_without_the_
     assert!(status == 5 && stdout.contains("it failed at step"), "{status}: {stdout}{stderr}");
     // It is made small with the program; what only the program can show is not tried without it.
     let small = scratch.path().join("small.ava").display().to_string();
-    let (status, stdout, stderr) =
-        outcome(&mut avastra(&["shrink", &path, "--ads", &config, "--out", &small]));
-    assert_eq!(status, 0, "{stdout}{stderr}");
+    done(&["shrink", &path, "--ads", &config, "--out", &small]);
     let claims_minimal = std::fs::read_to_string(&small).unwrap().contains("expect minimal");
     for (more, is_tried) in [(&[][..], false), (&["--ads", &config], true)] {
-        let (status, stdout, stderr) = outcome(&mut avastra(&[&["replay", &small][..], more].concat()));
-        assert_eq!(status, 0, "{more:?}: {stdout}{stderr}");
+        let stdout = done(&[&["replay", &small][..], more].concat());
         assert_eq!(stdout.contains("not tried"), claims_minimal && !is_tried, "{more:?}: {stdout}");
     }
     // Changed answers are noticed, and missing ones are asked for.
     let answers = Path::new(&path).with_extension("answers.jsonl");
     let text = std::fs::read_to_string(&answers).unwrap();
     std::fs::write(&answers, text.replacen("\"v\":", "\"v\":1", 1)).unwrap();
-    let (status, _, stderr) = outcome(&mut avastra(&["replay", &path]));
-    assert!(status == 1 && stderr.contains("changed"), "{stderr}");
+    fails(&["replay", &path], "changed");
     std::fs::remove_file(&answers).unwrap();
-    let (status, _, stderr) = outcome(&mut avastra(&["replay", &path]));
-    assert!(status == 1 && stderr.contains("--ads"), "{stderr}");
+    fails(&["replay", &path], "--ads");
 }
 
 #[test]
@@ -379,8 +370,7 @@ fn a_socket_is_as_good_as_a_pipe() {
 
 #[test]
 fn the_schema_of_every_message_is_printed() {
-    let (status, stdout, _) = outcome(&mut avastra(&["ads", "schema"]));
-    assert_eq!(status, 0);
+    let stdout = done(&["ads", "schema"]);
     let schema: Value = serde_json::from_str(&stdout).expect("it is JSON");
     let defined: Vec<&String> = schema["$defs"].as_object().expect("messages").keys().collect();
     let words = [
@@ -480,8 +470,7 @@ fn a_failure_is_a_regression_test_until_it_is_gone() {
     assert!(detail.contains("exit status 1"), "how it ended is told: {detail}{stderr}");
     let name = result["failures"][0]["scenario"].as_str().expect("a name");
     let file = out.join(format!("failures/{name}.ava")).display().to_string();
-    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &file]));
-    assert_eq!(status, 0, "{stdout}{stderr}");
+    let stdout = done(&["replay", &file]);
     assert!(stdout.contains("it ends with ads_crash (exited) at step 20"), "{stdout}");
     let well = tempfile::tempdir().expect("a scratch directory");
     let well = profile(well.path(), &[], "1", "");
@@ -570,8 +559,7 @@ fn mistakes_in_a_profile_are_told_where_they_are() {
     ] {
         std::fs::write(&file, text).unwrap();
         for arguments in [&["ads", "check", "--ads", &config][..], &["run", SPACE, "--ads", &config]] {
-            let (status, _, stderr) = outcome(&mut avastra(arguments));
-            assert!(status == 1 && stderr.contains(word), "{text}: {status}: {stderr}");
+            fails(arguments, word);
         }
     }
     let config = profile(scratch.path(), &[], "1", "");
@@ -579,9 +567,7 @@ fn mistakes_in_a_profile_are_told_where_they_are() {
     let study = serde_json::json!({ "space": space, "agents": [{ "name": "none", "ads_config": config }] });
     let file = scratch.path().join("study.yaml");
     std::fs::write(&file, study.to_string()).unwrap();
-    let (status, _, stderr) = outcome(&mut avastra(&["study", &file.display().to_string()]));
-    assert!(status == 1 && stderr.contains("`ads_config` of the study"), "{status}: {stderr}");
+    fails(&["study", &file.display().to_string()], "`ads_config` of the study");
     let causes = ["run", SPACE, "--causes", "--ads", &config];
-    let (status, _, stderr) = outcome(&mut avastra(&causes));
-    assert!(status == 1 && stderr.contains("`toy 1` is not made of modules"), "{status}: {stderr}");
+    fails(&causes, "`toy 1` is not made of modules");
 }

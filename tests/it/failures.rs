@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use avastra::ads::Weaknesses;
 
-use crate::command::{avastra, outcome};
+use crate::command::{avastra, done, fails, outcome};
 use crate::world::FLICKER;
 
 #[test]
@@ -14,9 +14,7 @@ fn found_scenarios_are_explained_shrunk_and_tested_again() {
     let out = path("run");
     let settings =
         ["--road", "corner", "--episodes", "20", "--seed", "5", "--ads", FLICKER, "--causes", "--out", &out];
-    let (status, stdout, stderr) =
-        outcome(&mut avastra(&[&["run", "scenarios/avastra45.ava"], &settings[..]].concat()));
-    assert_eq!(status, 0, "{stderr}");
+    let stdout = done(&[&["run", "scenarios/avastra45.ava"], &settings[..]].concat());
     assert!(stdout.contains("distinct failure"), "{stdout}");
     let mut files: Vec<PathBuf> = std::fs::read_dir(scratch.path().join("run/critical"))
         .expect("the run made it")
@@ -30,8 +28,7 @@ fn found_scenarios_are_explained_shrunk_and_tested_again() {
         Some((file.display().to_string(), text, line))
     });
     let (file, text, claim) = with_cause.expect("a crash of twenty episodes has a cause");
-    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &file]));
-    assert_eq!(status, 0, "{stdout}{stderr}");
+    let stdout = done(&["replay", &file]);
     assert!(stdout.contains("delta-v"), "{stdout}");
 
     // The actuators of this system have no error, so control is never the cause.
@@ -118,7 +115,6 @@ fn found_scenarios_are_explained_shrunk_and_tested_again() {
         (&["run", "scenarios/avastra45.ava", "--ads", "idm", "--causes"], "`idm` is not made of modules"),
     ];
     for (arguments, message) in cases {
-        let (status, _, stderr) = outcome(&mut avastra(arguments));
-        assert!(status == 1 && stderr.contains(message), "{arguments:?}: {stderr}");
+        fails(arguments, message);
     }
 }

@@ -14,7 +14,7 @@ use proptest::prelude::*;
 use safetensors::SafeTensors;
 
 use crate::cases::root;
-use crate::command::{avastra, outcome};
+use crate::command::{avastra, done, fails, outcome};
 use crate::world::{SMALL, read};
 
 /// A policy of a few episodes with a network of a few neurons, trained once for all tests.
@@ -79,20 +79,16 @@ fn sealed(text: &str) -> String {
 #[test]
 fn both_faces_are_played_and_what_they_claim_is_checked() {
     let file = trained().display().to_string();
-    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &file]));
-    assert_eq!(status, 0, "{stderr}");
+    let stdout = done(&["replay", &file]);
     assert!(stdout.contains("played again by each of its faces"), "{stdout}");
-    let (status, _, stderr) = outcome(&mut avastra(&["replay", &file, "--ads", "idm"]));
-    assert!(status == 1 && stderr.contains("that it was trained against"), "{stderr}");
+    fails(&["replay", &file, "--ads", "idm"], "that it was trained against");
 
     let traces = ["network", "rules"].map(|face| {
         let out = trained().with_file_name(format!("played_{face}"));
         let _ = std::fs::remove_dir_all(&out);
         let out_text = out.display().to_string();
         let words = ["run", "--policy", &file, "--face", face, "--road", "corner", "--episodes", "3"];
-        let (status, stdout, stderr) =
-            outcome(&mut avastra(&[&words[..], &["--format", "json", "--out", &out_text]].concat()));
-        assert_eq!(status, 0, "{stderr}");
+        let stdout = done(&[&words[..], &["--format", "json", "--out", &out_text]].concat());
         let settings = std::fs::read_to_string(out.join("run.yaml")).expect("it is written");
         assert!(settings.contains(&format!("face: {face}")), "{settings}");
         let last = stdout.lines().last().expect("a result").to_owned();
@@ -154,9 +150,7 @@ fn a_flipped_bit_anywhere_in_a_small_policy_is_noticed() {
     assert_eq!(noticed + not_text, 8 * sound.len());
     let mut bytes = sound.into_bytes();
     bytes[40] ^= 0x80;
-    let (status, _, stderr) = outcome(&mut avastra(&["replay", &beside("not_text.ava", &bytes)]));
-    assert_eq!(status, 1);
-    assert!(stderr.contains("not text: byte 40 is not UTF-8"), "{stderr}");
+    fails(&["replay", &beside("not_text.ava", &bytes)], "not text: byte 40 is not UTF-8");
 }
 
 #[test]
@@ -191,8 +185,7 @@ fn weights_come_back_from_safetensors_bit_by_bit() {
 fn a_policy_is_explained() {
     let file = trained().display().to_string();
     let words = ["policy", "explain", &file, "--episodes", "3", "--repeats", "3"];
-    let (status, stdout, stderr) = outcome(&mut avastra(&[&words[..], &["--format", "json"]].concat()));
-    assert_eq!(status, 0, "{stderr}");
+    let stdout = done(&[&words[..], &["--format", "json"]].concat());
     let result: serde_json::Value =
         serde_json::from_str(stdout.lines().last().expect("a result")).expect("it is JSON");
     let insight = &result["insight"];
@@ -207,17 +200,14 @@ fn a_policy_is_explained() {
     assert_eq!(insight["state"]["q_values"].as_array().map(Vec::len), Some(45));
 
     let given = ["--state", "ego_speed: 12, time: Night, dist_nearest: 0.02 km"];
-    let (status, stdout, _) = outcome(&mut avastra(&[&words[..], &given[..]].concat()));
-    assert_eq!(status, 0);
+    let stdout = done(&[&words[..], &given[..]].concat());
     for shown in ["ego_speed: 12.00 m/s", "time: Night", "dist_nearest: 20.00 m", "permutation importance"] {
         assert!(stdout.contains(shown), "{shown}: {stdout}");
     }
     for (state, reason) in
         [("ego_sped: 12", "did you mean `ego_speed`?"), ("time: 12", "Morning"), ("=", "write")]
     {
-        let (status, _, stderr) = outcome(&mut avastra(&[&words[..], &["--state", state]].concat()));
-        assert_eq!(status, 1, "{stderr}");
-        assert!(stderr.contains(reason), "{stderr}");
+        fails(&[&words[..], &["--state", state]].concat(), reason);
     }
 }
 

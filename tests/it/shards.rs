@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::cases::root;
-use crate::command::{avastra, background, outcome};
+use crate::command::{avastra, background, done, fails, outcome};
 use crate::world::FLICKER;
 
 const SPACE: &str = "scenarios/avastra45.ava";
@@ -37,12 +37,6 @@ fn equal(one: &Path, other: &Path) {
     assert_eq!(one.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>());
     let differ: Vec<_> = one.iter().filter(|(name, bytes)| other[*name] != **bytes).collect();
     assert!(differ.is_empty(), "{:?}", differ.iter().map(|(name, _)| name).collect::<Vec<_>>());
-}
-
-fn done(arguments: &[&str]) -> String {
-    let (status, stdout, stderr) = outcome(&mut avastra(arguments));
-    assert_eq!(status, 0, "{arguments:?}: {stderr}");
-    stdout
 }
 
 fn text(path: &Path) -> &str {
@@ -201,15 +195,12 @@ fn a_shard_is_gone_on_with() {
     child.kill().expect("it is ours to kill");
     child.wait().expect("it ends");
     let resumed = ["run", "--resume", text(&two), "--format", "json"];
-    let (status, stdout, stderr) = outcome(&mut avastra(&resumed));
-    assert_eq!(status, 0, "{stderr}");
+    let stdout = done(&resumed);
     assert!(stdout.contains("\"episodes\":20"), "the other half is not played: {stdout}");
     done(&["merge", text(&one), text(&two), "--out", text(&at("merged"))]);
     equal(&at("whole"), &at("merged"));
     // A directory that holds something else stays.
-    let (status, _, stderr) =
-        outcome(&mut avastra(&["merge", text(&one), text(&two), "--out", text(&at("shards"))]));
-    assert!(status == 1 && stderr.contains("is not empty"), "{stderr}");
+    fails(&["merge", text(&one), text(&two), "--out", text(&at("shards"))], "is not empty");
 }
 
 #[test]
@@ -260,8 +251,7 @@ fn schedulers_say_which_shard_it_is() {
     assert!(!out.join("shard.yaml").exists());
     let (status, _, stderr) = outcome(avastra(&asked).env("SLURM_ARRAY_TASK_ID", "4"));
     assert!(status == 1 && stderr.contains("say `--shard I/N`"), "{stderr}");
-    let (status, _, stderr) = outcome(&mut avastra(&[&asked[..], &["--shard", "4/3"]].concat()));
-    assert!(status == 1 && stderr.contains("the last is 3"), "{stderr}");
+    fails(&[&asked[..], &["--shard", "4/3"]].concat(), "the last is 3");
 }
 
 #[test]
@@ -296,8 +286,7 @@ fn a_dry_run_says_what_would_be_played() {
     std::fs::write(out.join("notes"), "mine").expect("it is writable");
     let used = [&run[..], &["--out", text(&out)]].concat();
     for (wrong, reason) in [(&["study", "none.yaml"][..], "none.yaml"), (&used, "is not empty")] {
-        let (status, _, stderr) = outcome(&mut avastra(&[wrong, &["--dry-run"]].concat()));
-        assert!(status == 1 && stderr.contains(reason), "{stderr}");
+        fails(&[wrong, &["--dry-run"]].concat(), reason);
     }
 }
 
@@ -307,8 +296,7 @@ fn trainings_and_nothing_cannot_be_merged() {
     let (folder, training) = (scratch.path().join("folder"), scratch.path().join("training"));
     std::fs::create_dir(&folder).expect("it is writable");
     let refused = |arguments: &[&str], reason: &str| {
-        let (status, _, stderr) = outcome(&mut avastra(&[&["merge"], arguments].concat()));
-        assert!(status == 1 && stderr.contains(reason), "{stderr}");
+        fails(&[&["merge"], arguments].concat(), reason);
     };
     refused(&[text(&folder), "--missing"], "none of the directories holds");
     std::fs::write(folder.join("notes"), "mine").expect("it is writable");

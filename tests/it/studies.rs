@@ -10,7 +10,7 @@ use avastra::study::StudyDatabase;
 use serde_json::Value;
 
 use crate::cases::{expect_snapshot, root};
-use crate::command::{avastra, background, outcome};
+use crate::command::{avastra, background, done, fails, outcome};
 use crate::report::index_of;
 use crate::world::FLICKER;
 
@@ -289,9 +289,7 @@ fn cells_are_runs(whole: &Value) {
             ["run", "scenarios/avastra45.ava", "--road", "corner", "--episodes", "3", "--format", "json"];
         let run = [&run[..], &["--ads", FLICKER]].concat();
         let seed = seed.as_str().expect("a text");
-        let (status, stdout, stderr) =
-            outcome(&mut avastra(&[&run[..], &["--seed", seed, "--out", &out]].concat()));
-        assert_eq!(status, 0, "{stderr}");
+        let stdout = done(&[&run[..], &["--seed", seed, "--out", &out]].concat());
         let line: Value = serde_json::from_str(stdout.lines().last().expect("a result")).expect("JSON");
         found += line["totals"]["collisions"].as_u64().expect("a number");
     }
@@ -303,8 +301,7 @@ fn a_quick_study_says_that_it_is_none() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let out = scratch.path().join("quick").display().to_string();
     let study = ["study", "scenarios/studies/healthy.yaml", "--quick", "--format", "json", "--out", &out];
-    let (status, stdout, stderr) = outcome(&mut avastra(&study));
-    assert_eq!(status, 0, "{stderr}");
+    let stdout = done(&study);
     let line = stdout.lines().last().expect("a result");
     assert!(line.starts_with("{\"schema\":3,\"command\":\"study\""), "{line}");
     let result: Value = serde_json::from_str(line).expect("JSON");
@@ -356,8 +353,7 @@ fn what_no_study_can_be_is_said_so() {
         std::fs::write(&file, format!("space: {space}\n{text}\n")).expect("it is writable");
         let out = scratch.path().join("out");
         let arguments = ["study", &file.display().to_string(), "--out", &out.display().to_string()];
-        let (status, _, stderr) = outcome(&mut avastra(&arguments));
-        assert!(status == 1 && stderr.contains(reason), "{text}: {stderr}");
+        fails(&arguments, reason);
         assert!(!out.exists(), "{text}: nothing is left behind");
     }
     // A mistake of form is reported with its line.
@@ -365,8 +361,7 @@ fn what_no_study_can_be_is_said_so() {
         .expect("writable");
     let (_, _, stderr) = outcome(&mut avastra(&["study", &file.display().to_string()]));
     assert!(stderr.contains("line 3"), "{stderr}");
-    let (status, _, stderr) = outcome(&mut avastra(&["study", "--resume", "scenarios"]));
-    assert!(status == 1 && stderr.contains("it has no study.yaml"), "{stderr}");
+    fails(&["study", "--resume", "scenarios"], "it has no study.yaml");
 }
 
 #[test]

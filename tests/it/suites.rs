@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::cases::root;
-use crate::command::{avastra, outcome};
+use crate::command::{avastra, done, fails, outcome};
 use crate::world::FLICKER;
 
 /// A copy of the shipped space, and a run in it that found crashes.
@@ -28,8 +28,7 @@ impl Found {
         let (file, run) = (found.path("space/avastra45.ava"), found.path("run"));
         let settings =
             ["--road", "corner", "--episodes", "12", "--seed", "5", "--ads", FLICKER, "--out", &run];
-        let (status, _, stderr) = outcome(&mut avastra(&[&["run", &file], &settings[..], flags].concat()));
-        assert_eq!(status, 0, "{stderr}");
+        done(&[&["run", &file], &settings[..], flags].concat());
         found.scenarios = found.files("run/critical").len();
         assert!(found.scenarios >= 2, "a suite needs scenarios");
         found
@@ -261,8 +260,7 @@ fn a_review_says_what_differs_in_meaning() {
         assert_eq!((*then == now, now.contains("ads: \"reactive\"")), (is_kept, !is_kept), "{now}{stderr}");
         if !is_kept {
             assert!(!now.contains("profile"), "{now}");
-            let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &file]));
-            assert_eq!(status, 0, "{stdout}{stderr}");
+            done(&["replay", &file]);
         }
     }
 }
@@ -384,20 +382,16 @@ fn packed_scenarios_are_a_folder_that_moves() {
     let suite = found.path("suite");
     // Twice: what is there with the same content is no obstacle.
     for _ in 0..2 {
-        let (status, _, stderr) =
-            outcome(&mut avastra(&[&["export", "--to", "ava"], &files[..], &["--out", &suite]].concat()));
-        assert_eq!(status, 0, "{stderr}");
+        done(&[&["export", "--to", "ava"], &files[..], &["--out", &suite]].concat());
     }
     std::fs::remove_dir_all(found.scratch.path().join("space")).expect("it is there");
     let far = found.path("far");
     std::fs::rename(&suite, &far).expect("it moves");
-    let (status, _, stderr) = outcome(&mut avastra(&["replay", &format!("{far}/{}", stem(&names[0]))]));
-    assert_eq!(status, 0, "{stderr}");
+    done(&["replay", &format!("{far}/{}", stem(&names[0]))]);
 
     // What is shrunk stays apart, under a name of its own. Files and folders together are one suite.
     let first = format!("{far}/{}", stem(&names[0]));
-    let (status, stdout, stderr) = outcome(&mut avastra(&["shrink", &first, "--format", "json"]));
-    assert_eq!(status, 0, "{stderr}");
+    let stdout = done(&["shrink", &first, "--format", "json"]);
     let told: serde_json::Value = serde_json::from_str(stdout.trim_end()).expect("it is JSON");
     let shrunk = &told["scenarios"][0];
     assert!(shrunk["scenario"].as_str().is_some_and(|name| name.ends_with("_shrunk")), "{shrunk}");
@@ -448,8 +442,7 @@ fn what_is_packed_keeps_away_from_what_is_there() {
     assert!(status == 1 && stderr.contains("with another content"), "{stderr}");
 
     // A folder is none of the files to name, but may hold some.
-    let (status, _, stderr) = outcome(&mut avastra(&["shrink", &path("one").display().to_string()]));
-    assert!(status == 1 && stderr.contains("one/*.ava`"), "{stderr}");
+    fails(&["shrink", &path("one").display().to_string()], "one/*.ava`");
 
     // What fails leaves nothing behind, and a file that is named twice is one.
     let [one, two] = ["one/one.ava", "two/two.ava"].map(|name| path(name).display().to_string());

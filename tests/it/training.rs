@@ -10,7 +10,7 @@ use avastra::rng::{Stream, below, stream};
 use avastra::syntax::ast::FileId;
 
 use crate::cases::root;
-use crate::command::{avastra, outcome};
+use crate::command::{avastra, done, fails, outcome};
 use crate::report::index_of;
 use crate::world::{FLICKER, SMALL, read};
 
@@ -142,8 +142,7 @@ fn scenarios_of_a_training_that_are_gone_or_edited_are_noticed() {
     let at = out.display().to_string();
     let train = ["train", "scenarios/avastra45.ava", "--road", "corner", "--agent", "constant"];
     let how = ["--seed", "5", "--episodes", "12", "--ads", FLICKER, "--out", &at];
-    let (status, _, stderr) = outcome(&mut avastra(&[&train[..], &how].concat()));
-    assert_eq!(status, 0, "{stderr}");
+    done(&[&train[..], &how].concat());
     let critical = std::fs::read_dir(out.join("critical")).expect("it is there").flatten();
     let mut files: Vec<PathBuf> = critical.map(|entry| entry.path()).collect();
     files.sort();
@@ -152,8 +151,7 @@ fn scenarios_of_a_training_that_are_gone_or_edited_are_noticed() {
     let written = read(gone);
     std::fs::remove_file(gone).expect("it is there");
     std::fs::write(edited, format!("// mine\n{}", read(edited))).expect("it is writable");
-    let (status, stdout, stderr) = outcome(&mut avastra(&["train", "--resume", &at]));
-    assert_eq!(status, 0, "{stderr}");
+    let stdout = done(&["train", "--resume", &at]);
     assert!(stdout.contains("was missing, is written again"), "{stdout}");
     assert!(stdout.contains("edited since the training wrote it"), "{stdout}");
     assert_eq!(read(gone), written);
@@ -163,8 +161,7 @@ fn scenarios_of_a_training_that_are_gone_or_edited_are_noticed() {
     let change = "UPDATE learning SET return = 9 WHERE episode = 3; UPDATE result SET text = '{}'";
     database.execute_batch(change).expect("it can be changed");
     drop(database);
-    let (status, _, stderr) = outcome(&mut avastra(&["train", "--resume", &at]));
-    assert!(status == 1 && stderr.contains("a training must be begun anew"), "{stderr}");
+    fails(&["train", "--resume", &at], "a training must be begun anew");
     let page = scratch.path().join("page.html");
     let (status, _, stderr) =
         outcome(&mut avastra(&["report", &at, "--most", "1", "--out", &page.display().to_string()]));
