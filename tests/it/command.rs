@@ -5,7 +5,7 @@ use std::process::{Child, Stdio};
 
 use assert_cmd::Command;
 
-use crate::cases::{cases, each_case, root};
+use crate::cases::{cases, each_case, files, root, texts};
 use crate::world::FLICKER;
 
 /// `avastra` with arguments, in the repository.
@@ -183,17 +183,7 @@ fn compile_and_run_write_the_same_files_twice() {
     in_scratch(&[&["run", "--jobs", "1"], &settings[..]].concat());
     in_scratch(&[&["run", "--jobs", "2"], &settings[..]].concat());
     let critical = |run: &str| -> Vec<(String, String)> {
-        let directory = scratch.path().join("runs").join(run).join("critical");
-        let mut files: Vec<(String, String)> = std::fs::read_dir(&directory)
-            .expect("the run made it")
-            .flatten()
-            .map(|entry| {
-                let text = std::fs::read_to_string(entry.path()).expect("it is readable");
-                (entry.file_name().to_string_lossy().into_owned(), text)
-            })
-            .collect();
-        files.sort();
-        files
+        texts(scratch.path().join("runs").join(run).join("critical")).into_iter().collect()
     };
     let files = critical("0001");
     assert!(!files.is_empty(), "twenty episodes find a crash");
@@ -307,14 +297,8 @@ fn a_run_says_what_never_happened() {
 
 #[test]
 fn shipped_files_are_sound_and_formatted() {
-    let files: Vec<String> = std::fs::read_dir(root().join("scenarios"))
-        .expect("it is a directory")
-        .flatten()
-        .map(|entry| entry.path())
-        .filter(|path| path.extension().is_some_and(|extension| extension == "ava"))
-        .map(|path| path.display().to_string())
-        .collect();
-    let files: Vec<&str> = files.iter().map(String::as_str).collect();
+    let files = files(root().join("scenarios"), "ava");
+    let files: Vec<&str> = files.iter().map(|path| path.to_str().expect("it is text")).collect();
     done(&[&["check", "--strict"], &files[..]].concat());
     done(&[&["fmt", "--check"], &files[..]].concat());
 }

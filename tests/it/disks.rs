@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Stdio;
 use std::time::Duration;
 
-use crate::cases::root;
+use crate::cases::{entries, root};
 use crate::command::{avastra, done, fails, outcome};
 use crate::report::index_of;
 use crate::world::FLICKER;
@@ -281,9 +281,7 @@ fn scenarios_that_are_gone_or_edited_are_noticed() {
     let out = scratch.text("run");
     let settings = ["--ads", FLICKER, "--road", "corner", "--episodes", "12", "--seed", "5", "--out", &out];
     done(&[&["run", SPACE], &settings[..]].concat());
-    let critical = std::fs::read_dir(scratch.path("run/critical")).expect("it is there").flatten();
-    let mut files: Vec<PathBuf> = critical.map(|entry| entry.path()).collect();
-    files.sort();
+    let files = entries(scratch.path("run/critical"));
     let [gone, edited, ..] = files.as_slice() else { panic!("the run finds two crashes: {files:?}") };
     let written = std::fs::read(gone).expect("it is readable");
     std::fs::remove_file(gone).expect("it is there");

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::cases::expect_snapshot;
+use crate::cases::{entries, expect_snapshot};
 use crate::command::{avastra, done, fails, outcome};
 use crate::report::index_of;
 
@@ -64,12 +64,7 @@ fn an_estimate_depends_on_its_settings_alone() {
         assert_eq!(kept(&directory), whole, "{method}");
     }
     // What was tried out beside the episodes replays like any episode: it has their seeds and a script of its own.
-    let critical = scratch.path().join("probe/critical");
-    let mut files: Vec<PathBuf> = std::fs::read_dir(critical)
-        .expect("every estimate has it")
-        .map(|entry| entry.expect("it is readable").path())
-        .collect();
-    files.sort();
+    let files = entries(scratch.path().join("probe/critical"));
     assert!(!files.is_empty(), "a trial found something");
     let verified = outcome(avastra(&["replay"]).args(files.iter().take(3)));
     assert_eq!(verified.0, 0, "{verified:?}");

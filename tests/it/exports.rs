@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use avastra::geometry::{Pose, Vec2, wrap_angle};
 use roxmltree::{Document, Node};
 
-use crate::cases::{expect_snapshot, root};
+use crate::cases::{expect_snapshot, files, root, stem, texts};
 use crate::command::{avastra, outcome};
 
 const SCENARIO: &str = "tests/cases/exports/wet_corner.ava";
@@ -16,17 +16,6 @@ const SCENARIO: &str = "tests/cases/exports/wet_corner.ava";
 fn export(format: &str, file: &str, out: &Path, more: &[&str]) -> (i32, String, String) {
     let out = out.display().to_string();
     outcome(&mut avastra(&[&["export", "--to", format, "--out", &out, file], more].concat()))
-}
-
-/// The files of a folder and their texts.
-fn texts(folder: &Path) -> BTreeMap<String, String> {
-    let entries = std::fs::read_dir(folder).expect("it was written").flatten();
-    entries
-        .map(|entry| {
-            let text = std::fs::read_to_string(entry.path()).expect("it is text");
-            (entry.file_name().to_string_lossy().into_owned(), text)
-        })
-        .collect()
 }
 
 /// A file without its figures, and without lines that say the same again: what does not change when driving does.
@@ -143,7 +132,7 @@ fn a_natural_version_has_actions_in_place_of_trajectories() {
         assert_eq!(status, 0, "{stderr}");
     }
     let written = texts(scratch.path());
-    let stem = file.file_stem().expect("it has a name").to_string_lossy();
+    let stem = stem(&file);
     let users = table(&written[&format!("{stem}.csv")]);
     let document = Document::parse(&written[&format!("{stem}.xosc")]).expect("it is well-formed");
     let properties: Vec<&str> =
@@ -234,7 +223,7 @@ fn every_format_has_everyone_where_the_table_has_them() {
             assert_eq!(status, 0, "{format}: {stderr}");
         }
         let written = texts(scratch.path());
-        let stem = file.file_stem().expect("it has a name").to_string_lossy();
+        let stem = stem(&file);
         let users = table(&written[&format!("{stem}.csv")]);
         assert!(users.len() > 1, "the ego vehicle is not alone");
         let played = Document::parse(&written[&format!("{stem}.xosc")]).expect("it is well-formed");
@@ -249,11 +238,7 @@ fn every_format_has_everyone_where_the_table_has_them() {
 
 /// The shipped crash.
 pub fn crash() -> PathBuf {
-    let entries = std::fs::read_dir(root().join("scenarios/found")).expect("it is shipped").flatten();
-    let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
-    files.retain(|file| file.extension().is_some_and(|extension| extension == "ava"));
-    files.sort();
-    files.swap_remove(0)
+    files(root().join("scenarios/found"), "ava").swap_remove(0)
 }
 
 /// The rows of a table: poses of each road user by tick.

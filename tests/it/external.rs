@@ -2,7 +2,6 @@
 //!
 //! They are driven by `avastra ads toy`, so the tests need nothing but the program itself.
 
-use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixListener;
@@ -11,7 +10,7 @@ use std::path::Path;
 use assert_cmd::cargo::cargo_bin;
 use serde_json::Value;
 
-use crate::cases::root;
+use crate::cases::{root, texts};
 use crate::command::{avastra, done, fails, outcome};
 
 const SPACE: &str = "scenarios/avastra45.ava";
@@ -230,17 +229,6 @@ fn episodes(directory: &Path) -> Vec<(i64, String, String)> {
     rows.collect::<Result<_, _>>().unwrap()
 }
 
-/// The emitted files of a run with their texts.
-fn emitted(directory: &Path) -> BTreeMap<String, String> {
-    let files = std::fs::read_dir(directory.join("critical")).unwrap().flatten();
-    files
-        .map(|file| {
-            let name = file.file_name().to_string_lossy().into_owned();
-            (name, std::fs::read_to_string(file.path()).unwrap())
-        })
-        .collect()
-}
-
 #[test]
 fn threads_and_processes_change_nothing_and_crashes_replay_with_and_without_the_program() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
@@ -253,8 +241,9 @@ fn threads_and_processes_change_nothing_and_crashes_replay_with_and_without_the_
         out
     });
     assert_eq!(episodes(&one), episodes(&two));
-    assert_eq!(emitted(&one), emitted(&two));
-    let scenarios: Vec<String> = emitted(&one).into_keys().filter(|name| name.ends_with(".ava")).collect();
+    let emitted = texts(one.join("critical"));
+    assert_eq!(emitted, texts(two.join("critical")));
+    let scenarios: Vec<String> = emitted.into_keys().filter(|name| name.ends_with(".ava")).collect();
     assert!(!scenarios.is_empty(), "who drives on whatever is in the way collides");
     let path = one.join("critical").join(&scenarios[0]).display().to_string();
     for more in [&[][..], &["--ads", &config]] {

@@ -1,9 +1,8 @@
 //! A failure that a run found is explained, shrunk and tested again, and false claims about it are refuted.
 
-use std::path::PathBuf;
-
 use avastra::ads::Weaknesses;
 
+use crate::cases::entries;
 use crate::command::{avastra, done, fails, outcome};
 use crate::world::FLICKER;
 
@@ -16,11 +15,7 @@ fn found_scenarios_are_explained_shrunk_and_tested_again() {
         ["--road", "corner", "--episodes", "20", "--seed", "5", "--ads", FLICKER, "--causes", "--out", &out];
     let stdout = done(&[&["run", "scenarios/avastra45.ava"], &settings[..]].concat());
     assert!(stdout.contains("distinct failure"), "{stdout}");
-    let mut files: Vec<PathBuf> = std::fs::read_dir(scratch.path().join("run/critical"))
-        .expect("the run made it")
-        .map(|entry| entry.expect("it reads").path())
-        .collect();
-    files.sort();
+    let files = entries(scratch.path().join("run/critical"));
     // The last one is the cheapest to shrink.
     let with_cause = files.iter().rev().find_map(|file| {
         let text = std::fs::read_to_string(file).expect("it is readable");

@@ -15,7 +15,7 @@ use avastra::rng;
 use avastra::rng::{Rng, Stream};
 use avastra::road::RoadMap;
 
-use crate::cases::{cases, root};
+use crate::cases::{cases, entries, files, root};
 use crate::scaling_maps::constructs::CONSTRUCTS;
 
 /// Limits on processor time (s) and memory (MB) for a text of 64 KB. The aim is 1 s, which `fuzz/run.sh` checks
@@ -26,14 +26,11 @@ const PEAK_MB_MAX: f64 = 500.0;
 
 #[test]
 fn what_the_fuzz_target_kept_breaks_no_law() {
-    let seeds = root().join("fuzz/seeds");
-    let mut read = 0;
-    for entry in std::fs::read_dir(&seeds).expect("the seeds are there").flatten() {
-        let bytes = std::fs::read(entry.path()).expect("a seed is readable");
-        examine::examine(&String::from_utf8_lossy(&bytes));
-        read += 1;
+    let seeds = entries(root().join("fuzz/seeds"));
+    for seed in &seeds {
+        examine::examine(&String::from_utf8_lossy(&std::fs::read(seed).expect("a seed is readable")));
     }
-    assert!(read >= 40, "{read} seeds");
+    assert!(seeds.len() >= 40, "{} seeds", seeds.len());
 }
 
 #[test]
@@ -474,14 +471,10 @@ fn a_thousand_mutated_maps_do_no_harm() {
 }
 
 fn examine_mutated_maps(count: u64) {
-    let folders = ["scenarios/roads", "tests/cases/faults", "tests/cases/diagnostics"];
-    let found =
-        folders.iter().flat_map(|folder| std::fs::read_dir(root().join(folder)).expect("it is there"));
-    let mut paths: Vec<_> = found.flatten().map(|entry| entry.path()).collect();
-    paths.retain(|path| path.extension().is_some_and(|extension| extension == "xodr"));
-    paths.sort();
+    let folders = ["scenarios/roads", "tests/cases/diagnostics", "tests/cases/faults"];
+    let paths = folders.iter().flat_map(|folder| files(root().join(folder), "xodr"));
     let texts: Vec<String> =
-        paths.iter().map(|path| std::fs::read_to_string(path).expect("a map is readable")).collect();
+        paths.map(|path| std::fs::read_to_string(path).expect("a map is readable")).collect();
     let (mut read, mut dearest_s) = (0, 0.0_f64);
     for index in 0..count {
         let mut random = rng::stream(1, Stream::Exploration, index);

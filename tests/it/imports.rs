@@ -1,13 +1,12 @@
 //! What `avastra import` makes of OpenSCENARIO files: the scenario that it writes, or all that it refuses with its lines.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use avastra::import::{Files, openscenario};
 use avastra::rng;
 use avastra::rng::Stream;
 
-use crate::cases::{expect_snapshot, root};
+use crate::cases::{expect_snapshot, root, stem};
 use crate::command::{avastra, done, outcome};
 use crate::exports::crash;
 
@@ -62,7 +61,7 @@ fn an_export_of_ours_comes_back_and_replays() {
     for (file, claims) in
         [(crash.as_str(), &["expect collision with npc#", "expect trace =="][..]), (WET, &[])]
     {
-        let stem = Path::new(file).file_stem().expect("it is a file").to_string_lossy();
+        let stem = stem(file.as_ref());
         for more in [&[][..], &["--natural"], &["--profile", "carla"]] {
             let scratch = tempfile::tempdir().expect("a scratch directory");
             let folder = scratch.path().display().to_string();

@@ -12,7 +12,7 @@ use assert_cmd::cargo::cargo_bin;
 use avastra::estimate::EstimateDatabase;
 use avastra::run::{Database, Units};
 
-use crate::cases::root;
+use crate::cases::{entries, name, root};
 use crate::command::{avastra, done, outcome};
 use crate::world::FLICKER;
 
@@ -502,13 +502,7 @@ fn pages_written_at_once_and_to_a_full_disk_leave_nothing_behind() {
     let space = shipped("scenarios/avastra45.ava");
     let settings = ["--ads", "cc", "--road", "corner", "--episodes", "1", "--out", &out];
     assert_eq!(outcome(&mut avastra(&[&["run", &space][..], &settings].concat())).0, 0);
-    let names = || -> Vec<String> {
-        let entries = std::fs::read_dir(&run).expect("it is there").flatten();
-        let mut names: Vec<String> =
-            entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
-        names.sort();
-        names
-    };
+    let names = || -> Vec<String> { entries(&run).iter().map(|path| name(path)).collect() };
     // A file that may not grow fails as a full disk does.
     let script =
         format!("trap '' XFSZ; ulimit -f 16; exec '{}' report '{out}'", cargo_bin("avastra").display());

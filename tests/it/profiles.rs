@@ -6,7 +6,7 @@ use std::path::Path;
 use avastra::ads::ModularConfig;
 use avastra::run::RunSettings;
 
-use crate::cases::root;
+use crate::cases::{entries, root};
 use crate::command::{avastra, done, fails, outcome};
 use crate::world::SMALL;
 
@@ -50,12 +50,7 @@ fn a_scenario_keeps_the_profile_that_it_was_found_with() {
     let directory = scratch.path().join("run");
     let (status, _, stderr) = run(&directory, &["--episodes", "30", "--ads", FAULT]);
     assert_eq!(status, 0, "{stderr}");
-    let critical = directory.join("critical");
-    let mut files: Vec<_> = std::fs::read_dir(&critical)
-        .expect("it exists")
-        .map(|entry| entry.expect("it reads").path())
-        .collect();
-    files.sort();
+    let files = entries(directory.join("critical"));
     let file = files.first().expect("a system that never yields hits an obstacle");
     let text = std::fs::read_to_string(file).expect("it was written");
     assert!(text.contains("never_yields: true"), "{text}");

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::cases::root;
+use crate::cases::{entries, root};
 use crate::command::{avastra, background, done, fails, outcome};
 use crate::world::FLICKER;
 
@@ -14,13 +14,12 @@ fn files(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut open = vec![directory.to_owned()];
     while let Some(folder) = open.pop() {
-        for entry in std::fs::read_dir(&folder).expect("it is there").flatten() {
-            match entry.path() {
-                path if path.is_dir() => open.push(path),
-                path => {
-                    let bytes = std::fs::read(&path).expect("it is readable");
-                    found.insert(path.strip_prefix(directory).expect("it is below").to_owned(), bytes);
-                }
+        for path in entries(&folder) {
+            if path.is_dir() {
+                open.push(path);
+            } else {
+                let bytes = std::fs::read(&path).expect("it is readable");
+                found.insert(path.strip_prefix(directory).expect("it is below").to_owned(), bytes);
             }
         }
     }
@@ -107,9 +106,7 @@ fn merged(command: &[&str], kind: &str, order: &[u32]) -> tempfile::TempDir {
 fn eight_shards_of_a_run_make_the_run() {
     let command = ["run", SPACE, "--road", "corner", "--episodes", "21", "--seed", "5", "--ads", FLICKER];
     let scratch = merged(&command, "run", &[3, 8, 1, 6, 2, 5, 7, 4]);
-    let critical = scratch.path().join("merged/critical");
-    let scenarios: Vec<PathBuf> =
-        std::fs::read_dir(critical).expect("it is there").flatten().map(|entry| entry.path()).collect();
+    let scenarios = entries(scratch.path().join("merged/critical"));
     assert!(!scenarios.is_empty(), "without a scenario this says little");
     scenarios.iter().for_each(|file| drop(done(&["replay", text(file)])));
 

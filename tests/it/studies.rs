@@ -9,7 +9,7 @@ use avastra::sim::ENGINE;
 use avastra::study::StudyDatabase;
 use serde_json::Value;
 
-use crate::cases::{expect_snapshot, root};
+use crate::cases::{expect_snapshot, files, root};
 use crate::command::{avastra, background, done, fails, outcome};
 use crate::report::index_of;
 use crate::world::FLICKER;
@@ -369,20 +369,15 @@ fn the_results_are_what_the_kept_studies_say() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let out = scratch.path().join("RESULTS.md");
     let written = ["study", "results", "scenarios/studies", "--out", &out.display().to_string()];
-    let (status, _, stderr) = outcome(avastra(&written).current_dir(root()));
-    assert_eq!(status, 0, "{stderr}");
+    done(&written);
     let read = |path: &Path| std::fs::read_to_string(path).expect("it is readable");
     assert!(read(&out) == read(&root().join("RESULTS.md")), "write it again with `avastra study results`");
 }
 
 #[test]
 fn every_shipped_study_can_begin() {
-    let folder = root().join("scenarios/studies");
-    for entry in std::fs::read_dir(folder).expect("it is there").flatten() {
-        if entry.path().extension().is_none_or(|extension| extension != "yaml") {
-            continue;
-        }
-        let text = std::fs::read_to_string(entry.path()).expect("it is readable");
+    for path in files(root().join("scenarios/studies"), "yaml") {
+        let text = std::fs::read_to_string(&path).expect("it is readable");
         let study = loaded(&text);
         // No episode is used both for training and for evaluation.
         let settings = study.settings();
@@ -402,7 +397,7 @@ fn every_shipped_study_can_begin() {
         let count = all.len();
         all.sort_unstable();
         all.dedup();
-        assert_eq!(all.len(), count, "{}", entry.path().display());
+        assert_eq!(all.len(), count, "{}", path.display());
     }
 }
 

@@ -1,9 +1,9 @@
 //! Found scenarios as a suite that lives: the space may be documented, moved and changed, and the suite says what it
 //! means for it.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use crate::cases::root;
+use crate::cases::{entries, name, root};
 use crate::command::{avastra, done, fails, outcome};
 use crate::world::FLICKER;
 
@@ -39,10 +39,8 @@ impl Found {
     }
 
     fn files(&self, folder: &str) -> Vec<PathBuf> {
-        let entries = std::fs::read_dir(self.scratch.path().join(folder)).expect("it is there").flatten();
-        let mut files: Vec<PathBuf> =
-            entries.map(|entry| entry.path()).filter(|path| path.is_file()).collect();
-        files.sort();
+        let mut files = entries(self.scratch.path().join(folder));
+        files.retain(|path| path.is_file());
         files
     }
 
@@ -320,10 +318,6 @@ fn a_review_tells_what_is_gone() {
     assert!(differences.contains("is not legal any more, because cannot spawn"), "{tested}");
 }
 
-fn name(path: &Path) -> String {
-    path.file_name().expect("it has a name").to_string_lossy().into_owned()
-}
-
 impl Found {
     fn texts(&self) -> Vec<String> {
         let read = |path: &PathBuf| std::fs::read_to_string(path).expect("it is readable");
@@ -387,10 +381,10 @@ fn packed_scenarios_are_a_folder_that_moves() {
     std::fs::remove_dir_all(found.scratch.path().join("space")).expect("it is there");
     let far = found.path("far");
     std::fs::rename(&suite, &far).expect("it moves");
-    done(&["replay", &format!("{far}/{}", stem(&names[0]))]);
+    done(&["replay", &format!("{far}/{}", name(names[0].as_ref()))]);
 
     // What is shrunk stays apart, under a name of its own. Files and folders together are one suite.
-    let first = format!("{far}/{}", stem(&names[0]));
+    let first = format!("{far}/{}", name(names[0].as_ref()));
     let stdout = done(&["shrink", &first, "--format", "json"]);
     let told: serde_json::Value = serde_json::from_str(stdout.trim_end()).expect("it is JSON");
     let shrunk = &told["scenarios"][0];
@@ -452,8 +446,4 @@ fn what_is_packed_keeps_away_from_what_is_there() {
     let (status, stdout, stderr) =
         outcome(&mut avastra(&["export", "--to", "ava", &one, &one, "--out", &out]));
     assert!(status == 0 && stdout.contains("1 file with all that they use"), "{stdout}{stderr}");
-}
-
-fn stem(path: &str) -> String {
-    Path::new(path).file_name().expect("it has a name").to_string_lossy().into_owned()
 }

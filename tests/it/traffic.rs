@@ -5,6 +5,7 @@ use std::path::Path;
 use avastra::run::RunSettings;
 use avastra::sim::TrafficProfile;
 
+use crate::cases::entries;
 use crate::command::{avastra, done, fails, outcome};
 use crate::world::FLICKER;
 
@@ -33,11 +34,7 @@ fn a_run_under_released_traffic_is_recorded_and_its_scenarios_replay() {
     let record = settings(&directory).1.traffic.expect("it is not the default");
     assert_eq!((record.settings, record.digest), (released, released.digest()));
 
-    let mut files: Vec<_> = std::fs::read_dir(directory.join("critical"))
-        .expect("it exists")
-        .map(|entry| entry.expect("it reads").path())
-        .collect();
-    files.sort();
+    let files = entries(directory.join("critical"));
     let file = files.first().expect("such traffic causes a collision");
     let text = std::fs::read_to_string(file).expect("it was written");
     assert!(text.contains("traffic: ") && text.contains(&released.digest()), "{text}");

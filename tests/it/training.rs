@@ -1,7 +1,7 @@
 //! Training: a killed one resumes to the same bytes, its policies keep their claims, and damaged policies are
 //! refused.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Stdio;
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use avastra::model::policy::{Policy, seal};
 use avastra::rng::{Stream, below, stream};
 use avastra::syntax::ast::FileId;
 
-use crate::cases::root;
+use crate::cases::{entries, root};
 use crate::command::{avastra, done, fails, outcome};
 use crate::report::index_of;
 use crate::world::{FLICKER, SMALL, read};
@@ -143,9 +143,7 @@ fn scenarios_of_a_training_that_are_gone_or_edited_are_noticed() {
     let train = ["train", "scenarios/avastra45.ava", "--road", "corner", "--agent", "constant"];
     let how = ["--seed", "5", "--episodes", "12", "--ads", FLICKER, "--out", &at];
     done(&[&train[..], &how].concat());
-    let critical = std::fs::read_dir(out.join("critical")).expect("it is there").flatten();
-    let mut files: Vec<PathBuf> = critical.map(|entry| entry.path()).collect();
-    files.sort();
+    let files = entries(out.join("critical"));
     let [gone, edited, ..] = files.as_slice() else { panic!("the training finds two crashes: {files:?}") };
     let read = |path: &Path| std::fs::read_to_string(path).expect("it is readable");
     let written = read(gone);
@@ -259,9 +257,6 @@ fn what_cannot_be_trained_is_said_so() {
         (&["train", "--resume", "scenarios"], "no run.yaml"),
     ];
     for (arguments, reason) in cases {
-        let output = avastra(arguments).output().expect("it starts");
-        let stderr = String::from_utf8(output.stderr).expect("it prints UTF-8");
-        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {stderr}");
-        assert!(stderr.contains(reason), "{arguments:?}: {stderr}");
+        fails(arguments, reason);
     }
 }
