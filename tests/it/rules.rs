@@ -145,79 +145,59 @@ struct Breach {
 const SEDAN: (&str, &str) = ("vehicle", "Sedan");
 const RED: (&str, &str) = ("colour", "Red");
 
+/// What most breaches have in common.
+const USUAL: Breach = Breach {
+    rule: "",
+    road: "corner",
+    states: "time: Noon",
+    row: "",
+    values: &[],
+    safety_gap_m: 0.0,
+    enforced: Enforcement::Draw,
+};
+
 const BREACHES: [Breach; 8] = [
-    Breach {
-        rule: "chronology",
-        road: "corner",
-        states: "time: Noon",
-        row: "set_time(to: Morning)",
-        values: &[],
-        safety_gap_m: 0.0,
-        enforced: Enforcement::Transition,
-    },
+    Breach { rule: "chronology", row: "set_time(to: Morning)", enforced: Enforcement::Transition, ..USUAL },
     Breach {
         rule: "npc_gap",
-        road: "corner",
-        states: "time: Noon",
         row: "drive_ahead(lane: Current, mode: Near, then: Keep)",
         values: &[SEDAN, RED, ("speed", "10"), ("distance", "17.5")],
-        safety_gap_m: 0.0,
-        enforced: Enforcement::Draw,
+        ..USUAL
     },
     Breach {
         rule: "ped_gap",
-        road: "corner",
-        states: "time: Noon",
         row: "pedestrian(from: Left)",
         values: &[("mode", "Near"), ("speed", "1"), ("distance", "20.5")],
-        safety_gap_m: 0.0,
-        enforced: Enforcement::Draw,
+        ..USUAL
     },
     Breach {
         rule: "npc_speed",
-        road: "corner",
-        states: "time: Noon",
         row: "drive_ahead(lane: Current, mode: Near, then: Keep)",
         values: &[SEDAN, RED, ("speed", "12"), ("distance", "18")],
-        safety_gap_m: 0.0,
-        enforced: Enforcement::Draw,
+        ..USUAL
     },
     Breach {
         rule: "walking_pace",
-        road: "corner",
-        states: "time: Noon",
         row: "pedestrian(from: Right)",
         values: &[("mode", "Far"), ("speed", "1.5"), ("distance", "40")],
-        safety_gap_m: 0.0,
-        enforced: Enforcement::Draw,
+        ..USUAL
     },
     Breach {
         rule: "lane_exists",
         road: "boulevard",
-        states: "time: Noon",
         row: "drive_ahead(lane: Left, mode: Near, then: Keep)",
         values: &[SEDAN, RED, ("speed", "10"), ("distance", "17")],
-        safety_gap_m: 0.0,
-        enforced: Enforcement::Draw,
+        ..USUAL
     },
     Breach {
         rule: "no_teleport",
-        road: "corner",
-        states: "time: Noon",
         row: "pedestrian(from: Left)",
         values: &[("mode", "Near"), ("speed", "1"), ("distance", "20")],
         safety_gap_m: 20.5,
         enforced: Enforcement::Survey,
+        ..USUAL
     },
-    Breach {
-        rule: "wet_needs_cause",
-        road: "corner",
-        states: "time: Noon, sky: None",
-        row: "wet(how: High)",
-        values: &[],
-        safety_gap_m: 0.0,
-        enforced: Enforcement::Draw,
-    },
+    Breach { rule: "wet_needs_cause", states: "time: Noon, sky: None", row: "wet(how: High)", ..USUAL },
 ];
 
 impl Breach {
