@@ -181,8 +181,9 @@ fn texts_that_cost_much_are_refused_or_read() {
     let scratch = Scratch::new();
     let mut wrong = Vec::new();
     for (name, size, fate) in texts {
-        let construct = scale::GRAMMAR.iter().find(|construct| construct.name == name);
-        let came = scratch.run("check", &(construct.expect("it is in the list").text)(size), CPU_S_MAX);
+        let construct = scale::GRAMMAR.iter().find(|(construct, _)| *construct == name);
+        let (_, text) = construct.expect("it is in the list");
+        let came = scratch.run("check", &text(size), CPU_S_MAX);
         let is_right = match fate {
             Sound => came.exit == Some(0),
             Refused(code) => came.exit == Some(2) && came.output.contains(code),
@@ -235,9 +236,9 @@ fn each_construct_scales() {
         std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
     };
     let (seconds, seed) = (number("FUZZ_S", 60) as f64, number("FUZZ_SEED", 1));
-    let of_grammar = scale::GRAMMAR.iter().flat_map(|&scale::Construct { name, text }| {
-        VERBS.into_iter().map(move |verb| Large { name, text, verb })
-    });
+    let of_grammar = scale::GRAMMAR
+        .iter()
+        .flat_map(|&(name, text)| VERBS.into_iter().map(move |verb| Large { name, text, verb }));
     let of_maps = CONSTRUCTS.iter().map(|&(name, text, _)| Large { name, text, verb: "road" });
     let all: Vec<Large> = of_grammar.chain(of_maps).collect();
     let mut measured = Measured { scratch: Scratch::new(), runs: 0, spent_s: 0.0, dear: Vec::new() };
