@@ -37,7 +37,13 @@ pub fn outcome(command: &mut Command) -> (i32, String, String) {
 /// What a command prints that ends well.
 #[track_caller]
 pub fn done(arguments: &[&str]) -> String {
-    let (status, stdout, stderr) = outcome(&mut avastra(arguments));
+    done_in(&root(), arguments)
+}
+
+/// What a command prints that ends well in a folder.
+#[track_caller]
+pub fn done_in(folder: &Path, arguments: &[&str]) -> String {
+    let (status, stdout, stderr) = outcome(avastra(arguments).current_dir(folder));
     assert_eq!(status, 0, "{arguments:?}: {stdout}{stderr}");
     stdout
 }
@@ -172,11 +178,7 @@ fn what_does_not_exist_is_named_with_what_does() {
 fn compile_and_run_write_the_same_files_twice() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let space = root().join("scenarios/avastra45.ava").display().to_string();
-    let in_scratch = |arguments: &[&str]| {
-        let (status, stdout, stderr) = outcome(avastra(arguments).current_dir(scratch.path()));
-        assert_eq!(status, 0, "{arguments:?}: {stderr}");
-        stdout
-    };
+    let in_scratch = |arguments: &[&str]| done_in(scratch.path(), arguments);
     in_scratch(&["compile", &space]);
     let profile = root().join(FLICKER).display().to_string();
     let settings = ["--seed", "7", "--episodes", "10", "--ads", &profile];
@@ -235,11 +237,10 @@ fn an_interrupted_run_goes_on_where_it_was() {
     let space = root().join("scenarios/avastra45.ava").display().to_string();
     let run = |out: &str| {
         let arguments = ["run", &space, "--seed", "3", "--episodes", "12", "--out", out, "--format", "json"];
-        outcome(avastra(&arguments).current_dir(scratch.path()))
+        done_in(scratch.path(), &arguments)
     };
-    let (status, whole, stderr) = run("whole");
-    assert_eq!(status, 0, "{stderr}");
-    assert_eq!(run("cut").0, 0);
+    let whole = run("whole");
+    run("cut");
     // The directory is left as by a run that was killed half-way.
     let database = rusqlite::Connection::open(scratch.path().join("cut/run.db")).expect("it is a database");
     let cut = "DELETE FROM step WHERE episode >= 5; DELETE FROM collision WHERE episode >= 5;
@@ -248,9 +249,7 @@ fn an_interrupted_run_goes_on_where_it_was() {
                DELETE FROM seal WHERE unit >= 5;";
     database.execute_batch(cut).expect("it can be cut");
     drop(database);
-    let resume = ["run", "--resume", "cut", "--format", "json"];
-    let (status, resumed, stderr) = outcome(avastra(&resume).current_dir(scratch.path()));
-    assert_eq!(status, 0, "{stderr}");
+    let resumed = done_in(scratch.path(), &["run", "--resume", "cut", "--format", "json"]);
     // What never happened is told of all episodes, the earlier ones included.
     let never =
         |text: &str| serde_json::from_str::<serde_json::Value>(text).expect("a result")["never"].clone();
@@ -281,9 +280,7 @@ fn a_run_says_what_never_happened() {
     std::fs::write(&space, text).expect("it is writable");
     let run = |more: &[&str]| {
         let all = ["run", "space.ava", "--road", "corner", "--episodes", "2", "--format", "plain"];
-        let (status, stdout, stderr) = outcome(avastra(&[&all, more].concat()).current_dir(scratch.path()));
-        assert_eq!(status, 0, "{stderr}");
-        stdout
+        done_in(scratch.path(), &[&all, more].concat())
     };
     let short = run(&[]);
     assert!(short.contains("1 of 3 rows never happened, in "), "{short}");

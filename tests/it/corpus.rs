@@ -10,7 +10,7 @@ use avastra::syntax::ast::FileId;
 use avastra::syntax::{Diagnostic, Severity, apply_fixes};
 
 use crate::cases::{cases, each_case, root};
-use crate::command::{avastra, done, outcome};
+use crate::command::{avastra, done, done_in, outcome};
 
 /// Loads a case, with `text` in place of the file's own text if there is one.
 fn loaded(path: &Path, text: Option<&str>) -> Loaded {
@@ -166,11 +166,7 @@ fn fixes_are_made_when_asked_for() {
 #[test]
 fn a_new_space_is_ready_to_use() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
-    let in_scratch = |arguments: &[&str]| {
-        let (status, stdout, stderr) = outcome(avastra(arguments).current_dir(scratch.path()));
-        assert_eq!(status, 0, "{arguments:?}: {stdout}{stderr}");
-        stdout
-    };
+    let in_scratch = |arguments: &[&str]| done_in(scratch.path(), arguments);
     in_scratch(&["new", "mine"]);
     in_scratch(&["check", "--strict", "mine/space.ava"]);
     in_scratch(&["fmt", "--check", "mine/space.ava", "mine/roads.ava"]);

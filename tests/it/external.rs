@@ -11,7 +11,7 @@ use assert_cmd::cargo::cargo_bin;
 use serde_json::Value;
 
 use crate::cases::{root, texts};
-use crate::command::{avastra, done, fails, outcome};
+use crate::command::{avastra, done, done_in, fails, outcome};
 
 const SPACE: &str = "scenarios/avastra45.ava";
 
@@ -437,9 +437,7 @@ fn what_was_begun_against_one_program_is_not_gone_on_with_against_another() {
     let resumed = [["run", &runs], ["train", &train], ["study", &cell]];
     for [command, directory] in resumed {
         // From another folder, too, the same program is started.
-        let mut again = avastra(&[command, "--resume", directory]);
-        let (status, stdout, stderr) = outcome(again.current_dir(scratch.path().join("run")));
-        assert_eq!(status, 0, "{command}: {stdout}{stderr}");
+        done_in(&scratch.path().join("run"), &[command, "--resume", directory]);
     }
     script(scratch.path(), "", "--as-version 2");
     for [command, directory] in resumed {

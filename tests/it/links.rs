@@ -13,7 +13,7 @@ use avastra::estimate::EstimateDatabase;
 use avastra::run::{Database, Units};
 
 use crate::cases::{entries, name, root};
-use crate::command::{avastra, done, outcome};
+use crate::command::{avastra, done, done_in, outcome};
 use crate::world::FLICKER;
 
 /// How a command must end.
@@ -321,10 +321,7 @@ fn make_home(home: &Path) {
                   evaluation: { episodes: 1, seeds: 1 }\nbaselines: [random]\n";
     write("clone/theirs.yaml", &format!("space: {space}\n{theirs}"));
     let flicker = shipped(FLICKER);
-    let played = |arguments: &[&str]| {
-        let (status, _, stderr) = outcome(avastra(arguments).current_dir(&clone));
-        assert_eq!(status, 0, "{arguments:?}: {stderr}");
-    };
+    let played = |arguments: &[&str]| drop(done_in(&clone, arguments));
     let corner = ["--road", "corner"];
     let found = ["--self-contained", "--episodes", "8", "--seed", "5", "--ads", &flicker, "--out", "run"];
     played(&[&["run", &space][..], &corner, &found].concat());
@@ -453,8 +450,7 @@ fn a_link_that_the_user_names_is_followed() {
     let at = |name: &str| scratch.path().join(name);
     std::fs::write(at("real.ava"), "language 1\nlet   a = 3 m\n").expect("it is writable");
     symlink("real.ava", at("named.ava")).expect("links can be made");
-    let (status, _, stderr) = outcome(avastra(&["fmt", "named.ava"]).current_dir(scratch.path()));
-    assert_eq!(status, 0, "{stderr}");
+    done_in(scratch.path(), &["fmt", "named.ava"]);
     assert!(at("named.ava").is_symlink());
     assert_eq!(std::fs::read_to_string(at("real.ava")).expect("it is there"), "language 1\nlet a = 3 m\n");
 }
@@ -466,7 +462,7 @@ fn pages_written_at_once_and_to_a_full_disk_leave_nothing_behind() {
     let out = run.display().to_string();
     let space = shipped("scenarios/avastra45.ava");
     let settings = ["--ads", "cc", "--road", "corner", "--episodes", "1", "--out", &out];
-    assert_eq!(outcome(&mut avastra(&[&["run", &space][..], &settings].concat())).0, 0);
+    done(&[&["run", &space][..], &settings].concat());
     let names = || -> Vec<String> { entries(&run).iter().map(|path| name(path)).collect() };
     // A file that may not grow fails as a full disk does.
     let script =

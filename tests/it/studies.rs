@@ -10,7 +10,7 @@ use avastra::study::StudyDatabase;
 use serde_json::Value;
 
 use crate::cases::{expect_snapshot, files, root};
-use crate::command::{avastra, background, done, fails, outcome};
+use crate::command::{avastra, background, done, done_in, fails, outcome};
 use crate::report::index_of;
 use crate::world::FLICKER;
 
@@ -190,10 +190,7 @@ fn kept_and_written_again(scratch: &Path, played: &Path) {
 
     let out = scratch.join("RESULTS.md").display().to_string();
     let write = |more: &[&str]| {
-        let mut command =
-            avastra(&[&["study", "results", "scenarios/studies", "--out", &out], more].concat());
-        let (status, _, stderr) = outcome(command.current_dir(scratch));
-        assert_eq!(status, 0, "{stderr}");
+        done_in(scratch, &[&["study", "results", "scenarios/studies", "--out", &out], more].concat());
         std::fs::read_to_string(&out).expect("it was written")
     };
     let first = write(&["--add", &played.display().to_string(), "--commit", "0123abc"]);
