@@ -15,7 +15,7 @@ use safetensors::SafeTensors;
 
 use crate::cases::root;
 use crate::command::{avastra, done, fails, outcome};
-use crate::world::{SMALL, read};
+use crate::world::{SMALL, loaded};
 
 /// A policy of a few episodes with a network of a few neurons, trained once for all tests.
 fn trained() -> &'static Path {
@@ -46,31 +46,26 @@ fn beside(name: &str, bytes: &[u8]) -> String {
 }
 
 /// Loads a text as if it stood beside the shipped spaces.
-fn load(text: &str) -> Result<Policy, Vec<String>> {
-    let path = root().join("scenarios/policy_under_test.ava");
-    let read = |asked: &Path| if asked == path { Ok(text.to_owned()) } else { read(asked) };
-    let loaded = avastra::check::load(&path, &read).expect("the root can be read");
+pub fn load(text: &str) -> Result<Policy, Vec<String>> {
+    let loaded = loaded("scenarios/policy_under_test.ava", text);
     let messages = loaded.diagnostics.iter().map(|found| format!("{}: {}", found.code, found.message));
     loaded.policy.ok_or_else(|| messages.collect())
 }
 
 fn space() -> &'static Arc<Space> {
     static SPACE: OnceLock<Arc<Space>> = OnceLock::new();
-    SPACE.get_or_init(|| {
-        let path = root().join("scenarios/avastra45.ava");
-        avastra::check::load(&path, &read).expect("it can be read").space.expect("it is sound")
-    })
+    SPACE.get_or_init(|| crate::world::space("avastra45.ava"))
 }
 
 /// A policy with the `use` of a file that stands beside the shipped space.
-fn moved(text: &str) -> String {
+pub fn moved(text: &str) -> String {
     let begin = text.find("use \"").expect("it uses a space") + 5;
     let end = begin + text[begin..].find('"').expect("the path ends");
     format!("{}avastra45.ava{}", &text[..begin], &text[end..])
 }
 
 /// A changed text with a seal that fits it.
-fn sealed(text: &str) -> String {
+pub fn sealed(text: &str) -> String {
     let (tree, _) = avastra::syntax::parse(FileId(0), text);
     let begin = text.find("digest: \"sha256:").expect("it is sealed") + 9;
     format!("{}{}{}", &text[..begin], seal(text, &tree), &text[begin + 71..])

@@ -13,7 +13,7 @@ use serde_json::Value;
 
 use crate::cases::root;
 use crate::command::{avastra, done, outcome};
-use crate::world::read;
+use crate::world::loaded;
 
 /// A pedestrian walks in front of a driving system that yields to nobody. Its seed, and so what is driven, is fixed.
 const SOURCE: &str = r#"language 1
@@ -43,9 +43,7 @@ scenario walk {
 
 /// The scenario, with its table and driving system.
 fn walk() -> (ActionTable, Scenario, Selected) {
-    let path = root().join("scenarios/walk.ava");
-    let with_it = |path: &Path| if path.ends_with("walk.ava") { Ok(SOURCE.to_owned()) } else { read(path) };
-    let loaded = avastra::check::load(&path, &with_it).expect("it is there");
+    let loaded = loaded("scenarios/walk.ava", SOURCE);
     let scenario = loaded.scenario.expect("it has a scenario");
     let ads = recorded(&scenario).expect("its driving system exists");
     (ActionTable::new(loaded.space.expect("its space is sound")), scenario, ads)

@@ -6,14 +6,12 @@
 //! The audit: every rule has a draw that breaks this rule alone. The draw is refused with the rule's name,
 //! and passes without the rule. So this test fails if a rule is no longer enforced somewhere.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use avastra::action::{
     ActionTable, Draw, Effect, Enforcement, Offer, Refusal, Situation, SpawnFacts, SpawnRequest,
     Surroundings, audit,
 };
-use avastra::check::load;
 use avastra::check::state_argument::memory_from;
 use avastra::episode::{Choice, Moment};
 use avastra::model::vocabulary::{Body, TimeOfDay, Verb};
@@ -21,8 +19,7 @@ use avastra::model::{MomentFacts, RulesInForce, Type, Value};
 use avastra::rng;
 use avastra::rng::Stream;
 
-use crate::cases::root;
-use crate::world::{Wide, assert_replays, read, run, space};
+use crate::world::{Wide, assert_replays, loaded, run, space};
 
 const RULES: [&str; 5] = ["chronology", "npc_gap", "npc_speed", "walking_pace", "no_teleport"];
 
@@ -270,11 +267,7 @@ fn a_scenario_with_a_breach_does_not_compile() {
             "language 1\nuse \"avastra45.ava\"\nscenario s {{\n{origin}\nroad: {}\nstart {{ {} }}\nsteps {{ 0: {} {drawn} }}\n}}\n",
             breach.road, breach.states, breach.row
         );
-        let loaded = load(Path::new("s.ava"), &|path| match path.to_str() {
-            Some("s.ava") => Ok(text.clone()),
-            _ => read(&root().join("scenarios").join(path)),
-        });
-        let loaded = loaded.expect("its text is known");
+        let loaded = loaded("scenarios/s.ava", &text);
         assert_eq!(loaded.scenario.is_some(), loaded.diagnostics.is_empty());
         loaded.diagnostics.iter().map(|found| format!("{} {}", found.code, found.message)).collect()
     };
@@ -303,11 +296,7 @@ enum Body = Jeep | SUV | Sedan
 action a(any d: Length in 1 m .. 9 m where d < 5 m, any body: Body in [Jeep, SUV]) {
   spawn body ahead 40 m + d { lane: Current, speed: 5 m/s, does: DriveAhead }
 }";
-    let loaded = load(Path::new("a.ava"), &|path| match path.to_str() {
-        Some("a.ava") => Ok(TEXT.to_owned()),
-        _ => read(&root().join("scenarios").join(path)),
-    });
-    let table = ActionTable::new(loaded.expect("its text is known").space.expect("it is sound"));
+    let table = ActionTable::new(loaded("scenarios/a.ava", TEXT).space.expect("it is sound"));
     let space = table.space();
     let rules = RulesInForce::new(space, &[], &[]).expect("no rule is named");
     let memory = space.initial_memory(1);
