@@ -4,6 +4,7 @@ use std::path::Path;
 use std::process::{Child, Stdio};
 
 use assert_cmd::Command;
+use serde_json::Value;
 
 use crate::cases::{cases, each_case, files, root, texts};
 use crate::world::FLICKER;
@@ -53,6 +54,11 @@ pub fn done_in(folder: &Path, arguments: &[&str]) -> String {
 pub fn fails(arguments: &[&str], reason: &str) {
     let (status, stdout, stderr) = outcome(&mut avastra(arguments));
     assert!(status == 1 && stderr.contains(reason), "{arguments:?}: {status}: {stdout}{stderr}");
+}
+
+/// The last line that a command prints: its result.
+pub fn last_line(stdout: &str) -> Value {
+    serde_json::from_str(stdout.lines().last().expect("it prints a result")).expect("the result is JSON")
 }
 
 #[test]
@@ -124,7 +130,7 @@ fn every_diagnostic_is_also_json() {
         let (_, stdout, stderr) =
             outcome(&mut avastra(&["check", "--format", "json", &path.display().to_string()]));
         for line in stderr.lines().chain(stdout.lines()) {
-            let value: serde_json::Value = serde_json::from_str(line).unwrap_or_else(|error| {
+            let value: Value = serde_json::from_str(line).unwrap_or_else(|error| {
                 panic!("{stem}: {error}: {line}");
             });
             assert!(value.is_object(), "{stem}: {line}");
@@ -251,8 +257,7 @@ fn an_interrupted_run_goes_on_where_it_was() {
     drop(database);
     let resumed = done_in(scratch.path(), &["run", "--resume", "cut", "--format", "json"]);
     // What never happened is told of all episodes, the earlier ones included.
-    let never =
-        |text: &str| serde_json::from_str::<serde_json::Value>(text).expect("a result")["never"].clone();
+    let never = |text: &str| serde_json::from_str::<Value>(text).expect("a result")["never"].clone();
     assert_eq!(never(&whole), never(&resumed));
     assert_eq!(never(&whole)["rows"], 45, "{whole}");
     let traces = |run: &str| -> Vec<String> {

@@ -39,9 +39,11 @@ fn run_into(out: &str) -> (i32, String, String) {
     outcome(&mut avastra(&[&["run", SPACE], &settings[..]].concat()))
 }
 
-fn resume(command: &str, directory: &str) -> (i32, String) {
-    let (status, _, stderr) = outcome(&mut avastra(&[command, "--resume", directory]));
-    (status, stderr)
+/// What is said on standard error when a run is gone on with.
+fn resumed(directory: &str) -> String {
+    let (status, _, stderr) = outcome(&mut avastra(&["run", "--resume", directory]));
+    assert_eq!(status, 0, "{stderr}");
+    stderr
 }
 
 /// Replaces a part of a file.
@@ -111,18 +113,16 @@ fn what_a_kill_left_before_the_beginning_can_be_begun() {
     let out = scratch.text("run");
     std::fs::create_dir_all(scratch.path("run/critical/space")).expect("it is writable");
     std::fs::write(scratch.path("run/run.yaml.partial"), "avastra: 0").expect("it is writable");
-    let (status, stderr) = resume("run", &out);
-    assert!(status == 1 && stderr.contains("it has no run.yaml; begin one with `--out"), "{stderr}");
+    fails(&["run", "--resume", &out], "it has no run.yaml; begin one with `--out");
     assert_eq!(run_into(&out).0, 0);
     let (status, _, stderr) = run_into(&out);
     assert!(status == 1 && stderr.contains("is not empty"), "{stderr}");
     // The database may be missing as long as nothing was found.
     std::fs::remove_file(scratch.path("run/run.db")).expect("it is there");
-    assert_eq!(resume("run", &out).0, 0);
+    resumed(&out);
     std::fs::write(scratch.path("run/critical/corner_0000.ava"), "language 1\n").expect("it is writable");
     std::fs::remove_file(scratch.path("run/run.db")).expect("it is there");
-    let (status, stderr) = resume("run", &out);
-    assert!(status == 1 && stderr.contains("is missing, and `critical` has scenarios"), "{stderr}");
+    fails(&["run", "--resume", &out], "is missing, and `critical` has scenarios");
 }
 
 #[test]
@@ -138,15 +138,12 @@ fn a_run_that_was_edited_is_not_gone_on_with() {
         ("ambient: 0", "ambient: 5", "`ambient` was 0"),
     ] {
         edit(&settings, from, to);
-        let (status, stderr) = resume("run", &out);
-        assert!(status == 1 && stderr.contains(what), "{stderr}");
+        fails(&["run", "--resume", &out], what);
         std::fs::write(&settings, &whole).expect("it is writable");
     }
-    assert_eq!(resume("run", &out).0, 0);
-    let (status, stderr) = resume("train", &out);
-    assert!(status == 1 && stderr.contains("holds a run: go on with `avastra run --resume"), "{stderr}");
-    let (status, stderr) = resume("study", &out);
-    assert!(status == 1 && stderr.contains("holds a run"), "{stderr}");
+    resumed(&out);
+    fails(&["train", "--resume", &out], "holds a run: go on with `avastra run --resume");
+    fails(&["study", "--resume", &out], "holds a run");
 
     // An episode whose rows were changed is named, counts for nothing, and is played again.
     let bytes = std::fs::read(scratch.path("run/run.db")).expect("it is readable");
@@ -167,17 +164,15 @@ fn a_run_that_was_edited_is_not_gone_on_with() {
     assert!(overview["totals"]["driven_m"].as_f64().is_some_and(|driven_m| driven_m < 1e6), "{overview}");
     let (status, _, stderr) = outcome(&mut avastra(&["merge", &out, "--missing"]));
     assert!(status == 0 && stderr.contains("its rows of episode 1 were changed"), "{stderr}");
-    let (status, stderr) = resume("run", &out);
-    let again = format!("{changed}: each such episode is played again");
-    assert!(status == 0 && stderr.contains(&again), "{stderr}");
+    let stderr = resumed(&out);
+    assert!(stderr.contains(&format!("{changed}: each such episode is played again")), "{stderr}");
     assert!(std::fs::read(scratch.path("run/run.db")).expect("it is readable") == bytes);
-    let (status, stderr) = resume("run", &out);
-    assert!(status == 0 && !stderr.contains("changed"), "{stderr}");
+    let stderr = resumed(&out);
+    assert!(!stderr.contains("changed"), "{stderr}");
     let torn: Vec<u8> =
         bytes.iter().enumerate().map(|(at, byte)| if at % 991 == 990 { !byte } else { *byte }).collect();
     std::fs::write(scratch.path("run/run.db"), torn).expect("it is writable");
-    let (status, stderr) = resume("run", &out);
-    assert!(status == 1 && stderr.contains("begin a new one"), "{stderr}");
+    fails(&["run", "--resume", &out], "begin a new one");
 }
 
 #[test]
@@ -187,10 +182,9 @@ fn one_process_at_a_time_works_in_a_directory() {
     assert_eq!(run_into(&out).0, 0);
     let other = std::fs::File::open(scratch.path("run")).expect("it is there");
     other.lock().expect("no process holds it");
-    let (status, stderr) = resume("run", &out);
-    assert!(status == 1 && stderr.contains("another avastra is at work"), "{stderr}");
+    fails(&["run", "--resume", &out], "another avastra is at work");
     other.unlock().expect("it was locked");
-    assert_eq!(resume("run", &out).0, 0);
+    resumed(&out);
 }
 
 #[test]
@@ -293,8 +287,7 @@ fn scenarios_that_are_gone_or_edited_are_noticed() {
 
     // A database without anything in it is no reason to play all again over what was found.
     std::fs::write(scratch.path("run/run.db"), "").expect("it is writable");
-    let (status, stderr) = resume("run", &out);
-    assert!(status == 1 && stderr.contains("is empty, and `critical` has scenarios"), "{stderr}");
+    fails(&["run", "--resume", &out], "is empty, and `critical` has scenarios");
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use crate::cases::{entries, expect_snapshot};
-use crate::command::{avastra, done, fails, outcome};
+use crate::command::{avastra, done, fails, last_line, outcome};
 use crate::report::index_of;
 
 const SPACE: &str = "scenarios/avastra45.ava";
@@ -17,11 +17,6 @@ fn arguments<'a>(method: &'a str, episodes: &'a str, parts: &'a str, out: &'a st
     let how =
         ["--method", method, "--episodes", episodes, "--parts", parts, "--out", out, "--format", "json"];
     [&["estimate", SPACE][..], &ads, &how].concat()
-}
-
-/// The result that was printed last.
-fn result(stdout: &str) -> Value {
-    serde_json::from_str(stdout.lines().last().expect("a line is printed")).expect("it is JSON")
 }
 
 fn kept(directory: &Path) -> Vec<u8> {
@@ -49,7 +44,7 @@ fn an_estimate_depends_on_its_settings_alone() {
         let (status, stdout, stderr) =
             outcome(avastra(&arguments(method, episodes, parts, &out)).args(["--jobs", "1"]));
         assert_eq!(status, 0, "{stderr}");
-        let together = &result(&stdout)["results"]["together"];
+        let together = &last_line(&stdout)["results"]["together"];
         let text = serde_json::to_string_pretty(together).expect("it is JSON");
         expect_snapshot("estimates", method, &text);
         let whole = kept(&directory);
@@ -130,14 +125,14 @@ fn an_estimate_stops_at_a_look_and_stays_stopped() {
     // Twenty episodes, those of the first look, take longer than this.
     asked.extend(["--hours", "0.3", "--jobs", "2"]);
     let stdout = done(&asked);
-    let results = result(&stdout)["results"].clone();
+    let results = last_line(&stdout)["results"].clone();
     // Three looks, at 2, 4 and 8 parts, share the 5 %.
     assert_eq!(results["missing"].as_f64(), Some(0.05));
     assert!((results["missing_at_look"].as_f64().expect("it is there") - 0.05 / 3.0).abs() < 1e-12);
     assert!(results["parts"].as_u64() < results["parts_wanted"].as_u64(), "{results}");
     // Gone on with, it has nothing left to do.
     let stdout = done(&["estimate", "--resume", &out, "--format", "json"]);
-    assert_eq!(result(&stdout)["results"], results);
+    assert_eq!(last_line(&stdout)["results"], results);
 }
 
 #[test]
@@ -151,7 +146,7 @@ fn two_driving_systems_are_told_apart_in_the_same_episodes() {
         ]
         .concat();
         let stdout = done(&arguments);
-        result(&stdout)["results"].clone()
+        last_line(&stdout)["results"].clone()
     };
     let same = compare(["reactive", "reactive"], "1");
     assert_eq!((&same["first_only"], &same["second_only"], &same["p"]), (&0.into(), &0.into(), &1.0.into()));

@@ -11,7 +11,7 @@ use assert_cmd::cargo::cargo_bin;
 use serde_json::Value;
 
 use crate::cases::{root, texts};
-use crate::command::{avastra, done, done_in, fails, outcome};
+use crate::command::{avastra, done, done_in, fails, last_line, outcome};
 
 const SPACE: &str = "scenarios/avastra45.ava";
 
@@ -38,16 +38,18 @@ fn running(word: &str) -> Vec<String> {
     found
 }
 
-fn last_line(stdout: &str) -> Value {
-    serde_json::from_str(stdout.lines().last().expect("it prints a result")).expect("the result is JSON")
-}
-
 /// A run of some episodes on one road: its status, its result and what it wrote on standard error.
 fn run(config: &str, out: &Path, more: &[&str]) -> (i32, Value, String) {
     let out = out.display().to_string();
     let begin = ["run", SPACE, "--road", "corner", "--ads", config, "--out", &out, "--format", "json"];
     let (status, stdout, stderr) = outcome(&mut avastra(&[&begin[..], more].concat()));
     (status, last_line(&stdout), stderr)
+}
+
+/// The words of a training of some episodes on one road.
+fn training<'a>(episodes: &'a str, config: &'a str, out: &'a str) -> Vec<&'a str> {
+    let how = ["--road", "corner", "--episodes", episodes, "--ads", config, "--out", out];
+    [&["train", SPACE, "--agent", "av-fuzzer"][..], &how].concat()
 }
 
 #[test]
@@ -155,21 +157,7 @@ fn a_training_and_a_study_say_that_the_driving_system_failed() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let config = profile(scratch.path(), &["--misbehave", "crash-in-episode"], "1", "");
     let out = scratch.path().join("train").display().to_string();
-    let train = [
-        "train",
-        SPACE,
-        "--agent",
-        "av-fuzzer",
-        "--road",
-        "corner",
-        "--episodes",
-        "2",
-        "--ads",
-        &config,
-        "--out",
-        &out,
-    ];
-    let (status, stdout, stderr) = outcome(&mut avastra(&train));
+    let (status, stdout, stderr) = outcome(&mut avastra(&training("2", &config, &out)));
     assert_eq!(status, 5, "nothing was learned of it: {stdout}{stderr}");
     assert!(stderr.contains("warning: the driving system failed in 17 of 17 episodes"), "{stdout}{stderr}");
     assert!(
@@ -413,20 +401,7 @@ fn what_was_begun_against_one_program_is_not_gone_on_with_against_another() {
     let planner = scratch.path().join("planner").display().to_string();
     let begun = [
         vec!["run", SPACE, "--road", "corner", "--episodes", "1", "--ads", &config, "--out", &runs],
-        vec![
-            "train",
-            SPACE,
-            "--agent",
-            "av-fuzzer",
-            "--road",
-            "corner",
-            "--episodes",
-            "1",
-            "--ads",
-            &config,
-            "--out",
-            &train,
-        ],
+        training("1", &config, &train),
         vec!["study", &file, "--ads", &planner, "--out", &cell],
     ];
     for arguments in &begun {

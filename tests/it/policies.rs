@@ -14,7 +14,7 @@ use proptest::prelude::*;
 use safetensors::SafeTensors;
 
 use crate::cases::root;
-use crate::command::{avastra, done, fails, outcome};
+use crate::command::{avastra, done, fails, last_line, outcome};
 use crate::world::{SMALL, loaded};
 
 /// A policy of a few episodes with a network of a few neurons, trained once for all tests.
@@ -181,8 +181,7 @@ fn a_policy_is_explained() {
     let file = trained().display().to_string();
     let words = ["policy", "explain", &file, "--episodes", "3", "--repeats", "3"];
     let stdout = done(&[&words[..], &["--format", "json"]].concat());
-    let result: serde_json::Value =
-        serde_json::from_str(stdout.lines().last().expect("a result")).expect("it is JSON");
+    let result = last_line(&stdout);
     let insight = &result["insight"];
     let importance = insight["importance"].as_array().expect("a list");
     assert_eq!(importance.iter().filter(|one| one["of_paper"] == true).count(), 19);

@@ -12,7 +12,7 @@ use base64::Engine;
 use serde_json::Value;
 
 use crate::cases::root;
-use crate::command::{avastra, done, outcome};
+use crate::command::{avastra, done, last_line, outcome};
 use crate::world::loaded;
 
 /// A pedestrian walks in front of a driving system that yields to nobody. Its seed, and so what is driven, is fixed.
@@ -304,7 +304,7 @@ fn trainings_and_estimates_have_pages_with_their_results() {
     let training =
         ["train", space, "--agent", "constant", "--episodes", "6", "--out", &train, "--format", "json"];
     let stdout = done(&[&training[..], &short].concat());
-    let printed: Value = serde_json::from_str(stdout.lines().last().expect("a result")).expect("it is JSON");
+    let printed = last_line(&stdout);
     // The page is made of what the database holds, whatever the file for others says.
     std::fs::write(scratch.path().join("train/results.json"), "{}").expect("it is writable");
     let (status, stderr, index) = reported(scratch.path(), &[&train]);

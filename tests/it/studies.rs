@@ -10,7 +10,7 @@ use avastra::study::StudyDatabase;
 use serde_json::Value;
 
 use crate::cases::{expect_snapshot, files, root};
-use crate::command::{avastra, background, done, done_in, fails, outcome};
+use crate::command::{avastra, background, done, done_in, fails, last_line, outcome};
 use crate::report::index_of;
 use crate::world::FLICKER;
 
@@ -287,7 +287,7 @@ fn cells_are_runs(whole: &Value) {
         let run = [&run[..], &["--ads", FLICKER]].concat();
         let seed = seed.as_str().expect("a text");
         let stdout = done(&[&run[..], &["--seed", seed, "--out", &out]].concat());
-        let line: Value = serde_json::from_str(stdout.lines().last().expect("a result")).expect("JSON");
+        let line = last_line(&stdout);
         found += line["totals"]["collisions"].as_u64().expect("a number");
     }
     assert_eq!(counted, found as f64 / 2.0);
