@@ -7,6 +7,9 @@ use super::trigger::{Condition, Pair, Trigger, When};
 /// What holds from the beginning.
 const ALWAYS: &str = "elapsed >= 0 s";
 
+/// Why a condition between others is refused.
+const NEVER: &str = "at the speeds of the beginning this never comes";
+
 /// Whether a group of conditions holds from the beginning.
 pub fn is_always(all: &[Condition]) -> bool {
     all.iter().all(|condition| matches!(condition.kind, When::Always))
@@ -170,18 +173,14 @@ fn meeting(
         return already(source, condition);
     }
     let closing_mps = back.along_mps() - front.along_mps();
-    let seconds = (gap_m - metres) / closing_mps;
-    if closing_mps > 0.0 && pair.is_less || closing_mps < 0.0 && !pair.is_less {
-        return at(source, mark, seconds);
-    }
-    source.refuse(mark, "at the speeds of the beginning this never comes")
+    let comes = if pair.is_less { closing_mps > 0.0 } else { closing_mps < 0.0 };
+    source.refuse_if(!comes, mark, NEVER)?;
+    at(source, mark, (gap_m - metres) / closing_mps)
 }
 
 /// A moment that follows from speeds and distances.
 fn at(source: &mut Source, mark: &Mark, seconds: f64) -> Option<String> {
-    if !(0.0..1e4).contains(&seconds) {
-        return source.refuse(mark, "at the speeds of the beginning this never comes");
-    }
+    source.refuse_if(!(0.0..1e4).contains(&seconds), mark, NEVER)?;
     source.note(
         "a condition between others is asked at the time at which it comes true if they keep their speeds",
     );

@@ -89,9 +89,8 @@ impl Ground {
         let place = lane_place(source, &self.map, mark, position)?;
         let point = self.map.lane(place.lane).centre.pose_at(place.station_m).position;
         let station_m = self.station_of(point);
-        if station_m >= self.route.path.length_m() {
-            return source.refuse(mark, "it lies beyond the end of the ego vehicle's way");
-        }
+        let reason = "it lies beyond the end of the ego vehicle's way";
+        source.refuse_if(station_m >= self.route.path.length_m(), mark, reason)?;
         let here = self.route.lane_at(station_m.max(0.0)).lane;
         let is_it =
             |lane: LaneIndex| lane == place.lane || station_m < 0.0 && self.leads_to(place.lane, lane);

@@ -49,9 +49,8 @@ fn is_of(kind: &str, value: &str) -> bool {
 fn holds(source: &mut Source, constraint: Node, kind: &str, value: &str) -> Option<bool> {
     let bound = source.text(constraint, "value")?;
     let rule = source.text(constraint, "rule")?;
-    if !RULES.contains(&rule.as_str()) {
-        return source.refuse(constraint, format!("`rule` is `{rule}`; it may be {}", RULES.join(", ")));
-    }
+    let reason = format!("`rule` is `{rule}`; it may be {}", RULES.join(", "));
+    source.refuse_if(!RULES.contains(&rule.as_str()), constraint, reason)?;
     source.refuse_if(!is_of(kind, &bound), constraint, format!("its value `{bound}` is no `{kind}`"))?;
     let number = |text: &str| text.trim().parse::<f64>().ok();
     let order = match kind {

@@ -295,15 +295,13 @@ impl Scene {
         }
         let (from_m, from_left_m) = (from.x, from.y);
         let (to_m, to_left_m) = (to.x, to.y);
-        if from_left_m * to_left_m >= 0.0 {
-            return source.refuse(&walk.mark, "a pedestrian walks across the ego vehicle's way");
-        }
+        let reason = "a pedestrian walks across the ego vehicle's way";
+        source.refuse_if(from_left_m * to_left_m >= 0.0, &walk.mark, reason)?;
         let way_m = (to_left_m - from_left_m).abs();
         spawn.speed_mps = walk.duration_s.map_or(mps, |duration_s| way_m / duration_s);
         source.refuse_if(spawn.speed_mps > *SPAWN_SPEED_MPS.end(), &walk.mark, too_fast(spawn.speed_mps))?;
-        if spawn.speed_mps <= 0.0 {
-            return source.refuse(&walk.mark, "neither times nor a speed say how fast it walks");
-        }
+        let reason = "neither times nor a speed say how fast it walks";
+        source.refuse_if(spawn.speed_mps <= 0.0, &walk.mark, reason)?;
         let station_m = (from_m + to_m) / 2.0;
         spawn.does = "Walk";
         spawn.side = Some(if from_left_m > 0.0 { "Left" } else { "Right" });
@@ -376,14 +374,12 @@ impl<'a> Setting<'a> {
         let beside = match position {
             Position::RelativeLane { entity: of, lanes, ahead_m, offset_m, heading } => {
                 let of = self.find(of)?;
-                if !of.beside.is_along {
-                    return source.refuse(mark, "a place relative to an oncoming vehicle is not read");
-                }
+                let reason = "a place relative to an oncoming vehicle is not read";
+                source.refuse_if(!of.beside.is_along, mark, reason)?;
                 let lanes_left = of.beside.lanes_left + lanes;
                 let station_m = of.beside.station_m + ahead_m;
-                if station_m >= self.ground.route.path.length_m() {
-                    return source.refuse(mark, "it lies beyond the end of the ego vehicle's way");
-                }
+                let reason = "it lies beyond the end of the ego vehicle's way";
+                source.refuse_if(station_m >= self.ground.route.path.length_m(), mark, reason)?;
                 self.ground.faces_on(source, mark, station_m, *heading)?;
                 Beside { station_m, lanes_left, is_along: true, offset_m: *offset_m }
             }

@@ -73,9 +73,8 @@ pub struct Change {
 /// Reads a file. What cannot be said is refused; `None` if that is so much that nothing can be placed.
 pub fn read(source: &mut Source, document: &Document, ego: Option<&str>, files: &dyn Files) -> Option<Story> {
     let root = document.root_element();
-    if !root.has_tag_name("OpenSCENARIO") {
-        return source.refuse(root, "the root element of a scenario is `OpenSCENARIO`");
-    }
+    let reason = "the root element of a scenario is `OpenSCENARIO`";
+    source.refuse_if(!root.has_tag_name("OpenSCENARIO"), root, reason)?;
     let header = source.required(root, "FileHeader")?;
     source.minor = source.integer(header, "revMinor")?;
     if source.integer(header, "revMajor")? != 1 || !(0..=MINOR_MAX).contains(&source.minor) {
