@@ -230,12 +230,8 @@ const VERBS: [&str; 4] = ["check", "table", "compile", "lsp"];
 /// `FUZZ_S=1800 FUZZ_SEED=1 cargo test --release --test it -- --ignored --nocapture each_construct_scales`
 #[test]
 #[ignore = "runs for as long as it is told to"]
-#[expect(clippy::disallowed_methods, reason = "how long and with which seed is said in the environment")]
 fn each_construct_scales() {
-    let number = |name: &str, default: u64| {
-        std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
-    };
-    let (seconds, seed) = (number("FUZZ_S", 60) as f64, number("FUZZ_SEED", 1));
+    let (seconds, seed) = (asked("FUZZ_S", 60) as f64, asked("FUZZ_SEED", 1));
     let of_grammar = scale::GRAMMAR
         .iter()
         .flat_map(|&(name, text)| VERBS.into_iter().map(move |verb| Large { name, text, verb }));
@@ -264,6 +260,12 @@ fn each_construct_scales() {
     let Measured { runs, spent_s, dear, .. } = measured;
     println!("{runs} runs, {spent_s:.0} s");
     assert!(dear.is_empty(), "{}", dear.join("\n"));
+}
+
+/// A number from the environment.
+#[expect(clippy::disallowed_methods, reason = "how long and with which seed is said in the environment")]
+fn asked(name: &str, default: u64) -> u64 {
+    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
 /// A construct, and what the program is asked to do with texts that are large in it.
@@ -428,12 +430,8 @@ fn messages(path: &Path, text: &str) -> Vec<u8> {
 /// `FUZZ_S=3600 FUZZ_SEED=1 cargo test --test it -- --ignored --nocapture made_up_texts`
 #[test]
 #[ignore = "runs for as long as it is told to"]
-#[expect(clippy::disallowed_methods, reason = "how long and with which seed is said in the environment")]
 fn made_up_texts_break_no_law() {
-    let number = |name: &str, default: u64| {
-        std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
-    };
-    let (seconds, seed) = (number("FUZZ_S", 60) as f64, number("FUZZ_SEED", 1));
+    let (seconds, seed) = (asked("FUZZ_S", 60) as f64, asked("FUZZ_SEED", 1));
     let maker = Maker::new();
     let begin_s = processor_s();
     let (mut texts, mut bytes, mut dearest) = (0_u64, 0_u64, 0.0_f64);
@@ -450,7 +448,7 @@ fn made_up_texts_break_no_law() {
         }
         (texts, bytes, dearest) = (texts + 1, bytes + text.len() as u64, dearest.max(took_s));
     }
-    let peak_mb = peak_mb();
+    let (_, peak_mb) = own_cost();
     println!(
         "{texts} texts, {bytes} bytes, {:.0} s, at most {dearest:.2} s and {peak_mb:.0} MB",
         processor_s() - begin_s
@@ -657,22 +655,16 @@ fn parts(text: &str) -> Vec<String> {
 
 /// Processor time of this process so far, s.
 fn processor_s() -> f64 {
-    let usage = own_usage();
-    let seconds = |time: libc::timeval| time.tv_sec as f64 + time.tv_usec as f64 * 1e-6;
-    seconds(usage.ru_utime) + seconds(usage.ru_stime)
+    own_cost().0
 }
 
-/// The most memory that this process had, MB.
-fn peak_mb() -> f64 {
-    own_usage().ru_maxrss as f64 / 1024.0
-}
-
-fn own_usage() -> libc::rusage {
+/// Processor time (s) and peak memory (MB) of this process so far.
+fn own_cost() -> (f64, f64) {
     // SAFETY: it is plain data that the kernel fills in.
     unsafe {
         let mut usage: libc::rusage = std::mem::zeroed();
         assert_eq!(libc::getrusage(libc::RUSAGE_SELF, &mut usage), 0);
-        usage
+        taken(&usage)
     }
 }
 
