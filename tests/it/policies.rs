@@ -29,7 +29,7 @@ fn trained() -> &'static Path {
         let (config, out_text) = (config.display().to_string(), out.display().to_string());
         let words =
             ["train", "scenarios/avastra45.ava", "--road", "corner", "--episodes", "20", "--seed", "5"];
-        avastra(&[&words[..], &["--config", &config, "--out", &out_text]].concat()).assert().success();
+        done(&[&words[..], &["--config", &config, "--out", &out_text]].concat());
         out.join("policy/corner_ddqn_5.ava")
     })
 }
@@ -104,16 +104,14 @@ fn both_faces_are_played_and_what_they_claim_is_checked() {
 fn rules_are_distilled_anew_and_hold() {
     let file = trained().display().to_string();
     let fewer = trained().with_file_name("fewer.ava").display().to_string();
-    avastra(&["policy", "distil", &file, "--leaves", "2", "--episodes", "2", "--out", &fewer])
-        .assert()
-        .success();
+    done(&["policy", "distil", &file, "--leaves", "2", "--episodes", "2", "--out", &fewer]);
     let policy = load(&moved(&std::fs::read_to_string(&fewer).expect("it is written"))).expect("it is sound");
     assert!((1..=2).contains(&policy.rules.len()));
     assert!(
         policy.rules.last().is_some_and(|rule| rule.conditions.is_empty()),
         "the last line takes the rest"
     );
-    avastra(&["replay", &fewer]).assert().success();
+    done(&["replay", &fewer]);
     let (first, second) = (load(&moved(&trained_text())).expect("sound"), policy);
     assert_eq!(first.parameters, second.parameters, "the network stays as it is");
 }
@@ -152,7 +150,7 @@ fn a_flipped_bit_anywhere_in_a_small_policy_is_noticed() {
 fn weights_come_back_from_safetensors_bit_by_bit() {
     let file = trained().display().to_string();
     let out = trained().with_extension("safetensors");
-    avastra(&["policy", "weights", &file]).assert().success();
+    done(&["policy", "weights", &file]);
     let bytes = std::fs::read(&out).expect("it is written");
     let tensors = SafeTensors::deserialize(&bytes).expect("it is safetensors");
     let policy = load(&moved(&trained_text())).expect("it is sound");

@@ -300,7 +300,7 @@ fn a_review_tells_what_is_gone() {
     let fault = "scenarios/ads/faults/planning_never_yields.yaml";
     let place = ["--road", "residential", "--episodes", "9", "--seed", "1", "--ads", fault];
     let space = "scenarios/avastra45.ava";
-    avastra(&[&["run", space, "--out", &run][..], &place].concat()).assert().success();
+    done(&[&["run", space, "--out", &run][..], &place].concat());
     let review = ["test", "--format", "json", "--accept", "--ads", "idm", &run];
     let (status, stdout, stderr) = outcome(&mut avastra(&review));
     let tested: serde_json::Value = serde_json::from_str(stdout.trim_end()).expect("it is JSON");
@@ -338,7 +338,7 @@ fn a_suite_is_judged_by_the_verdict_of_its_space() {
     std::fs::write(&space, text).expect("it is writable");
     let settings = ["--road", "crossroad", "--episodes", "40", "--seed", "5", "--traffic", "released"];
     let begin = ["run", &space, "--ads", profile, "--out", &run];
-    avastra(&[&begin[..], &settings[..]].concat()).assert().success();
+    done(&[&begin[..], &settings[..]].concat());
     let test = |more: &[&str]| {
         let (status, stdout, stderr) = outcome(&mut avastra(&[&["test", &run][..], more].concat()));
         assert_eq!(status, 4, "{stdout}{stderr}");

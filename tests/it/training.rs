@@ -33,7 +33,7 @@ fn policy_of(out: &Path) -> String {
 /// The policy of a whole training.
 fn trained(out: &Path) -> String {
     let arguments = training(out);
-    avastra(&arguments.iter().map(String::as_str).collect::<Vec<_>>()).assert().success();
+    done(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
     policy_of(out)
 }
 
@@ -58,7 +58,7 @@ fn killed(arguments: &[String], out: &Path, waits_ms: impl IntoIterator<Item = u
         child.kill().expect("it is ours to kill");
         child.wait().expect("it ends");
     }
-    avastra(&resume.each_ref().map(String::as_str)).assert().success();
+    done(&resume.each_ref().map(String::as_str));
 }
 
 #[test]
@@ -93,7 +93,7 @@ fn twenty_kills_change_nothing() {
             (arguments, out)
         };
         let (arguments, whole) = begun("whole");
-        avastra(&arguments.iter().map(String::as_str).collect::<Vec<_>>()).assert().success();
+        done(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
         let (arguments, out) = begun("killed");
         let mut rng = stream(2026, Stream::Reset, 0);
         let moments: Vec<u64> = (0..20).map(|_| 100 + u64::from(below(&mut rng, 1400))).collect();
@@ -161,18 +161,8 @@ fn a_policy_is_verified_played_and_refused_when_damaged() {
     let out = scratch.path().join("run");
     let text = trained(&out);
     let file = out.join("policy/corner_ddqn_5.ava").display().to_string();
-    avastra(&["replay", &file]).assert().success();
-    avastra(&[
-        "run",
-        "--policy",
-        &file,
-        "--episodes",
-        "2",
-        "--out",
-        &out.join("played").display().to_string(),
-    ])
-    .assert()
-    .success();
+    done(&["replay", &file]);
+    done(&["run", "--policy", &file, "--episodes", "2", "--out", &out.join("played").display().to_string()]);
 
     let moved = moved(&text);
     let policy = load(&moved).expect("a policy may move");
