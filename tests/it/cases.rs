@@ -40,6 +40,15 @@ pub fn stem(path: &Path) -> String {
     path.file_stem().expect("it has a name").to_string_lossy().into_owned()
 }
 
+/// Copies the shipped space, with its roads and their maps, into a folder.
+pub fn copy_space(folder: &Path) {
+    std::fs::create_dir_all(folder.join("roads")).expect("it is writable");
+    let roads = ["corner", "residential", "boulevard", "crossroad"].map(|road| format!("roads/{road}.xodr"));
+    for name in ["avastra45.ava", "roads.ava"].into_iter().chain(roads.iter().map(String::as_str)) {
+        std::fs::copy(root().join("scenarios").join(name), folder.join(name)).expect("it is shipped");
+    }
+}
+
 /// Stem and path of every case of an area, sorted.
 pub fn cases(area: &str) -> Vec<(String, PathBuf)> {
     let found = files(root().join("tests/cases").join(area), "ava");

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::cases::{entries, root};
+use crate::cases::{copy_space, entries, root};
 use crate::command::{avastra, background, done, fails, outcome};
 use crate::world::FLICKER;
 
@@ -306,12 +306,7 @@ fn trainings_and_nothing_cannot_be_merged() {
 
 /// A space and a policy as they lie beside each other.
 fn checkout(folder: &Path) {
-    let roads = ["corner", "residential", "boulevard", "crossroad"].map(|road| format!("roads/{road}.xodr"));
-    std::fs::create_dir_all(folder.join("scenarios/roads")).expect("it is writable");
-    for name in ["avastra45.ava", "roads.ava"].into_iter().chain(roads.iter().map(String::as_str)) {
-        let name = Path::new("scenarios").join(name);
-        std::fs::copy(root().join(&name), folder.join(&name)).expect("it is shipped");
-    }
+    copy_space(&folder.join("scenarios"));
     std::fs::create_dir_all(folder.join("policies")).expect("it is writable");
     let name = "policies/corner.ava";
     std::fs::copy(root().join(name), folder.join(name)).expect("it is shipped");

@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use crate::cases::{entries, name, root};
+use crate::cases::{copy_space, entries, name, root};
 use crate::command::{avastra, done, fails, outcome};
 use crate::world::FLICKER;
 
@@ -17,13 +17,7 @@ struct Found {
 impl Found {
     fn new(flags: &[&str]) -> Found {
         let scratch = tempfile::tempdir().expect("a scratch directory");
-        let space = scratch.path().join("space");
-        std::fs::create_dir_all(space.join("roads")).expect("it is writable");
-        let roads =
-            ["corner", "residential", "boulevard", "crossroad"].map(|road| format!("roads/{road}.xodr"));
-        for name in ["avastra45.ava", "roads.ava"].into_iter().chain(roads.iter().map(String::as_str)) {
-            std::fs::copy(root().join("scenarios").join(name), space.join(name)).expect("it is shipped");
-        }
+        copy_space(&scratch.path().join("space"));
         let mut found = Found { scratch, scenarios: 0 };
         let (file, run) = (found.path("space/avastra45.ava"), found.path("run"));
         let settings =
