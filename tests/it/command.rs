@@ -61,6 +61,12 @@ pub fn last_line(stdout: &str) -> Value {
     serde_json::from_str(stdout.lines().last().expect("it prints a result")).expect("the result is JSON")
 }
 
+/// Changes a database behind the back of the program.
+pub fn change(database: &Path, statements: &str) {
+    let database = rusqlite::Connection::open(database).expect("it is a database");
+    database.execute_batch(statements).expect("it can be changed");
+}
+
 #[test]
 fn a_misspelt_command_is_told_the_nearest() {
     for (word, meant) in [("rn", "run"), ("chek", "check"), ("tran", "train")] {
@@ -248,13 +254,11 @@ fn an_interrupted_run_goes_on_where_it_was() {
     let whole = run("whole");
     run("cut");
     // The directory is left as by a run that was killed half-way.
-    let database = rusqlite::Connection::open(scratch.path().join("cut/run.db")).expect("it is a database");
     let cut = "DELETE FROM step WHERE episode >= 5; DELETE FROM collision WHERE episode >= 5;
                DELETE FROM offer WHERE episode >= 5; DELETE FROM held WHERE episode >= 5;
                DELETE FROM episode WHERE episode >= 5;
                DELETE FROM seal WHERE unit >= 5;";
-    database.execute_batch(cut).expect("it can be cut");
-    drop(database);
+    change(&scratch.path().join("cut/run.db"), cut);
     let resumed = done_in(scratch.path(), &["run", "--resume", "cut", "--format", "json"]);
     // What never happened is told of all episodes, the earlier ones included.
     let never = |text: &str| serde_json::from_str::<Value>(text).expect("a result")["never"].clone();

@@ -7,7 +7,7 @@ use std::process::Stdio;
 use std::time::Duration;
 
 use crate::cases::{entries, root};
-use crate::command::{avastra, done, fails, outcome};
+use crate::command::{avastra, change, done, fails, outcome};
 use crate::report::index_of;
 use crate::world::FLICKER;
 
@@ -147,13 +147,11 @@ fn a_run_that_was_edited_is_not_gone_on_with() {
 
     // An episode whose rows were changed is named, counts for nothing, and is played again.
     let bytes = std::fs::read(scratch.path("run/run.db")).expect("it is readable");
-    let database = rusqlite::Connection::open(scratch.path("run/run.db")).expect("it is a database");
-    let change = "UPDATE step SET proc = 0.5 WHERE episode = 1 AND step = 0;
-                  UPDATE episode SET distance_m = 1e9 WHERE episode = 1;
-                  PRAGMA foreign_keys = OFF;
-                  INSERT INTO held VALUES (9, 0, 1.0, 'nothing')";
-    database.execute_batch(change).expect("it can be changed");
-    drop(database);
+    let rows = "UPDATE step SET proc = 0.5 WHERE episode = 1 AND step = 0;
+                UPDATE episode SET distance_m = 1e9 WHERE episode = 1;
+                PRAGMA foreign_keys = OFF;
+                INSERT INTO held VALUES (9, 0, 1.0, 'nothing')";
+    change(&scratch.path("run/run.db"), rows);
     let changed = "the rows of episode 1, episode 9 were changed since they were written";
     let page = scratch.path("page.html");
     let (status, _, stderr) = outcome(&mut avastra(&["report", &out, "--out", &page.display().to_string()]));

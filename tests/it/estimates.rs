@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use crate::cases::{entries, expect_snapshot};
-use crate::command::{avastra, done, fails, last_line, outcome};
+use crate::command::{avastra, change, done, fails, last_line, outcome};
 use crate::report::index_of;
 
 const SPACE: &str = "scenarios/avastra45.ava";
@@ -95,9 +95,7 @@ fn only_its_database_counts(scratch: &Path, files: &[PathBuf]) {
     }
 
     // A part that was changed is played again.
-    let database = rusqlite::Connection::open(directory.join("estimate.db")).expect("it is a database");
-    database.execute_batch("UPDATE part SET probability = 0.9 WHERE part = 2").expect("it can be changed");
-    drop(database);
+    change(&directory.join("estimate.db"), "UPDATE part SET probability = 0.9 WHERE part = 2");
     let (status, stdout, stderr) = outcome(&mut avastra(&["estimate", "--resume", &out]));
     assert!(status == 0 && stderr.contains("the rows of part 2 were changed"), "{stderr}");
     let is_told = stdout.contains("was missing, is written again")
@@ -107,9 +105,7 @@ fn only_its_database_counts(scratch: &Path, files: &[PathBuf]) {
     assert_eq!(kept(&directory), results);
 
     // Where all parts were changed there is nothing to show, but it is not unfinished.
-    let database = rusqlite::Connection::open(directory.join("estimate.db")).expect("it is a database");
-    database.execute_batch("UPDATE part SET probability = 0.9").expect("it can be changed");
-    drop(database);
+    change(&directory.join("estimate.db"), "UPDATE part SET probability = 0.9");
     let (status, _, stderr) = outcome(&mut avastra(&["report", &out, "--out", &page]));
     let is_told = stderr.contains("were changed since they were written")
         && stderr.contains("--resume")

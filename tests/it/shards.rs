@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::cases::{copy_space, entries, root};
-use crate::command::{avastra, background, done, fails, outcome};
+use crate::command::{avastra, background, change, done, fails, outcome};
 use crate::world::FLICKER;
 
 const SPACE: &str = "scenarios/avastra45.ava";
@@ -83,8 +83,7 @@ fn merged(command: &[&str], kind: &str, order: &[u32]) -> tempfile::TempDir {
         equal(&at("whole"), &at(out));
     }
     // A merge that was killed after it had named the directory is ended by the next one.
-    let database = rusqlite::Connection::open(at("merged").join(format!("{kind}.db")));
-    database.expect("it is a database").execute_batch("VACUUM").expect("it can be written anew");
+    change(&at("merged").join(format!("{kind}.db")), "VACUUM");
     let results = at("merged/results.json");
     if results.is_file() {
         std::fs::remove_file(results).expect("it is there");
@@ -129,9 +128,7 @@ fn eight_shards_of_a_run_make_the_run() {
     assert_eq!((status, stdout.trim()), (0, "4"), "{stderr}");
     assert!(stderr.contains("4/run.db"), "{stderr}");
     // One that another version wrote is not torn.
-    let database = rusqlite::Connection::open(scratch.path().join("far/away/5/run.db"));
-    let set = database.expect("it is a database").pragma_update(None, "user_version", 9999);
-    set.expect("it can be changed");
+    change(&scratch.path().join("far/away/5/run.db"), "PRAGMA user_version = 9999");
     let (status, stdout, stderr) = outcome(&mut avastra(&[&["merge"], &copies[..], &["--missing"]].concat()));
     assert!(status == 1 && stdout.is_empty() && stderr.contains("it has layout 9999"), "{stdout}{stderr}");
 
@@ -166,9 +163,8 @@ fn eight_shards_of_a_run_make_the_run() {
     let told = merge(&scratch.path().join("shards/2"));
     assert!(told.contains("is shard 2/9") && told.contains("is shard 1/8"), "{told}");
     // Rows that were changed behind its back.
-    let database = scratch.path().join("shards/3/run.db");
-    let database = rusqlite::Connection::open(database).expect("it is a database");
-    database.execute_batch("UPDATE episode SET distance_m = distance_m + 1").expect("it can be changed");
+    let longer = "UPDATE episode SET distance_m = distance_m + 1";
+    change(&scratch.path().join("shards/3/run.db"), longer);
     let told = merge(&scratch.path().join("shards/3"));
     assert!(told.contains("were changed since they were written"), "{told}");
 }

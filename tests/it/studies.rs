@@ -10,7 +10,7 @@ use avastra::study::StudyDatabase;
 use serde_json::Value;
 
 use crate::cases::{expect_snapshot, files, root};
-use crate::command::{avastra, background, done, done_in, fails, last_line, outcome};
+use crate::command::{avastra, background, change, done, done_in, fails, last_line, outcome};
 use crate::report::index_of;
 use crate::world::FLICKER;
 
@@ -113,10 +113,8 @@ fn what_another_study_has_played_is_taken_over() {
         (index_of(&html)["overview"]["study"].clone(), stderr)
     };
     assert_eq!(overview().0, whole);
-    let database = rusqlite::Connection::open(alone.join("study.db")).expect("it is a database");
-    let change = "UPDATE evaluated SET distance_m = 1e9 WHERE cell = 1 AND episode = 0";
-    database.execute_batch(change).expect("it can be changed");
-    drop(database);
+    let longer = "UPDATE evaluated SET distance_m = 1e9 WHERE cell = 1 AND episode = 0";
+    change(&alone.join("study.db"), longer);
     let (damaged, stderr) = overview();
     assert!(stderr.contains("the rows of cell 1 were changed"), "{stderr}");
     assert_eq!(damaged["cells"].as_u64().map(|cells| cells + 1), whole["cells"].as_u64());

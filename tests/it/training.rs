@@ -8,7 +8,7 @@ use std::time::Duration;
 use avastra::rng::{Stream, below, stream};
 
 use crate::cases::{entries, root};
-use crate::command::{avastra, done, fails, outcome};
+use crate::command::{avastra, change, done, fails, outcome};
 use crate::policies::{load, moved, sealed};
 use crate::report::index_of;
 use crate::world::{FLICKER, SMALL};
@@ -139,10 +139,8 @@ fn scenarios_of_a_training_that_are_gone_or_edited_are_noticed() {
     assert_eq!(read(gone), written);
 
     // Each episode depends on those before, so a changed one cannot be played again alone. A page leaves it out.
-    let database = rusqlite::Connection::open(out.join("run.db")).expect("it is a database");
-    let change = "UPDATE learning SET return = 9 WHERE episode = 3; UPDATE result SET text = '{}'";
-    database.execute_batch(change).expect("it can be changed");
-    drop(database);
+    let rows = "UPDATE learning SET return = 9 WHERE episode = 3; UPDATE result SET text = '{}'";
+    change(&out.join("run.db"), rows);
     fails(&["train", "--resume", &at], "a training must be begun anew");
     let page = scratch.path().join("page.html");
     let (status, _, stderr) =
