@@ -14,7 +14,7 @@ const SIZE_MAX: usize = 3_000;
 
 fuzz_target!(|bytes: &[u8]| {
     let [construct, low, high, ..] = bytes else { return };
-    let construct = &scale::GRAMMAR[usize::from(*construct) % scale::GRAMMAR.len()];
+    let (_, text) = scale::GRAMMAR[usize::from(*construct) % scale::GRAMMAR.len()];
     let size = 1 + usize::from(u16::from_le_bytes([*low, *high])) % SIZE_MAX;
-    examine::examine(&(construct.text)(size));
+    examine::examine(&text(size));
 });

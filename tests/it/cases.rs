@@ -1,5 +1,6 @@
 //! Cases: each file of a directory is rendered, and the result is compared with its snapshot.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// The repository.
@@ -7,19 +8,52 @@ pub fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
+/// What is in a folder, sorted.
+pub fn entries(folder: impl AsRef<Path>) -> Vec<PathBuf> {
+    let folder = folder.as_ref();
+    let found = std::fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
+    let mut paths: Vec<PathBuf> = found.map(|entry| entry.expect("it is readable").path()).collect();
+    paths.sort();
+    paths
+}
+
+/// The files of a folder with an extension, sorted.
+pub fn files(folder: impl AsRef<Path>, extension: &str) -> Vec<PathBuf> {
+    let mut paths = entries(folder);
+    paths.retain(|path| path.extension().is_some_and(|found| found == extension));
+    paths
+}
+
+/// The names of the files in a folder, and their texts.
+pub fn texts(folder: impl AsRef<Path>) -> BTreeMap<String, String> {
+    let text = |path: PathBuf| (name(&path), std::fs::read_to_string(path).expect("it is text"));
+    entries(folder).into_iter().map(text).collect()
+}
+
+/// The name of a file.
+pub fn name(path: &Path) -> String {
+    path.file_name().expect("it has a name").to_string_lossy().into_owned()
+}
+
+/// The name of a file without its extension.
+pub fn stem(path: &Path) -> String {
+    path.file_stem().expect("it has a name").to_string_lossy().into_owned()
+}
+
+/// Copies the shipped space, with its roads and their maps, into a folder.
+pub fn copy_space(folder: &Path) {
+    std::fs::create_dir_all(folder.join("roads")).expect("it is writable");
+    let roads = ["corner", "residential", "boulevard", "crossroad"].map(|road| format!("roads/{road}.xodr"));
+    for name in ["avastra45.ava", "roads.ava"].into_iter().chain(roads.iter().map(String::as_str)) {
+        std::fs::copy(root().join("scenarios").join(name), folder.join(name)).expect("it is shipped");
+    }
+}
+
 /// Stem and path of every case of an area, sorted.
 pub fn cases(area: &str) -> Vec<(String, PathBuf)> {
-    let directory = root().join("tests/cases").join(area);
-    let mut found: Vec<(String, PathBuf)> = std::fs::read_dir(&directory)
-        .unwrap_or_else(|error| panic!("{}: {error}", directory.display()))
-        .flatten()
-        .map(|entry| entry.path())
-        .filter(|path| path.extension().is_some_and(|extension| extension == "ava"))
-        .map(|path| (path.file_stem().expect("it has a name").to_string_lossy().into_owned(), path))
-        .collect();
-    found.sort();
-    assert!(!found.is_empty(), "no case in {}", directory.display());
-    found
+    let found = files(root().join("tests/cases").join(area), "ava");
+    assert!(!found.is_empty(), "no case in {area}");
+    found.into_iter().map(|path| (stem(&path), path)).collect()
 }
 
 /// Compares a text with `snapshots/<area>/<stem>.snap`.

@@ -4,8 +4,9 @@ use std::path::Path;
 use std::process::{Child, Stdio};
 
 use assert_cmd::Command;
+use serde_json::Value;
 
-use crate::cases::{cases, each_case, root};
+use crate::cases::{cases, each_case, files, root, texts};
 use crate::world::FLICKER;
 
 /// `avastra` with arguments, in the repository.
@@ -34,12 +35,42 @@ pub fn outcome(command: &mut Command) -> (i32, String, String) {
     (status, text(output.stdout), text(output.stderr))
 }
 
+/// What a command prints that ends well.
+#[track_caller]
+pub fn done(arguments: &[&str]) -> String {
+    done_in(&root(), arguments)
+}
+
+/// What a command prints that ends well in a folder.
+#[track_caller]
+pub fn done_in(folder: &Path, arguments: &[&str]) -> String {
+    let (status, stdout, stderr) = outcome(avastra(arguments).current_dir(folder));
+    assert_eq!(status, 0, "{arguments:?}: {stdout}{stderr}");
+    stdout
+}
+
+/// A command ends with status 1, and says why.
+#[track_caller]
+pub fn fails(arguments: &[&str], reason: &str) {
+    let (status, stdout, stderr) = outcome(&mut avastra(arguments));
+    assert!(status == 1 && stderr.contains(reason), "{arguments:?}: {status}: {stdout}{stderr}");
+}
+
+/// The last line that a command prints: its result.
+pub fn last_line(stdout: &str) -> Value {
+    serde_json::from_str(stdout.lines().last().expect("it prints a result")).expect("the result is JSON")
+}
+
+/// Changes a database behind the back of the program.
+pub fn change(database: &Path, statements: &str) {
+    let database = rusqlite::Connection::open(database).expect("it is a database");
+    database.execute_batch(statements).expect("it can be changed");
+}
+
 #[test]
 fn a_misspelt_command_is_told_the_nearest() {
     for (word, meant) in [("rn", "run"), ("chek", "check"), ("tran", "train")] {
-        let (status, _, stderr) = outcome(&mut avastra(&[word]));
-        assert_eq!(status, 1, "{stderr}");
-        assert!(stderr.contains(&format!("exists: '{meant}'")), "{stderr}");
+        fails(&[word], &format!("exists: '{meant}'"));
     }
 }
 
@@ -50,8 +81,7 @@ fn a_command_or_an_option_that_was_is_told_its_new_name() {
         (&["explain-policy", "a.ava"], "`explain-policy` is now `policy explain`"),
         (&["run", "a.ava", "--ads-config", "car.yaml"], "`--ads-config` is now `--ads FILE`"),
     ] {
-        let (status, _, stderr) = outcome(&mut avastra(words));
-        assert!(status == 1 && stderr.contains(now), "{stderr}");
+        fails(words, now);
     }
 }
 
@@ -66,9 +96,7 @@ fn a_picture_shows_sidewalks() {
     );
     let file = scratch.path().join("street.ava");
     std::fs::write(&file, scenario).expect("it is writable");
-    let (status, svg, stderr) =
-        outcome(&mut avastra(&["render", &file.display().to_string(), "--at", "1", "--out", "-"]));
-    assert_eq!(status, 0, "{stderr}");
+    let svg = done(&["render", &file.display().to_string(), "--at", "1", "--out", "-"]);
     assert_eq!(svg.matches("fill=\"#dcd7cf\"").count(), 2, "one on each side");
 }
 
@@ -95,8 +123,7 @@ fn a_run_says_what_it_refused_and_how_much_traffic_there_was() {
     let space = ["run", "scenarios/avastra45.ava", "--format", "plain"];
     let settings =
         ["--agent", "random-raw", "--episodes", "2", "--seed", "3", "--ambient", "4", "--out", &out];
-    let (status, stdout, stderr) = outcome(&mut avastra(&[&space[..], &settings[..]].concat()));
-    assert_eq!(status, 0, "{stderr}");
+    let stdout = done(&[&space[..], &settings[..]].concat());
     assert!(stdout.contains("refused: "), "{stdout}");
     assert!(stdout.contains(" × "), "{stdout}");
     let settings = std::fs::read_to_string(scratch.path().join("run/run.yaml")).expect("it is written");
@@ -109,7 +136,7 @@ fn every_diagnostic_is_also_json() {
         let (_, stdout, stderr) =
             outcome(&mut avastra(&["check", "--format", "json", &path.display().to_string()]));
         for line in stderr.lines().chain(stdout.lines()) {
-            let value: serde_json::Value = serde_json::from_str(line).unwrap_or_else(|error| {
+            let value: Value = serde_json::from_str(line).unwrap_or_else(|error| {
                 panic!("{stem}: {error}: {line}");
             });
             assert!(value.is_object(), "{stem}: {line}");
@@ -155,9 +182,7 @@ fn what_does_not_exist_is_named_with_what_does() {
         (&["render", space, "--at", "2", "9.5"], "separated by commas, as in `--at 2,9.5`"),
     ];
     for (arguments, hint) in cases {
-        let (status, _, stderr) = outcome(&mut avastra(arguments));
-        assert_eq!(status, 1, "{arguments:?}: {stderr}");
-        assert!(stderr.contains(hint), "{arguments:?}: {stderr}");
+        fails(arguments, hint);
     }
 }
 
@@ -165,28 +190,14 @@ fn what_does_not_exist_is_named_with_what_does() {
 fn compile_and_run_write_the_same_files_twice() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let space = root().join("scenarios/avastra45.ava").display().to_string();
-    let in_scratch = |arguments: &[&str]| {
-        let (status, stdout, stderr) = outcome(avastra(arguments).current_dir(scratch.path()));
-        assert_eq!(status, 0, "{arguments:?}: {stderr}");
-        stdout
-    };
+    let in_scratch = |arguments: &[&str]| done_in(scratch.path(), arguments);
     in_scratch(&["compile", &space]);
     let profile = root().join(FLICKER).display().to_string();
     let settings = ["--seed", "7", "--episodes", "10", "--ads", &profile];
     in_scratch(&[&["run", "--jobs", "1"], &settings[..]].concat());
     in_scratch(&[&["run", "--jobs", "2"], &settings[..]].concat());
     let critical = |run: &str| -> Vec<(String, String)> {
-        let directory = scratch.path().join("runs").join(run).join("critical");
-        let mut files: Vec<(String, String)> = std::fs::read_dir(&directory)
-            .expect("the run made it")
-            .flatten()
-            .map(|entry| {
-                let text = std::fs::read_to_string(entry.path()).expect("it is readable");
-                (entry.file_name().to_string_lossy().into_owned(), text)
-            })
-            .collect();
-        files.sort();
-        files
+        texts(scratch.path().join("runs").join(run).join("critical")).into_iter().collect()
     };
     let files = critical("0001");
     assert!(!files.is_empty(), "twenty episodes find a crash");
@@ -226,8 +237,7 @@ fn what_is_no_plain_file_is_written_to_and_never_replaced() {
     std::os::unix::fs::symlink("/dev/null", &to_device).expect("links can be made");
     for link in [to_file, to_device] {
         let out = link.to_str().expect("the path is text");
-        let (status, _, stderr) = outcome(&mut avastra(&["compile", "scenarios/avastra45.ava", "-o", out]));
-        assert_eq!(status, 0, "{stderr}");
+        done(&["compile", "scenarios/avastra45.ava", "-o", out]);
         assert!(link.is_symlink(), "{out} was replaced");
     }
     assert!(std::fs::read_to_string(&kept).expect("it is readable").len() > 1000, "the link was followed");
@@ -239,25 +249,19 @@ fn an_interrupted_run_goes_on_where_it_was() {
     let space = root().join("scenarios/avastra45.ava").display().to_string();
     let run = |out: &str| {
         let arguments = ["run", &space, "--seed", "3", "--episodes", "12", "--out", out, "--format", "json"];
-        outcome(avastra(&arguments).current_dir(scratch.path()))
+        done_in(scratch.path(), &arguments)
     };
-    let (status, whole, stderr) = run("whole");
-    assert_eq!(status, 0, "{stderr}");
-    assert_eq!(run("cut").0, 0);
+    let whole = run("whole");
+    run("cut");
     // The directory is left as by a run that was killed half-way.
-    let database = rusqlite::Connection::open(scratch.path().join("cut/run.db")).expect("it is a database");
     let cut = "DELETE FROM step WHERE episode >= 5; DELETE FROM collision WHERE episode >= 5;
                DELETE FROM offer WHERE episode >= 5; DELETE FROM held WHERE episode >= 5;
                DELETE FROM episode WHERE episode >= 5;
                DELETE FROM seal WHERE unit >= 5;";
-    database.execute_batch(cut).expect("it can be cut");
-    drop(database);
-    let resume = ["run", "--resume", "cut", "--format", "json"];
-    let (status, resumed, stderr) = outcome(avastra(&resume).current_dir(scratch.path()));
-    assert_eq!(status, 0, "{stderr}");
+    change(&scratch.path().join("cut/run.db"), cut);
+    let resumed = done_in(scratch.path(), &["run", "--resume", "cut", "--format", "json"]);
     // What never happened is told of all episodes, the earlier ones included.
-    let never =
-        |text: &str| serde_json::from_str::<serde_json::Value>(text).expect("a result")["never"].clone();
+    let never = |text: &str| serde_json::from_str::<Value>(text).expect("a result")["never"].clone();
     assert_eq!(never(&whole), never(&resumed));
     assert_eq!(never(&whole)["rows"], 45, "{whole}");
     let traces = |run: &str| -> Vec<String> {
@@ -285,9 +289,7 @@ fn a_run_says_what_never_happened() {
     std::fs::write(&space, text).expect("it is writable");
     let run = |more: &[&str]| {
         let all = ["run", "space.ava", "--road", "corner", "--episodes", "2", "--format", "plain"];
-        let (status, stdout, stderr) = outcome(avastra(&[&all, more].concat()).current_dir(scratch.path()));
-        assert_eq!(status, 0, "{stderr}");
-        stdout
+        done_in(scratch.path(), &[&all, more].concat())
     };
     let short = run(&[]);
     assert!(short.contains("1 of 3 rows never happened, in "), "{short}");
@@ -301,18 +303,10 @@ fn a_run_says_what_never_happened() {
 
 #[test]
 fn shipped_files_are_sound_and_formatted() {
-    let files: Vec<String> = std::fs::read_dir(root().join("scenarios"))
-        .expect("it is a directory")
-        .flatten()
-        .map(|entry| entry.path())
-        .filter(|path| path.extension().is_some_and(|extension| extension == "ava"))
-        .map(|path| path.display().to_string())
-        .collect();
-    let files: Vec<&str> = files.iter().map(String::as_str).collect();
-    let (status, _, stderr) = outcome(&mut avastra(&[&["check", "--strict"], &files[..]].concat()));
-    assert_eq!(status, 0, "{stderr}");
-    let (status, stdout, _) = outcome(&mut avastra(&[&["fmt", "--check"], &files[..]].concat()));
-    assert_eq!(status, 0, "{stdout}");
+    let files = files(root().join("scenarios"), "ava");
+    let files: Vec<&str> = files.iter().map(|path| path.to_str().expect("it is text")).collect();
+    done(&[&["check", "--strict"], &files[..]].concat());
+    done(&[&["fmt", "--check"], &files[..]].concat());
 }
 
 #[test]

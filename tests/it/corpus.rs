@@ -10,7 +10,7 @@ use avastra::syntax::ast::FileId;
 use avastra::syntax::{Diagnostic, Severity, apply_fixes};
 
 use crate::cases::{cases, each_case, root};
-use crate::command::{avastra, outcome};
+use crate::command::{avastra, done, done_in, outcome};
 
 /// Loads a case, with `text` in place of the file's own text if there is one.
 fn loaded(path: &Path, text: Option<&str>) -> Loaded {
@@ -166,11 +166,7 @@ fn fixes_are_made_when_asked_for() {
 #[test]
 fn a_new_space_is_ready_to_use() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
-    let in_scratch = |arguments: &[&str]| {
-        let (status, stdout, stderr) = outcome(avastra(arguments).current_dir(scratch.path()));
-        assert_eq!(status, 0, "{arguments:?}: {stdout}{stderr}");
-        stdout
-    };
+    let in_scratch = |arguments: &[&str]| done_in(scratch.path(), arguments);
     in_scratch(&["new", "mine"]);
     in_scratch(&["check", "--strict", "mine/space.ava"]);
     in_scratch(&["fmt", "--check", "mine/space.ava", "mine/roads.ava"]);
@@ -188,8 +184,7 @@ fn a_new_space_is_ready_to_use() {
 
 #[test]
 fn codes_and_shells_are_explained() {
-    let (status, stdout, _) = outcome(&mut avastra(&["explain", "av0401"]));
-    assert_eq!(status, 0);
+    let stdout = done(&["explain", "av0401"]);
     assert!(stdout.starts_with("# AV0401: ") && stdout.contains("## Right"), "{stdout}");
     let (_, stdout, _) = outcome(&mut avastra(&["explain"]));
     assert_eq!(stdout.lines().count(), PAGES.len() + 1, "a line for each code, and one for `json`");
@@ -208,8 +203,7 @@ fn differences_are_told_by_their_meaning() {
     let (status, stdout, stderr) = outcome(&mut avastra(&["diff", space, space]));
     assert_eq!((status, stdout.as_str()), (0, "the two spaces mean the same\n"), "{stderr}");
     let own = root().join("tests/cases/spaces/own_gap.ava");
-    let (status, stdout, stderr) = outcome(&mut avastra(&["diff", space, &own.display().to_string()]));
-    assert_eq!(status, 0, "{stderr}");
+    let stdout = done(&["diff", space, &own.display().to_string()]);
     for line in [
         "changed fn `lead`: ",
         "tightened rule `walking_pace`: ",

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::Stdio;
 use std::time::Duration;
 
-use crate::cases::root;
-use crate::command::{avastra, outcome};
+use crate::cases::{entries, root};
+use crate::command::{avastra, change, done, fails, outcome};
 use crate::report::index_of;
 use crate::world::FLICKER;
 
@@ -39,9 +39,11 @@ fn run_into(out: &str) -> (i32, String, String) {
     outcome(&mut avastra(&[&["run", SPACE], &settings[..]].concat()))
 }
 
-fn resume(command: &str, directory: &str) -> (i32, String) {
-    let (status, _, stderr) = outcome(&mut avastra(&[command, "--resume", directory]));
-    (status, stderr)
+/// What is said on standard error when a run is gone on with.
+fn resumed(directory: &str) -> String {
+    let (status, _, stderr) = outcome(&mut avastra(&["run", "--resume", directory]));
+    assert_eq!(status, 0, "{stderr}");
+    stderr
 }
 
 /// Replaces a part of a file.
@@ -63,8 +65,7 @@ fn names_that_are_no_text_are_refused_before_anything_is_played() {
         assert!(stdout.lines().all(|line| serde_json::from_str::<serde_json::Value>(line).is_ok()));
     }
     // One that is found in a folder is named; nothing of the folder is played.
-    let (status, _, stderr) = outcome(&mut avastra(&["test", &scratch.0.path().display().to_string()]));
-    assert!(status == 1 && stderr.contains("the path is not UTF-8"), "{stderr}");
+    fails(&["test", &scratch.0.path().display().to_string()], "the path is not UTF-8");
     let inside = scratch.0.path().join(OsStr::from_bytes(b"run\xfe"));
     std::fs::create_dir(&inside).expect("it is writable");
     let space = root().join(SPACE);
@@ -112,18 +113,16 @@ fn what_a_kill_left_before_the_beginning_can_be_begun() {
     let out = scratch.text("run");
     std::fs::create_dir_all(scratch.path("run/critical/space")).expect("it is writable");
     std::fs::write(scratch.path("run/run.yaml.partial"), "avastra: 0").expect("it is writable");
-    let (status, stderr) = resume("run", &out);
-    assert!(status == 1 && stderr.contains("it has no run.yaml; begin one with `--out"), "{stderr}");
+    fails(&["run", "--resume", &out], "it has no run.yaml; begin one with `--out");
     assert_eq!(run_into(&out).0, 0);
     let (status, _, stderr) = run_into(&out);
     assert!(status == 1 && stderr.contains("is not empty"), "{stderr}");
     // The database may be missing as long as nothing was found.
     std::fs::remove_file(scratch.path("run/run.db")).expect("it is there");
-    assert_eq!(resume("run", &out).0, 0);
+    resumed(&out);
     std::fs::write(scratch.path("run/critical/corner_0000.ava"), "language 1\n").expect("it is writable");
     std::fs::remove_file(scratch.path("run/run.db")).expect("it is there");
-    let (status, stderr) = resume("run", &out);
-    assert!(status == 1 && stderr.contains("is missing, and `critical` has scenarios"), "{stderr}");
+    fails(&["run", "--resume", &out], "is missing, and `critical` has scenarios");
 }
 
 #[test]
@@ -139,25 +138,20 @@ fn a_run_that_was_edited_is_not_gone_on_with() {
         ("ambient: 0", "ambient: 5", "`ambient` was 0"),
     ] {
         edit(&settings, from, to);
-        let (status, stderr) = resume("run", &out);
-        assert!(status == 1 && stderr.contains(what), "{stderr}");
+        fails(&["run", "--resume", &out], what);
         std::fs::write(&settings, &whole).expect("it is writable");
     }
-    assert_eq!(resume("run", &out).0, 0);
-    let (status, stderr) = resume("train", &out);
-    assert!(status == 1 && stderr.contains("holds a run: go on with `avastra run --resume"), "{stderr}");
-    let (status, stderr) = resume("study", &out);
-    assert!(status == 1 && stderr.contains("holds a run"), "{stderr}");
+    resumed(&out);
+    fails(&["train", "--resume", &out], "holds a run: go on with `avastra run --resume");
+    fails(&["study", "--resume", &out], "holds a run");
 
     // An episode whose rows were changed is named, counts for nothing, and is played again.
     let bytes = std::fs::read(scratch.path("run/run.db")).expect("it is readable");
-    let database = rusqlite::Connection::open(scratch.path("run/run.db")).expect("it is a database");
-    let change = "UPDATE step SET proc = 0.5 WHERE episode = 1 AND step = 0;
-                  UPDATE episode SET distance_m = 1e9 WHERE episode = 1;
-                  PRAGMA foreign_keys = OFF;
-                  INSERT INTO held VALUES (9, 0, 1.0, 'nothing')";
-    database.execute_batch(change).expect("it can be changed");
-    drop(database);
+    let rows = "UPDATE step SET proc = 0.5 WHERE episode = 1 AND step = 0;
+                UPDATE episode SET distance_m = 1e9 WHERE episode = 1;
+                PRAGMA foreign_keys = OFF;
+                INSERT INTO held VALUES (9, 0, 1.0, 'nothing')";
+    change(&scratch.path("run/run.db"), rows);
     let changed = "the rows of episode 1, episode 9 were changed since they were written";
     let page = scratch.path("page.html");
     let (status, _, stderr) = outcome(&mut avastra(&["report", &out, "--out", &page.display().to_string()]));
@@ -168,17 +162,15 @@ fn a_run_that_was_edited_is_not_gone_on_with() {
     assert!(overview["totals"]["driven_m"].as_f64().is_some_and(|driven_m| driven_m < 1e6), "{overview}");
     let (status, _, stderr) = outcome(&mut avastra(&["merge", &out, "--missing"]));
     assert!(status == 0 && stderr.contains("its rows of episode 1 were changed"), "{stderr}");
-    let (status, stderr) = resume("run", &out);
-    let again = format!("{changed}: each such episode is played again");
-    assert!(status == 0 && stderr.contains(&again), "{stderr}");
+    let stderr = resumed(&out);
+    assert!(stderr.contains(&format!("{changed}: each such episode is played again")), "{stderr}");
     assert!(std::fs::read(scratch.path("run/run.db")).expect("it is readable") == bytes);
-    let (status, stderr) = resume("run", &out);
-    assert!(status == 0 && !stderr.contains("changed"), "{stderr}");
+    let stderr = resumed(&out);
+    assert!(!stderr.contains("changed"), "{stderr}");
     let torn: Vec<u8> =
         bytes.iter().enumerate().map(|(at, byte)| if at % 991 == 990 { !byte } else { *byte }).collect();
     std::fs::write(scratch.path("run/run.db"), torn).expect("it is writable");
-    let (status, stderr) = resume("run", &out);
-    assert!(status == 1 && stderr.contains("begin a new one"), "{stderr}");
+    fails(&["run", "--resume", &out], "begin a new one");
 }
 
 #[test]
@@ -188,10 +180,9 @@ fn one_process_at_a_time_works_in_a_directory() {
     assert_eq!(run_into(&out).0, 0);
     let other = std::fs::File::open(scratch.path("run")).expect("it is there");
     other.lock().expect("no process holds it");
-    let (status, stderr) = resume("run", &out);
-    assert!(status == 1 && stderr.contains("another avastra is at work"), "{stderr}");
+    fails(&["run", "--resume", &out], "another avastra is at work");
     other.unlock().expect("it was locked");
-    assert_eq!(resume("run", &out).0, 0);
+    resumed(&out);
 }
 
 #[test]
@@ -272,8 +263,7 @@ fn a_link_to_nothing_is_not_replaced() {
     let scratch = Scratch::new();
     let link = scratch.path("link.yaml");
     std::os::unix::fs::symlink(scratch.path("nothing"), &link).expect("links can be made");
-    let (status, _, stderr) = outcome(&mut avastra(&["compile", SPACE, "-o", &link.display().to_string()]));
-    assert!(status == 1 && stderr.contains("a link to a file that does not exist"), "{stderr}");
+    fails(&["compile", SPACE, "-o", &link.display().to_string()], "a link to a file that does not exist");
     assert!(link.is_symlink());
 }
 
@@ -282,25 +272,20 @@ fn scenarios_that_are_gone_or_edited_are_noticed() {
     let scratch = Scratch::new();
     let out = scratch.text("run");
     let settings = ["--ads", FLICKER, "--road", "corner", "--episodes", "12", "--seed", "5", "--out", &out];
-    let (status, _, stderr) = outcome(&mut avastra(&[&["run", SPACE], &settings[..]].concat()));
-    assert_eq!(status, 0, "{stderr}");
-    let critical = std::fs::read_dir(scratch.path("run/critical")).expect("it is there").flatten();
-    let mut files: Vec<PathBuf> = critical.map(|entry| entry.path()).collect();
-    files.sort();
+    done(&[&["run", SPACE], &settings[..]].concat());
+    let files = entries(scratch.path("run/critical"));
     let [gone, edited, ..] = files.as_slice() else { panic!("the run finds two crashes: {files:?}") };
     let written = std::fs::read(gone).expect("it is readable");
     std::fs::remove_file(gone).expect("it is there");
     edit(edited, "language 1", "// mine\nlanguage 1");
-    let (status, stdout, stderr) = outcome(&mut avastra(&["run", "--resume", &out]));
-    assert_eq!(status, 0, "{stderr}");
+    let stdout = done(&["run", "--resume", &out]);
     assert!(stdout.contains("was missing, is written again"), "{stdout}");
     assert!(stdout.contains("edited since the run wrote it"), "{stdout}");
     assert_eq!(std::fs::read(gone).expect("it is back"), written);
 
     // A database without anything in it is no reason to play all again over what was found.
     std::fs::write(scratch.path("run/run.db"), "").expect("it is writable");
-    let (status, stderr) = resume("run", &out);
-    assert!(status == 1 && stderr.contains("is empty, and `critical` has scenarios"), "{stderr}");
+    fails(&["run", "--resume", &out], "is empty, and `critical` has scenarios");
 }
 
 #[test]

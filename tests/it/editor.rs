@@ -7,6 +7,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use serde_json::{Value, json};
 
 use crate::cases::{expect_snapshot, root};
+use crate::command::done;
 
 /// An editor with a server.
 struct Editor {
@@ -125,10 +126,19 @@ impl Editor {
         self.ask(method, params)
     }
 
+    /// What the server knows of the place of `|`.
+    fn find(&mut self, what: &str, uri: &str, marked: &str) -> Value {
+        let found = self.ask_at(&format!("textDocument/{what}"), uri, marked, json!({}));
+        found.expect("it can be asked")
+    }
+
+    fn rename(&mut self, uri: &str, marked: &str, name: &str) -> Result<Value, Value> {
+        self.ask_at("textDocument/rename", uri, marked, json!({ "newName": name }))
+    }
+
     /// The labels that are proposed at `|`, best first.
     fn proposals(&mut self, marked: &str) -> Vec<String> {
-        let list = self.ask_at("textDocument/completion", &space_uri(), marked, json!({}));
-        let list = list.expect("proposals need nothing");
+        let list = self.find("completion", &space_uri(), marked);
         let mut items: Vec<(String, String)> = list["items"]
             .as_array()
             .expect("a list")
@@ -140,8 +150,7 @@ impl Editor {
     }
 
     fn hover(&mut self, marked: &str) -> String {
-        let found = self.ask_at("textDocument/hover", &space_uri(), marked, json!({}));
-        text(&found.expect("it can be asked")["contents"]["value"])
+        text(&self.find("hover", &space_uri(), marked)["contents"]["value"])
     }
 
     /// Ends the input. Returns exit status and stderr.
@@ -416,27 +425,23 @@ fn definitions_and_references_cross_files() {
     let mut editor = Editor::ready();
     let uri = space_uri();
     let roads = self::uri(&root().join("scenarios/roads.ava"));
-    let found =
-        editor.ask_at("textDocument/definition", &uri, &marked("roads: [residential, corn"), json!({}));
-    let found = found.expect("it can be asked");
+    let found = editor.find("definition", &uri, &marked("roads: [residential, corn"));
     assert_eq!(found[0]["uri"], roads.as_str());
     assert_eq!(found[0]["range"]["start"], json!({ "line": 4, "character": 5 }));
-    let found = editor.ask_at("textDocument/definition", &uri, &marked("use \"roads"), json!({}));
-    assert_eq!(found.expect("it can be asked")[0]["uri"], roads.as_str());
+    let found = editor.find("definition", &uri, &marked("use \"roads"));
+    assert_eq!(found[0]["uri"], roads.as_str());
     // A variant of two enums is told apart by its type.
-    let found = editor.ask_at("textDocument/references", &uri, &marked("enum Lane = Le"), json!({}));
-    assert_eq!(found.expect("it can be asked").as_array().map(Vec::len), Some(1));
+    let found = editor.find("references", &uri, &marked("enum Lane = Le"));
+    assert_eq!(found.as_array().map(Vec::len), Some(1));
     // A rule over a group names a parameter of each of its actions.
-    let found =
-        editor.ask_at("textDocument/definition", &uri, &marked("rule npc_speed on vehicles: sp"), json!({}));
-    assert_eq!(found.expect("it can be asked").as_array().map(Vec::len), Some(4));
+    let found = editor.find("definition", &uri, &marked("rule npc_speed on vehicles: sp"));
+    assert_eq!(found.as_array().map(Vec::len), Some(4));
     let context = json!({ "context": { "includeDeclaration": false } });
     let found = editor.ask_at("textDocument/references", &uri, &marked("fn si"), context);
     assert_eq!(found.expect("it can be asked").as_array().map(Vec::len), Some(1));
-    let found = editor.ask_at("textDocument/documentHighlight", &uri, &marked("state sk"), json!({}));
-    assert_eq!(found.expect("it can be asked").as_array().map(Vec::len), Some(12));
-    let found = editor.ask_at("textDocument/definition", &uri, &marked("\nlangua"), json!({}));
-    assert_eq!(found, Ok(Value::Null));
+    let found = editor.find("documentHighlight", &uri, &marked("state sk"));
+    assert_eq!(found.as_array().map(Vec::len), Some(12));
+    assert_eq!(editor.find("definition", &uri, &marked("\nlangua")), Value::Null);
 }
 
 #[test]
@@ -447,8 +452,8 @@ fn odds_and_roads_in_rules_are_names_too() {
                rule quiet on pedestrian: road == corner implies speed <= 1 m/s\n";
     let mut lines = |before: &str| {
         let marked = own.replacen(before, &format!("{before}|"), 1);
-        let found = editor.ask_at("textDocument/definition", &uri, &marked, json!({}));
-        text(&found.expect("it can be asked")[0]["uri"]).rsplit('/').next().unwrap_or_default().to_owned()
+        let found = editor.find("definition", &uri, &marked);
+        text(&found[0]["uri"]).rsplit('/').next().unwrap_or_default().to_owned()
     };
     for before in ["without set_", "chrono", "odds Veh", "BoxTr", "on pedes"] {
         assert_eq!(lines(before), "avastra45.ava", "{before}");
@@ -460,9 +465,7 @@ fn odds_and_roads_in_rules_are_names_too() {
 fn renames_are_tried_first() {
     let mut editor = Editor::ready();
     let uri = space_uri();
-    let mut rename = |before: &str, name: &str| {
-        editor.ask_at("textDocument/rename", &uri, &marked(before), json!({ "newName": name }))
-    };
+    let mut rename = |before: &str, name: &str| editor.rename(&uri, &marked(before), name);
     // One parameter of four actions, and its uses in rules and effects.
     let found = rename("rule npc_speed on vehicles: sp", "pace").expect("it can be renamed");
     let edits = &found["changes"][&uri];
@@ -495,14 +498,13 @@ fn renames_are_tried_first() {
     }
     // Without a mistake, but the rule would compare the parameter with itself.
     let own = "language 1\nuse \"avastra45.ava\"\nlet fa|st = 12 m/s\nrule slow on vehicles: speed <= fast\n";
-    let error = editor.ask_at("textDocument/rename", &uri, own, json!({ "newName": "speed" }));
-    let error = error.expect_err("the parameter hides it");
+    let error = editor.rename(&uri, own, "speed").expect_err("the parameter hides it");
     assert!(text(&error["message"]).contains("would stand for something else"), "{error}");
     let broken = marked("fn si").replace("group environment =", "group environment = =");
-    let error = editor.ask_at("textDocument/rename", &uri, &broken, json!({ "newName": "bulk" }));
-    assert!(text(&error.expect_err("it is broken")["message"]).contains("repair the syntax"));
-    let range = editor.ask_at("textDocument/prepareRename", &uri, &marked("fn si"), json!({}));
-    assert_eq!(range.expect("it can be renamed")["end"]["character"], 7);
+    let error = editor.rename(&uri, &broken, "bulk").expect_err("it is broken");
+    assert!(text(&error["message"]).contains("repair the syntax"));
+    let range = editor.find("prepareRename", &uri, &marked("fn si"));
+    assert_eq!(range["end"]["character"], 7);
 }
 
 /// A file that overrides a declaration of another.
@@ -520,21 +522,19 @@ fn an_overridden_declaration_is_known_too() {
     let mut editor = Editor::ready();
     // From the override to what it replaces, and the body of that is known: `far` and `twice` are used there.
     let marked = OVERRIDING.1.replace("fn rea", "fn rea|");
-    let found = editor.ask_at("textDocument/definition", &own, &marked, json!({})).expect("it can be asked");
+    let found = editor.find("definition", &own, &marked);
     assert_eq!(found.as_array().map(Vec::len), Some(1));
     assert_eq!((&found[0]["uri"], &found[0]["range"]["start"]["line"]), (&json!(base), &json!(3)));
-    let said = editor.ask_at("textDocument/hover", &own, &marked, json!({})).expect("it can be asked");
+    let said = editor.find("hover", &own, &marked);
     assert!(text(&said["contents"]["value"]).contains("pace * 2 s"), "{said}");
-    let found = editor.ask_at("textDocument/rename", &own, &marked, json!({ "newName": "range" }));
-    let found = found.expect("both are renamed");
+    let found = editor.rename(&own, &marked, "range").expect("both are renamed");
     let changes = [&found["changes"][&base], &found["changes"][&own]];
     assert_eq!(changes.map(|edits| edits.as_array().map(Vec::len)), [Some(1), Some(1)], "{found}");
     let more = OVERRIDING.1.to_owned() + "fn more() -> Length = fa|r\n";
-    let found = editor.ask_at("textDocument/references", &own, &more, json!({})).expect("it can be asked");
+    let found = editor.find("references", &own, &more);
     assert_eq!(found.as_array().map(Vec::len), Some(3), "{found}");
     let more = OVERRIDING.1.to_owned() + "fn more() -> Length = twice(d|: 5 m)\n";
-    let found = editor.ask_at("textDocument/rename", &own, &more, json!({ "newName": "length" }));
-    let found = found.expect("the overridden use is renamed");
+    let found = editor.rename(&own, &more, "length").expect("the overridden use is renamed");
     assert_eq!(found["changes"][&base].as_array().map(Vec::len), Some(3), "{found}");
 }
 
@@ -567,16 +567,14 @@ fn a_half_written_declaration_keeps_its_names() {
         // A line that does not parse, elsewhere: the rest of the file is known all the same.
         for broken in ["", "group g = = =\n"] {
             let marked = format!("{head}{broken}{place}");
-            let found = editor.ask_at("textDocument/definition", &uri, &marked, json!({}));
-            let found = found.expect("it can be asked");
+            let found = editor.find("definition", &uri, &marked);
             assert_eq!(found[0]["range"]["start"]["line"], line, "{broken}{place}: {found}");
             let said = editor.hover(&marked);
             assert!(said.contains(wanted), "{broken}{place}: {said}");
         }
     }
     let marked = format!("{head}fn f(s: Nothing) -> Length = near(Left) + fa|r\n");
-    let found = editor.ask_at("textDocument/rename", &uri, &marked, json!({ "newName": "away" }));
-    let found = found.expect("a mistake beside it is no reason not to");
+    let found = editor.rename(&uri, &marked, "away").expect("a mistake beside it is no reason not to");
     assert_eq!(found["changes"][&uri].as_array().map(Vec::len), Some(3), "{found}");
 }
 
@@ -594,15 +592,13 @@ fn a_rename_reaches_files_that_are_not_open() {
     editor.ask("initialize", json!({ "workspaceFolders": folder })).expect("it can be initialized");
     let base = uri(&scratch.path().join("base.ava"));
     let marked = "language 1\nlet fa|r = 50 m\n";
-    let found = editor.ask_at("textDocument/rename", &base, marked, json!({ "newName": "away" }));
-    let found = found.expect("it can be renamed");
+    let found = editor.rename(&base, marked, "away").expect("it can be renamed");
     let user = uri(&scratch.path().join("deep/user.ava"));
     assert_eq!(found["changes"].as_object().map(serde_json::Map::len), Some(2), "{found}");
     assert_eq!(found["changes"][&user][0]["range"]["start"], json!({ "line": 2, "character": 23 }));
     // A clash in a file that is not open is a reason to refuse.
     write("deep/user.ava", "language 1\nuse \"../base.ava\"\nlet away = far * 2\n");
-    let found = editor.ask_at("textDocument/rename", &base, marked, json!({ "newName": "away" }));
-    let error = found.expect_err("the name is taken there");
+    let error = editor.rename(&base, marked, "away").expect_err("the name is taken there");
     assert!(text(&error["message"]).contains("`far` cannot be called `away`"), "{error}");
 }
 
@@ -785,9 +781,7 @@ fn no_prefix_of_a_file_breaks_anything() {
 fn the_extension_is_that_of_the_language() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let folder = scratch.path().display().to_string();
-    let (status, _, stderr) =
-        crate::command::outcome(&mut crate::command::avastra(&["editor-files", &folder]));
-    assert_eq!(status, 0, "{stderr}");
+    done(&["editor-files", &folder]);
     let shipped = root().join("editors/vscode");
     for name in ["syntaxes/avastra.tmLanguage.json", "language-configuration.json"] {
         let read = |folder: &Path| std::fs::read_to_string(folder.join(name)).expect("it is readable");
@@ -833,27 +827,19 @@ fn a_document_has_a_structure() {
     let found = editor.ask("workspace/symbol", json!({ "query": "LEA" })).expect("it searches");
     assert_eq!((&found[0]["name"], &found[0]["location"]["uri"]), (&"lead".into(), &uri(&base).into()));
 
-    let help = editor.ask_at(
-        "textDocument/signatureHelp",
-        &here,
-        &format!("{head}let a = lead(2 m/s, |"),
-        json!({}),
-    );
-    let help = help.expect("it knows the call");
+    let help = editor.find("signatureHelp", &here, &format!("{head}let a = lead(2 m/s, |"));
     assert_eq!(help["signatures"][0]["label"], "lead(v: Speed, room: Length) -> Length", "{help}");
     assert_eq!(help["activeParameter"], 1, "{help}");
-    let none = editor.ask_at("textDocument/signatureHelp", &here, &format!("{head}let a = |"), json!({}));
-    assert_eq!(none.expect("it can be asked"), Value::Null);
+    assert_eq!(editor.find("signatureHelp", &here, &format!("{head}let a = |")), Value::Null);
 
     let labels = |list: Value| -> Vec<String> {
         list["items"].as_array().expect("a list").iter().map(|item| text(&item["label"])).collect()
     };
     for (written, wanted) in [("override fn |", "lead"), ("override let |", "far")] {
-        let list = editor.ask_at("textDocument/completion", &here, &format!("{head}{written}"), json!({}));
-        assert_eq!(labels(list.expect("it proposes")), [wanted], "{written}");
+        let list = editor.find("completion", &here, &format!("{head}{written}"));
+        assert_eq!(labels(list), [wanted], "{written}");
     }
-    let list = editor.ask_at("textDocument/completion", &here, &format!("{head}reward {{ |"), json!({}));
-    let list = labels(list.expect("it proposes"));
+    let list = labels(editor.find("completion", &here, &format!("{head}reward {{ |")));
     assert!(
         list.iter().any(|word| word == "proc") && !list.iter().any(|word| word == "avoidable"),
         "{list:?}"
@@ -861,13 +847,12 @@ fn a_document_has_a_structure() {
 
     let bodies =
         format!("{head}body Scooter {{ like: Motorcycle }}\nverdict v: hit == Sedan or near in [Bicycle, |");
-    let list =
-        labels(editor.ask_at("textDocument/completion", &here, &bodies, json!({})).expect("it proposes"));
+    let list = labels(editor.find("completion", &here, &bodies));
     assert!(["Scooter", "Pedestrian"].iter().all(|body| list.iter().any(|word| word == body)), "{list:?}");
 
     let walker = "action a() { spawn Pedestrian ahead 9 m { d|oes: Walk, side: Left, speed: 1 m/s } }\n";
-    let hover = editor.ask_at("textDocument/hover", &here, &format!("{head}{walker}"), json!({}));
-    assert!(text(&hover.expect("it knows it")["contents"]["value"]).starts_with("**does**"));
+    let hover = editor.find("hover", &here, &format!("{head}{walker}"));
+    assert!(text(&hover["contents"]["value"]).starts_with("**does**"));
 
     // Names in files that are not open, and a name that is taken.
     let place = format!("{head}let mine = f|ar\n");
@@ -876,8 +861,8 @@ fn a_document_has_a_structure() {
     let files: Vec<String> =
         found.as_array().expect("a list").iter().map(|place| text(&place["uri"])).collect();
     assert!(files.contains(&uri(&user)) && files.contains(&uri(&base)), "{files:?}");
-    let taken = editor.ask_at("textDocument/rename", &here, &place, json!({ "newName": "mine" }));
-    let taken = text(&taken.expect_err("the name is taken")["message"]);
+    let taken = editor.rename(&here, &place, "mine").expect_err("the name is taken");
+    let taken = text(&taken["message"]);
     assert_eq!(taken, "`far` cannot be called `mine`: that name is taken");
 
     // A second declaration of a name may be meant to replace the first.

@@ -1,7 +1,6 @@
 //! What a run emits replays to the bit, reads back to the same value, and depends on nothing but the seed.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use avastra::episode::{EpisodeLog, Outcome, Script};
@@ -9,8 +8,8 @@ use avastra::oracle::Replays;
 use avastra::run::{EpisodeSummary, Run, RunSettings, play};
 use avastra::{emit, oracle};
 
-use crate::cases::{expect_snapshot, root};
-use crate::world::{assert_replays, read, run, run_of, run_with_flicker, space_at};
+use crate::cases::expect_snapshot;
+use crate::world::{assert_replays, loaded, run, run_of, run_with_flicker, space_at};
 
 const EPISODES: u32 = 12;
 
@@ -68,12 +67,8 @@ fn emitted_scenarios_keep_every_claim() {
         if emitted <= 2 {
             expect_snapshot("emitted", &format!("scenario_{emitted}"), &text);
         }
-        // The file is read as if it stood in `scenarios/`, because its `use` is relative to that folder.
-        let path = root().join("scenarios/emitted.ava");
-        let with_it = |path: &Path| -> Result<String, _> {
-            if path.ends_with("emitted.ava") { Ok(text.clone()) } else { read(path) }
-        };
-        let loaded = avastra::check::load(&path, &with_it).expect("it is there");
+        // Its `use` is relative to `scenarios/`.
+        let loaded = loaded("scenarios/emitted.ava", &text);
         assert!(loaded.diagnostics.is_empty(), "{text}\n{:?}", loaded.diagnostics);
         let scenario = loaded.scenario.as_ref().expect("it has a scenario");
         let script = Script::of_scenario(scenario);

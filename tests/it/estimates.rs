@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::cases::expect_snapshot;
-use crate::command::{avastra, outcome};
+use crate::cases::{entries, expect_snapshot};
+use crate::command::{avastra, change, done, fails, last_line, outcome};
 use crate::report::index_of;
 
 const SPACE: &str = "scenarios/avastra45.ava";
@@ -17,11 +17,6 @@ fn arguments<'a>(method: &'a str, episodes: &'a str, parts: &'a str, out: &'a st
     let how =
         ["--method", method, "--episodes", episodes, "--parts", parts, "--out", out, "--format", "json"];
     [&["estimate", SPACE][..], &ads, &how].concat()
-}
-
-/// The result that was printed last.
-fn result(stdout: &str) -> Value {
-    serde_json::from_str(stdout.lines().last().expect("a line is printed")).expect("it is JSON")
 }
 
 fn kept(directory: &Path) -> Vec<u8> {
@@ -49,7 +44,7 @@ fn an_estimate_depends_on_its_settings_alone() {
         let (status, stdout, stderr) =
             outcome(avastra(&arguments(method, episodes, parts, &out)).args(["--jobs", "1"]));
         assert_eq!(status, 0, "{stderr}");
-        let together = &result(&stdout)["results"]["together"];
+        let together = &last_line(&stdout)["results"]["together"];
         let text = serde_json::to_string_pretty(together).expect("it is JSON");
         expect_snapshot("estimates", method, &text);
         let whole = kept(&directory);
@@ -60,17 +55,11 @@ fn an_estimate_depends_on_its_settings_alone() {
 
         // Gone on with, on two threads.
         cut(&directory);
-        let (status, _, stderr) = outcome(&mut avastra(&["estimate", "--jobs", "2", "--resume", &out]));
-        assert_eq!(status, 0, "{stderr}");
+        done(&["estimate", "--jobs", "2", "--resume", &out]);
         assert_eq!(kept(&directory), whole, "{method}");
     }
     // What was tried out beside the episodes replays like any episode: it has their seeds and a script of its own.
-    let critical = scratch.path().join("probe/critical");
-    let mut files: Vec<PathBuf> = std::fs::read_dir(critical)
-        .expect("every estimate has it")
-        .map(|entry| entry.expect("it is readable").path())
-        .collect();
-    files.sort();
+    let files = entries(scratch.path().join("probe/critical"));
     assert!(!files.is_empty(), "a trial found something");
     let verified = outcome(avastra(&["replay"]).args(files.iter().take(3)));
     assert_eq!(verified.0, 0, "{verified:?}");
@@ -106,9 +95,7 @@ fn only_its_database_counts(scratch: &Path, files: &[PathBuf]) {
     }
 
     // A part that was changed is played again.
-    let database = rusqlite::Connection::open(directory.join("estimate.db")).expect("it is a database");
-    database.execute_batch("UPDATE part SET probability = 0.9 WHERE part = 2").expect("it can be changed");
-    drop(database);
+    change(&directory.join("estimate.db"), "UPDATE part SET probability = 0.9 WHERE part = 2");
     let (status, stdout, stderr) = outcome(&mut avastra(&["estimate", "--resume", &out]));
     assert!(status == 0 && stderr.contains("the rows of part 2 were changed"), "{stderr}");
     let is_told = stdout.contains("was missing, is written again")
@@ -118,9 +105,7 @@ fn only_its_database_counts(scratch: &Path, files: &[PathBuf]) {
     assert_eq!(kept(&directory), results);
 
     // Where all parts were changed there is nothing to show, but it is not unfinished.
-    let database = rusqlite::Connection::open(directory.join("estimate.db")).expect("it is a database");
-    database.execute_batch("UPDATE part SET probability = 0.9").expect("it can be changed");
-    drop(database);
+    change(&directory.join("estimate.db"), "UPDATE part SET probability = 0.9");
     let (status, _, stderr) = outcome(&mut avastra(&["report", &out, "--out", &page]));
     let is_told = stderr.contains("were changed since they were written")
         && stderr.contains("--resume")
@@ -135,17 +120,15 @@ fn an_estimate_stops_at_a_look_and_stays_stopped() {
     let mut asked = arguments("count", "10", "8", &out);
     // Twenty episodes, those of the first look, take longer than this.
     asked.extend(["--hours", "0.3", "--jobs", "2"]);
-    let (status, stdout, stderr) = outcome(&mut avastra(&asked));
-    assert_eq!(status, 0, "{stderr}");
-    let results = result(&stdout)["results"].clone();
+    let stdout = done(&asked);
+    let results = last_line(&stdout)["results"].clone();
     // Three looks, at 2, 4 and 8 parts, share the 5 %.
     assert_eq!(results["missing"].as_f64(), Some(0.05));
     assert!((results["missing_at_look"].as_f64().expect("it is there") - 0.05 / 3.0).abs() < 1e-12);
     assert!(results["parts"].as_u64() < results["parts_wanted"].as_u64(), "{results}");
     // Gone on with, it has nothing left to do.
-    let (status, stdout, stderr) = outcome(&mut avastra(&["estimate", "--resume", &out, "--format", "json"]));
-    assert_eq!(status, 0, "{stderr}");
-    assert_eq!(result(&stdout)["results"], results);
+    let stdout = done(&["estimate", "--resume", &out, "--format", "json"]);
+    assert_eq!(last_line(&stdout)["results"], results);
 }
 
 #[test]
@@ -158,9 +141,8 @@ fn two_driving_systems_are_told_apart_in_the_same_episodes() {
             &["--jobs", jobs, "--format", "json"],
         ]
         .concat();
-        let (status, stdout, stderr) = outcome(&mut avastra(&arguments));
-        assert_eq!(status, 0, "{stderr}");
-        result(&stdout)["results"].clone()
+        let stdout = done(&arguments);
+        last_line(&stdout)["results"].clone()
     };
     let same = compare(["reactive", "reactive"], "1");
     assert_eq!((&same["first_only"], &same["second_only"], &same["p"]), (&0.into(), &0.into(), &1.0.into()));
@@ -181,8 +163,6 @@ fn requests_that_cannot_be_met_are_refused() {
         (&["estimate", SPACE, "--than", "nobody"], "no driving system `nobody`"),
     ];
     for (arguments, reason) in cases {
-        let (status, _, stderr) = outcome(&mut avastra(arguments));
-        assert_eq!(status, 1, "{arguments:?}");
-        assert!(stderr.contains(reason), "{arguments:?}: {stderr}");
+        fails(arguments, reason);
     }
 }

@@ -7,7 +7,7 @@ use avastra::model::vocabulary::{Body, Level, Side, TimeOfDay};
 use avastra::syntax::ast::FileId;
 use avastra::syntax::{Diagnostic, format};
 
-use crate::cases::{expect_snapshot, root};
+use crate::cases::{expect_snapshot, files, root, stem};
 use crate::command::{avastra, outcome};
 use crate::wishes::{draws, row};
 use crate::world::{assert_replays, read, run_of, space_at};
@@ -20,14 +20,7 @@ pub fn example(name: &str) -> ActionTable {
 }
 
 fn names() -> Vec<String> {
-    let folder = std::fs::read_dir(root().join("scenarios/examples")).expect("there are examples");
-    let paths = folder.flatten().map(|entry| entry.path());
-    let mut names: Vec<String> = paths
-        .filter(|path| path.extension().is_some_and(|extension| extension == "ava"))
-        .map(|path| path.file_stem().expect("it has a name").to_string_lossy().into_owned())
-        .collect();
-    names.sort();
-    names
+    files(root().join("scenarios/examples"), "ava").iter().map(|path| stem(path)).collect()
 }
 
 fn spawns(draw: &Draw) -> impl Iterator<Item = &SpawnRequest> {

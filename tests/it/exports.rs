@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use avastra::geometry::{Pose, Vec2, wrap_angle};
 use roxmltree::{Document, Node};
 
-use crate::cases::{expect_snapshot, root};
+use crate::cases::{expect_snapshot, files, root, stem, texts};
 use crate::command::{avastra, outcome};
 
 const SCENARIO: &str = "tests/cases/exports/wet_corner.ava";
@@ -18,15 +18,16 @@ fn export(format: &str, file: &str, out: &Path, more: &[&str]) -> (i32, String, 
     outcome(&mut avastra(&[&["export", "--to", format, "--out", &out, file], more].concat()))
 }
 
-/// The files of a folder and their texts.
-fn texts(folder: &Path) -> BTreeMap<String, String> {
-    let entries = std::fs::read_dir(folder).expect("it was written").flatten();
-    entries
-        .map(|entry| {
-            let text = std::fs::read_to_string(entry.path()).expect("it is text");
-            (entry.file_name().to_string_lossy().into_owned(), text)
-        })
-        .collect()
+#[track_caller]
+fn exported(format: &str, file: &str, out: &Path, more: &[&str]) {
+    let (status, _, stderr) = export(format, file, out, more);
+    assert_eq!(status, 0, "{format}: {stderr}");
+}
+
+#[track_caller]
+fn refused(format: &str, file: &str, out: &Path, more: &[&str], reason: &str) {
+    let (status, _, stderr) = export(format, file, out, more);
+    assert!(status == 1 && stderr.contains(reason), "{format}: {stderr}");
 }
 
 /// A file without its figures, and without lines that say the same again: what does not change when driving does.
@@ -57,8 +58,7 @@ fn every_format_has_its_shape() {
         ("csv", &[], "wet_corner.csv", "csv"),
     ] {
         let scratch = tempfile::tempdir().expect("a scratch directory");
-        let (status, _, stderr) = export(format, SCENARIO, scratch.path(), more);
-        assert_eq!(status, 0, "{format}: {stderr}");
+        exported(format, SCENARIO, scratch.path(), more);
         let written = texts(scratch.path());
         let text = &written[name];
         if format != "csv" {
@@ -99,8 +99,7 @@ fn a_recording_is_complete_and_at_its_times() {
     }
     let of_ego = |more: &[&str]| {
         let out = scratch.path().join("other");
-        let (status, _, stderr) = export("openscenario", SCENARIO, &out, more);
-        assert_eq!(status, 0, "{stderr}");
+        exported("openscenario", SCENARIO, &out, more);
         texts(&out)["wet_corner.xosc"].clone()
     };
     assert!(of_ego(&[]).contains("ego_follows"));
@@ -120,8 +119,7 @@ fn an_own_body_keeps_its_name() {
     );
     let file = scratch.path().join("cart.ava");
     std::fs::write(&file, text).expect("it is writable");
-    let (status, _, stderr) = export("csv", &file.display().to_string(), &scratch.path().join("out"), &[]);
-    assert_eq!(status, 0, "{stderr}");
+    exported("csv", &file.display().to_string(), &scratch.path().join("out"), &[]);
     let table = texts(&scratch.path().join("out"))["cart.csv"].clone();
     let bodies: BTreeSet<(&str, &str)> = table
         .lines()
@@ -139,11 +137,10 @@ fn a_natural_version_has_actions_in_place_of_trajectories() {
     let file = crash();
     let scratch = tempfile::tempdir().expect("a scratch directory");
     for (format, more) in [("openscenario", &["--natural"][..]), ("csv", &[])] {
-        let (status, _, stderr) = export(format, &file.display().to_string(), scratch.path(), more);
-        assert_eq!(status, 0, "{stderr}");
+        exported(format, &file.display().to_string(), scratch.path(), more);
     }
     let written = texts(scratch.path());
-    let stem = file.file_stem().expect("it has a name").to_string_lossy();
+    let stem = stem(&file);
     let users = table(&written[&format!("{stem}.csv")]);
     let document = Document::parse(&written[&format!("{stem}.xosc")]).expect("it is well-formed");
     let properties: Vec<&str> =
@@ -205,13 +202,12 @@ fn a_file_for_carla_has_what_its_player_reads() {
     assert!(vehicles.into_iter().all(|model| model.starts_with("vehicle.")), "{text}");
     let ego = all(document.root(), "Property").find(|node| node.attribute("value") == Some("ego_vehicle"));
     assert!(ego.is_some(), "{text}");
-    let (status, _, stderr) = export(
+    exported(
         "openscenario",
         &name,
         &scratch.path().join("driven"),
         &["--profile", "carla", "--ego", "controller"],
     );
-    assert_eq!(status, 0, "{stderr}");
     let driven = texts(&scratch.path().join("driven"));
     assert!(driven.values().any(|text| text.contains("external_control")), "its own program drives");
 }
@@ -230,11 +226,10 @@ fn every_format_has_everyone_where_the_table_has_them() {
         for (format, more) in
             [("openscenario", &[][..]), ("commonroad", &["--ego", "trajectory"]), ("csv", &[])]
         {
-            let (status, _, stderr) = export(format, &name, scratch.path(), more);
-            assert_eq!(status, 0, "{format}: {stderr}");
+            exported(format, &name, scratch.path(), more);
         }
         let written = texts(scratch.path());
-        let stem = file.file_stem().expect("it has a name").to_string_lossy();
+        let stem = stem(&file);
         let users = table(&written[&format!("{stem}.csv")]);
         assert!(users.len() > 1, "the ego vehicle is not alone");
         let played = Document::parse(&written[&format!("{stem}.xosc")]).expect("it is well-formed");
@@ -249,11 +244,7 @@ fn every_format_has_everyone_where_the_table_has_them() {
 
 /// The shipped crash.
 pub fn crash() -> PathBuf {
-    let entries = std::fs::read_dir(root().join("scenarios/found")).expect("it is shipped").flatten();
-    let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
-    files.retain(|file| file.extension().is_some_and(|extension| extension == "ava"));
-    files.sort();
-    files.swap_remove(0)
+    files(root().join("scenarios/found"), "ava").swap_remove(0)
 }
 
 /// The rows of a table: poses of each road user by tick.
@@ -342,8 +333,7 @@ fn a_contact_is_in_the_row_at_the_end_of_its_tick() {
     let id = words.next().expect("a number");
     let claimed_s: f64 = words.nth(1).expect("a time").parse().expect("a time");
     let scratch = tempfile::tempdir().expect("a scratch directory");
-    let (status, _, stderr) = export("csv", &file.display().to_string(), scratch.path(), &[]);
-    assert_eq!(status, 0, "{stderr}");
+    exported("csv", &file.display().to_string(), scratch.path(), &[]);
     let table = texts(scratch.path()).into_values().next().expect("it was written");
     let rows: Vec<Vec<&str>> = table.lines().skip(1).map(|line| line.split(',').collect()).collect();
     for user in ["0", id] {
@@ -361,17 +351,13 @@ fn a_contact_is_in_the_row_at_the_end_of_its_tick() {
 #[test]
 fn what_is_no_scenario_or_does_not_replay_is_refused() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
-    let (status, _, stderr) = export("csv", "scenarios/avastra45.ava", scratch.path(), &[]);
-    assert_eq!((status, stderr.contains("has no scenario")), (1, true), "{stderr}");
-    let (status, _, stderr) = export("csv", "scenarios/nowhere.ava", scratch.path(), &[]);
-    assert_eq!((status, stderr.contains("cannot read")), (1, true), "{stderr}");
+    refused("csv", "scenarios/avastra45.ava", scratch.path(), &[], "has no scenario");
+    refused("csv", "scenarios/nowhere.ava", scratch.path(), &[], "cannot read");
     for (format, option) in [("csv", "--ego"), ("commonroad", "--ego")] {
-        let (status, _, stderr) = export(format, SCENARIO, scratch.path(), &[option, "controller"]);
-        assert_eq!((status, stderr.contains("--ego")), (1, true), "{stderr}");
+        refused(format, SCENARIO, scratch.path(), &[option, "controller"], "--ego");
     }
     for option in [&["--natural"][..], &["--profile", "carla"]] {
-        let (status, _, stderr) = export("csv", SCENARIO, scratch.path(), option);
-        assert_eq!((status, stderr.contains(option[0])), (1, true), "{stderr}");
+        refused("csv", SCENARIO, scratch.path(), option, option[0]);
     }
 
     let text = std::fs::read_to_string(root().join(SCENARIO)).expect("it is a case");
@@ -386,31 +372,26 @@ fn what_is_no_scenario_or_does_not_replay_is_refused() {
     assert!(!out.exists(), "nothing is written");
     let old = text.replace("seed: 7,", "seed: 7, engine: \"plane/1\",");
     std::fs::write(&lie, old).expect("it is writable");
-    let (status, _, stderr) = export("csv", &lie.display().to_string(), &out, &[]);
-    assert_eq!((status, stderr.contains("plane/1")), (1, true), "{stderr}");
+    refused("csv", &lie.display().to_string(), &out, &[], "plane/1");
 }
 
 #[test]
 fn nothing_of_others_is_overwritten() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     std::fs::write(scratch.path().join("corner.xodr"), "another map").expect("it is writable");
-    let (status, _, stderr) = export("openscenario", SCENARIO, scratch.path(), &[]);
-    assert_eq!((status, stderr.contains("another map is already at")), (1, true), "{stderr}");
+    refused("openscenario", SCENARIO, scratch.path(), &[], "another map is already at");
     assert!(!scratch.path().join("wet_corner.xosc").exists());
     // What cannot be read as a map is somebody's all the same.
     let bytes = [0x50, 0x4b, 0xff, 0xfe];
     let taken = scratch.path().join("taken");
     std::fs::create_dir(&taken).expect("it is new");
     std::fs::write(taken.join("corner.xodr"), bytes).expect("it is writable");
-    let (status, _, stderr) = export("openscenario", SCENARIO, &taken, &[]);
-    assert_eq!((status, stderr.contains("is in the place of the map: not text")), (1, true), "{stderr}");
+    refused("openscenario", SCENARIO, &taken, &[], "is in the place of the map: not text");
     assert_eq!(std::fs::read(taken.join("corner.xodr")).expect("it is there"), bytes);
     assert!(!taken.join("wet_corner.xosc").exists());
     // A folder that is a file.
-    let (status, _, stderr) = export("csv", SCENARIO, &scratch.path().join("corner.xodr"), &[]);
-    assert_eq!((status, stderr.contains("cannot")), (1, true), "{stderr}");
+    refused("csv", SCENARIO, &scratch.path().join("corner.xodr"), &[], "cannot");
     let twin = scratch.path().join("wet_corner.ava");
     std::fs::copy(root().join(SCENARIO), &twin).expect("it is writable");
-    let (status, _, stderr) = export("csv", SCENARIO, scratch.path(), &[&twin.display().to_string()]);
-    assert_eq!((status, stderr.contains("would both be written to")), (1, true), "{stderr}");
+    refused("csv", SCENARIO, scratch.path(), &[&twin.display().to_string()], "would both be written to");
 }

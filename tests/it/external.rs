@@ -2,7 +2,6 @@
 //!
 //! They are driven by `avastra ads toy`, so the tests need nothing but the program itself.
 
-use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixListener;
@@ -11,8 +10,8 @@ use std::path::Path;
 use assert_cmd::cargo::cargo_bin;
 use serde_json::Value;
 
-use crate::cases::root;
-use crate::command::{avastra, outcome};
+use crate::cases::{root, texts};
+use crate::command::{avastra, done, done_in, fails, last_line, outcome};
 
 const SPACE: &str = "scenarios/avastra45.ava";
 
@@ -39,16 +38,18 @@ fn running(word: &str) -> Vec<String> {
     found
 }
 
-fn last_line(stdout: &str) -> Value {
-    serde_json::from_str(stdout.lines().last().expect("it prints a result")).expect("the result is JSON")
-}
-
 /// A run of some episodes on one road: its status, its result and what it wrote on standard error.
 fn run(config: &str, out: &Path, more: &[&str]) -> (i32, Value, String) {
     let out = out.display().to_string();
     let begin = ["run", SPACE, "--road", "corner", "--ads", config, "--out", &out, "--format", "json"];
     let (status, stdout, stderr) = outcome(&mut avastra(&[&begin[..], more].concat()));
     (status, last_line(&stdout), stderr)
+}
+
+/// The words of a training of some episodes on one road.
+fn training<'a>(episodes: &'a str, config: &'a str, out: &'a str) -> Vec<&'a str> {
+    let how = ["--road", "corner", "--episodes", episodes, "--ads", config, "--out", out];
+    [&["train", SPACE, "--agent", "av-fuzzer"][..], &how].concat()
 }
 
 #[test]
@@ -92,8 +93,7 @@ fn every_misbehaviour_is_a_finding_and_leaves_nothing_behind() {
         assert!(told.contains(kind) && told.contains(problem), "{how}: {told}");
         // The finding replays, from the recorded answers and without the program.
         let scenario = folder.join(format!("run/failures/{name}.ava")).display().to_string();
-        let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &scenario]));
-        assert_eq!(status, 0, "{how}: {stdout}{stderr}");
+        done(&["replay", &scenario]);
         if how == "crash-at-reset" {
             // A failure before the first step leaves a scenario, too, which passes once the crash is mended.
             let well = profile(&folder, &[], "1", "");
@@ -157,21 +157,7 @@ fn a_training_and_a_study_say_that_the_driving_system_failed() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let config = profile(scratch.path(), &["--misbehave", "crash-in-episode"], "1", "");
     let out = scratch.path().join("train").display().to_string();
-    let train = [
-        "train",
-        SPACE,
-        "--agent",
-        "av-fuzzer",
-        "--road",
-        "corner",
-        "--episodes",
-        "2",
-        "--ads",
-        &config,
-        "--out",
-        &out,
-    ];
-    let (status, stdout, stderr) = outcome(&mut avastra(&train));
+    let (status, stdout, stderr) = outcome(&mut avastra(&training("2", &config, &out)));
     assert_eq!(status, 5, "nothing was learned of it: {stdout}{stderr}");
     assert!(stderr.contains("warning: the driving system failed in 17 of 17 episodes"), "{stdout}{stderr}");
     assert!(
@@ -219,9 +205,7 @@ fn what_cannot_be_started_is_an_error_with_its_reason() {
         ("./planner 'unclosed", "not closed"),
     ] {
         let all = ["run", SPACE, "--ads", command, "--episodes", "1"];
-        let (status, _, stderr) = outcome(&mut avastra(&all));
-        assert_eq!(status, 1, "{command}");
-        assert!(stderr.contains(word), "{command}: {stderr}");
+        fails(&all, word);
     }
 }
 
@@ -231,17 +215,6 @@ fn episodes(directory: &Path) -> Vec<(i64, String, String)> {
     let mut rows = database.prepare("SELECT episode, ended, trace FROM episode ORDER BY episode").unwrap();
     let rows = rows.query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?))).unwrap();
     rows.collect::<Result<_, _>>().unwrap()
-}
-
-/// The emitted files of a run with their texts.
-fn emitted(directory: &Path) -> BTreeMap<String, String> {
-    let files = std::fs::read_dir(directory.join("critical")).unwrap().flatten();
-    files
-        .map(|file| {
-            let name = file.file_name().to_string_lossy().into_owned();
-            (name, std::fs::read_to_string(file.path()).unwrap())
-        })
-        .collect()
 }
 
 #[test]
@@ -256,13 +229,13 @@ fn threads_and_processes_change_nothing_and_crashes_replay_with_and_without_the_
         out
     });
     assert_eq!(episodes(&one), episodes(&two));
-    assert_eq!(emitted(&one), emitted(&two));
-    let scenarios: Vec<String> = emitted(&one).into_keys().filter(|name| name.ends_with(".ava")).collect();
+    let emitted = texts(one.join("critical"));
+    assert_eq!(emitted, texts(two.join("critical")));
+    let scenarios: Vec<String> = emitted.into_keys().filter(|name| name.ends_with(".ava")).collect();
     assert!(!scenarios.is_empty(), "who drives on whatever is in the way collides");
     let path = one.join("critical").join(&scenarios[0]).display().to_string();
     for more in [&[][..], &["--ads", &config]] {
-        let (status, stdout, stderr) = outcome(&mut avastra(&[&["replay", &path][..], more].concat()));
-        assert_eq!(status, 0, "{more:?}: {stdout}{stderr}");
+        let stdout = done(&[&["replay", &path][..], more].concat());
         assert!(stdout.contains("confirmed"), "{more:?}: {stdout}");
     }
     // Who dies on the way has not been cured of the crash.
@@ -274,24 +247,19 @@ fn threads_and_processes_change_nothing_and_crashes_replay_with_and_without_the_
     assert!(status == 5 && stdout.contains("it failed at step"), "{status}: {stdout}{stderr}");
     // It is made small with the program; what only the program can show is not tried without it.
     let small = scratch.path().join("small.ava").display().to_string();
-    let (status, stdout, stderr) =
-        outcome(&mut avastra(&["shrink", &path, "--ads", &config, "--out", &small]));
-    assert_eq!(status, 0, "{stdout}{stderr}");
+    done(&["shrink", &path, "--ads", &config, "--out", &small]);
     let claims_minimal = std::fs::read_to_string(&small).unwrap().contains("expect minimal");
     for (more, is_tried) in [(&[][..], false), (&["--ads", &config], true)] {
-        let (status, stdout, stderr) = outcome(&mut avastra(&[&["replay", &small][..], more].concat()));
-        assert_eq!(status, 0, "{more:?}: {stdout}{stderr}");
+        let stdout = done(&[&["replay", &small][..], more].concat());
         assert_eq!(stdout.contains("not tried"), claims_minimal && !is_tried, "{more:?}: {stdout}");
     }
     // Changed answers are noticed, and missing ones are asked for.
     let answers = Path::new(&path).with_extension("answers.jsonl");
     let text = std::fs::read_to_string(&answers).unwrap();
     std::fs::write(&answers, text.replacen("\"v\":", "\"v\":1", 1)).unwrap();
-    let (status, _, stderr) = outcome(&mut avastra(&["replay", &path]));
-    assert!(status == 1 && stderr.contains("changed"), "{stderr}");
+    fails(&["replay", &path], "changed");
     std::fs::remove_file(&answers).unwrap();
-    let (status, _, stderr) = outcome(&mut avastra(&["replay", &path]));
-    assert!(status == 1 && stderr.contains("--ads"), "{stderr}");
+    fails(&["replay", &path], "--ads");
 }
 
 #[test]
@@ -379,8 +347,7 @@ fn a_socket_is_as_good_as_a_pipe() {
 
 #[test]
 fn the_schema_of_every_message_is_printed() {
-    let (status, stdout, _) = outcome(&mut avastra(&["ads", "schema"]));
-    assert_eq!(status, 0);
+    let stdout = done(&["ads", "schema"]);
     let schema: Value = serde_json::from_str(&stdout).expect("it is JSON");
     let defined: Vec<&String> = schema["$defs"].as_object().expect("messages").keys().collect();
     let words = [
@@ -434,20 +401,7 @@ fn what_was_begun_against_one_program_is_not_gone_on_with_against_another() {
     let planner = scratch.path().join("planner").display().to_string();
     let begun = [
         vec!["run", SPACE, "--road", "corner", "--episodes", "1", "--ads", &config, "--out", &runs],
-        vec![
-            "train",
-            SPACE,
-            "--agent",
-            "av-fuzzer",
-            "--road",
-            "corner",
-            "--episodes",
-            "1",
-            "--ads",
-            &config,
-            "--out",
-            &train,
-        ],
+        training("1", &config, &train),
         vec!["study", &file, "--ads", &planner, "--out", &cell],
     ];
     for arguments in &begun {
@@ -458,9 +412,7 @@ fn what_was_begun_against_one_program_is_not_gone_on_with_against_another() {
     let resumed = [["run", &runs], ["train", &train], ["study", &cell]];
     for [command, directory] in resumed {
         // From another folder, too, the same program is started.
-        let mut again = avastra(&[command, "--resume", directory]);
-        let (status, stdout, stderr) = outcome(again.current_dir(scratch.path().join("run")));
-        assert_eq!(status, 0, "{command}: {stdout}{stderr}");
+        done_in(&scratch.path().join("run"), &[command, "--resume", directory]);
     }
     script(scratch.path(), "", "--as-version 2");
     for [command, directory] in resumed {
@@ -480,8 +432,7 @@ fn a_failure_is_a_regression_test_until_it_is_gone() {
     assert!(detail.contains("exit status 1"), "how it ended is told: {detail}{stderr}");
     let name = result["failures"][0]["scenario"].as_str().expect("a name");
     let file = out.join(format!("failures/{name}.ava")).display().to_string();
-    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &file]));
-    assert_eq!(status, 0, "{stdout}{stderr}");
+    let stdout = done(&["replay", &file]);
     assert!(stdout.contains("it ends with ads_crash (exited) at step 20"), "{stdout}");
     let well = tempfile::tempdir().expect("a scratch directory");
     let well = profile(well.path(), &[], "1", "");
@@ -570,8 +521,7 @@ fn mistakes_in_a_profile_are_told_where_they_are() {
     ] {
         std::fs::write(&file, text).unwrap();
         for arguments in [&["ads", "check", "--ads", &config][..], &["run", SPACE, "--ads", &config]] {
-            let (status, _, stderr) = outcome(&mut avastra(arguments));
-            assert!(status == 1 && stderr.contains(word), "{text}: {status}: {stderr}");
+            fails(arguments, word);
         }
     }
     let config = profile(scratch.path(), &[], "1", "");
@@ -579,9 +529,7 @@ fn mistakes_in_a_profile_are_told_where_they_are() {
     let study = serde_json::json!({ "space": space, "agents": [{ "name": "none", "ads_config": config }] });
     let file = scratch.path().join("study.yaml");
     std::fs::write(&file, study.to_string()).unwrap();
-    let (status, _, stderr) = outcome(&mut avastra(&["study", &file.display().to_string()]));
-    assert!(status == 1 && stderr.contains("`ads_config` of the study"), "{status}: {stderr}");
+    fails(&["study", &file.display().to_string()], "`ads_config` of the study");
     let causes = ["run", SPACE, "--causes", "--ads", &config];
-    let (status, _, stderr) = outcome(&mut avastra(&causes));
-    assert!(status == 1 && stderr.contains("`toy 1` is not made of modules"), "{status}: {stderr}");
+    fails(&causes, "`toy 1` is not made of modules");
 }

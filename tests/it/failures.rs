@@ -1,10 +1,9 @@
 //! A failure that a run found is explained, shrunk and tested again, and false claims about it are refuted.
 
-use std::path::PathBuf;
-
 use avastra::ads::Weaknesses;
 
-use crate::command::{avastra, outcome};
+use crate::cases::entries;
+use crate::command::{avastra, done, fails, outcome};
 use crate::world::FLICKER;
 
 #[test]
@@ -14,15 +13,9 @@ fn found_scenarios_are_explained_shrunk_and_tested_again() {
     let out = path("run");
     let settings =
         ["--road", "corner", "--episodes", "20", "--seed", "5", "--ads", FLICKER, "--causes", "--out", &out];
-    let (status, stdout, stderr) =
-        outcome(&mut avastra(&[&["run", "scenarios/avastra45.ava"], &settings[..]].concat()));
-    assert_eq!(status, 0, "{stderr}");
+    let stdout = done(&[&["run", "scenarios/avastra45.ava"], &settings[..]].concat());
     assert!(stdout.contains("distinct failure"), "{stdout}");
-    let mut files: Vec<PathBuf> = std::fs::read_dir(scratch.path().join("run/critical"))
-        .expect("the run made it")
-        .map(|entry| entry.expect("it reads").path())
-        .collect();
-    files.sort();
+    let files = entries(scratch.path().join("run/critical"));
     // The last one is the cheapest to shrink.
     let with_cause = files.iter().rev().find_map(|file| {
         let text = std::fs::read_to_string(file).expect("it is readable");
@@ -30,8 +23,7 @@ fn found_scenarios_are_explained_shrunk_and_tested_again() {
         Some((file.display().to_string(), text, line))
     });
     let (file, text, claim) = with_cause.expect("a crash of twenty episodes has a cause");
-    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &file]));
-    assert_eq!(status, 0, "{stdout}{stderr}");
+    let stdout = done(&["replay", &file]);
     assert!(stdout.contains("delta-v"), "{stdout}");
 
     // The actuators of this system have no error, so control is never the cause.
@@ -118,7 +110,6 @@ fn found_scenarios_are_explained_shrunk_and_tested_again() {
         (&["run", "scenarios/avastra45.ava", "--ads", "idm", "--causes"], "`idm` is not made of modules"),
     ];
     for (arguments, message) in cases {
-        let (status, _, stderr) = outcome(&mut avastra(arguments));
-        assert!(status == 1 && stderr.contains(message), "{arguments:?}: {stderr}");
+        fails(arguments, message);
     }
 }

@@ -3,7 +3,7 @@
 use assert_cmd::Command;
 
 use crate::cases::root;
-use crate::command::{avastra, outcome};
+use crate::command::{avastra, done, outcome};
 
 /// Commands that only read and write small files, and end soon.
 const QUICK: [&str; 11] =
@@ -11,8 +11,7 @@ const QUICK: [&str; 11] =
 
 /// The lines to type that the help of a command shows.
 fn examples(command: &str) -> Vec<String> {
-    let (status, help, _) = outcome(&mut avastra(&[command, "--help"]));
-    assert_eq!(status, 0, "{command}");
+    let help = done(&[command, "--help"]);
     let lines = help.lines().filter_map(|line| line.strip_prefix("  avastra "));
     let lines: Vec<String> = lines.map(|line| line.split("  ").next().unwrap_or(line).to_owned()).collect();
     assert!(!lines.is_empty(), "{command} has no example: {help}");
@@ -56,8 +55,7 @@ fn the_examples_of_quick_commands_work() {
 #[test]
 fn completions_offer_the_values_of_closed_sets() {
     for shell in ["bash", "zsh", "fish"] {
-        let (status, script, _) = outcome(&mut avastra(&["completions", shell]));
-        assert_eq!(status, 0);
+        let script = done(&["completions", shell]);
         for value in ["random-raw", "frenet", "map-elites", "released", "sarif", "network"] {
             assert!(script.contains(value), "{shell}: {value}");
         }

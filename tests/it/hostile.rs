@@ -15,7 +15,7 @@ use avastra::rng;
 use avastra::rng::{Rng, Stream};
 use avastra::road::RoadMap;
 
-use crate::cases::{cases, root};
+use crate::cases::{cases, entries, files, root};
 use crate::scaling_maps::constructs::CONSTRUCTS;
 
 /// Limits on processor time (s) and memory (MB) for a text of 64 KB. The aim is 1 s, which `fuzz/run.sh` checks
@@ -26,14 +26,11 @@ const PEAK_MB_MAX: f64 = 500.0;
 
 #[test]
 fn what_the_fuzz_target_kept_breaks_no_law() {
-    let seeds = root().join("fuzz/seeds");
-    let mut read = 0;
-    for entry in std::fs::read_dir(&seeds).expect("the seeds are there").flatten() {
-        let bytes = std::fs::read(entry.path()).expect("a seed is readable");
-        examine::examine(&String::from_utf8_lossy(&bytes));
-        read += 1;
+    let seeds = entries(root().join("fuzz/seeds"));
+    for seed in &seeds {
+        examine::examine(&String::from_utf8_lossy(&std::fs::read(seed).expect("a seed is readable")));
     }
-    assert!(read >= 40, "{read} seeds");
+    assert!(seeds.len() >= 40, "{} seeds", seeds.len());
 }
 
 #[test]
@@ -184,8 +181,9 @@ fn texts_that_cost_much_are_refused_or_read() {
     let scratch = Scratch::new();
     let mut wrong = Vec::new();
     for (name, size, fate) in texts {
-        let construct = scale::GRAMMAR.iter().find(|construct| construct.name == name);
-        let came = scratch.run("check", &(construct.expect("it is in the list").text)(size), CPU_S_MAX);
+        let construct = scale::GRAMMAR.iter().find(|(construct, _)| *construct == name);
+        let (_, text) = construct.expect("it is in the list");
+        let came = scratch.run("check", &text(size), CPU_S_MAX);
         let is_right = match fate {
             Sound => came.exit == Some(0),
             Refused(code) => came.exit == Some(2) && came.output.contains(code),
@@ -232,15 +230,11 @@ const VERBS: [&str; 4] = ["check", "table", "compile", "lsp"];
 /// `FUZZ_S=1800 FUZZ_SEED=1 cargo test --release --test it -- --ignored --nocapture each_construct_scales`
 #[test]
 #[ignore = "runs for as long as it is told to"]
-#[expect(clippy::disallowed_methods, reason = "how long and with which seed is said in the environment")]
 fn each_construct_scales() {
-    let number = |name: &str, default: u64| {
-        std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
-    };
-    let (seconds, seed) = (number("FUZZ_S", 60) as f64, number("FUZZ_SEED", 1));
-    let of_grammar = scale::GRAMMAR.iter().flat_map(|&scale::Construct { name, text }| {
-        VERBS.into_iter().map(move |verb| Large { name, text, verb })
-    });
+    let (seconds, seed) = (asked("FUZZ_S", 60) as f64, asked("FUZZ_SEED", 1));
+    let of_grammar = scale::GRAMMAR
+        .iter()
+        .flat_map(|&(name, text)| VERBS.into_iter().map(move |verb| Large { name, text, verb }));
     let of_maps = CONSTRUCTS.iter().map(|&(name, text, _)| Large { name, text, verb: "road" });
     let all: Vec<Large> = of_grammar.chain(of_maps).collect();
     let mut measured = Measured { scratch: Scratch::new(), runs: 0, spent_s: 0.0, dear: Vec::new() };
@@ -266,6 +260,12 @@ fn each_construct_scales() {
     let Measured { runs, spent_s, dear, .. } = measured;
     println!("{runs} runs, {spent_s:.0} s");
     assert!(dear.is_empty(), "{}", dear.join("\n"));
+}
+
+/// A number from the environment.
+#[expect(clippy::disallowed_methods, reason = "how long and with which seed is said in the environment")]
+fn asked(name: &str, default: u64) -> u64 {
+    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
 /// A construct, and what the program is asked to do with texts that are large in it.
@@ -430,12 +430,8 @@ fn messages(path: &Path, text: &str) -> Vec<u8> {
 /// `FUZZ_S=3600 FUZZ_SEED=1 cargo test --test it -- --ignored --nocapture made_up_texts`
 #[test]
 #[ignore = "runs for as long as it is told to"]
-#[expect(clippy::disallowed_methods, reason = "how long and with which seed is said in the environment")]
 fn made_up_texts_break_no_law() {
-    let number = |name: &str, default: u64| {
-        std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
-    };
-    let (seconds, seed) = (number("FUZZ_S", 60) as f64, number("FUZZ_SEED", 1));
+    let (seconds, seed) = (asked("FUZZ_S", 60) as f64, asked("FUZZ_SEED", 1));
     let maker = Maker::new();
     let begin_s = processor_s();
     let (mut texts, mut bytes, mut dearest) = (0_u64, 0_u64, 0.0_f64);
@@ -443,7 +439,7 @@ fn made_up_texts_break_no_law() {
         let (length, took_s) = maker.examine(seed, texts, 1.0);
         (texts, bytes, dearest) = (texts + 1, bytes + length as u64, dearest.max(took_s));
     }
-    let peak_mb = peak_mb();
+    let (_, peak_mb) = own_cost();
     println!(
         "{texts} texts, {bytes} bytes, {:.0} s, at most {dearest:.2} s and {peak_mb:.0} MB",
         processor_s() - begin_s
@@ -474,14 +470,10 @@ fn a_thousand_mutated_maps_do_no_harm() {
 }
 
 fn examine_mutated_maps(count: u64) {
-    let folders = ["scenarios/roads", "tests/cases/faults", "tests/cases/diagnostics"];
-    let found =
-        folders.iter().flat_map(|folder| std::fs::read_dir(root().join(folder)).expect("it is there"));
-    let mut paths: Vec<_> = found.flatten().map(|entry| entry.path()).collect();
-    paths.retain(|path| path.extension().is_some_and(|extension| extension == "xodr"));
-    paths.sort();
+    let folders = ["scenarios/roads", "tests/cases/diagnostics", "tests/cases/faults"];
+    let paths = folders.iter().flat_map(|folder| files(root().join(folder), "xodr"));
     let texts: Vec<String> =
-        paths.iter().map(|path| std::fs::read_to_string(path).expect("a map is readable")).collect();
+        paths.map(|path| std::fs::read_to_string(path).expect("a map is readable")).collect();
     let (mut read, mut dearest_s) = (0, 0.0_f64);
     for index in 0..count {
         let mut random = rng::stream(1, Stream::Exploration, index);
@@ -678,22 +670,16 @@ fn parts(text: &str) -> Vec<String> {
 
 /// Processor time of this process so far, s.
 fn processor_s() -> f64 {
-    let usage = own_usage();
-    let seconds = |time: libc::timeval| time.tv_sec as f64 + time.tv_usec as f64 * 1e-6;
-    seconds(usage.ru_utime) + seconds(usage.ru_stime)
+    own_cost().0
 }
 
-/// The most memory that this process had, MB.
-fn peak_mb() -> f64 {
-    own_usage().ru_maxrss as f64 / 1024.0
-}
-
-fn own_usage() -> libc::rusage {
+/// Processor time (s) and peak memory (MB) of this process so far.
+fn own_cost() -> (f64, f64) {
     // SAFETY: it is plain data that the kernel fills in.
     unsafe {
         let mut usage: libc::rusage = std::mem::zeroed();
         assert_eq!(libc::getrusage(libc::RUSAGE_SELF, &mut usage), 0);
-        usage
+        taken(&usage)
     }
 }
 

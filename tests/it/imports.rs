@@ -1,14 +1,13 @@
 //! What `avastra import` makes of OpenSCENARIO files: the scenario that it writes, or all that it refuses with its lines.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use avastra::import::{Files, openscenario};
 use avastra::rng;
 use avastra::rng::Stream;
 
-use crate::cases::{expect_snapshot, root};
-use crate::command::{avastra, outcome};
+use crate::cases::{expect_snapshot, root, stem};
+use crate::command::{avastra, done, outcome};
 use crate::exports::crash;
 
 const AREA: &str = "tests/cases/imports";
@@ -34,11 +33,9 @@ fn every_file_becomes_a_scenario_or_is_refused_with_its_lines() {
         let text = std::fs::read_to_string(&written).expect("it was written");
         expect_snapshot("imports", name, &text);
         let file = written.display().to_string();
-        let (status, stdout, stderr) = outcome(&mut avastra(&["check", &file]));
-        assert_eq!(status, 0, "{name}: {stdout}{stderr}");
+        done(&["check", &file]);
         assert_eq!(outcome(&mut avastra(&["fmt", "--check", &file])).0, 0, "{name} is formatted");
-        let (status, stdout, stderr) = outcome(&mut avastra(&["export", "--to", "csv", &file]));
-        assert_eq!(status, 0, "{name}: {stdout}{stderr}");
+        done(&["export", "--to", "csv", &file]);
         let table = std::fs::read_to_string(scratch.path().join(format!("exported/{name}.csv")));
         let first: Vec<f64> = table
             .expect("it was written")
@@ -64,23 +61,19 @@ fn an_export_of_ours_comes_back_and_replays() {
     for (file, claims) in
         [(crash.as_str(), &["expect collision with npc#", "expect trace =="][..]), (WET, &[])]
     {
-        let stem = Path::new(file).file_stem().expect("it is a file").to_string_lossy();
+        let stem = stem(file.as_ref());
         for more in [&[][..], &["--natural"], &["--profile", "carla"]] {
             let scratch = tempfile::tempdir().expect("a scratch directory");
             let folder = scratch.path().display().to_string();
             let export = ["export", "--to", "openscenario", "--out", &folder, file];
-            let (status, _, stderr) = outcome(&mut avastra(&[&export[..], more].concat()));
-            assert_eq!(status, 0, "{file} {more:?}: {stderr}");
+            done(&[&export[..], more].concat());
             let exported = scratch.path().join(format!("{stem}.xosc")).display().to_string();
-            let (status, stdout, stderr) = outcome(&mut avastra(&["import", &exported]));
-            assert_eq!(status, 0, "{file} {more:?}: {stdout}{stderr}");
+            let stdout = done(&["import", &exported]);
             assert!(stdout.contains("an export of avastra"), "what is not kept is said: {stdout}");
             let imported = scratch.path().join(format!("imported/{stem}.ava"));
             let text = std::fs::read_to_string(&imported).expect("it was written");
             assert!(claims.iter().all(|claim| text.contains(claim)), "{text}");
-            let (status, stdout, stderr) =
-                outcome(&mut avastra(&["replay", &imported.display().to_string()]));
-            assert_eq!(status, 0, "{file} {more:?}: {stdout}{stderr}");
+            done(&["replay", &imported.display().to_string()]);
         }
     }
 }
@@ -90,9 +83,7 @@ fn an_export_of_ours_comes_back_and_replays() {
 fn an_export_that_was_tampered_with_uses_no_other_file() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let folder = scratch.path().display().to_string();
-    let (status, _, stderr) =
-        outcome(&mut avastra(&["export", "--to", "openscenario", "--out", &folder, WET]));
-    assert_eq!(status, 0, "{stderr}");
+    done(&["export", "--to", "openscenario", "--out", &folder, WET]);
     let file = scratch.path().join("wet_corner.xosc");
     let text = std::fs::read_to_string(&file).expect("it was written");
     std::fs::write(scratch.path().join("other.ava"), "language 1\n").expect("it can be written");
@@ -207,14 +198,12 @@ fn conditions_and_words_are_read_or_refused() {
         let declared = r#"<ParameterDeclaration name="free" parameterType="boolean" value="true"/></ParameterDeclarations>"#;
         let text = format!("{}{condition}{}", &cut_in[..begin], &cut_in[end..]);
         let text = text.replacen("</ParameterDeclarations>", declared, 1);
-        let found = import(&text);
+        let mut found = import(&text);
         if wanted == "elapsed >= 0 s" {
             assert!(found.contains("`rising` never comes"), "{condition}: {found}");
-            let found = import(&text.replace("conditionEdge=\"rising\"", "conditionEdge=\"none\""));
-            assert!(found.contains(&format!("{begins}{wanted}")), "{condition}: {found}");
-        } else {
-            assert!(found.contains(&format!("{begins}{wanted}")), "{condition}: {found}");
+            found = import(&text.replace("conditionEdge=\"rising\"", "conditionEdge=\"none\""));
         }
+        assert!(found.contains(&format!("{begins}{wanted}")), "{condition}: {found}");
     }
     let behind = cut_in.replace("${$gap + 10}", "-20").replace("value=\"-3\"", "value=\"3\"");
     let found = import(&behind.replace(&cut_in[begin..end], conditions[5].0));

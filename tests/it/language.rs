@@ -1,9 +1,8 @@
 //! The reference page: every example on it compiles, and every word of the language is on it.
 
 use std::collections::BTreeSet;
-use std::path::Path;
 
-use avastra::check::{Loaded, load};
+use avastra::check::Loaded;
 use avastra::model::vocabulary::{
     Body, Colour, EpisodeField, Fact, LaneChoice, Level, Light, OriginField, Phenomenon, Priority,
     ROAD_LANES, RoadField, RoadKind, ScenarioClaim, Side, SpaceClaim, SpawnField, StartField, StopReason,
@@ -15,7 +14,7 @@ use avastra::syntax::keyword::keywords;
 use avastra::units::UNITS;
 
 use crate::cases::root;
-use crate::world::read;
+use crate::world::loaded;
 
 fn page() -> String {
     std::fs::read_to_string(root().join("LANGUAGE.md")).expect("the page is there")
@@ -40,11 +39,7 @@ fn compiled(example: &str) -> Loaded {
         true => example.to_owned(),
         false => format!("language 1\nuse \"avastra45.ava\"\n{example}"),
     };
-    load(Path::new("example.ava"), &|path| match path.to_str() {
-        Some("example.ava") => Ok(text.clone()),
-        _ => read(&root().join("scenarios").join(path)),
-    })
-    .expect("its text is known")
+    loaded("scenarios/example.ava", &text)
 }
 
 #[test]

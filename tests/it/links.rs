@@ -12,8 +12,8 @@ use assert_cmd::cargo::cargo_bin;
 use avastra::estimate::EstimateDatabase;
 use avastra::run::{Database, Units};
 
-use crate::cases::root;
-use crate::command::{avastra, outcome};
+use crate::cases::{entries, name, root};
+use crate::command::{avastra, done, done_in, outcome};
 use crate::world::FLICKER;
 
 /// How a command must end.
@@ -30,6 +30,12 @@ use End::{Any, Done, Refused};
 
 /// Words of the error about a link.
 const LINK: &str = "it is a symbolic link";
+/// Words of the errors about a name in a database.
+const PLAIN: &str = "is no plain name";
+const NAME: &str = "is no name of a scenario";
+
+/// Merges the two shards of the fixture's estimate.
+const MERGE: &[&str] = &["merge", "e1", "e2", "--out", "m"];
 
 struct Attack {
     /// Links in the clone, each with its target in the home.
@@ -46,6 +52,15 @@ const fn linked(
     end: End,
 ) -> Attack {
     Attack { links, change: None, command, end }
+}
+
+const fn changed(
+    links: &'static [(&'static str, &'static str)],
+    change: fn(&Path),
+    command: &'static [&'static str],
+    end: End,
+) -> Attack {
+    Attack { links, change: Some(change), command, end }
 }
 
 /// The scenario that the run of the fixture found first.
@@ -131,18 +146,8 @@ const ATTACKS: &[Attack] = &[
         Done,
     ),
     // Databases that are links: to a database of the user, and to a place where one would be made.
-    Attack {
-        links: &[("run/run.db", "mine.db")],
-        change: Some(own_database),
-        command: &["report", "run"],
-        end: Refused(LINK),
-    },
-    Attack {
-        links: &[("run/run.db", "mine.db")],
-        change: Some(own_database),
-        command: &["run", "--resume", "run"],
-        end: Refused(LINK),
-    },
+    changed(&[("run/run.db", "mine.db")], own_database, &["report", "run"], Refused(LINK)),
+    changed(&[("run/run.db", "mine.db")], own_database, &["run", "--resume", "run"], Refused(LINK)),
     linked(&[("run/run.db", "nowhere")], &["run", "--resume", "run"], Any),
     linked(&[("run/run.db-journal", "mine.txt")], &["run", "--resume", "run"], Any),
     linked(&[("run/run.db-journal", "nowhere")], &["run", "--resume", "run"], Any),
@@ -169,97 +174,57 @@ const ATTACKS: &[Attack] = &[
     linked(&[("build", "folder")], &["compile", "SPACE"], Refused(LINK)),
     linked(&[("fresh/roads", "folder")], &["new", "fresh"], Refused(LINK)),
     linked(&[("ed/syntaxes", "folder")], &["editor-files", "ed"], Refused(LINK)),
-    Attack {
-        links: &[("theirs/imported", "folder")],
-        change: Some(own_import),
-        command: &["import", "theirs/cut_in.xosc"],
-        end: Refused(LINK),
-    },
+    changed(&[("theirs/imported", "folder")], own_import, &["import", "theirs/cut_in.xosc"], Refused(LINK)),
     // Scenarios that were edited, so that `--accept` writes them.
-    Attack {
-        links: &[("run/critical/corner_0000.ava.partial", "mine.txt")],
-        change: Some(edited),
-        command: &["test", "--accept", "run"],
-        end: Any,
-    },
-    Attack {
-        links: &[(FOUND, "mine.ava")],
-        change: Some(edited_elsewhere),
-        command: &["test", "--accept", "run"],
-        end: Any,
-    },
+    changed(
+        &[("run/critical/corner_0000.ava.partial", "mine.txt")],
+        edited,
+        &["test", "--accept", "run"],
+        Any,
+    ),
+    changed(&[(FOUND, "mine.ava")], edited_elsewhere, &["test", "--accept", "run"], Any),
     // Merges: links in shards and in the way, and names that databases give.
-    linked(&[("m.partial", "folder")], &["merge", "e1", "e2", "--out", "m"], Refused(LINK)),
-    linked(&[("m.partial/merge.partial", "mine.txt")], &["merge", "e1", "e2", "--out", "m"], Done),
-    linked(&[("e2/critical", "folder")], &["merge", "e1", "e2", "--out", "m"], Refused(LINK)),
+    linked(&[("m.partial", "folder")], MERGE, Refused(LINK)),
+    linked(&[("m.partial/merge.partial", "mine.txt")], MERGE, Done),
+    linked(&[("e2/critical", "folder")], MERGE, Refused(LINK)),
     linked(&[("run/critical/space", "folder")], &["merge", "run", "--out", "m"], Any),
-    Attack {
-        links: &[(FOUND, "mine.ava")],
-        change: Some(moved_away),
-        command: &["merge", "run", "--out", "m"],
-        // The text comes from the sealed database.
-        end: Done,
-    },
-    Attack {
-        links: &[],
-        change: Some(|clone| name_in_estimate(&clone.join("e2"), "../../../mine.txt")),
-        command: &["merge", "e1", "e2", "--out", "m"],
-        end: Refused("is no plain name"),
-    },
-    Attack {
-        links: &[],
-        change: Some(|clone| name_in_estimate(&clone.join("e2"), &beside(clone, "mine.txt"))),
-        command: &["merge", "e1", "e2", "--out", "m"],
-        end: Refused("is no plain name"),
-    },
-    Attack {
-        links: &[("e2/critical/a", "folder")],
-        change: Some(|clone| name_in_estimate(&clone.join("e2"), "a/keep.txt")),
-        command: &["merge", "e1", "e2", "--out", "m"],
-        end: Refused("is no plain name"),
-    },
-    Attack {
-        links: &[],
-        change: Some(|clone| name_in_estimate(&clone.join("e1"), &beside(clone, "mine.txt"))),
-        command: &["estimate", "--resume", "e1"],
-        end: Refused("is no plain name"),
-    },
-    Attack {
-        links: &[],
-        change: Some(|clone| name_in_estimate(&clone.join("e2"), ".bashrc")),
-        command: &["merge", "e1", "e2", "--out", "m"],
-        end: Refused("is no name of a scenario"),
-    },
-    Attack {
-        links: &[],
-        change: Some(|clone| name_in_estimate(&clone.join("e2"), "-rf.ava")),
-        command: &["merge", "e1", "e2", "--out", "m"],
-        end: Refused("is no name of a scenario"),
-    },
-    Attack {
-        links: &[],
-        change: Some(|clone| name_in_estimate(&clone.join("e1"), "x.sh")),
-        command: &["estimate", "--resume", "e1"],
-        end: Refused("is no name of a scenario"),
-    },
-    Attack {
-        links: &[],
-        change: Some(|clone| name_in_estimate(&clone.join("e1"), "estimate.yaml")),
-        command: &["estimate", "--resume", "e1"],
-        end: Refused("is no name of a scenario"),
-    },
-    Attack {
-        links: &[],
-        change: Some(road_in_run),
-        command: &["merge", "run", "--out", "m"],
-        end: Refused("is no plain name"),
-    },
-    Attack {
-        links: &[],
-        change: Some(road_in_run),
-        command: &["run", "--resume", "run"],
-        end: Refused("plain name"),
-    },
+    // The text comes from the sealed database.
+    changed(&[(FOUND, "mine.ava")], moved_away, &["merge", "run", "--out", "m"], Done),
+    changed(&[], |clone| name_in_estimate(&clone.join("e2"), "../../../mine.txt"), MERGE, Refused(PLAIN)),
+    changed(
+        &[],
+        |clone| name_in_estimate(&clone.join("e2"), &beside(clone, "mine.txt")),
+        MERGE,
+        Refused(PLAIN),
+    ),
+    changed(
+        &[("e2/critical/a", "folder")],
+        |clone| name_in_estimate(&clone.join("e2"), "a/keep.txt"),
+        MERGE,
+        Refused(PLAIN),
+    ),
+    changed(
+        &[],
+        |clone| name_in_estimate(&clone.join("e1"), &beside(clone, "mine.txt")),
+        &["estimate", "--resume", "e1"],
+        Refused(PLAIN),
+    ),
+    changed(&[], |clone| name_in_estimate(&clone.join("e2"), ".bashrc"), MERGE, Refused(NAME)),
+    changed(&[], |clone| name_in_estimate(&clone.join("e2"), "-rf.ava"), MERGE, Refused(NAME)),
+    changed(
+        &[],
+        |clone| name_in_estimate(&clone.join("e1"), "x.sh"),
+        &["estimate", "--resume", "e1"],
+        Refused(NAME),
+    ),
+    changed(
+        &[],
+        |clone| name_in_estimate(&clone.join("e1"), "estimate.yaml"),
+        &["estimate", "--resume", "e1"],
+        Refused(NAME),
+    ),
+    changed(&[], road_in_run, &["merge", "run", "--out", "m"], Refused(PLAIN)),
+    changed(&[], road_in_run, &["run", "--resume", "run"], Refused("plain name")),
     // Programs that files name: the fixture's leaves a file beside the clone when it is started.
     linked(&[], &["study", "theirs.yaml", "--dry-run"], Done),
     linked(&[], &["run", "SPACE", "--ads", "profile.yaml", "--dry-run"], Done),
@@ -267,12 +232,12 @@ const ATTACKS: &[Attack] = &[
     linked(&[], &["merge", "p1", "p2", "--out", "m"], Done),
     linked(&[], &["merge", "p1", "p2", "--missing"], Done),
     linked(&[], &["report", "p1"], Done),
-    Attack {
-        links: &[],
-        change: Some(|clone| std::fs::remove_file(clone.join("driver.sh")).expect("it is there")),
-        command: &["merge", "p1", "p2", "--out", "m"],
-        end: Done,
-    },
+    changed(
+        &[],
+        |clone| std::fs::remove_file(clone.join("driver.sh")).expect("it is there"),
+        &["merge", "p1", "p2", "--out", "m"],
+        Done,
+    ),
 ];
 
 #[test]
@@ -356,10 +321,7 @@ fn make_home(home: &Path) {
                   evaluation: { episodes: 1, seeds: 1 }\nbaselines: [random]\n";
     write("clone/theirs.yaml", &format!("space: {space}\n{theirs}"));
     let flicker = shipped(FLICKER);
-    let played = |arguments: &[&str]| {
-        let (status, _, stderr) = outcome(avastra(arguments).current_dir(&clone));
-        assert_eq!(status, 0, "{arguments:?}: {stderr}");
-    };
+    let played = |arguments: &[&str]| drop(done_in(&clone, arguments));
     let corner = ["--road", "corner"];
     let found = ["--self-contained", "--episodes", "8", "--seed", "5", "--ads", &flicker, "--out", "run"];
     played(&[&["run", &space][..], &corner, &found].concat());
@@ -488,8 +450,7 @@ fn a_link_that_the_user_names_is_followed() {
     let at = |name: &str| scratch.path().join(name);
     std::fs::write(at("real.ava"), "language 1\nlet   a = 3 m\n").expect("it is writable");
     symlink("real.ava", at("named.ava")).expect("links can be made");
-    let (status, _, stderr) = outcome(avastra(&["fmt", "named.ava"]).current_dir(scratch.path()));
-    assert_eq!(status, 0, "{stderr}");
+    done_in(scratch.path(), &["fmt", "named.ava"]);
     assert!(at("named.ava").is_symlink());
     assert_eq!(std::fs::read_to_string(at("real.ava")).expect("it is there"), "language 1\nlet a = 3 m\n");
 }
@@ -501,14 +462,8 @@ fn pages_written_at_once_and_to_a_full_disk_leave_nothing_behind() {
     let out = run.display().to_string();
     let space = shipped("scenarios/avastra45.ava");
     let settings = ["--ads", "cc", "--road", "corner", "--episodes", "1", "--out", &out];
-    assert_eq!(outcome(&mut avastra(&[&["run", &space][..], &settings].concat())).0, 0);
-    let names = || -> Vec<String> {
-        let entries = std::fs::read_dir(&run).expect("it is there").flatten();
-        let mut names: Vec<String> =
-            entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
-        names.sort();
-        names
-    };
+    done(&[&["run", &space][..], &settings].concat());
+    let names = || -> Vec<String> { entries(&run).iter().map(|path| name(path)).collect() };
     // A file that may not grow fails as a full disk does.
     let script =
         format!("trap '' XFSZ; ulimit -f 16; exec '{}' report '{out}'", cargo_bin("avastra").display());
@@ -519,8 +474,7 @@ fn pages_written_at_once_and_to_a_full_disk_leave_nothing_behind() {
     std::thread::scope(|scope| {
         for _ in 0..3 {
             scope.spawn(|| {
-                let (status, _, stderr) = outcome(&mut avastra(&["report", &out]));
-                assert_eq!(status, 0, "{stderr}");
+                done(&["report", &out]);
             });
         }
     });

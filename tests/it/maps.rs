@@ -10,7 +10,7 @@ use avastra::run::{Run, RunSettings};
 use avastra::sim::{Scene, SensedObject, Start, World};
 
 use crate::cases::{expect_snapshot, root};
-use crate::command::{avastra, outcome};
+use crate::command::{avastra, fails, outcome};
 use crate::drives::start;
 use crate::world::space_at;
 
@@ -121,13 +121,8 @@ fn priority_records_say_who_goes_first() {
 #[test]
 fn where_a_street_ends_there_is_no_way_on() {
     let file = path("dead_end.xodr");
-    let (status, _, stderr) =
-        outcome(&mut avastra(&["road", &file, "--from", "street/-1@10", "--to", "street/1@10"]));
-    assert_eq!(status, 1);
-    assert!(
-        stderr.contains("there is no way from lane -1 of road `street` to lane 1 of road `street`"),
-        "{stderr}"
-    );
+    let reason = "there is no way from lane -1 of road `street` to lane 1 of road `street`";
+    fails(&["road", &file, "--from", "street/-1@10", "--to", "street/1@10"], reason);
 }
 
 #[test]

@@ -14,8 +14,8 @@ use proptest::prelude::*;
 use safetensors::SafeTensors;
 
 use crate::cases::root;
-use crate::command::{avastra, outcome};
-use crate::world::{SMALL, read};
+use crate::command::{avastra, done, fails, last_line, outcome};
+use crate::world::{SMALL, loaded};
 
 /// A policy of a few episodes with a network of a few neurons, trained once for all tests.
 fn trained() -> &'static Path {
@@ -29,7 +29,7 @@ fn trained() -> &'static Path {
         let (config, out_text) = (config.display().to_string(), out.display().to_string());
         let words =
             ["train", "scenarios/avastra45.ava", "--road", "corner", "--episodes", "20", "--seed", "5"];
-        avastra(&[&words[..], &["--config", &config, "--out", &out_text]].concat()).assert().success();
+        done(&[&words[..], &["--config", &config, "--out", &out_text]].concat());
         out.join("policy/corner_ddqn_5.ava")
     })
 }
@@ -46,31 +46,26 @@ fn beside(name: &str, bytes: &[u8]) -> String {
 }
 
 /// Loads a text as if it stood beside the shipped spaces.
-fn load(text: &str) -> Result<Policy, Vec<String>> {
-    let path = root().join("scenarios/policy_under_test.ava");
-    let read = |asked: &Path| if asked == path { Ok(text.to_owned()) } else { read(asked) };
-    let loaded = avastra::check::load(&path, &read).expect("the root can be read");
+pub fn load(text: &str) -> Result<Policy, Vec<String>> {
+    let loaded = loaded("scenarios/policy_under_test.ava", text);
     let messages = loaded.diagnostics.iter().map(|found| format!("{}: {}", found.code, found.message));
     loaded.policy.ok_or_else(|| messages.collect())
 }
 
 fn space() -> &'static Arc<Space> {
     static SPACE: OnceLock<Arc<Space>> = OnceLock::new();
-    SPACE.get_or_init(|| {
-        let path = root().join("scenarios/avastra45.ava");
-        avastra::check::load(&path, &read).expect("it can be read").space.expect("it is sound")
-    })
+    SPACE.get_or_init(|| crate::world::space("avastra45.ava"))
 }
 
 /// A policy with the `use` of a file that stands beside the shipped space.
-fn moved(text: &str) -> String {
+pub fn moved(text: &str) -> String {
     let begin = text.find("use \"").expect("it uses a space") + 5;
     let end = begin + text[begin..].find('"').expect("the path ends");
     format!("{}avastra45.ava{}", &text[..begin], &text[end..])
 }
 
 /// A changed text with a seal that fits it.
-fn sealed(text: &str) -> String {
+pub fn sealed(text: &str) -> String {
     let (tree, _) = avastra::syntax::parse(FileId(0), text);
     let begin = text.find("digest: \"sha256:").expect("it is sealed") + 9;
     format!("{}{}{}", &text[..begin], seal(text, &tree), &text[begin + 71..])
@@ -79,20 +74,16 @@ fn sealed(text: &str) -> String {
 #[test]
 fn both_faces_are_played_and_what_they_claim_is_checked() {
     let file = trained().display().to_string();
-    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &file]));
-    assert_eq!(status, 0, "{stderr}");
+    let stdout = done(&["replay", &file]);
     assert!(stdout.contains("played again by each of its faces"), "{stdout}");
-    let (status, _, stderr) = outcome(&mut avastra(&["replay", &file, "--ads", "idm"]));
-    assert!(status == 1 && stderr.contains("that it was trained against"), "{stderr}");
+    fails(&["replay", &file, "--ads", "idm"], "that it was trained against");
 
     let traces = ["network", "rules"].map(|face| {
         let out = trained().with_file_name(format!("played_{face}"));
         let _ = std::fs::remove_dir_all(&out);
         let out_text = out.display().to_string();
         let words = ["run", "--policy", &file, "--face", face, "--road", "corner", "--episodes", "3"];
-        let (status, stdout, stderr) =
-            outcome(&mut avastra(&[&words[..], &["--format", "json", "--out", &out_text]].concat()));
-        assert_eq!(status, 0, "{stderr}");
+        let stdout = done(&[&words[..], &["--format", "json", "--out", &out_text]].concat());
         let settings = std::fs::read_to_string(out.join("run.yaml")).expect("it is written");
         assert!(settings.contains(&format!("face: {face}")), "{settings}");
         let last = stdout.lines().last().expect("a result").to_owned();
@@ -113,16 +104,14 @@ fn both_faces_are_played_and_what_they_claim_is_checked() {
 fn rules_are_distilled_anew_and_hold() {
     let file = trained().display().to_string();
     let fewer = trained().with_file_name("fewer.ava").display().to_string();
-    avastra(&["policy", "distil", &file, "--leaves", "2", "--episodes", "2", "--out", &fewer])
-        .assert()
-        .success();
+    done(&["policy", "distil", &file, "--leaves", "2", "--episodes", "2", "--out", &fewer]);
     let policy = load(&moved(&std::fs::read_to_string(&fewer).expect("it is written"))).expect("it is sound");
     assert!((1..=2).contains(&policy.rules.len()));
     assert!(
         policy.rules.last().is_some_and(|rule| rule.conditions.is_empty()),
         "the last line takes the rest"
     );
-    avastra(&["replay", &fewer]).assert().success();
+    done(&["replay", &fewer]);
     let (first, second) = (load(&moved(&trained_text())).expect("sound"), policy);
     assert_eq!(first.parameters, second.parameters, "the network stays as it is");
 }
@@ -154,16 +143,14 @@ fn a_flipped_bit_anywhere_in_a_small_policy_is_noticed() {
     assert_eq!(noticed + not_text, 8 * sound.len());
     let mut bytes = sound.into_bytes();
     bytes[40] ^= 0x80;
-    let (status, _, stderr) = outcome(&mut avastra(&["replay", &beside("not_text.ava", &bytes)]));
-    assert_eq!(status, 1);
-    assert!(stderr.contains("not text: byte 40 is not UTF-8"), "{stderr}");
+    fails(&["replay", &beside("not_text.ava", &bytes)], "not text: byte 40 is not UTF-8");
 }
 
 #[test]
 fn weights_come_back_from_safetensors_bit_by_bit() {
     let file = trained().display().to_string();
     let out = trained().with_extension("safetensors");
-    avastra(&["policy", "weights", &file]).assert().success();
+    done(&["policy", "weights", &file]);
     let bytes = std::fs::read(&out).expect("it is written");
     let tensors = SafeTensors::deserialize(&bytes).expect("it is safetensors");
     let policy = load(&moved(&trained_text())).expect("it is sound");
@@ -191,10 +178,8 @@ fn weights_come_back_from_safetensors_bit_by_bit() {
 fn a_policy_is_explained() {
     let file = trained().display().to_string();
     let words = ["policy", "explain", &file, "--episodes", "3", "--repeats", "3"];
-    let (status, stdout, stderr) = outcome(&mut avastra(&[&words[..], &["--format", "json"]].concat()));
-    assert_eq!(status, 0, "{stderr}");
-    let result: serde_json::Value =
-        serde_json::from_str(stdout.lines().last().expect("a result")).expect("it is JSON");
+    let stdout = done(&[&words[..], &["--format", "json"]].concat());
+    let result = last_line(&stdout);
     let insight = &result["insight"];
     let importance = insight["importance"].as_array().expect("a list");
     assert_eq!(importance.iter().filter(|one| one["of_paper"] == true).count(), 19);
@@ -207,17 +192,14 @@ fn a_policy_is_explained() {
     assert_eq!(insight["state"]["q_values"].as_array().map(Vec::len), Some(45));
 
     let given = ["--state", "ego_speed: 12, time: Night, dist_nearest: 0.02 km"];
-    let (status, stdout, _) = outcome(&mut avastra(&[&words[..], &given[..]].concat()));
-    assert_eq!(status, 0);
+    let stdout = done(&[&words[..], &given[..]].concat());
     for shown in ["ego_speed: 12.00 m/s", "time: Night", "dist_nearest: 20.00 m", "permutation importance"] {
         assert!(stdout.contains(shown), "{shown}: {stdout}");
     }
     for (state, reason) in
         [("ego_sped: 12", "did you mean `ego_speed`?"), ("time: 12", "Morning"), ("=", "write")]
     {
-        let (status, _, stderr) = outcome(&mut avastra(&[&words[..], &["--state", state]].concat()));
-        assert_eq!(status, 1, "{stderr}");
-        assert!(stderr.contains(reason), "{stderr}");
+        fails(&[&words[..], &["--state", state]].concat(), reason);
     }
 }
 

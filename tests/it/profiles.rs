@@ -6,8 +6,8 @@ use std::path::Path;
 use avastra::ads::ModularConfig;
 use avastra::run::RunSettings;
 
-use crate::cases::root;
-use crate::command::{avastra, outcome};
+use crate::cases::{entries, root};
+use crate::command::{avastra, done, fails, outcome};
 use crate::world::SMALL;
 
 const FAULT: &str = "scenarios/ads/faults/planning_never_yields.yaml";
@@ -50,19 +50,13 @@ fn a_scenario_keeps_the_profile_that_it_was_found_with() {
     let directory = scratch.path().join("run");
     let (status, _, stderr) = run(&directory, &["--episodes", "30", "--ads", FAULT]);
     assert_eq!(status, 0, "{stderr}");
-    let critical = directory.join("critical");
-    let mut files: Vec<_> = std::fs::read_dir(&critical)
-        .expect("it exists")
-        .map(|entry| entry.expect("it reads").path())
-        .collect();
-    files.sort();
+    let files = entries(directory.join("critical"));
     let file = files.first().expect("a system that never yields hits an obstacle");
     let text = std::fs::read_to_string(file).expect("it was written");
     assert!(text.contains("never_yields: true"), "{text}");
 
     let path = file.display().to_string();
-    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &path]));
-    assert_eq!(status, 0, "{stdout}{stderr}");
+    done(&["replay", &path]);
     // The file holds the recorded profile, so claims are checked.
     let (status, stdout, _) = outcome(&mut avastra(&["replay", &path, "--ads", FAULT]));
     assert!(status == 0 && !stdout.contains("against"), "{stdout}");
@@ -73,8 +67,7 @@ fn a_scenario_keeps_the_profile_that_it_was_found_with() {
 
     let svg = scratch.path().join("strip.svg").display().to_string();
     let drawn = ["render", &path, "--strip", "--ads", cautious, "--out", &svg];
-    let (status, _, stderr) = outcome(&mut avastra(&drawn));
-    assert_eq!(status, 0, "{stderr}");
+    done(&drawn);
     let svg = std::fs::read_to_string(&svg).expect("it was drawn");
     assert!(svg.contains(&format!("driven by {cautious}: ")), "a picture says whose drive it is");
 
@@ -84,8 +77,7 @@ fn a_scenario_keeps_the_profile_that_it_was_found_with() {
     assert!(text.contains(&digest));
     std::fs::write(&other, text.replace(&digest, &ModularConfig::default().digest()))
         .expect("it is writable");
-    let (status, _, stderr) = outcome(&mut avastra(&["shrink", &other.display().to_string()]));
-    assert!(status == 1 && stderr.contains("--ads FILE"), "{stderr}");
+    fails(&["shrink", &other.display().to_string()], "--ads FILE");
 }
 
 #[test]
@@ -127,11 +119,9 @@ fn a_policy_is_verified_against_the_profile_that_it_was_trained_against() {
     let (config, out) = (config.display().to_string(), scratch.path().join("run").display().to_string());
     let place = ["train", "scenarios/avastra45.ava", "--road", "corner", "--episodes", "12", "--seed", "5"];
     let how = ["--config", &config, "--out", &out, "--ads", FAULT];
-    let (status, _, stderr) = outcome(&mut avastra(&[&place[..], &how].concat()));
-    assert_eq!(status, 0, "{stderr}");
+    done(&[&place[..], &how].concat());
     let file = scratch.path().join("run/policy/corner_ddqn_5.ava");
     let text = std::fs::read_to_string(&file).expect("it was written");
     assert!(text.contains("never_yields: true") && text.contains(&profile(FAULT).digest()), "{text}");
-    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &file.display().to_string()]));
-    assert_eq!(status, 0, "{stdout}{stderr}");
+    done(&["replay", &file.display().to_string()]);
 }

@@ -12,8 +12,8 @@ use base64::Engine;
 use serde_json::Value;
 
 use crate::cases::root;
-use crate::command::{avastra, outcome};
-use crate::world::read;
+use crate::command::{avastra, done, last_line, outcome};
+use crate::world::loaded;
 
 /// A pedestrian walks in front of a driving system that yields to nobody. Its seed, and so what is driven, is fixed.
 const SOURCE: &str = r#"language 1
@@ -43,9 +43,7 @@ scenario walk {
 
 /// The scenario, with its table and driving system.
 fn walk() -> (ActionTable, Scenario, Selected) {
-    let path = root().join("scenarios/walk.ava");
-    let with_it = |path: &Path| if path.ends_with("walk.ava") { Ok(SOURCE.to_owned()) } else { read(path) };
-    let loaded = avastra::check::load(&path, &with_it).expect("it is there");
+    let loaded = loaded("scenarios/walk.ava", SOURCE);
     let scenario = loaded.scenario.expect("it has a scenario");
     let ads = recorded(&scenario).expect("its driving system exists");
     (ActionTable::new(loaded.space.expect("its space is sound")), scenario, ads)
@@ -172,11 +170,8 @@ fn a_page_holds_everything_and_repeats_itself() {
 #[test]
 fn the_picture_of_the_readme_is_of_its_scenario() {
     let found = "scenarios/found/boulevard_0383";
-    let (status, _, stderr) = outcome(&mut avastra(&["replay", &format!("{found}.ava")]));
-    assert_eq!(status, 0, "{stderr}");
-    let (status, drawn, stderr) =
-        outcome(&mut avastra(&["render", &format!("{found}.ava"), "--strip", "--out", "-"]));
-    assert_eq!(status, 0, "{stderr}");
+    done(&["replay", &format!("{found}.ava")]);
+    let drawn = done(&["render", &format!("{found}.ava"), "--strip", "--out", "-"]);
     let kept = std::fs::read_to_string(root().join(format!("{found}.svg"))).expect("it is shipped");
     assert_eq!(drawn.trim_end(), kept.trim_end());
     let document = roxmltree::Document::parse(&kept).expect("it is well-formed XML");
@@ -196,10 +191,8 @@ fn a_shrunk_scenario_and_the_found_one_name_each_other() {
     let file = critical.join("walk.ava");
     std::fs::write(&file, source).expect("it can be written");
     let at = |path: &Path| path.display().to_string();
-    let (status, _, stderr) = outcome(&mut avastra(&["shrink", &at(&file)]));
-    assert_eq!(status, 0, "{stderr}");
-    let (status, _, stderr) = outcome(&mut avastra(&["report", &at(scratch.path())]));
-    assert_eq!(status, 0, "{stderr}");
+    done(&["shrink", &at(&file)]);
+    done(&["report", &at(scratch.path())]);
     let html = std::fs::read_to_string(scratch.path().join("report.html")).expect("it was written");
     let index = index_of(&html);
     let scenarios = index["scenarios"].as_array().unwrap();
@@ -310,9 +303,8 @@ fn trainings_and_estimates_have_pages_with_their_results() {
     let space = "scenarios/avastra45.ava";
     let training =
         ["train", space, "--agent", "constant", "--episodes", "6", "--out", &train, "--format", "json"];
-    let (status, stdout, stderr) = outcome(&mut avastra(&[&training[..], &short].concat()));
-    assert_eq!(status, 0, "{stderr}");
-    let printed: Value = serde_json::from_str(stdout.lines().last().expect("a result")).expect("it is JSON");
+    let stdout = done(&[&training[..], &short].concat());
+    let printed = last_line(&stdout);
     // The page is made of what the database holds, whatever the file for others says.
     std::fs::write(scratch.path().join("train/results.json"), "{}").expect("it is writable");
     let (status, stderr, index) = reported(scratch.path(), &[&train]);
@@ -324,8 +316,7 @@ fn trainings_and_estimates_have_pages_with_their_results() {
     assert_eq!(overview["conditions"][1], serde_json::json!(["Driving system", "modular"]));
 
     let estimating = ["estimate", space, "--parts", "2", "--episodes", "2", "--out", &estimate];
-    let (status, _, stderr) = outcome(&mut avastra(&[&estimating[..], &short].concat()));
-    assert_eq!(status, 0, "{stderr}");
+    done(&[&estimating[..], &short].concat());
     let (status, stderr, index) = reported(scratch.path(), &[&estimate]);
     assert_eq!(status, 0, "{stderr}");
     assert_eq!(index["overview"]["kind"], "estimate");

@@ -1,8 +1,6 @@
 //! `avastra road`: maps in words, as JSON and as pictures.
 
-use serde_json::Value;
-
-use crate::command::{avastra, outcome};
+use crate::command::{avastra, done, last_line, outcome};
 
 const CORNER: &str = "scenarios/roads/corner.xodr";
 
@@ -32,7 +30,7 @@ fn a_map_is_told_in_words() {
 fn a_map_in_json_holds_every_lane_with_its_poses() {
     let (status, stdout, _) = road(&[CORNER, "--format", "json"]);
     assert_eq!(status, 0);
-    let map: Value = serde_json::from_str(stdout.lines().last().expect("one line")).expect("it is JSON");
+    let map = last_line(&stdout);
     assert_eq!((map["schema"].as_u64(), map["command"].as_str()), (Some(3), Some("road")));
     let lanes = map["lanes"].as_array().expect("lanes");
     assert_eq!(lanes.len(), 39);
@@ -96,11 +94,10 @@ fn a_taper_costs_no_collisions() {
         std::fs::write(&file, space).expect("it is writable");
         let out = scratch.path().join(name);
         let (file, out) = (file.display().to_string(), out.display().to_string());
-        let (status, stdout, stderr) = outcome(&mut avastra(&[
+        let stdout = done(&[
             "run", &file, "--episodes", "180", "--seed", "1", "--out", &out, "--format", "json",
-        ]));
-        assert_eq!(status, 0, "{stderr}{stdout}");
-        let result: Value = serde_json::from_str(stdout.lines().last().expect("one line")).expect("it is JSON");
+        ]);
+        let result = last_line(&stdout);
         println!("{name}: {}", result["totals"]);
         result["totals"]["collisions"].as_u64().expect("a number")
     });

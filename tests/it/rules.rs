@@ -6,13 +6,11 @@
 //! The audit: every rule has a draw that breaks this rule alone. The draw is refused with the rule's name,
 //! and passes without the rule. So this test fails if a rule is no longer enforced somewhere.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use avastra::action::{
     ActionTable, Draw, Effect, Enforcement, Refusal, Situation, SpawnFacts, SpawnRequest, Surroundings, audit,
 };
-use avastra::check::load;
 use avastra::check::state_argument::memory_from;
 use avastra::episode::{Choice, Moment};
 use avastra::model::vocabulary::{Body, TimeOfDay, Verb};
@@ -20,8 +18,7 @@ use avastra::model::{MomentFacts, RulesInForce, Type, Value};
 use avastra::rng;
 use avastra::rng::Stream;
 
-use crate::cases::root;
-use crate::world::{Wide, assert_replays, read, run, space};
+use crate::world::{Wide, assert_replays, loaded, run, space};
 
 const RULES: [&str; 5] = ["chronology", "npc_gap", "npc_speed", "walking_pace", "no_teleport"];
 
@@ -138,79 +135,59 @@ struct Breach {
 const SEDAN: (&str, &str) = ("vehicle", "Sedan");
 const RED: (&str, &str) = ("colour", "Red");
 
+/// What most breaches have in common.
+const USUAL: Breach = Breach {
+    rule: "",
+    road: "corner",
+    states: "time: Noon",
+    row: "",
+    values: &[],
+    safety_gap_m: 0.0,
+    enforced: Enforcement::Draw,
+};
+
 const BREACHES: [Breach; 8] = [
-    Breach {
-        rule: "chronology",
-        road: "corner",
-        states: "time: Noon",
-        row: "set_time(to: Morning)",
-        values: &[],
-        safety_gap_m: 0.0,
-        enforced: Enforcement::Transition,
-    },
+    Breach { rule: "chronology", row: "set_time(to: Morning)", enforced: Enforcement::Transition, ..USUAL },
     Breach {
         rule: "npc_gap",
-        road: "corner",
-        states: "time: Noon",
         row: "drive_ahead(lane: Current, mode: Near, then: Keep)",
         values: &[SEDAN, RED, ("speed", "10"), ("distance", "17.5")],
-        safety_gap_m: 0.0,
-        enforced: Enforcement::Draw,
+        ..USUAL
     },
     Breach {
         rule: "ped_gap",
-        road: "corner",
-        states: "time: Noon",
         row: "pedestrian(from: Left)",
         values: &[("mode", "Near"), ("speed", "1"), ("distance", "20.5")],
-        safety_gap_m: 0.0,
-        enforced: Enforcement::Draw,
+        ..USUAL
     },
     Breach {
         rule: "npc_speed",
-        road: "corner",
-        states: "time: Noon",
         row: "drive_ahead(lane: Current, mode: Near, then: Keep)",
         values: &[SEDAN, RED, ("speed", "12"), ("distance", "18")],
-        safety_gap_m: 0.0,
-        enforced: Enforcement::Draw,
+        ..USUAL
     },
     Breach {
         rule: "walking_pace",
-        road: "corner",
-        states: "time: Noon",
         row: "pedestrian(from: Right)",
         values: &[("mode", "Far"), ("speed", "1.5"), ("distance", "40")],
-        safety_gap_m: 0.0,
-        enforced: Enforcement::Draw,
+        ..USUAL
     },
     Breach {
         rule: "lane_exists",
         road: "boulevard",
-        states: "time: Noon",
         row: "drive_ahead(lane: Left, mode: Near, then: Keep)",
         values: &[SEDAN, RED, ("speed", "10"), ("distance", "17")],
-        safety_gap_m: 0.0,
-        enforced: Enforcement::Draw,
+        ..USUAL
     },
     Breach {
         rule: "no_teleport",
-        road: "corner",
-        states: "time: Noon",
         row: "pedestrian(from: Left)",
         values: &[("mode", "Near"), ("speed", "1"), ("distance", "20")],
         safety_gap_m: 20.5,
         enforced: Enforcement::Survey,
+        ..USUAL
     },
-    Breach {
-        rule: "wet_needs_cause",
-        road: "corner",
-        states: "time: Noon, sky: None",
-        row: "wet(how: High)",
-        values: &[],
-        safety_gap_m: 0.0,
-        enforced: Enforcement::Draw,
-    },
+    Breach { rule: "wet_needs_cause", states: "time: Noon, sky: None", row: "wet(how: High)", ..USUAL },
 ];
 
 impl Breach {
@@ -283,11 +260,7 @@ fn a_scenario_with_a_breach_does_not_compile() {
             "language 1\nuse \"avastra45.ava\"\nscenario s {{\n{origin}\nroad: {}\nstart {{ {} }}\nsteps {{ 0: {} {drawn} }}\n}}\n",
             breach.road, breach.states, breach.row
         );
-        let loaded = load(Path::new("s.ava"), &|path| match path.to_str() {
-            Some("s.ava") => Ok(text.clone()),
-            _ => read(&root().join("scenarios").join(path)),
-        });
-        let loaded = loaded.expect("its text is known");
+        let loaded = loaded("scenarios/s.ava", &text);
         assert_eq!(loaded.scenario.is_some(), loaded.diagnostics.is_empty());
         loaded.diagnostics.iter().map(|found| format!("{} {}", found.code, found.message)).collect()
     };
@@ -316,11 +289,7 @@ enum Body = Jeep | SUV | Sedan
 action a(any d: Length in 1 m .. 9 m where d < 5 m, any body: Body in [Jeep, SUV]) {
   spawn body ahead 40 m + d { lane: Current, speed: 5 m/s, does: DriveAhead }
 }";
-    let loaded = load(Path::new("a.ava"), &|path| match path.to_str() {
-        Some("a.ava") => Ok(TEXT.to_owned()),
-        _ => read(&root().join("scenarios").join(path)),
-    });
-    let table = ActionTable::new(loaded.expect("its text is known").space.expect("it is sound"));
+    let table = ActionTable::new(loaded("scenarios/a.ava", TEXT).space.expect("it is sound"));
     let space = table.space();
     let rules = RulesInForce::new(space, &[], &[]).expect("no rule is named");
     let memory = space.initial_memory(1);

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::cases::root;
-use crate::command::{avastra, background, outcome};
+use crate::cases::{copy_space, entries, root};
+use crate::command::{avastra, background, change, done, fails, outcome};
 use crate::world::FLICKER;
 
 const SPACE: &str = "scenarios/avastra45.ava";
@@ -14,13 +14,12 @@ fn files(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut open = vec![directory.to_owned()];
     while let Some(folder) = open.pop() {
-        for entry in std::fs::read_dir(&folder).expect("it is there").flatten() {
-            match entry.path() {
-                path if path.is_dir() => open.push(path),
-                path => {
-                    let bytes = std::fs::read(&path).expect("it is readable");
-                    found.insert(path.strip_prefix(directory).expect("it is below").to_owned(), bytes);
-                }
+        for path in entries(&folder) {
+            if path.is_dir() {
+                open.push(path);
+            } else {
+                let bytes = std::fs::read(&path).expect("it is readable");
+                found.insert(path.strip_prefix(directory).expect("it is below").to_owned(), bytes);
             }
         }
     }
@@ -37,12 +36,6 @@ fn equal(one: &Path, other: &Path) {
     assert_eq!(one.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>());
     let differ: Vec<_> = one.iter().filter(|(name, bytes)| other[*name] != **bytes).collect();
     assert!(differ.is_empty(), "{:?}", differ.iter().map(|(name, _)| name).collect::<Vec<_>>());
-}
-
-fn done(arguments: &[&str]) -> String {
-    let (status, stdout, stderr) = outcome(&mut avastra(arguments));
-    assert_eq!(status, 0, "{arguments:?}: {stderr}");
-    stdout
 }
 
 fn text(path: &Path) -> &str {
@@ -90,8 +83,7 @@ fn merged(command: &[&str], kind: &str, order: &[u32]) -> tempfile::TempDir {
         equal(&at("whole"), &at(out));
     }
     // A merge that was killed after it had named the directory is ended by the next one.
-    let database = rusqlite::Connection::open(at("merged").join(format!("{kind}.db")));
-    database.expect("it is a database").execute_batch("VACUUM").expect("it can be written anew");
+    change(&at("merged").join(format!("{kind}.db")), "VACUUM");
     let results = at("merged/results.json");
     if results.is_file() {
         std::fs::remove_file(results).expect("it is there");
@@ -113,9 +105,7 @@ fn merged(command: &[&str], kind: &str, order: &[u32]) -> tempfile::TempDir {
 fn eight_shards_of_a_run_make_the_run() {
     let command = ["run", SPACE, "--road", "corner", "--episodes", "21", "--seed", "5", "--ads", FLICKER];
     let scratch = merged(&command, "run", &[3, 8, 1, 6, 2, 5, 7, 4]);
-    let critical = scratch.path().join("merged/critical");
-    let scenarios: Vec<PathBuf> =
-        std::fs::read_dir(critical).expect("it is there").flatten().map(|entry| entry.path()).collect();
+    let scenarios = entries(scratch.path().join("merged/critical"));
     assert!(!scenarios.is_empty(), "without a scenario this says little");
     scenarios.iter().for_each(|file| drop(done(&["replay", text(file)])));
 
@@ -138,9 +128,7 @@ fn eight_shards_of_a_run_make_the_run() {
     assert_eq!((status, stdout.trim()), (0, "4"), "{stderr}");
     assert!(stderr.contains("4/run.db"), "{stderr}");
     // One that another version wrote is not torn.
-    let database = rusqlite::Connection::open(scratch.path().join("far/away/5/run.db"));
-    let set = database.expect("it is a database").pragma_update(None, "user_version", 9999);
-    set.expect("it can be changed");
+    change(&scratch.path().join("far/away/5/run.db"), "PRAGMA user_version = 9999");
     let (status, stdout, stderr) = outcome(&mut avastra(&[&["merge"], &copies[..], &["--missing"]].concat()));
     assert!(status == 1 && stdout.is_empty() && stderr.contains("it has layout 9999"), "{stdout}{stderr}");
 
@@ -175,9 +163,8 @@ fn eight_shards_of_a_run_make_the_run() {
     let told = merge(&scratch.path().join("shards/2"));
     assert!(told.contains("is shard 2/9") && told.contains("is shard 1/8"), "{told}");
     // Rows that were changed behind its back.
-    let database = scratch.path().join("shards/3/run.db");
-    let database = rusqlite::Connection::open(database).expect("it is a database");
-    database.execute_batch("UPDATE episode SET distance_m = distance_m + 1").expect("it can be changed");
+    let longer = "UPDATE episode SET distance_m = distance_m + 1";
+    change(&scratch.path().join("shards/3/run.db"), longer);
     let told = merge(&scratch.path().join("shards/3"));
     assert!(told.contains("were changed since they were written"), "{told}");
 }
@@ -201,15 +188,12 @@ fn a_shard_is_gone_on_with() {
     child.kill().expect("it is ours to kill");
     child.wait().expect("it ends");
     let resumed = ["run", "--resume", text(&two), "--format", "json"];
-    let (status, stdout, stderr) = outcome(&mut avastra(&resumed));
-    assert_eq!(status, 0, "{stderr}");
+    let stdout = done(&resumed);
     assert!(stdout.contains("\"episodes\":20"), "the other half is not played: {stdout}");
     done(&["merge", text(&one), text(&two), "--out", text(&at("merged"))]);
     equal(&at("whole"), &at("merged"));
     // A directory that holds something else stays.
-    let (status, _, stderr) =
-        outcome(&mut avastra(&["merge", text(&one), text(&two), "--out", text(&at("shards"))]));
-    assert!(status == 1 && stderr.contains("is not empty"), "{stderr}");
+    fails(&["merge", text(&one), text(&two), "--out", text(&at("shards"))], "is not empty");
 }
 
 #[test]
@@ -260,8 +244,7 @@ fn schedulers_say_which_shard_it_is() {
     assert!(!out.join("shard.yaml").exists());
     let (status, _, stderr) = outcome(avastra(&asked).env("SLURM_ARRAY_TASK_ID", "4"));
     assert!(status == 1 && stderr.contains("say `--shard I/N`"), "{stderr}");
-    let (status, _, stderr) = outcome(&mut avastra(&[&asked[..], &["--shard", "4/3"]].concat()));
-    assert!(status == 1 && stderr.contains("the last is 3"), "{stderr}");
+    fails(&[&asked[..], &["--shard", "4/3"]].concat(), "the last is 3");
 }
 
 #[test]
@@ -296,8 +279,7 @@ fn a_dry_run_says_what_would_be_played() {
     std::fs::write(out.join("notes"), "mine").expect("it is writable");
     let used = [&run[..], &["--out", text(&out)]].concat();
     for (wrong, reason) in [(&["study", "none.yaml"][..], "none.yaml"), (&used, "is not empty")] {
-        let (status, _, stderr) = outcome(&mut avastra(&[wrong, &["--dry-run"]].concat()));
-        assert!(status == 1 && stderr.contains(reason), "{stderr}");
+        fails(&[wrong, &["--dry-run"]].concat(), reason);
     }
 }
 
@@ -307,8 +289,7 @@ fn trainings_and_nothing_cannot_be_merged() {
     let (folder, training) = (scratch.path().join("folder"), scratch.path().join("training"));
     std::fs::create_dir(&folder).expect("it is writable");
     let refused = |arguments: &[&str], reason: &str| {
-        let (status, _, stderr) = outcome(&mut avastra(&[&["merge"], arguments].concat()));
-        assert!(status == 1 && stderr.contains(reason), "{stderr}");
+        fails(&[&["merge"], arguments].concat(), reason);
     };
     refused(&[text(&folder), "--missing"], "none of the directories holds");
     std::fs::write(folder.join("notes"), "mine").expect("it is writable");
@@ -321,12 +302,7 @@ fn trainings_and_nothing_cannot_be_merged() {
 
 /// A space and a policy as they lie beside each other.
 fn checkout(folder: &Path) {
-    let roads = ["corner", "residential", "boulevard", "crossroad"].map(|road| format!("roads/{road}.xodr"));
-    std::fs::create_dir_all(folder.join("scenarios/roads")).expect("it is writable");
-    for name in ["avastra45.ava", "roads.ava"].into_iter().chain(roads.iter().map(String::as_str)) {
-        let name = Path::new("scenarios").join(name);
-        std::fs::copy(root().join(&name), folder.join(&name)).expect("it is shipped");
-    }
+    copy_space(&folder.join("scenarios"));
     std::fs::create_dir_all(folder.join("policies")).expect("it is writable");
     let name = "policies/corner.ava";
     std::fs::copy(root().join(name), folder.join(name)).expect("it is shipped");

@@ -9,8 +9,8 @@ use avastra::sim::ENGINE;
 use avastra::study::StudyDatabase;
 use serde_json::Value;
 
-use crate::cases::{expect_snapshot, root};
-use crate::command::{avastra, background, outcome};
+use crate::cases::{expect_snapshot, files, root};
+use crate::command::{avastra, background, change, done, done_in, fails, last_line, outcome};
 use crate::report::index_of;
 use crate::world::FLICKER;
 
@@ -53,7 +53,7 @@ fn a_study_depends_on_its_file_alone() {
         child.kill().expect("it is ours to kill");
         child.wait().expect("it ends");
         let resume = ["study", "--jobs", "2", "--resume", &broken.display().to_string()];
-        avastra(&resume).assert().success();
+        done(&resume);
     }
     assert_eq!(results(&broken), whole);
 
@@ -113,10 +113,8 @@ fn what_another_study_has_played_is_taken_over() {
         (index_of(&html)["overview"]["study"].clone(), stderr)
     };
     assert_eq!(overview().0, whole);
-    let database = rusqlite::Connection::open(alone.join("study.db")).expect("it is a database");
-    let change = "UPDATE evaluated SET distance_m = 1e9 WHERE cell = 1 AND episode = 0";
-    database.execute_batch(change).expect("it can be changed");
-    drop(database);
+    let longer = "UPDATE evaluated SET distance_m = 1e9 WHERE cell = 1 AND episode = 0";
+    change(&alone.join("study.db"), longer);
     let (damaged, stderr) = overview();
     assert!(stderr.contains("the rows of cell 1 were changed"), "{stderr}");
     assert_eq!(damaged["cells"].as_u64().map(|cells| cells + 1), whole["cells"].as_u64());
@@ -190,10 +188,7 @@ fn kept_and_written_again(scratch: &Path, played: &Path) {
 
     let out = scratch.join("RESULTS.md").display().to_string();
     let write = |more: &[&str]| {
-        let mut command =
-            avastra(&[&["study", "results", "scenarios/studies", "--out", &out], more].concat());
-        let (status, _, stderr) = outcome(command.current_dir(scratch));
-        assert_eq!(status, 0, "{stderr}");
+        done_in(scratch, &[&["study", "results", "scenarios/studies", "--out", &out], more].concat());
         std::fs::read_to_string(&out).expect("it was written")
     };
     let first = write(&["--add", &played.display().to_string(), "--commit", "0123abc"]);
@@ -289,10 +284,8 @@ fn cells_are_runs(whole: &Value) {
             ["run", "scenarios/avastra45.ava", "--road", "corner", "--episodes", "3", "--format", "json"];
         let run = [&run[..], &["--ads", FLICKER]].concat();
         let seed = seed.as_str().expect("a text");
-        let (status, stdout, stderr) =
-            outcome(&mut avastra(&[&run[..], &["--seed", seed, "--out", &out]].concat()));
-        assert_eq!(status, 0, "{stderr}");
-        let line: Value = serde_json::from_str(stdout.lines().last().expect("a result")).expect("JSON");
+        let stdout = done(&[&run[..], &["--seed", seed, "--out", &out]].concat());
+        let line = last_line(&stdout);
         found += line["totals"]["collisions"].as_u64().expect("a number");
     }
     assert_eq!(counted, found as f64 / 2.0);
@@ -303,8 +296,7 @@ fn a_quick_study_says_that_it_is_none() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let out = scratch.path().join("quick").display().to_string();
     let study = ["study", "scenarios/studies/healthy.yaml", "--quick", "--format", "json", "--out", &out];
-    let (status, stdout, stderr) = outcome(&mut avastra(&study));
-    assert_eq!(status, 0, "{stderr}");
+    let stdout = done(&study);
     let line = stdout.lines().last().expect("a result");
     assert!(line.starts_with("{\"schema\":3,\"command\":\"study\""), "{line}");
     let result: Value = serde_json::from_str(line).expect("JSON");
@@ -356,8 +348,7 @@ fn what_no_study_can_be_is_said_so() {
         std::fs::write(&file, format!("space: {space}\n{text}\n")).expect("it is writable");
         let out = scratch.path().join("out");
         let arguments = ["study", &file.display().to_string(), "--out", &out.display().to_string()];
-        let (status, _, stderr) = outcome(&mut avastra(&arguments));
-        assert!(status == 1 && stderr.contains(reason), "{text}: {stderr}");
+        fails(&arguments, reason);
         assert!(!out.exists(), "{text}: nothing is left behind");
     }
     // A mistake of form is reported with its line.
@@ -365,8 +356,7 @@ fn what_no_study_can_be_is_said_so() {
         .expect("writable");
     let (_, _, stderr) = outcome(&mut avastra(&["study", &file.display().to_string()]));
     assert!(stderr.contains("line 3"), "{stderr}");
-    let (status, _, stderr) = outcome(&mut avastra(&["study", "--resume", "scenarios"]));
-    assert!(status == 1 && stderr.contains("it has no study.yaml"), "{stderr}");
+    fails(&["study", "--resume", "scenarios"], "it has no study.yaml");
 }
 
 #[test]
@@ -374,20 +364,15 @@ fn the_results_are_what_the_kept_studies_say() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let out = scratch.path().join("RESULTS.md");
     let written = ["study", "results", "scenarios/studies", "--out", &out.display().to_string()];
-    let (status, _, stderr) = outcome(avastra(&written).current_dir(root()));
-    assert_eq!(status, 0, "{stderr}");
+    done(&written);
     let read = |path: &Path| std::fs::read_to_string(path).expect("it is readable");
     assert!(read(&out) == read(&root().join("RESULTS.md")), "write it again with `avastra study results`");
 }
 
 #[test]
 fn every_shipped_study_can_begin() {
-    let folder = root().join("scenarios/studies");
-    for entry in std::fs::read_dir(folder).expect("it is there").flatten() {
-        if entry.path().extension().is_none_or(|extension| extension != "yaml") {
-            continue;
-        }
-        let text = std::fs::read_to_string(entry.path()).expect("it is readable");
+    for path in files(root().join("scenarios/studies"), "yaml") {
+        let text = std::fs::read_to_string(&path).expect("it is readable");
         let study = loaded(&text);
         // No episode is used both for training and for evaluation.
         let settings = study.settings();
@@ -407,7 +392,7 @@ fn every_shipped_study_can_begin() {
         let count = all.len();
         all.sort_unstable();
         all.dedup();
-        assert_eq!(all.len(), count, "{}", entry.path().display());
+        assert_eq!(all.len(), count, "{}", path.display());
     }
 }
 

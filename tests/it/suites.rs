@@ -1,10 +1,10 @@
 //! Found scenarios as a suite that lives: the space may be documented, moved and changed, and the suite says what it
 //! means for it.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use crate::cases::root;
-use crate::command::{avastra, outcome};
+use crate::cases::{copy_space, entries, name, root};
+use crate::command::{avastra, done, fails, outcome};
 use crate::world::FLICKER;
 
 /// A copy of the shipped space, and a run in it that found crashes.
@@ -17,19 +17,12 @@ struct Found {
 impl Found {
     fn new(flags: &[&str]) -> Found {
         let scratch = tempfile::tempdir().expect("a scratch directory");
-        let space = scratch.path().join("space");
-        std::fs::create_dir_all(space.join("roads")).expect("it is writable");
-        let roads =
-            ["corner", "residential", "boulevard", "crossroad"].map(|road| format!("roads/{road}.xodr"));
-        for name in ["avastra45.ava", "roads.ava"].into_iter().chain(roads.iter().map(String::as_str)) {
-            std::fs::copy(root().join("scenarios").join(name), space.join(name)).expect("it is shipped");
-        }
+        copy_space(&scratch.path().join("space"));
         let mut found = Found { scratch, scenarios: 0 };
         let (file, run) = (found.path("space/avastra45.ava"), found.path("run"));
         let settings =
             ["--road", "corner", "--episodes", "12", "--seed", "5", "--ads", FLICKER, "--out", &run];
-        let (status, _, stderr) = outcome(&mut avastra(&[&["run", &file], &settings[..], flags].concat()));
-        assert_eq!(status, 0, "{stderr}");
+        done(&[&["run", &file], &settings[..], flags].concat());
         found.scenarios = found.files("run/critical").len();
         assert!(found.scenarios >= 2, "a suite needs scenarios");
         found
@@ -40,10 +33,8 @@ impl Found {
     }
 
     fn files(&self, folder: &str) -> Vec<PathBuf> {
-        let entries = std::fs::read_dir(self.scratch.path().join(folder)).expect("it is there").flatten();
-        let mut files: Vec<PathBuf> =
-            entries.map(|entry| entry.path()).filter(|path| path.is_file()).collect();
-        files.sort();
+        let mut files = entries(self.scratch.path().join(folder));
+        files.retain(|path| path.is_file());
         files
     }
 
@@ -261,8 +252,7 @@ fn a_review_says_what_differs_in_meaning() {
         assert_eq!((*then == now, now.contains("ads: \"reactive\"")), (is_kept, !is_kept), "{now}{stderr}");
         if !is_kept {
             assert!(!now.contains("profile"), "{now}");
-            let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &file]));
-            assert_eq!(status, 0, "{stdout}{stderr}");
+            done(&["replay", &file]);
         }
     }
 }
@@ -304,7 +294,7 @@ fn a_review_tells_what_is_gone() {
     let fault = "scenarios/ads/faults/planning_never_yields.yaml";
     let place = ["--road", "residential", "--episodes", "9", "--seed", "1", "--ads", fault];
     let space = "scenarios/avastra45.ava";
-    avastra(&[&["run", space, "--out", &run][..], &place].concat()).assert().success();
+    done(&[&["run", space, "--out", &run][..], &place].concat());
     let review = ["test", "--format", "json", "--accept", "--ads", "idm", &run];
     let (status, stdout, stderr) = outcome(&mut avastra(&review));
     let tested: serde_json::Value = serde_json::from_str(stdout.trim_end()).expect("it is JSON");
@@ -320,10 +310,6 @@ fn a_review_tells_what_is_gone() {
     assert_eq!(tested["reviewed"][0]["change"], "gone");
     let differences = tested["reviewed"][0]["differences"].to_string();
     assert!(differences.contains("is not legal any more, because cannot spawn"), "{tested}");
-}
-
-fn name(path: &Path) -> String {
-    path.file_name().expect("it has a name").to_string_lossy().into_owned()
 }
 
 impl Found {
@@ -346,7 +332,7 @@ fn a_suite_is_judged_by_the_verdict_of_its_space() {
     std::fs::write(&space, text).expect("it is writable");
     let settings = ["--road", "crossroad", "--episodes", "40", "--seed", "5", "--traffic", "released"];
     let begin = ["run", &space, "--ads", profile, "--out", &run];
-    avastra(&[&begin[..], &settings[..]].concat()).assert().success();
+    done(&[&begin[..], &settings[..]].concat());
     let test = |more: &[&str]| {
         let (status, stdout, stderr) = outcome(&mut avastra(&[&["test", &run][..], more].concat()));
         assert_eq!(status, 4, "{stdout}{stderr}");
@@ -384,20 +370,16 @@ fn packed_scenarios_are_a_folder_that_moves() {
     let suite = found.path("suite");
     // Twice: what is there with the same content is no obstacle.
     for _ in 0..2 {
-        let (status, _, stderr) =
-            outcome(&mut avastra(&[&["export", "--to", "ava"], &files[..], &["--out", &suite]].concat()));
-        assert_eq!(status, 0, "{stderr}");
+        done(&[&["export", "--to", "ava"], &files[..], &["--out", &suite]].concat());
     }
     std::fs::remove_dir_all(found.scratch.path().join("space")).expect("it is there");
     let far = found.path("far");
     std::fs::rename(&suite, &far).expect("it moves");
-    let (status, _, stderr) = outcome(&mut avastra(&["replay", &format!("{far}/{}", stem(&names[0]))]));
-    assert_eq!(status, 0, "{stderr}");
+    done(&["replay", &format!("{far}/{}", name(names[0].as_ref()))]);
 
     // What is shrunk stays apart, under a name of its own. Files and folders together are one suite.
-    let first = format!("{far}/{}", stem(&names[0]));
-    let (status, stdout, stderr) = outcome(&mut avastra(&["shrink", &first, "--format", "json"]));
-    assert_eq!(status, 0, "{stderr}");
+    let first = format!("{far}/{}", name(names[0].as_ref()));
+    let stdout = done(&["shrink", &first, "--format", "json"]);
     let told: serde_json::Value = serde_json::from_str(stdout.trim_end()).expect("it is JSON");
     let shrunk = &told["scenarios"][0];
     assert!(shrunk["scenario"].as_str().is_some_and(|name| name.ends_with("_shrunk")), "{shrunk}");
@@ -448,8 +430,7 @@ fn what_is_packed_keeps_away_from_what_is_there() {
     assert!(status == 1 && stderr.contains("with another content"), "{stderr}");
 
     // A folder is none of the files to name, but may hold some.
-    let (status, _, stderr) = outcome(&mut avastra(&["shrink", &path("one").display().to_string()]));
-    assert!(status == 1 && stderr.contains("one/*.ava`"), "{stderr}");
+    fails(&["shrink", &path("one").display().to_string()], "one/*.ava`");
 
     // What fails leaves nothing behind, and a file that is named twice is one.
     let [one, two] = ["one/one.ava", "two/two.ava"].map(|name| path(name).display().to_string());
@@ -459,8 +440,4 @@ fn what_is_packed_keeps_away_from_what_is_there() {
     let (status, stdout, stderr) =
         outcome(&mut avastra(&["export", "--to", "ava", &one, &one, "--out", &out]));
     assert!(status == 0 && stdout.contains("1 file with all that they use"), "{stdout}{stderr}");
-}
-
-fn stem(path: &str) -> String {
-    Path::new(path).file_name().expect("it has a name").to_string_lossy().into_owned()
 }

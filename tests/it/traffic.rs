@@ -5,7 +5,8 @@ use std::path::Path;
 use avastra::run::RunSettings;
 use avastra::sim::TrafficProfile;
 
-use crate::command::{avastra, outcome};
+use crate::cases::entries;
+use crate::command::{avastra, done, fails, outcome};
 use crate::world::FLICKER;
 
 const SPACE: &str = "scenarios/avastra45.ava";
@@ -33,25 +34,19 @@ fn a_run_under_released_traffic_is_recorded_and_its_scenarios_replay() {
     let record = settings(&directory).1.traffic.expect("it is not the default");
     assert_eq!((record.settings, record.digest), (released, released.digest()));
 
-    let mut files: Vec<_> = std::fs::read_dir(directory.join("critical"))
-        .expect("it exists")
-        .map(|entry| entry.expect("it reads").path())
-        .collect();
-    files.sort();
+    let files = entries(directory.join("critical"));
     let file = files.first().expect("such traffic causes a collision");
     let text = std::fs::read_to_string(file).expect("it was written");
     assert!(text.contains("traffic: ") && text.contains(&released.digest()), "{text}");
     // Every claim, the digest of the trace among them.
     let path = file.display().to_string();
-    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &path]));
-    assert_eq!(status, 0, "{stdout}{stderr}");
+    done(&["replay", &path]);
 
     // Under other traffic the digest does not fit the settings.
     let careful = TrafficProfile::default();
     let other = file.with_file_name("other.ava");
     std::fs::write(&other, text.replace(&released.digest(), &careful.digest())).expect("it is writable");
-    let (status, _, stderr) = outcome(&mut avastra(&["shrink", &other.display().to_string()]));
-    assert!(status == 1 && stderr.contains("traffic profile"), "{status} {stderr}");
+    fails(&["shrink", &other.display().to_string()], "traffic profile");
 }
 
 #[test]

@@ -1,18 +1,17 @@
 //! Training: a killed one resumes to the same bytes, its policies keep their claims, and damaged policies are
 //! refused.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Stdio;
 use std::time::Duration;
 
-use avastra::model::policy::{Policy, seal};
 use avastra::rng::{Stream, below, stream};
-use avastra::syntax::ast::FileId;
 
-use crate::cases::root;
-use crate::command::{avastra, outcome};
+use crate::cases::{entries, root};
+use crate::command::{avastra, change, done, fails, outcome};
+use crate::policies::{load, moved, sealed};
 use crate::report::index_of;
-use crate::world::{FLICKER, SMALL, read};
+use crate::world::{FLICKER, SMALL};
 
 /// A training of a few episodes with a network of a few neurons, into a directory.
 fn training(out: &Path) -> Vec<String> {
@@ -34,23 +33,8 @@ fn policy_of(out: &Path) -> String {
 /// The policy of a whole training.
 fn trained(out: &Path) -> String {
     let arguments = training(out);
-    avastra(&arguments.iter().map(String::as_str).collect::<Vec<_>>()).assert().success();
+    done(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
     policy_of(out)
-}
-
-/// Loads a policy text as if it stood beside the shipped space.
-fn load(text: &str) -> Result<Policy, Vec<&'static str>> {
-    let path = root().join("scenarios/policy_under_test.ava");
-    let read = |asked: &Path| if asked == path { Ok(text.to_owned()) } else { read(asked) };
-    let loaded = avastra::check::load(&path, &read).expect("the root can be read");
-    loaded.policy.ok_or_else(|| loaded.diagnostics.iter().map(|diagnostic| diagnostic.code).collect())
-}
-
-/// A policy that has moved beside the shipped space.
-fn beside_the_space(text: &str) -> String {
-    let begin = text.find("use \"").expect("it uses a space") + 5;
-    let end = begin + text[begin..].find('"').expect("the path ends");
-    format!("{}avastra45.ava{}", &text[..begin], &text[end..])
 }
 
 /// Kills a training after each of the waiting times, resumes it every time, and lets it end.
@@ -74,7 +58,7 @@ fn killed(arguments: &[String], out: &Path, waits_ms: impl IntoIterator<Item = u
         child.kill().expect("it is ours to kill");
         child.wait().expect("it ends");
     }
-    avastra(&resume.each_ref().map(String::as_str)).assert().success();
+    done(&resume.each_ref().map(String::as_str));
 }
 
 #[test]
@@ -109,7 +93,7 @@ fn twenty_kills_change_nothing() {
             (arguments, out)
         };
         let (arguments, whole) = begun("whole");
-        avastra(&arguments.iter().map(String::as_str).collect::<Vec<_>>()).assert().success();
+        done(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
         let (arguments, out) = begun("killed");
         let mut rng = stream(2026, Stream::Reset, 0);
         let moments: Vec<u64> = (0..20).map(|_| 100 + u64::from(below(&mut rng, 1400))).collect();
@@ -142,29 +126,22 @@ fn scenarios_of_a_training_that_are_gone_or_edited_are_noticed() {
     let at = out.display().to_string();
     let train = ["train", "scenarios/avastra45.ava", "--road", "corner", "--agent", "constant"];
     let how = ["--seed", "5", "--episodes", "12", "--ads", FLICKER, "--out", &at];
-    let (status, _, stderr) = outcome(&mut avastra(&[&train[..], &how].concat()));
-    assert_eq!(status, 0, "{stderr}");
-    let critical = std::fs::read_dir(out.join("critical")).expect("it is there").flatten();
-    let mut files: Vec<PathBuf> = critical.map(|entry| entry.path()).collect();
-    files.sort();
+    done(&[&train[..], &how].concat());
+    let files = entries(out.join("critical"));
     let [gone, edited, ..] = files.as_slice() else { panic!("the training finds two crashes: {files:?}") };
     let read = |path: &Path| std::fs::read_to_string(path).expect("it is readable");
     let written = read(gone);
     std::fs::remove_file(gone).expect("it is there");
     std::fs::write(edited, format!("// mine\n{}", read(edited))).expect("it is writable");
-    let (status, stdout, stderr) = outcome(&mut avastra(&["train", "--resume", &at]));
-    assert_eq!(status, 0, "{stderr}");
+    let stdout = done(&["train", "--resume", &at]);
     assert!(stdout.contains("was missing, is written again"), "{stdout}");
     assert!(stdout.contains("edited since the training wrote it"), "{stdout}");
     assert_eq!(read(gone), written);
 
     // Each episode depends on those before, so a changed one cannot be played again alone. A page leaves it out.
-    let database = rusqlite::Connection::open(out.join("run.db")).expect("it is a database");
-    let change = "UPDATE learning SET return = 9 WHERE episode = 3; UPDATE result SET text = '{}'";
-    database.execute_batch(change).expect("it can be changed");
-    drop(database);
-    let (status, _, stderr) = outcome(&mut avastra(&["train", "--resume", &at]));
-    assert!(status == 1 && stderr.contains("a training must be begun anew"), "{stderr}");
+    let rows = "UPDATE learning SET return = 9 WHERE episode = 3; UPDATE result SET text = '{}'";
+    change(&out.join("run.db"), rows);
+    fails(&["train", "--resume", &at], "a training must be begun anew");
     let page = scratch.path().join("page.html");
     let (status, _, stderr) =
         outcome(&mut avastra(&["report", &at, "--most", "1", "--out", &page.display().to_string()]));
@@ -182,20 +159,10 @@ fn a_policy_is_verified_played_and_refused_when_damaged() {
     let out = scratch.path().join("run");
     let text = trained(&out);
     let file = out.join("policy/corner_ddqn_5.ava").display().to_string();
-    avastra(&["replay", &file]).assert().success();
-    avastra(&[
-        "run",
-        "--policy",
-        &file,
-        "--episodes",
-        "2",
-        "--out",
-        &out.join("played").display().to_string(),
-    ])
-    .assert()
-    .success();
+    done(&["replay", &file]);
+    done(&["run", "--policy", &file, "--episodes", "2", "--out", &out.join("played").display().to_string()]);
 
-    let moved = beside_the_space(&text);
+    let moved = moved(&text);
     let policy = load(&moved).expect("a policy may move");
     let weights = avastra::model::policy::weights_to_lines(&policy.parameters);
     assert!(weights.iter().all(|line| moved.contains(line)), "the weights come back bit by bit");
@@ -212,12 +179,11 @@ fn a_policy_is_verified_played_and_refused_when_damaged() {
 #[test]
 fn a_policy_that_does_not_fit_is_refused() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
-    let moved = beside_the_space(&trained(&scratch.path().join("run")));
+    let moved = moved(&trained(&scratch.path().join("run")));
     // The text is changed and sealed again, so that the seal is right and the change must be found.
-    let sealed = |text: &str| {
-        let (tree, _) = avastra::syntax::parse(FileId(0), text);
-        let begin = text.find("    digest: \"").expect("it is sealed") + 13;
-        format!("{}{}{}", &text[..begin], seal(text, &tree), &text[begin + 71..])
+    let codes = |text: &str| -> Vec<String> {
+        let messages = load(text).expect_err("it does not fit").into_iter();
+        messages.map(|message| message.split(':').next().unwrap_or_default().to_owned()).collect()
     };
     assert_eq!(load(&sealed(&moved)), load(&moved));
     let cases = [
@@ -232,11 +198,11 @@ fn a_policy_that_does_not_fit_is_refused() {
     for (from, to, code) in cases {
         assert!(moved.contains(from), "{from}");
         let text = moved.replacen(from, to, 1);
-        assert_eq!(load(&sealed(&text)).expect_err("it does not fit"), [code], "{to}");
+        assert_eq!(codes(&sealed(&text)), [code], "{to}");
     }
-    assert_eq!(load(&moved.replacen("seed: 5", "seed: 6", 1)).expect_err("not sealed"), ["AV0702"]);
+    assert_eq!(codes(&moved.replacen("seed: 5", "seed: 6", 1)), ["AV0702"], "not sealed");
     let twice = format!("{moved}\n{}", &moved[moved.find("policy corner").expect("its name")..]);
-    assert_eq!(load(&twice.replacen("policy corner", "policy other", 1)).expect_err("two"), ["AV0704"]);
+    assert_eq!(codes(&twice.replacen("policy corner", "policy other", 1)), ["AV0704"], "two");
 }
 
 #[test]
@@ -262,9 +228,6 @@ fn what_cannot_be_trained_is_said_so() {
         (&["train", "--resume", "scenarios"], "no run.yaml"),
     ];
     for (arguments, reason) in cases {
-        let output = avastra(arguments).output().expect("it starts");
-        let stderr = String::from_utf8(output.stderr).expect("it prints UTF-8");
-        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {stderr}");
-        assert!(stderr.contains(reason), "{arguments:?}: {stderr}");
+        fails(arguments, reason);
     }
 }

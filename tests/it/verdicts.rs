@@ -9,7 +9,7 @@ use avastra::action::ActionTable;
 use avastra::model::{Avoidability, Claim, Scenario};
 use avastra::run::{Stage, on_threads, recorded};
 
-use crate::cases::root;
+use crate::cases::{entries, name, root};
 use crate::world::{read, run_of};
 
 /// The folder with a folder for each family of situations.
@@ -67,12 +67,7 @@ fn people_who_stand_in_plain_view_can_be_avoided_after_a_lane_change_too() {
 
 /// The names of the families, sorted.
 fn families() -> Vec<String> {
-    let entries = std::fs::read_dir(root().join(AREA)).expect("the area is there").flatten();
-    let folders = entries.filter(|entry| entry.path().is_dir());
-    let mut names: Vec<String> =
-        folders.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
-    names.sort();
-    names
+    entries(root().join(AREA)).iter().filter(|path| path.is_dir()).map(|path| name(path)).collect()
 }
 
 /// The situations of a family, sorted.

@@ -12,7 +12,7 @@ use avastra::syntax::ast::FileId;
 use avastra::syntax::{Diagnostic, format, print};
 
 use crate::cases::{cases, root};
-use crate::command::{avastra, outcome};
+use crate::command::{avastra, done, outcome};
 use crate::examples::example;
 use crate::world::{Wide, assert_replays, read, run_of, space_at};
 
@@ -413,8 +413,7 @@ fn what_the_world_refuses_is_said_with_its_speed() {
 #[test]
 fn a_scenario_by_hand_holds_what_it_claims() {
     let path = root().join("tests/cases/wishes/by_hand.ava").display().to_string();
-    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &path]));
-    assert_eq!(status, 0, "{stdout}{stderr}");
+    done(&["replay", &path]);
 }
 
 #[test]
@@ -457,8 +456,7 @@ rule own_lane on ahead: speed <= npc.limit
     let file = folder.path().join("turn.ava").display().to_string();
     std::fs::write(folder.path().join("turn.xodr"), map).expect("it can be written");
     std::fs::write(&file, space).expect("it can be written");
-    let (status, stdout, stderr) = outcome(&mut avastra(&["road", &file]));
-    assert_eq!(status, 0, "{stderr}");
+    let stdout = done(&["road", &file]);
     assert!(stdout.contains("road.limit is 33 km/h: lane 803/-1 from"), "{stdout}");
     let (_, stdout, _) = outcome(&mut avastra(&["table", &file, "--row", "0"]));
     assert!(stdout.contains("legal, for example ahead() with { speed: 10"), "{stdout}");

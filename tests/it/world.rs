@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use avastra::action::{ActionTable, SpawnFacts, SpawnRequest, Surroundings};
 use avastra::ads::ModularConfig;
-use avastra::check::ReadError;
+use avastra::check::{Loaded, ReadError};
 use avastra::episode::{EpisodeLog, Script};
 use avastra::model::{MomentFacts, Space};
 use avastra::run::{Profile, Run, RunSettings};
@@ -41,6 +41,13 @@ impl Surroundings for Wide {
 /// Reads a file as the command line does.
 pub fn read(path: &Path) -> Result<String, ReadError> {
     std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()))
+}
+
+/// Loads a text as if it were a file of the repository.
+pub fn loaded(name: &str, text: &str) -> Loaded {
+    let path = root().join(name);
+    let read = |asked: &Path| if asked == path { Ok(text.to_owned()) } else { read(asked) };
+    avastra::check::load(&path, &read).expect("its text is known")
 }
 
 /// A shipped space, which must be without mistakes.

@@ -117,10 +117,8 @@ fn at_once(source: &mut Source, dynamics: Node) -> Option<bool> {
         },
         _ => source.amount(dynamics, "value")?,
     };
-    if dimension == "time" && value > DURATION_S_MAX {
-        return source
-            .refuse(dynamics, format!("it takes {value} s: nothing lasts longer than {DURATION_S_MAX} s"));
-    }
+    let reason = format!("it takes {value} s: nothing lasts longer than {DURATION_S_MAX} s");
+    source.refuse_if(dimension == "time" && value > DURATION_S_MAX, dynamics, reason)?;
     Some(shape == "step" || (dimension == "time" && value == 0.0))
 }
 
@@ -260,8 +258,6 @@ fn scale(source: &mut Source, timing: Node) -> Option<f64> {
         return source.refuse(timing, "a pedestrian sets out when it is triggered: `offset` is 0");
     }
     let scale = source.number_or(timing, "scale", 1.0)?;
-    if scale <= 0.0 {
-        return source.refuse(timing, format!("`scale` is {scale}: times go on, by more than 0"));
-    }
+    source.refuse_if(scale <= 0.0, timing, format!("`scale` is {scale}: times go on, by more than 0"))?;
     Some(scale)
 }

@@ -56,7 +56,7 @@ impl Ground {
             if source.is_torn(&story.ego.name) {
                 return None;
             }
-            return source.refuse_at(&story.ego.mark, "the file does not say where the ego vehicle begins");
+            return source.refuse(&story.ego.mark, "the file does not say where the ego vehicle begins");
         };
         let start = lane_place(source, &map, mark, position)?;
         faces_along(source, &map, mark, position, start)?;
@@ -64,9 +64,7 @@ impl Ground {
             Some((mark, position)) => lane_place(source, &map, mark, position)?,
             None => {
                 let (goal, way_m) = straight_on(&map, start);
-                if way_m < WAY_M_MIN {
-                    return source.refuse_at(mark, format!("the road ends {way_m:.0} m after it"));
-                }
+                source.refuse_if(way_m < WAY_M_MIN, mark, format!("the road ends {way_m:.0} m after it"))?;
                 goal
             }
         };
@@ -75,7 +73,7 @@ impl Ground {
         }
         match Route::find(&map, start, goal) {
             Ok(route) => Some(Ground { map, route, start, goal }),
-            Err(error) => source.refuse_at(mark, format!("the way of the ego vehicle: {error}")),
+            Err(error) => source.refuse(mark, format!("the way of the ego vehicle: {error}")),
         }
     }
 
@@ -91,9 +89,8 @@ impl Ground {
         let place = lane_place(source, &self.map, mark, position)?;
         let point = self.map.lane(place.lane).centre.pose_at(place.station_m).position;
         let station_m = self.station_of(point);
-        if station_m >= self.route.path.length_m() {
-            return source.refuse_at(mark, "it lies beyond the end of the ego vehicle's way");
-        }
+        let reason = "it lies beyond the end of the ego vehicle's way";
+        source.refuse_if(station_m >= self.route.path.length_m(), mark, reason)?;
         let here = self.route.lane_at(station_m.max(0.0)).lane;
         let is_it =
             |lane: LaneIndex| lane == place.lane || station_m < 0.0 && self.leads_to(place.lane, lane);
@@ -115,7 +112,7 @@ impl Ground {
                 lane = next.lane;
             }
         }
-        source.refuse_at(
+        source.refuse(
             mark,
             "its lane is not beside the ego vehicle's way: neither along it, nor the nearest oncoming one",
         )
@@ -172,7 +169,7 @@ fn lane_place(source: &mut Source, map: &RoadMap, mark: &Mark, position: &Positi
         Position::Lane { road, lane, s_m, offset_m, .. } => {
             let place = match map.place(road, *lane, *s_m) {
                 Ok(place) => place,
-                Err(error) => return source.refuse_at(mark, error.to_string()),
+                Err(error) => return source.refuse(mark, error.to_string()),
             };
             let lane = map.lane(place.lane);
             // The file's offsets are to the left of the road's reference line.
@@ -180,10 +177,11 @@ fn lane_place(source: &mut Source, map: &RoadMap, mark: &Mark, position: &Positi
         }
         Position::World { x_m, y_m, heading_rad } => {
             let found = map.nearest(Vec2::new(*x_m, *y_m), *heading_rad, REACH_M);
-            found.or_else(|| source.refuse_at(mark, "no driving lane is there"))
+            found.or_else(|| source.refuse(mark, "no driving lane is there"))
         }
-        Position::RelativeLane { .. } => source
-            .refuse_at(mark, "a place relative to an entity is read of vehicles alone, at the beginning"),
+        Position::RelativeLane { .. } => {
+            source.refuse(mark, "a place relative to an entity is read of vehicles alone, at the beginning")
+        }
     }
 }
 
@@ -213,12 +211,8 @@ fn faces_along(
 
 /// Refuses what stands across a lane or against it.
 fn is_along(source: &mut Source, mark: &Mark, across_rad: f64) -> Option<()> {
-    if across_rad > PI - ACROSS_RAD {
-        return source.refuse_at(mark, "it faces against its lane");
-    }
-    if across_rad > ACROSS_RAD {
-        return source.refuse_at(mark, "it does not point along the lane that is there");
-    }
+    source.refuse_if(across_rad > PI - ACROSS_RAD, mark, "it faces against its lane")?;
+    source.refuse_if(across_rad > ACROSS_RAD, mark, "it does not point along the lane that is there")?;
     if across_rad > ASKEW_RAD {
         source.note("vehicles begin along their lanes");
     }

@@ -14,9 +14,7 @@ const RULES: [&str; 6] =
 /// says that it can be read on: what else is wrong with the file does not follow from it.
 pub fn check(source: &mut Source, declared: Node, value: &str) -> Option<()> {
     let kind = source.word(declared, "parameterType", &TYPES)?;
-    if !is_of(kind, value) {
-        return source.refuse(declared, format!("its value `{value}` is no `{kind}`"));
-    }
+    source.refuse_if(!is_of(kind, value), declared, format!("its value `{value}` is no `{kind}`"))?;
     let mut is_excluded = false;
     for group in elements(declared, "ConstraintGroup") {
         let constraints = elements(group, "ValueConstraint");
@@ -28,9 +26,7 @@ pub fn check(source: &mut Source, declared: Node, value: &str) -> Option<()> {
             None => return Some(()),
         }
     }
-    if is_excluded {
-        source.refuse::<()>(declared, format!("its constraints exclude the value `{value}`"));
-    }
+    source.refuse_if(is_excluded, declared, format!("its constraints exclude the value `{value}`"));
     Some(())
 }
 
@@ -53,12 +49,9 @@ fn is_of(kind: &str, value: &str) -> bool {
 fn holds(source: &mut Source, constraint: Node, kind: &str, value: &str) -> Option<bool> {
     let bound = source.text(constraint, "value")?;
     let rule = source.text(constraint, "rule")?;
-    if !RULES.contains(&rule.as_str()) {
-        return source.refuse(constraint, format!("`rule` is `{rule}`; it may be {}", RULES.join(", ")));
-    }
-    if !is_of(kind, &bound) {
-        return source.refuse(constraint, format!("its value `{bound}` is no `{kind}`"));
-    }
+    let reason = format!("`rule` is `{rule}`; it may be {}", RULES.join(", "));
+    source.refuse_if(!RULES.contains(&rule.as_str()), constraint, reason)?;
+    source.refuse_if(!is_of(kind, &bound), constraint, format!("its value `{bound}` is no `{kind}`"))?;
     let number = |text: &str| text.trim().parse::<f64>().ok();
     let order = match kind {
         // Dates of one form are in the order of their texts.

@@ -5,14 +5,15 @@ use avastra_campaign::emit::lane_point;
 use avastra_lang::model::{SPAWN_DISTANCE_M, SPAWN_SPEED_MPS};
 use avastra_road::RoadMap;
 
+use super::Files;
 use super::action::{Headway, Speed, Target};
 use super::body::Shape;
+use super::condition::{Waiting, is_always};
 use super::ground::{Beside, Ground};
 use super::position::{Heading, Position};
 use super::source::{Mark, Source};
 use super::story::{Change, Entity, Story};
 use super::trigger::{Condition, When};
-use super::{Files, condition};
 
 /// Vehicles keep to the middle of their lanes: a file's may be this far beside it, m.
 const OFFSET_M_MAX: f64 = 0.3;
@@ -72,7 +73,7 @@ impl Scene {
         let read = |text: String| RoadMap::from_opendrive("map", &text).map_err(|error| error.to_string());
         let map = match files.map(path).and_then(read) {
             Ok(map) => map,
-            Err(reason) => return source.refuse_at(mark, format!("`{path}`: {reason}")),
+            Err(reason) => return source.refuse(mark, format!("`{path}`: {reason}")),
         };
         let ground = Ground::of(source, story, map)?;
         let (start, goal) = (lane_point(&ground.map, ground.start), lane_point(&ground.map, ground.goal));
@@ -82,14 +83,13 @@ impl Scene {
         }
         let mut scene = Scene { start, goal, ego_mps, others: Vec::new(), change: None, once: None };
         let beside = Beside { station_m: 0.0, lanes_left: 0, is_along: true, offset_m: 0.0 };
-        let mut placed = vec![Placed { entity: &story.ego, beside, mps: ego_mps }];
+        let placed = vec![Placed { entity: &story.ego, beside, mps: ego_mps }];
+        let mut setting = Setting { story, ground, placed };
         // A place may be relative to one that stands later in the file.
         let mut left: Vec<&Entity> = story.others.iter().collect();
         while !left.is_empty() {
             let is_known = |entity: &&Entity| match &entity.position {
-                Some((_, Position::RelativeLane { entity: of, .. })) => {
-                    placed.iter().any(|other| other.name() == of)
-                }
+                Some((_, Position::RelativeLane { entity: of, .. })) => setting.find(of).is_some(),
                 _ => true,
             };
             let Some(at) = left.iter().position(is_known) else {
@@ -100,7 +100,7 @@ impl Scene {
                 let waiting = if left.iter().any(is_torn) { Vec::new() } else { left };
                 for entity in waiting {
                     let mark = entity.position.as_ref().map_or(&entity.mark, |(mark, _)| mark);
-                    source.refuse_at::<()>(mark, "it is placed relative to something that has no place");
+                    source.refuse::<()>(mark, "it is placed relative to something that has no place");
                 }
                 break;
             };
@@ -110,37 +110,30 @@ impl Scene {
             for walk in entity.walks.iter().skip(usize::from(is_walker)) {
                 let reason =
                     if is_walker { "a pedestrian walks one way" } else { "a vehicle follows its lane" };
-                source.refuse_at::<()>(&walk.mark, reason);
+                source.refuse::<()>(&walk.mark, reason);
             }
             if is_walker {
                 if !source.is_torn(&entity.name) {
-                    scene.on_foot(source, story, &ground, entity);
+                    scene.on_foot(source, &setting, entity);
                 }
                 continue;
             }
-            let found = source.about(&entity.name, |source| place(source, story, &ground, entity, &placed));
-            placed.extend(found);
+            let found = source.about(&entity.name, |source| setting.place(source, entity));
+            setting.placed.extend(found);
         }
-        for other in &placed[1..] {
+        for other in &setting.placed[1..] {
             if !source.is_torn(other.name()) {
-                scene.vehicle(source, story, &ground, other, &placed);
+                scene.vehicle(source, &setting, other);
             }
         }
         (!source.is_refused()).then_some(scene)
     }
 
     /// A vehicle before, behind or against the ego vehicle.
-    fn vehicle(
-        &mut self,
-        source: &mut Source,
-        story: &Story,
-        ground: &Ground,
-        other: &Placed,
-        placed: &[Placed],
-    ) -> Option<()> {
+    fn vehicle(&mut self, source: &mut Source, setting: &Setting, other: &Placed) -> Option<()> {
         let Placed { entity, beside, mps } = other;
         let mark = entity.position.as_ref().map_or(&entity.mark, |(mark, _)| mark);
-        let ego = &placed[0];
+        let ego = setting.ego();
         let (front_m, back_m) = ego.ends_m();
         let (own_front_m, own_back_m) = other.ends_m();
         let ahead_m = match &entity.headway {
@@ -150,16 +143,14 @@ impl Scene {
         };
         let behind_m = back_m - own_front_m;
         if let Some((mark, _)) = entity.headway.as_ref().filter(|_| behind_m >= 0.0) {
-            return source.refuse_at(mark, "a distance to the ego vehicle is read of a vehicle ahead of it");
+            return source.refuse(mark, "a distance to the ego vehicle is read of a vehicle ahead of it");
         }
         let mut spawn = Other { gap_m: ahead_m, speed_mps: *mps, ..Other::new(entity, "DriveAhead") };
         if !beside.is_along {
-            if ahead_m < 0.0 {
-                return source.refuse_at(mark, "an oncoming vehicle is ahead of the ego vehicle");
-            }
+            source.refuse_if(ahead_m < 0.0, mark, "an oncoming vehicle is ahead of the ego vehicle")?;
             spawn.does = "DriveOpposite";
             if let Some(change) = entity.changes.first() {
-                return source.refuse_at(&change.mark, "an oncoming vehicle keeps its lane");
+                return source.refuse(&change.mark, "an oncoming vehicle keeps its lane");
             }
             return self.appears(source, mark, spawn);
         }
@@ -167,27 +158,23 @@ impl Scene {
             0 => "Current",
             1 => "Left",
             -1 => "Right",
-            _ => return source.refuse_at(mark, "only the ego vehicle's lane and those beside it are read"),
+            _ => return source.refuse(mark, "only the ego vehicle's lane and those beside it are read"),
         });
         if ahead_m < 0.0 && behind_m >= 0.0 {
             (spawn.does, spawn.is_behind, spawn.gap_m) = ("Overtake", true, behind_m);
-            if beside.lanes_left == 0 {
-                return source
-                    .refuse_at(mark, "a vehicle that follows the ego vehicle in its lane is not read");
-            }
-            if *mps <= ego.mps {
-                return source
-                    .refuse_at(mark, "a vehicle that comes from behind is faster than the ego vehicle");
-            }
+            let reason = "a vehicle that follows the ego vehicle in its lane is not read";
+            source.refuse_if(beside.lanes_left == 0, mark, reason)?;
+            let reason = "a vehicle that comes from behind is faster than the ego vehicle";
+            source.refuse_if(*mps <= ego.mps, mark, reason)?;
         } else if ahead_m < 0.0 {
             return source
-                .refuse_at(mark, "it begins beside the ego vehicle; vehicles appear before or behind it");
+                .refuse(mark, "it begins beside the ego vehicle; vehicles appear before or behind it");
         }
         if let Some(extra) = entity.changes.get(1) {
-            return source.refuse_at(&extra.mark, "a vehicle changes lanes once");
+            return source.refuse(&extra.mark, "a vehicle changes lanes once");
         }
         if let Some(change) = entity.changes.first() {
-            spawn.changes = self.lane_change(source, story, ground, change, other, placed)?;
+            spawn.changes = self.lane_change(source, setting, change, other)?;
         }
         self.appears(source, mark, spawn)
     }
@@ -197,7 +184,7 @@ impl Scene {
         if !SPAWN_DISTANCE_M.contains(&spawn.gap_m) {
             let far_m = SPAWN_DISTANCE_M.end();
             let reason = format!("it begins {:.0} m away: nothing appears beyond {far_m} m", spawn.gap_m);
-            return source.refuse_at(mark, reason);
+            return source.refuse(mark, reason);
         }
         self.others.push(spawn);
         Some(())
@@ -207,19 +194,18 @@ impl Scene {
     fn lane_change(
         &mut self,
         source: &mut Source,
-        story: &Story,
-        ground: &Ground,
+        setting: &Setting,
         change: &Change,
         other: &Placed,
-        placed: &[Placed],
     ) -> Option<bool> {
+        let Setting { story, ground, .. } = setting;
         let mark = &change.mark;
         let own = other.beside.lanes_left;
         let to = match &change.to {
-            Target::Beside(name, lanes) => match placed.iter().find(|other| other.name() == name) {
+            Target::Beside(name, lanes) => match setting.find(name) {
                 Some(of) => of.beside.lanes_left + lanes,
                 None if source.is_torn(name) => return None,
-                None => return source.refuse_at(mark, format!("`{name}` is no vehicle with a place")),
+                None => return source.refuse(mark, format!("`{name}` is no vehicle with a place")),
             },
             Target::Lane(lane) => {
                 let here = ground.route.lane_at(other.beside.station_m.max(0.0)).lane;
@@ -251,24 +237,20 @@ impl Scene {
             source.note(format!("{kept}, and {end_s:.0} s are played"));
             return Some(false);
         }
-        if side.abs() > 1 {
-            return source.refuse_at(mark, "a vehicle changes to the next lane, not over two");
-        }
+        source.refuse_if(side.abs() > 1, mark, "a vehicle changes to the next lane, not over two")?;
         if own == 0 {
             // The engine draws the side of a vehicle that leaves the ego vehicle's lane.
             let lane = ground.map.lane(ground.route.lane_at(other.beside.station_m.max(0.0)).lane);
             let away = if side > 0 { lane.right } else { lane.left };
             if away.is_some_and(|away| away.same_direction) {
                 let reason = "a vehicle in the ego vehicle's lane that has lanes on both sides draws the one it changes to";
-                return source.refuse_at(mark, reason);
+                return source.refuse(mark, reason);
             }
         } else if to != 0 {
-            return source.refuse_at(mark, "a vehicle beside the ego vehicle's lane changes into it alone");
+            return source.refuse(mark, "a vehicle beside the ego vehicle's lane changes into it alone");
         }
-        if self.change.is_some() {
-            return source.refuse_at(mark, "one vehicle of a scenario changes lanes");
-        }
-        let when = condition::text(source, ground, &change.when, other, placed)?;
+        source.refuse_if(self.change.is_some(), mark, "one vehicle of a scenario changes lanes")?;
+        let when = Waiting { actor: other, setting }.text(source, &change.when)?;
         source.note(
             "a lane change takes as long as the engine's drivers need, and waits until the lane is free",
         );
@@ -277,38 +259,25 @@ impl Scene {
     }
 
     /// A pedestrian that stands in the ego vehicle's lane, or crosses its way.
-    fn on_foot(
-        &mut self,
-        source: &mut Source,
-        story: &Story,
-        ground: &Ground,
-        entity: &Entity,
-    ) -> Option<()> {
+    fn on_foot(&mut self, source: &mut Source, setting: &Setting, entity: &Entity) -> Option<()> {
+        let Setting { story, ground, .. } = setting;
         let Some((mark, position)) = &entity.position else {
-            return source.refuse_at(&entity.mark, "the file does not say where it begins");
+            return source.refuse(&entity.mark, "the file does not say where it begins");
         };
         if let Some(change) = entity.changes.first() {
-            return source.refuse_at(&change.mark, "a pedestrian does not change lanes");
+            return source.refuse(&change.mark, "a pedestrian does not change lanes");
         }
         let half_m = entity.body.length_m / 2.0;
         let front_m = story.ego.body.middle_m + story.ego.body.length_m / 2.0;
         let mut spawn = Other::new(entity, "Stand");
         let mps = speed(source, story, entity, 0)?;
         let Some(walk) = entity.walks.first() else {
-            if mps != 0.0 {
-                return source.refuse_at(mark, "a pedestrian stands, or crosses the road on a trajectory");
-            }
+            source.refuse_if(mps != 0.0, mark, "a pedestrian stands, or crosses the road on a trajectory")?;
             let beside = ground.beside(source, mark, position)?;
-            if beside.lanes_left != 0 || beside.offset_m.abs() > OFFSET_M_MAX {
-                return source.refuse_at(
-                    mark,
-                    "a pedestrian that stands does so in the middle of the ego vehicle's lane",
-                );
-            }
+            let reason = "a pedestrian that stands does so in the middle of the ego vehicle's lane";
+            source.refuse_if(beside.lanes_left != 0 || beside.offset_m.abs() > OFFSET_M_MAX, mark, reason)?;
             spawn.gap_m = beside.station_m - half_m - front_m;
-            if spawn.gap_m < 0.0 {
-                return source.refuse_at(mark, "it is not ahead of the ego vehicle");
-            }
+            source.refuse_if(spawn.gap_m < 0.0, mark, "it is not ahead of the ego vehicle")?;
             return self.appears(source, mark, spawn);
         };
         let mut way = Vec::new();
@@ -321,39 +290,28 @@ impl Scene {
         for (place, (mark, _)) in way.iter().zip(&walk.way) {
             let along = (place - from).dot(&straight) / straight.norm_squared().max(f64::MIN_POSITIVE);
             let aside_m = (place - from - straight * along.clamp(0.0, 1.0)).norm();
-            if aside_m > STRAIGHT_M {
-                let reason = format!("a pedestrian walks straight: it lies {aside_m:.1} m beside its way");
-                return source.refuse_at(mark, reason);
-            }
+            let reason = format!("a pedestrian walks straight: it lies {aside_m:.1} m beside its way");
+            source.refuse_if(aside_m > STRAIGHT_M, mark, reason)?;
         }
         let (from_m, from_left_m) = (from.x, from.y);
         let (to_m, to_left_m) = (to.x, to.y);
-        if from_left_m * to_left_m >= 0.0 {
-            return source.refuse_at(&walk.mark, "a pedestrian walks across the ego vehicle's way");
-        }
+        let reason = "a pedestrian walks across the ego vehicle's way";
+        source.refuse_if(from_left_m * to_left_m >= 0.0, &walk.mark, reason)?;
         let way_m = (to_left_m - from_left_m).abs();
         spawn.speed_mps = walk.duration_s.map_or(mps, |duration_s| way_m / duration_s);
-        if spawn.speed_mps > *SPAWN_SPEED_MPS.end() {
-            return source.refuse_at(&walk.mark, too_fast(spawn.speed_mps));
-        }
-        if spawn.speed_mps <= 0.0 {
-            return source.refuse_at(&walk.mark, "neither times nor a speed say how fast it walks");
-        }
+        source.refuse_if(spawn.speed_mps > *SPAWN_SPEED_MPS.end(), &walk.mark, too_fast(spawn.speed_mps))?;
+        let reason = "neither times nor a speed say how fast it walks";
+        source.refuse_if(spawn.speed_mps <= 0.0, &walk.mark, reason)?;
         let station_m = (from_m + to_m) / 2.0;
         spawn.does = "Walk";
         spawn.side = Some(if from_left_m > 0.0 { "Left" } else { "Right" });
         spawn.gap_m = station_m - half_m - front_m;
-        if spawn.gap_m < 0.0 {
-            return source.refuse_at(&walk.mark, "it is not ahead of the ego vehicle");
-        }
+        source.refuse_if(spawn.gap_m < 0.0, &walk.mark, "it is not ahead of the ego vehicle")?;
         source.note("a pedestrian crosses from kerb to kerb, and sets out so as to meet the ego vehicle");
         let near_m = SETS_OUT_S * speed(source, story, &story.ego, 0)?;
         if spawn.gap_m > near_m {
-            if story.others.len() > 1 {
-                let reason =
-                    "a pedestrian that crosses far ahead is read where it is the only other road user";
-                return source.refuse_at(&walk.mark, reason);
-            }
+            let reason = "a pedestrian that crosses far ahead is read where it is the only other road user";
+            source.refuse_if(story.others.len() > 1, &walk.mark, reason)?;
             let left_m = ground.route.goal_m - (spawn.gap_m - near_m);
             self.once = Some(format!("ego.route_left <= {left_m:.2} m"));
             spawn.gap_m = near_m;
@@ -388,49 +346,60 @@ impl Placed<'_> {
     }
 }
 
-fn place<'a>(
-    source: &mut Source,
-    story: &Story,
-    ground: &Ground,
-    entity: &'a Entity,
-    placed: &[Placed],
-) -> Option<Placed<'a>> {
-    let Some((mark, position)) = &entity.position else {
-        if source.is_torn(&entity.name) {
-            return None;
-        }
-        return source.refuse_at(&entity.mark, "the file does not say where it begins");
-    };
-    let beside = match position {
-        Position::RelativeLane { entity: of, lanes, ahead_m, offset_m, heading } => {
-            let of = placed.iter().find(|other| other.name() == of)?;
-            if !of.beside.is_along {
-                return source.refuse_at(mark, "a place relative to an oncoming vehicle is not read");
-            }
-            let lanes_left = of.beside.lanes_left + lanes;
-            let station_m = of.beside.station_m + ahead_m;
-            if station_m >= ground.route.path.length_m() {
-                return source.refuse_at(mark, "it lies beyond the end of the ego vehicle's way");
-            }
-            ground.faces_on(source, mark, station_m, *heading)?;
-            Beside { station_m, lanes_left, is_along: true, offset_m: *offset_m }
-        }
-        _ => ground.vehicle(source, mark, position)?,
-    };
-    if beside.offset_m.abs() > OFFSET_M_MAX {
-        let reason =
-            format!("{:.2} m beside the middle of its lane: vehicles keep to the middle", beside.offset_m);
-        return source.refuse_at(mark, reason);
+/// The story on its map, with the vehicles that have a place: the ego vehicle is the first.
+pub struct Setting<'a> {
+    pub story: &'a Story,
+    pub ground: Ground,
+    pub placed: Vec<Placed<'a>>,
+}
+
+impl<'a> Setting<'a> {
+    pub fn ego(&self) -> &Placed<'a> {
+        &self.placed[0]
     }
-    let mps = speed(source, story, entity, 0)?;
-    Some(Placed { entity, beside, mps })
+
+    /// The vehicle of a name, if it has a place.
+    pub fn find(&self, name: &str) -> Option<&Placed<'a>> {
+        self.placed.iter().find(|other| other.name() == name)
+    }
+
+    /// A place for one more.
+    fn place(&self, source: &mut Source, entity: &'a Entity) -> Option<Placed<'a>> {
+        let Some((mark, position)) = &entity.position else {
+            if source.is_torn(&entity.name) {
+                return None;
+            }
+            return source.refuse(&entity.mark, "the file does not say where it begins");
+        };
+        let beside = match position {
+            Position::RelativeLane { entity: of, lanes, ahead_m, offset_m, heading } => {
+                let of = self.find(of)?;
+                let reason = "a place relative to an oncoming vehicle is not read";
+                source.refuse_if(!of.beside.is_along, mark, reason)?;
+                let lanes_left = of.beside.lanes_left + lanes;
+                let station_m = of.beside.station_m + ahead_m;
+                let reason = "it lies beyond the end of the ego vehicle's way";
+                source.refuse_if(station_m >= self.ground.route.path.length_m(), mark, reason)?;
+                self.ground.faces_on(source, mark, station_m, *heading)?;
+                Beside { station_m, lanes_left, is_along: true, offset_m: *offset_m }
+            }
+            _ => self.ground.vehicle(source, mark, position)?,
+        };
+        if beside.offset_m.abs() > OFFSET_M_MAX {
+            let reason = format!(
+                "{:.2} m beside the middle of its lane: vehicles keep to the middle",
+                beside.offset_m
+            );
+            return source.refuse(mark, reason);
+        }
+        let mps = speed(source, self.story, entity, 0)?;
+        Some(Placed { entity, beside, mps })
+    }
 }
 
 /// The speed with which an entity begins, m/s; it must keep it, unless it is the ego vehicle.
 fn speed(source: &mut Source, story: &Story, entity: &Entity, depth: usize) -> Option<f64> {
-    if depth > story.others.len() {
-        return source.refuse_at(&entity.mark, "its speed is relative to itself");
-    }
+    source.refuse_if(depth > story.others.len(), &entity.mark, "its speed is relative to itself")?;
     let is_ego = entity.name == story.ego.name;
     let mut mps = 0.0;
     for paced in &entity.speeds {
@@ -439,18 +408,14 @@ fn speed(source: &mut Source, story: &Story, entity: &Entity, depth: usize) -> O
             Speed::More(name, more_mps) => speed_of(source, story, &paced.mark, name, depth)? + more_mps,
             Speed::Times(name, factor) => speed_of(source, story, &paced.mark, name, depth)? * factor,
         };
-        if wanted > *SPAWN_SPEED_MPS.end() {
-            return source.refuse_at(&paced.mark, too_fast(wanted));
-        }
-        if wanted < 0.0 {
-            return source.refuse_at(&paced.mark, "no vehicle drives backwards");
-        }
-        let at_begin = paced.when.is_empty() || paced.when.iter().any(|all| condition::is_always(all));
+        source.refuse_if(wanted > *SPAWN_SPEED_MPS.end(), &paced.mark, too_fast(wanted))?;
+        source.refuse_if(wanted < 0.0, &paced.mark, "no vehicle drives backwards")?;
+        let at_begin = paced.when.is_empty() || paced.when.iter().any(|all| is_always(all));
         if at_begin && paced.at_once {
             mps = wanted;
         } else if (wanted - mps).abs() > 1e-9 && !is_ego {
             let reason = "a vehicle keeps the speed with which it appears, unless something is in its way";
-            return source.refuse_at(&paced.mark, reason);
+            return source.refuse(&paced.mark, reason);
         }
     }
     Some(mps)
@@ -465,6 +430,6 @@ fn speed_of(source: &mut Source, story: &Story, mark: &Mark, name: &str, depth: 
     match everyone.find(|entity| entity.name == name) {
         Some(entity) => speed(source, story, entity, depth + 1),
         None if source.is_torn(name) => None,
-        None => source.refuse_at(mark, format!("no entity is called `{name}`")),
+        None => source.refuse(mark, format!("no entity is called `{name}`")),
     }
 }

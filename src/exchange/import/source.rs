@@ -24,6 +24,23 @@ pub struct Mark {
     pub element: String,
 }
 
+/// What can be refused: an element, or the mark of one.
+pub trait Marked {
+    fn mark(self, source: &Source) -> Mark;
+}
+
+impl Marked for Node<'_, '_> {
+    fn mark(self, source: &Source) -> Mark {
+        source.mark(self)
+    }
+}
+
+impl Marked for &Mark {
+    fn mark(self, _: &Source) -> Mark {
+        self.clone()
+    }
+}
+
 /// The parameters that are in force, and what was found wrong and worth a note so far.
 #[derive(Debug)]
 pub struct Source {
@@ -86,10 +103,19 @@ impl Source {
         self.notes.insert(text.into());
     }
 
-    /// Refuses an element. `None`, so that a reader can end with it.
-    pub fn refuse<T>(&mut self, node: Node, reason: impl Into<String>) -> Option<T> {
-        let mark = self.mark(node);
-        self.refuse_at(&mark, reason)
+    /// Refuses what stands somewhere. `None`, so that a reader can end with it.
+    pub fn refuse<T>(&mut self, at: impl Marked, reason: impl Into<String>) -> Option<T> {
+        self.told += 1;
+        if self.refused.len() < REFUSALS_MAX {
+            let Mark { line, element } = at.mark(self);
+            self.refused.insert(Refusal { line, element, reason: reason.into() });
+        }
+        None
+    }
+
+    /// Refuses what stands somewhere if that is wrong; `None` then.
+    pub fn refuse_if(&mut self, is_wrong: bool, at: impl Marked, reason: impl Into<String>) -> Option<()> {
+        if is_wrong { self.refuse(at, reason) } else { Some(()) }
     }
 
     /// Does something for an entity; if anything is refused meanwhile, what follows from that is not told again.
@@ -110,15 +136,6 @@ impl Source {
     /// Whether something of an entity was refused, so that it need not be what the file says.
     pub fn is_torn(&self, entity: &str) -> bool {
         self.torn.contains(entity)
-    }
-
-    pub fn refuse_at<T>(&mut self, mark: &Mark, reason: impl Into<String>) -> Option<T> {
-        self.told += 1;
-        if self.refused.len() < REFUSALS_MAX {
-            let reason = reason.into();
-            self.refused.insert(Refusal { line: mark.line, element: mark.element.clone(), reason });
-        }
-        None
     }
 
     /// Declares the parameters that a `ParameterDeclarations` within an element lists.
@@ -209,9 +226,7 @@ impl Source {
     /// A number from 0 on.
     pub fn amount(&mut self, node: Node, name: &str) -> Option<f64> {
         let number = self.number(node, name)?;
-        if number < 0.0 {
-            return self.refuse(node, format!("`{name}` is {number}, less than 0"));
-        }
+        self.refuse_if(number < 0.0, node, format!("`{name}` is {number}, less than 0"))?;
         Some(number)
     }
 

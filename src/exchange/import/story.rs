@@ -73,9 +73,8 @@ pub struct Change {
 /// Reads a file. What cannot be said is refused; `None` if that is so much that nothing can be placed.
 pub fn read(source: &mut Source, document: &Document, ego: Option<&str>, files: &dyn Files) -> Option<Story> {
     let root = document.root_element();
-    if !root.has_tag_name("OpenSCENARIO") {
-        return source.refuse(root, "the root element of a scenario is `OpenSCENARIO`");
-    }
+    let reason = "the root element of a scenario is `OpenSCENARIO`";
+    source.refuse_if(!root.has_tag_name("OpenSCENARIO"), root, reason)?;
     let header = source.required(root, "FileHeader")?;
     source.minor = source.integer(header, "revMinor")?;
     if source.integer(header, "revMajor")? != 1 || !(0..=MINOR_MAX).contains(&source.minor) {
@@ -150,9 +149,7 @@ impl Cast {
                 return None;
             }
             let names: Vec<String> = entities.iter().map(|entity| format!("`{}`", entity.name)).collect();
-            if names.is_empty() {
-                return source.refuse(root, "no entity can be read");
-            }
+            source.refuse_if(names.is_empty(), root, "no entity can be read")?;
             let reason =
                 format!("which entity is the ego vehicle? Name it with `--ego`: {}", names.join(", "));
             return source.refuse(root, reason);
@@ -172,9 +169,7 @@ impl Cast {
     /// Whether an entity has a name that an element asks for; refuses a name that none has.
     fn knows(&mut self, source: &mut Source, node: Node, name: &str) -> bool {
         let is_known = self.is_ego(name) || self.other(name).is_some();
-        if !is_known && !source.is_torn(name) {
-            source.refuse::<()>(node, format!("no entity is called `{name}`"));
-        }
+        source.refuse_if(!is_known && !source.is_torn(name), node, format!("no entity is called `{name}`"));
         is_known
     }
 
@@ -226,9 +221,7 @@ impl Cast {
                 }
             }
             if names.is_empty() {
-                if is_read {
-                    source.refuse::<()>(actors, "it names nobody who acts");
-                }
+                source.refuse_if(is_read, actors, "it names nobody who acts");
                 continue;
             }
             for manoeuvre in elements(group, "Maneuver") {

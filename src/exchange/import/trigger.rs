@@ -95,14 +95,10 @@ pub fn both(a: &Trigger, b: &Trigger) -> Trigger {
 
 fn condition(source: &mut Source, node: Node) -> Option<Condition> {
     let delay_s = source.number_or(node, "delay", 0.0)?;
-    if delay_s < 0.0 {
-        return source.refuse(node, "its `delay` is less than 0");
-    }
+    source.refuse_if(delay_s < 0.0, node, "its `delay` is less than 0")?;
     let edge = source.word(node, "conditionEdge", &["none", "rising", "falling", "risingOrFalling"])?;
     let is_rising = edge == "rising";
-    if edge.ends_with("alling") {
-        return source.refuse(node, "only what begins to hold is read, not what ends");
-    }
+    source.refuse_if(edge.ends_with("alling"), node, "only what begins to hold is read, not what ends")?;
     if let Some(value) = element(node, "ByValueCondition") {
         let Some(inner) = children(value).next() else { return source.refuse(value, "it is empty") };
         let kind = match inner.tag_name().name() {
@@ -117,10 +113,12 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
                 let of = source.word(inner, "storyboardElementType", &STORYBOARD_ELEMENTS)?;
                 let state = source.word(inner, "state", &STATES)?;
                 let begins = matches!(state, "startTransition" | "runningState");
-                if !(begins && matches!(of, "act" | "story")) || delay_s > 0.0 {
-                    let reason = "an event does not wait for another: what ends when is up to the drivers";
-                    return source.refuse(inner, reason);
-                }
+                let reason = "an event does not wait for another: what ends when is up to the drivers";
+                source.refuse_if(
+                    !(begins && matches!(of, "act" | "story")) || delay_s > 0.0,
+                    inner,
+                    reason,
+                )?;
                 When::Always
             }
             _ => return source.refuse(inner, "this condition is not read"),
@@ -141,9 +139,7 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
             if names.is_empty() { "it names no entity" } else { "a condition asks about one entity" };
         return source.refuse(list, reason);
     };
-    if delay_s > 0.0 {
-        return source.refuse(node, "a delay is read of times alone");
-    }
+    source.refuse_if(delay_s > 0.0, node, "a delay is read of times alone")?;
     let kind = match inner.tag_name().name() {
         "TimeHeadwayCondition" => {
             frame(source, inner)?;
@@ -162,9 +158,7 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
             let is_less = is_less(source, inner)?;
             let is_free_space = source.switch(inner, "freespace", false)?;
             let pair = Pair { of: of.clone(), to, is_less, is_free_space };
-            if !is_less {
-                return source.refuse(inner, "only `lessThan` is read");
-            }
+            source.refuse_if(!is_less, inner, "only `lessThan` is read")?;
             When::Collides { pair, seconds: source.amount(inner, "value")? }
         }
         "ReachPositionCondition" => {

@@ -58,9 +58,7 @@ impl Weather {
 /// The weather of a `GlobalAction`.
 pub fn weather(source: &mut Source, global: Node) -> Option<Weather> {
     let action = children(global).next()?;
-    if !action.has_tag_name("EnvironmentAction") {
-        return source.refuse(action, "this action is not read");
-    }
+    source.refuse_if(!action.has_tag_name("EnvironmentAction"), action, "this action is not read")?;
     let Some(environment) = element(action, "Environment") else {
         return source.refuse(action, "environments of catalogues are not read");
     };
@@ -124,9 +122,7 @@ fn wetness(source: &mut Source, node: Node) -> Option<Option<&'static str>> {
         return Some(None);
     }
     let part = source.amount(node, "frictionScaleFactor")?;
-    if part < FRICTION_MIN {
-        return source.refuse(node, "so little friction is ice, of which the engine has none");
-    }
+    source.refuse_if(part < FRICTION_MIN, node, "so little friction is ice, of which the engine has none")?;
     Some(Some(level(|bound| part >= FRICTION[bound])))
 }
 

@@ -150,7 +150,7 @@ fn storyboard(recording: &Recording, style: Style, exact: &[&Actor]) -> Element 
         let (begins, events) = if is_exact {
             (begins(recording, actor, style), events(recording, actor, style))
         } else {
-            Natural::of(recording, actor, version).written(actor)
+            Natural::of(recording, actor, version).written()
         };
         init.extend(begins);
         if !events.is_empty() {

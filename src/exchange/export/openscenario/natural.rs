@@ -40,10 +40,12 @@ const COMES_TICKS: usize = 25;
 const END_M: f64 = 0.1;
 
 /// A road user in actions.
-pub struct Natural {
+pub struct Natural<'a> {
     version: Version,
-    /// Where it is at first, and as a position.
-    pose: Pose,
+    recording: &'a Recording,
+    actor: &'a Actor,
+    poses: Vec<Pose>,
+    /// Where it is at first.
     place: Element,
     /// What it does from the first on.
     from_the_first: Vec<Element>,
@@ -91,15 +93,16 @@ pub fn names(actors: &[&Actor]) -> String {
     actors.iter().map(|actor| actor.name()).collect::<Vec<_>>().join(", ")
 }
 
-impl Natural {
-    pub fn of(recording: &Recording, actor: &Actor, version: Version) -> Natural {
+impl<'a> Natural<'a> {
+    pub fn of(recording: &'a Recording, actor: &'a Actor, version: Version) -> Natural<'a> {
         let poses = poses(recording, actor);
-        let (pose, place) = (poses[0], position(&poses[0]));
-        let mut natural = Natural { version, pose, place, from_the_first: Vec::new(), events: Vec::new() };
-        if !is_standing(&poses) {
-            match driven(&recording.map, &poses).filter(|_| actor.is_vehicle()) {
-                Some(way) => natural.drive_in_lanes(recording, actor, &poses, &way),
-                None => natural.go_along_a_line(recording, actor, &poses),
+        let place = position(&poses[0]);
+        let (from_the_first, events) = (Vec::new(), Vec::new());
+        let mut natural = Natural { version, recording, actor, poses, place, from_the_first, events };
+        if !is_standing(&natural.poses) {
+            match driven(&recording.map, &natural.poses).filter(|_| actor.is_vehicle()) {
+                Some(way) => natural.drive_in_lanes(&way),
+                None => natural.go_along_a_line(),
             }
         }
         natural.events.extend(stop_where_hit(recording, actor));
@@ -108,15 +111,15 @@ impl Natural {
     }
 
     /// Its entry in `Init`, if it is there from the beginning, and what it does later.
-    pub fn written(self, actor: &Actor) -> (Option<Element>, Vec<Element>) {
-        let name = actor.name();
+    pub fn written(self) -> (Option<Element>, Vec<Element>) {
+        let name = self.actor.name();
         let private = Element::new("Private").with("entityRef", &name);
-        if actor.first_tick() == 0 {
+        if self.actor.first_tick() == 0 {
             let begins = private.holding(teleport(self.place)).holding_all(self.from_the_first);
             return (Some(begins), self.events);
         }
         // CARLA's ScenarioRunner makes everyone as the scenario begins.
-        let waits = || private.holding(teleport(beneath(&self.pose, BENEATH_M)));
+        let waits = || private.holding(teleport(beneath(&self.poses[0], BENEATH_M)));
         let waits = (self.version == Version::Carla).then(waits);
         let added = match self.version {
             Version::Carla => teleport(self.place),
@@ -126,17 +129,17 @@ impl Natural {
         let actions = core::iter::once(action(&format!("{name}_added"), added))
             .chain(numbered.map(|(number, what)| action(&format!("{name}_begins_{}", number + 1), what)));
         let event = format!("{name}_appears");
-        let appears = event_at(self.version, &event, actions.collect(), seconds(actor, 0));
+        let appears = event_at(self.version, &event, actions.collect(), seconds(self.actor, 0));
         (waits, core::iter::once(appears).chain(self.events).collect())
     }
 
     /// A vehicle that drives in lanes.
-    fn drive_in_lanes(&mut self, recording: &Recording, actor: &Actor, poses: &[Pose], way: &Driven) {
-        let name = actor.name();
-        let pace = Pace::of(&places(poses));
-        self.place = lane_position(&recording.map, way.places[0]);
+    fn drive_in_lanes(&mut self, way: &Driven) {
+        let name = self.actor.name();
+        let pace = Pace::of(&places(&self.poses));
+        self.place = lane_position(&self.recording.map, way.places[0]);
         self.from_the_first.push(speed(pace.first_mps));
-        for (number, (from_s, route)) in routes(recording, actor, way).into_iter().enumerate() {
+        for (number, (from_s, route)) in routes(self.recording, self.actor, way).into_iter().enumerate() {
             if number == 0 {
                 self.from_the_first.push(route);
                 continue;
@@ -145,20 +148,20 @@ impl Natural {
             let turns = vec![action(&format!("{event}_taken"), route)];
             self.events.push(event_at(self.version, &format!("{event}_event"), turns, from_s));
         }
-        self.change_speeds(actor, pace.first_mps, &pace.changes);
+        self.events.extend(change_speeds(self.version, self.actor, pace.first_mps, &pace.changes));
         for (number, change) in way.changes.iter().enumerate() {
             let event = format!("{name}_lane_change_{}", number + 1);
-            let metres = way_m(poses, change.begin, change.length);
+            let metres = way_m(&self.poses, change.begin, change.length);
             let over = action(&event, change_lane(self.version, &name, change.lanes_left, metres));
-            let from_s = seconds(actor, change.begin);
+            let from_s = seconds(self.actor, change.begin);
             self.events.push(event_at(self.version, &format!("{event}_event"), vec![over], from_s));
         }
     }
 
     /// A pedestrian, or what drives beside the lanes.
-    fn go_along_a_line(&mut self, recording: &Recording, actor: &Actor, poses: &[Pose]) {
-        let name = actor.name();
-        let is_cut = touch(recording, actor).is_some();
+    fn go_along_a_line(&mut self) {
+        let (name, poses) = (self.actor.name(), &self.poses);
+        let is_cut = touch(self.recording, self.actor).is_some();
         let sets_out = (1..poses.len()).find(|at| !is_standing(&poses[..=*at]));
         // The last tick in which it stands.
         let begin = sets_out.map_or(0, |at| moving_before(poses, at));
@@ -183,7 +186,7 @@ impl Natural {
             [last] => last.target_mps == 0.0 && last.to - last.from <= ONCE_TICKS,
             _ => false,
         };
-        let conditions = self.when(recording, actor, poses, begin, stop);
+        let conditions = self.when(begin, stop);
         self.events.push(event(&event_name, actions, conditions));
         if !stop {
             let later = changes.iter().map(|change| Change {
@@ -191,7 +194,8 @@ impl Natural {
                 to: change.to + begin,
                 ..*change
             });
-            self.change_speeds(actor, first_mps, &later.collect::<Vec<_>>());
+            let later: Vec<_> = later.collect();
+            self.events.extend(change_speeds(self.version, self.actor, first_mps, &later));
         } else if !changes.is_empty() || is_cut {
             let stands = action(&format!("{name}_stands"), speed(0.0));
             let over = vec![after_event(&format!("{name}_is_there"), &event_name)];
@@ -199,33 +203,9 @@ impl Natural {
         }
     }
 
-    fn change_speeds(&mut self, actor: &Actor, first_mps: f64, changes: &[Change]) {
-        let name = actor.name();
-        let mut before_mps = first_mps;
-        for (number, change) in changes.iter().enumerate() {
-            let action_name = format!("{name}_speed_{}", number + 2);
-            let time_s = (change.to - change.from) as f64 * DT_S;
-            let lost_mps = before_mps - change.target_mps;
-            before_mps = change.target_mps;
-            // In the middle of the piece, a jump costs no way.
-            let (from_s, time_s) = match is_impact(actor, lost_mps, time_s) {
-                true => (seconds(actor, change.from + (change.to - change.from) / 2), 0.0),
-                false => (seconds(actor, change.from), time_s),
-            };
-            let action = action(&action_name, speed_within(change.target_mps, time_s));
-            self.events.push(event_at(self.version, &format!("{action_name}_event"), vec![action], from_s));
-        }
-    }
-
     /// When it sets out: as the ego vehicle comes near, if it came nearer than ever just then; else at the time.
-    fn when(
-        &self,
-        recording: &Recording,
-        actor: &Actor,
-        poses: &[Pose],
-        begin: usize,
-        by_distance: bool,
-    ) -> Vec<Element> {
+    fn when(&self, begin: usize, by_distance: bool) -> Vec<Element> {
+        let Natural { recording, actor, poses, .. } = self;
         let name = actor.name();
         let ego_ahead_m = ahead_of_centre_m(&recording.seen.ego);
         let away_m = |sample: usize| {
@@ -255,6 +235,25 @@ impl Natural {
             None => vec![time(begin)],
         }
     }
+}
+
+/// The events of its changes of speed, from the first on.
+fn change_speeds(version: Version, actor: &Actor, first_mps: f64, changes: &[Change]) -> Vec<Element> {
+    let mut before_mps = first_mps;
+    let changed = |(number, change): (usize, &Change)| {
+        let name = format!("{}_speed_{}", actor.name(), number + 2);
+        let time_s = (change.to - change.from) as f64 * DT_S;
+        let lost_mps = before_mps - change.target_mps;
+        before_mps = change.target_mps;
+        // In the middle of the piece, a jump costs no way.
+        let (from_s, time_s) = match is_impact(actor, lost_mps, time_s) {
+            true => (seconds(actor, change.from + (change.to - change.from) / 2), 0.0),
+            false => (seconds(actor, change.from), time_s),
+        };
+        let action = action(&name, speed_within(change.target_mps, time_s));
+        event_at(version, &format!("{name}_event"), vec![action], from_s)
+    };
+    changes.iter().enumerate().map(changed).collect()
 }
 
 /// Where it was, up to the tick in which the ego vehicle touches it: what follows is that contact's doing.
@@ -394,20 +393,14 @@ mod tests {
     #[test]
     fn full_braking_takes_its_time_and_an_impact_none() {
         let mut actor = Actor::ego();
-        let pose = Pose::new(0.0, 0.0, 0.0);
-        actor.samples.push(Sample { tick: 0, pose, velocity_mps: Vec2::zeros() });
+        let sample = Sample { tick: 0, pose: Pose::new(0.0, 0.0, 0.0), velocity_mps: Vec2::zeros() };
+        actor.samples.push(sample);
         let brakes_mps2 = actor.shape.deceleration_mps2_max;
         assert!(brakes_mps2 > 0.0);
         let natural = |lost_mps: f64| {
-            let mut natural = Natural {
-                version: Version::V1_2,
-                pose,
-                place: position(&pose),
-                from_the_first: Vec::new(),
-                events: Vec::new(),
-            };
-            natural.change_speeds(&actor, lost_mps, &[Change { from: 100, to: 150, target_mps: 0.0 }]);
-            let [event] = &natural.events[..] else { panic!("one event") };
+            let change = Change { from: 100, to: 150, target_mps: 0.0 };
+            let events = change_speeds(Version::V1_2, &actor, lost_mps, &[change]);
+            let [event] = &events[..] else { panic!("one event") };
             event.clone().document()
         };
         let brakes = natural(1.04 * brakes_mps2);
