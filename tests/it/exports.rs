@@ -120,7 +120,7 @@ fn an_own_body_keeps_its_name() {
     let file = scratch.path().join("cart.ava");
     std::fs::write(&file, text).expect("it is writable");
     exported("csv", &file.display().to_string(), &scratch.path().join("out"), &[]);
-    let table = texts(&scratch.path().join("out"))["cart.csv"].clone();
+    let table = texts(scratch.path().join("out"))["cart.csv"].clone();
     let bodies: BTreeSet<(&str, &str)> = table
         .lines()
         .skip(1)
@@ -208,7 +208,7 @@ fn a_file_for_carla_has_what_its_player_reads() {
         &scratch.path().join("driven"),
         &["--profile", "carla", "--ego", "controller"],
     );
-    let driven = texts(&scratch.path().join("driven"));
+    let driven = texts(scratch.path().join("driven"));
     assert!(driven.values().any(|text| text.contains("external_control")), "its own program drives");
 }
 
