@@ -218,6 +218,26 @@ pub const GRAMMAR: &[Construct] = &[
             "{ROADS}enum Mode = Near | Far\n{gap}action a(each x: Int in 1 .. {n}, each m: Mode, {drawn}) {{ {spawn} }}\n{rules}"
         )
     }),
+    ("keys that rows of several maps set", |n| {
+        let maps = each(n.min(100), |i| {
+            format!("state m{i}: E -> E = any\naction t{i}(each k: E, each x: E) {{ set m{i}[k] = x }}\n")
+        });
+        format!("{ROADS}{}{maps}", largest_enum())
+    }),
+    ("orders of one action", |n| {
+        let spawn = "spawn Sedan as car ahead 50 m { lane: Current, speed: 9 m/s, does: DriveAhead }";
+        let orders = "order car { speed: v, rate: 3 m/s^2 }\n".repeat(n);
+        format!("{ROADS}action a() {{ {spawn} }}\naction b(any v: Speed in 1 m/s .. 9 m/s) {{ {orders} }}\n")
+    }),
+    ("names of road users", |n| {
+        let spawn = "ahead 50 m { lane: Current, speed: 9 m/s, does: DriveAhead }";
+        let actions = each(n, |i| {
+            format!(
+                "action a{i}() {{ spawn Sedan as n{i} {spawn} }}\naction b{i}() {{ order n{i} {{ speed: 1 m/s }} }}\nrule r{i} on b{i}: n{i}.gap <= 30 m\n"
+            )
+        });
+        ROADS.to_owned() + &actions
+    }),
     ("axes of two values", |n| {
         format!(
             "{ROADS}{BOOL}action a({}) {{ set b = true }}\n",

@@ -152,13 +152,12 @@ impl Rational {
         if self.is_integer() && other.is_integer() {
             return Rational::new(self.numerator.checked_mul(other.numerator)?, 1);
         }
-        // Crosswise reduction first keeps products small.
+        // Crosswise reduction keeps products small, and nothing is left to reduce.
         let left = Rational::new(self.numerator, other.denominator)?;
         let right = Rational::new(other.numerator, self.denominator)?;
-        Rational::new(
-            left.numerator.checked_mul(right.numerator)?,
-            left.denominator.checked_mul(right.denominator)?,
-        )
+        let numerator = left.numerator.checked_mul(right.numerator)?;
+        let denominator = left.denominator.checked_mul(right.denominator)?;
+        Some(Rational { numerator, denominator })
     }
 
     /// `None` also for a division by 0.
@@ -198,6 +197,9 @@ impl PartialOrd for Rational {
 impl Ord for Rational {
     /// Exact, by products where they fit, else by comparing whole parts and then the remainders' reciprocals.
     fn cmp(&self, other: &Rational) -> Ordering {
+        if self.denominator == other.denominator {
+            return self.numerator.cmp(&other.numerator);
+        }
         let products =
             (self.numerator.checked_mul(other.denominator), other.numerator.checked_mul(self.denominator));
         if let (Some(left), Some(right)) = products {

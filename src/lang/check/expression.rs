@@ -360,9 +360,14 @@ impl Checker {
             ast::ExprKind::Name(name) if things.contains(&name.as_str()) => name,
             _ => {
                 self.look_at(base, place, None);
-                let things = one_of(&things);
-                let error = Diagnostic::error(code::UNKNOWN, format!("only {things} has fields"));
-                return self.reject(error.at(base.span, format!("not {things}")));
+                let message = format!("only {} and named road users have fields", listed(&things));
+                let error = Diagnostic::error(code::UNKNOWN, message).at(base.span, "none of these");
+                let ast::ExprKind::Name(name) = &base.kind else { return self.reject(error) };
+                let known = things.iter().copied().chain(self.bearers.iter().map(String::as_str));
+                return match nearest(name, known) {
+                    Some(word) => self.reject(error.meant(base.span, word)),
+                    None => self.reject(error),
+                };
             }
         };
         let name = format!("{thing}.{}", part.text);

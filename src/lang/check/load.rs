@@ -15,7 +15,7 @@ use crate::model::policy::Policy;
 use crate::model::scenario::Scenario;
 use crate::model::{Meaning, Space, code, digest};
 use crate::syntax::ast::{FileId, ItemKind, Span};
-use crate::syntax::{Diagnostic, Severity, Sources, ast, parse};
+use crate::syntax::{Diagnostic, Severity, Sources, TOKENS_MAX, ast, parse};
 use avastra_road::{LanePlace, RoadError, RoadMap, Route};
 
 /// Why a file cannot be read, in a few words: `no such file`, `a directory`, `not text`.
@@ -283,13 +283,30 @@ struct Loader<'a> {
     /// Indices of files, imports before the files that use them.
     order: Vec<usize>,
     diagnostics: Vec<Diagnostic>,
+    /// Words and signs of the files so far.
+    words: usize,
+}
+
+/// Most words and signs of all files of a space together, comments included: a file of the greatest length, and what it
+/// uses.
+const WORDS_MAX: usize = TOKENS_MAX + 100_000;
+
+/// Words, and signs that are part of none.
+fn words(text: &str) -> usize {
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    text.split_whitespace()
+        .map(|part| {
+            let signs = part.chars().filter(|c| !is_word(*c)).count();
+            signs + part.split(|c| !is_word(c)).filter(|word| !word.is_empty()).count()
+        })
+        .sum()
 }
 
 impl<'a> Loader<'a> {
     fn read(root: &Path, read: &'a ReadFile<'a>) -> Result<Loader<'a>, ReadError> {
         let sources = Sources::new();
         let (files, order, diagnostics) = (Vec::new(), Vec::new(), Vec::new());
-        let mut loader = Loader { read, sources, files, order, diagnostics };
+        let mut loader = Loader { read, sources, files, order, diagnostics, words: 0 };
         loader.read_file(&normal(root), &mut Vec::new())?;
         Ok(loader)
     }
@@ -300,6 +317,13 @@ impl<'a> Loader<'a> {
             return Ok(());
         }
         let text = (self.read)(path)?;
+        self.words += words(&text);
+        // The parser says it of a root that is too long by itself.
+        if self.words > WORDS_MAX && !self.files.is_empty() {
+            let message =
+                format!("with it, the files of the space have more than {WORDS_MAX} words and signs");
+            return Err(ReadError(message));
+        }
         let file = self.sources.add(path.display().to_string(), text);
         let (tree, found) = parse(file, self.sources.text(file));
         self.diagnostics.extend(found);

@@ -18,7 +18,7 @@ use avastra_base::units::Rational;
 pub(crate) const VARIANTS_MAX: usize = 128;
 
 /// Steps for the product of two intervals: up to four products of fractions, each brought to its lowest terms.
-const PRODUCT_STEPS: usize = 2;
+const PRODUCT_STEPS: usize = 3;
 
 /// A set of values of one type.
 #[derive(Debug, Clone, Copy, PartialEq)]

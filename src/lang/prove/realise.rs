@@ -67,8 +67,9 @@ pub fn realise(space: &Space) -> (Realisable, RunsIn) {
     let mut realisable = vec![vec![Realised::Never; space.roads.len()]; space.rows.len()];
     let found = vec![vec![None; space.roads.len()]; space.rows.len()];
     let mut runs_in = RunsIn { states: Vec::new(), found };
+    let begun = space.initial_memory(0);
     for (index, road) in space.roads.iter().enumerate() {
-        let on_road = OnRoad { space, road, in_force: &in_force, left: &left };
+        let on_road = OnRoad { space, road, in_force: &in_force, left: &left, begun: &begun };
         on_road.rows(index, &mut realisable, &mut runs_in);
     }
     (realisable, runs_in)
@@ -115,12 +116,14 @@ struct OnRoad<'a> {
     road: &'a Road,
     in_force: &'a RulesInForce,
     left: &'a Left,
+    /// The states as they are declared, for rows that no state decides.
+    begun: &'a Memory,
 }
 
 impl<'a> OnRoad<'a> {
     /// A search for values of a row, at a moment of which that is known.
     fn search<'s>(&'s self, row: &'s Row, moment: Option<&'s Case>) -> Search<'s> {
-        let OnRoad { space, road, in_force, left } = *self;
+        let OnRoad { space, road, in_force, left, .. } = *self;
         Search { rules: RowRules { space, row, road: Some(&road.facts), in_force }, left, moment }
     }
 
@@ -184,13 +187,11 @@ impl<'a> OnRoad<'a> {
             return Realised::NotSearched;
         }
         let search = self.search(asked.row, None);
-        let (memories, are_all) = match asked.about_states {
-            true => search.memories(),
-            false => (vec![self.space.initial_memory(0)], true),
-        };
+        let (made, are_all) = if asked.about_states { search.memories() } else { (Vec::new(), true) };
+        let memories = if asked.about_states { &made[..] } else { core::slice::from_ref(self.begun) };
         let is_complete = !asked.is_undecided && (is_way_complete || !asked.about_states);
         let mut is_proved = are_all || is_complete;
-        for memory in &memories {
+        for memory in memories {
             if effort::is_spent() || self.left.is_spent() {
                 return Realised::NotSearched;
             }
