@@ -167,6 +167,13 @@ fn a_run_that_was_edited_is_not_gone_on_with() {
     assert!(std::fs::read(scratch.path("run/run.db")).expect("it is readable") == bytes);
     let stderr = resumed(&out);
     assert!(!stderr.contains("changed"), "{stderr}");
+    // A reason stands once for all episodes that name it. They are played again, and it gets its words back.
+    let reason =
+        "UPDATE reason SET text = 'because' WHERE reason = (SELECT min(reason) FROM offer WHERE reason > 0)";
+    change(&scratch.path("run/run.db"), reason);
+    let stderr = resumed(&out);
+    assert!(stderr.contains("were changed since they were written: each such episode"), "{stderr}");
+    assert!(std::fs::read(scratch.path("run/run.db")).expect("it is readable") == bytes);
     let torn: Vec<u8> =
         bytes.iter().enumerate().map(|(at, byte)| if at % 991 == 990 { !byte } else { *byte }).collect();
     std::fs::write(scratch.path("run/run.db"), torn).expect("it is writable");

@@ -219,6 +219,15 @@ impl Layout {
         Ok(())
     }
 
+    /// Deletes the rows that no unit names. An edited one would stand in the way of what it was before: both have one key.
+    pub(super) fn delete_unnamed(&self, connection: &Connection) -> Result<(), rusqlite::Error> {
+        if let Some((by, named)) = self.naming {
+            let unnamed = format!("DELETE FROM {named} WHERE {named} NOT IN (SELECT {named} FROM {by})");
+            connection.execute(&unnamed, [])?;
+        }
+        Ok(())
+    }
+
     /// Deletes the rows of all units from a number on.
     pub fn delete_from(&self, connection: &Connection, first: i64) -> Result<(), rusqlite::Error> {
         for table in self.tables.iter().rev() {

@@ -70,6 +70,7 @@ pub trait Units: Sized {
         for &number in &damaged {
             Self::LAYOUT.delete(&transaction, number)?;
         }
+        Self::LAYOUT.delete_unnamed(&transaction)?;
         transaction.commit()?;
         Ok((Self::from_connection(connection), damaged))
     }
