@@ -209,7 +209,7 @@ pub struct Contents {
 pub fn read(directory: &Path) -> Result<Contents, Failure> {
     let (path, file) = (directory.join("estimate.yaml"), directory.join("estimate.db"));
     let text = load::text(&path)?;
-    if !file.is_file() {
+    if run_directory::lost(&file).is_some() {
         return Ok(Contents { settings: text, results: None, damaged: None, remarks: Vec::new() });
     }
     let settings: EstimateSettings = load::parsed(&path, &text)?;

@@ -114,11 +114,19 @@ impl<C: Cut> Played<C> {
     /// Opens its database.
     fn open(&mut self) -> Result<(), DatabaseError> {
         let file = self.file();
-        if std::fs::metadata(&file).is_ok_and(|found| found.len() > 0) {
-            let database = C::Database::open(&file, &self.begun)?;
-            self.units = self.settings.numbered(&database)?;
-            self.database = Some(database);
+        if run_directory::lost(&file).is_some() {
+            return Ok(());
         }
+        let (database, damaged) = match C::Database::open_without_damaged(&file, &self.begun) {
+            // A kill left a journal, by which the file became empty.
+            Err(DatabaseError::Empty) => return Ok(()),
+            opened => opened?,
+        };
+        if let Some(&number) = damaged.first() {
+            return Err(DatabaseError::Rows { unit: C::Database::LAYOUT.unit, number });
+        }
+        self.units = self.settings.numbered(&database)?;
+        self.database = Some(database);
         Ok(())
     }
 }

@@ -154,7 +154,7 @@ fn of_directory(output: &Output, directory: &Path) -> Result<Found, Failure> {
     if settings("run").is_file() {
         remarks = of_run(output, directory, &load::text(&settings("run"))?, &mut found)?;
     } else if settings("study").is_file() {
-        if !directory.join("study.db").is_file() {
+        if run_directory::lost(&directory.join("study.db")).is_some() {
             return Err(without_results(directory, "study", None));
         }
         let (of_study, cells, remark) = study::read_sound(directory)?;
@@ -207,8 +207,8 @@ fn of_run(
         space: PathBuf,
     }
     let path = directory.join("run.db");
-    if !path.is_file() {
-        return Ok(vec![format!("`{}` is missing: only scenarios are shown", path.display())]);
+    if let Some(how) = run_directory::lost(&path) {
+        return Ok(vec![format!("`{}` is {how}: only scenarios are shown", path.display())]);
     }
     let unread = |error| Failure::file("read", &path, error);
     let (database, damaged) = run_directory::open_to_read::<Database>(&path, settings)?;

@@ -149,12 +149,7 @@ pub fn resume<C: Campaign>(
     // The scenarios of a run whose database is lost cannot be told from new ones.
     let database = C::KIND.database(directory);
     let left = load::sources_in(&directory.join("critical")).unwrap_or_default();
-    // A kill may leave an empty file before anything is in it.
-    let lost = match std::fs::metadata(&database) {
-        Err(_) => Some("missing"),
-        Ok(found) => (found.len() == 0).then_some("empty"),
-    };
-    match lost {
+    match lost(&database) {
         Some(how) if !left.is_empty() => {
             return Err(Failure::usage(format!(
                 "`{}` is {how}, and `critical` has scenarios: begin a new {what}, or delete them to begin this one anew",
@@ -180,6 +175,14 @@ pub fn resume<C: Campaign>(
         .take()
         .map(|attached| Attached { is_recorded: is_played, ..from_record(directory, attached) });
     Ok(Resumed { settings, text, table, held })
+}
+
+/// How a database is lost, if it is: a kill may leave an empty file before anything is in it.
+pub fn lost(database: &Path) -> Option<&'static str> {
+    match std::fs::metadata(database) {
+        Err(_) => Some("missing"),
+        Ok(found) => (found.is_file() && found.len() == 0).then_some("empty"),
+    }
 }
 
 /// Makes a directory ready to be resumed: refuses folders that are links, and removes partial files that a kill left.

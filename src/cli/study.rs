@@ -224,10 +224,16 @@ pub fn read(directory: &Path) -> Result<(StudySettings, Vec<CellRecord>), Failur
 /// As [`read`], but cells that were changed are left out, and a remark says so.
 pub fn read_sound(directory: &Path) -> Result<(StudySettings, Vec<CellRecord>, Option<String>), Failure> {
     let (path, file) = (directory.join("study.yaml"), directory.join("study.db"));
-    if !path.is_file() || !file.is_file() {
+    if !path.is_file() {
         let directory = directory.display();
         return Err(Failure::usage(format!(
             "`{directory}` is no study's directory: `avastra study FILE --out {directory}` makes one"
+        )));
+    }
+    if let Some(how) = run_directory::lost(&file) {
+        let (file, directory) = (file.display(), directory.display());
+        return Err(Failure::usage(format!(
+            "`{file}` is {how}: go on with `avastra study --resume {directory}`"
         )));
     }
     let text = load::text(&path)?;

@@ -250,6 +250,12 @@ fn a_run_without_its_database_is_said_so_of() {
     let (status, stderr, index) = reported(scratch.path(), &[&scratch.path().display().to_string()]);
     assert!(status == 0 && stderr.contains("run.db` is missing: only scenarios are shown"), "{stderr}");
     assert_eq!(index["scenarios"].as_array().map(Vec::len), Some(1));
+    // An empty one is no better, and stays empty.
+    let database = scratch.path().join("run.db");
+    std::fs::write(&database, "").expect("it can be written");
+    let (status, stderr, _) = reported(scratch.path(), &[&scratch.path().display().to_string()]);
+    assert!(status == 0 && stderr.contains("run.db` is empty: only scenarios are shown"), "{stderr}");
+    assert_eq!(std::fs::metadata(&database).expect("it is there").len(), 0);
 }
 
 #[test]

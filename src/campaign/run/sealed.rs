@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use rusqlite::types::ValueRef;
-use rusqlite::{Connection, OptionalExtension, Row, ToSql, params};
+use rusqlite::{Connection, OpenFlags, OptionalExtension, Row, ToSql, params};
 use serde_json::{Map, Value};
 use sha2::{Digest, Sha256};
 
@@ -30,6 +30,8 @@ CREATE TABLE seal (unit INTEGER PRIMARY KEY, digest TEXT NOT NULL) STRICT;
 pub enum DatabaseError {
     #[error("it has layout {found}, this version of avastra reads {wanted}: begin a new one")]
     Layout { found: i64, wanted: i64 },
+    #[error("it is empty: `--resume` plays all again")]
+    Empty,
     #[error("it names an episode {found}")]
     Episode { found: i64 },
     #[error("its checkpoint is damaged: begin a new training")]
@@ -74,6 +76,15 @@ impl From<rusqlite::Error> for DatabaseError {
     }
 }
 
+/// What is done with a file that has nothing in it.
+#[derive(Clone, Copy)]
+pub(super) enum IfEmpty {
+    /// Its tables are made.
+    Begin,
+    /// It is refused: whatever only reads writes nothing.
+    Refuse,
+}
+
 /// The layout of a database.
 pub struct Layout {
     /// Raised whenever a column changes.
@@ -103,7 +114,7 @@ impl Layout {
     /// # Errors
     /// If the file cannot be opened, is a link, has another layout or other settings, or was damaged or changed.
     pub fn open(&self, path: &Path, settings: &str) -> Result<Connection, DatabaseError> {
-        let (connection, damaged) = self.open_damaged(path, settings)?;
+        let (connection, damaged) = self.open_damaged(path, settings, IfEmpty::Begin)?;
         match damaged.first() {
             Some(&number) => Err(DatabaseError::Rows { unit: self.unit, number }),
             None => Ok(connection),
@@ -113,31 +124,57 @@ impl Layout {
     /// As [`Layout::open`], but units whose rows were changed are no error: their numbers come beside the connection.
     ///
     /// # Errors
-    /// As [`Layout::open`], but for changed rows.
+    /// As [`Layout::open`], but for changed rows. If the file is empty and is to be refused then.
     pub(super) fn open_damaged(
         &self,
         path: &Path,
         settings: &str,
+        if_empty: IfEmpty,
     ) -> Result<(Connection, Vec<i64>), DatabaseError> {
         // SQLite would follow a link and write where it leads.
         files::own_file(path)?;
-        let mut connection = Connection::open(path)?;
-        let found: i64 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
-        if found == 0 {
-            let transaction = connection.transaction()?;
-            transaction.execute_batch(TABLES)?;
-            transaction.execute_batch(&(self.schema)())?;
-            transaction.execute("INSERT INTO begun VALUES (1, ?)", [settings])?;
-            transaction.pragma_update(None, "user_version", self.version)?;
-            transaction.commit()?;
-        } else if found != self.version {
-            return Err(DatabaseError::Layout { found, wanted: self.version });
-        } else {
-            self.check_tables(&connection)?;
-            self.check(&connection, settings)?;
+        let mut connection = match if_empty {
+            IfEmpty::Begin => Connection::open(path)?,
+            // Not read-only: SQLite must be able to undo what a kill left half written. No file is made.
+            IfEmpty::Refuse => {
+                let existing = OpenFlags::default().difference(OpenFlags::SQLITE_OPEN_CREATE);
+                Connection::open_with_flags(path, existing)?
+            }
+        };
+        match (self.is_in(&connection)?, if_empty) {
+            (true, _) => {
+                self.check_tables(&connection)?;
+                self.check(&connection, settings)?;
+            }
+            (false, IfEmpty::Refuse) => return Err(DatabaseError::Empty),
+            (false, IfEmpty::Begin) => {
+                let transaction = connection.transaction()?;
+                transaction.execute_batch(TABLES)?;
+                transaction.execute_batch(&(self.schema)())?;
+                transaction.execute("INSERT INTO begun VALUES (1, ?)", [settings])?;
+                transaction.pragma_update(None, "user_version", self.version)?;
+                transaction.commit()?;
+            }
         }
         let damaged = self.damaged(&connection)?;
         Ok((connection, damaged))
+    }
+
+    /// Whether a file has this layout; false if nothing is in it.
+    ///
+    /// # Errors
+    /// If it has another layout.
+    pub(super) fn is_in(&self, connection: &Connection) -> Result<bool, DatabaseError> {
+        let found: i64 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
+        // A file with tables is not new, whatever number it has.
+        let tables = "SELECT count(*) FROM sqlite_schema";
+        let is_empty =
+            || connection.query_row(tables, [], |row| row.get::<_, i64>(0)).map(|tables| tables == 0);
+        match found {
+            found if found == self.version => Ok(true),
+            0 if is_empty()? => Ok(false),
+            found => Err(DatabaseError::Layout { found, wanted: self.version }),
+        }
     }
 
     /// Refuses a file unless its tables are those of this layout, see [`check_plain`].
