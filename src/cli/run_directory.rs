@@ -149,15 +149,12 @@ pub fn resume<C: Campaign>(
     // The scenarios of a run whose database is lost cannot be told from new ones.
     let database = C::KIND.database(directory);
     let left = load::sources_in(&directory.join("critical")).unwrap_or_default();
-    match lost(&database) {
-        Some(how) if !left.is_empty() => {
-            return Err(Failure::usage(format!(
-                "`{}` is {how}, and `critical` has scenarios: begin a new {what}, or delete them to begin this one anew",
-                database.display()
-            )));
-        }
-        Some(how) => output.tell(&format!("`{}` is {how}: the {what} begins anew", database.display())),
-        None => {}
+    let lost = lost(&database);
+    if let Some(how) = lost.filter(|_| !left.is_empty()) {
+        return Err(Failure::usage(format!(
+            "`{}` is {how}, and `critical` has scenarios: begin a new {what}, or delete them to begin this one anew",
+            database.display()
+        )));
     }
     let (mut settings, text) = settings_of::<C>(directory)?;
     let Outside { space, space_digest, external, .. } = settings.outside();
@@ -174,6 +171,10 @@ pub fn resume<C: Campaign>(
     *external = external
         .take()
         .map(|attached| Attached { is_recorded: is_played, ..from_record(directory, attached) });
+    // What cannot be gone on with does not begin anew either.
+    if let Some(how) = lost {
+        output.tell(&format!("`{}` is {how}: the {what} begins anew", database.display()));
+    }
     Ok(Resumed { settings, text, table, held })
 }
 

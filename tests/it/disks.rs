@@ -119,6 +119,12 @@ fn what_a_kill_left_before_the_beginning_can_be_begun() {
     assert!(status == 1 && stderr.contains("is not empty"), "{stderr}");
     // The database may be missing as long as nothing was found.
     std::fs::remove_file(scratch.path("run/run.db")).expect("it is there");
+    let settings = scratch.path("run/run.yaml");
+    let whole = std::fs::read(&settings).expect("it is readable");
+    std::fs::write(&settings, "seed: [").expect("it is writable");
+    let (status, stdout, stderr) = outcome(&mut avastra(&["run", "--resume", &out]));
+    assert!(status == 1 && !stdout.contains("begins anew"), "nothing can begin: {stdout}{stderr}");
+    std::fs::write(&settings, whole).expect("it is writable");
     resumed(&out);
     std::fs::write(scratch.path("run/critical/corner_0000.ava"), "language 1\n").expect("it is writable");
     std::fs::remove_file(scratch.path("run/run.db")).expect("it is there");
