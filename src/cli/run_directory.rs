@@ -171,6 +171,10 @@ pub fn resume<C: Campaign>(
     *external = external
         .take()
         .map(|attached| Attached { is_recorded: is_played, ..from_record(directory, attached) });
+    // Git keeps no empty folder.
+    if C::Database::keeps_scenarios() {
+        folder(directory, "critical")?;
+    }
     // What cannot be gone on with does not begin anew either.
     if let Some(how) = lost {
         output.tell(&format!("`{}` is {how}: the {what} begins anew", database.display()));

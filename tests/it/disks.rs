@@ -125,7 +125,10 @@ fn what_a_kill_left_before_the_beginning_can_be_begun() {
     let (status, stdout, stderr) = outcome(&mut avastra(&["run", "--resume", &out]));
     assert!(status == 1 && !stdout.contains("begins anew"), "nothing can begin: {stdout}{stderr}");
     std::fs::write(&settings, whole).expect("it is writable");
+    // Git drops an empty folder.
+    std::fs::remove_dir_all(scratch.path("run/critical")).expect("it is there");
     resumed(&out);
+    assert!(scratch.path("run/critical").is_dir());
     std::fs::write(scratch.path("run/critical/corner_0000.ava"), "language 1\n").expect("it is writable");
     std::fs::remove_file(scratch.path("run/run.db")).expect("it is there");
     fails(&["run", "--resume", &out], "is missing, and `critical` has scenarios");

@@ -104,6 +104,11 @@ fn only_its_database_counts(scratch: &Path, files: &[PathBuf]) {
     assert_eq!(text(gone), gone_text);
     assert_eq!(kept(&directory), results);
 
+    // The whole folder of scenarios comes back.
+    std::fs::remove_dir_all(directory.join("critical")).expect("it is there");
+    done(&["estimate", "--resume", &out]);
+    assert_eq!([text(gone), text(edited)], [gone_text, edited_text]);
+
     // Where all parts were changed there is nothing to show, but it is not unfinished.
     change(&directory.join("estimate.db"), "UPDATE part SET probability = 0.9");
     let (status, _, stderr) = outcome(&mut avastra(&["report", &out, "--out", &page]));
