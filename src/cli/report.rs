@@ -16,7 +16,7 @@ use super::error::Failure;
 use super::files::{must_end_in, write_result};
 use super::load;
 use super::look::{self, Looked};
-use super::output::{Output, plural};
+use super::output::{Output, for_shell, plural};
 use super::parallel::{PerFile, each_file};
 use super::replay::refutation;
 use super::{estimate, run_directory, shrink, study};
@@ -182,8 +182,8 @@ fn of_directory(output: &Output, directory: &Path) -> Result<Found, Failure> {
 
 /// The failure of a directory without results. `damaged` says which of its rows were changed, if any were.
 fn without_results(directory: &Path, command: &str, damaged: Option<String>) -> Failure {
+    let resume = format!("`avastra {command} --resume {}`", for_shell(directory));
     let directory = directory.display();
-    let resume = format!("`avastra {command} --resume {directory}`");
     Failure::usage(match damaged {
         None => format!("`{directory}` has no results yet: finish it with {resume}"),
         Some(damaged) => format!("`{directory}` has no results: {damaged}; {resume} plays them again"),

@@ -26,7 +26,7 @@ use super::campaign::{Campaign, KINDS, Kind, Outside};
 use super::error::Failure;
 use super::files::{folder, make, make_first, write, write_answers};
 use super::load;
-use super::output::{Output, plural};
+use super::output::{Output, for_shell, plural};
 use super::{pack, shard};
 
 /// The folders that a run, a training or an estimate writes into.
@@ -133,15 +133,17 @@ pub fn resume<C: Campaign>(
     if let Some(Kind { what: found, command, .. }) =
         what_was_begun(directory).filter(|found| found.what != what)
     {
-        let directory = directory.display();
         return Err(Failure::usage(format!(
-            "`{directory}` holds a {found}: go on with `avastra {command} --resume {directory}`"
+            "`{}` holds a {found}: go on with `avastra {command} --resume {}`",
+            directory.display(),
+            for_shell(directory)
         )));
     }
     if !path.is_file() {
-        let directory = directory.display();
         return Err(Failure::usage(format!(
-            "`{directory}` is no {kind} directory: it has no {kind}.yaml; begin one with `--out {directory}`"
+            "`{}` is no {kind} directory: it has no {kind}.yaml; begin one with `--out {}`",
+            directory.display(),
+            for_shell(directory)
         )));
     }
     let held = hold(directory)?;
@@ -353,10 +355,12 @@ impl<C: Campaign> Directory<C> {
         if is_started {
             return Ok(());
         }
-        let (directory, command) = (self.path.display(), C::KIND.command);
         Err(Failure::usage(format!(
-            "`{directory}` is not played to the end, and no program that a file names is started for that: look at its \
-             settings, then go on with `avastra {command} --resume {directory}`"
+            "`{}` is not played to the end, and no program that a file names is started for that: look at its \
+             settings, then go on with `avastra {} --resume {}`",
+            self.path.display(),
+            C::KIND.command,
+            for_shell(&self.path)
         )))
     }
 
@@ -456,7 +460,7 @@ fn make_empty(path: &Path) -> Result<Held, Failure> {
         return Err(Failure::usage(format!(
             "`{}` is not empty: name a new directory, or go on with `--resume {}`",
             path.display(),
-            path.display()
+            for_shell(path)
         )));
     }
     Ok(held)

@@ -20,7 +20,7 @@ use super::error::Failure;
 use super::files::{remove, write};
 use super::findings::kinds_text;
 use super::interrupt::stop_on_interrupt;
-use super::output::{Output, plural};
+use super::output::{Output, for_shell, plural};
 use super::parallel::jobs;
 use super::progress::now;
 use super::run_directory::Resumed;
@@ -215,7 +215,7 @@ pub fn read(directory: &Path) -> Result<(StudySettings, Vec<CellRecord>), Failur
     match read_sound(directory)? {
         (settings, cells, None) => Ok((settings, cells)),
         (.., Some(remark)) => {
-            let directory = directory.display();
+            let directory = for_shell(directory);
             Err(Failure::usage(format!("{remark}; go on with `avastra study --resume {directory}`")))
         }
     }
@@ -225,13 +225,14 @@ pub fn read(directory: &Path) -> Result<(StudySettings, Vec<CellRecord>), Failur
 pub fn read_sound(directory: &Path) -> Result<(StudySettings, Vec<CellRecord>, Option<String>), Failure> {
     let (path, file) = (directory.join("study.yaml"), directory.join("study.db"));
     if !path.is_file() {
-        let directory = directory.display();
         return Err(Failure::usage(format!(
-            "`{directory}` is no study's directory: `avastra study FILE --out {directory}` makes one"
+            "`{}` is no study's directory: `avastra study FILE --out {}` makes one",
+            directory.display(),
+            for_shell(directory)
         )));
     }
     if let Some(how) = run_directory::lost(&file) {
-        let (file, directory) = (file.display(), directory.display());
+        let (file, directory) = (file.display(), for_shell(directory));
         return Err(Failure::usage(format!(
             "`{file}` is {how}: go on with `avastra study --resume {directory}`"
         )));

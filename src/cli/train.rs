@@ -21,7 +21,7 @@ use super::files::{folder, write};
 use super::findings::{cut_off, failures_text, is_reproducible, kinds_text, unfinished};
 use super::interrupt::stop_on_interrupt;
 use super::load::UnderTest;
-use super::output::{Output, plural};
+use super::output::{Output, for_shell, plural};
 use super::policy::distil::{self, rules_text};
 use super::progress::{TrainingProgress, Working};
 use super::run::groups_text;
@@ -211,7 +211,7 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
             if let Some(rules) = rules {
                 output.say(&rules_text(policy.rules.len(), evaluation.return_mean, rules));
             }
-            output.say(&format!("{}\nplay it with: avastra run --policy {}", path.display(), path.display()))
+            output.say(&format!("{}\nplay it with: avastra run --policy {}", path.display(), for_shell(path)))
         }
         None => output.say(&search_text(&directory.path)?),
     }

@@ -190,6 +190,17 @@ fn a_run_that_was_edited_is_not_gone_on_with() {
 }
 
 #[test]
+fn printed_commands_can_be_pasted() {
+    let scratch = Scratch::new();
+    let out = scratch.text("a b'c");
+    assert_eq!(run_into(&out).0, 0);
+    let quoted = format!("'{}'", out.replace('\'', r"'\''"));
+    let (status, _, stderr) = run_into(&out);
+    assert!(status == 1 && stderr.contains(&format!("go on with `--resume {quoted}`")), "{stderr}");
+    fails(&["train", "--resume", &out], &format!("go on with `avastra run --resume {quoted}`"));
+}
+
+#[test]
 fn one_process_at_a_time_works_in_a_directory() {
     let scratch = Scratch::new();
     let out = scratch.text("run");
