@@ -188,7 +188,7 @@ impl Survey {
             let mut played = Played::<C>::read(path, to, outside)?;
             if let Err(error) = played.open() {
                 let told = output.filter(|_| error.is_torn());
-                let failure = Failure::file("open", &played.file(), error);
+                let failure = run_directory::unopened::<C>(path, &error);
                 match told {
                     Some(output) => output.warn(&failure.to_string()),
                     None => return Err(failure),
@@ -291,7 +291,7 @@ fn bring_together<C: Cut>(
     for path in directories {
         let _held = run_directory::hold(path)?;
         let mut played = Played::<C>::read(path, partial, outside)?;
-        played.open().map_err(|error| Failure::file("open", &played.file(), error))?;
+        played.open().map_err(|error| run_directory::unopened::<C>(path, &error))?;
         if let Some(database) = &played.database {
             let written =
                 database.scenarios().map_err(|error| Failure::file("read", &played.file(), error))?;
@@ -348,7 +348,7 @@ fn publish<C: Cut>(
 fn holds_all<C: Cut>(out: &Path, (partial, outside): (&Path, &Outside), text: &str) -> Result<bool, Failure> {
     let places = |path: &Path| -> Result<(String, BTreeSet<i64>), Failure> {
         let mut played = Played::<C>::read(path, partial, outside)?;
-        played.open().map_err(|error| Failure::file("open", &played.file(), error))?;
+        played.open().map_err(|error| run_directory::unopened::<C>(path, &error))?;
         Ok((played.text(), played.units.iter().map(|(_, place)| *place).collect()))
     };
     let ((settings, there), (_, merged)) = (places(out)?, places(partial)?);

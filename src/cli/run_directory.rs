@@ -277,6 +277,20 @@ pub fn open_to_read<D: Units>(file: &Path, settings: &str) -> Result<(D, Option<
     Ok((database, remark))
 }
 
+/// Why the database of a directory cannot be opened. Where rows were changed, it says what to do.
+pub fn unopened<C: Campaign>(directory: &Path, error: &DatabaseError) -> Failure {
+    let Kind { command, merge, .. } = C::KIND;
+    let advice = match error {
+        DatabaseError::Rows { .. } if merge.is_some() => {
+            format!(": `avastra {command} --resume {}` plays them again", for_shell(directory))
+        }
+        // Each episode of a training is chosen with what was learned before.
+        DatabaseError::Rows { .. } => ", and later ones learned from it: begin a new training".to_owned(),
+        _ => String::new(),
+    };
+    Failure::file("open", &C::KIND.database(directory), format!("{error}{advice}"))
+}
+
 /// Most changed units that a message names.
 const NAMED_MAX: usize = 8;
 
@@ -310,7 +324,7 @@ impl<C: Campaign> Directory<C> {
     pub fn open(held: Held, settings: &str) -> Result<Directory<C>, Failure> {
         let file = C::KIND.database(&held.path);
         let database =
-            C::Database::open(&file, settings).map_err(|error| Failure::file("open", &file, error))?;
+            C::Database::open(&file, settings).map_err(|error| unopened::<C>(&held.path, &error))?;
         Ok(Directory { path: held.path.clone(), database, _held: held })
     }
 

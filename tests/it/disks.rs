@@ -171,6 +171,7 @@ fn a_run_that_was_edited_is_not_gone_on_with() {
     assert!(overview["totals"]["driven_m"].as_f64().is_some_and(|driven_m| driven_m < 1e6), "{overview}");
     let (status, _, stderr) = outcome(&mut avastra(&["merge", &out, "--missing"]));
     assert!(status == 0 && stderr.contains("its rows of episode 1 were changed"), "{stderr}");
+    assert!(stderr.contains(&format!("`avastra run --resume {out}` plays them again")), "{stderr}");
     let stderr = resumed(&out);
     assert!(stderr.contains(&format!("{changed}: each such episode is played again")), "{stderr}");
     assert!(std::fs::read(scratch.path("run/run.db")).expect("it is readable") == bytes);

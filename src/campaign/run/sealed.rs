@@ -38,10 +38,7 @@ pub enum DatabaseError {
     Checkpoint,
     #[error("the settings were edited since it was begun: {what}; undo that, or begin a new one")]
     Settings { what: String },
-    #[error(
-        "its rows of {unit} {number} were changed since they were written: `--resume` plays it again, and a training must \
-         be begun anew"
-    )]
+    #[error("its rows of {unit} {number} were changed since they were written")]
     Rows { unit: &'static str, number: i64 },
     #[error("its results were changed since they were written: `avastra train --resume` writes them again")]
     Results,
