@@ -12,6 +12,7 @@ use avastra_lang::check::normal;
 use avastra_world::action::ActionTable;
 
 use super::arguments::{FilesArguments, ReportArguments};
+use super::campaign::KINDS;
 use super::error::Failure;
 use super::files::{must_end_in, write_result};
 use super::load;
@@ -172,12 +173,25 @@ fn of_directory(output: &Output, directory: &Path) -> Result<Found, Failure> {
         remarks.extend(contents.damaged);
         remarks.extend(contents.remarks);
         found.overview = report::of_estimate(&in_json(&results), &contents.settings);
-    } else if found.files.is_empty() {
-        found.files = load::sources_in(directory)?;
+    } else {
+        remarks.extend(without_settings(directory));
+        if found.files.is_empty() {
+            found.files = load::sources_in(directory)?;
+        }
     }
     remarks.iter().for_each(|remark| output.warn(remark));
     found.remarks.extend(remarks);
     Ok(found)
+}
+
+/// Says that the settings of a campaign are gone, where its database or something else in their place tells of one.
+fn without_settings(directory: &Path) -> Option<String> {
+    KINDS.into_iter().find_map(|kind| {
+        let settings = kind.settings(directory);
+        let how = if settings.exists() { "no file" } else { "missing" };
+        let is_one = settings.exists() || kind.database(directory).is_file();
+        is_one.then(|| format!("`{}` is {how}: only scenarios are shown", settings.display()))
+    })
 }
 
 /// The failure of a directory without results. `damaged` says which of its rows were changed, if any were.
