@@ -13,12 +13,12 @@ use avastra_campaign::run::{DatabaseError, Run, RunSettings, Shard, Units};
 use avastra_world::action::ActionTable;
 
 use super::arguments::EstimateArguments;
-use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, as_they_are};
+use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, as_they_are, missing};
 use super::error::Failure;
 use super::files::{remove, write};
 use super::findings::is_reproducible;
 use super::interrupt::stop_on_interrupt;
-use super::output::{Output, plural};
+use super::output::{Output, for_shell, plural};
 use super::parallel::jobs;
 use super::progress::{Progress, Working};
 use super::run::{critical_text, cut_short};
@@ -230,19 +230,33 @@ pub fn read(directory: &Path) -> Result<Contents, Failure> {
             (0..=last.unwrap_or(0)).map(|row| format!("row {row}")).collect()
         }
     };
-    let pilot = database.pilot().map_err(unread)?.unwrap_or_default();
+    let kept = database.pilot().map_err(unread)?;
+    if settings.method == Method::Probe && kept.is_none() && damaged.is_none() {
+        let directory = for_shell(directory);
+        let remark = format!("the pilot is missing: `avastra estimate --resume {directory}` plays it");
+        remarks.push(remark);
+    }
+    let pilot = kept.unwrap_or_default();
     let all = database.parts().map_err(unread)?.len();
     let mut results = None;
-    for look in settings.looks() {
+    // Parts of each road that it must have before it is over. A shard must have all of its parts.
+    let mut wanted = settings.parts;
+    let is_shard = !shard::kept(directory)?.is_whole();
+    let mut looks = settings.looks().into_iter();
+    while let Some(look) = looks.next() {
         let looked = at_look(&settings, &database, &pilot, &labels, look).map_err(unread)?;
         let is_whole = looked.parts.len() == look as usize * settings.run.roads.len();
         // A look may lack parts, because they are damaged or another shard's. Then later parts were played, too, so go on.
         let is_last = looked.parts.len() == all || (is_whole && looked.is_enough);
         results = Some(looked.results);
         if is_last {
+            let next = if is_whole && !looked.is_enough { looks.next() } else { None };
+            wanted = if is_shard { settings.parts } else { next.unwrap_or(look) };
             break;
         }
     }
+    let end = settings.place(Part { road: 0, number: wanted });
+    remarks.extend(missing(directory, &settings, &database, |part| part < end)?);
     Ok(Contents { settings: text, results: results.filter(|_| all > 0), damaged, remarks })
 }
 

@@ -5,14 +5,15 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use avastra_campaign::run::{Asked, Database, DatabaseError, Units, recorded};
+use avastra_campaign::run::{Asked, Database, DatabaseError, RunSettings, Units, recorded};
 use avastra_campaign::study::StudyResults;
+use avastra_campaign::train::TrainSettings;
 use avastra_exchange::report::{self, Page, Scene, record, record_another};
 use avastra_lang::check::normal;
 use avastra_world::action::ActionTable;
 
 use super::arguments::{FilesArguments, ReportArguments};
-use super::campaign::KINDS;
+use super::campaign::{KINDS, lacks, missing};
 use super::error::Failure;
 use super::files::{must_end_in, write_result};
 use super::load;
@@ -20,6 +21,7 @@ use super::look::{self, Looked};
 use super::output::{Output, for_shell, plural};
 use super::parallel::{PerFile, each_file};
 use super::replay::refutation;
+use super::study::Sound;
 use super::{estimate, run_directory, shrink, study};
 
 /// Name of the page in a directory.
@@ -158,11 +160,11 @@ fn of_directory(output: &Output, directory: &Path) -> Result<Found, Failure> {
         if run_directory::lost(&directory.join("study.db")).is_some() {
             return Err(without_results(directory, "study", None));
         }
-        let (of_study, cells, remark) = study::read_sound(directory)?;
+        let Sound { settings: of_study, cells, changed, missing } = study::read_sound(directory)?;
         if cells.is_empty() {
-            return Err(without_results(directory, "study", remark));
+            return Err(without_results(directory, "study", changed));
         }
-        remarks.extend(remark);
+        remarks.extend(changed.into_iter().chain(missing));
         let results = in_json(&StudyResults::new(&of_study, &cells));
         found.overview = report::of_study(&results, &load::text(&settings("study"))?);
     } else if settings("estimate").is_file() {
@@ -225,8 +227,18 @@ fn of_run(
         return Ok(vec![format!("`{}` is {how}: only scenarios are shown", path.display())]);
     }
     let unread = |error| Failure::file("read", &path, error);
-    let (database, damaged) = run_directory::open_to_read::<Database>(&path, settings)?;
-    let mut remarks: Vec<String> = damaged.into_iter().collect();
+    let (database, changed) = run_directory::open_to_read::<Database>(&path, settings)?;
+    let is_changed = changed.is_some();
+    let mut remarks: Vec<String> = changed.into_iter().collect();
+    remarks.extend(match run_directory::is_training(directory) {
+        Some(true) if !is_changed => missing_of_training(directory, settings, &database)?,
+        Some(false) => match serde_yaml::from_str::<RunSettings>(settings) {
+            Ok(run) => missing(directory, &run, &database, |_| true)?,
+            // Of settings of another version it is not known what they ask for.
+            Err(_) => None,
+        },
+        _ => None,
+    });
     let written = run_directory::written(directory, database.scenarios().map_err(unread)?);
     remarks.extend(run_directory::remarks_on(&written));
     let space = serde_yaml::from_str::<Begun>(settings).ok().map(|begun| directory.join(begun.space));
@@ -251,6 +263,26 @@ fn of_run(
     let worst = database.worst().map_err(unread)?;
     found.worst = worst.iter().map(|(road, episode)| name(road, *episode)).collect();
     Ok(remarks)
+}
+
+/// Says how many episodes a training lacks. If later ones are there, they learned from it, so it cannot be gone on with.
+fn missing_of_training(
+    directory: &Path,
+    settings: &str,
+    database: &Database,
+) -> Result<Option<String>, Failure> {
+    let Ok(training) = serde_yaml::from_str::<TrainSettings>(settings) else { return Ok(None) };
+    let unread = |error| Failure::file("read", &directory.join("run.db"), error);
+    let (there, wanted) = (database.episodes().map_err(unread)?, training.episodes as usize);
+    let lacking = wanted.saturating_sub(there.len());
+    let is_gap = there.last().is_some_and(|&last| last >= there.len());
+    Ok(match is_gap {
+        true => Some(format!(
+            "{lacking} of {} missing, and later ones learned from what is missing: begin a new training",
+            plural(wanted, "episode")
+        )),
+        false => lacks::<TrainSettings>(directory, lacking, wanted),
+    })
 }
 
 /// The files to play, and how many are left out: the worst comes first, then one of each kind of failure, then the others,

@@ -177,6 +177,14 @@ fn a_run_that_was_edited_is_not_gone_on_with() {
     assert!(std::fs::read(scratch.path("run/run.db")).expect("it is readable") == bytes);
     let stderr = resumed(&out);
     assert!(!stderr.contains("changed"), "{stderr}");
+    // An episode of which nothing is left, its seal included, is missing.
+    let tables = ["step", "offer", "held", "collision", "scenario", "episode"];
+    let gone = tables.map(|table| format!("DELETE FROM {table} WHERE episode = 1;")).concat();
+    change(&scratch.path("run/run.db"), &format!("{gone} DELETE FROM seal WHERE unit = 1"));
+    let (status, _, stderr) = outcome(&mut avastra(&["report", &out, "--out", &page.display().to_string()]));
+    let is_missing = format!("1 of 3 episodes is missing: `avastra run --resume {out}` plays it");
+    assert!(status == 0 && stderr.contains(&is_missing), "{stderr}");
+    resumed(&out);
     // A reason stands once for all episodes that name it. They are played again, and it gets its words back.
     let reason =
         "UPDATE reason SET text = 'because' WHERE reason = (SELECT min(reason) FROM offer WHERE reason > 0)";

@@ -117,6 +117,8 @@ fn what_another_study_has_played_is_taken_over() {
     change(&alone.join("study.db"), longer);
     let (damaged, stderr) = overview();
     assert!(stderr.contains("the rows of cell 1 were changed"), "{stderr}");
+    let is_missing = format!("cells is missing: `avastra study --resume {at}` plays it");
+    assert!(stderr.contains(&is_missing), "{stderr}");
     assert_eq!(damaged["cells"].as_u64().map(|cells| cells + 1), whole["cells"].as_u64());
     let ((status, _, stderr), _) = play(&second, "refused", &["--reuse", &at]);
     assert!(status == 1 && stderr.contains("go on with `avastra study --resume"), "{stderr}");
