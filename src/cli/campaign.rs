@@ -39,6 +39,8 @@ pub struct Kind {
     pub is_in: fn(&Path) -> bool,
     /// Brings shards together; nothing for what is one piece.
     pub merge: Option<Merge>,
+    /// Names the scenarios in a directory that it did not write.
+    pub foreign: fn(&Path) -> Option<String>,
 }
 
 impl Kind {

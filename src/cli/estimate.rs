@@ -40,6 +40,7 @@ impl Campaign for EstimateSettings {
         file: "estimate",
         is_in: |directory| directory.join("estimate.yaml").is_file(),
         merge: Some(merge::merged::<EstimateSettings>),
+        foreign: run_directory::foreign_in::<EstimateSettings>,
     };
     type Database = EstimateDatabase;
 
@@ -149,7 +150,7 @@ fn play_all(
     let text = serde_json::to_string_pretty(&results).expect("results have string keys only");
     write(&path.join("results.json"), &format!("{text}\n"))?;
     output.say(&estimate_text(&results, is_unfinished, share.shard));
-    let critical = load::sources_in(&path.join("critical"))?;
+    let critical = directory.critical(output)?;
     output.say(&critical_text(&path, &critical));
     let is_reproducible = is_reproducible(output, estimate.run().arena().program());
     output.result(serde_json::json!({
@@ -216,7 +217,11 @@ pub fn read(directory: &Path) -> Result<Contents, Failure> {
     let unread = |error| Failure::file("read", &file, error);
     let (database, damaged) = run_directory::open_to_read::<EstimateDatabase>(&file, &text)?;
     let scenarios = database.scenarios().map_err(unread)?;
-    let mut remarks = run_directory::remarks_on(&written(directory, scenarios));
+    let written = written(directory, scenarios);
+    let mut remarks = run_directory::remarks_on(&written);
+    if damaged.is_none() {
+        remarks.extend(run_directory::foreign_text(&EstimateSettings::KIND, directory, &written));
+    }
     let table = load::table(&Output::silent(), &directory.join(&settings.run.space)).ok();
     let is_it = |table: &ActionTable| table.space().meaning.is_sealed_by(&settings.run.space_digest);
     let labels: Vec<String> = match table.filter(is_it) {

@@ -241,6 +241,9 @@ fn of_run(
     });
     let written = run_directory::written(directory, database.scenarios().map_err(unread)?);
     remarks.extend(run_directory::remarks_on(&written));
+    if let Some(kind) = run_directory::what_was_begun(directory).filter(|_| !is_changed) {
+        remarks.extend(run_directory::foreign_text(&kind, directory, &written));
+    }
     let space = serde_yaml::from_str::<Begun>(settings).ok().map(|begun| directory.join(begun.space));
     // A page of what was found is worth having without the names of the rows.
     let table: Option<ActionTable> = space.and_then(|space| load::table(output, &space).ok());

@@ -41,6 +41,7 @@ impl Campaign for RunSettings {
         file: "run",
         is_in: |directory| run_directory::is_training(directory) == Some(false),
         merge: Some(merge::merged::<RunSettings>),
+        foreign: run_directory::foreign_in::<RunSettings>,
     };
     type Database = Database;
 
@@ -136,7 +137,7 @@ fn play_all(
     }
     let never = Never::new(run.table(), &directory.read(Database::rows)?);
     output.say(&never.in_words(output.verbose));
-    let critical = load::sources_in(&directory.path.join("critical"))?;
+    let critical = directory.critical(output)?;
     output.say(&critical_text(&directory.path, &critical));
     let failures = directory.read(Database::failures)?;
     if !failures.is_empty() {

@@ -6,6 +6,7 @@
 //! The truth of a directory is its database, which has the text of each scenario, too: a missing scenario is written again,
 //! and an edited one is named.
 
+use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::fs::{File, TryLockError};
 use std::io::ErrorKind;
@@ -268,6 +269,40 @@ pub fn remarks_on(written: &[WrittenFile]) -> Vec<String> {
     edited.chain(gone).collect()
 }
 
+/// The scenarios in `critical` that a database does not name: files of the user's own, for example.
+fn foreign(directory: &Path, written: &[WrittenFile]) -> Vec<PathBuf> {
+    let known: BTreeSet<&Path> = written.iter().map(|(path, _)| path.as_path()).collect();
+    let mut files = load::sources_in(&directory.join("critical")).unwrap_or_default();
+    files.retain(|file| !known.contains(file.as_path()));
+    files
+}
+
+/// Says which scenarios in `critical` are [`foreign`], if any.
+pub fn foreign_text(kind: &Kind, directory: &Path, written: &[WrittenFile]) -> Option<String> {
+    let files = foreign(directory, written);
+    let named: Vec<String> = files.iter().take(NAMED_MAX).map(|path| path.display().to_string()).collect();
+    let more = files.len() - named.len();
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    (!files.is_empty()).then(|| {
+        format!(
+            "{}{more}: not written by this {}, as far as `{}` tells",
+            named.join(", "),
+            kind.what,
+            kind.database(directory).display()
+        )
+    })
+}
+
+/// As [`foreign_text`], by the database of a directory. Nothing if it cannot be read, or if rows were changed: then it does not
+/// tell what was written.
+pub fn foreign_in<C: Campaign>(directory: &Path) -> Option<String> {
+    let settings = load::text(&C::KIND.settings(directory)).ok()?;
+    let file = C::KIND.database(directory);
+    let (database, damaged) = C::Database::open_without_damaged(&file, &settings).ok()?;
+    let scenarios = database.scenarios().ok().filter(|_| damaged.is_empty())?;
+    foreign_text(&C::KIND, directory, &written(directory, scenarios))
+}
+
 /// Opens the database of a directory to read it. Units whose rows were changed are left out, and a remark says so.
 pub fn open_to_read<D: Units>(file: &Path, settings: &str) -> Result<(D, Option<String>), Failure> {
     let (database, damaged) =
@@ -400,6 +435,16 @@ impl<C: Campaign> Directory<C> {
             ));
         }
         Ok(restored)
+    }
+
+    /// The files of scenarios that it wrote. Others that lie beside them are named.
+    pub fn critical(&self, output: &Output) -> Result<Vec<PathBuf>, Failure> {
+        let written = written(&self.path, self.read(Units::scenarios)?);
+        foreign_text(&C::KIND, &self.path, &written).iter().for_each(|text| output.warn(text));
+        let foreign = foreign(&self.path, &written);
+        let mut files = load::sources_in(&self.path.join("critical"))?;
+        files.retain(|file| !foreign.contains(file));
+        Ok(files)
     }
 
     /// Writes an episode that an external driving system failed in: `failures/ROAD_NNNN.txt` says how, and a scenario of

@@ -36,6 +36,7 @@ impl Campaign for StudySettings {
         file: "study",
         is_in: |directory| directory.join("study.yaml").is_file(),
         merge: Some(merge::merged::<StudySettings>),
+        foreign: run_directory::foreign_in::<StudySettings>,
     };
     type Database = StudyDatabase;
 

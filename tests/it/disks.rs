@@ -319,6 +319,17 @@ fn scenarios_that_are_gone_or_edited_are_noticed() {
     assert!(stdout.contains("edited since the run wrote it"), "{stdout}");
     assert_eq!(std::fs::read(gone).expect("it is back"), written);
 
+    // A scenario of the user's own is told from those that were found.
+    std::fs::copy(gone, scratch.path("run/critical/mine.ava")).expect("it is writable");
+    let foreign = "critical/mine.ava: not written by this run, as far as `";
+    let stderr = resumed(&out);
+    assert!(stderr.contains(foreign), "{stderr}");
+    let page = scratch.text("page.html");
+    for command in [&["report", &out, "--most", "1", "--out", &page][..], &["test", &out]] {
+        let (_, _, stderr) = outcome(&mut avastra(command));
+        assert!(stderr.contains(foreign), "{command:?}: {stderr}");
+    }
+
     // A database without anything in it is no reason to play all again over what was found.
     std::fs::write(scratch.path("run/run.db"), "").expect("it is writable");
     fails(&["run", "--resume", &out], "is empty, and `critical` has scenarios");
