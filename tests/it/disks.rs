@@ -192,6 +192,14 @@ fn a_run_that_was_edited_is_not_gone_on_with() {
     let stderr = resumed(&out);
     assert!(stderr.contains("were changed since they were written: each such episode"), "{stderr}");
     assert!(std::fs::read(scratch.path("run/run.db")).expect("it is readable") == bytes);
+    // Settings that were edited in both places are not those that the rows came from.
+    edit(&settings, "seed: 1", "seed: 2");
+    let reseeded = "UPDATE begun SET settings = replace(settings, 'seed: 1', 'seed: 2')";
+    change(&scratch.path("run/run.db"), reseeded);
+    let (status, _, stderr) = outcome(&mut avastra(&["report", &out, "--out", &page.display().to_string()]));
+    let changed = "the rows of episode 0, episode 1, episode 2 were changed";
+    assert!(status == 0 && stderr.contains(changed), "{stderr}");
+    std::fs::write(&settings, &whole).expect("it is writable");
     let torn: Vec<u8> =
         bytes.iter().enumerate().map(|(at, byte)| if at % 991 == 990 { !byte } else { *byte }).collect();
     std::fs::write(scratch.path("run/run.db"), torn).expect("it is writable");

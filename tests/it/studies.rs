@@ -418,7 +418,7 @@ fn a_database_of_another_kind_is_refused_by_its_layout() {
     let path = scratch.path().join("run.db");
     Database::open(&path, "").expect("it is new");
     let refused = StudyDatabase::open(&path, "").err().expect("it is not a study's").to_string();
-    assert!(refused.ends_with("this version of avastra reads 1005: begin a new one"), "{refused}");
+    assert!(refused.ends_with("this version of avastra reads 1006: begin a new one"), "{refused}");
     // A file with tables is not new, though its number says so.
     change(&path, "PRAGMA user_version = 0");
     let refused = Database::open(&path, "").err().expect("it has no number").to_string();

@@ -2,10 +2,10 @@
 //! was changed behind its back.
 //!
 //! The settings stand in the database as they were when it was begun. Every episode (or cell) has a seal: a digest of
-//! all its rows, written in the same transaction. SQLite's own check finds torn pages, a seal finds values that were
-//! changed. Neither protects against a forger who writes seals, too. A file from elsewhere may hold a view in place of a
-//! table, which could run for ever when it is read. So its tables are compared with those of this version before anything
-//! is read.
+//! these settings and of all its rows, written in the same transaction. So rows that were played with other settings count
+//! as changed. SQLite's own check finds torn pages, a seal finds values that were changed. Neither protects against a
+//! forger who writes seals, too. A file from elsewhere may hold a view in place of a table, which could run for ever when
+//! it is read. So its tables are compared with those of this version before anything is read.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -208,11 +208,12 @@ impl Layout {
         let of_tables: String =
             self.tables.iter().map(|table| format!("SELECT {unit} FROM {table} UNION ")).collect();
         let numbers = format!("{of_tables}SELECT unit FROM seal ORDER BY 1");
+        let settings = settings_digest(connection)?;
         let mut damaged = Vec::new();
         for number in query_all(connection, &numbers, |row| row.get::<_, i64>(0))? {
             let mut seal = connection.prepare_cached("SELECT digest FROM seal WHERE unit = ?")?;
             let seal: Option<String> = seal.query_row([number], |row| row.get(0)).optional()?;
-            if unsound.contains(&number) || seal != Some(self.rows_digest(connection, number)?) {
+            if unsound.contains(&number) || seal != Some(self.digest(connection, &settings, number)?) {
                 damaged.push(number);
             }
         }
@@ -238,7 +239,7 @@ impl Layout {
 
     /// Seals the rows of a unit; called in the transaction that adds them.
     pub fn seal(&self, connection: &Connection, number: i64) -> Result<(), rusqlite::Error> {
-        let digest = self.rows_digest(connection, number)?;
+        let digest = self.digest(connection, &settings_digest(connection)?, number)?;
         insert_row(connection, "seal", params![number, digest])
     }
 
@@ -271,9 +272,15 @@ impl Layout {
         Ok(())
     }
 
-    /// The digest of all rows of a unit.
-    fn rows_digest(&self, connection: &Connection, number: i64) -> Result<String, rusqlite::Error> {
+    /// The digest of the settings, given by their own digest, and of all rows of a unit.
+    fn digest(
+        &self,
+        connection: &Connection,
+        settings: &[u8; 32],
+        number: i64,
+    ) -> Result<String, rusqlite::Error> {
         let mut whole = Sha256::new();
+        whole.update(settings);
         for table in self.tables {
             let named = self.naming.filter(|(by, _)| by == table);
             let join =
@@ -283,6 +290,12 @@ impl Layout {
         }
         Ok(digest_text(&whole.finalize().into()))
     }
+}
+
+/// The digest of the settings that a database was begun with.
+pub(crate) fn settings_digest(connection: &Connection) -> Result<[u8; 32], rusqlite::Error> {
+    let settings: String = connection.query_row("SELECT settings FROM begun", [], |row| row.get(0))?;
+    Ok(Sha256::digest(settings.as_bytes()).into())
 }
 
 /// The columns of a table: name, type, and position in the key, which is 0 for a column outside the key.
@@ -520,6 +533,16 @@ mod tests {
             let refused = LAYOUT.open(&path, SETTINGS).unwrap_err().to_string();
             assert!(refused.contains(what), "{change}: {refused}");
         }
+    }
+
+    #[test]
+    fn rows_belong_to_their_settings() {
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("run.db");
+        let other = SETTINGS.replace("seed: 1", "seed: 2");
+        begun(&path).execute("UPDATE begun SET settings = ?", [&other]).unwrap();
+        let refused = LAYOUT.open(&path, &other).unwrap_err();
+        assert!(matches!(refused, DatabaseError::Rows { number: 0, .. }), "{refused}");
     }
 
     #[test]
