@@ -18,7 +18,7 @@ use avastra_drivers::external::{Attached, Program};
 
 use super::error::Failure;
 use super::findings::unfinished;
-use super::output::Output;
+use super::output::{Output, for_shell, plural};
 use super::progress::Progress;
 use super::run_directory::Directory;
 use super::shard;
@@ -39,6 +39,8 @@ pub struct Kind {
     pub is_in: fn(&Path) -> bool,
     /// Brings shards together; nothing for what is one piece.
     pub merge: Option<Merge>,
+    /// Names the scenarios in a directory that it did not write.
+    pub foreign: fn(&Path) -> Option<String>,
 }
 
 impl Kind {
@@ -164,6 +166,36 @@ impl Share {
         }
         Ok(())
     }
+}
+
+/// Says how many units a directory lacks of its share, if any. `is_wanted` tells which units it must have.
+pub fn missing<C: Cut>(
+    directory: &Path,
+    settings: &C,
+    database: &C::Database,
+    is_wanted: impl Fn(i64) -> bool,
+) -> Result<Option<String>, Failure> {
+    let Share { own, work, .. } = Share::of(directory, settings)?;
+    let played = settings.numbered(database);
+    let played = played.map_err(|error| Failure::file("read", &C::KIND.database(directory), error))?;
+    let played: BTreeSet<i64> = played.into_iter().map(|(_, place)| place).collect();
+    let wanted = own.iter().flat_map(|&item| work[item].units.clone()).filter(|&unit| is_wanted(unit));
+    let wanted: Vec<i64> = wanted.collect();
+    let lacking = wanted.iter().filter(|unit| !played.contains(*unit)).count();
+    Ok(lacks::<C>(directory, lacking, wanted.len()))
+}
+
+/// Says that units are missing, and how to go on; nothing if none is.
+pub fn lacks<C: Campaign>(directory: &Path, lacking: usize, wanted: usize) -> Option<String> {
+    let (are, them) = if lacking == 1 { ("is", "it") } else { ("are", "them") };
+    (lacking > 0).then(|| {
+        format!(
+            "{lacking} of {} {are} missing: `avastra {} --resume {}` plays {them}",
+            plural(wanted, C::Database::LAYOUT.unit),
+            C::KIND.command,
+            for_shell(directory)
+        )
+    })
 }
 
 /// Settles the database of a directory in which all is played.

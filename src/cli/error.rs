@@ -34,7 +34,8 @@ pub enum Failure {
     /// An external driving system was given up: what was played is saved.
     #[error(
         "the driving system could not be reached again and again, so the rest was not played: {reason}\n  when it \
-         answers, go on with `avastra {command} --resume {}`", directory.display()
+         answers, go on with `avastra {command} --resume {}`",
+        super::output::for_shell(directory)
     )]
     Unreached { command: &'static str, directory: PathBuf, reason: String },
     #[error("{count} failing", count = super::output::plural(*scenarios, "scenario"))]
@@ -43,7 +44,7 @@ pub enum Failure {
     #[error("interrupted: not done")]
     Stopped,
     /// Ctrl-C: what was done is saved.
-    #[error("interrupted; go on with `avastra {command} --resume {}`", directory.display())]
+    #[error("interrupted; go on with `avastra {command} --resume {}`", super::output::for_shell(directory))]
     Interrupted { command: &'static str, directory: PathBuf },
 }
 

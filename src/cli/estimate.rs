@@ -13,12 +13,12 @@ use avastra_campaign::run::{DatabaseError, Run, RunSettings, Shard, Units};
 use avastra_world::action::ActionTable;
 
 use super::arguments::EstimateArguments;
-use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, as_they_are};
+use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, as_they_are, missing};
 use super::error::Failure;
 use super::files::{remove, write};
 use super::findings::is_reproducible;
 use super::interrupt::stop_on_interrupt;
-use super::output::{Output, plural};
+use super::output::{Output, for_shell, plural};
 use super::parallel::jobs;
 use super::progress::{Progress, Working};
 use super::run::{critical_text, cut_short};
@@ -40,6 +40,7 @@ impl Campaign for EstimateSettings {
         file: "estimate",
         is_in: |directory| directory.join("estimate.yaml").is_file(),
         merge: Some(merge::merged::<EstimateSettings>),
+        foreign: run_directory::foreign_in::<EstimateSettings>,
     };
     type Database = EstimateDatabase;
 
@@ -149,7 +150,7 @@ fn play_all(
     let text = serde_json::to_string_pretty(&results).expect("results have string keys only");
     write(&path.join("results.json"), &format!("{text}\n"))?;
     output.say(&estimate_text(&results, is_unfinished, share.shard));
-    let critical = load::sources_in(&path.join("critical"))?;
+    let critical = directory.critical(output)?;
     output.say(&critical_text(&path, &critical));
     let is_reproducible = is_reproducible(output, estimate.run().arena().program());
     output.result(serde_json::json!({
@@ -209,14 +210,18 @@ pub struct Contents {
 pub fn read(directory: &Path) -> Result<Contents, Failure> {
     let (path, file) = (directory.join("estimate.yaml"), directory.join("estimate.db"));
     let text = load::text(&path)?;
-    if !file.is_file() {
+    if run_directory::lost(&file).is_some() {
         return Ok(Contents { settings: text, results: None, damaged: None, remarks: Vec::new() });
     }
     let settings: EstimateSettings = load::parsed(&path, &text)?;
     let unread = |error| Failure::file("read", &file, error);
     let (database, damaged) = run_directory::open_to_read::<EstimateDatabase>(&file, &text)?;
     let scenarios = database.scenarios().map_err(unread)?;
-    let mut remarks = run_directory::remarks_on(&written(directory, scenarios));
+    let written = written(directory, scenarios);
+    let mut remarks = run_directory::remarks_on(&written);
+    if damaged.is_none() {
+        remarks.extend(run_directory::foreign_text(&EstimateSettings::KIND, directory, &written));
+    }
     let table = load::table(&Output::silent(), &directory.join(&settings.run.space)).ok();
     let is_it = |table: &ActionTable| table.space().meaning.is_sealed_by(&settings.run.space_digest);
     let labels: Vec<String> = match table.filter(is_it) {
@@ -230,19 +235,33 @@ pub fn read(directory: &Path) -> Result<Contents, Failure> {
             (0..=last.unwrap_or(0)).map(|row| format!("row {row}")).collect()
         }
     };
-    let pilot = database.pilot().map_err(unread)?.unwrap_or_default();
+    let kept = database.pilot().map_err(unread)?;
+    if settings.method == Method::Probe && kept.is_none() && damaged.is_none() {
+        let directory = for_shell(directory);
+        let remark = format!("the pilot is missing: `avastra estimate --resume {directory}` plays it");
+        remarks.push(remark);
+    }
+    let pilot = kept.unwrap_or_default();
     let all = database.parts().map_err(unread)?.len();
     let mut results = None;
-    for look in settings.looks() {
+    // Parts of each road that it must have before it is over. A shard must have all of its parts.
+    let mut wanted = settings.parts;
+    let is_shard = !shard::kept(directory)?.is_whole();
+    let mut looks = settings.looks().into_iter();
+    while let Some(look) = looks.next() {
         let looked = at_look(&settings, &database, &pilot, &labels, look).map_err(unread)?;
         let is_whole = looked.parts.len() == look as usize * settings.run.roads.len();
         // A look may lack parts, because they are damaged or another shard's. Then later parts were played, too, so go on.
         let is_last = looked.parts.len() == all || (is_whole && looked.is_enough);
         results = Some(looked.results);
         if is_last {
+            let next = if is_whole && !looked.is_enough { looks.next() } else { None };
+            wanted = if is_shard { settings.parts } else { next.unwrap_or(look) };
             break;
         }
     }
+    let end = settings.place(Part { road: 0, number: wanted });
+    remarks.extend(missing(directory, &settings, &database, |part| part < end)?);
     Ok(Contents { settings: text, results: results.filter(|_| all > 0), damaged, remarks })
 }
 

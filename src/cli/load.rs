@@ -17,7 +17,7 @@ use avastra_world::places::{self, Scenes};
 use avastra_world::sim::TrafficProfile;
 
 use super::error::Failure;
-use super::output::Output;
+use super::output::{Output, for_shell};
 
 /// In a directory with more files than this, a file that declares a missing name is too weak a hint.
 const NEARBY_MAX: usize = 32;
@@ -181,12 +181,12 @@ pub fn below(folder: &Path) -> Vec<PathBuf> {
 pub fn table(output: &Output, path: &Path) -> Result<ActionTable, Failure> {
     let loaded = load(output, path)?;
     if loaded.scenario.is_some() {
-        let path = path.display();
-        return Err(Failure::usage(format!("`{path}` is a scenario: `avastra replay {path}` plays it")));
+        let (path, word) = (path.display(), for_shell(path));
+        return Err(Failure::usage(format!("`{path}` is a scenario: `avastra replay {word}` plays it")));
     }
     if loaded.policy.is_some() {
-        let path = path.display();
-        return Err(Failure::usage(format!("`{path}` is a policy: `avastra run --policy {path}` plays it")));
+        let (path, word) = (path.display(), for_shell(path));
+        return Err(Failure::usage(format!("`{path}` is a policy: `avastra run --policy {word}` plays it")));
     }
     Ok(ActionTable::new(space(loaded, path)?))
 }
@@ -203,11 +203,11 @@ pub fn scenario(output: &Output, path: &Path) -> Result<(ActionTable, Scenario),
 pub fn scenario_in(output: &Output, path: &Path, loaded: Loaded) -> Result<(ActionTable, Scenario), Failure> {
     let mut loaded = sound(output, loaded)?;
     let Some(scenario) = loaded.scenario.take() else {
-        let path = path.display();
+        let (path, word) = (path.display(), for_shell(path));
         let hint = match (&loaded.policy, &loaded.space) {
-            (Some(_), _) => format!(": it is a policy, and `avastra run --policy {path}` plays it"),
+            (Some(_), _) => format!(": it is a policy, and `avastra run --policy {word}` plays it"),
             (None, Some(space)) if !space.actions.is_empty() => {
-                format!(": it is a space, and `avastra run {path}` looks for scenarios in it")
+                format!(": it is a space, and `avastra run {word}` looks for scenarios in it")
             }
             _ => String::new(),
         };

@@ -114,11 +114,19 @@ impl<C: Cut> Played<C> {
     /// Opens its database.
     fn open(&mut self) -> Result<(), DatabaseError> {
         let file = self.file();
-        if std::fs::metadata(&file).is_ok_and(|found| found.len() > 0) {
-            let database = C::Database::open(&file, &self.begun)?;
-            self.units = self.settings.numbered(&database)?;
-            self.database = Some(database);
+        if run_directory::lost(&file).is_some() {
+            return Ok(());
         }
+        let (database, damaged) = match C::Database::open_without_damaged(&file, &self.begun) {
+            // A kill left a journal, by which the file became empty.
+            Err(DatabaseError::Empty) => return Ok(()),
+            opened => opened?,
+        };
+        if let Some(&number) = damaged.first() {
+            return Err(DatabaseError::Rows { unit: C::Database::LAYOUT.unit, number });
+        }
+        self.units = self.settings.numbered(&database)?;
+        self.database = Some(database);
         Ok(())
     }
 }
@@ -180,7 +188,7 @@ impl Survey {
             let mut played = Played::<C>::read(path, to, outside)?;
             if let Err(error) = played.open() {
                 let told = output.filter(|_| error.is_torn());
-                let failure = Failure::file("open", &played.file(), error);
+                let failure = run_directory::unopened::<C>(path, &error);
                 match told {
                     Some(output) => output.warn(&failure.to_string()),
                     None => return Err(failure),
@@ -283,7 +291,7 @@ fn bring_together<C: Cut>(
     for path in directories {
         let _held = run_directory::hold(path)?;
         let mut played = Played::<C>::read(path, partial, outside)?;
-        played.open().map_err(|error| Failure::file("open", &played.file(), error))?;
+        played.open().map_err(|error| run_directory::unopened::<C>(path, &error))?;
         if let Some(database) = &played.database {
             let written =
                 database.scenarios().map_err(|error| Failure::file("read", &played.file(), error))?;
@@ -340,7 +348,7 @@ fn publish<C: Cut>(
 fn holds_all<C: Cut>(out: &Path, (partial, outside): (&Path, &Outside), text: &str) -> Result<bool, Failure> {
     let places = |path: &Path| -> Result<(String, BTreeSet<i64>), Failure> {
         let mut played = Played::<C>::read(path, partial, outside)?;
-        played.open().map_err(|error| Failure::file("open", &played.file(), error))?;
+        played.open().map_err(|error| run_directory::unopened::<C>(path, &error))?;
         Ok((played.text(), played.units.iter().map(|(_, place)| *place).collect()))
     };
     let ((settings, there), (_, merged)) = (places(out)?, places(partial)?);

@@ -12,7 +12,7 @@ use super::arguments::NewArguments;
 use super::error::Failure;
 use super::files::{make_way, write_new};
 use super::load;
-use super::output::Output;
+use super::output::{Output, for_shell};
 
 /// The space to begin with.
 const STARTER: [(&str, &str); 3] = [
@@ -80,7 +80,7 @@ pub fn new(output: &Output, arguments: &NewArguments) -> Result<(), Failure> {
         write_new(path, text)?;
         output.tell(&path.display().to_string());
     }
-    let space = paths[0].0.display().to_string();
+    let space = for_shell(&paths[0].0);
     output.tell(&format!("next: avastra check {space}, then avastra run {space} --episodes 20"));
     let files: Vec<String> = paths.iter().map(|(path, _)| path.display().to_string()).collect();
     output.result(serde_json::json!({ "files": files }));

@@ -292,6 +292,17 @@ pub fn folded(text: &str, width: usize) -> Vec<String> {
     lines
 }
 
+/// A path as a shell takes it for one word, for commands that are printed to be copied.
+pub fn for_shell(path: &Path) -> String {
+    let text = path.display().to_string();
+    let is_plain = |letter: char| letter.is_alphanumeric() || "/._-+,:@%=".contains(letter);
+    if !text.is_empty() && text.chars().all(is_plain) {
+        return text;
+    }
+    // Between single quotes every other letter stands for itself.
+    format!("'{}'", text.replace('\'', r"'\''"))
+}
+
 /// `1 collision`, `2 collisions`.
 pub fn plural(count: usize, noun: &str) -> String {
     if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }

@@ -15,7 +15,7 @@ use super::arguments::ReplayArguments;
 use super::error::Failure;
 use super::load;
 use super::look::{self, Changed, Looked};
-use super::output::{Output, plural};
+use super::output::{Output, for_shell, plural};
 use super::parallel::each_file;
 use super::policy::claims;
 
@@ -77,9 +77,9 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
 fn replay_policy(output: &Output, path: &Path, loaded: Loaded, asked: &Asked) -> Result<Replayed, Failure> {
     let (table, policy) = load::policy_in(output, path, loaded)?;
     if !asked.is_nothing() {
-        let path = path.display();
+        let (path, word) = (path.display(), for_shell(path));
         return Err(Failure::usage(format!(
-            "`{path}` claims what happens with the driving system that it was trained against: `avastra run --policy {path}` \
+            "`{path}` claims what happens with the driving system that it was trained against: `avastra run --policy {word}` \
              plays it with another one"
         )));
     }

@@ -5,20 +5,23 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use avastra_campaign::run::{Asked, Database, DatabaseError, Units, recorded};
+use avastra_campaign::run::{Asked, Database, DatabaseError, RunSettings, Units, recorded};
 use avastra_campaign::study::StudyResults;
+use avastra_campaign::train::TrainSettings;
 use avastra_exchange::report::{self, Page, Scene, record, record_another};
 use avastra_lang::check::normal;
 use avastra_world::action::ActionTable;
 
 use super::arguments::{FilesArguments, ReportArguments};
+use super::campaign::{KINDS, lacks, missing};
 use super::error::Failure;
 use super::files::{must_end_in, write_result};
 use super::load;
 use super::look::{self, Looked};
-use super::output::{Output, plural};
+use super::output::{Output, for_shell, plural};
 use super::parallel::{PerFile, each_file};
 use super::replay::refutation;
+use super::study::Sound;
 use super::{estimate, run_directory, shrink, study};
 
 /// Name of the page in a directory.
@@ -154,14 +157,14 @@ fn of_directory(output: &Output, directory: &Path) -> Result<Found, Failure> {
     if settings("run").is_file() {
         remarks = of_run(output, directory, &load::text(&settings("run"))?, &mut found)?;
     } else if settings("study").is_file() {
-        if !directory.join("study.db").is_file() {
+        if run_directory::lost(&directory.join("study.db")).is_some() {
             return Err(without_results(directory, "study", None));
         }
-        let (of_study, cells, remark) = study::read_sound(directory)?;
+        let Sound { settings: of_study, cells, changed, missing } = study::read_sound(directory)?;
         if cells.is_empty() {
-            return Err(without_results(directory, "study", remark));
+            return Err(without_results(directory, "study", changed));
         }
-        remarks.extend(remark);
+        remarks.extend(changed.into_iter().chain(missing));
         let results = in_json(&StudyResults::new(&of_study, &cells));
         found.overview = report::of_study(&results, &load::text(&settings("study"))?);
     } else if settings("estimate").is_file() {
@@ -172,18 +175,31 @@ fn of_directory(output: &Output, directory: &Path) -> Result<Found, Failure> {
         remarks.extend(contents.damaged);
         remarks.extend(contents.remarks);
         found.overview = report::of_estimate(&in_json(&results), &contents.settings);
-    } else if found.files.is_empty() {
-        found.files = load::sources_in(directory)?;
+    } else {
+        remarks.extend(without_settings(directory));
+        if found.files.is_empty() {
+            found.files = load::sources_in(directory)?;
+        }
     }
     remarks.iter().for_each(|remark| output.warn(remark));
     found.remarks.extend(remarks);
     Ok(found)
 }
 
+/// Says that the settings of a campaign are gone, where its database or something else in their place tells of one.
+fn without_settings(directory: &Path) -> Option<String> {
+    KINDS.into_iter().find_map(|kind| {
+        let settings = kind.settings(directory);
+        let how = if settings.exists() { "no file" } else { "missing" };
+        let is_one = settings.exists() || kind.database(directory).is_file();
+        is_one.then(|| format!("`{}` is {how}: only scenarios are shown", settings.display()))
+    })
+}
+
 /// The failure of a directory without results. `damaged` says which of its rows were changed, if any were.
 fn without_results(directory: &Path, command: &str, damaged: Option<String>) -> Failure {
+    let resume = format!("`avastra {command} --resume {}`", for_shell(directory));
     let directory = directory.display();
-    let resume = format!("`avastra {command} --resume {directory}`");
     Failure::usage(match damaged {
         None => format!("`{directory}` has no results yet: finish it with {resume}"),
         Some(damaged) => format!("`{directory}` has no results: {damaged}; {resume} plays them again"),
@@ -207,14 +223,27 @@ fn of_run(
         space: PathBuf,
     }
     let path = directory.join("run.db");
-    if !path.is_file() {
-        return Ok(vec![format!("`{}` is missing: only scenarios are shown", path.display())]);
+    if let Some(how) = run_directory::lost(&path) {
+        return Ok(vec![format!("`{}` is {how}: only scenarios are shown", path.display())]);
     }
     let unread = |error| Failure::file("read", &path, error);
-    let (database, damaged) = run_directory::open_to_read::<Database>(&path, settings)?;
-    let mut remarks: Vec<String> = damaged.into_iter().collect();
+    let (database, changed) = run_directory::open_to_read::<Database>(&path, settings)?;
+    let is_changed = changed.is_some();
+    let mut remarks: Vec<String> = changed.into_iter().collect();
+    remarks.extend(match run_directory::is_training(directory) {
+        Some(true) if !is_changed => missing_of_training(directory, settings, &database)?,
+        Some(false) => match serde_yaml::from_str::<RunSettings>(settings) {
+            Ok(run) => missing(directory, &run, &database, |_| true)?,
+            // Of settings of another version it is not known what they ask for.
+            Err(_) => None,
+        },
+        _ => None,
+    });
     let written = run_directory::written(directory, database.scenarios().map_err(unread)?);
     remarks.extend(run_directory::remarks_on(&written));
+    if let Some(kind) = run_directory::what_was_begun(directory).filter(|_| !is_changed) {
+        remarks.extend(run_directory::foreign_text(&kind, directory, &written));
+    }
     let space = serde_yaml::from_str::<Begun>(settings).ok().map(|begun| directory.join(begun.space));
     // A page of what was found is worth having without the names of the rows.
     let table: Option<ActionTable> = space.and_then(|space| load::table(output, &space).ok());
@@ -237,6 +266,26 @@ fn of_run(
     let worst = database.worst().map_err(unread)?;
     found.worst = worst.iter().map(|(road, episode)| name(road, *episode)).collect();
     Ok(remarks)
+}
+
+/// Says how many episodes a training lacks. If later ones are there, they learned from it, so it cannot be gone on with.
+fn missing_of_training(
+    directory: &Path,
+    settings: &str,
+    database: &Database,
+) -> Result<Option<String>, Failure> {
+    let Ok(training) = serde_yaml::from_str::<TrainSettings>(settings) else { return Ok(None) };
+    let unread = |error| Failure::file("read", &directory.join("run.db"), error);
+    let (there, wanted) = (database.episodes().map_err(unread)?, training.episodes as usize);
+    let lacking = wanted.saturating_sub(there.len());
+    let is_gap = there.last().is_some_and(|&last| last >= there.len());
+    Ok(match is_gap {
+        true => Some(format!(
+            "{lacking} of {} missing, and later ones learned from what is missing: begin a new training",
+            plural(wanted, "episode")
+        )),
+        false => lacks::<TrainSettings>(directory, lacking, wanted),
+    })
 }
 
 /// The files to play, and how many are left out: the worst comes first, then one of each kind of failure, then the others,

@@ -22,7 +22,7 @@ use super::files::write_answers;
 use super::findings::{cut_off, failures_text, is_reproducible};
 use super::interrupt::stop_on_interrupt;
 use super::never::Never;
-use super::output::{Output, plural};
+use super::output::{Output, for_shell, plural};
 use super::parallel::jobs;
 use super::policy::acting;
 use super::progress::now;
@@ -41,6 +41,7 @@ impl Campaign for RunSettings {
         file: "run",
         is_in: |directory| run_directory::is_training(directory) == Some(false),
         merge: Some(merge::merged::<RunSettings>),
+        foreign: run_directory::foreign_in::<RunSettings>,
     };
     type Database = Database;
 
@@ -136,7 +137,7 @@ fn play_all(
     }
     let never = Never::new(run.table(), &directory.read(Database::rows)?);
     output.say(&never.in_words(output.verbose));
-    let critical = load::sources_in(&directory.path.join("critical"))?;
+    let critical = directory.critical(output)?;
     output.say(&critical_text(&directory.path, &critical));
     let failures = directory.read(Database::failures)?;
     if !failures.is_empty() {
@@ -390,9 +391,8 @@ pub fn critical_text(directory: &Path, files: &[PathBuf]) -> String {
     let head = format!("\n{} with a counted collision:", plural(files.len(), "scenario"));
     let mut text =
         cut_short(head, files, |file| file.display().to_string(), |more| format!("and {more} more"));
-    // A shell splits a path at its spaces, and must still expand the star.
-    let directory = directory.display().to_string();
-    let directory = if directory.contains(' ') { format!("'{directory}'") } else { directory };
+    // The star stands outside of the quotes: the shell must expand it.
+    let directory = for_shell(directory);
     text.push_str(&format!("\nreplay them with: avastra replay {directory}/critical/*.ava"));
     text.push_str(&format!("\nwatch them with: avastra report {directory}"));
     text

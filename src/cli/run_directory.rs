@@ -6,6 +6,7 @@
 //! The truth of a directory is its database, which has the text of each scenario, too: a missing scenario is written again,
 //! and an edited one is named.
 
+use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::fs::{File, TryLockError};
 use std::io::ErrorKind;
@@ -26,7 +27,7 @@ use super::campaign::{Campaign, KINDS, Kind, Outside};
 use super::error::Failure;
 use super::files::{folder, make, make_first, write, write_answers};
 use super::load;
-use super::output::{Output, plural};
+use super::output::{Output, for_shell, plural};
 use super::{pack, shard};
 
 /// The folders that a run, a training or an estimate writes into.
@@ -133,15 +134,17 @@ pub fn resume<C: Campaign>(
     if let Some(Kind { what: found, command, .. }) =
         what_was_begun(directory).filter(|found| found.what != what)
     {
-        let directory = directory.display();
         return Err(Failure::usage(format!(
-            "`{directory}` holds a {found}: go on with `avastra {command} --resume {directory}`"
+            "`{}` holds a {found}: go on with `avastra {command} --resume {}`",
+            directory.display(),
+            for_shell(directory)
         )));
     }
     if !path.is_file() {
-        let directory = directory.display();
         return Err(Failure::usage(format!(
-            "`{directory}` is no {kind} directory: it has no {kind}.yaml; begin one with `--out {directory}`"
+            "`{}` is no {kind} directory: it has no {kind}.yaml; begin one with `--out {}`",
+            directory.display(),
+            for_shell(directory)
         )));
     }
     let held = hold(directory)?;
@@ -149,20 +152,12 @@ pub fn resume<C: Campaign>(
     // The scenarios of a run whose database is lost cannot be told from new ones.
     let database = C::KIND.database(directory);
     let left = load::sources_in(&directory.join("critical")).unwrap_or_default();
-    // A kill may leave an empty file before anything is in it.
-    let lost = match std::fs::metadata(&database) {
-        Err(_) => Some("missing"),
-        Ok(found) => (found.len() == 0).then_some("empty"),
-    };
-    match lost {
-        Some(how) if !left.is_empty() => {
-            return Err(Failure::usage(format!(
-                "`{}` is {how}, and `critical` has scenarios: begin a new {what}, or delete them to begin this one anew",
-                database.display()
-            )));
-        }
-        Some(how) => output.tell(&format!("`{}` is {how}: the {what} begins anew", database.display())),
-        None => {}
+    let lost = lost(&database);
+    if let Some(how) = lost.filter(|_| !left.is_empty()) {
+        return Err(Failure::usage(format!(
+            "`{}` is {how}, and `critical` has scenarios: begin a new {what}, or delete them to begin this one anew",
+            database.display()
+        )));
     }
     let (mut settings, text) = settings_of::<C>(directory)?;
     let Outside { space, space_digest, external, .. } = settings.outside();
@@ -179,7 +174,23 @@ pub fn resume<C: Campaign>(
     *external = external
         .take()
         .map(|attached| Attached { is_recorded: is_played, ..from_record(directory, attached) });
+    // Git keeps no empty folder.
+    if C::Database::keeps_scenarios() {
+        folder(directory, "critical")?;
+    }
+    // What cannot be gone on with does not begin anew either.
+    if let Some(how) = lost {
+        output.tell(&format!("`{}` is {how}: the {what} begins anew", database.display()));
+    }
     Ok(Resumed { settings, text, table, held })
+}
+
+/// How a database is lost, if it is: a kill may leave an empty file before anything is in it.
+pub fn lost(database: &Path) -> Option<&'static str> {
+    match std::fs::metadata(database) {
+        Err(_) => Some("missing"),
+        Ok(found) => (found.is_file() && found.len() == 0).then_some("empty"),
+    }
 }
 
 /// Makes a directory ready to be resumed: refuses folders that are links, and removes partial files that a kill left.
@@ -258,6 +269,40 @@ pub fn remarks_on(written: &[WrittenFile]) -> Vec<String> {
     edited.chain(gone).collect()
 }
 
+/// The scenarios in `critical` that a database does not name: files of the user's own, for example.
+fn foreign(directory: &Path, written: &[WrittenFile]) -> Vec<PathBuf> {
+    let known: BTreeSet<&Path> = written.iter().map(|(path, _)| path.as_path()).collect();
+    let mut files = load::sources_in(&directory.join("critical")).unwrap_or_default();
+    files.retain(|file| !known.contains(file.as_path()));
+    files
+}
+
+/// Says which scenarios in `critical` are [`foreign`], if any.
+pub fn foreign_text(kind: &Kind, directory: &Path, written: &[WrittenFile]) -> Option<String> {
+    let files = foreign(directory, written);
+    let named: Vec<String> = files.iter().take(NAMED_MAX).map(|path| path.display().to_string()).collect();
+    let more = files.len() - named.len();
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    (!files.is_empty()).then(|| {
+        format!(
+            "{}{more}: not written by this {}, as far as `{}` tells",
+            named.join(", "),
+            kind.what,
+            kind.database(directory).display()
+        )
+    })
+}
+
+/// As [`foreign_text`], by the database of a directory. Nothing if it cannot be read, or if rows were changed: then it does not
+/// tell what was written.
+pub fn foreign_in<C: Campaign>(directory: &Path) -> Option<String> {
+    let settings = load::text(&C::KIND.settings(directory)).ok()?;
+    let file = C::KIND.database(directory);
+    let (database, damaged) = C::Database::open_without_damaged(&file, &settings).ok()?;
+    let scenarios = database.scenarios().ok().filter(|_| damaged.is_empty())?;
+    foreign_text(&C::KIND, directory, &written(directory, scenarios))
+}
+
 /// Opens the database of a directory to read it. Units whose rows were changed are left out, and a remark says so.
 pub fn open_to_read<D: Units>(file: &Path, settings: &str) -> Result<(D, Option<String>), Failure> {
     let (database, damaged) =
@@ -265,6 +310,20 @@ pub fn open_to_read<D: Units>(file: &Path, settings: &str) -> Result<(D, Option<
     let remark = || format!("{}: they count for nothing", changed::<D>(file, &damaged));
     let remark = (!damaged.is_empty()).then(remark);
     Ok((database, remark))
+}
+
+/// Why the database of a directory cannot be opened. Where rows were changed, it says what to do.
+pub fn unopened<C: Campaign>(directory: &Path, error: &DatabaseError) -> Failure {
+    let Kind { command, merge, .. } = C::KIND;
+    let advice = match error {
+        DatabaseError::Rows { .. } if merge.is_some() => {
+            format!(": `avastra {command} --resume {}` plays them again", for_shell(directory))
+        }
+        // Each episode of a training is chosen with what was learned before.
+        DatabaseError::Rows { .. } => ", and later ones learned from it: begin a new training".to_owned(),
+        _ => String::new(),
+    };
+    Failure::file("open", &C::KIND.database(directory), format!("{error}{advice}"))
 }
 
 /// Most changed units that a message names.
@@ -300,7 +359,7 @@ impl<C: Campaign> Directory<C> {
     pub fn open(held: Held, settings: &str) -> Result<Directory<C>, Failure> {
         let file = C::KIND.database(&held.path);
         let database =
-            C::Database::open(&file, settings).map_err(|error| Failure::file("open", &file, error))?;
+            C::Database::open(&file, settings).map_err(|error| unopened::<C>(&held.path, &error))?;
         Ok(Directory { path: held.path.clone(), database, _held: held })
     }
 
@@ -345,10 +404,12 @@ impl<C: Campaign> Directory<C> {
         if is_started {
             return Ok(());
         }
-        let (directory, command) = (self.path.display(), C::KIND.command);
         Err(Failure::usage(format!(
-            "`{directory}` is not played to the end, and no program that a file names is started for that: look at its \
-             settings, then go on with `avastra {command} --resume {directory}`"
+            "`{}` is not played to the end, and no program that a file names is started for that: look at its \
+             settings, then go on with `avastra {} --resume {}`",
+            self.path.display(),
+            C::KIND.command,
+            for_shell(&self.path)
         )))
     }
 
@@ -374,6 +435,16 @@ impl<C: Campaign> Directory<C> {
             ));
         }
         Ok(restored)
+    }
+
+    /// The files of scenarios that it wrote. Others that lie beside them are named.
+    pub fn critical(&self, output: &Output) -> Result<Vec<PathBuf>, Failure> {
+        let written = written(&self.path, self.read(Units::scenarios)?);
+        foreign_text(&C::KIND, &self.path, &written).iter().for_each(|text| output.warn(text));
+        let foreign = foreign(&self.path, &written);
+        let mut files = load::sources_in(&self.path.join("critical"))?;
+        files.retain(|file| !foreign.contains(file));
+        Ok(files)
     }
 
     /// Writes an episode that an external driving system failed in: `failures/ROAD_NNNN.txt` says how, and a scenario of
@@ -448,7 +519,7 @@ fn make_empty(path: &Path) -> Result<Held, Failure> {
         return Err(Failure::usage(format!(
             "`{}` is not empty: name a new directory, or go on with `--resume {}`",
             path.display(),
-            path.display()
+            for_shell(path)
         )));
     }
     Ok(held)

@@ -15,12 +15,12 @@ use avastra_lang::syntax::listed;
 use avastra_world::action::ActionTable;
 
 use super::arguments::{StudyArguments, StudyCommand};
-use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, costs, settled};
+use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, costs, missing, settled};
 use super::error::Failure;
 use super::files::{remove, write};
 use super::findings::kinds_text;
 use super::interrupt::stop_on_interrupt;
-use super::output::{Output, plural};
+use super::output::{Output, for_shell, plural};
 use super::parallel::jobs;
 use super::progress::now;
 use super::run_directory::Resumed;
@@ -36,6 +36,7 @@ impl Campaign for StudySettings {
         file: "study",
         is_in: |directory| directory.join("study.yaml").is_file(),
         merge: Some(merge::merged::<StudySettings>),
+        foreign: run_directory::foreign_in::<StudySettings>,
     };
     type Database = StudyDatabase;
 
@@ -213,32 +214,50 @@ fn played_elsewhere(directories: &[PathBuf], study: &Study) -> Result<Vec<Reused
 /// If it is no such directory, or something in it was changed.
 pub fn read(directory: &Path) -> Result<(StudySettings, Vec<CellRecord>), Failure> {
     match read_sound(directory)? {
-        (settings, cells, None) => Ok((settings, cells)),
-        (.., Some(remark)) => {
-            let directory = directory.display();
+        Sound { settings, cells, changed: None, .. } => Ok((settings, cells)),
+        Sound { changed: Some(remark), .. } => {
+            let directory = for_shell(directory);
             Err(Failure::usage(format!("{remark}; go on with `avastra study --resume {directory}`")))
         }
     }
 }
 
-/// As [`read`], but cells that were changed are left out, and a remark says so.
-pub fn read_sound(directory: &Path) -> Result<(StudySettings, Vec<CellRecord>, Option<String>), Failure> {
+/// What is sound in a study's directory.
+pub struct Sound {
+    pub settings: StudySettings,
+    pub cells: Vec<CellRecord>,
+    /// Says which cells were changed; they are left out.
+    pub changed: Option<String>,
+    /// Says how many cells are missing.
+    pub missing: Option<String>,
+}
+
+/// As [`read`], but cells that were changed are left out.
+pub fn read_sound(directory: &Path) -> Result<Sound, Failure> {
     let (path, file) = (directory.join("study.yaml"), directory.join("study.db"));
-    if !path.is_file() || !file.is_file() {
-        let directory = directory.display();
+    if !path.is_file() {
         return Err(Failure::usage(format!(
-            "`{directory}` is no study's directory: `avastra study FILE --out {directory}` makes one"
+            "`{}` is no study's directory: `avastra study FILE --out {}` makes one",
+            directory.display(),
+            for_shell(directory)
+        )));
+    }
+    if let Some(how) = run_directory::lost(&file) {
+        let (file, directory) = (file.display(), for_shell(directory));
+        return Err(Failure::usage(format!(
+            "`{file}` is {how}: go on with `avastra study --resume {directory}`"
         )));
     }
     let text = load::text(&path)?;
     let settings: StudySettings = load::parsed(&path, &text)?;
     let unread = |error| Failure::file("read", &file, error);
-    let (database, remark) = run_directory::open_to_read::<StudyDatabase>(&file, &text)?;
+    let (database, changed) = run_directory::open_to_read::<StudyDatabase>(&file, &text)?;
+    let missing = missing(directory, &settings, &database, |_| true)?;
     let cells = Times::read(directory)?.on(database.cells().map_err(unread)?);
     if !FailedCell::among(&cells).is_empty() {
         return Err(Failure::file("use", &file, "the driving system failed in it, so there are no results"));
     }
-    Ok((settings, cells, remark))
+    Ok(Sound { settings, cells, changed, missing })
 }
 
 /// The cells that the driving system failed in, and what to do.

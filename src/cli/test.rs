@@ -22,6 +22,7 @@ use super::output::{Output, plural};
 use super::parallel::each_file_in_turn;
 use super::progress::now;
 use super::review::{Change, Review, review};
+use super::run_directory::what_was_begun;
 
 /// The result for one scenario.
 struct Case {
@@ -49,6 +50,10 @@ enum Outcome {
 pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
     let asked = load::asked(arguments.against.ads.as_deref())?;
     let suite = Suite { arguments, asked };
+    for path in &arguments.paths {
+        let foreign = what_was_begun(path).and_then(|kind| (kind.foreign)(path));
+        foreign.iter().for_each(|text| output.warn(text));
+    }
     let many = FilesArguments { files: suite_files(&arguments.paths)?, jobs: arguments.jobs };
     let program = suite.asked.external.as_ref();
     let mut tell = |found: &Option<(Case, Notes)>| found.iter().for_each(|found| tell(output, found));

@@ -21,7 +21,7 @@ use super::files::{folder, write};
 use super::findings::{cut_off, failures_text, is_reproducible, kinds_text, unfinished};
 use super::interrupt::stop_on_interrupt;
 use super::load::UnderTest;
-use super::output::{Output, plural};
+use super::output::{Output, for_shell, plural};
 use super::policy::distil::{self, rules_text};
 use super::progress::{TrainingProgress, Working};
 use super::run::groups_text;
@@ -43,6 +43,7 @@ impl Campaign for TrainSettings {
         is_in: |directory| run_directory::is_training(directory) == Some(true),
         // Each episode is chosen with what was learned before.
         merge: None,
+        foreign: run_directory::foreign_in::<TrainSettings>,
     };
     type Database = Database;
 
@@ -205,15 +206,16 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
     if !groups.is_empty() {
         output.say(&groups_text(&groups));
     }
+    let critical = directory.critical(output)?;
     let rules = kept.as_ref().and_then(|(_, policy)| policy.claims.as_ref()?.rules.as_ref());
     match &kept {
         Some((path, policy)) => {
             if let Some(rules) = rules {
                 output.say(&rules_text(policy.rules.len(), evaluation.return_mean, rules));
             }
-            output.say(&format!("{}\nplay it with: avastra run --policy {}", path.display(), path.display()))
+            output.say(&format!("{}\nplay it with: avastra run --policy {}", path.display(), for_shell(path)))
         }
-        None => output.say(&search_text(&directory.path)?),
+        None => output.say(&search_text(&directory.path, &critical)),
     }
     let failures = directory.read(Database::failures)?;
     if !failures.is_empty() {
@@ -259,15 +261,14 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
 }
 
 /// Where to find what a search found, which has no policy file.
-fn search_text(directory: &Path) -> Result<String, Failure> {
-    let critical = directory.join("critical");
-    let found = if critical.is_dir() { load::sources_in(&critical)?.len() } else { 0 };
-    Ok(match found {
+fn search_text(directory: &Path, critical: &[PathBuf]) -> String {
+    match critical.len() {
         0 => "a search has no policy file; no scenario was written".to_owned(),
         found => {
+            let critical = directory.join("critical");
             format!("a search has no policy file: {} in {}", plural(found, "scenario"), critical.display())
         }
-    })
+    }
 }
 
 /// Episodes of an evaluation, on all roads together.

@@ -119,7 +119,16 @@ fn what_a_kill_left_before_the_beginning_can_be_begun() {
     assert!(status == 1 && stderr.contains("is not empty"), "{stderr}");
     // The database may be missing as long as nothing was found.
     std::fs::remove_file(scratch.path("run/run.db")).expect("it is there");
+    let settings = scratch.path("run/run.yaml");
+    let whole = std::fs::read(&settings).expect("it is readable");
+    std::fs::write(&settings, "seed: [").expect("it is writable");
+    let (status, stdout, stderr) = outcome(&mut avastra(&["run", "--resume", &out]));
+    assert!(status == 1 && !stdout.contains("begins anew"), "nothing can begin: {stdout}{stderr}");
+    std::fs::write(&settings, whole).expect("it is writable");
+    // Git drops an empty folder.
+    std::fs::remove_dir_all(scratch.path("run/critical")).expect("it is there");
     resumed(&out);
+    assert!(scratch.path("run/critical").is_dir());
     std::fs::write(scratch.path("run/critical/corner_0000.ava"), "language 1\n").expect("it is writable");
     std::fs::remove_file(scratch.path("run/run.db")).expect("it is there");
     fails(&["run", "--resume", &out], "is missing, and `critical` has scenarios");
@@ -162,15 +171,50 @@ fn a_run_that_was_edited_is_not_gone_on_with() {
     assert!(overview["totals"]["driven_m"].as_f64().is_some_and(|driven_m| driven_m < 1e6), "{overview}");
     let (status, _, stderr) = outcome(&mut avastra(&["merge", &out, "--missing"]));
     assert!(status == 0 && stderr.contains("its rows of episode 1 were changed"), "{stderr}");
+    assert!(stderr.contains(&format!("`avastra run --resume {out}` plays them again")), "{stderr}");
     let stderr = resumed(&out);
     assert!(stderr.contains(&format!("{changed}: each such episode is played again")), "{stderr}");
     assert!(std::fs::read(scratch.path("run/run.db")).expect("it is readable") == bytes);
     let stderr = resumed(&out);
     assert!(!stderr.contains("changed"), "{stderr}");
+    // An episode of which nothing is left, its seal included, is missing.
+    let tables = ["step", "offer", "held", "collision", "scenario", "episode"];
+    let gone = tables.map(|table| format!("DELETE FROM {table} WHERE episode = 1;")).concat();
+    change(&scratch.path("run/run.db"), &format!("{gone} DELETE FROM seal WHERE unit = 1"));
+    let (status, _, stderr) = outcome(&mut avastra(&["report", &out, "--out", &page.display().to_string()]));
+    let is_missing = format!("1 of 3 episodes is missing: `avastra run --resume {out}` plays it");
+    assert!(status == 0 && stderr.contains(&is_missing), "{stderr}");
+    resumed(&out);
+    // A reason stands once for all episodes that name it. They are played again, and it gets its words back.
+    let reason =
+        "UPDATE reason SET text = 'because' WHERE reason = (SELECT min(reason) FROM offer WHERE reason > 0)";
+    change(&scratch.path("run/run.db"), reason);
+    let stderr = resumed(&out);
+    assert!(stderr.contains("were changed since they were written: each such episode"), "{stderr}");
+    assert!(std::fs::read(scratch.path("run/run.db")).expect("it is readable") == bytes);
+    // Settings that were edited in both places are not those that the rows came from.
+    edit(&settings, "seed: 1", "seed: 2");
+    let reseeded = "UPDATE begun SET settings = replace(settings, 'seed: 1', 'seed: 2')";
+    change(&scratch.path("run/run.db"), reseeded);
+    let (status, _, stderr) = outcome(&mut avastra(&["report", &out, "--out", &page.display().to_string()]));
+    let changed = "the rows of episode 0, episode 1, episode 2 were changed";
+    assert!(status == 0 && stderr.contains(changed), "{stderr}");
+    std::fs::write(&settings, &whole).expect("it is writable");
     let torn: Vec<u8> =
         bytes.iter().enumerate().map(|(at, byte)| if at % 991 == 990 { !byte } else { *byte }).collect();
     std::fs::write(scratch.path("run/run.db"), torn).expect("it is writable");
     fails(&["run", "--resume", &out], "begin a new one");
+}
+
+#[test]
+fn printed_commands_can_be_pasted() {
+    let scratch = Scratch::new();
+    let out = scratch.text("a b'c");
+    assert_eq!(run_into(&out).0, 0);
+    let quoted = format!("'{}'", out.replace('\'', r"'\''"));
+    let (status, _, stderr) = run_into(&out);
+    assert!(status == 1 && stderr.contains(&format!("go on with `--resume {quoted}`")), "{stderr}");
+    fails(&["train", "--resume", &out], &format!("go on with `avastra run --resume {quoted}`"));
 }
 
 #[test]
@@ -282,6 +326,17 @@ fn scenarios_that_are_gone_or_edited_are_noticed() {
     assert!(stdout.contains("was missing, is written again"), "{stdout}");
     assert!(stdout.contains("edited since the run wrote it"), "{stdout}");
     assert_eq!(std::fs::read(gone).expect("it is back"), written);
+
+    // A scenario of the user's own is told from those that were found.
+    std::fs::copy(gone, scratch.path("run/critical/mine.ava")).expect("it is writable");
+    let foreign = "critical/mine.ava: not written by this run, as far as `";
+    let stderr = resumed(&out);
+    assert!(stderr.contains(foreign), "{stderr}");
+    let page = scratch.text("page.html");
+    for command in [&["report", &out, "--most", "1", "--out", &page][..], &["test", &out]] {
+        let (_, _, stderr) = outcome(&mut avastra(command));
+        assert!(stderr.contains(foreign), "{command:?}: {stderr}");
+    }
 
     // A database without anything in it is no reason to play all again over what was found.
     std::fs::write(scratch.path("run/run.db"), "").expect("it is writable");

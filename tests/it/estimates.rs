@@ -104,6 +104,19 @@ fn only_its_database_counts(scratch: &Path, files: &[PathBuf]) {
     assert_eq!(text(gone), gone_text);
     assert_eq!(kept(&directory), results);
 
+    // The whole folder of scenarios comes back.
+    std::fs::remove_dir_all(directory.join("critical")).expect("it is there");
+    done(&["estimate", "--resume", &out]);
+    assert_eq!([text(gone), text(edited)], [gone_text, edited_text]);
+
+    // A part of which nothing is left is missing, whatever the seals say.
+    let tables = [("event", "part"), ("scenario", "part"), ("part", "part"), ("seal", "unit")];
+    let gone = tables.map(|(table, key)| format!("DELETE FROM {table} WHERE {key} = 2;")).concat();
+    change(&directory.join("estimate.db"), &gone);
+    let (status, _, stderr) = outcome(&mut avastra(&["report", &out, "--most", "1", "--out", &page]));
+    let is_missing = format!("parts is missing: `avastra estimate --resume {out}` plays it");
+    assert!(status == 0 && stderr.contains(&is_missing), "{stderr}");
+
     // Where all parts were changed there is nothing to show, but it is not unfinished.
     change(&directory.join("estimate.db"), "UPDATE part SET probability = 0.9");
     let (status, _, stderr) = outcome(&mut avastra(&["report", &out, "--out", &page]));

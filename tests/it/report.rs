@@ -250,6 +250,19 @@ fn a_run_without_its_database_is_said_so_of() {
     let (status, stderr, index) = reported(scratch.path(), &[&scratch.path().display().to_string()]);
     assert!(status == 0 && stderr.contains("run.db` is missing: only scenarios are shown"), "{stderr}");
     assert_eq!(index["scenarios"].as_array().map(Vec::len), Some(1));
+    // An empty one is no better, and stays empty.
+    let (database, settings) = (scratch.path().join("run.db"), scratch.path().join("run.yaml"));
+    std::fs::write(&database, "").expect("it can be written");
+    let (status, stderr, _) = reported(scratch.path(), &[&scratch.path().display().to_string()]);
+    assert!(status == 0 && stderr.contains("run.db` is empty: only scenarios are shown"), "{stderr}");
+    assert_eq!(std::fs::metadata(&database).expect("it is there").len(), 0);
+    // Nor is a database without the settings that it was begun with.
+    std::fs::remove_file(&settings).expect("it is there");
+    let (status, stderr, _) = reported(scratch.path(), &[&scratch.path().display().to_string()]);
+    assert!(status == 0 && stderr.contains("run.yaml` is missing: only scenarios are shown"), "{stderr}");
+    std::fs::create_dir(&settings).expect("it can be made");
+    let (status, stderr, _) = reported(scratch.path(), &[&scratch.path().display().to_string()]);
+    assert!(status == 0 && stderr.contains("run.yaml` is no file: only scenarios are shown"), "{stderr}");
 }
 
 #[test]

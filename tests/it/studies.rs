@@ -117,6 +117,8 @@ fn what_another_study_has_played_is_taken_over() {
     change(&alone.join("study.db"), longer);
     let (damaged, stderr) = overview();
     assert!(stderr.contains("the rows of cell 1 were changed"), "{stderr}");
+    let is_missing = format!("cells is missing: `avastra study --resume {at}` plays it");
+    assert!(stderr.contains(&is_missing), "{stderr}");
     assert_eq!(damaged["cells"].as_u64().map(|cells| cells + 1), whole["cells"].as_u64());
     let ((status, _, stderr), _) = play(&second, "refused", &["--reuse", &at]);
     assert!(status == 1 && stderr.contains("go on with `avastra study --resume"), "{stderr}");
@@ -416,5 +418,22 @@ fn a_database_of_another_kind_is_refused_by_its_layout() {
     let path = scratch.path().join("run.db");
     Database::open(&path, "").expect("it is new");
     let refused = StudyDatabase::open(&path, "").err().expect("it is not a study's").to_string();
-    assert!(refused.ends_with("this version of avastra reads 1005: begin a new one"), "{refused}");
+    assert!(refused.ends_with("this version of avastra reads 1006: begin a new one"), "{refused}");
+    // A file with tables is not new, though its number says so.
+    change(&path, "PRAGMA user_version = 0");
+    let refused = Database::open(&path, "").err().expect("it has no number").to_string();
+    assert!(refused.starts_with("it has layout 0, this version of avastra reads "), "{refused}");
+}
+
+#[test]
+fn reading_an_empty_database_writes_nothing() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let path = scratch.path().join("study.db");
+    let refused =
+        || StudyDatabase::open_without_damaged(&path, "").err().expect("nothing is in it").to_string();
+    refused();
+    assert!(!path.exists());
+    std::fs::write(&path, "").expect("it is writable");
+    assert!(refused().starts_with("it is empty"));
+    assert_eq!(std::fs::metadata(&path).expect("it is there").len(), 0);
 }

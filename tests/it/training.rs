@@ -141,7 +141,8 @@ fn scenarios_of_a_training_that_are_gone_or_edited_are_noticed() {
     // Each episode depends on those before, so a changed one cannot be played again alone. A page leaves it out.
     let rows = "UPDATE learning SET return = 9 WHERE episode = 3; UPDATE result SET text = '{}'";
     change(&out.join("run.db"), rows);
-    fails(&["train", "--resume", &at], "a training must be begun anew");
+    let advice = "its rows of episode 3 were changed since they were written, and later ones learned from it: begin a new training";
+    fails(&["train", "--resume", &at], advice);
     let page = scratch.path().join("page.html");
     let (status, _, stderr) =
         outcome(&mut avastra(&["report", &at, "--most", "1", "--out", &page.display().to_string()]));

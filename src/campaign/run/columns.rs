@@ -32,9 +32,8 @@ pub enum Values {
 /// If the file cannot be read, has another layout, or has no such table.
 pub fn columns(path: &Path, table: &str) -> Result<Vec<Column>, DatabaseError> {
     let connection = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_ONLY)?;
-    let found: i64 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
-    if found != LAYOUT.version {
-        return Err(DatabaseError::Layout { found, wanted: LAYOUT.version });
+    if !LAYOUT.is_in(&connection)? {
+        return Err(DatabaseError::Empty);
     }
     LAYOUT.check_tables(&connection)?;
     let mut described = connection

@@ -23,7 +23,7 @@ use crate::run::shape::Shape;
 use crate::run::summary::{EpisodeSummary, Finding};
 
 pub(crate) const LAYOUT: Layout = Layout {
-    version: 10,
+    version: 11,
     schema: || format!("{SCHEMA}{}", step_table()),
     unit: "episode",
     tables: &["episode", "step", "held", "offer", "collision", "failure", "learning", "scenario"],

@@ -43,7 +43,7 @@ pub use profile::{
 pub(crate) use profile::{traffic_of, under_test};
 pub use sealed::differences as settings_differences;
 pub use sealed::{DatabaseError, Layout};
-pub(crate) use sealed::{insert_row, query_all};
+pub(crate) use sealed::{insert_row, query_all, settings_digest};
 pub use settings::{EPISODES_MAX, PolicyReference, RunError, RunSettings, VERSION};
 pub(crate) use settings::{agent_named, check_episodes};
 pub use settled::{Numbered, Units, WrittenScenario};

@@ -2,16 +2,16 @@
 //! was changed behind its back.
 //!
 //! The settings stand in the database as they were when it was begun. Every episode (or cell) has a seal: a digest of
-//! all its rows, written in the same transaction. SQLite's own check finds torn pages, a seal finds values that were
-//! changed. Neither protects against a forger who writes seals, too. A file from elsewhere may hold a view in place of a
-//! table, which could run for ever when it is read. So its tables are compared with those of this version before anything
-//! is read.
+//! these settings and of all its rows, written in the same transaction. So rows that were played with other settings count
+//! as changed. SQLite's own check finds torn pages, a seal finds values that were changed. Neither protects against a
+//! forger who writes seals, too. A file from elsewhere may hold a view in place of a table, which could run for ever when
+//! it is read. So its tables are compared with those of this version before anything is read.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use rusqlite::types::ValueRef;
-use rusqlite::{Connection, OptionalExtension, Row, ToSql, params};
+use rusqlite::{Connection, OpenFlags, OptionalExtension, Row, ToSql, params};
 use serde_json::{Map, Value};
 use sha2::{Digest, Sha256};
 
@@ -30,16 +30,15 @@ CREATE TABLE seal (unit INTEGER PRIMARY KEY, digest TEXT NOT NULL) STRICT;
 pub enum DatabaseError {
     #[error("it has layout {found}, this version of avastra reads {wanted}: begin a new one")]
     Layout { found: i64, wanted: i64 },
+    #[error("it is empty: `--resume` plays all again")]
+    Empty,
     #[error("it names an episode {found}")]
     Episode { found: i64 },
     #[error("its checkpoint is damaged: begin a new training")]
     Checkpoint,
     #[error("the settings were edited since it was begun: {what}; undo that, or begin a new one")]
     Settings { what: String },
-    #[error(
-        "its rows of {unit} {number} were changed since they were written: `--resume` plays it again, and a training must \
-         be begun anew"
-    )]
+    #[error("its rows of {unit} {number} were changed since they were written")]
     Rows { unit: &'static str, number: i64 },
     #[error("its results were changed since they were written: `avastra train --resume` writes them again")]
     Results,
@@ -74,6 +73,15 @@ impl From<rusqlite::Error> for DatabaseError {
     }
 }
 
+/// What is done with a file that has nothing in it.
+#[derive(Clone, Copy)]
+pub(super) enum IfEmpty {
+    /// Its tables are made.
+    Begin,
+    /// It is refused: whatever only reads writes nothing.
+    Refuse,
+}
+
 /// The layout of a database.
 pub struct Layout {
     /// Raised whenever a column changes.
@@ -103,7 +111,7 @@ impl Layout {
     /// # Errors
     /// If the file cannot be opened, is a link, has another layout or other settings, or was damaged or changed.
     pub fn open(&self, path: &Path, settings: &str) -> Result<Connection, DatabaseError> {
-        let (connection, damaged) = self.open_damaged(path, settings)?;
+        let (connection, damaged) = self.open_damaged(path, settings, IfEmpty::Begin)?;
         match damaged.first() {
             Some(&number) => Err(DatabaseError::Rows { unit: self.unit, number }),
             None => Ok(connection),
@@ -113,31 +121,57 @@ impl Layout {
     /// As [`Layout::open`], but units whose rows were changed are no error: their numbers come beside the connection.
     ///
     /// # Errors
-    /// As [`Layout::open`], but for changed rows.
+    /// As [`Layout::open`], but for changed rows. If the file is empty and is to be refused then.
     pub(super) fn open_damaged(
         &self,
         path: &Path,
         settings: &str,
+        if_empty: IfEmpty,
     ) -> Result<(Connection, Vec<i64>), DatabaseError> {
         // SQLite would follow a link and write where it leads.
         files::own_file(path)?;
-        let mut connection = Connection::open(path)?;
-        let found: i64 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
-        if found == 0 {
-            let transaction = connection.transaction()?;
-            transaction.execute_batch(TABLES)?;
-            transaction.execute_batch(&(self.schema)())?;
-            transaction.execute("INSERT INTO begun VALUES (1, ?)", [settings])?;
-            transaction.pragma_update(None, "user_version", self.version)?;
-            transaction.commit()?;
-        } else if found != self.version {
-            return Err(DatabaseError::Layout { found, wanted: self.version });
-        } else {
-            self.check_tables(&connection)?;
-            self.check(&connection, settings)?;
+        let mut connection = match if_empty {
+            IfEmpty::Begin => Connection::open(path)?,
+            // Not read-only: SQLite must be able to undo what a kill left half written. No file is made.
+            IfEmpty::Refuse => {
+                let existing = OpenFlags::default().difference(OpenFlags::SQLITE_OPEN_CREATE);
+                Connection::open_with_flags(path, existing)?
+            }
+        };
+        match (self.is_in(&connection)?, if_empty) {
+            (true, _) => {
+                self.check_tables(&connection)?;
+                self.check(&connection, settings)?;
+            }
+            (false, IfEmpty::Refuse) => return Err(DatabaseError::Empty),
+            (false, IfEmpty::Begin) => {
+                let transaction = connection.transaction()?;
+                transaction.execute_batch(TABLES)?;
+                transaction.execute_batch(&(self.schema)())?;
+                transaction.execute("INSERT INTO begun VALUES (1, ?)", [settings])?;
+                transaction.pragma_update(None, "user_version", self.version)?;
+                transaction.commit()?;
+            }
         }
         let damaged = self.damaged(&connection)?;
         Ok((connection, damaged))
+    }
+
+    /// Whether a file has this layout; false if nothing is in it.
+    ///
+    /// # Errors
+    /// If it has another layout.
+    pub(super) fn is_in(&self, connection: &Connection) -> Result<bool, DatabaseError> {
+        let found: i64 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
+        // A file with tables is not new, whatever number it has.
+        let tables = "SELECT count(*) FROM sqlite_schema";
+        let is_empty =
+            || connection.query_row(tables, [], |row| row.get::<_, i64>(0)).map(|tables| tables == 0);
+        match found {
+            found if found == self.version => Ok(true),
+            0 if is_empty()? => Ok(false),
+            found => Err(DatabaseError::Layout { found, wanted: self.version }),
+        }
     }
 
     /// Refuses a file unless its tables are those of this layout, see [`check_plain`].
@@ -174,11 +208,12 @@ impl Layout {
         let of_tables: String =
             self.tables.iter().map(|table| format!("SELECT {unit} FROM {table} UNION ")).collect();
         let numbers = format!("{of_tables}SELECT unit FROM seal ORDER BY 1");
+        let settings = settings_digest(connection)?;
         let mut damaged = Vec::new();
         for number in query_all(connection, &numbers, |row| row.get::<_, i64>(0))? {
             let mut seal = connection.prepare_cached("SELECT digest FROM seal WHERE unit = ?")?;
             let seal: Option<String> = seal.query_row([number], |row| row.get(0)).optional()?;
-            if unsound.contains(&number) || seal != Some(self.rows_digest(connection, number)?) {
+            if unsound.contains(&number) || seal != Some(self.digest(connection, &settings, number)?) {
                 damaged.push(number);
             }
         }
@@ -204,7 +239,7 @@ impl Layout {
 
     /// Seals the rows of a unit; called in the transaction that adds them.
     pub fn seal(&self, connection: &Connection, number: i64) -> Result<(), rusqlite::Error> {
-        let digest = self.rows_digest(connection, number)?;
+        let digest = self.digest(connection, &settings_digest(connection)?, number)?;
         insert_row(connection, "seal", params![number, digest])
     }
 
@@ -219,6 +254,15 @@ impl Layout {
         Ok(())
     }
 
+    /// Deletes the rows that no unit names. An edited one would stand in the way of what it was before: both have one key.
+    pub(super) fn delete_unnamed(&self, connection: &Connection) -> Result<(), rusqlite::Error> {
+        if let Some((by, named)) = self.naming {
+            let unnamed = format!("DELETE FROM {named} WHERE {named} NOT IN (SELECT {named} FROM {by})");
+            connection.execute(&unnamed, [])?;
+        }
+        Ok(())
+    }
+
     /// Deletes the rows of all units from a number on.
     pub fn delete_from(&self, connection: &Connection, first: i64) -> Result<(), rusqlite::Error> {
         for table in self.tables.iter().rev() {
@@ -228,9 +272,15 @@ impl Layout {
         Ok(())
     }
 
-    /// The digest of all rows of a unit.
-    fn rows_digest(&self, connection: &Connection, number: i64) -> Result<String, rusqlite::Error> {
+    /// The digest of the settings, given by their own digest, and of all rows of a unit.
+    fn digest(
+        &self,
+        connection: &Connection,
+        settings: &[u8; 32],
+        number: i64,
+    ) -> Result<String, rusqlite::Error> {
         let mut whole = Sha256::new();
+        whole.update(settings);
         for table in self.tables {
             let named = self.naming.filter(|(by, _)| by == table);
             let join =
@@ -240,6 +290,12 @@ impl Layout {
         }
         Ok(digest_text(&whole.finalize().into()))
     }
+}
+
+/// The digest of the settings that a database was begun with.
+pub(crate) fn settings_digest(connection: &Connection) -> Result<[u8; 32], rusqlite::Error> {
+    let settings: String = connection.query_row("SELECT settings FROM begun", [], |row| row.get(0))?;
+    Ok(Sha256::digest(settings.as_bytes()).into())
 }
 
 /// The columns of a table: name, type, and position in the key, which is 0 for a column outside the key.
@@ -477,6 +533,16 @@ mod tests {
             let refused = LAYOUT.open(&path, SETTINGS).unwrap_err().to_string();
             assert!(refused.contains(what), "{change}: {refused}");
         }
+    }
+
+    #[test]
+    fn rows_belong_to_their_settings() {
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("run.db");
+        let other = SETTINGS.replace("seed: 1", "seed: 2");
+        begun(&path).execute("UPDATE begun SET settings = ?", [&other]).unwrap();
+        let refused = LAYOUT.open(&path, &other).unwrap_err();
+        assert!(matches!(refused, DatabaseError::Rows { number: 0, .. }), "{refused}");
     }
 
     #[test]

@@ -12,7 +12,7 @@ use rusqlite::{Connection, params};
 use sha2::{Digest, Sha256};
 
 use crate::files::{PlainName, Temporary};
-use crate::run::sealed::{DatabaseError, Layout, add_rows, check_plain, plain_tables, query_all};
+use crate::run::sealed::{DatabaseError, IfEmpty, Layout, add_rows, check_plain, plain_tables, query_all};
 
 /// A unit to take over: its number in the other file, and the number that it gets here.
 pub type Numbered = (i64, i64);
@@ -65,11 +65,12 @@ pub trait Units: Sized {
     /// # Errors
     /// As [`Units::open`], but for changed rows.
     fn open_and_drop(path: &Path, settings: &str) -> Result<(Self, Vec<i64>), DatabaseError> {
-        let (mut connection, damaged) = Self::LAYOUT.open_damaged(path, settings)?;
+        let (mut connection, damaged) = Self::LAYOUT.open_damaged(path, settings, IfEmpty::Begin)?;
         let transaction = connection.transaction()?;
         for &number in &damaged {
             Self::LAYOUT.delete(&transaction, number)?;
         }
+        Self::LAYOUT.delete_unnamed(&transaction)?;
         transaction.commit()?;
         Ok((Self::from_connection(connection), damaged))
     }
@@ -78,9 +79,9 @@ pub trait Units: Sized {
     /// numbers come beside the database.
     ///
     /// # Errors
-    /// As [`Units::open`], but for changed rows.
+    /// As [`Units::open`], but for changed rows. If the file is not there or is empty.
     fn open_without_damaged(path: &Path, settings: &str) -> Result<(Self, Vec<i64>), DatabaseError> {
-        let (connection, damaged) = Self::LAYOUT.open_damaged(path, settings)?;
+        let (connection, damaged) = Self::LAYOUT.open_damaged(path, settings, IfEmpty::Refuse)?;
         if !damaged.is_empty() {
             Self::LAYOUT.hide(&connection, &damaged)?;
         }

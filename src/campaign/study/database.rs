@@ -13,7 +13,7 @@ use crate::study::settings::StudySettings;
 
 /// Versions begin at 1001, so that a `run.db` is never taken for a `study.db`.
 const LAYOUT: Layout = Layout {
-    version: 1005,
+    version: 1006,
     schema: || SCHEMA.to_owned(),
     unit: "cell",
     tables: &["cell", "trained", "evaluated", "collision"],

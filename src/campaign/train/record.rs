@@ -5,7 +5,7 @@
 
 use rusqlite::{OptionalExtension, params};
 
-use crate::run::{Database, DatabaseError, LAYOUT, add_all, insert_row};
+use crate::run::{Database, DatabaseError, LAYOUT, add_all, insert_row, settings_digest};
 use avastra_lang::model::digest;
 use avastra_world::action::Draw;
 
@@ -61,7 +61,7 @@ impl Database {
     /// # Errors
     /// If the file cannot be written.
     pub fn keep_results(&self, text: &str) -> Result<(), DatabaseError> {
-        let seal = digest(text.as_bytes());
+        let seal = self.result_seal(text)?;
         self.connection.execute("INSERT OR REPLACE INTO result VALUES (1, ?, ?)", params![seal, text])?;
         Ok(())
     }
@@ -76,9 +76,15 @@ impl Database {
             .query_row("SELECT digest, text FROM result", [], |row| Ok((row.get(0)?, row.get(1)?)))
             .optional()?;
         match kept {
-            Some((seal, text)) if digest(text.as_bytes()) != seal => Err(DatabaseError::Results),
+            Some((seal, text)) if self.result_seal(&text)? != seal => Err(DatabaseError::Results),
             kept => Ok(kept.map(|(_, text)| text)),
         }
+    }
+
+    /// The digest of results, and of the settings that they came from.
+    fn result_seal(&self, text: &str) -> Result<String, DatabaseError> {
+        let settings = settings_digest(&self.connection)?;
+        Ok(digest(&[&settings[..], text.as_bytes()].concat()))
     }
 
     /// Time simulated for the episodes of a training so far, s.
