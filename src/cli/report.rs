@@ -13,7 +13,7 @@ use avastra_world::action::ActionTable;
 
 use super::arguments::{FilesArguments, ReportArguments};
 use super::error::Failure;
-use super::files::{must_end_in, write_result};
+use super::files::{must_end_in, place, write_result};
 use super::load;
 use super::look::{self, Looked};
 use super::output::{Output, plural};
@@ -30,7 +30,7 @@ const FOLDERS: [&str; 3] = ["critical", "failures", shrink::FOLDER];
 /// Writes the page of a directory or of files. A scenario that does not play as its file claims is shown, said so of before
 /// all else, and fails the command.
 pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failure> {
-    let path = arguments.output.clone().unwrap_or_else(|| default_path(&arguments.paths));
+    let path = place(arguments.output.as_ref(), default_path(&arguments.paths))?;
     must_end_in(&path, "html")?;
     let asked = arguments.ads.as_deref().map(|text| load::asked(Some(text))).transpose()?;
     let is_folder = matches!(arguments.paths.as_slice(), [directory] if directory.is_dir());

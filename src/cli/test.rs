@@ -15,7 +15,7 @@ use avastra_world::action::ActionTable;
 
 use super::arguments::{FilesArguments, TestArguments};
 use super::error::Failure;
-use super::files::{write, write_named};
+use super::files::{without_links, write, write_named};
 use super::findings::{is_reproducible, spot_check};
 use super::load::{self, Emitted, answers_path};
 use super::look::{as_it_is_now, is_outdated, meaning_text};
@@ -48,9 +48,13 @@ enum Outcome {
 
 /// Plays every scenario of a suite against a driving system.
 pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
+    let files = suite_files(&arguments.paths)?;
+    if arguments.accept {
+        files.iter().try_for_each(|file| without_links(file))?;
+    }
     let asked = load::asked(arguments.against.ads.as_deref())?;
     let suite = Suite { arguments, asked };
-    let many = FilesArguments { files: suite_files(&arguments.paths)?, jobs: arguments.jobs };
+    let many = FilesArguments { files, jobs: arguments.jobs };
     let program = suite.asked.external.as_ref();
     let mut tell = |found: &Option<(Case, Notes)>| found.iter().for_each(|found| tell(output, found));
     let mut played = each_file_in_turn(output, &many, program, |file| Ok(suite.play(file)), &mut tell)?;
