@@ -39,6 +39,7 @@ impl Campaign for EstimateSettings {
         command: "estimate",
         file: "estimate",
         is_in: |directory| directory.join("estimate.yaml").is_file(),
+        keeps_space: true,
         merge: Some(merge::merged::<EstimateSettings>),
     };
     type Database = EstimateDatabase;
@@ -217,6 +218,7 @@ pub fn read(directory: &Path) -> Result<Contents, Failure> {
     let (database, damaged) = run_directory::open_to_read::<EstimateDatabase>(&file, &text)?;
     let scenarios = database.scenarios().map_err(unread)?;
     let mut remarks = run_directory::remarks_on(&written(directory, scenarios));
+    remarks.extend(run_directory::remark_on_copy(directory));
     let table = load::table(&Output::silent(), &directory.join(&settings.run.space)).ok();
     let is_it = |table: &ActionTable| table.space().meaning.is_sealed_by(&settings.run.space_digest);
     let labels: Vec<String> = match table.filter(is_it) {

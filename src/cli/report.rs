@@ -215,6 +215,7 @@ fn of_run(
     let mut remarks: Vec<String> = damaged.into_iter().collect();
     let written = run_directory::written(directory, database.scenarios().map_err(unread)?);
     remarks.extend(run_directory::remarks_on(&written));
+    remarks.extend(run_directory::remark_on_copy(directory));
     let space = serde_yaml::from_str::<Begun>(settings).ok().map(|begun| directory.join(begun.space));
     // A page of what was found is worth having without the names of the rows.
     let table: Option<ActionTable> = space.and_then(|space| load::table(output, &space).ok());

@@ -35,6 +35,7 @@ impl Campaign for StudySettings {
         command: "study",
         file: "study",
         is_in: |directory| directory.join("study.yaml").is_file(),
+        keeps_space: false,
         merge: Some(merge::merged::<StudySettings>),
     };
     type Database = StudyDatabase;

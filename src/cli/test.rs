@@ -23,6 +23,7 @@ use super::output::{Output, plural};
 use super::parallel::each_file_in_turn;
 use super::progress::now;
 use super::review::{Change, Now, Review, review};
+use super::run_directory;
 
 /// The result for one scenario.
 struct Case {
@@ -52,6 +53,8 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
     if arguments.accept {
         files.iter().try_for_each(|file| without_links(file))?;
     }
+    let remarks = arguments.paths.iter().filter_map(|path| run_directory::remark_on_copy(path));
+    remarks.for_each(|remark| output.warn(&remark));
     let asked = load::asked(arguments.against.ads.as_deref())?;
     let suite = Suite { arguments, asked };
     let many = FilesArguments { files, jobs: arguments.jobs };
