@@ -15,7 +15,7 @@
 //! Files are read in `cli::load`.
 
 use std::fs::{File, Metadata};
-use std::io::{Error, ErrorKind, Result, Write};
+use std::io::{Error, ErrorKind, Read, Result, Write};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::{Component, Path, PathBuf};
 use std::sync::LazyLock;
@@ -298,6 +298,21 @@ pub fn without_links(path: &Path) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// The first bytes of a file: fewer if it is shorter, none if nothing is there.
+///
+/// # Errors
+/// If it is there and cannot be read.
+pub fn first_bytes(path: &Path, count: u64) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    match File::open(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => {}
+        opened => {
+            opened?.take(count).read_to_end(&mut bytes)?;
+        }
+    }
+    Ok(bytes)
 }
 
 fn own(path: &Path, fits: fn(&Metadata) -> bool, otherwise: &'static str) -> Result<()> {

@@ -32,6 +32,8 @@ use End::{Any, Done, Refused};
 const LINK: &str = "it is a symbolic link";
 /// Words of the error about a link on the way to a place that was named to be read.
 const WAY: &str = "on the way to it is a symbolic link";
+/// Words of the error about a database in another journal mode.
+const WAL: &str = "journal mode WAL";
 /// Words of the errors about a name in a database.
 const PLAIN: &str = "is no plain name";
 const NAME: &str = "is no name of a scenario";
@@ -157,6 +159,10 @@ const ATTACKS: &[Attack] = &[
     linked(&[("run/run.db-journal", "mine.txt")], &["run", "--resume", "run"], Any),
     linked(&[("run/run.db-journal", "nowhere")], &["run", "--resume", "run"], Any),
     linked(&[("e1/estimate.db", "nowhere")], &["estimate", "--resume", "e1"], Refused(LINK)),
+    // A database in the journal mode WAL, in which SQLite writes into `run.db-shm` even to read.
+    changed(&[], in_wal, &["report", "run"], Refused(WAL)),
+    changed(&[], in_wal, &["run", "--resume", "run"], Refused(WAL)),
+    changed(&[], in_wal, &["merge", "run", "--out", "m"], Refused(WAL)),
     // Folders that are links.
     linked(&[("runs", "folder")], &["run", "SPACE", "QUICK", "1"], Refused(LINK)),
     linked(
@@ -409,6 +415,16 @@ fn copy(from: &Path, to: &Path) {
 fn own_database(clone: &Path) {
     let database = rusqlite::Connection::open(clone.with_file_name("mine.db")).expect("it is new");
     database.execute_batch("CREATE TABLE mine (x); INSERT INTO mine VALUES (1)").expect("it is writable");
+}
+
+/// Takes the run's database to the journal mode WAL, and gives a file of the user a further name beside it.
+fn in_wal(clone: &Path) {
+    let database = rusqlite::Connection::open(clone.join("run/run.db")).expect("it is a database");
+    let mode: String =
+        database.query_row("PRAGMA journal_mode = WAL", [], |row| row.get(0)).expect("it is writable");
+    assert_eq!(mode, "wal");
+    drop(database);
+    std::fs::hard_link(clone.with_file_name("mine.txt"), clone.join("run/run.db-shm")).expect("it is free");
 }
 
 /// Puts a file to import into a folder of the clone.
