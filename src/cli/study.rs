@@ -62,8 +62,8 @@ impl Cut for StudySettings {
     }
 
     fn take_beside([from, to]: [&Path; 2]) -> Result<(), Failure> {
-        let mut times = Times::read(to)?;
-        times.extend(Times::read(from)?);
+        let mut times = Times::read(to);
+        times.extend(Times::read(from));
         times.write(to)
     }
 
@@ -121,7 +121,7 @@ fn play_all(
     let share = Share::of(&path, study.settings())?;
     let all = study.settings().jobs();
     output.tell(&format!("{}, into {}", heading(&study), path.display()));
-    let mut times = Times::read(&path)?;
+    let mut times = Times::read(&path);
     for Reused { directory: other, played } in reused {
         let lacking = share.lacking(study.settings(), &directory)?;
         let lacking: Vec<&Job> = lacking.into_iter().map(|job| &all[job]).collect();
@@ -235,7 +235,7 @@ pub fn read_sound(directory: &Path) -> Result<(StudySettings, Vec<CellRecord>, O
     let settings: StudySettings = load::parsed(&path, &text)?;
     let unread = |error| Failure::file("read", &file, error);
     let (database, remark) = run_directory::open_to_read::<StudyDatabase>(&file, &text)?;
-    let cells = Times::read(directory)?.on(database.cells().map_err(unread)?);
+    let cells = Times::read(directory).on(database.cells().map_err(unread)?);
     if !FailedCell::among(&cells).is_empty() {
         return Err(Failure::file("use", &file, "the driving system failed in it, so there are no results"));
     }
@@ -330,13 +330,16 @@ fn spent() -> Spent {
 
 static BEGAN: LazyLock<Instant> = LazyLock::new(now);
 
-/// Mean times of an agent's cells.
+/// Mean times of an agent's cells, over those whose times are known.
 #[derive(serde::Serialize)]
 struct Timing {
     agent: String,
     cells: usize,
-    wall_s: f64,
+    wall_s: Option<f64>,
     cpu_s: Option<f64>,
+    /// Cells whose times are known.
+    #[serde(skip)]
+    timed: usize,
 }
 
 fn timing(cells: &[CellRecord]) -> Vec<Timing> {
@@ -344,14 +347,16 @@ fn timing(cells: &[CellRecord]) -> Vec<Timing> {
     labels.sort_unstable();
     labels.dedup();
     let of = |label: &str| {
-        let own: Vec<Spent> =
+        let own: Vec<Option<Spent>> =
             cells.iter().filter(|cell| cell.agent == label).map(|cell| cell.spent).collect();
-        let count = own.len() as f64;
+        let known: Vec<Spent> = own.iter().copied().flatten().collect();
+        let mean = |sum_s: f64| (!known.is_empty()).then(|| sum_s / known.len() as f64);
         Timing {
             agent: label.to_owned(),
             cells: own.len(),
-            wall_s: own.iter().map(|spent| spent.wall_s).sum::<f64>() / count,
-            cpu_s: own.iter().map(|spent| spent.cpu_s).sum::<Option<f64>>().map(|sum| sum / count),
+            wall_s: mean(known.iter().map(|spent| spent.wall_s).sum()),
+            cpu_s: known.iter().map(|spent| spent.cpu_s).sum::<Option<f64>>().and_then(mean),
+            timed: known.len(),
         }
     };
     labels.into_iter().map(of).collect()
@@ -359,9 +364,16 @@ fn timing(cells: &[CellRecord]) -> Vec<Timing> {
 
 fn timing_text(directory: &Path, timing: &[Timing]) -> String {
     let mut text = format!("\nall figures: {}", directory.join("results.json").display());
-    for Timing { agent, cells, wall_s, cpu_s } in timing {
+    for Timing { agent, cells, wall_s, cpu_s, timed } in timing {
+        let cells = plural(*cells, "cell");
+        let Some(wall_s) = wall_s else {
+            text.push_str(&format!("\n{agent}: {cells}, no times are known"));
+            continue;
+        };
         let cpu = cpu_s.map_or(String::new(), |cpu_s| format!(", {cpu_s:.1} s of a processor"));
-        text.push_str(&format!("\n{agent}: {} of {wall_s:.1} s{cpu} on average", plural(*cells, "cell")));
+        let timed = plural(*timed, "cell");
+        let only = if timed == cells { String::new() } else { format!(", by the times of {timed}") };
+        text.push_str(&format!("\n{agent}: {cells} of {wall_s:.1} s{cpu} on average{only}"));
     }
     text
 }
