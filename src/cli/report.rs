@@ -222,8 +222,14 @@ fn of_run(
     if table.is_none() {
         found.remarks.push("the space of the run cannot be read: its rows have numbers only".to_owned());
     }
+    let is_training = run_directory::is_training(directory) == Some(true);
     // A training that is not finished has not been judged yet, and a run never is.
     let results = match database.results() {
+        Err(DatabaseError::Results) | Ok(Some(_)) if !is_training => {
+            let path = path.display();
+            remarks.push(format!("`{path}` has results, which only a training has: they count for nothing"));
+            None
+        }
         Err(error @ DatabaseError::Results) => {
             remarks.push(unread(error).to_string());
             None

@@ -380,14 +380,18 @@ impl<C: Campaign> Directory<C> {
         Ok(Directory { path: held.path.clone(), database, _held: held })
     }
 
-    /// As [`Directory::open`], but units whose rows were changed are named and dropped, so that they are played again.
+    /// As [`Directory::open`], but units whose rows were changed are named and removed. Those that belong to the directory are
+    /// lacking then, so they are played again.
     pub fn open_to_go_on(output: &Output, held: Held, settings: &str) -> Result<Directory<C>, Failure> {
         let file = C::KIND.database(&held.path);
         let (database, damaged) = C::Database::open_and_drop(&file, settings)
             .map_err(|error| Failure::file("open", &file, error))?;
         if !damaged.is_empty() {
             let changed = changed::<C::Database>(&file, &damaged);
-            output.warn(&format!("{changed}: each such {} is played again", C::Database::LAYOUT.unit));
+            let unit = C::Database::LAYOUT.unit;
+            output.warn(&format!(
+                "{changed}: each such {unit} is removed, and played again if it is to be played here"
+            ));
         }
         Ok(Directory { path: held.path.clone(), database, _held: held })
     }

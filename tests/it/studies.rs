@@ -121,7 +121,7 @@ fn what_another_study_has_played_is_taken_over() {
     let ((status, _, stderr), _) = play(&second, "refused", &["--reuse", &at]);
     assert!(status == 1 && stderr.contains("go on with `avastra study --resume"), "{stderr}");
     let (status, _, stderr) = outcome(&mut avastra(&["study", "--resume", &at]));
-    assert!(status == 0 && stderr.contains("is played again"), "{stderr}");
+    assert!(status == 0 && stderr.contains("is removed, and played again"), "{stderr}");
     assert!(std::fs::read(alone.join("study.db")).expect("it is readable") == sound);
     assert_eq!(results(&alone), whole);
 
