@@ -18,6 +18,7 @@ use avastra_campaign::run::{
     DatabaseError, EpisodeSummary, Numbered, Shard, Units, VERSION, WrittenScenario,
 };
 use avastra_drivers::external::{Attached, ExternalSettings};
+use avastra_lang::check::normal;
 use avastra_lang::syntax::{ast, print};
 use avastra_world::action::ActionTable;
 use avastra_world::sim::ENGINE;
@@ -182,7 +183,26 @@ pub fn resume<C: Campaign>(
     *external = external
         .take()
         .map(|attached| Attached { is_recorded: is_played, ..from_record(directory, attached) });
+    if let Some(attached) = external.as_ref().filter(|attached| !attached.is_recorded) {
+        // Nothing on the command line names it.
+        output.say(&named_in(&path, &attached.settings));
+    }
     Ok(Resumed { settings, text, table, held })
+}
+
+/// Says what a directory's settings start or reach, and how.
+fn named_in(file: &Path, settings: &ExternalSettings) -> String {
+    let (file, command) = (file.display(), settings.command.text());
+    if settings.command.is_socket() {
+        return format!("`{file}` names the driving system, which is reached now: {command}");
+    }
+    let folder = settings.working_directory.as_deref().map(normal);
+    let folder = folder.filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(PathBuf::from("."));
+    let env: String = settings.env.iter().map(|(name, value)| format!("{name}={value} ")).collect();
+    format!(
+        "`{file}` names the driving system, which is started now in `{}`: {env}{command}",
+        folder.display()
+    )
 }
 
 /// The copy of the space in a directory.

@@ -458,8 +458,13 @@ fn what_was_begun_against_one_program_is_not_gone_on_with_against_another() {
     }
     let resumed = [["run", &runs], ["train", &train], ["study", &cell]];
     for [command, directory] in resumed {
-        // From another folder, too, the same program is started.
-        done_in(&scratch.path().join("run"), &[command, "--resume", directory]);
+        // From another folder, too, the same program is started, and it is said which.
+        let stdout = done_in(&scratch.path().join("run"), &[command, "--resume", directory]);
+        let (named, of) =
+            stdout.split_once("names the driving system, which is started now in `").expect("named");
+        assert!(
+            named.contains(".yaml` ") && of.lines().next().is_some_and(|line| line.ends_with("/planner"))
+        );
     }
     script(scratch.path(), "", "--as-version 2");
     for [command, directory] in resumed {
