@@ -1,18 +1,21 @@
 //! The one place where files and folders are made, replaced, renamed and removed; `tests/it/layers.rs` keeps it so.
 //!
-//! A directory may be hostile: a cloned repository, a shard or a run from another machine. So three rules hold here:
+//! A directory may be hostile: a cloned repository, a shard or a run from another machine. So four rules hold here:
 //!
 //! - A file is written under a new name and takes its place by a rename, which replaces a symbolic link and never follows it.
 //! - A folder of ours inside a directory is used only if it is a folder and no link.
 //! - A name that a database or a file gives must be a [`PlainName`]; otherwise the database or the file is refused.
+//! - Where the user named a place to read, nothing is written beside it or in it if a folder on the way there is a link
+//!   ([`without_links`]): what leads out of a clone was not named as a place to write.
 //!
-//! Only a path that the user wrote in the command is followed wherever it leads ([`write_named`], [`make`]).
+//! Only a path that the user named to be written (`--out`, `--resume`) is followed wherever it leads ([`write_named`], [`make`]).
+//! A file that is to be changed (`fmt`, `check --fix`) is between the two: it may be a link itself, on the way to it there is none.
 //!
 //! A process that changes the directory at the same moment is not guarded against: it has the user's rights already.
 //! Files are read in `cli::load`.
 
 use std::fs::{File, Metadata};
-use std::io::{Error, ErrorKind, Result, Write};
+use std::io::{Error, ErrorKind, Read, Result, Write};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::{Component, Path, PathBuf};
 use std::sync::LazyLock;
@@ -277,6 +280,41 @@ pub fn own_folder(path: &Path) -> Result<()> {
     own(path, Metadata::is_dir, "it is no folder")
 }
 
+/// Refuses a path if a folder on the way to it is a link. The path itself may be one. A link in the root of the file system is
+/// passed: only the system makes such links, as `/tmp` of some systems.
+///
+/// # Errors
+/// Which folder is a link.
+pub fn without_links(path: &Path) -> Result<()> {
+    let mut folder = PathBuf::new();
+    for part in path.parent().unwrap_or(Path::new("")).components() {
+        folder.push(part);
+        let is_of_system = folder.parent() == Some(Path::new("/"));
+        if folder.is_symlink() && !is_of_system {
+            return Err(Error::other(format!(
+                "`{}` on the way to it is a symbolic link, which may lead anywhere: name the path that it leads to",
+                folder.display()
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// The first bytes of a file: fewer if it is shorter, none if nothing is there.
+///
+/// # Errors
+/// If it is there and cannot be read.
+pub fn first_bytes(path: &Path, count: u64) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    match File::open(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => {}
+        opened => {
+            opened?.take(count).read_to_end(&mut bytes)?;
+        }
+    }
+    Ok(bytes)
+}
+
 fn own(path: &Path, fits: fn(&Metadata) -> bool, otherwise: &'static str) -> Result<()> {
     match std::fs::symlink_metadata(path) {
         Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Ok(()),
@@ -394,6 +432,27 @@ mod tests {
         assert_eq!(std::fs::read_dir(at("elsewhere")).unwrap().count(), 0);
         make_way(&at("made"), &at("made/x/y.ava")).unwrap();
         assert!(at("made/x").is_dir() && !at("made/x/y.ava").exists());
+    }
+
+    #[test]
+    fn no_folder_on_the_way_is_a_link() {
+        let scratch = tempfile::tempdir().unwrap();
+        // The folder for temporary files may itself lie behind links.
+        let clone = scratch.path().canonicalize().unwrap();
+        std::fs::create_dir_all(clone.join("run/own")).unwrap();
+        for (target, link) in [("own", "run/link"), ("own/x", "run/x"), ("/tmp", "run/system")] {
+            std::os::unix::fs::symlink(target, clone.join(link)).unwrap();
+        }
+        for passed in ["run/x", "run/link", "run/own/x", "run/./own/../own/x", "run/missing/x"] {
+            without_links(&clone.join(passed)).unwrap();
+        }
+        for refused in ["run/link/x", "run/link/./x", "run/link/../x", "run//link//own/x", "run/system/x"] {
+            let error = without_links(&clone.join(refused)).unwrap_err().to_string();
+            assert!(error.contains("is a symbolic link"), "{refused}: {error}");
+        }
+        for passed in ["", "x", "/x", "/tmp/x", "../x"] {
+            without_links(Path::new(passed)).unwrap();
+        }
     }
 
     #[test]

@@ -37,6 +37,8 @@ pub struct Kind {
     pub file: &'static str,
     /// Whether a directory holds one.
     pub is_in: fn(&Path) -> bool,
+    /// Whether a copy of its space lies in the directory, in which its scenarios are shown as they were recorded.
+    pub keeps_space: bool,
     /// Brings shards together; nothing for what is one piece.
     pub merge: Option<Merge>,
     /// Names the scenarios in a directory that it did not write.

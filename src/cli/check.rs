@@ -11,7 +11,7 @@ use avastra_world::sim::ENGINE;
 
 use super::arguments::{CheckArguments, Dump};
 use super::error::Failure;
-use super::files::write_named;
+use super::files::write_again;
 use super::load;
 use super::output::{Output, plural};
 
@@ -97,7 +97,7 @@ fn fix(output: &Output, path: &Path, loaded: &Loaded) -> Result<bool, Failure> {
     let root = FileId::default();
     let (text, made) = apply_fixes(root, loaded.sources.text(root), &loaded.diagnostics);
     if made > 0 {
-        write_named(path, &text)?;
+        write_again(path, &text)?;
         output.tell(&format!("{}: {} made", path.display(), plural(made, "change")));
     }
     Ok(made > 0)

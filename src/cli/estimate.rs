@@ -39,6 +39,7 @@ impl Campaign for EstimateSettings {
         command: "estimate",
         file: "estimate",
         is_in: |directory| directory.join("estimate.yaml").is_file(),
+        keeps_space: true,
         merge: Some(merge::merged::<EstimateSettings>),
         foreign: run_directory::foreign_in::<EstimateSettings>,
     };
@@ -222,6 +223,7 @@ pub fn read(directory: &Path) -> Result<Contents, Failure> {
     if damaged.is_none() {
         remarks.extend(run_directory::foreign_text(&EstimateSettings::KIND, directory, &written));
     }
+    remarks.extend(run_directory::remark_on_copy(directory));
     let table = load::table(&Output::silent(), &directory.join(&settings.run.space)).ok();
     let is_it = |table: &ActionTable| table.space().meaning.is_sealed_by(&settings.run.space_digest);
     let labels: Vec<String> = match table.filter(is_it) {

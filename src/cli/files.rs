@@ -33,6 +33,25 @@ pub fn write_named(path: &Path, text: &(impl AsRef<[u8]> + ?Sized)) -> Result<()
     files::write_named(path, text.as_ref()).map_err(|error| Failure::file("write", path, error))
 }
 
+/// Writes a file anew that the user named to be changed. It may be a link itself; on the way to it there must be none.
+pub fn write_again(path: &Path, text: &(impl AsRef<[u8]> + ?Sized)) -> Result<(), Failure> {
+    without_links(path)?;
+    write_named(path, text)
+}
+
+/// Refuses a place that the user did not name to be written, as [`files::without_links`].
+pub fn without_links(path: &Path) -> Result<(), Failure> {
+    files::without_links(path).map_err(|error| Failure::file("write", path, error))
+}
+
+/// Where the result of a command goes: to the path that the user named, or else to one of our own naming, if no link leads there.
+pub fn place(named: Option<&PathBuf>, own: PathBuf) -> Result<PathBuf, Failure> {
+    match named {
+        Some(path) => Ok(path.clone()),
+        None => without_links(&own).map(|()| own),
+    }
+}
+
 /// Writes the result of a command to the path that the user named, or else to one of our own naming.
 pub fn write_result(
     named: Option<&PathBuf>,
@@ -110,7 +129,11 @@ pub fn target(file: &Path, named: Option<&PathBuf>, own: &str, extension: &str) 
     let beside = || file.parent().unwrap_or(Path::new("")).join(own);
     let stem = file.file_stem();
     let stem = stem.ok_or_else(|| Failure::file("read", file, "it is a folder: name a file in it"))?;
-    Ok(named.cloned().unwrap_or_else(beside).join(stem).with_added_extension(extension))
+    let target = named.cloned().unwrap_or_else(beside).join(stem).with_added_extension(extension);
+    if named.is_none() {
+        without_links(&target)?;
+    }
+    Ok(target)
 }
 
 /// Copies a map. Several scenarios share it; nothing else that has its name is overwritten.

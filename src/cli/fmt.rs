@@ -6,7 +6,7 @@ use avastra_lang::syntax::{FormatError, Sources};
 
 use super::arguments::FmtArguments;
 use super::error::Failure;
-use super::files::write_named;
+use super::files::write_again;
 use super::load;
 use super::output::Output;
 
@@ -32,7 +32,7 @@ pub fn fmt(output: &Output, arguments: &FmtArguments) -> Result<(), Failure> {
             output.document(formatted.trim_end_matches('\n'));
             texts.push(formatted);
         } else if !is_formatted {
-            write_named(path, &formatted)?;
+            write_again(path, &formatted)?;
             output.tell(&format!("{}: formatted", path.display()));
         }
     }

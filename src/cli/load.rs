@@ -1,6 +1,7 @@
 //! Loads files for the commands: each is read, checked and its diagnostics printed; a command gets a table, a
 //! scenario, a policy or a profile, or an error.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
@@ -172,6 +173,27 @@ pub fn below(folder: &Path) -> Vec<PathBuf> {
     }
     found.sort();
     found
+}
+
+/// All files of a directory and of the folders in it, by their paths in it.
+pub fn everything_in(directory: &Path) -> Result<BTreeMap<PathBuf, PathBuf>, Failure> {
+    let mut found = BTreeMap::new();
+    let mut open = vec![directory.to_owned()];
+    while let Some(folder) = open.pop() {
+        let failed = |error| Failure::file("read", &folder, error);
+        for entry in std::fs::read_dir(&folder).map_err(failed)? {
+            let entry = entry.map_err(failed)?;
+            let path = entry.path();
+            // A link is not followed: links may go in a circle.
+            if entry.file_type().map_err(failed)?.is_dir() {
+                open.push(path);
+            } else {
+                let name = path.strip_prefix(directory).expect("it is below").to_owned();
+                found.insert(name, path);
+            }
+        }
+    }
+    Ok(found)
 }
 
 /// The action table of a space file.

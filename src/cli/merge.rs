@@ -12,7 +12,7 @@
 //! Until it is whole, the directory has the name `OUT.partial`. It gets its own name only if its space still means what it
 //! meant; then it is ended. A merge that was killed in between is ended by the next one.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::path::{Component, Path, PathBuf};
 
@@ -326,7 +326,7 @@ fn publish<C: Cut>(
     if holds_all::<C>(out, (partial, outside), text).unwrap_or(false) {
         C::conclude(&silent, out)?;
     }
-    let (mut merged, known) = (files_of(partial)?, files_of(out)?);
+    let (mut merged, known) = (load::everything_in(partial)?, load::everything_in(out)?);
     // Machines need not have taken the same time.
     for name in [MARK, timing::FILE] {
         merged.remove(Path::new(name));
@@ -353,27 +353,6 @@ fn holds_all<C: Cut>(out: &Path, (partial, outside): (&Path, &Outside), text: &s
     };
     let ((settings, there), (_, merged)) = (places(out)?, places(partial)?);
     Ok(settings == text && there.is_superset(&merged))
-}
-
-/// All files of a directory, by their paths in it.
-fn files_of(directory: &Path) -> Result<BTreeMap<PathBuf, PathBuf>, Failure> {
-    let mut found = BTreeMap::new();
-    let mut open = vec![directory.to_owned()];
-    while let Some(folder) = open.pop() {
-        let failed = |error| Failure::file("read", &folder, error);
-        for entry in std::fs::read_dir(&folder).map_err(failed)? {
-            let entry = entry.map_err(failed)?;
-            let path = entry.path();
-            // A link is not followed: links may go in a circle.
-            if entry.file_type().map_err(failed)?.is_dir() {
-                open.push(path);
-            } else {
-                let name = path.strip_prefix(directory).expect("it is below").to_owned();
-                found.insert(name, path);
-            }
-        }
-    }
-    Ok(found)
 }
 
 impl Outside {
@@ -483,8 +462,10 @@ impl Way<'_> {
         if from.join(pack::SPACE).is_dir() {
             copy_folder(OsStr::new(pack::SPACE), [&from, &to])?;
         }
+        let remark = run_directory::remark_on_copy(self.from);
+        remark.iter().for_each(|remark| output.warn(remark));
         // Copies of one meaning may differ in comments: that of the first directory is kept.
-        if self.from.join(pack::SPACE).is_dir() && !self.to.join(pack::SPACE).exists() {
+        if remark.is_none() && self.from.join(pack::SPACE).is_dir() && !self.to.join(pack::SPACE).exists() {
             copy_folder(OsStr::new(pack::SPACE), [self.from, self.to])?;
         }
         let copied = |found: WrittenScenario| {

@@ -15,7 +15,7 @@ use avastra_world::action::ActionTable;
 use super::arguments::{FilesArguments, ReportArguments};
 use super::campaign::{KINDS, lacks, missing};
 use super::error::Failure;
-use super::files::{must_end_in, write_result};
+use super::files::{must_end_in, place, write_result};
 use super::load;
 use super::look::{self, Looked};
 use super::output::{Output, for_shell, plural};
@@ -33,7 +33,7 @@ const FOLDERS: [&str; 3] = ["critical", "failures", shrink::FOLDER];
 /// Writes the page of a directory or of files. A scenario that does not play as its file claims is shown, said so of before
 /// all else, and fails the command.
 pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failure> {
-    let path = arguments.output.clone().unwrap_or_else(|| default_path(&arguments.paths));
+    let path = place(arguments.output.as_ref(), default_path(&arguments.paths))?;
     must_end_in(&path, "html")?;
     let asked = arguments.ads.as_deref().map(|text| load::asked(Some(text))).transpose()?;
     let is_folder = matches!(arguments.paths.as_slice(), [directory] if directory.is_dir());
@@ -244,14 +244,21 @@ fn of_run(
     if let Some(kind) = run_directory::what_was_begun(directory).filter(|_| !is_changed) {
         remarks.extend(run_directory::foreign_text(&kind, directory, &written));
     }
+    remarks.extend(run_directory::remark_on_copy(directory));
     let space = serde_yaml::from_str::<Begun>(settings).ok().map(|begun| directory.join(begun.space));
     // A page of what was found is worth having without the names of the rows.
     let table: Option<ActionTable> = space.and_then(|space| load::table(output, &space).ok());
     if table.is_none() {
         found.remarks.push("the space of the run cannot be read: its rows have numbers only".to_owned());
     }
+    let is_training = run_directory::is_training(directory) == Some(true);
     // A training that is not finished has not been judged yet, and a run never is.
     let results = match database.results() {
+        Err(DatabaseError::Results) | Ok(Some(_)) if !is_training => {
+            let path = path.display();
+            remarks.push(format!("`{path}` has results, which only a training has: they count for nothing"));
+            None
+        }
         Err(error @ DatabaseError::Results) => {
             remarks.push(unread(error).to_string());
             None

@@ -7,7 +7,7 @@ use avastra_exchange::report::{self, Chapter};
 
 use super::arguments::ResultsArguments;
 use super::error::Failure;
-use super::files::{write, write_named};
+use super::files::{without_links, write, write_named};
 use super::load;
 use super::output::{Output, plural};
 use super::study;
@@ -29,6 +29,7 @@ pub fn results(output: &Output, arguments: &ResultsArguments) -> Result<(), Fail
             );
             return Err(Failure::file("add", directory, reason));
         }
+        without_links(&path)?;
         write(&path, &played.to_text())?;
         output.tell(&format!(
             "{} of {} into {}",

@@ -4,11 +4,13 @@
 //! hold any more. Claims that an author took out stay out.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use avastra_campaign::emit;
 use avastra_campaign::episode::{EpisodeLog, Outcome};
 use avastra_campaign::oracle::{self, ClaimResult};
 use avastra_campaign::run::{Asked, EpisodeSummary, RunError, Stage, recorded_traffic};
+use avastra_drivers::external;
 use avastra_lang::model::vocabulary::Word;
 use avastra_lang::model::{Avoidability, Claim, Scenario};
 use avastra_lang::syntax::ast::{self, ClauseKind, Doc, Expect, ExprKind, FileId, Span};
@@ -17,8 +19,11 @@ use avastra_world::sim::ENGINE;
 
 use super::error::Failure;
 
-/// Fields of an origin that say by what the scenario was played.
-const PLAYED_BY: [&str; 6] = ["ads", "profile", "profile_digest", "answers", "engine", "traffic_digest"];
+/// Fields of an origin that say which driving system drove.
+const DRIVEN_BY: [&str; 4] = ["ads", "profile", "profile_digest", "answers"];
+
+/// Fields of an origin that say in which world it drove.
+const PLAYED_IN: [&str; 2] = ["engine", "traffic_digest"];
 
 /// How the crash of a scenario differs from what the scenario says; the larger difference comes later.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -53,8 +58,15 @@ pub struct Review {
     pub differences: Vec<String>,
     /// Which step is not legal any more, and why.
     pub illegal: Option<String>,
-    /// The text that says what is so now, and the log of it; `None` for what is gone.
-    pub now: Option<(String, EpisodeLog)>,
+    /// What is so now; `None` for what is gone.
+    pub now: Option<Now>,
+}
+
+/// What a scenario's files say if it is taken over as it is now.
+pub struct Now {
+    pub text: String,
+    /// The text of its file of answers; `None` if there is none, or if the one that is there holds as it is.
+    pub answers: Option<Arc<str>>,
 }
 
 /// Plays a scenario as things are now: against the driving system that is asked for, or else the recorded one. `text` is its
@@ -99,7 +111,8 @@ pub fn review(
         let change = if is_same { Change::Same } else { Change::Gone };
         differences.extend(refuted().map(|(_, result)| in_words(result)));
         let is_kept = change == Change::Gone || !is_recorded;
-        let now = (!is_kept).then(|| (text.to_owned(), log));
+        // Such a scenario is a whole episode: if it ends as it did, its answers are those that are recorded.
+        let now = (!is_kept).then(|| Now { text: text.to_owned(), answers: None });
         return Ok(Review { change, differences, illegal, now });
     }
 
@@ -138,8 +151,25 @@ pub fn review(
     };
     let told_anew = avastra_lang::syntax::print(&emit::retold(table, &log, &summary, &source));
     let is_refuted: Vec<bool> = results.iter().map(ClaimResult::is_refuted).collect();
-    let now = rewritten(text, &told_anew, &is_refuted);
-    Ok(Review { change, differences, illegal, now: Some((now, log)) })
+    let is_kept = answers_hold(&scenario, &log);
+    let fields = if is_kept { PLAYED_IN.to_vec() } else { [&DRIVEN_BY[..], &PLAYED_IN].concat() };
+    let conversation = log.conversation.as_deref().filter(|_| !is_kept);
+    let answers = conversation.map(|conversation| external::to_text(&conversation.exchanges).into());
+    let now = Now { text: rewritten(text, &told_anew, &is_refuted, &fields), answers };
+    Ok(Review { change, differences, illegal, now: Some(now) })
+}
+
+/// Whether the recorded answers hold for a log: it has the same driving system and the same answers, as far as it goes. The
+/// recorded ones may go on, because they are those of the whole episode, and a scenario is cut after its last crash.
+fn answers_hold(scenario: &Scenario, log: &EpisodeLog) -> bool {
+    let origin = &scenario.origin;
+    let (Some(conversation), Some(text)) = (log.conversation.as_deref(), origin.recorded_answers.as_deref())
+    else {
+        return false;
+    };
+    origin.profile_digest.as_deref() == Some(conversation.attached.digest().as_str())
+        && external::from_text(text, origin.answers.as_deref())
+            .is_ok_and(|recorded| conversation.begins(&recorded))
 }
 
 /// Gives a scenario the present engine and traffic as its origin, and returns what has changed, in words.
@@ -214,16 +244,16 @@ fn newly_hit(scenario: &Scenario, summary: &EpisodeSummary) -> Vec<String> {
     new.map(|contact| format!("npc#{} is hit at {:.2} s", contact.obstacle, contact.time_s)).collect()
 }
 
-/// A scenario's file with what another text of it says by what it was played, and with the other text's claims in place of
-/// those that are refuted. Everything else stays: other claims, comments, ends of lines.
-fn rewritten(text: &str, anew: &str, is_refuted: &[bool]) -> String {
+/// A scenario's file with what another text of it says in these `fields` of its origin, and with the other text's claims in place
+/// of those that are refuted. Everything else stays: other claims, comments, ends of lines.
+fn rewritten(text: &str, anew: &str, is_refuted: &[bool], fields: &[&str]) -> String {
     let (old_file, new_file) = (parsed(text), parsed(anew));
     let (Some((old, old_docs)), Some((new, new_docs))) = (scenario_of(&old_file), scenario_of(&new_file))
     else {
         return text.to_owned();
     };
     let mut edits: Vec<(Range<usize>, String)> = Vec::new();
-    for name in PLAYED_BY {
+    for name in fields {
         edits.extend(field_edit(name, (text, old), (anew, new)));
     }
     edits.extend(claim_edits((text, &old.expects), (anew, &new.expects), is_refuted));
@@ -395,7 +425,7 @@ scenario s {
 
     #[test]
     fn claims_about_another_crash_take_the_place_of_those_about_the_one() {
-        let now = rewritten(OLD, NEW, &[true; 5]);
+        let now = rewritten(OLD, NEW, &[true; 5], &PLAYED_IN);
         let (_, claims) = now.split_once("wait() }\n").unwrap();
         let wanted = "  // who
   expect collision with npc#2 at 4.00 s
@@ -411,6 +441,6 @@ scenario s {
         assert_eq!(claims, wanted);
         // A file keeps its ends of lines.
         let crlf = |text: &str| text.replace('\n', "\r\n");
-        assert_eq!(rewritten(&crlf(OLD), NEW, &[true; 5]), crlf(&now));
+        assert_eq!(rewritten(&crlf(OLD), NEW, &[true; 5], &PLAYED_IN), crlf(&now));
     }
 }

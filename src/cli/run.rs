@@ -40,6 +40,7 @@ impl Campaign for RunSettings {
         command: "run",
         file: "run",
         is_in: |directory| run_directory::is_training(directory) == Some(false),
+        keeps_space: true,
         merge: Some(merge::merged::<RunSettings>),
         foreign: run_directory::foreign_in::<RunSettings>,
     };

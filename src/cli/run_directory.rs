@@ -4,7 +4,7 @@
 //! directory can be begun again; what it leaves after that can be resumed. One process at a time works in it.
 //!
 //! The truth of a directory is its database, which has the text of each scenario, too: a missing scenario is written again,
-//! and an edited one is named.
+//! and an edited one is named. So is the copy of the space, whose meaning the settings record.
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
@@ -19,6 +19,7 @@ use avastra_campaign::run::{
     DatabaseError, EpisodeSummary, Numbered, Shard, Units, VERSION, WrittenScenario,
 };
 use avastra_drivers::external::{Attached, ExternalSettings};
+use avastra_lang::check::normal;
 use avastra_lang::syntax::{ast, print};
 use avastra_world::action::ActionTable;
 use avastra_world::sim::ENGINE;
@@ -171,6 +172,9 @@ pub fn resume<C: Campaign>(
             table.space().path.display()
         )));
     }
+    if C::KIND.keeps_space {
+        restore_copy(output, directory, (space.as_str(), space_digest), &table.space().path)?;
+    }
     *external = external
         .take()
         .map(|attached| Attached { is_recorded: is_played, ..from_record(directory, attached) });
@@ -182,6 +186,10 @@ pub fn resume<C: Campaign>(
     if let Some(how) = lost {
         output.tell(&format!("`{}` is {how}: the {what} begins anew", database.display()));
     }
+    if let Some(attached) = external.as_ref().filter(|attached| !attached.is_recorded) {
+        // Nothing on the command line names it.
+        output.say(&named_in(&path, &attached.settings));
+    }
     Ok(Resumed { settings, text, table, held })
 }
 
@@ -191,6 +199,94 @@ pub fn lost(database: &Path) -> Option<&'static str> {
         Err(_) => Some("missing"),
         Ok(found) => (found.is_file() && found.len() == 0).then_some("empty"),
     }
+}
+
+/// Says what a directory's settings start or reach, and how.
+fn named_in(file: &Path, settings: &ExternalSettings) -> String {
+    let (file, command) = (file.display(), settings.command.text());
+    if settings.command.is_socket() {
+        return format!("`{file}` names the driving system, which is reached now: {command}");
+    }
+    let folder = settings.working_directory.as_deref().map(normal);
+    let folder = folder.filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(PathBuf::from("."));
+    let env: String = settings.env.iter().map(|(name, value)| format!("{name}={value} ")).collect();
+    format!(
+        "`{file}` names the driving system, which is started now in `{}`: {env}{command}",
+        folder.display()
+    )
+}
+
+/// The copy of the space in a directory.
+enum Copied {
+    Sound,
+    Edited,
+    Gone,
+}
+
+/// What became of the copy of a space in a directory. `space` is the path of the space from there, `digest` what it meant.
+fn copied(directory: &Path, space: &str, digest: &str) -> Copied {
+    let folder = directory.join(pack::SPACE);
+    let space = Path::new(space);
+    // What is played is the copy itself, which is compared whenever it is read.
+    let is_inside = space.is_relative() && !space.starts_with("..");
+    if is_inside {
+        return Copied::Sound;
+    }
+    if is_gone(&folder) {
+        return Copied::Gone;
+    }
+    let silent = Output::silent();
+    let is_it = |file: &&PathBuf| {
+        file.file_name() == space.file_name()
+            && load::table(&silent, file).is_ok_and(|table| table.space().meaning.is_sealed_by(digest))
+    };
+    let files = load::everything_in(&folder).unwrap_or_default();
+    if files.values().any(|file| is_it(&file)) { Copied::Sound } else { Copied::Edited }
+}
+
+/// A remark on the copy of its space in a directory, if it was edited or is gone.
+pub fn remark_on_copy(directory: &Path) -> Option<String> {
+    #[derive(serde::Deserialize)]
+    struct Begun {
+        space: String,
+        space_digest: String,
+    }
+    let kind = what_was_begun(directory).filter(|kind| kind.keeps_space)?;
+    let text = load::read(&kind.settings(directory)).ok()?;
+    let Begun { space, space_digest } = serde_yaml::from_str(&text).ok()?;
+    let copy = directory.join(pack::SPACE);
+    let copy = copy.display();
+    match copied(directory, &space, &space_digest) {
+        Copied::Sound => None,
+        Copied::Edited => Some(format!(
+            "`{copy}` was edited since it was written: it is not the space of this {} any more, and is not used; delete it, and \
+             `--resume` writes it again",
+            kind.what
+        )),
+        Copied::Gone => Some(format!(
+            "`{copy}`, the copy of the space of this {}, is gone: `--resume` writes it again",
+            kind.what
+        )),
+    }
+}
+
+/// Writes the copy of a space again if it is gone, and names one that was edited. `space` is the path of the space from the
+/// directory, with what it means; `there` is its file, which means that.
+fn restore_copy(
+    output: &Output,
+    directory: &Path,
+    (space, digest): (&str, &str),
+    there: &Path,
+) -> Result<(), Failure> {
+    match copied(directory, space, digest) {
+        Copied::Sound => {}
+        Copied::Edited => remark_on_copy(directory).iter().for_each(|remark| output.warn(remark)),
+        Copied::Gone => {
+            let copy = pack::pack_space(there, directory)?;
+            output.tell(&format!("{}: was missing, is written again", copy.display()));
+        }
+    }
+    Ok(())
 }
 
 /// Makes a directory ready to be resumed: refuses folders that are links, and removes partial files that a kill left.
@@ -363,14 +459,18 @@ impl<C: Campaign> Directory<C> {
         Ok(Directory { path: held.path.clone(), database, _held: held })
     }
 
-    /// As [`Directory::open`], but units whose rows were changed are named and dropped, so that they are played again.
+    /// As [`Directory::open`], but units whose rows were changed are named and removed. Those that belong to the directory are
+    /// lacking then, so they are played again.
     pub fn open_to_go_on(output: &Output, held: Held, settings: &str) -> Result<Directory<C>, Failure> {
         let file = C::KIND.database(&held.path);
         let (database, damaged) = C::Database::open_and_drop(&file, settings)
             .map_err(|error| Failure::file("open", &file, error))?;
         if !damaged.is_empty() {
             let changed = changed::<C::Database>(&file, &damaged);
-            output.warn(&format!("{changed}: each such {} is played again", C::Database::LAYOUT.unit));
+            let unit = C::Database::LAYOUT.unit;
+            output.warn(&format!(
+                "{changed}: each such {unit} is removed, and played again if it is to be played here"
+            ));
         }
         Ok(Directory { path: held.path.clone(), database, _held: held })
     }

@@ -208,7 +208,7 @@ study
   results object? as in results.json; absent if the driving system failed
   failures[] object a cell that a driving system of your own failed in: `agent`, `road`, `number`, and how often by \
     kind, `trained` and `evaluated`
-  timing[] object of an agent: `cells`, mean `wall_s` and `cpu_s`
+  timing[] object of an agent: `cells`, mean `wall_s` and `cpu_s`, null where no times are known
 study results
   output text where the results were written
   studies[] object `study`, its name; of a played one its `cells`, and how it departs from its file: `smaller`, `other`

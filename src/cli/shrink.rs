@@ -11,7 +11,7 @@ use avastra_lang::model::Claim;
 
 use super::arguments::ShrinkArguments;
 use super::error::Failure;
-use super::files::{folder, make, write_answers, write_result};
+use super::files::{folder, make, without_links, write_answers, write_result};
 use super::findings::{is_reproducible, spot_check};
 use super::load;
 use super::look;
@@ -117,7 +117,10 @@ impl Small {
 fn apart(file: &Path) -> Result<PathBuf, Failure> {
     let beside = file.parent().unwrap_or(Path::new(""));
     let beside = if beside.ends_with("critical") { beside.parent().unwrap_or(beside) } else { beside };
-    Ok(folder(beside, FOLDER)?.join(file.file_name().unwrap_or_default()))
+    let path = beside.join(FOLDER).join(file.file_name().unwrap_or_default());
+    without_links(&path)?;
+    folder(beside, FOLDER)?;
+    Ok(path)
 }
 
 /// Shrinks the scenario of a file into another, for which the user may have named a path.

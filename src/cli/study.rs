@@ -35,6 +35,7 @@ impl Campaign for StudySettings {
         command: "study",
         file: "study",
         is_in: |directory| directory.join("study.yaml").is_file(),
+        keeps_space: false,
         merge: Some(merge::merged::<StudySettings>),
         foreign: run_directory::foreign_in::<StudySettings>,
     };
@@ -62,8 +63,8 @@ impl Cut for StudySettings {
     }
 
     fn take_beside([from, to]: [&Path; 2]) -> Result<(), Failure> {
-        let mut times = Times::read(to)?;
-        times.extend(Times::read(from)?);
+        let mut times = Times::read(to);
+        times.extend(Times::read(from));
         times.write(to)
     }
 
@@ -121,7 +122,7 @@ fn play_all(
     let share = Share::of(&path, study.settings())?;
     let all = study.settings().jobs();
     output.tell(&format!("{}, into {}", heading(&study), path.display()));
-    let mut times = Times::read(&path)?;
+    let mut times = Times::read(&path);
     for Reused { directory: other, played } in reused {
         let lacking = share.lacking(study.settings(), &directory)?;
         let lacking: Vec<&Job> = lacking.into_iter().map(|job| &all[job]).collect();
@@ -253,7 +254,7 @@ pub fn read_sound(directory: &Path) -> Result<Sound, Failure> {
     let unread = |error| Failure::file("read", &file, error);
     let (database, changed) = run_directory::open_to_read::<StudyDatabase>(&file, &text)?;
     let missing = missing(directory, &settings, &database, |_| true)?;
-    let cells = Times::read(directory)?.on(database.cells().map_err(unread)?);
+    let cells = Times::read(directory).on(database.cells().map_err(unread)?);
     if !FailedCell::among(&cells).is_empty() {
         return Err(Failure::file("use", &file, "the driving system failed in it, so there are no results"));
     }
@@ -348,13 +349,16 @@ fn spent() -> Spent {
 
 static BEGAN: LazyLock<Instant> = LazyLock::new(now);
 
-/// Mean times of an agent's cells.
+/// Mean times of an agent's cells, over those whose times are known.
 #[derive(serde::Serialize)]
 struct Timing {
     agent: String,
     cells: usize,
-    wall_s: f64,
+    wall_s: Option<f64>,
     cpu_s: Option<f64>,
+    /// Cells whose times are known.
+    #[serde(skip)]
+    timed: usize,
 }
 
 fn timing(cells: &[CellRecord]) -> Vec<Timing> {
@@ -362,14 +366,16 @@ fn timing(cells: &[CellRecord]) -> Vec<Timing> {
     labels.sort_unstable();
     labels.dedup();
     let of = |label: &str| {
-        let own: Vec<Spent> =
+        let own: Vec<Option<Spent>> =
             cells.iter().filter(|cell| cell.agent == label).map(|cell| cell.spent).collect();
-        let count = own.len() as f64;
+        let known: Vec<Spent> = own.iter().copied().flatten().collect();
+        let mean = |sum_s: f64| (!known.is_empty()).then(|| sum_s / known.len() as f64);
         Timing {
             agent: label.to_owned(),
             cells: own.len(),
-            wall_s: own.iter().map(|spent| spent.wall_s).sum::<f64>() / count,
-            cpu_s: own.iter().map(|spent| spent.cpu_s).sum::<Option<f64>>().map(|sum| sum / count),
+            wall_s: mean(known.iter().map(|spent| spent.wall_s).sum()),
+            cpu_s: known.iter().map(|spent| spent.cpu_s).sum::<Option<f64>>().and_then(mean),
+            timed: known.len(),
         }
     };
     labels.into_iter().map(of).collect()
@@ -377,9 +383,16 @@ fn timing(cells: &[CellRecord]) -> Vec<Timing> {
 
 fn timing_text(directory: &Path, timing: &[Timing]) -> String {
     let mut text = format!("\nall figures: {}", directory.join("results.json").display());
-    for Timing { agent, cells, wall_s, cpu_s } in timing {
+    for Timing { agent, cells, wall_s, cpu_s, timed } in timing {
+        let cells = plural(*cells, "cell");
+        let Some(wall_s) = wall_s else {
+            text.push_str(&format!("\n{agent}: {cells}, no times are known"));
+            continue;
+        };
         let cpu = cpu_s.map_or(String::new(), |cpu_s| format!(", {cpu_s:.1} s of a processor"));
-        text.push_str(&format!("\n{agent}: {} of {wall_s:.1} s{cpu} on average", plural(*cells, "cell")));
+        let timed = plural(*timed, "cell");
+        let only = if timed == cells { String::new() } else { format!(", by the times of {timed}") };
+        text.push_str(&format!("\n{agent}: {cells} of {wall_s:.1} s{cpu} on average{only}"));
     }
     text
 }

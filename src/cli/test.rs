@@ -1,6 +1,7 @@
 //! `avastra test`: emitted scenarios as a regression suite for a driving system.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use avastra_campaign::files;
 use avastra_campaign::oracle::{self, Regression};
@@ -14,14 +15,15 @@ use avastra_world::action::ActionTable;
 
 use super::arguments::{FilesArguments, TestArguments};
 use super::error::Failure;
-use super::files::{write, write_answers, write_named};
+use super::files::{without_links, write, write_named};
 use super::findings::{is_reproducible, spot_check};
-use super::load::{self, Emitted};
+use super::load::{self, Emitted, answers_path};
 use super::look::{as_it_is_now, is_outdated, meaning_text};
 use super::output::{Output, plural};
 use super::parallel::each_file_in_turn;
 use super::progress::now;
-use super::review::{Change, Review, review};
+use super::review::{Change, Now, Review, review};
+use super::run_directory;
 use super::run_directory::what_was_begun;
 
 /// The result for one scenario.
@@ -48,13 +50,19 @@ enum Outcome {
 
 /// Plays every scenario of a suite against a driving system.
 pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
+    let files = suite_files(&arguments.paths)?;
+    if arguments.accept {
+        files.iter().try_for_each(|file| without_links(file))?;
+    }
+    let remarks = arguments.paths.iter().filter_map(|path| run_directory::remark_on_copy(path));
+    remarks.for_each(|remark| output.warn(&remark));
     let asked = load::asked(arguments.against.ads.as_deref())?;
     let suite = Suite { arguments, asked };
     for path in &arguments.paths {
         let foreign = what_was_begun(path).and_then(|kind| (kind.foreign)(path));
         foreign.iter().for_each(|text| output.warn(text));
     }
-    let many = FilesArguments { files: suite_files(&arguments.paths)?, jobs: arguments.jobs };
+    let many = FilesArguments { files, jobs: arguments.jobs };
     let program = suite.asked.external.as_ref();
     let mut tell = |found: &Option<(Case, Notes)>| found.iter().for_each(|found| tell(output, found));
     let mut played = each_file_in_turn(output, &many, program, |file| Ok(suite.play(file)), &mut tell)?;
@@ -252,7 +260,7 @@ impl Suite<'_> {
         notes.reviewed = Some(serde_json::json!({
             "file": file, "scenario": scenario.name, "change": change.in_words(), "differences": differences,
         }));
-        let Some((text, log)) = now else {
+        let Some(Now { text, answers }) = now else {
             let why = illegal.unwrap_or_else(|| "no collision of it counts any more".to_owned());
             let gone = Outcome::Gone(format!("{why}; it is kept as it was"));
             return Ok((emitted, (change == Change::Gone).then_some(gone)));
@@ -265,9 +273,15 @@ impl Suite<'_> {
         if text == before {
             return Ok((emitted, None));
         }
-        let emitted = notes.emitted(file, load::check_text(file, &text)?)?;
+        let mut emitted = notes.emitted(file, load::check_text(file, &text)?)?;
+        if let (Emitted::Scenario(_, scenario), Some(answers)) = (&mut emitted, &answers) {
+            // The file beside it has the answers of the text before.
+            scenario.origin.recorded_answers = Some(Arc::clone(answers));
+        }
         if self.arguments.accept {
-            write_answers(file, &log)?;
+            if let Some(answers) = &answers {
+                write(&answers_path(file), &**answers)?;
+            }
             write(file, &text)?;
             notes.is_accepted = true;
         }

@@ -29,25 +29,20 @@ struct Line {
 }
 
 impl Times {
-    /// Those that a directory of a study has.
-    pub fn read(directory: &Path) -> Result<Times, Failure> {
-        let mut times = Times::default();
-        let file = directory.join(FILE);
-        if file.exists() {
-            // A line that cannot be read is a time that is not known.
-            for Line { agent, road, number, spent } in
-                load::text(&file)?.lines().filter_map(|line| serde_json::from_str(line).ok())
-            {
-                times.of_cells.insert((agent, road, number), spent);
-            }
-        }
-        Ok(times)
+    /// Those that a directory of a study has. What cannot be read is a time that is not known.
+    pub fn read(directory: &Path) -> Times {
+        let text = load::read(&directory.join(FILE)).unwrap_or_default();
+        let lines = text.lines().filter_map(|line| serde_json::from_str::<Line>(line).ok());
+        let is_time = |spent: &Spent| spent.wall_s >= 0.0 && spent.cpu_s.is_none_or(|cpu_s| cpu_s >= 0.0);
+        let sound = lines.filter(|line| is_time(&line.spent));
+        Times { of_cells: sound.map(|line| ((line.agent, line.road, line.number), line.spent)).collect() }
     }
 
     /// Takes the times of cells in that were played.
     pub fn add(&mut self, cells: &[CellRecord]) {
-        let timed = |cell: &CellRecord| ((cell.agent.clone(), cell.road.clone(), cell.number), cell.spent);
-        self.of_cells.extend(cells.iter().map(timed));
+        let timed =
+            |cell: &CellRecord| Some(((cell.agent.clone(), cell.road.clone(), cell.number), cell.spent?));
+        self.of_cells.extend(cells.iter().filter_map(timed));
     }
 
     /// Takes those of another directory in.
@@ -64,11 +59,11 @@ impl Times {
         write(&directory.join(FILE), &self.of_cells.iter().map(line).collect::<String>())
     }
 
-    /// The cells with their times.
+    /// The cells with their times, as far as they are known.
     pub fn on(&self, mut cells: Vec<CellRecord>) -> Vec<CellRecord> {
         for cell in &mut cells {
             let key = (cell.agent.clone(), cell.road.clone(), cell.number);
-            cell.spent = self.of_cells.get(&key).copied().unwrap_or_default();
+            cell.spent = self.of_cells.get(&key).copied();
         }
         cells
     }

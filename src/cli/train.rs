@@ -41,6 +41,7 @@ impl Campaign for TrainSettings {
         command: "train",
         file: "run",
         is_in: |directory| run_directory::is_training(directory) == Some(true),
+        keeps_space: true,
         // Each episode is chosen with what was learned before.
         merge: None,
         foreign: run_directory::foreign_in::<TrainSettings>,

@@ -154,7 +154,7 @@ fn a_run_that_was_edited_is_not_gone_on_with() {
     fails(&["train", "--resume", &out], "holds a run: go on with `avastra run --resume");
     fails(&["study", "--resume", &out], "holds a run");
 
-    // An episode whose rows were changed is named, counts for nothing, and is played again.
+    // An episode whose rows were changed is named, counts for nothing, and is played again; one too many is only removed.
     let bytes = std::fs::read(scratch.path("run/run.db")).expect("it is readable");
     let rows = "UPDATE step SET proc = 0.5 WHERE episode = 1 AND step = 0;
                 UPDATE episode SET distance_m = 1e9 WHERE episode = 1;
@@ -173,7 +173,10 @@ fn a_run_that_was_edited_is_not_gone_on_with() {
     assert!(status == 0 && stderr.contains("its rows of episode 1 were changed"), "{stderr}");
     assert!(stderr.contains(&format!("`avastra run --resume {out}` plays them again")), "{stderr}");
     let stderr = resumed(&out);
-    assert!(stderr.contains(&format!("{changed}: each such episode is played again")), "{stderr}");
+    assert!(
+        stderr.contains(&format!("{changed}: each such episode is removed, and played again if")),
+        "{stderr}"
+    );
     assert!(std::fs::read(scratch.path("run/run.db")).expect("it is readable") == bytes);
     let stderr = resumed(&out);
     assert!(!stderr.contains("changed"), "{stderr}");
@@ -204,6 +207,19 @@ fn a_run_that_was_edited_is_not_gone_on_with() {
         bytes.iter().enumerate().map(|(at, byte)| if at % 991 == 990 { !byte } else { *byte }).collect();
     std::fs::write(scratch.path("run/run.db"), torn).expect("it is writable");
     fails(&["run", "--resume", &out], "begin a new one");
+}
+
+/// Advice goes by what the directory holds, not by what somebody put into its database.
+#[test]
+fn rows_of_a_training_do_not_make_a_run_one() {
+    let scratch = Scratch::new();
+    let out = scratch.text("run");
+    assert_eq!(run_into(&out).0, 0);
+    let rows = "INSERT INTO result VALUES (1, 'x', '{}'); INSERT INTO checkpoint VALUES (1, 5, 'x', x'00')";
+    change(&scratch.path("run/run.db"), rows);
+    let (status, _, stderr) = outcome(&mut avastra(&["report", &out, "--out", &scratch.text("page.html")]));
+    let is_told = stderr.contains("has results, which only a training has: they count for nothing");
+    assert!(status == 0 && is_told && !stderr.contains("avastra train"), "{stderr}");
 }
 
 #[test]

@@ -10,7 +10,7 @@ use std::path::Path;
 use assert_cmd::cargo::cargo_bin;
 use serde_json::Value;
 
-use crate::cases::{root, texts};
+use crate::cases::{copy_space, root, texts};
 use crate::command::{avastra, done, done_in, fails, last_line, outcome};
 
 const SPACE: &str = "scenarios/avastra45.ava";
@@ -262,6 +262,53 @@ fn threads_and_processes_change_nothing_and_crashes_replay_with_and_without_the_
     fails(&["replay", &path], "--ads");
 }
 
+/// A scenario ends with its crash, and its answers are those of the whole episode: a review plays only their beginning.
+#[test]
+fn a_review_keeps_recorded_answers_that_hold() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let path = |name: &str| scratch.path().join(name).display().to_string();
+    copy_space(&scratch.path().join("space"));
+    let config = profile(scratch.path(), &["--answer", "trajectory", "--blind"], "1", "");
+    let (space, out) = (path("space/avastra45.ava"), path("run"));
+    let settings = ["--road", "corner", "--episodes", "2", "--seed", "3", "--ads", &config, "--out", &out];
+    done(&[&["run", &space], &settings[..]].concat());
+    let critical = scratch.path().join("run/critical");
+    let before = texts(&critical);
+    let scenario = before.keys().find(|name| name.ends_with(".ava")).expect("it crashes").clone();
+    let file = critical.join(&scenario).display().to_string();
+    let review = |more: &[&str], wanted: &str| {
+        for how in ["--review", "--accept"] {
+            let (status, stdout, stderr) = outcome(&mut avastra(&[&["test", how, &out], more].concat()));
+            let is_played =
+                stdout.contains(wanted) && stdout.contains("1 still fail, 0 fixed, 0 changed, 0 not");
+            assert!(status == 4 && is_played, "{how} {more:?}: {status}: {stdout}{stderr}");
+        }
+    };
+    let same = format!("{scenario}: same\n");
+    for more in [&[][..], &["--ads", &config]] {
+        review(more, &same);
+        assert_eq!(texts(&critical), before, "{more:?}: nothing changed, so nothing is written");
+    }
+    // The scenario does not meet this change of its space, so only the digest of the space is another.
+    let text = std::fs::read_to_string(&space).expect("it is readable");
+    let changed = text.replacen("let weight_mode = 1.0", "let weight_mode = 1.0\nodds Side { Left => 3 }", 1);
+    assert_ne!(text, changed);
+    std::fs::write(&space, changed).expect("it is writable");
+    review(&[], &same);
+    let after = texts(&critical);
+    let lines =
+        before.values().flat_map(|text| text.lines()).zip(after.values().flat_map(|text| text.lines()));
+    let differ: Vec<_> = lines.filter(|(then, now)| then != now).collect();
+    assert!(differ.len() == 1 && differ[0].1.starts_with("use "), "{differ:?}");
+    done(&["replay", &file]);
+    // With another driving system the answers are others, and become those of the scenario.
+    let other = tempfile::tempdir().expect("a scratch directory");
+    let other = profile(other.path(), &["--answer", "acceleration", "--blind"], "1", "");
+    review(&["--ads", &other], "");
+    assert_ne!(texts(&critical), after);
+    done(&["replay", &file]);
+}
+
 #[test]
 fn a_check_passes_for_every_kind_of_answer_and_finds_what_remembers() {
     let program = cargo_bin("avastra").display().to_string();
@@ -411,8 +458,13 @@ fn what_was_begun_against_one_program_is_not_gone_on_with_against_another() {
     }
     let resumed = [["run", &runs], ["train", &train], ["study", &cell]];
     for [command, directory] in resumed {
-        // From another folder, too, the same program is started.
-        done_in(&scratch.path().join("run"), &[command, "--resume", directory]);
+        // From another folder, too, the same program is started, and it is said which.
+        let stdout = done_in(&scratch.path().join("run"), &[command, "--resume", directory]);
+        let (named, of) =
+            stdout.split_once("names the driving system, which is started now in `").expect("named");
+        assert!(
+            named.contains(".yaml` ") && of.lines().next().is_some_and(|line| line.ends_with("/planner"))
+        );
     }
     script(scratch.path(), "", "--as-version 2");
     for [command, directory] in resumed {

@@ -30,6 +30,10 @@ use End::{Any, Done, Refused};
 
 /// Words of the error about a link.
 const LINK: &str = "it is a symbolic link";
+/// Words of the error about a link on the way to a place that was named to be read.
+const WAY: &str = "on the way to it is a symbolic link";
+/// Words of the error about a database in another journal mode.
+const WAL: &str = "journal mode WAL";
 /// Words of the errors about a name in a database.
 const PLAIN: &str = "is no plain name";
 const NAME: &str = "is no name of a scenario";
@@ -65,6 +69,9 @@ const fn changed(
 
 /// The scenario that the run of the fixture found first.
 const FOUND: &str = "run/critical/corner_0000.ava";
+
+/// A link on the way to it.
+const CRITICAL: [(&str, &str); 1] = [("run/critical", "folder")];
 
 /// In commands, `SPACE` and the like stand for files of the repository, `FOUND` for [`FOUND`], and `QUICK` for options of a short
 /// run; the number of episodes follows.
@@ -152,6 +159,10 @@ const ATTACKS: &[Attack] = &[
     linked(&[("run/run.db-journal", "mine.txt")], &["run", "--resume", "run"], Any),
     linked(&[("run/run.db-journal", "nowhere")], &["run", "--resume", "run"], Any),
     linked(&[("e1/estimate.db", "nowhere")], &["estimate", "--resume", "e1"], Refused(LINK)),
+    // A database in the journal mode WAL, in which SQLite writes into `run.db-shm` even to read.
+    changed(&[], in_wal, &["report", "run"], Refused(WAL)),
+    changed(&[], in_wal, &["run", "--resume", "run"], Refused(WAL)),
+    changed(&[], in_wal, &["merge", "run", "--out", "m"], Refused(WAL)),
     // Folders that are links.
     linked(&[("runs", "folder")], &["run", "SPACE", "QUICK", "1"], Refused(LINK)),
     linked(
@@ -175,6 +186,21 @@ const ATTACKS: &[Attack] = &[
     linked(&[("fresh/roads", "folder")], &["new", "fresh"], Refused(LINK)),
     linked(&[("ed/syntaxes", "folder")], &["editor-files", "ed"], Refused(LINK)),
     changed(&[("theirs/imported", "folder")], own_import, &["import", "theirs/cut_in.xosc"], Refused(LINK)),
+    // Folders that are links, on the way to what is named.
+    changed(&CRITICAL, critical_elsewhere, &["export", "--to", "csv", "FOUND"], Refused(WAY)),
+    changed(&CRITICAL, critical_elsewhere, &["export", "--to", "openscenario", "FOUND"], Refused(WAY)),
+    changed(&CRITICAL, critical_elsewhere, &["export", "--to", "csv", "FOUND", "--out", "out"], Done),
+    changed(&CRITICAL, critical_elsewhere, &["test", "--accept", "run/critical"], Refused(WAY)),
+    changed(&CRITICAL, critical_elsewhere, &["test", "--accept", "FOUND"], Refused(WAY)),
+    changed(&CRITICAL, critical_elsewhere, &["report", "run/critical"], Refused(WAY)),
+    changed(&CRITICAL, critical_elsewhere, &["report", "run/critical", "--out", "page.html"], Any),
+    changed(&CRITICAL, critical_elsewhere, &["fmt", "run/critical/x.ava"], Refused(WAY)),
+    changed(&CRITICAL, critical_elsewhere, &["fmt", "./run/critical/../critical/x.ava"], Refused(WAY)),
+    changed(&CRITICAL, critical_elsewhere, &["check", "--fix", "run/critical/typo.ava"], Refused(WAY)),
+    changed(&CRITICAL, critical_elsewhere, &["shrink", "FOUND"], Done),
+    linked(&CRITICAL, &["policy", "weights", "run/critical/p.ava"], Refused(WAY)),
+    linked(&CRITICAL, &["policy", "distil", "run/critical/p.ava"], Refused(WAY)),
+    linked(&CRITICAL, &["import", "run/critical/cut_in.xosc"], Refused(WAY)),
     // Scenarios that were edited, so that `--accept` writes them.
     changed(
         &[("run/critical/corner_0000.ava.partial", "mine.txt")],
@@ -391,6 +417,16 @@ fn own_database(clone: &Path) {
     database.execute_batch("CREATE TABLE mine (x); INSERT INTO mine VALUES (1)").expect("it is writable");
 }
 
+/// Takes the run's database to the journal mode WAL, and gives a file of the user a further name beside it.
+fn in_wal(clone: &Path) {
+    let database = rusqlite::Connection::open(clone.join("run/run.db")).expect("it is a database");
+    let mode: String =
+        database.query_row("PRAGMA journal_mode = WAL", [], |row| row.get(0)).expect("it is writable");
+    assert_eq!(mode, "wal");
+    drop(database);
+    std::fs::hard_link(clone.with_file_name("mine.txt"), clone.join("run/run.db-shm")).expect("it is free");
+}
+
 /// Puts a file to import into a folder of the clone.
 fn own_import(clone: &Path) {
     let text = std::fs::read_to_string(shipped("tests/cases/imports/cut_in.xosc")).expect("it is shipped");
@@ -398,6 +434,14 @@ fn own_import(clone: &Path) {
     let text = text.replace("\"catalogue\"", &format!("\"{}\"", shipped("tests/cases/imports/catalogue")));
     std::fs::create_dir(clone.join("theirs")).expect("it is new");
     std::fs::write(clone.join("theirs/cut_in.xosc"), text).expect("it is writable");
+}
+
+/// Copies the scenarios of the run to a folder of the user, and puts files there that `fmt` and `check --fix` would change.
+fn critical_elsewhere(clone: &Path) {
+    let folder = clone.with_file_name("folder");
+    copy(&clone.join("run/critical"), &folder);
+    std::fs::copy(clone.join("x.ava"), folder.join("x.ava")).expect("it can be copied");
+    std::fs::write(folder.join("typo.ava"), "language 1\nlet a = 3 m;\n").expect("it is writable");
 }
 
 /// Refutes a claim of the scenario.

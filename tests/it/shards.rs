@@ -101,6 +101,53 @@ fn merged(command: &[&str], kind: &str, order: &[u32]) -> tempfile::TempDir {
     scratch
 }
 
+/// A copy of a space is used and taken over only if it means what was played in it.
+#[test]
+fn an_edited_copy_of_a_space_is_named_and_not_taken_over() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let at = |name: &str| scratch.path().join(name);
+    let command = ["run", SPACE, "--road", "corner", "--episodes", "2", "--seed", "5", "--ads", "cc"];
+    for number in ["1", "2"] {
+        done(&[&command[..], &["--shard", &format!("{number}/2"), "--out", text(&at(number))]].concat());
+    }
+    let (one, two) = (at("1"), at("2"));
+    let read = |directory: &str| {
+        std::fs::read_to_string(at(directory).join("space/avastra45.ava")).expect("it is readable")
+    };
+    let whole = read("1");
+    // A comment changes no meaning.
+    std::fs::write(one.join("space/avastra45.ava"), format!("{whole}\n// looked at\n")).expect("writable");
+    let says = |arguments: &[&str], wanted: &str, is_said: bool| {
+        let (_, stdout, stderr) = outcome(&mut avastra(arguments));
+        assert_eq!(format!("{stdout}{stderr}").contains(wanted), is_said, "{arguments:?}: {stdout}{stderr}");
+    };
+    let looks: [&[&str]; 3] =
+        [&["report", text(&one)], &["test", text(&one)], &["run", "--resume", text(&one)]];
+    looks.iter().for_each(|look| says(look, "since it was written", false));
+
+    let edited = whole.replacen("let weight_mode = 1.0", "let weight_mode = 2.0", 1);
+    assert_ne!(edited, whole);
+    std::fs::write(one.join("space/avastra45.ava"), &edited).expect("it is writable");
+    looks.iter().for_each(|look| says(look, "1/space` was edited since it was written", true));
+    assert_eq!(read("1"), edited, "it is left as it is");
+    let merge = |out: &Path| outcome(&mut avastra(&["merge", text(&one), text(&two), "--out", text(out)]));
+    let (status, _, stderr) = merge(&at("merged"));
+    assert!(status == 0 && stderr.contains("1/space` was edited since it was written"), "{stderr}");
+    assert_eq!(read("merged"), whole);
+
+    for shard in [&one, &two] {
+        std::fs::remove_dir_all(shard.join("space")).expect("it is there");
+    }
+    looks[..2]
+        .iter()
+        .for_each(|look| says(look, "1/space`, the copy of the space of this run, is gone", true));
+    let (status, _, stderr) = merge(&at("again"));
+    assert!(status == 0 && stderr.contains("is gone"), "{stderr}");
+    assert_eq!(read("again"), whole, "it is made of the space");
+    says(looks[2], "was missing, is written again", true);
+    assert_eq!(read("1"), whole);
+}
+
 #[test]
 fn eight_shards_of_a_run_make_the_run() {
     let command = ["run", SPACE, "--road", "corner", "--episodes", "21", "--seed", "5", "--ads", FLICKER];

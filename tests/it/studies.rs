@@ -123,7 +123,7 @@ fn what_another_study_has_played_is_taken_over() {
     let ((status, _, stderr), _) = play(&second, "refused", &["--reuse", &at]);
     assert!(status == 1 && stderr.contains("go on with `avastra study --resume"), "{stderr}");
     let (status, _, stderr) = outcome(&mut avastra(&["study", "--resume", &at]));
-    assert!(status == 0 && stderr.contains("is played again"), "{stderr}");
+    assert!(status == 0 && stderr.contains("is removed, and played again"), "{stderr}");
     assert!(std::fs::read(alone.join("study.db")).expect("it is readable") == sound);
     assert_eq!(results(&alone), whole);
 
@@ -155,7 +155,7 @@ fn two_baselines_are_compared_once() {
         training_seed: None,
         trained: Vec::new(),
         episodes: Vec::new(),
-        spent: avastra::study::Spent::default(),
+        spent: None,
     };
     let cells = ["none", "random", "greedy"].map(|agent| [cell(agent, 0), cell(agent, 1)]).concat();
     let found = avastra::study::StudyResults::new(loaded(text).settings(), &cells);
@@ -308,6 +308,14 @@ fn a_quick_study_says_that_it_is_none() {
     assert_eq!(rate["events"], 0, "there is no obstacle to hit: {rate}");
     assert!(rate["high"].as_f64().expect("a bound") > 0.0);
     assert!(result["timing"][0]["wall_s"].as_f64().is_some_and(|wall_s| wall_s > 0.0));
+    // Times that are damaged or gone are not known, and are not 0.
+    let times = Path::new(&out).join("timing.jsonl");
+    std::fs::write(&times, b"\xff no text").expect("it is writable");
+    let stdout = done(&["study", "--resume", &out]);
+    assert!(stdout.contains(", no times are known"), "{stdout}");
+    std::fs::remove_file(&times).expect("it is there");
+    let result = last_line(&done(&["study", "--resume", &out, "--format", "json"]));
+    assert!(result["timing"][0]["wall_s"].is_null() && result["timing"][0]["cells"].is_u64(), "{result}");
 }
 
 #[test]

@@ -50,6 +50,11 @@ pub enum DatabaseError {
     Differs { unit: &'static str, number: i64 },
     #[error("{0}: begin a new one")]
     Name(#[from] NotPlain),
+    #[error(
+        "it is in SQLite's journal mode WAL, which avastra does not use: SQLite would write into files beside it even to read it; \
+         if it is your own, `sqlite3 FILE 'PRAGMA journal_mode = DELETE'` takes it back"
+    )]
+    Journal,
     #[error(transparent)]
     File(#[from] std::io::Error),
     #[error(transparent)]
@@ -130,6 +135,7 @@ impl Layout {
     ) -> Result<(Connection, Vec<i64>), DatabaseError> {
         // SQLite would follow a link and write where it leads.
         files::own_file(path)?;
+        check_journal(path)?;
         let mut connection = match if_empty {
             IfEmpty::Begin => Connection::open(path)?,
             // Not read-only: SQLite must be able to undo what a kill left half written. No file is made.
@@ -296,6 +302,20 @@ impl Layout {
 pub(crate) fn settings_digest(connection: &Connection) -> Result<[u8; 32], rusqlite::Error> {
     let settings: String = connection.query_row("SELECT settings FROM begun", [], |row| row.get(0))?;
     Ok(Sha256::digest(settings.as_bytes()).into())
+}
+
+/// What every file of SQLite begins with.
+const MAGIC: &[u8] = b"SQLite format 3\0";
+
+/// Refuses a file in the journal mode WAL. In that mode, whoever opens the file writes into `FILE-shm`, which may be a further name
+/// of a file of the user.
+pub(super) fn check_journal(path: &Path) -> Result<(), DatabaseError> {
+    let head = files::first_bytes(path, 20)?;
+    // The versions that writing and reading need: 1 with a rollback journal, 2 with WAL.
+    match head.strip_prefix(MAGIC) {
+        Some([_, _, write, read]) if (*write, *read) != (1, 1) => Err(DatabaseError::Journal),
+        _ => Ok(()),
+    }
 }
 
 /// The columns of a table: name, type, and position in the key, which is 0 for a column outside the key.
@@ -573,6 +593,22 @@ mod tests {
             let refused = LAYOUT.open(&path, SETTINGS).unwrap_err();
             assert!(refused.is_torn() && refused.to_string().contains(what), "{change}: {refused}");
         }
+    }
+
+    #[test]
+    fn a_file_in_another_journal_mode_is_refused() {
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("run.db");
+        let mode = |connection: &Connection, mode: &str| -> String {
+            connection.query_row(&format!("PRAGMA journal_mode = {mode}"), [], |row| row.get(0)).unwrap()
+        };
+        assert_eq!(mode(&begun(&path), "WAL"), "wal");
+        std::fs::write(scratch.path().join("run.db-shm"), "mine").unwrap();
+        let refused = LAYOUT.open(&path, SETTINGS).unwrap_err();
+        assert!(matches!(refused, DatabaseError::Journal), "{refused}");
+        assert_eq!(std::fs::read(scratch.path().join("run.db-shm")).unwrap(), b"mine");
+        assert_eq!(mode(&Connection::open(&path).unwrap(), "DELETE"), "delete");
+        LAYOUT.open(&path, SETTINGS).expect("it is as it was");
     }
 
     #[test]

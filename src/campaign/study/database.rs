@@ -8,7 +8,7 @@ use rusqlite::{Connection, Row, params};
 
 use crate::run::{DatabaseError, Layout, Numbered, Units, insert_row, query_all};
 
-use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureClass, Spent, TrainedRecord};
+use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureClass, TrainedRecord};
 use crate::study::settings::StudySettings;
 
 /// Versions begin at 1001, so that a `run.db` is never taken for a `study.db`.
@@ -149,7 +149,7 @@ impl StudyDatabase {
                         .transpose()?,
                     trained: Vec::new(),
                     episodes: Vec::new(),
-                    spent: Spent::default(),
+                    spent: None,
                 })
             })?
             .into_iter()

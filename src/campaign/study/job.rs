@@ -111,7 +111,7 @@ fn play(
             training_seed: agent.training.is_some().then(|| study.training_seed(job.number)),
             trained: trained.clone(),
             episodes,
-            spent,
+            spent: Some(spent),
         });
     }
     Some(cells)

@@ -108,8 +108,8 @@ pub struct MeasuredCell {
     pub road: String,
     /// Number of the training or repetition, from 0.
     pub number: u32,
-    /// Time that it took on the machine that played it, as in `Spent`.
-    pub wall_s: f64,
+    /// Time that it took on the machine that played it, as in `Spent`; `None` if it is not known.
+    pub wall_s: Option<f64>,
     pub cpu_s: Option<f64>,
     /// In the order of [`MEASURES`]; in a line, in that of the study's head.
     pub values: Vec<Option<f64>>,
@@ -121,8 +121,8 @@ impl MeasuredCell {
             agent: cell.agent.clone(),
             road: cell.road.clone(),
             number: cell.number,
-            wall_s: cell.spent.wall_s,
-            cpu_s: cell.spent.cpu_s,
+            wall_s: cell.spent.map(|spent| spent.wall_s),
+            cpu_s: cell.spent.and_then(|spent| spent.cpu_s),
             values: MEASURES.iter().map(|measure| (measure.of)(cell, plan)).collect(),
         }
     }

@@ -147,8 +147,8 @@ impl Played {
         Ok(Played { commit: head.commit, settings: head.settings, cells })
     }
 
-    /// Time of one worker for all cells, s.
-    pub fn wall_s(&self) -> f64 {
+    /// Time of one worker for all cells, s; `None` if that of a cell is not known.
+    pub fn wall_s(&self) -> Option<f64> {
         self.cells.iter().map(|cell| cell.wall_s).sum()
     }
 

@@ -20,8 +20,8 @@ pub struct CellRecord {
     pub trained: Vec<TrainedRecord>,
     /// All evaluated episodes, seed by seed.
     pub episodes: Vec<EpisodeRecord>,
-    /// Zero if unknown; `study.db` does not keep it.
-    pub spent: Spent,
+    /// `None` if it is not known; `study.db` does not keep it.
+    pub spent: Option<Spent>,
 }
 
 /// Time that a cell took on this machine; no part of the result.

@@ -86,7 +86,7 @@ pub struct RunArguments {
     pub self_contained: bool,
     #[command(flatten)]
     pub shard: ShardArguments,
-    /// Go on with an interrupted run directory; its own settings hold.
+    /// Go on with an interrupted run directory; its own settings hold, and the program that they name is started.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "policy", "face", "episodes", "seed", "ambient", "traffic", "causes", "out", "self_contained", "shard", "dry_run", "without", "with"])]
     pub resume: Option<PathBuf>,
     /// Exit with status 4 if a counted collision was found.
@@ -135,7 +135,7 @@ pub struct EstimateArguments {
     pub out: Option<PathBuf>,
     #[command(flatten)]
     pub shard: ShardArguments,
-    /// Go on with an interrupted estimate; its own settings hold.
+    /// Go on with an interrupted estimate; its own settings hold, and the program that they name is started.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "event", "method", "parts", "precision", "hours", "episodes", "ads", "than", "road", "agent", "seed", "ambient", "traffic", "out", "shard", "dry_run", "without", "with"])]
     pub resume: Option<PathBuf>,
 }

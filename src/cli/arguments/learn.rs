@@ -44,7 +44,7 @@ pub struct TrainArguments {
     /// Put the space and its maps into `critical/space`, so that the scenarios can be moved with them.
     #[arg(long)]
     pub self_contained: bool,
-    /// Go on with an interrupted run directory; its own settings hold.
+    /// Go on with an interrupted run directory; its own settings hold, and the program that they name is started.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "preset", "config", "episodes", "seed", "traffic", "out", "self_contained", "without", "with"])]
     pub resume: Option<PathBuf>,
 }
@@ -129,7 +129,7 @@ pub struct StudyArguments {
     /// Worker threads; the result does not depend on it [default: one for each core].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub jobs: Option<u32>,
-    /// Go on with an interrupted study; its own settings hold.
+    /// Go on with an interrupted study; its own settings hold, and the program that they name is started.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "ads", "out", "shard", "dry_run", "quick"])]
     pub resume: Option<PathBuf>,
     /// Take over the cells that another study has played already: those of agents with the same settings, on the same

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::cli::arguments::DistilArguments;
 use crate::cli::error::Failure;
-use crate::cli::files::write_result;
+use crate::cli::files::{place, write_result};
 use crate::cli::load;
 use crate::cli::output::{Output, plural};
 use crate::cli::progress::Working;
@@ -20,6 +20,7 @@ use super::{acting, same_world};
 
 /// Distils rules anew, with other settings than those of the training, and writes the policy with them.
 pub fn distil(output: &Output, arguments: &DistilArguments) -> Result<(), Failure> {
+    let path = place(arguments.output.as_ref(), arguments.file.with_extension("distilled.ava"))?;
     let (table, mut policy) = load::policy(output, &arguments.file)?;
     same_world(&policy)?;
     for (name, value) in [("rules_leaves", arguments.leaves), ("rules_episodes", arguments.episodes)] {
@@ -40,7 +41,6 @@ pub fn distil(output: &Output, arguments: &DistilArguments) -> Result<(), Failur
     let working = Working::new(output, "distilling rules from the network");
     let policy = with_rules(&arena, &acting, policy);
     drop(working);
-    let path = arguments.output.clone().unwrap_or_else(|| arguments.file.with_extension("distilled.ava"));
     let folder = path.parent().map_or(PathBuf::new(), PathBuf::from);
     let space_path = load::relative(&folder, &table.space().path)?;
     write_result(arguments.output.as_ref(), &path, &emit::policy_text(&policy, table.space(), &space_path))?;

@@ -2,7 +2,7 @@
 
 use crate::cli::arguments::WeightsArguments;
 use crate::cli::error::Failure;
-use crate::cli::files::write_result;
+use crate::cli::files::{place, write_result};
 use crate::cli::load;
 use crate::cli::output::Output;
 use avastra_campaign::emit;
@@ -12,9 +12,9 @@ use super::acting;
 
 /// Writes the weights as safetensors.
 pub fn weights(output: &Output, arguments: &WeightsArguments) -> Result<(), Failure> {
+    let path = place(arguments.output.as_ref(), arguments.file.with_extension("safetensors"))?;
     let (table, policy) = load::policy(output, &arguments.file)?;
     let acting = acting(&table, &policy, Face::Network)?;
-    let path = arguments.output.clone().unwrap_or_else(|| arguments.file.with_extension("safetensors"));
     write_result(arguments.output.as_ref(), &path, &emit::safetensors(acting.network()))?;
     let (shape, count) = (acting.network().shape(), acting.network().parameters().len());
     let widths: Vec<String> = shape.layers.iter().map(ToString::to_string).collect();

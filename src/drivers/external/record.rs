@@ -190,6 +190,13 @@ impl Conversation {
         let step = index.saturating_sub(1);
         Some((step, format!("from step {step} on it answered {second} instead of {first}")))
     }
+
+    /// Whether these recorded answers begin with the answers of this conversation, to the same questions.
+    pub fn begins(&self, recorded: &[(Key, Outcome)]) -> bool {
+        let mut pairs = self.exchanges.iter().zip(recorded);
+        self.exchanges.len() <= recorded.len()
+            && pairs.all(|(now, then)| now.0 == then.0 && now.1.means(&then.1))
+    }
 }
 
 /// Why a file of answers cannot be used.
@@ -265,6 +272,7 @@ pub fn digest_of(exchanges: &[(Key, Outcome)]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::external::Target;
     use crate::external::finding::Problem;
     use crate::external::message::{AccelerationMessage, Internal};
 
@@ -288,6 +296,16 @@ mod tests {
         assert_eq!(from_text(&text.replace("-0.1", "-0.2"), Some(&digest)), Err(RecordError::Digest));
         assert_eq!(digest_of(&from_text(&text.replace("follow 3", "follow 4"), None).unwrap()), digest);
         assert_eq!(from_text("", None), Err(RecordError::Format));
+        let part = |exchanges: &[(Key, Outcome)]| Conversation {
+            attached: Attached {
+                identity: None,
+                settings: ExternalSettings::of(Target::from_text("./planner").unwrap()),
+                is_recorded: false,
+            },
+            exchanges: exchanges.to_vec(),
+        };
+        assert!(part(&exchanges[..2]).begins(&exchanges) && part(&exchanges).begins(&exchanges));
+        assert!(!part(&exchanges).begins(&exchanges[..2]) && !part(&exchanges[1..]).begins(&exchanges));
         assert!(matches!(
             from_text(&text.replace("\"missed\"", "\"lost\""), None),
             Err(RecordError::Line { line: 4, .. })

@@ -108,9 +108,10 @@ fn conditions_text(chapter: &Chapter, played: &Played) -> String {
     let config = chapter.file.ads_config.as_deref().and_then(|config| config.rsplit('/').next());
     let config = config.map(|config| format!(" with `{config}`"));
     let commit = played.commit.as_deref().map(|commit| format!(", commit {commit}"));
+    let took = played.wall_s().map(|wall_s| format!(" in {} of one worker", duration(wall_s)));
     text.push_str(&format!(
         "\n{} of {} cells of {}. Each is judged by {} under each of {}; all seeds follow from {}. \
-         Played by avastra {}{}, world `{}`, against `{}`{}: {:.1} h simulated in {} of one worker. Play it again: `{}`\n",
+         Played by avastra {}{}, world `{}`, against `{}`{}: {:.1} h simulated{}. Play it again: `{}`\n",
         played.cells.len(),
         settings.agents.iter().map(|agent| agent.repeats as usize).sum::<usize>() * settings.roads.len(),
         sizes.collect::<Vec<_>>().join(", "),
@@ -123,7 +124,7 @@ fn conditions_text(chapter: &Chapter, played: &Played) -> String {
         settings.ads,
         config.unwrap_or_default(),
         played.simulated_h(),
-        duration(played.wall_s()),
+        took.unwrap_or_default(),
         chapter.command,
     ));
     text
