@@ -195,7 +195,7 @@ const ATTACKS: &[Attack] = &[
     changed(&CRITICAL, critical_elsewhere, &["report", "run/critical"], Refused(WAY)),
     changed(&CRITICAL, critical_elsewhere, &["report", "run/critical", "--out", "page.html"], Any),
     changed(&CRITICAL, critical_elsewhere, &["fmt", "run/critical/x.ava"], Refused(WAY)),
-    changed(&CRITICAL, critical_elsewhere, &["fmt", "./run/critical/../critical/x.ava"], Refused(WAY)),
+    changed(&CRITICAL, critical_elsewhere, &["fmt", "./run/critical/../critical/x.ava"], Any),
     changed(&CRITICAL, critical_elsewhere, &["check", "--fix", "run/critical/typo.ava"], Refused(WAY)),
     changed(&CRITICAL, critical_elsewhere, &["shrink", "FOUND"], Done),
     linked(&CRITICAL, &["policy", "weights", "run/critical/p.ava"], Refused(WAY)),
