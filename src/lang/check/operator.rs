@@ -2,7 +2,9 @@
 //! values: `road == corner` and `road in [corner, boulevard]` are read here as one condition.
 
 use crate::check::checker::Checker;
-use crate::check::expression::{Place, SEEN_BY, article, dimension, fits, is_number, unknown_here};
+use crate::check::expression::{
+    Place, SEEN_BY, article, dimension, fits, is_number, unit_help, unknown_here,
+};
 use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of};
@@ -58,7 +60,7 @@ impl Checker {
             Arithmetic::Add | Arithmetic::Subtract if a == b => Some(a),
             Arithmetic::Add | Arithmetic::Subtract => {
                 let verb = if op == Arithmetic::Add { "added" } else { "subtracted" };
-                self.mismatch(&format!("cannot be {verb}"), at, &left, &right);
+                self.mismatch(&format!("cannot be {verb}"), at, of, &left, &right);
                 return None;
             }
             Arithmetic::Multiply => a.times(b),
@@ -72,12 +74,15 @@ impl Checker {
         Some(Expr { kind: ExprKind::Arithmetic(op, Box::new(left), Box::new(right)), ty, span })
     }
 
-    fn mismatch(&mut self, what: &str, at: Span, left: &Expr, right: &Expr) {
+    fn mismatch(&mut self, what: &str, at: Span, sides: Sides<'_>, left: &Expr, right: &Expr) {
         let (a, b) = (self.references.type_name(left.ty), self.references.type_name(right.ty));
         let code =
             if is_number(left.ty) && is_number(right.ty) { code::UNIT_MISMATCH } else { code::TYPE_MISMATCH };
         let error = Diagnostic::error(code, format!("`{a}` and `{b}` {what}")).at(at, "");
-        self.report(error.beside(left.span, article(&a)).beside(right.span, article(&b)));
+        let error = error.beside(left.span, article(&a)).beside(right.span, article(&b));
+        // The number beside what has a dimension already is the one that lacks it.
+        let help = unit_help(sides.right, left.ty).or_else(|| unit_help(sides.left, right.ty));
+        self.report(error.help_if(help.filter(|_| is_number(left.ty) && is_number(right.ty))));
     }
 
     fn comparison(&mut self, op: Comparison, sides: Sides<'_>, place: &Place<'_>) -> Option<Expr> {
@@ -109,7 +114,7 @@ impl Checker {
         }
         let (left, right) = self.both_sides(left, right, place)?;
         if !fits(left.ty, right.ty) && !fits(right.ty, left.ty) {
-            self.mismatch("cannot be compared", span, &left, &right);
+            self.mismatch("cannot be compared", span, sides, &left, &right);
             return None;
         }
         match left.ty {
