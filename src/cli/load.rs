@@ -441,13 +441,29 @@ pub fn read(path: &Path) -> Result<String, ReadError> {
 /// Reads a file that another file names. Whatever a file from somebody else names, only sources and maps are read and
 /// shown in a diagnostic: the name must say so, and that of the file at the end of a link.
 pub fn read_used(path: &Path) -> Result<String, ReadError> {
-    let followed = path.canonicalize().map_err(|error| ReadError(reason(&error)))?;
+    let followed = path.canonicalize().map_err(|error| {
+        let meant = beside(path).map_or(String::new(), |meant| format!("; did you mean `{meant}`?"));
+        ReadError(format!("{}{meant}", reason(&error)))
+    })?;
     if followed.is_file()
         && followed.extension().is_none_or(|extension| extension != "ava" && extension != "xodr")
     {
         return Err(ReadError("it is neither a source (`.ava`) nor a map (`.xodr`)".to_owned()));
     }
     read(path)
+}
+
+/// The source or map beside a missing file whose name is near to its name.
+fn beside(missing: &Path) -> Option<String> {
+    let (name, extension) = (missing.file_name()?.to_str()?, missing.extension()?);
+    let folder = missing.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let entries = std::fs::read_dir(folder.unwrap_or(Path::new("."))).ok()?;
+    let paths = entries.take(ENTRIES_MAX).filter_map(|entry| Some(entry.ok()?.path()));
+    let names = paths.filter(|path| path.extension() == Some(extension) && path.is_file());
+    let mut names: Vec<String> =
+        names.filter_map(|path| Some(path.file_name()?.to_str()?.to_owned())).collect();
+    names.sort();
+    nearest(name, names.iter().map(String::as_str)).map(str::to_owned)
 }
 
 /// Reads a text file of a limited size. A pipe would wait, a device has no end: only regular files are read.

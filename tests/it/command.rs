@@ -145,6 +145,17 @@ fn every_diagnostic_is_also_json() {
 }
 
 #[test]
+fn a_misspelt_file_is_found_beside() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let space = scratch.path().join("space.ava");
+    std::fs::write(&space, "language 1\nuse \"road.ava\"\n").expect("it is writable");
+    let told = || outcome(&mut avastra(&["check", &space.display().to_string()])).2;
+    assert!(!told().contains("did you mean"), "{}", told());
+    std::fs::write(scratch.path().join("roads.ava"), "language 1\n").expect("it is writable");
+    assert!(told().contains("no such file or directory; did you mean `roads.ava`?"), "{}", told());
+}
+
+#[test]
 fn what_cannot_be_read_is_said_so() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let binary = scratch.path().join("binary.ava");
