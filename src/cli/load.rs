@@ -455,15 +455,16 @@ pub fn read_used(path: &Path) -> Result<String, ReadError> {
 
 /// The source or map beside a missing file whose name is near to its name.
 fn beside(missing: &Path) -> Option<String> {
-    let (name, extension) = (missing.file_name()?.to_str()?, missing.extension()?);
+    let (stem, extension) = (missing.file_stem()?.to_str()?, missing.extension()?.to_str()?);
     let folder = missing.parent().filter(|folder| !folder.as_os_str().is_empty());
     let entries = std::fs::read_dir(folder.unwrap_or(Path::new("."))).ok()?;
     let paths = entries.take(ENTRIES_MAX).filter_map(|entry| Some(entry.ok()?.path()));
-    let names = paths.filter(|path| path.extension() == Some(extension) && path.is_file());
-    let mut names: Vec<String> =
-        names.filter_map(|path| Some(path.file_name()?.to_str()?.to_owned())).collect();
-    names.sort();
-    nearest(name, names.iter().map(String::as_str)).map(str::to_owned)
+    let paths = paths.filter(|path| path.extension().is_some_and(|own| own == extension) && path.is_file());
+    let mut stems: Vec<String> =
+        paths.filter_map(|path| Some(path.file_stem()?.to_str()?.to_owned())).collect();
+    stems.sort();
+    let near = nearest(stem, stems.iter().map(String::as_str))?;
+    Some(format!("{near}.{extension}"))
 }
 
 /// Reads a text file of a limited size. A pipe would wait, a device has no end: only regular files are read.

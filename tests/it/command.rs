@@ -145,6 +145,13 @@ fn every_diagnostic_is_also_json() {
 }
 
 #[test]
+fn a_misspelt_argument_is_answered_with_what_is_meant() {
+    let run = ["run", "scenarios/avastra45.ava"];
+    fails(&[&run[..], &["--agent", "randm"]].concat(), "no agent `randm`: did you mean `random`? there are");
+    fails(&[&run[..], &["--seed", "abc"]].concat(), "'--seed <SEED>': give a whole number from 0");
+}
+
+#[test]
 fn a_misspelt_file_is_found_beside() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let space = scratch.path().join("space.ava");
