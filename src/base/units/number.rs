@@ -40,8 +40,23 @@ pub fn unit_of_all(values: &[f64], dimension: Dimension) -> Option<&'static Unit
 
 /// A quantity in a unit in which it is short; in SI where it is not.
 pub fn quantity_in(value: f64, dimension: Dimension, unit: Option<&Unit>) -> String {
-    let short = unit.and_then(|unit| Some(with_unit(number_of(value, unit)?, unit.word)));
-    short.unwrap_or_else(|| quantity(value, dimension))
+    unit.and_then(|unit| quantity_if_short(value, unit)).unwrap_or_else(|| quantity(value, dimension))
+}
+
+/// A quantity in a unit, if it is short in that and reads back to the same f64.
+pub fn quantity_if_short(value: f64, unit: &Unit) -> Option<String> {
+    Some(with_unit(number_of(value, unit)?, unit.word))
+}
+
+/// The unit in which an author has written a number that has many decimals in SI: that in which it is shortest. `None` if SI
+/// needs no more than three decimals, or no unit is shorter.
+pub fn unit_as_written(value: f64, dimension: Dimension) -> Option<&'static Unit> {
+    let in_si = decimal(value, false);
+    let decimals = in_si.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+    let of_dimension = UNITS.iter().filter(|unit| unit.dimension == dimension && decimals > 3);
+    let written = of_dimension.filter_map(|unit| Some((number_of(value, unit)?.len(), unit)));
+    let (len, unit) = written.min_by_key(|(len, _)| *len)?;
+    (len < in_si.len()).then_some(unit)
 }
 
 /// The number that a value is in a unit, if it is short and reads back to the same f64.
@@ -92,6 +107,15 @@ mod tests {
         assert_eq!(quantity_short(8.0, Dimension::SPEED), "8 m/s");
         assert!(unit_of_all(&[1.0 / 3.0, 2.0], Dimension::LENGTH).is_none());
         assert!(unit_of_all(&[], Dimension::LENGTH).is_none());
+        let written = |number: &str, word: &str| {
+            let (number, unit) = (Rational::from_decimal(number).unwrap(), crate::units::unit(word).unwrap());
+            let value = number.checked_mul(unit.factor()).unwrap().to_f64();
+            unit_as_written(value, unit.dimension).map(|unit| unit.word)
+        };
+        assert_eq!(written("8.5", "mph"), Some("mph"));
+        assert_eq!(written("12.345678", "km/h"), Some("km/h"));
+        assert_eq!(written("25", "mph"), None, "11.176 m/s has three decimals: it may be written in SI");
+        assert_eq!(written("1500", "m"), None);
     }
 
     proptest! {
