@@ -48,15 +48,15 @@ pub fn quantity_if_short(value: f64, unit: &Unit) -> Option<String> {
     Some(with_unit(number_of(value, unit)?, unit.word))
 }
 
-/// The unit in which an author has written a number that has many decimals in SI: that in which it is shortest. `None` if SI
-/// needs no more than three decimals, or no unit is shorter.
+/// The unit in which an author has probably written a number that has more than three decimals in SI: that in which it has
+/// fewest, and no more than in SI. `None` for SI's.
 pub fn unit_as_written(value: f64, dimension: Dimension) -> Option<&'static Unit> {
-    let in_si = decimal(value, false);
-    let decimals = in_si.split_once('.').map_or(0, |(_, decimals)| decimals.len());
-    let of_dimension = UNITS.iter().filter(|unit| unit.dimension == dimension && decimals > 3);
-    let written = of_dimension.filter_map(|unit| Some((number_of(value, unit)?.len(), unit)));
-    let (len, unit) = written.min_by_key(|(len, _)| *len)?;
-    (len < in_si.len()).then_some(unit)
+    let decimals = |number: &str| number.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+    let in_si = decimals(&decimal(value, false));
+    let others = UNITS.iter().filter(|unit| unit.dimension == dimension && unit.factor() != Rational::ONE);
+    let written = others.filter_map(|unit| Some((decimals(&number_of(value, unit)?), unit)));
+    let (fewest, unit) = written.min_by_key(|(decimals, _)| *decimals)?;
+    (in_si > 3 && fewest <= in_si).then_some(unit)
 }
 
 /// The number that a value is in a unit, if it is short and reads back to the same f64.
@@ -116,6 +116,7 @@ mod tests {
         assert_eq!(written("12.345678", "km/h"), Some("km/h"));
         assert_eq!(written("25", "mph"), None, "11.176 m/s has three decimals: it may be written in SI");
         assert_eq!(written("1500", "m"), None);
+        assert_eq!(written("3.4293", "m/s"), None, "it has more decimals in other units");
     }
 
     proptest! {

@@ -272,7 +272,7 @@ pub fn bare_point(text: &str, end: usize, failure: &Failure) -> Option<Foreign> 
     let rest = number[from..].trim_end_matches(|letter: char| letter.is_ascii_digit() || letter == '.');
     let start = from + rest.len();
     let is_number = number[start..].ends_with(|last: char| last.is_ascii_digit())
-        && !rest.ends_with(|letter| is_in_word(letter) || letter == '#');
+        && !rest.ends_with(|letter: char| is_in_word(letter) || letter == '#');
     is_number.then(|| Foreign {
         start,
         end,

@@ -271,9 +271,7 @@ impl Reader<'_> {
         let span = Span::new(self.file, token_start, token_start + found.len());
         let mistake = Diagnostic::error(code::SYNTAX, format!("expected {expected}, found `{found}`"))
             .at(span, "unexpected");
-        let effects: &[&str] = if at_end {
-            &[]
-        } else if words.contains(&EFFECT) {
+        let effects: &[&str] = if words.contains(&EFFECT) {
             EFFECTS
         } else if words.contains(&ONLY_SET) {
             &EFFECTS[..1]
@@ -281,7 +279,7 @@ impl Reader<'_> {
             &[]
         };
         // Effects stand on lines of their own: a misspelt one is wrong itself, and not the end of the line before.
-        if let Some(meant) = nearest(found, effects.iter().copied()) {
+        if let Some(meant) = nearest(found, effects.iter().copied()).filter(|_| !at_end) {
             return mistake.meant(span, meant);
         }
         let before = self.end_of_token_before(token_start);
