@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use avastra_base::statistics::Estimate;
 use avastra_campaign::episode::{Collision, EpisodeLog};
 use avastra_campaign::oracle::{
-    self, Comparison, Diagnosis, Evidence, Fate, Likelihood, Measure, MechanismShare, Mechanisms, Verdict,
-    WeaknessFinding,
+    self, Comparison, Diagnosis, Evidence, Fate, Likelihood, Measure, MechanismShare, Mechanisms,
+    ModuleFinding, Verdict, WeaknessFinding,
 };
 use avastra_campaign::run::{Asked, Stage};
-use avastra_drivers::{ModularConfig, Selected};
+use avastra_drivers::{ModularConfig, Module, Selected};
 use avastra_lang::model::Scenario;
 use avastra_lang::model::vocabulary::Word;
 use avastra_world::action::ActionTable;
@@ -124,8 +124,13 @@ impl Explained {
     /// The cause in a word or two.
     fn cause(&self) -> String {
         let names: Vec<&str> = self.diagnosis.cause.iter().map(|module| module.name()).collect();
-        if names.is_empty() { "none".to_owned() } else { names.join(" and ") }
+        if names.is_empty() { "none".to_owned() } else { names.join(joint(self.diagnosis.verdict)) }
     }
+}
+
+/// What stands between the names of several modules: two prevent the collision together, or they are not told apart.
+fn joint(verdict: Verdict) -> &'static str {
+    if verdict == Verdict::Together { " and " } else { " or " }
 }
 
 fn explain(
@@ -283,7 +288,7 @@ fn measured_text(measured: &[Measure]) -> String {
 /// The verdict in a sentence that follows from the evidence alone.
 fn sentence(diagnosis: &Diagnosis) -> String {
     let Diagnosis { cause, verdict, weakness, evidence } = diagnosis;
-    let name = cause.iter().map(|module| module.name()).collect::<Vec<_>>().join(" and ");
+    let name = cause.iter().map(|module| module.name()).collect::<Vec<_>>().join(joint(*verdict));
     let changed = changed_text(evidence);
     // Other modules that prevent it, told apart from chance.
     let told_apart: Vec<&str> = evidence
@@ -297,13 +302,18 @@ fn sentence(diagnosis: &Diagnosis) -> String {
     };
     match verdict {
         Verdict::Outside => {
-            let is_alone = |alone: Fate| alone == Fate::Crash && evidence.baseline == Some(Fate::Vanished);
-            let found = evidence.modules.iter().find(|found| cause.contains(&found.module));
-            let alone = match found {
-                Some(found) if is_alone(found.alone) => ", and its errors alone lead to it",
-                Some(_) | None => "",
+            let mut found = evidence.modules.iter().filter(|found| cause.contains(&found.module));
+            let is_alone = |found: &ModuleFinding| found.alone == Fate::Crash;
+            let alone = if evidence.baseline == Some(Fate::Vanished) && found.all(is_alone) {
+                format!(
+                    ", and {} alone lead to it",
+                    if cause.len() > 1 { "the errors of each" } else { "its errors" }
+                )
+            } else {
+                String::new()
             };
-            format!("{name} is at fault: {changed}, there is no crash{alone}{others}")
+            let crash = perfect_text(evidence, cause);
+            format!("{name} is at fault: {}{alone}{crash}{others}", mended_text(cause, changed))
         }
         Verdict::Weakness => {
             let weakness = weakness.unwrap_or_default();
@@ -315,7 +325,7 @@ fn sentence(diagnosis: &Diagnosis) -> String {
             });
             format!("{name} is at fault by what it gave this time: {error}; {changed}, there is no crash")
         }
-        Verdict::Deciding => format!("{name} is at fault: {changed}, there is no crash{others}"),
+        Verdict::Deciding => format!("{name} is at fault: {}{others}", mended_text(cause, changed)),
         Verdict::Brittle => format!(
             "{name} is brittle: it could not bear the errors of {}, which are within their specification",
             told_apart.join(", ")
@@ -336,6 +346,28 @@ fn sentence(diagnosis: &Diagnosis) -> String {
             chance_text(evidence)
         ),
         Verdict::Unexplained => "no module is at fault alone, nor are two together".to_owned(),
+    }
+}
+
+/// That the collision is gone if the module at fault is changed, whichever of several it is.
+fn mended_text(cause: &[Module], changed: &str) -> String {
+    let one = match cause {
+        [_] => return format!("{changed}, there is no crash"),
+        [_, _] => "either",
+        _ => "any of them",
+    };
+    format!("with {one} {changed} there is no crash, and the replays do not tell them apart")
+}
+
+/// That a module which crashes by what differs from the baseline crashes without any errors as well: the collision hangs
+/// on how it errs, and not on how much.
+fn perfect_text(evidence: &Evidence, cause: &[Module]) -> String {
+    let crashes = |found: &&ModuleFinding| matches!(found.idealised, Fate::Crash | Fate::Other);
+    let found = evidence.modules.iter().filter(|found| cause.contains(&found.module)).filter(crashes);
+    let names: Vec<&str> = found.map(|found| found.module.name()).collect();
+    match names.as_slice() {
+        [] => String::new(),
+        names => format!("; but with {} free of errors there is a crash as well", names.join(" or ")),
     }
 }
 
@@ -374,8 +406,7 @@ fn likelihood_text(likelihood: &Likelihood) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use avastra_campaign::oracle::{Chance, ModuleFinding};
-    use avastra_drivers::Module;
+    use avastra_campaign::oracle::Chance;
 
     /// A diagnosis of a driving system that differs from the baseline in perception, or in nothing.
     fn diagnosis(verdict: Verdict, cause: &[Module], differs: bool) -> Diagnosis {
@@ -389,6 +420,7 @@ mod tests {
                 alone: Fate::Crash,
                 noise: (is_asked && verdict != Verdict::Chance).then_some(told_apart),
                 noise_alone: None,
+                signs: Vec::new(),
             }
         };
         let measure = Measure { module: Module::Perception, what: "error, m", worst: 2.0, bound: 1.0 };
@@ -431,6 +463,26 @@ mod tests {
         ] {
             assert_eq!(sentence(&found), wanted);
         }
+    }
+
+    #[test]
+    fn a_sentence_says_what_weakens_it() {
+        let mut found = diagnosis(Verdict::Outside, &[Module::Perception], true);
+        found.evidence.modules[Module::Perception as usize].idealised = Fate::Crash;
+        assert_eq!(
+            sentence(&found),
+            "perception is at fault: as in the baseline, there is no crash, and its errors alone lead to it; but \
+             with perception free of errors there is a crash as well"
+        );
+        let mut found = diagnosis(Verdict::Outside, &[Module::Perception, Module::Tracking], true);
+        let told_apart = found.evidence.modules[Module::Perception as usize].clone();
+        let tracking = ModuleFinding { module: Module::Tracking, alone: Fate::Vanished, ..told_apart };
+        found.evidence.modules[Module::Tracking as usize] = tracking;
+        assert_eq!(
+            sentence(&found),
+            "perception or tracking is at fault: with either as in the baseline there is no crash, and the replays \
+             do not tell them apart"
+        );
     }
 
     #[test]

@@ -463,13 +463,30 @@ pub fn read(path: &Path) -> Result<String, ReadError> {
 /// Reads a file that another file names. Whatever a file from somebody else names, only sources and maps are read and
 /// shown in a diagnostic: the name must say so, and that of the file at the end of a link.
 pub fn read_used(path: &Path) -> Result<String, ReadError> {
-    let followed = path.canonicalize().map_err(|error| ReadError(reason(&error)))?;
+    let followed = path.canonicalize().map_err(|error| {
+        let meant = beside(path).map_or(String::new(), |meant| format!("; did you mean `{meant}`?"));
+        ReadError(format!("{}{meant}", reason(&error)))
+    })?;
     if followed.is_file()
         && followed.extension().is_none_or(|extension| extension != "ava" && extension != "xodr")
     {
         return Err(ReadError("it is neither a source (`.ava`) nor a map (`.xodr`)".to_owned()));
     }
     read(path)
+}
+
+/// The source or map beside a missing file whose name is near to its name.
+fn beside(missing: &Path) -> Option<String> {
+    let (stem, extension) = (missing.file_stem()?.to_str()?, missing.extension()?.to_str()?);
+    let folder = missing.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let entries = std::fs::read_dir(folder.unwrap_or(Path::new("."))).ok()?;
+    let paths = entries.take(ENTRIES_MAX).filter_map(|entry| Some(entry.ok()?.path()));
+    let paths = paths.filter(|path| path.extension().is_some_and(|own| own == extension) && path.is_file());
+    let mut stems: Vec<String> =
+        paths.filter_map(|path| Some(path.file_stem()?.to_str()?.to_owned())).collect();
+    stems.sort();
+    let near = nearest(stem, stems.iter().map(String::as_str))?;
+    Some(format!("{near}.{extension}"))
 }
 
 /// Reads a text file of a limited size. A pipe would wait, a device has no end: only regular files are read.

@@ -195,7 +195,12 @@ fn play(
             let failed = log.failure.as_ref().map_or_else(String::new, |failure| {
                 format!("; it failed at {}, {}: {}", failure.stage, failure.kind().name(), failure.detail)
             });
-            format!("{name}: {collisions}, {} counted, {avoidable} avoidable{failed}", counted.unwrap_or(0))
+            let refused = log.refused().map(|(step, reason)| format!("\n  step {step} is refused: {reason}"));
+            let refused: String = refused.collect();
+            format!(
+                "{name}: {collisions}, {} counted, {avoidable} avoidable{failed}{refused}",
+                counted.unwrap_or(0)
+            )
         }
         _ => {
             let lines = log.collisions.iter().zip(&severities);

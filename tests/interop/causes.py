@@ -6,6 +6,7 @@ looked at, not only over those that vanish when the planted module is mended.
 - `degraded.yaml`: 400 episodes on each of the four roads. Right is a module that differs from the default.
 - Each fault of `scenarios/ads/faults/`, and each pair of faults of two modules, among decoys: small changes in all other
   modules, so that the cause is not simply what differs from the default. Right is a planted module.
+- Several modules that the replays do not tell apart are neither right nor wrong if a planted one is among them (`tied`).
 
 The shipped space is played, and those of `tests/cases/faults`, in which crashes count whether they can be avoided or not. SINGLE
 crashes of each fault are diagnosed, and PAIRED of each pair. Takes some 20 minutes of processor time; ends with status 1 if a mark
@@ -113,6 +114,11 @@ def as_default(diagnosis):
     return [module for module in diagnosis["cause"] if module in same]
 
 
+def is_tied(diagnosis):
+    """Whether several modules are named because the replays do not tell them apart."""
+    return len(diagnosis["cause"]) > 1 and diagnosis["verdict"] != "together"
+
+
 def planted(faults, counts, looked_at):
     """Diagnoses the first crashes of a profile with these faults, one of each space in turn."""
     name = "+".join(faults)
@@ -159,19 +165,25 @@ for fault in FAULTS:
     found = planted([fault], SINGLE_EPISODES, SINGLE)
     for diagnosis in found:
         cause = " and ".join(diagnosis["cause"])
-        matrix[module_of(fault), cause if cause in MODULES else "pair" if cause else "none"] += 1
-        if cause and diagnosis["cause"] != [module_of(fault)]:
+        module = module_of(fault)
+        if is_tied(diagnosis):
+            matrix[module, "tied"] += 1
+            missed = module not in diagnosis["cause"]
+        else:
+            matrix[module, cause if cause in MODULES else "pair" if cause else "none"] += 1
+            missed = bool(cause) and diagnosis["cause"] != [module]
+        if missed:
             wrong.append(f"{fault}: {cause} ({diagnosis['verdict']})")
         blamed += [f"{fault}: {module}" for module in as_default(diagnosis)]
     singles += found
-columns = [*MODULES, "pair", "none"]
+columns = [*MODULES, "pair", "tied", "none"]
 print(f"{'':14}" + "".join(f"{column[:9]:>10}" for column in columns))
 for row in MODULES:
     print(f"{row:14}" + "".join(f"{matrix[row, column] or '.':>10}" for column in columns))
-own = [diagnosis for diagnosis in singles if diagnosis["cause"]]
 own_right = sum(matrix[module, module] for module in MODULES)
-right, named = right + own_right, named + len(own)
-print(f"{len(singles)} crashes; {verdicts_text(singles)}\n{share_text(own_right, len(own))}")
+own_named = own_right + len(wrong)
+right, named = right + own_right, named + own_named
+print(f"{len(singles)} crashes; {verdicts_text(singles)}\n{share_text(own_right, own_named)}")
 print("".join(f"  wrong: {line}\n" for line in wrong), flush=True)
 
 print("two faults among decoys: planted modules (rows), and what of them is named (columns)", flush=True)
@@ -185,6 +197,8 @@ for first, second in itertools.combinations(FAULTS, 2):
         cause = diagnosis["cause"]
         if not cause:
             kind = "none"
+        elif is_tied(diagnosis) and set(cause) & set(both):
+            kind = "tied"
         elif not set(cause) <= set(both):
             kind = "another"
             wrong.append(f"{first}+{second}: {' and '.join(cause)} ({diagnosis['verdict']})")
@@ -194,14 +208,14 @@ for first, second in itertools.combinations(FAULTS, 2):
         matrix[tuple(sorted(both, key=MODULES.index)), kind] += 1
         blamed += [f"{first}+{second}: {module}" for module in as_default(diagnosis)]
     pairs += found
-columns = ["one", "both", "another", "none"]
+columns = ["one", "both", "tied", "another", "none"]
 print(f"{'':28}" + "".join(f"{column:>10}" for column in columns))
 for row in itertools.combinations(MODULES, 2):
     print(f"{' and '.join(row):28}" + "".join(f"{matrix[row, column] or '.':>10}" for column in columns))
-own = [diagnosis for diagnosis in pairs if diagnosis["cause"]]
-own_right = len(own) - len(wrong)
-right, named = right + own_right, named + len(own)
-print(f"{len(pairs)} crashes; {verdicts_text(pairs)}\n{share_text(own_right, len(own))}")
+own_right = sum(matrix[modules, kind] for modules, kind in matrix if kind in ("one", "both"))
+own_named = own_right + len(wrong)
+right, named = right + own_right, named + own_named
+print(f"{len(pairs)} crashes; {verdicts_text(pairs)}\n{share_text(own_right, own_named)}")
 print("".join(f"  wrong: {line}\n" for line in wrong), flush=True)
 
 print(f"all: {share_text(right, named)} (mark: {RIGHT_MIN:.0%})")

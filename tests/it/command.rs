@@ -145,6 +145,24 @@ fn every_diagnostic_is_also_json() {
 }
 
 #[test]
+fn a_misspelt_argument_is_answered_with_what_is_meant() {
+    let run = ["run", "scenarios/avastra45.ava"];
+    fails(&[&run[..], &["--agent", "randm"]].concat(), "no agent `randm`: did you mean `random`? there are");
+    fails(&[&run[..], &["--seed", "abc"]].concat(), "'--seed <SEED>': give a whole number from 0");
+}
+
+#[test]
+fn a_misspelt_file_is_found_beside() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let space = scratch.path().join("space.ava");
+    std::fs::write(&space, "language 1\nuse \"road.ava\"\n").expect("it is writable");
+    let told = || outcome(&mut avastra(&["check", &space.display().to_string()])).2;
+    assert!(!told().contains("did you mean"), "{}", told());
+    std::fs::write(scratch.path().join("roads.ava"), "language 1\n").expect("it is writable");
+    assert!(told().contains("no such file or directory; did you mean `roads.ava`?"), "{}", told());
+}
+
+#[test]
 fn what_cannot_be_read_is_said_so() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let binary = scratch.path().join("binary.ava");

@@ -283,6 +283,8 @@ fn a_review_tells_that_a_step_is_illegal_though_it_crashes() {
     let scenario = &tested["scenarios"][0];
     let reason = scenario["reason"].as_str().expect("a reason");
     assert!(scenario["outcome"] == "gone" && reason.contains("is not legal any more"), "{tested}");
+    let told = done(&["replay", &file, "--ads", "idm"]);
+    assert!(told.contains(&format!("\n  step {number} is refused: ")), "{told}");
     assert_eq!(std::fs::read_to_string(&file).expect("it is readable"), edited, "it is kept");
 }
 

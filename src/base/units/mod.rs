@@ -9,6 +9,8 @@ mod rational;
 mod unit;
 
 pub use dimension::Dimension;
-pub use number::{decimal, quantity, quantity_in, quantity_short, unit_of_all};
+pub use number::{
+    decimal, quantity, quantity_if_short, quantity_in, quantity_short, unit_as_written, unit_of_all,
+};
 pub use rational::Rational;
 pub use unit::{UNITS, Unit, unit};

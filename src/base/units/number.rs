@@ -40,8 +40,23 @@ pub fn unit_of_all(values: &[f64], dimension: Dimension) -> Option<&'static Unit
 
 /// A quantity in a unit in which it is short; in SI where it is not.
 pub fn quantity_in(value: f64, dimension: Dimension, unit: Option<&Unit>) -> String {
-    let short = unit.and_then(|unit| Some(with_unit(number_of(value, unit)?, unit.word)));
-    short.unwrap_or_else(|| quantity(value, dimension))
+    unit.and_then(|unit| quantity_if_short(value, unit)).unwrap_or_else(|| quantity(value, dimension))
+}
+
+/// A quantity in a unit, if it is short in that and reads back to the same f64.
+pub fn quantity_if_short(value: f64, unit: &Unit) -> Option<String> {
+    Some(with_unit(number_of(value, unit)?, unit.word))
+}
+
+/// The unit in which an author has probably written a number that has more than three decimals in SI: that in which it has
+/// fewest, and no more than in SI. `None` for SI's.
+pub fn unit_as_written(value: f64, dimension: Dimension) -> Option<&'static Unit> {
+    let decimals = |number: &str| number.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+    let in_si = decimals(&decimal(value, false));
+    let others = UNITS.iter().filter(|unit| unit.dimension == dimension && unit.factor() != Rational::ONE);
+    let written = others.filter_map(|unit| Some((decimals(&number_of(value, unit)?), unit)));
+    let (fewest, unit) = written.min_by_key(|(decimals, _)| *decimals)?;
+    (in_si > 3 && fewest <= in_si).then_some(unit)
 }
 
 /// The number that a value is in a unit, if it is short and reads back to the same f64.
@@ -92,6 +107,16 @@ mod tests {
         assert_eq!(quantity_short(8.0, Dimension::SPEED), "8 m/s");
         assert!(unit_of_all(&[1.0 / 3.0, 2.0], Dimension::LENGTH).is_none());
         assert!(unit_of_all(&[], Dimension::LENGTH).is_none());
+        let written = |number: &str, word: &str| {
+            let (number, unit) = (Rational::from_decimal(number).unwrap(), crate::units::unit(word).unwrap());
+            let value = number.checked_mul(unit.factor()).unwrap().to_f64();
+            unit_as_written(value, unit.dimension).map(|unit| unit.word)
+        };
+        assert_eq!(written("8.5", "mph"), Some("mph"));
+        assert_eq!(written("12.345678", "km/h"), Some("km/h"));
+        assert_eq!(written("25", "mph"), None, "11.176 m/s has three decimals: it may be written in SI");
+        assert_eq!(written("1500", "m"), None);
+        assert_eq!(written("3.4293", "m/s"), None, "it has more decimals in other units");
     }
 
     proptest! {

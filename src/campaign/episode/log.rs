@@ -130,6 +130,17 @@ impl EpisodeLog {
         self.steps.get(step).map_or(&self.memory, |step| &step.memory)
     }
 
+    /// The numbers of the steps whose action was refused, each with the reason.
+    pub fn refused(&self) -> impl Iterator<Item = (usize, String)> {
+        self.steps.iter().enumerate().filter_map(|(number, step)| match &step.outcome {
+            Outcome::Refused { rule, reason, .. } => {
+                let rule = rule.as_ref().map_or(String::new(), |rule| format!("rule `{rule}`: "));
+                Some((number, format!("{rule}{reason}")))
+            }
+            Outcome::Done { .. } | Outcome::Passed => None,
+        })
+    }
+
     /// What held the speed back at a time, s; `None` before anything did.
     pub fn held_at(&self, time_s: f64) -> Option<&Held> {
         // Times of contacts lie within a tick, which is driven by what is said at its beginning.

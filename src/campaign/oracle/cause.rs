@@ -177,6 +177,7 @@ impl<'a> Inquiry<'a> {
             alone: self.fate(&alone),
             noise: None,
             noise_alone: None,
+            signs: Vec::new(),
         }
     }
 
@@ -237,26 +238,34 @@ impl<'a> Inquiry<'a> {
             return;
         }
         let tries = evidence.modules.iter().filter(|found| found.vanishes(differs)).count();
-        for found in &mut evidence.modules {
-            let changed = change(&own, found.module, baseline, differs);
-            found.noise = found.vanishes(differs).then(|| self.compared(&changed, unchanged, tries));
+        for found in evidence.modules.iter_mut().filter(|found| found.vanishes(differs)) {
+            let changed = self.replayed(&change(&own, found.module, baseline, differs), unchanged.len());
+            let both = unchanged.iter().copied().zip(changed.iter().copied());
+            found.noise = Some(Comparison::of(both, tries));
+            found.signs = changed.into_iter().map(u8::from).collect();
         }
         if differs && evidence.told_apart().count() > 1 {
             let modules = evidence.modules.iter_mut();
             for found in modules.filter(|found| is_told_apart(found.noise)) {
                 let alone = baseline.with_module_of(found.module, &own);
-                let noises = 1..=unchanged.len() as u32;
-                let vanished = noises.filter(|noise| self.vanishes(&alone, *noise)).count();
-                found.noise_alone = Some(vanished as u32);
+                let vanished = self.replayed(&alone, unchanged.len());
+                found.noise_alone = Some(vanished.iter().filter(|vanished| **vanished).count() as u32);
+                for (signs, vanished) in found.signs.iter_mut().zip(vanished) {
+                    *signs += u8::from(!vanished);
+                }
             }
         }
     }
 
     /// Compares replays with a change to those with the same noise alone; `tries` is the number of changes that are compared.
     fn compared(&self, changed: &ModularConfig, unchanged: &[bool], tries: usize) -> Comparison {
-        let replays = unchanged.iter().zip(1_u32..);
-        let both = replays.map(|(vanished, noise)| (*vanished, self.vanishes(changed, noise)));
-        Comparison::of(both, tries)
+        let changed = self.replayed(changed, unchanged.len());
+        Comparison::of(unchanged.iter().copied().zip(changed), tries)
+    }
+
+    /// Whether the collision vanishes if a profile takes over, in each of so many replays with other noise.
+    fn replayed(&self, profile: &ModularConfig, replays: usize) -> Vec<bool> {
+        (1..=replays as u32).map(|noise| self.vanishes(profile, noise)).collect()
     }
 
     /// Whether the collision vanishes in each replay with other noise and nothing else changed: until it has happened

@@ -17,7 +17,8 @@
 //! **Verdict.** The first of these that holds, see [`Verdict`]:
 //!
 //! 1. Some modules differ from the baseline, and one of them, made as in the baseline, prevents the collision, told apart
-//!    from chance. If several do, the one whose errors alone lead to the collision most often is named.
+//!    from chance. If several do, the one whose errors alone lead to the collision most often is named, and with it each
+//!    that the replays do not tell apart from it: whichever of them is mended, the collision is gone.
 //! 2. None differs, and a documented weakness, switched off, prevents the collision, told apart from chance.
 //! 3. No change alone is told apart from chance, and two modules together prevent the collision, told apart from it.
 //! 4. None differs, a module's output was beyond its specification in the seconds before (see `measured`), and the module
@@ -25,7 +26,7 @@
 //!    some module before many a near miss, and where other noise prevents the collision anyway, another draw of any
 //!    module's errors would have, too. The table shows what was measured all the same.
 //! 5. None differs, and a module that decides (planning, control, emergency braking) prevents the collision without its
-//!    errors, told apart from chance.
+//!    errors, told apart from chance; of several as above.
 //! 6. None differs, and a module that gives planning its picture prevents the collision without its errors, told apart from
 //!    chance. These errors are within its specification, so planning is brittle.
 //!
@@ -45,7 +46,8 @@ const MISSING: f64 = 0.05;
 /// The cause of a collision, with the evidence for it.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Diagnosis {
-    /// The module at fault; two if only both together prevent the collision; none where the verdict says why.
+    /// The module at fault; several if they are not told apart, or if only both together prevent the collision; none
+    /// where the verdict says why.
     pub cause: Vec<Module>,
     pub verdict: Verdict,
     /// The documented weakness by which it is at fault.
@@ -116,6 +118,9 @@ pub struct ModuleFinding {
     /// Number of these replays in which the errors of this module alone do not lead to the collision. Played only to
     /// tell several modules apart.
     pub noise_alone: Option<u32>,
+    /// For each of these replays, how many of two signs it has that this module is at fault: its change prevents the
+    /// collision, and its errors alone lead to it. The second is looked for only to tell several modules apart.
+    pub signs: Vec<u8>,
 }
 
 /// A documented weakness, and the collision without it.
@@ -218,8 +223,9 @@ impl Evidence {
 
     fn conclude(&self) -> (Verdict, Vec<Module>, Option<&'static str>) {
         let differs = self.differs();
-        if differs && let Some(found) = foremost(self.told_apart()) {
-            return (Verdict::Outside, vec![found.module], None);
+        let named = foremost(self.told_apart());
+        if differs && !named.is_empty() {
+            return (Verdict::Outside, named, None);
         }
         if let Some(found) = self.weakness() {
             return (Verdict::Weakness, vec![found.module], Some(found.weakness));
@@ -230,8 +236,9 @@ impl Evidence {
         if !differs && let Some(found) = self.beyond_specification() {
             return (Verdict::Measured, vec![found.module], None);
         }
-        if !differs && let Some(found) = foremost(self.told_apart().filter(|found| decides(found.module))) {
-            return (Verdict::Deciding, vec![found.module], None);
+        let named = foremost(self.told_apart().filter(|found| decides(found.module)));
+        if !differs && !named.is_empty() {
+            return (Verdict::Deciding, named, None);
         }
         if !differs && self.told_apart().next().is_some() {
             return (Verdict::Brittle, vec![Module::Planning], None);
@@ -275,16 +282,25 @@ impl ModuleFinding {
         fate == Some(Fate::Vanished)
     }
 
-    /// How much it explains: the replays that its change saves, less those that its errors alone do not crash.
-    fn weight(&self) -> i64 {
-        let vanished = self.noise.map_or(0, |noise| i64::from(noise.vanished));
-        vanished - self.noise_alone.map_or(0, i64::from)
+    /// How much it explains: its signs in all replays together.
+    fn weight(&self) -> u32 {
+        self.signs.iter().map(|signs| u32::from(*signs)).sum()
+    }
+
+    /// Whether the replays say that this module is at fault rather than another. Only those count in which the two have
+    /// different numbers of signs. `tries` is the number of modules that it is compared with.
+    fn is_told_apart_from(&self, other: &ModuleFinding, tries: usize) -> bool {
+        let replays = self.signs.iter().zip(&other.signs);
+        Comparison::of(replays.map(|(own, other)| (other > own, own > other)), tries).is_told_apart()
     }
 }
 
-/// The module that explains most; among equals the one that comes first in the flow of data.
-fn foremost<'a>(found: impl Iterator<Item = &'a ModuleFinding>) -> Option<&'a ModuleFinding> {
-    found.min_by_key(|found| Reverse(found.weight()))
+/// The module that explains most, and each that is not told apart from it; in the order of the flow of data.
+fn foremost<'a>(found: impl Iterator<Item = &'a ModuleFinding>) -> Vec<Module> {
+    let found: Vec<&ModuleFinding> = found.collect();
+    let Some(first) = found.iter().min_by_key(|one| Reverse(one.weight())) else { return Vec::new() };
+    let named = found.iter().filter(|one| !first.is_told_apart_from(one, found.len() - 1));
+    named.map(|one| one.module).collect()
 }
 
 /// Whether a module decides what the vehicle does. Prediction does not count as one: without errors it would know the
@@ -325,7 +341,15 @@ mod tests {
     }
 
     fn finding(module: Module, restored: Option<Fate>, idealised: Fate) -> ModuleFinding {
-        ModuleFinding { module, restored, idealised, alone: Fate::Vanished, noise: None, noise_alone: None }
+        ModuleFinding {
+            module,
+            restored,
+            idealised,
+            alone: Fate::Vanished,
+            noise: None,
+            noise_alone: None,
+            signs: Vec::new(),
+        }
     }
 
     /// Evidence of a driving system that is the baseline, or that differs from it in some modules.
@@ -373,15 +397,20 @@ mod tests {
     fn of_several_the_one_whose_errors_alone_suffice_is_named() {
         let mut found = evidence(&[Module::Tracking, Module::Latency]);
         found.chance = Some(Chance { replays: 10, vanished: 0 });
-        for (module, alone) in [(Module::Tracking, 9), (Module::Latency, 1)] {
+        // In each replay the change prevents the collision, and in some of them the errors alone lead to it.
+        let signs = |alone: usize| [vec![2; alone], vec![1; 10 - alone]].concat();
+        for (module, alone) in [(Module::Tracking, 1), (Module::Latency, 9)] {
             let one = &mut found.modules[module as usize];
             one.restored = Some(Fate::Vanished);
             one.noise = Some(compared(10, 0, 2));
-            one.noise_alone = Some(alone);
+            one.signs = signs(alone);
         }
         assert_eq!(named(&found), (Verdict::Outside, vec![Module::Latency]));
-        found.modules[Module::Latency as usize].noise_alone = Some(9);
-        assert_eq!(named(&found), (Verdict::Outside, vec![Module::Tracking]), "the first on the data's way");
+        let either = (Verdict::Outside, vec![Module::Tracking, Module::Latency]);
+        for alone in [6, 1, 0] {
+            found.modules[Module::Latency as usize].signs = signs(alone);
+            assert_eq!(named(&found), either, "{alone}: they are not told apart");
+        }
     }
 
     #[test]
@@ -433,6 +462,7 @@ mod tests {
             one.restored = one.restored.map(|_| fate(rng));
             one.idealised = fate(rng);
             one.noise = noise(rng).filter(|_| one.vanishes(differs));
+            one.signs = (0..12).map(|_| rng::below(rng, 3) as u8).collect();
         }
         if found.modules.iter().any(|one| one.vanishes(differs)) {
             found.chance = Some(Chance { replays: 12, vanished: 2 });

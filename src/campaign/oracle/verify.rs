@@ -1,6 +1,6 @@
 //! The claims of an emitted scenario against what a replay finds.
 
-use crate::episode::{Collision, EpisodeLog, Outcome};
+use crate::episode::{Collision, EpisodeLog};
 use avastra_drivers::Module;
 use avastra_lang::model::vocabulary::Word;
 use avastra_lang::model::{Claim, Obstacle, Scenario, Space, digest_text};
@@ -48,13 +48,7 @@ pub fn verify(
     judgements: &[Judgement],
     replays: &Replays,
 ) -> Vec<ClaimResult> {
-    let steps = log.steps.iter().enumerate().filter_map(|(number, step)| match &step.outcome {
-        Outcome::Refused { rule, reason, .. } => {
-            let rule = rule.as_ref().map_or(String::new(), |rule| format!("rule `{rule}`: "));
-            Some(judged(format!("step {number} is legal"), Err(format!("{rule}{reason}"))))
-        }
-        _ => None,
-    });
+    let steps = log.refused().map(|(number, reason)| judged(format!("step {number} is legal"), Err(reason)));
     let claims = scenario.claims.iter().map(|claim| check(space, claim, log, judgements, replays));
     steps.chain(claims).collect()
 }

@@ -5,7 +5,7 @@ use crate::oracle::AvoidabilitySettings;
 use avastra_drivers as ads;
 use avastra_drivers::external::{Attached, Failure, RecordError};
 use avastra_lang::model::Space;
-use avastra_lang::syntax::listed;
+use avastra_lang::syntax::{listed, nearest};
 use avastra_search::agent;
 use avastra_world::sim::{ENGINE, TrafficError};
 
@@ -105,8 +105,8 @@ pub enum RunError {
     Road { name: String, known: String },
     #[error("no driving system `{name}`: there are {known}")]
     Ads { name: String, known: String },
-    #[error("no agent `{name}`: there are {known}")]
-    Agent { name: String, known: String },
+    #[error("no agent `{name}`: {meant}there are {known}")]
+    Agent { name: String, meant: String, known: String },
     #[error("`{name}` has to be trained first: `avastra train`, then `avastra run --policy FILE`")]
     Untrained { name: String },
     #[error("`{name}` has nothing to learn: `avastra run --agent {name}` plays it")]
@@ -195,8 +195,10 @@ pub const EPISODES_MAX: u32 = 1_000_000;
 /// If there is none.
 pub(crate) fn agent_named(name: &str) -> Result<&'static agent::Entry, RunError> {
     agent::by_name(name).ok_or_else(|| {
-        let known = listed(&agent::REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>());
-        RunError::Agent { name: name.to_owned(), known }
+        let known: Vec<&str> = agent::REGISTRY.iter().map(|entry| entry.name).collect();
+        let meant = nearest(name, known.iter().copied());
+        let meant = meant.map_or(String::new(), |meant| format!("did you mean `{meant}`? "));
+        RunError::Agent { name: name.to_owned(), meant, known: listed(&known) }
     })
 }
 

@@ -42,7 +42,7 @@ pub struct ConditionArguments {
     #[arg(long, default_value = "random", value_parser = Named::AGENT)]
     pub agent: String,
     /// Seed of everything.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = super::seed)]
     pub seed: u64,
     /// Vehicles of ambient traffic around the ego vehicle, besides those that actions make appear.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(avastra_lang::model::AMBIENT_MAX)))]

@@ -33,7 +33,7 @@ pub struct AdsCheckArguments {
     #[arg(long)]
     pub road: Option<String>,
     /// Seed of the episodes.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = super::seed)]
     pub seed: u64,
 }
 

@@ -68,7 +68,7 @@ pub struct TrialArguments {
     #[arg(long, requires = "try", value_name = "NAME|FILE", default_value = avastra_campaign::run::DEFAULT_ADS, value_parser = Named::ADS)]
     pub ads: String,
     /// Seed of the drives and tries.
-    #[arg(long, requires = "try", default_value_t = 1)]
+    #[arg(long, requires = "try", default_value_t = 1, value_parser = super::seed)]
     pub seed: u64,
     /// Write one try of each row and road as a scenario, one that failed if there is any.
     #[arg(long, requires = "try", value_name = "DIR")]

@@ -31,7 +31,7 @@ pub struct TrainArguments {
     #[arg(long, default_value_t = 750, value_parser = clap::value_parser!(u32).range(1..=i64::from(avastra_campaign::run::EPISODES_MAX)))]
     pub episodes: u32,
     /// Seed of the whole training.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = super::seed)]
     pub seed: u64,
     /// How other vehicles drive: a name, or a profile like scenarios/traffic/careful.yaml [default: careful].
     #[arg(long, value_name = "NAME|FILE", value_parser = Named::TRAFFIC)]
@@ -94,7 +94,7 @@ pub struct ExplainPolicyArguments {
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub episodes: u32,
     /// Seed of the episodes and of the shuffles.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = super::seed)]
     pub seed: u64,
     /// Shuffles of each variable.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(2..=1000))]

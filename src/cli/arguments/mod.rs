@@ -24,6 +24,11 @@ pub use scenarios::{
     TestArguments,
 };
 
+/// Reads the seed of an argument.
+fn seed(text: &str) -> Result<u64, &'static str> {
+    text.parse().map_err(|_| "give a whole number from 0")
+}
+
 /// Finds out which of the things that may happen around a self-driving car make it crash.
 #[derive(Debug, Parser)]
 #[command(name = "avastra", version, max_term_width = 100)]

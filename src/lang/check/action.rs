@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use crate::check::checker::{Checker, docs, each, literal};
 use crate::check::declaration::unknown_word;
 use crate::check::expression::{NUMBER_MAX, Place, is_beyond_states, is_number};
+use crate::check::operator::with_range;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of, field};
 use crate::check::rule::locals;
@@ -275,7 +276,7 @@ impl Checker {
             _ => {
                 self.look_at(within, &place, Some(ty));
                 let error = Diagnostic::error(code::TYPE_MISMATCH, "`in` needs a range or a list here");
-                self.reject(error.at(within.span, "neither"))
+                self.reject(with_range(error.at(within.span, "neither"), within))
             }
         }
     }

@@ -61,6 +61,9 @@ fn difference(change: Change, subject: impl Into<String>, detail: impl Into<Stri
     Difference { change, subject: subject.into(), detail: detail.into() }
 }
 
+/// How the titles of declarations begin that rules compute with.
+const TERMS: [&str; 7] = ["body `", "enum `", "`episode`", "fn `", "let `", "road `", "state `"];
+
 /// One of the two spaces.
 struct Side<'a> {
     space: &'a Space,
@@ -86,6 +89,17 @@ impl<'a> Side<'a> {
     /// The row that has the label of a row of the other space.
     fn row(&self, other: &Row) -> Option<&'a Row> {
         self.rows.get(other.label.as_str()).copied()
+    }
+
+    /// Whether something is declared in another way that a rule's meaning may hang on besides its own text. That of an action
+    /// is not: what its parameters may be is no work of the rule's.
+    fn has_other_terms(&self, other: &Side<'_>) -> bool {
+        let differs = |of: &Side<'_>, than: &Side<'_>| {
+            let mut terms =
+                of.texts.iter().filter(|(title, _)| TERMS.iter().any(|kind| title.starts_with(*kind)));
+            terms.any(|(title, text)| than.texts.get(*title) != Some(text))
+        };
+        differs(self, other) || differs(other, self)
     }
 
     /// The index of the rule with this title.
@@ -169,7 +183,8 @@ fn of_rule(
     let mandatory = |text: &str| text.strip_prefix("optional ").unwrap_or(text).to_owned();
     let (before, after) = (mandatory(before), mandatory(after));
     let written = (before != after).then(|| changed_lines(&before, &after));
-    match (compared(old, new, [rule, same]), written) {
+    let may_differ = written.is_some() || old.has_other_terms(new);
+    match (compared(old, new, [rule, same], may_differ), written) {
         (Some((change, detail)), None) => found.push(difference(change, title, detail)),
         (Some((change, detail)), Some(written)) => {
             found.push(difference(change, title, format!("{detail}; {written}")));
@@ -180,8 +195,14 @@ fn of_rule(
     found
 }
 
-/// Whether a rule forbids more or less than before, by its moves or by what it leaves of each range.
-fn compared(old: &Side<'_>, new: &Side<'_>, [rule, same]: [usize; 2]) -> Option<(Change, String)> {
+/// Whether a rule forbids more or less than before, by its moves or by what it leaves of each range. If it cannot itself
+/// differ (`may_differ`), another range is that of the action, which is told there.
+fn compared(
+    old: &Side<'_>,
+    new: &Side<'_>,
+    [rule, same]: [usize; 2],
+    may_differ: bool,
+) -> Option<(Change, String)> {
     let mut turns = Turns::default();
     if let (
         RuleBody::Moves { state, allowed: before, .. },
@@ -213,7 +234,7 @@ fn compared(old: &Side<'_>, new: &Side<'_>, [rule, same]: [usize; 2]) -> Option<
                 turns.looser.push(format!("binds `{}` no longer", row.label));
                 continue;
             }
-            for (was, is) in shared_roads(old.space, new.space) {
+            for (was, is) in shared_roads(old.space, new.space).into_iter().filter(|_| may_differ) {
                 let (was, is) = (&old.space.roads[was], &new.space.roads[is]);
                 let (before, after) = (left(old.space, rule, row, was), left(new.space, same, other, is));
                 turns.judge(before.as_deref(), after.as_deref(), &was.name);

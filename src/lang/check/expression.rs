@@ -76,11 +76,16 @@ impl Checker {
     /// An expression of a wanted type; `None` once the mistake is reported.
     pub(super) fn typed(&mut self, expr: &ast::Expr, place: &Place<'_>, wanted: Type) -> Option<Expr> {
         let found = self.expr(expr, place, Some(wanted))?;
-        self.fit(found, wanted)
+        self.fit(found, wanted, || unit_help(expr, wanted))
     }
 
-    /// Reports an expression that is not of the wanted type.
-    pub(super) fn fit(&mut self, found: Expr, wanted: Type) -> Option<Expr> {
+    /// Reports an expression that is not of the wanted type; `help` says what to do about a number.
+    pub(super) fn fit(
+        &mut self,
+        found: Expr,
+        wanted: Type,
+        help: impl FnOnce() -> Option<String>,
+    ) -> Option<Expr> {
         if fits(found.ty, wanted) {
             return Some(found);
         }
@@ -92,13 +97,16 @@ impl Checker {
         let error =
             Diagnostic::error(code, format!("{what} mismatch: wanted `{wanted_name}`, found `{found_name}`"))
                 .at(found.span, format!("this is {}", article(&found_name)));
-        self.reject(match wanted {
+        let help = match wanted {
             Type::Enum(of) if self.enums[of.0].variants.len() <= 12 => {
                 let variants: Vec<&str> = self.enums[of.0].variants.iter().map(String::as_str).collect();
-                error.help(format!("a `{wanted_name}` is {}", one_of(&variants)))
+                Some(format!("a `{wanted_name}` is {}", one_of(&variants)))
             }
-            Type::Enum(_) | Type::Bool | Type::Int | Type::Quantity(_) => error,
-        })
+            Type::Enum(_) | Type::Bool => None,
+            Type::Int | Type::Quantity(_) if both_numbers => help(),
+            Type::Int | Type::Quantity(_) => None,
+        };
+        self.reject(error.help_if(help))
     }
 
     /// An expression of any type. `hint` decides between variants of the same name.
@@ -669,7 +677,7 @@ impl Checker {
     fn arm_value(&mut self, value: &ast::Expr, place: &Place<'_>, ty: &mut Option<Type>) -> Option<Expr> {
         let found = self.expr(value, place, *ty)?;
         let wanted = *ty.get_or_insert(found.ty);
-        self.fit(found, wanted)
+        self.fit(found, wanted, || unit_help(value, wanted))
     }
 
     /// Notes which variants an arm takes, and reports the arm if it takes none.
@@ -754,6 +762,33 @@ pub(crate) fn unknown_unit(word: &ast::Name) -> Diagnostic {
         Some(near) => error.meant(word.span, near),
         None => error.help(format!("the units are {}", words().collect::<Vec<_>>().join(", "))),
     }
+}
+
+/// What to write in place of a number without a unit, or with a unit of something else; `None` for an expression that is no
+/// such number, and where no unit is wanted.
+pub(super) fn unit_help(expr: &ast::Expr, wanted: Type) -> Option<String> {
+    match &expr.kind {
+        ast::ExprKind::Number(number) => number_help("", number, dimension(wanted)),
+        ast::ExprKind::Unary { op: UnaryOp::Negate, operand } => match &operand.kind {
+            ast::ExprKind::Number(number) => number_help("-", number, dimension(wanted)),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// As [`unit_help`], of a literal with its sign.
+pub(super) fn number_help(sign: &str, number: &ast::Number, wanted: Dimension) -> Option<String> {
+    if wanted == Dimension::RATIO {
+        return None;
+    }
+    let of_wanted = units::UNITS.iter().filter(|unit| unit.dimension == wanted);
+    let words: Vec<&str> = of_wanted.map(|unit| unit.word).collect();
+    let usual = words.first()?;
+    Some(match number.unit {
+        None => format!("write a unit: `{sign}{} {usual}`", number.digits),
+        Some(_) => format!("{} is in {}", article(&wanted.to_string()), one_of(&words)),
+    })
 }
 
 /// What is said of a number beyond those of states.

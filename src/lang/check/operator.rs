@@ -2,7 +2,9 @@
 //! values: `road == corner` and `road in [corner, boulevard]` are read here as one condition.
 
 use crate::check::checker::Checker;
-use crate::check::expression::{Place, SEEN_BY, article, dimension, fits, is_number, unknown_here};
+use crate::check::expression::{
+    Place, SEEN_BY, article, dimension, fits, is_number, unit_help, unknown_here,
+};
 use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of};
@@ -10,7 +12,8 @@ use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::vocabulary::{Body, Known, LaneChoice, Word, WordFact};
 use crate::model::{BodyWord, Type, code};
 use crate::syntax::ast::{BinaryOp, Span};
-use crate::syntax::{Diagnostic, ast, one_of};
+use crate::syntax::{Diagnostic, ast, one_of, print_expr};
+use avastra_base::units;
 use avastra_base::units::Rational;
 
 /// Two expressions with an operator between them.
@@ -46,6 +49,9 @@ impl Checker {
     }
 
     fn arithmetic(&mut self, op: Arithmetic, at: Span, of: Sides<'_>, place: &Place<'_>) -> Option<Expr> {
+        if let Some(error) = self.unit_apart(op, of, place) {
+            return self.reject(error);
+        }
         let (left, right) = (self.numeric(of.left, place), self.numeric(of.right, place));
         let (left, right, span) = (left?, right?, of.span);
         let (a, b) = (dimension(left.ty), dimension(right.ty));
@@ -58,7 +64,7 @@ impl Checker {
             Arithmetic::Add | Arithmetic::Subtract if a == b => Some(a),
             Arithmetic::Add | Arithmetic::Subtract => {
                 let verb = if op == Arithmetic::Add { "added" } else { "subtracted" };
-                self.mismatch(&format!("cannot be {verb}"), at, &left, &right);
+                self.mismatch(&format!("cannot be {verb}"), at, of, &left, &right);
                 return None;
             }
             Arithmetic::Multiply => a.times(b),
@@ -72,12 +78,29 @@ impl Checker {
         Some(Expr { kind: ExprKind::Arithmetic(op, Box::new(left), Box::new(right)), ty, span })
     }
 
-    fn mismatch(&mut self, what: &str, at: Span, left: &Expr, right: &Expr) {
+    /// The mistake if a unit is written with blanks around its `/`: `18 km / h`.
+    fn unit_apart(&self, op: Arithmetic, of: Sides<'_>, place: &Place<'_>) -> Option<Diagnostic> {
+        let ast::ExprKind::Number(number) = &of.left.kind else { return None };
+        let ast::ExprKind::Name(name) = &of.right.kind else { return None };
+        let first = number.unit.as_ref().filter(|_| op == Arithmetic::Divide)?;
+        let unit = units::unit(&format!("{}/{name}", first.text))?;
+        let is_unknown = self.is_bare_variant(of.right, place) && self.references.owners(name).is_empty();
+        is_unknown.then(|| {
+            let span = Span::new(first.span.file, first.span.start, of.right.span.end);
+            let error = Diagnostic::error(code::UNKNOWN_UNIT, "a unit is written without blanks");
+            error.at(span, "read as a division").meant(span, unit.word)
+        })
+    }
+
+    fn mismatch(&mut self, what: &str, at: Span, sides: Sides<'_>, left: &Expr, right: &Expr) {
         let (a, b) = (self.references.type_name(left.ty), self.references.type_name(right.ty));
         let code =
             if is_number(left.ty) && is_number(right.ty) { code::UNIT_MISMATCH } else { code::TYPE_MISMATCH };
         let error = Diagnostic::error(code, format!("`{a}` and `{b}` {what}")).at(at, "");
-        self.report(error.beside(left.span, article(&a)).beside(right.span, article(&b)));
+        let error = error.beside(left.span, article(&a)).beside(right.span, article(&b));
+        // The number beside what has a dimension already is the one that lacks it.
+        let help = unit_help(sides.right, left.ty).or_else(|| unit_help(sides.left, right.ty));
+        self.report(error.help_if(help.filter(|_| is_number(left.ty) && is_number(right.ty))));
     }
 
     fn comparison(&mut self, op: Comparison, sides: Sides<'_>, place: &Place<'_>) -> Option<Expr> {
@@ -109,7 +132,7 @@ impl Checker {
         }
         let (left, right) = self.both_sides(left, right, place)?;
         if !fits(left.ty, right.ty) && !fits(right.ty, left.ty) {
-            self.mismatch("cannot be compared", span, &left, &right);
+            self.mismatch("cannot be compared", span, sides, &left, &right);
             return None;
         }
         match left.ty {
@@ -193,7 +216,7 @@ impl Checker {
                 self.look_at(right, place, Some(ty));
                 let error =
                     Diagnostic::error(code::TYPE_MISMATCH, "`in` needs a list, a range or `road.lanes`");
-                return self.reject(error.at(right.span, "none of them"));
+                return self.reject(with_range(error.at(right.span, "none of them"), right));
             }
         };
         Some(Expr { kind, ty: Type::Bool, span })
@@ -305,6 +328,17 @@ impl Checker {
             }
             _ => None,
         }
+    }
+}
+
+/// Says how a range is written, where a difference stands in its place: `5 m/s - 15 m/s`.
+pub(super) fn with_range(error: Diagnostic, expr: &ast::Expr) -> Diagnostic {
+    match &expr.kind {
+        ast::ExprKind::Binary { op: BinaryOp::Arithmetic(Arithmetic::Subtract), op_span, left, right } => {
+            let help = format!("a range is written `{} .. {}`", print_expr(left), print_expr(right));
+            error.help(help).fix("write `..`", *op_span, "..")
+        }
+        _ => error,
     }
 }
 

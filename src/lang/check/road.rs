@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::check::checker::{Checker, docs};
-use crate::check::expression::Place;
+use crate::check::expression::{Place, number_help};
 use crate::check::names::unknown;
 use crate::check::report::{Report, field};
 use crate::model::vocabulary::{RoadField, Word};
@@ -158,7 +158,8 @@ impl Checker {
             );
         };
         let station_expr = self.number(station)?;
-        let station = self.fit(station_expr, Type::Quantity(Dimension::LENGTH))?;
+        let help = || number_help("", station, Dimension::LENGTH);
+        let station = self.fit(station_expr, Type::Quantity(Dimension::LENGTH), help)?;
         let station_m = self.fold_number(&station)?.to_f64();
         let Ok(lane_id) = lane.text.parse::<i32>() else {
             let error = Diagnostic::error(code::NO_ROUTE, "the lane's number is too large");

@@ -10,6 +10,7 @@ use crate::model::{Memory, Road, Row, RuleDef, RulesInForce, Space, Value, code}
 use crate::prove::{next_rows, shortest_way};
 use crate::syntax::ast::Span;
 use crate::syntax::{Diagnostic, ast, listed};
+use avastra_base::units::{quantity_if_short, unit};
 
 /// Largest number of legal rows that are listed for one step.
 const ROWS_SHOWN: usize = 6;
@@ -131,7 +132,7 @@ fn broken_condition(
         let parameter = &space.actions[moment.row.action].parameters[bound.local];
         let field = moment.step.drawn.iter().find(|field| *field.name.text == *parameter.name);
         let Some(field) = field.filter(|_| !parameter.axis) else { continue };
-        let shown = space.show(limit, parameter.ty);
+        let shown = in_unit_of(&field.value, limit).unwrap_or_else(|| space.show(limit, parameter.ty));
         error = error.at(
             field.value.span,
             format!("`{}` must be {} {shown} on `{}`", parameter.name, bound.op.symbol(), road.name),
@@ -164,6 +165,12 @@ fn broken_condition(
         ),
         None => error,
     })
+}
+
+/// A limit in the unit of the number that breaks it, if it is short in that.
+fn in_unit_of(broken: &ast::Expr, limit: Value) -> Option<String> {
+    let ast::ExprKind::Number(number) = &broken.kind else { return None };
+    quantity_if_short(limit.number(), unit(&number.unit.as_ref()?.text)?)
 }
 
 fn asks_for_limit(condition: &Expr) -> bool {

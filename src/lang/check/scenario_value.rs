@@ -1,6 +1,6 @@
 //! Values in scenarios. They are literals, and each is read back to exactly the `f64` that was written.
 
-use crate::check::expression::unknown_unit;
+use crate::check::expression::{number_help, unknown_unit};
 use crate::check::names::unknown;
 use crate::model::scenario::Figure;
 use crate::model::{Space, Type, Value, code};
@@ -109,7 +109,8 @@ pub(super) fn in_unit(
     if found != dimension {
         let message = format!("unit mismatch: {what} `{dimension}`, found `{found}`");
         let error = Diagnostic::error(code::UNIT_MISMATCH, message);
-        return Err(error.at(literal.span, format!("this is `{found}`")));
+        let error = error.at(literal.span, format!("this is `{found}`"));
+        return Err(error.help_if(number_help("", literal, dimension)));
     }
     let value = if factor == own {
         // The text is parsed as `f64` directly, so that the value is the same to the last bit.

@@ -670,6 +670,9 @@ reward {
     ] {
         assert!(told(from, to).starts_with(wanted), "`{wanted}` in\n{}", told(from, to));
     }
+    let narrowed = told("in 10 m/s .. 20 m/s", "in 11 m/s .. 20 m/s");
+    assert!(narrowed.contains("draws of `ahead`: ") && narrowed.contains("speed 10 .. "), "{narrowed}");
+    assert!(!narrowed.contains(" rule `"), "no rule has changed:\n{narrowed}");
     let rules = "rule calm_first on ahead: speed <= road.limit\nrule roomy: spawn_gap >= safety_gap\n";
     let turned = "rule roomy: spawn_gap >= safety_gap\nrule calm_first on ahead: speed <= road.limit\n";
     assert_eq!(told(rules, turned), "moved rule `roomy`: it comes before rule `calm_first` now");

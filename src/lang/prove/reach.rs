@@ -7,18 +7,18 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use crate::model::effort;
-use crate::model::expr::Expr;
+use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{self, Bound, Demand, RowRules, allowed, rules_by_action};
 use crate::model::vocabulary::Word;
 use crate::model::{
     ActionDef, Domain, Facts, Interval, Memory, Parameter, Reach, Road, Row, RuleBody, RulesInForce, Space,
-    Value, WordExpr, code, evaluate, locals,
+    Type, Value, WordExpr, code, evaluate, locals,
 };
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::prove::moment::{Case, may_hold_together, newcomers, ranges_named};
 use crate::prove::{distinct, product, rule_names};
 use crate::syntax::Diagnostic;
-use avastra_base::units::Unit;
+use avastra_base::units::{Unit, unit_as_written};
 
 /// Each row allows all proofs together this many more steps for each road, counting up to `ROADS_MAX` roads. A row under a
 /// few rules takes fewer, so the longest table can be checked.
@@ -308,15 +308,19 @@ impl<'a> RowRules<'a> {
             for bound in self.bounds().filter(|bound| bound.rule == Some(*rule)) {
                 let parameter = &parameters[bound.local];
                 let limit = allowed(bound.op, &enclose(&bound.limit, &known).interval());
-                wanted.push((parameter, limit, locals[bound.local].interval()));
+                // A limit that is written down is told in its own unit.
+                let unit = parameter.unit().or_else(|| unit_of_literal(&bound.limit));
+                wanted.push((parameter, (limit, unit), locals[bound.local].interval()));
             }
             // Two limits that look alike would make no conflict.
-            let ends: Vec<_> = wanted.iter().flat_map(|(_, limit, declared)| [*limit, *declared]).collect();
+            let ends: Vec<_> =
+                wanted.iter().flat_map(|(_, (limit, _), declared)| [*limit, *declared]).collect();
             let decimals = Interval::decimals_of(&ends);
-            let figure = |(parameter, limit, declared): &(&Parameter, Interval, Interval)| {
+            let figure = |(parameter, (limit, unit), declared): &(&Parameter, Limit, Interval)| {
                 let is = if declared.single().is_some() { "it is" } else { "its range is" };
-                let shown = |interval: &Interval| interval.shown_to(decimals, parameter.ty, parameter.unit());
-                format!("`{}` wants {}, {is} {}", parameter.name, shown(limit), shown(declared))
+                let limit = limit.shown_to(decimals, parameter.ty, *unit);
+                let declared = declared.shown_to(decimals, parameter.ty, parameter.unit());
+                format!("`{}` wants {limit}, {is} {declared}", parameter.name)
             };
             let figures: Vec<String> = wanted.iter().map(figure).collect();
             match figures.as_slice() {
@@ -357,6 +361,17 @@ impl<'a> RowRules<'a> {
             // Other rows of the action may obey the rule.
             false => format!("rule `{name}` cannot hold in `{}`", self.row.label),
         }
+    }
+}
+
+/// What a bound allows, and the unit in which it is told.
+type Limit = (Interval, Option<&'static Unit>);
+
+/// The unit in which a limit is written that is a number; `None` for SI's, and for what is computed.
+fn unit_of_literal(limit: &Expr) -> Option<&'static Unit> {
+    match (&limit.kind, limit.ty) {
+        (ExprKind::Number(value), Type::Quantity(dimension)) => unit_as_written(value.to_f64(), dimension),
+        _ => None,
     }
 }
 

@@ -36,7 +36,7 @@ fn errors(space: &Space, action: usize) -> impl Iterator<Item = Diagnostic> {
         })?;
         let message = format!("the {what} may lie out of bounds");
         let error = Diagnostic::error(code::OUT_OF_BOUNDS, message)
-            .at(expr.span, format!("{found} {unit} in `{}`", row.label))
+            .at(expr.span, format!("{} in `{}`", found.shown(expr.ty, found.unit(expr.ty)), row.label))
             .note("rules do not count here: they can be switched off");
         let (low, high) = (range.start(), range.end());
         let help = format!("give its parameters ranges that keep it within {low} .. {high} {unit}");

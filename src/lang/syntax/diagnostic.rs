@@ -106,6 +106,14 @@ impl Diagnostic {
         self
     }
 
+    /// Says what to do about it, where that is known.
+    pub(crate) fn help_if(self, help: Option<String>) -> Self {
+        match help {
+            Some(help) => self.help(help),
+            None => self,
+        }
+    }
+
     /// Adds a change of one place that removes the mistake.
     pub fn fix(mut self, title: impl Into<String>, span: Span, text: impl Into<String>) -> Self {
         self.fixes.push(Fix { title: title.into(), span, text: text.into() });

@@ -2,6 +2,7 @@
 //!
 //! They are looked for only where the grammar has failed, so they take nothing from what an author may write.
 
+use crate::syntax::grammar::NAME;
 use crate::syntax::keyword::OPERATORS;
 use avastra_base::units::unit;
 
@@ -156,6 +157,7 @@ fn infix_word(word: &str, failure: &Failure) -> Option<Meant> {
         "if" | "then" | "else" | "elif" | "elseif" => Some((CHOICE.to_owned(), None)),
         "is" | "equals" | "eq" => write("=="),
         "xor" => write("!="),
+        "to" => write(".."),
         "mod" => Some(("there is no remainder".to_owned(), None)),
         lower => {
             let mut operators = OPERATORS.iter().map(|(known, _)| *known);
@@ -262,6 +264,24 @@ fn percent_of_nothing(text: &str, token: usize, failure: &Failure) -> Option<For
     })
 }
 
+/// `5. m/s`: the point after which a number ends, which the grammar has taken for that of a part. `end` is where the last token
+/// before the failure ends.
+pub fn bare_point(text: &str, end: usize, failure: &Failure) -> Option<Foreign> {
+    let number = text[..end].strip_suffix('.').filter(|_| failure.expects(NAME))?;
+    let from = number.rfind("..").map_or(0, |range| range + "..".len());
+    let rest = number[from..].trim_end_matches(|letter: char| letter.is_ascii_digit() || letter == '.');
+    let start = from + rest.len();
+    let is_number = number[start..].ends_with(|last: char| last.is_ascii_digit())
+        && !rest.ends_with(|letter: char| is_in_word(letter) || letter == '#');
+    is_number.then(|| Foreign {
+        start,
+        end,
+        message: Some("a number ends with a digit".to_owned()),
+        help: format!("write `{}`", &number[start..]),
+        fix: Some((end - 1, end, String::new())),
+    })
+}
+
 /// The end of a type between `:` and `=`, as in `let far: Length = 3 m`.
 fn type_of_value(text: &str, from: usize) -> Option<usize> {
     let rest = &text[from..];
@@ -333,6 +353,13 @@ mod tests {
             (help.as_str(), mended.as_deref()),
             ("write `80 * road.limit`", Some("v <= 80 * road.limit"))
         );
+        let failure = Failure { at: 8, expected: vec![NAME], continues: false };
+        let pointed = |text: &str| bare_point(text, text.trim_end().len(), &failure);
+        assert_eq!(pointed("v <= 5. ").unwrap().help, "write `5`");
+        assert_eq!(pointed("in 1.50 .. 2.50.").unwrap().help, "write `2.50`");
+        assert_eq!(pointed("in 1..2.").unwrap().help, "write `2`");
+        assert_eq!(pointed("v <= road1."), None, "a part of something");
+        assert_eq!(pointed("once npc#1."), None, "a part of a road user");
         assert_eq!(said("road.limit.x", 10, &["an operator"], true), None);
     }
 }

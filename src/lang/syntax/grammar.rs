@@ -31,6 +31,12 @@ pub fn lone_item(text: &str) -> Result<Pairs<'_, Rule>, (usize, Vec<Rule>)> {
 
 /// What an author calls a name.
 pub const NAME: &str = "a name";
+/// What is expected where an action may go on.
+pub const EFFECT: &str = "an effect like `set time = to`";
+/// What is expected where more effects may go on, which only set states.
+pub const ONLY_SET: &str = "an effect like `set count = count + 1`";
+/// The words that effects begin with; the first is that of those which only set states.
+pub const EFFECTS: &[&str] = &["set", "spawn", "order"];
 /// What is expected where a transition names a value.
 pub const VARIANT: &str = "a variant";
 
@@ -83,7 +89,7 @@ pub fn role(rule: Rule) -> Role {
         Rule::type_name => Role::Said("a type"),
         Rule::function_param => Role::Said("a parameter"),
         Rule::action_param => Role::Said("a parameter like `each to: Time`"),
-        Rule::effect | Rule::set | Rule::spawn | Rule::order => Role::Said("an effect like `set time = to`"),
+        Rule::effect | Rule::set | Rule::spawn | Rule::order => Role::Said(EFFECT),
         Rule::transition => Role::Said("a transition like `Noon -> Night`"),
         Rule::field | Rule::field_name => Role::Said("a field like `speed: 5 m/s`"),
         Rule::fields | Rule::open_brace | Rule::initial_keys | Rule::moves => Role::Said("`{`"),
@@ -105,7 +111,7 @@ pub fn role(rule: Rule) -> Role {
         Rule::close_paren => Role::Said("`)`"),
         Rule::open_bracket | Rule::key | Rule::moved_key => Role::Said("`[`"),
         Rule::close_bracket => Role::Said("`]`"),
-        Rule::only_set => Role::Said("an effect like `set count = count + 1`"),
+        Rule::only_set => Role::Said(ONLY_SET),
         Rule::kw_also => Role::Said("`also`"),
         Rule::kw_step => Role::Said("`step`"),
         Rule::kw_digest => Role::Said("`digest`"),

@@ -10,8 +10,10 @@ use pest::iterators::Pair;
 use crate::syntax::ast::{Doc, Field, File, FileId, Item, Span};
 use crate::syntax::build::{Builder, Built, end_of};
 use crate::syntax::diagnostic::{enumerated, one_of};
-use crate::syntax::foreign::{Failure, foreign, foreign_declaration};
-use crate::syntax::grammar::{AvaParser, NAME, Rule, VARIANT, continues_expression, lone_item, words};
+use crate::syntax::foreign::{Failure, Foreign, bare_point, foreign, foreign_declaration};
+use crate::syntax::grammar::{
+    AvaParser, EFFECT, EFFECTS, NAME, ONLY_SET, Rule, VARIANT, continues_expression, lone_item, words,
+};
 use crate::syntax::keyword::{CLAUSES, DECLARATIONS, OPERATORS};
 use crate::syntax::scan::{Comment, Scan, scan};
 use crate::syntax::{Diagnostic, code, nearest};
@@ -185,14 +187,17 @@ impl Reader<'_> {
     /// The mistake where a mark or word of another language stands at the token at which the reading failed.
     fn foreign(&self, token: usize, found: &str, failure: &Failure) -> Option<Diagnostic> {
         let same_line = !self.text[self.end_of_token_before(token)..token].contains('\n');
-        let foreign = foreign(self.text, token, same_line, failure)?;
+        Some(self.told(foreign(self.text, token, same_line, failure)?, found, failure))
+    }
+
+    fn told(&self, foreign: Foreign, found: &str, failure: &Failure) -> Diagnostic {
         let message = foreign.message;
         let message = message
             .unwrap_or_else(|| format!("expected {}, found `{found}`", enumerated(&failure.expected, "or")));
         let mistake = Diagnostic::error(code::SYNTAX, message)
             .at(Span::new(self.file, foreign.start, foreign.end), "unexpected")
             .help(foreign.help);
-        Some(match foreign.fix {
+        match foreign.fix {
             Some((from, to, text)) => {
                 let title = match text.trim() {
                     "" => "delete it".to_owned(),
@@ -201,7 +206,7 @@ impl Reader<'_> {
                 mistake.fix(title, Span::new(self.file, from, to), text)
             }
             None => mistake,
-        })
+        }
     }
 
     /// Reports a word or mark that begins no declaration. On the line where the previous declaration ended
@@ -243,6 +248,9 @@ impl Reader<'_> {
         let expected = enumerated(words, "or");
         let (token_start, found) = self.token_after(failure.at);
         let at_end = token_start >= end;
+        if let Some(pointed) = bare_point(self.text, self.end_of_token_before(token_start), failure) {
+            return self.told(pointed, found, failure);
+        }
         let before_end = self.scan.unclosed.partition_point(|opener| opener.start < end);
         let opener = self.scan.unclosed[..before_end].last().filter(|opener| opener.start >= start);
         if let (true, Some(opener)) = (at_end, opener) {
@@ -260,20 +268,41 @@ impl Reader<'_> {
         if let Some(mistake) = (!at_end).then(|| self.foreign(token_start, found, failure)).flatten() {
             return mistake;
         }
+        let span = Span::new(self.file, token_start, token_start + found.len());
+        let mistake = Diagnostic::error(code::SYNTAX, format!("expected {expected}, found `{found}`"))
+            .at(span, "unexpected");
+        let effects: &[&str] = if words.contains(&EFFECT) {
+            EFFECTS
+        } else if words.contains(&ONLY_SET) {
+            &EFFECTS[..1]
+        } else {
+            &[]
+        };
+        // Effects stand on lines of their own: a misspelt one is wrong itself, and not the end of the line before.
+        if let Some(meant) = nearest(found, effects.iter().copied()).filter(|_| !at_end) {
+            return mistake.meant(span, meant);
+        }
         let before = self.end_of_token_before(token_start);
+        let lacks_colon = !at_end && is_condition_after_head(words, found);
+        let with_colon = |mistake: Diagnostic| {
+            let place = Span::new(self.file, before, before);
+            mistake.help("write `:` before the condition").fix("write `:`", place, ":")
+        };
         if at_end || self.text[before..token_start].contains('\n') {
             // The next line is right: something is missing at the end of this one.
-            return Diagnostic::error(code::SYNTAX, format!("expected {expected}"))
+            let missing = Diagnostic::error(code::SYNTAX, format!("expected {expected}"))
                 .at(Span::new(self.file, before, before), "here");
+            return if lacks_colon { with_colon(missing) } else { missing };
         }
-        let mistake = Diagnostic::error(code::SYNTAX, format!("expected {expected}, found `{found}`"))
-            .at(Span::new(self.file, token_start, token_start + found.len()), "unexpected");
+        if lacks_colon {
+            return with_colon(mistake);
+        }
         if words.contains(&NAME) && found.starts_with(|first: char| first.is_ascii_alphabetic()) {
             return mistake.help(format!("`{found}` is a word of the language; choose another name"));
         }
         let is_word = words_inside().any(|word| word == found);
         match nearest(found, words_inside()).filter(|_| found.len() > 2 && !is_word) {
-            Some(meant) => mistake.meant(Span::new(self.file, token_start, token_start + found.len()), meant),
+            Some(meant) => mistake.meant(span, meant),
             None => mistake,
         }
     }
@@ -375,6 +404,13 @@ impl Reader<'_> {
         }));
         found
     }
+}
+
+/// Whether the condition of a rule stands right after its name and what it binds, and the colon is forgotten.
+fn is_condition_after_head(expected: &[&str], found: &str) -> bool {
+    let is_head = ["`:`", "`during`"].iter().all(|word| expected.contains(word));
+    let is_condition = found.starts_with(|first: char| first.is_ascii_alphanumeric() || first == '(');
+    is_head && is_condition && nearest(found, ["on", "during"]).is_none()
 }
 
 /// What was expected, in the author's words.

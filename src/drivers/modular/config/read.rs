@@ -24,7 +24,7 @@ pub enum ConfigError {
     #[error("{}{key} is {found}; write {wanted}", at(*line))]
     Type { line: Option<usize>, key: String, found: String, wanted: &'static str },
     #[error("{}`{key}` is {value}; write a value from {low} to {high}", at(*line))]
-    Range { line: Option<usize>, key: String, value: f64, low: f64, high: f64 },
+    Range { line: Option<usize>, key: String, value: String, low: f64, high: f64 },
 }
 
 fn at(line: Option<usize>) -> String {
@@ -112,8 +112,10 @@ fn overlay(text: &str, path: &str, file: &Value, whole: &mut Value) -> Result<()
     if let Some(value) = file.as_f64() {
         let (low, high) = range(path);
         if !(low..=high).contains(&value) {
-            let (line, key) = (line_of(text, path), path.to_owned());
-            return Err(ConfigError::Range { line, key, value, low, high });
+            let line = line_of(text, path);
+            let value = line.and_then(|line| as_written(text, line, path, value));
+            let value = value.unwrap_or_else(|| file.to_string());
+            return Err(ConfigError::Range { line, key: path.to_owned(), value, low, high });
         }
         // `8` and `8.0` are one setting and must have one digest.
         if whole.is_f64() {
@@ -174,6 +176,15 @@ fn line_of(text: &str, path: &str) -> Option<usize> {
         line += lines[line..].iter().position(holds)?;
     }
     (!path.is_empty()).then_some(line + 1)
+}
+
+/// A number as the line of its key has it, `3.50`; `None` if it does not stand there in such a form.
+fn as_written(text: &str, line: usize, path: &str, value: f64) -> Option<String> {
+    let key = path.rsplit('.').next().unwrap_or(path);
+    let (_, after) = text.lines().nth(line - 1)?.rsplit_once(key)?;
+    let after = after.trim_start_matches(['"', '\'', ' ', ':']);
+    let number = after.split(|c: char| c.is_whitespace() || ",}#".contains(c)).next()?;
+    (number.parse::<f64>() == Ok(value)).then(|| number.to_owned())
 }
 
 /// The part of `own` that differs from `usual`, as flow YAML.
@@ -247,6 +258,10 @@ mod tests {
             (
                 "perception:\n  latency_frames: 1.5\n",
                 "line 2: `perception.latency_frames` is `1.5`; write a whole number",
+            ),
+            (
+                "perception:\n  range_factor: 3.50 # far\n",
+                "line 2: `perception.range_factor` is 3.50; write a value from 0.05 to 2",
             ),
             ("- 1\n", "the profile is a list; write a section of `key: value` lines"),
         ];
