@@ -4,12 +4,12 @@
 use avastra_lang::check::{Declaration, References, Symbol};
 use avastra_lang::model::Type;
 use avastra_lang::model::vocabulary::{
-    CHANGE, EpisodeField, OrderField, RoadField, ScenarioClaim, Site, SpaceClaim, SpawnField, StartField,
-    StopReason, THERE, WAIT, Word, parts_of, things,
+    CHANGE, EpisodeField, OrderField, PhaseField, RoadField, ScenarioClaim, Site, SpaceClaim, SpawnField,
+    StartField, StopReason, THERE, WAIT, Word, parts_of, things,
 };
 use avastra_lang::syntax::ast::{
     Action, ActionParam, Arm, BinaryOp, Call, Effect, EffectKind, Expr, ExprKind, Field, Initial, ItemKind,
-    Name, Policy, Rule, RuleBody, Scenario, State, Step, Type as WrittenType, TypeKind,
+    Name, Phase, Policy, Rule, RuleBody, Scenario, State, Step, Type as WrittenType, TypeKind,
 };
 use avastra_lang::syntax::{HERE, Unfinished, unfinished};
 
@@ -29,6 +29,7 @@ pub enum Kind {
     Units,
     Actions,
     Groups,
+    Manoeuvres,
     /// Names that spawns give.
     RoadUsers,
     States,
@@ -90,6 +91,7 @@ fn replaceable(item: &ItemKind) -> Vec<Kind> {
         ItemKind::State(_) => vec![Kind::States],
         ItemKind::Let(_) => vec![Kind::Constants],
         ItemKind::Fn(_) => vec![Kind::Functions],
+        ItemKind::Manoeuvre(_) => vec![Kind::Manoeuvres],
         ItemKind::Action(_) => vec![Kind::Actions],
         ItemKind::Group(_) => vec![Kind::Groups],
         ItemKind::Rule(_) => vec![Kind::Rules],
@@ -151,7 +153,7 @@ struct Place<'a> {
 impl<'a> Place<'a> {
     fn new(references: &'a References, item: &ItemKind, written: &'a str) -> Place<'a> {
         let about = match item.plain() {
-            ItemKind::Rule(_) => About::Rule,
+            ItemKind::Rule(_) | ItemKind::Manoeuvre(_) => About::Rule,
             ItemKind::Reward(_) => About::Outcome(Site::Reward),
             ItemKind::Verdict(_) => About::Outcome(Site::Verdict),
             ItemKind::Expect(_) => About::Space,
@@ -188,6 +190,10 @@ impl<'a> Place<'a> {
                 let mut types = of.params.iter().map(|param| &param.ty).chain([&of.result]);
                 let result = self.written_type(&of.result);
                 types.find_map(|ty| self.in_type(ty)).or_else(|| self.within(&of.body, result, result))
+            }
+            ItemKind::Manoeuvre(of) => {
+                let ty = of.params.iter().find_map(|param| self.in_type(&param.ty));
+                ty.or_else(|| of.phases.iter().find_map(|phase| self.in_phase(phase)))
             }
             ItemKind::Action(of) => self.in_action(of),
             ItemKind::Group(of) => any_here(&of.members).then(|| vec![Kind::Actions, Kind::Groups]),
@@ -251,10 +257,13 @@ impl<'a> Place<'a> {
                 key.or_else(|| self.within(value, known.and_then(|state| state.ty), None))
             }
             EffectKind::Order { who, .. } if is_here(who) => Some(vec![Kind::RoadUsers]),
-            EffectKind::Order { fields, .. } => fields.iter().find_map(|field| match is_here(&field.name) {
-                true => Some(unused::<OrderField>(fields)),
-                false => self.within(&field.value, None, None),
-            }),
+            EffectKind::Order { fields, .. } => {
+                fields.iter().find_map(|field| match OrderField::from_name(&field.name.text) {
+                    _ if is_here(&field.name) => Some(unused::<OrderField>(fields)),
+                    Some(OrderField::Then) => self.word_or_value(Kind::Manoeuvres, &field.value, None),
+                    _ => self.within(&field.value, None, None),
+                })
+            }
             EffectKind::Spawn { body, distance, cover, fields, .. } => {
                 let mut bodies = [Some(body), cover.as_deref()].into_iter().flatten();
                 bodies
@@ -263,6 +272,16 @@ impl<'a> Place<'a> {
                     .or_else(|| self.in_spawn(fields))
             }
         })
+    }
+
+    fn in_phase(&self, phase: &Phase) -> Option<Vec<Kind>> {
+        let clauses = [(&phase.once, Some(Type::Bool)), (&phase.within, None), (&phase.after, None)];
+        let clause = |(clause, ty): (&Option<Expr>, Option<Type>)| self.within(clause.as_ref()?, ty, ty);
+        let of_field = |field: &Field| match is_here(&field.name) {
+            true => Some(unused::<PhaseField>(&phase.fields)),
+            false => self.within(&field.value, None, None),
+        };
+        clauses.into_iter().find_map(clause).or_else(|| phase.fields.iter().find_map(of_field))
     }
 
     fn in_spawn(&self, fields: &[Field]) -> Option<Vec<Kind>> {
@@ -577,6 +596,9 @@ impl<'a> Place<'a> {
         let written = |name: &Name, ty: &WrittenType| (name.text.clone(), self.written_type(ty));
         match item {
             ItemKind::Fn(of) => found.extend(of.params.iter().map(|param| written(&param.name, &param.ty))),
+            ItemKind::Manoeuvre(of) => {
+                found.extend(of.params.iter().map(|param| written(&param.name, &param.ty)))
+            }
             ItemKind::Action(of) => {
                 found.extend(of.params.iter().map(|param| written(&param.name, &param.ty)))
             }

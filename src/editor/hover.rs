@@ -55,7 +55,7 @@ pub fn hover(analysis: &Analysis, byte: usize) -> Option<Hover> {
 /// The action or function that has the parameter.
 fn owner(symbol: &Symbol) -> Option<&str> {
     match symbol {
-        Symbol::Argument(of, _) | Symbol::Parameter(of, _) => Some(of),
+        Symbol::Argument(of, _) | Symbol::Given(of, _) | Symbol::Parameter(of, _) => Some(of),
         _ => None,
     }
 }
@@ -92,7 +92,7 @@ pub fn describe(analysis: &Analysis, symbol: &Symbol) -> Option<String> {
             format!("{text}{typed}{world}")
         }
         Symbol::Constant(_) => format!("{text}{typed}"),
-        Symbol::Argument(_, name) => {
+        Symbol::Argument(_, name) | Symbol::Given(_, name) => {
             format!("```avastra\n{name}: {}\n```", ty.as_deref().unwrap_or("unknown"))
         }
         Symbol::Action(name) => {

@@ -58,7 +58,7 @@ fn kind(item: &Item) -> Option<OutlineKind> {
         ItemKind::Odds(_) | ItemKind::Group(_) => OutlineKind::List,
         ItemKind::State(_) => OutlineKind::State,
         ItemKind::Let(_) => OutlineKind::Constant,
-        ItemKind::Fn(_) => OutlineKind::Function,
+        ItemKind::Fn(_) | ItemKind::Manoeuvre(_) => OutlineKind::Function,
         ItemKind::Action(_) | ItemKind::Also(_) | ItemKind::EachStep(_) => OutlineKind::Action,
         ItemKind::Rule(_) | ItemKind::Verdict(_) => OutlineKind::Rule,
         ItemKind::Body(_) | ItemKind::Road(_) | ItemKind::Episode(_) | ItemKind::Reward(_) => {

@@ -287,6 +287,89 @@ fn the_second_truck_brakes() {
 }
 
 #[test]
+fn a_leader_stops_and_goes() {
+    let table = wish("stop_and_go");
+    let stops = row(&table, "stops()");
+    let run = run_of(table.space().clone(), 1, 6, &[]);
+    let mut stopped = 0;
+    for episode in 0..run.episodes() {
+        let mut begun: Option<(f64, f64)> = None;
+        let mut choose = |moment: &Moment| match table.offer(moment.situation, stops) {
+            Ok(draw) if begun.is_none() => {
+                begun = Some((number(&draw, "rate"), moment.situation.surroundings.moment().elapsed_s));
+                Choice::Act(draw)
+            }
+            _ => Choice::Pass,
+        };
+        let mut speeds: Vec<(f64, f64)> = Vec::new();
+        let log = run.play(episode, &mut choose, &mut |world, _, contacts| {
+            let leader = world.obstacle(1).filter(|_| contacts.is_empty());
+            speeds.extend(leader.map(|leader| (world.time_s(), leader.velocity_mps.norm())));
+        });
+        assert_replays(&run, episode, &log);
+        let Some((rate_mps2, begun_s)) = begun else { continue };
+        let speed_at = |after_s: f64| {
+            let at = speeds.iter().find(|(at_s, _)| (at_s - begun_s - after_s).abs() < DT_S / 2.0);
+            at.map(|(_, speed_mps)| *speed_mps)
+        };
+        // Nobody else is there, so the leader does what it was told: 3 s at its speed, a stop, 2 s at rest, off again.
+        let Some(before_mps) = speed_at(2.9) else { continue };
+        let stop_s = before_mps / rate_mps2;
+        let wanted = [
+            (3.0 + stop_s / 2.0, before_mps / 2.0),
+            (3.0 + stop_s + 1.0, 0.0),
+            (3.0 + stop_s + 2.0 + 2.0, 3.0),
+        ];
+        for (after_s, wanted_mps) in wanted {
+            let Some(speed_mps) = speed_at((after_s / DT_S).round() * DT_S) else { continue };
+            assert!((speed_mps - wanted_mps).abs() < 0.15, "{speed_mps} after {after_s} s, not {wanted_mps}");
+            stopped += 1;
+        }
+    }
+    assert!(stopped >= 3, "{stopped} figures of a leader that stopped");
+}
+
+#[test]
+fn a_leader_brakes_when_it_is_near() {
+    let table = wish("stop_and_go");
+    let [waits, hurries] = [row(&table, "waits()"), row(&table, "hurries()")];
+    let run = run_of(table.space().clone(), 1, 6, &[]);
+    let (mut braked, mut ordered) = (0, 0);
+    for episode in 0..run.episodes() {
+        let mut acted = 0;
+        let mut choose = |moment: &Moment| {
+            let wanted = if acted == 0 { waits } else { hurries };
+            let is_asked = acted == 0 || acted == 1 && episode % 2 == 1;
+            match table.offer(moment.situation, wanted) {
+                Ok(draw) if is_asked => {
+                    acted += 1;
+                    Choice::Act(draw)
+                }
+                _ => Choice::Pass,
+            }
+        };
+        // The least gap at which it still drove at its speed, and the greatest at which it had braked.
+        let (mut free_m, mut braked_m) = (f64::INFINITY, 0.0_f64);
+        let log = run.play(episode, &mut choose, &mut |world, _, contacts| {
+            let Some(leader) = world.obstacle(1).filter(|_| contacts.is_empty()) else { return };
+            let speed_mps = leader.velocity_mps.norm();
+            if speed_mps > 5.9 && braked_m == 0.0 {
+                free_m = free_m.min(leader.distance_m);
+            } else if speed_mps < 5.5 && free_m < f64::INFINITY {
+                braked_m = braked_m.max(leader.distance_m);
+            }
+        });
+        assert_replays(&run, episode, &log);
+        ordered += usize::from(acted == 2);
+        if acted == 1 && braked_m > 0.0 {
+            assert!(braked_m <= 25.0 && free_m >= 23.0, "{free_m} m, {braked_m} m");
+            braked += 1;
+        }
+    }
+    assert!(braked > 0 && ordered > 0, "{braked} braked, {ordered} were ordered");
+}
+
+#[test]
 fn no_vehicle_appears_near_a_junction() {
     let table = example("away_from_junctions");
     let run = run_of(table.space().clone(), 1, 4, &[]);

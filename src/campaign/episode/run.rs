@@ -292,9 +292,12 @@ impl Play {
     fn carry_out(&mut self, draw: Draw, delay_ticks: u32) -> Outcome {
         let before = self.world.clone();
         let (mut spawned, mut own_bodies) = (Vec::new(), Vec::new());
-        for effect in &draw.effects {
+        for (nth, effect) in draw.effects.iter().enumerate() {
             match self.world.apply(effect) {
                 Ok(newcomer) => {
+                    if let Some((_, course)) = draw.courses.iter().find(|(at, _)| *at == nth) {
+                        self.world.begin_course(newcomer, effect, course);
+                    }
                     spawned.extend(newcomer.into_iter().flat_map(|id| id..id + effect.newcomers()));
                     own_bodies.extend(newcomer.into_iter().flat_map(|id| effect.own_bodies(id)));
                 }

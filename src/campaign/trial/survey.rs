@@ -229,8 +229,13 @@ fn attempt(moment: &Moment, draw: &Draw) -> Try {
     let mut world = moment.world.clone();
     let mut found = Try { failure: None, unfair: None, nearest_m: None };
     let mut newcomers = Vec::new();
-    for effect in &draw.effects {
-        match (effect, world.apply(effect)) {
+    for (nth, effect) in draw.effects.iter().enumerate() {
+        let applied = world.apply(effect);
+        let course = draw.courses.iter().find(|(at, _)| *at == nth && applied.is_ok());
+        if let (Some((_, course)), Ok(newcomer)) = (course, &applied) {
+            world.begin_course(*newcomer, effect, course);
+        }
+        match (effect, applied) {
             (_, Err(reason)) => {
                 found.failure = Some(format!("cannot spawn: {reason}"));
                 return found;

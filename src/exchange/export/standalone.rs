@@ -30,11 +30,12 @@ pub fn standalone(space: &Space, scenario: &Scenario, log: &EpisodeLog) -> Optio
     let mut actions = Actions::default();
     let mut steps = String::new();
     let mut before = &log.memory;
-    let mut is_bound = false;
+    let (mut is_bound, mut is_directed) = (false, false);
     for (number, step) in log.steps.iter().enumerate() {
         let (effects, delay_ticks) = match &step.outcome {
             Outcome::Done { draw, delay_ticks, .. } => {
                 is_bound |= draw.lane_changes.is_some();
+                is_directed |= !draw.courses.is_empty();
                 (draw.effects.clone(), *delay_ticks)
             }
             // `each step` also acts in a step without an action.
@@ -74,6 +75,7 @@ pub fn standalone(space: &Space, scenario: &Scenario, log: &EpisodeLog) -> Optio
     );
     let lacks = [
         is_bound.then_some("the rules on lane changes of its space"),
+        is_directed.then_some("the manoeuvres of its space"),
         is_external.then_some("the driving system, which does not come with avastra"),
     ];
     Some(Standalone { text, lacks: lacks.into_iter().flatten().collect() })
@@ -90,10 +92,11 @@ struct Actions<'a> {
 impl<'a> Actions<'a> {
     /// The name of the action with these effects.
     fn named(&mut self, space: &'a Space, effects: &[Effect]) -> String {
-        if effects.is_empty() {
+        let mut text: Vec<String> = effects.iter().map(|effect| self.effect(space, effect)).collect();
+        text.retain(|effect| !effect.is_empty());
+        if text.is_empty() {
             return "wait".to_owned();
         }
-        let text: Vec<String> = effects.iter().map(|effect| self.effect(space, effect)).collect();
         let text = text.join(" ");
         let known = self.effects.iter().position(|known| *known == text);
         let index = known.unwrap_or_else(|| {
@@ -110,6 +113,8 @@ impl<'a> Actions<'a> {
             Effect::Spawn(request) => self.spawn(space, request),
             Effect::Order(OrderRequest { who, speed_mps, rate_mps2 }) => {
                 let rate = rate_mps2.map(|rate| format!(", rate: {} m/s^2", decimal(rate, false)));
+                // An order of a manoeuvre, which the text lacks, lets its bearer drive on.
+                let Some(speed_mps) = speed_mps else { return String::new() };
                 let (name, speed) = (&space.bearers[*who], decimal(*speed_mps, false));
                 format!("order {name} {{ speed: {speed} m/s{} }}", rate.unwrap_or_default())
             }

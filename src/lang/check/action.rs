@@ -12,7 +12,7 @@ use crate::check::rule::locals;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::rules_by_action;
 use crate::model::vocabulary::{
-    Colour, Fact, LaneChoice, OrderField, Side, Site, SpaceClaim, SpawnField, Then, Verb, Word,
+    Colour, LaneChoice, OrderField, Side, Site, SpaceClaim, SpawnField, Then, Verb, Word,
 };
 use crate::model::{
     ActionDef, BodyWord, Domain, EffectDef, GroupDef, OrderDef, Parameter, RuleDef, SetDef, SpawnDef, Type,
@@ -55,8 +55,6 @@ impl Checker {
     pub(super) fn declare_actions(&mut self, items: &[&ast::Item]) {
         let (names, actions) = self.declared("action", items, ItemKind::as_action);
         self.action_names = names;
-        // Any action may order what any other spawns.
-        actions.iter().for_each(|(_, declared)| self.declare_bearers(declared));
         for (item, declared) in actions {
             let (action, is_whole) = self.action(item, declared).unzip();
             if is_whole == Some(false) {
@@ -377,9 +375,14 @@ impl Checker {
             }
             None => Some(WordExpr::Fixed(Side::Right)),
         };
+        let call = find(SpawnField::Then).and_then(|value| self.manoeuvre_call(value, place));
         let then = match find(SpawnField::Then) {
-            Some(value) => self.word::<Then>("word for `then`", value, place),
-            None => Some(WordExpr::Fixed(Then::Keep)),
+            Some(value) if call.is_none() => self.word::<Then>("word for `then`", value, place),
+            _ => Some(WordExpr::Fixed(Then::Keep)),
+        };
+        let manoeuvre = match call {
+            Some(call) => Some(call?),
+            None => None,
         };
         let colour = match find(SpawnField::Colour) {
             Some(value) => self.word::<Colour>("colour", value, place),
@@ -395,6 +398,14 @@ impl Checker {
         };
         let (body, verb) = (body_word?, verb?);
         self.check_verb(&body, &verb, behind, span);
+        if manoeuvre.is_some()
+            && let Some(verb) =
+                possible(&verb).into_iter().find(|verb| matches!(verb, Verb::Walk | Verb::Stand))
+        {
+            let message = format!("`{}` does no manoeuvre", verb.name());
+            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here");
+            self.report(error.help("manoeuvres are for vehicles; leave `then` out"));
+        }
         Some(SpawnDef {
             body,
             colour: colour?,
@@ -407,22 +418,16 @@ impl Checker {
             behind,
             cover: None,
             bearer: None,
+            manoeuvre,
             span,
         })
     }
 
-    /// Notes the names that an action gives to what it spawns.
-    fn declare_bearers(&mut self, declared: &ast::Action) {
-        for effect in &declared.effects {
-            let ast::EffectKind::Spawn { bearer: Some(name), .. } = &effect.kind else { continue };
-            if Fact::ALL.iter().any(|fact| fact.name().split('.').next() == Some(name.text.as_str())) {
-                let message = format!("`{}` cannot be the name of a road user", name.text);
-                let error = Diagnostic::error(code::NOT_HERE, message);
-                self.report(error.at(name.span, "the engine's own word").help("choose another name"));
-            } else if !self.bearers.contains(&name.text) {
-                self.bearers.push(name.text.clone());
-            }
-        }
+    fn no_manoeuvre<T>(&mut self, value: &ast::Expr, place: &Place<'_>) -> Option<T> {
+        self.look_at(value, place, None);
+        let error = Diagnostic::error(code::TYPE_MISMATCH, "an order's `then` is a manoeuvre");
+        let error = error.at(value.span, "no call of one");
+        self.reject(error.help("write its name and what it is given: `then: brake(4 m/s^2)`"))
     }
 
     fn order(
@@ -443,9 +448,20 @@ impl Checker {
         }
         self.note_fields::<OrderField>(fields, place);
         let fields = self.fields_known(fields);
+        let manoeuvre = match field(&fields, OrderField::Then) {
+            Some(value) => match self.manoeuvre_call(value, place) {
+                Some(call) => Some(call?),
+                None => return self.no_manoeuvre(value, place),
+            },
+            None => None,
+        };
         let speed = match field(&fields, OrderField::Speed) {
-            Some(value) => self.typed(value, place, Type::Quantity(Dimension::SPEED)),
-            None => self.missing_field(OrderField::Speed, span, "the order does not say how fast".to_owned()),
+            Some(value) => Some(self.typed(value, place, Type::Quantity(Dimension::SPEED))?),
+            None if manoeuvre.is_some() => None,
+            None => {
+                let message = "the order says neither how fast nor which manoeuvre".to_owned();
+                return self.missing_field(OrderField::Speed, span, message);
+            }
         };
         let rate = field(&fields, OrderField::Rate);
         let rate = rate.map(|value| self.typed(value, place, Type::Quantity(Dimension::ACCEL)));
@@ -453,7 +469,7 @@ impl Checker {
             Some(rate) => Some(rate?),
             None => None,
         };
-        Some(OrderDef { who: bearer?, speed: speed?, rate, span })
+        Some(OrderDef { who: bearer?, speed, rate, manoeuvre, span })
     }
 
     /// Reports a cover that is no vehicle, and one for a road user that does not walk.

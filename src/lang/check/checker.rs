@@ -16,7 +16,8 @@ use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{bounds, clauses, rules_by_action};
 use crate::model::vocabulary::TYPES;
 use crate::model::{
-    ActionDef, BodyDef, EnumDef, FnDef, GroupDef, Meaning, SetDef, Space, StateDef, Type, Value, code,
+    ActionDef, BodyDef, EnumDef, FnDef, GroupDef, ManoeuvreDef, Meaning, SetDef, Space, StateDef, Type,
+    Value, code,
 };
 use crate::prove;
 use crate::prove::{Known, RunsIn, enclose, product_size};
@@ -45,6 +46,9 @@ pub(super) struct Checker {
     pub(super) bodies: Vec<BodyDef>,
     /// Names that the spawns of all actions give.
     pub(super) bearers: Vec<String>,
+    pub(super) manoeuvre_names: Names,
+    /// `None` stands for a broken one.
+    pub(super) manoeuvres: Vec<Option<ManoeuvreDef>>,
     /// Each constant is folded to a literal; `None` stands for a broken one.
     pub(super) constants: Vec<(String, Option<Expr>)>,
     /// Positions in `constants`, by name.
@@ -144,6 +148,8 @@ pub(super) fn space(
     checker.declare_bodies(items);
     checker.declare_functions(items);
     checker.declare_states(items);
+    checker.declare_bearers(items);
+    checker.declare_manoeuvres(items);
     checker.declare_actions(items);
     checker.declare_groups(items);
     checker.declare_action_odds(items);
@@ -174,6 +180,7 @@ pub(super) fn space(
         states: core::mem::take(&mut checker.states),
         bodies: core::mem::take(&mut checker.bodies),
         bearers: core::mem::take(&mut checker.bearers),
+        manoeuvres: core::mem::take(&mut checker.manoeuvres).into_iter().flatten().collect(),
         functions: core::mem::take(&mut checker.functions),
         actions,
         groups: core::mem::take(&mut checker.groups),
@@ -311,6 +318,7 @@ impl Checker {
                 let signature = self.signature(declared);
                 self.function(declared, signature);
             }
+            ItemKind::Manoeuvre(declared) => drop(self.manoeuvre(item, declared)),
             ItemKind::Action(declared) => drop(self.action(item, declared)),
             ItemKind::Group(declared) => declared.members.iter().for_each(|name| drop(self.targets(name))),
             ItemKind::Also(declared) => drop(self.also(declared)),

@@ -347,6 +347,7 @@ impl Checker {
                 "`{name}` is a state, and the rows of the table are the same in every state: write a rule"
             ),
             Site::Change => format!("`{name}` is a state, and none is looked up when a lane change begins"),
+            Site::Phase => format!("`{name}` is a state, and none is looked up when a phase begins"),
             _ => format!("`{name}` is a state, and functions and constants see none: pass it as a parameter"),
         })
     }
@@ -521,6 +522,18 @@ impl Checker {
             self.look_at_arguments(&call.args, place);
             return None;
         };
+        let arguments = self.arguments(call, &parameters, Some(header), place)?;
+        Some(Expr { kind: ExprKind::Call(index, arguments), ty: result, span: call.span })
+    }
+
+    /// The arguments of a call, by parameter. `header` is where the parameters are declared.
+    pub(super) fn arguments(
+        &mut self,
+        call: &ast::Call,
+        parameters: &[(String, Type)],
+        header: Option<Span>,
+        place: &Place<'_>,
+    ) -> Option<Vec<Expr>> {
         if call.args.len() != parameters.len() {
             self.look_at_arguments(&call.args, place);
             let message = format!(
@@ -531,7 +544,8 @@ impl Checker {
                 call.args.len()
             );
             let error = Diagnostic::error(code::ARGUMENTS, message).at(call.span, "");
-            return self.reject(error.beside(header, "declared here"));
+            let beside = |error: Diagnostic, header| error.beside(header, "declared here");
+            return self.reject(header.into_iter().fold(error, beside));
         }
         let names: Vec<&str> = parameters.iter().map(|(parameter, _)| parameter.as_str()).collect();
         let mut given = vec![None; parameters.len()];
@@ -543,11 +557,10 @@ impl Checker {
             };
             arguments[slot] = self.typed(&argument.value, place, parameters[slot].1);
         }
-        let arguments: Option<Vec<Expr>> = arguments.into_iter().collect();
-        Some(Expr { kind: ExprKind::Call(index, arguments?), ty: result, span: call.span })
+        arguments.into_iter().collect()
     }
 
-    fn look_at_arguments(&mut self, arguments: &[ast::Arg], place: &Place<'_>) {
+    pub(super) fn look_at_arguments(&mut self, arguments: &[ast::Arg], place: &Place<'_>) {
         arguments.iter().for_each(|argument| self.look_at(&argument.value, place, None));
     }
 

@@ -74,6 +74,7 @@ fn has_free_order(kind: &ItemKind) -> bool {
             | ItemKind::Odds(_)
             | ItemKind::Let(_)
             | ItemKind::Fn(_)
+            | ItemKind::Manoeuvre(_)
             | ItemKind::Body(_)
             | ItemKind::Group(_)
     )

@@ -27,6 +27,7 @@ mod expect;
 pub mod explain;
 mod expression;
 mod load;
+mod manoeuvre;
 mod meaning;
 mod missing_use;
 mod names;

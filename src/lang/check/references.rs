@@ -29,6 +29,9 @@ pub enum Symbol {
     Function(String),
     /// A function and its parameter.
     Argument(String, String),
+    Manoeuvre(String),
+    /// A manoeuvre and its parameter.
+    Given(String, String),
     Action(String),
     /// An action and its parameter.
     Parameter(String, String),
@@ -232,6 +235,7 @@ impl Symbol {
     pub(super) fn parameter(&self, name: &str) -> Option<Symbol> {
         match self {
             Symbol::Function(of) => Some(Symbol::Argument(of.clone(), name.to_owned())),
+            Symbol::Manoeuvre(of) => Some(Symbol::Given(of.clone(), name.to_owned())),
             Symbol::Action(of) => Some(Symbol::Parameter(of.clone(), name.to_owned())),
             _ => None,
         }
@@ -248,6 +252,8 @@ impl Symbol {
             | Symbol::Constant(name)
             | Symbol::Function(name)
             | Symbol::Argument(_, name)
+            | Symbol::Manoeuvre(name)
+            | Symbol::Given(_, name)
             | Symbol::Action(name)
             | Symbol::Parameter(_, name)
             | Symbol::Group(name)
@@ -392,6 +398,11 @@ impl References {
                 let argument = |name: &Name| Symbol::Argument(of.name.text.clone(), name.text.clone());
                 let parts = of.params.iter().map(|p| (Some(&p.name), argument(&p.name), p.name.span, false));
                 self.declare(item, Symbol::Function, parts.collect());
+            }
+            ItemKind::Manoeuvre(of) => {
+                let given = |name: &Name| Symbol::Given(of.name.text.clone(), name.text.clone());
+                let parts = of.params.iter().map(|p| (Some(&p.name), given(&p.name), p.name.span, false));
+                self.declare(item, Symbol::Manoeuvre, parts.collect());
             }
             ItemKind::Action(of) => {
                 let parameter = |name: &Name| Symbol::Parameter(of.name.text.clone(), name.text.clone());

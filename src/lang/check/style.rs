@@ -24,6 +24,7 @@ fn names(kind: &ItemKind, into: &mut Vec<Diagnostic>) {
         ItemKind::Odds(_) => return,
         ItemKind::Enum(declared) => declared.variants.iter().collect(),
         ItemKind::Fn(declared) => declared.params.iter().map(|param| &param.name).collect(),
+        ItemKind::Manoeuvre(declared) => declared.params.iter().map(|param| &param.name).collect(),
         ItemKind::Action(declared) => declared.params.iter().map(|param| &param.name).collect(),
         _ => Vec::new(),
     };
@@ -83,6 +84,9 @@ fn conditions(kind: &ItemKind, into: &mut Vec<Diagnostic>) {
         ItemKind::Rule(ast::Rule { body: ast::RuleBody::Holds { condition, .. }, .. }) => vec![condition],
         ItemKind::Verdict(declared) => vec![&declared.condition],
         ItemKind::Fn(declared) => vec![&declared.body],
+        ItemKind::Manoeuvre(declared) => {
+            declared.phases.iter().filter_map(|phase| phase.once.as_ref()).collect()
+        }
         ItemKind::Reward(cases) => cases.iter().filter_map(|case| case.condition.as_ref()).collect(),
         ItemKind::Action(declared) => declared.params.iter().filter_map(|p| p.condition.as_ref()).collect(),
         _ => Vec::new(),

@@ -50,6 +50,9 @@ pub(super) fn report(own: &[&ast::Item], all: &[&ast::Item]) -> Vec<Diagnostic> 
             ItemKind::Group(declared) if is_unused(&declared.name) => {
                 diagnostics.push(warning("group", &declared.name));
             }
+            ItemKind::Manoeuvre(declared) if is_unused(&declared.name) => {
+                diagnostics.push(warning("manoeuvre", &declared.name));
+            }
             // The world reads `time` and `sky`, whether the file does or not.
             ItemKind::State(declared)
                 if is_unused(&declared.name) && WorldState::from_name(&declared.name.text).is_none() =>
@@ -127,6 +130,13 @@ fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
             exprs.extend(cases.iter().flat_map(|case| case.condition.iter().chain([&case.value])));
         }
         ItemKind::Verdict(declared) => exprs.push(&declared.condition),
+        ItemKind::Manoeuvre(declared) => {
+            names.extend(declared.params.iter().flat_map(|param| names_of_type(&param.ty)));
+            for phase in &declared.phases {
+                exprs.extend(phase.once.iter().chain(&phase.within).chain(&phase.after));
+                fields.extend(&phase.fields);
+            }
+        }
         ItemKind::Expect(expect) => exprs.push(&expect.claim),
         ItemKind::Odds(declared) => {
             names.push(&declared.name);

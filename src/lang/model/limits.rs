@@ -59,9 +59,10 @@ pub fn spawn_out_of_bounds(speed_mps: f64, distance_m: f64) -> Option<String> {
 }
 
 /// The same of an order.
-pub fn order_out_of_bounds(speed_mps: f64, rate_mps2: Option<f64>) -> Option<String> {
+pub fn order_out_of_bounds(speed_mps: Option<f64>, rate_mps2: Option<f64>) -> Option<String> {
+    let speed = speed_mps.map(|speed_mps| ("speed", speed_mps, "m/s", SPAWN_SPEED_MPS));
     let rate = rate_mps2.map(|rate_mps2| ("rate", rate_mps2, "m/s^2", ORDER_RATE_MPS2));
-    out_of_bounds("order", [("speed", speed_mps, "m/s", SPAWN_SPEED_MPS)].into_iter().chain(rate))
+    out_of_bounds("order", speed.into_iter().chain(rate))
 }
 
 fn out_of_bounds(

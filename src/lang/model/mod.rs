@@ -47,8 +47,8 @@ pub use scenario::{
 };
 pub use space::{
     ActionDef, BodyDef, BodyWord, COUNTED, Domain, EffectDef, EnumDef, EpisodeDef, FnDef, GroupDef, Initial,
-    OrderDef, Parameter, RewardCase, Road, RoadFacts, RuleBinding, RuleBody, RuleDef, SetDef, Space,
-    SpawnDef, StateDef, StateMeaning, VerdictDef, WordExpr,
+    ManoeuvreCall, ManoeuvreDef, OrderDef, Parameter, PhaseDef, RewardCase, Road, RoadFacts, RuleBinding,
+    RuleBody, RuleDef, SetDef, Space, SpawnDef, StateDef, StateMeaning, VerdictDef, WordExpr,
 };
 pub(crate) use value::STATE_MAX;
 pub use value::{EnumIndex, Memory, Type, Value};

@@ -37,6 +37,7 @@ pub struct Space {
     pub bodies: Vec<BodyDef>,
     /// Names that spawns give to road users, each once.
     pub bearers: Vec<String>,
+    pub manoeuvres: Vec<ManoeuvreDef>,
     pub functions: Vec<FnDef>,
     pub actions: Vec<ActionDef>,
     pub groups: Vec<GroupDef>,
@@ -296,7 +297,40 @@ pub struct SpawnDef {
     pub cover: Option<WordExpr<BodyWord>>,
     /// The name that it bears from then on, by index in `Space::bearers`.
     pub bearer: Option<usize>,
+    /// What it does from then on.
+    pub manoeuvre: Option<ManoeuvreCall>,
     pub span: Span,
+}
+
+/// What a road user does, phase by phase.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ManoeuvreDef {
+    pub name: String,
+    pub docs: Vec<String>,
+    /// The locals of its expressions.
+    pub parameters: Vec<(String, Type)>,
+    pub phases: Vec<PhaseDef>,
+}
+
+/// A phase begins when `once` holds, and `after` some more time. It ends when the road user has its speed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PhaseDef {
+    pub once: Option<Expr>,
+    /// How long it waits for `once` to hold, s; then the manoeuvre ends.
+    pub within: Option<Expr>,
+    /// s.
+    pub after: Option<Expr>,
+    /// m/s.
+    pub speed: Expr,
+    /// m/s²; without it the driver goes over to the speed as it would by itself.
+    pub rate: Option<Expr>,
+}
+
+/// A manoeuvre by its index in `Space::manoeuvres`, and the values that it is given.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ManoeuvreCall {
+    pub manoeuvre: usize,
+    pub arguments: Vec<Expr>,
 }
 
 /// What the latest bearer of a name is told to do.
@@ -304,10 +338,11 @@ pub struct SpawnDef {
 pub struct OrderDef {
     /// The name, by index in `Space::bearers`.
     pub who: usize,
-    /// m/s.
-    pub speed: Expr,
+    /// m/s; `None` for an order of a manoeuvre.
+    pub speed: Option<Expr>,
     /// m/s²; without it the driver goes over to the speed as it would by itself.
     pub rate: Option<Expr>,
+    pub manoeuvre: Option<ManoeuvreCall>,
     pub span: Span,
 }
 

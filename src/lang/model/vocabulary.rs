@@ -126,6 +126,8 @@ pub enum Site {
     Rule,
     /// In a rule `during change`.
     Change,
+    /// In a phase of a manoeuvre.
+    Phase,
     /// In `once` of a scenario's step.
     Trigger,
     Reward,
@@ -138,9 +140,9 @@ impl Site {
     pub fn knows(self, known: Known) -> bool {
         match known {
             Known::Road | Known::World => {
-                matches!(self, Site::Where | Site::Rule | Site::Change | Site::Trigger)
+                matches!(self, Site::Where | Site::Rule | Site::Change | Site::Phase | Site::Trigger)
             }
-            Known::Spawn => matches!(self, Site::Rule | Site::Change),
+            Known::Spawn => matches!(self, Site::Rule | Site::Change | Site::Phase),
             Known::Step => matches!(self, Site::Reward | Site::Verdict),
             Known::Judgement => self == Site::Verdict,
         }
@@ -307,6 +309,13 @@ words! {
 
 words! {
     OrderField "A field of `order`.":
+    Speed "speed" = "The speed that the road user goes over to.",
+    Rate "rate" = "How fast it gains or loses speed for that, as far as its body and the road allow.",
+    Then "then" = "The manoeuvre that it does: `then: brake(4 m/s^2)`.",
+}
+
+words! {
+    PhaseField "A field of a phase of a manoeuvre.":
     Speed "speed" = "The speed that the road user goes over to.",
     Rate "rate" = "How fast it gains or loses speed for that, as far as its body and the road allow.",
 }

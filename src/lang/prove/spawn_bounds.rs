@@ -26,7 +26,8 @@ fn errors(space: &Space, action: usize) -> impl Iterator<Item = Diagnostic> {
     });
     let of_orders = space.actions[action].orders().flat_map(|order| {
         let rate = order.rate.as_ref().map(|rate| ("rate of an order", "m/s^2", rate, &ORDER_RATE_MPS2));
-        [("speed of an order", "m/s", &order.speed, &SPAWN_SPEED_MPS)].into_iter().chain(rate)
+        let speed = order.speed.as_ref().map(|speed| ("speed of an order", "m/s", speed, &SPAWN_SPEED_MPS));
+        speed.into_iter().chain(rate)
     });
     of_spawns.chain(of_orders).filter_map(move |(what, unit, expr, range)| {
         let mut rows = space.rows_of(action).iter().take_while(|_| !effort::is_spent());

@@ -7,7 +7,9 @@
 use std::collections::BTreeMap;
 
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::{Domain, EffectDef, Row, RuleBody, Space, SpawnDef, Value, WordExpr, code, effort};
+use crate::model::{
+    Domain, EffectDef, ManoeuvreCall, Row, RuleBody, Space, SpawnDef, Value, WordExpr, code, effort,
+};
 use crate::prove::reduce::reduce;
 use crate::syntax::Diagnostic;
 use crate::syntax::ast::Span;
@@ -110,13 +112,23 @@ impl<'a> RowText<'a> {
                 let key = set.key.as_ref().map(|key| self.reduced(key));
                 format!("set {} {key:?} {:?}", set.state, self.reduced(&set.value))
             }
-            EffectDef::Spawn(spawn) => spawn_form(spawn, &|expr| self.reduced(expr)),
+            EffectDef::Spawn(spawn) => {
+                let then = spawn.manoeuvre.as_ref().map(|then| self.call_form(then));
+                format!("{} {then:?}", spawn_form(spawn, &|expr| self.reduced(expr)))
+            }
             EffectDef::Order(order) => {
                 let rate = order.rate.as_ref().map(|rate| self.reduced(rate).kind);
-                format!("order {} {:?} {rate:?}", order.who, self.reduced(&order.speed).kind)
+                let speed = order.speed.as_ref().map(|speed| self.reduced(speed).kind);
+                let then = order.manoeuvre.as_ref().map(|then| self.call_form(then));
+                format!("order {} {speed:?} {rate:?} {then:?}", order.who)
             }
         });
         effects.collect::<Vec<_>>().join("\n")
+    }
+
+    fn call_form(&self, call: &ManoeuvreCall) -> String {
+        let arguments = call.arguments.iter().map(|argument| self.reduced(argument).kind);
+        format!("{} {:?}", call.manoeuvre, arguments.collect::<Vec<_>>())
     }
 
     /// What the drawn values come from, and the rules.

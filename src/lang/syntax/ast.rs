@@ -153,6 +153,7 @@ kinds! {
     State(State) "state" as_state name;
     Let(Let) "let" as_let name;
     Fn(Fn) "fn" as_fn name;
+    Manoeuvre(Manoeuvre) "manoeuvre" as_manoeuvre name;
     Action(Action) "action" as_action name;
     Group(Group) "group" as_group name;
     Also(Also) "on" as_also;
@@ -270,6 +271,25 @@ pub struct Fn {
 pub struct FnParam {
     pub name: Name,
     pub ty: Type,
+}
+
+/// `manoeuvre brake(to: Speed, rate: Accel) { after 3 s { speed: to, rate: rate } }`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Manoeuvre {
+    pub name: Name,
+    pub params: Vec<FnParam>,
+    pub phases: Vec<Phase>,
+}
+
+/// `once npc.gap <= 20 m within 10 s after 1 s { speed: 0 m/s }`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Phase {
+    pub once: Option<Expr>,
+    pub within: Option<Expr>,
+    pub after: Option<Expr>,
+    pub fields: Vec<Field>,
+    #[serde(skip)]
+    pub span: Span,
 }
 
 /// `action name(each a: A, any b: B in lo .. hi) { effects }`.

@@ -9,9 +9,9 @@ use pest::iterators::Pair;
 
 use crate::syntax::ast::{
     Action, ActionParam, Also, Block, Case, Clause, ClauseKind, Effect, EffectKind, Enum, Expect, Expr,
-    Field, FileId, Fn, FnParam, Group, Initial, InitialKey, ItemKind, Let, Move, Name, Number, Odds,
-    ParamMode, Place, Policy, PolicyLine, Rule as NamedRule, RuleBody, Scenario, Span, State, Step, Text,
-    Type, TypeKind, Use, Verdict,
+    Field, FileId, Fn, FnParam, Group, Initial, InitialKey, ItemKind, Let, Manoeuvre, Move, Name, Number,
+    Odds, ParamMode, Phase, Place, Policy, PolicyLine, Rule as NamedRule, RuleBody, Scenario, Span, State,
+    Step, Text, Type, TypeKind, Use, Verdict,
 };
 use crate::syntax::grammar::{Rule, is_plain_terminal};
 use crate::syntax::{Diagnostic, code};
@@ -134,6 +134,7 @@ impl Builder {
                 ItemKind::Let(Let { name, value: self.expression(parts.next())? })
             }
             Rule::function => ItemKind::Fn(self.function(parts)?),
+            Rule::manoeuvre => ItemKind::Manoeuvre(self.manoeuvre(parts)?),
             Rule::action => ItemKind::Action(self.action(parts)?),
             Rule::group => {
                 let name = self.name(parts.next());
@@ -209,13 +210,32 @@ impl Builder {
 
     fn function(&self, mut parts: Parts<'_>) -> Built<Fn> {
         let name = self.name(parts.next());
+        let params = self.function_params(&mut parts);
+        let result = self.type_name(parts.next());
+        Ok(Fn { name, params, result, body: self.expression(parts.next())? })
+    }
+
+    fn function_params(&self, parts: &mut Parts<'_>) -> Vec<FnParam> {
         let mut params = Vec::new();
         while let Some(param) = parts.take(Rule::function_param) {
             let mut param = Parts::of(param);
             params.push(FnParam { name: self.name(param.next()), ty: self.type_name(param.next()) });
         }
-        let result = self.type_name(parts.next());
-        Ok(Fn { name, params, result, body: self.expression(parts.next())? })
+        params
+    }
+
+    fn manoeuvre(&self, mut parts: Parts<'_>) -> Built<Manoeuvre> {
+        let name = self.name(parts.next());
+        let params = self.function_params(&mut parts);
+        Ok(Manoeuvre { name, params, phases: self.all(parts, Builder::phase)? })
+    }
+
+    fn phase(&self, pair: Pair<'_, Rule>) -> Built<Phase> {
+        let span = self.span(&pair);
+        let mut parts = Parts::of(pair);
+        let mut clause = |rule| parts.take(rule).map(|clause| self.only_expression(clause)).transpose();
+        let (once, within, after) = (clause(Rule::once)?, clause(Rule::within_time)?, clause(Rule::after)?);
+        Ok(Phase { once, within, after, fields: self.fields(parts.next())?, span })
     }
 
     fn action(&self, mut parts: Parts<'_>) -> Built<Action> {

@@ -123,6 +123,8 @@ pub fn role(rule: Rule) -> Role {
         Rule::kw_where | Rule::condition => Role::Said("`where`"),
         Rule::kw_set => Role::Said("`set`"),
         Rule::kw_spawn => Role::Said("`spawn`"),
+        Rule::phase => Role::Said("a phase like `after 3 s { speed: 0 m/s }`"),
+        Rule::kw_within | Rule::within_time => Role::Said("`within`"),
         Rule::kw_as | Rule::bearer => Role::Said("`as`"),
         Rule::kw_order => Role::Said("`order`"),
         Rule::kw_ahead => Role::Said("`ahead`"),
@@ -159,6 +161,7 @@ pub fn role(rule: Rule) -> Role {
         | Rule::state
         | Rule::constant
         | Rule::function
+        | Rule::manoeuvre
         | Rule::action
         | Rule::cover
         | Rule::also
@@ -205,6 +208,7 @@ pub fn role(rule: Rule) -> Role {
         | Rule::kw_group
         | Rule::kw_optional
         | Rule::kw_body
+        | Rule::kw_manoeuvre
         | Rule::kw_episode
         | Rule::kw_reward
         | Rule::kw_verdict
@@ -236,6 +240,7 @@ pub fn opening_words(rule: Rule) -> Vec<&'static str> {
     match rule {
         Rule::action_param => vec!["each", "any"],
         Rule::effect => vec!["set", "spawn", "order"],
+        Rule::phase => vec!["once", "within", "after"],
         Rule::clause => vec!["with", "at", "by"],
         Rule::named_rule => vec!["optional", "rule"],
         Rule::policy_line => vec!["when"],

@@ -7,8 +7,8 @@
 
 use crate::syntax::ast::{
     Action, ActionParam, Case, ClauseKind, Doc, Effect, EffectKind, Expect, Expr, ExprKind, Field, File,
-    Initial, InitialKey, Item, ItemKind, Move, Name, ParamMode, Place, Policy, PolicyLine, Rule, RuleBody,
-    Scenario, Span, Step, Type, TypeKind,
+    FnParam, Initial, InitialKey, Item, ItemKind, Move, Name, ParamMode, Phase, Place, Policy, PolicyLine,
+    Rule, RuleBody, Scenario, Span, Step, Type, TypeKind,
 };
 use crate::syntax::layout::{INDENT, Layout, WIDTH};
 use crate::syntax::print_expression::{
@@ -261,15 +261,19 @@ impl Printer<'_> {
                 self.value(&item.value);
             }
             ItemKind::Fn(item) => {
-                let params = item.params.iter();
-                let params = params
-                    .map(|param| Layout::text(format!("{}: {}", param.name.text, type_text(&param.ty))));
                 self.words(&format!("fn {}", item.name.text));
                 self.put(&Layout::row([
-                    Layout::listed("(", params, ")"),
+                    fn_params(&item.params),
                     Layout::text(format!(" -> {} =", type_text(&item.result))),
                 ]));
                 self.value(&item.body);
+            }
+            ItemKind::Manoeuvre(item) => {
+                self.words(&format!("manoeuvre {}", item.name.text));
+                self.put(&Layout::row([fn_params(&item.params), Layout::text(" ")]));
+                self.block(span.end, |printer| {
+                    item.phases.iter().for_each(|of| printer.entry(of.span, &phase(of), ""));
+                });
             }
             ItemKind::Action(item) => self.action(item, span),
             ItemKind::Group(item) => {
@@ -540,6 +544,7 @@ fn one_line(kind: &ItemKind) -> bool {
         ItemKind::Verdict(item) => plain(&item.condition),
         ItemKind::Expect(_) => true,
         ItemKind::Action(_)
+        | ItemKind::Manoeuvre(_)
         | ItemKind::Also(_)
         | ItemKind::EachStep(_)
         | ItemKind::Odds(_)
@@ -634,6 +639,22 @@ fn effect(effect: &Effect) -> Layout {
             Layout::Row(parts)
         }
     }
+}
+
+fn fn_params(params: &[FnParam]) -> Layout {
+    let param = |param: &FnParam| Layout::text(format!("{}: {}", param.name.text, type_text(&param.ty)));
+    Layout::listed("(", params.iter().map(param), ")")
+}
+
+fn phase(phase: &Phase) -> Layout {
+    let mut parts = Vec::new();
+    for (keyword, clause) in [("once ", &phase.once), ("within ", &phase.within), ("after ", &phase.after)] {
+        parts.extend(
+            clause.iter().flat_map(|clause| [Layout::text(keyword), expression(clause), Layout::text(" ")]),
+        );
+    }
+    parts.push(fields(&phase.fields));
+    Layout::Row(parts)
 }
 
 fn expect(expect: &Expect) -> Layout {

@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use crate::action::table::{Draw, Refusal, Situation};
-use crate::action::{Effect, LaneChangeRules, OrderRequest, SpawnRequest};
+use crate::action::{Course, Effect, LaneChangeRules, OrderRequest, SpawnRequest};
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 use avastra_lang::model::body::OwnBody;
@@ -13,9 +13,9 @@ use avastra_lang::model::rules::{
     Before, Candidate, Choose, Clause, Nearest, Room, RowRules, TRIES_MAX, Unsolved,
 };
 use avastra_lang::model::{
-    ActionDef, BodyWord, Domain, EffectDef, Facts, Memory, MomentFacts, NpcFacts, ORDER_RATE_MPS2, OrderDef,
-    Parameter, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value, WorldFacts, evaluate, locals,
-    order_out_of_bounds, rounded_into, spawn_out_of_bounds,
+    ActionDef, BodyWord, Domain, EffectDef, Facts, ManoeuvreCall, Memory, MomentFacts, NpcFacts,
+    ORDER_RATE_MPS2, OrderDef, Parameter, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value,
+    WorldFacts, evaluate, locals, order_out_of_bounds, rounded_into, spawn_out_of_bounds,
 };
 
 /// Draws of one row in a step before the row is refused. Every draw obeys what can be known before; a further one
@@ -189,8 +189,9 @@ impl<'a> Judge<'a> {
             }
         }
         let lane_changes = self.lane_changes(values);
+        let courses = self.courses(values, &after, &effects);
         let values = self.action.drawn_of(values);
-        Ok(Draw { row: self.row.row.index, values, effects, memory_after: after, lane_changes })
+        Ok(Draw { row: self.row.row.index, values, effects, memory_after: after, lane_changes, courses })
     }
 
     /// The rules on the lane changes of what the action spawns.
@@ -202,9 +203,37 @@ impl<'a> Judge<'a> {
                 functions: self.row.space.functions.clone(),
                 locals: values.to_vec(),
                 road: self.row.road.cloned(),
-                step_ms: (self.row.space.episode.step_s * 1000.0).round() as u64,
+                step_ms: self.step_ms(),
             })
         })
+    }
+
+    /// The manoeuvres of its spawns and orders, which stand among the effects in the order of their declaration.
+    fn courses(&self, values: &[Value], after: &Memory, effects: &[Effect]) -> Vec<(usize, Arc<Course>)> {
+        let of_road_users = |effect: &Effect| matches!(effect, Effect::Spawn(_) | Effect::Order(_));
+        let places = effects.iter().enumerate().filter(|(_, effect)| of_road_users(effect)).map(|(at, _)| at);
+        let calls = self.action.effects.iter().filter_map(|effect| match effect {
+            EffectDef::Set(_) => None,
+            EffectDef::Spawn(spawn) => Some(spawn.manoeuvre.as_ref()),
+            EffectDef::Order(order) => Some(order.manoeuvre.as_ref()),
+        });
+        let space = self.row.space;
+        let course = |call: &ManoeuvreCall| {
+            let facts = self.facts(values, after);
+            let value = |argument: &Expr| evaluate(argument, &space.functions, &facts);
+            Arc::new(Course {
+                phases: space.manoeuvres[call.manoeuvre].phases.clone(),
+                functions: space.functions.clone(),
+                locals: call.arguments.iter().map(value).collect(),
+                road: self.row.road.cloned(),
+                step_ms: self.step_ms(),
+            })
+        };
+        places.zip(calls).filter_map(|(at, call)| Some((at, course(call?)))).collect()
+    }
+
+    fn step_ms(&self) -> u64 {
+        (self.row.space.episode.step_s * 1000.0).round() as u64
     }
 
     fn facts<'f>(&'f self, values: &'f [Value], memory: &'f Memory) -> Facts<'f> {
@@ -266,7 +295,7 @@ impl<'a> Judge<'a> {
         let number = |expr: &Expr| evaluate(expr, &self.row.space.functions, &facts).number();
         OrderRequest {
             who: order.who,
-            speed_mps: rounded_into(number(&order.speed), SPAWN_SPEED_MPS),
+            speed_mps: order.speed.as_ref().map(|speed| rounded_into(number(speed), SPAWN_SPEED_MPS)),
             rate_mps2: order.rate.as_ref().map(|rate| rounded_into(number(rate), ORDER_RATE_MPS2)),
         }
     }

@@ -25,8 +25,8 @@ pub enum Effect {
 pub struct OrderRequest {
     /// The name, by its index in the space.
     pub who: usize,
-    /// m/s.
-    pub speed_mps: f64,
+    /// m/s; `None` for an order of a manoeuvre alone.
+    pub speed_mps: Option<f64>,
     /// How fast it goes over to that speed, m/s², as far as its body and the road allow. `None`: as it drives by itself.
     pub rate_mps2: Option<f64>,
 }

@@ -18,6 +18,7 @@
 
 mod audit;
 mod count;
+mod course;
 mod draw;
 mod effect;
 mod file;
@@ -26,6 +27,7 @@ mod table;
 pub use audit::{Audit, Enforcement, RuleAudit, audit};
 pub use avastra_lang::model::SpawnFacts;
 pub use count::Count;
+pub use course::{Course, PhaseMoment};
 pub use effect::{Effect, LaneChangeRules, OrderRequest, SpawnRequest, Surroundings};
 pub use file::{AxisRecord, DrawRecord, RoadRecord, RowRecord, RuleRecord, TableFile};
 pub use table::{ActionTable, Draw, Offer, Refusal, Situation};

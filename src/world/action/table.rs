@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::action::draw::Judge;
-use crate::action::{Effect, LaneChangeRules, Surroundings};
+use crate::action::{Course, Effect, LaneChangeRules, Surroundings};
 use avastra_lang::model::{Memory, Road, Row, RulesInForce, Space, Value};
 
 /// The rows that an agent chooses from.
@@ -39,6 +39,8 @@ pub struct Draw {
     pub memory_after: Memory,
     /// Rules on the lane changes of what it makes appear; `None` without any.
     pub lane_changes: Option<Arc<LaneChangeRules>>,
+    /// The manoeuvres of what it makes appear or orders, each with the index of its effect.
+    pub courses: Vec<(usize, Arc<Course>)>,
 }
 
 /// Why a row cannot be chosen.

@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use crate::action::{Course, PhaseMoment};
 use avastra_base::geometry::{OrientedBox, Pose, Sweep, Vec2, distance_m, unit_vector};
 use avastra_base::kinematics::GRAVITY_MPS2;
 use avastra_lang::model::vocabulary::{Body, Colour, Verb};
@@ -85,6 +86,83 @@ pub(super) struct Mover {
     pub rights: Rights,
     /// The name that its action gave it, by index in the space.
     pub bearer: Option<usize>,
+    /// The manoeuvre that it does, until it ends or an order replaces it.
+    pub course: Option<Running>,
+}
+
+/// A manoeuvre under way.
+#[derive(Debug, Clone)]
+pub(super) struct Running {
+    course: Arc<Course>,
+    phase: usize,
+    stage: Stage,
+    /// Tick at which the stage began.
+    since: u64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Stage {
+    /// Until what the phase waits for has come.
+    Waiting,
+    /// Until this tick.
+    Holding(u64),
+    /// Until the road user has this speed, m/s.
+    Changing(f64),
+}
+
+impl Running {
+    pub fn new(course: Arc<Course>, tick: u64) -> Running {
+        Running { course, phase: 0, stage: Stage::Waiting, since: tick }
+    }
+
+    /// The names of road users that the present phase asks about.
+    pub fn bearers(&self) -> Vec<usize> {
+        self.course.bearers(self.phase)
+    }
+
+    /// Goes on at a tick. Gives what is left of it, and the speed and rate that a phase which begins now wants.
+    pub fn advance(
+        mut self,
+        moment: &PhaseMoment,
+        tick: u64,
+    ) -> (Option<Running>, Option<(f64, Option<f64>)>) {
+        loop {
+            match self.stage {
+                Stage::Waiting if self.course.has_come(self.phase, moment) => {
+                    let holds = super::world::ticks(self.course.after_s(self.phase, moment));
+                    (self.stage, self.since) = (Stage::Holding(tick + holds), tick);
+                }
+                Stage::Waiting => {
+                    let waited_s = (tick - self.since) as f64 * DT_S;
+                    let is_over =
+                        self.course.within_s(self.phase, moment).is_some_and(|most_s| waited_s >= most_s);
+                    return (if is_over { None } else { Some(self) }, None);
+                }
+                Stage::Holding(until) if tick >= until => {
+                    let Some(wanted) = self.course.wants(self.phase, moment) else { return (None, None) };
+                    (self.stage, self.since) = (Stage::Changing(wanted.0), tick);
+                    return (Some(self), Some(wanted));
+                }
+                Stage::Changing(speed_mps) if tick > self.since && moment.npc.speed_mps == speed_mps => {
+                    self.phase += 1;
+                    (self.stage, self.since) = (Stage::Waiting, tick);
+                    if self.phase == self.course.phases() {
+                        return (None, None);
+                    }
+                }
+                Stage::Holding(_) | Stage::Changing(_) => return (Some(self), None),
+            }
+        }
+    }
+
+    fn trace(&self, trace: &mut Trace) {
+        trace.words([self.phase as u64, self.since]);
+        match self.stage {
+            Stage::Waiting => trace.word(0),
+            Stage::Holding(until) => trace.words([1, until]),
+            Stage::Changing(speed_mps) => trace.number(speed_mps),
+        }
+    }
 }
 
 #[derive(Debug, Clone)]
@@ -173,6 +251,7 @@ impl Mover {
             visible_fraction: 1.0,
             rights: Rights::default(),
             bearer: None,
+            course: None,
         }
     }
 
@@ -264,6 +343,9 @@ impl Mover {
         // Nothing is fed for what has no name, as before there were names.
         if let Some(bearer) = self.bearer {
             trace.word(bearer as u64);
+        }
+        if let Some(running) = &self.course {
+            running.trace(trace);
         }
         self.rights.trace(trace);
         match &self.motion {

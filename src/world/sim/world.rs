@@ -10,7 +10,7 @@ mod tests;
 
 use std::sync::Arc;
 
-use crate::action::{Effect, LaneChangeRules, OrderRequest, SpawnRequest};
+use crate::action::{Course, Effect, LaneChangeRules, OrderRequest, PhaseMoment, SpawnRequest};
 use avastra_base::geometry::{Frame, OrientedBox, Pose, Sweep, Vec2};
 use avastra_base::rng;
 use avastra_base::rng::Stream;
@@ -29,7 +29,7 @@ use super::moment::npc_facts;
 use super::placement;
 use super::placement::Arrivals;
 use super::right_of_way::PassedLight;
-use super::road_user::{Motion, Moved, Obstacle, RoadUser};
+use super::road_user::{Motion, Moved, Obstacle, RoadUser, Running};
 use super::scene::Scene;
 use super::sense::{
     Conditions, EgoMotion, FRAME_S, FRAME_TICKS, RANGE_M, Sensed, SensedObject, SignalColour,
@@ -195,6 +195,7 @@ impl World {
         if self.ticks.is_multiple_of(FRAME_TICKS) {
             self.watch_rights();
         }
+        self.direct();
         let start = self.ego.outline;
         let friction = self.environment.grip().friction(self.ego.motion.speed_mps);
         self.ego.step(control, friction, DT_S);
@@ -530,10 +531,53 @@ impl World {
 
     fn order(&mut self, order: &OrderRequest) -> Result<(), String> {
         let index = self.ordered(order)?;
-        if let Motion::Drive(driver) = &mut self.users[index].mover.motion {
-            driver.order(order.speed_mps, order.rate_mps2);
+        let mover = &mut self.users[index].mover;
+        // The phases that are left of a manoeuvre are dropped.
+        mover.course = None;
+        if let (Motion::Drive(driver), Some(speed_mps)) = (&mut mover.motion, order.speed_mps) {
+            driver.order(speed_mps, order.rate_mps2);
         }
         Ok(())
+    }
+
+    /// Lets the road user with an id, or the one that an order was for, do a manoeuvre from now on.
+    pub fn begin_course(&mut self, id: Option<u32>, effect: &Effect, course: &Arc<Course>) {
+        let index = match (id, effect) {
+            (Some(id), _) => self.users.iter().position(|user| user.obstacle.id == id),
+            (None, Effect::Order(order)) => self.bearer(order.who),
+            (None, _) => None,
+        };
+        if let Some(index) = index {
+            self.users[index].mover.course = Some(Running::new(Arc::clone(course), self.ticks));
+        }
+    }
+
+    /// Moves on the manoeuvres of road users, which tells their drivers what to do.
+    fn direct(&mut self) {
+        let has_course = |user: &RoadUser| user.mover.course.is_some();
+        if !self.users.iter().any(has_course) {
+            return;
+        }
+        let moment = self.moment_facts();
+        for index in 0..self.users.len() {
+            let Some(running) = self.users[index].mover.course.take() else { continue };
+            let RoadUser { obstacle, mover } = &self.users[index];
+            if mover.is_wreck() {
+                continue;
+            }
+            let mut npc = npc_facts(&self.alone(), obstacle, &mover.motion);
+            if let Motion::Drive(driver) = &mover.motion {
+                npc.speed_mps = driver.speed_mps;
+            }
+            let facts = |who: usize| Some((who, self.bearer_facts(who)?));
+            let bearers = running.bearers().into_iter().filter_map(facts).collect();
+            let (running, wanted) = running.advance(&PhaseMoment { moment, npc, bearers }, self.ticks);
+            let mover = &mut self.users[index].mover;
+            mover.course = running;
+            if let (Motion::Drive(driver), Some((speed_mps, rate_mps2))) = (&mut mover.motion, wanted) {
+                driver.order(speed_mps, rate_mps2);
+            }
+        }
     }
 
     /// Indices of the commanded obstacles that leave for new ones, if there are as many as there may be.

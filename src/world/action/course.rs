@@ -1,0 +1,91 @@
+//! The manoeuvre that a road user does, with the values that its action gave it. The world asks it at every tick; it holds
+//! no state itself.
+
+use avastra_lang::model::expr::Expr;
+use avastra_lang::model::{
+    Facts, FnDef, Memory, MomentFacts, NpcFacts, ORDER_RATE_MPS2, PhaseDef, RoadFacts, SPAWN_SPEED_MPS,
+    SpawnFacts, Value, WorldFacts, evaluate,
+};
+
+/// Phases, one after another.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Course {
+    pub(super) phases: Vec<PhaseDef>,
+    pub(super) functions: Vec<FnDef>,
+    /// The arguments of the manoeuvre.
+    pub(super) locals: Vec<Value>,
+    pub(super) road: Option<RoadFacts>,
+    /// How long a step lasts, ms.
+    pub(super) step_ms: u64,
+}
+
+/// What phases ask of a moment.
+#[derive(Debug, Clone)]
+pub struct PhaseMoment {
+    pub moment: MomentFacts,
+    /// The road user itself.
+    pub npc: NpcFacts,
+    /// The named road users that are there, of those that the course asks about.
+    pub bearers: Vec<(usize, NpcFacts)>,
+}
+
+impl Course {
+    pub fn phases(&self) -> usize {
+        self.phases.len()
+    }
+
+    /// The names of road users that a phase asks about.
+    pub fn bearers(&self, phase: usize) -> Vec<usize> {
+        let PhaseDef { once, within, after, speed, rate } = &self.phases[phase];
+        let parts = once.iter().chain(within).chain(after).chain([speed]).chain(rate);
+        parts.flat_map(Expr::bearers).collect()
+    }
+
+    /// Whether what a phase waits for has come.
+    pub fn has_come(&self, phase: usize, moment: &PhaseMoment) -> bool {
+        self.phases[phase].once.as_ref().is_none_or(|once| self.value(once, moment).truth())
+    }
+
+    /// How long a phase waits for that, s; `None` if it waits for ever. A time without a value (a division by 0) is over.
+    pub fn within_s(&self, phase: usize, moment: &PhaseMoment) -> Option<f64> {
+        Some(not_negative(self.value(self.phases[phase].within.as_ref()?, moment)))
+    }
+
+    /// How long a phase waits after that, s.
+    pub fn after_s(&self, phase: usize, moment: &PhaseMoment) -> f64 {
+        self.phases[phase].after.as_ref().map_or(0.0, |after| not_negative(self.value(after, moment)))
+    }
+
+    /// The speed that a phase goes over to, m/s, and how fast, m/s²: as asked for, within what an order may ask. `None` for
+    /// a speed without a value.
+    pub fn wants(&self, phase: usize, moment: &PhaseMoment) -> Option<(f64, Option<f64>)> {
+        let PhaseDef { speed, rate, .. } = &self.phases[phase];
+        let within = |value: Value, range: core::ops::RangeInclusive<f64>| {
+            let number = value.number();
+            (!number.is_nan()).then(|| number.clamp(*range.start(), *range.end()))
+        };
+        let speed_mps = within(self.value(speed, moment), SPAWN_SPEED_MPS)?;
+        Some((speed_mps, rate.as_ref().and_then(|rate| within(self.value(rate, moment), ORDER_RATE_MPS2))))
+    }
+
+    fn value(&self, expr: &Expr, moment: &PhaseMoment) -> Value {
+        let PhaseMoment { moment, npc, bearers } = moment;
+        let step = (moment.elapsed_s * 1000.0).round() as u64 / self.step_ms.max(1);
+        let world = WorldFacts { moment: *moment, step, bearers: bearers.clone(), ..WorldFacts::default() };
+        let spawn = SpawnFacts { spawn_gap_m: npc.gap_m, npc: *npc, ..SpawnFacts::default() };
+        // No phase names a state.
+        let memory = Memory::default();
+        let facts = Facts {
+            road: self.road.as_ref(),
+            world: Some(&world),
+            spawn: Some(spawn),
+            ..Facts::new(&self.locals, &memory)
+        };
+        evaluate(expr, &self.functions, &facts)
+    }
+}
+
+/// A time, s. One below 0 or without a value is over.
+fn not_negative(value: Value) -> f64 {
+    value.number().max(0.0)
+}
