@@ -247,7 +247,7 @@ fn pedestrians_come_only_while_the_ego_vehicle_drives() {
 fn the_second_truck_brakes() {
     let table = wish("second_truck_brakes");
     let [trucks, brakes] = [row(&table, "trucks()"), row(&table, "middle_brakes()")];
-    let run = run_of(table.space().clone(), 1, 6, &[]);
+    let run = run_of(table.space().clone(), 8, 6, &[]);
     let mut braked = 0;
     for episode in 0..run.episodes() {
         let mut begun: Option<(f64, f64)> = None;
@@ -290,7 +290,7 @@ fn the_second_truck_brakes() {
 fn a_leader_stops_and_goes() {
     let table = wish("stop_and_go");
     let stops = row(&table, "stops()");
-    let run = run_of(table.space().clone(), 1, 6, &[]);
+    let run = run_of(table.space().clone(), 8, 6, &[]);
     let mut stopped = 0;
     for episode in 0..run.episodes() {
         let mut begun: Option<(f64, f64)> = None;
@@ -313,7 +313,7 @@ fn a_leader_stops_and_goes() {
             at.map(|(_, speed_mps)| *speed_mps)
         };
         // Nobody else is there, so the leader does what it was told: 3 s at its speed, a stop, 2 s at rest, off again.
-        let Some(before_mps) = speed_at(2.9) else { continue };
+        let Some(before_mps) = speed_at(3.0) else { continue };
         let stop_s = before_mps / rate_mps2;
         let wanted = [
             (3.0 + stop_s / 2.0, before_mps / 2.0),
@@ -322,7 +322,11 @@ fn a_leader_stops_and_goes() {
         ];
         for (after_s, wanted_mps) in wanted {
             let Some(speed_mps) = speed_at((after_s / DT_S).round() * DT_S) else { continue };
-            assert!((speed_mps - wanted_mps).abs() < 0.15, "{speed_mps} after {after_s} s, not {wanted_mps}");
+            // A velocity is the mean of a tick, and the time is that of the nearest one.
+            assert!(
+                (speed_mps - wanted_mps).abs() < 2.0 * rate_mps2 * DT_S,
+                "{speed_mps} after {after_s} s, not {wanted_mps}"
+            );
             stopped += 1;
         }
     }
@@ -333,7 +337,7 @@ fn a_leader_stops_and_goes() {
 fn a_leader_brakes_when_it_is_near() {
     let table = wish("stop_and_go");
     let [waits, hurries] = [row(&table, "waits()"), row(&table, "hurries()")];
-    let run = run_of(table.space().clone(), 1, 6, &[]);
+    let run = run_of(table.space().clone(), 8, 6, &[]);
     let (mut braked, mut ordered) = (0, 0);
     for episode in 0..run.episodes() {
         let mut acted = 0;
@@ -348,21 +352,17 @@ fn a_leader_brakes_when_it_is_near() {
                 _ => Choice::Pass,
             }
         };
-        // The least gap at which it still drove at its speed, and the greatest at which it had braked.
-        let (mut free_m, mut braked_m) = (f64::INFINITY, 0.0_f64);
+        // The gap at which it has braked. A bend slows it down, too, but not so far.
+        let mut braked_m: Option<f64> = None;
         let log = run.play(episode, &mut choose, &mut |world, _, contacts| {
-            let Some(leader) = world.obstacle(1).filter(|_| contacts.is_empty()) else { return };
-            let speed_mps = leader.velocity_mps.norm();
-            if speed_mps > 5.9 && braked_m == 0.0 {
-                free_m = free_m.min(leader.distance_m);
-            } else if speed_mps < 5.5 && free_m < f64::INFINITY {
-                braked_m = braked_m.max(leader.distance_m);
-            }
+            let leader =
+                world.obstacle(1).filter(|leader| contacts.is_empty() && leader.velocity_mps.norm() < 2.2);
+            braked_m = braked_m.or(leader.map(|leader| leader.distance_m));
         });
         assert_replays(&run, episode, &log);
         ordered += usize::from(acted == 2);
-        if acted == 1 && braked_m > 0.0 {
-            assert!(braked_m <= 25.0 && free_m >= 23.0, "{free_m} m, {braked_m} m");
+        if let (1, Some(braked_m)) = (acted, braked_m) {
+            assert!((2.0..=25.0).contains(&braked_m), "{braked_m} m");
             braked += 1;
         }
     }

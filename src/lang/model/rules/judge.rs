@@ -253,7 +253,14 @@ impl<'a> RowRules<'a> {
         let has_no_value = |expr: &Expr| matches!(evaluate(expr, &self.space.functions, &facts), Value::Number(n) if !n.is_finite());
         if condition.any(|kind| matches!(kind, ExprKind::Compare(_, left, right) if has_no_value(left) || has_no_value(right)))
         {
-            shown.push("a division by 0 has no value".to_owned());
+            let is_there = |who: &usize| {
+                facts.world.is_some_and(|world| world.bearers.iter().any(|(known, _)| known == who))
+            };
+            let absent = condition.bearers().into_iter().find(|who| !is_there(who));
+            shown.push(match absent {
+                Some(who) => format!("`{}` is not there", self.space.bearers[who]),
+                None => "a division by 0 has no value".to_owned(),
+            });
         }
         let asks_for_limit = condition.any(|kind| matches!(kind, ExprKind::Fact(Fact::RoadLimit)));
         let limited_at = self.road.and_then(|road| road.limited_at.as_ref());
