@@ -25,8 +25,7 @@ pub fn compile(output: &Output, arguments: &CompileArguments) -> Result<(), Fail
         let stem = arguments.file.file_stem().unwrap_or_default().to_string_lossy();
         Path::new(FOLDER).join(format!("{stem}.table.yaml"))
     });
-    let file = table.file();
-    let text = serde_yaml::to_string(&file).map_err(|error| Failure::file("write", &path, error))?;
+    let text = table.yaml().map_err(|error| Failure::file("write", &path, error))?;
     folder(Path::new(""), FOLDER)?;
     write_result(arguments.output.as_ref(), &path, &text)?;
     write(Path::new(LAST), &format!("{}\n", path.display()))?;

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use crate::action::{ActionTable, Count, Situation, Surroundings};
 use crate::sim::{Scene, Start, World};
 use avastra_lang::check::{Claim, Loaded, Runs};
-use avastra_lang::model::{EffectDef, Memory, Road, Row, RulesInForce, Space, code};
+use avastra_lang::model::{EffectDef, Memory, Road, Row, RulesInForce, Space, code, effort};
 use avastra_lang::syntax::{Diagnostic, listed};
 use avastra_road::{LanePlace, RoadMap};
 
@@ -23,8 +23,10 @@ const SPEED_MPS: f64 = 3.0;
 const SHARE_OF_LIMIT: f64 = 0.8;
 /// Fastest speed of the ego vehicle at a station, m/s. Maps have roads without a limit.
 const FAST_MPS_MAX: f64 = 30.0;
-/// Most offers in one search over all rows. A row that finds a place nowhere needs 128 on each road.
+/// Most offers in one search over all rows. A row that finds a place nowhere needs 128 on each road. An offer that takes
+/// many steps to draw counts as several.
 const OFFERS_MAX: usize = 5_000;
+const STEPS_AN_OFFER: u64 = 4_000;
 /// If a table has more rows than this beside those that are claimed to run, there are no warnings: the search would
 /// take seconds.
 const ROWS_WARNED_MAX: usize = 1_000;
@@ -196,8 +198,10 @@ fn without_place<'a>(
         let action = &space.actions[row.action];
         let asks =
             action.drawn().filter_map(|parameter| parameter.condition.as_ref()).any(|c| c.asks_the_world());
+        // Nobody is there to be ordered in the worlds that are searched.
+        let orders = action.effects.iter().any(|effect| matches!(effect, EffectDef::Order(_)));
         // What a `where` asks of the moment cannot be left out.
-        !asks && action.effects.iter().any(|effect| matches!(effect, EffectDef::Spawn(_)))
+        !asks && !orders && action.effects.iter().any(|effect| matches!(effect, EffectDef::Spawn(_)))
     };
     let wanted = rows.iter().map(|row| &space.rows[*row]).filter(|row| needs_place(row));
     let runs_somewhere =
@@ -225,9 +229,13 @@ fn without_place<'a>(
                     if state_of(lost) != Some(state) {
                         return true;
                     }
-                    let is_offered = offers_left > 0;
-                    offers_left = offers_left.saturating_sub(1);
-                    !is_offered || !lost.finds_place(&table, &situation, &world, index)
+                    if offers_left == 0 {
+                        return true;
+                    }
+                    let (is_found, steps) =
+                        effort::counted(|| lost.finds_place(&table, &situation, &world, index));
+                    offers_left = offers_left.saturating_sub(1 + (steps / STEPS_AN_OFFER) as usize);
+                    !is_found
                 });
                 if offers_left == 0 {
                     open.iter_mut().for_each(|lost| lost.is_searched = false);

@@ -334,6 +334,30 @@ fn a_leader_stops_and_goes() {
 }
 
 #[test]
+fn a_leader_slows_down_and_then_stops() {
+    let table = wish("slows_and_stops");
+    let run = run_of(table.space().clone(), 8, 4, &[]);
+    for (action, stops) in [("slows()", true), ("gives_up()", false), ("waits()", false)] {
+        let wanted = row(&table, action);
+        let mut stood = 0;
+        for episode in 0..run.episodes() {
+            let mut choose = |moment: &Moment| match table.offer(moment.situation, wanted) {
+                Ok(draw) if moment.step == 0 => Choice::Act(draw),
+                _ => Choice::Pass,
+            };
+            let mut stands = false;
+            let log = run.play(episode, &mut choose, &mut |world, _, contacts| {
+                let leader = world.obstacle(1).filter(|_| contacts.is_empty());
+                stands |= leader.is_some_and(|leader| leader.velocity_mps.norm() == 0.0);
+            });
+            assert_replays(&run, episode, &log);
+            stood += u64::from(stands);
+        }
+        assert_eq!(stood > 0, stops, "{action}: {stood} of {} stood", run.episodes());
+    }
+}
+
+#[test]
 fn a_leader_brakes_when_it_is_near() {
     let table = wish("stop_and_go");
     let [waits, hurries] = [row(&table, "waits()"), row(&table, "hurries()")];

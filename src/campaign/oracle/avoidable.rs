@@ -9,8 +9,8 @@
 //! evasive manoeuvres that begin at the onset without any delay are tried.
 //!
 //! If none of the careful drivers avoids it from there, and the ego vehicle slowed down to walking pace since, the question is
-//! asked once more from its slowest moment: a vehicle that has dealt with the hazard and then creeps on into what stands
-//! before it could have stayed. If another road user shoved the ego vehicle, so that most of its way to the contact was
+//! asked once more from its slowest moment, whatever it did after that: a vehicle that has dealt with the hazard and then
+//! drives on into what stands before it could have stayed. If another road user shoved the ego vehicle, so that most of its way to the contact was
 //! the shove's, the question begins when a careful driver has reacted to the shove: before it there was nothing to avoid.
 //!
 //! Where the ego vehicle had to give way, a driver that takes over before the ego vehicle has begun a lane change begins
@@ -72,6 +72,8 @@ pub struct AvoidabilitySettings {
     rewind_s: f64,
     watch_s: f64,
     after_s: f64,
+    shove_mps2: f64,
+    creep_mps: f64,
 }
 
 impl Default for AvoidabilitySettings {
@@ -83,6 +85,8 @@ impl Default for AvoidabilitySettings {
             rewind_s: REWIND_S,
             watch_s: WATCH_S,
             after_s: AFTER_S,
+            shove_mps2: SHOVE_MPS2,
+            creep_mps: WALKING_MPS,
         }
     }
 }
@@ -91,7 +95,7 @@ impl Default for AvoidabilitySettings {
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Judgement {
     pub class: Avoidability,
-    /// When the hazard began, s.
+    /// The moment from which the verdict's drivers drive, s: the onset of the hazard, or the slowest moment after it.
     pub onset_s: f64,
     /// Reference drivers that avoid the collision.
     pub avoided_by: Vec<String>,
@@ -192,7 +196,7 @@ pub fn judge_one(recording: &[World], contact: &Contact, met: OrientedBox) -> Ju
     if careful.is_empty()
         && let Some(slowest) = crept_from(recording, from)
     {
-        let again = Case { from: slowest, ..case };
+        let again = Case::new(recording, slowest, contact);
         careful = again.avoided_by(&CAREFUL);
         case = if careful.is_empty() { case } else { again };
     }
@@ -219,7 +223,7 @@ fn crept_from(recording: &[World], from: usize) -> Option<usize> {
     (speed_mps(&slowest) < WALKING_MPS).then_some(slowest)
 }
 
-/// The moment after the last shove from another road user that gave the ego vehicle more than half of its way to the
+/// The moment after the last shove (an earlier one counts as the ego vehicle's own speed) from another road user that gave the ego vehicle more than half of its way to the
 /// contact; `met` is its outline there.
 fn shoved(recording: &[World], met: OrientedBox) -> Option<usize> {
     let mut way_m = 0.0;

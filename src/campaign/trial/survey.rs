@@ -236,8 +236,9 @@ fn attempt(moment: &Moment, draw: &Draw) -> Try {
             world.begin_course(*newcomer, effect, course);
         }
         match (effect, applied) {
-            (_, Err(reason)) => {
-                found.failure = Some(format!("cannot spawn: {reason}"));
+            (effect, Err(reason)) => {
+                let verb = if matches!(effect, Effect::Order(_)) { "order" } else { "spawn" };
+                found.failure = Some(format!("cannot {verb}: {reason}"));
                 return found;
             }
             (Effect::Spawn(request), Ok(Some(id))) => {

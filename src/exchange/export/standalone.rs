@@ -111,11 +111,11 @@ impl<'a> Actions<'a> {
             Effect::Time(time) => format!("set time = {}", time.name()),
             Effect::Sky(phenomenon, level) => format!("set sky[{}] = {}", phenomenon.name(), level.name()),
             Effect::Spawn(request) => self.spawn(space, request),
-            Effect::Order(OrderRequest { who, speed_mps, rate_mps2 }) => {
+            Effect::Order(OrderRequest { bearer, speed_mps, rate_mps2 }) => {
                 let rate = rate_mps2.map(|rate| format!(", rate: {} m/s^2", decimal(rate, false)));
                 // An order of a manoeuvre, which the text lacks, lets its bearer drive on.
                 let Some(speed_mps) = speed_mps else { return String::new() };
-                let (name, speed) = (&space.bearers[*who], decimal(*speed_mps, false));
+                let (name, speed) = (&space.bearers[*bearer], decimal(*speed_mps, false));
                 format!("order {name} {{ speed: {speed} m/s{} }}", rate.unwrap_or_default())
             }
         }

@@ -15,8 +15,8 @@ use crate::model::vocabulary::{
     Colour, LaneChoice, OrderField, Side, Site, SpaceClaim, SpawnField, Then, Verb, Word,
 };
 use crate::model::{
-    ActionDef, BodyWord, Domain, EffectDef, GroupDef, OrderDef, Parameter, RuleDef, SetDef, SpawnDef, Type,
-    Value, WordExpr, code,
+    ActionDef, BodyWord, Domain, EffectDef, GroupDef, ManoeuvreCall, OrderDef, Parameter, RuleDef, SetDef,
+    SpawnDef, Type, Value, WordExpr, code,
 };
 use crate::prove::product_size;
 use crate::syntax::ast::{ItemKind, ParamMode, Span};
@@ -375,14 +375,9 @@ impl Checker {
             }
             None => Some(WordExpr::Fixed(Side::Right)),
         };
-        let call = find(SpawnField::Then).and_then(|value| self.manoeuvre_call(value, place));
         let then = match find(SpawnField::Then) {
-            Some(value) if call.is_none() => self.word::<Then>("word for `then`", value, place),
-            _ => Some(WordExpr::Fixed(Then::Keep)),
-        };
-        let manoeuvre = match call {
-            Some(call) => Some(call?),
-            None => None,
+            Some(value) => self.then(value, place),
+            None => Some((WordExpr::Fixed(Then::Keep), None)),
         };
         let colour = match find(SpawnField::Colour) {
             Some(value) => self.word::<Colour>("colour", value, place),
@@ -396,7 +391,7 @@ impl Checker {
             }
             None => self.missing_field(SpawnField::Speed, span, lacks("how fast it is")),
         };
-        let (body, verb) = (body_word?, verb?);
+        let (body, verb, (then, manoeuvre)) = (body_word?, verb?, then?);
         self.check_verb(&body, &verb, behind, span);
         if manoeuvre.is_some()
             && let Some(verb) =
@@ -412,7 +407,7 @@ impl Checker {
             verb,
             lane: lane?,
             side: side?,
-            then: then?,
+            then,
             speed: speed?,
             distance: distance?,
             behind,
@@ -469,7 +464,24 @@ impl Checker {
             Some(rate) => Some(rate?),
             None => None,
         };
-        Some(OrderDef { who: bearer?, speed, rate, manoeuvre, span })
+        if let (Some(rate), None) = (field(&fields, OrderField::Rate), &speed) {
+            let error = Diagnostic::error(code::NOT_HERE, "`rate` belongs to the `speed` of an order");
+            let error = error.at(rate.span, "without a `speed`");
+            return self.reject(error.help("give it to the manoeuvre as an argument"));
+        }
+        Some(OrderDef { bearer: bearer?, speed, rate, manoeuvre, span })
+    }
+
+    /// The `then` of a spawn: a word, or a manoeuvre.
+    fn then(
+        &mut self,
+        value: &ast::Expr,
+        place: &Place<'_>,
+    ) -> Option<(WordExpr<Then>, Option<ManoeuvreCall>)> {
+        match self.manoeuvre_call(value, place) {
+            Some(call) => Some((WordExpr::Fixed(Then::Keep), Some(call?))),
+            None => Some((self.word::<Then>("word for `then`", value, place)?, None)),
+        }
     }
 
     /// Reports a cover that is no vehicle, and one for a road user that does not walk.

@@ -22,7 +22,7 @@ use avastra_base::units::{Dimension, Rational};
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Place<'a> {
     pub locals: &'a [(String, Type)],
-    /// The function or the action whose parameters the locals are.
+    /// The function, action or manoeuvre whose parameters the locals are.
     pub owner: Option<&'a Symbol>,
     pub states: bool,
     pub site: Site,
@@ -33,7 +33,7 @@ impl Place<'_> {
     pub const RULE: Place<'static> = Place { locals: &[], owner: None, states: true, site: Site::Rule };
 
     fn fact(&self, name: &str) -> Option<Fact> {
-        Fact::from_name(name).filter(|fact| self.site.knows(fact.known()))
+        Fact::from_name(name).filter(|fact| self.site.knows_fact(*fact))
     }
 
     /// Whether something can be asked of a thing (`road`) here.
@@ -369,7 +369,7 @@ impl Checker {
             ast::ExprKind::Name(name) if things.contains(&name.as_str()) => name,
             _ => {
                 self.look_at(base, place, None);
-                let message = format!("only {} and named road users have fields", listed(&things));
+                let message = format!("only named road users, {} have fields", listed(&things));
                 let error = Diagnostic::error(code::UNKNOWN, message).at(base.span, "none of these");
                 let ast::ExprKind::Name(name) = &base.kind else { return self.reject(error) };
                 let known = things.iter().copied().chain(self.bearers.iter().map(String::as_str));

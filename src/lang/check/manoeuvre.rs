@@ -47,7 +47,8 @@ impl Checker {
         }
         if declared.phases.is_empty() || declared.phases.len() > PHASES_MAX {
             let message = format!("`{}` has {} phases", declared.name.text, declared.phases.len());
-            let error = Diagnostic::error(code::NO_EFFECT, message).at(declared.name.span, "");
+            let code = if declared.phases.is_empty() { code::NO_EFFECT } else { code::TOO_MUCH };
+            let error = Diagnostic::error(code, message).at(declared.name.span, "");
             self.report(
                 error.help(format!("give it 1 to {PHASES_MAX}, such as `after 3 s {{ speed: 0 m/s }}`")),
             );
@@ -116,7 +117,12 @@ impl Checker {
         place: &Place<'_>,
     ) -> Option<Option<ManoeuvreCall>> {
         let ast::ExprKind::Call(call) = &value.kind else { return None };
-        let symbol = Symbol::Manoeuvre(call.name.text.clone());
+        // A function may give `Keep` or `Change`.
+        let name = &call.name.text;
+        if self.manoeuvre_names.get(name).is_none() && self.function_names.get(name).is_some() {
+            return None;
+        }
+        let symbol = Symbol::Manoeuvre(name.clone());
         self.references.uses(call.name.span, symbol.clone());
         let named = call.args.iter().filter_map(|argument| argument.name.as_ref());
         named.for_each(|name| self.references.uses_parameter(name, &symbol));

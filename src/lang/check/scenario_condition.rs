@@ -28,6 +28,7 @@ pub(super) fn condition(space: &Space, written: &ast::Expr) -> Result<Expr, Vec<
         function_names,
         signatures: space.functions.iter().map(|function| Some(signature(function))).collect(),
         functions: space.functions.clone(),
+        bearers: space.bearers.clone(),
         ..Checker::default()
     };
     let states = space.states.iter().enumerate();

@@ -36,7 +36,7 @@ pub(crate) fn foresee(steps: u64) {
 }
 
 /// Does some work. Returns its result and the steps that it took.
-pub(crate) fn counted<T>(work: impl FnOnce() -> T) -> (T, u64) {
+pub fn counted<T>(work: impl FnOnce() -> T) -> (T, u64) {
     let begun = SPENT.get();
     let done = work();
     (done, SPENT.get().wrapping_sub(begun))
@@ -70,5 +70,17 @@ mod tests {
         let (inner, is_outer_enough) = within(100, || within(10, || spend(11)).1);
         assert!(!inner && is_outer_enough);
         assert!(!is_spent(), "the limit ends with the work");
+    }
+
+    #[test]
+    fn what_is_granted_is_added_and_what_is_foreseen_ends_it() {
+        assert_eq!(counted(|| spend(7)), ((), 7));
+        let granted = || {
+            grant(5);
+            spend(15);
+        };
+        assert!(within(10, granted).1 && !within(9, granted).1);
+        let foreseen = |steps| within(10, || (spend(4), foresee(steps))).1;
+        assert!(foreseen(6) && !foreseen(7));
     }
 }

@@ -280,7 +280,7 @@ fn are_equal(left: f64, right: f64) -> bool {
     let apart = (left - right).abs();
     let largest = left.abs().max(right.abs());
     let are_exact = || left.fract() == 0.0 && right.fract() == 0.0 && largest < EXACT;
-    // Where nobody is near, the nearest is infinitely far, which is no number of ten digits.
+    // Without a road user the nearest gap is infinite, which is no number of ten digits.
     left == right || apart.is_finite() && apart <= EQUAL_PART * largest && !are_exact()
 }
 

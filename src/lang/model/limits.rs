@@ -58,7 +58,7 @@ pub fn spawn_out_of_bounds(speed_mps: f64, distance_m: f64) -> Option<String> {
     out_of_bounds("spawn", [("speed", speed_mps, "m/s", SPAWN_SPEED_MPS), distance])
 }
 
-/// The same of an order.
+/// Why the world must not be given an order with these figures; `None` if it may.
 pub fn order_out_of_bounds(speed_mps: Option<f64>, rate_mps2: Option<f64>) -> Option<String> {
     let speed = speed_mps.map(|speed_mps| ("speed", speed_mps, "m/s", SPAWN_SPEED_MPS));
     let rate = rate_mps2.map(|rate_mps2| ("rate", rate_mps2, "m/s^2", ORDER_RATE_MPS2));

@@ -8,7 +8,7 @@
 pub mod body;
 pub mod code;
 mod digest;
-pub(crate) mod effort;
+pub mod effort;
 mod eval;
 pub mod expr;
 mod interval;

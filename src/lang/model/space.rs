@@ -297,7 +297,7 @@ pub struct SpawnDef {
     pub cover: Option<WordExpr<BodyWord>>,
     /// The name that it bears from then on, by index in `Space::bearers`.
     pub bearer: Option<usize>,
-    /// What it does from then on.
+    /// The manoeuvre that it begins when it appears.
     pub manoeuvre: Option<ManoeuvreCall>,
     pub span: Span,
 }
@@ -337,7 +337,7 @@ pub struct ManoeuvreCall {
 #[derive(Debug, Clone, PartialEq)]
 pub struct OrderDef {
     /// The name, by index in `Space::bearers`.
-    pub who: usize,
+    pub bearer: usize,
     /// m/s; `None` for an order of a manoeuvre.
     pub speed: Option<Expr>,
     /// m/s²; without it the driver goes over to the speed as it would by itself.

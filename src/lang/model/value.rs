@@ -31,7 +31,7 @@ pub enum Value {
 
 impl Value {
     /// Equal for equal values of one type.
-    pub(crate) fn bits(self) -> u64 {
+    pub fn bits(self) -> u64 {
         match self {
             Value::Bool(truth) => u64::from(truth),
             // Both zeros are equal.

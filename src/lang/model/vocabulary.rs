@@ -148,9 +148,15 @@ impl Site {
         }
     }
 
+    /// Whether a fact is known here. What a spawn asks for is known at the draw alone.
+    pub fn knows_fact(self, fact: Fact) -> bool {
+        let is_of_spawn = matches!(fact, Fact::SpawnGap | Fact::SafetyGap);
+        self.knows(fact.known()) && !(is_of_spawn && matches!(self, Site::Change | Site::Phase))
+    }
+
     /// The facts that are known here.
     pub fn facts(self) -> impl Iterator<Item = Fact> {
-        Fact::ALL.iter().copied().filter(move |fact| self.knows(fact.known()))
+        Fact::ALL.iter().copied().filter(move |fact| self.knows_fact(*fact))
     }
 
     /// Those that are words.

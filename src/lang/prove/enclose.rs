@@ -11,7 +11,7 @@ use crate::model::{
     SPEED_MPS_MAX, Type, Value,
 };
 use crate::prove::moment::Case;
-use crate::prove::sums::{difference, is_same, lacks_value};
+use crate::prove::sums::{difference, is_same, lacks_value, may_lack_a_value};
 use avastra_base::units::Rational;
 
 /// The most variants of an enum: a set of them fits one integer.
@@ -153,7 +153,9 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
             Some(piece) => Values::Number(piece),
             None => fact_values(*fact, known),
         },
-        ExprKind::OfRoadUser(_, fact) | ExprKind::OfBearer(_, fact) => fact_values(*fact, known),
+        ExprKind::OfRoadUser(_, fact) => fact_values(*fact, known),
+        // While it is not there, it has no value: as after a division by 0, no comparison is certain.
+        ExprKind::OfBearer(..) => Values::Number(Interval::ALL),
         ExprKind::IsThere(_) => Values::UNKNOWN_TRUTH,
         ExprKind::Call(function, arguments) => {
             let locals: Vec<Values> = arguments.iter().map(values).collect();
@@ -161,7 +163,9 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
         }
         ExprKind::Not(inner) => not(values(inner)),
         ExprKind::Negate(inner) => Values::Number(values(inner).interval().neg()),
-        ExprKind::Arithmetic(Arithmetic::Subtract, left, right) if is_same(left, right) => {
+        ExprKind::Arithmetic(Arithmetic::Subtract, left, right)
+            if is_same(left, right) && !may_lack_a_value(left, known) =>
+        {
             Values::Number(Interval::point(Rational::ZERO))
         }
         ExprKind::Arithmetic(op, left, right) => {
@@ -282,10 +286,6 @@ fn compare_parts(op: Comparison, left: &Expr, right: &Expr, known: &Known<'_>) -
         return Values::truth(op == Comparison::NotEqual);
     }
     let apart = compare(op, enclose(left, known), enclose(right, known));
-    // While no bearer is there, a comparison with it does not hold, but `!=` does.
-    if [left, right].iter().any(|side| side.any(|kind| matches!(kind, ExprKind::OfBearer(..)))) {
-        return apart.union(Values::truth(op == Comparison::NotEqual));
-    }
     if !(apart.may_hold() && apart.may_fail()) {
         return apart;
     }

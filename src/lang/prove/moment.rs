@@ -114,7 +114,7 @@ impl Case {
     }
 }
 
-/// `nearest.gap` where there is nobody, m.
+/// `nearest.gap` without a road user, m.
 const NO_ROAD_USER_M: i64 = 100;
 
 /// What is known of each newcomer of an action before it appears, beside what is known of the moment; of an action

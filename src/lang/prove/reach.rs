@@ -55,13 +55,14 @@ pub(crate) fn rows(space: &Space) -> Vec<Row> {
         let key_of =
             |values: &[Value]| -> Vec<u64> { deciding.iter().map(|local| values[*local].bits()).collect() };
         let products = products(space, action);
-        let mut pace = Pace { proved: 0, spent: 0, count: products.len() as u64 };
+        let count = products.len() as u64;
+        let mut pace = Pace { proved: 0, spent: 0, count };
         if !are_all {
             pace.count = products.iter().map(|values| key_of(values)).collect::<BTreeSet<_>>().len() as u64;
         }
         // A row that runs everywhere, for each combination of the values that decide it.
         let mut open: BTreeMap<Vec<u64>, usize> = BTreeMap::new();
-        for values in products {
+        for (left, values) in (0..count).rev().zip(products) {
             if effort::is_spent() {
                 return rows;
             }
@@ -90,7 +91,7 @@ pub(crate) fn rows(space: &Space) -> Vec<Row> {
                     let rules = RowRules { space, row: &row, road: None, in_force: &in_force };
                     let reach = |road: &Road| RowRules { road: Some(&road.facts), ..rules }.reach();
                     let (roads, steps) = effort::counted(|| space.roads.iter().map(reach).collect());
-                    pace.note(steps, granted);
+                    pace.note(steps, granted * left);
                     roads
                 }
             };
@@ -112,15 +113,15 @@ struct Pace {
 }
 
 impl Pace {
-    /// Counts a proof. From time to time it gives up if the other rows, which bring `granted` steps each, would take more
-    /// than there are.
+    /// Counts a proof. From time to time it gives up if the other proofs would take more steps than there are and than
+    /// the other rows bring, which are `granted`.
     fn note(&mut self, steps: u64, granted: u64) {
         self.proved += 1;
         self.spent += steps;
         if self.proved.is_multiple_of(ROWS_OF_A_SAMPLE) {
             // The proofs after this one take at least half as many steps.
-            let each = (self.spent * 3 / 2 / self.proved).saturating_sub(granted);
-            effort::foresee(each * self.count.saturating_sub(self.proved));
+            let needed = self.spent * 3 / 2 / self.proved * self.count.saturating_sub(self.proved);
+            effort::foresee(needed.saturating_sub(granted));
         }
     }
 }

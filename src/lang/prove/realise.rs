@@ -181,7 +181,7 @@ impl<'a> OnRoad<'a> {
         runs_in.states.push(way.states.into_iter().map(|met| met.memory).collect());
     }
 
-    /// What there is of a row that did not run in any state that was followed.
+    /// How a row is classed that ran in no state that was followed.
     fn elsewhere(&self, asked: &Asked<'a>, is_way_complete: bool) -> Realised {
         if effort::is_spent() {
             return Realised::NotSearched;
@@ -241,7 +241,7 @@ struct Way {
 /// A state that was met.
 struct Met {
     memory: Memory,
-    /// Of `memory`: most states differ in it, which spares a look at all their cells.
+    /// Digest of `memory`. It spares a look at all cells, because most states differ in it.
     digest: u64,
     since: u64,
     /// Whether the first start comes here without an action. Such states are followed however many others there are.

@@ -3,7 +3,7 @@
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::rules::allowed;
 use crate::model::{Interval, Type, effort};
-use crate::prove::enclose::{Known, enclose};
+use crate::prove::enclose::{Known, Values, enclose};
 use avastra_base::units::Rational;
 
 /// The most comparisons of one question that are held against each other.
@@ -11,7 +11,7 @@ const COMPARED_MAX: usize = 64;
 
 /// What the left side is more than the right one; `None` if they name nothing alike, or where one may have no value.
 pub(super) fn difference(left: &Expr, right: &Expr, known: &Known<'_>) -> Option<Interval> {
-    if is_same(left, right) {
+    if is_same(left, right) && !may_lack_a_value(left, known) {
         return Some(Interval::point(Rational::ZERO));
     }
     let mut sum = Sum { terms: Vec::new(), constant: Rational::ZERO, are_shared: false };
@@ -52,12 +52,14 @@ impl<'a> Sum<'a> {
                 Arithmetic::Multiply => match (fixed(left), fixed(right)) {
                     (_, Some(by)) => self.add(left, factor.checked_mul(by)?, known)?,
                     (Some(by), _) => self.add(right, factor.checked_mul(by)?, known)?,
-                    (None, None) if may_lack_a_value(expr) => return None,
+                    (None, None) if may_lack_a_value(expr, known) => return None,
                     (None, None) => self.terms.push((expr, factor)),
                 },
                 Arithmetic::Divide => self.add(left, factor.checked_div(fixed(right)?)?, known)?,
             },
-            _ if !matches!(expr.ty, Type::Int | Type::Quantity(_)) || may_lack_a_value(expr) => return None,
+            _ if !matches!(expr.ty, Type::Int | Type::Quantity(_)) || may_lack_a_value(expr, known) => {
+                return None;
+            }
             _ => match self.terms.iter_mut().find(|(term, _)| is_same(term, expr)) {
                 Some((_, sum)) => {
                     *sum = sum.checked_add(factor)?;
@@ -94,11 +96,13 @@ pub(super) fn is_same(left: &Expr, right: &Expr) -> bool {
     }
 }
 
-/// A quotient by 0 has no value, nor has a fact about a road user that is not there.
-fn may_lack_a_value(expr: &Expr) -> bool {
-    expr.any(|kind| {
-        let divides = matches!(kind, ExprKind::Arithmetic(Arithmetic::Divide, ..));
-        divides || matches!(kind, ExprKind::Call(..) | ExprKind::OfRoadUser(..) | ExprKind::OfBearer(..))
+/// A quotient by 0 has no value, nor has a fact about a road user that is not there, nor an argument that is one of them.
+pub(super) fn may_lack_a_value(expr: &Expr, known: &Known<'_>) -> bool {
+    expr.any(|kind| match kind {
+        ExprKind::Arithmetic(Arithmetic::Divide, ..) => true,
+        ExprKind::Call(..) | ExprKind::OfRoadUser(..) | ExprKind::OfBearer(..) => true,
+        ExprKind::Local(index) => known.locals.get(*index) == Some(&Values::Number(Interval::ALL)),
+        _ => false,
     })
 }
 

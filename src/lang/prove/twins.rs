@@ -120,7 +120,7 @@ impl<'a> RowText<'a> {
                 let rate = order.rate.as_ref().map(|rate| self.reduced(rate).kind);
                 let speed = order.speed.as_ref().map(|speed| self.reduced(speed).kind);
                 let then = order.manoeuvre.as_ref().map(|then| self.call_form(then));
-                format!("order {} {speed:?} {rate:?} {then:?}", order.who)
+                format!("order {} {speed:?} {rate:?} {then:?}", order.bearer)
             }
         });
         effects.collect::<Vec<_>>().join("\n")

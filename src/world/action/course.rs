@@ -34,6 +34,11 @@ impl Course {
         self.phases.len()
     }
 
+    /// The values of the arguments, in bits.
+    pub fn arguments(&self) -> impl Iterator<Item = u64> {
+        self.locals.iter().map(|value| value.bits())
+    }
+
     /// The names of road users that a phase asks about.
     pub fn bearers(&self, phase: usize) -> Vec<usize> {
         let PhaseDef { once, within, after, speed, rate } = &self.phases[phase];

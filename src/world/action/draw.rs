@@ -294,20 +294,23 @@ impl<'a> Judge<'a> {
         let facts = self.facts(locals, after);
         let number = |expr: &Expr| evaluate(expr, &self.row.space.functions, &facts).number();
         OrderRequest {
-            who: order.who,
+            bearer: order.bearer,
             speed_mps: order.speed.as_ref().map(|speed| rounded_into(number(speed), SPAWN_SPEED_MPS)),
             rate_mps2: order.rate.as_ref().map(|rate| rounded_into(number(rate), ORDER_RATE_MPS2)),
         }
     }
 
-    /// Why an order cannot be given after the effects before it. Whoever they let appear under that name is there.
+    /// Why an order cannot be given after the effects before it. A vehicle that one of them spawns under that name is there.
     fn order_refusal(&self, order: &OrderRequest, before: &[Effect]) -> Option<Refusal> {
-        let appears = |effect: &Effect| matches!(effect, Effect::Spawn(request) if request.bearer == Some(order.who) && request.body.is_vehicle());
+        let appears = |effect: &Effect| match effect {
+            Effect::Spawn(request) => request.bearer == Some(order.bearer) && request.body.is_vehicle(),
+            Effect::Time(_) | Effect::Sky(..) | Effect::Order(_) => false,
+        };
         let out = order_out_of_bounds(order.speed_mps, order.rate_mps2);
         out.or_else(|| {
             let surroundings = self.situation.surroundings;
             let reason = (!before.iter().any(appears)).then(|| surroundings.order_refusal(order))??;
-            Some(format!("cannot order `{}`: {reason}", self.row.space.bearers[order.who]))
+            Some(format!("cannot order `{}`: {reason}", self.row.space.bearers[order.bearer]))
         })
         .map(|reason| refuse(None, reason))
     }

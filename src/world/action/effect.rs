@@ -24,7 +24,7 @@ pub enum Effect {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OrderRequest {
     /// The name, by its index in the space.
-    pub who: usize,
+    pub bearer: usize,
     /// m/s; `None` for an order of a manoeuvre alone.
     pub speed_mps: Option<f64>,
     /// How fast it goes over to that speed, m/s², as far as its body and the road allow. `None`: as it drives by itself.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::action::table::ActionTable;
-use avastra_lang::model::{Domain, End, Interval, Parameter, Reach, Row, Type};
+use avastra_lang::model::{Domain, End, Interval, Parameter, Reach, Row, RuleDef, Type};
 
 /// Version of the file's fields. It rises when a field changes its meaning.
 const VERSION: u32 = 1;
@@ -79,23 +79,57 @@ pub struct DrawRecord {
     pub values: Vec<String>,
 }
 
+/// A table whose rows are made one after another as they are written, because a long table takes hundreds of megabytes.
+#[derive(Serialize)]
+struct Written<'a> {
+    version: u32,
+    space: String,
+    digest: &'a str,
+    rules: Vec<RuleRecord>,
+    #[serde(serialize_with = "in_turn")]
+    rows: &'a ActionTable,
+}
+
+fn in_turn<S: serde::Serializer>(table: &ActionTable, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(table.rows().iter().map(|row| table.row_record(row)))
+}
+
 impl ActionTable {
+    /// The table as the text of a file, as [`TableFile`] reads it.
+    ///
+    /// # Errors
+    /// None that is known: every part of a table can be written.
+    pub fn yaml(&self) -> Result<String, serde_yaml::SerializeError> {
+        let space = self.space();
+        serde_yaml::to_string(&Written {
+            version: VERSION,
+            space: space.path.display().to_string(),
+            digest: space.meaning.digest(),
+            rules: self.rule_records(),
+            rows: self,
+        })
+    }
+
     /// The table as data.
     pub fn file(&self) -> TableFile {
         let space = self.space();
-        let bound = |rule: usize| self.rows().iter().filter(|row| row.rules.contains(&rule)).count();
-        let rules = space.rules.iter().enumerate().map(|(index, rule)| RuleRecord {
-            name: rule.name.clone(),
-            optional: rule.optional,
-            rows: bound(index),
-        });
         TableFile {
             version: VERSION,
             space: space.path.display().to_string(),
             digest: space.meaning.digest().to_owned(),
-            rules: rules.collect(),
+            rules: self.rule_records(),
             rows: self.rows().iter().map(|row| self.row_record(row)).collect(),
         }
+    }
+
+    fn rule_records(&self) -> Vec<RuleRecord> {
+        let bound = |rule: usize| self.rows().iter().filter(|row| row.rules.contains(&rule)).count();
+        let record = |(index, rule): (usize, &RuleDef)| RuleRecord {
+            name: rule.name.clone(),
+            optional: rule.optional,
+            rows: bound(index),
+        };
+        self.space().rules.iter().enumerate().map(record).collect()
     }
 
     /// The table as text, one line for each row; with a road, also the row's ranges or its mask there.

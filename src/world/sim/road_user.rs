@@ -21,6 +21,9 @@ use super::world::DT_S;
 /// How long a wreck stays where it came to rest, s; longer while the ego vehicle sees it.
 const WRECK_S: f64 = 2.0;
 
+/// A road user this near to the speed of a phase has it, m/s: without a `rate`, the driver model only approaches it.
+const SPEED_REACHED_MPS: f64 = 0.1;
+
 /// What walks or stands does so beside this stretch of the ego vehicle's route, before and behind it, m.
 const ON_FOOT_M: f64 = 200.0;
 
@@ -130,7 +133,7 @@ impl Running {
             match self.stage {
                 Stage::Waiting if self.course.has_come(self.phase, moment) => {
                     let holds = super::world::ticks(self.course.after_s(self.phase, moment));
-                    (self.stage, self.since) = (Stage::Holding(tick + holds), tick);
+                    (self.stage, self.since) = (Stage::Holding(tick.saturating_add(holds)), tick);
                 }
                 Stage::Waiting => {
                     let waited_s = (tick - self.since) as f64 * DT_S;
@@ -143,7 +146,9 @@ impl Running {
                     (self.stage, self.since) = (Stage::Changing(wanted.0), tick);
                     return (Some(self), Some(wanted));
                 }
-                Stage::Changing(speed_mps) if tick > self.since && moment.npc.speed_mps == speed_mps => {
+                Stage::Changing(speed_mps)
+                    if tick > self.since && has_speed(moment.npc.speed_mps, speed_mps) =>
+                {
                     self.phase += 1;
                     (self.stage, self.since) = (Stage::Waiting, tick);
                     if self.phase == self.course.phases() {
@@ -158,11 +163,17 @@ impl Running {
     fn trace(&self, trace: &mut Trace) {
         trace.words([self.phase as u64, self.since]);
         match self.stage {
-            Stage::Waiting => trace.word(0),
+            Stage::Waiting => trace.words([0, 0]),
             Stage::Holding(until) => trace.words([1, until]),
-            Stage::Changing(speed_mps) => trace.number(speed_mps),
+            Stage::Changing(speed_mps) => trace.words([2, speed_mps.to_bits()]),
         }
+        trace.words(self.course.arguments());
     }
+}
+
+/// Whether a road user has the speed that a phase wants, m/s. A stop is exact.
+fn has_speed(now_mps: f64, wanted_mps: f64) -> bool {
+    now_mps == wanted_mps || wanted_mps > 0.0 && (now_mps - wanted_mps).abs() < SPEED_REACHED_MPS
 }
 
 #[derive(Debug, Clone)]
@@ -278,7 +289,8 @@ impl Mover {
     pub fn is_stuck(&self, this: &Obstacle) -> bool {
         match &self.motion {
             _ if self.is_wreck() => this.velocity_mps == Vec2::zeros(),
-            Motion::Drive(driver) => driver.has_given_up() || driver.is_parked(),
+            // One that stands within a manoeuvre may go on by itself.
+            Motion::Drive(driver) => driver.has_given_up() || self.course.is_none() && driver.is_parked(),
             Motion::Walk(_) | Motion::Stand => false,
         }
     }

@@ -474,7 +474,7 @@ impl World {
         VehicleParameters::MKZ.front_m(self.ego_station_m)
     }
 
-    /// The world as nobody in it looks around.
+    /// The world around no road user in particular.
     pub(super) fn alone(&self) -> Around<'_> {
         self.around([&self.users, &[]])
     }
@@ -520,7 +520,7 @@ impl World {
     /// # Errors
     /// Why it cannot be ordered, in words that complete "cannot order `NAME`: …".
     fn ordered(&self, order: &OrderRequest) -> Result<usize, String> {
-        let index = self.bearer(order.who).ok_or("no road user of that name is there")?;
+        let index = self.bearer(order.bearer).ok_or("no road user of that name is there")?;
         let mover = &self.users[index].mover;
         match mover.motion {
             _ if mover.is_wreck() => Err("it is a wreck".to_owned()),
@@ -544,7 +544,7 @@ impl World {
     pub fn begin_course(&mut self, id: Option<u32>, effect: &Effect, course: &Arc<Course>) {
         let index = match (id, effect) {
             (Some(id), _) => self.users.iter().position(|user| user.obstacle.id == id),
-            (None, Effect::Order(order)) => self.bearer(order.who),
+            (None, Effect::Order(order)) => self.bearer(order.bearer),
             (None, _) => None,
         };
         if let Some(index) = index {

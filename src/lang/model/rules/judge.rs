@@ -233,6 +233,10 @@ impl<'a> RowRules<'a> {
                 shown.push(figure);
             }
         });
+        let has_no_value = |expr: &Expr| match evaluate(expr, &self.space.functions, &facts) {
+            Value::Number(number) => !number.is_finite(),
+            Value::Bool(_) | Value::Variant(..) => false,
+        };
         let bound = rule.and_then(|rule| self.broken_bounds(rule, candidate, spawn).next());
         match (bound, &condition.kind) {
             (Some((bound, limit)), kind) => {
@@ -245,14 +249,17 @@ impl<'a> RowRules<'a> {
                     false => format!("wanted {name} {op} {limit}"),
                 });
             }
-            (None, ExprKind::Compare(op, _, right)) => {
+            (None, ExprKind::Compare(op, _, right)) if !has_no_value(right) => {
                 shown.push(format!("wanted {} {}", op.symbol(), value(right)));
             }
             (None, _) => {}
         }
-        let has_no_value = |expr: &Expr| matches!(evaluate(expr, &self.space.functions, &facts), Value::Number(n) if !n.is_finite());
-        if condition.any(|kind| matches!(kind, ExprKind::Compare(_, left, right) if has_no_value(left) || has_no_value(right)))
-        {
+        let lacks_a_side = |kind: &ExprKind| match kind {
+            ExprKind::Compare(_, left, right) => has_no_value(left) || has_no_value(right),
+            ExprKind::InRange(inner, _, _) => has_no_value(inner),
+            _ => false,
+        };
+        if condition.any(lacks_a_side) {
             let is_there = |who: &usize| {
                 facts.world.is_some_and(|world| world.bearers.iter().any(|(known, _)| known == who))
             };

@@ -36,7 +36,7 @@ const CHANGE_M_MAX: f64 = 8.0;
 
 /// A lane change that waits for its occasion.
 #[derive(Debug, Clone)]
-pub(in crate::sim) struct Manoeuvre {
+pub(in crate::sim) struct PlannedChange {
     pub when: When,
     pub towards: Towards,
 }

@@ -24,7 +24,7 @@ use crate::sim::trace::Trace;
 use crate::sim::way::{Way, body_at};
 use crate::sim::world::DT_S;
 
-use super::change::{Change, Manoeuvre};
+use super::change::{Change, PlannedChange};
 use super::leader::{Leader, following};
 use super::manners::GIVE_UP_S;
 
@@ -78,7 +78,7 @@ pub(in crate::sim) struct Driver {
     pub(super) change: Option<Change>,
     pub(super) last_change: Option<Side>,
     /// In reverse order: the next manoeuvre is last.
-    pub(super) plan: Vec<Manoeuvre>,
+    pub(super) plan: Vec<PlannedChange>,
     /// Rules of the space on the lane changes of `plan`.
     pub lane_changes: Option<Arc<LaneChangeRules>>,
     /// How often it drew where to go, so that each draw has its own stream.
@@ -100,7 +100,7 @@ impl Driver {
         way: Arc<Way>,
         station_m: f64,
         cruise: Cruise,
-        mut plan: Vec<Manoeuvre>,
+        mut plan: Vec<PlannedChange>,
     ) -> Driver {
         plan.reverse();
         let (cruise_mps, limit_part) = match cruise {

@@ -18,5 +18,5 @@ mod mobil;
 mod rays;
 mod stop_line;
 
-pub(super) use change::{Manoeuvre, Towards, When, can_change, lane_beside};
+pub(super) use change::{PlannedChange, Towards, When, can_change, lane_beside};
 pub(super) use driver::{Cruise, Driver, View, choices};

@@ -5,7 +5,7 @@ use avastra_lang::model::vocabulary::{Side, Then};
 use avastra_road::{Conflict, LaneIndex};
 
 use crate::sim::ego::VehicleParameters;
-use crate::sim::npc::{Driver, Manoeuvre, Towards, When, can_change, choices, lane_beside};
+use crate::sim::npc::{Driver, PlannedChange, Towards, When, can_change, choices, lane_beside};
 use crate::sim::sense::SignalColour;
 use crate::sim::way::Way;
 use crate::sim::world::DT_S;
@@ -89,7 +89,7 @@ fn rendezvous(asked: &Asked, conflict: &Conflict, arrival_s: f64) -> Result<Driv
         reason = "no room to change lanes before the junction";
     }
     let (first, station_m) = found.ok_or(reason)?;
-    let change = Manoeuvre { when: When::Tick(around.tick), towards: Towards::Way(way) };
+    let change = PlannedChange { when: When::Tick(around.tick), towards: Towards::Way(way) };
     Ok(commanded(asked, first, station_m, vec![change]))
 }
 

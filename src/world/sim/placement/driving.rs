@@ -6,7 +6,7 @@ use avastra_road::LaneIndex;
 
 use crate::sim::around::Around;
 use crate::sim::ego::VehicleParameters;
-use crate::sim::npc::{Driver, Manoeuvre, Towards, When, can_change, choices, lane_beside};
+use crate::sim::npc::{Driver, PlannedChange, Towards, When, can_change, choices, lane_beside};
 use crate::sim::way::Way;
 use crate::sim::world::ticks;
 
@@ -44,7 +44,7 @@ pub(super) fn drive_ahead(asked: &Asked) -> Result<Driver, String> {
         }
         let towards = Towards::To(sides[rng::below(&mut rng, sides.len() as u32) as usize]);
         let when = When::Tick(around.tick + ticks(CHANGE_AFTER_S));
-        plan.push(Manoeuvre { when, towards });
+        plan.push(PlannedChange { when, towards });
     }
     Ok(commanded(asked, way, station_m, plan))
 }
@@ -65,10 +65,10 @@ pub(super) fn overtake(asked: &Asked) -> Result<Driver, String> {
     let lane = chosen_lane(around, around.ego_station_m, request.lane)?;
     let mut rng = choices(around.seed, id, 0);
     let mut plan = Vec::new();
-    let when_ahead = |gap_m, towards| Manoeuvre { when: When::AheadOfEgo(gap_m), towards };
+    let when_ahead = |gap_m, towards| PlannedChange { when: When::AheadOfEgo(gap_m), towards };
     match (request.lane, request.then) {
         (LaneChoice::Current, then) => {
-            plan.push(Manoeuvre { when: When::Tick(around.tick), towards: Towards::Either });
+            plan.push(PlannedChange { when: When::Tick(around.tick), towards: Towards::Either });
             let gap_m = if then == Then::Change { CUT_IN_M } else { RETURN_M };
             plan.push(when_ahead(gap_m, Towards::Back));
         }
@@ -109,7 +109,7 @@ pub(super) fn drive_opposite(asked: &Asked) -> Result<Driver, String> {
         Then::Change => {
             let second = lane_beside(around, inner, Side::Right).ok_or("no second opposing lane")?;
             let when = When::Tick(around.tick);
-            (second, vec![Manoeuvre { when, towards: Towards::To(Side::Left) }])
+            (second, vec![PlannedChange { when, towards: Towards::To(Side::Left) }])
         }
     };
     let beside_route = around.scene.route.path.pose_at(station_m).position;

@@ -21,7 +21,7 @@ use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
 use crate::sim::moment::npc_facts;
-use crate::sim::npc::{Cruise, Driver, Manoeuvre};
+use crate::sim::npc::{Cruise, Driver, PlannedChange};
 use crate::sim::road_user::{Motion, Moved, Mover, RoadUser};
 use crate::sim::sense::{RANGE_M, visible_fraction};
 use crate::sim::way::Way;
@@ -155,7 +155,7 @@ fn meets_route(around: &Around, mover: &Mover) -> bool {
 }
 
 /// A driver at the speed that was asked for.
-fn commanded(asked: &Asked, way: Arc<Way>, station_m: f64, plan: Vec<Manoeuvre>) -> Driver {
+fn commanded(asked: &Asked, way: Arc<Way>, station_m: f64, plan: Vec<PlannedChange>) -> Driver {
     Driver::new(asked.around.scene, way, station_m, Cruise::Commanded(asked.request.speed_mps), plan)
 }
 
