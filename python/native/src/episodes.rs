@@ -230,6 +230,8 @@ impl Episodes {
             if let Some(program) = self.run.arena().program() {
                 // How it ends is of no interest any more.
                 let _ = program.close();
+                // What begins again may be another program by then.
+                program.forget();
             }
         });
     }

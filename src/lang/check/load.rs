@@ -291,6 +291,9 @@ struct Loader<'a> {
 /// uses.
 const WORDS_MAX: usize = TOKENS_MAX + 100_000;
 
+/// Most `use`s of a file: each asks the file system.
+const USES_MAX: usize = 1_000;
+
 /// Words, and signs that are part of none.
 fn words(text: &str) -> usize {
     let is_word = |c: char| c.is_alphanumeric() || c == '_';
@@ -329,7 +332,14 @@ impl<'a> Loader<'a> {
         self.diagnostics.extend(found);
         let index = self.files.len();
         self.files.push(LoadedFile { path: path.to_owned(), tree });
-        let uses: Vec<ast::Use> = uses(&self.files[index]).cloned().collect();
+        let mut uses: Vec<ast::Use> = uses(&self.files[index]).cloned().collect();
+        if let Some(beyond) = uses.get(USES_MAX) {
+            let message = format!("the file has {} `use`s", uses.len());
+            let error = Diagnostic::error(code::TOO_MUCH, message)
+                .at(beyond.path.span, "not read, nor those after it");
+            self.diagnostics.push(error.help(format!("at most {USES_MAX} are read")));
+            uses.truncate(USES_MAX);
+        }
         way.push(path.to_owned());
         for used in uses {
             let target = normal(&folder(path).join(&used.path.value));
