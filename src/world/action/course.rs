@@ -2,31 +2,15 @@
 //! no state itself.
 
 use avastra_lang::model::expr::Expr;
-use avastra_lang::model::{
-    Facts, FnDef, Memory, MomentFacts, NpcFacts, ORDER_RATE_MPS2, PhaseDef, RoadFacts, SPAWN_SPEED_MPS,
-    SpawnFacts, Value, WorldFacts, evaluate,
-};
+use avastra_lang::model::{ORDER_RATE_MPS2, PhaseDef, SPAWN_SPEED_MPS, Value};
+
+use super::later::{Later, LaterMoment};
 
 /// Phases, one after another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Course {
     pub(super) phases: Vec<PhaseDef>,
-    pub(super) functions: Vec<FnDef>,
-    /// The arguments of the manoeuvre.
-    pub(super) locals: Vec<Value>,
-    pub(super) road: Option<RoadFacts>,
-    /// How long a step lasts, ms.
-    pub(super) step_ms: u64,
-}
-
-/// What phases ask of a moment.
-#[derive(Debug, Clone)]
-pub struct PhaseMoment {
-    pub moment: MomentFacts,
-    /// The road user itself.
-    pub npc: NpcFacts,
-    /// The named road users that are there, of those that the course asks about.
-    pub bearers: Vec<(usize, NpcFacts)>,
+    pub(super) later: Later,
 }
 
 impl Course {
@@ -36,7 +20,7 @@ impl Course {
 
     /// The values of the arguments, in bits.
     pub fn arguments(&self) -> impl Iterator<Item = u64> {
-        self.locals.iter().map(|value| value.bits())
+        self.later.locals.iter().map(|value| value.bits())
     }
 
     /// The names of road users that a phase asks about.
@@ -47,46 +31,33 @@ impl Course {
     }
 
     /// Whether what a phase waits for has come.
-    pub fn has_come(&self, phase: usize, moment: &PhaseMoment) -> bool {
-        self.phases[phase].once.as_ref().is_none_or(|once| self.value(once, moment).truth())
+    pub fn has_come(&self, phase: usize, moment: &LaterMoment) -> bool {
+        self.phases[phase].once.as_ref().is_none_or(|once| self.later.value(once, moment).truth())
     }
 
     /// How long a phase waits for that, s; `None` if it waits for ever. A time without a value (a division by 0) is over.
-    pub fn within_s(&self, phase: usize, moment: &PhaseMoment) -> Option<f64> {
-        Some(not_negative(self.value(self.phases[phase].within.as_ref()?, moment)))
+    pub fn within_s(&self, phase: usize, moment: &LaterMoment) -> Option<f64> {
+        Some(not_negative(self.later.value(self.phases[phase].within.as_ref()?, moment)))
     }
 
     /// How long a phase waits after that, s.
-    pub fn after_s(&self, phase: usize, moment: &PhaseMoment) -> f64 {
-        self.phases[phase].after.as_ref().map_or(0.0, |after| not_negative(self.value(after, moment)))
+    pub fn after_s(&self, phase: usize, moment: &LaterMoment) -> f64 {
+        self.phases[phase].after.as_ref().map_or(0.0, |after| not_negative(self.later.value(after, moment)))
     }
 
     /// The speed that a phase goes over to, m/s, and how fast, m/s²: as asked for, within what an order may ask. `None` for
     /// a speed without a value.
-    pub fn wants(&self, phase: usize, moment: &PhaseMoment) -> Option<(f64, Option<f64>)> {
+    pub fn wants(&self, phase: usize, moment: &LaterMoment) -> Option<(f64, Option<f64>)> {
         let PhaseDef { speed, rate, .. } = &self.phases[phase];
         let within = |value: Value, range: core::ops::RangeInclusive<f64>| {
             let number = value.number();
             (!number.is_nan()).then(|| number.clamp(*range.start(), *range.end()))
         };
-        let speed_mps = within(self.value(speed, moment), SPAWN_SPEED_MPS)?;
-        Some((speed_mps, rate.as_ref().and_then(|rate| within(self.value(rate, moment), ORDER_RATE_MPS2))))
-    }
-
-    fn value(&self, expr: &Expr, moment: &PhaseMoment) -> Value {
-        let PhaseMoment { moment, npc, bearers } = moment;
-        let step = (moment.elapsed_s * 1000.0).round() as u64 / self.step_ms.max(1);
-        let world = WorldFacts { moment: *moment, step, bearers: bearers.clone(), ..WorldFacts::default() };
-        let spawn = SpawnFacts { spawn_gap_m: npc.gap_m, npc: *npc, ..SpawnFacts::default() };
-        // No phase names a state.
-        let memory = Memory::default();
-        let facts = Facts {
-            road: self.road.as_ref(),
-            world: Some(&world),
-            spawn: Some(spawn),
-            ..Facts::new(&self.locals, &memory)
-        };
-        evaluate(expr, &self.functions, &facts)
+        let speed_mps = within(self.later.value(speed, moment), SPAWN_SPEED_MPS)?;
+        Some((
+            speed_mps,
+            rate.as_ref().and_then(|rate| within(self.later.value(rate, moment), ORDER_RATE_MPS2)),
+        ))
     }
 }
 

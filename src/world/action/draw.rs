@@ -3,6 +3,7 @@
 use std::cell::Cell;
 use std::sync::Arc;
 
+use crate::action::later::Later;
 use crate::action::table::{Draw, Refusal, Situation};
 use crate::action::{Course, Effect, LaneChangeRules, OrderRequest, SpawnRequest};
 use avastra_base::rng;
@@ -39,18 +40,17 @@ impl<'a> Judge<'a> {
         let row = &space.rows[row];
         let action = &space.actions[row.action];
         let row = RowRules { space, row, road: Some(&situation.road.facts), in_force: situation.rules };
-        let wheres = action.parameters.iter().filter_map(|parameter| parameter.condition.as_ref());
-        let asked = wheres.chain(row.demands().filter_map(|(_, demand)| demand.condition()));
-        let asking: Vec<&Expr> = asked.filter(|condition| condition.asks_the_world()).collect();
-        let moment = match asking.is_empty() {
-            true => MomentFacts::default(),
-            false => situation.surroundings.moment(),
+        let asked = || {
+            let wheres = action.parameters.iter().filter_map(|parameter| parameter.condition.as_ref());
+            wheres.chain(row.demands().filter_map(|(_, demand)| demand.condition()))
         };
-        let mut bearers: Vec<usize> = asking.iter().flat_map(|condition| condition.bearers()).collect();
-        bearers.sort_unstable();
-        bearers.dedup();
+        let asks_who = |who: &usize| asked().any(|condition| condition.bearers().contains(who));
         let facts = |who: usize| Some((who, situation.surroundings.bearer(who)?));
-        let bearers = bearers.into_iter().filter_map(facts).collect();
+        let bearers = (0..space.bearers.len()).filter(asks_who).filter_map(facts).collect();
+        let moment = match asked().any(Expr::asks_the_world) {
+            true => situation.surroundings.moment(),
+            false => MomentFacts::default(),
+        };
         Judge { row, action, situation, moment, bearers }
     }
 
@@ -198,13 +198,8 @@ impl<'a> Judge<'a> {
     fn lane_changes(&self, values: &[Value]) -> Option<Arc<LaneChangeRules>> {
         let conditions: Vec<Expr> = self.row.during().cloned().collect();
         (!conditions.is_empty()).then(|| {
-            Arc::new(LaneChangeRules {
-                conditions,
-                functions: self.row.space.functions.clone(),
-                locals: values.to_vec(),
-                road: self.row.road.cloned(),
-                step_ms: self.step_ms(),
-            })
+            let later = self.later(values.to_vec());
+            Arc::new(LaneChangeRules { conditions, later })
         })
     }
 
@@ -221,19 +216,21 @@ impl<'a> Judge<'a> {
         let course = |call: &ManoeuvreCall| {
             let facts = self.facts(values, after);
             let value = |argument: &Expr| evaluate(argument, &space.functions, &facts);
-            Arc::new(Course {
-                phases: space.manoeuvres[call.manoeuvre].phases.clone(),
-                functions: space.functions.clone(),
-                locals: call.arguments.iter().map(value).collect(),
-                road: self.row.road.cloned(),
-                step_ms: self.step_ms(),
-            })
+            let later = self.later(call.arguments.iter().map(value).collect());
+            Arc::new(Course { phases: space.manoeuvres[call.manoeuvre].phases.clone(), later })
         };
         places.zip(calls).filter_map(|(at, call)| Some((at, course(call?)))).collect()
     }
 
-    fn step_ms(&self) -> u64 {
-        (self.row.space.episode.step_s * 1000.0).round() as u64
+    /// What is asked after the draw, with these values.
+    fn later(&self, locals: Vec<Value>) -> Later {
+        let space = self.row.space;
+        Later {
+            functions: space.functions.clone(),
+            locals,
+            road: self.row.road.cloned(),
+            step_ms: (space.episode.step_s * 1000.0).round() as u64,
+        }
     }
 
     fn facts<'f>(&'f self, values: &'f [Value], memory: &'f Memory) -> Facts<'f> {

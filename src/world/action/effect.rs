@@ -5,10 +5,9 @@ use avastra_lang::model::expr::Expr;
 use avastra_lang::model::vocabulary::{
     Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb,
 };
-use avastra_lang::model::{
-    Facts, FnDef, Memory, MomentFacts, NpcFacts, RoadFacts, Space, SpawnFacts, StateDef, StateMeaning, Value,
-    WorldFacts, evaluate,
-};
+use avastra_lang::model::{Memory, MomentFacts, NpcFacts, Space, SpawnFacts, StateDef, StateMeaning};
+
+use super::later::{Later, LaterMoment};
 
 /// One change of the world. A row has one or more, applied in order.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -100,28 +99,14 @@ impl Effect {
 #[derive(Debug, Clone, PartialEq)]
 pub struct LaneChangeRules {
     pub(super) conditions: Vec<Expr>,
-    pub(super) functions: Vec<FnDef>,
-    pub(super) locals: Vec<Value>,
-    pub(super) road: Option<RoadFacts>,
-    /// How long a step lasts, ms.
-    pub(super) step_ms: u64,
+    pub(super) later: Later,
 }
 
 impl LaneChangeRules {
     /// Whether a lane change may begin at a moment.
     pub fn allow(&self, moment: MomentFacts, npc: NpcFacts) -> bool {
-        let step = (moment.elapsed_s * 1000.0).round() as u64 / self.step_ms.max(1);
-        let world = WorldFacts { moment, step, ..WorldFacts::default() };
-        let spawn = SpawnFacts { spawn_gap_m: npc.gap_m, npc, ..SpawnFacts::default() };
-        // No such condition names a state.
-        let memory = Memory::default();
-        let facts = Facts {
-            road: self.road.as_ref(),
-            world: Some(&world),
-            spawn: Some(spawn),
-            ..Facts::new(&self.locals, &memory)
-        };
-        self.conditions.iter().all(|condition| evaluate(condition, &self.functions, &facts).truth())
+        let moment = LaterMoment { moment, npc, bearers: Vec::new() };
+        self.conditions.iter().all(|condition| self.later.value(condition, &moment).truth())
     }
 }
 

@@ -22,14 +22,16 @@ mod course;
 mod draw;
 mod effect;
 mod file;
+mod later;
 mod table;
 
 pub use audit::{Audit, Enforcement, RuleAudit, audit};
 pub use avastra_lang::model::SpawnFacts;
 pub use count::Count;
-pub use course::{Course, PhaseMoment};
+pub use course::Course;
 pub use effect::{Effect, LaneChangeRules, OrderRequest, SpawnRequest, Surroundings};
 pub use file::{AxisRecord, DrawRecord, RoadRecord, RowRecord, RuleRecord, TableFile};
+pub use later::LaterMoment;
 pub use table::{ActionTable, Draw, Offer, Refusal, Situation};
 
 #[cfg(test)]

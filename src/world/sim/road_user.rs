@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use crate::action::{Course, PhaseMoment};
+use crate::action::{Course, LaterMoment};
 use avastra_base::geometry::{OrientedBox, Pose, Sweep, Vec2, distance_m, unit_vector};
 use avastra_base::kinematics::GRAVITY_MPS2;
 use avastra_lang::model::vocabulary::{Body, Colour, Verb};
@@ -126,7 +126,7 @@ impl Running {
     /// Goes on at a tick. Gives what is left of it, and the speed and rate that a phase which begins now wants.
     pub fn advance(
         mut self,
-        moment: &PhaseMoment,
+        moment: &LaterMoment,
         tick: u64,
     ) -> (Option<Running>, Option<(f64, Option<f64>)>) {
         loop {

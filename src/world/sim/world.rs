@@ -10,7 +10,7 @@ mod tests;
 
 use std::sync::Arc;
 
-use crate::action::{Course, Effect, LaneChangeRules, OrderRequest, PhaseMoment, SpawnRequest};
+use crate::action::{Course, Effect, LaneChangeRules, LaterMoment, OrderRequest, SpawnRequest};
 use avastra_base::geometry::{Frame, OrientedBox, Pose, Sweep, Vec2};
 use avastra_base::rng;
 use avastra_base::rng::Stream;
@@ -571,7 +571,7 @@ impl World {
             }
             let facts = |who: usize| Some((who, self.bearer_facts(who)?));
             let bearers = running.bearers().into_iter().filter_map(facts).collect();
-            let (running, wanted) = running.advance(&PhaseMoment { moment, npc, bearers }, self.ticks);
+            let (running, wanted) = running.advance(&LaterMoment { moment, npc, bearers }, self.ticks);
             let mover = &mut self.users[index].mover;
             mover.course = running;
             if let (Motion::Drive(driver), Some((speed_mps, rate_mps2))) = (&mut mover.motion, wanted) {
