@@ -34,6 +34,7 @@ use avastra::check::ReadError;
 use avastra::editor::{Files, Workspace, diagnostics};
 use avastra::mdp::ProcKind;
 use avastra::model::Space;
+use avastra::model::command::Manners;
 use avastra::model::vocabulary::{Body, Colour, LaneChoice, Level, Side, Then, TimeOfDay, Verb};
 use avastra::run::{Arena, Run, RunSettings};
 use avastra::sim::{Scene, Sensed, Start, TrafficProfile, World};
@@ -131,6 +132,8 @@ fn crowded(scene: &Arc<Scene>) -> World {
                     speed_mps: if verb == Verb::Walk { 1.2 } else { 9.0 },
                     distance_m,
                     cover: None,
+                    offset_m: 0.0,
+                    ignores: Manners::default(),
                     bearer: None,
                     own: None,
                     cover_own: None,

@@ -111,7 +111,11 @@ fn action_section(text: &mut String, space: &Space, index: usize, action: &Actio
 fn rule_section(text: &mut String, space: &Space, index: usize, rule: &RuleDef) {
     let rows = space.rows.iter().filter(|row| row.rules.contains(&index)).count();
     let optional = if rule.optional { ", optional" } else { "" };
-    let during = if matches!(rule.body, RuleBody::During(_)) { " during lane changes" } else { "" };
+    let during = match rule.body {
+        RuleBody::During(_) => " during lane changes",
+        RuleBody::Phases { .. } => " as phases of a manoeuvre begin",
+        RuleBody::Holds(_) | RuleBody::Moves { .. } => "",
+    };
     let _ = write!(text, "### `{}` (binds {}{during}{optional})\n\n", rule.name, plural(rows, "row"));
     text.push_str(&paragraph(&rule.docs));
     if let RuleBody::Moves { state, cell, allowed, .. } = &rule.body {

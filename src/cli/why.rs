@@ -59,6 +59,7 @@ pub fn why(
         let state = match (rules.contains(rule), &space.rules[rule].body) {
             (false, _) => " (off)",
             (true, RuleBody::During(_)) => " (during lane changes)",
+            (true, RuleBody::Phases { .. }) => " (as phases begin)",
             (true, _) => "",
         };
         output.say(&format!("  bound by {}{state}", space.rules[rule].name));

@@ -4,8 +4,8 @@
 use avastra_lang::check::{Declaration, References, Symbol};
 use avastra_lang::model::Type;
 use avastra_lang::model::vocabulary::{
-    CHANGE, EpisodeField, OrderField, PhaseField, RoadField, ScenarioClaim, Site, SpaceClaim, SpawnField,
-    StartField, StopReason, THERE, WAIT, Word, parts_of, things,
+    CHANGE, CommandField, EpisodeField, RoadField, ScenarioClaim, Site, SpaceClaim, SpawnField, StartField,
+    StopReason, THERE, WAIT, Word, parts_of, things,
 };
 use avastra_lang::syntax::ast::{
     Action, ActionParam, Arm, BinaryOp, Call, Effect, EffectKind, Expr, ExprKind, Field, Initial, ItemKind,
@@ -257,13 +257,10 @@ impl<'a> Place<'a> {
                 key.or_else(|| self.within(value, known.and_then(|state| state.ty), None))
             }
             EffectKind::Order { who, .. } if is_here(who) => Some(vec![Kind::RoadUsers]),
-            EffectKind::Order { fields, .. } => {
-                fields.iter().find_map(|field| match OrderField::from_name(&field.name.text) {
-                    _ if is_here(&field.name) => Some(unused::<OrderField>(fields)),
-                    Some(OrderField::Then) => self.word_or_value(Kind::Manoeuvres, &field.value, None),
-                    _ => self.within(&field.value, None, None),
-                })
-            }
+            EffectKind::Order { fields, .. } => fields.iter().find_map(|field| match is_here(&field.name) {
+                true => Some(unused::<CommandField>(fields)),
+                false => self.in_command(field),
+            }),
             EffectKind::Spawn { body, distance, cover, fields, .. } => {
                 let mut bodies = [Some(body), cover.as_deref()].into_iter().flatten();
                 bodies
@@ -278,10 +275,21 @@ impl<'a> Place<'a> {
         let clauses = [(&phase.once, Some(Type::Bool)), (&phase.within, None), (&phase.after, None)];
         let clause = |(clause, ty): (&Option<Expr>, Option<Type>)| self.within(clause.as_ref()?, ty, ty);
         let of_field = |field: &Field| match is_here(&field.name) {
-            true => Some(unused::<PhaseField>(&phase.fields)),
-            false => self.within(&field.value, None, None),
+            true => Some(unused::<CommandField>(&phase.fields)),
+            false => self.in_command(field),
         };
         clauses.into_iter().find_map(clause).or_else(|| phase.fields.iter().find_map(of_field))
+    }
+
+    /// In the value of a field of an order or a phase.
+    fn in_command(&self, field: &Field) -> Option<Vec<Kind>> {
+        match CommandField::from_name(&field.name.text) {
+            Some(CommandField::Then) => self.word_or_value(Kind::Manoeuvres, &field.value, None),
+            Some(CommandField::Lane | CommandField::Ignores) => {
+                self.word_or_value(Kind::Words(words::engine_words(&field.name.text)), &field.value, None)
+            }
+            _ => self.within(&field.value, None, None),
+        }
     }
 
     fn in_spawn(&self, fields: &[Field]) -> Option<Vec<Kind>> {
@@ -300,7 +308,7 @@ impl<'a> Place<'a> {
                 Some(vec![Kind::Actions, Kind::Groups, Kind::States])
             }
             RuleBody::Holds { during: Some(during), .. } if is_here(during) => {
-                Some(vec![Kind::Words(vec![CHANGE])])
+                Some(vec![Kind::Words(vec![CHANGE]), Kind::Manoeuvres])
             }
             RuleBody::Holds { condition, .. } => self.within(condition, Some(Type::Bool), Some(Type::Bool)),
             RuleBody::Moves { state, key, moves } => {

@@ -211,6 +211,7 @@ fn bound_by(space: &Space, name: &str) -> Option<String> {
     let kind = match &rule.body {
         RuleBody::Holds(_) => "Binds",
         RuleBody::During(_) => "Binds, when they change lanes, the road users of",
+        RuleBody::Phases { .. } => "Binds, when phases of their manoeuvre begin, the road users of",
         RuleBody::Moves { .. } => "Orders the changes made by",
     };
     let optional = if rule.optional { "\n\nOff unless asked for: `--with`." } else { "" };

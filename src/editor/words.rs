@@ -2,8 +2,8 @@
 //! engine's words in `model::vocabulary`.
 
 use avastra_lang::model::vocabulary::{
-    Body, Colour, EpisodeField, LaneChoice, OrderField, RoadField, Side, Site, SpawnField, StartField, TYPES,
-    Then, Verb, Word,
+    Body, Colour, CommandField, EpisodeField, LaneChoice, Manner, RoadField, Side, Site, SpawnField,
+    StartField, TYPES, Then, Verb, Word,
 };
 use avastra_lang::model::{ENDS, MODULES};
 
@@ -35,8 +35,9 @@ pub fn engine_words(field: &str) -> Vec<Entry> {
         Some(SpawnField::Side) => of::<Side>(),
         Some(SpawnField::Then) => of::<Then>(),
         Some(SpawnField::Colour) => of::<Colour>(),
+        Some(SpawnField::Ignores) => of::<Manner>(),
         None if field == "body" => of::<Body>(),
-        Some(SpawnField::Speed) | None => Vec::new(),
+        Some(SpawnField::Speed | SpawnField::Offset) | None => Vec::new(),
     }
 }
 
@@ -51,8 +52,13 @@ pub fn claim_words(claim: &str) -> &'static [&'static str] {
 
 /// What a field of a block means: of a spawn, an order, a road, an episode or a start.
 pub fn field(word: &str) -> Option<&'static str> {
-    let blocks =
-        [of::<SpawnField>(), of::<OrderField>(), of::<RoadField>(), of::<EpisodeField>(), of::<StartField>()];
+    let blocks = [
+        of::<SpawnField>(),
+        of::<CommandField>(),
+        of::<RoadField>(),
+        of::<EpisodeField>(),
+        of::<StartField>(),
+    ];
     blocks.iter().find_map(|fields| meaning(fields, word))
 }
 

@@ -136,13 +136,10 @@ impl Lost<'_> {
     ) -> bool {
         let reason = match table.offer(situation, self.row.index) {
             // Each spawn was judged alone: the first of an action may stand in the way of its second.
-            Ok(draw) if draw.effects.len() > 1 => {
-                let mut world = world.clone();
-                match draw.effects.iter().try_for_each(|effect| world.apply(effect).map(drop)) {
-                    Ok(()) => return true,
-                    Err(reason) => reason,
-                }
-            }
+            Ok(draw) if draw.effects.len() > 1 => match world.clone().carry_out(&draw) {
+                Ok(_) => return true,
+                Err((_, reason)) => reason,
+            },
             Ok(_) => return true,
             Err(refusal) => refusal.in_words(),
         };

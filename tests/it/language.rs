@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 
 use avastra::check::Loaded;
 use avastra::model::vocabulary::{
-    Body, Colour, EpisodeField, Fact, LaneChoice, Level, Light, OriginField, Phenomenon, Priority,
-    ROAD_LANES, RoadField, RoadKind, ScenarioClaim, Side, SpaceClaim, SpawnField, StartField, StopReason,
-    TYPES, Then, TimeOfDay, Verb, WAIT, Word, WordFact,
+    Body, Colour, CommandField, EpisodeField, Fact, LaneChoice, Level, Light, Manner, OriginField,
+    Phenomenon, Priority, ROAD_LANES, RoadField, RoadKind, ScenarioClaim, Side, SpaceClaim, SpawnField,
+    StartField, StopReason, TYPES, Then, TimeOfDay, Verb, WAIT, Word, WordFact,
 };
 use avastra::model::{Avoidability, COUNTED, ENDS, MODULES};
 use avastra::syntax::Diagnostic;
@@ -85,7 +85,7 @@ fn every_word_of_the_language_is_on_the_page() {
     let mut on_page: BTreeSet<&str> = page.split(|c: char| !(c.is_alphanumeric() || c == '_')).collect();
     // Units and the like do not consist of letters alone.
     on_page.extend(page.split([' ', '`', ',', '|', '\n', ')', '(', '}']));
-    let all: [Vec<&str>; 23] = [
+    let all: [Vec<&str>; 26] = [
         keywords().map(|(word, _)| *word).collect(),
         UNITS.iter().map(|unit| unit.word).collect(),
         ENDS.to_vec(),
@@ -104,6 +104,9 @@ fn every_word_of_the_language_is_on_the_page() {
         Colour::names().collect(),
         LaneChoice::names().collect(),
         Level::names().collect(),
+        Manner::names().collect(),
+        SpawnField::names().collect(),
+        CommandField::names().collect(),
         Phenomenon::names().collect(),
         Priority::names().collect(),
         Side::names().collect(),

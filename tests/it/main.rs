@@ -45,5 +45,6 @@ mod training;
 mod traffic;
 mod trials;
 mod verdicts;
+mod manoeuvres;
 mod wishes;
 mod world;

@@ -270,7 +270,7 @@ fn a_scenario_with_a_breach_does_not_compile() {
         let on = if optional { format!("origin {{ with: [{rule}] }}") } else { String::new() };
         let off = if optional { String::new() } else { format!("origin {{ without: [{rule}] }}") };
         let wanted = match breach.enforced {
-            Enforcement::Survey | Enforcement::Change => Vec::new(),
+            Enforcement::Survey | Enforcement::Change | Enforcement::Phase => Vec::new(),
             Enforcement::Draw | Enforcement::Transition => {
                 vec![format!("AV0605 step 0 breaks rule `{rule}`")]
             }

@@ -17,7 +17,7 @@ use crate::command::{avastra, done, outcome};
 use crate::examples::example;
 use crate::world::{Wide, assert_replays, read, run_of, space_at};
 
-fn wish(name: &str) -> ActionTable {
+pub fn wish(name: &str) -> ActionTable {
     ActionTable::new(space_at(&format!("tests/cases/wishes/{name}.ava")))
 }
 
@@ -44,7 +44,7 @@ pub fn draws(table: &ActionTable, row: usize, road: usize, memory: &Memory, seed
     (0..seeds).filter_map(offer).collect()
 }
 
-fn number(draw: &Draw, name: &str) -> f64 {
+pub fn number(draw: &Draw, name: &str) -> f64 {
     drawn(draw, name).number()
 }
 

@@ -288,29 +288,18 @@ impl Play {
         }
     }
 
-    /// Carries out a whole action or nothing of it: its second spawn may find its first in the way.
+    /// Carries out a whole action or nothing of it.
     fn carry_out(&mut self, draw: Draw, delay_ticks: u32) -> Outcome {
-        let before = self.world.clone();
-        let (mut spawned, mut own_bodies) = (Vec::new(), Vec::new());
-        for (nth, effect) in draw.effects.iter().enumerate() {
-            match self.world.apply(effect) {
-                Ok(newcomer) => {
-                    if let Some((_, course)) = draw.courses.iter().find(|(at, _)| *at == nth) {
-                        self.world.begin_course(newcomer, effect, course);
-                    }
-                    spawned.extend(newcomer.into_iter().flat_map(|id| id..id + effect.newcomers()));
-                    own_bodies.extend(newcomer.into_iter().flat_map(|id| effect.own_bodies(id)));
-                }
-                Err(reason) => {
-                    self.world = before;
-                    return Outcome::Refused { row: draw.row, rule: None, reason };
-                }
-            }
+        let newcomers = match self.world.carry_out(&draw) {
+            Ok(newcomers) => newcomers,
+            Err((_, reason)) => return Outcome::Refused { row: draw.row, rule: None, reason },
+        };
+        let mut spawned = Vec::new();
+        for (nth, id) in newcomers {
+            let effect = &draw.effects[nth];
+            spawned.extend(id..id + effect.newcomers());
+            self.own_bodies.extend(effect.own_bodies(id));
         }
-        if let Some(rules) = &draw.lane_changes {
-            spawned.iter().for_each(|id| self.world.bind_lane_changes(*id, rules));
-        }
-        self.own_bodies.extend(own_bodies);
         self.memory = draw.memory_after.clone();
         Outcome::Done { draw, spawned, delay_ticks }
     }

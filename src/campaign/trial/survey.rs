@@ -228,32 +228,19 @@ impl<'a> Trials<'a> {
 fn attempt(moment: &Moment, draw: &Draw) -> Try {
     let mut world = moment.world.clone();
     let mut found = Try { failure: None, unfair: None, nearest_m: None };
-    let mut newcomers = Vec::new();
-    for (nth, effect) in draw.effects.iter().enumerate() {
-        let applied = world.apply(effect);
-        let course = draw.courses.iter().find(|(at, _)| *at == nth && applied.is_ok());
-        if let (Some((_, course)), Ok(newcomer)) = (course, &applied) {
-            world.begin_course(*newcomer, effect, course);
+    let newcomers = match world.carry_out(draw) {
+        Ok(newcomers) => newcomers,
+        Err((nth, reason)) => {
+            let verb = if matches!(draw.effects[nth], Effect::Order(_)) { "order" } else { "spawn" };
+            found.failure = Some(format!("cannot {verb}: {reason}"));
+            return found;
         }
-        match (effect, applied) {
-            (effect, Err(reason)) => {
-                let verb = if matches!(effect, Effect::Order(_)) { "order" } else { "spawn" };
-                found.failure = Some(format!("cannot {verb}: {reason}"));
-                return found;
-            }
-            (Effect::Spawn(request), Ok(Some(id))) => {
-                if let Some(rules) = &draw.lane_changes {
-                    world.bind_lane_changes(id, rules);
-                }
-                newcomers.push((*request, id));
-            }
-            (_, Ok(_)) => {}
-        }
-    }
+    };
     found.failure = unmet(&world, &draw.effects);
     let scene = Arc::clone(world.scene());
-    for (request, id) in newcomers {
-        found.unfair = found.unfair.or_else(|| fairness::complaint(&world, &request, id));
+    for (nth, id) in newcomers {
+        let Effect::Spawn(request) = &draw.effects[nth] else { continue };
+        found.unfair = found.unfair.or_else(|| fairness::complaint(&world, request, id));
         let mut ads = moment.ads.clone();
         let mut sensed: Sensed = world.sensed();
         let Some(seen) = sighting::watch(world.clone(), ads.as_mut(), &mut sensed, id, judge::HORIZON_S)
@@ -263,7 +250,7 @@ fn attempt(moment: &Moment, draw: &Draw) -> Try {
         };
         let nearest_m = seen.frames.iter().map(|frame| frame.gap_m).fold(f64::INFINITY, f64::min);
         found.nearest_m = Some(found.nearest_m.map_or(nearest_m, |other| other.min(nearest_m)));
-        if let Err(why) = judge::verdict(&scene, &request, &seen) {
+        if let Err(why) = judge::verdict(&scene, request, &seen) {
             found.failure.get_or_insert(why);
         }
     }

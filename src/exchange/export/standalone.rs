@@ -10,6 +10,7 @@ use avastra_base::units::decimal;
 use avastra_campaign::emit::{identifier, lane_point, quoted};
 use avastra_campaign::episode::{EpisodeLog, Outcome};
 use avastra_lang::model::body::parameters;
+use avastra_lang::model::command::{Command, Manners};
 use avastra_lang::model::vocabulary::{Body, Phenomenon, Verb, Word};
 use avastra_lang::model::{BodyDef, Memory, Road, SPAWN_SPEED_MPS, Scenario, Space, ticks_s};
 use avastra_world::action::{Effect, OrderRequest, SpawnRequest};
@@ -111,12 +112,11 @@ impl<'a> Actions<'a> {
             Effect::Time(time) => format!("set time = {}", time.name()),
             Effect::Sky(phenomenon, level) => format!("set sky[{}] = {}", phenomenon.name(), level.name()),
             Effect::Spawn(request) => self.spawn(space, request),
-            Effect::Order(OrderRequest { bearer, speed_mps, rate_mps2 }) => {
-                let rate = rate_mps2.map(|rate| format!(", rate: {} m/s^2", decimal(rate, false)));
+            Effect::Order(OrderRequest { bearer, command }) => {
                 // An order of a manoeuvre, which the text lacks, lets its bearer drive on.
-                let Some(speed_mps) = speed_mps else { return String::new() };
-                let (name, speed) = (&space.bearers[*bearer], decimal(*speed_mps, false));
-                format!("order {name} {{ speed: {speed} m/s{} }}", rate.unwrap_or_default())
+                let fields = command_fields(command);
+                let name = &space.bearers[*bearer];
+                if fields.is_empty() { fields } else { format!("order {name} {{ {fields} }}") }
             }
         }
     }
@@ -146,6 +146,12 @@ impl<'a> Actions<'a> {
         }
         if request.verb != Verb::Stand {
             fields.push(format!("speed: {} m/s", decimal(request.speed_mps, false)));
+        }
+        if request.offset_m != 0.0 {
+            fields.push(format!("offset: {} m", decimal(request.offset_m, false)));
+        }
+        if request.ignores != Manners::default() {
+            fields.push(manners_field(request.ignores));
         }
         fields.push(format!("colour: {}", request.colour.name()));
         let distance = decimal(request.distance_m, false);
@@ -245,4 +251,26 @@ fn start_text(log: &EpisodeLog) -> String {
         start.ambient,
         start.seed
     )
+}
+
+fn manners_field(ignores: Manners) -> String {
+    let ignored: Vec<&str> = ignores.ignored().map(Word::name).collect();
+    format!("ignores: [{}]", ignored.join(", "))
+}
+
+/// What a command says, as the fields of an order.
+fn command_fields(command: &Command) -> String {
+    let Command { speed_mps, rate_mps2, lane, offset_m, aside_mps, ignores } = command;
+    let figure = |name: &str, value: &Option<f64>, unit: &str| {
+        value.map(|value| format!("{name}: {} {unit}", decimal(value, false)))
+    };
+    let fields = [
+        figure("speed", speed_mps, "m/s"),
+        figure("rate", rate_mps2, "m/s^2"),
+        lane.map(|lane| format!("lane: {}", lane.name())),
+        figure("offset", offset_m, "m"),
+        figure("aside", aside_mps, "m/s"),
+        ignores.map(manners_field),
+    ];
+    fields.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }

@@ -11,12 +11,10 @@ use crate::check::report::{Report, all_of, field};
 use crate::check::rule::locals;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::rules_by_action;
-use crate::model::vocabulary::{
-    Colour, LaneChoice, OrderField, Side, Site, SpaceClaim, SpawnField, Then, Verb, Word,
-};
+use crate::model::vocabulary::{Colour, LaneChoice, Side, Site, SpaceClaim, SpawnField, Then, Verb, Word};
 use crate::model::{
-    ActionDef, BodyWord, Domain, EffectDef, GroupDef, ManoeuvreCall, OrderDef, Parameter, RuleDef, SetDef,
-    SpawnDef, Type, Value, WordExpr, code,
+    ActionDef, BodyWord, Domain, EffectDef, GroupDef, ManoeuvreCall, Parameter, RuleDef, SetDef, SpawnDef,
+    Type, Value, WordExpr, code,
 };
 use crate::prove::product_size;
 use crate::syntax::ast::{ItemKind, ParamMode, Span};
@@ -391,16 +389,17 @@ impl Checker {
             }
             None => self.missing_field(SpawnField::Speed, span, lacks("how fast it is")),
         };
+        let offset = match find(SpawnField::Offset) {
+            Some(value) => self.typed(value, place, Type::Quantity(Dimension::LENGTH)).map(Some),
+            None => Some(None),
+        };
+        let ignores = match find(SpawnField::Ignores) {
+            Some(value) => self.manners(value, place),
+            None => Some(Vec::new()),
+        };
         let (body, verb, (then, manoeuvre)) = (body_word?, verb?, then?);
         self.check_verb(&body, &verb, behind, span);
-        if manoeuvre.is_some()
-            && let Some(verb) =
-                possible(&verb).into_iter().find(|verb| matches!(verb, Verb::Walk | Verb::Stand))
-        {
-            let message = format!("`{}` does no manoeuvre", verb.name());
-            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here");
-            self.report(error.help("manoeuvres are for vehicles; leave `then` out"));
-        }
+        self.check_fields(&fields, &verb, manoeuvre.as_ref(), span);
         Some(SpawnDef {
             body,
             colour: colour?,
@@ -412,64 +411,48 @@ impl Checker {
             distance: distance?,
             behind,
             cover: None,
+            offset: offset?,
+            ignores: ignores?,
             bearer: None,
             manoeuvre,
             span,
         })
     }
 
-    fn no_manoeuvre<T>(&mut self, value: &ast::Expr, place: &Place<'_>) -> Option<T> {
-        self.look_at(value, place, None);
-        let error = Diagnostic::error(code::TYPE_MISMATCH, "an order's `then` is a manoeuvre");
-        let error = error.at(value.span, "no call of one");
-        self.reject(error.help("write its name and what it is given: `then: brake(4 m/s^2)`"))
-    }
-
-    fn order(
+    /// Reports fields that mean nothing to a verb.
+    fn check_fields(
         &mut self,
-        who: &ast::Name,
-        fields: &[ast::Field],
-        place: &Place<'_>,
+        fields: &[(SpawnField, &ast::Expr)],
+        verb: &WordExpr<Verb>,
+        manoeuvre: Option<&ManoeuvreCall>,
         span: Span,
-    ) -> Option<OrderDef> {
-        self.references.uses(who.span, Symbol::RoadUser(who.text.clone()));
-        let bearer = self.bearers.iter().position(|name| *name == who.text);
-        if bearer.is_none() {
-            let mut error =
-                self.unknown("road user", &who.text, who.span, self.bearers.iter().map(String::as_str));
-            let name_it = || format!("name it where it appears: `spawn … as {} ahead …`", who.text);
-            error.help = error.help.or_else(|| Some(name_it()));
-            self.report(error);
+    ) {
+        let changes_lanes = manoeuvre.is_some_and(|call| self.has_lanes(call.manoeuvre));
+        for verb in possible(verb) {
+            let on_foot = matches!(verb, Verb::Walk | Verb::Stand);
+            let other_way = matches!(verb, Verb::DriveOpposite | Verb::CrossRoad);
+            let says = |wanted: SpawnField| field(fields, wanted).is_some();
+            let (what, help) = match () {
+                () if on_foot && manoeuvre.is_some() => {
+                    ("does no manoeuvre", "manoeuvres are for vehicles; leave `then` out")
+                }
+                () if on_foot && says(SpawnField::Ignores) => {
+                    ("ignores nothing", "rules of the road are for vehicles; leave `ignores` out")
+                }
+                () if verb == Verb::Walk && says(SpawnField::Offset) => {
+                    ("begins at the kerb", "leave `offset` out")
+                }
+                () if other_way && changes_lanes => (
+                    "drives in no lane of the ego vehicle's direction",
+                    "in its manoeuvre, write `offset` for `lane`",
+                ),
+                () => continue,
+            };
+            let message = format!("`{}` {what}", verb.name());
+            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here");
+            self.report(error.help(help));
+            return;
         }
-        self.note_fields::<OrderField>(fields, place);
-        let fields = self.fields_known(fields);
-        let manoeuvre = match field(&fields, OrderField::Then) {
-            Some(value) => match self.manoeuvre_call(value, place) {
-                Some(call) => Some(call?),
-                None => return self.no_manoeuvre(value, place),
-            },
-            None => None,
-        };
-        let speed = match field(&fields, OrderField::Speed) {
-            Some(value) => Some(self.typed(value, place, Type::Quantity(Dimension::SPEED))?),
-            None if manoeuvre.is_some() => None,
-            None => {
-                let message = "the order says neither how fast nor which manoeuvre".to_owned();
-                return self.missing_field(OrderField::Speed, span, message);
-            }
-        };
-        let rate = field(&fields, OrderField::Rate);
-        let rate = rate.map(|value| self.typed(value, place, Type::Quantity(Dimension::ACCEL)));
-        let rate = match rate {
-            Some(rate) => Some(rate?),
-            None => None,
-        };
-        if let (Some(rate), None) = (field(&fields, OrderField::Rate), &speed) {
-            let error = Diagnostic::error(code::NOT_HERE, "`rate` belongs to the `speed` of an order");
-            let error = error.at(rate.span, "without a `speed`");
-            return self.reject(error.help("give it to the manoeuvre as an argument"));
-        }
-        Some(OrderDef { bearer: bearer?, speed, rate, manoeuvre, span })
     }
 
     /// The `then` of a spawn: a word, or a manoeuvre.
@@ -526,7 +509,12 @@ impl Checker {
         }
     }
 
-    fn word<W: Word>(&mut self, kind: &str, expr: &ast::Expr, place: &Place<'_>) -> Option<WordExpr<W>> {
+    pub(super) fn word<W: Word>(
+        &mut self,
+        kind: &str,
+        expr: &ast::Expr,
+        place: &Place<'_>,
+    ) -> Option<WordExpr<W>> {
         let known = |_: &Checker, name: &str, span| {
             W::from_name(name).ok_or_else(|| unknown_word::<W>(kind, name, span))
         };

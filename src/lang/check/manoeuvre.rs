@@ -1,12 +1,13 @@
-//! Manoeuvres: parameters, phases, and how spawns and orders name them.
+//! Orders and manoeuvres: what a vehicle is told, phase by phase, and how spawns and orders name manoeuvres.
 
 use crate::check::checker::{Checker, docs, each};
 use crate::check::expression::Place;
 use crate::check::references::Symbol;
-use crate::check::report::{Report, field};
-use crate::model::vocabulary::{Fact, PhaseField, Site, Word};
-use crate::model::{ManoeuvreCall, ManoeuvreDef, PhaseDef, Type, code};
-use crate::syntax::ast::ItemKind;
+use crate::check::report::{Report, all_of, field};
+use crate::model::command::CommandDef;
+use crate::model::vocabulary::{CommandField, Fact, LaneChoice, Manner, Site, Word};
+use crate::model::{ManoeuvreCall, ManoeuvreDef, OrderDef, PhaseDef, Type, WordExpr, code};
+use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
 use avastra_base::units::Dimension;
 
@@ -90,13 +91,17 @@ impl Checker {
         let once = part(self, declared.once.as_ref(), Type::Bool);
         let within = part(self, declared.within.as_ref(), DURATION);
         let after = part(self, declared.after.as_ref(), DURATION);
-        self.note_fields::<PhaseField>(&declared.fields, place);
+        self.note_fields::<CommandField>(&declared.fields, place);
         let fields = self.fields_known(&declared.fields);
-        let speed = part(self, field(&fields, PhaseField::Speed), Type::Quantity(Dimension::SPEED));
-        let rate = part(self, field(&fields, PhaseField::Rate), Type::Quantity(Dimension::ACCEL));
-        if field(&fields, PhaseField::Speed).is_none() {
-            let message = "the phase does not say how fast".to_owned();
-            return self.missing_field(PhaseField::Speed, declared.span, message);
+        if let Some(then) = field(&fields, CommandField::Then) {
+            self.look_at(then, place, None);
+            let error = Diagnostic::error(code::NOT_HERE, "a phase has no `then`").at(then.span, "not here");
+            return self.reject(error.help("write the phases of that manoeuvre here"));
+        }
+        let command = self.command(&fields, place);
+        if matches!(&command, Some(command) if *command == CommandDef::default()) {
+            let message = "the phase tells the vehicle nothing".to_owned();
+            return self.missing_field(CommandField::Speed, declared.span, message);
         }
         if let (Some(within), None) = (&declared.within, &declared.once) {
             let error =
@@ -105,8 +110,102 @@ impl Checker {
                 error.at(within.span, "without a `once`").help("write `after` for a time that passes"),
             );
         }
-        let speed = speed.filter(|_| all)?;
-        Some(PhaseDef { once, within, after, speed, rate })
+        let command = command.filter(|_| all)?;
+        Some(PhaseDef { once, within, after, command })
+    }
+
+    pub(super) fn order(
+        &mut self,
+        who: &ast::Name,
+        fields: &[ast::Field],
+        place: &Place<'_>,
+        span: Span,
+    ) -> Option<OrderDef> {
+        self.references.uses(who.span, Symbol::RoadUser(who.text.clone()));
+        let bearer = self.bearers.iter().position(|name| *name == who.text);
+        if bearer.is_none() {
+            let mut error =
+                self.unknown("road user", &who.text, who.span, self.bearers.iter().map(String::as_str));
+            let name_it = || format!("name it where it appears: `spawn … as {} ahead …`", who.text);
+            error.help = error.help.or_else(|| Some(name_it()));
+            self.report(error);
+        }
+        self.note_fields::<CommandField>(fields, place);
+        let fields = self.fields_known(fields);
+        let manoeuvre = match field(&fields, CommandField::Then) {
+            Some(value) => match self.manoeuvre_call(value, place) {
+                Some(call) => Some(call?),
+                None => return self.no_manoeuvre(value, place),
+            },
+            None => None,
+        };
+        let command = self.command(&fields, place)?;
+        if manoeuvre.is_none() && command == CommandDef::default() {
+            let message = "the order tells the vehicle nothing".to_owned();
+            return self.missing_field(CommandField::Speed, span, message);
+        }
+        Some(OrderDef { bearer: bearer?, command, manoeuvre, span })
+    }
+
+    fn no_manoeuvre<T>(&mut self, value: &ast::Expr, place: &Place<'_>) -> Option<T> {
+        self.look_at(value, place, None);
+        let error = Diagnostic::error(code::TYPE_MISMATCH, "an order's `then` is a manoeuvre");
+        let error = error.at(value.span, "no call of one");
+        self.reject(error.help("write its name and what it is given: `then: brake(4 m/s^2)`"))
+    }
+
+    /// What the fields of an order or a phase tell a vehicle; `None` after a mistake, which is reported.
+    fn command(&mut self, fields: &[(CommandField, &ast::Expr)], place: &Place<'_>) -> Option<CommandDef> {
+        let mut all = true;
+        let mut figure = |wanted: CommandField, dimension: Dimension| {
+            let found = self.typed(field(fields, wanted)?, place, Type::Quantity(dimension));
+            all &= found.is_some();
+            found
+        };
+        let speed = figure(CommandField::Speed, Dimension::SPEED);
+        let rate = figure(CommandField::Rate, Dimension::ACCEL);
+        let offset = figure(CommandField::Offset, Dimension::LENGTH);
+        let aside = figure(CommandField::Aside, Dimension::SPEED);
+        let lane = match field(fields, CommandField::Lane) {
+            Some(value) => Some(self.word::<LaneChoice>("lane", value, place)?),
+            None => None,
+        };
+        let ignores = match field(fields, CommandField::Ignores) {
+            Some(value) => Some(self.manners(value, place)?),
+            None => None,
+        };
+        let says = |wanted: CommandField| field(fields, wanted).is_some();
+        let goes_aside = says(CommandField::Lane) || says(CommandField::Offset);
+        for (part, of, is_there) in [
+            (CommandField::Rate, "a `speed`", says(CommandField::Speed)),
+            (CommandField::Aside, "a `lane` or an `offset`", goes_aside),
+        ] {
+            if let Some(value) = field(fields, part).filter(|_| !is_there) {
+                let message = format!("`{}` belongs to {of}", part.name());
+                let error = Diagnostic::error(code::NOT_HERE, message);
+                let error = error.at(value.span, format!("without {of}"));
+                self.report(error.help(format!("say {of}, too, or leave `{}` out", part.name())));
+                all = false;
+            }
+        }
+        all.then_some(CommandDef { speed, rate, lane, offset, aside, ignores })
+    }
+
+    /// The rules of the road that are ignored: `[Signals, Ego]`.
+    pub(super) fn manners(&mut self, value: &ast::Expr, place: &Place<'_>) -> Option<Vec<WordExpr<Manner>>> {
+        let ast::ExprKind::List(items) = &value.kind else {
+            self.look_at(value, place, None);
+            let error = Diagnostic::error(code::TYPE_MISMATCH, "`ignores` is a list of rules of the road");
+            let error = error.at(value.span, "no list");
+            return self.reject(error.help("write them in brackets: `ignores: [Signals]`; `[]` for none"));
+        };
+        all_of(items.iter().map(|item| self.word::<Manner>("rule of the road", item, place)))
+    }
+
+    /// Whether a phase of a manoeuvre leads to a lane.
+    pub(super) fn has_lanes(&self, manoeuvre: usize) -> bool {
+        let phases = self.manoeuvres[manoeuvre].iter().flat_map(|manoeuvre| &manoeuvre.phases);
+        phases.into_iter().any(|phase| phase.command.lane.is_some())
     }
 
     /// `brake(4 m/s^2)` in the `then` of a spawn or an order; `None` if the value is no call. The inner `None` stands for a

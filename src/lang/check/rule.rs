@@ -12,7 +12,7 @@ use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::states_read;
 use crate::model::vocabulary::{CHANGE, Known, Site, Then, Verb};
 use crate::model::{
-    ActionDef, EnumIndex, Initial, RuleBinding, RuleBody, RuleDef, SetDef, Type, WordExpr, code,
+    ActionDef, EnumIndex, Initial, RuleBinding, RuleBody, RuleDef, SetDef, SpawnDef, Type, WordExpr, code,
 };
 use crate::syntax::ast::ItemKind;
 use crate::syntax::{Diagnostic, ast, listed};
@@ -54,15 +54,15 @@ impl Checker {
         during: Option<&ast::Name>,
         condition: &ast::Expr,
     ) -> Option<RuleBody> {
-        let change = during.filter(|during| during.text == CHANGE.0);
         if self.has_compiled_too_much(rule.name.span) {
             return None;
         }
-        if let Some(during) = during {
-            match change {
-                Some(_) => self.references.note(during.span, Symbol::Engine(CHANGE.0, CHANGE.1), false),
-                None => self.report(unknown("behaviour", &during.text, during.span, [CHANGE.0])),
+        match during {
+            Some(during) if during.text == CHANGE.0 => {
+                self.references.note(during.span, Symbol::Engine(CHANGE.0, CHANGE.1), false);
             }
+            Some(during) => return self.on_phases(rule, on, during, condition),
+            None => {}
         }
         let site = Place {
             states: during.is_none(),
@@ -77,8 +77,9 @@ impl Checker {
             targets = match during {
                 None => self.targets_of_global(rule, condition)?,
                 Some(_) => {
-                    let may_change =
-                        |action: &usize| self.actions[*action].as_ref().is_some_and(changes_lanes);
+                    let may_change = |action: &usize| {
+                        self.actions[*action].as_ref().is_some_and(|action| self.changes_lanes(action))
+                    };
                     (0..self.actions.len()).filter(may_change).collect()
                 }
             };
@@ -100,7 +101,7 @@ impl Checker {
             let is_whole = !self.half_broken.contains(&action);
             let found = self.binding((rule, during), condition, (&definition, is_whole), site);
             self.actions[action] = Some(definition);
-            self.compiled += found.as_ref().map_or(OPERATIONS_BROKEN, Expr::operations);
+            self.compiled += condition_size(found.as_ref());
             bindings.extend(found.map(|condition| RuleBinding { action, condition }));
             if self.has_compiled_too_much(rule.name.span) {
                 return None;
@@ -111,6 +112,50 @@ impl Checker {
             self.binds_nothing(rule, help);
         }
         Some(if during.is_some() { RuleBody::During(bindings) } else { RuleBody::Holds(bindings) })
+    }
+
+    /// A rule on the moments at which phases of a manoeuvre begin.
+    fn on_phases(
+        &mut self,
+        rule: &ast::Rule,
+        on: &[ast::Name],
+        during: &ast::Name,
+        condition: &ast::Expr,
+    ) -> Option<RuleBody> {
+        let owner = Symbol::Manoeuvre(during.text.clone());
+        self.references.uses(during.span, owner.clone());
+        let Some(manoeuvre) = self.manoeuvre_names.get(&during.text) else {
+            self.look_at_condition(condition, &during.text);
+            let names = self.manoeuvre_names.all().chain([CHANGE.0]);
+            let error = unknown("manoeuvre", &during.text, during.span, names);
+            return self.reject(error);
+        };
+        let locals = self.references.locals(&owner);
+        let definition = self.manoeuvres[manoeuvre].as_ref();
+        let locals = definition.map_or(locals, |definition| definition.parameters.clone());
+        let place = Place { locals: &locals, owner: Some(&owner), site: Site::Phase, ..Place::default() };
+        let found = self.typed(condition, &place, Type::Bool);
+        self.compiled += condition_size(found.as_ref());
+        let gives = |action: &ActionDef| action.manoeuvres().any(|given| given == manoeuvre);
+        let mut actions = match on.is_empty() {
+            true => (0..self.actions.len()).collect(),
+            false => self.all_targets(on),
+        };
+        actions.sort_unstable();
+        if let Some(action) =
+            actions.iter().filter_map(|action| self.actions[*action].as_ref()).find(|a| !gives(a))
+            && !on.is_empty()
+        {
+            let message = format!("nobody does `{}` because of `{}`", during.text, action.name);
+            let error = Diagnostic::error(code::NO_SPAWN, message).at(rule.name.span, "never asked");
+            let error = error.beside(action.span, "gives it to nobody");
+            return self.reject(error.help("bind actions with `then` and this manoeuvre"));
+        }
+        actions.retain(|action| self.actions[*action].as_ref().is_some_and(gives));
+        if actions.is_empty() {
+            self.binds_nothing(rule, "give the manoeuvre to somebody: `then: …` in a spawn or an order");
+        }
+        Some(RuleBody::Phases { manoeuvre, condition: found?, actions })
     }
 
     /// The condition of a rule, compiled for one of its actions; `None` if the rule cannot bind this action.
@@ -125,10 +170,10 @@ impl Checker {
         let owner = Symbol::Action(definition.name.clone());
         let place = Place { locals: &locals, owner: Some(&owner), ..site };
         let condition = self.typed(condition, &place, Type::Bool)?;
-        if during.is_some() && !changes_lanes(definition) && is_whole {
+        if during.is_some() && !self.changes_lanes(definition) && is_whole {
             let message = format!("no road user of `{}` changes lanes", definition.name);
             let error = Diagnostic::error(code::NO_SPAWN, message).at(rule.name.span, "never asked");
-            let help = "bind actions whose spawn has `then` or overtakes in its own lane";
+            let help = "bind actions that let somebody change lanes: by `then`, by `lane` in an order or a phase, or by `Overtake` in its own lane";
             return self.reject(error.beside(definition.span, "changes no lanes").help(help));
         }
         self.warn_of_later(rule, definition, &condition, during);
@@ -365,6 +410,16 @@ impl Checker {
         found
     }
 
+    /// Whether a road user of an action may be told to change lanes.
+    fn changes_lanes(&self, action: &ActionDef) -> bool {
+        let by_spawn = |spawn: &SpawnDef| {
+            possible(&spawn.then).contains(&Then::Change) || possible(&spawn.verb).contains(&Verb::Overtake)
+        };
+        action.spawns().any(by_spawn)
+            || action.orders().any(|order| order.command.lane.is_some())
+            || action.manoeuvres().any(|manoeuvre| self.has_lanes(manoeuvre))
+    }
+
     /// Reports a value from which no move is allowed, and a value to which no other value may move and with which no
     /// episode begins.
     fn check_graph(
@@ -404,11 +459,9 @@ impl Checker {
     }
 }
 
-/// Whether a road user of an action may be told to change lanes.
-fn changes_lanes(action: &ActionDef) -> bool {
-    action.spawns().any(|spawn| {
-        possible(&spawn.then).contains(&Then::Change) || possible(&spawn.verb).contains(&Verb::Overtake)
-    })
+/// The operations of a condition, or what stands for those of one with a mistake.
+fn condition_size(condition: Option<&Expr>) -> usize {
+    condition.map_or(OPERATIONS_BROKEN, Expr::operations)
 }
 
 /// Another variant than `value`, if there is one.

@@ -61,9 +61,14 @@ pub struct MomentFacts {
     pub ego_route_left_m: f64,
     /// Positive to the left of the route.
     pub ego_offset_m: f64,
+    /// Stations of its bumpers on the route.
+    pub ego_front_m: f64,
+    pub ego_rear_m: f64,
     pub ego_light: Light,
     pub ego_road: RoadKind,
     pub road_users: u32,
+    /// Those that were told to ignore a rule of the road.
+    pub rule_breakers: u32,
     /// Between the outlines.
     pub nearest_gap_m: f64,
     pub nearest_speed_mps: f64,
@@ -83,7 +88,19 @@ pub struct NpcFacts {
     pub junction_ahead_m: f64,
     /// Limit of the lane that it is in.
     pub limit_mps: f64,
+    /// Stations of its ends on the ego vehicle's route.
+    pub front_m: f64,
+    pub rear_m: f64,
+    /// How far its middle is to the left of that route.
+    pub offset_m: f64,
+    /// Until the stretches of the route beside the two meet, at most [`TIME_S_MAX`].
+    pub ttc_s: f64,
+    /// Way between the two, by the speed of the one behind, at most [`TIME_S_MAX`].
+    pub headway_s: f64,
 }
+
+/// Stands for a time that is longer, and for one that does not come at all, s.
+pub const TIME_S_MAX: f64 = 100.0;
 
 /// What a rule may ask about a spawn before it happens.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -213,7 +230,10 @@ fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
         Fact::EgoJunctionAhead => moment(|moment| moment.ego_junction_ahead_m),
         Fact::EgoRouteLeft => moment(|moment| moment.ego_route_left_m),
         Fact::EgoOffset => moment(|moment| moment.ego_offset_m),
+        Fact::EgoFront => moment(|moment| moment.ego_front_m),
+        Fact::EgoRear => moment(|moment| moment.ego_rear_m),
         Fact::RoadUsers => moment(|moment| f64::from(moment.road_users)),
+        Fact::RuleBreakers => moment(|moment| f64::from(moment.rule_breakers)),
         Fact::NearestGap => moment(|moment| moment.nearest_gap_m),
         Fact::NearestSpeed => moment(|moment| moment.nearest_speed_mps),
         Fact::Elapsed => moment(|moment| moment.elapsed_s),
@@ -222,6 +242,11 @@ fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
         Fact::NpcGap => spawn(|spawn| spawn.npc.gap_m),
         Fact::NpcJunctionAhead => spawn(|spawn| spawn.npc.junction_ahead_m),
         Fact::NpcLimit => spawn(|spawn| spawn.npc.limit_mps),
+        Fact::NpcFront => spawn(|spawn| spawn.npc.front_m),
+        Fact::NpcRear => spawn(|spawn| spawn.npc.rear_m),
+        Fact::NpcOffset => spawn(|spawn| spawn.npc.offset_m),
+        Fact::NpcTtc => spawn(|spawn| spawn.npc.ttc_s),
+        Fact::NpcHeadway => spawn(|spawn| spawn.npc.headway_s),
         Fact::SpawnGap => spawn(|spawn| spawn.spawn_gap_m),
         Fact::SafetyGap => spawn(|spawn| spawn.safety_gap_m),
         Fact::Proc => Value::Number(facts.outcome.proc),
@@ -292,6 +317,16 @@ fn compare_numbers(op: Comparison, left: f64, right: f64) -> bool {
         Comparison::NotEqual => !equal,
         Comparison::Less | Comparison::Greater => !equal && op.holds(left, right),
         Comparison::LessEqual | Comparison::GreaterEqual => equal || op.holds(left, right),
+    }
+}
+
+impl<W> WordExpr<W> {
+    /// The expression that chooses the word, if it is not fixed.
+    pub fn expr(&self) -> Option<&Expr> {
+        match self {
+            WordExpr::Fixed(_) => None,
+            WordExpr::Of(expr, _) => Some(expr),
+        }
     }
 }
 

@@ -4,6 +4,7 @@
 
 use core::ops::RangeInclusive;
 
+use crate::model::command::OFFSET_M;
 use crate::model::eval::compare;
 use crate::model::expr::Comparison;
 use crate::model::value::Value;
@@ -16,9 +17,6 @@ pub const SPEED_MPS_MAX: f64 = 70.0;
 
 /// Speeds at which anything may be spawned, m/s.
 pub const SPAWN_SPEED_MPS: RangeInclusive<f64> = 0.0..=SPEED_MPS_MAX;
-
-/// Rates at which a road user may be told to change its speed, m/s². The most is more than tyres give.
-pub const ORDER_RATE_MPS2: RangeInclusive<f64> = 0.1..=15.0;
 
 /// More than tyres give the ego vehicle, forwards or backwards, m/s².
 pub const EGO_ACCELERATION_MPS2_MAX: f64 = 10.0;
@@ -53,19 +51,13 @@ pub fn rounded_into(figure: f64, bounds: RangeInclusive<f64>) -> f64 {
 
 /// Why the world must not be asked for a spawn with these figures, whatever the rules say; `None` if it
 /// may. NaN is out of bounds, too.
-pub fn spawn_out_of_bounds(speed_mps: f64, distance_m: f64) -> Option<String> {
+pub fn spawn_out_of_bounds(speed_mps: f64, distance_m: f64, offset_m: f64) -> Option<String> {
     let distance = ("distance", distance_m, "m", SPAWN_DISTANCE_M);
-    out_of_bounds("spawn", [("speed", speed_mps, "m/s", SPAWN_SPEED_MPS), distance])
+    let offset = ("offset", offset_m, "m", OFFSET_M);
+    out_of_bounds("spawn", [("speed", speed_mps, "m/s", SPAWN_SPEED_MPS), distance, offset])
 }
 
-/// Why the world must not be given an order with these figures; `None` if it may.
-pub fn order_out_of_bounds(speed_mps: Option<f64>, rate_mps2: Option<f64>) -> Option<String> {
-    let speed = speed_mps.map(|speed_mps| ("speed", speed_mps, "m/s", SPAWN_SPEED_MPS));
-    let rate = rate_mps2.map(|rate_mps2| ("rate", rate_mps2, "m/s^2", ORDER_RATE_MPS2));
-    out_of_bounds("order", speed.into_iter().chain(rate))
-}
-
-fn out_of_bounds(
+pub(super) fn out_of_bounds(
     whose: &str,
     figures: impl IntoIterator<Item = (&'static str, f64, &'static str, RangeInclusive<f64>)>,
 ) -> Option<String> {
@@ -82,15 +74,17 @@ mod tests {
     #[test]
     fn no_spawn_lies_out_of_bounds() {
         for (speed_mps, distance_m) in [(0.0, 0.0), (70.0, 1000.0)] {
-            assert_eq!(spawn_out_of_bounds(speed_mps, distance_m), None);
+            assert_eq!(spawn_out_of_bounds(speed_mps, distance_m, 0.0), None);
         }
         let rounded = |speed_mps| rounded_into(speed_mps, SPAWN_SPEED_MPS);
         assert_eq!([70.0 * (0.1 + 0.2) / 0.3, 70.0, 69.9, 70.1].map(rounded), [70.0, 70.0, 69.9, 70.1]);
         for speed_mps in [-0.1, 70.1, f64::NAN] {
-            assert!(spawn_out_of_bounds(speed_mps, 10.0).is_some_and(|reason| reason.contains("speed")));
+            assert!(spawn_out_of_bounds(speed_mps, 10.0, 0.0).is_some_and(|reason| reason.contains("speed")));
         }
         for distance_m in [-0.1, 1000.1, f64::NAN] {
-            assert!(spawn_out_of_bounds(5.0, distance_m).is_some_and(|reason| reason.contains("distance")));
+            assert!(
+                spawn_out_of_bounds(5.0, distance_m, 0.0).is_some_and(|reason| reason.contains("distance"))
+            );
         }
     }
 }

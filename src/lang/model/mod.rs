@@ -7,6 +7,7 @@
 
 pub mod body;
 pub mod code;
+pub mod command;
 mod digest;
 pub mod effort;
 mod eval;
@@ -26,13 +27,13 @@ pub mod vocabulary;
 
 pub use digest::{digest, digest_text};
 pub use eval::{
-    Facts, JUNCTION_AHEAD_M_MAX, MomentFacts, NpcFacts, OutcomeFacts, SpawnFacts, WorldFacts, evaluate,
+    Facts, JUNCTION_AHEAD_M_MAX, MomentFacts, NpcFacts, OutcomeFacts, SpawnFacts, TIME_S_MAX, WorldFacts,
+    evaluate,
 };
 pub use interval::{End, Interval};
 pub use limits::{
-    AMBIENT_MAX, COMMANDED_MAX, EGO_ACCELERATION_MPS2_MAX, LIMIT_PART_MAX, ORDER_RATE_MPS2, SIGNAL_PHASE_S,
-    SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, TICK_MS, order_out_of_bounds, rounded_into,
-    spawn_out_of_bounds,
+    AMBIENT_MAX, COMMANDED_MAX, EGO_ACCELERATION_MPS2_MAX, LIMIT_PART_MAX, SIGNAL_PHASE_S, SPAWN_DISTANCE_M,
+    SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, TICK_MS, rounded_into, spawn_out_of_bounds,
 };
 pub use meaning::Meaning;
 pub(crate) use on_route::stretches;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::model::body::BodyParameters;
+use crate::model::command::CommandDef;
 use crate::model::expr::Expr;
 use crate::model::interval::Interval;
 use crate::model::meaning::Meaning;
@@ -13,7 +14,7 @@ use crate::model::row::Row;
 use crate::model::rules::{Bound, Clause};
 use crate::model::value::{EnumIndex, Type, Value};
 use crate::model::vocabulary::{
-    Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb, Word,
+    Body, Colour, LaneChoice, Level, Manner, Phenomenon, Side, Then, TimeOfDay, Verb, Word,
 };
 use crate::syntax::ast::Span;
 use avastra_base::units::{Rational, Unit, decimal, quantity, quantity_in, quantity_short, unit_of_all};
@@ -211,6 +212,16 @@ impl ActionDef {
         })
     }
 
+    /// The manoeuvres that it gives to road users, in the order of its effects.
+    pub(crate) fn manoeuvres(&self) -> impl Iterator<Item = usize> {
+        let calls = self.effects.iter().filter_map(|effect| match effect {
+            EffectDef::Set(_) => None,
+            EffectDef::Spawn(spawn) => spawn.manoeuvre.as_ref(),
+            EffectDef::Order(order) => order.manoeuvre.as_ref(),
+        });
+        calls.map(|call| call.manoeuvre)
+    }
+
     /// What it orders named road users to do.
     pub(crate) fn orders(&self) -> impl Iterator<Item = &OrderDef> {
         self.effects.iter().filter_map(|effect| match effect {
@@ -295,6 +306,9 @@ pub struct SpawnDef {
     pub behind: bool,
     /// The parked vehicle from behind which a pedestrian steps.
     pub cover: Option<WordExpr<BodyWord>>,
+    /// m to the left of the middle of its lane.
+    pub offset: Option<Expr>,
+    pub ignores: Vec<WordExpr<Manner>>,
     /// The name that it bears from then on, by index in `Space::bearers`.
     pub bearer: Option<usize>,
     /// The manoeuvre that it begins when it appears.
@@ -312,7 +326,7 @@ pub struct ManoeuvreDef {
     pub phases: Vec<PhaseDef>,
 }
 
-/// A phase begins when `once` holds, and `after` some more time. It ends when the road user has its speed.
+/// A phase begins when `once` holds, and `after` some more time. It ends when the road user has done what it is told.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhaseDef {
     pub once: Option<Expr>,
@@ -320,10 +334,7 @@ pub struct PhaseDef {
     pub within: Option<Expr>,
     /// s.
     pub after: Option<Expr>,
-    /// m/s.
-    pub speed: Expr,
-    /// m/s²; without it the driver goes over to the speed as it would by itself.
-    pub rate: Option<Expr>,
+    pub command: CommandDef,
 }
 
 /// A manoeuvre by its index in `Space::manoeuvres`, and the values that it is given.
@@ -338,10 +349,8 @@ pub struct ManoeuvreCall {
 pub struct OrderDef {
     /// The name, by index in `Space::bearers`.
     pub bearer: usize,
-    /// m/s; `None` for an order of a manoeuvre.
-    pub speed: Option<Expr>,
-    /// m/s²; without it the driver goes over to the speed as it would by itself.
-    pub rate: Option<Expr>,
+    /// Empty for an order of a manoeuvre alone.
+    pub command: CommandDef,
     pub manoeuvre: Option<ManoeuvreCall>,
     pub span: Span,
 }
@@ -381,6 +390,9 @@ pub enum RuleBody {
     Holds(Vec<RuleBinding>),
     /// A condition under which a commanded lane change may begin; states are not known then.
     During(Vec<RuleBinding>),
+    /// A condition under which a phase of a manoeuvre may begin; its locals are the manoeuvre's parameters. The rule binds
+    /// the actions that give the manoeuvre to somebody.
+    Phases { manoeuvre: usize, condition: Expr, actions: Vec<usize> },
     /// `allowed[from][to]` for a plain state, or for one key of a map; `cell` is its position in the memory. The rule
     /// binds the actions that may set it.
     Moves { state: usize, cell: usize, allowed: Vec<Vec<bool>>, actions: Vec<usize> },

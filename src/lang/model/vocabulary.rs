@@ -199,7 +199,10 @@ facts! {
     EgoJunctionAhead "ego.junction_ahead" LENGTH, World = "A `Length`: along the route to the next junction; 0 in one, 1000 m if there is none nearer.";
     EgoRouteLeft "ego.route_left" LENGTH, World = "A `Length`: along the route to the goal.";
     EgoOffset "ego.offset" LENGTH, World = "A `Length`: how far the ego vehicle is to the left of its route.";
+    EgoFront "ego.front" LENGTH, World = "A `Length`: where the ego vehicle's front is along its route, whose start has 0 m.";
+    EgoRear "ego.rear" LENGTH, World = "A `Length`: where the ego vehicle's rear is along its route.";
     RoadUsers "road_users" Type::Int, World = "A `Int`: how many there are beside the ego vehicle.";
+    RuleBreakers "rule_breakers" Type::Int, World = "A `Int`: how many of them ignore a rule of the road, as a spawn or a command told them to.";
     NearestGap "nearest.gap" LENGTH, World = "A `Length`: to the nearest road user; 100 m if there is none.";
     NearestSpeed "nearest.speed" SPEED, World = "A `Speed`: of the nearest road user; 0 if there is none.";
     Elapsed "elapsed" DURATION, World = "A `Duration`: since the episode began.";
@@ -208,6 +211,11 @@ facts! {
     NpcGap "npc.gap" LENGTH, Spawn = "A `Length`: from the road user that appears to the ego vehicle.";
     NpcJunctionAhead "npc.junction_ahead" LENGTH, Spawn = "A `Length`: along its way to the next junction; 0 in one, 1000 m if there is none nearer.";
     NpcLimit "npc.limit" SPEED, Spawn = "A `Speed`: the limit of the lane in which it appears.";
+    NpcFront "npc.front" LENGTH, Spawn = "A `Length`: its end that is farthest along the ego vehicle's route.";
+    NpcRear "npc.rear" LENGTH, Spawn = "A `Length`: its end that is least far along the ego vehicle's route.";
+    NpcOffset "npc.offset" LENGTH, Spawn = "A `Length`: how far its middle is to the left of the ego vehicle's route.";
+    NpcTtc "npc.ttc" DURATION, Spawn = "A `Duration`: until it and the ego vehicle are beside each other at their present speeds; 0 if they are, 100 s if they do not get there sooner.";
+    NpcHeadway "npc.headway" DURATION, Spawn = "A `Duration`: until whichever of it and the ego vehicle is behind, at its present speed, is where the other one is now; 100 s if not sooner.";
     SpawnGap "spawn_gap" LENGTH, Spawn = "A `Length`: the gap from the ego vehicle to the road user that appears.";
     SafetyGap "safety_gap" LENGTH, Spawn = "A `Length`: the gap that a careful driver needs.";
     Proc "proc" RATIO, Step = "A `Ratio`: the collision probability of the step.";
@@ -310,20 +318,20 @@ words! {
     Side "side" = "The side that it comes from: `Left` or `Right`.",
     Then "then" = "Whether it keeps its lane or changes it: `Keep` or `Change`.",
     Speed "speed" = "How fast it is.",
+    Offset "offset" = "How far to the left of its lane's middle it is; negative to the right.",
+    Ignores "ignores" = "The rules of the road that it ignores: `ignores: [Signals]`.",
     Colour "colour" = "Its paint.",
 }
 
 words! {
-    OrderField "A field of `order`.":
+    CommandField "A field of `order` and of a phase of a manoeuvre.":
     Speed "speed" = "The speed that the road user goes over to.",
     Rate "rate" = "How fast it gains or loses speed for that, as far as its body and the road allow.",
-    Then "then" = "The manoeuvre that it does: `then: brake(4 m/s^2)`.",
-}
-
-words! {
-    PhaseField "A field of a phase of a manoeuvre.":
-    Speed "speed" = "The speed that the road user goes over to.",
-    Rate "rate" = "How fast it gains or loses speed for that, as far as its body and the road allow.",
+    Lane "lane" = "The lane that it changes to, seen from the ego vehicle: `Left`, `Current` or `Right`.",
+    Offset "offset" = "How far to the left of its lane's middle it drives from then on; negative to the right.",
+    Aside "aside" = "Its greatest speed to the side on the way there, as far as the road allows.",
+    Ignores "ignores" = "The rules of the road that it ignores from then on: `ignores: [Signals]`; `[]` for none.",
+    Then "then" = "The manoeuvre that it does, in an order: `then: brake(4 m/s^2)`.",
 }
 
 words! {
@@ -466,6 +474,13 @@ words! {
     Npc "npc" = "Nothing.",
     Pedestrian "pedestrian",
     Vehicle "vehicle",
+}
+
+words! {
+    Manner "A rule of the road that a vehicle ignores.":
+    Signals "Signals" = "It stops neither at red lights nor at stop signs.",
+    RightOfWay "RightOfWay" = "It waits for nobody at junctions.",
+    Ego "Ego" = "It follows and changes lanes as if the ego vehicle were not there.",
 }
 
 words! {

@@ -8,7 +8,7 @@ use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::vocabulary::Fact;
 use crate::model::{
     AMBIENT_MAX, COMMANDED_MAX, EGO_ACCELERATION_MPS2_MAX, FnDef, Interval, JUNCTION_AHEAD_M_MAX, RoadFacts,
-    SPEED_MPS_MAX, Type, Value,
+    SPEED_MPS_MAX, TIME_S_MAX, Type, Value,
 };
 use crate::prove::moment::Case;
 use crate::prove::sums::{difference, is_same, lacks_value, may_lack_a_value};
@@ -243,8 +243,15 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
         Fact::EgoSpeed => between(0.0, SPEED_MPS_MAX),
         Fact::EgoAcceleration => between(-EGO_ACCELERATION_MPS2_MAX, EGO_ACCELERATION_MPS2_MAX),
         Fact::EgoJunctionAhead | Fact::NpcJunctionAhead => between(0.0, JUNCTION_AHEAD_M_MAX),
-        Fact::EgoOffset | Fact::EgoRouteLeft => Interval::ALL,
-        Fact::RoadUsers => between(0.0, f64::from(COMMANDED_MAX + AMBIENT_MAX)),
+        Fact::NpcTtc | Fact::NpcHeadway => between(0.0, TIME_S_MAX),
+        Fact::EgoOffset
+        | Fact::EgoRouteLeft
+        | Fact::EgoFront
+        | Fact::EgoRear
+        | Fact::NpcFront
+        | Fact::NpcRear
+        | Fact::NpcOffset => Interval::ALL,
+        Fact::RoadUsers | Fact::RuleBreakers => between(0.0, f64::from(COMMANDED_MAX + AMBIENT_MAX)),
         Fact::RoadLimit
         | Fact::EgoLimit
         | Fact::NearestGap

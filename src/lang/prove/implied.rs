@@ -119,9 +119,11 @@ fn follows(space: &Space, rule: usize, others: &RulesInForce, work: &mut usize) 
                     let pairs = stricter.iter().flatten().zip(allowed.iter().flatten());
                     same == cell && pairs.into_iter().all(|(stricter, allowed)| *allowed || !*stricter)
                 }
-                RuleBody::Holds(_) | RuleBody::During(_) => false,
+                RuleBody::Holds(_) | RuleBody::During(_) | RuleBody::Phases { .. } => false,
             })
         }
+        // Of the moment at which a phase begins nothing is proved.
+        RuleBody::Phases { .. } => false,
         RuleBody::During(_) | RuleBody::Holds(_) => {
             let on_any = |row| RowRules { space, row, road: None, in_force: others };
             bound.into_iter().all(|row| holds(on_any(row), rule, work)) && start_holds(space, rule, others)

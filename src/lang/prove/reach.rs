@@ -12,7 +12,7 @@ use crate::model::rules::{self, Bound, Demand, RowRules, allowed, rules_by_actio
 use crate::model::vocabulary::Word;
 use crate::model::{
     ActionDef, Domain, Facts, Interval, Memory, Parameter, Reach, Road, Row, RuleBody, RulesInForce, Space,
-    Type, Value, WordExpr, code, evaluate, locals,
+    Type, Value, code, evaluate, locals,
 };
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::prove::moment::{Case, may_hold_together, newcomers, ranges_named};
@@ -130,11 +130,8 @@ impl Pace {
 fn deciding_axes(space: &Space, action: usize) -> Vec<usize> {
     let definition = &space.actions[action];
     let of_spawns = definition.spawns().flat_map(|spawn| {
-        let verb = match &spawn.verb {
-            WordExpr::Fixed(_) => None,
-            WordExpr::Of(expr, _) => Some(expr),
-        };
-        [&spawn.speed, &spawn.distance].into_iter().chain(verb).flat_map(rules::locals)
+        let verb = spawn.verb.expr();
+        [&spawn.speed, &spawn.distance].into_iter().chain(&spawn.offset).chain(verb).flat_map(rules::locals)
     });
     let of_spawns: Vec<usize> = of_spawns.collect();
     let decides = |local: &usize| {
@@ -157,7 +154,7 @@ pub(crate) fn spawn_figures(space: &Space, row: &Row, expr: &Expr) -> Option<Int
 fn without_other_keys(space: &Space, row: &Row) -> Option<Arc<[usize]>> {
     let is_of_key = |rule: &usize| match &space.rules[*rule].body {
         RuleBody::Moves { state, .. } => space.states[*state].key.is_some(),
-        RuleBody::Holds(_) | RuleBody::During(_) => false,
+        RuleBody::Holds(_) | RuleBody::During(_) | RuleBody::Phases { .. } => false,
     };
     if !row.rules.iter().any(is_of_key) {
         return None;
@@ -165,7 +162,7 @@ fn without_other_keys(space: &Space, row: &Row) -> Option<Arc<[usize]>> {
     let set = space.cells_set(row.action, &declared(space, row));
     let is_other = |rule: &usize| match &space.rules[*rule].body {
         RuleBody::Moves { cell, .. } => is_of_key(rule) && !set.contains(cell),
-        RuleBody::Holds(_) | RuleBody::During(_) => false,
+        RuleBody::Holds(_) | RuleBody::During(_) | RuleBody::Phases { .. } => false,
     };
     let kept: Arc<[usize]> = row.rules.iter().filter(|rule| !is_other(rule)).copied().collect();
     (kept.len() < row.rules.len()).then_some(kept)

@@ -2,7 +2,9 @@
 
 use core::ops::RangeInclusive;
 
-use crate::model::{Interval, ORDER_RATE_MPS2, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, code, effort};
+use crate::model::command::OFFSET_M;
+use crate::model::vocabulary::Word;
+use crate::model::{Interval, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, code, effort};
 use crate::prove::reach::spawn_figures;
 use crate::syntax::Diagnostic;
 use avastra_base::units::Rational;
@@ -20,22 +22,23 @@ pub(crate) fn is_out(space: &Space, action: usize) -> bool {
 fn errors(space: &Space, action: usize) -> impl Iterator<Item = Diagnostic> {
     let of_spawns = space.actions[action].spawns().flat_map(|spawn| {
         [
-            ("speed of a spawn", "m/s", &spawn.speed, &SPAWN_SPEED_MPS),
-            ("distance of a spawn", "m", &spawn.distance, &SPAWN_DISTANCE_M),
+            Some(("speed", "a spawn", "m/s", &spawn.speed, SPAWN_SPEED_MPS)),
+            Some(("distance", "a spawn", "m", &spawn.distance, SPAWN_DISTANCE_M)),
+            spawn.offset.as_ref().map(|offset| ("offset", "a spawn", "m", offset, OFFSET_M)),
         ]
     });
-    let of_orders = space.actions[action].orders().flat_map(|order| {
-        let rate = order.rate.as_ref().map(|rate| ("rate of an order", "m/s^2", rate, &ORDER_RATE_MPS2));
-        let speed = order.speed.as_ref().map(|speed| ("speed of an order", "m/s", speed, &SPAWN_SPEED_MPS));
-        speed.into_iter().chain(rate)
-    });
-    of_spawns.chain(of_orders).filter_map(move |(what, unit, expr, range)| {
+    let of_spawns = of_spawns.flatten();
+    let of_orders = space.actions[action]
+        .orders()
+        .flat_map(|order| order.command.figures())
+        .map(|figure| (figure.field.name(), "an order", figure.unit, figure.expr, figure.bounds));
+    of_spawns.chain(of_orders).filter_map(move |(what, whose, unit, expr, range)| {
         let mut rows = space.rows_of(action).iter().take_while(|_| !effort::is_spent());
         let (row, found) = rows.find_map(|row| {
             let found = spawn_figures(space, row, expr)?;
-            (!lies_in(&found, range)).then_some((row, found))
+            (!lies_in(&found, &range)).then_some((row, found))
         })?;
-        let message = format!("the {what} may lie out of bounds");
+        let message = format!("the {what} of {whose} may lie out of bounds");
         let error = Diagnostic::error(code::OUT_OF_BOUNDS, message)
             .at(expr.span, format!("{} in `{}`", found.shown(expr.ty, found.unit(expr.ty)), row.label))
             .note("rules do not count here: they can be switched off");

@@ -6,7 +6,9 @@
 
 use std::collections::BTreeMap;
 
+use crate::model::command::Figure;
 use crate::model::expr::{Expr, ExprKind};
+use crate::model::vocabulary::Manner;
 use crate::model::{
     Domain, EffectDef, ManoeuvreCall, Row, RuleBody, Space, SpawnDef, Value, WordExpr, code, effort,
 };
@@ -117,10 +119,15 @@ impl<'a> RowText<'a> {
                 format!("{} {then:?}", spawn_form(spawn, &|expr| self.reduced(expr)))
             }
             EffectDef::Order(order) => {
-                let rate = order.rate.as_ref().map(|rate| self.reduced(rate).kind);
-                let speed = order.speed.as_ref().map(|speed| self.reduced(speed).kind);
+                let figure =
+                    |figure: Figure<'_>| format!("{:?} {:?}", figure.field, self.reduced(figure.expr).kind);
+                let figures: Vec<String> = order.command.figures().map(figure).collect();
+                let lane =
+                    order.command.lane.as_ref().map(|lane| word_form(lane, &|expr| self.reduced(expr)));
                 let then = order.manoeuvre.as_ref().map(|then| self.call_form(then));
-                format!("order {} {speed:?} {rate:?} {then:?}", order.bearer)
+                let ignores = order.command.ignores.as_ref();
+                let ignores = ignores.map(|ignores| manners_form(ignores, &|expr| self.reduced(expr)));
+                format!("order {} {figures:?} {lane:?} {ignores:?} {then:?}", order.bearer)
             }
         });
         effects.collect::<Vec<_>>().join("\n")
@@ -143,7 +150,7 @@ impl<'a> RowText<'a> {
         }
         for rule in self.row.rules.iter() {
             match &self.space.rules[*rule].body {
-                RuleBody::Moves { .. } => parts.push(format!("rule {rule}")),
+                RuleBody::Phases { .. } | RuleBody::Moves { .. } => parts.push(format!("rule {rule}")),
                 RuleBody::Holds(bindings) | RuleBody::During(bindings) => {
                     let found = bindings.binary_search_by_key(&self.row.action, |binding| binding.action);
                     let condition = found.ok().map(|binding| self.reduced(&bindings[binding].condition));
@@ -157,28 +164,36 @@ impl<'a> RowText<'a> {
     }
 }
 
-fn spawn_form(spawn: &SpawnDef, reduced: &impl Fn(&Expr) -> Expr) -> String {
-    fn word<W: Copy + core::fmt::Debug>(word: &WordExpr<W>, reduced: &impl Fn(&Expr) -> Expr) -> String {
-        match word {
-            WordExpr::Fixed(word) => format!("{word:?}"),
-            WordExpr::Of(expr, words) => match reduced(expr) {
-                Expr { kind: ExprKind::Variant(_, variant), .. } => format!("{:?}", words[variant]),
-                expr => format!("{:?} of {words:?}", expr.kind),
-            },
-        }
+fn word_form<W: Copy + core::fmt::Debug>(word: &WordExpr<W>, reduced: &impl Fn(&Expr) -> Expr) -> String {
+    match word {
+        WordExpr::Fixed(word) => format!("{word:?}"),
+        WordExpr::Of(expr, words) => match reduced(expr) {
+            Expr { kind: ExprKind::Variant(_, variant), .. } => format!("{:?}", words[variant]),
+            expr => format!("{:?} of {words:?}", expr.kind),
+        },
     }
+}
+
+fn manners_form(ignores: &[WordExpr<Manner>], reduced: &impl Fn(&Expr) -> Expr) -> String {
+    let ignored: Vec<String> = ignores.iter().map(|manner| word_form(manner, reduced)).collect();
+    ignored.join(" ")
+}
+
+fn spawn_form(spawn: &SpawnDef, reduced: &impl Fn(&Expr) -> Expr) -> String {
     format!(
-        "spawn {} {} {} {} {} {} {:?} {:?} {} {} {:?}",
-        word(&spawn.body, reduced),
-        word(&spawn.colour, reduced),
-        word(&spawn.verb, reduced),
-        word(&spawn.lane, reduced),
-        word(&spawn.side, reduced),
-        word(&spawn.then, reduced),
+        "spawn {} {} {} {} {} {} {:?} {:?} {:?} {} {} {} {:?}",
+        word_form(&spawn.body, reduced),
+        word_form(&spawn.colour, reduced),
+        word_form(&spawn.verb, reduced),
+        word_form(&spawn.lane, reduced),
+        word_form(&spawn.side, reduced),
+        word_form(&spawn.then, reduced),
         reduced(&spawn.speed).kind,
         reduced(&spawn.distance).kind,
+        spawn.offset.as_ref().map(|offset| reduced(offset).kind),
+        manners_form(&spawn.ignores, reduced),
         spawn.behind,
-        spawn.cover.as_ref().map_or(String::new(), |cover| word(cover, reduced)),
+        spawn.cover.as_ref().map_or(String::new(), |cover| word_form(cover, reduced)),
         spawn.bearer,
     )
 }

@@ -12,6 +12,7 @@ use std::cell::Cell;
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
+use crate::model::command::OFFSET_M;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Before, Candidate, Choose, Demand, Nearest, Room, RowRules, cells_read};
 use crate::model::{
@@ -302,7 +303,8 @@ impl Search<'_> {
         for spawn in action.spawns() {
             let speed_mps = rounded_into(number(&spawn.speed), SPAWN_SPEED_MPS);
             let distance_m = rounded_into(number(&spawn.distance), SPAWN_DISTANCE_M);
-            if spawn_out_of_bounds(speed_mps, distance_m).is_some() {
+            let offset_m = spawn.offset.as_ref().map_or(0.0, |offset| rounded_into(number(offset), OFFSET_M));
+            if spawn_out_of_bounds(speed_mps, distance_m, offset_m).is_some() {
                 return false;
             }
             // The spawn lands where it was asked to, and no gap is unfair.
@@ -411,7 +413,7 @@ impl Search<'_> {
             set.key.iter().chain([&set.value]).for_each(&mut named);
         }
         for spawn in self.action().spawns() {
-            [&spawn.speed, &spawn.distance].into_iter().for_each(&mut named);
+            [&spawn.speed, &spawn.distance].into_iter().chain(&spawn.offset).for_each(&mut named);
         }
         for (_, demand) in self.rules.demands() {
             match demand {

@@ -42,6 +42,8 @@ pub enum Enforcement {
     Transition,
     /// On every lane change that an action commanded, when it would begin.
     Change,
+    /// On every phase of a manoeuvre, when it would begin.
+    Phase,
 }
 
 /// Audits every rule of the table's space.
@@ -54,6 +56,7 @@ pub fn audit(table: &ActionTable) -> Audit {
         let enforced = match &rule.body {
             RuleBody::Moves { .. } => Enforcement::Transition,
             RuleBody::During(_) => Enforcement::Change,
+            RuleBody::Phases { .. } => Enforcement::Phase,
             RuleBody::Holds(bindings)
                 if bindings.iter().any(|binding| binding.condition.known() > Known::Road) =>
             {
@@ -93,6 +96,7 @@ impl fmt::Display for Audit {
                 Enforcement::Survey => "every draw, in the world",
                 Enforcement::Transition => "every transition",
                 Enforcement::Change => "every lane change, as it begins",
+                Enforcement::Phase => "every phase of its manoeuvre, as it begins",
             };
             write!(f, "{:width$}  binds {:>3} rows, enforced on {enforced}", rule.name, rule.rows.len())?;
             if rule.from_the_start {

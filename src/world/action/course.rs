@@ -1,8 +1,9 @@
 //! The manoeuvre that a road user does, with the values that its action gave it. The world asks it at every tick; it holds
 //! no state itself.
 
+use avastra_lang::model::command::Command;
 use avastra_lang::model::expr::Expr;
-use avastra_lang::model::{ORDER_RATE_MPS2, PhaseDef, SPAWN_SPEED_MPS, Value};
+use avastra_lang::model::{PhaseDef, Value};
 
 use super::later::{Later, LaterMoment};
 
@@ -10,6 +11,8 @@ use super::later::{Later, LaterMoment};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Course {
     pub(super) phases: Vec<PhaseDef>,
+    /// The rules in force on the moments at which phases begin.
+    pub(super) rules: Vec<Expr>,
     pub(super) later: Later,
 }
 
@@ -25,9 +28,9 @@ impl Course {
 
     /// The names of road users that a phase asks about.
     pub fn bearers(&self, phase: usize) -> Vec<usize> {
-        let PhaseDef { once, within, after, speed, rate } = &self.phases[phase];
-        let parts = once.iter().chain(within).chain(after).chain([speed]).chain(rate);
-        parts.flat_map(Expr::bearers).collect()
+        let PhaseDef { once, within, after, command } = &self.phases[phase];
+        let parts = once.iter().chain(within).chain(after).chain(command.parts());
+        parts.chain(&self.rules).flat_map(Expr::bearers).collect()
     }
 
     /// Whether what a phase waits for has come.
@@ -45,19 +48,15 @@ impl Course {
         self.phases[phase].after.as_ref().map_or(0.0, |after| not_negative(self.later.value(after, moment)))
     }
 
-    /// The speed that a phase goes over to, m/s, and how fast, m/s²: as asked for, within what an order may ask. `None` for
-    /// a speed without a value.
-    pub fn wants(&self, phase: usize, moment: &LaterMoment) -> Option<(f64, Option<f64>)> {
-        let PhaseDef { speed, rate, .. } = &self.phases[phase];
-        let within = |value: Value, range: core::ops::RangeInclusive<f64>| {
-            let number = value.number();
-            (!number.is_nan()).then(|| number.clamp(*range.start(), *range.end()))
-        };
-        let speed_mps = within(self.later.value(speed, moment), SPAWN_SPEED_MPS)?;
-        Some((
-            speed_mps,
-            rate.as_ref().and_then(|rate| within(self.later.value(rate, moment), ORDER_RATE_MPS2)),
-        ))
+    /// Whether the rules let a phase begin.
+    pub fn may_begin(&self, moment: &LaterMoment) -> bool {
+        self.rules.iter().all(|rule| self.later.value(rule, moment).truth())
+    }
+
+    /// What a phase tells the vehicle, within what an order may say. `None` if its speed or its offset has no value; a
+    /// `rate` or an `aside` without one is left out.
+    pub fn command(&self, phase: usize, moment: &LaterMoment) -> Option<Command> {
+        self.later.command(&self.phases[phase].command, moment).within_bounds()
     }
 }
 

@@ -9,14 +9,15 @@ use crate::action::{Course, Effect, LaneChangeRules, OrderRequest, SpawnRequest}
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 use avastra_lang::model::body::OwnBody;
+use avastra_lang::model::command::{Manners, OFFSET_M};
 use avastra_lang::model::expr::Expr;
 use avastra_lang::model::rules::{
     Before, Candidate, Choose, Clause, Nearest, Room, RowRules, TRIES_MAX, Unsolved,
 };
 use avastra_lang::model::{
-    ActionDef, BodyWord, Domain, EffectDef, Facts, ManoeuvreCall, Memory, MomentFacts, NpcFacts,
-    ORDER_RATE_MPS2, OrderDef, Parameter, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value,
-    WorldFacts, evaluate, locals, order_out_of_bounds, rounded_into, spawn_out_of_bounds,
+    ActionDef, BodyWord, Domain, EffectDef, Facts, ManoeuvreCall, Memory, MomentFacts, NpcFacts, OrderDef,
+    Parameter, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value, WorldFacts, evaluate, locals,
+    rounded_into, spawn_out_of_bounds,
 };
 
 /// Draws of one row in a step before the row is refused. Every draw obeys what can be known before; a further one
@@ -40,14 +41,12 @@ impl<'a> Judge<'a> {
         let row = &space.rows[row];
         let action = &space.actions[row.action];
         let row = RowRules { space, row, road: Some(&situation.road.facts), in_force: situation.rules };
-        let asked = || {
-            let wheres = action.parameters.iter().filter_map(|parameter| parameter.condition.as_ref());
-            wheres.chain(row.demands().filter_map(|(_, demand)| demand.condition()))
-        };
-        let asks_who = |who: &usize| asked().any(|condition| condition.bearers().contains(who));
+        let in_force = |clause: &&Clause| clause.rule().is_none_or(|rule| situation.rules.contains(rule));
+        let asked = || space.clauses[row.row.action].iter().filter(in_force);
+        let asks_who = |who: &usize| asked().any(|clause| clause.bearers.contains(who));
         let facts = |who: usize| Some((who, situation.surroundings.bearer(who)?));
         let bearers = (0..space.bearers.len()).filter(asks_who).filter_map(facts).collect();
-        let moment = match asked().any(Expr::asks_the_world) {
+        let moment = match asked().any(|clause| clause.asks_the_world) {
             true => situation.surroundings.moment(),
             false => MomentFacts::default(),
         };
@@ -163,7 +162,8 @@ impl<'a> Judge<'a> {
                     continue;
                 }
             };
-            if let Some(reason) = spawn_out_of_bounds(request.speed_mps, request.distance_m) {
+            if let Some(reason) = spawn_out_of_bounds(request.speed_mps, request.distance_m, request.offset_m)
+            {
                 refusals.push(refuse(None, reason));
                 continue;
             }
@@ -217,7 +217,8 @@ impl<'a> Judge<'a> {
             let facts = self.facts(values, after);
             let value = |argument: &Expr| evaluate(argument, &space.functions, &facts);
             let later = self.later(call.arguments.iter().map(value).collect());
-            Arc::new(Course { phases: space.manoeuvres[call.manoeuvre].phases.clone(), later })
+            let rules = self.row.on_phases(call.manoeuvre).cloned().collect();
+            Arc::new(Course { phases: space.manoeuvres[call.manoeuvre].phases.clone(), rules, later })
         };
         places.zip(calls).filter_map(|(at, call)| Some((at, course(call?)))).collect()
     }
@@ -283,18 +284,19 @@ impl<'a> Judge<'a> {
             speed_mps: rounded_into(evaluate(&spawn.speed, functions, &facts).number(), SPAWN_SPEED_MPS),
             distance_m: rounded_into(evaluate(&spawn.distance, functions, &facts).number(), SPAWN_DISTANCE_M),
             cover: cover.map(|cover| cover.like),
+            offset_m: spawn
+                .offset
+                .as_ref()
+                .map_or(0.0, |offset| rounded_into(evaluate(offset, functions, &facts).number(), OFFSET_M)),
+            ignores: Manners::of(spawn.ignores.iter().map(|manner| manner.word(functions, &facts))),
             bearer: spawn.bearer,
         }
     }
 
     fn order(&self, order: &OrderDef, locals: &[Value], after: &Memory) -> OrderRequest {
         let facts = self.facts(locals, after);
-        let number = |expr: &Expr| evaluate(expr, &self.row.space.functions, &facts).number();
-        OrderRequest {
-            bearer: order.bearer,
-            speed_mps: order.speed.as_ref().map(|speed| rounded_into(number(speed), SPAWN_SPEED_MPS)),
-            rate_mps2: order.rate.as_ref().map(|rate| rounded_into(number(rate), ORDER_RATE_MPS2)),
-        }
+        let command = order.command.evaluate(&self.row.space.functions, &facts);
+        OrderRequest { bearer: order.bearer, command }
     }
 
     /// Why an order cannot be given after the effects before it. A vehicle that one of them spawns under that name is there.
@@ -303,13 +305,15 @@ impl<'a> Judge<'a> {
             Effect::Spawn(request) => request.bearer == Some(order.bearer) && request.body.is_vehicle(),
             Effect::Time(_) | Effect::Sky(..) | Effect::Order(_) => false,
         };
-        let out = order_out_of_bounds(order.speed_mps, order.rate_mps2);
-        out.or_else(|| {
-            let surroundings = self.situation.surroundings;
-            let reason = (!before.iter().any(appears)).then(|| surroundings.order_refusal(order))??;
-            Some(format!("cannot order `{}`: {reason}", self.row.space.bearers[order.bearer]))
-        })
-        .map(|reason| refuse(None, reason))
+        order
+            .command
+            .out_of_bounds()
+            .or_else(|| {
+                let surroundings = self.situation.surroundings;
+                let reason = (!before.iter().any(appears)).then(|| surroundings.order_refusal(order))??;
+                Some(format!("cannot order `{}`: {reason}", self.row.space.bearers[order.bearer]))
+            })
+            .map(|reason| refuse(None, reason))
     }
 
     /// What the world says before it is asked about spawns.

@@ -1,6 +1,7 @@
 //! What a row does to the world once its parameters are drawn.
 
 use avastra_lang::model::body::OwnBody;
+use avastra_lang::model::command::{Command, Manners};
 use avastra_lang::model::expr::Expr;
 use avastra_lang::model::vocabulary::{
     Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb,
@@ -24,10 +25,8 @@ pub enum Effect {
 pub struct OrderRequest {
     /// The name, by its index in the space.
     pub bearer: usize,
-    /// m/s; `None` for an order of a manoeuvre alone.
-    pub speed_mps: Option<f64>,
-    /// How fast it goes over to that speed, m/s², as far as its body and the road allow. `None`: as it drives by itself.
-    pub rate_mps2: Option<f64>,
+    /// Empty for an order of a manoeuvre alone.
+    pub command: Command,
 }
 
 /// A road user that is to appear.
@@ -51,6 +50,10 @@ pub struct SpawnRequest {
     pub cover_own: Option<OwnBody>,
     /// A vehicle that is parked with it, so that it steps out from behind; for `Walk` alone.
     pub cover: Option<Body>,
+    /// m to the left of the middle of its lane.
+    pub offset_m: f64,
+    /// The rules of the road that it ignores.
+    pub ignores: Manners,
     /// The name that it bears, by its index in the space.
     pub bearer: Option<usize>,
 }

@@ -1,5 +1,6 @@
 //! What is asked after the draw: by a driver before it changes lanes, by a manoeuvre at every tick.
 
+use avastra_lang::model::command::{Command, CommandDef};
 use avastra_lang::model::expr::Expr;
 use avastra_lang::model::{
     Facts, FnDef, Memory, MomentFacts, NpcFacts, RoadFacts, SpawnFacts, Value, WorldFacts, evaluate,
@@ -28,6 +29,14 @@ pub struct LaterMoment {
 
 impl Later {
     pub fn value(&self, expr: &Expr, moment: &LaterMoment) -> Value {
+        self.at(moment, |facts| evaluate(expr, &self.functions, facts))
+    }
+
+    pub fn command(&self, command: &CommandDef, moment: &LaterMoment) -> Command {
+        self.at(moment, |facts| command.evaluate(&self.functions, facts))
+    }
+
+    fn at<T>(&self, moment: &LaterMoment, ask: impl FnOnce(&Facts<'_>) -> T) -> T {
         let LaterMoment { moment, npc, bearers } = moment;
         let step = (moment.elapsed_s * 1000.0).round() as u64 / self.step_ms.max(1);
         let world = WorldFacts { moment: *moment, step, bearers: bearers.clone(), ..WorldFacts::default() };
@@ -40,6 +49,6 @@ impl Later {
             spawn: Some(spawn),
             ..Facts::new(&self.locals, &memory)
         };
-        evaluate(expr, &self.functions, &facts)
+        ask(&facts)
     }
 }

@@ -24,6 +24,10 @@ const LEVEL_STEPS: u32 = 25;
 /// Stretch of the route before and behind the ego vehicle on which others meet it, m.
 const LEVEL_REACH_M: f64 = 200.0;
 
+/// A road user is looked for on so many times the straight way to it along the route, and this much more, m.
+const WINDING: f64 = 2.0;
+const BESIDE_M: f64 = 50.0;
+
 /// The world around one road user during one tick, or around a newcomer that is not in it yet.
 #[derive(Clone, Copy)]
 pub(super) struct Around<'a> {
@@ -98,6 +102,17 @@ impl Around<'_> {
             }
         }
         is_apart_at(beside(user.obstacle.outline.pose.position).station_m, user.obstacle.elevation_m)
+    }
+
+    /// Where a place lies beside the ego vehicle's route: the station, how far to the left, m, and the unit vector along the
+    /// route there. Before its start and beyond its end the route goes on straight.
+    pub fn beside_route(&self, position: Vec2) -> (f64, f64, Vec2) {
+        let path = &self.scene.route.path;
+        let away_m = (position - self.ego_outline.pose.position).norm();
+        let near_m = path.project_near(position, self.ego_station_m, BESIDE_M + WINDING * away_m).station_m;
+        let (point, along) = path.along(near_m);
+        let aside = position - point;
+        (near_m + along.dot(&aside), along.perp(&aside), along)
     }
 
     /// The ego vehicle and every obstacle.

@@ -27,6 +27,7 @@ mod ego;
 mod environment;
 mod incident;
 mod junction;
+mod lanes;
 mod moment;
 mod npc;
 mod pedestrian;

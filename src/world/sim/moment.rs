@@ -1,10 +1,12 @@
 //! What can be asked about a moment: the facts of the ego vehicle and its surroundings, and those of another road
 //! user. Rules, policies and the paper's state variables read the same ones.
 
+use avastra_lang::model::command::Manners;
 use avastra_lang::model::vocabulary::Light;
-use avastra_lang::model::{MomentFacts, NpcFacts, OnRoute, junction_ahead_m};
+use avastra_lang::model::{MomentFacts, NpcFacts, OnRoute, TIME_S_MAX, junction_ahead_m};
 
 use super::around::Around;
+use super::ego::VehicleParameters;
 use super::npc::Driver;
 use super::road_user::{Motion, Obstacle};
 use super::sense::SignalColour;
@@ -55,9 +57,13 @@ impl Around<'_> {
             ego_junction_ahead_m: junction_ahead_m,
             ego_route_left_m: route_left_m,
             ego_offset_m: self.ego_offset_m,
+            ego_front_m: VehicleParameters::MKZ.front_m(self.ego_station_m),
+            ego_rear_m: VehicleParameters::MKZ.rear_m(self.ego_station_m),
             ego_light: self.light(signal),
             ego_road: road,
             road_users: self.obstacles_on_level().count() as u32,
+            rule_breakers: self.drivers().filter(|(.., driver)| driver.ignores != Manners::default()).count()
+                as u32,
             nearest_gap_m: nearest.map_or(NO_ROAD_USER_M, |(gap_m, _)| gap_m),
             nearest_speed_mps: nearest.map_or(0.0, |(_, speed_mps)| speed_mps),
             // The number nearest to the exact time, so that `elapsed >= 0.7 s` holds at 0.7 s.
@@ -82,7 +88,7 @@ impl Around<'_> {
 }
 
 /// The same moment with one road user more: the one that looked around, and did not count itself.
-pub(super) fn with_itself(moment: MomentFacts, this: &Obstacle) -> MomentFacts {
+pub(super) fn with_itself(moment: MomentFacts, this: &Obstacle, driver: &Driver) -> MomentFacts {
     if this.is_apart {
         return moment;
     }
@@ -91,7 +97,13 @@ pub(super) fn with_itself(moment: MomentFacts, this: &Obstacle) -> MomentFacts {
         true => (this.distance_m, this.velocity_mps.norm()),
         false => (moment.nearest_gap_m, moment.nearest_speed_mps),
     };
-    MomentFacts { road_users: moment.road_users + 1, nearest_gap_m, nearest_speed_mps, ..moment }
+    MomentFacts {
+        road_users: moment.road_users + 1,
+        rule_breakers: moment.rule_breakers + u32::from(driver.ignores != Manners::default()),
+        nearest_gap_m,
+        nearest_speed_mps,
+        ..moment
+    }
 }
 
 /// The facts of a road user. One on foot has those of the ego vehicle's route beside it.
@@ -102,7 +114,7 @@ pub(super) fn npc_facts(around: &Around, obstacle: &Obstacle, motion: &Motion) -
         Motion::Walk(_) | Motion::Stand => {
             let station_m = scene.route.path.project(obstacle.outline.pose.position).station_m;
             let beside = OnRoute::at(&scene.map, &scene.route, station_m);
-            facts(obstacle, beside.limit_mps, beside.junction_ahead_m)
+            facts(around, obstacle, beside.limit_mps, beside.junction_ahead_m)
         }
     }
 }
@@ -118,12 +130,37 @@ pub(super) fn driver_facts(around: &Around, obstacle: &Obstacle, driver: &Driver
         (lane, from_m)
     });
     let ahead_m = junction_ahead_m(&scene.map, ahead, station_m);
-    facts(obstacle, way.limit_mps(scene, station_m), ahead_m)
+    facts(around, obstacle, way.limit_mps(scene, station_m), ahead_m)
 }
 
-fn facts(obstacle: &Obstacle, limit_mps: f64, junction_ahead_m: f64) -> NpcFacts {
-    let (speed_mps, gap_m) = (obstacle.velocity_mps.norm(), obstacle.distance_m);
-    NpcFacts { speed_mps, gap_m, junction_ahead_m, limit_mps }
+fn facts(around: &Around, obstacle: &Obstacle, limit_mps: f64, junction_ahead_m: f64) -> NpcFacts {
+    let (station_m, offset_m, along) = around.beside_route(obstacle.outline.pose.position);
+    let (half_length_m, _) = obstacle.outline.half_extent_m(obstacle.forward, along);
+    let (front_m, rear_m) = (station_m + half_length_m, station_m - half_length_m);
+    let ego = VehicleParameters::MKZ;
+    let (ego_front_m, ego_rear_m) = (ego.front_m(around.ego_station_m), ego.rear_m(around.ego_station_m));
+    // The way between the two, and the speeds of the one behind and of the one before, along the route.
+    let (ego_mps, other_mps) = (around.ego.speed_mps, along.dot(&obstacle.velocity_mps));
+    let (between_m, behind_mps, before_mps) = match rear_m >= ego_front_m {
+        true => (rear_m - ego_front_m, ego_mps, other_mps),
+        false => (ego_rear_m - front_m, other_mps, ego_mps),
+    };
+    let takes_s = |speed_mps: f64| match between_m <= 0.0 {
+        true => 0.0,
+        false if speed_mps > 0.0 => (between_m / speed_mps).min(TIME_S_MAX),
+        false => TIME_S_MAX,
+    };
+    NpcFacts {
+        speed_mps: obstacle.velocity_mps.norm(),
+        gap_m: obstacle.distance_m,
+        junction_ahead_m,
+        limit_mps,
+        front_m,
+        rear_m,
+        offset_m,
+        ttc_s: takes_s(behind_mps - before_mps),
+        headway_s: takes_s(behind_mps),
+    }
 }
 
 #[cfg(test)]
@@ -131,7 +168,7 @@ mod tests {
     use std::path::Path;
     use std::sync::Arc;
 
-    use crate::action::{ActionTable, Situation};
+    use crate::action::{ActionTable, Draw, Situation};
     use crate::sim::{Control, DT_S, Scene, World, testing};
     use avastra_lang::check::{ReadError, load};
     use avastra_lang::model::vocabulary::{Light, RoadKind, Verb};
@@ -206,13 +243,12 @@ mod tests {
                 Situation { memory: &memory, road, rules: &rules, surroundings: &world, seed: 1, step: 0 };
             for row in space.rows.iter().filter(is_changer) {
                 let Ok(draw) = table.offer(&situation, row.index) else { continue };
-                let rules = draw.lane_changes.as_ref().expect("the rule binds it");
+                assert!(draw.lane_changes.is_some(), "the rule binds it");
                 for binds in [true, false] {
                     let mut world = world.clone();
-                    let id = world.apply(&draw.effects[0]).expect("it is legal").expect("it spawns");
-                    if binds {
-                        world.bind_lane_changes(id, rules);
-                    }
+                    let lane_changes = draw.lane_changes.clone().filter(|_| binds);
+                    let draw = Draw { lane_changes, ..draw.clone() };
+                    let (_, id) = world.carry_out(&draw).expect("it is legal")[0];
                     let Some(begin) = first_change(&mut world, id) else { continue };
                     let holds = begin.junction_ahead_m >= 40.0 && begin.gap_m >= 12.0;
                     assert!(!binds || holds, "{}: {begin:?}", row.label);

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::action::{Course, LaterMoment};
 use avastra_base::geometry::{OrientedBox, Pose, Sweep, Vec2, distance_m, unit_vector};
 use avastra_base::kinematics::GRAVITY_MPS2;
+use avastra_lang::model::command::Command;
 use avastra_lang::model::vocabulary::{Body, Colour, Verb};
 use avastra_road::is_apart;
 
@@ -107,10 +108,10 @@ pub(super) struct Running {
 enum Stage {
     /// Until what the phase waits for has come.
     Waiting,
-    /// Until this tick.
+    /// Until this tick, and until the rules let the phase begin.
     Holding(u64),
-    /// Until the road user has this speed, m/s.
-    Changing(f64),
+    /// Until the road user has done what it was told.
+    Changing(Command),
 }
 
 impl Running {
@@ -123,12 +124,14 @@ impl Running {
         self.course.bearers(self.phase)
     }
 
-    /// Goes on at a tick. Gives what is left of it, and the speed and rate that a phase which begins now wants.
+    /// Goes on at a tick, in which the driver is or is not aside as it was told. Gives what is left of it, and what a phase
+    /// that begins now tells the driver.
     pub fn advance(
         mut self,
         moment: &LaterMoment,
+        is_aside: bool,
         tick: u64,
-    ) -> (Option<Running>, Option<(f64, Option<f64>)>) {
+    ) -> (Option<Running>, Option<Command>) {
         loop {
             match self.stage {
                 Stage::Waiting if self.course.has_come(self.phase, moment) => {
@@ -141,13 +144,15 @@ impl Running {
                         self.course.within_s(self.phase, moment).is_some_and(|most_s| waited_s >= most_s);
                     return (if is_over { None } else { Some(self) }, None);
                 }
-                Stage::Holding(until) if tick >= until => {
-                    let Some(wanted) = self.course.wants(self.phase, moment) else { return (None, None) };
-                    (self.stage, self.since) = (Stage::Changing(wanted.0), tick);
-                    return (Some(self), Some(wanted));
+                Stage::Holding(until) if tick >= until && self.course.may_begin(moment) => {
+                    let Some(command) = self.course.command(self.phase, moment) else { return (None, None) };
+                    (self.stage, self.since) = (Stage::Changing(command), tick);
+                    return (Some(self), Some(command));
                 }
-                Stage::Changing(speed_mps)
-                    if tick > self.since && has_speed(moment.npc.speed_mps, speed_mps) =>
+                Stage::Changing(command)
+                    if tick > self.since
+                        && command.speed_mps.is_none_or(|mps| has_speed(moment.npc.speed_mps, mps))
+                        && (is_aside || !command.goes_aside()) =>
                 {
                     self.phase += 1;
                     (self.stage, self.since) = (Stage::Waiting, tick);
@@ -165,7 +170,10 @@ impl Running {
         match self.stage {
             Stage::Waiting => trace.words([0, 0]),
             Stage::Holding(until) => trace.words([1, until]),
-            Stage::Changing(speed_mps) => trace.words([2, speed_mps.to_bits()]),
+            Stage::Changing(command) => {
+                trace.words([2, command.speed_mps.map_or(u64::MAX, f64::to_bits)]);
+                trace.word(u64::from(command.goes_aside()));
+            }
         }
         trace.words(self.course.arguments());
     }

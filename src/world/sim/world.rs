@@ -1,6 +1,7 @@
 //! The world of one episode, and what a tick does to it. `world/playback` moves it by a recording, `world/survey`
 //! answers what drawing asks.
 
+mod commands;
 mod playback;
 mod survey;
 #[cfg(any(test, feature = "testing"))]
@@ -10,7 +11,6 @@ mod tests;
 
 use std::sync::Arc;
 
-use crate::action::{Course, Effect, LaneChangeRules, LaterMoment, OrderRequest, SpawnRequest};
 use avastra_base::geometry::{Frame, OrientedBox, Pose, Sweep, Vec2};
 use avastra_base::rng;
 use avastra_base::rng::Stream;
@@ -26,10 +26,8 @@ use super::ego::{Control, Ego, VehicleParameters};
 use super::environment::Environment;
 use super::incident::{Bump, Incident, bump, exchange, impact};
 use super::moment::npc_facts;
-use super::placement;
-use super::placement::Arrivals;
 use super::right_of_way::PassedLight;
-use super::road_user::{Motion, Moved, Obstacle, RoadUser, Running};
+use super::road_user::{Moved, Obstacle, RoadUser};
 use super::scene::Scene;
 use super::sense::{
     Conditions, EgoMotion, FRAME_S, FRAME_TICKS, RANGE_M, Sensed, SensedObject, SignalColour,
@@ -50,10 +48,6 @@ pub const DT_S: f64 = TICK_MS as f64 / 1000.0;
 pub(super) const fn ticks(time_s: f64) -> u64 {
     (time_s / DT_S + 0.5) as u64
 }
-
-/// Commanded obstacles at a time. For the next one, the oldest that is out of sight leaves; in the published package the
-/// oldest leaves wherever it is.
-const OBSTACLES_MAX: usize = COMMANDED_MAX as usize;
 
 /// What stands farther ahead than this on the route does not block the ego vehicle, m: a queue of five cars.
 const QUEUE_M: f64 = 40.0;
@@ -164,7 +158,7 @@ impl World {
             conditions: environment.conditions(speed_mps),
             environment,
             signals: SignalClock::new(start.signal_phase_s),
-            users: Vec::with_capacity(OBSTACLES_MAX),
+            users: Vec::with_capacity(COMMANDED_MAX as usize),
             next_id: 1,
             ambient: Ambient::new(start.ambient),
             traffic: start.traffic,
@@ -230,23 +224,6 @@ impl World {
         &self.contacts
     }
 
-    /// Carries out an effect.
-    ///
-    /// # Errors
-    /// Why a spawn or an order is impossible; the world is then unchanged. Otherwise the id of the newcomer, if there is
-    /// one.
-    pub fn apply(&mut self, effect: &Effect) -> Result<Option<u32>, String> {
-        match effect {
-            Effect::Time(time) => self.environment.time = *time,
-            Effect::Sky(phenomenon, level) => self.environment.set(*phenomenon, *level),
-            Effect::Spawn(request) => return self.spawn(request).map(Some),
-            Effect::Order(order) => return self.order(order).map(|()| None),
-        }
-        self.weather_tick = self.ticks + (self.traffic.weather_rest_s / DT_S).round() as u64;
-        self.conditions = self.environment.conditions(self.ego.motion.speed_mps);
-        Ok(None)
-    }
-
     /// Dimensions, mass and limits of a road user; `None` if there is none with that id.
     pub fn body(&self, id: u32) -> Option<&BodyParameters> {
         self.users.iter().find(|user| user.obstacle.id == id).map(|user| &user.mover.size)
@@ -304,14 +281,6 @@ impl World {
     /// The road user with an id, if it is there.
     pub fn obstacle(&self, id: u32) -> Option<&Obstacle> {
         self.obstacles().find(|obstacle| obstacle.id == id)
-    }
-
-    /// Binds the lane changes of a road user that just appeared by rules.
-    pub fn bind_lane_changes(&mut self, id: u32, rules: &Arc<LaneChangeRules>) {
-        let user = self.users.iter_mut().find(|user| user.obstacle.id == id);
-        if let Some(Motion::Drive(driver)) = user.map(|user| &mut user.mover.motion) {
-            driver.lane_changes = Some(Arc::clone(rules));
-        }
     }
 
     /// What can be asked about the road user with an id, if it is there.
@@ -498,103 +467,6 @@ impl World {
             traffic: &self.traffic,
             seed: self.seed,
         }
-    }
-
-    fn spawn(&mut self, request: &SpawnRequest) -> Result<u32, String> {
-        let leave = self.make_room(request)?;
-        let placed = placement::place(&self.alone(), &Arrivals::default(), request, self.next_id)?;
-        for index in leave.into_iter().rev() {
-            self.users.remove(index);
-        }
-        let mut asked = placed.asked;
-        asked.mover.bearer = request.bearer;
-        let id = self.next_id;
-        self.next_id += 1 + u32::from(placed.cover.is_some());
-        self.users.extend([asked].into_iter().chain(placed.cover));
-        self.look();
-        Ok(id)
-    }
-
-    /// The index of the road user that an order is for, which drives.
-    ///
-    /// # Errors
-    /// Why it cannot be ordered, in words that complete "cannot order `NAME`: …".
-    fn ordered(&self, order: &OrderRequest) -> Result<usize, String> {
-        let index = self.bearer(order.bearer).ok_or("no road user of that name is there")?;
-        let mover = &self.users[index].mover;
-        match mover.motion {
-            _ if mover.is_wreck() => Err("it is a wreck".to_owned()),
-            Motion::Drive(_) => Ok(index),
-            Motion::Walk(_) | Motion::Stand => Err("it is on foot".to_owned()),
-        }
-    }
-
-    fn order(&mut self, order: &OrderRequest) -> Result<(), String> {
-        let index = self.ordered(order)?;
-        let mover = &mut self.users[index].mover;
-        // The phases that are left of a manoeuvre are dropped.
-        mover.course = None;
-        if let (Motion::Drive(driver), Some(speed_mps)) = (&mut mover.motion, order.speed_mps) {
-            driver.order(speed_mps, order.rate_mps2);
-        }
-        Ok(())
-    }
-
-    /// Lets the road user with an id, or the one that an order was for, do a manoeuvre from now on.
-    pub fn begin_course(&mut self, id: Option<u32>, effect: &Effect, course: &Arc<Course>) {
-        let index = match (id, effect) {
-            (Some(id), _) => self.users.iter().position(|user| user.obstacle.id == id),
-            (None, Effect::Order(order)) => self.bearer(order.bearer),
-            (None, _) => None,
-        };
-        if let Some(index) = index {
-            self.users[index].mover.course = Some(Running::new(Arc::clone(course), self.ticks));
-        }
-    }
-
-    /// Moves on the manoeuvres of road users, which tells their drivers what to do.
-    fn direct(&mut self) {
-        let has_course = |user: &RoadUser| user.mover.course.is_some();
-        if !self.users.iter().any(has_course) {
-            return;
-        }
-        let moment = self.moment_facts();
-        for index in 0..self.users.len() {
-            let Some(running) = self.users[index].mover.course.take() else { continue };
-            let RoadUser { obstacle, mover } = &self.users[index];
-            if mover.is_wreck() {
-                continue;
-            }
-            let mut npc = npc_facts(&self.alone(), obstacle, &mover.motion);
-            if let Motion::Drive(driver) = &mover.motion {
-                npc.speed_mps = driver.speed_mps;
-            }
-            let facts = |who: usize| Some((who, self.bearer_facts(who)?));
-            let bearers = running.bearers().into_iter().filter_map(facts).collect();
-            let (running, wanted) = running.advance(&LaterMoment { moment, npc, bearers }, self.ticks);
-            let mover = &mut self.users[index].mover;
-            mover.course = running;
-            if let (Motion::Drive(driver), Some((speed_mps, rate_mps2))) = (&mut mover.motion, wanted) {
-                driver.order(speed_mps, rate_mps2);
-            }
-        }
-    }
-
-    /// Indices of the commanded obstacles that leave for new ones, if there are as many as there may be.
-    fn make_room(&self, request: &SpawnRequest) -> Result<Vec<usize>, String> {
-        let commanded = self.users.iter().enumerate().filter(|(_, user)| !user.obstacle.is_ambient());
-        let wanted = commanded.clone().count() + Effect::Spawn(*request).newcomers() as usize;
-        let too_many = wanted.saturating_sub(OBSTACLES_MAX);
-        let around = self.alone();
-        let is_hidden = |user: &RoadUser| {
-            self.traffic.oldest_leaves_in_sight
-                || !around.is_in_sight(&user.obstacle, user.mover.visible_fraction)
-        };
-        // What has a name is still wanted.
-        let is_spare = |user: &RoadUser| user.mover.bearer.is_none() && is_hidden(user);
-        let hidden = commanded.filter(|(_, user)| too_many > 0 && is_spare(user));
-        let oldest: Vec<usize> = hidden.take(too_many).map(|(index, _)| index).collect();
-        if oldest.len() < too_many { Err("ten road users are there already".into()) } else { Ok(oldest) }
     }
 
     /// Lets ambient traffic leave and appear; `begins` is before the first tick.

@@ -17,6 +17,10 @@ pub struct Clause {
     needs: Vec<usize>,
     /// Whether it depends on what the step does to the memory.
     pub reads_effects: bool,
+    /// Whether it asks about the moment in the world.
+    pub asks_the_world: bool,
+    /// The names of road users that it asks about, by index in `Space::bearers`.
+    pub bearers: Vec<usize>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,6 +32,12 @@ pub enum Source {
 }
 
 impl Clause {
+    fn new(source: Source, condition: Option<&Expr>, needs: Vec<usize>, reads_effects: bool) -> Clause {
+        let asks_the_world = condition.is_some_and(Expr::asks_the_world);
+        let bearers = condition.map(Expr::bearers).unwrap_or_default();
+        Clause { source, needs, reads_effects, asks_the_world, bearers }
+    }
+
     pub fn needs(&self, local: usize) -> bool {
         self.needs.contains(&local)
     }
@@ -57,7 +67,7 @@ pub(crate) fn clauses(space: &Space) -> Vec<Vec<Clause>> {
                 let (source, mut needs) = (Source::Where(parameter), locals(condition));
                 let read = states_read(condition, states);
                 let reads_effects = add_effects(&sets, states, read, &mut needs);
-                found.push(Clause { source, needs, reads_effects });
+                found.push(Clause::new(source, Some(condition), needs, reads_effects));
             }
         }
         for &rule in &binding[index] {
@@ -65,13 +75,15 @@ pub(crate) fn clauses(space: &Space) -> Vec<Vec<Clause>> {
             if effort::is_spent() {
                 break;
             }
-            let (mut needs, read) = match rules[rule].body.demand(index) {
+            let demand = rules[rule].body.demand(index);
+            let (mut needs, read) = match demand {
                 Some(Demand::Holds(condition)) => (locals(condition), states_read(condition, states)),
                 Some(Demand::Moves { state, .. }) => (Vec::new(), vec![state]),
                 None => continue,
             };
             let reads_effects = add_effects(&sets, states, read, &mut needs);
-            found.push(Clause { source: Source::Rule(rule), needs, reads_effects });
+            let condition = demand.and_then(Demand::condition);
+            found.push(Clause::new(Source::Rule(rule), condition, needs, reads_effects));
         }
         found
     };

@@ -79,7 +79,12 @@ impl<'a> Demand<'a> {
 impl RuleBody {
     /// Whether the rule binds the action.
     pub fn binds(&self, action: usize) -> bool {
-        self.demand(action).is_some() || self.during(action).is_some()
+        match self {
+            RuleBody::Holds(bindings) | RuleBody::During(bindings) => bound(bindings, action).is_some(),
+            RuleBody::Phases { actions, .. } | RuleBody::Moves { actions, .. } => {
+                actions.binary_search(&action).is_ok()
+            }
+        }
     }
 
     /// What must hold when a road user of the action changes lanes.
@@ -94,7 +99,7 @@ impl RuleBody {
             RuleBody::Holds(bindings) | RuleBody::During(bindings) => {
                 bindings.iter().map(|binding| binding.action).collect()
             }
-            RuleBody::Moves { actions, .. } => actions.clone(),
+            RuleBody::Phases { actions, .. } | RuleBody::Moves { actions, .. } => actions.clone(),
         }
     }
 
@@ -102,7 +107,7 @@ impl RuleBody {
     pub fn demand(&self, action: usize) -> Option<Demand<'_>> {
         match self {
             RuleBody::Holds(bindings) => bound(bindings, action).map(Demand::Holds),
-            RuleBody::During(_) => None,
+            RuleBody::During(_) | RuleBody::Phases { .. } => None,
             RuleBody::Moves { state, cell, allowed, actions } => {
                 let is_bound = actions.binary_search(&action).is_ok();
                 is_bound.then_some(Demand::Moves { state: *state, cell: *cell, allowed })
@@ -137,6 +142,15 @@ impl<'a> RowRules<'a> {
     pub fn during(self) -> impl Iterator<Item = &'a Expr> {
         let rules = self.in_force.on_row(self.row);
         rules.filter_map(move |rule| self.space.rules[rule].body.during(self.row.action))
+    }
+
+    /// The conditions in force under which phases of a manoeuvre may begin that the row gives to somebody.
+    pub fn on_phases(self, manoeuvre: usize) -> impl Iterator<Item = &'a Expr> {
+        let rules = self.in_force.on_row(self.row);
+        rules.filter_map(move |rule| match &self.space.rules[rule].body {
+            RuleBody::Phases { manoeuvre: of, condition, .. } if *of == manoeuvre => Some(condition),
+            _ => None,
+        })
     }
 
     /// The bounds on the numbers of the row: those of `where`s, and those of rules in force.

@@ -8,15 +8,17 @@ use std::sync::Arc;
 
 use crate::action::LaneChangeRules;
 use avastra_base::geometry::{
-    OrientedBox, Pose, SMOOTH_STEP_SLOPE_MAX, SmoothStep, Vec2, distance_m, smooth_step, wrap_angle,
+    OrientedBox, Pose, SMOOTH_STEP_BEND_MAX, SMOOTH_STEP_SLOPE_MAX, SmoothStep, Vec2, distance_m,
+    smooth_step, wrap_angle,
 };
-use avastra_base::kinematics::braking_m;
+use avastra_base::kinematics::{GRAVITY_MPS2, braking_m};
 use avastra_lang::model::vocabulary::Side;
 use avastra_road as road;
-use avastra_road::{Lane, LaneIndex, Neighbour, is_apart};
+use avastra_road::{Lane, LaneIndex, is_apart};
 
 use crate::sim::around::{Around, Other};
 use crate::sim::body::BodyParameters;
+use crate::sim::lanes::lane_beside;
 use crate::sim::moment::{driver_facts, with_itself};
 use crate::sim::road_user::Moved;
 use crate::sim::traffic::TrafficProfile;
@@ -69,11 +71,25 @@ pub(super) struct Change {
     pub duration_s: f64,
 }
 
+/// Whose wish a move to the side is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Whose {
+    /// The driver's own: it leaves others room.
+    Own,
+    /// It was told to, perhaps at a greatest speed to the side, m/s. Then it begins as soon as nobody is beside it.
+    Told(Option<f64>),
+}
+
 impl Change {
     /// The part of the change that is done on each metre of the way, at a speed.
     pub fn progress_per_m(&self, speed_mps: f64) -> f64 {
-        1.0 / (speed_mps.max(CHANGE_FULL_MPS) * self.duration_s)
+        per_m(speed_mps, self.duration_s)
     }
+}
+
+/// The part of a move to the side of this duration that is done on each metre of the way, at a speed.
+pub(super) fn per_m(speed_mps: f64, duration_s: f64) -> f64 {
+    1.0 / (speed_mps.max(CHANGE_FULL_MPS) * duration_s)
 }
 
 impl Driver {
@@ -83,8 +99,8 @@ impl Driver {
         let View { this, size, around } = *view;
         let Some(next) = self.plan.last() else {
             let Some(side) = self.wants_side(view) else { return };
-            if let Some(begun) = self.change_to(side, view) {
-                self.set_out(begun, view);
+            if let Some(begun) = self.change_to(side, Whose::Own, view) {
+                self.set_out(begun, Whose::Own, view);
             }
             return;
         };
@@ -96,39 +112,50 @@ impl Driver {
             }
         };
         let allowed = |rules: &Arc<LaneChangeRules>| {
-            rules.allow(with_itself(around.moment_facts(), this), driver_facts(around, this, self))
+            rules.allow(with_itself(around.moment_facts(), this, self), driver_facts(around, this, self))
         };
         if !due || !self.lane_changes.as_ref().is_none_or(allowed) {
             return;
         }
+        let change = |driver: &mut Driver, side| driver.change_to(side, Whose::Own, view);
         let begun = match next.towards.clone() {
             Towards::Way(way) => {
                 let to_m = way.path.project(this.outline.pose.position).station_m;
                 Some((way, to_m, None))
             }
-            Towards::To(side) => self.change_to(side, view),
-            Towards::Either => self.change_to(Side::Left, view).or_else(|| self.change_to(Side::Right, view)),
+            Towards::To(side) => change(self, side),
+            Towards::Either => change(self, Side::Left).or_else(|| change(self, Side::Right)),
             Towards::Back => match self.last_change {
-                Some(Side::Left) => self.change_to(Side::Right, view),
-                Some(Side::Right) => self.change_to(Side::Left, view),
+                Some(Side::Left) => change(self, Side::Right),
+                Some(Side::Right) => change(self, Side::Left),
                 None => None,
             },
         };
         let Some(begun) = begun else { return };
-        self.set_out(begun, view);
+        self.set_out(begun, Whose::Own, view);
         self.plan.pop();
     }
 
     /// Begins a change to a way, at the own station there.
-    fn set_out(&mut self, (to, to_station_m, side): (Arc<Way>, f64, Option<Side>), view: &View) {
+    pub(super) fn set_out(
+        &mut self,
+        (to, to_station_m, side): (Arc<Way>, f64, Option<Side>),
+        whose: Whose,
+        view: &View,
+    ) {
         let aside_m = (to.path.pose_at(to_station_m).position - view.this.outline.pose.position).norm();
-        let duration_s = change_duration_s(aside_m, view.around.traffic);
+        let duration_s = duration_s(aside_m, self.speed_mps, whose, view.around);
         self.change = Some(Change { to, to_station_m, progress: 0.0, duration_s });
         self.last_change = side;
     }
 
     /// The way in the neighbouring lane, if there is one and room in it, and the own station there.
-    fn change_to(&mut self, side: Side, view: &View) -> Option<(Arc<Way>, f64, Option<Side>)> {
+    pub(super) fn change_to(
+        &mut self,
+        side: Side,
+        whose: Whose,
+        view: &View,
+    ) -> Option<(Arc<Way>, f64, Option<Side>)> {
         let View { this, around, .. } = *view;
         let map = &around.scene.map;
         let (here, here_m) = self.way.lane_at(self.station_m);
@@ -138,8 +165,8 @@ impl Driver {
         // `change_room_m` ends at markings that forbid a change, and at junctions, where lanes part.
         let room_m = map.change_room_m(here, on_road(side), here_m);
         if there.distance_m > CHANGE_M_MAX
-            || room_m < change_length_m(self.speed_mps, there.distance_m, around.traffic)
-            || !self.may_enter(side, map.lane(target), there.station_m, view)
+            || room_m < length_m(self.speed_mps, there.distance_m, whose, around)
+            || !self.may_enter(side, map.lane(target), there.station_m, whose, view)
         {
             return None;
         }
@@ -149,27 +176,38 @@ impl Driver {
     }
 
     /// Whether the profile's check of the other lane lets it change.
-    fn may_enter(&self, side: Side, lane: &Lane, station_m: f64, view: &View) -> bool {
+    fn may_enter(&self, side: Side, lane: &Lane, station_m: f64, whose: Whose, view: &View) -> bool {
         let View { this, size, around } = *view;
-        if !around.traffic.change_by_sphere {
-            return self.is_free(lane, station_m, size, around);
+        if whose != Whose::Own || !around.traffic.change_by_sphere {
+            return self.is_free(lane, station_m, size, whose, around);
         }
         let left = Vec2::new(-this.forward.y, this.forward.x);
         let sphere_m = (SPHERE_PART * size.width_m / 2.0).min(SPHERE_M_MAX);
         let aside = if side == Side::Left { left * size.width_m } else { left * -size.width_m };
         let centre = this.outline.pose.position + this.forward * (size.length_m / 2.0) + aside;
         let point = OrientedBox::new(Pose { position: centre, ..this.outline.pose }, 0.0, 0.0);
-        around.others().all(|other| {
+        self.minded(around).all(|other| {
             distance_m(&point, other.outline) > sphere_m || is_apart(this.elevation_m, other.elevation_m)
         })
     }
 
     /// Whether no vehicle is beside it in another lane or would be soon, and none has to brake hard for it.
-    fn is_free(&self, lane: &Lane, station_m: f64, size: &BodyParameters, around: &Around) -> bool {
+    fn is_free(
+        &self,
+        lane: &Lane,
+        station_m: f64,
+        size: &BodyParameters,
+        whose: Whose,
+        around: &Around,
+    ) -> bool {
+        let gap_m = |closing_mps: f64| match whose {
+            Whose::Own => change_gap_m(closing_mps, around.traffic),
+            Whose::Told(_) => 0.0,
+        };
         let path = &lane.centre;
         let here = path.pose_at(station_m);
         let forward = here.forward();
-        around.others().all(|Other { outline, forward: heading, velocity_mps, elevation_m }| {
+        self.minded(around).all(|Other { outline, forward: heading, velocity_mps, elevation_m }| {
             let ahead_m = forward.dot(&(outline.pose.position - here.position));
             let Some(other) = path.project_from(outline.pose.position, station_m + ahead_m) else {
                 return true;
@@ -180,7 +218,7 @@ impl Driver {
             let closing_mps = (velocity_mps.dot(&forward) - self.speed_mps)
                 * if other.station_m < station_m { 1.0 } else { -1.0 };
             aside_m > SIDE_ROOM_M
-                || apart_m > change_gap_m(closing_mps.max(0.0), around.traffic)
+                || apart_m > gap_m(closing_mps.max(0.0))
                 || is_apart(lane.height_at(other.station_m), elevation_m)
         })
     }
@@ -199,7 +237,7 @@ impl Driver {
         };
         let from_lane_rad = self.lane_heading_rad();
         let Some(change) = &mut self.change else {
-            return at(from, from_lane_rad);
+            return at(self.moved_aside(from, way_m), from_lane_rad);
         };
         let guess_m = change.to_station_m + way_m;
         change.to_station_m =
@@ -212,7 +250,7 @@ impl Driver {
             (self.way, self.station_m) = (Arc::clone(&change.to), change.to_station_m);
             (self.change, self.hold_m) = (None, None);
             (self.insists_to_m, self.stopped_to_m) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
-            return at(to, to_lane_rad);
+            return at(self.moved_aside(to, way_m), to_lane_rad);
         }
         let SmoothStep { value: blend, slope, .. } = smooth_step(change.progress);
         let heading_rad = from.heading_rad + wrap_angle(to.heading_rad - from.heading_rad) * blend;
@@ -221,7 +259,8 @@ impl Driver {
             position: from.position + (to.position - from.position) * blend,
             heading_rad: wrap_angle(heading_rad + turned_rad),
         };
-        at(pose, if change.progress < 0.5 { from_lane_rad } else { to_lane_rad })
+        let lane_rad = if change.progress < 0.5 { from_lane_rad } else { to_lane_rad };
+        at(self.moved_aside(pose, way_m), lane_rad)
     }
 }
 
@@ -240,8 +279,8 @@ pub(in crate::sim) fn can_change(
     ahead.take_while(|(lane, _)| !in_junction(*lane)).any(|(lane, at_m)| {
         let Some(target) = lane_beside(around, lane, side) else { return false };
         let here = map.lane(lane).centre.pose_at(at_m).position;
-        let length_m =
-            change_length_m(speed_mps, map.lane(target).centre.project(here).distance_m, around.traffic);
+        let aside_m = map.lane(target).centre.project(here).distance_m;
+        let length_m = length_m(speed_mps, aside_m, Whose::Own, around);
         map.changes_from_m(lane, on_road(side), at_m).iter().any(|(_, room_m)| *room_m >= length_m)
     })
 }
@@ -257,9 +296,22 @@ fn change_gap_m(closing_mps: f64, traffic: &TrafficProfile) -> f64 {
     traffic.change_room_m + slowing_m.max(closing_mps * traffic.change_time_s)
 }
 
+/// How long a move of `aside_m` to the side takes at a speed of at least [`CHANGE_FULL_MPS`], s. One that was told is no
+/// quicker than the grip of the road allows.
+pub(super) fn duration_s(aside_m: f64, speed_mps: f64, whose: Whose, around: &Around) -> f64 {
+    match whose {
+        Whose::Own | Whose::Told(None) => change_duration_s(aside_m, around.traffic),
+        Whose::Told(Some(told_mps)) => {
+            let grip_mps2 = around.grip.friction(speed_mps) * GRAVITY_MPS2;
+            (SMOOTH_STEP_SLOPE_MAX * aside_m / told_mps)
+                .max((SMOOTH_STEP_BEND_MAX * aside_m / grip_mps2).sqrt())
+        }
+    }
+}
+
 /// Way that a lane change of `aside_m` to the side takes at a speed, m.
-fn change_length_m(speed_mps: f64, aside_m: f64, traffic: &TrafficProfile) -> f64 {
-    speed_mps.max(CHANGE_FULL_MPS) * change_duration_s(aside_m, traffic)
+fn length_m(speed_mps: f64, aside_m: f64, whose: Whose, around: &Around) -> f64 {
+    speed_mps.max(CHANGE_FULL_MPS) * duration_s(aside_m, speed_mps, whose, around)
 }
 
 fn on_road(side: Side) -> road::Side {
@@ -267,17 +319,6 @@ fn on_road(side: Side) -> road::Side {
         Side::Left => road::Side::Left,
         Side::Right => road::Side::Right,
     }
-}
-
-/// The same-direction lane on a side of a lane, if there is one and no median lies between.
-pub(in crate::sim) fn lane_beside(around: &Around, lane: LaneIndex, side: Side) -> Option<LaneIndex> {
-    let lane = around.scene.map.lane(lane);
-    let neighbour = match side {
-        Side::Left => lane.left,
-        Side::Right => lane.right,
-    };
-    let reachable = |neighbour: &Neighbour| neighbour.same_direction && neighbour.gap_m <= road::STRIP_M_MAX;
-    neighbour.filter(reachable).map(|neighbour| neighbour.lane)
 }
 
 #[cfg(test)]

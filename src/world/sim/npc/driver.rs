@@ -13,6 +13,7 @@ use crate::action::LaneChangeRules;
 use avastra_base::kinematics::STANDING_MPS;
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
+use avastra_lang::model::command::Manners;
 use avastra_lang::model::vocabulary::Side;
 
 use crate::sim::around::Around;
@@ -24,6 +25,7 @@ use crate::sim::trace::Trace;
 use crate::sim::way::{Way, body_at};
 use crate::sim::world::DT_S;
 
+use super::aside::Aside;
 use super::change::{Change, PlannedChange};
 use super::leader::{Leader, following};
 use super::manners::GIVE_UP_S;
@@ -60,7 +62,7 @@ pub(in crate::sim) struct Driver {
     pub speed_mps: f64,
     pub(super) cruise_mps: f64,
     /// How fast it goes over to `cruise_mps`, m/s², if it was ordered so.
-    ordered_mps2: Option<f64>,
+    pub(super) ordered_mps2: Option<f64>,
     /// Part of the limits that it drives at; `None` if its speed was asked for.
     limit_part: Option<f64>,
     pub(super) yields_to_ego: bool,
@@ -76,6 +78,9 @@ pub(in crate::sim) struct Driver {
     /// Ticks at rest because of others.
     pub(super) waited_ticks: u32,
     pub(super) change: Option<Change>,
+    pub(super) aside: Aside,
+    /// The rules of the road that it was told to ignore.
+    pub ignores: Manners,
     pub(super) last_change: Option<Side>,
     /// In reverse order: the next manoeuvre is last.
     pub(super) plan: Vec<PlannedChange>,
@@ -122,6 +127,8 @@ impl Driver {
             stopped_to_m: f64::NEG_INFINITY,
             waited_ticks: 0,
             change: None,
+            aside: Aside::default(),
+            ignores: Manners::default(),
             last_change: None,
             plan,
             lane_changes: None,
@@ -134,14 +141,9 @@ impl Driver {
         self.change.is_some()
     }
 
-    /// From now on it wants to drive at this speed, m/s, and goes over to it at a rate, m/s², or as it would by itself.
-    pub fn order(&mut self, speed_mps: f64, rate_mps2: Option<f64>) {
-        (self.cruise_mps, self.ordered_mps2) = (speed_mps, rate_mps2);
-    }
-
     /// Where it is before its first tick.
     pub fn moved(&self, size: &BodyParameters) -> Moved {
-        let pose = body_at(&self.way.path, self.station_m, size);
+        let pose = self.aside.beside(body_at(&self.way.path, self.station_m, size));
         let forward = pose.forward();
         Moved {
             pose,
@@ -163,6 +165,9 @@ impl Driver {
         let looks = !touched && (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS);
         if looks {
             self.look(view);
+        }
+        if !touched {
+            self.begin_aside(view);
         }
         let braking_mps2 = around.braking_mps2(size, self.speed_mps);
         let acceleration_mps2 = if touched {
@@ -312,6 +317,11 @@ impl Driver {
         }
         if let Some(change) = &self.change {
             trace.numbers([change.to_station_m, change.progress, change.duration_s]);
+        }
+        self.aside.trace(trace);
+        // Nothing is fed for good manners, as before there were others.
+        if self.ignores != Manners::default() {
+            trace.word(u64::from(self.ignores.bits()));
         }
         trace.word(self.last_change.map_or(0, |side| side as u64 + 1));
         trace.words([self.plan.len() as u64, u64::from(self.draws)]);

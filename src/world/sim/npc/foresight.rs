@@ -46,7 +46,9 @@ impl Driver {
         // The own poses at those moments, worked out only if there is a vehicle to meet.
         let speed_mps = self.speed_mps.max(CREEP_MPS);
         let own = LazyCell::new(|| {
-            MOMENTS_S.map(|time_s| body_at(&self.way.path, self.station_m + speed_mps * time_s, size))
+            MOMENTS_S.map(|time_s| {
+                self.aside.beside(body_at(&self.way.path, self.station_m + speed_mps * time_s, size))
+            })
         });
         let mut free_m = f64::INFINITY;
         if self.yields_to_ego && matters(around.ego_outline, around.ego_elevation_m, around.ego.speed_mps) {
@@ -61,8 +63,10 @@ impl Driver {
             {
                 continue;
             }
-            let other =
-                |time_s| body_at(&driver.way.path, driver.station_m + driver.speed_mps * time_s, body);
+            let other = |time_s| {
+                let station_m = driver.station_m + driver.speed_mps * time_s;
+                driver.aside.beside(body_at(&driver.way.path, station_m, body))
+            };
             free_m = free_m.min(free_way_m(this, &own, speed_mps, &obstacle.outline, other));
         }
         free_m.is_finite().then_some(Leader { gap_m: free_m + STOP_M, speed_mps: 0.0, crosswise: true })

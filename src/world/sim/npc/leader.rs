@@ -5,9 +5,10 @@
 
 use avastra_base::geometry::{Pose, smooth_step};
 use avastra_base::kinematics::{Following, STANDING_MPS, needed_mps2};
+use avastra_lang::model::vocabulary::Manner;
 use avastra_road::is_apart;
 
-use crate::sim::around::Other;
+use crate::sim::around::{Around, Other};
 use crate::sim::body::BodyParameters;
 use crate::sim::way::Way;
 
@@ -50,7 +51,7 @@ impl Driver {
     /// not ahead in its corridor.
     pub fn gap_to(&self, size: &BodyParameters, other: Other) -> Option<(f64, f64)> {
         let here = self.way.path.pose_at(self.station_m);
-        in_corridor(&self.way, self.station_m, &here, size, other)
+        self.in_corridor(&self.way, self.station_m, &here, size, other)
             .map(|leader| (leader.gap_m, leader.speed_mps))
     }
 
@@ -63,19 +64,20 @@ impl Driver {
             + self.speed_mps * (TIME_GAP_S + self.speed_mps / (2.0 * COMFORT_MPS2))
             + size.length_m / 2.0;
         let mut nearest: Option<Leader> = None;
-        for other in around.others() {
+        for other in self.minded(around) {
             let outline = other.outline;
             let delta = outline.pose.position - here.position;
             let reach_m = reach_m + outline.half_length_m;
             if delta.norm_squared() > reach_m * reach_m || forward.dot(&delta) < 0.0 {
                 continue;
             }
-            let on_own_way = in_corridor(&self.way, self.station_m, here, size, other)
+            let on_own_way = self
+                .in_corridor(&self.way, self.station_m, here, size, other)
                 .filter(|leader| !self.evades(leader, size, other));
             let on_next_way = self
                 .change
                 .as_ref()
-                .and_then(|change| in_corridor(&change.to, change.to_station_m, here, size, other));
+                .and_then(|change| self.in_corridor(&change.to, change.to_station_m, here, size, other));
             for leader in on_own_way.into_iter().chain(on_next_way) {
                 if nearest.is_none_or(|found| leader.gap_m < found.gap_m) {
                     nearest = Some(leader);
@@ -83,6 +85,11 @@ impl Driver {
             }
         }
         nearest
+    }
+
+    /// All others that it minds. The ego vehicle is the first of all.
+    pub(super) fn minded<'a>(&self, around: &'a Around) -> impl Iterator<Item = Other<'a>> {
+        around.others().skip(usize::from(self.ignores.ignores(Manner::Ego)))
     }
 
     /// Whether a lane change under way leads past a road user that stands in the lane that it leaves: when the front reaches
@@ -114,28 +121,30 @@ impl Driver {
         let needed_mps2 = needed_mps2(closing_mps, (leader.gap_m - GAP_M_MIN / 2.0).max(0.1));
         if needed_mps2 > COMFORT_MPS2 { idm_mps2.min(-needed_mps2) } else { idm_mps2 }
     }
-}
 
-/// Another road user as the leader of a driver at `station_m` of a way, if it is ahead and in the driver's
-/// corridor.
-fn in_corridor(
-    way: &Way,
-    station_m: f64,
-    here: &Pose,
-    size: &BodyParameters,
-    Other { outline, forward, velocity_mps, elevation_m }: Other,
-) -> Option<Leader> {
-    let straight_m = (outline.pose.position - here.position).norm();
-    let other = way.path.project_from(outline.pose.position, station_m + straight_m)?;
-    let (half_length_m, half_width_m) = outline.half_extent_m(forward, other.forward);
-    let aside_m = other.offset_m.abs() - half_width_m - size.width_m / 2.0;
-    let is_aside = other.station_m < station_m || aside_m > SIDE_ROOM_M;
-    if is_aside || is_apart(way.height_at(other.station_m), elevation_m) {
-        return None;
+    /// Another road user as its leader, were it at `station_m` of a way, if that one is ahead and in its corridor.
+    fn in_corridor(
+        &self,
+        way: &Way,
+        station_m: f64,
+        here: &Pose,
+        size: &BodyParameters,
+        Other { outline, forward, velocity_mps, elevation_m }: Other,
+    ) -> Option<Leader> {
+        let straight_m = (outline.pose.position - here.position).norm();
+        let other = way.path.project_from(outline.pose.position, station_m + straight_m)?;
+        let (half_length_m, half_width_m) = outline.half_extent_m(forward, other.forward);
+        let gap_m = other.station_m - station_m - half_length_m - size.length_m / 2.0;
+        let own_m = self.aside.after_m(gap_m, self.speed_mps);
+        let aside_m = (other.offset_m - own_m).abs() - half_width_m - size.width_m / 2.0;
+        let is_aside = other.station_m < station_m || aside_m > SIDE_ROOM_M;
+        if is_aside || is_apart(way.height_at(other.station_m), elevation_m) {
+            return None;
+        }
+        Some(Leader {
+            gap_m,
+            speed_mps: velocity_mps.dot(&other.forward),
+            crosswise: forward.dot(&other.forward) < CROSSWISE_COS_MAX,
+        })
     }
-    Some(Leader {
-        gap_m: other.station_m - station_m - half_length_m - size.length_m / 2.0,
-        speed_mps: velocity_mps.dot(&other.forward),
-        crosswise: forward.dot(&other.forward) < CROSSWISE_COS_MAX,
-    })
 }

@@ -30,6 +30,7 @@ use crate::sim::junction::Area;
 use crate::sim::sense::SignalColour;
 use crate::sim::world::DT_S;
 use avastra_base::kinematics::{STANDING_MPS, braking_m};
+use avastra_lang::model::vocabulary::Manner;
 
 use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, LOOK_AHEAD_M, View};
 
@@ -117,6 +118,9 @@ fn waits(own: &Passage, other: &Passage, goes_first: bool, impatient: bool) -> b
 impl Driver {
     /// Station of the own way at which to wait now, m, if there is something to wait for.
     pub(super) fn find_hold_m(&self, view: &View) -> Option<f64> {
+        if self.ignores.ignores(Manner::RightOfWay) {
+            return None;
+        }
         let length_m = view.size.length_m;
         let front_m = self.station_m + length_m / 2.0;
         let reach_m = LOOK_AHEAD_M + braking_m(self.speed_mps, COMFORT_MPS2);

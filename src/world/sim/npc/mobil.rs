@@ -15,9 +15,9 @@ use avastra_road::is_apart;
 use crate::sim::around;
 use crate::sim::traffic::TrafficProfile;
 
-use super::change::lane_beside;
 use super::driver::{Driver, SIDE_ROOM_M, View};
 use super::leader::following;
+use crate::sim::lanes::lane_beside;
 
 /// Ticks between two considerations: a second.
 const CONSIDER_TICKS: u64 = 50;

@@ -6,6 +6,7 @@ use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
 use crate::sim::sense::SignalColour;
 use avastra_base::kinematics::STANDING_MPS;
+use avastra_lang::model::vocabulary::Manner;
 
 use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, LOOK_AHEAD_M};
 
@@ -23,6 +24,9 @@ impl Driver {
         around: &Around,
         braking_mps2: f64,
     ) -> Option<f64> {
+        if self.ignores.ignores(Manner::Signals) {
+            return None;
+        }
         let front_m = self.station_m + size.length_m / 2.0;
         let line = self.way.stop_lines.iter().find(|line| line.station_m > front_m)?;
         let braking_mps2 = match around.signals.colour(&around.scene.map, line.signal, around.tick) {
@@ -35,6 +39,9 @@ impl Driver {
 
     /// Gap from the front to the stop sign's line at which it still has to stop, m.
     pub(super) fn sign_gap_m(&self, size: &BodyParameters, braking_mps2: f64) -> Option<f64> {
+        if self.ignores.ignores(Manner::Signals) {
+            return None;
+        }
         let front_m = self.station_m + size.length_m / 2.0;
         let from_m = front_m.max(self.stopped_to_m);
         let line_m = *self.way.stop_signs_m.iter().find(|line_m| **line_m > from_m)?;

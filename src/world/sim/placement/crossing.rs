@@ -1,11 +1,12 @@
 //! Crossing traffic: a rendezvous with the ego vehicle at a conflict of its route, on a leg whose signal will
 //! be green.
 
-use avastra_lang::model::vocabulary::{Side, Then};
-use avastra_road::{Conflict, LaneIndex};
+use avastra_lang::model::vocabulary::{Manner, Side, Then};
+use avastra_road::{Conflict, LaneIndex, StopLine};
 
 use crate::sim::ego::VehicleParameters;
-use crate::sim::npc::{Driver, PlannedChange, Towards, When, can_change, choices, lane_beside};
+use crate::sim::lanes::lane_beside;
+use crate::sim::npc::{Driver, PlannedChange, Towards, When, can_change, choices};
 use crate::sim::sense::SignalColour;
 use crate::sim::way::Way;
 use crate::sim::world::DT_S;
@@ -103,17 +104,21 @@ fn approach_m(asked: &Asked, way: &Way, meeting_m: f64, arrival_s: f64) -> Resul
     let mut front_m = meeting_m;
     let mut left_s = arrival_s;
     let mut passed_lines: Vec<(usize, f64)> = Vec::new();
+    // Signs and lights at which it stops.
+    let minds_signals = !request.ignores.ignores(Manner::Signals);
+    let signs_m: &[f64] = if minds_signals { &way.stop_signs_m } else { &[] };
+    let lines: &[StopLine] = if minds_signals { &way.stop_lines } else { &[] };
     while left_s > 1e-9 {
         let speed_mps = request.speed_mps.min(way.speed_mps_max(front_m)).max(0.1);
         let step_m = TIMING_M.min(speed_mps * left_s);
         front_m -= step_m;
         left_s -= step_m / speed_mps;
-        for line in &way.stop_lines {
+        for line in lines {
             if (front_m..front_m + step_m).contains(&line.station_m) {
                 passed_lines.push((line.signal, left_s.max(0.0)));
             }
         }
-        if way.stop_signs_m.iter().any(|line_m| (front_m..front_m + step_m).contains(line_m)) {
+        if signs_m.iter().any(|line_m| (front_m..front_m + step_m).contains(line_m)) {
             left_s -= STANDS_S + speed_mps / 2.0 * (1.0 / STOPS_MPS2 + 1.0 / size.acceleration_mps2_max);
             if left_s < 0.0 {
                 return Err("it would have to stop at a sign".into());
@@ -125,10 +130,10 @@ fn approach_m(asked: &Asked, way: &Way, meeting_m: f64, arrival_s: f64) -> Resul
     }
     // No vehicle appears just beyond a line at which it would have had to stop.
     let beyond = front_m - BEYOND_LINE_M..front_m;
-    if way.stop_signs_m.iter().any(|line_m| beyond.contains(line_m)) {
+    if signs_m.iter().any(|line_m| beyond.contains(line_m)) {
         return Err("it would have had to stop at a sign".into());
     }
-    let behind = way.stop_lines.iter().filter(|line| beyond.contains(&line.station_m));
+    let behind = lines.iter().filter(|line| beyond.contains(&line.station_m));
     passed_lines.extend(behind.map(|line| (line.signal, 0.0)));
     let is_green = |(signal, after_s): &(usize, f64)| {
         let tick = around.tick + (after_s / DT_S) as u64;

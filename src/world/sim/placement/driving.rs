@@ -6,11 +6,11 @@ use avastra_road::LaneIndex;
 
 use crate::sim::around::Around;
 use crate::sim::ego::VehicleParameters;
-use crate::sim::npc::{Driver, PlannedChange, Towards, When, can_change, choices, lane_beside};
+use crate::sim::lanes::{chosen_lane, lane_along, lane_before, lane_beside, opposing_lane};
+use crate::sim::npc::{Driver, PlannedChange, Towards, When, can_change, choices};
 use crate::sim::way::Way;
 use crate::sim::world::ticks;
 
-use super::lanes::{chosen_lane, lane_along, lane_before, opposing_lane};
 use super::{Asked, ahead_m, commanded};
 
 /// Time after which a vehicle ahead changes lanes, s.

@@ -8,7 +8,6 @@
 mod arrival;
 mod crossing;
 mod driving;
-mod lanes;
 mod on_foot;
 
 use std::sync::Arc;
@@ -69,13 +68,14 @@ pub(super) fn place(
     check(request)?;
     let size = request.own.map_or_else(|| body::parameters(request.body), |own| own.shape);
     let asked = Asked { around, arrivals, request, size, id };
-    let driver = match request.verb {
+    let mut driver = match request.verb {
         Verb::DriveAhead => drive_ahead(&asked)?,
         Verb::Overtake => overtake(&asked)?,
         Verb::DriveOpposite => drive_opposite(&asked)?,
         Verb::CrossRoad => cross_road(&asked)?,
         Verb::Walk | Verb::Stand => return on_foot(&asked),
     };
+    driver.begin_at(request.offset_m, request.ignores);
     check_way(around, &driver, &size)?;
     let moved = driver.moved(&size);
     Ok(Newcomers { asked: finish(&asked, Motion::Drive(driver), moved)?, cover: None })

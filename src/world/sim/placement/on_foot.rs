@@ -43,7 +43,7 @@ pub(super) fn on_foot(asked: &Asked) -> Result<Newcomers, String> {
     let Asked { around, request, .. } = *asked;
     let asked_m = ahead_m(asked)?;
     if request.verb == Verb::Stand {
-        let lane = around.scene.route.path.pose_at(asked_m);
+        let lane = around.scene.route.path.pose_at(asked_m).offset(0.0, request.offset_m);
         let turn_rad = if request.side == Side::Left { -FRAC_PI_2 } else { FRAC_PI_2 };
         let pose = Pose { heading_rad: wrap_angle(lane.heading_rad + turn_rad), ..lane };
         return Ok(Newcomers { asked: finish(asked, Motion::Stand, at(pose))?, cover: None });

@@ -1,5 +1,6 @@
 //! How other vehicles move: on bends, after a crash, at stop signs, by each traffic profile.
 
+use avastra_lang::model::command::Command;
 use std::sync::Arc;
 
 use crate::action::{Effect, OrderRequest, SpawnRequest, Surroundings};
@@ -85,7 +86,9 @@ fn an_order_changes_speed_at_its_rate() {
     for (speed_mps, rate_mps2) in [(0.0, 3.0), (4.0, 1.5), (0.0, 6.0), (14.0, 0.5)] {
         let mut world = driven(&testing::straight(), 8.0, 1.0);
         let user = spawn(&mut world, named);
-        let order = OrderRequest { bearer: 7, speed_mps: Some(speed_mps), rate_mps2: Some(rate_mps2) };
+        let command =
+            Command { speed_mps: Some(speed_mps), rate_mps2: Some(rate_mps2), ..Command::default() };
+        let order = OrderRequest { bearer: 7, command };
         world.apply(&Effect::Order(order)).expect("it is there and drives");
         let from_m = user.outline.pose.position.x;
         let (mut ticks, mut now) = (0, user);
@@ -113,7 +116,7 @@ fn an_order_changes_speed_at_its_rate() {
 #[test]
 fn an_order_is_for_the_latest_bearer_and_no_wreck_obeys() {
     let mut world = driven(&testing::straight(), 8.0, 1.0);
-    let order = OrderRequest { bearer: 0, speed_mps: Some(3.0), rate_mps2: None };
+    let order = OrderRequest { bearer: 0, command: Command { speed_mps: Some(3.0), ..Command::default() } };
     assert_eq!(world.order_refusal(&order).as_deref(), Some("no road user of that name is there"));
     let named = |distance_m| SpawnRequest { bearer: Some(0), ..request(Verb::DriveAhead, distance_m, 9.0) };
     let [first, second] = [90.0, 60.0].map(|distance_m| spawn(&mut world, named(distance_m)).id);

@@ -1,14 +1,18 @@
-//! Which lane a request means: the ego vehicle's, one beside it, or an oncoming one.
+//! Which lane a request or a command means: the ego vehicle's, one beside it, or an oncoming one.
 
 use avastra_lang::model::vocabulary::{LaneChoice, Side};
-use avastra_road::{LaneIndex, RouteLane, Turn};
+use avastra_road as road;
+use avastra_road::{LaneIndex, Neighbour, RouteLane, Turn};
 
-use crate::sim::around::Around;
-use crate::sim::npc::lane_beside;
+use super::around::Around;
 
 /// A median wider than this divides a road: lanes beyond it do not count as oncoming, m.
 const MEDIAN_M_MAX: f64 = 3.0;
 
+/// The lane of a choice beside a station of the route.
+///
+/// # Errors
+/// That there is none, in words.
 pub(super) fn chosen_lane(around: &Around, station_m: f64, choice: LaneChoice) -> Result<LaneIndex, String> {
     let beside = |side, refusal: &str| {
         lane_along(around, station_m, true, |lane| lane_beside(around, lane, side).ok_or(refusal.into()))
@@ -78,4 +82,15 @@ pub(super) fn lane_before(around: &Around, lane: LaneIndex) -> Option<LaneIndex>
 
 fn lane_at(around: &Around, station_m: f64) -> LaneIndex {
     around.scene.route.lane_at(station_m).lane
+}
+
+/// The same-direction lane on a side of a lane, if there is one and no median lies between.
+pub(super) fn lane_beside(around: &Around, lane: LaneIndex, side: Side) -> Option<LaneIndex> {
+    let lane = around.scene.map.lane(lane);
+    let neighbour = match side {
+        Side::Left => lane.left,
+        Side::Right => lane.right,
+    };
+    let reachable = |neighbour: &Neighbour| neighbour.same_direction && neighbour.gap_m <= road::STRIP_M_MAX;
+    neighbour.filter(reachable).map(|neighbour| neighbour.lane)
 }

@@ -1,0 +1,160 @@
+//! What actions do to the world: weather, newcomers, orders, and the manoeuvres that go on from tick to tick.
+
+use std::sync::Arc;
+
+use crate::action::{Draw, Effect, LaterMoment, OrderRequest, SpawnRequest};
+use crate::sim::moment::npc_facts;
+use crate::sim::placement;
+use crate::sim::placement::Arrivals;
+use crate::sim::road_user::{Motion, RoadUser, Running};
+use avastra_lang::model::{COMMANDED_MAX, NpcFacts};
+
+use super::{DT_S, World};
+
+/// Commanded obstacles at a time. For the next one, the oldest that is out of sight leaves; in the published package the
+/// oldest leaves wherever it is.
+const OBSTACLES_MAX: usize = COMMANDED_MAX as usize;
+
+impl World {
+    /// Carries out a whole draw or nothing of it: its second spawn may find its first in the way. Returns the index of each
+    /// effect that made road users appear, with the id of the first of them.
+    ///
+    /// # Errors
+    /// The index of the effect that is impossible, and why; the world is then unchanged.
+    pub fn carry_out(&mut self, draw: &Draw) -> Result<Vec<(usize, u32)>, (usize, String)> {
+        let before = self.clone();
+        let mut newcomers = Vec::new();
+        for (nth, effect) in draw.effects.iter().enumerate() {
+            let newcomer = match self.apply(effect) {
+                Ok(newcomer) => newcomer,
+                Err(reason) => {
+                    *self = before;
+                    return Err((nth, reason));
+                }
+            };
+            newcomers.extend(newcomer.map(|id| (nth, id)));
+            let index = match (newcomer, effect) {
+                (Some(id), _) => self.users.iter().position(|user| user.obstacle.id == id),
+                (None, Effect::Order(order)) => self.bearer(order.bearer),
+                (None, _) => None,
+            };
+            let Some(index) = index else { continue };
+            let mover = &mut self.users[index].mover;
+            if let Some((_, course)) = draw.courses.iter().find(|(at, _)| *at == nth) {
+                mover.course = Some(Running::new(Arc::clone(course), self.ticks));
+            }
+            if let (Some(rules), Motion::Drive(driver)) = (&draw.lane_changes, &mut mover.motion) {
+                driver.lane_changes = Some(Arc::clone(rules));
+            }
+        }
+        Ok(newcomers)
+    }
+
+    /// Carries out an effect.
+    ///
+    /// # Errors
+    /// Why a spawn or an order is impossible; the world is then unchanged. Otherwise the id of the newcomer, if there is
+    /// one.
+    pub fn apply(&mut self, effect: &Effect) -> Result<Option<u32>, String> {
+        match effect {
+            Effect::Time(time) => self.environment.time = *time,
+            Effect::Sky(phenomenon, level) => self.environment.set(*phenomenon, *level),
+            Effect::Spawn(request) => return self.spawn(request).map(Some),
+            Effect::Order(order) => return self.order(order).map(|()| None),
+        }
+        self.weather_tick = self.ticks + (self.traffic.weather_rest_s / DT_S).round() as u64;
+        self.conditions = self.environment.conditions(self.ego.motion.speed_mps);
+        Ok(None)
+    }
+
+    pub(super) fn spawn(&mut self, request: &SpawnRequest) -> Result<u32, String> {
+        let leave = self.make_room(request)?;
+        let placed = placement::place(&self.alone(), &Arrivals::default(), request, self.next_id)?;
+        for index in leave.into_iter().rev() {
+            self.users.remove(index);
+        }
+        let mut asked = placed.asked;
+        asked.mover.bearer = request.bearer;
+        let id = self.next_id;
+        self.next_id += 1 + u32::from(placed.cover.is_some());
+        self.users.extend([asked].into_iter().chain(placed.cover));
+        self.look();
+        Ok(id)
+    }
+
+    /// The index of the road user that an order is for, which drives.
+    ///
+    /// # Errors
+    /// Why it cannot be ordered, in words that complete "cannot order `NAME`: …".
+    pub(super) fn ordered(&self, order: &OrderRequest) -> Result<usize, String> {
+        let index = self.bearer(order.bearer).ok_or("no road user of that name is there")?;
+        let RoadUser { obstacle, mover } = &self.users[index];
+        match &mover.motion {
+            _ if mover.is_wreck() => Err("it is a wreck".to_owned()),
+            Motion::Drive(driver) => {
+                if let Some(lane) = order.command.lane {
+                    driver.side_of(lane, obstacle.outline.pose.position, &self.alone())?;
+                }
+                Ok(index)
+            }
+            Motion::Walk(_) | Motion::Stand => Err("it is on foot".to_owned()),
+        }
+    }
+
+    fn order(&mut self, order: &OrderRequest) -> Result<(), String> {
+        let index = self.ordered(order)?;
+        let mover = &mut self.users[index].mover;
+        // The phases that are left of a manoeuvre are dropped.
+        mover.course = None;
+        if let Motion::Drive(driver) = &mut mover.motion {
+            driver.order(&order.command);
+        }
+        Ok(())
+    }
+
+    /// Moves on the manoeuvres of road users, which tells their drivers what to do.
+    pub(super) fn direct(&mut self) {
+        let has_course = |user: &RoadUser| user.mover.course.is_some();
+        if !self.users.iter().any(has_course) {
+            return;
+        }
+        let moment = self.moment_facts();
+        for index in 0..self.users.len() {
+            let Some(running) = self.users[index].mover.course.take() else { continue };
+            let RoadUser { obstacle, mover } = &self.users[index];
+            if mover.is_wreck() {
+                continue;
+            }
+            let Motion::Drive(driver) = &mover.motion else { continue };
+            let npc = npc_facts(&self.alone(), obstacle, &mover.motion);
+            let (npc, is_aside) =
+                (NpcFacts { speed_mps: driver.speed_mps, ..npc }, driver.is_aside_as_told());
+            let facts = |who: usize| Some((who, self.bearer_facts(who)?));
+            let bearers = running.bearers().into_iter().filter_map(facts).collect();
+            let moment = LaterMoment { moment, npc, bearers };
+            let (running, command) = running.advance(&moment, is_aside, self.ticks);
+            let mover = &mut self.users[index].mover;
+            mover.course = running;
+            if let (Motion::Drive(driver), Some(command)) = (&mut mover.motion, command) {
+                driver.order(&command);
+            }
+        }
+    }
+
+    /// Indices of the commanded obstacles that leave for new ones, if there are as many as there may be.
+    pub(super) fn make_room(&self, request: &SpawnRequest) -> Result<Vec<usize>, String> {
+        let commanded = self.users.iter().enumerate().filter(|(_, user)| !user.obstacle.is_ambient());
+        let wanted = commanded.clone().count() + Effect::Spawn(*request).newcomers() as usize;
+        let too_many = wanted.saturating_sub(OBSTACLES_MAX);
+        let around = self.alone();
+        let is_hidden = |user: &RoadUser| {
+            self.traffic.oldest_leaves_in_sight
+                || !around.is_in_sight(&user.obstacle, user.mover.visible_fraction)
+        };
+        // What has a name is still wanted.
+        let is_spare = |user: &RoadUser| user.mover.bearer.is_none() && is_hidden(user);
+        let hidden = commanded.filter(|(_, user)| too_many > 0 && is_spare(user));
+        let oldest: Vec<usize> = hidden.take(too_many).map(|(index, _)| index).collect();
+        if oldest.len() < too_many { Err("ten road users are there already".into()) } else { Ok(oldest) }
+    }
+}
