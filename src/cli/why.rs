@@ -42,7 +42,7 @@ pub fn why(
         None => space.memory_at_start(road, &rules, SEED).map_err(Failure::usage)?,
         Some(text) => legal_memory_from(space, text, road, &rules, SEED).map_err(Failure::usage)?,
     };
-    let start = Start::drawn(space, &memory, SEED);
+    let start = Start::drawn(space, road, &memory, SEED);
     let world = World::new(Arc::new(Scene::of(road)), &start);
     let situation =
         Situation { memory: &memory, road, rules: &rules, surroundings: &world, seed: SEED, step: 0 };

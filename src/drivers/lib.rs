@@ -18,7 +18,7 @@
 //! let road = space.roads.iter().find(|road| road.name == "corner").expect("it is declared");
 //! let memory = space.memory_at_start(road, &RulesInForce::by_default(&space), 1)?;
 //! let scene = Arc::new(Scene::of(road));
-//! let mut world = World::new(scene.clone(), &Start::drawn(&space, &memory, 1));
+//! let mut world = World::new(scene.clone(), &Start::drawn(&space, road, &memory, 1));
 //!
 //! // Each tick the driver is told what is sensed, and answers with pedals and wheel.
 //! let mut driver = (by_name("idm").expect("it is in the registry").build)(&scene, 1);

@@ -288,6 +288,7 @@ impl<'a> Builder<'a> {
                     self.lanes.insert((road_index, section_index, element.id), index);
                     let limit_mps = limit_mps.unwrap_or(LIMIT_MPS_DEFAULT);
                     let mut lane = new_lane(key, centre, limit_mps, road.left_hand, junction);
+                    lane.is_motorway = road.is_motorway;
                     lane.heights = Heights::sampled(lane.centre.length_m(), |station_m| {
                         road.elevation.at(lane.road_station_m(station_m)).value
                     });
@@ -616,6 +617,7 @@ fn new_lane(
         centre: centre.path,
         widths_m: centre.widths_m,
         speed_limit_mps,
+        is_motorway: false,
         keeps_left,
         successors: Vec::new(),
         predecessors: Vec::new(),

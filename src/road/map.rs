@@ -42,6 +42,8 @@ pub struct Lane {
     pub widths_m: Vec<f64>,
     /// m/s.
     pub speed_limit_mps: f64,
+    /// Whether its road is a motorway, on which nobody goes on foot.
+    pub is_motorway: bool,
     /// Whether traffic keeps left on its road.
     pub keeps_left: bool,
     pub successors: Vec<LaneIndex>,

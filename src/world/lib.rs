@@ -20,7 +20,7 @@
 //! let (space, road) = (table.space(), &table.space().roads[0]);
 //! let rules = RulesInForce::by_default(space);
 //! let memory = space.memory_at_start(road, &rules, 1)?;
-//! let mut world = World::new(Arc::new(Scene::of(road)), &Start::drawn(space, &memory, 1));
+//! let mut world = World::new(Arc::new(Scene::of(road)), &Start::drawn(space, road, &memory, 1));
 //!
 //! // A row is offered, what it does is carried out, and time goes on.
 //! let before = world.clone();

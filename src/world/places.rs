@@ -217,7 +217,7 @@ fn without_place<'a>(
             for state in states {
                 let memory = runs.runs_in.state(index, state);
                 let scene = of_roads[index].get_or_insert_with(|| scenes.of(road));
-                let world = moment.world(space, scene, memory);
+                let world = moment.world(space, road, scene, memory);
                 let kept = world.for_many();
                 let surroundings = kept.as_deref().unwrap_or(&world);
                 let situation =
@@ -283,11 +283,11 @@ fn moments() -> impl Iterator<Item = Moment> {
 }
 
 impl Moment {
-    fn world(&self, space: &Space, scene: &Arc<Scene>, memory: &Memory) -> World {
+    fn world(&self, space: &Space, road: &Road, scene: &Arc<Scene>, memory: &Memory) -> World {
         let station_m = self.share * scene.route.goal_m;
         let limit_mps = scene.map.lane(scene.route.lane_at(station_m).lane).speed_limit_mps;
         let speed_mps = if self.is_fast { SHARE_OF_LIMIT * limit_mps.min(FAST_MPS_MAX) } else { SPEED_MPS };
-        let start = Start { signal_phase_s: self.phase_s, ..Start::drawn(space, memory, self.number) };
+        let start = Start { signal_phase_s: self.phase_s, ..Start::drawn(space, road, memory, self.number) };
         World::with_ego_at(Arc::clone(scene), &start, station_m, speed_mps)
     }
 }

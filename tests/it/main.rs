@@ -25,6 +25,7 @@ mod language;
 mod layers;
 mod links;
 mod maps;
+mod motorway;
 mod pedestrians;
 mod policies;
 mod profiles;

@@ -148,6 +148,8 @@ fn origin(log: &EpisodeLog, source: &Provenance) -> Vec<Field> {
 }
 
 fn start(space: &Space, log: &EpisodeLog) -> Vec<Field> {
+    let road = space.roads.iter().find(|road| road.name == log.road);
+    let road_mps = road.map_or(START_MPS, |road| road.ego_mps);
     let states = space.states.iter().map(|state| tree::field(&state.name, state_value(space, log, state)));
     states
         .chain([
@@ -155,7 +157,7 @@ fn start(space: &Space, log: &EpisodeLog) -> Vec<Field> {
             tree::field("traffic_seed", tree::whole(log.start.seed)),
         ])
         .chain(
-            (log.start.ego_mps != START_MPS)
+            (log.start.ego_mps != road_mps)
                 .then(|| tree::field("ego_speed", tree::quantity(log.start.ego_mps, Dimension::SPEED))),
         )
         .chain((log.start.ambient > 0).then(|| tree::field("ambient", tree::whole(log.start.ambient.into()))))

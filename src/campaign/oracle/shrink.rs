@@ -278,7 +278,7 @@ impl<'a> Search<'a> {
                 continue;
             }
             let Start { ego_mps, signal_phase_s, seed, ambient, traffic, .. } = best.start;
-            let start = Start::drawn(space, &candidate.memory, self.setup.seed);
+            let start = Start::drawn(space, self.setup.road, &candidate.memory, self.setup.seed);
             candidate.start = Start { ego_mps, signal_phase_s, seed, ambient, traffic, ..start };
             self.take(best, candidate, None);
         }

@@ -112,7 +112,7 @@ impl Arena {
             rules: &self.rules,
             ads: self.ads.clone(),
             seed,
-            start: Start { traffic: self.traffic, ..Start::drawn(space, &memory, seed) },
+            start: Start { traffic: self.traffic, ..Start::drawn(space, road, &memory, seed) },
             memory,
             period_shifts: Vec::new(),
             proc: ProcKind::default(),

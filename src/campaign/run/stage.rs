@@ -57,7 +57,7 @@ impl<'a> Stage<'a> {
                 ambient: start.ambient,
                 ego_mps: start.ego_mps,
                 traffic: self.traffic,
-                ..Start::drawn(space, &memory, seed)
+                ..Start::drawn(space, &space.roads[self.scenario.road], &memory, seed)
             },
             memory,
             period_shifts: Vec::new(),

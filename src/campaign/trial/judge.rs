@@ -14,7 +14,8 @@
 //! | walk | it appears beside the route on the asked side and walks over the route's path |
 //! | stand | it stands on the route's path |
 //!
-//! A vehicle that is to keep its lane does not change it; a vehicle that is to change it does so once.
+//! A vehicle with a manoeuvre begins each of its phases; where these lead it is theirs to say. Without one,
+//! a vehicle that is to keep its lane does not change it; a vehicle that is to change it does so once.
 //! An overtaker in the ego vehicle's own lane changes it once to get past, and comes back: it must if it is
 //! to change, and may when it is well ahead otherwise. Changes inside junctions, where lanes lie over each other, are
 //! not counted.
@@ -27,8 +28,9 @@ use avastra_world::sim::{Scene, VehicleParameters};
 
 use crate::trial::sighting::{Ending, Frame, Sighting};
 
-/// A vehicle has this long to do what its verb says: four observation periods, s.
+/// A vehicle has this long to do what its verb says: four observation periods, s; and this long for a manoeuvre.
 pub(super) const HORIZON_S: f64 = 24.0;
+pub(super) const MANOEUVRE_S: f64 = 60.0;
 /// A vehicle whose centre is farther than this outside its lane has left the road, m: half of what a bus needs in a
 /// tight turn.
 const BESIDE_ROAD_M: f64 = 0.5;
@@ -45,9 +47,25 @@ const OPPOSES_RAD: f64 = 3.0 * core::f64::consts::FRAC_PI_4;
 /// An oncoming vehicle that passes farther aside than this does not meet the ego vehicle, m.
 const MEETS_M: f64 = 12.0;
 
-/// Whether it did what its verb says; if not, what was wrong, in words.
-pub(super) fn verdict(scene: &Scene, request: &SpawnRequest, seen: &Sighting) -> Result<(), String> {
+/// Whether it did what its verb says, and began the phases of its manoeuvre, if it has one; if not, what was wrong, in words.
+pub(super) fn verdict(
+    scene: &Scene,
+    request: &SpawnRequest,
+    phases: Option<usize>,
+    seen: &Sighting,
+) -> Result<(), String> {
     let first = &seen.frames[0];
+    if let Some(phases) = phases {
+        if request.verb == Verb::DriveAhead {
+            appears_ahead(scene, request, first)?;
+        }
+        return match seen.phases_begun as usize {
+            begun if begun < phases => {
+                Err(ended(seen, &format!("phase {} of {phases} had begun", begun + 1)))
+            }
+            _ => Ok(()),
+        };
+    }
     let drives = || seen.frames.iter().try_for_each(|frame| stays_on_road(scene, frame));
     let asked = usize::from(request.then == Then::Change);
     match request.verb {
@@ -95,7 +113,7 @@ pub(super) fn verdict(scene: &Scene, request: &SpawnRequest, seen: &Sighting) ->
                 return Err("it appears on the route itself".to_owned());
             }
             let crossing = crosses(seen)?;
-            let until = Sighting { frames: seen.frames[..=crossing].to_vec(), ending: seen.ending };
+            let until = Sighting { frames: seen.frames[..=crossing].to_vec(), ..*seen };
             changes(&scene.map, request, &until, [asked, asked], 0)
         }
     }
@@ -134,6 +152,7 @@ fn appears_ahead(scene: &Scene, request: &SpawnRequest, first: &Frame) -> Result
     }
     let own = scene.map.lane(scene.route.lane_at(first.route_station_m).lane);
     let aside_m = own.centre.project(first.outline.pose.position).offset_m;
+    let aside_m = aside_m - request.offset_m;
     let is_there = match request.lane {
         LaneChoice::Left => aside_m > BESIDE_M,
         LaneChoice::Current => aside_m.abs() < BESIDE_M,
@@ -255,7 +274,10 @@ fn lane_changes(map: &RoadMap, frames: &[Frame]) -> Vec<usize> {
 /// The complaint that `what` had not happened when the sighting ended.
 fn ended(seen: &Sighting, what: &str) -> String {
     match seen.ending {
-        Ending::TimeOver => format!("{HORIZON_S:.0} s were over before {what}"),
+        Ending::TimeOver => {
+            let last_s = seen.frames[seen.frames.len() - 1].after_s;
+            format!("{last_s:.0} s were over before {what}")
+        }
         Ending::Arrived => format!("the ego vehicle arrived before {what}"),
         Ending::TouchedEgo => format!("it touched the ego vehicle before {what}"),
         Ending::TouchedOther => format!("it touched another road user before {what}"),

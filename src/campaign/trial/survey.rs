@@ -243,14 +243,15 @@ fn attempt(moment: &Moment, draw: &Draw) -> Try {
         found.unfair = found.unfair.or_else(|| fairness::complaint(&world, request, id));
         let mut ads = moment.ads.clone();
         let mut sensed: Sensed = world.sensed();
-        let Some(seen) = sighting::watch(world.clone(), ads.as_mut(), &mut sensed, id, judge::HORIZON_S)
-        else {
+        let phases = draw.courses.iter().find(|(at, _)| *at == nth).map(|(_, course)| course.phases());
+        let horizon_s = if phases.is_some() { judge::MANOEUVRE_S } else { judge::HORIZON_S };
+        let Some(seen) = sighting::watch(world.clone(), ads.as_mut(), &mut sensed, id, horizon_s) else {
             found.failure = Some("it is gone at once".to_owned());
             continue;
         };
         let nearest_m = seen.frames.iter().map(|frame| frame.gap_m).fold(f64::INFINITY, f64::min);
         found.nearest_m = Some(found.nearest_m.map_or(nearest_m, |other| other.min(nearest_m)));
-        if let Err(why) = judge::verdict(&scene, request, &seen) {
+        if let Err(why) = judge::verdict(&scene, request, phases, &seen) {
             found.failure.get_or_insert(why);
         }
     }

@@ -50,7 +50,7 @@ impl Frenet {
             lanes: Lanes::new(scene),
             steering: Steering::usual(),
             // A LiDAR sees by night as by day.
-            sight: Sight::new(1.0),
+            sight: Sight::new(scene, 1.0),
             signs: Signs::default(),
             plan: None,
             helm: Helm::default(),

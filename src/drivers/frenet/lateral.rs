@@ -92,7 +92,7 @@ pub struct Lanes {
 
 impl Lanes {
     pub fn new(scene: &Arc<Scene>) -> Lanes {
-        Lanes { scene: Arc::clone(scene), changes: RouteChanges::new(scene, SpeedRules::TOWN) }
+        Lanes { scene: Arc::clone(scene), changes: RouteChanges::new(scene, SpeedRules::on(scene)) }
     }
 
     /// Along the lane that the vehicle is in.
@@ -103,7 +103,7 @@ impl Lanes {
     /// The speed limit at a station, or the cruising speed if it is lower, m/s.
     pub fn limit_mps(&self, station_m: f64) -> f64 {
         let lane = self.scene.route.lane_at(station_m).lane;
-        self.scene.map.lane(lane).speed_limit_mps.min(SpeedRules::TOWN.cruise_mps)
+        self.scene.map.lane(lane).speed_limit_mps.min(SpeedRules::on(&self.scene).cruise_mps)
     }
 
     /// The lane changes of the route.

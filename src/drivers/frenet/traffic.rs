@@ -4,7 +4,7 @@
 //! that moves across its lane, and every pedestrian, keeps its velocity (PDM-Closed: constant velocity for all).
 //! In these forecasts no road user obeys a signal or gives way.
 
-use crate::kit::{Guide, RANGE_M};
+use crate::kit::Guide;
 use avastra_base::geometry::{Beside, Pose, Span, Vec2, extent_m, unit_vector, wrap_angle};
 use avastra_road::{LanePlace, RoadMap, Turn};
 use avastra_world::sim::SensedObject;
@@ -64,7 +64,7 @@ impl Other {
     pub fn seen(map: &RoadMap, guide: &Guide, object: &SensedObject, station_m: f64) -> Option<Other> {
         let poses = forecast(map, object);
         let reach_m = SIDE_M + (object.length_m + object.width_m) / 2.0;
-        let (from_m, to_m) = (station_m - BEHIND_M, station_m + RANGE_M);
+        let (from_m, to_m) = (station_m - BEHIND_M, station_m + guide.range_m());
         let (first, mut tracer) = guide.trace(object.pose.position, from_m, to_m, reach_m);
         let mut places = [None; FORECAST_STEPS];
         for (step, place) in places.iter_mut().enumerate() {

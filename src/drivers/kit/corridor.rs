@@ -4,7 +4,6 @@ use avastra_base::geometry::{Beside, Span, unit_vector};
 use avastra_world::sim::{SensedObject, VehicleParameters};
 
 use super::guide::Guide;
-use super::sight::RANGE_M;
 
 /// Room on each side of the vehicle, m. Ours: a vehicle that enters a lane of 3.5 m by 0.3 m, which UN R157 calls a
 /// cut-in, is in the corridor.
@@ -20,7 +19,7 @@ pub const FOLLOWED_MPS: f64 = 0.5;
 /// user's speed along them, m/s. `front_m` is the station of the vehicle's front.
 pub fn in_lane(guide: &Guide, object: &SensedObject, lateral_m: f64, front_m: f64) -> Option<(Span, f64)> {
     let rear_m = front_m - VehicleParameters::MKZ.length_m;
-    let at = guide.project(object.pose.position, rear_m - RANGE_M, front_m + RANGE_M);
+    let at = guide.project(object.pose.position, rear_m - guide.range_m(), front_m + guide.range_m());
     let in_lane = Beside { offset_m: at.offset_m - lateral_m, ..at };
     let forward = unit_vector(object.pose.heading_rad);
     let span = in_lane.taken(forward, object.length_m, object.width_m, HALF_WAY_M)?;

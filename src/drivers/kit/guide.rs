@@ -12,7 +12,7 @@
 //! There are no signals and no obstacles here.
 
 use avastra_base::geometry::{Beside, Pose, Vec2, smaller, unit_vector, wrap_angle};
-use avastra_world::sim::Scene;
+use avastra_world::sim::{RANGE_M, Scene, SensedObject};
 
 use super::speed::PREVIEW_S;
 
@@ -52,6 +52,11 @@ impl SpeedRules {
     pub const TOWN: SpeedRules =
         SpeedRules { cruise_mps: 11.18, lateral_acceleration_mps2_max: 2.0, slowdown_mps2: 1.5 };
 
+    /// As in towns, but at the speed that the road asks for, if it does.
+    pub fn on(scene: &Scene) -> SpeedRules {
+        SpeedRules { cruise_mps: scene.set_mps.unwrap_or(SpeedRules::TOWN.cruise_mps), ..SpeedRules::TOWN }
+    }
+
     /// For a guide that is only steered along: nothing bounds the speed but the limits of the road.
     pub const NONE: SpeedRules = SpeedRules {
         cruise_mps: f64::INFINITY,
@@ -64,6 +69,9 @@ impl SpeedRules {
 #[derive(Debug, Clone)]
 pub struct Guide {
     samples: Vec<Sample>,
+    /// How far from the ego vehicle road users are looked for along it, m.
+    range_m: f64,
+    is_motorway: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -128,7 +136,23 @@ impl Guide {
             let reachable_mps = (next_mps * next_mps + 2.0 * rules.slowdown_mps2 * SPACING_M).sqrt();
             samples[index].speed_mps_max = samples[index].speed_mps_max.min(reachable_mps);
         }
-        Guide { samples }
+        Guide { samples, range_m: scene.range_m, is_motorway: scene.is_motorway }
+    }
+
+    /// Where a road user is taken to be some time after it was seen beside the guide. It goes straight on, but on a motorway,
+    /// where seconds are bends of some metres, it follows the road.
+    pub fn expected(&self, object: &SensedObject, beside: &Beside, time_s: f64) -> Vec2 {
+        if !self.is_motorway {
+            return object.pose.position + object.velocity_mps * time_s;
+        }
+        let along_m = beside.forward.dot(&object.velocity_mps) * time_s;
+        let left_m = beside.forward.perp(&object.velocity_mps) * time_s;
+        self.pose_at(beside.station_m + along_m).offset(0.0, beside.offset_m + left_m).position
+    }
+
+    /// How far vehicles are sensed where it leads, m.
+    pub fn range_m(&self) -> f64 {
+        self.range_m
     }
 
     /// Through poses, one after another, of which two may be at the same place; and the station of each, m. There is
@@ -167,7 +191,10 @@ impl Guide {
                 speed_mps_max: f64::INFINITY,
             }
         };
-        (Guide { samples: (0..count).map(sample).collect() }, stations_m)
+        (
+            Guide { samples: (0..count).map(sample).collect(), range_m: RANGE_M, is_motorway: false },
+            stations_m,
+        )
     }
 
     /// The pose at a station; beyond the ends the route goes on straight.

@@ -34,7 +34,7 @@ pub use helm::Helm;
 pub use lane_changes::RouteChanges;
 pub use pedals::{Pedals, PedalsConfig};
 pub use point::Point;
-pub use sight::{RANGE_M, Sight};
+pub use sight::Sight;
 pub use speed::{HARDEST_MPS2, HOLD_MPS2, PREVIEW_S, held_mps2, speed_mps2};
 pub use steering::{Aside, Steering, SteeringConfig};
 pub use stops::{LIGHT_MPS2, Signs, Stop, crosswalks, lights};

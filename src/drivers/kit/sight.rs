@@ -2,10 +2,8 @@
 //! It is for driving systems that are about planning or control. Ranges and delays are those of `modular`. An object
 //! that is seen is seen as it is: noise, missed frames, ghosts and wrong classes are left out; `modular` has them.
 
-use avastra_world::sim::{Conditions, FRAME_S, Sensed, SensedObject};
+use avastra_world::sim::{Conditions, FRAME_S, Scene, Sensed, SensedObject};
 
-/// How far vehicles and lights are seen, m. Ours, as in `scenarios/ads/default.yaml`.
-pub const RANGE_M: f64 = 120.0;
 /// How far pedestrians are seen by day, m. Ours, as in `scenarios/ads/default.yaml`.
 const PEDESTRIAN_M: f64 = 60.0;
 /// An object is not seen if less than this share of it is in sight. Ours, as in `scenarios/ads/default.yaml`.
@@ -14,6 +12,8 @@ const VISIBLE_FRACTION_MIN: f64 = 0.2;
 /// What a driver has seen.
 #[derive(Debug, Clone, Default)]
 pub struct Sight {
+    /// How far vehicles are seen, m: as far as anything is sensed.
+    vehicle_m: f64,
     /// Factor of the range for pedestrians in full darkness, in `[0, 1]`.
     night_factor: f64,
     /// What was in sight at the last two looks, the newer last.
@@ -23,8 +23,8 @@ pub struct Sight {
 
 impl Sight {
     /// Sensors whose range for pedestrians falls by a factor in full darkness: 1 for a LiDAR.
-    pub fn new(night_factor: f64) -> Sight {
-        Sight { night_factor, ..Sight::default() }
+    pub fn new(scene: &Scene, night_factor: f64) -> Sight {
+        Sight { vehicle_m: scene.range_m, night_factor, ..Sight::default() }
     }
 
     /// Looks once; to be called every frame. What the driver knows then is the look of the frame before
@@ -43,7 +43,7 @@ impl Sight {
         newer.clear();
         let in_sight = |object: &&SensedObject| {
             object.visible_fraction >= VISIBLE_FRACTION_MIN
-                && object.distance_m <= range_m(object, &sensed.conditions, self.night_factor)
+                && object.distance_m <= range_m(object, &sensed.conditions, self.vehicle_m, self.night_factor)
         };
         newer.extend(sensed.objects.iter().filter(in_sight));
     }
@@ -55,9 +55,9 @@ impl Sight {
 }
 
 /// How far an object of its kind is seen, m: no farther than the fog allows.
-fn range_m(object: &SensedObject, conditions: &Conditions, night_factor: f64) -> f64 {
+fn range_m(object: &SensedObject, conditions: &Conditions, vehicle_m: f64, night_factor: f64) -> f64 {
     let clear_m = if object.body.is_vehicle() {
-        RANGE_M
+        vehicle_m
     } else {
         PEDESTRIAN_M * (night_factor + (1.0 - night_factor) * conditions.light)
     };
@@ -67,14 +67,14 @@ fn range_m(object: &SensedObject, conditions: &Conditions, night_factor: f64) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{CLEAR_DAY, object, sensed};
+    use crate::testing::{CLEAR_DAY, object, sensed, straight};
     use avastra_base::geometry::Pose;
     use avastra_lang::model::vocabulary::Body;
 
     /// The numbers of the looks, from 1, after which the object is known.
     fn known_after(seen: SensedObject, conditions: Conditions, night_factor: f64) -> Vec<usize> {
         let sensed = Sensed { conditions, ..sensed(Pose::new(0.0, 0.0, 0.0), 10.0, vec![seen]) };
-        let mut sight = Sight::new(night_factor);
+        let mut sight = Sight::new(&straight(), night_factor);
         let look = |_: &usize| {
             sight.look(&sensed);
             !sight.known().is_empty()

@@ -9,7 +9,6 @@ use avastra_road::SignKind;
 use avastra_world::sim::{Scene, Sensed, SensedObject, SignalColour};
 
 use super::guide::Guide;
-use super::sight::RANGE_M;
 use super::speed::HARDEST_MPS2;
 
 /// A place that the front of the vehicle must not pass now.
@@ -53,13 +52,13 @@ impl Signs {
             self.done += 1;
             return None;
         }
-        (distance_m < RANGE_M).then_some(Stop { station_m: line.station_m, reason: Reason::StopSign })
+        (distance_m < scene.range_m).then_some(Stop { station_m: line.station_m, reason: Reason::StopSign })
     }
 }
 
 /// The lights ahead that the vehicle stops for.
 pub fn lights<'a>(scene: &'a Scene, sensed: &'a Sensed, front_m: f64) -> impl Iterator<Item = Stop> + 'a {
-    let range_m = RANGE_M.min(sensed.conditions.visibility_m);
+    let range_m = scene.range_m.min(sensed.conditions.visibility_m);
     scene.route.stop_lines.iter().filter_map(move |line| {
         let stoppable_mps2 = match sensed.signals[line.signal] {
             SignalColour::Green => return None,
@@ -89,7 +88,7 @@ pub fn crosswalks<'a>(
             let reach_m = if comes { CROSSWALK_SIDE_M } else { ON_THE_WAY_M };
             along.contains(&beside.station_m) && beside.offset_m.abs() <= reach_m
         };
-        let ahead = (0.0..RANGE_M).contains(&(from_m - front_m))
+        let ahead = (0.0..scene.range_m).contains(&(from_m - front_m))
             && can_stop(from_m - front_m, speed_mps, HARDEST_MPS2);
         (ahead && known.iter().any(|object| !object.body.is_vehicle() && uses(object)))
             .then_some(Stop { station_m: from_m, reason: Reason::Crosswalk })

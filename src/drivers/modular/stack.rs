@@ -51,6 +51,10 @@ impl Modular {
         seed: u64,
         foresight: Option<Arc<Foresight>>,
     ) -> Modular {
+        let mut config = config.clone();
+        config.perception = config.perception.on(scene);
+        config.planning.cruise_mps = scene.set_mps.unwrap_or(config.planning.cruise_mps);
+        let config = &config;
         let junctions = Arc::new(Junctions::of(scene));
         let weak = &config.weaknesses;
         let latency_frames = config.perception.latency_frames;

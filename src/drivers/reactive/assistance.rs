@@ -10,7 +10,7 @@
 //! The standards state what a system must reach at least; this one reaches that and no more. Left out: warnings
 //! and the override by a driver. Unlike many sold systems it reacts to vehicles, too, that it never saw move.
 
-use crate::kit::{BESIDE_M, FOLLOWED_MPS, Guide, HALF_WAY_M, HARDEST_MPS2, RANGE_M, in_lane, speed_mps2};
+use crate::kit::{BESIDE_M, FOLLOWED_MPS, Guide, HALF_WAY_M, HARDEST_MPS2, in_lane, speed_mps2};
 use crate::status::Reason;
 use avastra_base::geometry::{Beside, extent_m, unit_vector};
 use avastra_base::kinematics::needed_mps2;
@@ -85,7 +85,7 @@ impl Target {
             return None;
         }
         let size = (object.length_m, object.width_m);
-        let beside = guide.project(object.pose.position, front_m - BESIDE_M, front_m + RANGE_M);
+        let beside = guide.project(object.pose.position, front_m - BESIDE_M, front_m + guide.range_m());
         let forward = unit_vector(object.pose.heading_rad);
         let taken = |beside: &Beside| beside.taken(forward, size.0, size.1, HALF_WAY_M);
         let (enters_s, span) = match taken(&beside) {

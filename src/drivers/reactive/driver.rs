@@ -38,9 +38,9 @@ impl Reactive {
     pub fn new(scene: &Arc<Scene>) -> Reactive {
         Reactive {
             scene: Arc::clone(scene),
-            changes: RouteChanges::new(scene, SpeedRules::TOWN),
+            changes: RouteChanges::new(scene, SpeedRules::on(scene)),
             free_s: 0.0,
-            sight: Sight::new(NIGHT_FACTOR),
+            sight: Sight::new(scene, NIGHT_FACTOR),
             signs: Signs::default(),
             targets: Vec::new(),
             stop: None,

@@ -54,7 +54,7 @@ impl Encounter {
     ) -> Option<Encounter> {
         let car = VehicleParameters::MKZ;
         let reach_m = 10.0 + HORIZON_S * (own_mps + object.velocity_mps.norm());
-        let (from_m, to_m) = (front_m - car.length_m - 10.0, front_m + 130.0);
+        let (from_m, to_m) = (front_m - car.length_m - 10.0, front_m + guide.range_m() + 10.0);
         let forward = unit_vector(object.pose.heading_rad);
         let size = (object.length_m, object.width_m);
         let beside_m = (object.length_m + object.width_m + car.width_m) / 2.0;
@@ -69,7 +69,7 @@ impl Encounter {
             None
         } else {
             (0..=(HORIZON_S / STEP_S) as usize).map(|step| step as f64 * STEP_S).find(|&time_s| {
-                let position = object.pose.position + object.velocity_mps * time_s;
+                let position = guide.expected(object, &beside, time_s);
                 let Some(then) = tracer.next(position) else { return false };
                 let (along_m, across_m) = extent_m(forward, then.forward, size);
                 let ego_front_m = front_m + own_mps * time_s;

@@ -13,8 +13,8 @@ use std::sync::Arc;
 
 use crate::driver::Ads;
 use crate::kit::{
-    BESIDE_M, Guide, HALF_WAY_M, HARDEST_MPS2, Helm, LIGHT_MPS2, RANGE_M, RouteChanges, Signs, SpeedRules,
-    Steering, held_mps2, in_lane, speed_mps2,
+    BESIDE_M, Guide, HALF_WAY_M, HARDEST_MPS2, Helm, LIGHT_MPS2, RouteChanges, Signs, SpeedRules, Steering,
+    held_mps2, in_lane, speed_mps2,
 };
 use crate::status::{PerceivedObject, Reason, Status};
 use avastra_base::geometry::{Beside, Pose, Vec2, unit_vector};
@@ -79,14 +79,14 @@ struct Reach {
 }
 
 impl Reach {
-    /// The stretches of all moments, for a speed and a place of the front bumper.
-    fn of_moments(speed_mps: f64, front_m: f64) -> [Reach; LOOKS] {
+    /// The stretches of all moments, for a speed, the one that is wanted, and a place of the front bumper.
+    fn of_moments(speed_mps: f64, cruise_mps: f64, front_m: f64) -> [Reach; LOOKS] {
         let rear_m = front_m - VehicleParameters::MKZ.length_m;
         core::array::from_fn(|index| {
             let time_s = (index + 1) as f64 * LOOK_STEP_S;
             // A slow ego vehicle may speed up meanwhile.
             let reach_s = time_s + CONFLICT_S;
-            let way_m = (speed_mps * reach_s + reach_s * reach_s).min(SpeedRules::TOWN.cruise_mps * reach_s);
+            let way_m = (speed_mps * reach_s + reach_s * reach_s).min(cruise_mps * reach_s);
             let from_m = rear_m + speed_mps * (time_s - CONFLICT_S).max(0.0);
             Reach { time_s, from_m, to_m: front_m + way_m }
         })
@@ -113,7 +113,7 @@ impl Idm {
     pub fn new(scene: &Arc<Scene>) -> Idm {
         Idm {
             scene: Arc::clone(scene),
-            changes: RouteChanges::new(scene, SpeedRules::TOWN),
+            changes: RouteChanges::new(scene, SpeedRules::on(scene)),
             is_beset: false,
             steering: Steering::usual(),
             helm: Helm::default(),
@@ -153,8 +153,9 @@ impl Idm {
         ahead.extend(self.lights(sensed, front_m));
         let sign = self.signs.next_stop(&self.scene, front_m, sensed.ego.speed_mps);
         ahead.extend(sign.map(|stop| Ahead::at_line(stop.station_m, stop.reason)));
-        let objects = || sensed.objects.iter().filter(|object| object.distance_m < RANGE_M);
-        let reaches = Reach::of_moments(sensed.ego.speed_mps, front_m);
+        let objects = || sensed.objects.iter().filter(|object| object.distance_m < self.scene.range_m);
+        let reaches =
+            Reach::of_moments(sensed.ego.speed_mps, SpeedRules::on(&self.scene).cruise_mps, front_m);
         ahead.extend(objects().filter_map(|object| self.ahead(sensed, object, front_m, &reaches)));
         // Where it must wait for a gap.
         let wait_m = self.changes.wait_m();
@@ -201,7 +202,7 @@ impl Idm {
         self.scene.route.stop_lines.iter().filter_map(move |line| {
             let distance_m = line.station_m - front_m;
             let stops = sensed.signals[line.signal] != SignalColour::Green
-                && (-LINE_GAP_M..RANGE_M).contains(&distance_m)
+                && (-LINE_GAP_M..self.scene.range_m).contains(&distance_m)
                 && needed_mps2(speed_mps, distance_m.max(0.1)) <= LIGHT_MPS2;
             stops.then_some(Ahead::at_line(line.station_m, Reason::RedLight))
         })
@@ -220,7 +221,7 @@ impl Idm {
         let taken = |beside: &Beside| beside.taken(forward, object.length_m, object.width_m, HALF_WAY_M);
         let reach_m = HALF_WAY_M + (object.length_m + object.width_m) / 2.0;
         let (beside, mut tracer) =
-            self.guide().trace(object.pose.position, rear_m - 10.0, front_m + RANGE_M, reach_m);
+            self.guide().trace(object.pose.position, rear_m - 10.0, front_m + self.scene.range_m, reach_m);
         if let Some(span) = taken(&beside) {
             // It is on the way now; once its middle is behind the front, the ego vehicle is past it.
             return (span.middle_m() > front_m - BESIDE_M).then(|| Ahead {
@@ -233,9 +234,10 @@ impl Idm {
         if object.velocity_mps == Vec2::zeros() {
             return None;
         }
+        let seen = beside;
         let front = self.guide().pose_at(front_m).position;
         for &Reach { time_s, from_m: ego_from_m, to_m: ego_to_m } in reaches {
-            let position = object.pose.position + object.velocity_mps * time_s;
+            let position = self.guide().expected(object, &seen, time_s);
             let within_m = GUIDE_STRETCH_MAX * (ego_to_m - front_m) + reach_m;
             if (position - front).norm_squared() > within_m * within_m {
                 continue;

@@ -194,6 +194,9 @@ fn road_text(road: &Road, name: &str) -> Option<String> {
     if limit_mps <= *SPAWN_SPEED_MPS.end() {
         let _ = write!(text, ", limit: {} m/s", decimal(limit_mps, false));
     }
+    if let Some(set_mps) = road.set_mps {
+        let _ = write!(text, ", set_speed: {} m/s", decimal(set_mps, false));
+    }
     let mut passed = road.route.lanes.iter().filter_map(|part| road.map.lane(part.lane).junction);
     if passed.any(|junction| road.map.junctions[junction].idle_lights > 0) {
         text += ", unlit: true";

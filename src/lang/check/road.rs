@@ -8,11 +8,14 @@ use crate::check::expression::{Place, number_help};
 use crate::check::names::unknown;
 use crate::check::report::{Report, field};
 use crate::model::vocabulary::{RoadField, Word};
-use crate::model::{Road, RoadFacts, SPAWN_SPEED_MPS, Type, code, stretches};
+use crate::model::{Road, RoadFacts, SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, Type, code, stretches};
 use crate::syntax::ast::ItemKind;
 use crate::syntax::{Diagnostic, ast, print_expr};
 use avastra_base::units::{Dimension, Rational};
 use avastra_road::{LanePlace, RoadError, RoadMap, Route};
+
+/// Least speed that an ego vehicle may want, m/s: it has to arrive.
+const SET_MPS_MIN: f64 = 1.0;
 
 /// Loads maps. Its implementation knows the folder of the file that names a map.
 pub(crate) trait Maps {
@@ -99,9 +102,16 @@ impl Checker {
                 "mend the map, or choose places between which it has none; `avastra road MAP` lists the gaps",
             ));
         }
+        let mut speed = |wanted: RoadField, what: &str, least_mps: f64| {
+            field(&fields, wanted).map(|value| self.road_speed(value, wanted, what, least_mps))
+        };
+        let ego_mps = speed(RoadField::EgoSpeed, "a speed", 0.0);
+        let set_mps = speed(RoadField::SetSpeed, "a wanted speed", SET_MPS_MIN);
+        let (ego_mps, set_mps) =
+            (ego_mps.unwrap_or(Some(START_MPS))?, set_mps.map_or(Some(None), |set| set.map(Some))?);
         let facts = facts(&block.name.text, &map, &route);
         let name = block.name.text.clone();
-        Some(Road { name, docs: docs(item), map_path, map, start, goal, route, facts })
+        Some(Road { name, docs: docs(item), map_path, map, start, goal, route, ego_mps, set_mps, facts })
     }
 
     /// Notes the names and numbers of a road, whether its map can be read or not.
@@ -148,6 +158,19 @@ impl Checker {
             Diagnostic::error(code::SETTING, format!("a limit of `{}` is not possible", print_expr(value)));
         let wanted = format!("must be more than 0 m/s and at most {} m/s", SPAWN_SPEED_MPS.end());
         self.reject(error.at(value.span, wanted).help("write for example `limit: 30 km/h`"))
+    }
+
+    /// A speed of the ego vehicle, m/s.
+    fn road_speed(&mut self, value: &ast::Expr, of: RoadField, what: &str, least_mps: f64) -> Option<f64> {
+        let speed = self.typed(value, &Place::default(), Type::Quantity(Dimension::SPEED))?;
+        let speed_mps = self.fold_number(&speed)?.to_f64();
+        if (least_mps..=SPEED_MPS_MAX).contains(&speed_mps) {
+            return Some(speed_mps);
+        }
+        let message = format!("{what} of `{}` is not possible", print_expr(value));
+        let error = Diagnostic::error(code::SETTING, message);
+        let error = error.at(value.span, format!("must lie within {least_mps} .. {SPEED_MPS_MAX} m/s"));
+        self.reject(error.help(format!("write for example `{}: 60 km/h`", of.name())))
     }
 
     fn lane_point(&mut self, value: &ast::Expr, map: &RoadMap) -> Option<LanePlace> {

@@ -42,7 +42,7 @@ pub fn scenario(file: &ast::File, space: &Space) -> Result<Scenario, Vec<Diagnos
     let mut reader = Reader { space, diagnostics: Vec::new() };
     let origin = reader.origin(&declared.origin);
     let road = reader.road(&declared.road);
-    let start = reader.start(declared);
+    let start = reader.start(declared, road);
     if let (true, Some(road)) = (reader.diagnostics.is_empty(), road) {
         let in_force = reader.in_force(&origin);
         let at = declared.start.first().map_or(declared.name.span, |field| field.name.span);
@@ -136,7 +136,7 @@ impl<'a> Reader<'a> {
         found.or_else(|| self.reject(unknown("road", &name.text, name.span, roads())))
     }
 
-    fn start(&mut self, declared: &ast::Scenario) -> ScenarioStart {
+    fn start(&mut self, declared: &ast::Scenario, road: Option<usize>) -> ScenarioStart {
         let space = self.space;
         // Any seed will do: every state that it draws is replaced below or reported as missing.
         let mut start = ScenarioStart {
@@ -144,7 +144,7 @@ impl<'a> Reader<'a> {
             signal_phase_s: 0.0,
             traffic_seed: None,
             ambient: 0,
-            ego_mps: START_MPS,
+            ego_mps: road.map_or(START_MPS, |road| self.space.roads[road].ego_mps),
         };
         self.fields_once("field", &declared.start);
         for field in &declared.start {

@@ -57,7 +57,7 @@ pub struct ScenarioStart {
     pub traffic_seed: Option<u64>,
     /// `ambient`: vehicles of ambient traffic; 0 if not given.
     pub ambient: u32,
-    /// `ego_speed`, m/s; `START_MPS` if not given.
+    /// `ego_speed`, m/s; that of the road if not given.
     pub ego_mps: f64,
 }
 

@@ -449,6 +449,10 @@ pub struct Road {
     pub start: LanePlace,
     pub goal: LanePlace,
     pub route: Route,
+    /// Speed of the ego vehicle as an episode begins, m/s.
+    pub ego_mps: f64,
+    /// The speed that it wants on a free road, m/s; `None`: its driver's own.
+    pub set_mps: Option<f64>,
     pub facts: RoadFacts,
 }
 

@@ -296,6 +296,8 @@ words! {
     Start "start" = "Where the ego vehicle starts: `start: lane 1/-1 at 12 m`.",
     Goal "goal" = "Where it is to arrive: `goal: lane 7/-1 at 80 m`.",
     Limit "limit" = "A lower limit for the whole road: `limit: 30 km/h`.",
+    EgoSpeed "ego_speed" = "How fast the ego vehicle is as an episode begins: `ego_speed: 60 km/h`.",
+    SetSpeed "set_speed" = "How fast the ego vehicle wants to drive where it is free to: `set_speed: 130 km/h`.",
     Unlit "unlit" = "Whether to drive through junctions whose lights hold no lane, as if they had none: `unlit: true`.",
 }
 

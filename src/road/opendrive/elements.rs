@@ -31,6 +31,8 @@ pub struct RoadElement {
     pub successor: Option<RoadLink>,
     /// Station from which a speed limit holds, m, and the limit, m/s; `None` where it ends. By rising station.
     pub speeds: Vec<(f64, Option<f64>)>,
+    /// Whether all of it is a motorway.
+    pub is_motorway: bool,
     pub reference: ReferenceLine,
     /// Height of the reference line, m. Banks and crossfalls are not read.
     pub elevation: Cubics,

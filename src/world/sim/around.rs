@@ -10,7 +10,7 @@ use super::npc::Driver;
 use super::pedestrian::Walker;
 use super::road_user::{Motion, Obstacle, RoadUser};
 use super::scene::Scene;
-use super::sense::{EgoMotion, RANGE_M};
+use super::sense::EgoMotion;
 use super::signals::SignalClock;
 use super::traffic::TrafficProfile;
 
@@ -146,7 +146,7 @@ impl Around<'_> {
 
     /// Whether the ego vehicle's sensors would see an obstacle of which nothing hides `visible_fraction`.
     pub fn is_in_sight(&self, obstacle: &Obstacle, visible_fraction: f64) -> bool {
-        visible_fraction > 0.0 && obstacle.distance_m < RANGE_M.min(self.visibility_m)
+        visible_fraction > 0.0 && obstacle.distance_m < self.scene.range_m.min(self.visibility_m)
     }
 
     /// The hardest braking of a body at a speed on this road, m/s².

@@ -92,6 +92,8 @@ pub(super) struct Mover {
     pub bearer: Option<usize>,
     /// The manoeuvre that it does, until it ends or an order replaces it.
     pub course: Option<Running>,
+    /// How many phases of its last manoeuvre have begun. Nothing depends on it.
+    pub phases_begun: u32,
 }
 
 /// A manoeuvre under way.
@@ -271,6 +273,7 @@ impl Mover {
             rights: Rights::default(),
             bearer: None,
             course: None,
+            phases_begun: 0,
         }
     }
 

@@ -10,12 +10,25 @@ use super::junction::ConflictAreas;
 use super::right_of_way::{RouteArea, route_areas};
 use super::way::Ways;
 
+/// Objects farther away than this are not sensed at all, m: the clear-day range for cars of the LiDAR and the camera that
+/// driving systems are given.
+pub const RANGE_M: f64 = 120.0;
+
+/// The same on a motorway, m: that of a long-range radar as Apollo takes (Continental ARS 408-21: 250 m).
+const MOTORWAY_RANGE_M: f64 = 250.0;
+
 /// What stays the same during all episodes of one road. Shared, never copied.
 #[derive(Debug)]
 pub struct Scene {
     pub map: Arc<RoadMap>,
     /// Where the ego vehicle is to go.
     pub route: Route,
+    /// The speed that it is to want on a free road, m/s; `None`: its driver's own.
+    pub set_mps: Option<f64>,
+    /// Whether all of the route is a motorway.
+    pub is_motorway: bool,
+    /// How far vehicles are sensed, m.
+    pub range_m: f64,
     pub(super) areas: ConflictAreas,
     /// Where the ways of others cross or join the route, by rising station.
     pub(super) route_areas: Vec<RouteArea>,
@@ -28,7 +41,7 @@ pub struct Scene {
 impl Scene {
     /// The scene of a road of a space.
     pub fn of(road: &Road) -> Scene {
-        Scene::new(road.map.clone(), road.route.clone())
+        Scene { set_mps: road.set_mps, ..Scene::new(road.map.clone(), road.route.clone()) }
     }
 
     pub fn new(map: Arc<RoadMap>, route: Route) -> Scene {
@@ -38,6 +51,7 @@ impl Scene {
             end_m += lane.centre.length_m();
             streets.push((LaneIndex(index), end_m));
         }
+        let is_motorway = route.lanes.iter().all(|part| map.lane(part.lane).is_motorway);
         let areas = ConflictAreas::new(&map);
         let route_areas = route_areas(&areas, &route);
         Scene {
@@ -46,8 +60,11 @@ impl Scene {
             ways: Ways::default(),
             foot_ways: FootWays::default(),
             streets,
+            is_motorway,
+            range_m: if is_motorway { MOTORWAY_RANGE_M } else { RANGE_M },
             map,
             route,
+            set_mps: None,
         }
     }
 

@@ -10,10 +10,6 @@ use avastra_lang::model::vocabulary::Body;
 use super::road_user::Obstacle;
 use super::world::DT_S;
 
-/// Objects farther away than this are not sensed at all, m: the clear-day range for cars of the
-/// LiDAR and the camera that driving systems are given.
-pub(super) const RANGE_M: f64 = 120.0;
-
 /// Ticks between two frames (10 Hz): once a frame, lines of sight are worked out, driving systems perceive
 /// and other drivers react.
 pub const FRAME_TICKS: u64 = 5;

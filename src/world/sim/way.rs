@@ -11,8 +11,7 @@ use avastra_road::{Heights, Lane, LaneIndex, RoadMap, SignKind, StopLine};
 
 use super::body::BodyParameters;
 use super::junction::Area;
-use super::scene::Scene;
-use super::sense::RANGE_M;
+use super::scene::{RANGE_M, Scene};
 
 /// Lateral acceleration that other drivers accept in a bend, m/s²: upper end of comfort.
 const LATERAL_MPS2: f64 = 3.0;

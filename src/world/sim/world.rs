@@ -16,7 +16,7 @@ use avastra_base::rng;
 use avastra_base::rng::Stream;
 use avastra_lang::model::body::BodyParameters;
 use avastra_lang::model::vocabulary::{Level, TimeOfDay};
-use avastra_lang::model::{COMMANDED_MAX, Memory, NpcFacts, START_MPS, Space, TICK_MS};
+use avastra_lang::model::{COMMANDED_MAX, Memory, NpcFacts, Road, Space, TICK_MS};
 use avastra_road::{RouteLaneChange, is_apart};
 
 use super::ambient::{Ambient, RENEWAL_TICKS, is_gone};
@@ -30,8 +30,7 @@ use super::right_of_way::PassedLight;
 use super::road_user::{Moved, Obstacle, RoadUser};
 use super::scene::Scene;
 use super::sense::{
-    Conditions, EgoMotion, FRAME_S, FRAME_TICKS, RANGE_M, Sensed, SensedObject, SignalColour,
-    visible_fraction,
+    Conditions, EgoMotion, FRAME_S, FRAME_TICKS, Sensed, SensedObject, SignalColour, visible_fraction,
 };
 use super::signals::SignalClock;
 use super::trace::Trace;
@@ -89,13 +88,13 @@ pub struct Start {
 
 impl Start {
     /// The start of an episode with this seed and memory, without ambient traffic, under the default traffic profile.
-    pub fn drawn(space: &Space, memory: &Memory, seed: u64) -> Start {
+    pub fn drawn(space: &Space, road: &Road, memory: &Memory, seed: u64) -> Start {
         let mut rng = rng::stream(seed, Stream::Reset, 1);
         // A multiple of 1/64 s is a short decimal in a file.
         let signal_phase_s = (rng::between(&mut rng, 0.0, PHASES_S) * 64.0).floor() / 64.0;
         let (time, sky) = space.weather(memory);
         Start {
-            ego_mps: START_MPS,
+            ego_mps: road.ego_mps,
             time,
             sky,
             signal_phase_s,
@@ -289,6 +288,12 @@ impl World {
         Some(npc_facts(&self.alone(), &user.obstacle, &user.mover.motion))
     }
 
+    /// How many phases of its manoeuvre the road user with an id has begun; 0 if it is not there.
+    pub fn phases_begun(&self, id: u32) -> u32 {
+        let user = self.users.iter().find(|user| user.obstacle.id == id);
+        user.map_or(0, |user| user.mover.phases_begun)
+    }
+
     /// What can be asked about the latest bearer of a name, if one is there.
     pub fn bearer_facts(&self, who: usize) -> Option<NpcFacts> {
         self.npc_facts(self.users[self.bearer(who)?].obstacle.id)
@@ -346,9 +351,10 @@ impl World {
         into.signals.clear();
         into.signals.extend((0..self.scene.map.signals.len()).map(|signal| self.signal(signal)));
         into.objects.clear();
+        let range_m = self.scene.range_m;
         for RoadUser { obstacle, mover } in self.users.iter().filter(|user| !user.obstacle.is_apart) {
             let away = obstacle.outline.pose.position - self.ego.outline.pose.position;
-            if away.norm_squared() > RANGE_M * RANGE_M {
+            if away.norm_squared() > range_m * range_m {
                 continue;
             }
             into.objects.push(SensedObject {
@@ -471,8 +477,9 @@ impl World {
 
     /// Lets ambient traffic leave and appear; `begins` is before the first tick.
     fn renew_ambient(&mut self, begins: bool) {
-        let ego_outline = self.ego.outline;
-        let is_gone = |user: &RoadUser| user.obstacle.is_ambient() && is_gone(&user.obstacle, &ego_outline);
+        let (ego_outline, range_m) = (self.ego.outline, self.scene.range_m);
+        let is_gone =
+            |user: &RoadUser| user.obstacle.is_ambient() && is_gone(&user.obstacle, &ego_outline, range_m);
         self.users.retain(|user| !is_gone(user));
         let present = self.obstacles().filter(|obstacle| obstacle.is_ambient()).count();
         if present >= self.ambient.wanted as usize {

@@ -1,6 +1,7 @@
 //! Settings of the parts that find out what is: localisation, perception, tracking.
 
 use avastra_world::section;
+use avastra_world::sim::{RANGE_M, Scene};
 
 section! {
     /// Pose error of RTK and LiDAR map matching.
@@ -93,6 +94,19 @@ section! {
         blind_to_large_vehicles: bool = false;
         /// Every object that the sensors reach is detected as it is, hidden or not, without ghosts; and so is every light. An idealisation, to find causes with.
         perfect: bool = false;
+    }
+}
+
+impl PerceptionConfig {
+    /// With the ranges for vehicles that the sensors have on a road: on a motorway they are farther.
+    pub fn on(&self, scene: &Scene) -> PerceptionConfig {
+        let farther = scene.range_m / RANGE_M;
+        PerceptionConfig {
+            lidar_vehicle_m: self.lidar_vehicle_m * farther,
+            camera_vehicle_m: self.camera_vehicle_m * farther,
+            grid_m: self.grid_m * farther,
+            ..self.clone()
+        }
     }
 }
 

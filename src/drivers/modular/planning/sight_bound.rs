@@ -56,6 +56,10 @@ pub struct SightBound {
     /// Crosswalks, from and to, m.
     crosswalks_m: Vec<(f64, f64)>,
     prior: Vec<PriorLane>,
+    /// What the planner is told of its sensors, not what a planted fault makes of them.
+    sensors: PerceptionConfig,
+    /// Nobody goes on foot on a motorway (Vienna Convention on Road Traffic, article 25).
+    is_motorway: bool,
     /// The conditions that the ranges were worked out for, and these.
     known: Option<(Conditions, Seen)>,
 }
@@ -83,7 +87,13 @@ struct PriorLane {
 impl SightBound {
     pub fn new(scene: &Scene, rights: &RouteRights) -> SightBound {
         let prior = rights.to_wait_for().map(|meeting| PriorLane::of(&scene.map, meeting)).collect();
-        SightBound { crosswalks_m: scene.route.crosswalks_m.clone(), prior, known: None }
+        SightBound {
+            crosswalks_m: scene.route.crosswalks_m.clone(),
+            prior,
+            sensors: PerceptionConfig::default().on(scene),
+            is_motorway: scene.is_motorway,
+            known: None,
+        }
     }
 
     /// Adds the limits that the view sets here and ahead.
@@ -143,9 +153,9 @@ impl SightBound {
         match &self.known {
             Some((known, seen)) if same(known) => *seen,
             _ => {
-                // What the planner is told of its sensors, not what a planted fault makes of them.
-                let (pedestrian_m, vehicle_m) = surely_seen_m(&PerceptionConfig::default(), conditions);
-                let seen = Seen { allowed_mps: stoppable_mps(config, pedestrian_m), vehicle_m };
+                let (pedestrian_m, vehicle_m) = surely_seen_m(&self.sensors, conditions);
+                let clear_m = if self.is_motorway { vehicle_m } else { pedestrian_m };
+                let seen = Seen { allowed_mps: stoppable_mps(config, clear_m), vehicle_m };
                 self.known = Some((*conditions, seen));
                 seen
             }

@@ -184,6 +184,8 @@ impl Reader {
         };
         let (predecessor, successor) = (link("predecessor")?, link("successor")?);
         let mut speeds = Vec::new();
+        let mut types = road.children("type").map(|kind| kind.attribute("type")).peekable();
+        let is_motorway = types.peek().is_some() && types.all(|kind| kind == Some("motorway"));
         for kind in road.children("type") {
             let limit = kind.child("speed").map(|speed| self.speed(speed)).transpose()?;
             speeds.push((kind.number_or("s", 0.0)?, limit.flatten()));
@@ -204,6 +206,7 @@ impl Reader {
             predecessor,
             successor,
             speeds,
+            is_motorway,
             reference: self.reference_line(road, &id, length_m)?,
             elevation,
             lane_offset: cubics(lanes.children("laneOffset"), "s")?,

@@ -33,6 +33,8 @@ const SPHERE_PART: f64 = 0.75;
 const SPHERE_M_MAX: f64 = 1.2;
 /// Below this speed a lane change slows down with the vehicle, which cannot slide sideways, m/s.
 const CHANGE_FULL_MPS: f64 = 5.0;
+/// Headway to another vehicle that changes into the same lane, s. Ours.
+const MERGE_S: f64 = 1.0;
 /// Neighbouring lanes whose centres are farther apart than this have parted, m.
 const CHANGE_M_MAX: f64 = 8.0;
 
@@ -167,6 +169,7 @@ impl Driver {
         if there.distance_m > CHANGE_M_MAX
             || room_m < length_m(self.speed_mps, there.distance_m, whose, around)
             || !self.may_enter(side, map.lane(target), there.station_m, whose, view)
+            || whose == Whose::Own && around.scene.is_motorway && self.is_wanted(target, view)
         {
             return None;
         }
@@ -191,6 +194,20 @@ impl Driver {
         })
     }
 
+    /// Whether another driver changes into a lane where this one would, from its other side. In towns drivers do not ask:
+    /// there, speeds are low and three lanes rare.
+    fn is_wanted(&self, lane: LaneIndex, view: &View) -> bool {
+        let View { this, size, around } = *view;
+        around.drivers().any(|(obstacle, body, driver)| {
+            let Some(change) = &driver.change else { return false };
+            let ahead_m = this.forward.dot(&(obstacle.outline.pose.position - this.outline.pose.position));
+            let closing_mps = (driver.speed_mps - self.speed_mps) * -ahead_m.signum();
+            let apart_m = ahead_m.abs() - (size.length_m + body.length_m) / 2.0;
+            let wanted_m = change_gap_m(closing_mps.max(0.0), around.traffic).max(self.speed_mps * MERGE_S);
+            change.to.lane_at(change.to_station_m).0 == lane && apart_m <= wanted_m
+        })
+    }
+
     /// Whether no vehicle is beside it in another lane or would be soon, and none has to brake hard for it.
     fn is_free(
         &self,
@@ -207,6 +224,11 @@ impl Driver {
         let path = &lane.centre;
         let here = path.pose_at(station_m);
         let forward = here.forward();
+        // On a motorway a driver reckons with its own braking for what it follows, as far as those behind are concerned.
+        let slowed_mps = match &self.leader {
+            Some(leader) if around.scene.is_motorway => self.speed_mps.min(leader.speed_mps.max(0.0)),
+            _ => self.speed_mps,
+        };
         self.minded(around).all(|Other { outline, forward: heading, velocity_mps, elevation_m }| {
             let ahead_m = forward.dot(&(outline.pose.position - here.position));
             let Some(other) = path.project_from(outline.pose.position, station_m + ahead_m) else {
@@ -215,8 +237,11 @@ impl Driver {
             let (half_length_m, half_width_m) = outline.half_extent_m(heading, other.forward);
             let aside_m = other.offset_m.abs() - half_width_m - size.width_m / 2.0;
             let apart_m = (other.station_m - station_m).abs() - half_length_m - size.length_m / 2.0;
-            let closing_mps = (velocity_mps.dot(&forward) - self.speed_mps)
-                * if other.station_m < station_m { 1.0 } else { -1.0 };
+            let along_mps = velocity_mps.dot(&forward);
+            let closing_mps = match other.station_m < station_m {
+                true => along_mps - slowed_mps,
+                false => self.speed_mps - along_mps,
+            };
             aside_m > SIDE_ROOM_M
                 || apart_m > gap_m(closing_mps.max(0.0))
                 || is_apart(lane.height_at(other.station_m), elevation_m)

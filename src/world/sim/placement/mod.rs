@@ -22,7 +22,7 @@ use crate::sim::ego::VehicleParameters;
 use crate::sim::moment::npc_facts;
 use crate::sim::npc::{Cruise, Driver, PlannedChange};
 use crate::sim::road_user::{Motion, Moved, Mover, RoadUser};
-use crate::sim::sense::{RANGE_M, visible_fraction};
+use crate::sim::sense::visible_fraction;
 use crate::sim::way::Way;
 use crate::sim::{body, safety};
 
@@ -134,7 +134,7 @@ pub(super) fn facts(around: &Around, request: &SpawnRequest, newcomers: &Newcome
     let cover_m = newcomers.cover.as_ref().map_or(f64::INFINITY, |cover| cover.obstacle.distance_m);
     let spawn_gap_m = newcomer.obstacle.distance_m.min(cover_m);
     let is_behind = request.verb == Verb::Overtake;
-    let sight_m = RANGE_M.min(around.visibility_m);
+    let sight_m = around.scene.range_m.min(around.visibility_m);
     let in_view = || {
         let eye = around.ego_outline.pose.position;
         spawn_gap_m < sight_m && visible_fraction(eye, &newcomer.obstacle, around.obstacles_on_level()) > 0.0

@@ -42,6 +42,7 @@ impl World {
             let mover = &mut self.users[index].mover;
             if let Some((_, course)) = draw.courses.iter().find(|(at, _)| *at == nth) {
                 mover.course = Some(Running::new(Arc::clone(course), self.ticks));
+                mover.phases_begun = 0;
             }
             if let (Some(rules), Motion::Drive(driver)) = (&draw.lane_changes, &mut mover.motion) {
                 driver.lane_changes = Some(Arc::clone(rules));
@@ -135,6 +136,7 @@ impl World {
             let (running, command) = running.advance(&moment, is_aside, self.ticks);
             let mover = &mut self.users[index].mover;
             mover.course = running;
+            mover.phases_begun += u32::from(command.is_some());
             if let (Motion::Drive(driver), Some(command)) = (&mut mover.motion, command) {
                 driver.order(&command);
             }
