@@ -51,7 +51,7 @@ impl Modular {
         seed: u64,
         foresight: Option<Arc<Foresight>>,
     ) -> Modular {
-        let mut config = config.clone();
+        let mut config = *config;
         config.perception = config.perception.on(scene);
         config.planning.cruise_mps = scene.set_mps.unwrap_or(config.planning.cruise_mps);
         let config = &config;

@@ -105,7 +105,7 @@ impl PerceptionConfig {
             lidar_vehicle_m: self.lidar_vehicle_m * farther,
             camera_vehicle_m: self.camera_vehicle_m * farther,
             grid_m: self.grid_m * farther,
-            ..self.clone()
+            ..*self
         }
     }
 }
