@@ -1,14 +1,25 @@
 //! Manoeuvres against closed forms: when each phase begins, how long it takes, where it ends.
 
-use avastra::action::ActionTable;
-use avastra::episode::{Choice, Moment};
-use avastra::geometry::SMOOTH_STEP_SLOPE_MAX;
+use std::cell::Cell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use avastra::action::{ActionTable, Draw, Effect};
+use avastra::episode::{Choice, Moment, Outcome};
+use avastra::geometry::{SMOOTH_STEP_SLOPE_MAX, Vec2, distance_m, unit_vector};
 use avastra::model::NpcFacts;
-use avastra::sim::DT_S;
+use avastra::rng;
+use avastra::rng::{Rng, Stream};
+use avastra::sim::{DT_S, Obstacle};
 
 use crate::wishes::{number, row, wish};
-use crate::world::{assert_replays, run_of};
+use crate::world::{assert_replays, loaded, run_against, run_of};
 
+/// What a dry road grips, m/s².
+const GRIP_MPS2: f64 = 0.85 * 9.81;
+/// A vehicle that brakes below 5 m/s during a move to the side slows down sideways, too, m/s²: brakes and tyres are bounded one by
+/// one.
+const SLOWING_MPS2: f64 = 2.0;
 /// A lane change is at its place within this distance, m.
 const PLACE_M: f64 = 0.05;
 
@@ -170,4 +181,223 @@ fn an_ambulance_passes_red_lights_and_is_the_only_one_that_does() {
         ran_red += usize::from(is_running);
     }
     assert!(came > 0 && ran_red > 0, "{came} came, {ran_red} episodes with a red light passed");
+}
+
+/// A condition on a moment, and what it is of the facts of the one that it is about and of the ego vehicle's front.
+struct Guard {
+    text: String,
+    fact: fn(&NpcFacts, f64) -> f64,
+    least: f64,
+}
+
+impl Guard {
+    fn of(who: &str, rng: &mut Rng) -> Guard {
+        type Fact = (&'static str, &'static str, f64, fn(&NpcFacts, f64) -> f64);
+        let facts: [Fact; 5] = [
+            ("WHO.gap", "m", 40.0, |npc, _| npc.gap_m),
+            ("WHO.ttc", "s", 20.0, |npc, _| npc.ttc_s),
+            ("WHO.headway", "s", 6.0, |npc, _| npc.headway_s),
+            ("WHO.rear - ego.front", "m", 60.0, |npc, front_m| npc.rear_m - front_m),
+            ("WHO.offset", "m", 4.0, |npc, _| npc.offset_m),
+        ];
+        let (name, unit, most, fact) = facts[rng::below(rng, facts.len() as u32) as usize];
+        let least = (rng::unit(rng) * most * 10.0).round() / 10.0 - if unit == "m" { 4.0 } else { 0.0 };
+        Guard { text: format!("{} >= {least:.1} {unit}", name.replace("WHO", who)), fact, least }
+    }
+
+    fn holds(&self, npc: &NpcFacts, ego_front_m: f64) -> bool {
+        (self.fact)(npc, ego_front_m) >= (self.least * 10.0).round() / 10.0 - 1e-9
+    }
+}
+
+/// The text of a space with two manoeuvres, each bound by a rule, and orders that are bound by others.
+fn random_space(rng: &mut Rng) -> (String, [Guard; 2], Guard) {
+    let number = |rng: &mut Rng, low: f64, high: f64| (rng::between(rng, low, high) * 10.0).round() / 10.0;
+    let chance = |rng: &mut Rng| rng::below(rng, 2) == 0;
+    let fields = |rng: &mut Rng| {
+        let mut fields = Vec::new();
+        if chance(rng) {
+            fields.push(format!("speed: {} m/s", number(rng, 0.0, 22.0)));
+            if chance(rng) {
+                fields.push(format!("rate: {} m/s^2", number(rng, 0.2, 12.0)));
+            }
+        }
+        let lane = chance(rng);
+        if lane {
+            fields.push(format!("lane: {}", ["Left", "Current", "Right"][rng::below(rng, 3) as usize]));
+        }
+        let offset = chance(rng) || fields.is_empty();
+        if offset {
+            fields.push(format!("offset: {} m", number(rng, -1.5, 1.5)));
+        }
+        if (lane || offset) && chance(rng) {
+            fields.push(format!("aside: {} m/s", number(rng, 0.2, 4.0)));
+        }
+        if rng::below(rng, 4) == 0 {
+            fields.push(
+                ["ignores: []", "ignores: [Ego]", "ignores: [Signals, RightOfWay]"]
+                    [rng::below(rng, 3) as usize]
+                    .into(),
+            );
+        }
+        fields.join(", ")
+    };
+    let mut text = String::from(
+        "language 1\nuse \"../../../scenarios/roads.ava\"\nenum Lane = Left | Current | Right\nenum Car = Sedan | BoxTruck | Motorcycle | Bicycle\n",
+    );
+    text += "road lanes { map: \"../verdicts/lanes.xodr\", start: lane 1/-2 at 60 m, goal: lane 1/-2 at 560 m }\n";
+    for name in ["one", "two"] {
+        text += &format!("manoeuvre {name}() {{\n");
+        for _ in 0..1 + rng::below(rng, 3) {
+            if chance(rng) {
+                text += &format!("once {} within {} s ", Guard::of("npc", rng).text, number(rng, 1.0, 9.0));
+            }
+            if chance(rng) {
+                text += &format!("after {} s ", number(rng, 0.0, 3.0));
+            }
+            text += &format!("{{ {} }}\n", fields(rng));
+        }
+        text += "}\n";
+    }
+    text += "action first(each lane: Lane, any car: Car, any speed: Speed in 0 m/s .. 18 m/s, any far: Length in 5 m .. 60 m, any offset: Length in -1 m .. 1 m) {\n  spawn car as a ahead far { does: DriveAhead, lane: lane, speed: speed, offset: offset, then: one() }\n}\n";
+    text += "action second(each lane: Lane, any speed: Speed in 4 m/s .. 18 m/s) {\n  spawn SUV as b behind 15 m { does: Overtake, lane: lane, speed: speed, then: two() }\n}\n";
+    text += "action again() { order a { then: two() } }\n";
+    text += &format!("action tell() {{ order a {{ {} }} }}\n", fields(rng));
+    let guards = [Guard::of("npc", rng), Guard::of("npc", rng)];
+    let of_orders = Guard::of("a", rng);
+    text += &format!("rule g1 during one: {}\nrule g2 during two: {}\n", guards[0].text, guards[1].text);
+    text += &format!("rule g3 on again, tell: {}\n", of_orders.text);
+    text += "episode { roads: [lanes, boulevard, crossroad, corner], step: 1.5 s, limit: 20 steps }\n";
+    (text, guards, of_orders)
+}
+
+/// What an audit of random spaces saw.
+#[derive(Debug, Default)]
+struct Audited {
+    spaces: u64,
+    manoeuvres: u64,
+    phases: u64,
+    orders: u64,
+}
+
+/// Plays random spaces with manoeuvres, orders and rules about them. No phase begins and no order is given while its rule
+/// does not hold, nothing leaps, overlaps unnoticed or is quicker than its body, and every log replays.
+fn audit(from: u64, spaces: u64, episodes: u32) -> Audited {
+    let mut seen = Audited::default();
+    for number in from..from + spaces {
+        let (text, guards, of_orders) = random_space(&mut rng::stream(number, Stream::Exploration, 1));
+        let found = loaded("tests/cases/wishes/random.ava", &text);
+        let space = found.space.unwrap_or_else(|| panic!("{:?}\n{text}", found.diagnostics));
+        seen.spaces += 1;
+        let table = ActionTable::new(Arc::clone(&space));
+        let run = run_against("idm", Arc::clone(&space), episodes, number, &[]);
+        for episode in 0..run.episodes() {
+            let mut chosen = rng::stream(number, Stream::Exploration, 2 + episode as u64);
+            // Which manoeuvre each road user does, and who was spawned as `a`.
+            let (mut does, mut of_a): (BTreeMap<u32, usize>, Vec<u32>) = Default::default();
+            let (mut begun, mut facts): (BTreeMap<u32, u32>, BTreeMap<u32, NpcFacts>) = Default::default();
+            let mut before: BTreeMap<u32, Obstacle> = BTreeMap::new();
+            let (mut front_m, mut crashed) = (f64::NAN, BTreeSet::new());
+            // The action of this step, until its first tick has passed.
+            let told: Cell<Option<&str>> = Cell::new(None);
+            let mut choose = |moment: &Moment| {
+                let offers = table.offers(moment.situation).into_iter().filter_map(Result::ok);
+                let legal: Vec<Draw> = offers.collect();
+                if legal.is_empty() || rng::below(&mut chosen, 4) == 0 {
+                    return Choice::Pass;
+                }
+                let draw = legal[rng::below(&mut chosen, legal.len() as u32) as usize].clone();
+                let action = &space.actions[space.rows[draw.row].action].name;
+                if matches!(action.as_str(), "again" | "tell") {
+                    let a = moment.situation.surroundings.bearer(0).expect("it is there");
+                    let ego_front_m = moment.situation.surroundings.moment().ego_front_m;
+                    assert!(of_orders.holds(&a, ego_front_m), "{action}: {a:?}\n{text}");
+                }
+                told.set(["first", "second", "again", "tell"].into_iter().find(|name| name == action));
+                Choice::Act(draw)
+            };
+            let log = run.play(episode, &mut choose, &mut |world, _, contacts| {
+                let ids: Vec<u32> = world.obstacles().map(|other| other.id).collect();
+                let told = told.take();
+                crashed.extend(contacts.iter().map(|contact| contact.obstacle));
+                crashed.extend(world.incidents().iter().flat_map(|incident| [incident.obstacle, incident.other]));
+                for id in ids.iter().filter(|id| !before.contains_key(id)) {
+                    does.insert(*id, usize::from(told == Some("second")));
+                    of_a.extend((told == Some("first")).then_some(*id));
+                }
+                if let (Some("again"), Some(id)) = (told, of_a.iter().rfind(|id| ids.contains(id))) {
+                    does.insert(*id, 1);
+                    begun.remove(id);
+                }
+                for id in &ids {
+                    let now = world.phases_begun(*id);
+                    let was = begun.insert(*id, now).unwrap_or(0);
+                    let Some(npc) = facts.get(id) else { continue };
+                    if now > was {
+                        seen.phases += u64::from(now - was);
+                        let holds = guards[does[id]].holds(npc, front_m);
+                        assert!(holds, "a phase of {id} begins at {}\n{npc:?}\n{text}", world.time_s());
+                    }
+                }
+                for id in &ids {
+                    let (now, body) =
+                        (world.obstacle(*id).expect("it is there"), world.body(*id).expect("it has one"));
+                    if let Some(was) = before.get(id) {
+                        let moved_m = (now.outline.pose.position - was.outline.pose.position).norm();
+                        let most_m = was.velocity_mps.norm().max(now.velocity_mps.norm()) * DT_S + 0.01;
+                        assert!(moved_m <= most_m, "{id} leaps {moved_m} m at {}\n{text}", world.time_s());
+                        let is_hit = crashed.contains(id);
+                        let along = unit_vector(now.lane_heading_rad);
+                        let gained_mps2 = (now.velocity_mps - was.velocity_mps).dot(&along) / DT_S;
+                        let on_lanes = world.scene().map.name.contains("lanes");
+                        assert!(
+                            is_hit || !on_lanes || gained_mps2 <= body.acceleration_mps2_max + 0.6,
+                            "{id} gains {gained_mps2} m/s² at {}\n{text}",
+                            world.time_s()
+                        );
+                        let left = Vec2::new(-along.y, along.x);
+                        let aside_mps2 = ((now.velocity_mps - was.velocity_mps).dot(&left) / DT_S).abs();
+                        assert!(
+                            is_hit || !on_lanes || aside_mps2 <= GRIP_MPS2 + SLOWING_MPS2,
+                            "{id} is pushed aside by {aside_mps2} m/s² at {} in {number}/{episode}: {was:?} {now:?}\n{text}",
+                            world.time_s()
+                        );
+                    }
+                }
+                for (nth, id) in ids.iter().enumerate() {
+                    for other in ids[..nth].iter().filter(|other| !crashed.contains(id) || !crashed.contains(other)) {
+                        let [a, b] = [id, other].map(|id| world.obstacle(*id).expect("it is there").outline);
+                        assert!(distance_m(&a, &b) > 0.0, "{id} and {other} overlap at {} in {number}/{episode}\n{text}", world.time_s());
+                    }
+                }
+                facts = ids.iter().filter_map(|id| Some((*id, world.npc_facts(*id)?))).collect();
+                before = world.obstacles().map(|other| (other.id, *other)).collect();
+                front_m = world.moment_facts().ego_front_m;
+            });
+            for step in &log.steps {
+                if let Outcome::Done { draw, .. } = &step.outcome {
+                    seen.manoeuvres += draw.courses.len() as u64;
+                    seen.orders +=
+                        draw.effects.iter().filter(|effect| matches!(effect, Effect::Order(_))).count()
+                            as u64;
+                }
+            }
+            assert_replays(&run, episode, &log);
+        }
+    }
+    seen
+}
+
+#[test]
+fn random_manoeuvres_keep_their_rules_and_their_bodies() {
+    let seen = audit(0, 6, 2);
+    assert!(seen.manoeuvres > 100 && seen.phases > 50 && seen.orders > 20, "{seen:?}");
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn ten_thousand_manoeuvres_keep_their_rules_and_their_bodies() {
+    let seen = audit(1000, 300, 4);
+    println!("{seen:?}");
+    assert!(seen.manoeuvres > 10_000, "{seen:?}");
 }

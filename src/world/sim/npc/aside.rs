@@ -1,7 +1,7 @@
 //! What drivers are told to do to the side: to change to a lane seen from the ego vehicle, and to drive beside the middle
 //! of their lane. Both begin in the tick in which they are told, if the road and others leave the place.
 
-use avastra_base::geometry::{Pose, SmoothStep, Vec2, smooth_step};
+use avastra_base::geometry::{Pose, SmoothStep, Vec2, smooth_step, unit_vector};
 use avastra_lang::model::command::{Command, Manners};
 use avastra_lang::model::vocabulary::{LaneChoice, Side};
 use avastra_road::LaneIndex;
@@ -9,6 +9,7 @@ use avastra_road::LaneIndex;
 use crate::sim::around::Around;
 use crate::sim::lanes::{chosen_lane, lane_beside};
 use crate::sim::moment::{driver_facts, with_itself};
+use crate::sim::road_user::Obstacle;
 use crate::sim::trace::Trace;
 
 use super::change::{Whose, duration_s, per_m};
@@ -94,25 +95,42 @@ impl Driver {
         }
     }
 
+    /// Where the middle of its lane is beside it.
+    pub(super) fn middle(&self, this: &Obstacle) -> Vec2 {
+        let Aside { now_m, .. } = self.aside;
+        let position = this.outline.pose.position;
+        if now_m == 0.0 { position } else { position - left_of(self.lane_heading_rad()) * now_m }
+    }
+
+    /// Whether it moves to another place beside the middle of its lane.
+    pub(super) fn is_moving_aside(&self) -> bool {
+        self.aside.shift.is_some()
+    }
+
     /// Whether it is where it was told to be.
     pub fn is_aside_as_told(&self) -> bool {
         let Aside { lane, wanted_m, now_m, shift, .. } = &self.aside;
         lane.is_none() && self.change.is_none() && shift.is_none() && wanted_m == now_m
     }
 
-    /// Begins what it was told to do to the side and has not begun.
+    /// Begins what it was told to do to the side and has not begun: first the lane, then the place in it. Both at once would
+    /// be faster to the side than it was told, and than the road grips.
     #[inline]
     pub(super) fn begin_aside(&mut self, view: &View) {
-        if let Some(lane) = self.aside.lane
-            && self.change.is_none()
-        {
-            self.go_over(lane, view);
+        if self.change.is_some() || self.aside.shift.is_some() {
+            return;
         }
-        let Aside { wanted_m, now_m, told_mps, shift, .. } = &mut self.aside;
-        if shift.is_none() && wanted_m != now_m {
+        if let Some(lane) = self.aside.lane {
+            self.go_over(lane, view);
+            if self.aside.lane.is_some() {
+                return;
+            }
+        }
+        let Aside { wanted_m, now_m, told_mps, .. } = self.aside;
+        if wanted_m != now_m {
             let duration_s =
-                duration_s((*wanted_m - *now_m).abs(), self.speed_mps, Whose::Told(*told_mps), view.around);
-            *shift = Some(Shift { from_m: *now_m, to_m: *wanted_m, progress: 0.0, duration_s });
+                duration_s((wanted_m - now_m).abs(), self.speed_mps, Whose::Told(told_mps), view.around);
+            self.aside.shift = Some(Shift { from_m: now_m, to_m: wanted_m, progress: 0.0, duration_s });
         }
     }
 
@@ -182,6 +200,10 @@ impl Driver {
 }
 
 fn beside(pose: Pose, left_m: f64) -> Pose {
-    let forward = pose.forward();
-    Pose { position: pose.position + Vec2::new(-forward.y, forward.x) * left_m, ..pose }
+    Pose { position: pose.position + left_of(pose.heading_rad) * left_m, ..pose }
+}
+
+fn left_of(heading_rad: f64) -> Vec2 {
+    let forward = unit_vector(heading_rad);
+    Vec2::new(-forward.y, forward.x)
 }

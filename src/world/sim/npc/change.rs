@@ -116,7 +116,7 @@ impl Driver {
         let allowed = |rules: &Arc<LaneChangeRules>| {
             rules.allow(with_itself(around.moment_facts(), this, self), driver_facts(around, this, self))
         };
-        if !due || !self.lane_changes.as_ref().is_none_or(allowed) {
+        if !due || self.is_moving_aside() || !self.lane_changes.as_ref().is_none_or(allowed) {
             return;
         }
         let change = |driver: &mut Driver, side| driver.change_to(side, Whose::Own, view);
@@ -145,7 +145,7 @@ impl Driver {
         whose: Whose,
         view: &View,
     ) {
-        let aside_m = (to.path.pose_at(to_station_m).position - view.this.outline.pose.position).norm();
+        let aside_m = (to.path.pose_at(to_station_m).position - self.middle(view.this)).norm();
         let duration_s = duration_s(aside_m, self.speed_mps, whose, view.around);
         self.change = Some(Change { to, to_station_m, progress: 0.0, duration_s });
         self.last_change = side;
@@ -163,7 +163,7 @@ impl Driver {
         let (here, here_m) = self.way.lane_at(self.station_m);
         let target = lane_beside(around, here, side)?;
         let centre = &map.lane(target).centre;
-        let there = centre.project(this.outline.pose.position);
+        let there = centre.project(self.middle(this));
         // `change_room_m` ends at markings that forbid a change, and at junctions, where lanes part.
         let room_m = map.change_room_m(here, on_road(side), here_m);
         if there.distance_m > CHANGE_M_MAX
@@ -264,10 +264,12 @@ impl Driver {
         let Some(change) = &mut self.change else {
             return at(self.moved_aside(from, way_m), from_lane_rad);
         };
+        // No move to another place in the lane is under way at the same time.
+        let from = self.aside.beside(from);
         let guess_m = change.to_station_m + way_m;
         change.to_station_m =
             change.to.path.project_from(from.position, guess_m).map_or(guess_m, |found| found.station_m);
-        let to = body_at(&change.to.path, change.to_station_m, size);
+        let to = self.aside.beside(body_at(&change.to.path, change.to_station_m, size));
         let to_lane_rad = change.to.path.heading_at(change.to_station_m);
         let progress_per_m = change.progress_per_m(self.speed_mps);
         change.progress += progress_per_m * way_m;
@@ -275,7 +277,7 @@ impl Driver {
             (self.way, self.station_m) = (Arc::clone(&change.to), change.to_station_m);
             (self.change, self.hold_m) = (None, None);
             (self.insists_to_m, self.stopped_to_m) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
-            return at(self.moved_aside(to, way_m), to_lane_rad);
+            return at(to, to_lane_rad);
         }
         let SmoothStep { value: blend, slope, .. } = smooth_step(change.progress);
         let heading_rad = from.heading_rad + wrap_angle(to.heading_rad - from.heading_rad) * blend;
@@ -285,7 +287,7 @@ impl Driver {
             heading_rad: wrap_angle(heading_rad + turned_rad),
         };
         let lane_rad = if change.progress < 0.5 { from_lane_rad } else { to_lane_rad };
-        at(self.moved_aside(pose, way_m), lane_rad)
+        at(pose, lane_rad)
     }
 }
 
