@@ -13,7 +13,7 @@ use avastra::rng::{Rng, Stream};
 use avastra::sim::{DT_S, Obstacle};
 
 use crate::wishes::{number, row, wish};
-use crate::world::{assert_replays, loaded, run_against, run_of};
+use crate::world::{assert_replays, loaded, run_against, run_of, space};
 
 /// What a dry road grips, m/s².
 const GRIP_MPS2: f64 = 0.85 * 9.81;
@@ -400,4 +400,22 @@ fn ten_thousand_manoeuvres_keep_their_rules_and_their_bodies() {
     let seen = audit(1000, 300, 4);
     println!("{seen:?}");
     assert!(seen.manoeuvres > 10_000, "{seen:?}");
+}
+
+#[test]
+fn the_shipped_space_of_manoeuvres_does_all_that_it_says() {
+    let table = ActionTable::new(space("manoeuvres.ava"));
+    let run = run_against("idm", table.space().clone(), 3, 5, &[]);
+    let mut done = BTreeSet::new();
+    for episode in 0..run.episodes() {
+        let log = run.episode(episode);
+        assert_replays(&run, episode, &log);
+        done.extend(log.steps.iter().filter_map(|step| match &step.outcome {
+            Outcome::Done { draw, .. } => Some(draw.row),
+            Outcome::Passed | Outcome::Refused { .. } => None,
+        }));
+    }
+    let rows = table.rows().iter().filter(|row| !done.contains(&row.index));
+    let missing: Vec<&str> = rows.map(|row| &*row.label).collect();
+    assert!(missing.is_empty(), "{missing:?} never happened");
 }

@@ -177,7 +177,8 @@ impl Checker {
             return self.reject(error.beside(definition.span, "changes no lanes").help(help));
         }
         self.warn_of_later(rule, definition, &condition, during);
-        if condition.known() == Known::Spawn && definition.spawns().next().is_none() && is_whole {
+        let asks_a_spawn = during.is_none() && condition.known() == Known::Spawn;
+        if asks_a_spawn && definition.spawns().next().is_none() && is_whole {
             let message =
                 format!("`{}` asks about a spawn, and `{}` has none", rule.name.text, definition.name);
             let error = Diagnostic::error(code::NO_SPAWN, message).at(condition.span, "needs a spawn");
