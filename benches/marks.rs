@@ -134,6 +134,7 @@ fn crowded(scene: &Arc<Scene>) -> World {
                     cover: None,
                     offset_m: 0.0,
                     ignores: Manners::default(),
+                    meet: None,
                     bearer: None,
                     own: None,
                     cover_own: None,

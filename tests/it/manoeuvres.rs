@@ -4,13 +4,14 @@ use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use avastra::action::{ActionTable, Draw, Effect};
+use avastra::action::{ActionTable, Draw, Effect, Situation};
+use avastra::ads;
 use avastra::episode::{Choice, Moment, Outcome};
 use avastra::geometry::{SMOOTH_STEP_SLOPE_MAX, Vec2, distance_m, unit_vector};
-use avastra::model::NpcFacts;
+use avastra::model::{NpcFacts, RulesInForce};
 use avastra::rng;
 use avastra::rng::{Rng, Stream};
-use avastra::sim::{DT_S, Obstacle};
+use avastra::sim::{DT_S, Obstacle, Scene, Sensed, Start, VehicleParameters, World};
 
 use crate::wishes::{number, row, wish};
 use crate::world::{assert_replays, loaded, run_against, run_of, space};
@@ -181,6 +182,43 @@ fn an_ambulance_passes_red_lights_and_is_the_only_one_that_does() {
         ran_red += usize::from(is_running);
     }
     assert!(came > 0 && ran_red > 0, "{came} came, {ran_red} episodes with a red light passed");
+}
+
+#[test]
+fn an_adult_is_met_at_the_point_that_was_asked_for() {
+    let table = wish("adult_at_a_point");
+    let space = table.space();
+    let (road, rules) = (&space.roads[0], RulesInForce::by_default(space));
+    let scene = Arc::new(Scene::of(road));
+    let memory = space.initial_memory(1);
+    let mut met = 0;
+    for seed in 0..4 {
+        for (row, part) in [0.25, 0.5, 0.75].into_iter().enumerate() {
+            let mut world = World::new(Arc::clone(&scene), &Start::drawn(space, road, &memory, seed));
+            let situation =
+                Situation { memory: &memory, road, rules: &rules, surroundings: &world, seed, step: 0 };
+            let draw = table.offer(&situation, row).expect("there is room");
+            world.carry_out(&draw).expect("there is room");
+            let mut driver = (ads::by_name("idm").expect("it is one of ours").build)(&scene, seed);
+            let contact = loop {
+                // It does not see who walks there, and keeps its speed.
+                let sensed = Sensed { objects: Vec::new(), ..world.sensed() };
+                let control = driver.drive(&sensed);
+                if let Some(contact) = world.tick(&control).first() {
+                    break *contact;
+                }
+                assert!(world.time_s() < 30.0, "{part}: nobody was met");
+            };
+            let width_m = VehicleParameters::MKZ.width_m;
+            // From the right.
+            let wanted_m = (part - 0.5) * width_m;
+            let walker = world.obstacle(1).expect("it was hit").outline.pose.position;
+            let hit_m = world.ego_outline().pose.to_local(walker).y;
+            assert!((hit_m - wanted_m).abs() < PLACE_M, "{part}: {hit_m} m, not {wanted_m} m; {contact:?}");
+            met += 1;
+        }
+    }
+    assert_eq!(met, 12);
 }
 
 /// A condition on a moment, and what it is of the facts of the one that it is about and of the ego vehicle's front.

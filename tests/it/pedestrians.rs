@@ -32,6 +32,7 @@ fn walks_ahead(side: Side, distance_m: f64, speed_mps: f64, cover: Option<Body>)
         cover,
         offset_m: 0.0,
         ignores: Manners::default(),
+        meet: None,
         bearer: None,
     }
 }

@@ -150,6 +150,9 @@ impl<'a> Actions<'a> {
         if request.offset_m != 0.0 {
             fields.push(format!("offset: {} m", decimal(request.offset_m, false)));
         }
+        if let Some(meet) = request.meet {
+            fields.push(format!("meet: {}", decimal(meet, false)));
+        }
         if request.ignores != Manners::default() {
             fields.push(manners_field(request.ignores));
         }

@@ -397,6 +397,10 @@ impl Checker {
             Some(value) => self.manners(value, place),
             None => Some(Vec::new()),
         };
+        let meet = match find(SpawnField::Meet) {
+            Some(value) => self.typed(value, place, Type::Quantity(Dimension::RATIO)).map(Some),
+            None => Some(None),
+        };
         let (body, verb, (then, manoeuvre)) = (body_word?, verb?, then?);
         self.check_verb(&body, &verb, behind, span);
         self.check_fields(&fields, &verb, manoeuvre.as_ref(), span);
@@ -413,6 +417,7 @@ impl Checker {
             cover: None,
             offset: offset?,
             ignores: ignores?,
+            meet: meet?,
             bearer: None,
             manoeuvre,
             span,
@@ -441,6 +446,9 @@ impl Checker {
                 }
                 () if verb == Verb::Walk && says(SpawnField::Offset) => {
                     ("begins at the kerb", "leave `offset` out")
+                }
+                () if verb != Verb::Walk && says(SpawnField::Meet) => {
+                    ("is met at no point of the ego vehicle", "`meet` is for `Walk`; leave it out")
                 }
                 () if other_way && changes_lanes => (
                     "drives in no lane of the ego vehicle's direction",

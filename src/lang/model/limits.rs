@@ -24,6 +24,9 @@ pub const EGO_ACCELERATION_MPS2_MAX: f64 = 10.0;
 /// Distances from the ego vehicle at which anything may be spawned, m.
 pub const SPAWN_DISTANCE_M: RangeInclusive<f64> = 0.0..=1000.0;
 
+/// Parts of the ego vehicle's front at which somebody may be met.
+pub const MEET: RangeInclusive<f64> = 0.0..=1.0;
+
 /// Offsets at which the cycle of the signals may begin, s.
 pub const SIGNAL_PHASE_S: RangeInclusive<f64> = 0.0..=3600.0;
 
@@ -51,10 +54,19 @@ pub fn rounded_into(figure: f64, bounds: RangeInclusive<f64>) -> f64 {
 
 /// Why the world must not be asked for a spawn with these figures, whatever the rules say; `None` if it
 /// may. NaN is out of bounds, too.
-pub fn spawn_out_of_bounds(speed_mps: f64, distance_m: f64, offset_m: f64) -> Option<String> {
+pub fn spawn_out_of_bounds(
+    speed_mps: f64,
+    distance_m: f64,
+    offset_m: f64,
+    meet: Option<f64>,
+) -> Option<String> {
     let distance = ("distance", distance_m, "m", SPAWN_DISTANCE_M);
     let offset = ("offset", offset_m, "m", OFFSET_M);
-    out_of_bounds("spawn", [("speed", speed_mps, "m/s", SPAWN_SPEED_MPS), distance, offset])
+    let meet = meet.map(|part| ("meet", part, "", MEET));
+    out_of_bounds(
+        "spawn",
+        [("speed", speed_mps, "m/s", SPAWN_SPEED_MPS), distance, offset].into_iter().chain(meet),
+    )
 }
 
 pub(super) fn out_of_bounds(
@@ -64,7 +76,8 @@ pub(super) fn out_of_bounds(
     let is_out = |(_, value, _, range): &(_, f64, _, RangeInclusive<f64>)| !range.contains(value);
     let (what, value, unit, range) = figures.into_iter().find(is_out)?;
     let (low, high) = range.into_inner();
-    Some(format!("the {whose}'s {what} is {value} {unit}, possible is {low} .. {high} {unit}"))
+    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+    Some(format!("the {whose}'s {what} is {value}{unit}, possible is {low} .. {high}{unit}"))
 }
 
 #[cfg(test)]
@@ -74,16 +87,20 @@ mod tests {
     #[test]
     fn no_spawn_lies_out_of_bounds() {
         for (speed_mps, distance_m) in [(0.0, 0.0), (70.0, 1000.0)] {
-            assert_eq!(spawn_out_of_bounds(speed_mps, distance_m, 0.0), None);
+            assert_eq!(spawn_out_of_bounds(speed_mps, distance_m, 0.0, None), None);
         }
         let rounded = |speed_mps| rounded_into(speed_mps, SPAWN_SPEED_MPS);
         assert_eq!([70.0 * (0.1 + 0.2) / 0.3, 70.0, 69.9, 70.1].map(rounded), [70.0, 70.0, 69.9, 70.1]);
         for speed_mps in [-0.1, 70.1, f64::NAN] {
-            assert!(spawn_out_of_bounds(speed_mps, 10.0, 0.0).is_some_and(|reason| reason.contains("speed")));
+            assert!(
+                spawn_out_of_bounds(speed_mps, 10.0, 0.0, None)
+                    .is_some_and(|reason| reason.contains("speed"))
+            );
         }
         for distance_m in [-0.1, 1000.1, f64::NAN] {
             assert!(
-                spawn_out_of_bounds(5.0, distance_m, 0.0).is_some_and(|reason| reason.contains("distance"))
+                spawn_out_of_bounds(5.0, distance_m, 0.0, None)
+                    .is_some_and(|reason| reason.contains("distance"))
             );
         }
     }

@@ -309,6 +309,8 @@ pub struct SpawnDef {
     /// m to the left of the middle of its lane.
     pub offset: Option<Expr>,
     pub ignores: Vec<WordExpr<Manner>>,
+    /// The part of the ego vehicle's front at which it is met, from the side that it comes from.
+    pub meet: Option<Expr>,
     /// The name that it bears from then on, by index in `Space::bearers`.
     pub bearer: Option<usize>,
     /// The manoeuvre that it begins when it appears.

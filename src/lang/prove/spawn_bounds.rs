@@ -4,7 +4,7 @@ use core::ops::RangeInclusive;
 
 use crate::model::command::OFFSET_M;
 use crate::model::vocabulary::Word;
-use crate::model::{Interval, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, code, effort};
+use crate::model::{Interval, MEET, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, code, effort};
 use crate::prove::reach::spawn_figures;
 use crate::syntax::Diagnostic;
 use avastra_base::units::Rational;
@@ -25,6 +25,7 @@ fn errors(space: &Space, action: usize) -> impl Iterator<Item = Diagnostic> {
             Some(("speed", "a spawn", "m/s", &spawn.speed, SPAWN_SPEED_MPS)),
             Some(("distance", "a spawn", "m", &spawn.distance, SPAWN_DISTANCE_M)),
             spawn.offset.as_ref().map(|offset| ("offset", "a spawn", "m", offset, OFFSET_M)),
+            spawn.meet.as_ref().map(|meet| ("meet", "a spawn", "", meet, MEET)),
         ]
     });
     let of_spawns = of_spawns.flatten();
@@ -43,7 +44,9 @@ fn errors(space: &Space, action: usize) -> impl Iterator<Item = Diagnostic> {
             .at(expr.span, format!("{} in `{}`", found.shown(expr.ty, found.unit(expr.ty)), row.label))
             .note("rules do not count here: they can be switched off");
         let (low, high) = (range.start(), range.end());
-        let help = format!("give its parameters ranges that keep it within {low} .. {high} {unit}");
+        let help = format!("give its parameters ranges that keep it within {low} .. {high} {unit}")
+            .trim_end()
+            .to_owned();
         Some(error.help(help))
     })
 }

@@ -181,7 +181,7 @@ fn manners_form(ignores: &[WordExpr<Manner>], reduced: &impl Fn(&Expr) -> Expr) 
 
 fn spawn_form(spawn: &SpawnDef, reduced: &impl Fn(&Expr) -> Expr) -> String {
     format!(
-        "spawn {} {} {} {} {} {} {:?} {:?} {:?} {} {} {} {:?}",
+        "spawn {} {} {} {} {} {} {:?} {:?} {:?} {:?} {} {} {} {:?}",
         word_form(&spawn.body, reduced),
         word_form(&spawn.colour, reduced),
         word_form(&spawn.verb, reduced),
@@ -191,6 +191,7 @@ fn spawn_form(spawn: &SpawnDef, reduced: &impl Fn(&Expr) -> Expr) -> String {
         reduced(&spawn.speed).kind,
         reduced(&spawn.distance).kind,
         spawn.offset.as_ref().map(|offset| reduced(offset).kind),
+        spawn.meet.as_ref().map(|meet| reduced(meet).kind),
         manners_form(&spawn.ignores, reduced),
         spawn.behind,
         spawn.cover.as_ref().map_or(String::new(), |cover| word_form(cover, reduced)),

@@ -304,7 +304,7 @@ impl Search<'_> {
             let speed_mps = rounded_into(number(&spawn.speed), SPAWN_SPEED_MPS);
             let distance_m = rounded_into(number(&spawn.distance), SPAWN_DISTANCE_M);
             let offset_m = spawn.offset.as_ref().map_or(0.0, |offset| rounded_into(number(offset), OFFSET_M));
-            if spawn_out_of_bounds(speed_mps, distance_m, offset_m).is_some() {
+            if spawn_out_of_bounds(speed_mps, distance_m, offset_m, None).is_some() {
                 return false;
             }
             // The spawn lands where it was asked to, and no gap is unfair.

@@ -15,9 +15,9 @@ use avastra_lang::model::rules::{
     Before, Candidate, Choose, Clause, Nearest, Room, RowRules, TRIES_MAX, Unsolved,
 };
 use avastra_lang::model::{
-    ActionDef, BodyWord, Domain, EffectDef, Facts, ManoeuvreCall, Memory, MomentFacts, NpcFacts, OrderDef,
-    Parameter, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value, WorldFacts, evaluate, locals,
-    rounded_into, spawn_out_of_bounds,
+    ActionDef, BodyWord, Domain, EffectDef, Facts, MEET, ManoeuvreCall, Memory, MomentFacts, NpcFacts,
+    OrderDef, Parameter, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value, WorldFacts,
+    evaluate, locals, rounded_into, spawn_out_of_bounds,
 };
 
 /// Draws of one row in a step before the row is refused. Every draw obeys what can be known before; a further one
@@ -162,7 +162,8 @@ impl<'a> Judge<'a> {
                     continue;
                 }
             };
-            if let Some(reason) = spawn_out_of_bounds(request.speed_mps, request.distance_m, request.offset_m)
+            if let Some(reason) =
+                spawn_out_of_bounds(request.speed_mps, request.distance_m, request.offset_m, request.meet)
             {
                 refusals.push(refuse(None, reason));
                 continue;
@@ -289,6 +290,10 @@ impl<'a> Judge<'a> {
                 .as_ref()
                 .map_or(0.0, |offset| rounded_into(evaluate(offset, functions, &facts).number(), OFFSET_M)),
             ignores: Manners::of(spawn.ignores.iter().map(|manner| manner.word(functions, &facts))),
+            meet: spawn
+                .meet
+                .as_ref()
+                .map(|meet| rounded_into(evaluate(meet, functions, &facts).number(), MEET)),
             bearer: spawn.bearer,
         }
     }

@@ -54,6 +54,8 @@ pub struct SpawnRequest {
     pub offset_m: f64,
     /// The rules of the road that it ignores.
     pub ignores: Manners,
+    /// The part of the ego vehicle's front at which it is met, from the side that it comes from; for `Walk` alone.
+    pub meet: Option<f64>,
     /// The name that it bears, by its index in the space.
     pub bearer: Option<usize>,
 }

@@ -1,7 +1,9 @@
 //! Pedestrians who cross the road: they wait at the kerb, walk straight over to the other, and go out of sight.
 //!
 //! A pedestrian sets out when it would meet the ego vehicle in the middle of that vehicle's way, but waits at
-//! least 1 s (published package) and at most 10 s. Behind the other kerb it walks on as far as there is room, and
+//! least 1 s (published package) and at most 10 s. One that is to be met at a point of the ego vehicle's front waits until then,
+//! at most 60 s, goes by the ego vehicle's speed of each moment until it sets out, and then walks steadily, as the targets of
+//! Euro NCAP's tests do. Behind the other kerb it walks on as far as there is room, and
 //! leaves the world when the ego vehicle cannot see it.
 //!
 //! The published package's pedestrian walks on, whatever comes. Here that is the most frequent of four manners,
@@ -24,6 +26,7 @@ use avastra_base::rng::Rng;
 use avastra_road::is_apart;
 
 use super::around::{Around, Other};
+use super::ego::VehicleParameters;
 use super::road_user::{Moved, Obstacle};
 use super::sense::FRAME_TICKS;
 use super::trace::Trace;
@@ -35,6 +38,8 @@ const WAIT_S: f64 = 1.0;
 const WAIT_S_MAX: f64 = 10.0;
 /// Before setting out and in a hurry, pedestrians look at the ground in front of them up to this far, m: a lane.
 const LOOK_M: f64 = 3.5;
+/// Longest time at the kerb for the sake of a meeting at a point of the ego vehicle, s. Ours.
+const MEETING_S_MAX: f64 = 60.0;
 /// Running adult of Euro NCAP (8 km/h), m/s.
 const RUN_MPS_MAX: f64 = 8.0 / 3.6;
 /// Factor of the walking pace in a hurry. Ours.
@@ -77,9 +82,35 @@ impl Manner {
     }
 }
 
+/// A meeting with the ego vehicle's front at a point of its width.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Meeting {
+    /// Station of the route at which the front then is, m.
+    pub station_m: f64,
+    /// Way from the kerb to that point of a vehicle in the middle of the route, m.
+    pub way_m: f64,
+    pub comes_from_left: bool,
+}
+
+impl Meeting {
+    /// How long the pedestrian can still wait, if the ego vehicle keeps its speed and its place beside the route, s; negative
+    /// if it is too late, and without end before a vehicle that stands.
+    pub fn left_s(self, speed_mps: f64, around: &Around) -> f64 {
+        let aside_m = if self.comes_from_left { -around.ego_offset_m } else { around.ego_offset_m };
+        let front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
+        let comes_s = match around.ego.speed_mps {
+            0.0 => f64::INFINITY,
+            ego_mps => (self.station_m - front_m) / ego_mps,
+        };
+        comes_s - (self.way_m + aside_m) / speed_mps
+    }
+}
+
 /// A walk over a road.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Walk {
+    /// To be met at a point, rather than in the middle and for any manner.
+    pub meeting: Option<Meeting>,
     /// Where it begins, facing its end.
     pub from: Pose,
     /// From kerb to kerb, m.
@@ -93,6 +124,8 @@ pub(super) struct Walk {
 
 #[derive(Debug, Clone)]
 pub(super) struct Walker {
+    /// The meeting for which it waits at the kerb.
+    meeting: Option<Meeting>,
     from: Pose,
     /// Unit vector along the way.
     along: Vec2,
@@ -122,10 +155,13 @@ pub(super) struct Walker {
 impl Walker {
     /// A pedestrian who is to walk; the manner is drawn.
     pub fn new(walk: Walk, spawn_tick: u64, rng: &mut Rng) -> Walker {
-        let Walk { from, way_m, beyond_m, speed_mps, meets_s } = walk;
-        let begins_tick = spawn_tick + ticks(meets_s.clamp(WAIT_S, WAIT_S_MAX));
-        let manner = Manner::draw(rng);
+        let Walk { meeting, from, way_m, beyond_m, speed_mps, meets_s } = walk;
+        let waits_s = if meeting.is_some() { MEETING_S_MAX } else { meets_s.clamp(WAIT_S, WAIT_S_MAX) };
+        let begins_tick = spawn_tick + ticks(waits_s);
+        let drawn = Manner::draw(rng);
+        let manner = if meeting.is_some() { Manner::Steady } else { drawn };
         Walker {
+            meeting,
             from,
             along: from.forward(),
             way_m,
@@ -159,6 +195,10 @@ impl Walker {
         }
         if (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS) {
             self.look(this, around);
+        }
+        // The step of this tick is the first if waiting for another one would be too long.
+        if self.meeting.is_some_and(|meeting| meeting.left_s(self.speed_mps, around) < DT_S) {
+            (self.meeting, self.begins_tick) = (None, around.tick);
         }
         if around.tick < self.begins_tick {
             return Some(Moved::at_rest(this));
@@ -205,6 +245,10 @@ impl Walker {
         ]);
         trace.words([self.startle_ticks, self.stuck_ticks, u32::from(self.returns)].map(u64::from));
         trace.words([self.begins_tick, self.begins_tick_max, self.manner as u64]);
+        // Nothing is fed for who waits for no meeting, as before there were any.
+        if let Some(Meeting { station_m, way_m, comes_from_left }) = self.meeting {
+            trace.numbers([station_m, way_m, f64::from(u8::from(comes_from_left))]);
+        }
     }
 
     /// Where it is now, with the velocity since it was at `this`.

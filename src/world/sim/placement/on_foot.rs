@@ -11,7 +11,7 @@ use crate::sim::around::Around;
 use crate::sim::body;
 use crate::sim::ego::VehicleParameters;
 use crate::sim::npc::choices;
-use crate::sim::pedestrian::{Walk, Walker};
+use crate::sim::pedestrian::{Meeting, Walk, Walker};
 use crate::sim::road_user::{Motion, Moved, Mover, Obstacle, RoadUser};
 use crate::sim::sense::visible_fraction;
 
@@ -105,7 +105,17 @@ fn walk(asked: &Asked, way: &Crossing) -> Result<RoadUser, String> {
         return Err("a parked vehicle stands in the way".into());
     }
     let front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
+    let meeting = request.meet.map(|part| Meeting {
+        // The near side of its body.
+        station_m: way.station_m - asked.size.width_m / 2.0,
+        way_m: way.from.way_m + (part - 0.5) * VehicleParameters::MKZ.width_m,
+        comes_from_left: request.side == Side::Left,
+    });
+    if meeting.is_some_and(|meeting| meeting.left_s(request.speed_mps, around) < 0.0) {
+        return Err("it would come too late to meet the ego vehicle there".into());
+    }
     let walk = Walk {
+        meeting,
         from,
         way_m,
         beyond_m: way.to.beyond_m,
