@@ -34,7 +34,7 @@ use avastra::check::ReadError;
 use avastra::editor::{Files, Workspace, diagnostics};
 use avastra::mdp::ProcKind;
 use avastra::model::Space;
-use avastra::model::command::Manners;
+use avastra::model::command::IgnoredRules;
 use avastra::model::vocabulary::{Body, Colour, LaneChoice, Level, Side, Then, TimeOfDay, Verb};
 use avastra::run::{Arena, Run, RunSettings};
 use avastra::sim::{Scene, Sensed, Start, TrafficProfile, World};
@@ -133,7 +133,7 @@ fn crowded(scene: &Arc<Scene>) -> World {
                     distance_m,
                     cover: None,
                     offset_m: 0.0,
-                    ignores: Manners::default(),
+                    ignores: IgnoredRules::default(),
                     meet: None,
                     bearer: None,
                     own: None,

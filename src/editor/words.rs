@@ -2,8 +2,8 @@
 //! engine's words in `model::vocabulary`.
 
 use avastra_lang::model::vocabulary::{
-    Body, Colour, CommandField, EpisodeField, LaneChoice, Manner, RoadField, Side, Site, SpawnField,
-    StartField, TYPES, Then, Verb, Word,
+    Body, Colour, CommandField, EpisodeField, LaneChoice, RoadField, Side, Site, SpawnField, StartField,
+    TYPES, Then, TrafficRule, Verb, Word,
 };
 use avastra_lang::model::{ENDS, MODULES};
 
@@ -35,7 +35,7 @@ pub fn engine_words(field: &str) -> Vec<Entry> {
         Some(SpawnField::Side) => of::<Side>(),
         Some(SpawnField::Then) => of::<Then>(),
         Some(SpawnField::Colour) => of::<Colour>(),
-        Some(SpawnField::Ignores) => of::<Manner>(),
+        Some(SpawnField::Ignores) => of::<TrafficRule>(),
         None if field == "body" => of::<Body>(),
         Some(SpawnField::Speed | SpawnField::Offset | SpawnField::Meet) | None => Vec::new(),
     }

@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 
 use avastra::check::Loaded;
 use avastra::model::vocabulary::{
-    Body, Colour, CommandField, EpisodeField, Fact, LaneChoice, Level, Light, Manner, OriginField,
-    Phenomenon, Priority, ROAD_LANES, RoadField, RoadKind, ScenarioClaim, Side, SpaceClaim, SpawnField,
-    StartField, StopReason, TYPES, Then, TimeOfDay, Verb, WAIT, Word, WordFact,
+    Body, Colour, CommandField, EpisodeField, Fact, LaneChoice, Level, Light, OriginField, Phenomenon,
+    Priority, ROAD_LANES, RoadField, RoadKind, ScenarioClaim, Side, SpaceClaim, SpawnField, StartField,
+    StopReason, TYPES, Then, TimeOfDay, TrafficRule, Verb, WAIT, Word, WordFact,
 };
 use avastra::model::{Avoidability, COUNTED, ENDS, MODULES};
 use avastra::syntax::Diagnostic;
@@ -104,7 +104,7 @@ fn every_word_of_the_language_is_on_the_page() {
         Colour::names().collect(),
         LaneChoice::names().collect(),
         Level::names().collect(),
-        Manner::names().collect(),
+        TrafficRule::names().collect(),
         SpawnField::names().collect(),
         CommandField::names().collect(),
         Phenomenon::names().collect(),

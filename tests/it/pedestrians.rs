@@ -6,7 +6,7 @@ use avastra::action::{Effect, SpawnRequest, Surroundings};
 use avastra::ads;
 use avastra::episode::Outcome;
 use avastra::geometry::distance_m;
-use avastra::model::command::Manners;
+use avastra::model::command::IgnoredRules;
 use avastra::model::vocabulary::{Body, Colour, LaneChoice, Level, Side, Then, TimeOfDay, Verb};
 use avastra::sim::{Control, Obstacle, Scene, Start, World};
 
@@ -31,7 +31,7 @@ fn walks_ahead(side: Side, distance_m: f64, speed_mps: f64, cover: Option<Body>)
         cover_own: None,
         cover,
         offset_m: 0.0,
-        ignores: Manners::default(),
+        ignores: IgnoredRules::default(),
         meet: None,
         bearer: None,
     }

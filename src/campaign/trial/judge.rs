@@ -14,7 +14,7 @@
 //! | walk | it appears beside the route on the asked side and walks over the route's path |
 //! | stand | it stands on the route's path |
 //!
-//! A vehicle with a manoeuvre begins each of its phases; where these lead it is theirs to say. Without one,
+//! A vehicle with a manoeuvre does all of its phases; where these lead it is theirs to say. Without one,
 //! a vehicle that is to keep its lane does not change it; a vehicle that is to change it does so once.
 //! An overtaker in the ego vehicle's own lane changes it once to get past, and comes back: it must if it is
 //! to change, and may when it is well ahead otherwise. Changes inside junctions, where lanes lie over each other, are
@@ -47,7 +47,7 @@ const OPPOSES_RAD: f64 = 3.0 * core::f64::consts::FRAC_PI_4;
 /// An oncoming vehicle that passes farther aside than this does not meet the ego vehicle, m.
 const MEETS_M: f64 = 12.0;
 
-/// Whether it did what its verb says, and began the phases of its manoeuvre, if it has one; if not, what was wrong, in words.
+/// Whether it did what its verb says, or the phases of its manoeuvre, if it has one; if not, what was wrong, in words.
 pub(super) fn verdict(
     scene: &Scene,
     request: &SpawnRequest,
@@ -59,11 +59,11 @@ pub(super) fn verdict(
         if request.verb == Verb::DriveAhead {
             appears_ahead(scene, request, first)?;
         }
-        return match seen.phases_begun as usize {
-            begun if begun < phases => {
-                Err(ended(seen, &format!("phase {} of {phases} had begun", begun + 1)))
-            }
-            _ => Ok(()),
+        let (begun, over) = (seen.phases.0 as usize, seen.phases.1 as usize);
+        return match () {
+            () if over == phases || begun == phases && seen.ending == Ending::TouchedEgo => Ok(()),
+            () if begun > over => Err(ended(seen, &format!("phase {begun} of {phases} had ended"))),
+            () => Err(ended(seen, &format!("phase {} of {phases} had begun", begun + 1))),
         };
     }
     let drives = || seen.frames.iter().try_for_each(|frame| stays_on_road(scene, frame));

@@ -49,8 +49,8 @@ pub(super) struct Sighting {
     /// Never empty; the first is of the moment at which it appeared.
     pub frames: Vec<Frame>,
     pub ending: Ending,
-    /// How many phases of its manoeuvre began.
-    pub phases_begun: u32,
+    /// How many phases of its manoeuvre began, and ended.
+    pub phases: (u32, u32),
 }
 
 /// Lets time pass for up to `horizon_s` and watches the road user of an id; `None` if there is none.
@@ -65,14 +65,14 @@ pub(super) fn watch(
     let begin_s = world.time_s();
     let drives = world.obstacle(id)?.body.is_vehicle();
     let mut frames = vec![frame(&scene, &world, id, begin_s)?];
-    let mut phases_begun = 0;
+    let mut phases = (0, 0);
     let ending = loop {
         if world.time_s() - begin_s >= horizon_s - DT_S / 2.0 {
             break Ending::TimeOver;
         }
         world.sense(sensed);
         let control = ads.drive(sensed);
-        phases_begun = world.phases_begun(id).max(phases_begun);
+        phases = world.phases(id).max(phases);
         let touched = world.tick(&control).iter().any(|contact: &Contact| contact.obstacle == id);
         let bumped =
             world.incidents().iter().any(|incident| [incident.obstacle, incident.other].contains(&id));
@@ -96,8 +96,8 @@ pub(super) fn watch(
             break Ending::Arrived;
         }
     };
-    let phases_begun = world.phases_begun(id).max(phases_begun);
-    Some(Sighting { frames, ending, phases_begun })
+    let phases = world.phases(id).max(phases);
+    Some(Sighting { frames, ending, phases })
 }
 
 /// Whether a vehicle drove over the edge of the map between two frames. It goes on there while it is in sight, and

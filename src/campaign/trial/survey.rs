@@ -131,7 +131,10 @@ impl<'a> Trials<'a> {
     pub fn again(&self, road: usize, row: usize, sample: &Sample) -> EpisodeLog {
         let setup = self.arena.setup(road, sample.seed);
         let table = self.arena.table();
-        let steps = (judge::HORIZON_S / table.space().episode.step_s).ceil() as usize;
+        let space = table.space();
+        let action = &space.actions[space.rows[row].action];
+        let seen_s = if action.manoeuvres().next().is_some() { judge::MANOEUVRE_S } else { judge::HORIZON_S };
+        let steps = (seen_s / space.episode.step_s).ceil() as usize;
         let mut choose = |moment: &episode::Moment| {
             if moment.step >= sample.step + steps {
                 return Choice::Stop;

@@ -139,8 +139,8 @@ impl Guide {
         Guide { samples, range_m: scene.range_m, is_motorway: scene.is_motorway }
     }
 
-    /// Where a road user is taken to be some time after it was seen beside the guide. It goes straight on, but on a motorway,
-    /// where seconds are bends of some metres, it follows the road.
+    /// Predicts where a road user is some time after it was seen beside the guide: straight on; on a motorway along the road,
+    /// because at those speeds a bend moves it metres to the side within seconds.
     pub fn expected(&self, object: &SensedObject, beside: &Beside, time_s: f64) -> Vec2 {
         if !self.is_motorway {
             return object.pose.position + object.velocity_mps * time_s;

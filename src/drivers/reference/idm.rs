@@ -220,8 +220,17 @@ impl Idm {
         let forward = unit_vector(object.pose.heading_rad);
         let taken = |beside: &Beside| beside.taken(forward, object.length_m, object.width_m, HALF_WAY_M);
         let reach_m = HALF_WAY_M + (object.length_m + object.width_m) / 2.0;
-        let (beside, mut tracer) =
-            self.guide().trace(object.pose.position, rear_m - 10.0, front_m + self.scene.range_m, reach_m);
+        let behind_m = if self.scene.is_motorway { self.scene.range_m } else { 10.0 };
+        let (beside, mut tracer) = self.guide().trace(
+            object.pose.position,
+            rear_m - behind_m,
+            front_m + self.scene.range_m,
+            reach_m,
+        );
+        // On a motorway who is behind keeps the distance, also beside the lane or on the way into it.
+        if self.scene.is_motorway && beside.station_m < rear_m {
+            return None;
+        }
         if let Some(span) = taken(&beside) {
             // It is on the way now; once its middle is behind the front, the ego vehicle is past it.
             return (span.middle_m() > front_m - BESIDE_M).then(|| Ahead {

@@ -10,7 +10,7 @@ use avastra_base::units::decimal;
 use avastra_campaign::emit::{identifier, lane_point, quoted};
 use avastra_campaign::episode::{EpisodeLog, Outcome};
 use avastra_lang::model::body::parameters;
-use avastra_lang::model::command::{Command, Manners};
+use avastra_lang::model::command::{Command, IgnoredRules};
 use avastra_lang::model::vocabulary::{Body, Phenomenon, Verb, Word};
 use avastra_lang::model::{BodyDef, Memory, Road, SPAWN_SPEED_MPS, Scenario, Space, ticks_s};
 use avastra_world::action::{Effect, OrderRequest, SpawnRequest};
@@ -153,8 +153,8 @@ impl<'a> Actions<'a> {
         if let Some(meet) = request.meet {
             fields.push(format!("meet: {}", decimal(meet, false)));
         }
-        if request.ignores != Manners::default() {
-            fields.push(manners_field(request.ignores));
+        if !request.ignores.is_empty() {
+            fields.push(ignored_field(request.ignores));
         }
         fields.push(format!("colour: {}", request.colour.name()));
         let distance = decimal(request.distance_m, false);
@@ -259,8 +259,8 @@ fn start_text(log: &EpisodeLog) -> String {
     )
 }
 
-fn manners_field(ignores: Manners) -> String {
-    let ignored: Vec<&str> = ignores.ignored().map(Word::name).collect();
+fn ignored_field(ignores: IgnoredRules) -> String {
+    let ignored: Vec<&str> = ignores.iter().map(Word::name).collect();
     format!("ignores: [{}]", ignored.join(", "))
 }
 
@@ -276,7 +276,7 @@ fn command_fields(command: &Command) -> String {
         lane.map(|lane| format!("lane: {}", lane.name())),
         figure("offset", offset_m, "m"),
         figure("aside", aside_mps, "m/s"),
-        ignores.map(manners_field),
+        ignores.map(ignored_field),
     ];
     fields.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }

@@ -394,7 +394,7 @@ impl Checker {
             None => Some(None),
         };
         let ignores = match find(SpawnField::Ignores) {
-            Some(value) => self.manners(value, place),
+            Some(value) => self.ignored_rules(value, place),
             None => Some(Vec::new()),
         };
         let meet = match find(SpawnField::Meet) {

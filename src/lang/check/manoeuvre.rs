@@ -1,17 +1,23 @@
 //! Orders and manoeuvres: what a vehicle is told, phase by phase, and how spawns and orders name manoeuvres.
 
+use core::ops::RangeInclusive;
+
 use crate::check::checker::{Checker, docs, each};
 use crate::check::expression::Place;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of, field};
 use crate::model::command::CommandDef;
-use crate::model::vocabulary::{CommandField, Fact, LaneChoice, Manner, Site, Word};
+use crate::model::expr::{Expr, ExprKind};
+use crate::model::vocabulary::{CHANGE, CommandField, Fact, LaneChoice, Site, TrafficRule, Word};
 use crate::model::{ManoeuvreCall, ManoeuvreDef, OrderDef, PhaseDef, Type, WordExpr, code};
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
 use avastra_base::units::Dimension;
 
 const DURATION: Type = Type::Quantity(Dimension::DURATION);
+
+/// Times that a phase waits, s.
+const TIME_S: RangeInclusive<f64> = 0.0..=f64::INFINITY;
 
 /// Largest number of phases of a manoeuvre.
 const PHASES_MAX: usize = 100;
@@ -36,6 +42,12 @@ impl Checker {
         let (names, declared) = self.declared("manoeuvre", items, ItemKind::as_manoeuvre);
         self.manoeuvre_names = names;
         for (item, manoeuvre) in declared {
+            if manoeuvre.name.text == CHANGE.0 {
+                let message = format!("`{}` cannot be the name of a manoeuvre", CHANGE.0);
+                let error = Diagnostic::error(code::NOT_HERE, message);
+                let error = error.at(manoeuvre.name.span, "`during change` means lane changes");
+                self.report(error.help("choose another name"));
+            }
             let found = self.manoeuvre(item, manoeuvre);
             self.manoeuvres.push(found);
         }
@@ -99,6 +111,14 @@ impl Checker {
             return self.reject(error.help("write the phases of that manoeuvre here"));
         }
         let command = self.command(&fields, place);
+        if let Some(command) = &command {
+            for figure in command.figures() {
+                self.check_figure(figure.expr, figure.field.name(), figure.unit, &figure.bounds);
+            }
+        }
+        for (expr, name) in [(&within, "within"), (&after, "after")] {
+            expr.iter().for_each(|expr| self.check_figure(expr, name, "s", &TIME_S));
+        }
         if matches!(&command, Some(command) if *command == CommandDef::default()) {
             let message = "the phase tells the vehicle nothing".to_owned();
             return self.missing_field(CommandField::Speed, declared.span, message);
@@ -112,6 +132,25 @@ impl Checker {
         }
         let command = command.filter(|_| all)?;
         Some(PhaseDef { once, within, after, command })
+    }
+
+    /// Reports a figure of a phase that is written out, out of its bounds. What is computed is brought into them later.
+    fn check_figure(&mut self, expr: &Expr, name: &str, unit: &str, bounds: &RangeInclusive<f64>) {
+        let is_open = |kind: &ExprKind| {
+            !matches!(kind, ExprKind::Number(_) | ExprKind::Negate(_) | ExprKind::Arithmetic(..))
+        };
+        if expr.any(is_open) {
+            return;
+        }
+        let Some(value) = self.quietly(|checker| checker.fold_number(expr)) else { return };
+        if !bounds.contains(&value.to_f64()) {
+            let message = format!("the {name} of a phase lies out of bounds");
+            let range = match bounds.end().is_finite() {
+                true => format!("must lie within {} .. {} {unit}", bounds.start(), bounds.end()),
+                false => format!("must be at least {} {unit}", bounds.start()),
+            };
+            self.report(Diagnostic::error(code::OUT_OF_BOUNDS, message).at(expr.span, range));
+        }
     }
 
     pub(super) fn order(
@@ -171,7 +210,7 @@ impl Checker {
             None => None,
         };
         let ignores = match field(fields, CommandField::Ignores) {
-            Some(value) => Some(self.manners(value, place)?),
+            Some(value) => Some(self.ignored_rules(value, place)?),
             None => None,
         };
         let says = |wanted: CommandField| field(fields, wanted).is_some();
@@ -192,14 +231,18 @@ impl Checker {
     }
 
     /// The rules of the road that are ignored: `[Signals, Ego]`.
-    pub(super) fn manners(&mut self, value: &ast::Expr, place: &Place<'_>) -> Option<Vec<WordExpr<Manner>>> {
+    pub(super) fn ignored_rules(
+        &mut self,
+        value: &ast::Expr,
+        place: &Place<'_>,
+    ) -> Option<Vec<WordExpr<TrafficRule>>> {
         let ast::ExprKind::List(items) = &value.kind else {
             self.look_at(value, place, None);
             let error = Diagnostic::error(code::TYPE_MISMATCH, "`ignores` is a list of rules of the road");
             let error = error.at(value.span, "no list");
             return self.reject(error.help("write them in brackets: `ignores: [Signals]`; `[]` for none"));
         };
-        all_of(items.iter().map(|item| self.word::<Manner>("rule of the road", item, place)))
+        all_of(items.iter().map(|item| self.word::<TrafficRule>("rule of the road", item, place)))
     }
 
     /// Whether a phase of a manoeuvre leads to a lane.

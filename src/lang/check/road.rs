@@ -102,16 +102,30 @@ impl Checker {
                 "mend the map, or choose places between which it has none; `avastra road MAP` lists the gaps",
             ));
         }
-        let mut speed = |wanted: RoadField, what: &str, least_mps: f64| {
-            field(&fields, wanted).map(|value| self.road_speed(value, wanted, what, least_mps))
+        let ego_mps = match field(&fields, RoadField::EgoSpeed) {
+            Some(value) => self.road_speed(value, RoadField::EgoSpeed, "a speed", 0.0),
+            None => Some(START_MPS),
         };
-        let ego_mps = speed(RoadField::EgoSpeed, "a speed", 0.0);
-        let set_mps = speed(RoadField::SetSpeed, "a wanted speed", SET_MPS_MIN);
-        let (ego_mps, set_mps) =
-            (ego_mps.unwrap_or(Some(START_MPS))?, set_mps.map_or(Some(None), |set| set.map(Some))?);
+        let set_mps = match field(&fields, RoadField::SetSpeed) {
+            Some(value) => {
+                Some(self.road_speed(value, RoadField::SetSpeed, "a wanted speed", SET_MPS_MIN)?)
+            }
+            None => None,
+        };
         let facts = facts(&block.name.text, &map, &route);
         let name = block.name.text.clone();
-        Some(Road { name, docs: docs(item), map_path, map, start, goal, route, ego_mps, set_mps, facts })
+        Some(Road {
+            name,
+            docs: docs(item),
+            map_path,
+            map,
+            start,
+            goal,
+            route,
+            ego_mps: ego_mps?,
+            set_mps,
+            facts,
+        })
     }
 
     /// Notes the names and numbers of a road, whether its map can be read or not.

@@ -142,9 +142,11 @@ impl Checker {
             false => self.all_targets(on),
         };
         actions.sort_unstable();
-        if let Some(action) =
-            actions.iter().filter_map(|action| self.actions[*action].as_ref()).find(|a| !gives(a))
-            && !on.is_empty()
+        // Why a broken action gives it to nobody was reported where that stands.
+        let is_whole = |action: &&usize| !self.half_broken.contains(action);
+        let mut whole = actions.iter().filter(is_whole).filter_map(|action| self.actions[*action].as_ref());
+        if !on.is_empty()
+            && let Some(action) = whole.find(|action| !gives(action))
         {
             let message = format!("nobody does `{}` because of `{}`", during.text, action.name);
             let error = Diagnostic::error(code::NO_SPAWN, message).at(rule.name.span, "never asked");

@@ -6,16 +6,16 @@ use crate::model::eval::{Facts, evaluate};
 use crate::model::expr::Expr;
 use crate::model::limits::{SPAWN_SPEED_MPS, out_of_bounds, rounded_into};
 use crate::model::space::{FnDef, WordExpr};
-use crate::model::vocabulary::{CommandField, LaneChoice, Manner, Word};
+use crate::model::vocabulary::{CommandField, LaneChoice, TrafficRule, Word};
 
 /// Rates at which a vehicle may be told to change its speed, m/s². The most is more than tyres give.
-pub const RATE_MPS2: RangeInclusive<f64> = 0.1..=15.0;
+const RATE_MPS2: RangeInclusive<f64> = 0.1..=15.0;
 
 /// Places beside the middle of a lane, m to the left: the next lane's middle and more, on either side.
 pub const OFFSET_M: RangeInclusive<f64> = -5.0..=5.0;
 
 /// Speeds to the side, m/s. UN R157's cut-ins reach 3 m/s.
-pub const ASIDE_MPS: RangeInclusive<f64> = 0.1..=4.0;
+const ASIDE_MPS: RangeInclusive<f64> = 0.1..=4.0;
 
 /// A command whose values are still to be computed.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -29,7 +29,7 @@ pub struct CommandDef {
     pub offset: Option<Expr>,
     /// m/s; without it the driver moves over as it would by itself.
     pub aside: Option<Expr>,
-    pub ignores: Option<Vec<WordExpr<Manner>>>,
+    pub ignores: Option<Vec<WordExpr<TrafficRule>>>,
 }
 
 /// A command. What is `None` stays as it is.
@@ -40,25 +40,28 @@ pub struct Command {
     pub lane: Option<LaneChoice>,
     pub offset_m: Option<f64>,
     pub aside_mps: Option<f64>,
-    pub ignores: Option<Manners>,
+    pub ignores: Option<IgnoredRules>,
 }
 
 /// The rules of the road that a vehicle ignores; none by default.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Manners(u8);
+pub struct IgnoredRules(u8);
 
-impl Manners {
-    pub fn of(ignored: impl IntoIterator<Item = Manner>) -> Manners {
-        Manners(ignored.into_iter().fold(0, |bits, manner| bits | 1 << manner as u8))
+impl IgnoredRules {
+    pub fn of(ignored: impl IntoIterator<Item = TrafficRule>) -> IgnoredRules {
+        IgnoredRules(ignored.into_iter().fold(0, |bits, rule| bits | 1 << rule as u8))
     }
 
-    pub fn ignores(self, manner: Manner) -> bool {
-        self.0 >> manner as u8 & 1 == 1
+    pub fn contains(self, rule: TrafficRule) -> bool {
+        self.0 >> rule as u8 & 1 == 1
     }
 
-    /// Those that are ignored.
-    pub fn ignored(self) -> impl Iterator<Item = Manner> {
-        Manner::ALL.iter().copied().filter(move |manner| self.ignores(*manner))
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    pub fn iter(self) -> impl Iterator<Item = TrafficRule> {
+        TrafficRule::ALL.iter().copied().filter(move |rule| self.contains(*rule))
     }
 
     pub fn bits(self) -> u8 {
@@ -66,35 +69,64 @@ impl Manners {
     }
 }
 
-/// The fields that are figures.
-const FIGURES: [CommandField; 4] =
-    [CommandField::Speed, CommandField::Rate, CommandField::Offset, CommandField::Aside];
+/// One figure of a command: what it is, and where it stands.
+struct Figure {
+    field: CommandField,
+    unit: &'static str,
+    bounds: RangeInclusive<f64>,
+    /// Whether a command goes on without its value if it has none.
+    may_be_left_out: bool,
+    written: fn(&CommandDef) -> Option<&Expr>,
+    value: fn(&mut Command) -> &mut Option<f64>,
+}
 
-/// One figure of a command, as the file says it.
-#[derive(Debug, Clone)]
-pub struct Figure<'a> {
+const FIGURES: [Figure; 4] = [
+    Figure {
+        field: CommandField::Speed,
+        unit: "m/s",
+        bounds: SPAWN_SPEED_MPS,
+        may_be_left_out: false,
+        written: |def| def.speed.as_ref(),
+        value: |command| &mut command.speed_mps,
+    },
+    Figure {
+        field: CommandField::Rate,
+        unit: "m/s^2",
+        bounds: RATE_MPS2,
+        may_be_left_out: true,
+        written: |def| def.rate.as_ref(),
+        value: |command| &mut command.rate_mps2,
+    },
+    Figure {
+        field: CommandField::Offset,
+        unit: "m",
+        bounds: OFFSET_M,
+        may_be_left_out: false,
+        written: |def| def.offset.as_ref(),
+        value: |command| &mut command.offset_m,
+    },
+    Figure {
+        field: CommandField::Aside,
+        unit: "m/s",
+        bounds: ASIDE_MPS,
+        may_be_left_out: true,
+        written: |def| def.aside.as_ref(),
+        value: |command| &mut command.aside_mps,
+    },
+];
+
+/// A figure as the file says it, with its unit and its bounds.
+pub struct WrittenFigure<'a> {
     pub field: CommandField,
     pub expr: &'a Expr,
     pub unit: &'static str,
     pub bounds: RangeInclusive<f64>,
 }
 
-/// The unit and the bounds of a figure.
-fn bounds(field: CommandField) -> (&'static str, RangeInclusive<f64>) {
-    match field {
-        CommandField::Rate => ("m/s^2", RATE_MPS2),
-        CommandField::Offset => ("m", OFFSET_M),
-        CommandField::Aside => ("m/s", ASIDE_MPS),
-        _ => ("m/s", SPAWN_SPEED_MPS),
-    }
-}
-
 impl CommandDef {
-    pub fn figures(&self) -> impl Iterator<Item = Figure<'_>> {
-        let all = FIGURES.into_iter().zip([&self.speed, &self.rate, &self.offset, &self.aside]);
-        all.filter_map(|(field, expr)| {
-            let (unit, bounds) = bounds(field);
-            Some(Figure { field, expr: expr.as_ref()?, unit, bounds })
+    pub fn figures(&self) -> impl Iterator<Item = WrittenFigure<'_>> {
+        FIGURES.into_iter().filter_map(|Figure { field, unit, bounds, written, .. }| {
+            Some(WrittenFigure { field, expr: written(self)?, unit, bounds })
         })
     }
 
@@ -107,58 +139,43 @@ impl CommandDef {
 
     /// The command with its values. What has no value is NaN.
     pub fn evaluate(&self, functions: &[FnDef], facts: &Facts<'_>) -> Command {
-        let manners = |ignores: &Vec<WordExpr<Manner>>| {
-            Manners::of(ignores.iter().map(|manner| manner.word(functions, facts)))
+        let ignored = |ignores: &Vec<WordExpr<TrafficRule>>| {
+            IgnoredRules::of(ignores.iter().map(|rule| rule.word(functions, facts)))
         };
         let mut command = Command {
             lane: self.lane.as_ref().map(|lane| lane.word(functions, facts)),
-            ignores: self.ignores.as_ref().map(manners),
+            ignores: self.ignores.as_ref().map(ignored),
             ..Command::default()
         };
-        for Figure { field, expr, bounds, .. } in self.figures() {
-            let value = rounded_into(evaluate(expr, functions, facts).number(), bounds);
-            *command.figure(field) = Some(value);
+        for Figure { bounds, written, value, .. } in FIGURES {
+            if let Some(expr) = written(self) {
+                let number = evaluate(expr, functions, facts).number();
+                *value(&mut command) = Some(rounded_into(number, bounds));
+            }
         }
         command
     }
 }
 
 impl Command {
-    fn figure(&mut self, field: CommandField) -> &mut Option<f64> {
-        match field {
-            CommandField::Rate => &mut self.rate_mps2,
-            CommandField::Offset => &mut self.offset_m,
-            CommandField::Aside => &mut self.aside_mps,
-            _ => &mut self.speed_mps,
-        }
-    }
-
-    /// The figures that it has, each with its name, unit and bounds.
-    fn figures(&self) -> impl Iterator<Item = (&'static str, f64, &'static str, RangeInclusive<f64>)> {
-        FIGURES.into_iter().filter_map(|field| {
-            let (unit, range) = bounds(field);
-            let mut all = *self;
-            let value = *all.figure(field);
-            value.map(|value| (field.name(), value, unit, range))
-        })
-    }
-
     /// Why the world must not be given this command; `None` if it may.
-    pub fn out_of_bounds(&self) -> Option<String> {
-        out_of_bounds("order", self.figures())
+    pub fn out_of_bounds(mut self) -> Option<String> {
+        let figures = FIGURES.into_iter().filter_map(|Figure { field, unit, bounds, value, .. }| {
+            Some((field.name(), (*value(&mut self))?, unit, bounds))
+        });
+        out_of_bounds("order", figures)
     }
 
-    /// The same with its figures brought within their bounds; a rate and a speed to the side that have no value are left
-    /// out. `None` if its speed or its offset has none.
+    /// Brings every figure into its range. Drops a `rate` or an `aside` without a value; `None` if the speed or the offset
+    /// has none.
     pub fn within_bounds(mut self) -> Option<Command> {
-        for field in FIGURES {
-            let (_, range) = bounds(field);
-            let figure = self.figure(field);
-            let Some(value) = *figure else { continue };
-            *figure = match (value.is_nan(), field) {
-                (false, _) => Some(value.clamp(*range.start(), *range.end())),
-                (true, CommandField::Rate | CommandField::Aside) => None,
-                (true, _) => return None,
+        for Figure { bounds, may_be_left_out, value, .. } in FIGURES {
+            let figure = value(&mut self);
+            let Some(number) = *figure else { continue };
+            *figure = match number.is_nan() {
+                false => Some(number.clamp(*bounds.start(), *bounds.end())),
+                true if may_be_left_out => None,
+                true => return None,
             };
         }
         Some(self)

@@ -60,6 +60,13 @@ pub fn spawn_out_of_bounds(
     offset_m: f64,
     meet: Option<f64>,
 ) -> Option<String> {
+    let all_lie_within = SPAWN_SPEED_MPS.contains(&speed_mps)
+        && SPAWN_DISTANCE_M.contains(&distance_m)
+        && OFFSET_M.contains(&offset_m)
+        && meet.is_none_or(|part| MEET.contains(&part));
+    if all_lie_within {
+        return None;
+    }
     let distance = ("distance", distance_m, "m", SPAWN_DISTANCE_M);
     let offset = ("offset", offset_m, "m", OFFSET_M);
     let meet = meet.map(|part| ("meet", part, "", MEET));

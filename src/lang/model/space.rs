@@ -14,7 +14,7 @@ use crate::model::row::Row;
 use crate::model::rules::{Bound, Clause};
 use crate::model::value::{EnumIndex, Type, Value};
 use crate::model::vocabulary::{
-    Body, Colour, LaneChoice, Level, Manner, Phenomenon, Side, Then, TimeOfDay, Verb, Word,
+    Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, TrafficRule, Verb, Word,
 };
 use crate::syntax::ast::Span;
 use avastra_base::units::{Rational, Unit, decimal, quantity, quantity_in, quantity_short, unit_of_all};
@@ -213,7 +213,7 @@ impl ActionDef {
     }
 
     /// The manoeuvres that it gives to road users, in the order of its effects.
-    pub(crate) fn manoeuvres(&self) -> impl Iterator<Item = usize> {
+    pub fn manoeuvres(&self) -> impl Iterator<Item = usize> {
         let calls = self.effects.iter().filter_map(|effect| match effect {
             EffectDef::Set(_) => None,
             EffectDef::Spawn(spawn) => spawn.manoeuvre.as_ref(),
@@ -308,7 +308,7 @@ pub struct SpawnDef {
     pub cover: Option<WordExpr<BodyWord>>,
     /// m to the left of the middle of its lane.
     pub offset: Option<Expr>,
-    pub ignores: Vec<WordExpr<Manner>>,
+    pub ignores: Vec<WordExpr<TrafficRule>>,
     /// The part of the ego vehicle's front at which it is met, from the side that it comes from.
     pub meet: Option<Expr>,
     /// The name that it bears from then on, by index in `Space::bearers`.

@@ -480,7 +480,7 @@ words! {
 }
 
 words! {
-    Manner "A rule of the road that a vehicle ignores.":
+    TrafficRule "A rule of the road that a vehicle ignores.":
     Signals "Signals" = "It stops neither at red lights nor at stop signs.",
     RightOfWay "RightOfWay" = "It waits for nobody at junctions.",
     Ego "Ego" = "It follows and changes lanes as if the ego vehicle were not there.",

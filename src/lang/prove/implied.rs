@@ -122,7 +122,7 @@ fn follows(space: &Space, rule: usize, others: &RulesInForce, work: &mut usize) 
                 RuleBody::Holds(_) | RuleBody::During(_) | RuleBody::Phases { .. } => false,
             })
         }
-        // Of the moment at which a phase begins nothing is proved.
+        // Nothing is known about the moment at which a phase begins.
         RuleBody::Phases { .. } => false,
         RuleBody::During(_) | RuleBody::Holds(_) => {
             let on_any = |row| RowRules { space, row, road: None, in_force: others };

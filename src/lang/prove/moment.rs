@@ -228,7 +228,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
             let message = format!("rule `{}` lets no lane change begin", definition.name);
             let warning =
                 Diagnostic::warning(code::NO_CHANGE, message).at(definition.span, "holds at no moment");
-            let help = "say when lane changes may begin; to have none, write `then: Keep` in the spawn";
+            let help = "say when lane changes may begin; to have none, tell nobody to change lanes";
             diagnostics.push(warning.help(help));
         }
     }

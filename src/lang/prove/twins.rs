@@ -6,9 +6,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::model::command::Figure;
+use crate::model::command::WrittenFigure;
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::vocabulary::Manner;
+use crate::model::vocabulary::TrafficRule;
 use crate::model::{
     Domain, EffectDef, ManoeuvreCall, Row, RuleBody, Space, SpawnDef, Value, WordExpr, code, effort,
 };
@@ -119,14 +119,15 @@ impl<'a> RowText<'a> {
                 format!("{} {then:?}", spawn_form(spawn, &|expr| self.reduced(expr)))
             }
             EffectDef::Order(order) => {
-                let figure =
-                    |figure: Figure<'_>| format!("{:?} {:?}", figure.field, self.reduced(figure.expr).kind);
+                let figure = |figure: WrittenFigure<'_>| {
+                    format!("{:?} {:?}", figure.field, self.reduced(figure.expr).kind)
+                };
                 let figures: Vec<String> = order.command.figures().map(figure).collect();
                 let lane =
                     order.command.lane.as_ref().map(|lane| word_form(lane, &|expr| self.reduced(expr)));
                 let then = order.manoeuvre.as_ref().map(|then| self.call_form(then));
                 let ignores = order.command.ignores.as_ref();
-                let ignores = ignores.map(|ignores| manners_form(ignores, &|expr| self.reduced(expr)));
+                let ignores = ignores.map(|ignores| ignored_form(ignores, &|expr| self.reduced(expr)));
                 format!("order {} {figures:?} {lane:?} {ignores:?} {then:?}", order.bearer)
             }
         });
@@ -174,7 +175,7 @@ fn word_form<W: Copy + core::fmt::Debug>(word: &WordExpr<W>, reduced: &impl Fn(&
     }
 }
 
-fn manners_form(ignores: &[WordExpr<Manner>], reduced: &impl Fn(&Expr) -> Expr) -> String {
+fn ignored_form(ignores: &[WordExpr<TrafficRule>], reduced: &impl Fn(&Expr) -> Expr) -> String {
     let ignored: Vec<String> = ignores.iter().map(|manner| word_form(manner, reduced)).collect();
     ignored.join(" ")
 }
@@ -192,7 +193,7 @@ fn spawn_form(spawn: &SpawnDef, reduced: &impl Fn(&Expr) -> Expr) -> String {
         reduced(&spawn.distance).kind,
         spawn.offset.as_ref().map(|offset| reduced(offset).kind),
         spawn.meet.as_ref().map(|meet| reduced(meet).kind),
-        manners_form(&spawn.ignores, reduced),
+        ignored_form(&spawn.ignores, reduced),
         spawn.behind,
         spawn.cover.as_ref().map_or(String::new(), |cover| word_form(cover, reduced)),
         spawn.bearer,

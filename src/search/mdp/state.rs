@@ -22,8 +22,6 @@ pub const STATE_LEN: usize = 19;
 /// One state: shape `(STATE_LEN,)`.
 pub type StateVector = Array1<f32>;
 
-/// No sensor reaches obstacles that are farther away, m.
-const SENSOR_REACH_M: f64 = 120.0;
 /// A localisation error below this has no direction, m.
 const DEVIATION_M_MIN: f64 = 1e-3;
 
@@ -108,18 +106,19 @@ pub struct PerceptionCounts {
     pub ghosts: u32,
 }
 
-/// Counts missed objects and ghosts. Obstacles beyond the sensors' reach (120 m) are not missed.
+/// Counts missed objects and ghosts. Obstacles beyond the sensors' reach are not missed.
 pub fn perception_counts(world: &World, status: &Status) -> PerceptionCounts {
-    counts(world.obstacles_on_level(), &status.perceived)
+    counts(world.obstacles_on_level(), &status.perceived, world.scene().range_m)
 }
 
 fn counts<'a>(
     real: impl Iterator<Item = &'a Obstacle> + Clone,
     perceived: &[PerceivedObject],
+    range_m: f64,
 ) -> PerceptionCounts {
     let known = |id: u32| perceived.iter().any(|object| object.id == Some(id));
     let missed =
-        real.clone().filter(|obstacle| obstacle.distance_m <= SENSOR_REACH_M && !known(obstacle.id)).count();
+        real.clone().filter(|obstacle| obstacle.distance_m <= range_m && !known(obstacle.id)).count();
     let ghosts =
         perceived.iter().filter(|object| !real.clone().any(|truth| Some(truth.id) == object.id)).count();
     PerceptionCounts { missed: missed as u32, ghosts: ghosts as u32 }
@@ -206,7 +205,7 @@ mod tests {
         assert_eq!(perception_differences([truth].iter(), &[]), Differences::default());
         let far = Obstacle { distance_m: 200.0, id: 2, ..truth };
         let seen = |objects: &[PerceivedObject]| {
-            let counts = counts([truth, far].iter(), objects);
+            let counts = counts([truth, far].iter(), objects, 120.0);
             (counts.missed, counts.ghosts)
         };
         assert_eq!(seen(&[]), (1, 0));

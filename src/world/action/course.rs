@@ -10,6 +10,8 @@ use super::later::{Later, LaterMoment};
 /// Phases, one after another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Course {
+    /// Which manoeuvre it is, by its index in the space.
+    pub manoeuvre: usize,
     pub(super) phases: Vec<PhaseDef>,
     /// The rules in force on the moments at which phases begin.
     pub(super) rules: Vec<Expr>,
@@ -26,11 +28,14 @@ impl Course {
         self.later.locals.iter().map(|value| value.bits())
     }
 
-    /// The names of road users that a phase asks about.
-    pub fn bearers(&self, phase: usize) -> Vec<usize> {
-        let PhaseDef { once, within, after, command } = &self.phases[phase];
-        let parts = once.iter().chain(within).chain(after).chain(command.parts());
-        parts.chain(&self.rules).flat_map(Expr::bearers).collect()
+    /// The names of road users that its phases and their rules ask about: several phases may be asked in one tick.
+    pub fn bearers(&self) -> Vec<usize> {
+        let parts = |phase: &'_ PhaseDef| -> Vec<usize> {
+            let PhaseDef { once, within, after, command } = phase;
+            let parts = once.iter().chain(within).chain(after).chain(command.parts());
+            parts.flat_map(Expr::bearers).collect()
+        };
+        self.phases.iter().flat_map(parts).chain(self.rules.iter().flat_map(Expr::bearers)).collect()
     }
 
     /// Whether what a phase waits for has come.

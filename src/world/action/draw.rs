@@ -9,7 +9,7 @@ use crate::action::{Course, Effect, LaneChangeRules, OrderRequest, SpawnRequest}
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 use avastra_lang::model::body::OwnBody;
-use avastra_lang::model::command::{Manners, OFFSET_M};
+use avastra_lang::model::command::{IgnoredRules, OFFSET_M};
 use avastra_lang::model::expr::Expr;
 use avastra_lang::model::rules::{
     Before, Candidate, Choose, Clause, Nearest, Room, RowRules, TRIES_MAX, Unsolved,
@@ -219,7 +219,8 @@ impl<'a> Judge<'a> {
             let value = |argument: &Expr| evaluate(argument, &space.functions, &facts);
             let later = self.later(call.arguments.iter().map(value).collect());
             let rules = self.row.on_phases(call.manoeuvre).cloned().collect();
-            Arc::new(Course { phases: space.manoeuvres[call.manoeuvre].phases.clone(), rules, later })
+            let (manoeuvre, phases) = (call.manoeuvre, space.manoeuvres[call.manoeuvre].phases.clone());
+            Arc::new(Course { manoeuvre, phases, rules, later })
         };
         places.zip(calls).filter_map(|(at, call)| Some((at, course(call?)))).collect()
     }
@@ -289,7 +290,7 @@ impl<'a> Judge<'a> {
                 .offset
                 .as_ref()
                 .map_or(0.0, |offset| rounded_into(evaluate(offset, functions, &facts).number(), OFFSET_M)),
-            ignores: Manners::of(spawn.ignores.iter().map(|manner| manner.word(functions, &facts))),
+            ignores: IgnoredRules::of(spawn.ignores.iter().map(|manner| manner.word(functions, &facts))),
             meet: spawn
                 .meet
                 .as_ref()

@@ -1,7 +1,7 @@
 //! What a row does to the world once its parameters are drawn.
 
 use avastra_lang::model::body::OwnBody;
-use avastra_lang::model::command::{Command, Manners};
+use avastra_lang::model::command::{Command, IgnoredRules};
 use avastra_lang::model::expr::Expr;
 use avastra_lang::model::vocabulary::{
     Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb,
@@ -53,7 +53,7 @@ pub struct SpawnRequest {
     /// m to the left of the middle of its lane.
     pub offset_m: f64,
     /// The rules of the road that it ignores.
-    pub ignores: Manners,
+    pub ignores: IgnoredRules,
     /// The part of the ego vehicle's front at which it is met, from the side that it comes from; for `Walk` alone.
     pub meet: Option<f64>,
     /// The name that it bears, by its index in the space.

@@ -37,7 +37,7 @@ pub struct Draw {
     /// What it does to the world, in order.
     pub effects: Vec<Effect>,
     pub memory_after: Memory,
-    /// Rules on the lane changes of what it makes appear; `None` without any.
+    /// Rules on the lane changes of what it makes appear or orders; `None` without any.
     pub lane_changes: Option<Arc<LaneChangeRules>>,
     /// The manoeuvres of what it makes appear or orders, each with the index of its effect.
     pub courses: Vec<(usize, Arc<Course>)>,

@@ -24,7 +24,8 @@ const LEVEL_STEPS: u32 = 25;
 /// Stretch of the route before and behind the ego vehicle on which others meet it, m.
 const LEVEL_REACH_M: f64 = 200.0;
 
-/// A road user is looked for on so many times the straight way to it along the route, and this much more, m.
+/// A road user is searched for along the route within [`WINDING`] times its straight distance plus [`BESIDE_M`]: in bends the
+/// route is longer than the straight way.
 const WINDING: f64 = 2.0;
 const BESIDE_M: f64 = 50.0;
 

@@ -1,7 +1,6 @@
 //! What can be asked about a moment: the facts of the ego vehicle and its surroundings, and those of another road
 //! user. Rules, policies and the paper's state variables read the same ones.
 
-use avastra_lang::model::command::Manners;
 use avastra_lang::model::vocabulary::Light;
 use avastra_lang::model::{MomentFacts, NpcFacts, OnRoute, TIME_S_MAX, junction_ahead_m};
 
@@ -62,8 +61,10 @@ impl Around<'_> {
             ego_light: self.light(signal),
             ego_road: road,
             road_users: self.obstacles_on_level().count() as u32,
-            rule_breakers: self.drivers().filter(|(.., driver)| driver.ignores != Manners::default()).count()
-                as u32,
+            rule_breakers: self
+                .drivers()
+                .filter(|(obstacle, _, driver)| !obstacle.is_apart && !driver.ignores.is_empty())
+                .count() as u32,
             nearest_gap_m: nearest.map_or(NO_ROAD_USER_M, |(gap_m, _)| gap_m),
             nearest_speed_mps: nearest.map_or(0.0, |(_, speed_mps)| speed_mps),
             // The number nearest to the exact time, so that `elapsed >= 0.7 s` holds at 0.7 s.
@@ -99,7 +100,7 @@ pub(super) fn with_itself(moment: MomentFacts, this: &Obstacle, driver: &Driver)
     };
     MomentFacts {
         road_users: moment.road_users + 1,
-        rule_breakers: moment.rule_breakers + u32::from(driver.ignores != Manners::default()),
+        rule_breakers: moment.rule_breakers + u32::from(!driver.ignores.is_empty()),
         nearest_gap_m,
         nearest_speed_mps,
         ..moment

@@ -92,8 +92,9 @@ pub(super) struct Mover {
     pub bearer: Option<usize>,
     /// The manoeuvre that it does, until it ends or an order replaces it.
     pub course: Option<Running>,
-    /// How many phases of its last manoeuvre have begun. Nothing depends on it.
+    /// How many phases of its last manoeuvre have begun, and ended. Nothing depends on them.
     pub phases_begun: u32,
+    pub phases_ended: u32,
 }
 
 /// A manoeuvre under way.
@@ -113,7 +114,17 @@ enum Stage {
     /// Until this tick, and until the rules let the phase begin.
     Holding(u64),
     /// Until the road user has done what it was told.
-    Changing(Command),
+    UnderWay(Command),
+}
+
+/// What a tick does to a manoeuvre.
+pub(super) struct Advance {
+    /// What is left of it.
+    pub rest: Option<Running>,
+    /// What a phase tells the driver that begins now.
+    pub command: Option<Command>,
+    /// How many phases have ended.
+    pub ended: u32,
 }
 
 impl Running {
@@ -121,19 +132,15 @@ impl Running {
         Running { course, phase: 0, stage: Stage::Waiting, since: tick }
     }
 
-    /// The names of road users that the present phase asks about.
+    /// The names of road users that its phases ask about.
     pub fn bearers(&self) -> Vec<usize> {
-        self.course.bearers(self.phase)
+        self.course.bearers()
     }
 
-    /// Goes on at a tick, in which the driver is or is not aside as it was told. Gives what is left of it, and what a phase
-    /// that begins now tells the driver.
-    pub fn advance(
-        mut self,
-        moment: &LaterMoment,
-        is_aside: bool,
-        tick: u64,
-    ) -> (Option<Running>, Option<Command>) {
+    /// Advances by one tick. `is_aside`: whether the driver is in the lane and at the offset that it was told.
+    pub fn advance(mut self, moment: &LaterMoment, is_aside: bool, tick: u64) -> Advance {
+        let mut ended = 0;
+        let over = |ended| Advance { rest: None, command: None, ended };
         loop {
             match self.stage {
                 Stage::Waiting if self.course.has_come(self.phase, moment) => {
@@ -144,25 +151,28 @@ impl Running {
                     let waited_s = (tick - self.since) as f64 * DT_S;
                     let is_over =
                         self.course.within_s(self.phase, moment).is_some_and(|most_s| waited_s >= most_s);
-                    return (if is_over { None } else { Some(self) }, None);
+                    return Advance { rest: (!is_over).then_some(self), command: None, ended };
                 }
                 Stage::Holding(until) if tick >= until && self.course.may_begin(moment) => {
-                    let Some(command) = self.course.command(self.phase, moment) else { return (None, None) };
-                    (self.stage, self.since) = (Stage::Changing(command), tick);
-                    return (Some(self), Some(command));
+                    let Some(command) = self.course.command(self.phase, moment) else { return over(ended) };
+                    (self.stage, self.since) = (Stage::UnderWay(command), tick);
+                    return Advance { rest: Some(self), command: Some(command), ended };
                 }
-                Stage::Changing(command)
+                Stage::UnderWay(command)
                     if tick > self.since
                         && command.speed_mps.is_none_or(|mps| has_speed(moment.npc.speed_mps, mps))
                         && (is_aside || !command.goes_aside()) =>
                 {
                     self.phase += 1;
+                    ended += 1;
                     (self.stage, self.since) = (Stage::Waiting, tick);
                     if self.phase == self.course.phases() {
-                        return (None, None);
+                        return over(ended);
                     }
                 }
-                Stage::Holding(_) | Stage::Changing(_) => return (Some(self), None),
+                Stage::Holding(_) | Stage::UnderWay(_) => {
+                    return Advance { rest: Some(self), command: None, ended };
+                }
             }
         }
     }
@@ -172,11 +182,14 @@ impl Running {
         match self.stage {
             Stage::Waiting => trace.words([0, 0]),
             Stage::Holding(until) => trace.words([1, until]),
-            Stage::Changing(command) => {
+            Stage::UnderWay(command) => {
                 trace.words([2, command.speed_mps.map_or(u64::MAX, f64::to_bits)]);
-                trace.word(u64::from(command.goes_aside()));
+                if command.goes_aside() {
+                    trace.word(1);
+                }
             }
         }
+        trace.word(self.course.manoeuvre as u64);
         trace.words(self.course.arguments());
     }
 }
@@ -274,6 +287,7 @@ impl Mover {
             bearer: None,
             course: None,
             phases_begun: 0,
+            phases_ended: 0,
         }
     }
 

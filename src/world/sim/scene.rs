@@ -14,7 +14,8 @@ use super::way::Ways;
 /// driving systems are given.
 pub const RANGE_M: f64 = 120.0;
 
-/// The same on a motorway, m: that of a long-range radar as Apollo takes (Continental ARS 408-21: 250 m).
+/// How far vehicles are sensed on a motorway, m: as far as the long-range radar that Apollo takes reaches (Continental ARS
+/// 408-21).
 const MOTORWAY_RANGE_M: f64 = 250.0;
 
 /// What stays the same during all episodes of one road. Shared, never copied.

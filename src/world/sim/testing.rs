@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::action::SpawnRequest;
 use avastra_base::geometry::Vec2;
 use avastra_lang::model::START_MPS;
-use avastra_lang::model::command::Manners;
+use avastra_lang::model::command::IgnoredRules;
 use avastra_lang::model::vocabulary::{Body, Colour, LaneChoice, Level, Side, Then, TimeOfDay, Verb};
 use avastra_road::testing::{lanes, road, street};
 use avastra_road::{RoadMap, Route};
@@ -85,7 +85,7 @@ pub fn request(verb: Verb, distance_m: f64, speed_mps: f64) -> SpawnRequest {
         cover_own: None,
         cover: None,
         offset_m: 0.0,
-        ignores: Manners::default(),
+        ignores: IgnoredRules::default(),
         meet: None,
         bearer: None,
     }

@@ -83,11 +83,11 @@ fn impossible_spawns_are_refused() {
     let ahead = request(Verb::DriveAhead, 50.0, 10.0);
     for speed_mps in [f64::NAN, f64::INFINITY, -0.1, 70.1, 1e300] {
         let refusal = world.survey(&SpawnRequest { speed_mps, ..ahead }).expect_err("no such speed");
-        assert_eq!(refusal, "the speed is not between 0 and 70 m/s");
+        assert_eq!(refusal, format!("the spawn's speed is {speed_mps} m/s, possible is 0 .. 70 m/s"));
     }
     for distance_m in [f64::NAN, f64::INFINITY, -0.1, 1000.1, 1e300] {
         let refusal = world.survey(&SpawnRequest { distance_m, ..ahead }).expect_err("no such distance");
-        assert_eq!(refusal, "the distance is not between 0 and 1000 m");
+        assert_eq!(refusal, format!("the spawn's distance is {distance_m} m, possible is 0 .. 1000 m"));
     }
     for verb in Verb::ALL {
         let on_foot = matches!(verb, Verb::Walk | Verb::Stand);

@@ -288,10 +288,10 @@ impl World {
         Some(npc_facts(&self.alone(), &user.obstacle, &user.mover.motion))
     }
 
-    /// How many phases of its manoeuvre the road user with an id has begun; 0 if it is not there.
-    pub fn phases_begun(&self, id: u32) -> u32 {
+    /// How many phases of its manoeuvre the road user with an id has begun, and ended; 0 if it is not there.
+    pub fn phases(&self, id: u32) -> (u32, u32) {
         let user = self.users.iter().find(|user| user.obstacle.id == id);
-        user.map_or(0, |user| user.mover.phases_begun)
+        user.map_or((0, 0), |user| (user.mover.phases_begun, user.mover.phases_ended))
     }
 
     /// What can be asked about the latest bearer of a name, if one is there.

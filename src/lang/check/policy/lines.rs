@@ -231,7 +231,9 @@ fn illegal(
     let from: u128 = from.map(|variant| 1 << variant).sum();
     let forbidding = in_force.all().map(|rule| &space.rules[rule]).find(|rule| match &rule.body {
         crate::model::RuleBody::Moves { state, .. } => *state == clock && forbids(space, rule, row, from),
-        _ => false,
+        crate::model::RuleBody::Holds(_)
+        | crate::model::RuleBody::During(_)
+        | crate::model::RuleBody::Phases { .. } => false,
     })?;
     let error = error
         .at(call.span, format!("forbidden by `{}` at every time that the line leaves", forbidding.name))

@@ -144,7 +144,7 @@ impl<'a> RowRules<'a> {
         rules.filter_map(move |rule| self.space.rules[rule].body.during(self.row.action))
     }
 
-    /// The conditions in force under which phases of a manoeuvre may begin that the row gives to somebody.
+    /// The rules in force on the phases of a manoeuvre that the row gives to a vehicle.
     pub fn on_phases(self, manoeuvre: usize) -> impl Iterator<Item = &'a Expr> {
         let rules = self.in_force.on_row(self.row);
         rules.filter_map(move |rule| match &self.space.rules[rule].body {

@@ -1,14 +1,14 @@
 //! What drivers are told to do to the side: to change to a lane seen from the ego vehicle, and to drive beside the middle
-//! of their lane. Both begin in the tick in which they are told, if the road and others leave the place.
+//! of their lane. A lane change begins when markings, rules and vehicles beside it allow it. A move within the lane begins
+//! at once and asks nobody.
 
 use avastra_base::geometry::{Pose, SmoothStep, Vec2, smooth_step, unit_vector};
-use avastra_lang::model::command::{Command, Manners};
+use avastra_lang::model::command::{Command, IgnoredRules};
 use avastra_lang::model::vocabulary::{LaneChoice, Side};
 use avastra_road::LaneIndex;
 
 use crate::sim::around::Around;
 use crate::sim::lanes::{chosen_lane, lane_beside};
-use crate::sim::moment::{driver_facts, with_itself};
 use crate::sim::road_user::Obstacle;
 use crate::sim::trace::Trace;
 
@@ -42,9 +42,7 @@ struct Shift {
 }
 
 impl Aside {
-    /// How far to the left of the middle it will be when it has driven on, m.
-    #[inline]
-    pub fn after_m(&self, way_m: f64, speed_mps: f64) -> f64 {
+    fn after_m(&self, way_m: f64, speed_mps: f64) -> f64 {
         match &self.shift {
             None => self.now_m,
             Some(Shift { from_m, to_m, progress, duration_s }) => {
@@ -54,17 +52,7 @@ impl Aside {
         }
     }
 
-    /// The pose of a body whose way leads it to `pose`.
-    #[inline]
-    pub fn beside(&self, pose: Pose) -> Pose {
-        if self.now_m == 0.0 { pose } else { beside(pose, self.now_m) }
-    }
-
     pub fn trace(&self, trace: &mut Trace) {
-        // Nothing is fed for what was told nothing, as before there were commands.
-        if self.lane.is_none() && self.wanted_m == 0.0 && self.now_m == 0.0 && self.shift.is_none() {
-            return;
-        }
         trace.word(self.lane.map_or(0, |lane| lane as u64 + 1));
         trace.numbers([self.wanted_m, self.now_m, self.told_mps.unwrap_or(0.0)]);
         if let Some(Shift { from_m, to_m, progress, duration_s }) = self.shift {
@@ -75,85 +63,105 @@ impl Aside {
 
 impl Driver {
     /// It begins so far to the left of the middle of its lane, m, and ignores these rules of the road.
-    pub fn begin_at(&mut self, left_m: f64, ignores: Manners) {
-        self.aside = Aside { wanted_m: left_m, now_m: left_m, ..Aside::default() };
+    pub fn begin_at(&mut self, left_m: f64, ignores: IgnoredRules) {
+        let aside = || Box::new(Aside { wanted_m: left_m, now_m: left_m, ..Aside::default() });
+        self.aside = (left_m != 0.0).then(aside);
         self.ignores = ignores;
     }
 
-    /// From now on it does what it is told, as soon as it can. What it was told before and has not begun is dropped; a lane
-    /// change or a move to the side that is under way is finished first.
+    /// How far to the left of the middle of its lane it is, m.
+    #[inline]
+    pub(super) fn aside_m(&self) -> f64 {
+        self.aside.as_ref().map_or(0.0, |aside| aside.now_m)
+    }
+
+    /// How far to the left of the middle of its lane it will be when it has driven on, m.
+    #[inline]
+    pub(super) fn aside_after_m(&self, way_m: f64) -> f64 {
+        self.aside.as_ref().map_or(0.0, |aside| aside.after_m(way_m, self.speed_mps))
+    }
+
+    /// The pose of a body whose way leads it to `pose`.
+    #[inline]
+    pub(super) fn beside_way(&self, pose: Pose) -> Pose {
+        beside(pose, self.aside_m())
+    }
+
+    /// From now on it does what it is told, as soon as it can. A command that says where to the side replaces all of the last
+    /// one that has not begun; what is under way is finished first.
     pub fn order(&mut self, command: &Command) {
         if let Some(speed_mps) = command.speed_mps {
             (self.cruise_mps, self.ordered_mps2) = (speed_mps, command.rate_mps2);
         }
         self.ignores = command.ignores.unwrap_or(self.ignores);
-        self.aside.lane = command.lane;
         if command.goes_aside() {
             self.plan.clear();
-            self.aside.told_mps = command.aside_mps;
-            self.aside.wanted_m = command.offset_m.unwrap_or(self.aside.wanted_m);
+            let aside = self.aside.get_or_insert_default();
+            let heads_for_m = aside.shift.map_or(aside.now_m, |shift| shift.to_m);
+            aside.wanted_m = command.offset_m.unwrap_or(heads_for_m);
+            (aside.lane, aside.told_mps) = (command.lane, command.aside_mps);
         }
     }
 
     /// Where the middle of its lane is beside it.
     pub(super) fn middle(&self, this: &Obstacle) -> Vec2 {
-        let Aside { now_m, .. } = self.aside;
+        let now_m = self.aside_m();
         let position = this.outline.pose.position;
         if now_m == 0.0 { position } else { position - left_of(self.lane_heading_rad()) * now_m }
     }
 
     /// Whether it moves to another place beside the middle of its lane.
     pub(super) fn is_moving_aside(&self) -> bool {
-        self.aside.shift.is_some()
+        self.aside.as_ref().is_some_and(|aside| aside.shift.is_some())
     }
 
     /// Whether it is where it was told to be.
     pub fn is_aside_as_told(&self) -> bool {
-        let Aside { lane, wanted_m, now_m, shift, .. } = &self.aside;
-        lane.is_none() && self.change.is_none() && shift.is_none() && wanted_m == now_m
+        let is_there =
+            |aside: &Aside| aside.lane.is_none() && aside.shift.is_none() && aside.wanted_m == aside.now_m;
+        self.change.is_none() && self.aside.as_deref().is_none_or(is_there)
     }
 
     /// Begins what it was told to do to the side and has not begun: first the lane, then the place in it. Both at once would
     /// be faster to the side than it was told, and than the road grips.
     #[inline]
     pub(super) fn begin_aside(&mut self, view: &View) {
-        if self.change.is_some() || self.aside.shift.is_some() {
+        let Some(Aside { lane, wanted_m, now_m, told_mps, shift }) = self.aside.as_deref().cloned() else {
+            return;
+        };
+        if self.change.is_some() || shift.is_some() {
             return;
         }
-        if let Some(lane) = self.aside.lane {
-            self.go_over(lane, view);
-            if self.aside.lane.is_some() {
-                return;
-            }
+        if let Some(lane) = lane
+            && !self.go_over(lane, told_mps, view)
+        {
+            return;
         }
-        let Aside { wanted_m, now_m, told_mps, .. } = self.aside;
         if wanted_m != now_m {
             let duration_s =
                 duration_s((wanted_m - now_m).abs(), self.speed_mps, Whose::Told(told_mps), view.around);
-            self.aside.shift = Some(Shift { from_m: now_m, to_m: wanted_m, progress: 0.0, duration_s });
+            let shift = Shift { from_m: now_m, to_m: wanted_m, progress: 0.0, duration_s };
+            self.aside.get_or_insert_default().shift = Some(shift);
         }
     }
 
-    /// Begins a change to the next lane on the way to the one that is meant, if the road and others leave the place.
-    fn go_over(&mut self, lane: LaneChoice, view: &View) {
+    /// Begins a change to the next lane on the way to the one that is meant, if the road and others leave the place; whether
+    /// it is in that lane already.
+    fn go_over(&mut self, lane: LaneChoice, told_mps: Option<f64>, view: &View) -> bool {
         let View { this, around, .. } = *view;
-        match self.side_of(lane, this.outline.pose.position, around) {
-            Ok(None) => self.aside.lane = None,
-            Ok(Some(side)) => {
-                let allowed = self.lane_changes.as_ref().is_none_or(|rules| {
-                    rules.allow(
-                        with_itself(around.moment_facts(), this, self),
-                        driver_facts(around, this, self),
-                    )
-                });
-                let whose = Whose::Told(self.aside.told_mps);
-                if allowed && let Some(begun) = self.change_to(side, whose, view) {
-                    self.set_out(begun, whose, view);
-                }
-            }
-            // In a junction, or where that lane has not begun yet.
-            Err(_) => {}
+        // An error: in a junction, or where that lane has not begun yet.
+        let Ok(side) = self.side_of(lane, this.outline.pose.position, around) else { return false };
+        let Some(side) = side else {
+            self.aside.get_or_insert_default().lane = None;
+            return true;
+        };
+        let whose = Whose::Told(told_mps);
+        if self.may_change(view)
+            && let Some(begun) = self.change_to(side, whose, view)
+        {
+            self.set_out(begun, whose, view);
         }
+        false
     }
 
     /// The side on which the lane that is meant lies from the one that it is in; `None` if that is the one.
@@ -183,23 +191,29 @@ impl Driver {
     /// The pose of a body whose way leads it to `pose`, with the move to the side moved on by `way_m` of way.
     #[inline]
     pub(super) fn moved_aside(&mut self, pose: Pose, way_m: f64) -> Pose {
-        let Some(shift) = &mut self.aside.shift else { return self.aside.beside(pose) };
+        let Some(aside) = &mut self.aside else { return pose };
+        let Some(shift) = &mut aside.shift else { return self.beside_way(pose) };
         let per_m = per_m(self.speed_mps, shift.duration_s);
         shift.progress += per_m * way_m;
         let over_m = shift.to_m - shift.from_m;
         if shift.progress >= 1.0 {
-            self.aside.now_m = shift.to_m;
-            self.aside.shift = None;
-            return self.aside.beside(pose);
+            aside.now_m = shift.to_m;
+            aside.shift = None;
+            return self.beside_way(pose);
         }
         let SmoothStep { value, slope, .. } = smooth_step(shift.progress);
-        self.aside.now_m = shift.from_m + over_m * value;
-        let pose = beside(pose, self.aside.now_m);
+        aside.now_m = shift.from_m + over_m * value;
+        let pose = beside(pose, aside.now_m);
         Pose { heading_rad: pose.heading_rad + libm::atan(over_m * slope * per_m), ..pose }
     }
 }
 
-fn beside(pose: Pose, left_m: f64) -> Pose {
+/// A pose so far to the left of another one, m; the same to the bit at 0 m.
+#[inline]
+pub(super) fn beside(pose: Pose, left_m: f64) -> Pose {
+    if left_m == 0.0 {
+        return pose;
+    }
     Pose { position: pose.position + left_of(pose.heading_rad) * left_m, ..pose }
 }
 

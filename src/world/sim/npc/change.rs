@@ -6,7 +6,6 @@
 
 use std::sync::Arc;
 
-use crate::action::LaneChangeRules;
 use avastra_base::geometry::{
     OrientedBox, Pose, SMOOTH_STEP_BEND_MAX, SMOOTH_STEP_SLOPE_MAX, SmoothStep, Vec2, distance_m,
     smooth_step, wrap_angle,
@@ -25,6 +24,7 @@ use crate::sim::traffic::TrafficProfile;
 use crate::sim::way::{Way, body_at};
 use crate::sim::world::DT_S;
 
+use super::aside::beside;
 use super::driver::{Driver, SIDE_ROOM_M, View};
 
 /// The sphere of LGSVL's check: its radius in half widths of the vehicle, and at most, m. Its centre is half a width
@@ -113,10 +113,7 @@ impl Driver {
                 ahead_m - size.length_m / 2.0 - around.ego_outline.half_length_m >= gap_m
             }
         };
-        let allowed = |rules: &Arc<LaneChangeRules>| {
-            rules.allow(with_itself(around.moment_facts(), this, self), driver_facts(around, this, self))
-        };
-        if !due || self.is_moving_aside() || !self.lane_changes.as_ref().is_none_or(allowed) {
+        if !due || self.is_moving_aside() || !self.may_change(view) {
             return;
         }
         let change = |driver: &mut Driver, side| driver.change_to(side, Whose::Own, view);
@@ -136,6 +133,14 @@ impl Driver {
         let Some(begun) = begun else { return };
         self.set_out(begun, Whose::Own, view);
         self.plan.pop();
+    }
+
+    /// Whether the rules on its lane changes let one begin now.
+    pub(super) fn may_change(&self, view: &View) -> bool {
+        let View { this, around, .. } = *view;
+        self.lane_changes.iter().all(|rules| {
+            rules.allow(with_itself(around.moment_facts(), this, self), driver_facts(around, this, self))
+        })
     }
 
     /// Begins a change to a way, at the own station there.
@@ -224,7 +229,8 @@ impl Driver {
         let path = &lane.centre;
         let here = path.pose_at(station_m);
         let forward = here.forward();
-        // On a motorway a driver reckons with its own braking for what it follows, as far as those behind are concerned.
+        // On a motorway a driver that closes in on a leader will brake, so vehicles behind close in on it faster than its present
+        // speed says.
         let slowed_mps = match &self.leader {
             Some(leader) if around.scene.is_motorway => self.speed_mps.min(leader.speed_mps.max(0.0)),
             _ => self.speed_mps,
@@ -235,7 +241,7 @@ impl Driver {
                 return true;
             };
             let (half_length_m, half_width_m) = outline.half_extent_m(heading, other.forward);
-            let aside_m = other.offset_m.abs() - half_width_m - size.width_m / 2.0;
+            let aside_m = (other.offset_m - self.aside_m()).abs() - half_width_m - size.width_m / 2.0;
             let apart_m = (other.station_m - station_m).abs() - half_length_m - size.length_m / 2.0;
             let along_mps = velocity_mps.dot(&forward);
             let closing_mps = match other.station_m < station_m {
@@ -261,15 +267,16 @@ impl Driver {
             velocity_mps: (pose.position - before) / DT_S,
         };
         let from_lane_rad = self.lane_heading_rad();
+        let aside_m = self.aside_m();
         let Some(change) = &mut self.change else {
             return at(self.moved_aside(from, way_m), from_lane_rad);
         };
         // No move to another place in the lane is under way at the same time.
-        let from = self.aside.beside(from);
+        let from = beside(from, aside_m);
         let guess_m = change.to_station_m + way_m;
         change.to_station_m =
             change.to.path.project_from(from.position, guess_m).map_or(guess_m, |found| found.station_m);
-        let to = self.aside.beside(body_at(&change.to.path, change.to_station_m, size));
+        let to = beside(body_at(&change.to.path, change.to_station_m, size), aside_m);
         let to_lane_rad = change.to.path.heading_at(change.to_station_m);
         let progress_per_m = change.progress_per_m(self.speed_mps);
         change.progress += progress_per_m * way_m;
@@ -323,8 +330,8 @@ fn change_gap_m(closing_mps: f64, traffic: &TrafficProfile) -> f64 {
     traffic.change_room_m + slowing_m.max(closing_mps * traffic.change_time_s)
 }
 
-/// How long a move of `aside_m` to the side takes at a speed of at least [`CHANGE_FULL_MPS`], s. One that was told is no
-/// quicker than the grip of the road allows.
+/// How long a move of `aside_m` to the side takes at a speed of at least [`CHANGE_FULL_MPS`], s. One that was told a speed to
+/// the side is no quicker than the grip of the road allows.
 pub(super) fn duration_s(aside_m: f64, speed_mps: f64, whose: Whose, around: &Around) -> f64 {
     match whose {
         Whose::Own | Whose::Told(None) => change_duration_s(aside_m, around.traffic),

@@ -13,7 +13,7 @@ use crate::action::LaneChangeRules;
 use avastra_base::kinematics::STANDING_MPS;
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
-use avastra_lang::model::command::Manners;
+use avastra_lang::model::command::IgnoredRules;
 use avastra_lang::model::vocabulary::Side;
 
 use crate::sim::around::Around;
@@ -78,14 +78,15 @@ pub(in crate::sim) struct Driver {
     /// Ticks at rest because of others.
     pub(super) waited_ticks: u32,
     pub(super) change: Option<Change>,
-    pub(super) aside: Aside,
+    /// What it was told to do to the side, if it was told something.
+    pub(super) aside: Option<Box<Aside>>,
     /// The rules of the road that it was told to ignore.
-    pub ignores: Manners,
+    pub ignores: IgnoredRules,
     pub(super) last_change: Option<Side>,
     /// In reverse order: the next manoeuvre is last.
     pub(super) plan: Vec<PlannedChange>,
-    /// Rules of the space on the lane changes of `plan`.
-    pub lane_changes: Option<Arc<LaneChangeRules>>,
+    /// Rules of the space on its lane changes, those of orders among them.
+    pub lane_changes: Vec<Arc<LaneChangeRules>>,
     /// How often it drew where to go, so that each draw has its own stream.
     draws: u32,
 }
@@ -127,11 +128,11 @@ impl Driver {
             stopped_to_m: f64::NEG_INFINITY,
             waited_ticks: 0,
             change: None,
-            aside: Aside::default(),
-            ignores: Manners::default(),
+            aside: None,
+            ignores: IgnoredRules::default(),
             last_change: None,
             plan,
-            lane_changes: None,
+            lane_changes: Vec::new(),
             // That of its way.
             draws: 1,
         }
@@ -143,7 +144,7 @@ impl Driver {
 
     /// Where it is before its first tick.
     pub fn moved(&self, size: &BodyParameters) -> Moved {
-        let pose = self.aside.beside(body_at(&self.way.path, self.station_m, size));
+        let pose = self.beside_way(body_at(&self.way.path, self.station_m, size));
         let forward = pose.forward();
         Moved {
             pose,
@@ -318,9 +319,11 @@ impl Driver {
         if let Some(change) = &self.change {
             trace.numbers([change.to_station_m, change.progress, change.duration_s]);
         }
-        self.aside.trace(trace);
-        // Nothing is fed for good manners, as before there were others.
-        if self.ignores != Manners::default() {
+        if let Some(aside) = &self.aside {
+            aside.trace(trace);
+        }
+        // Nothing is fed for one that ignores nothing, as before it could.
+        if !self.ignores.is_empty() {
             trace.word(u64::from(self.ignores.bits()));
         }
         trace.word(self.last_change.map_or(0, |side| side as u64 + 1));

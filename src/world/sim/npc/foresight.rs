@@ -47,7 +47,7 @@ impl Driver {
         let speed_mps = self.speed_mps.max(CREEP_MPS);
         let own = LazyCell::new(|| {
             MOMENTS_S.map(|time_s| {
-                self.aside.beside(body_at(&self.way.path, self.station_m + speed_mps * time_s, size))
+                self.beside_way(body_at(&self.way.path, self.station_m + speed_mps * time_s, size))
             })
         });
         let mut free_m = f64::INFINITY;
@@ -65,7 +65,7 @@ impl Driver {
             }
             let other = |time_s| {
                 let station_m = driver.station_m + driver.speed_mps * time_s;
-                driver.aside.beside(body_at(&driver.way.path, station_m, body))
+                driver.beside_way(body_at(&driver.way.path, station_m, body))
             };
             free_m = free_m.min(free_way_m(this, &own, speed_mps, &obstacle.outline, other));
         }

@@ -5,7 +5,7 @@
 
 use avastra_base::geometry::{Pose, smooth_step};
 use avastra_base::kinematics::{Following, STANDING_MPS, needed_mps2};
-use avastra_lang::model::vocabulary::Manner;
+use avastra_lang::model::vocabulary::TrafficRule;
 use avastra_road::is_apart;
 
 use crate::sim::around::{Around, Other};
@@ -89,7 +89,7 @@ impl Driver {
 
     /// All others that it minds. The ego vehicle is the first of all.
     pub(super) fn minded<'a>(&self, around: &'a Around) -> impl Iterator<Item = Other<'a>> {
-        around.others().skip(usize::from(self.ignores.ignores(Manner::Ego)))
+        around.others().skip(usize::from(self.ignores.contains(TrafficRule::Ego)))
     }
 
     /// Whether a lane change under way leads past a road user that stands in the lane that it leaves: when the front reaches
@@ -107,7 +107,7 @@ impl Driver {
         let progress = change.progress + change.progress_per_m(self.speed_mps) * leader.gap_m.max(0.0);
         let moved_m = over_m * smooth_step(progress).value;
         let (_, half_width_m) = other.outline.half_extent_m(other.forward, beside.forward);
-        (beside.offset_m - moved_m).abs() - half_width_m - size.width_m / 2.0 > SIDE_ROOM_M
+        (beside.offset_m - self.aside_m() - moved_m).abs() - half_width_m - size.width_m / 2.0 > SIDE_ROOM_M
     }
 
     /// Acceleration behind a leader, m/s²: IDM's, or the braking that still avoids the leader if that is harder.
@@ -135,7 +135,7 @@ impl Driver {
         let other = way.path.project_from(outline.pose.position, station_m + straight_m)?;
         let (half_length_m, half_width_m) = outline.half_extent_m(forward, other.forward);
         let gap_m = other.station_m - station_m - half_length_m - size.length_m / 2.0;
-        let own_m = self.aside.after_m(gap_m, self.speed_mps);
+        let own_m = self.aside_after_m(gap_m);
         let aside_m = (other.offset_m - own_m).abs() - half_width_m - size.width_m / 2.0;
         let is_aside = other.station_m < station_m || aside_m > SIDE_ROOM_M;
         if is_aside || is_apart(way.height_at(other.station_m), elevation_m) {

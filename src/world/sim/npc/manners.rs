@@ -30,7 +30,7 @@ use crate::sim::junction::Area;
 use crate::sim::sense::SignalColour;
 use crate::sim::world::DT_S;
 use avastra_base::kinematics::{STANDING_MPS, braking_m};
-use avastra_lang::model::vocabulary::Manner;
+use avastra_lang::model::vocabulary::TrafficRule;
 
 use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, LOOK_AHEAD_M, View};
 
@@ -118,7 +118,7 @@ fn waits(own: &Passage, other: &Passage, goes_first: bool, impatient: bool) -> b
 impl Driver {
     /// Station of the own way at which to wait now, m, if there is something to wait for.
     pub(super) fn find_hold_m(&self, view: &View) -> Option<f64> {
-        if self.ignores.ignores(Manner::RightOfWay) {
+        if self.ignores.contains(TrafficRule::RightOfWay) {
             return None;
         }
         let length_m = view.size.length_m;

@@ -56,7 +56,7 @@ impl Driver {
             (front - corner, profile.ray_m.min(stop_m) / 2.0),
         ];
         let mut nearest: Option<Leader> = None;
-        for Other { outline, forward, velocity_mps, elevation_m } in around.others() {
+        for Other { outline, forward, velocity_mps, elevation_m } in self.minded(around) {
             let reach_m = stop_m + this.outline.radius_m() + outline.radius_m();
             let away = outline.pose.position - this.outline.pose.position;
             if away.norm_squared() > reach_m * reach_m || is_apart(this.elevation_m, elevation_m) {

@@ -14,6 +14,7 @@ use std::sync::Arc;
 
 use crate::action::{SpawnFacts, SpawnRequest};
 use avastra_base::kinematics::braking_m;
+use avastra_lang::model::spawn_out_of_bounds;
 use avastra_lang::model::vocabulary::Verb;
 
 use crate::sim::around::Around;
@@ -32,10 +33,6 @@ use crossing::cross_road;
 use driving::{drive_ahead, drive_opposite, overtake};
 use on_foot::on_foot;
 
-/// Fastest and farthest that a request may ask for, m/s and m: beyond any road of a scenario, and
-/// small enough for every sum that is made of them.
-const SPEED_MPS_MAX: f64 = 70.0;
-const DISTANCE_M_MAX: f64 = 1000.0;
 /// Least gap between a newcomer and any other road user, m.
 const ROOM_M: f64 = 0.5;
 
@@ -84,11 +81,9 @@ pub(super) fn place(
 /// Refuses what no road user could do. Requests of scripts come from outside, so nothing is taken for
 /// granted; NaN is in no range.
 fn check(request: &SpawnRequest) -> Result<(), String> {
-    if !(0.0..=SPEED_MPS_MAX).contains(&request.speed_mps) {
-        return Err(format!("the speed is not between 0 and {SPEED_MPS_MAX} m/s"));
-    }
-    if !(0.0..=DISTANCE_M_MAX).contains(&request.distance_m) {
-        return Err(format!("the distance is not between 0 and {DISTANCE_M_MAX} m"));
+    let SpawnRequest { speed_mps, distance_m, offset_m, meet, .. } = *request;
+    if let Some(reason) = spawn_out_of_bounds(speed_mps, distance_m, offset_m, meet) {
+        return Err(reason);
     }
     if request.cover.is_some_and(|cover| !cover.is_vehicle() || request.verb != Verb::Walk) {
         return Err("only a pedestrian who walks comes from behind a vehicle".into());
@@ -107,7 +102,8 @@ fn check(request: &SpawnRequest) -> Result<(), String> {
 /// The gap at the spawn is between the outlines. The safety gap is what a careful driver needs (see
 /// `safety`): to slow down to a vehicle ahead, or to stop for a newcomer that crosses, walks or stands.
 /// For a newcomer from behind it is what the newcomer needs to slow down to the ego vehicle. An oncoming
-/// vehicle stays in its own lanes and needs none, unless its way crosses the route at a junction.
+/// vehicle stays in its own lanes and needs none, unless its way crosses the route at a junction or it appears beside the
+/// middle of its lane, towards the ego vehicle.
 ///
 /// A newcomer in plain view (not from behind, and not hidden by others, fog or distance) needs at least
 /// the way that the ego vehicle drives while a careful driver perceives and reacts, even if it would be
@@ -125,7 +121,7 @@ pub(super) fn facts(around: &Around, request: &SpawnRequest, newcomers: &Newcome
             let braking_mps2 = around.braking_mps2(&newcomer.mover.size, along_mps.max(0.0));
             safety::from_behind_m(along_mps, ego_mps, braking_mps2)
         }
-        Verb::DriveOpposite if meets_route(around, &newcomer.mover) => {
+        Verb::DriveOpposite if request.offset_m > 0.0 || meets_route(around, &newcomer.mover) => {
             safety::oncoming_m(ego_mps, -along_mps, friction)
         }
         Verb::DriveOpposite => 0.0,

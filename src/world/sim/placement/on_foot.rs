@@ -41,6 +41,9 @@ struct Crossing {
 /// A pedestrian who crosses the whole road, or who stands on the route.
 pub(super) fn on_foot(asked: &Asked) -> Result<Newcomers, String> {
     let Asked { around, request, .. } = *asked;
+    if around.scene.is_motorway {
+        return Err("nobody goes on foot on a motorway".into());
+    }
     let asked_m = ahead_m(asked)?;
     if request.verb == Verb::Stand {
         let lane = around.scene.route.path.pose_at(asked_m).offset(0.0, request.offset_m);

@@ -6,7 +6,7 @@ use crate::action::{Draw, Effect, LaterMoment, OrderRequest, SpawnRequest};
 use crate::sim::moment::npc_facts;
 use crate::sim::placement;
 use crate::sim::placement::Arrivals;
-use crate::sim::road_user::{Motion, RoadUser, Running};
+use crate::sim::road_user::{Advance, Motion, RoadUser, Running};
 use avastra_lang::model::{COMMANDED_MAX, NpcFacts};
 
 use super::{DT_S, World};
@@ -22,13 +22,16 @@ impl World {
     /// # Errors
     /// The index of the effect that is impossible, and why; the world is then unchanged.
     pub fn carry_out(&mut self, draw: &Draw) -> Result<Vec<(usize, u32)>, (usize, String)> {
-        let before = self.clone();
+        // One effect alone changes nothing if it is impossible.
+        let before = (draw.effects.len() > 1).then(|| self.clone());
         let mut newcomers = Vec::new();
         for (nth, effect) in draw.effects.iter().enumerate() {
             let newcomer = match self.apply(effect) {
                 Ok(newcomer) => newcomer,
                 Err(reason) => {
-                    *self = before;
+                    if let Some(before) = before {
+                        *self = before;
+                    }
                     return Err((nth, reason));
                 }
             };
@@ -40,12 +43,19 @@ impl World {
             };
             let Some(index) = index else { continue };
             let mover = &mut self.users[index].mover;
-            if let Some((_, course)) = draw.courses.iter().find(|(at, _)| *at == nth) {
+            let course = draw.courses.iter().find(|(at, _)| *at == nth);
+            let may_change = match effect {
+                Effect::Order(order) => order.command.lane.is_some() || course.is_some(),
+                Effect::Time(_) | Effect::Sky(..) | Effect::Spawn(_) => true,
+            };
+            if let Some((_, course)) = course {
                 mover.course = Some(Running::new(Arc::clone(course), self.ticks));
-                mover.phases_begun = 0;
+                (mover.phases_begun, mover.phases_ended) = (0, 0);
             }
-            if let (Some(rules), Motion::Drive(driver)) = (&draw.lane_changes, &mut mover.motion) {
-                driver.lane_changes = Some(Arc::clone(rules));
+            if let (Some(rules), Motion::Drive(driver), true) =
+                (&draw.lane_changes, &mut mover.motion, may_change)
+            {
+                driver.lane_changes.push(Arc::clone(rules));
             }
         }
         Ok(newcomers)
@@ -133,9 +143,10 @@ impl World {
             let facts = |who: usize| Some((who, self.bearer_facts(who)?));
             let bearers = running.bearers().into_iter().filter_map(facts).collect();
             let moment = LaterMoment { moment, npc, bearers };
-            let (running, command) = running.advance(&moment, is_aside, self.ticks);
+            let Advance { rest, command, ended } = running.advance(&moment, is_aside, self.ticks);
             let mover = &mut self.users[index].mover;
-            mover.course = running;
+            mover.course = rest;
+            mover.phases_ended += ended;
             mover.phases_begun += u32::from(command.is_some());
             if let (Motion::Drive(driver), Some(command)) = (&mut mover.motion, command) {
                 driver.order(&command);
