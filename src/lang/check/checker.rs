@@ -46,6 +46,8 @@ pub(super) struct Checker {
     pub(super) bodies: Vec<BodyDef>,
     /// Names that the spawns of all actions give.
     pub(super) bearers: Vec<String>,
+    /// Those of them that are given to a vehicle somewhere.
+    pub(super) drivers: BTreeSet<String>,
     pub(super) manoeuvre_names: Names,
     /// `None` stands for a broken one.
     pub(super) manoeuvres: Vec<Option<ManoeuvreDef>>,

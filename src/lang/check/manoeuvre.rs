@@ -8,7 +8,7 @@ use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of, field};
 use crate::model::command::CommandDef;
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::vocabulary::{CHANGE, CommandField, Fact, LaneChoice, Site, TrafficRule, Word};
+use crate::model::vocabulary::{Body, CHANGE, CommandField, Fact, LaneChoice, Site, TrafficRule, Word};
 use crate::model::{ManoeuvreCall, ManoeuvreDef, OrderDef, PhaseDef, Type, WordExpr, code};
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
@@ -27,7 +27,10 @@ impl Checker {
     pub(super) fn declare_bearers(&mut self, items: &[&ast::Item]) {
         let effects = each(items, ItemKind::as_action).flat_map(|(_, action)| &action.effects);
         for effect in effects {
-            let ast::EffectKind::Spawn { bearer: Some(name), .. } = &effect.kind else { continue };
+            let ast::EffectKind::Spawn { bearer: Some(name), body, .. } = &effect.kind else { continue };
+            if !matches!(&body.kind, ast::ExprKind::Name(body) if body == Body::Pedestrian.name()) {
+                self.drivers.insert(name.text.clone());
+            }
             if Fact::ALL.iter().any(|fact| fact.name().split('.').next() == Some(name.text.as_str())) {
                 let message = format!("`{}` cannot be the name of a road user", name.text);
                 let error = Diagnostic::error(code::NOT_HERE, message);
@@ -168,6 +171,11 @@ impl Checker {
             let name_it = || format!("name it where it appears: `spawn … as {} ahead …`", who.text);
             error.help = error.help.or_else(|| Some(name_it()));
             self.report(error);
+        }
+        if bearer.is_some() && !self.drivers.contains(&who.text) {
+            let message = format!("`{}` is always on foot", who.text);
+            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(who.span, "drives no vehicle");
+            self.report(error.help("orders are for vehicles; give the name to one, or leave the order out"));
         }
         self.note_fields::<CommandField>(fields, place);
         let fields = self.fields_known(fields);
