@@ -123,6 +123,10 @@ impl Checker {
             expr.iter().for_each(|expr| self.check_figure(expr, name, "s", &TIME_S));
         }
         if matches!(&command, Some(command) if *command == CommandDef::default()) {
+            // A misspelt field was reported.
+            if fields.len() < declared.fields.len() {
+                return None;
+            }
             let message = "the phase tells the vehicle nothing".to_owned();
             return self.missing_field(CommandField::Speed, declared.span, message);
         }
@@ -178,7 +182,7 @@ impl Checker {
             self.report(error.help("orders are for vehicles; give the name to one, or leave the order out"));
         }
         self.note_fields::<CommandField>(fields, place);
-        let fields = self.fields_known(fields);
+        let (declared, fields) = (fields.len(), self.fields_known(fields));
         let manoeuvre = match field(&fields, CommandField::Then) {
             Some(value) => match self.manoeuvre_call(value, place) {
                 Some(call) => Some(call?),
@@ -188,6 +192,10 @@ impl Checker {
         };
         let command = self.command(&fields, place)?;
         if manoeuvre.is_none() && command == CommandDef::default() {
+            // A misspelt field was reported.
+            if fields.len() < declared {
+                return None;
+            }
             let message = "the order tells the vehicle nothing".to_owned();
             return self.missing_field(CommandField::Speed, span, message);
         }

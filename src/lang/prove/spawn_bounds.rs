@@ -3,6 +3,7 @@
 use core::ops::RangeInclusive;
 
 use crate::model::command::OFFSET_M;
+use crate::model::expr::ExprKind;
 use crate::model::vocabulary::Word;
 use crate::model::{Interval, MEET, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, code, effort};
 use crate::prove::reach::spawn_figures;
@@ -44,9 +45,11 @@ fn errors(space: &Space, action: usize) -> impl Iterator<Item = Diagnostic> {
             .at(expr.span, format!("{} in `{}`", found.shown(expr.ty, found.unit(expr.ty)), row.label))
             .note("rules do not count here: they can be switched off");
         let (low, high) = (range.start(), range.end());
-        let help = format!("give its parameters ranges that keep it within {low} .. {high} {unit}")
-            .trim_end()
-            .to_owned();
+        let how = match expr.any(|kind| matches!(kind, ExprKind::Local(_))) {
+            true => "give its parameters ranges that keep it within",
+            false => "keep it within",
+        };
+        let help = format!("{how} {low} .. {high} {unit}").trim_end().to_owned();
         Some(error.help(help))
     })
 }
