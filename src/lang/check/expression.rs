@@ -736,7 +736,7 @@ impl Checker {
 }
 
 /// Where facts of the world are known, in words that a thing follows.
-pub(super) const SEEN_BY: &str = "only rules, the `where` of a drawn parameter and `once` see";
+pub(super) const SEEN_BY: &str = "only rules, the `where` of a drawn parameter, phases and `once` see";
 
 /// A thing that is asked where no fact about it is known.
 pub(super) fn unknown_here(thing: &str, span: Span, site: Site) -> Diagnostic {
