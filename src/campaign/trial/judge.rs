@@ -28,9 +28,10 @@ use avastra_world::sim::{Scene, VehicleParameters};
 
 use crate::trial::sighting::{Ending, Frame, Sighting};
 
-/// A vehicle has this long to do what its verb says: four observation periods, s; and this long for a manoeuvre.
-pub(super) const HORIZON_S: f64 = 24.0;
-pub(super) const MANOEUVRE_S: f64 = 60.0;
+/// A vehicle has this long to do what its verb says: four observation periods, s.
+const HORIZON_S: f64 = 24.0;
+/// It has this long for all phases of a manoeuvre, s. Ours.
+const MANOEUVRE_S: f64 = 60.0;
 /// A vehicle whose centre is farther than this outside its lane has left the road, m: half of what a bus needs in a
 /// tight turn.
 const BESIDE_ROAD_M: f64 = 0.5;
@@ -46,6 +47,11 @@ const BESIDE_M: f64 = 1.5;
 const OPPOSES_RAD: f64 = 3.0 * core::f64::consts::FRAC_PI_4;
 /// An oncoming vehicle that passes farther aside than this does not meet the ego vehicle, m.
 const MEETS_M: f64 = 12.0;
+
+/// How long a vehicle is watched, s.
+pub(super) fn horizon_s(has_manoeuvre: bool) -> f64 {
+    if has_manoeuvre { MANOEUVRE_S } else { HORIZON_S }
+}
 
 /// Whether it did what its verb says, or the phases of its manoeuvre, if it has one; if not, what was wrong, in words.
 pub(super) fn verdict(

@@ -133,7 +133,7 @@ impl<'a> Trials<'a> {
         let table = self.arena.table();
         let space = table.space();
         let action = &space.actions[space.rows[row].action];
-        let seen_s = if action.manoeuvres().next().is_some() { judge::MANOEUVRE_S } else { judge::HORIZON_S };
+        let seen_s = judge::horizon_s(action.manoeuvres().next().is_some());
         let steps = (seen_s / space.episode.step_s).ceil() as usize;
         let mut choose = |moment: &episode::Moment| {
             if moment.step >= sample.step + steps {
@@ -246,8 +246,8 @@ fn attempt(moment: &Moment, draw: &Draw) -> Try {
         found.unfair = found.unfair.or_else(|| fairness::complaint(&world, request, id));
         let mut ads = moment.ads.clone();
         let mut sensed: Sensed = world.sensed();
-        let phases = draw.courses.iter().find(|(at, _)| *at == nth).map(|(_, course)| course.phases());
-        let horizon_s = if phases.is_some() { judge::MANOEUVRE_S } else { judge::HORIZON_S };
+        let phases = draw.course(nth).map(|course| course.phases());
+        let horizon_s = judge::horizon_s(phases.is_some());
         let Some(seen) = sighting::watch(world.clone(), ads.as_mut(), &mut sensed, id, horizon_s) else {
             found.failure = Some("it is gone at once".to_owned());
             continue;

@@ -139,22 +139,6 @@ impl Guide {
         Guide { samples, range_m: scene.range_m, is_motorway: scene.is_motorway }
     }
 
-    /// Predicts where a road user is some time after it was seen beside the guide: straight on; on a motorway along the road,
-    /// because at those speeds a bend moves it metres to the side within seconds.
-    pub fn expected(&self, object: &SensedObject, beside: &Beside, time_s: f64) -> Vec2 {
-        if !self.is_motorway {
-            return object.pose.position + object.velocity_mps * time_s;
-        }
-        let along_m = beside.forward.dot(&object.velocity_mps) * time_s;
-        let left_m = beside.forward.perp(&object.velocity_mps) * time_s;
-        self.pose_at(beside.station_m + along_m).offset(0.0, beside.offset_m + left_m).position
-    }
-
-    /// How far vehicles are sensed where it leads, m.
-    pub fn range_m(&self) -> f64 {
-        self.range_m
-    }
-
     /// Through poses, one after another, of which two may be at the same place; and the station of each, m. There is
     /// no speed limit on it.
     pub fn through(poses: &[Pose]) -> (Guide, Vec<f64>) {
@@ -195,6 +179,22 @@ impl Guide {
             Guide { samples: (0..count).map(sample).collect(), range_m: RANGE_M, is_motorway: false },
             stations_m,
         )
+    }
+
+    /// How far vehicles are sensed where it leads, m.
+    pub fn range_m(&self) -> f64 {
+        self.range_m
+    }
+
+    /// Predicts where a road user is some time after it was seen beside the guide: straight on; on a motorway along the road,
+    /// because at those speeds a bend moves it metres to the side within seconds.
+    pub fn expected(&self, object: &SensedObject, beside: &Beside, time_s: f64) -> Vec2 {
+        if !self.is_motorway {
+            return object.pose.position + object.velocity_mps * time_s;
+        }
+        let along_m = beside.forward.dot(&object.velocity_mps) * time_s;
+        let left_m = beside.forward.perp(&object.velocity_mps) * time_s;
+        self.pose_at(beside.station_m + along_m).offset(0.0, beside.offset_m + left_m).position
     }
 
     /// The pose at a station; beyond the ends the route goes on straight.

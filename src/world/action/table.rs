@@ -68,6 +68,11 @@ impl Draw {
     pub fn makes_appear(&self) -> bool {
         self.effects.iter().any(|effect| effect.newcomers() > 0)
     }
+
+    /// The manoeuvre that one of its effects gives to a road user.
+    pub fn course(&self, effect: usize) -> Option<&Arc<Course>> {
+        self.courses.iter().find(|(index, _)| *index == effect).map(|(_, course)| course)
+    }
 }
 
 impl ActionTable {

@@ -98,8 +98,8 @@ section! {
 }
 
 impl PerceptionConfig {
-    /// As on a road. On a motorway every range for vehicles is multiplied by the ratio of the two sensing ranges, a profile's own
-    /// among them. Ours: it stands in for the radar, which is not modelled.
+    /// The settings as they hold on a road: on a motorway every range for vehicles is multiplied by the ratio of the two
+    /// sensing ranges, a profile's own among them. Ours: it stands in for the radar, which is not modelled.
     pub fn on(&self, scene: &Scene) -> PerceptionConfig {
         let farther = scene.range_m / RANGE_M;
         PerceptionConfig {

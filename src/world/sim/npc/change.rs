@@ -293,8 +293,7 @@ impl Driver {
             position: from.position + (to.position - from.position) * blend,
             heading_rad: wrap_angle(heading_rad + turned_rad),
         };
-        let lane_rad = if change.progress < 0.5 { from_lane_rad } else { to_lane_rad };
-        at(pose, lane_rad)
+        at(pose, if change.progress < 0.5 { from_lane_rad } else { to_lane_rad })
     }
 }
 

@@ -43,12 +43,12 @@ impl World {
             };
             let Some(index) = index else { continue };
             let mover = &mut self.users[index].mover;
-            let course = draw.courses.iter().find(|(at, _)| *at == nth);
+            let course = draw.course(nth);
             let may_change = match effect {
                 Effect::Order(order) => order.command.lane.is_some() || course.is_some(),
                 Effect::Time(_) | Effect::Sky(..) | Effect::Spawn(_) => true,
             };
-            if let Some((_, course)) = course {
+            if let Some(course) = course {
                 mover.course = Some(Running::new(Arc::clone(course), self.ticks));
                 (mover.phases_begun, mover.phases_ended) = (0, 0);
             }
