@@ -154,6 +154,9 @@ fn lane_words(map: &RoadMap, index: LaneIndex) -> String {
         format!("{:.0} km/h", lane.speed_limit_mps * 3.6),
         format!("leads to {}", listed(&names(map, &lane.successors))),
     ];
+    if lane.for_buses {
+        parts.push("for buses".to_owned());
+    }
     for (side, title) in [(Side::Left, "left"), (Side::Right, "right")] {
         let Some(Neighbour { lane: beside, same_direction, gap_m }) = lane.neighbour(side) else { continue };
         let way = if same_direction { "same way" } else { "oncoming" };

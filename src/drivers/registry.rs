@@ -49,7 +49,7 @@ pub const REGISTRY: &[Entry] = &[
     Entry {
         name: "cc",
         summary: "reference driver: competent and careful human of UN R157, after JAMA",
-        build: |scene, _seed| Box::new(Reference::new(scene, CarefulHuman)),
+        build: |scene, _seed| Box::new(Reference::new(scene, CarefulHuman { looks_far: scene.is_motorway })),
     },
     Entry {
         name: "fsm",

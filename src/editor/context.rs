@@ -132,8 +132,8 @@ fn unused<W: Word>(fields: &[Field]) -> Vec<Kind> {
 enum About {
     Value,
     Rule,
-    /// A reward or a verdict.
-    Outcome(Site),
+    /// A reward, a verdict, what every step does, or the odds of actions.
+    Facts(Site),
     /// A claim about the space.
     Space,
     /// A claim about a scenario.
@@ -154,8 +154,12 @@ impl<'a> Place<'a> {
     fn new(references: &'a References, item: &ItemKind, written: &'a str) -> Place<'a> {
         let about = match item.plain() {
             ItemKind::Rule(_) | ItemKind::Manoeuvre(_) => About::Rule,
-            ItemKind::Reward(_) => About::Outcome(Site::Reward),
-            ItemKind::Verdict(_) => About::Outcome(Site::Verdict),
+            ItemKind::Reward(_) => About::Facts(Site::Reward),
+            ItemKind::Verdict(_) => About::Facts(Site::Verdict),
+            ItemKind::EachStep(_) => About::Facts(Site::StepBegins),
+            ItemKind::Odds(of) if of.name.text == SpaceClaim::Actions.name() => {
+                About::Facts(Site::StepBegins)
+            }
             ItemKind::Expect(_) => About::Space,
             ItemKind::Scenario(_) => About::Scenario,
             _ => About::Value,
@@ -489,7 +493,7 @@ impl<'a> Place<'a> {
         };
         match (self.about, name_of(left).filter(|_| is_compared)?) {
             (About::Rule, "road") => Some(vec![Kind::Roads]),
-            (About::Outcome(_), "hit" | "near") => Some(vec![Kind::Bodies]),
+            (About::Facts(_), "hit" | "near") => Some(vec![Kind::Bodies]),
             (About::Scenario, claim) => {
                 let words = words::claim_words(claim).iter().map(|word| (*word, ""));
                 Some(vec![Kind::Words(words.collect())])
@@ -549,7 +553,7 @@ impl<'a> Place<'a> {
                 kinds.extend(things().into_iter().map(Kind::Keyword));
                 kinds
             }
-            About::Outcome(site) => [vec![Kind::Words(words::facts(site))], kinds].concat(),
+            About::Facts(site) => [vec![Kind::Words(words::facts(site))], kinds].concat(),
             About::Space => vec![Kind::Words(words::of::<SpaceClaim>())],
             About::Scenario => {
                 let facts = [words::facts(Site::Verdict), words::of::<ScenarioClaim>()].concat();

@@ -289,6 +289,7 @@ impl<'a> Builder<'a> {
                     let limit_mps = limit_mps.unwrap_or(LIMIT_MPS_DEFAULT);
                     let mut lane = new_lane(key, centre, limit_mps, road.left_hand, junction);
                     lane.is_motorway = road.is_motorway;
+                    lane.for_buses = element.for_buses;
                     lane.heights = Heights::sampled(lane.centre.length_m(), |station_m| {
                         road.elevation.at(lane.road_station_m(station_m)).value
                     });
@@ -618,6 +619,7 @@ fn new_lane(
         widths_m: centre.widths_m,
         speed_limit_mps,
         is_motorway: false,
+        for_buses: false,
         keeps_left,
         successors: Vec::new(),
         predecessors: Vec::new(),

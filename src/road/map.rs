@@ -44,6 +44,8 @@ pub struct Lane {
     pub speed_limit_mps: f64,
     /// Whether its road is a motorway, on which nobody goes on foot.
     pub is_motorway: bool,
+    /// Whether it is a bus lane.
+    pub for_buses: bool,
     /// Whether traffic keeps left on its road.
     pub keeps_left: bool,
     pub successors: Vec<LaneIndex>,
@@ -277,6 +279,29 @@ impl RoadMap {
     /// The stop line before a lane inside a junction, or on it.
     pub fn stop_line_of(&self, lane: LaneIndex) -> Option<StopLine> {
         self.approach(lane).find_map(|lane| self.lane(lane).stop_lines.last().copied())
+    }
+
+    /// Makes the lanes at these places bus lanes, with what they go on as before and behind up to junctions. A lane inside a
+    /// junction from which only bus lanes go on is one too.
+    pub fn keep_for_buses(&mut self, places: &[LanePlace]) {
+        let mut open: Vec<LaneIndex> = places.iter().map(|place| place.lane).collect();
+        while let Some(index) = open.pop() {
+            let lane = &mut self.lanes[index.0];
+            if core::mem::replace(&mut lane.for_buses, true) || lane.junction.is_some() {
+                continue;
+            }
+            let beside = [&lane.successors, &lane.predecessors].into_iter().flatten().copied();
+            let beside: Vec<LaneIndex> = beside.collect();
+            open.extend(beside.into_iter().filter(|next| self.lane(*next).junction.is_none()));
+        }
+        let leads_there = |lane: &Lane| {
+            lane.junction.is_some()
+                && !lane.successors.is_empty()
+                && lane.successors.iter().all(|next| self.lane(*next).for_buses)
+        };
+        let inside: Vec<usize> =
+            (0..self.lanes.len()).filter(|index| leads_there(&self.lanes[*index])).collect();
+        inside.into_iter().for_each(|index| self.lanes[index].for_buses = true);
     }
 
     /// The place named by an OpenDRIVE road, lane and station (`s` along the road's reference line).

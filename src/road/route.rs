@@ -261,7 +261,9 @@ fn no_way(map: &RoadMap, start: LanePlace, goal: LanePlace) -> RoadError {
              junction or the end of a lane forbid it; start earlier or in another lane"
         )
     } else {
-        format!("there is no way from {from} to {to}")
+        let for_buses = map.lanes.iter().any(|lane| lane.for_buses);
+        let but = if for_buses { "; bus lanes are left out" } else { "" };
+        format!("there is no way from {from} to {to}{but}")
     };
     RoadError::Route { message }
 }

@@ -14,7 +14,7 @@
 //!     panic!("it needs no training")
 //! };
 //! // Three rows with equal odds, of which one is legal.
-//! let mut agent = build(&[1, 1, 1]);
+//! let mut agent = build();
 //! let legal = Array1::from_vec(vec![false, true, false]);
 //! let mut rng = rng::stream(1, Stream::Exploration, 0);
 //! agent.begin();

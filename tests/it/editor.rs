@@ -368,6 +368,8 @@ fn proposals_fit_their_place() {
         "action a(each x: Side) {\n  set |",
         "action a(each x: Side) {\n  set sky[|",
         "action a(each x: Side) {\n  set sky = |",
+        "each step {\n  set sky[Fog] = match step >= 2 and eg|",
+        "odds actions { cross => |",
         "action a(each x: Side) {\n  spawn |",
         "action a(each x: Side) {\n  spawn Sedan ahead 5 m { lane: Current, |",
         "action a(each x: Side) {\n  spawn Sedan ahead 5 m { does: |",

@@ -224,6 +224,58 @@ fn an_adult_is_met_at_the_point_that_was_asked_for() {
     assert_eq!(met, 12);
 }
 
+#[test]
+fn somebody_on_foot_stops_hesitates_and_runs_back_and_comes_again_when_told() {
+    let table = wish("hesitates_and_runs_back");
+    let [adult, again] = [row(&table, "adult()"), row(&table, "comes_again()")];
+    let run = run_of(table.space().clone(), 12, 5, &[]);
+    let (mut returned, mut crossed) = (0, 0);
+    for episode in 0..run.episodes() {
+        let (mut drawn, mut told_s): (Option<f64>, Option<f64>) = (None, None);
+        let mut choose = |moment: &Moment| {
+            if drawn.is_none() {
+                let Ok(draw) = table.offer(moment.situation, adult) else { return Choice::Pass };
+                drawn = Some(number(&draw, "wait"));
+                return Choice::Act(draw);
+            }
+            // Every second one is told to come again, long after it is back.
+            let is_due = episode % 2 == 1 && told_s.is_none() && moment.step == 9;
+            match table.offer(moment.situation, again) {
+                Ok(draw) if is_due => {
+                    told_s = Some(moment.situation.surroundings.moment().elapsed_s);
+                    Choice::Act(draw)
+                }
+                _ => Choice::Pass,
+            }
+        };
+        let (mut seen, mut is_whole): (Vec<(f64, NpcFacts)>, bool) = (Vec::new(), true);
+        let log = run.play(episode, &mut choose, &mut |world, _, contacts| {
+            is_whole &= contacts.is_empty();
+            seen.extend(world.npc_facts(1).filter(|_| is_whole).map(|facts| (world.time_s(), facts)));
+        });
+        assert_replays(&run, episode, &log);
+        let Some(wait_s) = drawn else { continue };
+        let before = |(at_s, _): &&(f64, NpcFacts)| told_s.is_none_or(|told_s| *at_s <= told_s);
+        let first: Vec<(f64, NpcFacts)> = seen.iter().take_while(before).copied().collect();
+        // It stops where it was told, within a tick of its way, for so long, and goes back to where it stood.
+        let Some(stop) = first.iter().position(|(_, npc)| npc.offset_m >= -3.0) else { continue };
+        let (stop_s, stands) = first[stop];
+        assert!(stands.offset_m + 3.0 <= stands.speed_mps * DT_S + 1e-9, "{stands:?}");
+        let Some(back) = first[stop + 2..].iter().find(|(_, npc)| npc.speed_mps > 0.0) else { continue };
+        // A tick to see that it is there, one until it stands.
+        assert!((back.0 - stop_s - wait_s).abs() <= 3.0 * DT_S, "{} s, not {wait_s} s", back.0 - stop_s);
+        assert!((back.1.speed_mps - 3.0).abs() < 1e-9, "{back:?}");
+        let (Some(begin), Some(end)) = (first.first(), first.last()) else { continue };
+        if end.1.speed_mps == 0.0 {
+            assert!((end.1.offset_m - begin.1.offset_m).abs() < 1e-6, "{begin:?} {end:?}");
+            returned += 1;
+        }
+        let last = seen.last().expect("it was seen").1;
+        crossed += usize::from(told_s.is_some() && last.offset_m > 3.0);
+    }
+    assert!(returned > 3 && crossed > 0, "{returned} returned, {crossed} crossed");
+}
+
 /// A condition such as `npc.gap >= 8 m`: its text, and the fact that it bounds, of a road user and the ego vehicle's front.
 struct Guard {
     text: String,

@@ -84,7 +84,7 @@ fn every_second_step_is_slow() {
     let table = wish("slow_every_second_step");
     let space = table.space();
     let (cold, rules) = (space.initial_memory(0), RulesInForce::by_default(space));
-    let hot = space.memory_after_wait(&cold, 1, Some(&space.roads[0].facts), &rules);
+    let hot = space.memory_after_wait(&cold, 1, Some(&space.roads[0].facts), None, &rules);
     let speeds = |memory: &Memory| -> Vec<f64> {
         draws(&table, 0, 0, memory, 40).iter().map(|draw| number(draw, "speed")).collect()
     };
@@ -135,21 +135,6 @@ fn trucks_are_twice_as_likely() {
     assert!(all == 1400 && trucks.abs_diff(400) < 68, "{trucks} of {all}");
     let (all, trucks) = count(&ActionTable::new(space_at("scenarios/avastra45.ava")));
     assert!(all == 1400 && trucks.abs_diff(233) < 56, "{trucks} of {all}");
-}
-
-#[test]
-fn in_most_steps_nothing_happens() {
-    let table = wish("rare_pedestrians");
-    let odds = |action: &str| {
-        let rows = table.rows().iter().zip(table.odds());
-        let of_action = rows.filter(|(row, _)| row.label.split('(').next() == Some(action));
-        of_action.map(|(_, odds)| odds).collect::<Vec<_>>()
-    };
-    assert_eq!(odds("nothing"), [1000]);
-    assert_eq!(odds("pedestrian"), [5; 2]);
-    assert_eq!(odds("cross_road"), [20; 8]);
-    assert_eq!(odds("fog"), [1; 3], "what is not named is `_`");
-    assert_eq!(ActionTable::new(space_at("scenarios/avastra45.ava")).odds(), [1; 45]);
 }
 
 #[test]

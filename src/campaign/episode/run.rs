@@ -306,8 +306,7 @@ impl Play {
 
     /// What every step does, in a step without an action.
     fn wait(&mut self, setup: &Setup) {
-        let (effects, memory) =
-            setup.table.wait(&self.memory, self.steps.len() as u64, setup.road, setup.rules);
+        let (effects, memory) = setup.table.wait(&self.situation(setup));
         for effect in effects {
             self.world.apply(&effect).expect("weather and time of day need no place");
         }

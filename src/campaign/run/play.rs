@@ -42,10 +42,7 @@ impl Run {
     /// twice, or a number of episodes that is not possible.
     pub fn new(table: ActionTable, settings: RunSettings) -> Result<Run, RunError> {
         match agent_named(&settings.agent)?.kind {
-            Kind::Ready(build) => {
-                let odds = table.odds();
-                Run::with_agent(table, settings, Box::new(move || build(&odds)))
-            }
+            Kind::Ready(build) => Run::with_agent(table, settings, Box::new(build)),
             Kind::Learning(_) | Kind::Searching(_) => Err(RunError::Untrained { name: settings.agent }),
         }
     }

@@ -214,7 +214,7 @@ impl Checks<'_> {
         let Kind::Ready(build) = agent::by_name("random").expect("it is in the registry").kind else {
             unreachable!("it learns nothing")
         };
-        let mut agent = build(&arena.table().odds());
+        let mut agent = build();
         let mut choose = |moment: &episode::Moment| {
             if moment.step >= steps { Choice::Stop } else { choose(agent.as_mut(), moment).0 }
         };

@@ -56,10 +56,11 @@ impl Sight {
 
 /// How far an object of its kind is seen, m: no farther than the fog allows.
 fn range_m(object: &SensedObject, conditions: &Conditions, vehicle_m: f64, night_factor: f64) -> f64 {
-    let clear_m = if object.body.is_vehicle() {
-        vehicle_m
-    } else {
-        PEDESTRIAN_M * (night_factor + (1.0 - night_factor) * conditions.light)
+    let dark_share = night_factor + (1.0 - night_factor) * conditions.light;
+    let clear_m = match object.body.is_vehicle() {
+        true if object.is_unlit => vehicle_m * dark_share,
+        true => vehicle_m,
+        false => PEDESTRIAN_M * dark_share,
     };
     clear_m.min(conditions.visibility_m)
 }

@@ -24,7 +24,7 @@ use super::reflex::{Braking, Reflex};
 
 /// Comfortable deceleration for other road users, m/s² (what Treiber's page of the
 /// IDM uses).
-const COMFORTABLE_MPS2: f64 = 3.0;
+pub(super) const COMFORTABLE_MPS2: f64 = 3.0;
 /// Part of an outline that must be in sight for the road user to be recognised. Ours.
 const SEEN_PART_MIN: f64 = 0.25;
 /// Slower than this towards the way is no movement towards it, m/s.

@@ -95,7 +95,7 @@ mod tests {
 
     #[test]
     fn evaluation_reaction_and_build_up_follow_each_other() {
-        let mut reflex = Reflex::new(CarefulHuman.braking());
+        let mut reflex = Reflex::new(CarefulHuman::default().braking());
         let course: Vec<f64> = (0..200).map(|_| reflex.step(9.0, 0.01)).collect();
         assert_eq!(course[38], 0.0);
         assert_eq!(course[80], 0.4);
@@ -106,7 +106,7 @@ mod tests {
 
     #[test]
     fn a_driver_that_has_just_braked_does_not_react_anew() {
-        let mut reflex = Reflex::new(CarefulHuman.braking());
+        let mut reflex = Reflex::new(CarefulHuman::default().braking());
         for _ in 0..200 {
             reflex.step(9.0, 0.01);
         }

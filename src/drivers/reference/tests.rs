@@ -66,7 +66,11 @@ fn grid(cut_in: CutIn) -> [bool; 4] {
         crashes(&FuzzySafety, FuzzySafety.braking(), cut_in),
         crashes(&rss, rss.braking(), cut_in),
         crashes(&MinimalPerformance, MinimalPerformance.braking(), cut_in),
-        crashes(&CarefulHuman, Braking { evaluation_s: 0.0, ..CarefulHuman.braking() }, cut_in),
+        crashes(
+            &CarefulHuman::default(),
+            Braking { evaluation_s: 0.0, ..CarefulHuman::default().braking() },
+            cut_in,
+        ),
     ]
 }
 
@@ -108,7 +112,7 @@ fn a_careful_human_needs_the_published_distance() {
     for (speed_kmph, published_m) in
         [(10.0, 4.4), (20.0, 10.0), (30.0, 16.5), (40.0, 24.1), (50.0, 32.7), (60.0, 42.4)]
     {
-        let mut reflex = Reflex::new(CarefulHuman.braking());
+        let mut reflex = Reflex::new(CarefulHuman::default().braking());
         let (mut speed_mps, mut way_m): (f64, f64) = (speed_kmph / 3.6, 0.0);
         while speed_mps > 0.0 {
             let next_mps = (speed_mps - reflex.step(9.0, 0.001) * 0.001).max(0.0);

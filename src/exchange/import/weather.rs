@@ -130,8 +130,10 @@ fn time(source: &mut Source, node: Node) -> Option<&'static str> {
     let text = source.text(node, "dateTime")?;
     let hour = text.split_once('T').and_then(|(_, clock)| clock.get(..2)?.parse::<u32>().ok());
     match hour {
-        Some(6..=11) => Some("Morning"),
+        Some(6) => Some("Dawn"),
+        Some(7..=11) => Some("Morning"),
         Some(12..=17) => Some("Noon"),
+        Some(18) => Some("Dusk"),
         Some(0..=23) => Some("Night"),
         _ => source.refuse(node, format!("`{text}` is no date and time")),
     }

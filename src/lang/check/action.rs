@@ -3,12 +3,13 @@
 use std::collections::BTreeSet;
 
 use crate::check::checker::{Checker, docs, each, literal};
-use crate::check::declaration::unknown_word;
+use crate::check::declaration::{even_odds, unknown_word};
 use crate::check::expression::{NUMBER_MAX, Place, is_beyond_states, is_number};
 use crate::check::operator::with_range;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of, field};
 use crate::check::rule::locals;
+use crate::model::command::CommandDef;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::rules_by_action;
 use crate::model::vocabulary::{Colour, LaneChoice, Side, Site, SpaceClaim, SpawnField, Then, Verb, Word};
@@ -141,7 +142,7 @@ impl Checker {
             parameters,
             effects: effects.into_iter().flatten().collect(),
             // Until `odds actions` says otherwise.
-            odds: 1,
+            odds: even_odds(),
             span: declared.name.span,
         };
         Some((action, is_whole))
@@ -432,14 +433,27 @@ impl Checker {
         manoeuvre: Option<&ManoeuvreCall>,
         span: Span,
     ) {
-        let changes_lanes = manoeuvre.is_some_and(|call| self.has_lanes(call.manoeuvre));
+        let has = |is_so: fn(&CommandDef) -> bool| {
+            manoeuvre.is_some_and(|call| self.has_command(call.manoeuvre, is_so))
+        };
+        let changes_lanes = has(|command| command.lane.is_some());
+        let for_vehicles = has(|command| !command.is_for_feet());
+        let goes_back = has(CommandDef::goes_back);
         for verb in possible(verb) {
             let on_foot = matches!(verb, Verb::Walk | Verb::Stand);
             let other_way = matches!(verb, Verb::DriveOpposite | Verb::CrossRoad);
             let says = |wanted: SpawnField| field(fields, wanted).is_some();
             let (what, help) = match () {
-                () if on_foot && manoeuvre.is_some() => {
-                    ("does no manoeuvre", "manoeuvres are for vehicles; leave `then` out")
+                () if verb == Verb::Stand && manoeuvre.is_some() => (
+                    "does no manoeuvre",
+                    "leave `then` out, or let it `Walk`, with `speed: 0 m/s` until it is told",
+                ),
+                () if on_foot && for_vehicles => (
+                    "is told a `speed` alone",
+                    "the other fields of its manoeuvre are for vehicles; leave them out",
+                ),
+                () if !on_foot && goes_back => {
+                    ("does not drive backwards", "give its manoeuvre no speed below 0 m/s")
                 }
                 () if on_foot && says(SpawnField::Ignores) => {
                     ("ignores nothing", "rules of the road are for vehicles; leave `ignores` out")
@@ -627,7 +641,7 @@ impl Checker {
 
     /// The effects of every step.
     pub(super) fn sets(&mut self, effects: &[ast::Effect]) -> Vec<SetDef> {
-        let place = Place { states: true, ..Place::default() };
+        let place = Place { states: true, site: Site::StepBegins, ..Place::default() };
         let found = effects.iter().filter_map(|effect| self.effect(effect, &place));
         let sets = found.filter_map(|effect| match effect {
             EffectDef::Set(set) => Some(*set),

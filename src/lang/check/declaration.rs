@@ -8,11 +8,12 @@ use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of};
 use crate::check::rule::names_in;
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::vocabulary::{Level, Phenomenon, SpaceClaim, TimeOfDay, Word, WorldState};
-use crate::model::{EnumDef, EnumIndex, FnDef, Initial, StateDef, StateMeaning, Type, code};
-use crate::prove::VARIANTS_MAX;
+use crate::model::vocabulary::{Level, Phenomenon, Site, SpaceClaim, TimeOfDay, Word, WorldState};
+use crate::model::{ACTION_ODDS_MAX, EnumDef, EnumIndex, FnDef, Initial, StateDef, StateMeaning, Type, code};
+use crate::prove::{VARIANTS_MAX, odds_out_of_bounds};
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast, listed, nearest};
+use avastra_base::units::Rational;
 
 /// Most values that states hold together: proofs copy them.
 const CELLS_MAX: usize = 10_000;
@@ -38,8 +39,11 @@ struct Cost {
 
 /// Largest value that `odds` may give to a variant.
 const ODDS_MAX: u32 = 100;
-/// Largest value that it may give to the rows of an action: with all that a table may have, the sum still fits.
-const ACTION_ODDS_MAX: u32 = 10_000;
+
+/// The odds of what `odds` does not name.
+pub(super) fn even_odds() -> Expr {
+    Expr { kind: ExprKind::Number(Rational::ONE), ty: Type::Int, span: Span::NONE }
+}
 
 impl Checker {
     pub(super) fn declare_enums(&mut self, items: &[&ast::Item]) {
@@ -83,7 +87,7 @@ impl Checker {
         let of_actions = each(items, ItemKind::as_odds).find(|(_, declared)| self.is_of_actions(declared));
         let Some((_, declared)) = of_actions else { return };
         for (action, odds) in self.action_odds(declared).into_iter().enumerate() {
-            self.actions[action].iter_mut().for_each(|known| known.odds = odds);
+            self.actions[action].iter_mut().for_each(|known| known.odds = odds.clone());
         }
     }
 
@@ -93,10 +97,25 @@ impl Checker {
     }
 
     /// The odds of each action.
-    pub(super) fn action_odds(&mut self, declared: &ast::Odds) -> Vec<u32> {
+    pub(super) fn action_odds(&mut self, declared: &ast::Odds) -> Vec<Expr> {
         self.references.word(declared.name.span, SpaceClaim::Actions);
-        let odds = self.shares(declared, self.actions.len(), ACTION_ODDS_MAX, Checker::all_targets);
-        if !odds.is_empty() && odds.iter().all(|odds| *odds == 0) {
+        let place = Place { states: true, site: Site::StepBegins, ..Place::default() };
+        let value = |checker: &mut Checker, value: &ast::Expr| {
+            let odds = checker.typed(value, &place, Type::Int)?;
+            let is_out = |number: &Rational| {
+                *number < Rational::ZERO || *number > Rational::integer(i64::from(ACTION_ODDS_MAX))
+            };
+            // What is not written out is proved once all is known.
+            if matches!(&odds.kind, ExprKind::Number(number) if is_out(number)) {
+                return checker.reject(odds_out_of_bounds(odds.span));
+            }
+            Some(odds)
+        };
+        let odds = self.shares(declared, self.actions.len(), value, Checker::all_targets);
+        let odds: Vec<Expr> = odds.into_iter().map(|odds| odds.unwrap_or_else(even_odds)).collect();
+        let is_zero =
+            |odds: &Expr| matches!(&odds.kind, ExprKind::Number(number) if *number == Rational::ZERO);
+        if !odds.is_empty() && odds.iter().all(is_zero) {
             let error = Diagnostic::error(code::EMPTY, "no action is ever drawn")
                 .at(declared.name.span, "all its odds are 0");
             self.report(error.help("give at least one action odds above 0"));
@@ -104,17 +123,18 @@ impl Checker {
         odds
     }
 
-    /// The odds of so many things; `named` gives those of them that a line names. A line counts for what has no odds yet.
-    fn shares(
+    /// The odds of so many things: `value` reads them, `named` gives those of the things that a line names. A line counts for
+    /// what has no odds yet. What no line names has none.
+    fn shares<T: Clone>(
         &mut self,
         declared: &ast::Odds,
         count: usize,
-        most: u32,
+        value: impl Fn(&mut Checker, &ast::Expr) -> Option<T>,
         named: impl Fn(&mut Checker, &[ast::Name]) -> Vec<usize>,
-    ) -> Vec<u32> {
-        let mut odds: Vec<Option<u32>> = vec![None; count];
+    ) -> Vec<Option<T>> {
+        let mut odds: Vec<Option<Option<T>>> = vec![None; count];
         for arm in &declared.arms {
-            let value = self.odds_of(&arm.value, most).unwrap_or(1);
+            let value = value(self, &arm.value);
             let is_rest = arm.patterns.is_empty();
             let taken = if is_rest { (0..count).collect() } else { named(self, &arm.patterns) };
             // An unknown name was reported.
@@ -124,11 +144,10 @@ impl Checker {
                 self.report(error.at(arm.span, "the lines before it say it all").help("remove the line"));
             }
             for index in taken {
-                odds[index] = odds[index].or(Some(value));
+                odds[index].get_or_insert_with(|| value.clone());
             }
         }
-        // What is not named is as likely as before.
-        odds.into_iter().map(|odds| odds.unwrap_or(1)).collect()
+        odds.into_iter().map(Option::flatten).collect()
     }
 
     /// The enum, and the odds of each of its variants.
@@ -142,9 +161,12 @@ impl Checker {
             let error = self.unknown("enum", &declared.name.text, declared.name.span, self.enum_names.all());
             return self.reject(error);
         };
-        let odds = self.shares(declared, self.enums[of].variants.len(), ODDS_MAX, |checker, names| {
+        let count = self.enums[of].variants.len();
+        let odds = self.shares(declared, count, Checker::odds_of, |checker, names| {
             names.iter().filter_map(|name| checker.variant(name, of)).collect()
         });
+        // What is not named is as likely as before.
+        let odds: Vec<u32> = odds.into_iter().map(|odds| odds.unwrap_or(1)).collect();
         if odds.iter().all(|odds| *odds == 0) {
             let message = format!("no `{}` is ever drawn", declared.name.text);
             let error = Diagnostic::error(code::EMPTY, message).at(declared.name.span, "all its odds are 0");
@@ -153,7 +175,7 @@ impl Checker {
         Some((of, odds))
     }
 
-    fn odds_of(&mut self, value: &ast::Expr, most: u32) -> Option<u32> {
+    fn odds_of(&mut self, value: &ast::Expr) -> Option<u32> {
         let expr = self.expr(value, &Place::default(), Some(Type::Int))?;
         let found = match (expr.ty, self.fold(&expr)?) {
             (Type::Int, ExprKind::Number(number)) => {
@@ -161,9 +183,9 @@ impl Checker {
             }
             _ => None,
         };
-        found.filter(|odds| *odds <= most).or_else(|| {
+        found.filter(|odds| *odds <= ODDS_MAX).or_else(|| {
             let error = Diagnostic::error(code::SETTING, "odds are whole numbers")
-                .at(value.span, format!("wanted a whole number from 0 to {most}"));
+                .at(value.span, format!("wanted a whole number from 0 to {ODDS_MAX}"));
             self.reject(error.help("`BoxTruck => 2` makes trucks twice as likely as what has 1"))
         })
     }

@@ -176,11 +176,6 @@ impl Checker {
             error.help = error.help.or_else(|| Some(name_it()));
             self.report(error);
         }
-        if bearer.is_some() && !self.drivers.contains(&who.text) {
-            let message = format!("`{}` is always on foot", who.text);
-            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(who.span, "drives no vehicle");
-            self.report(error.help("orders are for vehicles; give the name to one, or leave the order out"));
-        }
         self.note_fields::<CommandField>(fields, place);
         let (declared, fields) = (fields.len(), self.fields_known(fields));
         let manoeuvre = match field(&fields, CommandField::Then) {
@@ -199,7 +194,17 @@ impl Checker {
             let message = "the order tells the vehicle nothing".to_owned();
             return self.missing_field(CommandField::Speed, span, message);
         }
-        Some(OrderDef { bearer: bearer?, command, manoeuvre, span })
+        let for_vehicles = !command.is_for_feet()
+            || manoeuvre
+                .as_ref()
+                .is_some_and(|call| self.has_command(call.manoeuvre, |it| !it.is_for_feet()));
+        let may_drive = self.drivers.contains(&who.text);
+        if bearer.is_some() && for_vehicles && !may_drive {
+            let message = format!("`{}` is always on foot", who.text);
+            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(who.span, "drives no vehicle");
+            self.report(error.help("tell it a `speed` alone; the other fields are for vehicles"));
+        }
+        Some(OrderDef { bearer: bearer?, command, manoeuvre, may_drive, span })
     }
 
     fn no_manoeuvre<T>(&mut self, value: &ast::Expr, place: &Place<'_>) -> Option<T> {
@@ -261,10 +266,10 @@ impl Checker {
         all_of(items.iter().map(|item| self.word::<TrafficRule>("rule of the road", item, place)))
     }
 
-    /// Whether a phase of a manoeuvre leads to a lane.
-    pub(super) fn has_lanes(&self, manoeuvre: usize) -> bool {
+    /// Whether a phase of a manoeuvre has such a command.
+    pub(super) fn has_command(&self, manoeuvre: usize, is_so: impl Fn(&CommandDef) -> bool) -> bool {
         let phases = self.manoeuvres[manoeuvre].iter().flat_map(|manoeuvre| &manoeuvre.phases);
-        phases.into_iter().any(|phase| phase.command.lane.is_some())
+        phases.into_iter().any(|phase| is_so(&phase.command))
     }
 
     /// `brake(4 m/s^2)` in the `then` of a spawn or an order; `None` if the value is no call. The inner `None` stands for a

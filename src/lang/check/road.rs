@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::check::checker::{Checker, docs};
 use crate::check::expression::{Place, number_help};
 use crate::check::names::unknown;
-use crate::check::report::{Report, field};
+use crate::check::report::{Report, all_of, field};
 use crate::model::vocabulary::{RoadField, Word};
 use crate::model::{Road, RoadFacts, SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, Type, code, stretches};
 use crate::syntax::ast::ItemKind;
@@ -73,6 +73,10 @@ impl Checker {
             None => map,
             Some(limit_mps) => slowed(&map, limit_mps?),
         };
+        let map = match field(&fields, RoadField::BusLanes) {
+            None => map,
+            Some(lanes) => self.with_bus_lanes(lanes, &map)?,
+        };
         let start = self.lane_point(start, &map);
         let goal = self.lane_point(goal, &map);
         let (start, goal) = (start?, goal?);
@@ -132,9 +136,17 @@ impl Checker {
     pub(super) fn note_road(&mut self, block: &ast::Block) {
         for field in &block.fields {
             self.references.word_named::<RoadField>(field.name.span, &field.name.text);
-            match &field.value.kind {
-                ast::ExprKind::LanePoint { station, .. } => self.references.number(station),
-                _ => self.look_at(&field.value, &Place::default(), None),
+            let parts = match &field.value.kind {
+                ast::ExprKind::List(items) => items.as_slice(),
+                _ => core::slice::from_ref(&field.value),
+            };
+            let stations = parts.iter().filter_map(|part| match &part.kind {
+                ast::ExprKind::LanePoint { station, .. } => Some(station),
+                _ => None,
+            });
+            match stations.clone().count() == parts.len() {
+                true => stations.for_each(|station| self.references.number(station)),
+                false => self.look_at(&field.value, &Place::default(), None),
             }
         }
     }
@@ -151,6 +163,20 @@ impl Checker {
         self.reject(Diagnostic::error(code::NO_ROUTE, message).at(block.name.span, reason).help(
             "`avastra road MAP` names these lights; `unlit: true` drives through the junction as if it had none",
         ))
+    }
+
+    /// A copy of the map with these lanes kept for buses. Drivers read it there.
+    fn with_bus_lanes(&mut self, value: &ast::Expr, map: &RoadMap) -> Option<Arc<RoadMap>> {
+        let ast::ExprKind::List(items) = &value.kind else {
+            let error = Diagnostic::error(code::TYPE_MISMATCH, "`bus_lanes` is a list of places on lanes");
+            return self.reject(
+                error.at(value.span, "no list").help("write one place for each: `[lane 3/4 at 10 m]`"),
+            );
+        };
+        let places = all_of(items.iter().map(|item| self.lane_point(item, map)))?;
+        let mut map = map.clone();
+        map.keep_for_buses(&places);
+        Some(Arc::new(map))
     }
 
     fn truth(&mut self, value: &ast::Expr) -> Option<bool> {

@@ -420,7 +420,9 @@ impl Checker {
         };
         action.spawns().any(by_spawn)
             || action.orders().any(|order| order.command.lane.is_some())
-            || action.manoeuvres().any(|manoeuvre| self.has_lanes(manoeuvre))
+            || action
+                .manoeuvres()
+                .any(|manoeuvre| self.has_command(manoeuvre, |command| command.lane.is_some()))
     }
 
     /// Reports a value from which no move is allowed, and a value to which no other value may move and with which no

@@ -304,7 +304,8 @@ impl<'a> Reader<'a> {
             let place = Place { road, in_force: &in_force, before: memory };
             let Some(drawn) = self.drawn(step, row, &place) else { continue };
             let locals = locals(action, row, &drawn);
-            let after = self.space.memory_after(row.action, &locals, memory);
+            let road_facts = road.map(|road| &self.space.roads[road].facts);
+            let after = self.space.memory_after(row.action, &locals, memory, road_facts, None);
             let moment = Moment { step, row, locals: &locals, after: &after, history: &history, road };
             self.diagnostics.extend(breaches(self.space, &moment, &in_force));
             history.push((number, after));
@@ -325,7 +326,7 @@ impl<'a> Reader<'a> {
         let is_timed = in_force.all().any(asks_for_step);
         for number in steps {
             let before = &history[history.len() - 1].1;
-            let after = self.space.memory_after_wait(before, number, road, in_force);
+            let after = self.space.memory_after_wait(before, number, road, None, in_force);
             if after != *before {
                 history.push((number, after));
             } else if !is_timed {

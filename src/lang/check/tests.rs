@@ -254,11 +254,11 @@ rule never_soaked: sky[Wetness] <= Moderate
     let cell = |name: &str| cell(&space, name);
     let action = action(&space, "ahead");
     let locals = vec![Value::Bool(false); space.actions[action].parameters.len()];
-    let after = space.memory_after(action, &locals, &space.initial_memory(0));
+    let after = space.memory_after(action, &locals, &space.initial_memory(0), None, None);
     assert_eq!(after.cells()[cell("count")], Value::Number(10.0));
     assert_eq!(after.cells()[cell("rest")], Value::Number(1.0));
     let (road, rules) = (&space.roads[0].facts, RulesInForce::by_default(&space));
-    let wait = |memory: &Memory| space.memory_after_wait(memory, 1, Some(road), &rules);
+    let wait = |memory: &Memory| space.memory_after_wait(memory, 1, Some(road), None, &rules);
     let waited = wait(&after);
     assert_eq!(waited.cells()[cell("rest")], Value::Number(0.0));
     assert_eq!(waited.cells()[cell("sky") + 2].variant(), 2);
@@ -280,7 +280,7 @@ rule not_too_often on more: count <= 2
     ));
     let rooms = [-1.0, 0.0, 1.0, 2.0, 3.0].map(|n| called(&space, "room", n));
     assert_eq!(rooms, [50.0, 30.0, 50.0, 30.0, 40.0]);
-    let memory = space.memory_after(action(&space, "more"), &[], &space.initial_memory(0));
+    let memory = space.memory_after(action(&space, "more"), &[], &space.initial_memory(0), None, None);
     assert_eq!(memory.cells()[cell(&space, "count")], Value::Number(1.0));
 }
 

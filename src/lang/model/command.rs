@@ -1,12 +1,18 @@
-//! What a vehicle is told by an order or a phase: how fast it drives, and where to the side. The two run together.
+//! What a road user is told by an order or a phase: how fast it goes, and a vehicle where to the side. The two run together.
 
 use core::ops::RangeInclusive;
 
 use crate::model::eval::{Facts, evaluate};
-use crate::model::expr::Expr;
-use crate::model::limits::{SPAWN_SPEED_MPS, out_of_bounds, rounded_into};
+use crate::model::expr::{Expr, ExprKind};
+use crate::model::limits::{SPEED_MPS_MAX, out_of_bounds, rounded_into};
 use crate::model::space::{FnDef, WordExpr};
 use crate::model::vocabulary::{CommandField, LaneChoice, TrafficRule, Word};
+
+/// Speeds that anybody may be told, m/s: those on foot below 0 for the way back, and vehicles alone above 10.
+const SPEED_MPS: RangeInclusive<f64> = -ON_FOOT_MPS_MAX..=SPEED_MPS_MAX;
+
+/// Nobody on foot is told to go faster, m/s: below a sprinter's 12 m/s.
+pub const ON_FOOT_MPS_MAX: f64 = 10.0;
 
 /// Rates at which a vehicle may be told to change its speed, m/s². The most is more than tyres give.
 const RATE_MPS2: RangeInclusive<f64> = 0.1..=15.0;
@@ -84,7 +90,7 @@ const FIGURES: [Figure; 4] = [
     Figure {
         field: CommandField::Speed,
         unit: "m/s",
-        bounds: SPAWN_SPEED_MPS,
+        bounds: SPEED_MPS,
         may_be_left_out: false,
         written: |def| def.speed.as_ref(),
         value: |command| &mut command.speed_mps,
@@ -128,6 +134,17 @@ impl CommandDef {
         FIGURES.into_iter().filter_map(|Figure { field, unit, bounds, written, .. }| {
             Some(WrittenFigure { field, expr: written(self)?, unit, bounds })
         })
+    }
+
+    /// Whether it can be told to somebody on foot: it says a speed alone.
+    pub fn is_for_feet(&self) -> bool {
+        *self == CommandDef { speed: self.speed.clone(), ..CommandDef::default() }
+    }
+
+    /// Whether it is written as a speed below 0. One that is computed may still be.
+    pub fn goes_back(&self) -> bool {
+        let is_negative = |speed: &Expr| matches!(&speed.kind, ExprKind::Negate(_));
+        self.speed.as_ref().is_some_and(is_negative)
     }
 
     /// All expressions, those of its words among them.

@@ -1,9 +1,11 @@
 //! How the memory begins and how actions change it.
 
+use std::collections::BTreeSet;
+
 use crate::model::effort;
-use crate::model::eval::{Facts, evaluate};
-use crate::model::expr::ExprKind;
-use crate::model::rules::{Combinations, RulesInForce};
+use crate::model::eval::{Facts, WorldFacts, evaluate};
+use crate::model::expr::{Expr, ExprKind};
+use crate::model::rules::{Combinations, RulesInForce, cells_read};
 use crate::model::space::{Initial, Road, RoadFacts, RuleBody, SetDef, Space, StateDef, StateMeaning};
 use crate::model::value::{Memory, Type, Value};
 use crate::model::vocabulary::{Level, TimeOfDay};
@@ -100,21 +102,31 @@ impl Space {
         plain
     }
 
-    /// The memory after a step with this action and these parameter values.
-    pub fn memory_after(&self, action: usize, locals: &[Value], before: &Memory) -> Memory {
+    /// The memory after a step with this action and these parameter values, which begins at the moment of `world`. Where
+    /// there is none, what asks about it does not happen.
+    pub fn memory_after(
+        &self,
+        action: usize,
+        locals: &[Value],
+        before: &Memory,
+        road: Option<&RoadFacts>,
+        world: Option<&WorldFacts>,
+    ) -> Memory {
         effort::spend(before.cells.len());
         let mut after = before.clone();
-        self.sets(Some(action)).for_each(|set| self.change(&mut after, set, locals));
+        self.sets(Some(action)).for_each(|set| self.change(&mut after, set, locals, road, world));
         after
     }
 
     /// The memory after a step without an action. If the effects of every step would break a rule in force that
-    /// stands for all states or orders their changes, or give a state no value, they do not happen. `step` is its number.
+    /// stands for all states or orders their changes, or give a state no value, they do not happen. `step` is its number,
+    /// `world` the moment at which it begins; where there is none, what asks about it does not happen.
     pub fn memory_after_wait(
         &self,
         before: &Memory,
         step: u64,
         road: Option<&RoadFacts>,
+        world: Option<&WorldFacts>,
         rules: &RulesInForce,
     ) -> Memory {
         if self.each_step.is_empty() {
@@ -122,16 +134,59 @@ impl Space {
         }
         effort::spend(before.cells.len());
         let mut after = before.clone();
-        self.sets(None).for_each(|set| self.change(&mut after, set, &[]));
+        self.sets(None).for_each(|set| self.change(&mut after, set, &[], road, world));
+        if self.may_wait(before, &after, step, road, rules) { after } else { before.clone() }
+    }
+
+    /// Whether a step without an action may change the memory so, under the rules in force.
+    pub(crate) fn may_wait(
+        &self,
+        before: &Memory,
+        after: &Memory,
+        step: u64,
+        road: Option<&RoadFacts>,
+        rules: &RulesInForce,
+    ) -> bool {
         let is_broken = |rule: usize| {
             let RuleBody::Moves { cell, allowed, .. } = &self.rules[rule].body else {
-                return !self.stands(rule, &after, road, step);
+                return !self.stands(rule, after, road, step);
             };
-            let [from, to] = [before, &after].map(|memory| memory.cells[*cell].variant());
+            let [from, to] = [before, after].map(|memory| memory.cells[*cell].variant());
             self.may_set_each_step(*cell) && !allowed[from][to]
         };
         let is_kept = after.cells.iter().all(|value| value.is_kept());
-        if !is_kept || rules.all().any(is_broken) { before.clone() } else { after }
+        is_kept && !rules.all().any(is_broken)
+    }
+
+    /// Whether what every step does asks about its moment.
+    pub fn each_step_asks_the_world(&self) -> bool {
+        self.each_step.iter().any(SetDef::asks_the_world)
+    }
+
+    /// The cells whose value the moment decides at which a step begins: those that are set by what asks about it, and
+    /// those that are set from them.
+    pub(crate) fn cells_of_the_moment(&self) -> BTreeSet<usize> {
+        let mut found: BTreeSet<usize> = BTreeSet::new();
+        if !self.each_step_asks_the_world() {
+            return found;
+        }
+        let count: usize = self.states.iter().map(|state| state.cells).sum();
+        let all: Vec<&SetDef> =
+            self.actions.iter().flat_map(|action| action.sets()).chain(&self.each_step).collect();
+        loop {
+            let known = found.len();
+            for set in &all {
+                effort::spend(count);
+                let reads =
+                    |part: &Expr| cells_read(part, &self.states).iter().any(|cell| found.contains(cell));
+                if set.asks_the_world() || set.parts().any(reads) {
+                    found.extend((0..count).filter(|cell| self.sets_cell(set, *cell)));
+                }
+            }
+            if found.len() == known || effort::is_spent() {
+                return found;
+            }
+        }
     }
 
     /// Whether the effects of every step may set a cell.
@@ -150,8 +205,18 @@ impl Space {
         })
     }
 
-    fn change(&self, memory: &mut Memory, set: &SetDef, locals: &[Value]) {
-        let facts = Facts::new(locals, memory);
+    fn change(
+        &self,
+        memory: &mut Memory,
+        set: &SetDef,
+        locals: &[Value],
+        road: Option<&RoadFacts>,
+        world: Option<&WorldFacts>,
+    ) {
+        if world.is_none() && set.asks_the_world() {
+            return;
+        }
+        let facts = Facts { road, world, ..Facts::new(locals, memory) };
         let value = evaluate(&set.value, &self.functions, &facts);
         let key = set.key.as_ref().map(|key| evaluate(key, &self.functions, &facts).variant());
         let state = &self.states[set.state];

@@ -47,9 +47,10 @@ pub use scenario::{
     ticks_s,
 };
 pub use space::{
-    ActionDef, BodyDef, BodyWord, COUNTED, Domain, EffectDef, EnumDef, EpisodeDef, FnDef, GroupDef, Initial,
-    ManoeuvreCall, ManoeuvreDef, OrderDef, Parameter, PhaseDef, RewardCase, Road, RoadFacts, RuleBinding,
-    RuleBody, RuleDef, SetDef, Space, SpawnDef, StateDef, StateMeaning, VerdictDef, WordExpr,
+    ACTION_ODDS_MAX, ActionDef, BodyDef, BodyWord, COUNTED, Domain, EffectDef, EnumDef, EpisodeDef, FnDef,
+    GroupDef, Initial, ManoeuvreCall, ManoeuvreDef, OrderDef, Parameter, PhaseDef, RewardCase, Road,
+    RoadFacts, RuleBinding, RuleBody, RuleDef, SetDef, Space, SpawnDef, StateDef, StateMeaning, VerdictDef,
+    WordExpr,
 };
 pub(crate) use value::STATE_MAX;
 pub use value::{EnumIndex, Memory, Type, Value};

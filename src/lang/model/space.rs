@@ -152,6 +152,9 @@ pub struct FnDef {
     pub span: Span,
 }
 
+/// Largest value that `odds actions` may give: with all rows that a table may have, the sum still fits.
+pub const ACTION_ODDS_MAX: u32 = 10_000;
+
 #[derive(Debug, Clone, PartialEq)]
 pub struct ActionDef {
     pub name: String,
@@ -160,8 +163,9 @@ pub struct ActionDef {
     pub parameters: Vec<Parameter>,
     /// Its own, then those that `on … also` adds.
     pub effects: Vec<EffectDef>,
-    /// How often each of its rows is drawn by chance, relative to other rows.
-    pub odds: u32,
+    /// How often each of its rows is drawn by chance, relative to other rows: a whole number from 0 to
+    /// [`ACTION_ODDS_MAX`], in states and at moments.
+    pub odds: Expr,
     pub span: Span,
 }
 
@@ -289,6 +293,17 @@ pub struct SetDef {
     pub span: Span,
 }
 
+impl SetDef {
+    /// Its key, if it has one, and its value.
+    pub(crate) fn parts(&self) -> impl Iterator<Item = &Expr> {
+        self.key.iter().chain([&self.value])
+    }
+
+    pub(crate) fn asks_the_world(&self) -> bool {
+        self.parts().any(Expr::asks_the_world)
+    }
+}
+
 /// How a spawn request is made from an action's parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpawnDef {
@@ -354,6 +369,8 @@ pub struct OrderDef {
     /// Empty for an order of a manoeuvre alone.
     pub command: CommandDef,
     pub manoeuvre: Option<ManoeuvreCall>,
+    /// Whether a vehicle may bear the name.
+    pub may_drive: bool,
     pub span: Span,
 }
 

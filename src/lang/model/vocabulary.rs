@@ -128,6 +128,8 @@ pub enum Site {
     Change,
     /// In a phase of a manoeuvre.
     Phase,
+    /// In what every step does, and in the odds of actions: at the moment at which a step begins.
+    StepBegins,
     /// In `once` of a scenario's step.
     Trigger,
     Reward,
@@ -140,7 +142,10 @@ impl Site {
     pub fn knows(self, known: Known) -> bool {
         match known {
             Known::Road | Known::World => {
-                matches!(self, Site::Where | Site::Rule | Site::Change | Site::Phase | Site::Trigger)
+                matches!(
+                    self,
+                    Site::Where | Site::Rule | Site::Change | Site::Phase | Site::StepBegins | Site::Trigger
+                )
             }
             Known::Spawn => matches!(self, Site::Rule | Site::Change | Site::Phase),
             Known::Step => matches!(self, Site::Reward | Site::Verdict),
@@ -296,6 +301,7 @@ words! {
     Start "start" = "Where the ego vehicle starts: `start: lane 1/-1 at 12 m`.",
     Goal "goal" = "Where it is to arrive: `goal: lane 7/-1 at 80 m`.",
     Limit "limit" = "A lower limit for the whole road: `limit: 30 km/h`.",
+    BusLanes "bus_lanes" = "Lanes that only buses use, each by a place on it: `bus_lanes: [lane 3/4 at 10 m]`.",
     EgoSpeed "ego_speed" = "How fast the ego vehicle is as an episode begins: `ego_speed: 60 km/h`.",
     SetSpeed "set_speed" = "How fast the ego vehicle wants to drive where it is free to: `set_speed: 130 km/h`.",
     Unlit "unlit" = "Whether to drive through junctions whose lights hold no lane, as if they had none: `unlit: true`.",
@@ -391,7 +397,13 @@ words! {
 
 words! {
     /// 10:00, 14:00 and 20:00 in the published package.
-    TimeOfDay "A period of the day.": Morning, Noon, Night
+    /// New ones come last: traces hold their places.
+    TimeOfDay "A period of the day.":
+    Morning = "10:00, the sun at 20 degrees.",
+    Noon = "14:00, the sun at 60 degrees.",
+    Night = "20:00, the sun far below the horizon; headlights are on.",
+    Dawn = "6:00, civil twilight, the sun 4 degrees below the horizon; headlights are on.",
+    Dusk = "18:00, civil twilight, the sun 4 degrees below the horizon; headlights are on.",
 }
 
 words! {
@@ -484,11 +496,37 @@ words! {
     Signals "Signals" = "It stops neither at red lights nor at stop signs.",
     RightOfWay "RightOfWay" = "It waits for nobody at junctions.",
     Ego "Ego" = "It follows and changes lanes as if the ego vehicle were not there.",
+    Others "Others" = "It follows and changes lanes as if nobody but the ego vehicle were there.",
+    BusLanes "BusLanes" = "It drives in bus lanes though it is no bus.",
+    Headlights "Headlights" = "It drives without lights from dusk to dawn.",
 }
 
 words! {
     /// The paper's "lane-change" group.
     Then "Whether a vehicle keeps its lane or changes it.": Keep, Change
+}
+
+impl TimeOfDay {
+    /// h. Those of Morning, Noon and Night are the published package's.
+    pub fn hour(self) -> u32 {
+        match self {
+            TimeOfDay::Dawn => 6,
+            TimeOfDay::Morning => 10,
+            TimeOfDay::Noon => 14,
+            TimeOfDay::Dusk => 18,
+            TimeOfDay::Night => 20,
+        }
+    }
+
+    /// Height of the sun above the horizon, degrees. Civil twilight lasts down to -6 degrees.
+    pub fn sun_elevation_deg(self) -> f64 {
+        match self {
+            TimeOfDay::Morning => 20.0,
+            TimeOfDay::Noon => 60.0,
+            TimeOfDay::Dawn | TimeOfDay::Dusk => -4.0,
+            TimeOfDay::Night => -30.0,
+        }
+    }
 }
 
 impl Level {

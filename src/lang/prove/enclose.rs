@@ -120,6 +120,19 @@ impl Values {
         }
     }
 
+    /// The only value of an enum or a truth value; `None` for numbers, and if there are several.
+    pub fn value(self, ty: Type) -> Option<Value> {
+        match (self, ty) {
+            (Values::Variants(set), Type::Enum(of)) if set.is_power_of_two() => {
+                Some(Value::Variant(of, set.trailing_zeros() as usize))
+            }
+            (Values::Truth { may_hold, may_fail }, Type::Bool) if may_hold != may_fail => {
+                Some(Value::Bool(may_hold))
+            }
+            _ => None,
+        }
+    }
+
     /// Everything in either.
     pub fn union(self, other: Values) -> Values {
         match (self, other) {

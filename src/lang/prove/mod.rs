@@ -35,6 +35,7 @@ pub(crate) use enclose::{Known, VARIANTS_MAX, enclose};
 pub(crate) use reach::{product_size, rows};
 pub(crate) use realise::mark_dead;
 pub use realise::{Realisable, Realised, RunsIn, realise};
+pub(crate) use spawn_bounds::odds_out_of_bounds;
 pub use time::{BrokenByTime, lasts};
 pub use witness::{Witness, witness};
 

@@ -9,10 +9,12 @@ use std::collections::BTreeSet;
 use crate::model::expr::ExprKind;
 use crate::model::rules::RowRules;
 use crate::model::vocabulary::Fact;
-use crate::model::{Memory, Reach, Road, Row, RulesInForce, Space, effort};
+use crate::model::{Memory, Reach, Road, Row, RulesInForce, Space, Value, effort};
+use crate::prove::enclose::Values;
 use crate::prove::moment::Case;
-use crate::prove::rule_names;
-use crate::prove::witness::{Found, Left, Search};
+use crate::prove::reach::declared;
+use crate::prove::witness::{Found, Left, Search, points};
+use crate::prove::{product, rule_names};
 
 /// The most boxes of ranges that the searches of all rows look at; most rows need one for each road.
 const BOXES_MAX: usize = 20_000;
@@ -68,8 +70,16 @@ pub fn realise(space: &Space) -> (Realisable, RunsIn) {
     let found = vec![vec![None; space.roads.len()]; space.rows.len()];
     let mut runs_in = RunsIn { states: Vec::new(), found };
     let begun = space.initial_memory(0);
+    let of_the_moment = space.cells_of_the_moment();
     for (index, road) in space.roads.iter().enumerate() {
-        let on_road = OnRoad { space, road, in_force: &in_force, left: &left, begun: &begun };
+        let on_road = OnRoad {
+            space,
+            road,
+            in_force: &in_force,
+            left: &left,
+            begun: &begun,
+            of_the_moment: &of_the_moment,
+        };
         on_road.rows(index, &mut realisable, &mut runs_in);
     }
     (realisable, runs_in)
@@ -118,9 +128,30 @@ struct OnRoad<'a> {
     left: &'a Left,
     /// The states as they are declared, for rows that no state decides.
     begun: &'a Memory,
+    /// The cells that the moment decides. No search knows them, so what it finds impossible there is not proved.
+    of_the_moment: &'a BTreeSet<usize>,
 }
 
 impl<'a> OnRoad<'a> {
+    /// A memory after a step, with each value that the moment may give to what it decides: `after` has all that may be.
+    /// Numbers stay as they are.
+    fn at_any_moment(&self, memory: &Memory, after: impl Fn() -> Vec<Values>) -> Vec<Memory> {
+        let mut found = vec![memory.clone()];
+        if self.of_the_moment.is_empty() {
+            return found;
+        }
+        let after = after();
+        for cell in self.of_the_moment {
+            let ty = self.space.state_of(*cell).ty;
+            let literals: Vec<Value> =
+                after[*cell].each().into_iter().filter_map(|one| one.value(ty)).collect();
+            if !literals.is_empty() && found.len() * literals.len() <= STATES_MAX {
+                found = product(&found, &literals, |memory, value| memory.cells[*cell] = value);
+            }
+        }
+        found
+    }
+
     /// A search for values of a row, at a moment of which that is known.
     fn search<'s>(&'s self, row: &'s Row, moment: Option<&'s Case>) -> Search<'s> {
         let OnRoad { space, road, in_force, left, .. } = *self;
@@ -197,13 +228,14 @@ impl<'a> OnRoad<'a> {
             }
             match search.at(memory) {
                 _ if self.left.is_spent() => return Realised::NotSearched,
-                Found::Runs(_) if is_complete => return Realised::Unreached,
+                Found::Runs(_) if is_complete && self.of_the_moment.is_empty() => return Realised::Unreached,
                 Found::Runs(_) => return Realised::Elsewhere,
                 Found::Never => {}
                 Found::Unknown => is_proved = false,
             }
         }
         match (is_proved, is_complete) {
+            _ if !self.of_the_moment.is_empty() => Realised::Unknown,
             (true, _) => Realised::Never,
             (false, true) => Realised::Unreached,
             (false, false) => Realised::Unknown,
@@ -329,9 +361,15 @@ impl Way {
         for state in &now {
             let Met { memory, is_waited_for, .. } = &self.states[*state];
             let (memory, is_waited_for) = (memory.clone(), *is_waited_for);
-            let waited = space.memory_after_wait(&memory, step, Some(&road.facts), in_force);
-            let waited = self.number(waited, step + 1, is_waited_for);
-            self.now.extend(waited);
+            let waited = space.memory_after_wait(&memory, step, Some(&road.facts), None, in_force);
+            let after = || space.cells_after_wait(&points(memory.cells()));
+            for one in on_road.at_any_moment(&waited, after) {
+                let may_wait = || space.may_wait(&memory, &one, step, Some(&road.facts), in_force);
+                if one == waited || may_wait() {
+                    let number = self.number(one, step + 1, is_waited_for);
+                    self.now.extend(number);
+                }
+            }
             for position in core::mem::take(&mut self.states[*state].open) {
                 if effort::is_spent() {
                     return false;
@@ -346,6 +384,11 @@ impl Way {
                 let search = on_road.search(mover.row, mover.about_time.then_some(moment));
                 let (led_to, are_all) = search.successors(&memory);
                 self.is_complete &= are_all;
+                let after = || {
+                    space.cells_after(mover.row.action, &declared(space, mover.row), &points(memory.cells()))
+                };
+                let led_to: Vec<Memory> =
+                    led_to.iter().flat_map(|to| on_road.at_any_moment(to, after)).collect();
                 let led_to: Vec<usize> =
                     led_to.into_iter().filter_map(|to| self.number(to, step + 1, false)).collect();
                 match mover.about_time {

@@ -1,18 +1,51 @@
 //! Spawns and orders whose figures may leave the bounds of `model::limits`.
 
 use core::ops::RangeInclusive;
+use std::collections::BTreeSet;
 
-use crate::model::command::OFFSET_M;
+use crate::model::command::{OFFSET_M, ON_FOOT_MPS_MAX};
 use crate::model::expr::ExprKind;
-use crate::model::vocabulary::Word;
-use crate::model::{Interval, MEET, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, code, effort};
+use crate::model::vocabulary::{CommandField, Word};
+use crate::model::{
+    ACTION_ODDS_MAX, ActionDef, Interval, MEET, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, SPEED_MPS_MAX, Space,
+    code, effort,
+};
+use crate::prove::enclose::{Known, enclose};
 use crate::prove::reach::spawn_figures;
 use crate::syntax::Diagnostic;
+use crate::syntax::ast::Span;
 use avastra_base::units::Rational;
 
-/// One error for each figure of a spawn or an order that may leave its bounds, with the first row that shows it. Rules are ignored, because `--without` can switch them off.
+/// One error for each figure of a spawn, an order or odds that may leave its bounds, with the first row that shows it. Rules
+/// are ignored, because `--without` can switch them off.
 pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
-    (0..space.actions.len()).flat_map(|action| errors(space, action)).collect()
+    let of_rows = (0..space.actions.len()).flat_map(|action| errors(space, action));
+    of_rows.chain(of_odds(space)).collect()
+}
+
+/// The error for odds of actions beyond their bounds.
+pub(crate) fn odds_out_of_bounds(span: Span) -> Diagnostic {
+    let error = Diagnostic::error(code::SETTING, "odds of actions are whole numbers");
+    error.at(span, format!("wanted a whole number from 0 to {ACTION_ODDS_MAX}"))
+}
+
+/// One error for the odds of each action that may leave their bounds, once for a line that names several.
+fn of_odds(space: &Space) -> Vec<Diagnostic> {
+    let range = 0.0..=f64::from(ACTION_ODDS_MAX);
+    let cells = space.cells_unknown();
+    let known = Known { functions: &space.functions, locals: &[], cells: &cells, road: None, case: None };
+    let mut found: Vec<Diagnostic> = Vec::new();
+    let mut seen = BTreeSet::new();
+    for ActionDef { odds, .. } in &space.actions {
+        let may_be = enclose(odds, &known).interval();
+        if lies_in(&may_be, &range) || !seen.insert((odds.span.file, odds.span.start)) {
+            continue;
+        }
+        let error = odds_out_of_bounds(odds.span);
+        let help = "choose them by `match`, as in `match hour { Morning => 5, _ => 1 }`";
+        found.push(if odds.reads_memory() { error.help(help) } else { error });
+    }
+    found
 }
 
 /// Whether [`report`] has an error about a spawn or an order of an action.
@@ -30,10 +63,16 @@ fn errors(space: &Space, action: usize) -> impl Iterator<Item = Diagnostic> {
         ]
     });
     let of_spawns = of_spawns.flatten();
-    let of_orders = space.actions[action]
-        .orders()
-        .flat_map(|order| order.command.figures())
-        .map(|figure| (figure.field.name(), "an order", figure.unit, figure.expr, figure.bounds));
+    let of_orders = space.actions[action].orders().flat_map(|order| {
+        order.command.figures().map(|figure| {
+            let bounds = match figure.field {
+                CommandField::Speed if order.may_drive => 0.0..=SPEED_MPS_MAX,
+                CommandField::Speed => -ON_FOOT_MPS_MAX..=ON_FOOT_MPS_MAX,
+                _ => figure.bounds,
+            };
+            (figure.field.name(), "an order", figure.unit, figure.expr, bounds)
+        })
+    });
     of_spawns.chain(of_orders).filter_map(move |(what, whose, unit, expr, range)| {
         let mut rows = space.rows_of(action).iter().take_while(|_| !effort::is_spent());
         let (row, found) = rows.find_map(|row| {

@@ -86,7 +86,7 @@ fn figures(space: &Space, road: &Road, spawn: &SpawnDef, values: &[Value], memor
 fn remark(space: &Space, row: &Row, road: &Road, spawn: &SpawnDef, found: &Witness) -> Diagnostic {
     let action = &space.actions[row.action];
     let values = locals(action, row, &found.values);
-    let after = space.memory_after(row.action, &values, &found.memory);
+    let after = space.memory_after(row.action, &values, &found.memory, Some(&road.facts), None);
     let figures = figures(space, road, spawn, &values, &after);
     let facts = Facts { road: Some(&road.facts), ..Facts::new(&values, &after) };
     let verb = spawn.verb.word(&space.functions, &facts);

@@ -285,7 +285,7 @@ impl Search<'_> {
     }
 
     fn after(&self, values: &[Value], before: &Memory) -> Memory {
-        self.rules.space.memory_after(self.rules.row.action, values, before)
+        self.rules.space.memory_after(self.rules.row.action, values, before, self.rules.road, None)
     }
 
     /// Whether these values run in an empty world, as far as that can be told.
@@ -426,7 +426,7 @@ impl Search<'_> {
     }
 }
 
-fn points(values: &[Value]) -> Vec<Values> {
+pub(super) fn points(values: &[Value]) -> Vec<Values> {
     values.iter().map(|value| Values::point(*value)).collect()
 }
 

@@ -70,6 +70,8 @@ pub struct LaneElement {
     pub line: u32,
     /// Why no car drives on it, in one direction; `None` for a driving lane.
     pub undriven: Option<LeftOut>,
+    /// Whether it is a driving lane for buses.
+    pub for_buses: bool,
     /// What a lane that is no driving lane is to people on foot.
     pub beside: Option<StripKind>,
     /// Width over the distance from the section's begin.

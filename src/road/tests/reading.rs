@@ -289,20 +289,46 @@ fn lights_without_a_junctions_controller_are_grouped_by_their_arms() {
 fn what_a_flat_map_of_cars_cannot_hold_is_said() {
     let lanes = TWO_LANES.replace(
         r#"<lane id="-1" type="driving">"#,
-        r#"<lane id="-2" type="onRamp"><width a="3"/></lane><lane id="-3" type="bus"><width a="3"/></lane>
+        r#"<lane id="-2" type="onRamp"><width a="3"/></lane><lane id="-3" type="taxi"><width a="3"/></lane>
         <lane id="-4" type="driving" direction="reversed"><width a="3"/></lane><lane id="-1" type="driving">"#,
     );
     let heights = r#"<elevationProfile><elevation s="0" a="3" b="0.05" c="0" d="0"/></elevationProfile>
         <lateralProfile><superelevation s="0" a="0.02" b="0" c="0" d="0"/></lateralProfile>"#;
     let map = read(&one_road("", heights, LINE_100, &lanes, ""));
     let ids: Vec<_> = map.lanes.iter().map(|lane| lane.key.lane).collect();
-    assert_eq!(ids, [1, -1, -2], "a ramp is a lane, a bus lane is none");
-    for words in ["slopes", "banked", "type `bus`", "direction `reversed`"] {
+    assert_eq!(ids, [1, -1, -2], "a ramp is a lane, a lane for taxis is none");
+    for words in ["slopes", "banked", "type `taxi`", "direction `reversed`"] {
         assert!(map.warnings.iter().any(|warning| warning.contains(words)), "{words}: {:?}", map.warnings);
     }
     let level = r#"<elevationProfile><elevation s="0" a="3" b="0" c="0" d="0"/></elevationProfile>"#;
     let map = read(&one_road("", level, LINE_100, TWO_LANES, ""));
     assert!(!map.warnings.iter().any(|warning| warning.contains("slopes")), "{:?}", map.warnings);
+}
+
+#[test]
+fn bus_lanes_are_told_by_type_and_by_access() {
+    let lane = |id: i32, kind: &str, access: &str| {
+        format!(r#"<lane id="{id}" type="{kind}"><width a="3"/>{access}</lane>"#)
+    };
+    let lanes = [
+        lane(-2, "bus", ""),
+        lane(-3, "driving", r#"<access sOffset="0" rule="allow" restriction="bus"/>"#),
+        lane(-4, "driving", r#"<access sOffset="0" restriction="bus"/>"#),
+        lane(-5, "driving", r#"<access sOffset="0" rule="deny"><restriction type="passengerCar"/></access>"#),
+        lane(-6, "driving", r#"<access sOffset="0" rule="deny" restriction="bus"/>"#),
+        lane(-7, "driving", r#"<access sOffset="0" rule="allow" restriction="none"/>"#),
+    ];
+    let lanes = TWO_LANES
+        .replace(r#"<lane id="-1" type="driving">"#, &(lanes.concat() + r#"<lane id="-1" type="driving">"#));
+    let map = read(&one_road("", "", LINE_100, &lanes, ""));
+    let for_buses: Vec<_> =
+        map.lanes.iter().filter(|lane| lane.for_buses).map(|lane| lane.key.lane).collect();
+    assert_eq!(for_buses, [-2, -3, -4, -5]);
+    assert!(!map.warnings.iter().any(|warning| warning.contains("access")), "{:?}", map.warnings);
+    // No way leads over them.
+    let place = |lane| map.place("1", lane, 20.0).expect("it is on the map");
+    assert!(Route::find(&map, place(-1), place(-6)).is_err());
+    assert!(Route::find(&map, place(-1), map.place("1", -2, 90.0).expect("it is on the map")).is_ok());
 }
 
 #[test]

@@ -8,23 +8,24 @@ use avastra_base::rng::Rng;
 
 use super::registry::Agent;
 
-/// Draws among the legal rows by their odds.
+/// Draws among the legal rows by their odds, each as likely until it is told others.
+#[derive(Default)]
 pub struct MaskedRandom {
     odds: Vec<u32>,
 }
 
 impl MaskedRandom {
-    pub fn new(odds: &[u32]) -> MaskedRandom {
-        MaskedRandom { odds: odds.to_vec() }
-    }
-
     /// The odds of the legal rows, 0 for others.
     fn legal_odds<'a>(&'a self, legal: ArrayView1<'a, bool>) -> impl Iterator<Item = u32> + 'a {
-        (0..legal.len()).map(move |row| if legal[row] { self.odds[row] } else { 0 })
+        (0..legal.len()).map(move |row| if legal[row] { self.odds.get(row).copied().unwrap_or(1) } else { 0 })
     }
 }
 
 impl Agent for MaskedRandom {
+    fn weigh(&mut self, odds: &[u32]) {
+        self.odds = odds.to_vec();
+    }
+
     fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
         let sum: u32 = self.legal_odds(legal).sum();
         if sum == 0 {
@@ -74,7 +75,8 @@ mod tests {
     #[test]
     fn rows_come_by_their_odds() {
         let mut rng = stream(3, Stream::Exploration, 0);
-        let mut agent = MaskedRandom::new(&[1, 7, 0, 3]);
+        let mut agent = MaskedRandom::default();
+        agent.weigh(&[1, 7, 0, 3]);
         let legal = Array1::from_vec(vec![true, false, true, true]);
         let chances = agent.chances(legal.view()).unwrap();
         assert_eq!(chances.to_vec(), [0.25, 0.0, 0.0, 0.75]);
@@ -85,7 +87,7 @@ mod tests {
         }
         assert!(seen.iter().zip(&chances).all(|(seen, chance)| (seen - chance).abs() < 0.03), "{seen:?}");
         // Without odds each open row is as likely, and is drawn as by `any`.
-        let mut equal = MaskedRandom::new(&[1; 4]);
+        let mut equal = MaskedRandom::default();
         let [mut one, mut other] = [stream(5, Stream::Exploration, 1), stream(5, Stream::Exploration, 1)];
         for _ in 0..100 {
             let row = equal.choose(&Observation::zeros(), legal.view(), &mut one);

@@ -18,6 +18,9 @@ pub trait Agent: Send {
     /// A new episode begins.
     fn begin(&mut self) {}
 
+    /// A step begins, in which the space gives the rows these odds.
+    fn weigh(&mut self, _odds: &[u32]) {}
+
     /// The row to carry out next, or none. `legal` has shape `(rows,)`; at least one is true.
     fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize>;
 
@@ -75,8 +78,8 @@ pub struct Entry {
 
 /// How an agent is made.
 pub enum Kind {
-    /// It can act at once: a fresh one for each episode, under the odds of the rows.
-    Ready(fn(&[u32]) -> Box<dyn Agent>),
+    /// It can act at once: a fresh one for each episode.
+    Ready(fn() -> Box<dyn Agent>),
     /// It must be trained: its presets, the default first. See [`super::Learner`].
     Learning(&'static [Preset]),
     /// It searches over many episodes, and what it found can act: how its settings are made from changes by name.
@@ -89,22 +92,22 @@ pub const REGISTRY: &[Entry] = &[
     Entry {
         name: "none",
         summary: "nothing happens but ordinary traffic, if there is any",
-        kind: Kind::Ready(|_| Box::new(Idle)),
+        kind: Kind::Ready(|| Box::new(Idle)),
     },
     Entry {
         name: "random",
         summary: "by chance among the rows that the rules allow at the moment, each as likely unless the space gives odds",
-        kind: Kind::Ready(|odds| Box::new(random::MaskedRandom::new(odds))),
+        kind: Kind::Ready(|| Box::new(random::MaskedRandom::default())),
     },
     Entry {
         name: "random-raw",
         summary: "uniform over all rows, as the published random search; an illegal choice is a step lost",
-        kind: Kind::Ready(|_| Box::new(random::RawRandom)),
+        kind: Kind::Ready(|| Box::new(random::RawRandom)),
     },
     Entry {
         name: "space-filling",
         summary: "random, but spread evenly over the rows and their drawn values: a Latin hypercube in each episode",
-        kind: Kind::Ready(|_| Box::new(space_filling::SpaceFilling::default())),
+        kind: Kind::Ready(|| Box::new(space_filling::SpaceFilling::default())),
     },
     Entry {
         name: "ddqn",
@@ -119,7 +122,7 @@ pub const REGISTRY: &[Entry] = &[
     Entry {
         name: "greedy",
         summary: "one step of lookahead: tries every legal row in a copy of the world, takes the most dangerous",
-        kind: Kind::Ready(|_| Box::new(greedy::Greedy::default())),
+        kind: Kind::Ready(|| Box::new(greedy::Greedy::default())),
     },
     Entry {
         name: "av-fuzzer",
@@ -183,7 +186,7 @@ mod tests {
     fn fresh(entry: &Entry, seed: u64) -> Vec<(Box<dyn Agent>, bool)> {
         let rows = || Arc::new(Rows { allowed: vec![true; ROWS], environment: vec![false; ROWS] });
         match entry.kind {
-            Kind::Ready(build) => vec![(build(&[1; ROWS]), entry.name != "random-raw")],
+            Kind::Ready(build) => vec![(build(), entry.name != "random-raw")],
             Kind::Learning(presets) => {
                 let learner = |preset: &Preset| -> (Box<dyn Agent>, bool) {
                     let settings = (preset.settings)();

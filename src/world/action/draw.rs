@@ -46,7 +46,7 @@ impl<'a> Judge<'a> {
         let asks_who = |who: &usize| asked().any(|clause| clause.bearers.contains(who));
         let facts = |who: usize| Some((who, situation.surroundings.bearer(who)?));
         let bearers = (0..space.bearers.len()).filter(asks_who).filter_map(facts).collect();
-        let moment = match asked().any(|clause| clause.asks_the_world) {
+        let moment = match asked().any(|clause| clause.asks_the_world) || space.each_step_asks_the_world() {
             true => situation.surroundings.moment(),
             false => MomentFacts::default(),
         };
@@ -140,7 +140,7 @@ impl<'a> Judge<'a> {
     /// The first refusals, at most `refusals_max`.
     fn judge(&self, values: &[Value], refusals_max: usize) -> Result<Draw, Vec<Refusal>> {
         let before = self.situation.memory;
-        let after = self.row.space.memory_after(self.row.row.action, values, before);
+        let after = self.after(values);
         let mut effects = self.effects(values, &after);
         let mut refusals = Vec::new();
         let mut spawns = Vec::new();
@@ -322,6 +322,12 @@ impl<'a> Judge<'a> {
             .map(|reason| refuse(None, reason))
     }
 
+    /// The memory after the step.
+    fn after(&self, values: &[Value]) -> Memory {
+        let RowRules { space, row, road, .. } = self.row;
+        space.memory_after(row.action, values, self.situation.memory, road, Some(&self.world()))
+    }
+
     /// What the world says before it is asked about spawns.
     fn world(&self) -> WorldFacts {
         let bearers = self.bearers.clone();
@@ -332,7 +338,7 @@ impl<'a> Judge<'a> {
     fn refused(&self, unsolved: &Unsolved, world: &WorldFacts) -> Refusal {
         let space = self.row.space;
         let values = &unsolved.values;
-        let after = space.memory_after(self.row.row.action, values, self.situation.memory);
+        let after = self.after(values);
         let candidate =
             Candidate { values, before: self.situation.memory, after: &after, world: Some(world) };
         let clause = unsolved.clause.map(|clause| &space.clauses[self.row.row.action][clause]);

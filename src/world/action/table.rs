@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use crate::action::draw::Judge;
 use crate::action::{Course, Effect, LaneChangeRules, Surroundings};
-use avastra_lang::model::{Memory, Road, Row, RulesInForce, Space, Value};
+use avastra_lang::model::{
+    ActionDef, Facts, Memory, Road, Row, RulesInForce, Space, Value, WorldFacts, evaluate,
+};
 
 /// The rows that an agent chooses from.
 #[derive(Debug, Clone)]
@@ -89,8 +91,15 @@ impl ActionTable {
     }
 
     /// How often each row is drawn by chance, relative to the others.
-    pub fn odds(&self) -> Vec<u32> {
-        self.rows().iter().map(|row| self.space.actions[row.action].odds).collect()
+    pub fn odds(&self, situation: &Situation<'_>) -> Vec<u32> {
+        let Situation { memory, road, .. } = *situation;
+        let space = &self.space;
+        let asks = |action: &ActionDef| action.odds.asks_the_world();
+        let world = space.actions.iter().any(asks).then(|| world_facts(situation));
+        let facts = Facts { road: Some(&road.facts), world: world.as_ref(), ..Facts::new(&[], memory) };
+        let odds = |action: &ActionDef| evaluate(&action.odds, &space.functions, &facts).number() as u32;
+        let of_actions: Vec<u32> = space.actions.iter().map(odds).collect();
+        self.rows().iter().map(|row| of_actions[row.action]).collect()
     }
 
     /// One offer for each row. Every row draws from a stream of its own, so that one row's draws do not
@@ -114,14 +123,10 @@ impl ActionTable {
     }
 
     /// What a step without an action does: to the world, and the memory after it.
-    pub fn wait(
-        &self,
-        memory: &Memory,
-        step: u64,
-        road: &Road,
-        rules: &RulesInForce,
-    ) -> (Vec<Effect>, Memory) {
-        let after = self.space.memory_after_wait(memory, step, Some(&road.facts), rules);
+    pub fn wait(&self, situation: &Situation<'_>) -> (Vec<Effect>, Memory) {
+        let Situation { memory, road, rules, step, .. } = *situation;
+        let world = self.space.each_step_asks_the_world().then(|| world_facts(situation));
+        let after = self.space.memory_after_wait(memory, step, Some(&road.facts), world.as_ref(), rules);
         (Effect::of_change(&self.space, memory, &after), after)
     }
 
@@ -151,4 +156,9 @@ impl ActionTable {
     ) -> Result<Draw, Vec<Refusal>> {
         Judge::new(&self.space, situation, row).check(values)
     }
+}
+
+/// What can be asked about the moment at which a step begins.
+fn world_facts(situation: &Situation<'_>) -> WorldFacts {
+    WorldFacts { moment: situation.surroundings.moment(), step: situation.step, ..WorldFacts::default() }
 }

@@ -13,10 +13,12 @@ use avastra_base::geometry::OrientedBox;
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 use avastra_lang::model::AMBIENT_MAX;
+use avastra_lang::model::command::IgnoredRules;
 use avastra_lang::model::vocabulary::{Body, Colour, Verb, Word};
 
 use super::around::Around;
 use super::body;
+use super::lanes::may_use;
 use super::npc::{Cruise, Driver};
 use super::road_user::{Motion, Mover, Obstacle, RoadUser};
 use super::trace::Trace;
@@ -88,6 +90,9 @@ fn draw(around: &Around, nearest_m: f64, id: u32, rng: &mut Rng) -> Option<RoadU
     let (lane, station_m) = around.scene.street_at(rng::unit(rng))?;
     let bodies = || Body::ALL.iter().filter(|body| body.is_vehicle() && !body.has_two_wheels());
     let body = *bodies().nth(rng::below(rng, bodies().count() as u32) as usize)?;
+    if !may_use(around, lane, body, IgnoredRules::default()) {
+        return None;
+    }
     let colour = Colour::ALL[rng::below(rng, Colour::ALL.len() as u32) as usize];
     let cruise =
         Cruise::Limit(rng::between(rng, around.traffic.limit_part_min, around.traffic.limit_part_max));

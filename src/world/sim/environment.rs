@@ -11,7 +11,8 @@
 //! | water on the road | rain fills, drains with [`DRAIN_S`], dries with [`DRYING_MMPH`] | ours, from the rows of rain and wetness | here |
 //! | friction | new tyres at 50, 90, 130 km/h and 0, 0.2, 1, 2 mm | Bosch, Automotive Handbook; between its columns the mapping 0.1, 0.5, 1.5 mm to 0.70, 0.60, 0.52 is ours | here |
 //! | braking | min(brakes, μ·g), forces inside the friction circle | physics | `ego`, `around` |
-//! | light | 0.8, 1, 0.15 of a camera's light | ours: a low sun costs contrast, street lamps leave the range of low beams | here |
+//! | light | 0.8, 1, 0.15 of a camera's light by morning, noon, night, 0.4 in twilight | ours: a low sun costs contrast, street lamps leave the range of low beams | here |
+//! | headlights | on from dusk to dawn, but for who ignores `Headlights`: seen in the dark no farther than a pedestrian's share of a camera's range | Vienna Convention on Road Traffic, article 32; the share is ours | `ads::modular::perception`, `drivers::kit` |
 //! | sight through fog and rain | R·e^(σR) = R₀, σ = 2.996 / MOR (Koschmieder) + 1.076·R^0.67 dB/km (Carbonneau) | as named | `ads::modular::perception` |
 //! | detection by class, position noise | ranges of LiDAR and camera for cars and pedestrians, noise per metre | as `scenarios/ads/default.yaml` says | `ads::modular::perception` |
 //! | night | camera ranges fall with the light, LiDAR's do not | ours: low beams leave 40 % on pedestrians, 70 % on lit vehicles | `ads::modular::perception` |
@@ -27,9 +28,17 @@ use avastra_lang::model::vocabulary::{Level, Phenomenon, TimeOfDay};
 use super::sense::Conditions;
 use super::trace::Trace;
 
-/// Light for Morning, Noon and Night, 1 at noon. Ours: a low sun costs a camera some contrast, and
+/// A camera's light, 1 at noon. Ours: a low sun costs a camera some contrast, twilight lies between it and night, and
 /// street lamps leave it the recognition range that low beams give (35 to 50 %) on few pixels.
-const LIGHT: [f64; 3] = [0.8, 1.0, 0.15];
+fn light(time: TimeOfDay) -> f64 {
+    match time {
+        TimeOfDay::Morning => 0.8,
+        TimeOfDay::Noon => 1.0,
+        TimeOfDay::Dawn | TimeOfDay::Dusk => 0.4,
+        TimeOfDay::Night => 0.15,
+    }
+}
+
 // The next three tables have an entry for each level: None, Light, Moderate, High.
 /// Rain, mm/h: bounds of light, moderate and violent rain (WMO).
 const RAIN_MMPH: [f64; 4] = [0.0, 2.5, 10.0, 50.0];
@@ -108,7 +117,7 @@ impl Environment {
     pub fn conditions(&self, ego_mps: f64) -> Conditions {
         let [rain, fog, _] = self.sky;
         Conditions {
-            light: LIGHT[self.time as usize],
+            light: light(self.time),
             rain_mmph: RAIN_MMPH[rain as usize],
             visibility_m: VISIBILITY_M[fog as usize],
             water_mm: self.water_mm,

@@ -1,6 +1,7 @@
 //! Which lane a request or a command means: the ego vehicle's, one beside it, or an oncoming one.
 
-use avastra_lang::model::vocabulary::{LaneChoice, Side};
+use avastra_lang::model::command::IgnoredRules;
+use avastra_lang::model::vocabulary::{Body, LaneChoice, Side, TrafficRule};
 use avastra_road as road;
 use avastra_road::{LaneIndex, Neighbour, RouteLane, Turn};
 
@@ -82,6 +83,12 @@ pub(super) fn lane_before(around: &Around, lane: LaneIndex) -> Option<LaneIndex>
 
 fn lane_at(around: &Around, station_m: f64) -> LaneIndex {
     around.scene.route.lane_at(station_m).lane
+}
+
+/// Whether a vehicle drives in a lane by itself: bus lanes are for buses, and for those who ignore that.
+pub(super) fn may_use(around: &Around, lane: LaneIndex, body: Body, ignores: IgnoredRules) -> bool {
+    let for_buses = around.scene.map.lane(lane).for_buses;
+    !for_buses || body == Body::SchoolBus || ignores.contains(TrafficRule::BusLanes)
 }
 
 /// The same-direction lane on a side of a lane, if there is one and no median lies between.

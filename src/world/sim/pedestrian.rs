@@ -4,7 +4,8 @@
 //! least 1 s (published package) and at most 10 s. One that is to be met at a point of the ego vehicle's front waits until then,
 //! at most 60 s, goes by the ego vehicle's speed of each moment until it sets out, and then walks steadily, as the targets of
 //! Euro NCAP's tests do. Behind the other kerb it walks on as far as there is room, and
-//! leaves the world when the ego vehicle cannot see it.
+//! leaves the world when the ego vehicle cannot see it. One that is told its speed, by an order or by a phase of its
+//! manoeuvre, sets out or turns round at once and walks steadily from then on.
 //!
 //! The published package's pedestrian walks on, whatever comes. Here that is the most frequent of four manners,
 //! drawn once from the pedestrian's own stream:
@@ -23,6 +24,7 @@
 use avastra_base::geometry::{OrientedBox, Pose, Vec2, distance_m, wrap_angle};
 use avastra_base::rng;
 use avastra_base::rng::Rng;
+use avastra_lang::model::command::ON_FOOT_MPS_MAX;
 use avastra_road::is_apart;
 
 use super::around::{Around, Other};
@@ -141,6 +143,8 @@ pub(super) struct Walker {
     aside_m: f64,
     /// Whether it walks back to where it began.
     returns: bool,
+    /// Whether it was told its speed, and stands if that is 0.
+    is_told: bool,
     /// Pace and offset that it wants since its last look.
     pace_mps: f64,
     wants_aside_m: f64,
@@ -172,6 +176,7 @@ impl Walker {
             walked_m: 0.0,
             aside_m: 0.0,
             returns: false,
+            is_told: false,
             pace_mps: speed_mps,
             wants_aside_m: 0.0,
             begins_tick,
@@ -187,10 +192,34 @@ impl Walker {
         OrientedBox::new(middle, to_m - from_m, 2.0 * this.half_width_m)
     }
 
+    /// From now on it walks at this speed, m/s, steadily; below 0 it turns round and goes back to where it began.
+    pub fn order(&mut self, speed_mps: f64, tick: u64) {
+        self.is_told = true;
+        self.speed_mps = speed_mps.abs().min(ON_FOOT_MPS_MAX);
+        self.pace_mps = self.speed_mps;
+        if speed_mps != 0.0 && self.returns != (speed_mps < 0.0) {
+            self.returns = !self.returns;
+            self.wants_aside_m = 0.0;
+        }
+        (self.meeting, self.manner, self.begins_tick) = (None, Manner::Steady, tick);
+    }
+
+    /// How fast it goes on, m/s; below 0 back to where it began.
+    pub fn pace_mps(&self) -> f64 {
+        match self.is_over() {
+            true => 0.0,
+            false if self.returns => -self.pace_mps,
+            false => self.pace_mps,
+        }
+    }
+
+    fn is_over(&self) -> bool {
+        if self.returns { self.walked_m <= 0.0 } else { self.walked_m >= self.end_m }
+    }
+
     /// Where it is at the end of a tick; `None` once it has left, which the ego vehicle does not see (`in_sight`).
     pub fn step(&mut self, this: &Obstacle, in_sight: bool, around: &Around) -> Option<Moved> {
-        let is_over = if self.returns { self.walked_m <= 0.0 } else { self.walked_m >= self.end_m };
-        if is_over {
+        if self.is_over() {
             return in_sight.then_some(Moved::at_rest(this));
         }
         if (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS) {
@@ -201,6 +230,9 @@ impl Walker {
             (self.meeting, self.begins_tick) = (None, around.tick);
         }
         if around.tick < self.begins_tick {
+            return Some(Moved::at_rest(this));
+        }
+        if self.is_told && self.speed_mps == 0.0 {
             return Some(Moved::at_rest(this));
         }
         if self.pace_mps == 0.0 {
@@ -245,7 +277,10 @@ impl Walker {
         ]);
         trace.words([self.startle_ticks, self.stuck_ticks, u32::from(self.returns)].map(u64::from));
         trace.words([self.begins_tick, self.begins_tick_max, self.manner as u64]);
-        // Nothing is fed for who waits for no meeting, as before there were any.
+        // Nothing is fed for who was told nothing and waits for no meeting, as before there were any.
+        if self.is_told {
+            trace.word(1);
+        }
         if let Some(Meeting { station_m, way_m, comes_from_left }) = self.meeting {
             trace.numbers([station_m, way_m, f64::from(u8::from(comes_from_left))]);
         }

@@ -7,7 +7,7 @@ use crate::action::{Course, LaterMoment};
 use avastra_base::geometry::{OrientedBox, Pose, Sweep, Vec2, distance_m, unit_vector};
 use avastra_base::kinematics::GRAVITY_MPS2;
 use avastra_lang::model::command::Command;
-use avastra_lang::model::vocabulary::{Body, Colour, Verb};
+use avastra_lang::model::vocabulary::{Body, Colour, TrafficRule, Verb};
 use avastra_road::is_apart;
 
 use super::ambient::COMMANDED_MAX;
@@ -117,6 +117,15 @@ enum Stage {
     UnderWay(Command),
 }
 
+/// How far a road user is with what it was told.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Progress {
+    /// Below 0 back to where it began, on foot.
+    pub speed_mps: f64,
+    /// Whether it is in the lane and at the offset that it was told.
+    pub is_aside: bool,
+}
+
 /// What a tick does to a manoeuvre.
 pub(super) struct Advance {
     /// What is left of it.
@@ -137,8 +146,8 @@ impl Running {
         self.course.bearers()
     }
 
-    /// Advances by one tick. `is_aside`: whether the driver is in the lane and at the offset that it was told.
-    pub fn advance(mut self, moment: &LaterMoment, is_aside: bool, tick: u64) -> Advance {
+    /// Advances by one tick. `progress`: how far the road user is with what it was told.
+    pub fn advance(mut self, moment: &LaterMoment, progress: Progress, tick: u64) -> Advance {
         let mut ended = 0;
         let over = |ended| Advance { rest: None, command: None, ended };
         loop {
@@ -160,8 +169,8 @@ impl Running {
                 }
                 Stage::UnderWay(command)
                     if tick > self.since
-                        && command.speed_mps.is_none_or(|mps| has_speed(moment.npc.speed_mps, mps))
-                        && (is_aside || !command.goes_aside()) =>
+                        && command.speed_mps.is_none_or(|mps| has_speed(progress.speed_mps, mps))
+                        && (progress.is_aside || !command.goes_aside()) =>
                 {
                     self.phase += 1;
                     ended += 1;
@@ -196,7 +205,7 @@ impl Running {
 
 /// Whether a road user has the speed that a phase wants, m/s. A stop is exact.
 fn has_speed(now_mps: f64, wanted_mps: f64) -> bool {
-    now_mps == wanted_mps || wanted_mps > 0.0 && (now_mps - wanted_mps).abs() < SPEED_REACHED_MPS
+    now_mps == wanted_mps || wanted_mps != 0.0 && (now_mps - wanted_mps).abs() < SPEED_REACHED_MPS
 }
 
 #[derive(Debug, Clone)]
@@ -204,6 +213,19 @@ pub(super) enum Motion {
     Drive(Driver),
     Walk(Walker),
     Stand,
+}
+
+impl Motion {
+    /// From now on it does what it is told, as soon as it can.
+    pub fn order(&mut self, command: &Command, tick: u64) {
+        match self {
+            Motion::Drive(driver) => driver.order(command),
+            Motion::Walk(walker) => {
+                command.speed_mps.iter().for_each(|speed_mps| walker.order(*speed_mps, tick));
+            }
+            Motion::Stand => {}
+        }
+    }
 }
 
 /// Where a road user is after a tick.
@@ -304,6 +326,11 @@ impl Mover {
         self.touched || self.crashed_with.is_some()
     }
 
+    /// Whether it drives without lights.
+    pub fn is_unlit(&self) -> bool {
+        matches!(&self.motion, Motion::Drive(driver) if driver.ignores.contains(TrafficRule::Headlights))
+    }
+
     /// Whether it has crashed into another obstacle, or another into it.
     pub fn has_crashed(&self) -> bool {
         self.crashed_with.is_some()
@@ -342,7 +369,8 @@ impl Mover {
                 moved
             }
             Motion::Walk(_) if self.touched => Some(rest),
-            Motion::Walk(walker) => walker.step(this, in_sight, around),
+            // Who has still something to do does not leave.
+            Motion::Walk(walker) => walker.step(this, in_sight || self.course.is_some(), around),
             Motion::Stand => Some(rest),
         }
     }

@@ -76,6 +76,8 @@ pub struct SensedObject {
     pub visible_fraction: f64,
     /// Distance between the outlines, m.
     pub distance_m: f64,
+    /// Whether it is a vehicle that drives without lights. By day that makes no difference.
+    pub is_unlit: bool,
 }
 
 /// Light and weather where the ego vehicle is.

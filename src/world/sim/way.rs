@@ -75,11 +75,16 @@ impl Way {
         let mut last = *lanes.last()?;
         let mut beyond_m = 0.0;
         while beyond_m < REACH_M {
-            let next = &map.lane(last).successors;
-            if next.is_empty() {
-                break;
-            }
-            last = next[rng::below(rng, next.len() as u32) as usize];
+            let all = &map.lane(last).successors;
+            // Nobody turns into a bus lane, unless nothing else is left.
+            let is_open = |next: &&LaneIndex| map.lane(last).for_buses || !map.lane(**next).for_buses;
+            let count = all.iter().filter(is_open).count();
+            let next = match (all.len(), count) {
+                (0, _) => break,
+                (all_of_them, 0) => all.get(rng::below(rng, all_of_them as u32) as usize),
+                _ => all.iter().filter(is_open).nth(rng::below(rng, count as u32) as usize),
+            };
+            last = *next.expect("one was counted");
             beyond_m += map.lane(last).centre.length_m();
             chain.push(last);
         }

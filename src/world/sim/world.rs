@@ -367,6 +367,7 @@ impl World {
                 height_m: mover.size.height_m,
                 visible_fraction: mover.visible_fraction,
                 distance_m: obstacle.distance_m,
+                is_unlit: mover.is_unlit(),
             });
         }
     }

@@ -20,6 +20,8 @@ pub struct Ranges {
     lidar_vehicle_m: f64,
     lidar_pedestrian_m: f64,
     camera_vehicle_m: f64,
+    /// Of vehicles without lights.
+    camera_unlit_m: f64,
     camera_pedestrian_m: f64,
     camera_may_begin: bool,
 }
@@ -41,6 +43,7 @@ impl Ranges {
             lidar_vehicle_m: lidar(config.lidar_vehicle_m, config.grid_m),
             lidar_pedestrian_m: lidar(config.lidar_pedestrian_m, config.small_m),
             camera_vehicle_m: camera(config.camera_vehicle_m, config.night_vehicle_factor),
+            camera_unlit_m: camera(config.camera_vehicle_m, config.night_pedestrian_factor),
             camera_pedestrian_m: camera(config.camera_pedestrian_m, config.night_pedestrian_factor),
             camera_may_begin: conditions.light >= config.camera_alone_light,
         }
@@ -51,10 +54,10 @@ impl Ranges {
     pub fn detection_chance(&self, config: &PerceptionConfig, object: &SensedObject, known: bool) -> f64 {
         // Half of a surface gives as many returns as all of it from √2 times as far.
         let distance_m = object.distance_m / object.visible_fraction.sqrt();
-        let (lidar_m, camera_m) = if object.body.is_vehicle() {
-            (self.lidar_vehicle_m, self.camera_vehicle_m)
-        } else {
-            (self.lidar_pedestrian_m, self.camera_pedestrian_m)
+        let (lidar_m, camera_m) = match object.body.is_vehicle() {
+            true if object.is_unlit => (self.lidar_vehicle_m, self.camera_unlit_m),
+            true => (self.lidar_vehicle_m, self.camera_vehicle_m),
+            false => (self.lidar_pedestrian_m, self.camera_pedestrian_m),
         };
         let camera_begins = object.distance_m > config.camera_alone_m && self.camera_may_begin;
         let fused_m = lidar_m + config.camera_weight * (camera_m - lidar_m);

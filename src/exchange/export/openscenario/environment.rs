@@ -47,20 +47,20 @@ pub fn environment(sky: &Sky, number: usize) -> Element {
 
 /// The clock of the world's time of day.
 pub fn time(sky: &Sky) -> Element {
-    let clock = match sky.time_of_day {
-        TimeOfDay::Morning => "T10:00:00",
-        TimeOfDay::Noon => "T14:00:00",
-        TimeOfDay::Night => "T20:00:00",
-    };
-    Element::new("TimeOfDay").with("animation", false).with("dateTime", format!("{DATE}{clock}"))
+    let hour = sky.time_of_day.hour();
+    Element::new("TimeOfDay").with("animation", false).with("dateTime", format!("{DATE}T{hour:02}:00:00"))
 }
 
 /// Where the sun is, and its illuminance, lx.
 pub fn sun(sky: &Sky) -> (Element, f64) {
-    let (elevation_deg, azimuth_rad, illuminance_lx) = match sky.time_of_day {
-        TimeOfDay::Morning => (20.0, FRAC_PI_2, 20_000.0),
-        TimeOfDay::Noon => (60.0, PI, 100_000.0),
-        TimeOfDay::Night => (-30.0, 0.0, 0.1),
+    let elevation_deg = sky.time_of_day.sun_elevation_deg();
+    // In civil twilight the ground has 400 lx as the sun sets and 3.4 lx as it is 6 degrees below the horizon.
+    let (azimuth_rad, illuminance_lx) = match sky.time_of_day {
+        TimeOfDay::Dawn => (FRAC_PI_2, 30.0),
+        TimeOfDay::Morning => (FRAC_PI_2, 20_000.0),
+        TimeOfDay::Noon => (PI, 100_000.0),
+        TimeOfDay::Dusk => (PI + FRAC_PI_2, 30.0),
+        TimeOfDay::Night => (0.0, 0.1),
     };
     let sun = Element::new("Sun")
         .measured("azimuth", azimuth_rad)

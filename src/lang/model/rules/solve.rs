@@ -276,7 +276,8 @@ impl<'a> Solver<'a> {
     }
 
     fn after(&self, values: &[Value]) -> Memory {
-        self.rules.space.memory_after(self.rules.row.action, values, self.before.memory)
+        let Before { memory, world, .. } = self.before;
+        self.rules.space.memory_after(self.rules.row.action, values, memory, self.rules.road, world)
     }
 
     /// Chooses each parameter by the clauses that no later one decides.

@@ -92,6 +92,7 @@ impl Reader {
             id,
             line: lane.line(),
             undriven,
+            for_buses: kind == "bus" || self.is_kept_for_buses(lane),
             beside,
             widths,
             borders,
@@ -103,13 +104,42 @@ impl Reader {
     }
 }
 
-/// What a type of lane is: whether vehicles of all kinds may use it in one direction, whether some kinds may, and what it is
+impl Reader {
+    /// Whether `access` keeps cars out of a lane and lets buses in.
+    fn is_kept_for_buses(&mut self, lane: Element) -> bool {
+        let mut kept = false;
+        let mut others = false;
+        for access in lane.children("access") {
+            // Without a rule, as before OpenDRIVE 1.6, a restriction says who alone may use the lane.
+            let allows = access.attribute("rule") != Some("deny");
+            let named = access.children("restriction").filter_map(|one| one.attribute("type"));
+            for who in access.attribute("restriction").into_iter().chain(named) {
+                match (allows, who) {
+                    (true, "bus") | (false, "passengerCar") => kept = true,
+                    (
+                        true,
+                        "none" | "passengerCar" | "throughTraffic" | "autonomousTraffic"
+                        | "autonomous traffic",
+                    )
+                    | (false, _) => {}
+                    (true, _) => others = true,
+                }
+            }
+        }
+        if others && !kept {
+            self.ignore("rules of access to lanes for others than buses".to_owned());
+        }
+        kept
+    }
+}
+
+/// What a type of lane is: whether vehicles drive on it in one direction, whether some kinds may, and what it is
 /// to people on foot where no car drives on it; `None` for verges and medians, where they may stand but do not walk along.
 fn lane_type(kind: &str) -> (bool, bool, Option<StripKind>) {
     match kind {
         "driving" | "entry" | "exit" | "onRamp" | "offRamp" | "connectingRamp" | "slipLane" | "mwyEntry"
-        | "mwyExit" => (true, true, Some(StripKind::Paved)),
-        "bus" | "taxi" | "HOV" | "bidirectional" => (false, true, Some(StripKind::Paved)),
+        | "mwyExit" | "bus" => (true, true, Some(StripKind::Paved)),
+        "taxi" | "HOV" | "bidirectional" => (false, true, Some(StripKind::Paved)),
         "parking" | "stop" | "biking" | "tram" | "rail" => (false, false, Some(StripKind::Paved)),
         "sidewalk" | "walking" => (false, false, Some(StripKind::Walkway)),
         "none" | "shoulder" | "border" | "curb" | "median" | "roadWorks" | "roadMarks" => {

@@ -8,7 +8,7 @@ use avastra_lang::model::vocabulary::{LaneChoice, Side};
 use avastra_road::LaneIndex;
 
 use crate::sim::around::Around;
-use crate::sim::lanes::{chosen_lane, lane_beside};
+use crate::sim::lanes::{chosen_lane, lane_beside, may_use};
 use crate::sim::road_user::Obstacle;
 use crate::sim::trace::Trace;
 
@@ -91,7 +91,7 @@ impl Driver {
     /// one that has not begun; what is under way is finished first.
     pub fn order(&mut self, command: &Command) {
         if let Some(speed_mps) = command.speed_mps {
-            (self.cruise_mps, self.ordered_mps2) = (speed_mps, command.rate_mps2);
+            (self.cruise_mps, self.ordered_mps2) = (speed_mps.max(0.0), command.rate_mps2);
         }
         self.ignores = command.ignores.unwrap_or(self.ignores);
         if command.goes_aside() {
@@ -150,7 +150,7 @@ impl Driver {
     fn go_over(&mut self, lane: LaneChoice, told_mps: Option<f64>, view: &View) -> bool {
         let View { this, around, .. } = *view;
         // An error: in a junction, or where that lane has not begun yet.
-        let Ok(side) = self.side_of(lane, this.outline.pose.position, around) else { return false };
+        let Ok(side) = self.side_of(lane, this, around) else { return false };
         let Some(side) = side else {
             self.aside.get_or_insert_default().lane = None;
             return true;
@@ -167,14 +167,17 @@ impl Driver {
     /// The side on which the lane that is meant lies from the one that it is in; `None` if that is the one.
     ///
     /// # Errors
-    /// That the lane does not lie beside its own, in words.
+    /// That the lane does not lie beside its own, or is for buses, in words.
     pub(in crate::sim) fn side_of(
         &self,
         lane: LaneChoice,
-        position: Vec2,
+        this: &Obstacle,
         around: &Around,
     ) -> Result<Option<Side>, String> {
-        let meant = chosen_lane(around, around.beside_route(position).0, lane)?;
+        let meant = chosen_lane(around, around.beside_route(this.outline.pose.position).0, lane)?;
+        if !may_use(around, meant, this.body, self.ignores) {
+            return Err("that lane is for buses".into());
+        }
         let (here, _) = self.way.lane_at(self.station_m);
         let lies = |side: Side| {
             let next = |lane: &LaneIndex| lane_beside(around, *lane, side);

@@ -15,9 +15,10 @@ use avastra_lang::model::vocabulary::Side;
 use avastra_road as road;
 use avastra_road::{Lane, LaneIndex, is_apart};
 
+use crate::action::SpawnRequest;
 use crate::sim::around::{Around, Other};
 use crate::sim::body::BodyParameters;
-use crate::sim::lanes::lane_beside;
+use crate::sim::lanes::{lane_beside, may_use};
 use crate::sim::moment::{driver_facts, with_itself};
 use crate::sim::road_user::Moved;
 use crate::sim::traffic::TrafficProfile;
@@ -167,6 +168,9 @@ impl Driver {
         let map = &around.scene.map;
         let (here, here_m) = self.way.lane_at(self.station_m);
         let target = lane_beside(around, here, side)?;
+        if !may_use(around, target, this.body, self.ignores) {
+            return None;
+        }
         let centre = &map.lane(target).centre;
         let there = centre.project(self.middle(this));
         // `change_room_m` ends at markings that forbid a change, and at junctions, where lanes part.
@@ -304,16 +308,19 @@ pub(in crate::sim) fn can_change(
     way: &Way,
     station_m: f64,
     side: Side,
-    speed_mps: f64,
+    request: &SpawnRequest,
 ) -> bool {
     let map = &around.scene.map;
     let in_junction = |lane: LaneIndex| map.lane(lane).junction.is_some();
     let ahead = way.lanes_from(station_m).skip_while(|(lane, _)| in_junction(*lane));
     ahead.take_while(|(lane, _)| !in_junction(*lane)).any(|(lane, at_m)| {
         let Some(target) = lane_beside(around, lane, side) else { return false };
+        if !may_use(around, target, request.body, request.ignores) {
+            return false;
+        }
         let here = map.lane(lane).centre.pose_at(at_m).position;
         let aside_m = map.lane(target).centre.project(here).distance_m;
-        let length_m = length_m(speed_mps, aside_m, Whose::Own, around);
+        let length_m = length_m(request.speed_mps, aside_m, Whose::Own, around);
         map.changes_from_m(lane, on_road(side), at_m).iter().any(|(_, room_m)| *room_m >= length_m)
     })
 }

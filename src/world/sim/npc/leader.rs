@@ -89,7 +89,12 @@ impl Driver {
 
     /// All others that it minds. The ego vehicle is the first of all.
     pub(super) fn minded<'a>(&self, around: &'a Around) -> impl Iterator<Item = Other<'a>> {
-        around.others().skip(usize::from(self.ignores.contains(TrafficRule::Ego)))
+        let minds_ego = !self.ignores.contains(TrafficRule::Ego);
+        let most = match self.ignores.contains(TrafficRule::Others) {
+            true => usize::from(minds_ego),
+            false => usize::MAX,
+        };
+        around.others().skip(usize::from(!minds_ego)).take(most)
     }
 
     /// Whether a lane change under way leads past a road user that stands in the lane that it leaves: when the front reaches

@@ -83,7 +83,7 @@ fn rendezvous(asked: &Asked, conflict: &Conflict, arrival_s: f64) -> Result<Driv
         let Some(beside) = lane_beside(around, leg, side) else { continue };
         let first = Way::along(around.scene, &[beside], &mut rng).ok_or("that lane leads nowhere")?;
         let station_m = map.lane(beside).centre.project(start).station_m;
-        if can_change(around, &first, station_m, back, request.speed_mps) {
+        if can_change(around, &first, station_m, back, request) {
             found = Some((first, station_m));
             break;
         }

@@ -37,7 +37,7 @@ pub(super) fn drive_ahead(asked: &Asked) -> Result<Driver, String> {
             LaneChoice::Current => &[Side::Left, Side::Right],
         };
         let begin_m = station_m + request.speed_mps * CHANGE_AFTER_S;
-        let possible = |side: &Side| can_change(around, &way, begin_m, *side, request.speed_mps);
+        let possible = |side: &Side| can_change(around, &way, begin_m, *side, request);
         let sides: Vec<Side> = sides.iter().copied().filter(possible).collect();
         if sides.is_empty() {
             return Err(no_change(around, lane).into());
@@ -91,7 +91,7 @@ pub(super) fn overtake(asked: &Asked) -> Result<Driver, String> {
         lanes.insert(0, previous);
     }
     let way = Way::along(around.scene, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
-    let passes = |side| can_change(around, &way, station_m, side, request.speed_mps);
+    let passes = |side| can_change(around, &way, station_m, side, request);
     if request.lane == LaneChoice::Current && !passes(Side::Left) && !passes(Side::Right) {
         return Err(no_change(around, lane).into());
     }
@@ -115,7 +115,7 @@ pub(super) fn drive_opposite(asked: &Asked) -> Result<Driver, String> {
     let beside_route = around.scene.route.path.pose_at(station_m).position;
     let station_m = map.lane(lane).centre.project(beside_route).station_m;
     let way = Way::along(around.scene, &[lane], &mut rng).ok_or("that lane leads nowhere")?;
-    if request.then == Then::Change && !can_change(around, &way, station_m, Side::Left, request.speed_mps) {
+    if request.then == Then::Change && !can_change(around, &way, station_m, Side::Left, request) {
         return Err("no room to change lanes before the junction".into());
     }
     Ok(commanded(asked, way, station_m, plan))

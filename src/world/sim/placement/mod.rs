@@ -20,6 +20,7 @@ use avastra_lang::model::vocabulary::Verb;
 use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
+use crate::sim::lanes::may_use;
 use crate::sim::moment::npc_facts;
 use crate::sim::npc::{Cruise, Driver, PlannedChange};
 use crate::sim::road_user::{Motion, Moved, Mover, RoadUser};
@@ -72,6 +73,10 @@ pub(super) fn place(
         Verb::CrossRoad => cross_road(&asked)?,
         Verb::Walk | Verb::Stand => return on_foot(&asked),
     };
+    let (lane, _) = driver.way.lane_at(driver.station_m);
+    if !may_use(around, lane, request.body, request.ignores) {
+        return Err("that lane is for buses".into());
+    }
     driver.begin_at(request.offset_m, request.ignores);
     check_way(around, &driver, &size)?;
     let moved = driver.moved(&size);

@@ -129,7 +129,12 @@ fn an_order_is_for_the_latest_bearer_and_no_wreck_obeys() {
     assert_eq!(world.order_refusal(&order).as_deref(), Some("it is a wreck"));
     let walker = SpawnRequest { bearer: Some(0), ..request(Verb::Stand, 40.0, 1.0) };
     spawn(&mut world, walker);
-    assert_eq!(world.order_refusal(&order).as_deref(), Some("it is on foot"));
+    assert_eq!(world.order_refusal(&order).as_deref(), Some("it stands, and does not walk"));
+    let backwards = Command { speed_mps: Some(-1.0), ..Command::default() };
+    let car = SpawnRequest { bearer: Some(1), ..request(Verb::DriveOpposite, 60.0, 9.0) };
+    spawn(&mut world, car);
+    let refusal = world.order_refusal(&OrderRequest { bearer: 1, command: backwards });
+    assert_eq!(refusal.as_deref(), Some("it does not drive backwards"));
 }
 
 #[test]

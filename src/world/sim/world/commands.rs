@@ -6,7 +6,8 @@ use crate::action::{Draw, Effect, LaterMoment, OrderRequest, SpawnRequest};
 use crate::sim::moment::npc_facts;
 use crate::sim::placement;
 use crate::sim::placement::Arrivals;
-use crate::sim::road_user::{Advance, Motion, RoadUser, Running};
+use crate::sim::road_user::{Advance, Motion, Progress, RoadUser, Running};
+use avastra_lang::model::command::{Command, ON_FOOT_MPS_MAX};
 use avastra_lang::model::{COMMANDED_MAX, NpcFacts};
 
 use super::{DT_S, World};
@@ -100,15 +101,26 @@ impl World {
     pub(super) fn ordered(&self, order: &OrderRequest) -> Result<usize, String> {
         let index = self.bearer(order.bearer).ok_or("no road user of that name is there")?;
         let RoadUser { obstacle, mover } = &self.users[index];
+        let Command { speed_mps, .. } = order.command;
         match &mover.motion {
             _ if mover.is_wreck() => Err("it is a wreck".to_owned()),
+            Motion::Drive(_) if speed_mps.is_some_and(|speed_mps| speed_mps < 0.0) => {
+                Err("it does not drive backwards".to_owned())
+            }
             Motion::Drive(driver) => {
                 if let Some(lane) = order.command.lane {
-                    driver.side_of(lane, obstacle.outline.pose.position, &self.alone())?;
+                    driver.side_of(lane, obstacle, &self.alone())?;
                 }
                 Ok(index)
             }
-            Motion::Walk(_) | Motion::Stand => Err("it is on foot".to_owned()),
+            Motion::Walk(_) if order.command != (Command { speed_mps, ..Command::default() }) => {
+                Err("it is on foot, and can be told a speed alone".to_owned())
+            }
+            Motion::Walk(_) if speed_mps.is_some_and(|speed_mps| speed_mps.abs() > ON_FOOT_MPS_MAX) => {
+                Err(format!("nobody on foot is told more than {ON_FOOT_MPS_MAX} m/s"))
+            }
+            Motion::Walk(_) => Ok(index),
+            Motion::Stand => Err("it stands, and does not walk".to_owned()),
         }
     }
 
@@ -117,9 +129,7 @@ impl World {
         let mover = &mut self.users[index].mover;
         // The phases that are left of a manoeuvre are dropped.
         mover.course = None;
-        if let Motion::Drive(driver) = &mut mover.motion {
-            driver.order(&order.command);
-        }
+        mover.motion.order(&order.command, self.ticks);
         Ok(())
     }
 
@@ -136,20 +146,28 @@ impl World {
             if mover.is_wreck() {
                 continue;
             }
-            let Motion::Drive(driver) = &mover.motion else { continue };
-            let npc = npc_facts(&self.alone(), obstacle, &mover.motion);
-            let (npc, is_aside) =
-                (NpcFacts { speed_mps: driver.speed_mps, ..npc }, driver.is_aside_as_told());
+            let (speed_mps, progress) = match &mover.motion {
+                Motion::Drive(driver) => {
+                    let is_aside = driver.is_aside_as_told();
+                    (driver.speed_mps, Progress { speed_mps: driver.speed_mps, is_aside })
+                }
+                Motion::Walk(walker) => {
+                    let speed_mps = walker.pace_mps();
+                    (obstacle.velocity_mps.norm(), Progress { speed_mps, is_aside: true })
+                }
+                Motion::Stand => continue,
+            };
+            let npc = NpcFacts { speed_mps, ..npc_facts(&self.alone(), obstacle, &mover.motion) };
             let facts = |who: usize| Some((who, self.bearer_facts(who)?));
             let bearers = running.bearers().into_iter().filter_map(facts).collect();
             let moment = LaterMoment { moment, npc, bearers };
-            let Advance { rest, command, ended } = running.advance(&moment, is_aside, self.ticks);
+            let Advance { rest, command, ended } = running.advance(&moment, progress, self.ticks);
             let mover = &mut self.users[index].mover;
             mover.course = rest;
             mover.phases_ended += ended;
             mover.phases_begun += u32::from(command.is_some());
-            if let (Motion::Drive(driver), Some(command)) = (&mut mover.motion, command) {
-                driver.order(&command);
+            if let Some(command) = command {
+                mover.motion.order(&command, self.ticks);
             }
         }
     }

@@ -375,7 +375,7 @@ fn played(space: &Arc<Space>, made: &Made, found: &[Diagnostic], draws: u32, see
                     legal.push(draw);
                 }
                 if legal.is_empty() || waits_always || rng::below(&mut choices, 4) == 0 {
-                    let (_, waited) = table.wait(&memory, step, road, &rules);
+                    let (_, waited) = table.wait(&situation);
                     let found = Twin::of(space, &waited, road_number, step);
                     assert_eq!(found.states(), before.waited(made).states(), "{}", made.text());
                     memory = waited;
