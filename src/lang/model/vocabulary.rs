@@ -518,6 +518,11 @@ impl TimeOfDay {
         }
     }
 
+    /// Whether the sun is a little below the horizon.
+    pub fn is_twilight(self) -> bool {
+        matches!(self, TimeOfDay::Dawn | TimeOfDay::Dusk)
+    }
+
     /// Height of the sun above the horizon, degrees. Civil twilight lasts down to -6 degrees.
     pub fn sun_elevation_deg(self) -> f64 {
         match self {

@@ -13,7 +13,7 @@ use ndarray::Array1;
 use avastra_base::geometry::{Vec2, wrap_angle};
 use avastra_drivers::{PerceivedObject, Status};
 use avastra_lang::model::MomentFacts;
-use avastra_lang::model::vocabulary::{Light, RoadKind};
+use avastra_lang::model::vocabulary::{Light, RoadKind, TimeOfDay};
 use avastra_world::sim::{Obstacle, World};
 
 /// Number of state variables; they are the first of [`VARIABLES`](avastra_lang::model::policy::VARIABLES).
@@ -37,7 +37,7 @@ fn surroundings(world: &World, moment: &MomentFacts) -> [f64; 7] {
     [
         // One number for three phenomena, as the published package packs them.
         100.0 * rain + 10.0 * fog + wetness,
-        f64::from(world.time_of_day().hour()),
+        f64::from(observed(world.time_of_day()).hour()),
         match moment.ego_light {
             Light::Red => -1.0,
             // Neither says whether the way is free or closed, so both stand between red and green.
@@ -77,6 +77,11 @@ fn driving_system(world: &World, status: &Status) -> [f64; 12] {
         status.control.brake_pct,
         ego.speed_mps,
     ]
+}
+
+/// The paper's state knows morning, noon and night. In twilight headlights are on, as at night.
+fn observed(time: TimeOfDay) -> TimeOfDay {
+    if time.is_twilight() { TimeOfDay::Night } else { time }
 }
 
 /// `angleDeviation`, Eq. 2, by `atan2` (the printed `arctan` loses the quadrant and divides by 0);
