@@ -146,6 +146,7 @@ pub fn object(id: u32, body: Body, pose: Pose, speed_mps: f64) -> SensedObject {
         visible_fraction: 1.0,
         distance_m: 0.0,
         is_unlit: false,
+        has_siren: false,
     }
 }
 

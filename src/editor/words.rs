@@ -37,7 +37,9 @@ pub fn engine_words(field: &str) -> Vec<Entry> {
         Some(SpawnField::Colour) => of::<Colour>(),
         Some(SpawnField::Ignores) => of::<TrafficRule>(),
         None if field == "body" => of::<Body>(),
-        Some(SpawnField::Speed | SpawnField::Offset | SpawnField::Meet) | None => Vec::new(),
+        Some(SpawnField::Speed | SpawnField::Offset | SpawnField::Meet | SpawnField::Siren) | None => {
+            Vec::new()
+        }
     }
 }
 

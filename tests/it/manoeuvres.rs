@@ -8,6 +8,7 @@ use avastra::action::{ActionTable, Draw, Effect, Situation};
 use avastra::ads;
 use avastra::episode::{Choice, Moment, Outcome};
 use avastra::geometry::{SMOOTH_STEP_SLOPE_MAX, Vec2, distance_m, unit_vector};
+use avastra::model::vocabulary::Priority;
 use avastra::model::{NpcFacts, RulesInForce};
 use avastra::rng;
 use avastra::rng::{Rng, Stream};
@@ -185,6 +186,34 @@ fn an_ambulance_passes_red_lights_and_is_the_only_one_that_does() {
         ran_red += usize::from(is_running);
     }
     assert!(came > 0 && ran_red > 0, "{came} came, {ran_red} episodes with a red light passed");
+}
+
+#[test]
+fn who_runs_into_a_siren_had_to_wait() {
+    let table = wish("siren");
+    let (mut came, mut ran_red, mut hit) = (0, 0, 0);
+    for ads in ["idm", "modular", "reactive"] {
+        let run = run_against(ads, table.space().clone(), 24, 3, &[]);
+        for episode in 0..run.episodes() {
+            let mut choose = |moment: &Moment| {
+                let legal = (0..2).find_map(|row| table.offer(moment.situation, row).ok());
+                came += usize::from(legal.is_some());
+                legal.map_or(Choice::Pass, Choice::Act)
+            };
+            let mut is_running = false;
+            let log = run.play(episode, &mut choose, &mut |world, _, _| {
+                assert_eq!(world.moment_facts().rule_breakers, 0);
+                is_running |= world.obstacles().any(|other| world.runs_red(other.id));
+            });
+            assert_replays(&run, episode, &log);
+            ran_red += usize::from(is_running);
+            for collision in &log.collisions {
+                assert_ne!(collision.contact.priority, Priority::Ego, "{ads}: {collision:?}");
+                hit += usize::from(collision.contact.priority == Priority::Other);
+            }
+        }
+    }
+    assert!(came > 30 && ran_red > 0 && hit > 0, "{came} came, {ran_red} ran a red light, {hit} were hit");
 }
 
 #[test]

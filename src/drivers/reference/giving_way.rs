@@ -13,9 +13,9 @@ const BESIDE_M: f64 = 1.0;
 const AHEAD_M: f64 = 80.0;
 
 /// Whether the ego vehicle, with its front at `front_m`, may go before a road user that would cross its way: it
-/// has priority wherever the lane of the other meets the route, and the other can still stop gently.
+/// has priority wherever the lane of the other meets the route, the other has no siren, and it can still stop gently.
 pub fn goes_before(scene: &Scene, sensed: &Sensed, object: &SensedObject, front_m: f64) -> bool {
-    if !object.body.is_vehicle() {
+    if !object.body.is_vehicle() || object.has_siren {
         return false;
     }
     let (map, route) = (&scene.map, &scene.route);

@@ -153,6 +153,9 @@ impl<'a> Actions<'a> {
         if let Some(meet) = request.meet {
             fields.push(format!("meet: {}", decimal(meet, false)));
         }
+        if request.siren {
+            fields.push("siren: true".to_owned());
+        }
         if !request.ignores.is_empty() {
             fields.push(ignored_field(request.ignores));
         }

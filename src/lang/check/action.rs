@@ -398,6 +398,10 @@ impl Checker {
             Some(value) => self.ignored_rules(value, place),
             None => Some(Vec::new()),
         };
+        let siren = match find(SpawnField::Siren) {
+            Some(value) => self.typed(value, place, Type::Bool).map(Some),
+            None => Some(None),
+        };
         let meet = match find(SpawnField::Meet) {
             Some(value) => self.typed(value, place, Type::Quantity(Dimension::RATIO)).map(Some),
             None => Some(None),
@@ -419,6 +423,7 @@ impl Checker {
             offset: offset?,
             ignores: ignores?,
             meet: meet?,
+            siren: siren?,
             bearer: None,
             manoeuvre,
             span,
@@ -458,6 +463,7 @@ impl Checker {
                 () if on_foot && says(SpawnField::Ignores) => {
                     ("ignores nothing", "rules of the road are for vehicles; leave `ignores` out")
                 }
+                () if on_foot && says(SpawnField::Siren) => ("has no siren", "leave `siren` out"),
                 () if verb == Verb::Walk && says(SpawnField::Offset) => {
                     ("begins at the kerb", "leave `offset` out")
                 }

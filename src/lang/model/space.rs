@@ -326,6 +326,8 @@ pub struct SpawnDef {
     pub ignores: Vec<WordExpr<TrafficRule>>,
     /// The part of the ego vehicle's front at which it is met, from the side that it comes from.
     pub meet: Option<Expr>,
+    /// Whether it is an emergency vehicle under way.
+    pub siren: Option<Expr>,
     /// The name that it bears from then on, by index in `Space::bearers`.
     pub bearer: Option<usize>,
     /// The manoeuvre that it begins when it appears.

@@ -328,6 +328,7 @@ words! {
     Speed "speed" = "How fast it is.",
     Offset "offset" = "How far to the left of its lane's middle it is; negative to the right.",
     Ignores "ignores" = "The rules of the road that it ignores: `ignores: [Signals]`.",
+    Siren "siren" = "Whether it is an emergency vehicle under way, for which all others wait: `siren: true`.",
     Meet "meet" = "The part of the ego vehicle's front at which it is met, from the side that it comes from: `meet: 25 %`.",
     Colour "colour" = "Its paint.",
 }

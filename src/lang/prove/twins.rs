@@ -182,7 +182,7 @@ fn ignored_form(ignores: &[WordExpr<TrafficRule>], reduced: &impl Fn(&Expr) -> E
 
 fn spawn_form(spawn: &SpawnDef, reduced: &impl Fn(&Expr) -> Expr) -> String {
     format!(
-        "spawn {} {} {} {} {} {} {:?} {:?} {:?} {:?} {} {} {} {:?}",
+        "spawn {} {} {} {} {} {} {:?} {:?} {:?} {:?} {:?} {} {} {} {:?}",
         word_form(&spawn.body, reduced),
         word_form(&spawn.colour, reduced),
         word_form(&spawn.verb, reduced),
@@ -193,6 +193,7 @@ fn spawn_form(spawn: &SpawnDef, reduced: &impl Fn(&Expr) -> Expr) -> String {
         reduced(&spawn.distance).kind,
         spawn.offset.as_ref().map(|offset| reduced(offset).kind),
         spawn.meet.as_ref().map(|meet| reduced(meet).kind),
+        spawn.siren.as_ref().map(|siren| reduced(siren).kind),
         ignored_form(&spawn.ignores, reduced),
         spawn.behind,
         spawn.cover.as_ref().map_or(String::new(), |cover| word_form(cover, reduced)),

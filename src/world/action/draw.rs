@@ -295,6 +295,7 @@ impl<'a> Judge<'a> {
                 .meet
                 .as_ref()
                 .map(|meet| rounded_into(evaluate(meet, functions, &facts).number(), MEET)),
+            siren: spawn.siren.as_ref().is_some_and(|siren| evaluate(siren, functions, &facts).truth()),
             bearer: spawn.bearer,
         }
     }
@@ -308,7 +309,7 @@ impl<'a> Judge<'a> {
     /// Why an order cannot be given after the effects before it. A vehicle that one of them spawns under that name is there.
     fn order_refusal(&self, order: &OrderRequest, before: &[Effect]) -> Option<Refusal> {
         let appears = |effect: &Effect| match effect {
-            Effect::Spawn(request) => request.bearer == Some(order.bearer) && request.body.is_vehicle(),
+            Effect::Spawn(request) => request.bearer == Some(order.bearer),
             Effect::Time(_) | Effect::Sky(..) | Effect::Order(_) => false,
         };
         order

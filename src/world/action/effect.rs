@@ -56,6 +56,8 @@ pub struct SpawnRequest {
     pub ignores: IgnoredRules,
     /// The part of the ego vehicle's front at which it is met, from the side that it comes from; for `Walk` alone.
     pub meet: Option<f64>,
+    /// Whether it is an emergency vehicle under way.
+    pub siren: bool,
     /// The name that it bears, by its index in the space.
     pub bearer: Option<usize>,
 }

@@ -5,6 +5,7 @@
 //!
 //! | where | rule | article |
 //! |---|---|---|
+//! | lanes of a junction | an emergency vehicle under way | 34.1 |
 //! | lanes of a junction | a red light, then signs, then turning left before oncoming traffic, then the right | 23, 18, 16 |
 //! | one lane | a vehicle that comes into it gives way to one that is in it | 14 |
 //! | one lane | a vehicle behind another keeps its distance | 13.5 |
@@ -300,7 +301,7 @@ impl Rights {
     ) {
         if let Some(found) = Crossing::of(this, driver, around) {
             let place = Place::Area(found.ego.lane, found.other.lane);
-            let judged = || found.priority(ego_passed, self.passed, around);
+            let judged = || found.priority(ego_passed, self.passed, driver.has_siren, around);
             let known = self.meeting.filter(|meeting| meeting.place == place);
             let priority = known.map_or_else(judged, |meeting| meeting.priority);
             self.meeting = Some(Meeting { place, priority, tick: around.tick });
@@ -437,6 +438,7 @@ impl Crossing {
         &self,
         ego_passed: Option<PassedLight>,
         other_passed: Option<PassedLight>,
+        has_siren: bool,
         around: &Around,
     ) -> Priority {
         let map = &around.scene.map;
@@ -451,7 +453,10 @@ impl Crossing {
             })
         };
         let (ego_red, other_red) = (red(&self.ego, ego_passed), red(&self.other, other_passed));
-        let by_rule = by_lanes(map, (self.ego.lane, ego_red), (self.other.lane, other_red));
+        let by_rule = match has_siren {
+            true => Priority::Other,
+            false => by_lanes(map, (self.ego.lane, ego_red), (self.other.lane, other_red)),
+        };
         let ego_first = match (self.ego.is_inside(), self.other.is_inside()) {
             (true, true) => return by_rule,
             (ego_first, _) => ego_first,

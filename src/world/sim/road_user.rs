@@ -326,6 +326,11 @@ impl Mover {
         self.touched || self.crashed_with.is_some()
     }
 
+    /// Whether it is an emergency vehicle under way.
+    pub fn has_siren(&self) -> bool {
+        matches!(&self.motion, Motion::Drive(driver) if driver.has_siren)
+    }
+
     /// Whether it drives without lights.
     pub fn is_unlit(&self) -> bool {
         matches!(&self.motion, Motion::Drive(driver) if driver.ignores.contains(TrafficRule::Headlights))

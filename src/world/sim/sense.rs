@@ -78,6 +78,8 @@ pub struct SensedObject {
     pub distance_m: f64,
     /// Whether it is a vehicle that drives without lights. By day that makes no difference.
     pub is_unlit: bool,
+    /// Whether it is an emergency vehicle under way.
+    pub has_siren: bool,
 }
 
 /// Light and weather where the ego vehicle is.

@@ -86,6 +86,7 @@ pub fn request(verb: Verb, distance_m: f64, speed_mps: f64) -> SpawnRequest {
         cover: None,
         offset_m: 0.0,
         ignores: IgnoredRules::default(),
+        siren: false,
         meet: None,
         bearer: None,
     }

@@ -368,6 +368,7 @@ impl World {
                 visible_fraction: mover.visible_fraction,
                 distance_m: obstacle.distance_m,
                 is_unlit: mover.is_unlit(),
+                has_siren: mover.has_siren(),
             });
         }
     }

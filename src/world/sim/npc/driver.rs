@@ -82,6 +82,8 @@ pub(in crate::sim) struct Driver {
     pub(super) aside: Option<Box<Aside>>,
     /// The rules of the road that it was told to ignore.
     pub ignores: IgnoredRules,
+    /// Whether it is an emergency vehicle under way: it passes lights and signs, and all others wait for it.
+    pub has_siren: bool,
     pub(super) last_change: Option<Side>,
     /// In reverse order: the next manoeuvre is last.
     pub(super) plan: Vec<PlannedChange>,
@@ -130,6 +132,7 @@ impl Driver {
             change: None,
             aside: None,
             ignores: IgnoredRules::default(),
+            has_siren: false,
             last_change: None,
             plan,
             lane_changes: Vec::new(),
@@ -325,6 +328,9 @@ impl Driver {
         // Nothing is fed for one that ignores nothing, as before it could.
         if !self.ignores.is_empty() {
             trace.word(u64::from(self.ignores.bits()));
+        }
+        if self.has_siren {
+            trace.word(1);
         }
         trace.word(self.last_change.map_or(0, |side| side as u64 + 1));
         trace.words([self.plan.len() as u64, u64::from(self.draws)]);

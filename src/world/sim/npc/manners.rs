@@ -116,9 +116,14 @@ fn waits(own: &Passage, other: &Passage, goes_first: bool, impatient: bool) -> b
 }
 
 impl Driver {
+    /// Whether it stops neither at lights nor at signs.
+    pub(super) fn passes_signals(&self) -> bool {
+        self.has_siren || self.ignores.contains(TrafficRule::Signals)
+    }
+
     /// Station of the own way at which to wait now, m, if there is something to wait for.
     pub(super) fn find_hold_m(&self, view: &View) -> Option<f64> {
-        if self.ignores.contains(TrafficRule::RightOfWay) {
+        if self.has_siren || self.ignores.contains(TrafficRule::RightOfWay) {
             return None;
         }
         let length_m = view.size.length_m;
@@ -164,7 +169,8 @@ impl Driver {
                 return false;
             }
             let other = driver.passage_through(area, body, around);
-            other.is_some_and(|other| waits(&own, &other, area.goes_first, impatient))
+            let goes_first = area.goes_first && !driver.has_siren;
+            other.is_some_and(|other| waits(&own, &other, goes_first, impatient))
         });
         let for_ego = || {
             let other = ego_passage(area, around);

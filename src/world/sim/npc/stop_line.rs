@@ -6,7 +6,6 @@ use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
 use crate::sim::sense::SignalColour;
 use avastra_base::kinematics::STANDING_MPS;
-use avastra_lang::model::vocabulary::TrafficRule;
 
 use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, LOOK_AHEAD_M};
 
@@ -24,7 +23,7 @@ impl Driver {
         around: &Around,
         braking_mps2: f64,
     ) -> Option<f64> {
-        if self.ignores.contains(TrafficRule::Signals) {
+        if self.passes_signals() {
             return None;
         }
         let front_m = self.station_m + size.length_m / 2.0;
@@ -39,7 +38,7 @@ impl Driver {
 
     /// Gap from the front to the stop sign's line at which it still has to stop, m.
     pub(super) fn sign_gap_m(&self, size: &BodyParameters, braking_mps2: f64) -> Option<f64> {
-        if self.ignores.contains(TrafficRule::Signals) {
+        if self.passes_signals() {
             return None;
         }
         let front_m = self.station_m + size.length_m / 2.0;

@@ -105,7 +105,7 @@ fn approach_m(asked: &Asked, way: &Way, meeting_m: f64, arrival_s: f64) -> Resul
     let mut left_s = arrival_s;
     let mut passed_lines: Vec<(usize, f64)> = Vec::new();
     // Signs and lights at which it stops.
-    let minds_signals = !request.ignores.contains(TrafficRule::Signals);
+    let minds_signals = !request.siren && !request.ignores.contains(TrafficRule::Signals);
     let signs_m: &[f64] = if minds_signals { &way.stop_signs_m } else { &[] };
     let lines: &[StopLine] = if minds_signals { &way.stop_lines } else { &[] };
     while left_s > 1e-9 {

@@ -78,6 +78,7 @@ pub(super) fn place(
         return Err("that lane is for buses".into());
     }
     driver.begin_at(request.offset_m, request.ignores);
+    driver.has_siren = request.siren;
     check_way(around, &driver, &size)?;
     let moved = driver.moved(&size);
     Ok(Newcomers { asked: finish(&asked, Motion::Drive(driver), moved)?, cover: None })
