@@ -40,21 +40,38 @@ impl Heights {
     pub(super) fn sampled(length_m: f64, height_m: impl Fn(f64) -> f64) -> Heights {
         let steps = (length_m / STEP_M).ceil().max(1.0);
         let at = |step: u32| length_m * f64::from(step) / steps;
-        let all: Vec<_> = (0..=steps as u32).map(|step| (at(step), height_m(at(step)))).collect();
-        let is_level = all.iter().all(|(_, height_m)| *height_m == all[0].1);
-        Heights(if is_level { vec![all[0], all[all.len() - 1]] } else { all })
+        Heights::of((0..=steps as u32).map(|step| (at(step), height_m(at(step)))))
+    }
+
+    /// Most roads are level: one height says all of them. Everything that drives asks for its own in every tick.
+    fn of(all: impl Iterator<Item = (f64, f64)>) -> Heights {
+        let mut all: Vec<(f64, f64)> = all.collect();
+        if all.iter().all(|(_, height_m)| *height_m == all[0].1) {
+            all.truncate(1);
+        }
+        Heights(all)
     }
 
     /// The heights along lanes that follow each other, each with the station at which it begins.
     pub fn chained<'a>(lanes: impl Iterator<Item = (f64, &'a Lane)>) -> Heights {
         let of_lane = |(from_m, lane): (f64, &'a Lane)| {
-            lane.heights.0.iter().map(move |(station_m, height_m)| (from_m + station_m, *height_m))
+            let heights = &lane.heights.0;
+            // A level lane is level up to its end.
+            let level = match heights[..] {
+                [(_, level_m)] => Some((lane.centre.length_m(), level_m)),
+                _ => None,
+            };
+            let all = heights.iter().copied().chain(level);
+            all.map(move |(station_m, height_m)| (from_m + station_m, height_m))
         };
-        Heights(lanes.flat_map(of_lane).collect())
+        Heights::of(lanes.flat_map(of_lane))
     }
 
     /// Height at a station, clamped to the ends, m.
     pub fn at(&self, station_m: f64) -> f64 {
+        if let [(_, level_m)] = self.0[..] {
+            return level_m;
+        }
         let after = self.0.partition_point(|(at_m, _)| *at_m <= station_m);
         match (self.0.get(after.wrapping_sub(1)), self.0.get(after)) {
             (Some((from_m, from)), Some((to_m, to))) => {

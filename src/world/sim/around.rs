@@ -155,7 +155,7 @@ impl Around<'_> {
         size.deceleration_mps2_max.min(self.grip.friction(speed_mps) * GRAVITY_MPS2)
     }
 
-    fn ego(&self) -> Other<'_> {
+    pub(super) fn ego(&self) -> Other<'_> {
         Other {
             outline: self.ego_outline,
             forward: self.ego_forward,

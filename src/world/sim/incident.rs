@@ -49,7 +49,6 @@ pub(super) fn bump(users: &[RoadUser], index: usize, end: &Pose, tick: u64) -> O
         return None;
     }
     let sweep = Sweep { start: *outline, end: *end };
-    let own = Frame::along(outline, this.forward);
     // No corner moves farther than `most_m`.
     let radius_m = outline.half_length_m + outline.half_width_m;
     let turn_rad = wrap_angle(end.heading_rad - outline.pose.heading_rad);
@@ -63,7 +62,9 @@ pub(super) fn bump(users: &[RoadUser], index: usize, end: &Pose, tick: u64) -> O
         if other == index || is_far || is_apart(this.elevation_m, obstacle.elevation_m) {
             continue;
         }
-        if own.is_apart(&Frame::along(&obstacle.outline, obstacle.forward), most_m + CLOSE_M) {
+        let (own, its) =
+            (Frame::along(outline, this.forward), Frame::along(&obstacle.outline, obstacle.forward));
+        if own.is_apart(&its, most_m + CLOSE_M) {
             continue;
         }
         let still = Sweep { start: obstacle.outline, end: obstacle.outline.pose };

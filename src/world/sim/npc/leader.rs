@@ -88,13 +88,12 @@ impl Driver {
     }
 
     /// All others that it minds. The ego vehicle is the first of all.
+    #[inline]
     pub(super) fn minded<'a>(&self, around: &'a Around) -> impl Iterator<Item = Other<'a>> {
-        let minds_ego = !self.ignores.contains(TrafficRule::Ego);
-        let most = match self.ignores.contains(TrafficRule::Others) {
-            true => usize::from(minds_ego),
-            false => usize::MAX,
-        };
-        around.others().skip(usize::from(!minds_ego)).take(most)
+        let minds = |rule: TrafficRule| !self.ignores.contains(rule);
+        let (minds_ego, minds_others) = (minds(TrafficRule::Ego), minds(TrafficRule::Others));
+        let ego = minds_ego.then(|| around.ego()).into_iter();
+        ego.chain(around.obstacles().take_while(move |_| minds_others).map(Other::from))
     }
 
     /// Whether a lane change under way leads past a road user that stands in the lane that it leaves: when the front reaches
