@@ -136,6 +136,14 @@ pub struct World {
     incidents: Vec<Incident>,
 }
 
+/// The ego vehicle in a tick, before any contact.
+struct EgoTick {
+    party: Party,
+    speed_mps: f64,
+    /// Farthest that any point of it moves, m.
+    most_m: f64,
+}
+
 impl World {
     /// The beginning of an episode: the ego vehicle rolls with its rear axle on the start of
     /// the route; beside ambient traffic, if asked for, nothing else is there.
@@ -198,12 +206,12 @@ impl World {
             sweep: Sweep { start, end: self.ego.outline.pose },
             velocity_mps: self.ego.velocity_mps(),
         };
-        let ego_mps = self.ego.motion.speed_mps;
+        let ego = EgoTick { most_m: ego.sweep.most_m(), party: ego, speed_mps: self.ego.motion.speed_mps };
         // Taken out for the tick, so that each can move while it looks at the others and at the world.
         let mut users = core::mem::take(&mut self.users);
         let mut index = 0;
         while index < users.len() {
-            if self.tick_user(index, &mut users, &ego, ego_mps) {
+            if self.tick_user(index, &mut users, &ego) {
                 index += 1;
             } else {
                 users.remove(index);
@@ -510,8 +518,7 @@ impl World {
     }
 
     /// Moves one road user and finds what it touches; `false` if it left.
-    /// `ego_mps` is the ego vehicle's speed before any contact of this tick.
-    fn tick_user(&mut self, index: usize, users: &mut [RoadUser], ego: &Party, ego_mps: f64) -> bool {
+    fn tick_user(&mut self, index: usize, users: &mut [RoadUser], ego: &EgoTick) -> bool {
         let (earlier, rest) = users.split_at_mut(index);
         let (user, later) = rest.split_first_mut().expect("the index is that of a user");
         let before = user.obstacle;
@@ -541,12 +548,12 @@ impl World {
             return true;
         }
         let sweep = mover.sweep(before.outline, moved.pose);
-        if before.distance_m > ego.sweep.most_m() + sweep.most_m() + NEAR_M {
+        if before.distance_m > ego.most_m + sweep.most_m() + NEAR_M {
             // The gap is wider than both together can close it in a tick.
             return true;
         }
         let other = Party { sweep, velocity_mps: moved.velocity_mps };
-        if let Some((contact, normal)) = meet(ego, ego_mps, &other, before.id, self.ticks) {
+        if let Some((contact, normal)) = meet(&ego.party, ego.speed_mps, &other, before.id, self.ticks) {
             let around = self.around([&[], &[]]);
             let priority = if mover.has_crashed() {
                 mover.rights.at_contact_with_wreck(obstacle)
@@ -555,7 +562,7 @@ impl World {
             };
             // If two impacts happen in one tick, the second acts on the speed that is left after the first.
             let now_mps = self.ego.velocity_mps();
-            let lost_mps = (ego.velocity_mps - now_mps).dot(&normal);
+            let lost_mps = (ego.party.velocity_mps - now_mps).dot(&normal);
             let closing_mps = (contact.closing_speed_mps - lost_mps).max(0.0);
             let this = (VehicleParameters::MKZ.mass_t, now_mps);
             let that = (mover.size.mass_t, moved.velocity_mps);

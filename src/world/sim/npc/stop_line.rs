@@ -28,31 +28,32 @@ impl Driver {
         }
         let front_m = self.station_m + size.length_m / 2.0;
         let line = self.way.stop_lines.iter().find(|line| line.station_m > front_m)?;
-        let braking_mps2 = match around.signals.colour(&around.scene.map, line.signal, around.tick) {
-            SignalColour::Green => return None,
-            SignalColour::Yellow => YELLOW_BRAKING_MPS2,
-            SignalColour::Red => braking_mps2,
-        };
-        self.stops_within_m(line.station_m - front_m, braking_mps2)
+        let colour = || around.signals.colour(&around.scene.map, line.signal, around.tick);
+        self.stops_within_m(line.station_m - front_m, || match colour() {
+            SignalColour::Green => None,
+            SignalColour::Yellow => Some(YELLOW_BRAKING_MPS2),
+            SignalColour::Red => Some(braking_mps2),
+        })
     }
 
     /// Gap from the front to the stop sign's line at which it still has to stop, m.
     pub(super) fn sign_gap_m(&self, size: &BodyParameters, braking_mps2: f64) -> Option<f64> {
-        if self.passes_signals() {
+        if self.way.stop_signs_m.is_empty() || self.passes_signals() {
             return None;
         }
         let front_m = self.station_m + size.length_m / 2.0;
         let from_m = front_m.max(self.stopped_to_m);
         let line_m = *self.way.stop_signs_m.iter().find(|line_m| **line_m > from_m)?;
-        self.stops_within_m(line_m - front_m, braking_mps2)
+        self.stops_within_m(line_m - front_m, || Some(braking_mps2))
     }
 
     /// The gap to a line, if the driver looks as far ahead and can stop before the line. A driver that can no longer
-    /// stop passes the line: it does not stop behind it either.
-    fn stops_within_m(&self, gap_m: f64, braking_mps2: f64) -> Option<f64> {
+    /// stop passes the line: it does not stop behind it either. `braking_mps2` is asked for a line that matters alone, and is
+    /// `None` if it may be passed.
+    fn stops_within_m(&self, gap_m: f64, braking_mps2: impl FnOnce() -> Option<f64>) -> Option<f64> {
         let energy_m2ps2 = self.speed_mps * self.speed_mps / 2.0;
         let matters = gap_m <= LOOK_AHEAD_M + energy_m2ps2 / COMFORT_MPS2;
-        (matters && gap_m * braking_mps2 > energy_m2ps2).then_some(gap_m)
+        (matters && gap_m * braking_mps2()? > energy_m2ps2).then_some(gap_m)
     }
 
     /// Notes that it stands at the line of a stop sign.
