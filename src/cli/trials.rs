@@ -34,7 +34,7 @@ pub fn trials(output: &Output, arguments: &TableArguments, table: ActionTable) -
     if let Some(path) = given.profile {
         ads = ads.with_profile(load::profile(path)?).expect("the default driving system has settings");
     }
-    let arena = Arena::new(table, &roads, ads, &[], &[])?;
+    let arena = Arena::new(table, &roads, ads, &arguments.why.with, &arguments.why.without)?;
     let settings = TrialSettings { drives: DRIVES, tries: wanted.tries, seed: wanted.seed };
     let trials = Trials::new(&arena, settings);
     let progress = Pieces::new(output, "rows on roads", arena.roads() * arena.table().rows().len());
@@ -46,7 +46,9 @@ pub fn trials(output: &Output, arguments: &TableArguments, table: ActionTable) -
         }
     }
     output.say(report::trials(&cells).trim_end());
-    output.tell("each row was tried alone: the roads held no other traffic");
+    let has_before = cells.iter().any(|cell| cell.after.is_some());
+    let but = if has_before { ", but for who must be there" } else { "" };
+    output.tell(&format!("each row was tried alone{but}: the roads held no other traffic"));
     output.result(TableResult { table: arena.table().file(), trials: Some(settings), cells: Some(cells) });
     Ok(())
 }
@@ -72,8 +74,8 @@ fn emit_sample(
         space_path: &load::relative(directory, &arguments.file)?,
         episode: 0,
         agent: "trial",
-        without: &[],
-        with: &[],
+        without: &arguments.why.without,
+        with: &arguments.why.with,
     };
     let fate = sample.failure.as_deref().unwrap_or("it does what the row says");
     let headline = format!("{} in step {}: {fate}.", cell.label, sample.step);

@@ -14,6 +14,8 @@
 //! | walk | it appears beside the route on the asked side and walks over the route's path |
 //! | stand | it stands on the route's path |
 //!
+//! Somebody who is ordered gets to the speed, the lane and the place that it was told, or does all phases of its manoeuvre.
+//!
 //! A vehicle with a manoeuvre does all of its phases; where these lead it is theirs to say. Without one,
 //! a vehicle that is to keep its lane does not change it; a vehicle that is to change it does so once.
 //! An overtaker in the ego vehicle's own lane changes it once to get past, and comes back: it must if it is
@@ -53,6 +55,24 @@ pub(super) fn horizon_s(has_manoeuvre: bool) -> f64 {
     if has_manoeuvre { MANOEUVRE_S } else { HORIZON_S }
 }
 
+/// Whether it did what an order says: its phases, or all that it was told.
+pub(super) fn obeys(phases: Option<usize>, seen: &Sighting) -> Result<(), String> {
+    match phases {
+        Some(phases) => does_phases(phases, seen),
+        None if seen.has_done => Ok(()),
+        None => Err(ended(seen, "it had done what it was told")),
+    }
+}
+
+fn does_phases(phases: usize, seen: &Sighting) -> Result<(), String> {
+    let (begun, over) = (seen.phases.0 as usize, seen.phases.1 as usize);
+    match () {
+        () if over == phases || begun == phases && seen.ending == Ending::TouchedEgo => Ok(()),
+        () if begun > over => Err(ended(seen, &format!("phase {begun} of {phases} had ended"))),
+        () => Err(ended(seen, &format!("phase {} of {phases} had begun", begun + 1))),
+    }
+}
+
 /// Whether it did what its verb says, or the phases of its manoeuvre, if it has one; if not, what was wrong, in words.
 pub(super) fn verdict(
     scene: &Scene,
@@ -65,12 +85,7 @@ pub(super) fn verdict(
         if request.verb == Verb::DriveAhead {
             appears_ahead(scene, request, first)?;
         }
-        let (begun, over) = (seen.phases.0 as usize, seen.phases.1 as usize);
-        return match () {
-            () if over == phases || begun == phases && seen.ending == Ending::TouchedEgo => Ok(()),
-            () if begun > over => Err(ended(seen, &format!("phase {begun} of {phases} had ended"))),
-            () => Err(ended(seen, &format!("phase {} of {phases} had begun", begun + 1))),
-        };
+        return does_phases(phases, seen);
     }
     let drives = || seen.frames.iter().try_for_each(|frame| stays_on_road(scene, frame));
     let asked = usize::from(request.then == Then::Change);

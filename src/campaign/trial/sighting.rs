@@ -2,6 +2,7 @@
 
 use avastra_base::geometry::{OrientedBox, Vec2};
 use avastra_drivers::Ads;
+use avastra_lang::model::command::Command;
 use avastra_road::LaneIndex;
 use avastra_world::sim::{Contact, DT_S, FRAME_TICKS, Scene, Sensed, World};
 
@@ -51,6 +52,8 @@ pub(super) struct Sighting {
     pub ending: Ending,
     /// How many phases of its manoeuvre began, and ended.
     pub phases: (u32, u32),
+    /// Whether it has done what it was told.
+    pub has_done: bool,
 }
 
 /// Lets time pass for up to `horizon_s` and watches the road user of an id; `None` if there is none.
@@ -59,6 +62,7 @@ pub(super) fn watch(
     ads: &mut dyn Ads,
     sensed: &mut Sensed,
     id: u32,
+    told: Option<&Command>,
     horizon_s: f64,
 ) -> Option<Sighting> {
     let scene = world.scene().clone();
@@ -66,6 +70,7 @@ pub(super) fn watch(
     let drives = world.obstacle(id)?.body.is_vehicle();
     let mut frames = vec![frame(&scene, &world, id, begin_s)?];
     let mut phases = (0, 0);
+    let mut has_done = false;
     let ending = loop {
         if world.time_s() - begin_s >= horizon_s - DT_S / 2.0 {
             break Ending::TimeOver;
@@ -73,6 +78,7 @@ pub(super) fn watch(
         world.sense(sensed);
         let control = ads.drive(sensed);
         phases = world.phases(id).max(phases);
+        has_done |= told.is_some_and(|told| world.has_done(id, told));
         let touched = world.tick(&control).iter().any(|contact: &Contact| contact.obstacle == id);
         let bumped =
             world.incidents().iter().any(|incident| [incident.obstacle, incident.other].contains(&id));
@@ -97,7 +103,7 @@ pub(super) fn watch(
         }
     };
     let phases = world.phases(id).max(phases);
-    Some(Sighting { frames, ending, phases })
+    Some(Sighting { frames, ending, phases, has_done })
 }
 
 /// Whether a vehicle drove over the edge of the map between two frames. It goes on there while it is in sight, and

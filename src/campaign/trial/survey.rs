@@ -2,8 +2,10 @@
 //! On each road some drives go by without an action. At each of their steps every row is offered, as to an agent; this
 //! counts how often the row is legal, and which reasons refuse it otherwise. From some of the legal moments, spread
 //! over all of them, the row is carried out and what happens is judged. So a row on a road is realised, or not realised
-//! (with the reason), or masked (with the reasons).
+//! (with the reason), or masked (with the reasons). A row about somebody who must be there is offered after the first row
+//! that makes that one appear.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use crate::episode;
@@ -11,9 +13,9 @@ use crate::episode::{Choice, EpisodeLog};
 use avastra_base::rng;
 use avastra_base::rng::Stream;
 use avastra_drivers::Ads;
-use avastra_lang::model::Row;
 use avastra_lang::model::vocabulary::Phenomenon;
-use avastra_world::action::{Count, Draw, Effect, Offer};
+use avastra_lang::model::{EffectDef, Row};
+use avastra_world::action::{ActionTable, Count, Draw, Effect, Offer};
 use avastra_world::sim::{Sensed, World};
 
 use crate::run::Arena;
@@ -49,6 +51,8 @@ pub struct Cell {
     pub row: usize,
     pub label: String,
     pub road: String,
+    /// The action that was carried out before, because this row is about somebody that it makes appear.
+    pub after: Option<String>,
     pub outcome: Outcome,
     /// Moments at which it was offered, and those of them at which it was legal.
     pub moments: usize,
@@ -117,14 +121,37 @@ impl<'a> Trials<'a> {
 
     /// The cells of the nth road of the arena, by row.
     fn road(&self, road: usize, judged: &(dyn Fn() + Sync)) -> Vec<Cell> {
-        let moments = self.moments(road);
+        let mut moments: BTreeMap<Vec<usize>, Vec<Moment>> = BTreeMap::new();
         let rows = self.arena.table().rows();
         let judge = |row: &Row| {
-            let cell = self.cell(road, row.index, &moments);
+            let before = self.rows_before(row);
+            let moments = moments.entry(before).or_insert_with_key(|before| self.moments(road, before));
+            let cell = self.cell(road, row.index, moments);
             judged();
             cell
         };
         rows.iter().map(judge).collect()
+    }
+
+    /// The rows that make somebody appear about whom this row is: whom it orders, or about whom its rules ask. None if there
+    /// is no such road user, or the row makes them appear itself.
+    fn rows_before(&self, row: &Row) -> Vec<usize> {
+        let space = self.arena.table().space();
+        let names = |row: &Row| {
+            let spawns = space.actions[row.action].effects.iter().filter_map(|effect| match effect {
+                EffectDef::Spawn(spawn) => spawn.bearer,
+                EffectDef::Set(_) | EffectDef::Order(_) => None,
+            });
+            spawns.collect::<BTreeSet<usize>>()
+        };
+        let ordered = space.actions[row.action].effects.iter().filter_map(|effect| match effect {
+            EffectDef::Order(order) => Some(order.bearer),
+            EffectDef::Set(_) | EffectDef::Spawn(_) => None,
+        });
+        let asked = space.clauses[row.action].iter().flat_map(|clause| clause.bearers.iter().copied());
+        let own = names(row);
+        let Some(about) = ordered.chain(asked).find(|who| !own.contains(who)) else { return Vec::new() };
+        space.rows.iter().filter(|row| names(row).contains(&about)).map(|row| row.index).collect()
     }
 
     /// A try again, as an episode that ends when the judge has seen enough.
@@ -135,32 +162,34 @@ impl<'a> Trials<'a> {
         let action = &space.actions[space.rows[row].action];
         let seen_s = judge::horizon_s(action.manoeuvres().next().is_some());
         let steps = (seen_s / space.episode.step_s).ceil() as usize;
+        let mut before = self.rows_before(&space.rows[row]);
         let mut choose = |moment: &episode::Moment| {
             if moment.step >= sample.step + steps {
                 return Choice::Stop;
             }
             if moment.step != sample.step {
-                return Choice::Pass;
+                return carry_out_once(table, &mut before, moment);
             }
             Choice::of(row, table.offer(moment.situation, row))
         };
         episode::run(&setup, &mut choose, &mut |_, _, _| {})
     }
 
-    fn moments(&self, road: usize) -> Vec<Moment> {
+    /// The moments of undisturbed drives; those after one of these rows was carried out, if there are any.
+    fn moments(&self, road: usize, before: &[usize]) -> Vec<Moment> {
         let table = self.arena.table();
         let mut moments = Vec::new();
         for drive in 0..u64::from(self.settings.drives) {
             let seed = rng::child_seed(self.settings.seed, Stream::Episode, drive);
             let setup = self.arena.setup(road, seed);
             let step_ticks = (table.space().episode.step_s / avastra_world::sim::DT_S).round() as u64;
-            let mut offered = Vec::new();
+            let (mut offered, mut open) = (Vec::new(), before.to_vec());
             let mut snapshots: Vec<(World, Box<dyn Ads>)> = Vec::new();
             let log = episode::run(
                 &setup,
                 &mut |moment| {
-                    offered.push(table.offers(moment.situation));
-                    Choice::Pass
+                    offered.push(open.is_empty().then(|| table.offers(moment.situation)));
+                    carry_out_once(table, &mut open, moment)
                 },
                 &mut |world, ads, _| {
                     if world.ticks().is_multiple_of(step_ticks) {
@@ -170,12 +199,8 @@ impl<'a> Trials<'a> {
             );
             debug_assert!(snapshots.len() >= log.steps.len());
             let at_steps = snapshots.into_iter().zip(offered).enumerate();
-            moments.extend(at_steps.map(|(step, ((world, ads), offers))| Moment {
-                seed,
-                step,
-                world,
-                ads,
-                offers,
+            moments.extend(at_steps.filter_map(|(step, ((world, ads), offers))| {
+                Some(Moment { seed, step, world, ads, offers: offers? })
             }));
         }
         moments
@@ -208,6 +233,10 @@ impl<'a> Trials<'a> {
             row,
             label: table.rows()[row].label.clone(),
             road: self.arena.road(road).name.clone(),
+            after: self.rows_before(&table.rows()[row]).first().map(|row| {
+                let space = table.space();
+                space.actions[space.rows[*row].action].name.clone()
+            }),
             outcome: match (tries, realised) {
                 (0, _) => Outcome::Masked,
                 (_, 0) => Outcome::NotRealised,
@@ -227,6 +256,18 @@ impl<'a> Trials<'a> {
     }
 }
 
+/// Carries out the first of these rows that is legal, as soon as one is, and then lets time pass.
+fn carry_out_once(table: &ActionTable, open: &mut Vec<usize>, moment: &episode::Moment) -> Choice {
+    let legal = open.iter().find_map(|row| table.offer(moment.situation, *row).ok());
+    match legal {
+        Some(draw) => {
+            open.clear();
+            Choice::Act(draw)
+        }
+        None => Choice::Pass,
+    }
+}
+
 /// Carries a draw out and judges everything that it does.
 fn attempt(moment: &Moment, draw: &Draw) -> Try {
     let mut world = moment.world.clone();
@@ -241,20 +282,34 @@ fn attempt(moment: &Moment, draw: &Draw) -> Try {
     };
     found.failure = unmet(&world, &draw.effects);
     let scene = Arc::clone(world.scene());
-    for (nth, id) in newcomers {
-        let Effect::Spawn(request) = &draw.effects[nth] else { continue };
-        found.unfair = found.unfair.or_else(|| fairness::complaint(&world, request, id));
+    let ordered = draw.effects.iter().enumerate().filter_map(|(nth, effect)| match effect {
+        Effect::Order(order) => Some((nth, world.bearer_id(order.bearer)?)),
+        Effect::Time(_) | Effect::Sky(..) | Effect::Spawn(_) => None,
+    });
+    for (nth, id) in newcomers.into_iter().chain(ordered) {
+        let (request, told) = match &draw.effects[nth] {
+            Effect::Spawn(request) => (Some(request), None),
+            Effect::Order(order) => (None, Some(&order.command)),
+            Effect::Time(_) | Effect::Sky(..) => continue,
+        };
+        let complaint = || request.and_then(|request| fairness::complaint(&world, request, id));
+        found.unfair = found.unfair.or_else(complaint);
         let mut ads = moment.ads.clone();
         let mut sensed: Sensed = world.sensed();
         let phases = draw.course(nth).map(|course| course.phases());
         let horizon_s = judge::horizon_s(phases.is_some());
-        let Some(seen) = sighting::watch(world.clone(), ads.as_mut(), &mut sensed, id, horizon_s) else {
+        let Some(seen) = sighting::watch(world.clone(), ads.as_mut(), &mut sensed, id, told, horizon_s)
+        else {
             found.failure = Some("it is gone at once".to_owned());
             continue;
         };
         let nearest_m = seen.frames.iter().map(|frame| frame.gap_m).fold(f64::INFINITY, f64::min);
         found.nearest_m = Some(found.nearest_m.map_or(nearest_m, |other| other.min(nearest_m)));
-        if let Err(why) = judge::verdict(&scene, request, phases, &seen) {
+        let verdict = match request {
+            Some(request) => judge::verdict(&scene, request, phases, &seen),
+            None => judge::obeys(phases, &seen),
+        };
+        if let Err(why) = verdict {
             found.failure.get_or_insert(why);
         }
     }

@@ -51,7 +51,7 @@ pub struct TableArguments {
     #[arg(long, conflicts_with_all = ["road", "try", "row"])]
     pub markdown: bool,
     /// Carry every row out on the road, or on all of them, without other traffic, and judge whether it does what it says.
-    #[arg(long, conflicts_with = "row")]
+    #[arg(long, group = "asked", conflicts_with = "row")]
     pub r#try: bool,
     #[command(flatten)]
     pub trials: TrialArguments,
@@ -80,16 +80,16 @@ pub struct TrialArguments {
 pub struct WhyArguments {
     /// Only the row of this number: whether it is legal at the start of the road (the first of the space if none is named), and
     /// which rule says no.
-    #[arg(long)]
+    #[arg(long, group = "asked")]
     pub row: Option<usize>,
     /// States at that moment, for example `time: Night, sky: { Rain: High }`.
-    #[arg(long, requires = "row")]
+    #[arg(long, requires = "row", conflicts_with = "try")]
     pub state: Option<String>,
-    /// Switch a rule off at that moment; may be given several times.
-    #[arg(long, requires = "row", value_name = "RULE")]
+    /// With `--row` or `--try`: switch a rule off; may be given several times.
+    #[arg(long, requires = "asked", value_name = "RULE")]
     pub without: Vec<String>,
-    /// Switch an optional rule on.
-    #[arg(long, requires = "row", value_name = "RULE")]
+    /// With `--row` or `--try`: switch an optional rule on.
+    #[arg(long, requires = "asked", value_name = "RULE")]
     pub with: Vec<String>,
 }
 

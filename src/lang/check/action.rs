@@ -133,14 +133,14 @@ impl Checker {
             let error = Diagnostic::error(code::NO_EFFECT, message).at(declared.name.span, "does nothing");
             self.report(error.help("give it a `set` or a `spawn`, or remove it"));
         }
-        let effects: Vec<Option<EffectDef>> =
+        let effects: Vec<Option<Vec<EffectDef>>> =
             declared.effects.iter().map(|effect| self.effect(effect, &place)).collect();
         let is_whole = effects.iter().all(Option::is_some);
         let action = ActionDef {
             name: declared.name.text.clone(),
             docs: docs(item),
             parameters,
-            effects: effects.into_iter().flatten().collect(),
+            effects: effects.into_iter().flatten().flatten().collect(),
             // Until `odds actions` says otherwise.
             odds: even_odds(),
             span: declared.name.span,
@@ -294,7 +294,8 @@ impl Checker {
         }
     }
 
-    fn effect(&mut self, effect: &ast::Effect, place: &Place<'_>) -> Option<EffectDef> {
+    /// What an effect does; several things if it is a row of road users.
+    fn effect(&mut self, effect: &ast::Effect, place: &Place<'_>) -> Option<Vec<EffectDef>> {
         match &effect.kind {
             ast::EffectKind::Set { state, key, value } => {
                 let Some(index) = self.state_named(state) else {
@@ -317,26 +318,62 @@ impl Checker {
                     return None;
                 };
                 let value = self.typed(value, place, ty)?;
-                Some(EffectDef::Set(Box::new(SetDef { state: index, key, value, span: effect.span })))
+                Some(vec![EffectDef::Set(Box::new(SetDef { state: index, key, value, span: effect.span }))])
             }
             ast::EffectKind::Order { who, fields } => {
                 let order = self.order(who, fields, place, effect.span)?;
-                Some(EffectDef::Order(Box::new(order)))
+                Some(vec![EffectDef::Order(Box::new(order))])
             }
-            ast::EffectKind::Spawn { body, bearer, place: side, distance, cover, fields } => {
+            ast::EffectKind::Spawn { body, bearers, place: side, distance, apart, cover, fields } => {
                 let behind = *side == ast::Place::Behind;
                 let cover = cover.as_ref().map(|cover| self.body_word(cover, place));
+                let apart = apart.as_ref().map(|apart| self.apart(apart, bearers, place));
                 let spawn = self.spawn(body, behind, distance, fields, place, effect.span)?;
                 let cover = match cover {
                     Some(cover) => Some(cover?),
                     None => None,
                 };
                 self.check_cover(cover.as_ref(), &spawn.verb, effect.span);
-                let bearer =
-                    bearer.as_ref().and_then(|name| self.bearers.iter().position(|one| *one == name.text));
-                Some(EffectDef::Spawn(Box::new(SpawnDef { cover, bearer, ..spawn })))
+                let spawn = SpawnDef { cover, ..spawn };
+                let bearer = |name: &ast::Name| self.bearers.iter().position(|one| *one == name.text);
+                let one = |spawn: SpawnDef| EffectDef::Spawn(Box::new(spawn));
+                match (apart, bearers.as_slice()) {
+                    (None, []) => Some(vec![one(spawn)]),
+                    (None, [name]) => Some(vec![one(SpawnDef { bearer: bearer(name), ..spawn })]),
+                    (None, [_, second, ..]) => {
+                        let error = Diagnostic::error(
+                            code::MISSING_FIELD,
+                            "the row does not say how far apart it is",
+                        );
+                        self.reject(
+                            error.at(second.span, "another one").help(
+                                "write the gap between them after the distance: `ahead 50 m apart 15 m`",
+                            ),
+                        )
+                    }
+                    (Some(apart), names) => {
+                        let apart = apart?;
+                        let nth = |(nth, name)| {
+                            let row = (nth > 0).then(|| (nth, apart.clone()));
+                            one(SpawnDef { bearer: bearer(name), row, ..spawn.clone() })
+                        };
+                        Some(names.iter().enumerate().map(nth).collect())
+                    }
+                }
             }
         }
+    }
+
+    /// The gap between the road users of a row, which are named.
+    fn apart(&mut self, apart: &ast::Expr, names: &[ast::Name], place: &Place<'_>) -> Option<Expr> {
+        let found = self.typed(apart, place, Type::Quantity(Dimension::LENGTH));
+        self.once("road user", names.iter());
+        if names.len() < 2 {
+            let error = Diagnostic::error(code::NOT_HERE, "`apart` belongs to a row of several road users");
+            return self
+                .reject(error.at(apart.span, "there is only one").help("name them all: `as [last, first]`"));
+        }
+        found
     }
 
     fn spawn(
@@ -425,6 +462,7 @@ impl Checker {
             meet: meet?,
             siren: siren?,
             bearer: None,
+            row: None,
             manoeuvre,
             span,
         })
@@ -627,9 +665,10 @@ impl Checker {
             let owner = Symbol::Action(definition.name.clone());
             let place = Place { locals: &locals, owner: Some(&owner), states: true, ..Place::default() };
             for effect in &declared.effects {
-                let Some(effect) = self.effect(effect, &place) else { continue };
-                self.compiled += operations_of(&effect);
-                added.push((action, effect));
+                for effect in self.effect(effect, &place).into_iter().flatten() {
+                    self.compiled += operations_of(&effect);
+                    added.push((action, effect));
+                }
             }
             if self.compiled > COMPILED_MAX {
                 break;
@@ -648,7 +687,7 @@ impl Checker {
     /// The effects of every step.
     pub(super) fn sets(&mut self, effects: &[ast::Effect]) -> Vec<SetDef> {
         let place = Place { states: true, site: Site::StepBegins, ..Place::default() };
-        let found = effects.iter().filter_map(|effect| self.effect(effect, &place));
+        let found = effects.iter().filter_map(|effect| self.effect(effect, &place)).flatten();
         let sets = found.filter_map(|effect| match effect {
             EffectDef::Set(set) => Some(*set),
             EffectDef::Spawn(_) | EffectDef::Order(_) => None,

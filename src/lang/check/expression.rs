@@ -434,7 +434,7 @@ impl Checker {
         place: &Place<'_>,
         span: Span,
     ) -> Option<Expr> {
-        if !place.site.knows(Known::World) || matches!(place.site, Site::Change | Site::StepBegins) {
+        if !place.site.knows(Known::World) || place.site == Site::Change {
             let error = Diagnostic::error(code::NOT_HERE, "no road user is looked up here");
             let error = error.at(span, "about one that is there at a moment");
             return self.reject(error.help("ask for it in a rule, or in the `where` of a drawn parameter"));
@@ -751,8 +751,8 @@ pub(super) fn unknown_here(thing: &str, span: Span, site: Site) -> Diagnostic {
             error.at(span, "which road user?").help("name it by its number, as it appeared: `npc#1.gap`")
         }
         Site::StepBegins if thing == "npc" => error
-            .at(span, "no road user is looked up as a step begins")
-            .help("ask for `nearest` or `road_users`, or write a rule on actions"),
+            .at(span, "which road user?")
+            .help("give it a name where it is spawned, and ask for that: `truck.gap`"),
         Site::Axis => error
             .at(span, "the rows of the table are the same at every moment")
             .help("write a rule on the action, or draw the parameter with `any`"),

@@ -26,8 +26,11 @@ impl Checker {
     /// Notes the names that actions give to what they spawn. Phases, orders and rules may stand before them.
     pub(super) fn declare_bearers(&mut self, items: &[&ast::Item]) {
         let effects = each(items, ItemKind::as_action).flat_map(|(_, action)| &action.effects);
-        for effect in effects {
-            let ast::EffectKind::Spawn { bearer: Some(name), body, .. } = &effect.kind else { continue };
+        let named = effects.filter_map(|effect| match &effect.kind {
+            ast::EffectKind::Spawn { bearers, body, .. } => Some((bearers, body)),
+            ast::EffectKind::Set { .. } | ast::EffectKind::Order { .. } => None,
+        });
+        for (name, body) in named.flat_map(|(bearers, body)| bearers.iter().map(move |name| (name, body))) {
             if !matches!(&body.kind, ast::ExprKind::Name(body) if body == Body::Pedestrian.name()) {
                 self.drivers.insert(name.text.clone());
             }

@@ -409,8 +409,13 @@ impl References {
                 let is_axis = |p: &ast::ActionParam| p.mode == ParamMode::Each;
                 let parts = of.params.iter().map(|p| (Some(&p.name), parameter(&p.name), p.span, is_axis(p)));
                 self.declare(item, Symbol::Action, parts.collect());
-                for effect in &of.effects {
-                    let ast::EffectKind::Spawn { bearer: Some(name), .. } = &effect.kind else { continue };
+                let named = of.effects.iter().flat_map(|effect| match &effect.kind {
+                    ast::EffectKind::Spawn { bearers, .. } => {
+                        bearers.iter().map(|name| (effect, name)).collect()
+                    }
+                    ast::EffectKind::Set { .. } | ast::EffectKind::Order { .. } => Vec::new(),
+                });
+                for (effect, name) in named {
                     let declaration = Declaration {
                         span: effect.span,
                         docs: docs(item),

@@ -163,6 +163,11 @@ impl Space {
         self.each_step.iter().any(SetDef::asks_the_world)
     }
 
+    /// The named road users about which what every step does asks.
+    pub fn bearers_of_each_step(&self) -> impl Iterator<Item = usize> {
+        self.each_step.iter().flat_map(SetDef::parts).flat_map(Expr::bearers)
+    }
+
     /// The cells whose value the moment decides at which a step begins: those that are set by what asks about it, and
     /// those that are set from them.
     pub(crate) fn cells_of_the_moment(&self) -> BTreeSet<usize> {

@@ -330,6 +330,9 @@ pub struct SpawnDef {
     pub siren: Option<Expr>,
     /// The name that it bears from then on, by index in `Space::bearers`.
     pub bearer: Option<usize>,
+    /// Its place in a row of road users, from 0 nearest to the ego vehicle, and the gap between them, m; `None` for one
+    /// that is alone or the first.
+    pub row: Option<(usize, Expr)>,
     /// The manoeuvre that it begins when it appears.
     pub manoeuvre: Option<ManoeuvreCall>,
     pub span: Span,

@@ -60,6 +60,11 @@ fn errors(space: &Space, action: usize) -> impl Iterator<Item = Diagnostic> {
             Some(("distance", "a spawn", "m", &spawn.distance, SPAWN_DISTANCE_M)),
             spawn.offset.as_ref().map(|offset| ("offset", "a spawn", "m", offset, OFFSET_M)),
             spawn.meet.as_ref().map(|meet| ("meet", "a spawn", "", meet, MEET)),
+            spawn
+                .row
+                .as_ref()
+                .filter(|(nth, _)| *nth == 1)
+                .map(|(_, apart)| ("gap", "a row", "m", apart, SPAWN_DISTANCE_M)),
         ]
     });
     let of_spawns = of_spawns.flatten();

@@ -182,7 +182,7 @@ fn ignored_form(ignores: &[WordExpr<TrafficRule>], reduced: &impl Fn(&Expr) -> E
 
 fn spawn_form(spawn: &SpawnDef, reduced: &impl Fn(&Expr) -> Expr) -> String {
     format!(
-        "spawn {} {} {} {} {} {} {:?} {:?} {:?} {:?} {:?} {} {} {} {:?}",
+        "spawn {} {} {} {} {} {} {:?} {:?} {:?} {:?} {:?} {} {} {} {:?} {:?}",
         word_form(&spawn.body, reduced),
         word_form(&spawn.colour, reduced),
         word_form(&spawn.verb, reduced),
@@ -198,6 +198,7 @@ fn spawn_form(spawn: &SpawnDef, reduced: &impl Fn(&Expr) -> Expr) -> String {
         spawn.behind,
         spawn.cover.as_ref().map_or(String::new(), |cover| word_form(cover, reduced)),
         spawn.bearer,
+        spawn.row.as_ref().map(|(nth, apart)| (nth, reduced(apart).kind)),
     )
 }
 

@@ -337,12 +337,14 @@ pub enum EffectKind {
     Set { state: Name, key: Option<Expr>, value: Expr },
     /// `spawn vehicle ahead distance { speed: speed }`.
     /// With a `cover`: `spawn Pedestrian ahead distance from behind SUV { … }`.
-    /// With a name for its `bearer`: `spawn BoxTruck as truck ahead distance { … }`.
+    /// With a name for its bearer: `spawn BoxTruck as truck ahead distance { … }`; with several for a row:
+    /// `spawn BoxTruck as [last, first] ahead distance apart 15 m { … }`.
     Spawn {
         body: Expr,
-        bearer: Option<Name>,
+        bearers: Vec<Name>,
         place: Place,
         distance: Expr,
+        apart: Option<Box<Expr>>,
         cover: Option<Box<Expr>>,
         fields: Vec<Field>,
     },

@@ -289,12 +289,20 @@ impl Builder {
             EffectKind::Set { state, key, value: self.expression(parts.next())? }
         } else {
             let body = self.expression(parts.next())?;
-            let bearer = parts.take(Rule::bearer).map(|bearer| self.name(Parts::of(bearer).next()));
+            let bearers = parts.take(Rule::bearer).map_or_else(Vec::new, |bearer| {
+                let mut parts = Parts::of(bearer);
+                match parts.take(Rule::names) {
+                    Some(names) => self.names(names),
+                    None => vec![self.name(parts.next())],
+                }
+            });
             let place = match parts.next().as_rule() {
                 Rule::kw_ahead => Place::Ahead,
                 _ => Place::Behind,
             };
             let distance = self.expression(parts.next())?;
+            let apart = parts.take(Rule::apart).map(|apart| self.only_expression(apart).map(Box::new));
+            let apart = apart.transpose()?;
             let cover = parts.take(Rule::cover).map(|cover| {
                 let mut parts = Parts::of(cover);
                 parts.take(Rule::kw_behind);
@@ -302,7 +310,7 @@ impl Builder {
             });
             let cover = cover.transpose()?;
             let fields = self.fields(parts.next())?;
-            EffectKind::Spawn { body, bearer, place, distance, cover, fields }
+            EffectKind::Spawn { body, bearers, place, distance, apart, cover, fields }
         };
         Ok(Effect { kind, span })
     }

@@ -126,6 +126,7 @@ pub fn role(rule: Rule) -> Role {
         Rule::phase => Role::Said("a phase like `after 3 s { speed: 0 m/s }`"),
         Rule::kw_within | Rule::within_time => Role::Said("`within`"),
         Rule::kw_as | Rule::bearer => Role::Said("`as`"),
+        Rule::kw_apart | Rule::apart => Role::Said("`apart`"),
         Rule::kw_order => Role::Said("`order`"),
         Rule::kw_ahead => Role::Said("`ahead`"),
         Rule::kw_behind => Role::Said("`behind`"),

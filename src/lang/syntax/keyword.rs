@@ -54,6 +54,10 @@ pub const CLAUSES: &[Keyword] = &[
         "A name for what is spawned, by which orders find it: `spawn BoxTruck as truck ahead 40 m { … }`.",
     ),
     (
+        "apart",
+        "The gaps within a row of road users: `spawn BoxTruck as [last, first] ahead 40 m apart 15 m { … }`.",
+    ),
+    (
         "order",
         "Tells a named road user that is there what to do: `order truck { speed: 0 m/s, rate: 4 m/s^2 }`.",
     ),

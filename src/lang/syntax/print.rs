@@ -624,14 +624,22 @@ fn effect(effect: &Effect) -> Layout {
         EffectKind::Order { who, fields: entries } => {
             Layout::row([Layout::text(format!("order {} ", who.text)), fields(entries)])
         }
-        EffectKind::Spawn { body, bearer, place, distance, cover, fields: entries } => {
+        EffectKind::Spawn { body, bearers, place, distance, apart, cover, fields: entries } => {
             let place = match place {
                 Place::Ahead => " ahead ",
                 Place::Behind => " behind ",
             };
             let mut parts = vec![Layout::text("spawn "), expression(body)];
-            parts.extend(bearer.iter().map(|name| Layout::text(format!(" as {}", name.text))));
+            let names: Vec<&str> = bearers.iter().map(|name| name.text.as_str()).collect();
+            match names[..] {
+                [] => {}
+                [name] => parts.push(Layout::text(format!(" as {name}"))),
+                _ => parts.push(Layout::text(format!(" as [{}]", names.join(", ")))),
+            }
             parts.extend([Layout::text(place), expression(distance)]);
+            if let Some(apart) = apart {
+                parts.extend([Layout::text(" apart "), expression(apart)]);
+            }
             if let Some(cover) = cover {
                 parts.extend([Layout::text(" from behind "), expression(cover)]);
             }

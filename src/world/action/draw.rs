@@ -8,7 +8,7 @@ use crate::action::table::{Draw, Refusal, Situation};
 use crate::action::{Course, Effect, LaneChangeRules, OrderRequest, SpawnRequest};
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
-use avastra_lang::model::body::OwnBody;
+use avastra_lang::model::body::{OwnBody, parameters};
 use avastra_lang::model::command::{IgnoredRules, OFFSET_M};
 use avastra_lang::model::expr::Expr;
 use avastra_lang::model::rules::{
@@ -43,7 +43,10 @@ impl<'a> Judge<'a> {
         let row = RowRules { space, row, road: Some(&situation.road.facts), in_force: situation.rules };
         let in_force = |clause: &&Clause| clause.rule().is_none_or(|rule| situation.rules.contains(rule));
         let asked = || space.clauses[row.row.action].iter().filter(in_force);
-        let asks_who = |who: &usize| asked().any(|clause| clause.bearers.contains(who));
+        let asks_who = |who: &usize| {
+            asked().any(|clause| clause.bearers.contains(who))
+                || space.bearers_of_each_step().any(|asked| asked == *who)
+        };
         let facts = |who: usize| Some((who, situation.surroundings.bearer(who)?));
         let bearers = (0..space.bearers.len()).filter(asks_who).filter_map(facts).collect();
         let moment = match asked().any(|clause| clause.asks_the_world) || space.each_step_asks_the_world() {
@@ -274,6 +277,11 @@ impl<'a> Judge<'a> {
         };
         let body = spawn.body.word(functions, &facts);
         let cover = spawn.cover.as_ref().map(|cover| cover.word(functions, &facts));
+        // The bodies of a row are all of one kind.
+        let before_m = spawn.row.as_ref().map_or(0.0, |(nth, apart)| {
+            let shape = own(body).map_or_else(|| parameters(body.like), |own| own.shape);
+            *nth as f64 * (shape.length_m + evaluate(apart, functions, &facts).number())
+        });
         SpawnRequest {
             body: body.like,
             own: own(body),
@@ -284,7 +292,10 @@ impl<'a> Judge<'a> {
             side: spawn.side.word(functions, &facts),
             then: spawn.then.word(functions, &facts),
             speed_mps: rounded_into(evaluate(&spawn.speed, functions, &facts).number(), SPAWN_SPEED_MPS),
-            distance_m: rounded_into(evaluate(&spawn.distance, functions, &facts).number(), SPAWN_DISTANCE_M),
+            distance_m: rounded_into(
+                evaluate(&spawn.distance, functions, &facts).number() + before_m,
+                SPAWN_DISTANCE_M,
+            ),
             cover: cover.map(|cover| cover.like),
             offset_m: spawn
                 .offset

@@ -95,7 +95,8 @@ impl ActionTable {
         let Situation { memory, road, .. } = *situation;
         let space = &self.space;
         let asks = |action: &ActionDef| action.odds.asks_the_world();
-        let world = space.actions.iter().any(asks).then(|| world_facts(situation));
+        let bearers = || space.actions.iter().flat_map(|action| action.odds.bearers());
+        let world = space.actions.iter().any(asks).then(|| world_facts(situation, bearers()));
         let facts = Facts { road: Some(&road.facts), world: world.as_ref(), ..Facts::new(&[], memory) };
         let odds = |action: &ActionDef| evaluate(&action.odds, &space.functions, &facts).number() as u32;
         let of_actions: Vec<u32> = space.actions.iter().map(odds).collect();
@@ -125,7 +126,8 @@ impl ActionTable {
     /// What a step without an action does: to the world, and the memory after it.
     pub fn wait(&self, situation: &Situation<'_>) -> (Vec<Effect>, Memory) {
         let Situation { memory, road, rules, step, .. } = *situation;
-        let world = self.space.each_step_asks_the_world().then(|| world_facts(situation));
+        let bearers = || self.space.bearers_of_each_step();
+        let world = self.space.each_step_asks_the_world().then(|| world_facts(situation, bearers()));
         let after = self.space.memory_after_wait(memory, step, Some(&road.facts), world.as_ref(), rules);
         (Effect::of_change(&self.space, memory, &after), after)
     }
@@ -158,7 +160,9 @@ impl ActionTable {
     }
 }
 
-/// What can be asked about the moment at which a step begins.
-fn world_facts(situation: &Situation<'_>) -> WorldFacts {
-    WorldFacts { moment: situation.surroundings.moment(), step: situation.step, ..WorldFacts::default() }
+/// What can be asked about the moment at which a step begins, of named road users about these.
+fn world_facts(situation: &Situation<'_>, bearers: impl Iterator<Item = usize>) -> WorldFacts {
+    let Situation { surroundings, step, .. } = *situation;
+    let bearers = bearers.filter_map(|who| Some((who, surroundings.bearer(who)?))).collect();
+    WorldFacts { moment: surroundings.moment(), step, bearers, ..WorldFacts::default() }
 }

@@ -126,6 +126,14 @@ pub(super) struct Progress {
     pub is_aside: bool,
 }
 
+impl Progress {
+    /// Whether it has done what a command says.
+    pub fn meets(&self, command: &Command) -> bool {
+        command.speed_mps.is_none_or(|mps| has_speed(self.speed_mps, mps))
+            && (self.is_aside || !command.goes_aside())
+    }
+}
+
 /// What a tick does to a manoeuvre.
 pub(super) struct Advance {
     /// What is left of it.
@@ -167,11 +175,7 @@ impl Running {
                     (self.stage, self.since) = (Stage::UnderWay(command), tick);
                     return Advance { rest: Some(self), command: Some(command), ended };
                 }
-                Stage::UnderWay(command)
-                    if tick > self.since
-                        && command.speed_mps.is_none_or(|mps| has_speed(progress.speed_mps, mps))
-                        && (progress.is_aside || !command.goes_aside()) =>
-                {
+                Stage::UnderWay(command) if tick > self.since && progress.meets(&command) => {
                     self.phase += 1;
                     ended += 1;
                     (self.stage, self.since) = (Stage::Waiting, tick);
@@ -216,6 +220,17 @@ pub(super) enum Motion {
 }
 
 impl Motion {
+    /// How far it is with what it was told; `None` for who only stands.
+    pub fn progress(&self) -> Option<Progress> {
+        match self {
+            Motion::Drive(driver) => {
+                Some(Progress { speed_mps: driver.speed_mps, is_aside: driver.is_aside_as_told() })
+            }
+            Motion::Walk(walker) => Some(Progress { speed_mps: walker.pace_mps(), is_aside: true }),
+            Motion::Stand => None,
+        }
+    }
+
     /// From now on it does what it is told, as soon as it can.
     pub fn order(&mut self, command: &Command, tick: u64) {
         match self {

@@ -15,6 +15,7 @@ use avastra_base::geometry::{Frame, OrientedBox, Pose, Sweep, Vec2};
 use avastra_base::rng;
 use avastra_base::rng::Stream;
 use avastra_lang::model::body::BodyParameters;
+use avastra_lang::model::command::Command;
 use avastra_lang::model::vocabulary::{Level, TimeOfDay};
 use avastra_lang::model::{COMMANDED_MAX, Memory, NpcFacts, Road, Space, TICK_MS};
 use avastra_road::{RouteLaneChange, is_apart};
@@ -300,6 +301,19 @@ impl World {
     pub fn phases(&self, id: u32) -> (u32, u32) {
         let user = self.users.iter().find(|user| user.obstacle.id == id);
         user.map_or((0, 0), |user| (user.mover.phases_begun, user.mover.phases_ended))
+    }
+
+    /// Whether the road user with an id has done what a command says: it has the speed, and is in the lane and at the place
+    /// beside its middle.
+    pub fn has_done(&self, id: u32, command: &Command) -> bool {
+        let user = self.users.iter().find(|user| user.obstacle.id == id);
+        let progress = user.and_then(|user| user.mover.motion.progress());
+        progress.is_some_and(|progress| progress.meets(command))
+    }
+
+    /// The id of the latest bearer of a name, if one is there.
+    pub fn bearer_id(&self, who: usize) -> Option<u32> {
+        Some(self.users[self.bearer(who)?].obstacle.id)
     }
 
     /// What can be asked about the latest bearer of a name, if one is there.

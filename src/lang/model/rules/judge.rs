@@ -133,7 +133,10 @@ impl<'a> RowRules<'a> {
                     false => words,
                 }
             }
-            Breach::Condition { rule, condition } => self.figures(Some(rule), condition, candidate, None),
+            Breach::Condition { rule, condition } => {
+                let decisive = self.decisive(condition, self.facts(candidate));
+                self.figures(Some(rule), decisive, candidate, None)
+            }
             Breach::Spawn { rule, condition, spawn } => {
                 let facts = Facts { spawn: Some(spawn), ..self.facts(candidate) };
                 let decisive = self.decisive(condition, facts);
@@ -199,7 +202,7 @@ impl<'a> RowRules<'a> {
         })
     }
 
-    /// The parameters and the facts of the world that a broken condition names, with their values, and what was
+    /// The parameters, states and facts of the world that a broken condition names, with their values, and what was
     /// wanted: the first broken bound, or the right side of a comparison that bounds no single number.
     fn figures(
         self,
@@ -218,10 +221,27 @@ impl<'a> RowRules<'a> {
         }
         let facts = Facts { spawn, ..self.facts(candidate) };
         let value = |expr: &Expr| self.space.show(evaluate(expr, &self.space.functions, &facts), expr.ty);
+        // What was measured, to a thousandth of its unit.
+        let measured = |expr: &Expr| match evaluate(expr, &self.space.functions, &facts) {
+            Value::Number(number) => {
+                self.space.show(Value::Number((number * 1000.0).round() / 1000.0), expr.ty)
+            }
+            other => self.space.show(other, expr.ty),
+        };
+        let is_known = |expr: &Expr| evaluate(expr, &self.space.functions, &facts).number().is_finite();
         condition.walk(&mut |part| {
             let figure = match &part.kind {
                 ExprKind::Fact(fact) if matches!(fact.known(), Known::World | Known::Spawn) => {
-                    format!("{} = {}", fact.name(), value(part))
+                    format!("{} = {}", fact.name(), measured(part))
+                }
+                ExprKind::OfBearer(who, fact) if is_known(part) => {
+                    let fact = fact.name().trim_start_matches("npc.");
+                    format!("{}.{fact} = {}", self.space.bearers[*who], measured(part))
+                }
+                ExprKind::Cell(cell) => format!("{} = {}", self.space.cell_name(*cell), value(part)),
+                ExprKind::CellAt(first, key) => {
+                    let key = evaluate(key, &self.space.functions, &facts).variant();
+                    format!("{} = {}", self.space.cell_name(first + key), value(part))
                 }
                 ExprKind::IsWord(fact, _) => {
                     let Some(word) = word_of(*fact, &facts) else { return };

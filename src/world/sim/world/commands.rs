@@ -6,7 +6,7 @@ use crate::action::{Draw, Effect, LaterMoment, OrderRequest, SpawnRequest};
 use crate::sim::moment::npc_facts;
 use crate::sim::placement;
 use crate::sim::placement::Arrivals;
-use crate::sim::road_user::{Advance, Motion, Progress, RoadUser, Running};
+use crate::sim::road_user::{Advance, Motion, RoadUser, Running};
 use avastra_lang::model::command::{Command, ON_FOOT_MPS_MAX};
 use avastra_lang::model::{COMMANDED_MAX, NpcFacts};
 
@@ -146,16 +146,10 @@ impl World {
             if mover.is_wreck() {
                 continue;
             }
-            let (speed_mps, progress) = match &mover.motion {
-                Motion::Drive(driver) => {
-                    let is_aside = driver.is_aside_as_told();
-                    (driver.speed_mps, Progress { speed_mps: driver.speed_mps, is_aside })
-                }
-                Motion::Walk(walker) => {
-                    let speed_mps = walker.pace_mps();
-                    (obstacle.velocity_mps.norm(), Progress { speed_mps, is_aside: true })
-                }
-                Motion::Stand => continue,
+            let Some(progress) = mover.motion.progress() else { continue };
+            let speed_mps = match &mover.motion {
+                Motion::Drive(driver) => driver.speed_mps,
+                Motion::Walk(_) | Motion::Stand => obstacle.velocity_mps.norm(),
             };
             let npc = NpcFacts { speed_mps, ..npc_facts(&self.alone(), obstacle, &mover.motion) };
             let facts = |who: usize| Some((who, self.bearer_facts(who)?));
