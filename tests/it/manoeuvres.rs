@@ -95,6 +95,28 @@ fn a_car_cuts_in_when_it_is_near_and_takes_the_time_of_its_lane_change() {
 }
 
 #[test]
+fn a_lane_and_a_place_in_it_are_one_move() {
+    let table = wish("filters");
+    let mut moves = 0;
+    for Seen { moments, drawn } in watched(&table, &["motorcycle()"], &["aside"], 6, &[]) {
+        let Some(begin) = moments.iter().position(|(_, npc)| npc.offset_m < 2.0 - 1e-6) else { continue };
+        // From 1.5 m to the right of the middle of the left lane, 3.5 m away, to the middle of this one.
+        let takes_s = SMOOTH_STEP_SLOPE_MAX * 2.0 / drawn[0];
+        let (begin_s, _) = moments[begin - 1];
+        let Some(end) = moments.iter().find(|(at_s, _)| at_s - begin_s >= takes_s + DT_S) else { continue };
+        assert!(end.1.offset_m.abs() < PLACE_M, "{end:?} after {takes_s} s");
+        for pair in moments[begin..].windows(2) {
+            let [(_, before), (_, after)] = pair else { panic!("pairs") };
+            let moved_m = before.offset_m - after.offset_m;
+            assert!((-1e-6..=drawn[0] * DT_S * 1.02).contains(&moved_m), "{before:?} {after:?}");
+            assert!(after.offset_m > -PLACE_M, "it overshoots: {after:?}");
+        }
+        moves += 1;
+    }
+    assert!(moves >= 3, "{moves} motorcycles came in");
+}
+
+#[test]
 fn phases_wait_for_their_rules() {
     let table = wish("cuts_in");
     let space = table.space();

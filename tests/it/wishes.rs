@@ -233,7 +233,7 @@ fn the_second_truck_brakes() {
     let table = wish("second_truck_brakes");
     let [trucks, brakes] = [row(&table, "trucks()"), row(&table, "middle_brakes()")];
     let run = run_of(table.space().clone(), 8, 6, &[]);
-    let mut braked = 0;
+    let (mut braked, mut rows) = (0, 0);
     for episode in 0..run.episodes() {
         let mut begun: Option<(f64, f64)> = None;
         let mut choose = |moment: &Moment| match moment.step {
@@ -241,7 +241,9 @@ fn the_second_truck_brakes() {
             _ => match table.offer(moment.situation, brakes) {
                 Ok(draw) if begun.is_none() => {
                     let facts = moment.situation.surroundings.moment();
-                    assert!(facts.nearest_gap_m <= 40.0);
+                    // Somebody else may be nearer than the last truck; along the route that one is within 40 m.
+                    let last = moment.situation.surroundings.bearer(0).expect("it is there");
+                    assert!(last.rear_m - facts.ego_front_m <= 40.0);
                     begun = Some((number(&draw, "rate"), facts.elapsed_s));
                     Choice::Act(draw)
                 }
@@ -251,6 +253,17 @@ fn the_second_truck_brakes() {
         // Time and speed of the middle truck, the second to appear.
         let mut speeds: Vec<(f64, f64)> = Vec::new();
         let log = run.play(episode, &mut choose, &mut |world, _, contacts| {
+            let has_just_appeared =
+                world.obstacle(1).is_some_and(|last| last.spawned_tick + 1 == world.ticks());
+            if let [Some(last), Some(middle), Some(first)] = [1, 2, 3].map(|id| world.npc_facts(id))
+                && has_just_appeared
+            {
+                // Along the lane, which is bent there.
+                for gap_m in [middle.rear_m - last.front_m, first.rear_m - middle.front_m] {
+                    assert!((gap_m - 15.0).abs() < 0.5, "{gap_m} m");
+                }
+                rows += 1;
+            }
             let truck = world.obstacle(2).filter(|_| contacts.is_empty());
             speeds.extend(truck.map(|truck| (world.time_s(), truck.velocity_mps.norm())));
         });
@@ -268,7 +281,7 @@ fn the_second_truck_brakes() {
         }
         braked += 1;
     }
-    assert!(braked > 0, "no truck braked");
+    assert!(braked > 0 && rows == run.episodes(), "{braked} trucks braked, {rows} rows");
 }
 
 #[test]

@@ -97,7 +97,8 @@ impl Driver {
         if command.goes_aside() {
             self.plan.clear();
             let aside = self.aside.get_or_insert_default();
-            let heads_for_m = aside.shift.map_or(aside.now_m, |shift| shift.to_m);
+            let begun_m = self.change.as_ref().map_or(aside.now_m, |change| change.ends_m);
+            let heads_for_m = aside.shift.map_or(begun_m, |shift| shift.to_m);
             aside.wanted_m = command.offset_m.unwrap_or(heads_for_m);
             (aside.lane, aside.told_mps) = (command.lane, command.aside_mps);
         }
@@ -122,8 +123,8 @@ impl Driver {
         self.change.is_none() && self.aside.as_deref().is_none_or(is_there)
     }
 
-    /// Begins what it was told to do to the side and has not begun: first the lane, then the place in it. Both at once would
-    /// be faster to the side than it was told, and than the road grips.
+    /// Begins what it was told to do to the side and has not begun: the change to the last lane on the way to the one that is
+    /// meant ends at the place that it was told.
     #[inline]
     pub(super) fn begin_aside(&mut self, view: &View) {
         let Some(Aside { lane, wanted_m, now_m, told_mps, shift }) = self.aside.as_deref().cloned() else {
@@ -159,9 +160,20 @@ impl Driver {
         if self.may_change(view)
             && let Some(begun) = self.change_to(side, whose, view)
         {
+            let (into, _) = begun.0.lane_at(begun.1);
+            let meant = chosen_lane(around, around.beside_route(this.outline.pose.position).0, lane);
             self.set_out(begun, whose, view);
+            if meant == Ok(into) {
+                let wanted_m = self.aside.as_ref().map_or(0.0, |aside| aside.wanted_m);
+                self.end_aside(wanted_m, whose, view);
+            }
         }
         false
+    }
+
+    /// It has come so far to the left of the middle of its lane.
+    pub(super) fn is_now_aside(&mut self, left_m: f64) {
+        self.aside.iter_mut().for_each(|aside| aside.now_m = left_m);
     }
 
     /// The side on which the lane that is meant lies from the one that it is in; `None` if that is the one.

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use avastra_base::geometry::{
     OrientedBox, Pose, SMOOTH_STEP_BEND_MAX, SMOOTH_STEP_SLOPE_MAX, SmoothStep, Vec2, distance_m,
-    smooth_step, wrap_angle,
+    smooth_step, unit_vector, wrap_angle,
 };
 use avastra_base::kinematics::{GRAVITY_MPS2, braking_m};
 use avastra_lang::model::vocabulary::Side;
@@ -72,6 +72,8 @@ pub(super) struct Change {
     /// In `[0, 1)`.
     pub progress: f64,
     pub duration_s: f64,
+    /// Where it ends, m to the left of the middle of the lane that it leads into.
+    pub ends_m: f64,
 }
 
 /// Whose wish a move to the side is.
@@ -153,8 +155,20 @@ impl Driver {
     ) {
         let aside_m = (to.path.pose_at(to_station_m).position - self.middle(view.this)).norm();
         let duration_s = duration_s(aside_m, self.speed_mps, whose, view.around);
-        self.change = Some(Change { to, to_station_m, progress: 0.0, duration_s });
+        let ends_m = self.aside_m();
+        self.change = Some(Change { to, to_station_m, progress: 0.0, duration_s, ends_m });
         self.last_change = side;
+    }
+
+    /// The lane change that has just begun ends beside the middle of its lane: one move to the side instead of two.
+    pub(super) fn end_aside(&mut self, ends_m: f64, whose: Whose, view: &View) {
+        let (middle, now_m, lane_rad) = (self.middle(view.this), self.aside_m(), self.lane_heading_rad());
+        let speed_mps = self.speed_mps;
+        let Some(change) = self.change.as_mut().filter(|_| ends_m != now_m) else { return };
+        let over = change.to.path.pose_at(change.to_station_m).position - middle;
+        let aside_m = unit_vector(lane_rad).perp(&over) + ends_m - now_m;
+        change.duration_s = duration_s(aside_m.abs(), speed_mps, whose, view.around);
+        change.ends_m = ends_m;
     }
 
     /// The way in the neighbouring lane, if there is one and room in it, and the own station there.
@@ -280,12 +294,14 @@ impl Driver {
         let guess_m = change.to_station_m + way_m;
         change.to_station_m =
             change.to.path.project_from(from.position, guess_m).map_or(guess_m, |found| found.station_m);
-        let to = beside(body_at(&change.to.path, change.to_station_m, size), aside_m);
+        let to = beside(body_at(&change.to.path, change.to_station_m, size), change.ends_m);
         let to_lane_rad = change.to.path.heading_at(change.to_station_m);
         let progress_per_m = change.progress_per_m(self.speed_mps);
         change.progress += progress_per_m * way_m;
         if change.progress >= 1.0 {
+            let ends_m = change.ends_m;
             (self.way, self.station_m) = (Arc::clone(&change.to), change.to_station_m);
+            self.is_now_aside(ends_m);
             (self.change, self.hold_m) = (None, None);
             (self.insists_to_m, self.stopped_to_m) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
             return at(to, to_lane_rad);

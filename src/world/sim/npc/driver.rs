@@ -321,6 +321,9 @@ impl Driver {
         }
         if let Some(change) = &self.change {
             trace.numbers([change.to_station_m, change.progress, change.duration_s]);
+            if change.ends_m != self.aside_m() {
+                trace.number(change.ends_m);
+            }
         }
         if let Some(aside) = &self.aside {
             aside.trace(trace);
