@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use avastra_campaign::emit;
 use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::run::{
     Database, DatabaseError, EpisodeSummary, Group, Numbered, PolicyReference, RefusalCount, Run,
@@ -13,7 +12,7 @@ use avastra_campaign::run::{
 use avastra_drivers::external::{Conversation, Problem};
 use avastra_lang::model::Policy;
 use avastra_search::agent::Face;
-use avastra_world::action::{ActionTable, Draw};
+use avastra_world::action::ActionTable;
 
 use super::arguments::RunArguments;
 use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, settled};
@@ -274,8 +273,7 @@ fn keep(
     let is_critical = summary.counted() > 0;
     let scenario = is_critical.then(|| directory.write_critical(&player, (log, summary))).transpose()?;
     directory.write_failure(&player, (log, summary))?;
-    let in_words = |draw: &Draw| emit::action_text(run.table(), draw);
-    directory.write(|database| database.add(summary, log, in_words, scenario.as_deref()))
+    directory.write(|database| database.add(summary, log, run.table(), scenario.as_deref()))
 }
 
 fn heading(run: &Run, arguments: &RunArguments) -> String {

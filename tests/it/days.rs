@@ -8,6 +8,7 @@ use avastra::model::vocabulary::{Body, Level, TimeOfDay};
 use avastra::model::{Memory, RulesInForce};
 use avastra::sim::{Scene, Sensed, Start, World};
 
+use crate::command::done;
 use crate::wishes::{row, wish};
 use crate::world::{Wide, assert_replays, run_of, space_at};
 
@@ -70,6 +71,37 @@ fn more_cars_come_in_the_rush_hour() {
     let share = |part: usize| f64::from(cars[part] as u32) / f64::from(steps[part] as u32);
     assert!(steps[0] > 50 && steps[1] > 20, "{steps:?}");
     assert!(share(1) > 2.0 * share(0), "{cars:?} of {steps:?}");
+}
+
+#[test]
+fn own_states_are_in_the_database() {
+    let directory = tempfile::tempdir().expect("a directory is made");
+    let out = directory.path().join("run");
+    let space = "tests/cases/wishes/rush_hour.ava";
+    done(&[
+        "run",
+        space,
+        "--road",
+        "corner",
+        "--ads",
+        "idm",
+        "--episodes",
+        "2",
+        "--out",
+        &out.display().to_string(),
+    ]);
+    let database = rusqlite::Connection::open(out.join("run.db")).expect("it is a database");
+    let mut steps = database.prepare("SELECT time_s, states FROM step").expect("the columns are there");
+    let steps = steps.query_map([], |row| Ok((row.get::<_, f64>(0)?, row.get::<_, String>(1)?)));
+    let mut seen = 0;
+    for step in steps.expect("they are read") {
+        let (at_s, states) = step.expect("it is read");
+        let is_rush = (60.0..=120.0).contains(&at_s);
+        let wanted = if is_rush { r#"{"hour":"Rush"}"# } else { r#"{"hour":"Quiet"}"# };
+        assert_eq!(states, wanted, "at {at_s} s");
+        seen += 1;
+    }
+    assert!(seen > 5, "{seen} steps");
 }
 
 #[test]

@@ -7,14 +7,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use rusqlite::{Connection, Transaction, params};
 use sha2::{Digest, Sha256};
 
+use crate::emit::action_text;
 use crate::episode::{EpisodeLog, Outcome};
 use crate::files::PlainName;
 use crate::oracle;
 use avastra_drivers::external::Failure;
 use avastra_lang::model::policy::VARIABLES;
 use avastra_lang::model::vocabulary::Word;
+use avastra_lang::model::{Memory, Space, StateMeaning, Value};
 use avastra_search::mdp::STATE_LEN;
-use avastra_world::action::Draw;
+use avastra_world::action::ActionTable;
 
 use crate::run::offered::{RowCount, without_figures};
 use crate::run::sealed::{DatabaseError, Layout, insert_row, query_all};
@@ -127,8 +129,8 @@ impl Units for Database {
 }
 
 impl Database {
-    /// Adds a whole episode, or nothing. `in_words` says what a draw does in the space's own words; `scenario` is the
-    /// text of the file that was written of it.
+    /// Adds a whole episode, or nothing. `table` is that of the space, in whose words actions and states are told; `scenario`
+    /// is the text of the file that was written of it.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -136,11 +138,11 @@ impl Database {
         &mut self,
         summary: &EpisodeSummary,
         log: &EpisodeLog,
-        in_words: impl Fn(&Draw) -> String,
+        table: &ActionTable,
         scenario: Option<&str>,
     ) -> Result<(), DatabaseError> {
         let transaction = self.connection.transaction()?;
-        add_all(&transaction, summary, log, in_words, scenario)?;
+        add_all(&transaction, summary, log, table, scenario)?;
         LAYOUT.seal(&transaction, summary.episode as i64)?;
         transaction.commit()?;
         Ok(())
@@ -351,7 +353,7 @@ fn step_table() -> String {
     format!(
         "CREATE TABLE step (
            episode INTEGER NOT NULL REFERENCES episode, step INTEGER NOT NULL, time_s REAL NOT NULL,
-           action_row INTEGER, action TEXT, refused TEXT, proc REAL NOT NULL, reward REAL NOT NULL,
+           action_row INTEGER, action TEXT, refused TEXT, states TEXT, proc REAL NOT NULL, reward REAL NOT NULL,
            ttc_s REAL, thw_s REAL, drac_mps2 REAL, required_mps2 REAL, rss_unsafe_s REAL,
            {}, PRIMARY KEY (episode, step)) STRICT;",
         states.join(", ")
@@ -363,13 +365,13 @@ pub(crate) fn add_all(
     transaction: &Transaction,
     summary: &EpisodeSummary,
     log: &EpisodeLog,
-    in_words: impl Fn(&Draw) -> String,
+    table: &ActionTable,
     scenario: Option<&str>,
 ) -> Result<(), DatabaseError> {
     add_episode(transaction, summary, log)?;
     for (index, step) in log.steps.iter().enumerate() {
         let (row, action, refused) = match &step.outcome {
-            Outcome::Done { draw, .. } => (Some(draw.row), Some(in_words(draw)), None),
+            Outcome::Done { draw, .. } => (Some(draw.row), Some(action_text(table, draw)), None),
             Outcome::Passed => (None, None, None),
             Outcome::Refused { row, rule, reason } => (
                 Some(*row),
@@ -384,6 +386,7 @@ pub(crate) fn add_all(
             row.map(|row| row as i64).into(),
             action.into(),
             refused.into(),
+            own_states(table.space(), &step.memory).into(),
             step.proc.into(),
             step.reward.into(),
         ];
@@ -420,6 +423,25 @@ pub(crate) fn add_all(
         insert_row(transaction, "scenario", params![summary.episode as i64, text])?;
     }
     Ok(())
+}
+
+/// The author's own states as they are after the action of a step, as a JSON object by cell: words, truth values, and numbers
+/// in SI units. `None` in a space without any.
+fn own_states(space: &Space, memory: &Memory) -> Option<String> {
+    let own = space.states.iter().filter(|state| state.meaning == StateMeaning::Private);
+    let cells = own.flat_map(|state| state.first_cell..state.first_cell + state.cells);
+    let told: serde_json::Map<String, serde_json::Value> = cells
+        .map(|cell| {
+            let value = match memory.cells()[cell] {
+                Value::Bool(truth) => truth.into(),
+                Value::Number(number) if number.fract() == 0.0 => (number as i64).into(),
+                Value::Number(number) => number.into(),
+                Value::Variant(of, variant) => space.enums[of.0].variants[variant].as_str().into(),
+            };
+            (space.cell_name(cell), value)
+        })
+        .collect();
+    (!told.is_empty()).then(|| serde_json::Value::Object(told).to_string())
 }
 
 fn add_offers(transaction: &Transaction, summary: &EpisodeSummary) -> Result<(), rusqlite::Error> {

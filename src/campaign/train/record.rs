@@ -7,7 +7,7 @@ use rusqlite::{OptionalExtension, params};
 
 use crate::run::{Database, DatabaseError, LAYOUT, add_all, insert_row, settings_digest};
 use avastra_lang::model::digest;
-use avastra_world::action::Draw;
+use avastra_world::action::ActionTable;
 
 use crate::train::training::TrainedEpisode;
 
@@ -18,7 +18,7 @@ pub struct Checkpoint {
 }
 
 impl Database {
-    /// Adds an episode of a training, and with it a checkpoint if there is one to keep. `in_words` and `scenario` are as for
+    /// Adds an episode of a training, and with it a checkpoint if there is one to keep. `table` and `scenario` are as for
     /// [`Database::add`].
     ///
     /// # Errors
@@ -27,12 +27,12 @@ impl Database {
         &mut self,
         trained: &TrainedEpisode,
         checkpoint: Option<&[u8]>,
-        in_words: impl Fn(&Draw) -> String,
+        table: &ActionTable,
         scenario: Option<&str>,
     ) -> Result<(), DatabaseError> {
         let transaction = self.connection.transaction()?;
         let episode = trained.summary.episode;
-        add_all(&transaction, &trained.summary, &trained.log, in_words, scenario)?;
+        add_all(&transaction, &trained.summary, &trained.log, table, scenario)?;
         let values = params![
             episode as i64,
             trained.sum,
