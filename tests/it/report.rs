@@ -147,6 +147,37 @@ fn a_page_says_what_the_world_did() {
 }
 
 #[test]
+fn a_page_says_when_phases_begin() {
+    const TOLD: &str = "language 1
+use \"roads.ava\"
+manoeuvre stop(wait: Duration) { after wait { speed: 0 m/s, rate: 4 m/s^2 } after 1 s { speed: 5 m/s } }
+action leader() {
+  spawn Sedan as leader ahead 40 m { does: DriveAhead, lane: Current, speed: 8 m/s, then: stop(2 s) }
+}
+action again() { order leader { then: stop(0 s) } }
+scenario told {
+  road: boulevard
+  start { }
+  steps { 0: leader() 2: again() }
+}
+";
+    let loaded = loaded("scenarios/told.ava", TOLD);
+    let scenario = loaded.scenario.expect("it has a scenario");
+    let table = ActionTable::new(loaded.space.expect("its space is sound"));
+    let ads = recorded(&scenario).expect("its driving system exists");
+    let html = page_of(record(&table, &scenario, &ads, TOLD).expect("it plays"));
+    let (header, _) = unpacked(&html, "s0");
+    let phases = header["obstacles"][0]["phases"].as_array().expect("it has phases");
+    let told: Vec<(f64, &str)> =
+        phases.iter().map(|one| (one[0].as_f64().unwrap(), one[1].as_str().unwrap())).collect();
+    // 2 s after it appeared; once it stands it waits for one more; then the order, in the third step.
+    let [(first_s, first), (second_s, second), (again_s, again), ..] = told[..] else { panic!("{told:?}") };
+    assert_eq!([first, second, again], ["stop, phase 1", "stop, phase 2", "stop, phase 1"]);
+    assert!((first_s - 2.0).abs() < 0.05 && second_s >= first_s + 1.0, "{told:?}");
+    assert!((again_s - 12.0).abs() < 0.05, "{told:?}");
+}
+
+#[test]
 fn a_page_holds_everything_and_repeats_itself() {
     let (table, scenario, ads) = walk();
     let page = || page_of(record(&table, &scenario, &ads, SOURCE).expect("it plays"));

@@ -13,7 +13,7 @@ mod setup;
 
 pub use facts::{at_fault, collision_facts, run_into_from_behind, side, struck};
 pub use log::{Collision, End, EpisodeLog, Held, Outcome, StepLog};
-pub use recorder::{Actor, Lights, Recorder, Sample, Sky, Touch};
+pub use recorder::{Actor, Lights, Phase, Recorder, Sample, Sky, Touch};
 pub use run::{Choice, Moment, Play, Watch, run, run_from};
 pub use script::{Script, ScriptedAction};
 pub use setup::Setup;

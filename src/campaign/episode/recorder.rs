@@ -49,6 +49,19 @@ pub struct Actor {
     pub samples: Vec<Sample>,
     /// The tick from which its brake lights are on or off; empty until they are on for the first time.
     pub brake_lights: Vec<(u64, bool)>,
+    /// The phases of manoeuvres that began.
+    pub phases: Vec<Phase>,
+}
+
+/// A phase of a manoeuvre begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Phase {
+    /// In this tick.
+    pub tick: u64,
+    /// The manoeuvre, by its index in the space.
+    pub manoeuvre: usize,
+    /// From 1.
+    pub number: u32,
 }
 
 /// A road user at a tick.
@@ -124,7 +137,11 @@ impl Recorder {
                 self.others.push(Actor { id, body, shape, first, ..Actor::ego() });
             }
             let sample = Sample { tick, pose: obstacle.outline.pose, velocity_mps: obstacle.velocity_mps };
-            self.others[place].note(sample);
+            let actor = &mut self.others[place];
+            actor.note(sample);
+            let phase = world.phase(obstacle.id);
+            let phase = phase.map(|(manoeuvre, number, tick)| Phase { tick, manoeuvre, number });
+            actor.phases.extend(phase.filter(|phase| actor.phases.last() != Some(phase)));
         }
         self.note_sky(world);
         self.note_lights(world);
@@ -184,7 +201,15 @@ impl Actor {
             acceleration_mps2_max: mkz.acceleration_mps2_max,
             deceleration_mps2_max: mkz.deceleration_mps2_max,
         };
-        Actor { id: 0, body: Body::Sedan, shape, first: None, samples: Vec::new(), brake_lights: Vec::new() }
+        Actor {
+            id: 0,
+            body: Body::Sedan,
+            shape,
+            first: None,
+            samples: Vec::new(),
+            brake_lights: Vec::new(),
+            phases: Vec::new(),
+        }
     }
 
     /// What other tools call it: `ego`, or `npc_3` for the one that claims call `npc#3`.

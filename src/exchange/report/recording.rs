@@ -12,7 +12,7 @@ use avastra_base::geometry::{Pose, wrap_angle};
 use avastra_campaign::emit;
 use avastra_campaign::episode;
 use avastra_campaign::episode::{
-    Actor, End, EpisodeLog, Held, Moment, Outcome, Recorder, Sample, Script, Sky,
+    Actor, End, EpisodeLog, Held, Moment, Outcome, Phase, Recorder, Sample, Script, Sky,
 };
 use avastra_campaign::oracle;
 use avastra_campaign::oracle::{ClaimResult, ReferenceDrive, Regression};
@@ -324,13 +324,21 @@ fn obstacles(
     let mut told = |actor: &Actor| {
         let first = actor.first.as_ref()?;
         let body = own.get(&actor.id).map_or(actor.body.name(), |own| &table.space().bodies[*own].name);
-        Some(json!({
+        let mut one = json!({
             "id": actor.id, "body": body, "like": actor.body.name(), "colour": first.colour.name(), "verb": first.verb.name(),
             "ambient": first.is_ambient(), "from_tick": actor.first_tick(), "length_m": actor.shape.length_m,
             "width_m": actor.shape.width_m, "places": places(columns, &poses(actor)),
             "speed_mps": columns.add(SPEED_MPS, actor.samples.iter().map(Sample::speed_mps)),
             "brake_lights": actor.brake_lights,
-        }))
+        });
+        if !actor.phases.is_empty() {
+            let phase = |phase: &Phase| {
+                let name = &table.space().manoeuvres[phase.manoeuvre].name;
+                (phase.tick as f64 * DT_S, format!("{name}, phase {}", phase.number))
+            };
+            one["phases"] = json!(actor.phases.iter().map(phase).collect::<Vec<_>>());
+        }
+        Some(one)
     };
     recorder.others.iter().filter_map(&mut told).collect()
 }

@@ -149,6 +149,13 @@ impl Running {
         Running { course, phase: 0, stage: Stage::Waiting, since: tick }
     }
 
+    /// The phase that is under way: its manoeuvre, by its index in the space, its number from 1, and the tick in which it
+    /// began.
+    pub fn under_way(&self) -> Option<(usize, u32, u64)> {
+        let is_under_way = matches!(self.stage, Stage::UnderWay(_));
+        is_under_way.then_some((self.course.manoeuvre, self.phase as u32 + 1, self.since))
+    }
+
     /// The names of road users that its phases ask about.
     pub fn bearers(&self) -> Vec<usize> {
         self.course.bearers()

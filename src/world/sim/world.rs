@@ -303,6 +303,13 @@ impl World {
         user.map_or((0, 0), |user| (user.mover.phases_begun, user.mover.phases_ended))
     }
 
+    /// The phase that the road user with an id is in: its manoeuvre, by its index in the space, its number from 1, and the tick
+    /// in which it began.
+    pub fn phase(&self, id: u32) -> Option<(usize, u32, u64)> {
+        let user = self.users.iter().find(|user| user.obstacle.id == id)?;
+        user.mover.course.as_ref()?.under_way()
+    }
+
     /// Whether the road user with an id has done what a command says: it has the speed, and is in the lane and at the place
     /// beside its middle.
     pub fn has_done(&self, id: u32, command: &Command) -> bool {

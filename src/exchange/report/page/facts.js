@@ -163,8 +163,11 @@ export function showUsers(place, recording, timeS) {
 
 /** The actions of all steps: offered, masked and by which rule, chosen, refused. */
 export function showSteps(place, recording, seek) {
-  const { steps, rows } = recording.header;
+  const { steps, rows, obstacles } = recording.header;
+  const phases = obstacles.flatMap(({ id, phases = [] }) => phases.map(([atS, what]) => ({ id, atS, what })));
   const shown = steps.map((step, number) => {
+    const endS = steps[number + 1]?.at_s ?? Infinity;
+    const begun = phases.filter(({ atS }) => atS > step.at_s - 1e-6 && atS < endS - 1e-6);
     const { outcome, offers } = step;
     const said = {
       done: () => outcome.text,
@@ -206,7 +209,19 @@ export function showSteps(place, recording, seek) {
           `${number} · ${figure(step.at_s, "s", 0)}`,
         ),
       ),
-      el("td", {}, said),
+      el(
+        "td",
+        {},
+        said,
+        begun.map(({ id, atS, what }) =>
+          el(
+            "div",
+            { class: "muted" },
+            el("button", { type: "button", class: "plain", onclick: () => seek(atS) }, figure(atS, "s", 1)),
+            ` npc#${id}: ${what} begins`,
+          ),
+        ),
+      ),
       el("td", {}, details || "–"),
       el("td", { class: "number" }, figure(step.proc, "", 3)),
     );
