@@ -64,7 +64,7 @@ fn emit_sample(
 ) -> Result<(), Failure> {
     let sample = cell.samples.iter().find(|sample| sample.failure.is_some()).or(cell.samples.first());
     let Some(sample) = sample else { return Ok(()) };
-    let log = trials.again(road, cell.row, sample);
+    let log = trials.again(road, cell, sample);
     let name = format!("row{:02}_{}", cell.row, cell.road);
     let path = directory.join(format!("{name}.ava"));
     make(directory)?;

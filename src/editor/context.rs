@@ -265,11 +265,12 @@ impl<'a> Place<'a> {
                 true => Some(unused::<CommandField>(fields)),
                 false => self.in_command(field),
             }),
-            EffectKind::Spawn { body, distance, cover, fields, .. } => {
+            EffectKind::Spawn { body, distance, apart, cover, fields, .. } => {
                 let mut bodies = [Some(body), cover.as_deref()].into_iter().flatten();
                 bodies
                     .find_map(|body| self.word_or_value(Kind::Bodies, body, None))
                     .or_else(|| self.within(distance, None, None))
+                    .or_else(|| self.within(apart.as_deref()?, None, None))
                     .or_else(|| self.in_spawn(fields))
             }
         })
@@ -550,6 +551,11 @@ impl<'a> Place<'a> {
             About::Value => kinds,
             About::Rule => {
                 kinds.push(Kind::Words(words::facts(Site::Rule)));
+                kinds.extend(things().into_iter().map(Kind::Keyword));
+                kinds
+            }
+            About::Facts(Site::StepBegins) => {
+                kinds.push(Kind::Words(words::facts(Site::StepBegins)));
                 kinds.extend(things().into_iter().map(Kind::Keyword));
                 kinds
             }

@@ -91,6 +91,7 @@ pub fn build(document: &Document) -> Result<RoadMap, RoadError> {
             return Err(wrong(junction.line, message));
         }
     }
+    map.close_for_buses();
     map.has_levels = map.find_levels();
     share_phases(&mut map);
     set_precedence(document, &mut map);

@@ -281,8 +281,7 @@ impl RoadMap {
         self.approach(lane).find_map(|lane| self.lane(lane).stop_lines.last().copied())
     }
 
-    /// Makes the lanes at these places bus lanes, with what they go on as before and behind up to junctions. A lane inside a
-    /// junction from which only bus lanes go on is one too.
+    /// Makes the lanes at these places bus lanes, with what they go on as before and behind up to junctions.
     pub fn keep_for_buses(&mut self, places: &[LanePlace]) {
         let mut open: Vec<LaneIndex> = places.iter().map(|place| place.lane).collect();
         while let Some(index) = open.pop() {
@@ -294,6 +293,11 @@ impl RoadMap {
             let beside: Vec<LaneIndex> = beside.collect();
             open.extend(beside.into_iter().filter(|next| self.lane(*next).junction.is_none()));
         }
+        self.close_for_buses();
+    }
+
+    /// A lane inside a junction from which only bus lanes go on is one too: nobody else turns into it.
+    pub(super) fn close_for_buses(&mut self) {
         let leads_there = |lane: &Lane| {
             lane.junction.is_some()
                 && !lane.successors.is_empty()

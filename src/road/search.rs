@@ -38,13 +38,9 @@ struct Label {
 
 /// The moves from start to goal; `None` if there is no way.
 pub fn cheapest_way(map: &RoadMap, start: LanePlace, goal: LanePlace) -> Option<Vec<Move>> {
-    let mut search = Search {
-        map,
-        goal: goal.lane,
-        labels: Vec::new(),
-        open: BinaryHeap::new(),
-        settled: BTreeMap::new(),
-    };
+    let for_buses = [start.lane, goal.lane].into_iter().any(|lane| map.lane(lane).for_buses);
+    let mut search =
+        Search { map, for_buses, labels: Vec::new(), open: BinaryHeap::new(), settled: BTreeMap::new() };
     search.push(start.lane, start.station_m, -millimetres(start.station_m), None);
     while let Some(Reverse((_, _, index))) = search.open.pop() {
         let (lane, station_m) = (search.labels[index].lane, search.labels[index].station_m);
@@ -66,8 +62,8 @@ pub fn cheapest_way(map: &RoadMap, start: LanePlace, goal: LanePlace) -> Option<
 
 struct Search<'a> {
     map: &'a RoadMap,
-    /// The only bus lane that may be on the way.
-    goal: LaneIndex,
+    /// Whether the way may lead over bus lanes: it does if it begins or ends on one.
+    for_buses: bool,
     labels: Vec<Label>,
     /// The labels to go on from, ordered by cost, station (mm) and index.
     open: BinaryHeap<Reverse<(i64, i64, usize)>>,
@@ -76,7 +72,7 @@ struct Search<'a> {
 
 impl Search<'_> {
     fn push(&mut self, lane: LaneIndex, station_m: f64, cost_mm: i64, came: Option<(usize, Move)>) {
-        if self.map.lane(lane).for_buses && lane != self.goal && came.is_some() {
+        if self.map.lane(lane).for_buses && !self.for_buses {
             return;
         }
         self.open.push(Reverse((cost_mm, millimetres(station_m), self.labels.len())));

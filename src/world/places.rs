@@ -197,8 +197,11 @@ fn without_place<'a>(
             action.drawn().filter_map(|parameter| parameter.condition.as_ref()).any(|c| c.asks_the_world());
         // Nobody is there to be ordered in the worlds that are searched.
         let orders = action.effects.iter().any(|effect| matches!(effect, EffectDef::Order(_)));
-        // What a `where` asks of the moment cannot be left out.
-        !asks && !orders && action.effects.iter().any(|effect| matches!(effect, EffectDef::Spawn(_)))
+        // What a `where` asks of the moment cannot be left out, nor states that it decides.
+        !asks
+            && !orders
+            && !space.depends_on_moment(row)
+            && action.effects.iter().any(|effect| matches!(effect, EffectDef::Spawn(_)))
     };
     let wanted = rows.iter().map(|row| &space.rows[*row]).filter(|row| needs_place(row));
     let runs_somewhere =

@@ -2,8 +2,8 @@
 //! On each road some drives go by without an action. At each of their steps every row is offered, as to an agent; this
 //! counts how often the row is legal, and which reasons refuse it otherwise. From some of the legal moments, spread
 //! over all of them, the row is carried out and what happens is judged. So a row on a road is realised, or not realised
-//! (with the reason), or masked (with the reasons). A row about somebody who must be there is offered after the first row
-//! that makes that one appear.
+//! (with the reason), or masked (with the reasons). A row that is legal at no moment, and is about somebody who must be
+//! there, is offered after a row that makes them appear: the first after which it is legal.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -51,7 +51,7 @@ pub struct Cell {
     pub row: usize,
     pub label: String,
     pub road: String,
-    /// The action that was carried out before, because this row is about somebody that it makes appear.
+    /// The row that was carried out before, because this one is about somebody whom it makes appear.
     pub after: Option<String>,
     pub outcome: Outcome,
     /// Moments at which it was offered, and those of them at which it was legal.
@@ -121,21 +121,33 @@ impl<'a> Trials<'a> {
 
     /// The cells of the nth road of the arena, by row.
     fn road(&self, road: usize, judged: &(dyn Fn() + Sync)) -> Vec<Cell> {
-        let mut moments: BTreeMap<Vec<usize>, Vec<Moment>> = BTreeMap::new();
+        let alone = self.moments(road, None);
+        let mut later: BTreeMap<usize, Vec<Moment>> = BTreeMap::new();
         let rows = self.arena.table().rows();
         let judge = |row: &Row| {
-            let before = self.rows_before(row);
-            let moments = moments.entry(before).or_insert_with_key(|before| self.moments(road, before));
-            let cell = self.cell(road, row.index, moments);
+            let is_legal = |moments: &[Moment]| moments.iter().any(|moment| moment.offers[row.index].is_ok());
+            let mut before = None;
+            if !is_legal(&alone) {
+                for maker in self.makers(row) {
+                    let after = later.entry(maker).or_insert_with(|| self.moments(road, Some(maker)));
+                    if is_legal(after) {
+                        before = Some(maker);
+                        break;
+                    }
+                    before = before.or((!after.is_empty()).then_some(maker));
+                }
+            }
+            let moments = before.map_or(&alone, |maker| &later[&maker]);
+            let cell = self.cell(road, row.index, before, moments);
             judged();
             cell
         };
         rows.iter().map(judge).collect()
     }
 
-    /// The rows that make somebody appear about whom this row is: whom it orders, or about whom its rules ask. None if there
-    /// is no such road user, or the row makes them appear itself.
-    fn rows_before(&self, row: &Row) -> Vec<usize> {
+    /// The rows that make somebody appear about whom this row is: the first whom it orders, or about whom its rules ask, and
+    /// whom it does not make appear itself.
+    fn makers(&self, row: &Row) -> Vec<usize> {
         let space = self.arena.table().space();
         let names = |row: &Row| {
             let spawns = space.actions[row.action].effects.iter().filter_map(|effect| match effect {
@@ -155,14 +167,16 @@ impl<'a> Trials<'a> {
     }
 
     /// A try again, as an episode that ends when the judge has seen enough.
-    pub fn again(&self, road: usize, row: usize, sample: &Sample) -> EpisodeLog {
+    pub fn again(&self, road: usize, cell: &Cell, sample: &Sample) -> EpisodeLog {
+        let row = cell.row;
         let setup = self.arena.setup(road, sample.seed);
         let table = self.arena.table();
         let space = table.space();
         let action = &space.actions[space.rows[row].action];
         let seen_s = judge::horizon_s(action.manoeuvres().next().is_some());
         let steps = (seen_s / space.episode.step_s).ceil() as usize;
-        let mut before = self.rows_before(&space.rows[row]);
+        let label = |row: &&Row| Some(&row.label) == cell.after.as_ref();
+        let mut before = space.rows.iter().find(label).map(|row| row.index);
         let mut choose = |moment: &episode::Moment| {
             if moment.step >= sample.step + steps {
                 return Choice::Stop;
@@ -175,20 +189,20 @@ impl<'a> Trials<'a> {
         episode::run(&setup, &mut choose, &mut |_, _, _| {})
     }
 
-    /// The moments of undisturbed drives; those after one of these rows was carried out, if there are any.
-    fn moments(&self, road: usize, before: &[usize]) -> Vec<Moment> {
+    /// The moments of undisturbed drives; those after a row was carried out, if one is given.
+    fn moments(&self, road: usize, before: Option<usize>) -> Vec<Moment> {
         let table = self.arena.table();
         let mut moments = Vec::new();
         for drive in 0..u64::from(self.settings.drives) {
             let seed = rng::child_seed(self.settings.seed, Stream::Episode, drive);
             let setup = self.arena.setup(road, seed);
             let step_ticks = (table.space().episode.step_s / avastra_world::sim::DT_S).round() as u64;
-            let (mut offered, mut open) = (Vec::new(), before.to_vec());
+            let (mut offered, mut open) = (Vec::new(), before);
             let mut snapshots: Vec<(World, Box<dyn Ads>)> = Vec::new();
             let log = episode::run(
                 &setup,
                 &mut |moment| {
-                    offered.push(open.is_empty().then(|| table.offers(moment.situation)));
+                    offered.push(open.is_none().then(|| table.offers(moment.situation)));
                     carry_out_once(table, &mut open, moment)
                 },
                 &mut |world, ads, _| {
@@ -206,7 +220,7 @@ impl<'a> Trials<'a> {
         moments
     }
 
-    fn cell(&self, road: usize, row: usize, moments: &[Moment]) -> Cell {
+    fn cell(&self, road: usize, row: usize, before: Option<usize>, moments: &[Moment]) -> Cell {
         let legal: Vec<(&Moment, &Draw)> =
             moments.iter().filter_map(|moment| Some((moment, moment.offers[row].as_ref().ok()?))).collect();
         let mut refusals = Vec::new();
@@ -233,10 +247,7 @@ impl<'a> Trials<'a> {
             row,
             label: table.rows()[row].label.clone(),
             road: self.arena.road(road).name.clone(),
-            after: self.rows_before(&table.rows()[row]).first().map(|row| {
-                let space = table.space();
-                space.actions[space.rows[*row].action].name.clone()
-            }),
+            after: before.map(|row| table.rows()[row].label.clone()),
             outcome: match (tries, realised) {
                 (0, _) => Outcome::Masked,
                 (_, 0) => Outcome::NotRealised,
@@ -256,16 +267,13 @@ impl<'a> Trials<'a> {
     }
 }
 
-/// Carries out the first of these rows that is legal, as soon as one is, and then lets time pass.
-fn carry_out_once(table: &ActionTable, open: &mut Vec<usize>, moment: &episode::Moment) -> Choice {
-    let legal = open.iter().find_map(|row| table.offer(moment.situation, *row).ok());
-    match legal {
-        Some(draw) => {
-            open.clear();
-            Choice::Act(draw)
-        }
-        None => Choice::Pass,
-    }
+/// Carries a row out as soon as it is legal, and then lets time pass.
+fn carry_out_once(table: &ActionTable, open: &mut Option<usize>, moment: &episode::Moment) -> Choice {
+    let Some(draw) = open.and_then(|row| table.offer(moment.situation, row).ok()) else {
+        return Choice::Pass;
+    };
+    *open = None;
+    Choice::Act(draw)
 }
 
 /// Carries a draw out and judges everything that it does.

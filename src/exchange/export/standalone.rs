@@ -49,7 +49,12 @@ pub fn standalone(space: &Space, scenario: &Scenario, log: &EpisodeLog) -> Optio
         let _ = write!(steps, " {number}: {call}(){after},");
     }
     let mut text = road_text(road, &road_name)?;
-    text += " enum Time = Morning | Noon | Night enum Sky = Rain | Fog | Wetness";
+    let has_twilight =
+        actions.effects.iter().any(|effect| effect.contains("Dawn") || effect.contains("Dusk"))
+            || space.weather(&log.memory).0.is_twilight();
+    text += " enum Time = Morning | Noon | Night";
+    text += if has_twilight { " | Dawn | Dusk" } else { "" };
+    text += " enum Sky = Rain | Fog | Wetness";
     text += " enum Level = None < Light < Moderate < High";
     text += " state time: Time = any state sky: Sky -> Level = None";
     for body in actions.bodies.values() {
@@ -269,7 +274,7 @@ fn ignored_field(ignores: IgnoredRules) -> String {
 
 /// What a command says, as the fields of an order.
 fn command_fields(command: &Command) -> String {
-    let Command { speed_mps, rate_mps2, lane, offset_m, aside_mps, ignores } = command;
+    let Command { speed_mps, rate_mps2, lane, offset_m, aside_mps, ignores, siren } = command;
     let figure = |name: &str, value: &Option<f64>, unit: &str| {
         value.map(|value| format!("{name}: {} {unit}", decimal(value, false)))
     };
@@ -280,6 +285,7 @@ fn command_fields(command: &Command) -> String {
         figure("offset", offset_m, "m"),
         figure("aside", aside_mps, "m/s"),
         ignores.map(ignored_field),
+        siren.map(|siren| format!("siren: {siren}")),
     ];
     fields.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }

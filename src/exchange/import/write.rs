@@ -25,8 +25,9 @@ pub fn scenario(scene: &Scene, story: &Story, name: &str, notes: BTreeSet<String
         let _ = writeln!(text, "  // the ego vehicle's speed in the file\n  limit: {ego_mps} m/s");
     }
     text += "}\n\n";
-    if story.weather.time.is_some() {
-        text += "enum Time = Morning | Noon | Night\nstate time: Time = any\n\n";
+    if let Some(time) = story.weather.time {
+        let more = if matches!(time, "Dawn" | "Dusk") { format!(" | {time}") } else { String::new() };
+        let _ = write!(text, "enum Time = Morning | Noon | Night{more}\nstate time: Time = any\n\n");
     }
     if story.weather.is_rough() {
         text += "enum Sky = Rain | Fog | Wetness\nenum Level = None < Light < Moderate < High\n";

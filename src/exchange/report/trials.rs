@@ -10,11 +10,11 @@ pub fn trials(cells: &[Cell]) -> String {
     let mut last = None;
     for cell in cells {
         if last != Some(cell.row) {
-            let after = cell.after.as_ref().map_or_else(String::new, |row| format!(", after {row}"));
-            text.push_str(&format!("{:>4}  {}{after}\n", cell.row, cell.label));
+            text.push_str(&format!("{:>4}  {}\n", cell.row, cell.label));
             last = Some(cell.row);
         }
-        text.push_str(&format!("      {:width$}  {}\n", cell.road, fate(cell)));
+        let after = cell.after.as_ref().map_or_else(String::new, |row| format!("after {row}: "));
+        text.push_str(&format!("      {:width$}  {after}{}\n", cell.road, fate(cell)));
     }
     text
 }
@@ -23,7 +23,6 @@ pub fn trials(cells: &[Cell]) -> String {
 fn fate(cell: &Cell) -> String {
     let Cell { realised, tried, legal, moments, .. } = cell;
     let head = match cell.outcome {
-        Outcome::Masked if cell.moments == 0 => return "masked: nobody whom it is about appeared".to_owned(),
         Outcome::Masked => return format!("masked: {}", reasons(&cell.refusals)),
         Outcome::Realised => format!("realised ({realised} of {tried} tries)"),
         Outcome::Partly => {

@@ -31,7 +31,11 @@ impl Checker {
             ast::EffectKind::Set { .. } | ast::EffectKind::Order { .. } => None,
         });
         for (name, body) in named.flat_map(|(bearers, body)| bearers.iter().map(move |name| (name, body))) {
-            if !matches!(&body.kind, ast::ExprKind::Name(body) if body == Body::Pedestrian.name()) {
+            let is_on_foot = |name: &String| {
+                let own = self.bodies.iter().find(|body| body.name == *name);
+                own.map_or(name == Body::Pedestrian.name(), |own| own.like == Body::Pedestrian)
+            };
+            if !matches!(&body.kind, ast::ExprKind::Name(body) if is_on_foot(body)) {
                 self.drivers.insert(name.text.clone());
             }
             if Fact::ALL.iter().any(|fact| fact.name().split('.').next() == Some(name.text.as_str())) {
@@ -237,6 +241,10 @@ impl Checker {
             Some(value) => Some(self.ignored_rules(value, place)?),
             None => None,
         };
+        let siren = match field(fields, CommandField::Siren) {
+            Some(value) => Some(self.typed(value, place, Type::Bool)?),
+            None => None,
+        };
         let says = |wanted: CommandField| field(fields, wanted).is_some();
         let goes_aside = says(CommandField::Lane) || says(CommandField::Offset);
         for (part, of, is_there) in [
@@ -251,7 +259,7 @@ impl Checker {
                 all = false;
             }
         }
-        all.then_some(CommandDef { speed, rate, lane, offset, aside, ignores })
+        all.then_some(CommandDef { speed, rate, lane, offset, aside, ignores, siren })
     }
 
     /// The rules of the road that are ignored: `[Signals, Ego]`.

@@ -156,8 +156,8 @@ fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
                 exprs.extend(key.iter().chain([value]));
             }
             ast::EffectKind::Order { fields: of_order, .. } => fields.extend(of_order),
-            ast::EffectKind::Spawn { body, distance, cover, fields: of_spawn, .. } => {
-                exprs.extend([body, distance].into_iter().chain(cover.as_deref()));
+            ast::EffectKind::Spawn { body, distance, apart, cover, fields: of_spawn, .. } => {
+                exprs.extend([body, distance].into_iter().chain(apart.as_deref()).chain(cover.as_deref()));
                 fields.extend(of_spawn);
             }
         }

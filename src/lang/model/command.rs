@@ -6,13 +6,20 @@ use crate::model::eval::{Facts, evaluate};
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::limits::{SPEED_MPS_MAX, out_of_bounds, rounded_into};
 use crate::model::space::{FnDef, WordExpr};
-use crate::model::vocabulary::{CommandField, LaneChoice, TrafficRule, Word};
+use avastra_base::units::Rational;
 
-/// Speeds that anybody may be told, m/s: those on foot below 0 for the way back, and vehicles alone above 10.
+use crate::model::vocabulary::{CommandField, LaneChoice, TrafficRule, Verb, Word};
+
+/// Speeds that an order or a phase may name, m/s. What of it a body does, [`speeds_mps`] says.
 const SPEED_MPS: RangeInclusive<f64> = -ON_FOOT_MPS_MAX..=SPEED_MPS_MAX;
 
 /// Nobody on foot is told to go faster, m/s: below a sprinter's 12 m/s.
-pub const ON_FOOT_MPS_MAX: f64 = 10.0;
+const ON_FOOT_MPS_MAX: f64 = 10.0;
+
+/// Speeds that somebody can be told, m/s: on foot below 0 for the way back.
+pub fn speeds_mps(on_foot: bool) -> RangeInclusive<f64> {
+    if on_foot { -ON_FOOT_MPS_MAX..=ON_FOOT_MPS_MAX } else { 0.0..=SPEED_MPS_MAX }
+}
 
 /// Rates at which a vehicle may be told to change its speed, m/s². The most is more than tyres give.
 const RATE_MPS2: RangeInclusive<f64> = 0.1..=15.0;
@@ -36,6 +43,7 @@ pub struct CommandDef {
     /// m/s; without it the driver moves over as it would by itself.
     pub aside: Option<Expr>,
     pub ignores: Option<Vec<WordExpr<TrafficRule>>>,
+    pub siren: Option<Expr>,
 }
 
 /// A command. What is `None` stays as it is.
@@ -47,6 +55,7 @@ pub struct Command {
     pub offset_m: Option<f64>,
     pub aside_mps: Option<f64>,
     pub ignores: Option<IgnoredRules>,
+    pub siren: Option<bool>,
 }
 
 /// The rules of the road that a vehicle ignores; none by default.
@@ -143,7 +152,10 @@ impl CommandDef {
 
     /// Whether it is written as a speed below 0. One that is computed may still be.
     pub fn goes_back(&self) -> bool {
-        let is_negative = |speed: &Expr| matches!(&speed.kind, ExprKind::Negate(_));
+        let is_negative = |speed: &Expr| match &speed.kind {
+            ExprKind::Number(number) => *number < Rational::ZERO,
+            kind => matches!(kind, ExprKind::Negate(_)),
+        };
         self.speed.as_ref().is_some_and(is_negative)
     }
 
@@ -151,7 +163,7 @@ impl CommandDef {
     pub fn parts(&self) -> impl Iterator<Item = &Expr> {
         let lane = self.lane.iter().filter_map(WordExpr::expr);
         let ignores = self.ignores.iter().flatten().filter_map(WordExpr::expr);
-        self.figures().map(|figure| figure.expr).chain(lane).chain(ignores)
+        self.figures().map(|figure| figure.expr).chain(lane).chain(ignores).chain(&self.siren)
     }
 
     /// The command with its values. What has no value is NaN.
@@ -162,6 +174,7 @@ impl CommandDef {
         let mut command = Command {
             lane: self.lane.as_ref().map(|lane| lane.word(functions, facts)),
             ignores: self.ignores.as_ref().map(ignored),
+            siren: self.siren.as_ref().map(|siren| evaluate(siren, functions, facts).truth()),
             ..Command::default()
         };
         for Figure { bounds, written, value, .. } in FIGURES {
@@ -196,6 +209,30 @@ impl Command {
             };
         }
         Some(self)
+    }
+
+    /// The same for somebody on foot, or for a vehicle: the nearest speed that it can be told.
+    pub fn for_body(self, on_foot: bool) -> Command {
+        let speeds_mps = speeds_mps(on_foot);
+        let speed_mps = self.speed_mps.map(|mps| mps.clamp(*speeds_mps.start(), *speeds_mps.end()));
+        Command { speed_mps, ..self }
+    }
+
+    /// Why nobody of that kind can be told this, in words; `None` if they can.
+    pub fn impossible(&self, verb: Verb) -> Option<String> {
+        let on_foot = matches!(verb, Verb::Walk | Verb::Stand);
+        let is_out = |mps: f64| !speeds_mps(on_foot).contains(&mps);
+        match (verb, self.speed_mps) {
+            (Verb::Stand, _) => Some("it stands, and does not walk".to_owned()),
+            (Verb::Walk, speed_mps) if *self != (Command { speed_mps, ..Command::default() }) => {
+                Some("it is on foot, and can be told a speed alone".to_owned())
+            }
+            (Verb::Walk, Some(mps)) if is_out(mps) => {
+                Some(format!("nobody on foot is told more than {ON_FOOT_MPS_MAX} m/s"))
+            }
+            (_, Some(mps)) if is_out(mps) => Some("it does not drive backwards".to_owned()),
+            _ => None,
+        }
     }
 
     /// Whether it says where to the side.

@@ -168,14 +168,17 @@ impl Space {
         self.each_step.iter().flat_map(SetDef::parts).flat_map(Expr::bearers)
     }
 
-    /// The cells whose value the moment decides at which a step begins: those that are set by what asks about it, and
-    /// those that are set from them.
+    /// The cells whose value the moment decides at which a step begins: all that every step sets, if a part of that asks about
+    /// the moment, and those that are set from them.
     pub(crate) fn cells_of_the_moment(&self) -> BTreeSet<usize> {
         let mut found: BTreeSet<usize> = BTreeSet::new();
         if !self.each_step_asks_the_world() {
             return found;
         }
         let count: usize = self.states.iter().map(|state| state.cells).sum();
+        // What every step does happens as a whole or not at all, so the moment decides all of it.
+        let of_each_step = |cell: &usize| self.each_step.iter().any(|set| self.sets_cell(set, *cell));
+        found.extend((0..count).filter(of_each_step));
         let all: Vec<&SetDef> =
             self.actions.iter().flat_map(|action| action.sets()).chain(&self.each_step).collect();
         loop {
@@ -184,7 +187,7 @@ impl Space {
                 effort::spend(count);
                 let reads =
                     |part: &Expr| cells_read(part, &self.states).iter().any(|cell| found.contains(cell));
-                if set.asks_the_world() || set.parts().any(reads) {
+                if set.parts().any(reads) {
                     found.extend((0..count).filter(|cell| self.sets_cell(set, *cell)));
                 }
             }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use crate::model::body::BodyParameters;
 use crate::model::command::CommandDef;
+use crate::model::eval::{Facts, evaluate};
 use crate::model::expr::Expr;
 use crate::model::interval::Interval;
 use crate::model::meaning::Meaning;
@@ -364,6 +365,16 @@ pub struct PhaseDef {
 pub struct ManoeuvreCall {
     pub manoeuvre: usize,
     pub arguments: Vec<Expr>,
+}
+
+impl SpawnDef {
+    /// How much farther away it is than the first of its row, m; `length_m` is that of its body.
+    pub fn behind_first_m(&self, length_m: f64, functions: &[FnDef], facts: &Facts<'_>) -> f64 {
+        let more_m = |(nth, apart): &(usize, Expr)| {
+            *nth as f64 * (length_m + evaluate(apart, functions, facts).number())
+        };
+        self.row.as_ref().map_or(0.0, more_m)
+    }
 }
 
 /// What the latest bearer of a name is told to do.

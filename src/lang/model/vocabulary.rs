@@ -341,6 +341,7 @@ words! {
     Offset "offset" = "How far to the left of its lane's middle it drives from then on; negative to the right.",
     Aside "aside" = "Its greatest speed to the side on the way there, as far as the road allows.",
     Ignores "ignores" = "The rules of the road that it ignores from then on: `ignores: [Signals]`; `[]` for none.",
+    Siren "siren" = "Whether it is an emergency vehicle under way from then on: `siren: false`.",
     Then "then" = "The manoeuvre that it does, in an order: `then: brake(4 m/s^2)`.",
 }
 

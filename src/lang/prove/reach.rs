@@ -189,6 +189,15 @@ fn products(space: &Space, action: &ActionDef) -> Vec<Vec<Value>> {
     rows
 }
 
+impl Space {
+    /// Whether rules in force by default on the row read states that the moment decides.
+    pub fn depends_on_moment(&self, row: &Row) -> bool {
+        let in_force = RulesInForce::by_default(self);
+        RowRules { space: self, row, road: None, in_force: &in_force }
+            .reads_any_of(&self.cells_of_the_moment())
+    }
+}
+
 impl<'a> RowRules<'a> {
     pub(crate) fn reach(self) -> Reach {
         if let Some(ranges) = self.ranges() {
@@ -276,6 +285,19 @@ impl<'a> RowRules<'a> {
         let possible =
             may_move && may_hold_together(&self.conditions(), &known, &self.space.episode, newcomers);
         possible.then_some(locals)
+    }
+
+    /// Whether a rule in force on the row reads one of these cells, or orders its changes.
+    pub(crate) fn reads_any_of(self, cells: &BTreeSet<usize>) -> bool {
+        if cells.is_empty() {
+            return false;
+        }
+        let reads = |condition: &Expr| {
+            rules::cells_read(condition, &self.space.states).iter().any(|cell| cells.contains(cell))
+        };
+        let moves =
+            |demand: &Demand<'_>| matches!(demand, Demand::Moves { cell, .. } if cells.contains(cell));
+        self.conditions().into_iter().any(reads) || self.demands().any(|(_, demand)| moves(&demand))
     }
 
     /// The conditions of a draw: those of rules, and the `where`s that ask about the moment. The others are bounds, or

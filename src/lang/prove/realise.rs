@@ -133,6 +133,11 @@ struct OnRoad<'a> {
 }
 
 impl<'a> OnRoad<'a> {
+    fn is_of_the_moment(&self, row: &Row) -> bool {
+        let OnRoad { space, road, in_force, of_the_moment, .. } = *self;
+        RowRules { space, row, road: Some(&road.facts), in_force }.reads_any_of(of_the_moment)
+    }
+
     /// A memory after a step, with each value that the moment may give to what it decides: `after` has all that may be.
     /// Numbers stay as they are.
     fn at_any_moment(&self, memory: &Memory, after: impl Fn() -> Vec<Values>) -> Vec<Memory> {
@@ -228,14 +233,17 @@ impl<'a> OnRoad<'a> {
             }
             match search.at(memory) {
                 _ if self.left.is_spent() => return Realised::NotSearched,
-                Found::Runs(_) if is_complete && self.of_the_moment.is_empty() => return Realised::Unreached,
+                Found::Runs(_) if is_complete && !self.is_of_the_moment(asked.row) => {
+                    return Realised::Unreached;
+                }
                 Found::Runs(_) => return Realised::Elsewhere,
                 Found::Never => {}
                 Found::Unknown => is_proved = false,
             }
         }
         match (is_proved, is_complete) {
-            _ if !self.of_the_moment.is_empty() => Realised::Unknown,
+            // What the moment decides may be as the rules want it.
+            _ if self.is_of_the_moment(asked.row) => Realised::Elsewhere,
             (true, _) => Realised::Never,
             (false, true) => Realised::Unreached,
             (false, false) => Realised::Unknown,
@@ -365,10 +373,10 @@ impl Way {
             let after = || space.cells_after_wait(&points(memory.cells()));
             for one in on_road.at_any_moment(&waited, after) {
                 let may_wait = || space.may_wait(&memory, &one, step, Some(&road.facts), in_force);
-                if one == waited || may_wait() {
-                    let number = self.number(one, step + 1, is_waited_for);
-                    self.now.extend(number);
-                }
+                // Where what every step does may not happen, all stays as it was.
+                let one = if one == waited || may_wait() { one } else { memory.clone() };
+                let number = self.number(one, step + 1, is_waited_for);
+                self.now.extend(number);
             }
             for position in core::mem::take(&mut self.states[*state].open) {
                 if effort::is_spent() {

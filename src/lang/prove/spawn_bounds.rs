@@ -3,12 +3,11 @@
 use core::ops::RangeInclusive;
 use std::collections::BTreeSet;
 
-use crate::model::command::{OFFSET_M, ON_FOOT_MPS_MAX};
+use crate::model::command::{OFFSET_M, speeds_mps};
 use crate::model::expr::ExprKind;
 use crate::model::vocabulary::{CommandField, Word};
 use crate::model::{
-    ACTION_ODDS_MAX, ActionDef, Interval, MEET, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, SPEED_MPS_MAX, Space,
-    code, effort,
+    ACTION_ODDS_MAX, ActionDef, Interval, MEET, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, code, effort,
 };
 use crate::prove::enclose::{Known, enclose};
 use crate::prove::reach::spawn_figures;
@@ -71,8 +70,7 @@ fn errors(space: &Space, action: usize) -> impl Iterator<Item = Diagnostic> {
     let of_orders = space.actions[action].orders().flat_map(|order| {
         order.command.figures().map(|figure| {
             let bounds = match figure.field {
-                CommandField::Speed if order.may_drive => 0.0..=SPEED_MPS_MAX,
-                CommandField::Speed => -ON_FOOT_MPS_MAX..=ON_FOOT_MPS_MAX,
+                CommandField::Speed => speeds_mps(!order.may_drive),
                 _ => figure.bounds,
             };
             (figure.field.name(), "an order", figure.unit, figure.expr, bounds)

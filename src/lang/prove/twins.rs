@@ -126,9 +126,10 @@ impl<'a> RowText<'a> {
                 let lane =
                     order.command.lane.as_ref().map(|lane| word_form(lane, &|expr| self.reduced(expr)));
                 let then = order.manoeuvre.as_ref().map(|then| self.call_form(then));
+                let siren = order.command.siren.as_ref().map(|siren| self.reduced(siren).kind);
                 let ignores = order.command.ignores.as_ref();
                 let ignores = ignores.map(|ignores| ignored_form(ignores, &|expr| self.reduced(expr)));
-                format!("order {} {figures:?} {lane:?} {ignores:?} {then:?}", order.bearer)
+                format!("order {} {figures:?} {lane:?} {ignores:?} {siren:?} {then:?}", order.bearer)
             }
         });
         effects.collect::<Vec<_>>().join("\n")

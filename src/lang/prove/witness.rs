@@ -12,6 +12,7 @@ use std::cell::Cell;
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
+use crate::model::body::parameters;
 use crate::model::command::OFFSET_M;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Before, Candidate, Choose, Demand, Nearest, Room, RowRules, cells_read};
@@ -302,7 +303,10 @@ impl Search<'_> {
         let mut spawns = Vec::new();
         for spawn in action.spawns() {
             let speed_mps = rounded_into(number(&spawn.speed), SPAWN_SPEED_MPS);
-            let distance_m = rounded_into(number(&spawn.distance), SPAWN_DISTANCE_M);
+            let body = spawn.body.word(&space.functions, &facts);
+            let shape = body.own.map_or_else(|| parameters(body.like), |own| space.bodies[own].shape);
+            let more_m = spawn.behind_first_m(shape.length_m, &space.functions, &facts);
+            let distance_m = rounded_into(number(&spawn.distance) + more_m, SPAWN_DISTANCE_M);
             let offset_m = spawn.offset.as_ref().map_or(0.0, |offset| rounded_into(number(offset), OFFSET_M));
             if spawn_out_of_bounds(speed_mps, distance_m, offset_m, None).is_some() {
                 return false;

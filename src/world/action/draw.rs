@@ -278,10 +278,8 @@ impl<'a> Judge<'a> {
         let body = spawn.body.word(functions, &facts);
         let cover = spawn.cover.as_ref().map(|cover| cover.word(functions, &facts));
         // The bodies of a row are all of one kind.
-        let before_m = spawn.row.as_ref().map_or(0.0, |(nth, apart)| {
-            let shape = own(body).map_or_else(|| parameters(body.like), |own| own.shape);
-            *nth as f64 * (shape.length_m + evaluate(apart, functions, &facts).number())
-        });
+        let shape = own(body).map_or_else(|| parameters(body.like), |own| own.shape);
+        let before_m = spawn.behind_first_m(shape.length_m, functions, &facts);
         SpawnRequest {
             body: body.like,
             own: own(body),
@@ -317,21 +315,22 @@ impl<'a> Judge<'a> {
         OrderRequest { bearer: order.bearer, command }
     }
 
-    /// Why an order cannot be given after the effects before it. A vehicle that one of them spawns under that name is there.
+    /// Why an order cannot be given after the effects before it. Somebody whom one of them spawns under that name is there.
     fn order_refusal(&self, order: &OrderRequest, before: &[Effect]) -> Option<Refusal> {
-        let appears = |effect: &Effect| match effect {
-            Effect::Spawn(request) => request.bearer == Some(order.bearer),
-            Effect::Time(_) | Effect::Sky(..) | Effect::Order(_) => false,
+        let spawned = before.iter().rev().find_map(|effect| match effect {
+            Effect::Spawn(request) if request.bearer == Some(order.bearer) => Some(request.verb),
+            Effect::Spawn(_) | Effect::Time(_) | Effect::Sky(..) | Effect::Order(_) => None,
+        });
+        let impossible = || match spawned {
+            Some(verb) => order.command.impossible(verb),
+            None => self.situation.surroundings.order_refusal(order),
         };
-        order
+        let name = || &self.row.space.bearers[order.bearer];
+        let reason = order
             .command
             .out_of_bounds()
-            .or_else(|| {
-                let surroundings = self.situation.surroundings;
-                let reason = (!before.iter().any(appears)).then(|| surroundings.order_refusal(order))??;
-                Some(format!("cannot order `{}`: {reason}", self.row.space.bearers[order.bearer]))
-            })
-            .map(|reason| refuse(None, reason))
+            .or_else(|| Some(format!("cannot order `{}`: {}", name(), impossible()?)));
+        reason.map(|reason| refuse(None, reason))
     }
 
     /// The memory after the step.

@@ -24,7 +24,6 @@
 use avastra_base::geometry::{OrientedBox, Pose, Vec2, distance_m, wrap_angle};
 use avastra_base::rng;
 use avastra_base::rng::Rng;
-use avastra_lang::model::command::ON_FOOT_MPS_MAX;
 use avastra_road::is_apart;
 
 use super::around::{Around, Other};
@@ -145,6 +144,8 @@ pub(super) struct Walker {
     returns: bool,
     /// Whether it was told its speed, and stands if that is 0.
     is_told: bool,
+    /// Whether it looks in the next tick, because it was just told something.
+    looks_now: bool,
     /// Pace and offset that it wants since its last look.
     pace_mps: f64,
     wants_aside_m: f64,
@@ -177,6 +178,7 @@ impl Walker {
             aside_m: 0.0,
             returns: false,
             is_told: false,
+            looks_now: false,
             pace_mps: speed_mps,
             wants_aside_m: 0.0,
             begins_tick,
@@ -195,8 +197,9 @@ impl Walker {
     /// From now on it walks at this speed, m/s, steadily; below 0 it turns round and goes back to where it began.
     pub fn order(&mut self, speed_mps: f64, tick: u64) {
         self.is_told = true;
-        self.speed_mps = speed_mps.abs().min(ON_FOOT_MPS_MAX);
+        self.speed_mps = speed_mps.abs();
         self.pace_mps = self.speed_mps;
+        (self.looks_now, self.stuck_ticks) = (true, 0);
         if speed_mps != 0.0 && self.returns != (speed_mps < 0.0) {
             self.returns = !self.returns;
             self.wants_aside_m = 0.0;
@@ -206,14 +209,11 @@ impl Walker {
 
     /// How fast it goes on, m/s; below 0 back to where it began.
     pub fn pace_mps(&self) -> f64 {
-        match self.is_over() {
-            true => 0.0,
-            false if self.returns => -self.pace_mps,
-            false => self.pace_mps,
-        }
+        if self.returns { -self.pace_mps } else { self.pace_mps }
     }
 
-    fn is_over(&self) -> bool {
+    /// Whether its walk is over, this way or back.
+    pub fn is_over(&self) -> bool {
         if self.returns { self.walked_m <= 0.0 } else { self.walked_m >= self.end_m }
     }
 
@@ -222,7 +222,8 @@ impl Walker {
         if self.is_over() {
             return in_sight.then_some(Moved::at_rest(this));
         }
-        if (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS) {
+        let is_due = (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS);
+        if core::mem::take(&mut self.looks_now) || is_due {
             self.look(this, around);
         }
         // The step of this tick is the first if waiting for another one would be too long.
@@ -232,7 +233,8 @@ impl Walker {
         if around.tick < self.begins_tick {
             return Some(Moved::at_rest(this));
         }
-        if self.is_told && self.speed_mps == 0.0 {
+        // Who was told to go waits for what is in the way, and does not turn round by itself.
+        if self.is_told && self.pace_mps == 0.0 {
             return Some(Moved::at_rest(this));
         }
         if self.pace_mps == 0.0 {
@@ -334,7 +336,9 @@ impl Walker {
 
     /// Whether something stands or passes right before its feet.
     fn is_blocked(&self, this: &Obstacle, around: &Around) -> bool {
-        let next = OrientedBox { pose: this.outline.pose.offset(STEP_M, 0.0), ..this.outline };
+        // One that was told to turn round has not done so yet.
+        let pose = if self.is_told { self.moved(this).pose } else { this.outline.pose };
+        let next = OrientedBox { pose: pose.offset(STEP_M, 0.0), ..this.outline };
         around.others().any(|Other { outline, elevation_m, .. }| {
             let reach_m = outline.half_length_m + outline.half_width_m + 2.0;
             let away = outline.pose.position - next.pose.position;

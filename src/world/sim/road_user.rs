@@ -22,8 +22,10 @@ use super::world::DT_S;
 /// How long a wreck stays where it came to rest, s; longer while the ego vehicle sees it.
 const WRECK_S: f64 = 2.0;
 
-/// A road user this near to the speed of a phase has it, m/s: without a `rate`, the driver model only approaches it.
+/// A road user this near to the speed of a phase has it, m/s, or by this part of it: without a `rate`, the driver model only
+/// approaches it.
 const SPEED_REACHED_MPS: f64 = 0.1;
+const SPEED_REACHED_PART: f64 = 0.02;
 
 /// What walks or stands does so beside this stretch of the ego vehicle's route, before and behind it, m.
 const ON_FOOT_M: f64 = 200.0;
@@ -124,12 +126,15 @@ pub(super) struct Progress {
     pub speed_mps: f64,
     /// Whether it is in the lane and at the offset that it was told.
     pub is_aside: bool,
+    pub on_foot: bool,
+    /// Whether it is where its walk ends, this way or back: no speed would get it farther.
+    pub is_over: bool,
 }
 
 impl Progress {
     /// Whether it has done what a command says.
     pub fn meets(&self, command: &Command) -> bool {
-        command.speed_mps.is_none_or(|mps| has_speed(self.speed_mps, mps))
+        command.speed_mps.is_none_or(|mps| self.is_over || has_speed(self.speed_mps, mps))
             && (self.is_aside || !command.goes_aside())
     }
 }
@@ -179,6 +184,7 @@ impl Running {
                 }
                 Stage::Holding(until) if tick >= until && self.course.may_begin(moment) => {
                     let Some(command) = self.course.command(self.phase, moment) else { return over(ended) };
+                    let command = command.for_body(progress.on_foot);
                     (self.stage, self.since) = (Stage::UnderWay(command), tick);
                     return Advance { rest: Some(self), command: Some(command), ended };
                 }
@@ -209,14 +215,15 @@ impl Running {
                 }
             }
         }
-        trace.word(self.course.manoeuvre as u64);
         trace.words(self.course.arguments());
     }
 }
 
 /// Whether a road user has the speed that a phase wants, m/s. A stop is exact.
 fn has_speed(now_mps: f64, wanted_mps: f64) -> bool {
-    now_mps == wanted_mps || wanted_mps != 0.0 && (now_mps - wanted_mps).abs() < SPEED_REACHED_MPS
+    now_mps == wanted_mps
+        || wanted_mps != 0.0
+            && (now_mps - wanted_mps).abs() < SPEED_REACHED_MPS.max(SPEED_REACHED_PART * wanted_mps.abs())
 }
 
 #[derive(Debug, Clone)]
@@ -231,9 +238,13 @@ impl Motion {
     pub fn progress(&self) -> Option<Progress> {
         match self {
             Motion::Drive(driver) => {
-                Some(Progress { speed_mps: driver.speed_mps, is_aside: driver.is_aside_as_told() })
+                let is_aside = driver.is_aside_as_told();
+                Some(Progress { speed_mps: driver.speed_mps, is_aside, on_foot: false, is_over: false })
             }
-            Motion::Walk(walker) => Some(Progress { speed_mps: walker.pace_mps(), is_aside: true }),
+            Motion::Walk(walker) => {
+                let (speed_mps, is_over) = (walker.pace_mps(), walker.is_over());
+                Some(Progress { speed_mps, is_aside: true, on_foot: true, is_over })
+            }
             Motion::Stand => None,
         }
     }
@@ -432,10 +443,9 @@ impl Mover {
         trace
             .words([u32::from(self.touched), self.crashed_with.unwrap_or(0), self.rest_ticks].map(u64::from));
         trace.number(self.visible_fraction);
-        // Nothing is fed for what has no name, as before there were names.
-        if let Some(bearer) = self.bearer {
-            trace.word(bearer as u64);
-        }
+        // Nothing is fed for what has no name, as before there were names. Names and manoeuvres are numbered as the space declares
+        // them, so their numbers are left out: what is declared beside them changes no episode.
+        trace.words(self.bearer.map(|_| 1));
         if let Some(running) = &self.course {
             running.trace(trace);
         }

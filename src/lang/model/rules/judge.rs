@@ -238,6 +238,11 @@ impl<'a> RowRules<'a> {
                     let fact = fact.name().trim_start_matches("npc.");
                     format!("{}.{fact} = {}", self.space.bearers[*who], measured(part))
                 }
+                ExprKind::IsThere(who) => {
+                    let is_there = evaluate(part, &self.space.functions, &facts).truth();
+                    let fate = if is_there { "is there" } else { "is not there" };
+                    format!("`{}` {fate}", self.space.bearers[*who])
+                }
                 ExprKind::Cell(cell) => format!("{} = {}", self.space.cell_name(*cell), value(part)),
                 ExprKind::CellAt(first, key) => {
                     let key = evaluate(key, &self.space.functions, &facts).variant();
@@ -284,10 +289,13 @@ impl<'a> RowRules<'a> {
                 facts.world.is_some_and(|world| world.bearers.iter().any(|(known, _)| known == who))
             };
             let absent = condition.bearers().into_iter().find(|who| !is_there(who));
-            shown.push(match absent {
+            let why = match absent {
                 Some(who) => format!("`{}` is not there", self.space.bearers[who]),
                 None => "a division by 0 has no value".to_owned(),
-            });
+            };
+            if !shown.contains(&why) {
+                shown.push(why);
+            }
         }
         let asks_for_limit = condition.any(|kind| matches!(kind, ExprKind::Fact(Fact::RoadLimit)));
         let limited_at = self.road.and_then(|road| road.limited_at.as_ref());

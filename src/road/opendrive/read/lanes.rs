@@ -107,26 +107,29 @@ impl Reader {
 impl Reader {
     /// Whether `access` keeps cars out of a lane and lets buses in.
     fn is_kept_for_buses(&mut self, lane: Element) -> bool {
-        let mut kept = false;
-        let mut others = false;
+        let (mut for_buses, mut for_cars, mut without_cars, mut for_others) = (false, false, false, false);
         for access in lane.children("access") {
             // Without a rule, as before OpenDRIVE 1.6, a restriction says who alone may use the lane.
             let allows = access.attribute("rule") != Some("deny");
             let named = access.children("restriction").filter_map(|one| one.attribute("type"));
             for who in access.attribute("restriction").into_iter().chain(named) {
                 match (allows, who) {
-                    (true, "bus") | (false, "passengerCar") => kept = true,
+                    (true, "bus") => for_buses = true,
                     (
                         true,
                         "none" | "passengerCar" | "throughTraffic" | "autonomousTraffic"
                         | "autonomous traffic",
-                    )
-                    | (false, _) => {}
-                    (true, _) => others = true,
+                    ) => {
+                        for_cars = true;
+                    }
+                    (true, _) => for_others = true,
+                    (false, "passengerCar") => without_cars = true,
+                    (false, _) => {}
                 }
             }
         }
-        if others && !kept {
+        let kept = for_buses && !for_cars || without_cars;
+        if for_others && !kept && !for_cars {
             self.ignore("rules of access to lanes for others than buses".to_owned());
         }
         kept

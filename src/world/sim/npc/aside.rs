@@ -91,9 +91,10 @@ impl Driver {
     /// one that has not begun; what is under way is finished first.
     pub fn order(&mut self, command: &Command) {
         if let Some(speed_mps) = command.speed_mps {
-            (self.cruise_mps, self.ordered_mps2) = (speed_mps.max(0.0), command.rate_mps2);
+            (self.cruise_mps, self.ordered_mps2) = (speed_mps, command.rate_mps2);
         }
         self.ignores = command.ignores.unwrap_or(self.ignores);
+        self.has_siren = command.siren.unwrap_or(self.has_siren);
         if command.goes_aside() {
             self.plan.clear();
             let aside = self.aside.get_or_insert_default();
@@ -151,22 +152,23 @@ impl Driver {
     fn go_over(&mut self, lane: LaneChoice, told_mps: Option<f64>, view: &View) -> bool {
         let View { this, around, .. } = *view;
         // An error: in a junction, or where that lane has not begun yet.
-        let Ok(side) = self.side_of(lane, this, around) else { return false };
+        let Ok(side) = self.side_of(lane, this, self.ignores, around) else { return false };
         let Some(side) = side else {
             self.aside.get_or_insert_default().lane = None;
             return true;
         };
         let whose = Whose::Told(told_mps);
-        if self.may_change(view)
-            && let Some(begun) = self.change_to(side, whose, view)
-        {
-            let (into, _) = begun.0.lane_at(begun.1);
-            let meant = chosen_lane(around, around.beside_route(this.outline.pose.position).0, lane);
-            self.set_out(begun, whose, view);
-            if meant == Ok(into) {
-                let wanted_m = self.aside.as_ref().map_or(0.0, |aside| aside.wanted_m);
-                self.end_aside(wanted_m, whose, view);
-            }
+        if !self.may_change(view) {
+            return false;
+        }
+        // The change into the last lane on the way to the one that is meant ends at the place that it was told.
+        let meant = chosen_lane(around, around.beside_route(this.outline.pose.position).0, lane);
+        let (here, _) = self.way.lane_at(self.station_m);
+        let is_last = meant.ok() == lane_beside(around, here, side);
+        let wanted_m = self.aside.as_ref().map_or(0.0, |aside| aside.wanted_m);
+        let ends_m = if is_last { wanted_m } else { self.aside_m() };
+        if let Some(begun) = self.change_to(side, ends_m, whose, view) {
+            self.set_out(begun, ends_m, whose, view);
         }
         false
     }
@@ -184,12 +186,10 @@ impl Driver {
         &self,
         lane: LaneChoice,
         this: &Obstacle,
+        ignores: IgnoredRules,
         around: &Around,
     ) -> Result<Option<Side>, String> {
         let meant = chosen_lane(around, around.beside_route(this.outline.pose.position).0, lane)?;
-        if !may_use(around, meant, this.body, self.ignores) {
-            return Err("that lane is for buses".into());
-        }
         let (here, _) = self.way.lane_at(self.station_m);
         let lies = |side: Side| {
             let next = |lane: &LaneIndex| lane_beside(around, *lane, side);
@@ -197,6 +197,7 @@ impl Driver {
         };
         match () {
             () if here == meant => Ok(None),
+            () if !may_use(around, meant, this.body, ignores) => Err("that lane is for buses".into()),
             () if lies(Side::Left) => Ok(Some(Side::Left)),
             () if lies(Side::Right) => Ok(Some(Side::Right)),
             () => Err("that lane does not lie beside its own".into()),

@@ -104,8 +104,8 @@ impl Driver {
         let View { this, size, around } = *view;
         let Some(next) = self.plan.last() else {
             let Some(side) = self.wants_side(view) else { return };
-            if let Some(begun) = self.change_to(side, Whose::Own, view) {
-                self.set_out(begun, Whose::Own, view);
+            if let Some(begun) = self.change_to(side, self.aside_m(), Whose::Own, view) {
+                self.set_out(begun, self.aside_m(), Whose::Own, view);
             }
             return;
         };
@@ -119,7 +119,8 @@ impl Driver {
         if !due || self.is_moving_aside() || !self.may_change(view) {
             return;
         }
-        let change = |driver: &mut Driver, side| driver.change_to(side, Whose::Own, view);
+        let ends_m = self.aside_m();
+        let change = |driver: &mut Driver, side| driver.change_to(side, ends_m, Whose::Own, view);
         let begun = match next.towards.clone() {
             Towards::Way(way) => {
                 let to_m = way.path.project(this.outline.pose.position).station_m;
@@ -134,7 +135,7 @@ impl Driver {
             },
         };
         let Some(begun) = begun else { return };
-        self.set_out(begun, Whose::Own, view);
+        self.set_out(begun, self.aside_m(), Whose::Own, view);
         self.plan.pop();
     }
 
@@ -150,31 +151,31 @@ impl Driver {
     pub(super) fn set_out(
         &mut self,
         (to, to_station_m, side): (Arc<Way>, f64, Option<Side>),
+        ends_m: f64,
         whose: Whose,
         view: &View,
     ) {
-        let aside_m = (to.path.pose_at(to_station_m).position - self.middle(view.this)).norm();
+        let over = to.path.pose_at(to_station_m).position - self.middle(view.this);
+        let aside_m = self.over_m(over, ends_m);
         let duration_s = duration_s(aside_m, self.speed_mps, whose, view.around);
-        let ends_m = self.aside_m();
         self.change = Some(Change { to, to_station_m, progress: 0.0, duration_s, ends_m });
         self.last_change = side;
     }
 
-    /// The lane change that has just begun ends beside the middle of its lane: one move to the side instead of two.
-    pub(super) fn end_aside(&mut self, ends_m: f64, whose: Whose, view: &View) {
-        let (middle, now_m, lane_rad) = (self.middle(view.this), self.aside_m(), self.lane_heading_rad());
-        let speed_mps = self.speed_mps;
-        let Some(change) = self.change.as_mut().filter(|_| ends_m != now_m) else { return };
-        let over = change.to.path.pose_at(change.to_station_m).position - middle;
-        let aside_m = unit_vector(lane_rad).perp(&over) + ends_m - now_m;
-        change.duration_s = duration_s(aside_m.abs(), speed_mps, whose, view.around);
-        change.ends_m = ends_m;
+    /// How far to the side it gets if the middle of its lane moves `over`, and it ends so far to the left of it, m.
+    fn over_m(&self, over: Vec2, ends_m: f64) -> f64 {
+        let now_m = self.aside_m();
+        if ends_m == now_m {
+            return over.norm();
+        }
+        (unit_vector(self.lane_heading_rad()).perp(&over) + ends_m - now_m).abs()
     }
 
     /// The way in the neighbouring lane, if there is one and room in it, and the own station there.
     pub(super) fn change_to(
         &mut self,
         side: Side,
+        ends_m: f64,
         whose: Whose,
         view: &View,
     ) -> Option<(Arc<Way>, f64, Option<Side>)> {
@@ -187,11 +188,15 @@ impl Driver {
         }
         let centre = &map.lane(target).centre;
         let there = centre.project(self.middle(this));
+        let aside_m = match ends_m == self.aside_m() {
+            true => there.distance_m,
+            false => self.over_m(centre.position_at(there.station_m) - self.middle(this), ends_m),
+        };
         // `change_room_m` ends at markings that forbid a change, and at junctions, where lanes part.
         let room_m = map.change_room_m(here, on_road(side), here_m);
         if there.distance_m > CHANGE_M_MAX
-            || room_m < length_m(self.speed_mps, there.distance_m, whose, around)
-            || !self.may_enter(side, map.lane(target), there.station_m, whose, view)
+            || room_m < length_m(self.speed_mps, aside_m, whose, around)
+            || !self.may_enter(side, (map.lane(target), there.station_m, ends_m), whose, view)
             || whose == Whose::Own && around.scene.is_motorway && self.is_wanted(target, view)
         {
             return None;
@@ -202,10 +207,10 @@ impl Driver {
     }
 
     /// Whether the profile's check of the other lane lets it change.
-    fn may_enter(&self, side: Side, lane: &Lane, station_m: f64, whose: Whose, view: &View) -> bool {
+    fn may_enter(&self, side: Side, place: (&Lane, f64, f64), whose: Whose, view: &View) -> bool {
         let View { this, size, around } = *view;
         if whose != Whose::Own || !around.traffic.change_by_sphere {
-            return self.is_free(lane, station_m, size, whose, around);
+            return self.is_free(place, size, whose, around);
         }
         let left = Vec2::new(-this.forward.y, this.forward.x);
         let sphere_m = (SPHERE_PART * size.width_m / 2.0).min(SPHERE_M_MAX);
@@ -231,11 +236,11 @@ impl Driver {
         })
     }
 
-    /// Whether no vehicle is beside it in another lane or would be soon, and none has to brake hard for it.
+    /// Whether no vehicle is beside it at a place beside the middle of another lane or would be soon, and none has to brake hard
+    /// for it.
     fn is_free(
         &self,
-        lane: &Lane,
-        station_m: f64,
+        (lane, station_m, ends_m): (&Lane, f64, f64),
         size: &BodyParameters,
         whose: Whose,
         around: &Around,
@@ -259,7 +264,7 @@ impl Driver {
                 return true;
             };
             let (half_length_m, half_width_m) = outline.half_extent_m(heading, other.forward);
-            let aside_m = (other.offset_m - self.aside_m()).abs() - half_width_m - size.width_m / 2.0;
+            let aside_m = (other.offset_m - ends_m).abs() - half_width_m - size.width_m / 2.0;
             let apart_m = (other.station_m - station_m).abs() - half_length_m - size.length_m / 2.0;
             let along_mps = velocity_mps.dot(&forward);
             let closing_mps = match other.station_m < station_m {

@@ -51,7 +51,7 @@ impl Driver {
     /// not ahead in its corridor.
     pub fn gap_to(&self, size: &BodyParameters, other: Other) -> Option<(f64, f64)> {
         let here = self.way.path.pose_at(self.station_m);
-        self.in_corridor(&self.way, self.station_m, &here, size, other)
+        self.in_corridor((&self.way, self.station_m, None), &here, size, other)
             .map(|leader| (leader.gap_m, leader.speed_mps))
     }
 
@@ -72,12 +72,11 @@ impl Driver {
                 continue;
             }
             let on_own_way = self
-                .in_corridor(&self.way, self.station_m, here, size, other)
+                .in_corridor((&self.way, self.station_m, None), here, size, other)
                 .filter(|leader| !self.evades(leader, size, other));
-            let on_next_way = self
-                .change
-                .as_ref()
-                .and_then(|change| self.in_corridor(&change.to, change.to_station_m, here, size, other));
+            let on_next_way = self.change.as_ref().and_then(|change| {
+                self.in_corridor((&change.to, change.to_station_m, Some(change.ends_m)), here, size, other)
+            });
             for leader in on_own_way.into_iter().chain(on_next_way) {
                 if nearest.is_none_or(|found| leader.gap_m < found.gap_m) {
                     nearest = Some(leader);
@@ -109,7 +108,7 @@ impl Driver {
         let target = change.to.path.position_at(change.to_station_m);
         let over_m = self.way.path.pose_at(self.station_m).to_local(target).y;
         let progress = change.progress + change.progress_per_m(self.speed_mps) * leader.gap_m.max(0.0);
-        let moved_m = over_m * smooth_step(progress).value;
+        let moved_m = (over_m + change.ends_m - self.aside_m()) * smooth_step(progress).value;
         let (_, half_width_m) = other.outline.half_extent_m(other.forward, beside.forward);
         (beside.offset_m - self.aside_m() - moved_m).abs() - half_width_m - size.width_m / 2.0 > SIDE_ROOM_M
     }
@@ -129,8 +128,7 @@ impl Driver {
     /// Another road user as its leader, were it at `station_m` of a way, if that one is ahead and in its corridor.
     fn in_corridor(
         &self,
-        way: &Way,
-        station_m: f64,
+        (way, station_m, ends_m): (&Way, f64, Option<f64>),
         here: &Pose,
         size: &BodyParameters,
         Other { outline, forward, velocity_mps, elevation_m }: Other,
@@ -139,7 +137,7 @@ impl Driver {
         let other = way.path.project_from(outline.pose.position, station_m + straight_m)?;
         let (half_length_m, half_width_m) = outline.half_extent_m(forward, other.forward);
         let gap_m = other.station_m - station_m - half_length_m - size.length_m / 2.0;
-        let own_m = self.aside_after_m(gap_m);
+        let own_m = ends_m.unwrap_or_else(|| self.aside_after_m(gap_m));
         let aside_m = (other.offset_m - own_m).abs() - half_width_m - size.width_m / 2.0;
         let is_aside = other.station_m < station_m || aside_m > SIDE_ROOM_M;
         if is_aside || is_apart(way.height_at(other.station_m), elevation_m) {

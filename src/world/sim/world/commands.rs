@@ -7,7 +7,6 @@ use crate::sim::moment::npc_facts;
 use crate::sim::placement;
 use crate::sim::placement::Arrivals;
 use crate::sim::road_user::{Advance, Motion, RoadUser, Running};
-use avastra_lang::model::command::{Command, ON_FOOT_MPS_MAX};
 use avastra_lang::model::{COMMANDED_MAX, NpcFacts};
 
 use super::{DT_S, World};
@@ -94,34 +93,24 @@ impl World {
         Ok(id)
     }
 
-    /// The index of the road user that an order is for, which drives.
+    /// The index of the road user that an order is for.
     ///
     /// # Errors
     /// Why it cannot be ordered, in words that complete "cannot order `NAME`: …".
     pub(super) fn ordered(&self, order: &OrderRequest) -> Result<usize, String> {
         let index = self.bearer(order.bearer).ok_or("no road user of that name is there")?;
         let RoadUser { obstacle, mover } = &self.users[index];
-        let Command { speed_mps, .. } = order.command;
-        match &mover.motion {
-            _ if mover.is_wreck() => Err("it is a wreck".to_owned()),
-            Motion::Drive(_) if speed_mps.is_some_and(|speed_mps| speed_mps < 0.0) => {
-                Err("it does not drive backwards".to_owned())
-            }
-            Motion::Drive(driver) => {
-                if let Some(lane) = order.command.lane {
-                    driver.side_of(lane, obstacle, &self.alone())?;
-                }
-                Ok(index)
-            }
-            Motion::Walk(_) if order.command != (Command { speed_mps, ..Command::default() }) => {
-                Err("it is on foot, and can be told a speed alone".to_owned())
-            }
-            Motion::Walk(_) if speed_mps.is_some_and(|speed_mps| speed_mps.abs() > ON_FOOT_MPS_MAX) => {
-                Err(format!("nobody on foot is told more than {ON_FOOT_MPS_MAX} m/s"))
-            }
-            Motion::Walk(_) => Ok(index),
-            Motion::Stand => Err("it stands, and does not walk".to_owned()),
+        if mover.is_wreck() {
+            return Err("it is a wreck".to_owned());
         }
+        if let Some(reason) = order.command.impossible(obstacle.verb) {
+            return Err(reason);
+        }
+        if let (Motion::Drive(driver), Some(lane)) = (&mover.motion, order.command.lane) {
+            let ignores = order.command.ignores.unwrap_or(driver.ignores);
+            driver.side_of(lane, obstacle, ignores, &self.alone())?;
+        }
+        Ok(index)
     }
 
     fn order(&mut self, order: &OrderRequest) -> Result<(), String> {
@@ -133,7 +122,7 @@ impl World {
         Ok(())
     }
 
-    /// Moves on the manoeuvres of road users, which tells their drivers what to do.
+    /// Moves on the manoeuvres of road users, whose phases tell them what to do.
     pub(super) fn direct(&mut self) {
         let has_course = |user: &RoadUser| user.mover.course.is_some();
         if !self.users.iter().any(has_course) {
