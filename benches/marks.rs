@@ -136,6 +136,7 @@ fn crowded(scene: &Arc<Scene>) -> World {
                     ignores: IgnoredRules::default(),
                     meet: None,
                     siren: false,
+                    turn: None,
                     bearer: None,
                     own: None,
                     cover_own: None,

@@ -2,6 +2,8 @@
 # Where the instructions go: per tick with ten others around, and per step of a whole run, by parts of avastra.
 # Counted by callgrind, so a busy machine changes nothing. callgrind has no SHA instructions: hashes weigh more than they do
 # on processors with them. `sh benches/profile.sh BINARIES` takes `avastra` and `marks` from a folder instead of building.
+# `sh benches/profile.sh tick AVASTRA…` counts instructions within ticks alone, of a town without actions, for each program
+# (built with symbols): what a change costs those who do not use it.
 set -eu
 cd "$(dirname "$0")/.."
 for needed in valgrind python3; do
@@ -22,6 +24,18 @@ counted() {
     valgrind --tool=callgrind --callgrind-out-file="$work/$out" "$@" > "$work/$out.log" 2>&1 \
         || { tail -n 20 "$work/$out.log" >&2; exit 1; }
 }
+if [ "${1-}" = tick ]; then
+    shift
+    for avastra in "$@"; do
+        for ads in idm modular; do
+            rm -rf "$work/run"
+            counted within_ticks --toggle-collect='*World::tick*' "$avastra" run scenarios/avastra45.ava --road boulevard \
+                --ads "$ads" --agent none --ambient 8 --seed 3 --episodes 3 --jobs 1 --quiet --out "$work/run"
+            echo "$avastra $ads: $(sed -n 's/.*Collected : //p' "$work/within_ticks.log") instructions within ticks"
+        done
+    done
+    exit
+fi
 for ads in modular idm; do
     counted "tick.$ads" --toggle-collect='marks::Drive::tick' "$1/marks" "ticks_per_s_$ads"
     python3 benches/profile.py "$work/tick.$ads" 'World::tick$' tick "$ads"

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+use avastra_campaign::emit;
 use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::run::{
     Database, DatabaseError, EpisodeSummary, Group, Numbered, PolicyReference, RefusalCount, Run,
@@ -12,7 +13,7 @@ use avastra_campaign::run::{
 use avastra_drivers::external::{Conversation, Problem};
 use avastra_lang::model::Policy;
 use avastra_search::agent::Face;
-use avastra_world::action::ActionTable;
+use avastra_world::action::{ActionTable, Draw};
 
 use super::arguments::RunArguments;
 use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, settled};
@@ -273,7 +274,9 @@ fn keep(
     let is_critical = summary.counted() > 0;
     let scenario = is_critical.then(|| directory.write_critical(&player, (log, summary))).transpose()?;
     directory.write_failure(&player, (log, summary))?;
-    directory.write(|database| database.add(summary, log, run.table(), scenario.as_deref()))
+    let table = run.table();
+    let in_words = |draw: &Draw| emit::action_text(table, draw);
+    directory.write(|database| database.add(summary, log, table.space(), in_words, scenario.as_deref()))
 }
 
 fn heading(run: &Run, arguments: &RunArguments) -> String {

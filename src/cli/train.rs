@@ -11,6 +11,7 @@ use avastra_lang::model::policy::{PolicyClaims, PolicyOrigin};
 use avastra_lang::model::{Policy, Space, digest_text};
 use avastra_lang::syntax::listed;
 use avastra_search::agent::{self, Kind, QPolicy, Settings};
+use avastra_world::action::Draw;
 
 use super::arguments::TrainArguments;
 use super::campaign::{self, Campaign, Outside, as_they_are};
@@ -168,8 +169,11 @@ fn keep(
         || stop.load(Ordering::Relaxed);
     let checkpoint = is_due.then(|| training.agent().save());
     let table = training.table();
-    directory
-        .write(|database| database.add_trained(trained, checkpoint.as_deref(), table, scenario.as_deref()))
+    let in_words = |draw: &Draw| emit::action_text(table, draw);
+    directory.write(|database| {
+        let checkpoint = checkpoint.as_deref();
+        database.add_trained(trained, checkpoint, table.space(), in_words, scenario.as_deref())
+    })
 }
 
 /// Evaluates the policy, writes it, and prints the result of the training.

@@ -197,7 +197,8 @@ impl<'a> Place<'a> {
             }
             ItemKind::Manoeuvre(of) => {
                 let ty = of.params.iter().find_map(|param| self.in_type(&param.ty));
-                ty.or_else(|| of.phases.iter().find_map(|phase| self.in_phase(phase)))
+                let repeat = || of.repeat.as_ref().and_then(|times| self.within(times, None, None));
+                ty.or_else(repeat).or_else(|| of.phases.iter().find_map(|phase| self.in_phase(phase)))
             }
             ItemKind::Action(of) => self.in_action(of),
             ItemKind::Group(of) => any_here(&of.members).then(|| vec![Kind::Actions, Kind::Groups]),

@@ -3,7 +3,7 @@
 
 use avastra_lang::model::vocabulary::{
     Body, Colour, CommandField, EpisodeField, LaneChoice, RoadField, Side, Site, SpawnField, StartField,
-    TYPES, Then, TrafficRule, Verb, Word,
+    TYPES, Then, TrafficRule, Turning, Verb, Word,
 };
 use avastra_lang::model::{ENDS, MODULES};
 
@@ -36,6 +36,7 @@ pub fn engine_words(field: &str) -> Vec<Entry> {
         Some(SpawnField::Then) => of::<Then>(),
         Some(SpawnField::Colour) => of::<Colour>(),
         Some(SpawnField::Ignores) => of::<TrafficRule>(),
+        Some(SpawnField::Turn) => of::<Turning>(),
         None if field == "body" => of::<Body>(),
         Some(SpawnField::Speed | SpawnField::Offset | SpawnField::Meet | SpawnField::Siren) | None => {
             Vec::new()

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use avastra::action::{ActionTable, Draw, Effect, Situation};
 use avastra::ads;
 use avastra::episode::{Choice, Moment, Outcome};
-use avastra::geometry::{SMOOTH_STEP_SLOPE_MAX, Vec2, distance_m, unit_vector};
+use avastra::geometry::{Pose, SMOOTH_STEP_SLOPE_MAX, Vec2, distance_m, unit_vector, wrap_angle};
 use avastra::model::vocabulary::Priority;
 use avastra::model::{NpcFacts, RulesInForce};
 use avastra::rng;
@@ -239,6 +239,102 @@ fn who_runs_into_a_siren_had_to_wait() {
 }
 
 #[test]
+fn phases_come_as_often_as_they_are_repeated() {
+    let table = wish("stops_again");
+    let mut by_times = BTreeSet::new();
+    for seen in watched(&table, &["stops()"], &["times"], 12, &[]) {
+        let speeds = seen.moments.iter().map(|(_, npc)| npc.speed_mps);
+        let stands: Vec<bool> = speeds.map(|speed_mps| speed_mps == 0.0).collect();
+        let stops = stands.windows(2).filter(|pair| !pair[0] && pair[1]).count();
+        let last = seen.moments.last().expect("it came").1;
+        let times = seen.drawn[0] as usize;
+        assert!(stops <= times, "{stops} stops, {times} were drawn");
+        // It may leave, or the episode may end, before.
+        if stops == times && last.speed_mps > 5.9 {
+            by_times.insert(times);
+        }
+    }
+    assert_eq!(by_times, BTreeSet::from([1, 2, 3]), "how often they stopped");
+    let mut whole = 0;
+    for seen in watched(&table, &["weaves()"], &[], 4, &[]) {
+        let places = seen.moments.iter().map(|(_, npc)| npc.offset_m);
+        // In a bend a long vehicle's middle is not where its axles are.
+        let outside: Vec<f64> = places.filter(|offset_m| offset_m.abs() > 0.3).map(f64::signum).collect();
+        let sides = 1 + outside.windows(2).filter(|pair| pair[0] != pair[1]).count();
+        assert!(sides <= 6, "{sides} sides");
+        whole += usize::from(sides == 6);
+    }
+    assert!(whole > 0, "nobody weaved three times");
+}
+
+#[test]
+fn who_is_told_to_turn_does_so_at_the_next_junction() {
+    let table = wish("turns_across");
+    let run = run_of(table.space().clone(), 15, 3, &[]);
+    let plans: [(&[&str], f64); 6] = [
+        (&["turns_across()"], 1.0),
+        (&["drives()", "goes(way: Left)"], 1.0),
+        (&["drives()", "goes(way: Right)"], -1.0),
+        (&["drives()", "goes(way: Straight)"], 0.0),
+        (&["drives()", "goes(way: Left)", "turns_and_stops(turn: Left)"], 1.0),
+        (&["drives()", "goes(way: Right)", "turns_and_stops(turn: Right)"], -1.0),
+    ];
+    for (plan, left) in plans {
+        let (mut passed, mut stood) = (0, 0);
+        for episode in 0..run.episodes() {
+            let done = Cell::new(0);
+            let mut choose = |moment: &Moment| {
+                let Some(label) = plan.get(done.get()) else { return Choice::Pass };
+                let Ok(draw) = table.offer(moment.situation, row(&table, label)) else { return Choice::Pass };
+                done.set(done.get() + 1);
+                Choice::Act(draw)
+            };
+            // Its headings, rad, in the first junction that it comes to after it was told, until somebody touches somebody.
+            let mut headings_rad = Vec::new();
+            let (mut last_rad, mut most_mps2) = (None, 0.0_f64);
+            let (mut has_touched, mut is_out, mut is_past) = (false, false, false);
+            let log = run.play(episode, &mut choose, &mut |world, _, contacts| {
+                has_touched |= !contacts.is_empty() || !world.incidents().is_empty();
+                let Some(other) = world.obstacle(1).filter(|_| !has_touched) else { return };
+                let Pose { heading_rad, .. } = other.outline.pose;
+                let map = &world.scene().map;
+                let is_in_junction = |pose: Pose| {
+                    let place = map.nearest(pose.position, heading_rad, 1.0);
+                    place.is_some_and(|place| map.lane(place.lane).junction.is_some())
+                };
+                let is_inside = is_in_junction(other.outline.pose);
+                // However late it was told, it does not turn faster than it would have by itself.
+                let yaw_rps = wrap_angle(heading_rad - last_rad.unwrap_or(heading_rad)) / DT_S;
+                most_mps2 = most_mps2.max(yaw_rps.abs() * other.velocity_mps.norm());
+                last_rad = Some(heading_rad);
+                let front = other.outline.pose.offset(other.outline.half_length_m, 0.0);
+                is_out |= done.get() == plan.len() && !is_inside && !is_in_junction(front);
+                is_past |= !headings_rad.is_empty() && !is_inside;
+                if is_out && is_inside && !is_past {
+                    headings_rad.push(heading_rad);
+                }
+                stood += usize::from(is_past && other.velocity_mps.norm() == 0.0);
+            });
+            assert_replays(&run, episode, &log);
+            assert!(most_mps2 < 6.0, "{plan:?} in episode {episode}: {most_mps2} m/s²");
+            if let ([first, .., last], true) = (&headings_rad[..], is_past) {
+                let turned_rad = wrap_angle(last - first);
+                passed += 1;
+                let is_right = if left == 0.0 {
+                    turned_rad.abs() < 0.7
+                } else {
+                    (0.7..2.6).contains(&(left * turned_rad))
+                };
+                // By the time of a third row it may have turned already; a phase then waits for the next lane that leads there.
+                assert!(is_right || plan.len() == 3, "{plan:?} in episode {episode}: {turned_rad} rad");
+            }
+        }
+        assert!(passed > 0, "nobody came to a junction by {plan:?}");
+        assert_eq!(stood > 0, plan.len() == 3, "{stood} ticks at rest after the turn of {plan:?}");
+    }
+}
+
+#[test]
 fn an_adult_is_met_at_the_point_that_was_asked_for() {
     let table = wish("adult_at_a_point");
     let space = table.space();
@@ -384,6 +480,9 @@ fn random_space(rng: &mut Rng) -> (String, [Guard; 2], Guard) {
                     .into(),
             );
         }
+        if rng::below(rng, 6) == 0 {
+            fields.push(format!("turn: {}", ["Left", "Straight", "Right"][rng::below(rng, 3) as usize]));
+        }
         fields.join(", ")
     };
     let mut text = String::from(
@@ -391,7 +490,8 @@ fn random_space(rng: &mut Rng) -> (String, [Guard; 2], Guard) {
     );
     text += "road lanes { map: \"../verdicts/lanes.xodr\", start: lane 1/-2 at 60 m, goal: lane 1/-2 at 560 m }\n";
     for name in ["one", "two"] {
-        text += &format!("manoeuvre {name}() {{\n");
+        let repeat = if rng::below(rng, 4) == 0 { "repeat 2 " } else { "" };
+        text += &format!("manoeuvre {name}() {repeat}{{\n");
         for _ in 0..1 + rng::below(rng, 3) {
             if chance(rng) {
                 text += &format!("once {} within {} s ", Guard::of("npc", rng).text, number(rng, 1.0, 9.0));

@@ -34,6 +34,7 @@ fn walks_ahead(side: Side, distance_m: f64, speed_mps: f64, cover: Option<Body>)
         ignores: IgnoredRules::default(),
         meet: None,
         siren: false,
+        turn: None,
         bearer: None,
     }
 }

@@ -7,7 +7,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use rusqlite::{Connection, Transaction, params};
 use sha2::{Digest, Sha256};
 
-use crate::emit::action_text;
 use crate::episode::{EpisodeLog, Outcome};
 use crate::files::PlainName;
 use crate::oracle;
@@ -16,7 +15,7 @@ use avastra_lang::model::policy::VARIABLES;
 use avastra_lang::model::vocabulary::Word;
 use avastra_lang::model::{Memory, Space, StateMeaning, Value};
 use avastra_search::mdp::STATE_LEN;
-use avastra_world::action::ActionTable;
+use avastra_world::action::Draw;
 
 use crate::run::offered::{RowCount, without_figures};
 use crate::run::sealed::{DatabaseError, Layout, insert_row, query_all};
@@ -129,8 +128,8 @@ impl Units for Database {
 }
 
 impl Database {
-    /// Adds a whole episode, or nothing. `table` is that of the space, in whose words actions and states are told; `scenario`
-    /// is the text of the file that was written of it.
+    /// Adds a whole episode, or nothing. `space` is the one that was played, and `in_words` says what a draw does in its
+    /// words; `scenario` is the text of the file that was written of it.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -138,11 +137,12 @@ impl Database {
         &mut self,
         summary: &EpisodeSummary,
         log: &EpisodeLog,
-        table: &ActionTable,
+        space: &Space,
+        in_words: impl Fn(&Draw) -> String,
         scenario: Option<&str>,
     ) -> Result<(), DatabaseError> {
         let transaction = self.connection.transaction()?;
-        add_all(&transaction, summary, log, table, scenario)?;
+        add_all(&transaction, summary, log, space, in_words, scenario)?;
         LAYOUT.seal(&transaction, summary.episode as i64)?;
         transaction.commit()?;
         Ok(())
@@ -365,13 +365,14 @@ pub(crate) fn add_all(
     transaction: &Transaction,
     summary: &EpisodeSummary,
     log: &EpisodeLog,
-    table: &ActionTable,
+    space: &Space,
+    in_words: impl Fn(&Draw) -> String,
     scenario: Option<&str>,
 ) -> Result<(), DatabaseError> {
     add_episode(transaction, summary, log)?;
     for (index, step) in log.steps.iter().enumerate() {
         let (row, action, refused) = match &step.outcome {
-            Outcome::Done { draw, .. } => (Some(draw.row), Some(action_text(table, draw)), None),
+            Outcome::Done { draw, .. } => (Some(draw.row), Some(in_words(draw)), None),
             Outcome::Passed => (None, None, None),
             Outcome::Refused { row, rule, reason } => (
                 Some(*row),
@@ -386,7 +387,7 @@ pub(crate) fn add_all(
             row.map(|row| row as i64).into(),
             action.into(),
             refused.into(),
-            own_states(table.space(), &step.memory).into(),
+            own_states(space, &step.memory).into(),
             step.proc.into(),
             step.reward.into(),
         ];

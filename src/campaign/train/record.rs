@@ -6,8 +6,8 @@
 use rusqlite::{OptionalExtension, params};
 
 use crate::run::{Database, DatabaseError, LAYOUT, add_all, insert_row, settings_digest};
-use avastra_lang::model::digest;
-use avastra_world::action::ActionTable;
+use avastra_lang::model::{Space, digest};
+use avastra_world::action::Draw;
 
 use crate::train::training::TrainedEpisode;
 
@@ -18,7 +18,7 @@ pub struct Checkpoint {
 }
 
 impl Database {
-    /// Adds an episode of a training, and with it a checkpoint if there is one to keep. `table` and `scenario` are as for
+    /// Adds an episode of a training, and with it a checkpoint if there is one to keep. The rest is as for
     /// [`Database::add`].
     ///
     /// # Errors
@@ -27,12 +27,13 @@ impl Database {
         &mut self,
         trained: &TrainedEpisode,
         checkpoint: Option<&[u8]>,
-        table: &ActionTable,
+        space: &Space,
+        in_words: impl Fn(&Draw) -> String,
         scenario: Option<&str>,
     ) -> Result<(), DatabaseError> {
         let transaction = self.connection.transaction()?;
         let episode = trained.summary.episode;
-        add_all(&transaction, &trained.summary, &trained.log, table, scenario)?;
+        add_all(&transaction, &trained.summary, &trained.log, space, in_words, scenario)?;
         let values = params![
             episode as i64,
             trained.sum,

@@ -95,6 +95,9 @@ pub(super) fn verdict(
         Verb::DriveAhead => {
             drives()?;
             appears_ahead(scene, request, first)?;
+            if request.turn.is_some() {
+                return has_turned(scene, seen);
+            }
             let last = &seen.frames[seen.frames.len() - 1];
             let way_m = (last.outline.pose.position - first.outline.pose.position).norm();
             if request.speed_mps == 0.0 && way_m > 0.0 && seen.ending != Ending::TouchedEgo {
@@ -111,6 +114,9 @@ pub(super) fn verdict(
             if ahead_m(first) > 0.0 {
                 return Err("it does not appear behind the ego vehicle".to_owned());
             }
+            if request.turn.is_some() {
+                return has_turned(scene, seen);
+            }
             let Some(passed) = seen.frames.iter().position(|frame| ahead_m(frame) > 0.0) else {
                 return Err(ended(seen, "it had passed"));
             };
@@ -122,6 +128,9 @@ pub(super) fn verdict(
             drives()?;
             if turned_rad(first) < OPPOSES_RAD {
                 return Err("it does not appear against the direction of the route".to_owned());
+            }
+            if request.turn.is_some() {
+                return has_turned(scene, seen);
             }
             meets(seen)?;
             changes(&scene.map, request, seen, [asked, asked], 0)
@@ -204,6 +213,14 @@ fn meets(seen: &Sighting) -> Result<(), String> {
     };
     let aside_m = there(&pair[1]).y.abs();
     if aside_m > MEETS_M { Err(format!("it passes {aside_m:.1} m aside")) } else { Ok(()) }
+}
+
+/// Whether the junction at which it was asked to turn is behind it, or it met the ego vehicle there.
+fn has_turned(scene: &Scene, seen: &Sighting) -> Result<(), String> {
+    let last = seen.frames[seen.frames.len() - 1].lane;
+    let is_there = last.is_some_and(|(lane, _)| scene.map.lane(lane).junction.is_some());
+    let is_done = seen.has_done || seen.ending == Ending::TouchedEgo && is_there;
+    if is_done { Ok(()) } else { Err(ended(seen, "it had turned")) }
 }
 
 /// The frame in which it is on the route's path.

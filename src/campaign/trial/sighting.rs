@@ -62,7 +62,7 @@ pub(super) fn watch(
     ads: &mut dyn Ads,
     sensed: &mut Sensed,
     id: u32,
-    told: Option<&Command>,
+    told: &Command,
     horizon_s: f64,
 ) -> Option<Sighting> {
     let scene = world.scene().clone();
@@ -78,7 +78,7 @@ pub(super) fn watch(
         world.sense(sensed);
         let control = ads.drive(sensed);
         phases = world.phases(id).max(phases);
-        has_done |= told.is_some_and(|told| world.has_done(id, told));
+        has_done |= world.has_done(id, told);
         let touched = world.tick(&control).iter().any(|contact: &Contact| contact.obstacle == id);
         let bumped =
             world.incidents().iter().any(|incident| [incident.obstacle, incident.other].contains(&id));

@@ -13,6 +13,7 @@ use crate::episode::{Choice, EpisodeLog};
 use avastra_base::rng;
 use avastra_base::rng::Stream;
 use avastra_drivers::Ads;
+use avastra_lang::model::command::Command;
 use avastra_lang::model::vocabulary::Phenomenon;
 use avastra_lang::model::{EffectDef, Row};
 use avastra_world::action::{ActionTable, Count, Draw, Effect, Offer};
@@ -296,8 +297,8 @@ fn attempt(moment: &Moment, draw: &Draw) -> Try {
     });
     for (nth, id) in newcomers.into_iter().chain(ordered) {
         let (request, told) = match &draw.effects[nth] {
-            Effect::Spawn(request) => (Some(request), None),
-            Effect::Order(order) => (None, Some(&order.command)),
+            Effect::Spawn(request) => (Some(request), Command { turn: request.turn, ..Command::default() }),
+            Effect::Order(order) => (None, order.command),
             Effect::Time(_) | Effect::Sky(..) => continue,
         };
         let complaint = || request.and_then(|request| fairness::complaint(&world, request, id));
@@ -306,7 +307,7 @@ fn attempt(moment: &Moment, draw: &Draw) -> Try {
         let mut sensed: Sensed = world.sensed();
         let phases = draw.course(nth).map(|course| course.phases());
         let horizon_s = judge::horizon_s(phases.is_some());
-        let Some(seen) = sighting::watch(world.clone(), ads.as_mut(), &mut sensed, id, told, horizon_s)
+        let Some(seen) = sighting::watch(world.clone(), ads.as_mut(), &mut sensed, id, &told, horizon_s)
         else {
             found.failure = Some("it is gone at once".to_owned());
             continue;

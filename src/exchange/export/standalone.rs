@@ -117,7 +117,7 @@ impl<'a> Actions<'a> {
             Effect::Time(time) => format!("set time = {}", time.name()),
             Effect::Sky(phenomenon, level) => format!("set sky[{}] = {}", phenomenon.name(), level.name()),
             Effect::Spawn(request) => self.spawn(space, request),
-            Effect::Order(OrderRequest { bearer, command }) => {
+            Effect::Order(OrderRequest { bearer, command, .. }) => {
                 // An order of a manoeuvre, which the text lacks, lets its bearer drive on.
                 let fields = command_fields(command);
                 let name = &space.bearers[*bearer];
@@ -160,6 +160,9 @@ impl<'a> Actions<'a> {
         }
         if request.siren {
             fields.push("siren: true".to_owned());
+        }
+        if let Some(turn) = request.turn {
+            fields.push(format!("turn: {}", turn.name()));
         }
         if !request.ignores.is_empty() {
             fields.push(ignored_field(request.ignores));
@@ -274,7 +277,8 @@ fn ignored_field(ignores: IgnoredRules) -> String {
 
 /// What a command says, as the fields of an order.
 fn command_fields(command: &Command) -> String {
-    let Command { speed_mps, rate_mps2, lane, offset_m, aside_mps, ignores, siren } = command;
+    let Command { speed_mps, rate_mps2, lane, offset_m, aside_mps, headway_s, ignores, siren, turn } =
+        command;
     let figure = |name: &str, value: &Option<f64>, unit: &str| {
         value.map(|value| format!("{name}: {} {unit}", decimal(value, false)))
     };
@@ -284,8 +288,10 @@ fn command_fields(command: &Command) -> String {
         lane.map(|lane| format!("lane: {}", lane.name())),
         figure("offset", offset_m, "m"),
         figure("aside", aside_mps, "m/s"),
+        figure("headway", headway_s, "s"),
         ignores.map(ignored_field),
         siren.map(|siren| format!("siren: {siren}")),
+        turn.map(|turn| format!("turn: {}", turn.name())),
     ];
     fields.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }

@@ -12,7 +12,9 @@ use crate::check::rule::locals;
 use crate::model::command::CommandDef;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::rules_by_action;
-use crate::model::vocabulary::{Colour, LaneChoice, Side, Site, SpaceClaim, SpawnField, Then, Verb, Word};
+use crate::model::vocabulary::{
+    Colour, LaneChoice, Side, Site, SpaceClaim, SpawnField, Then, Turning, Verb, Word,
+};
 use crate::model::{
     ActionDef, BodyWord, Domain, EffectDef, GroupDef, ManoeuvreCall, Parameter, RuleDef, SetDef, SpawnDef,
     Type, Value, WordExpr, code,
@@ -439,6 +441,10 @@ impl Checker {
             Some(value) => self.typed(value, place, Type::Bool).map(Some),
             None => Some(None),
         };
+        let turn = match find(SpawnField::Turn) {
+            Some(value) => self.word::<Turning>("turn", value, place).map(Some),
+            None => Some(None),
+        };
         let meet = match find(SpawnField::Meet) {
             Some(value) => self.typed(value, place, Type::Quantity(Dimension::RATIO)).map(Some),
             None => Some(None),
@@ -461,6 +467,7 @@ impl Checker {
             ignores: ignores?,
             meet: meet?,
             siren: siren?,
+            turn: turn?,
             bearer: None,
             row: None,
             manoeuvre,
@@ -502,6 +509,7 @@ impl Checker {
                     ("ignores nothing", "rules of the road are for vehicles; leave `ignores` out")
                 }
                 () if on_foot && says(SpawnField::Siren) => ("has no siren", "leave `siren` out"),
+                () if on_foot && says(SpawnField::Turn) => ("drives through no junction", "leave `turn` out"),
                 () if verb == Verb::Walk && says(SpawnField::Offset) => {
                     ("begins at the kerb", "leave `offset` out")
                 }

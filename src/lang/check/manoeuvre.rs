@@ -8,8 +8,10 @@ use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of, field};
 use crate::model::command::CommandDef;
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::vocabulary::{Body, CHANGE, CommandField, Fact, LaneChoice, Site, TrafficRule, Word};
-use crate::model::{ManoeuvreCall, ManoeuvreDef, OrderDef, PhaseDef, Type, WordExpr, code};
+use crate::model::vocabulary::{
+    Body, CHANGE, CommandField, Fact, LaneChoice, Site, TrafficRule, Turning, Word,
+};
+use crate::model::{ManoeuvreCall, ManoeuvreDef, OrderDef, PhaseDef, REPEAT, Type, WordExpr, code};
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
 use avastra_base::units::Dimension;
@@ -93,14 +95,34 @@ impl Checker {
             true => declared.phases.iter().map(|phase| self.phase(phase, &place)).collect(),
             false => {
                 let look = |checker: &mut Checker| {
+                    drop(checker.repeat(declared, &parameters, &owner));
                     declared.phases.iter().for_each(|phase| drop(checker.phase(phase, &place)));
                 };
                 self.quietly(look);
                 return None;
             }
         };
+        let repeat = self.repeat(declared, &parameters, &owner);
         let phases: Vec<PhaseDef> = phases.into_iter().collect::<Option<_>>()?;
-        Some(ManoeuvreDef { name: declared.name.text.clone(), docs: docs(item), parameters, phases })
+        let name = declared.name.text.clone();
+        Some(ManoeuvreDef { name, docs: docs(item), parameters, repeat: repeat?, phases })
+    }
+
+    /// How often a manoeuvre goes through its phases. It is known before the first one, so it asks for no moment.
+    fn repeat(
+        &mut self,
+        declared: &ast::Manoeuvre,
+        parameters: &[(String, Type)],
+        owner: &Symbol,
+    ) -> Option<Option<Expr>> {
+        let Some(written) = &declared.repeat else { return Some(None) };
+        let place = Place { locals: parameters, owner: Some(owner), ..Place::default() };
+        let times = self.typed(written, &place, Type::Int)?;
+        if self.written_out(&times).is_some_and(|count| !REPEAT.contains(&count)) {
+            let error = Diagnostic::error(code::OUT_OF_BOUNDS, "a manoeuvre is repeated 1 to 1000 times");
+            return self.reject(error.at(written.span, "must lie within 1 .. 1000"));
+        }
+        Some(Some(times))
     }
 
     fn phase(&mut self, declared: &ast::Phase, place: &Place<'_>) -> Option<PhaseDef> {
@@ -150,14 +172,7 @@ impl Checker {
 
     /// Reports a figure of a phase that is written out, out of its bounds. What is computed is brought into them later.
     fn check_figure(&mut self, expr: &Expr, name: &str, unit: &str, bounds: &RangeInclusive<f64>) {
-        let is_open = |kind: &ExprKind| {
-            !matches!(kind, ExprKind::Number(_) | ExprKind::Negate(_) | ExprKind::Arithmetic(..))
-        };
-        if expr.any(is_open) {
-            return;
-        }
-        let Some(value) = self.quietly(|checker| checker.fold_number(expr)) else { return };
-        if !bounds.contains(&value.to_f64()) {
+        if self.written_out(expr).is_some_and(|value| !bounds.contains(&value)) {
             let message = format!("the {name} of a phase lies out of bounds");
             let range = match bounds.end().is_finite() {
                 true => format!("must lie within {} .. {} {unit}", bounds.start(), bounds.end()),
@@ -165,6 +180,15 @@ impl Checker {
             };
             self.report(Diagnostic::error(code::OUT_OF_BOUNDS, message).at(expr.span, range));
         }
+    }
+
+    /// The value of an expression that is written out in numbers.
+    fn written_out(&mut self, expr: &Expr) -> Option<f64> {
+        let is_open = |kind: &ExprKind| {
+            !matches!(kind, ExprKind::Number(_) | ExprKind::Negate(_) | ExprKind::Arithmetic(..))
+        };
+        let value = (!expr.any(is_open)).then(|| self.quietly(|checker| checker.fold_number(expr)))??;
+        Some(value.to_f64())
     }
 
     pub(super) fn order(
@@ -233,6 +257,7 @@ impl Checker {
         let rate = figure(CommandField::Rate, Dimension::ACCEL);
         let offset = figure(CommandField::Offset, Dimension::LENGTH);
         let aside = figure(CommandField::Aside, Dimension::SPEED);
+        let headway = figure(CommandField::Headway, Dimension::DURATION);
         let lane = match field(fields, CommandField::Lane) {
             Some(value) => Some(self.word::<LaneChoice>("lane", value, place)?),
             None => None,
@@ -243,6 +268,10 @@ impl Checker {
         };
         let siren = match field(fields, CommandField::Siren) {
             Some(value) => Some(self.typed(value, place, Type::Bool)?),
+            None => None,
+        };
+        let turn = match field(fields, CommandField::Turn) {
+            Some(value) => Some(self.word::<Turning>("turn", value, place)?),
             None => None,
         };
         let says = |wanted: CommandField| field(fields, wanted).is_some();
@@ -259,7 +288,7 @@ impl Checker {
                 all = false;
             }
         }
-        all.then_some(CommandDef { speed, rate, lane, offset, aside, ignores, siren })
+        all.then_some(CommandDef { speed, rate, lane, offset, aside, headway, ignores, siren, turn })
     }
 
     /// The rules of the road that are ignored: `[Signals, Ego]`.

@@ -132,6 +132,7 @@ fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
         ItemKind::Verdict(declared) => exprs.push(&declared.condition),
         ItemKind::Manoeuvre(declared) => {
             names.extend(declared.params.iter().flat_map(|param| names_of_type(&param.ty)));
+            exprs.extend(&declared.repeat);
             for phase in &declared.phases {
                 exprs.extend(phase.once.iter().chain(&phase.within).chain(&phase.after));
                 fields.extend(&phase.fields);

@@ -8,13 +8,16 @@ use crate::model::limits::{SPEED_MPS_MAX, out_of_bounds, rounded_into};
 use crate::model::space::{FnDef, WordExpr};
 use avastra_base::units::Rational;
 
-use crate::model::vocabulary::{CommandField, LaneChoice, TrafficRule, Verb, Word};
+use crate::model::vocabulary::{CommandField, LaneChoice, TrafficRule, Turning, Verb, Word};
 
 /// Speeds that an order or a phase may name, m/s. What of it a body does, [`speeds_mps`] says.
 const SPEED_MPS: RangeInclusive<f64> = -ON_FOOT_MPS_MAX..=SPEED_MPS_MAX;
 
 /// Nobody on foot is told to go faster, m/s: below a sprinter's 12 m/s.
 const ON_FOOT_MPS_MAX: f64 = 10.0;
+
+/// Why nobody on foot is told anything else.
+pub const ON_FOOT: &str = "it is on foot, and can be told a speed alone";
 
 /// Speeds that somebody can be told, m/s: on foot below 0 for the way back.
 pub fn speeds_mps(on_foot: bool) -> RangeInclusive<f64> {
@@ -30,6 +33,9 @@ pub const OFFSET_M: RangeInclusive<f64> = -5.0..=5.0;
 /// Speeds to the side, m/s. UN R157's cut-ins reach 3 m/s.
 const ASIDE_MPS: RangeInclusive<f64> = 0.1..=4.0;
 
+/// Time gaps that a vehicle may be told to keep, s: from bumper on bumper to the sight of a town.
+const HEADWAY_S: RangeInclusive<f64> = 0.1..=10.0;
+
 /// A command whose values are still to be computed.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CommandDef {
@@ -42,8 +48,11 @@ pub struct CommandDef {
     pub offset: Option<Expr>,
     /// m/s; without it the driver moves over as it would by itself.
     pub aside: Option<Expr>,
+    /// s.
+    pub headway: Option<Expr>,
     pub ignores: Option<Vec<WordExpr<TrafficRule>>>,
     pub siren: Option<Expr>,
+    pub turn: Option<WordExpr<Turning>>,
 }
 
 /// A command. What is `None` stays as it is.
@@ -54,8 +63,11 @@ pub struct Command {
     pub lane: Option<LaneChoice>,
     pub offset_m: Option<f64>,
     pub aside_mps: Option<f64>,
+    pub headway_s: Option<f64>,
     pub ignores: Option<IgnoredRules>,
     pub siren: Option<bool>,
+    /// Where it goes at the next junction.
+    pub turn: Option<Turning>,
 }
 
 /// The rules of the road that a vehicle ignores; none by default.
@@ -95,7 +107,7 @@ struct Figure {
     value: fn(&mut Command) -> &mut Option<f64>,
 }
 
-const FIGURES: [Figure; 4] = [
+const FIGURES: [Figure; 5] = [
     Figure {
         field: CommandField::Speed,
         unit: "m/s",
@@ -127,6 +139,14 @@ const FIGURES: [Figure; 4] = [
         may_be_left_out: true,
         written: |def| def.aside.as_ref(),
         value: |command| &mut command.aside_mps,
+    },
+    Figure {
+        field: CommandField::Headway,
+        unit: "s",
+        bounds: HEADWAY_S,
+        may_be_left_out: true,
+        written: |def| def.headway.as_ref(),
+        value: |command| &mut command.headway_s,
     },
 ];
 
@@ -163,7 +183,8 @@ impl CommandDef {
     pub fn parts(&self) -> impl Iterator<Item = &Expr> {
         let lane = self.lane.iter().filter_map(WordExpr::expr);
         let ignores = self.ignores.iter().flatten().filter_map(WordExpr::expr);
-        self.figures().map(|figure| figure.expr).chain(lane).chain(ignores).chain(&self.siren)
+        let turn = self.turn.iter().filter_map(WordExpr::expr);
+        self.figures().map(|figure| figure.expr).chain(lane).chain(ignores).chain(&self.siren).chain(turn)
     }
 
     /// The command with its values. What has no value is NaN.
@@ -175,6 +196,7 @@ impl CommandDef {
             lane: self.lane.as_ref().map(|lane| lane.word(functions, facts)),
             ignores: self.ignores.as_ref().map(ignored),
             siren: self.siren.as_ref().map(|siren| evaluate(siren, functions, facts).truth()),
+            turn: self.turn.as_ref().map(|turn| turn.word(functions, facts)),
             ..Command::default()
         };
         for Figure { bounds, written, value, .. } in FIGURES {
@@ -196,7 +218,7 @@ impl Command {
         out_of_bounds("order", figures)
     }
 
-    /// Brings every figure into its range. Drops a `rate` or an `aside` without a value; `None` if the speed or the offset
+    /// Brings every figure into its range. Drops a `rate`, an `aside` or a `headway` without a value; `None` if the speed or the offset
     /// has none.
     pub fn within_bounds(mut self) -> Option<Command> {
         for Figure { bounds, may_be_left_out, value, .. } in FIGURES {
@@ -225,7 +247,7 @@ impl Command {
         match (verb, self.speed_mps) {
             (Verb::Stand, _) => Some("it stands, and does not walk".to_owned()),
             (Verb::Walk, speed_mps) if *self != (Command { speed_mps, ..Command::default() }) => {
-                Some("it is on foot, and can be told a speed alone".to_owned())
+                Some(ON_FOOT.to_owned())
             }
             (Verb::Walk, Some(mps)) if is_out(mps) => {
                 Some(format!("nobody on foot is told more than {ON_FOOT_MPS_MAX} m/s"))

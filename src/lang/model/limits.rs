@@ -15,6 +15,9 @@ pub const TICK_MS: u32 = 20;
 /// Nothing on the road is faster, m/s.
 pub const SPEED_MPS_MAX: f64 = 70.0;
 
+/// How often a manoeuvre may go through its phases.
+pub const REPEAT: RangeInclusive<f64> = 1.0..=1000.0;
+
 /// Speeds at which anything may be spawned, m/s.
 pub const SPAWN_SPEED_MPS: RangeInclusive<f64> = 0.0..=SPEED_MPS_MAX;
 

@@ -32,7 +32,7 @@ pub use eval::{
 };
 pub use interval::{End, Interval};
 pub use limits::{
-    AMBIENT_MAX, COMMANDED_MAX, EGO_ACCELERATION_MPS2_MAX, LIMIT_PART_MAX, MEET, SIGNAL_PHASE_S,
+    AMBIENT_MAX, COMMANDED_MAX, EGO_ACCELERATION_MPS2_MAX, LIMIT_PART_MAX, MEET, REPEAT, SIGNAL_PHASE_S,
     SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, TICK_MS, rounded_into, spawn_out_of_bounds,
 };
 pub use meaning::Meaning;

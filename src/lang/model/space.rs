@@ -15,7 +15,7 @@ use crate::model::row::Row;
 use crate::model::rules::{Bound, Clause};
 use crate::model::value::{EnumIndex, Type, Value};
 use crate::model::vocabulary::{
-    Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, TrafficRule, Verb, Word,
+    Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, TrafficRule, Turning, Verb, Word,
 };
 use crate::syntax::ast::Span;
 use avastra_base::units::{Rational, Unit, decimal, quantity, quantity_in, quantity_short, unit_of_all};
@@ -329,6 +329,7 @@ pub struct SpawnDef {
     pub meet: Option<Expr>,
     /// Whether it is an emergency vehicle under way.
     pub siren: Option<Expr>,
+    pub turn: Option<WordExpr<Turning>>,
     /// The name that it bears from then on, by index in `Space::bearers`.
     pub bearer: Option<usize>,
     /// Its place in a row of road users, from 0 nearest to the ego vehicle, and the gap between them, m; `None` for one
@@ -346,6 +347,8 @@ pub struct ManoeuvreDef {
     pub docs: Vec<String>,
     /// The locals of its expressions.
     pub parameters: Vec<(String, Type)>,
+    /// How often it goes through its phases; once without it.
+    pub repeat: Option<Expr>,
     pub phases: Vec<PhaseDef>,
 }
 

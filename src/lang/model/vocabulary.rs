@@ -329,6 +329,7 @@ words! {
     Offset "offset" = "How far to the left of its lane's middle it is; negative to the right.",
     Ignores "ignores" = "The rules of the road that it ignores: `ignores: [Signals]`.",
     Siren "siren" = "Whether it is an emergency vehicle under way, for which all others wait: `siren: true`.",
+    Turn "turn" = "Where it goes at the next junction: `Left`, `Straight` or `Right`.",
     Meet "meet" = "The part of the ego vehicle's front at which it is met, from the side that it comes from: `meet: 25 %`.",
     Colour "colour" = "Its paint.",
 }
@@ -340,8 +341,10 @@ words! {
     Lane "lane" = "The lane that it changes to, seen from the ego vehicle: `Left`, `Current` or `Right`.",
     Offset "offset" = "How far to the left of its lane's middle it drives from then on; negative to the right.",
     Aside "aside" = "Its greatest speed to the side on the way there, as far as the road allows.",
+    Headway "headway" = "The time gap that it keeps behind whoever is ahead of it.",
     Ignores "ignores" = "The rules of the road that it ignores from then on: `ignores: [Signals]`; `[]` for none.",
     Siren "siren" = "Whether it is an emergency vehicle under way from then on: `siren: false`.",
+    Turn "turn" = "Where it goes at the next junction: `Left`, `Straight` or `Right`.",
     Then "then" = "The manoeuvre that it does, in an order: `then: brake(4 m/s^2)`.",
 }
 
@@ -439,6 +442,10 @@ words! {
 
 words! {
     LaneChoice "A lane, seen from the ego vehicle's lane.": Left, Current, Right
+}
+
+words! {
+    Turning "Where a vehicle goes at a junction.": Left, Straight, Right
 }
 
 words! {

@@ -129,7 +129,9 @@ impl<'a> RowText<'a> {
                 let siren = order.command.siren.as_ref().map(|siren| self.reduced(siren).kind);
                 let ignores = order.command.ignores.as_ref();
                 let ignores = ignores.map(|ignores| ignored_form(ignores, &|expr| self.reduced(expr)));
-                format!("order {} {figures:?} {lane:?} {ignores:?} {siren:?} {then:?}", order.bearer)
+                let turn =
+                    order.command.turn.as_ref().map(|turn| word_form(turn, &|expr| self.reduced(expr)));
+                format!("order {} {figures:?} {lane:?} {ignores:?} {siren:?} {turn:?} {then:?}", order.bearer)
             }
         });
         effects.collect::<Vec<_>>().join("\n")
@@ -183,7 +185,7 @@ fn ignored_form(ignores: &[WordExpr<TrafficRule>], reduced: &impl Fn(&Expr) -> E
 
 fn spawn_form(spawn: &SpawnDef, reduced: &impl Fn(&Expr) -> Expr) -> String {
     format!(
-        "spawn {} {} {} {} {} {} {:?} {:?} {:?} {:?} {:?} {} {} {} {:?} {:?}",
+        "spawn {} {} {} {} {} {} {:?} {:?} {:?} {:?} {:?} {:?} {} {} {} {:?} {:?}",
         word_form(&spawn.body, reduced),
         word_form(&spawn.colour, reduced),
         word_form(&spawn.verb, reduced),
@@ -195,6 +197,7 @@ fn spawn_form(spawn: &SpawnDef, reduced: &impl Fn(&Expr) -> Expr) -> String {
         spawn.offset.as_ref().map(|offset| reduced(offset).kind),
         spawn.meet.as_ref().map(|meet| reduced(meet).kind),
         spawn.siren.as_ref().map(|siren| reduced(siren).kind),
+        spawn.turn.as_ref().map(|turn| word_form(turn, reduced)),
         ignored_form(&spawn.ignores, reduced),
         spawn.behind,
         spawn.cover.as_ref().map_or(String::new(), |cover| word_form(cover, reduced)),

@@ -273,11 +273,12 @@ pub struct FnParam {
     pub ty: Type,
 }
 
-/// `manoeuvre brake(to: Speed, rate: Accel) { after 3 s { speed: to, rate: rate } }`.
+/// `manoeuvre brake(to: Speed, rate: Accel) repeat 2 { after 3 s { speed: to, rate: rate } }`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Manoeuvre {
     pub name: Name,
     pub params: Vec<FnParam>,
+    pub repeat: Option<Expr>,
     pub phases: Vec<Phase>,
 }
 

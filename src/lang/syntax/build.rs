@@ -227,7 +227,8 @@ impl Builder {
     fn manoeuvre(&self, mut parts: Parts<'_>) -> Built<Manoeuvre> {
         let name = self.name(parts.next());
         let params = self.function_params(&mut parts);
-        Ok(Manoeuvre { name, params, phases: self.all(parts, Builder::phase)? })
+        let repeat = parts.take(Rule::repeat).map(|repeat| self.only_expression(repeat)).transpose()?;
+        Ok(Manoeuvre { name, params, repeat, phases: self.all(parts, Builder::phase)? })
     }
 
     fn phase(&self, pair: Pair<'_, Rule>) -> Built<Phase> {

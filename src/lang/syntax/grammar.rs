@@ -125,6 +125,7 @@ pub fn role(rule: Rule) -> Role {
         Rule::kw_spawn => Role::Said("`spawn`"),
         Rule::phase => Role::Said("a phase like `after 3 s { speed: 0 m/s }`"),
         Rule::kw_within | Rule::within_time => Role::Said("`within`"),
+        Rule::kw_repeat | Rule::repeat => Role::Said("`repeat`"),
         Rule::kw_as | Rule::bearer => Role::Said("`as`"),
         Rule::kw_apart | Rule::apart => Role::Said("`apart`"),
         Rule::kw_order => Role::Said("`order`"),

@@ -270,7 +270,13 @@ impl Printer<'_> {
             }
             ItemKind::Manoeuvre(item) => {
                 self.words(&format!("manoeuvre {}", item.name.text));
-                self.put(&Layout::row([fn_params(&item.params), Layout::text(" ")]));
+                let repeat = item
+                    .repeat
+                    .iter()
+                    .flat_map(|times| [Layout::text("repeat "), expression(times), Layout::text(" ")]);
+                self.put(&Layout::row(
+                    [fn_params(&item.params), Layout::text(" ")].into_iter().chain(repeat),
+                ));
                 self.block(span.end, |printer| {
                     item.phases.iter().for_each(|of| printer.entry(of.span, &phase(of), ""));
                 });

@@ -13,14 +13,21 @@ pub struct Course {
     /// Which manoeuvre it is, by its index in the space.
     pub manoeuvre: usize,
     pub(super) phases: Vec<PhaseDef>,
+    /// How often it goes through them.
+    pub(super) times: usize,
     /// The rules in force on the moments at which phases begin.
     pub(super) rules: Vec<Expr>,
     pub(super) later: Later,
 }
 
 impl Course {
+    /// How many phases it has, each counted as often as it comes.
     pub fn phases(&self) -> usize {
-        self.phases.len()
+        self.phases.len() * self.times
+    }
+
+    fn phase(&self, phase: usize) -> &PhaseDef {
+        &self.phases[phase % self.phases.len()]
     }
 
     /// The values of the arguments, in bits.
@@ -40,17 +47,17 @@ impl Course {
 
     /// Whether what a phase waits for has come.
     pub fn has_come(&self, phase: usize, moment: &LaterMoment) -> bool {
-        self.phases[phase].once.as_ref().is_none_or(|once| self.later.value(once, moment).truth())
+        self.phase(phase).once.as_ref().is_none_or(|once| self.later.value(once, moment).truth())
     }
 
     /// How long a phase waits for that, s; `None` if it waits for ever. A time without a value (a division by 0) is over.
     pub fn within_s(&self, phase: usize, moment: &LaterMoment) -> Option<f64> {
-        Some(not_negative(self.later.value(self.phases[phase].within.as_ref()?, moment)))
+        Some(not_negative(self.later.value(self.phase(phase).within.as_ref()?, moment)))
     }
 
     /// How long a phase waits after that, s.
     pub fn after_s(&self, phase: usize, moment: &LaterMoment) -> f64 {
-        self.phases[phase].after.as_ref().map_or(0.0, |after| not_negative(self.later.value(after, moment)))
+        self.phase(phase).after.as_ref().map_or(0.0, |after| not_negative(self.later.value(after, moment)))
     }
 
     /// Whether the rules let a phase begin.
@@ -61,7 +68,7 @@ impl Course {
     /// What a phase tells the vehicle, within what an order may say. `None` if its speed or its offset has no value; a
     /// `rate` or an `aside` without one is left out.
     pub fn command(&self, phase: usize, moment: &LaterMoment) -> Option<Command> {
-        self.later.command(&self.phases[phase].command, moment).within_bounds()
+        self.later.command(&self.phase(phase).command, moment).within_bounds()
     }
 }
 

@@ -15,9 +15,9 @@ use avastra_lang::model::rules::{
     Before, Candidate, Choose, Clause, Nearest, Room, RowRules, TRIES_MAX, Unsolved,
 };
 use avastra_lang::model::{
-    ActionDef, BodyWord, Domain, EffectDef, Facts, MEET, ManoeuvreCall, Memory, MomentFacts, NpcFacts,
-    OrderDef, Parameter, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value, WorldFacts,
-    evaluate, locals, rounded_into, spawn_out_of_bounds,
+    ActionDef, BodyWord, Domain, EffectDef, Facts, MEET, ManoeuvreCall, ManoeuvreDef, Memory, MomentFacts,
+    NpcFacts, OrderDef, Parameter, REPEAT, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value,
+    WorldFacts, evaluate, locals, rounded_into, spawn_out_of_bounds,
 };
 
 /// Draws of one row in a step before the row is refused. Every draw obeys what can be known before; a further one
@@ -222,8 +222,13 @@ impl<'a> Judge<'a> {
             let value = |argument: &Expr| evaluate(argument, &space.functions, &facts);
             let later = self.later(call.arguments.iter().map(value).collect());
             let rules = self.row.on_phases(call.manoeuvre).cloned().collect();
-            let (manoeuvre, phases) = (call.manoeuvre, space.manoeuvres[call.manoeuvre].phases.clone());
-            Arc::new(Course { manoeuvre, phases, rules, later })
+            let ManoeuvreDef { phases, repeat, .. } = &space.manoeuvres[call.manoeuvre];
+            let times = repeat.as_ref().map_or(1.0, |times| {
+                evaluate(times, &space.functions, &self.facts(&later.locals, after)).number()
+            });
+            // What has no value counts as once.
+            let times = times.clamp(*REPEAT.start(), *REPEAT.end()).max(*REPEAT.start()) as usize;
+            Arc::new(Course { manoeuvre: call.manoeuvre, phases: phases.clone(), times, rules, later })
         };
         places.zip(calls).filter_map(|(at, call)| Some((at, course(call?)))).collect()
     }
@@ -305,6 +310,7 @@ impl<'a> Judge<'a> {
                 .as_ref()
                 .map(|meet| rounded_into(evaluate(meet, functions, &facts).number(), MEET)),
             siren: spawn.siren.as_ref().is_some_and(|siren| evaluate(siren, functions, &facts).truth()),
+            turn: spawn.turn.as_ref().map(|turn| turn.word(functions, &facts)),
             bearer: spawn.bearer,
         }
     }
@@ -312,7 +318,11 @@ impl<'a> Judge<'a> {
     fn order(&self, order: &OrderDef, locals: &[Value], after: &Memory) -> OrderRequest {
         let facts = self.facts(locals, after);
         let command = order.command.evaluate(&self.row.space.functions, &facts);
-        OrderRequest { bearer: order.bearer, command }
+        let drives = order.manoeuvre.as_ref().is_some_and(|call| {
+            let ManoeuvreDef { phases, .. } = &self.row.space.manoeuvres[call.manoeuvre];
+            phases.iter().any(|phase| !phase.command.is_for_feet())
+        });
+        OrderRequest { bearer: order.bearer, command, drives }
     }
 
     /// Why an order cannot be given after the effects before it. Somebody whom one of them spawns under that name is there.
@@ -322,7 +332,7 @@ impl<'a> Judge<'a> {
             Effect::Spawn(_) | Effect::Time(_) | Effect::Sky(..) | Effect::Order(_) => None,
         });
         let impossible = || match spawned {
-            Some(verb) => order.command.impossible(verb),
+            Some(verb) => order.impossible(verb),
             None => self.situation.surroundings.order_refusal(order),
         };
         let name = || &self.row.space.bearers[order.bearer];

@@ -1,10 +1,10 @@
 //! What a row does to the world once its parameters are drawn.
 
 use avastra_lang::model::body::OwnBody;
-use avastra_lang::model::command::{Command, IgnoredRules};
+use avastra_lang::model::command::{Command, IgnoredRules, ON_FOOT};
 use avastra_lang::model::expr::Expr;
 use avastra_lang::model::vocabulary::{
-    Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb,
+    Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Turning, Verb,
 };
 use avastra_lang::model::{Memory, MomentFacts, NpcFacts, Space, SpawnFacts, StateDef, StateMeaning};
 
@@ -27,6 +27,16 @@ pub struct OrderRequest {
     pub bearer: usize,
     /// Empty for an order of a manoeuvre alone.
     pub command: Command,
+    /// Whether a phase of its manoeuvre says more than a speed, so that nobody on foot can do it.
+    pub drives: bool,
+}
+
+impl OrderRequest {
+    /// Why nobody of that kind can be told this, in words; `None` if they can.
+    pub fn impossible(&self, verb: Verb) -> Option<String> {
+        let drives = || (self.drives && verb == Verb::Walk).then(|| ON_FOOT.to_owned());
+        self.command.impossible(verb).or_else(drives)
+    }
 }
 
 /// A road user that is to appear.
@@ -58,6 +68,8 @@ pub struct SpawnRequest {
     pub meet: Option<f64>,
     /// Whether it is an emergency vehicle under way.
     pub siren: bool,
+    /// Where it goes at the next junction; with `CrossRoad` at the one where it crosses the ego vehicle's way.
+    pub turn: Option<Turning>,
     /// The name that it bears, by its index in the space.
     pub bearer: Option<usize>,
 }

@@ -126,6 +126,8 @@ pub(super) struct Progress {
     pub speed_mps: f64,
     /// Whether it is in the lane and at the offset that it was told.
     pub is_aside: bool,
+    /// Whether the junction at which it was told to turn is behind it.
+    pub has_turned: bool,
     pub on_foot: bool,
     /// Whether it is where its walk ends, this way or back: no speed would get it farther.
     pub is_over: bool,
@@ -136,6 +138,7 @@ impl Progress {
     pub fn meets(&self, command: &Command) -> bool {
         command.speed_mps.is_none_or(|mps| self.is_over || has_speed(self.speed_mps, mps))
             && (self.is_aside || !command.goes_aside())
+            && (self.has_turned || command.turn.is_none())
     }
 }
 
@@ -213,6 +216,9 @@ impl Running {
                 if command.goes_aside() {
                     trace.word(1);
                 }
+                if command.turn.is_some() {
+                    trace.word(2);
+                }
             }
         }
         trace.words(self.course.arguments());
@@ -238,12 +244,13 @@ impl Motion {
     pub fn progress(&self) -> Option<Progress> {
         match self {
             Motion::Drive(driver) => {
-                let is_aside = driver.is_aside_as_told();
-                Some(Progress { speed_mps: driver.speed_mps, is_aside, on_foot: false, is_over: false })
+                let (is_aside, has_turned) = (driver.is_aside_as_told(), driver.has_turned());
+                let speed_mps = driver.speed_mps;
+                Some(Progress { speed_mps, is_aside, has_turned, on_foot: false, is_over: false })
             }
             Motion::Walk(walker) => {
                 let (speed_mps, is_over) = (walker.pace_mps(), walker.is_over());
-                Some(Progress { speed_mps, is_aside: true, on_foot: true, is_over })
+                Some(Progress { speed_mps, is_aside: true, has_turned: true, on_foot: true, is_over })
             }
             Motion::Stand => None,
         }

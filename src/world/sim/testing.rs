@@ -87,6 +87,7 @@ pub fn request(verb: Verb, distance_m: f64, speed_mps: f64) -> SpawnRequest {
         offset_m: 0.0,
         ignores: IgnoredRules::default(),
         siren: false,
+        turn: None,
         meet: None,
         bearer: None,
     }

@@ -7,7 +7,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use avastra_base::geometry::{Bounds, Path, Pose, Vec2};
 use avastra_base::rng;
 use avastra_base::rng::Rng;
-use avastra_road::{Heights, Lane, LaneIndex, RoadMap, SignKind, StopLine};
+use avastra_lang::model::vocabulary::Turning;
+use avastra_road::{Heights, Lane, LaneIndex, RoadMap, SignKind, StopLine, Turn};
 
 use super::body::BodyParameters;
 use super::junction::Area;
@@ -70,25 +71,45 @@ impl Way {
     /// The way through `lanes`, which must follow each other, and on along successors drawn from
     /// `rng`. `None` without lanes.
     pub fn along(scene: &Scene, lanes: &[LaneIndex], rng: &mut Rng) -> Option<Arc<Way>> {
+        Way::turning(scene, lanes, None, rng).map(|(way, _)| way)
+    }
+
+    /// As [`Way::along`], but at the first junction after `lanes` to where it is asked to go; and the lane in which it goes
+    /// there, if the last of them leads there.
+    pub fn turning(
+        scene: &Scene,
+        lanes: &[LaneIndex],
+        to: Option<Turning>,
+        rng: &mut Rng,
+    ) -> Option<(Arc<Way>, Option<LaneIndex>)> {
         let map = &scene.map;
         let mut chain = lanes.to_vec();
         let mut last = *lanes.last()?;
+        let (mut to, mut turns_in) = (to, None);
         let mut beyond_m = 0.0;
         while beyond_m < REACH_M {
             let all = &map.lane(last).successors;
-            // Nobody turns into a bus lane, unless nothing else is left.
-            let is_open = |next: &&LaneIndex| map.lane(last).for_buses || !map.lane(**next).for_buses;
-            let count = all.iter().filter(is_open).count();
+            let wanted = to.filter(|to| turns(map, last, *to).next().is_some());
+            let may = |next: &&LaneIndex| match wanted {
+                Some(to) => turns(map, last, to).any(|turn| turn == **next),
+                None => is_open(map, last, **next),
+            };
+            let count = all.iter().filter(may).count();
             let next = match (all.len(), count) {
                 (0, _) => break,
                 (all_of_them, 0) => all.get(rng::below(rng, all_of_them as u32) as usize),
-                _ => all.iter().filter(is_open).nth(rng::below(rng, count as u32) as usize),
+                _ => all.iter().filter(may).nth(rng::below(rng, count as u32) as usize),
             };
-            last = *next.expect("one was counted");
+            let next = *next.expect("one was counted");
+            if enters_junction(map, last, next) {
+                turns_in = turns_in.or(wanted.map(|_| next));
+                to = None;
+            }
+            last = next;
             beyond_m += map.lane(last).centre.length_m();
             chain.push(last);
         }
-        scene.ways.through(scene, chain)
+        Some((scene.ways.through(scene, chain)?, turns_in))
     }
 
     fn through(scene: &Scene, chain: &[LaneIndex]) -> Option<Way> {
@@ -186,6 +207,39 @@ impl Way {
         scene.map.lane(self.lane_at(station_m).0).speed_limit_mps
     }
 
+    /// The lane in which it goes there at the first junction that begins beyond a front.
+    pub fn next_turn(&self, map: &RoadMap, front_m: f64, to: Turning) -> Option<LaneIndex> {
+        let (_, after) = self.next_junction(map, front_m)?;
+        leads_through(map, after.lane, to).then_some(after.lane)
+    }
+
+    /// Whether the last lane before that junction leads there, and a vehicle of this speed can slow down to what the bend
+    /// allows, as gently as drivers do before bends.
+    ///
+    /// # Errors
+    /// That it does not, in words.
+    pub fn can_turn(&self, map: &RoadMap, front_m: f64, speed_mps: f64, to: Turning) -> Result<(), String> {
+        let (before, after) = self.next_junction(map, front_m).ok_or("no junction lies near ahead of it")?;
+        let way_m = after.from_m - front_m;
+        let is_slow_enough = |lane: LaneIndex| {
+            let sharpest = map.lane(lane).centre.points().iter().map(|point| point.curvature_per_m.abs());
+            let bend_mps2 = LATERAL_MPS2 / sharpest.fold(1e-4, f64::max);
+            speed_mps * speed_mps <= bend_mps2 + 2.0 * BEND_BRAKING_MPS2 * way_m
+        };
+        let mut lanes = turns(map, before.lane, to).peekable();
+        if lanes.peek().is_none() {
+            return Err(format!("its lane does not lead {} at the next junction", in_words(to)));
+        }
+        if lanes.any(is_slow_enough) { Ok(()) } else { Err("it is too fast to turn there".to_owned()) }
+    }
+
+    /// The lanes before and after the edge of the first junction that begins beyond a front.
+    fn next_junction(&self, map: &RoadMap, front_m: f64) -> Option<(WayLane, WayLane)> {
+        let ahead = self.lanes.partition_point(|part| part.from_m <= front_m).max(1) - 1;
+        let mut pairs = self.lanes[ahead..].windows(2).map(|pair| (pair[0], pair[1]));
+        pairs.find(|(before, after)| enters_junction(map, before.lane, after.lane))
+    }
+
     /// Whether so little is left from a station that the way should be prolonged.
     pub fn ends_soon(&self, station_m: f64) -> bool {
         self.open && self.path.length_m() - station_m < REACH_M / 2.0
@@ -193,9 +247,71 @@ impl Way {
 
     /// A longer way that begins with the lane [`BEHIND_M`] behind `station_m`, and that station on the new way.
     pub fn prolonged(&self, scene: &Scene, station_m: f64, rng: &mut Rng) -> Option<(Arc<Way>, f64)> {
-        let after = self.lanes.partition_point(|part| part.from_m <= station_m - BEHIND_M).max(1);
-        let rest: Vec<LaneIndex> = self.lanes[after - 1..].iter().map(|part| part.lane).collect();
-        Some((Way::along(scene, &rest, rng)?, station_m - self.lanes[after - 1].from_m))
+        let first = self.first_kept(station_m);
+        let rest: Vec<LaneIndex> = self.lanes[first..].iter().map(|part| part.lane).collect();
+        Some((Way::along(scene, &rest, rng)?, station_m - self.lanes[first].from_m))
+    }
+
+    /// As [`Way::prolonged`], but laid anew from the first junction beyond a front on, where it goes to where it is asked; and
+    /// the lane in which it does.
+    pub fn turned(
+        &self,
+        scene: &Scene,
+        (station_m, front_m): (f64, f64),
+        to: Turning,
+        rng: &mut Rng,
+    ) -> Option<(Arc<Way>, f64, Option<LaneIndex>)> {
+        let first = self.first_kept(station_m);
+        let (_, edge) = self.next_junction(&scene.map, front_m)?;
+        let kept = self.lanes[first..].iter().take_while(|part| part.from_m < edge.from_m);
+        let kept: Vec<LaneIndex> = kept.map(|part| part.lane).collect();
+        let (way, lane) = Way::turning(scene, &kept, Some(to), rng)?;
+        Some((way, station_m - self.lanes[first].from_m, lane))
+    }
+
+    /// The index of the lane [`BEHIND_M`] behind a station.
+    fn first_kept(&self, station_m: f64) -> usize {
+        self.lanes.partition_point(|part| part.from_m <= station_m - BEHIND_M).max(1) - 1
+    }
+}
+
+/// Whether a vehicle may go on from one lane to the next: nobody turns into a bus lane, unless nothing else is left.
+fn is_open(map: &RoadMap, from: LaneIndex, next: LaneIndex) -> bool {
+    map.lane(from).for_buses || !map.lane(next).for_buses
+}
+
+/// Whether a lane leads there through a junction.
+pub(super) fn leads_through(map: &RoadMap, lane: LaneIndex, to: Turning) -> bool {
+    let lane = map.lane(lane);
+    let turn = match to {
+        Turning::Left => Turn::Left,
+        Turning::Straight => Turn::Straight,
+        Turning::Right => Turn::Right,
+    };
+    lane.junction.is_some() && lane.turn == turn
+}
+
+fn enters_junction(map: &RoadMap, from: LaneIndex, next: LaneIndex) -> bool {
+    map.lane(next).junction.is_some() && map.lane(next).junction != map.lane(from).junction
+}
+
+/// The lanes of a junction that follow a lane before it and lead there.
+fn turns(map: &RoadMap, from: LaneIndex, to: Turning) -> impl Iterator<Item = LaneIndex> {
+    let next = map.lane(from).successors.iter().copied();
+    let none_is_open = !next.clone().any(|next| is_open(map, from, next));
+    next.filter(move |next| {
+        enters_junction(map, from, *next)
+            && leads_through(map, *next, to)
+            && (none_is_open || is_open(map, from, *next))
+    })
+}
+
+/// Where somebody turns, as in "does not lead to the left".
+pub(super) fn in_words(to: Turning) -> &'static str {
+    match to {
+        Turning::Left => "to the left",
+        Turning::Straight => "straight on",
+        Turning::Right => "to the right",
     }
 }
 

@@ -310,8 +310,8 @@ impl World {
         user.mover.course.as_ref()?.under_way()
     }
 
-    /// Whether the road user with an id has done what a command says: it has the speed, and is in the lane and at the place
-    /// beside its middle.
+    /// Whether the road user with an id has done what a command says: it has the speed, is in the lane and at the place
+    /// beside its middle, and the junction of its turn is behind it.
     pub fn has_done(&self, id: u32, command: &Command) -> bool {
         let user = self.users.iter().find(|user| user.obstacle.id == id);
         let progress = user.and_then(|user| user.mover.motion.progress());

@@ -29,13 +29,16 @@ fn table(path: &str) -> ActionTable {
 /// asked for.
 struct Plain(f64);
 
+/// How fast the ego vehicle is there, m/s.
+const EGO_SPEED_MPS: f64 = 10.0;
+
 impl Surroundings for Plain {
     fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
         Ok(SpawnFacts { spawn_gap_m: request.distance_m, ..SpawnFacts::default() })
     }
 
     fn moment(&self) -> MomentFacts {
-        MomentFacts { ego_speed_mps: 10.0, elapsed_s: self.0, ..MomentFacts::default() }
+        MomentFacts { ego_speed_mps: EGO_SPEED_MPS, elapsed_s: self.0, ..MomentFacts::default() }
     }
 }
 

@@ -93,8 +93,10 @@ impl Driver {
         if let Some(speed_mps) = command.speed_mps {
             (self.cruise_mps, self.ordered_mps2) = (speed_mps, command.rate_mps2);
         }
+        self.time_gap_s = command.headway_s.unwrap_or(self.time_gap_s);
         self.ignores = command.ignores.unwrap_or(self.ignores);
         self.has_siren = command.siren.unwrap_or(self.has_siren);
+        command.turn.iter().for_each(|to| self.mean_to_turn(*to, None));
         if command.goes_aside() {
             self.plan.clear();
             let aside = self.aside.get_or_insert_default();

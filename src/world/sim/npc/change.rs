@@ -139,6 +139,11 @@ impl Driver {
         self.plan.pop();
     }
 
+    /// Whether it has still to come into a way that was laid for it.
+    pub(super) fn plans_way(&self) -> bool {
+        self.plan.iter().any(|next| matches!(next.towards, Towards::Way(_)))
+    }
+
     /// Whether the rules on its lane changes let one begin now.
     pub(super) fn may_change(&self, view: &View) -> bool {
         let View { this, around, .. } = *view;
@@ -179,7 +184,7 @@ impl Driver {
         whose: Whose,
         view: &View,
     ) -> Option<(Arc<Way>, f64, Option<Side>)> {
-        let View { this, around, .. } = *view;
+        let View { this, size, around } = *view;
         let map = &around.scene.map;
         let (here, here_m) = self.way.lane_at(self.station_m);
         let target = lane_beside(around, here, side)?;
@@ -202,7 +207,9 @@ impl Driver {
             return None;
         }
         let mut rng = self.draw(this.id, around);
-        let way = Way::along(around.scene, &[target], &mut rng)?;
+        let turning = self.turn_to_lay(size);
+        let (way, lane) = Way::turning(around.scene, &[target], turning, &mut rng)?;
+        turning.iter().for_each(|to| self.mean_to_turn(*to, lane));
         Some((way, there.station_m, Some(side)))
     }
 

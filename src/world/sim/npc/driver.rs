@@ -27,8 +27,9 @@ use crate::sim::world::DT_S;
 
 use super::aside::Aside;
 use super::change::{Change, PlannedChange};
-use super::leader::{Leader, following};
+use super::leader::{Leader, TIME_GAP_S, following};
 use super::manners::GIVE_UP_S;
+use super::turn::MeantTurn;
 
 /// IDM: comfortable deceleration, m/s². Ours.
 pub(super) const COMFORT_MPS2: f64 = 2.0;
@@ -63,6 +64,8 @@ pub(in crate::sim) struct Driver {
     pub(super) cruise_mps: f64,
     /// How fast it goes over to `cruise_mps`, m/s², if it was ordered so.
     pub(super) ordered_mps2: Option<f64>,
+    /// That it keeps behind a leader, s.
+    pub(super) time_gap_s: f64,
     /// Part of the limits that it drives at; `None` if its speed was asked for.
     limit_part: Option<f64>,
     pub(super) yields_to_ego: bool,
@@ -84,6 +87,8 @@ pub(in crate::sim) struct Driver {
     pub ignores: IgnoredRules,
     /// Whether it is an emergency vehicle under way: it passes lights and signs, and all others wait for it.
     pub has_siren: bool,
+    /// Where it was told to go at the next junction.
+    pub(super) turn: Option<MeantTurn>,
     pub(super) last_change: Option<Side>,
     /// In reverse order: the next manoeuvre is last.
     pub(super) plan: Vec<PlannedChange>,
@@ -121,6 +126,7 @@ impl Driver {
             station_m,
             cruise_mps,
             ordered_mps2: None,
+            time_gap_s: TIME_GAP_S,
             limit_part,
             yields_to_ego: false,
             aggression: 0,
@@ -133,6 +139,7 @@ impl Driver {
             aside: None,
             ignores: IgnoredRules::default(),
             has_siren: false,
+            turn: None,
             last_change: None,
             plan,
             lane_changes: Vec::new(),
@@ -204,12 +211,11 @@ impl Driver {
     /// Prolongs the way, begins a lane change that is due, and finds what to follow and what to wait for.
     fn look(&mut self, view: &View) {
         let View { this, size, around } = *view;
+        self.heed_turn(view);
         if self.way.ends_soon(self.station_m) {
             let mut rng = self.draw(this.id, around);
             if let Some((way, station_m)) = self.way.prolonged(around.scene, self.station_m, &mut rng) {
-                self.insists_to_m += station_m - self.station_m;
-                self.stopped_to_m += station_m - self.station_m;
-                (self.way, self.station_m) = (way, station_m);
+                self.go_on_along(way, station_m);
             }
         }
         self.note_stop(size);
@@ -234,6 +240,13 @@ impl Driver {
         if held && self.hold_m.is_none() && self.speed_mps < SETS_OUT_MPS {
             self.insists_to_m = self.junction_end_m(size);
         }
+    }
+
+    /// Takes another way that begins like its own, and on which it is at this station.
+    pub(super) fn go_on_along(&mut self, way: Arc<Way>, station_m: f64) {
+        self.insists_to_m += station_m - self.station_m;
+        self.stopped_to_m += station_m - self.station_m;
+        (self.way, self.station_m) = (way, station_m);
     }
 
     /// The lowest acceleration that the cruising speed, bends, the leader, a light or a wait demands.
@@ -264,7 +277,9 @@ impl Driver {
         } else if wish_mps < CRAWL_MPS {
             ((wish_mps - self.speed_mps) / DT_S).clamp(-COMFORT_MPS2, size.acceleration_mps2_max)
         } else {
-            following(size.acceleration_mps2_max).free_mps2(self.speed_mps, wish_mps).max(-COMFORT_MPS2)
+            following(size.acceleration_mps2_max, self.time_gap_s)
+                .free_mps2(self.speed_mps, wish_mps)
+                .max(-COMFORT_MPS2)
         };
         let mut wanted_mps2 = free_mps2;
         if let Some(leader) = &self.leader {
@@ -308,7 +323,8 @@ impl Driver {
         choices(around.seed, id, self.draws - 1)
     }
 
-    /// Feeds every bit that later ticks depend on to `trace`; ways follow from the draws.
+    /// Feeds every bit that later ticks depend on to `trace`; ways follow from the draws
+    /// and from what it was told for the next junction.
     pub fn trace(&self, trace: &mut Trace) {
         trace.numbers([self.station_m, self.speed_mps, self.cruise_mps]);
         let leader = self.leader.unwrap_or(Leader::line(-1.0));
@@ -334,6 +350,12 @@ impl Driver {
         }
         if self.has_siren {
             trace.word(1);
+        }
+        if let Some(turn) = self.turn {
+            turn.trace(trace);
+        }
+        if self.time_gap_s != TIME_GAP_S {
+            trace.number(self.time_gap_s);
         }
         trace.word(self.last_change.map_or(0, |side| side as u64 + 1));
         trace.words([self.plan.len() as u64, u64::from(self.draws)]);

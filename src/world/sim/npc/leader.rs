@@ -15,18 +15,13 @@ use crate::sim::way::Way;
 use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, LOOK_AHEAD_M, SIDE_ROOM_M, View};
 
 /// IDM: time gap, s. Ours.
-const TIME_GAP_S: f64 = 1.2;
+pub(super) const TIME_GAP_S: f64 = 1.2;
 /// A vehicle at more than this angle to the way stands across it or against it (cosine of 45°).
 const CROSSWISE_COS_MAX: f64 = core::f64::consts::FRAC_1_SQRT_2;
 
-/// The driver model of a vehicle of this acceleration, m/s².
-pub(super) fn following(acceleration_mps2: f64) -> Following {
-    Following {
-        gap_m_min: GAP_M_MIN,
-        time_gap_s: TIME_GAP_S,
-        acceleration_mps2,
-        comfortable_mps2: COMFORT_MPS2,
-    }
+/// The driver model of a vehicle of this acceleration, m/s², that keeps this time gap, s.
+pub(super) fn following(acceleration_mps2: f64, time_gap_s: f64) -> Following {
+    Following { gap_m_min: GAP_M_MIN, time_gap_s, acceleration_mps2, comfortable_mps2: COMFORT_MPS2 }
 }
 
 /// What is in front: another road user, or a line to stop at.
@@ -61,7 +56,7 @@ impl Driver {
         let here = &this.outline.pose;
         let forward = this.forward;
         let reach_m = LOOK_AHEAD_M
-            + self.speed_mps * (TIME_GAP_S + self.speed_mps / (2.0 * COMFORT_MPS2))
+            + self.speed_mps * (self.time_gap_s + self.speed_mps / (2.0 * COMFORT_MPS2))
             + size.length_m / 2.0;
         let mut nearest: Option<Leader> = None;
         for other in self.minded(around) {
@@ -116,7 +111,7 @@ impl Driver {
     /// Acceleration behind a leader, m/s²: IDM's, or the braking that still avoids the leader if that is harder.
     pub(super) fn follow_mps2(&self, size: &BodyParameters, leader: &Leader, free_mps2: f64) -> f64 {
         let closing_mps = self.speed_mps - leader.speed_mps;
-        let model = following(size.acceleration_mps2_max);
+        let model = following(size.acceleration_mps2_max, self.time_gap_s);
         let idm_mps2 = free_mps2 - model.interaction_mps2(self.speed_mps, leader.speed_mps, leader.gap_m);
         if closing_mps <= 0.0 {
             return idm_mps2;

@@ -16,7 +16,7 @@ use crate::sim::around;
 use crate::sim::traffic::TrafficProfile;
 
 use super::driver::{Driver, SIDE_ROOM_M, View};
-use super::leader::following;
+use super::leader::{TIME_GAP_S, following};
 use crate::sim::lanes::{lane_beside, may_use};
 
 /// Ticks between two considerations: a second.
@@ -109,7 +109,7 @@ struct Idm {
 impl Idm {
     /// Acceleration at a speed behind a leader, m/s².
     fn acceleration_mps2(&self, speed_mps: f64, leader: Option<Other>) -> f64 {
-        let model = following(self.acceleration_mps2);
+        let model = following(self.acceleration_mps2, TIME_GAP_S);
         let free_mps2 = model.free_mps2(speed_mps, self.wish_mps.max(speed_mps).max(0.1));
         let Some(leader) = leader else { return free_mps2 };
         free_mps2 - model.interaction_mps2(speed_mps, leader.speed_mps, leader.gap_m)

@@ -7,7 +7,7 @@
 //! | where it stops for a red or yellow light, or a sign | `stop_line` |
 //! | which vehicles it waits for at a junction, and for how long | `manners` |
 //! | when and how it changes lanes | `change`; for its own gain `mobil` |
-//! | how it does what an order or a phase tells it | to the side `aside`; its speed `driver` |
+//! | how it does what an order or a phase tells it | to the side `aside`; at the next junction `turn`; its speed `driver` |
 //! | what it sees and does under the profile `released` | `rays` |
 
 mod aside;
@@ -19,6 +19,7 @@ mod manners;
 mod mobil;
 mod rays;
 mod stop_line;
+mod turn;
 
 pub(super) use change::{PlannedChange, Towards, When, can_change};
 pub(super) use driver::{Cruise, Driver, View, choices};

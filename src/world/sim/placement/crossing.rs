@@ -8,7 +8,7 @@ use crate::sim::ego::VehicleParameters;
 use crate::sim::lanes::lane_beside;
 use crate::sim::npc::{Driver, PlannedChange, Towards, When, can_change, choices};
 use crate::sim::sense::SignalColour;
-use crate::sim::way::Way;
+use crate::sim::way::{Way, in_words, leads_through};
 use crate::sim::world::DT_S;
 
 use super::arrival::TIMING_M;
@@ -31,6 +31,7 @@ pub(super) fn cross_road(asked: &Asked) -> Result<Driver, String> {
         let from_right = conflict.angle_rad > 0.0;
         if !(request.distance_m..=request.distance_m + CROSSING_M).contains(&distance_m)
             || from_right != (request.side == Side::Right)
+            || request.turn.is_some_and(|to| !leads_through(&around.scene.map, conflict.lane, to))
         {
             continue;
         }
@@ -44,7 +45,8 @@ pub(super) fn cross_road(asked: &Asked) -> Result<Driver, String> {
             Side::Left => "left",
             Side::Right => "right",
         };
-        format!("no crossing leg from the {side} within {CROSSING_M} m")
+        let going = request.turn.map_or(String::new(), |to| format!(" that leads {}", in_words(to)));
+        format!("no crossing leg from the {side}{going} within {CROSSING_M} m")
     }))
 }
 
@@ -69,7 +71,7 @@ fn rendezvous(asked: &Asked, conflict: &Conflict, arrival_s: f64) -> Result<Driv
     let front_m = approach_m(asked, &way, meeting_m, arrival_s)?;
     let station_m = front_m - size.length_m / 2.0;
     if request.then == Then::Keep {
-        return Ok(commanded(asked, way, station_m, Vec::new()));
+        return Ok(meaning_to_turn(asked, conflict.lane, commanded(asked, way, station_m, Vec::new())));
     }
     // It starts beside its way and changes into it on the approach.
     let start = way.path.pose_at(station_m).position;
@@ -91,7 +93,13 @@ fn rendezvous(asked: &Asked, conflict: &Conflict, arrival_s: f64) -> Result<Driv
     }
     let (first, station_m) = found.ok_or(reason)?;
     let change = PlannedChange { when: When::Tick(around.tick), towards: Towards::Way(way) };
-    Ok(commanded(asked, first, station_m, vec![change]))
+    Ok(meaning_to_turn(asked, conflict.lane, commanded(asked, first, station_m, vec![change])))
+}
+
+/// A driver that means to turn, if that was asked, where its way meets the ego vehicle's.
+fn meaning_to_turn(asked: &Asked, lane: LaneIndex, mut driver: Driver) -> Driver {
+    asked.request.turn.iter().for_each(|to| driver.mean_to_turn(*to, Some(lane)));
+    driver
 }
 
 /// Station at which a front has to start to be at the meeting point after `arrival_s`, m. It is found by

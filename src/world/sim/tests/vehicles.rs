@@ -1,6 +1,6 @@
 //! How other vehicles move: on bends, after a crash, at stop signs, by each traffic profile.
 
-use avastra_lang::model::command::Command;
+use avastra_lang::model::command::{Command, IgnoredRules};
 use std::sync::Arc;
 
 use crate::action::{Effect, OrderRequest, SpawnRequest, Surroundings};
@@ -8,8 +8,10 @@ use crate::sim::body::BodyParameters;
 use crate::sim::testing::request;
 use crate::sim::way::body_at;
 use crate::sim::{Control, DT_S, Scene, Start, TrafficProfile, World, body, testing};
-use avastra_base::geometry::{OrientedBox, Path, Pose, Vec2};
-use avastra_lang::model::vocabulary::{Body, LaneChoice, Level, Phenomenon, Side, Then, Verb, Word};
+use avastra_base::geometry::{OrientedBox, Path, Pose, Vec2, distance_m};
+use avastra_lang::model::vocabulary::{
+    Body, LaneChoice, Level, Phenomenon, Side, Then, TrafficRule, Verb, Word,
+};
 
 use super::{drive, driven, hold, spawn, y_m};
 
@@ -88,7 +90,7 @@ fn an_order_changes_speed_at_its_rate() {
         let user = spawn(&mut world, named);
         let command =
             Command { speed_mps: Some(speed_mps), rate_mps2: Some(rate_mps2), ..Command::default() };
-        let order = OrderRequest { bearer: 7, command };
+        let order = OrderRequest { bearer: 7, command, drives: false };
         world.apply(&Effect::Order(order)).expect("it is there and drives");
         let from_m = user.outline.pose.position.x;
         let (mut ticks, mut now) = (0, user);
@@ -114,9 +116,49 @@ fn an_order_changes_speed_at_its_rate() {
 }
 
 #[test]
+fn who_ignores_others_runs_into_the_one_ahead() {
+    for (ignores, meets) in
+        [(IgnoredRules::default(), false), (IgnoredRules::of([TrafficRule::Others]), true)]
+    {
+        let mut world = driven(&testing::straight(), 3.0, 1.0);
+        spawn(&mut world, request(Verb::DriveAhead, 80.0, 2.0));
+        spawn(&mut world, SpawnRequest { ignores, ..request(Verb::DriveAhead, 30.0, 14.0) });
+        let mut has_met = false;
+        for _ in 0..800 {
+            world.tick(&hold(&world, 3.0));
+            has_met |= !world.incidents().is_empty();
+        }
+        assert_eq!(has_met, meets, "{ignores:?}");
+    }
+}
+
+#[test]
+fn a_told_headway_is_kept_as_the_driver_model_has_it() {
+    for headway_s in [0.3, 1.2, 2.5] {
+        let mut world = driven(&testing::straight(), 5.0, 1.0);
+        let leader = spawn(&mut world, request(Verb::DriveAhead, 120.0, 10.0));
+        let named = SpawnRequest { bearer: Some(0), ..request(Verb::DriveAhead, 60.0, 10.0) };
+        let follower = spawn(&mut world, named);
+        let command = Command { speed_mps: Some(20.0), headway_s: Some(headway_s), ..Command::default() };
+        world.apply(&Effect::Order(OrderRequest { bearer: 0, command, drives: false })).expect("it is there");
+        drive(&mut world, 8.0, 32.0);
+        let [ahead, behind] =
+            [leader, follower].map(|user| world.obstacle(user.id).expect("it is there").outline);
+        let gap_m = distance_m(&ahead, &behind);
+        // IDM's gap at rest: s* / √(1 - (v/v0)⁴) at half of the wished speed.
+        let wanted_m = (2.0 + 10.0 * headway_s) / (15.0_f64 / 16.0).sqrt();
+        assert!((gap_m - wanted_m).abs() < 0.05 * wanted_m, "{headway_s} s: {gap_m} m, {wanted_m} m");
+    }
+}
+
+#[test]
 fn an_order_is_for_the_latest_bearer_and_no_wreck_obeys() {
     let mut world = driven(&testing::straight(), 8.0, 1.0);
-    let order = OrderRequest { bearer: 0, command: Command { speed_mps: Some(3.0), ..Command::default() } };
+    let order = OrderRequest {
+        bearer: 0,
+        command: Command { speed_mps: Some(3.0), ..Command::default() },
+        drives: false,
+    };
     assert_eq!(world.order_refusal(&order).as_deref(), Some("no road user of that name is there"));
     let named = |distance_m| SpawnRequest { bearer: Some(0), ..request(Verb::DriveAhead, distance_m, 9.0) };
     let [first, second] = [90.0, 60.0].map(|distance_m| spawn(&mut world, named(distance_m)).id);
@@ -133,7 +175,7 @@ fn an_order_is_for_the_latest_bearer_and_no_wreck_obeys() {
     let backwards = Command { speed_mps: Some(-1.0), ..Command::default() };
     let car = SpawnRequest { bearer: Some(1), ..request(Verb::DriveOpposite, 60.0, 9.0) };
     spawn(&mut world, car);
-    let refusal = world.order_refusal(&OrderRequest { bearer: 1, command: backwards });
+    let refusal = world.order_refusal(&OrderRequest { bearer: 1, command: backwards, drives: false });
     assert_eq!(refusal.as_deref(), Some("it does not drive backwards"));
 }
 

@@ -103,12 +103,18 @@ impl World {
         if mover.is_wreck() {
             return Err("it is a wreck".to_owned());
         }
-        if let Some(reason) = order.command.impossible(obstacle.verb) {
+        if let Some(reason) = order.impossible(obstacle.verb) {
             return Err(reason);
         }
-        if let (Motion::Drive(driver), Some(lane)) = (&mover.motion, order.command.lane) {
-            let ignores = order.command.ignores.unwrap_or(driver.ignores);
-            driver.side_of(lane, obstacle, ignores, &self.alone())?;
+        if let Motion::Drive(driver) = &mover.motion {
+            let (around, command) = (self.alone(), &order.command);
+            let ignores = command.ignores.unwrap_or(driver.ignores);
+            let side =
+                command.lane.map(|lane| driver.side_of(lane, obstacle, ignores, &around)).transpose()?;
+            // One that is to change its lane will turn from another one.
+            if let (Some(to), None) = (command.turn, side.flatten()) {
+                driver.can_turn(to, &around, &mover.size)?;
+            }
         }
         Ok(index)
     }

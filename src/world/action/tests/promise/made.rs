@@ -79,6 +79,8 @@ pub(super) enum EachStep {
     CountFalls,
     FlagTurns,
     FogSoaks,
+    /// As the moment has it, of which proofs know nothing.
+    FlagOfTheMoment,
 }
 
 impl EachStep {
@@ -91,6 +93,7 @@ impl EachStep {
             EachStep::CountFalls => "each step { set count = match count { 0 => 0\n  _ => count - 1 } }\n",
             EachStep::FlagTurns => "each step { set flag = match flag { true => false\n  false => true } }\n",
             EachStep::FogSoaks => "each step { set wet[Back] = fog }\n",
+            EachStep::FlagOfTheMoment => "each step { set flag = ego.speed >= 8 m/s + count * 1 m/s }\n",
         }
     }
 }
@@ -337,6 +340,7 @@ episode {{ limit: {STEPS} steps }}
             1 => EachStep::CountFalls,
             2 => EachStep::FlagTurns,
             3 => EachStep::FogSoaks,
+            4 => EachStep::FlagOfTheMoment,
             _ => EachStep::Nothing,
         };
         Made { text: format!("{text}{}", each_step.text()), each_step, rules }

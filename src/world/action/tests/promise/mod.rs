@@ -13,8 +13,8 @@ mod made;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::action::tests::Plain;
 use crate::action::tests::witnesses::compiled;
+use crate::action::tests::{EGO_SPEED_MPS, Plain};
 use crate::action::{ActionTable, Draw, Situation};
 use avastra_base::rng;
 use avastra_base::rng::Stream;
@@ -151,6 +151,7 @@ impl Twin {
             EachStep::CountFalls => self.count = (self.count - 1.0).max(0.0),
             EachStep::FlagTurns => self.flag = !self.flag,
             EachStep::FogSoaks => self.wet[1] = self.fog,
+            EachStep::FlagOfTheMoment => self.flag = compared(">=", EGO_SPEED_MPS, 8.0 + self.count),
         }
     }
 
