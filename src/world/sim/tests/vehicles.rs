@@ -1,6 +1,6 @@
 //! How other vehicles move: on bends, after a crash, at stop signs, by each traffic profile.
 
-use avastra_lang::model::command::{Command, IgnoredRules};
+use avastra_lang::model::command::{Command, IgnoredRules, ON_FOOT};
 use std::sync::Arc;
 
 use crate::action::{Effect, OrderRequest, SpawnRequest, Surroundings};
@@ -172,6 +172,11 @@ fn an_order_is_for_the_latest_bearer_and_no_wreck_obeys() {
     let walker = SpawnRequest { bearer: Some(0), ..request(Verb::Stand, 40.0, 1.0) };
     spawn(&mut world, walker);
     assert_eq!(world.order_refusal(&order).as_deref(), Some("it stands, and does not walk"));
+    let walker = SpawnRequest { bearer: Some(2), ..request(Verb::Walk, 50.0, 1.0) };
+    spawn(&mut world, walker);
+    let manoeuvre = OrderRequest { bearer: 2, command: Command::default(), drives: true };
+    assert_eq!(world.order_refusal(&manoeuvre).as_deref(), Some(ON_FOOT));
+    assert_eq!(world.order_refusal(&OrderRequest { drives: false, ..manoeuvre }), None);
     let backwards = Command { speed_mps: Some(-1.0), ..Command::default() };
     let car = SpawnRequest { bearer: Some(1), ..request(Verb::DriveOpposite, 60.0, 9.0) };
     spawn(&mut world, car);
