@@ -154,7 +154,7 @@ pub fn choose(agent: &mut dyn Agent, moment: &Moment) -> (Choice, Array1<bool>) 
 /// What each row would do now.
 pub(crate) fn offers(agent: &mut dyn Agent, moment: &Moment) -> Vec<Offer> {
     let situation = situation(agent, moment);
-    agent.weigh(&moment.setup().table.odds(moment.situation));
+    agent.weigh(&|| moment.setup().table.odds(moment.situation));
     let shares = agent.draw_shares(moment.step, moment.situation.seed);
     moment.setup().table.offers_at(&situation, shares)
 }

@@ -119,8 +119,10 @@ impl Checker {
         let place = Place { locals: parameters, owner: Some(owner), ..Place::default() };
         let times = self.typed(written, &place, Type::Int)?;
         if self.written_out(&times).is_some_and(|count| !REPEAT.contains(&count)) {
-            let error = Diagnostic::error(code::OUT_OF_BOUNDS, "a manoeuvre is repeated 1 to 1000 times");
-            return self.reject(error.at(written.span, "must lie within 1 .. 1000"));
+            let (low, high) = (REPEAT.start(), REPEAT.end());
+            let message = format!("a manoeuvre is repeated {low} to {high} times");
+            let error = Diagnostic::error(code::OUT_OF_BOUNDS, message);
+            return self.reject(error.at(written.span, format!("must lie within {low} .. {high}")));
         }
         Some(Some(times))
     }

@@ -1,4 +1,5 @@
-//! What a road user is told by an order or a phase: how fast it goes, and a vehicle where to the side. The two run together.
+//! What a road user is told by an order or a phase: how fast it goes, and a vehicle where to the side, how near to others, in
+//! which manner, and where at the next junction. All of it runs together.
 
 use core::ops::RangeInclusive;
 
@@ -48,7 +49,7 @@ pub struct CommandDef {
     pub offset: Option<Expr>,
     /// m/s; without it the driver moves over as it would by itself.
     pub aside: Option<Expr>,
-    /// s.
+    /// s; without it as before.
     pub headway: Option<Expr>,
     pub ignores: Option<Vec<WordExpr<TrafficRule>>>,
     pub siren: Option<Expr>,

@@ -22,8 +22,8 @@ impl MaskedRandom {
 }
 
 impl Agent for MaskedRandom {
-    fn weigh(&mut self, odds: &[u32]) {
-        self.odds = odds.to_vec();
+    fn weigh(&mut self, odds: &dyn Fn() -> Vec<u32>) {
+        self.odds = odds();
     }
 
     fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
@@ -76,7 +76,7 @@ mod tests {
     fn rows_come_by_their_odds() {
         let mut rng = stream(3, Stream::Exploration, 0);
         let mut agent = MaskedRandom::default();
-        agent.weigh(&[1, 7, 0, 3]);
+        agent.weigh(&|| vec![1, 7, 0, 3]);
         let legal = Array1::from_vec(vec![true, false, true, true]);
         let chances = agent.chances(legal.view()).unwrap();
         assert_eq!(chances.to_vec(), [0.25, 0.0, 0.0, 0.75]);

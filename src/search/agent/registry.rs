@@ -19,7 +19,7 @@ pub trait Agent: Send {
     fn begin(&mut self) {}
 
     /// A step begins, in which the space gives the rows these odds.
-    fn weigh(&mut self, _odds: &[u32]) {}
+    fn weigh(&mut self, _odds: &dyn Fn() -> Vec<u32>) {}
 
     /// The row to carry out next, or none. `legal` has shape `(rows,)`; at least one is true.
     fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize>;

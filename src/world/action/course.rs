@@ -66,7 +66,7 @@ impl Course {
     }
 
     /// What a phase tells the vehicle, within what an order may say. `None` if its speed or its offset has no value; a
-    /// `rate` or an `aside` without one is left out.
+    /// `rate`, an `aside` or a `headway` without one is left out.
     pub fn command(&self, phase: usize, moment: &LaterMoment) -> Option<Command> {
         self.later.command(&self.phase(phase).command, moment).within_bounds()
     }

@@ -71,7 +71,7 @@ fn rendezvous(asked: &Asked, conflict: &Conflict, arrival_s: f64) -> Result<Driv
     let front_m = approach_m(asked, &way, meeting_m, arrival_s)?;
     let station_m = front_m - size.length_m / 2.0;
     if request.then == Then::Keep {
-        return Ok(meaning_to_turn(asked, conflict.lane, commanded(asked, way, station_m, Vec::new())));
+        return Ok(commanded(asked, way, Some(conflict.lane), station_m, Vec::new()));
     }
     // It starts beside its way and changes into it on the approach.
     let start = way.path.pose_at(station_m).position;
@@ -93,13 +93,7 @@ fn rendezvous(asked: &Asked, conflict: &Conflict, arrival_s: f64) -> Result<Driv
     }
     let (first, station_m) = found.ok_or(reason)?;
     let change = PlannedChange { when: When::Tick(around.tick), towards: Towards::Way(way) };
-    Ok(meaning_to_turn(asked, conflict.lane, commanded(asked, first, station_m, vec![change])))
-}
-
-/// A driver that means to turn, if that was asked, where its way meets the ego vehicle's.
-fn meaning_to_turn(asked: &Asked, lane: LaneIndex, mut driver: Driver) -> Driver {
-    asked.request.turn.iter().for_each(|to| driver.mean_to_turn(*to, Some(lane)));
-    driver
+    Ok(commanded(asked, first, Some(conflict.lane), station_m, vec![change]))
 }
 
 /// Station at which a front has to start to be at the meeting point after `arrival_s`, m. It is found by

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use avastra_base::rng;
 use avastra_base::rng::Rng;
-use avastra_lang::model::vocabulary::{LaneChoice, Side, Then, Turning};
+use avastra_lang::model::vocabulary::{LaneChoice, Side, Then};
 use avastra_road::LaneIndex;
 
 use crate::sim::around::Around;
@@ -31,7 +31,7 @@ pub(super) fn drive_ahead(asked: &Asked) -> Result<Driver, String> {
     let mut rng = choices(around.seed, id, 0);
     let beside_ego = around.scene.route.path.pose_at(station_m).position;
     let station_m = around.scene.map.lane(lane).centre.project(beside_ego).station_m;
-    let (way, turn) = way_of(asked, &[lane], &mut rng)?;
+    let (way, turns_in) = way_of(asked, &[lane], &mut rng)?;
     let mut plan = Vec::new();
     if request.then == Then::Change {
         let sides: &[Side] = match request.lane {
@@ -49,18 +49,19 @@ pub(super) fn drive_ahead(asked: &Asked) -> Result<Driver, String> {
         let when = When::Tick(around.tick + ticks(CHANGE_AFTER_S));
         plan.push(PlannedChange { when, towards });
     }
-    Ok(turning(commanded(asked, way, station_m, plan), turn))
+    Ok(commanded(asked, way, turns_in, station_m, plan))
 }
 
-/// Where it was asked to go at the next junction, and the lane in which its way leads there.
-type Turn = Option<(Turning, Option<LaneIndex>)>;
-
-/// The way along these lanes, to where the request asks to go at the first junction after them. One that changes its lane will
-/// turn from another one.
+/// The way along these lanes, to where the request asks to go at the first junction after them, and the lane in which it goes
+/// there. One that changes its lane will turn from another one.
 ///
 /// # Errors
 /// That the last of the lanes does not lead there, in words.
-fn way_of(asked: &Asked, lanes: &[LaneIndex], rng: &mut Rng) -> Result<(Arc<Way>, Turn), String> {
+fn way_of(
+    asked: &Asked,
+    lanes: &[LaneIndex],
+    rng: &mut Rng,
+) -> Result<(Arc<Way>, Option<LaneIndex>), String> {
     let Asked { around, request, .. } = *asked;
     let keeps = request.then == Then::Keep;
     let laid = Way::turning(around.scene, lanes, request.turn.filter(|_| keeps), rng);
@@ -69,13 +70,8 @@ fn way_of(asked: &Asked, lanes: &[LaneIndex], rng: &mut Rng) -> Result<(Arc<Way>
         Some(to) if keeps && lane.is_none() => {
             Err(format!("its lane does not lead {} at the next junction", in_words(to)))
         }
-        to => Ok((way, to.map(|to| (to, lane)))),
+        _ => Ok((way, lane)),
     }
-}
-
-fn turning(mut driver: Driver, turn: Turn) -> Driver {
-    turn.iter().for_each(|(to, lane)| driver.mean_to_turn(*to, *lane));
-    driver
 }
 
 /// Why a vehicle in this lane cannot change it.
@@ -119,12 +115,12 @@ pub(super) fn overtake(asked: &Asked) -> Result<Driver, String> {
         station_m += map.lane(previous).centre.length_m();
         lanes.insert(0, previous);
     }
-    let (way, turn) = way_of(asked, &lanes, &mut rng)?;
+    let (way, turns_in) = way_of(asked, &lanes, &mut rng)?;
     let passes = |side| can_change(around, &way, station_m, side, request);
     if request.lane == LaneChoice::Current && !passes(Side::Left) && !passes(Side::Right) {
         return Err(no_change(around, lane).into());
     }
-    Ok(turning(commanded(asked, way, station_m, plan), turn))
+    Ok(commanded(asked, way, turns_in, station_m, plan))
 }
 
 pub(super) fn drive_opposite(asked: &Asked) -> Result<Driver, String> {
@@ -143,9 +139,9 @@ pub(super) fn drive_opposite(asked: &Asked) -> Result<Driver, String> {
     };
     let beside_route = around.scene.route.path.pose_at(station_m).position;
     let station_m = map.lane(lane).centre.project(beside_route).station_m;
-    let (way, turn) = way_of(asked, &[lane], &mut rng)?;
+    let (way, turns_in) = way_of(asked, &[lane], &mut rng)?;
     if request.then == Then::Change && !can_change(around, &way, station_m, Side::Left, request) {
         return Err("no room to change lanes before the junction".into());
     }
-    Ok(turning(commanded(asked, way, station_m, plan), turn))
+    Ok(commanded(asked, way, turns_in, station_m, plan))
 }

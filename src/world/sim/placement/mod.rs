@@ -16,6 +16,7 @@ use crate::action::{SpawnFacts, SpawnRequest};
 use avastra_base::kinematics::braking_m;
 use avastra_lang::model::spawn_out_of_bounds;
 use avastra_lang::model::vocabulary::Verb;
+use avastra_road::LaneIndex;
 
 use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
@@ -156,9 +157,18 @@ fn meets_route(around: &Around, mover: &Mover) -> bool {
     ahead.any(|conflict| driver.way.lane_begin_m(conflict.lane).is_some())
 }
 
-/// A driver at the speed that was asked for.
-fn commanded(asked: &Asked, way: Arc<Way>, station_m: f64, plan: Vec<PlannedChange>) -> Driver {
-    Driver::new(asked.around.scene, way, station_m, Cruise::Commanded(asked.request.speed_mps), plan)
+/// A driver at the speed that was asked for. If it was asked to turn, it does so in `turns_in`, if a way leads there already.
+fn commanded(
+    asked: &Asked,
+    way: Arc<Way>,
+    turns_in: Option<LaneIndex>,
+    station_m: f64,
+    plan: Vec<PlannedChange>,
+) -> Driver {
+    let SpawnRequest { speed_mps, turn, .. } = *asked.request;
+    let mut driver = Driver::new(asked.around.scene, way, station_m, Cruise::Commanded(speed_mps), plan);
+    turn.iter().for_each(|to| driver.mean_to_turn(*to, turns_in));
+    driver
 }
 
 /// The newcomer, if there is room for it.
