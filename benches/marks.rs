@@ -135,6 +135,7 @@ fn crowded(scene: &Arc<Scene>) -> World {
                     offset_m: 0.0,
                     ignores: IgnoredRules::default(),
                     meet: None,
+                    waits_s: None,
                     siren: false,
                     turn: None,
                     bearer: None,

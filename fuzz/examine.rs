@@ -99,8 +99,15 @@ fn examine_draws(table: ActionTable) {
     let rules = RulesInForce::new(&space, &[], &[]).expect("no rule is named");
     for road in &space.roads {
         let memory = space.memory_at_start(road, &rules, 1).expect("what is checked has a start");
-        let situation =
-            Situation { memory: &memory, road, rules: &rules, surroundings: &Empty, seed: 1, step: 0 };
+        let situation = Situation {
+            memory: &memory,
+            road,
+            rules: &rules,
+            surroundings: &Empty,
+            seed: 1,
+            step: 0,
+            happened_s: &[],
+        };
         for row in 0..table.rows().len().min(ROWS_MAX) {
             let Ok(draw) = table.offer(&situation, row) else { continue };
             assert_eq!(table.check(&situation, row, &draw.values), Ok(draw), "what is drawn is legal");

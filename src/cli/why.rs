@@ -44,8 +44,15 @@ pub fn why(
     };
     let start = Start::drawn(space, road, &memory, SEED);
     let world = World::new(Arc::new(Scene::of(road)), &start);
-    let situation =
-        Situation { memory: &memory, road, rules: &rules, surroundings: &world, seed: SEED, step: 0 };
+    let situation = Situation {
+        memory: &memory,
+        road,
+        rules: &rules,
+        surroundings: &world,
+        seed: SEED,
+        step: 0,
+        happened_s: &[],
+    };
     let offer = table.offer(&situation, number);
 
     output.say(&format!("row {}: {} on {}", row.index, row.label, road.name));

@@ -4,8 +4,8 @@
 use avastra_lang::check::{Declaration, References, Symbol};
 use avastra_lang::model::Type;
 use avastra_lang::model::vocabulary::{
-    CHANGE, CommandField, EpisodeField, RoadField, ScenarioClaim, Site, SpaceClaim, SpawnField, StartField,
-    StopReason, THERE, WAIT, Word, parts_of, things,
+    CHANGE, CommandField, EpisodeField, ROAD_USER, RoadField, SINCE, ScenarioClaim, Site, SpaceClaim,
+    SpawnField, StartField, StopReason, THERE, WAIT, Word, parts_of, things,
 };
 use avastra_lang::syntax::ast::{
     Action, ActionParam, Arm, BinaryOp, Call, Effect, EffectKind, Expr, ExprKind, Field, Initial, ItemKind,
@@ -261,7 +261,11 @@ impl<'a> Place<'a> {
                 let key = key.as_ref().and_then(|key| self.within(key, of_key, None));
                 key.or_else(|| self.within(value, known.and_then(|state| state.ty), None))
             }
-            EffectKind::Order { who, .. } if is_here(who) => Some(vec![Kind::RoadUsers]),
+            EffectKind::Order { who, .. } if is_here(who) => {
+                let given = self.locals.iter().filter(|(_, ty)| self.is_road_user(*ty));
+                let given = given.map(|(name, ty)| Kind::Local(name.clone(), *ty, true));
+                Some(given.chain([Kind::RoadUsers]).collect())
+            }
             EffectKind::Order { fields, .. } => fields.iter().find_map(|field| match is_here(&field.name) {
                 true => Some(unused::<CommandField>(fields)),
                 false => self.in_command(field),
@@ -277,8 +281,17 @@ impl<'a> Place<'a> {
         })
     }
 
+    fn is_road_user(&self, ty: Option<Type>) -> bool {
+        ty.and_then(|ty| self.references.enum_of(ty)).is_some_and(|of| of.name == ROAD_USER.0)
+    }
+
     fn in_phase(&self, phase: &Phase) -> Option<Vec<Kind>> {
-        let clauses = [(&phase.once, Some(Type::Bool)), (&phase.within, None), (&phase.after, None)];
+        let clauses = [
+            (&phase.once, Some(Type::Bool)),
+            (&phase.held, None),
+            (&phase.within, None),
+            (&phase.after, None),
+        ];
         let clause = |(clause, ty): (&Option<Expr>, Option<Type>)| self.within(clause.as_ref()?, ty, ty);
         let of_field = |field: &Field| match is_here(&field.name) {
             true => Some(unused::<CommandField>(&phase.fields)),
@@ -452,7 +465,8 @@ impl<'a> Place<'a> {
             }
             ExprKind::Field { base, field } if is_here(field) => {
                 let name = name_of(base)?;
-                let is_named = self.references.declaration(&Symbol::RoadUser(name.to_owned())).is_some();
+                let is_named = self.references.declaration(&Symbol::RoadUser(name.to_owned())).is_some()
+                    || self.locals.iter().any(|(local, ty)| local == name && self.is_road_user(*ty));
                 let parts = match things().contains(&name) {
                     true => parts_of(name),
                     false if is_named => parts_of("npc").into_iter().chain([THERE]).collect(),
@@ -519,6 +533,9 @@ impl<'a> Place<'a> {
             let is_about = call.args.iter().any(|arg| is_named_here(&arg.value));
             let claims = || Kind::Words(words::of::<SpaceClaim>());
             return is_about.then(|| vec![claims(), Kind::Actions, Kind::Groups]);
+        }
+        if call.name.text == SINCE.0 && call.args.iter().any(|arg| is_named_here(&arg.value)) {
+            return Some(vec![Kind::Actions, Kind::Groups]);
         }
         let function = self.declared(Symbol::Function, &call.name.text);
         call.args.iter().enumerate().find_map(|(index, arg)| {

@@ -2,8 +2,8 @@
 //! engine's words in `model::vocabulary`.
 
 use avastra_lang::model::vocabulary::{
-    Body, Colour, CommandField, EpisodeField, LaneChoice, RoadField, Side, Site, SpawnField, StartField,
-    TYPES, Then, TrafficRule, Turning, Verb, Word,
+    Body, Colour, CommandField, EpisodeField, LaneChoice, ROAD_USER, RoadField, SINCE, Side, Site,
+    SpawnField, StartField, TYPES, Then, TrafficRule, Turning, Verb, Word,
 };
 use avastra_lang::model::{ENDS, MODULES};
 
@@ -17,14 +17,15 @@ pub fn of<W: Word>() -> Vec<Entry> {
 
 /// The types of the language.
 pub fn types() -> Vec<Entry> {
-    TYPES.iter().map(|(word, _, meaning)| (*word, *meaning)).collect()
+    TYPES.iter().map(|(word, _, meaning)| (*word, *meaning)).chain([ROAD_USER]).collect()
 }
 
 /// The facts that are known at a site, without those that have a `.`.
 pub fn facts(site: Site) -> Vec<Entry> {
     let facts = site.facts().map(|fact| (fact.name(), fact.meaning()));
     let words = site.word_facts().map(|fact| (fact.name(), fact.meaning()));
-    facts.chain(words).filter(|(name, _)| !name.contains('.')).collect()
+    let since = site.knows_actions().then_some(SINCE);
+    facts.chain(words).filter(|(name, _)| !name.contains('.')).chain(since).collect()
 }
 
 /// The words for a field of a spawn; `body` is what stands before `ahead` or `behind`.
@@ -38,9 +39,10 @@ pub fn engine_words(field: &str) -> Vec<Entry> {
         Some(SpawnField::Ignores) => of::<TrafficRule>(),
         Some(SpawnField::Turn) => of::<Turning>(),
         None if field == "body" => of::<Body>(),
-        Some(SpawnField::Speed | SpawnField::Offset | SpawnField::Meet | SpawnField::Siren) | None => {
-            Vec::new()
-        }
+        Some(
+            SpawnField::Speed | SpawnField::Offset | SpawnField::Meet | SpawnField::Waits | SpawnField::Siren,
+        )
+        | None => Vec::new(),
     }
 }
 

@@ -24,7 +24,7 @@
 //!
 //! // A row is offered, what it does is carried out, and time goes on.
 //! let before = world.clone();
-//! let situation = Situation { memory: &memory, road, rules: &rules, surroundings: &before, seed: 1, step: 0 };
+//! let situation = Situation { memory: &memory, road, rules: &rules, surroundings: &before, seed: 1, step: 0, happened_s: &[] };
 //! let row = table.rows().iter().find(|row| row.label == "fog(how: High)").expect("it is declared");
 //! let draw = table.offer(&situation, row.index).expect("no rule is about fog");
 //! for effect in &draw.effects {

@@ -223,8 +223,15 @@ fn without_place<'a>(
                 let world = moment.world(space, road, scene, memory);
                 let kept = world.for_many();
                 let surroundings = kept.as_deref().unwrap_or(&world);
-                let situation =
-                    Situation { memory, road, rules: &rules, surroundings, seed: moment.number, step: 0 };
+                let situation = Situation {
+                    memory,
+                    road,
+                    rules: &rules,
+                    surroundings,
+                    seed: moment.number,
+                    step: 0,
+                    happened_s: &[],
+                };
                 open.retain_mut(|lost| {
                     if state_of(lost) != Some(state) {
                         return true;

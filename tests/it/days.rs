@@ -17,7 +17,7 @@ fn odds_of(table: &ActionTable, memory: &Memory) -> Vec<u32> {
     let rules = RulesInForce::new(table.space(), &[], &[]).expect("no rule is named");
     let surroundings = &Wide { safety_gap_m: 0.0 };
     let road = &table.space().roads[0];
-    table.odds(&Situation { memory, road, rules: &rules, surroundings, seed: 1, step: 0 })
+    table.odds(&Situation { memory, road, rules: &rules, surroundings, seed: 1, step: 0, happened_s: &[] })
 }
 
 #[test]
@@ -201,8 +201,15 @@ fn only_buses_and_one_who_breaks_the_rule_are_in_the_bus_lane() {
     for seed in 0..12 {
         let start = Start { ambient: 20, ..Start::drawn(space, road, &memory, seed) };
         let mut world = World::new(Arc::clone(&scene), &start);
-        let situation =
-            Situation { memory: &memory, road, rules: &rules, surroundings: &world, seed, step: 0 };
+        let situation = Situation {
+            memory: &memory,
+            road,
+            rules: &rules,
+            surroundings: &world,
+            seed,
+            step: 0,
+            happened_s: &[],
+        };
         let wanted = if seed % 2 == 0 { bus } else { pushy };
         if let Ok(draw) = table.offer(&situation, wanted)
             && world.carry_out(&draw).is_ok()

@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use avastra::check::Loaded;
 use avastra::model::vocabulary::{
     Body, Colour, CommandField, EpisodeField, Fact, LaneChoice, Level, Light, OriginField, Phenomenon,
-    Priority, ROAD_LANES, RoadField, RoadKind, ScenarioClaim, Side, SpaceClaim, SpawnField, StartField,
-    StopReason, TYPES, Then, TimeOfDay, TrafficRule, Verb, WAIT, Word, WordFact,
+    Priority, ROAD_LANES, ROAD_USER, RoadField, RoadKind, ScenarioClaim, Side, SpaceClaim, SpawnField,
+    StartField, StopReason, TYPES, Then, TimeOfDay, TrafficRule, Verb, WAIT, Word, WordFact,
 };
 use avastra::model::{Avoidability, COUNTED, ENDS, MODULES};
 use avastra::syntax::Diagnostic;
@@ -73,7 +73,7 @@ fn the_tables_of_the_page_list_the_words_of_the_engine() {
     let check = |heading: &str, words: Vec<&str>| {
         assert_eq!(first_column(&page, heading), BTreeSet::from_iter(words), "the table `{heading}`");
     };
-    check("type", TYPES.iter().map(|(word, ..)| *word).collect());
+    check("type", TYPES.iter().map(|(word, ..)| *word).chain([ROAD_USER.0]).collect());
     check("field", SpawnField::names().collect());
     check("verb", Verb::names().collect());
     check("setting", EpisodeField::names().collect());

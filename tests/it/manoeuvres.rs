@@ -345,8 +345,15 @@ fn an_adult_is_met_at_the_point_that_was_asked_for() {
     for seed in 0..4 {
         for (row, part) in [0.25, 0.5, 0.75].into_iter().enumerate() {
             let mut world = World::new(Arc::clone(&scene), &Start::drawn(space, road, &memory, seed));
-            let situation =
-                Situation { memory: &memory, road, rules: &rules, surroundings: &world, seed, step: 0 };
+            let situation = Situation {
+                memory: &memory,
+                road,
+                rules: &rules,
+                surroundings: &world,
+                seed,
+                step: 0,
+                happened_s: &[],
+            };
             let draw = table.offer(&situation, row).expect("there is room");
             world.carry_out(&draw).expect("there is room");
             let mut driver = (ads::by_name("idm").expect("it is one of ours").build)(&scene, seed);

@@ -33,6 +33,7 @@ fn walks_ahead(side: Side, distance_m: f64, speed_mps: f64, cover: Option<Body>)
         offset_m: 0.0,
         ignores: IgnoredRules::default(),
         meet: None,
+        waits_s: None,
         siren: false,
         turn: None,
         bearer: None,

@@ -78,8 +78,15 @@ fn touches(table: &ActionTable, scenes: &[Arc<Scene>], road: usize, kind: Kind, 
     let memory = space.initial_memory(1);
     let rules = RulesInForce::by_default(space);
     let mut world = World::new(Arc::clone(scene), &Start::drawn(space, road, &memory, 1));
-    let situation =
-        Situation { memory: &memory, road, rules: &rules, surroundings: &world, seed: 1, step: 0 };
+    let situation = Situation {
+        memory: &memory,
+        road,
+        rules: &rules,
+        surroundings: &world,
+        seed: 1,
+        step: 0,
+        happened_s: &[],
+    };
     let values = values.map(|(name, value)| (Arc::from(name), Value::Number(value)));
     let draw = table.check(&situation, row(table, label), &values).expect("it is legal");
     world.carry_out(&draw).expect("there is room");

@@ -213,8 +213,15 @@ impl Breach {
         let values: Vec<(Arc<str>, Value)> = self.values.iter().map(value).collect();
         let memory = memory_from(space, self.states, 1).expect("the states exist");
         let surroundings = Wide { safety_gap_m: self.safety_gap_m };
-        let situation =
-            Situation { memory: &memory, road, rules: &rules, surroundings: &surroundings, seed: 1, step: 0 };
+        let situation = Situation {
+            memory: &memory,
+            road,
+            rules: &rules,
+            surroundings: &surroundings,
+            seed: 1,
+            step: 0,
+            happened_s: &[],
+        };
         table.check(&situation, row.index, &values)
     }
 }
@@ -298,7 +305,15 @@ action a(any d: Length in 1 m .. 9 m where d < 5 m, any body: Body in [Jeep, SUV
         let values: Vec<(Arc<str>, Value)> =
             values.iter().map(|(name, value)| (Arc::from(*name), *value)).collect();
         let road = &space.roads[0];
-        let situation = Situation { memory: &memory, road, rules: &rules, surroundings, seed: 1, step: 0 };
+        let situation = Situation {
+            memory: &memory,
+            road,
+            rules: &rules,
+            surroundings,
+            seed: 1,
+            step: 0,
+            happened_s: &[],
+        };
         table.check(&situation, 0, &values).map_err(|refusals| {
             assert!(refusals.iter().all(|refusal| refusal.rule.is_none()));
             refusals.into_iter().map(|refusal| refusal.reason).collect::<Vec<_>>().join("; ")

@@ -38,6 +38,7 @@ pub fn draws(table: &ActionTable, row: usize, road: usize, memory: &Memory, seed
             surroundings: &Wide { safety_gap_m: 0.0 },
             seed,
             step: 0,
+            happened_s: &[],
         };
         table.offer(&situation, row).ok()
     };

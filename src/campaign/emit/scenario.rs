@@ -192,7 +192,15 @@ fn step(table: &ActionTable, log: &EpisodeLog, number: usize) -> Step {
             (tree::call(&action.name, axes.collect()), self::drawn(table, draw), after)
         }
     };
-    Step { number: tree::digits(number.to_string()), action, drawn, once: None, after, span: Span::NONE }
+    Step {
+        number: tree::digits(number.to_string()),
+        action,
+        drawn,
+        once: None,
+        held: None,
+        after,
+        span: Span::NONE,
+    }
 }
 
 /// The drawn parameters of a step, as fields of its `with` block.

@@ -41,7 +41,7 @@ impl<'a> Moment<'a> {
     /// change.
     pub fn look_ahead(&self, draw: Draw) -> EpisodeLog {
         let mut copy = self.play.clone();
-        let begun = Begun::With(copy.carry_out(draw, 0));
+        let begun = Begun::With(copy.carry_out(draw, 0, self.setup));
         copy.observation_period(self.setup, self.observation.clone(), begun, &mut |_, _, _| {});
         copy.into_log(self.setup, End::Script)
     }
@@ -145,20 +145,23 @@ enum Begun {
 /// An action whose moment has not come.
 struct Waiting {
     action: ScriptedAction,
-    /// Tick of the step at which the condition first held.
-    held_tick: Option<i64>,
+    /// Tick of the step since which the condition has held.
+    held_since: Option<i64>,
+    /// Tick of the step at which it had held for long enough.
+    come_tick: Option<i64>,
 }
 
 impl Waiting {
     /// Whether the action happens before this tick of the step.
     fn is_due(&mut self, tick: i64, play: &Play, setup: &Setup) -> bool {
         let Some(trigger) = self.action.trigger.as_deref() else { return true };
-        if self.held_tick.is_none()
-            && trigger.once.as_ref().is_none_or(|once| play.holds(&once.expr, trigger, setup))
-        {
-            self.held_tick = Some(tick);
+        if self.come_tick.is_none() {
+            let holds = trigger.once.as_ref().is_none_or(|once| play.holds(&once.expr, trigger, setup));
+            self.held_since = holds.then(|| self.held_since.unwrap_or(tick));
+            let has_come = |since: &i64| tick - since >= i64::from(trigger.held_ticks);
+            self.come_tick = self.held_since.filter(has_come).map(|_| tick);
         }
-        self.held_tick.is_some_and(|held| tick - held >= i64::from(trigger.after_ticks))
+        self.come_tick.is_some_and(|come| tick - come >= i64::from(trigger.after_ticks))
     }
 
     /// The moment did not come.
@@ -197,6 +200,8 @@ pub struct Play {
     distance_m: f64,
     /// Steps without progress up to now.
     stalled: u32,
+    /// When each action last happened, s; empty if the space does not ask.
+    happened_s: Vec<f64>,
 }
 
 impl Play {
@@ -222,6 +227,10 @@ impl Play {
             trace: Trace::default(),
             distance_m: 0.0,
             stalled: 0,
+            happened_s: match setup.table.space().asks_when_actions_happened() {
+                true => vec![f64::NEG_INFINITY; setup.table.space().actions.len()],
+                false => Vec::new(),
+            },
         }
     }
 
@@ -257,8 +266,8 @@ impl Play {
         watch: &mut Watch,
     ) -> Option<End> {
         let begun = match choice {
-            Choice::Act(draw) => Begun::With(self.carry_out(draw, 0)),
-            Choice::Await(action) => Begun::Waiting(Waiting { action, held_tick: None }),
+            Choice::Act(draw) => Begun::With(self.carry_out(draw, 0, setup)),
+            Choice::Await(action) => Begun::Waiting(Waiting { action, held_since: None, come_tick: None }),
             Choice::Pass => Begun::With(Outcome::Passed),
             Choice::Refused { row, rule, reason } => Begun::With(Outcome::Refused { row, rule, reason }),
             Choice::Stop => return Some(End::Script),
@@ -285,11 +294,12 @@ impl Play {
             surroundings: &self.world,
             seed: self.seed,
             step: self.steps.len() as u64,
+            happened_s: &self.happened_s,
         }
     }
 
     /// Carries out a whole action or nothing of it.
-    fn carry_out(&mut self, draw: Draw, delay_ticks: u32) -> Outcome {
+    fn carry_out(&mut self, draw: Draw, delay_ticks: u32, setup: &Setup) -> Outcome {
         let newcomers = match self.world.carry_out(&draw) {
             Ok(newcomers) => newcomers,
             Err((_, reason)) => return Outcome::Refused { row: draw.row, rule: None, reason },
@@ -301,6 +311,9 @@ impl Play {
             self.own_bodies.extend(effect.own_bodies(id));
         }
         self.memory = draw.memory_after.clone();
+        if let Some(happened_s) = self.happened_s.get_mut(setup.table.rows()[draw.row].action) {
+            *happened_s = self.world.time_s();
+        }
         Outcome::Done { draw, spawned, delay_ticks }
     }
 
@@ -376,7 +389,7 @@ impl Play {
     fn carry_out_awaited(&mut self, waiting: &Waiting, tick: i64, setup: &Setup) -> Outcome {
         let judged = waiting.action.judged(setup.table, &self.situation(setup));
         match judged {
-            Choice::Act(draw) => self.carry_out(draw, tick as u32),
+            Choice::Act(draw) => self.carry_out(draw, tick as u32, setup),
             Choice::Refused { row, rule, reason } => Outcome::Refused { row, rule, reason },
             Choice::Await(_) | Choice::Pass | Choice::Stop => unreachable!("a judgement allows or refuses"),
         }

@@ -36,7 +36,7 @@ impl Script {
     pub fn of_log(log: &EpisodeLog) -> Script {
         let step = |outcome: &Outcome| match outcome {
             Outcome::Done { draw, delay_ticks, .. } => {
-                let trigger = Trigger { once: None, after_ticks: *delay_ticks };
+                let trigger = Trigger { once: None, held_ticks: 0, after_ticks: *delay_ticks };
                 let trigger = (*delay_ticks > 0).then(|| Arc::new(trigger));
                 Some(ScriptedAction { row: draw.row, values: draw.values.clone(), trigger })
             }

@@ -8,10 +8,12 @@
 //! | verb | realised if |
 //! |---|---|
 //! | drive ahead | it appears ahead at the asked gap, in the asked lane, heading along it, and moves; if it is asked to stand, it does not move at all |
+//! | drive behind | it appears behind the ego vehicle and moves, as drive ahead |
 //! | overtake | it appears behind the ego vehicle and gets wholly in front of it |
 //! | drive opposite | it appears in a lane that runs against the route, and passes the ego vehicle head-on |
 //! | cross road | it appears on a lane that is not of the route and comes onto the route's path before the ego vehicle has passed there |
 //! | walk | it appears beside the route on the asked side and walks over the route's path |
+//! | walk ahead, walk opposite | it appears beside the route where it was asked to, and walks along it that way |
 //! | stand | it stands on the route's path |
 //!
 //! Somebody who is ordered gets to the speed, the lane and the place that it was told, or does all phases of its manoeuvre.
@@ -92,21 +94,25 @@ pub(super) fn verdict(
     match request.verb {
         Verb::Walk => walks(request, seen),
         Verb::Stand => stands(seen),
+        Verb::WalkAhead | Verb::WalkOpposite => walks_along(request, seen),
         Verb::DriveAhead => {
             drives()?;
             appears_ahead(scene, request, first)?;
             if request.turn.is_some() {
                 return has_turned(scene, seen);
             }
-            let last = &seen.frames[seen.frames.len() - 1];
-            let way_m = (last.outline.pose.position - first.outline.pose.position).norm();
-            if request.speed_mps == 0.0 && way_m > 0.0 && seen.ending != Ending::TouchedEgo {
-                return Err("it does not stand".to_owned());
+            moves(request, seen)?;
+            changes(&scene.map, request, seen, [asked, asked], 0)
+        }
+        Verb::DriveBehind => {
+            drives()?;
+            if ahead_m(first) > 0.0 {
+                return Err("it does not appear behind the ego vehicle".to_owned());
             }
-            // A vehicle that crawls need only do half of the way that its speed allows.
-            if way_m < MOVES_M.min(request.speed_mps * HORIZON_S / 2.0) {
-                return Err(ended(seen, "it had moved"));
+            if request.turn.is_some() {
+                return has_turned(scene, seen);
             }
+            moves(request, seen)?;
             changes(&scene.map, request, seen, [asked, asked], 0)
         }
         Verb::Overtake => {
@@ -191,6 +197,20 @@ fn appears_ahead(scene: &Scene, request: &SpawnRequest, first: &Frame) -> Result
     if is_there { Ok(()) } else { Err(format!("it appears {aside_m:.1} m beside the route's lane")) }
 }
 
+/// Whether it drives, or stands if it was asked to.
+fn moves(request: &SpawnRequest, seen: &Sighting) -> Result<(), String> {
+    let (first, last) = (&seen.frames[0], &seen.frames[seen.frames.len() - 1]);
+    let way_m = (last.outline.pose.position - first.outline.pose.position).norm();
+    if request.speed_mps == 0.0 && way_m > 0.0 && seen.ending != Ending::TouchedEgo {
+        return Err("it does not stand".to_owned());
+    }
+    // A vehicle that crawls need only do half of the way that its speed allows.
+    if way_m < MOVES_M.min(request.speed_mps * HORIZON_S / 2.0) {
+        return Err(ended(seen, "it had moved"));
+    }
+    Ok(())
+}
+
 /// By how much its rear is in front of the ego vehicle's front, m; negative while it is not.
 fn ahead_m(frame: &Frame) -> f64 {
     let there = frame.ego.pose.to_local(frame.outline.pose.position);
@@ -257,6 +277,19 @@ fn walks(request: &SpawnRequest, seen: &Sighting) -> Result<(), String> {
         return Ok(());
     }
     Err(ended(seen, "it had walked over the route"))
+}
+
+fn walks_along(request: &SpawnRequest, seen: &Sighting) -> Result<(), String> {
+    let first = &seen.frames[0];
+    if (first.route_offset_m - request.offset_m).abs() > BESIDE_M {
+        return Err("it does not appear where it was asked to beside the route".to_owned());
+    }
+    let last = &seen.frames[seen.frames.len() - 1];
+    let forth_m = last.route_station_m - first.route_station_m;
+    let way_m = if request.verb == Verb::WalkOpposite { -forth_m } else { forth_m };
+    let wanted_m = MOVES_M.min(request.speed_mps * HORIZON_S / 2.0);
+    let is_done = way_m >= wanted_m || seen.ending == Ending::TouchedEgo;
+    if is_done { Ok(()) } else { Err(ended(seen, "it had walked on")) }
 }
 
 fn stands(seen: &Sighting) -> Result<(), String> {

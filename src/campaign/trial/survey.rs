@@ -158,7 +158,7 @@ impl<'a> Trials<'a> {
             spawns.collect::<BTreeSet<usize>>()
         };
         let ordered = space.actions[row.action].effects.iter().filter_map(|effect| match effect {
-            EffectDef::Order(order) => Some(order.bearer),
+            EffectDef::Order(order) => row.bearer(order.who, &space.actions[row.action]),
             EffectDef::Set(_) | EffectDef::Spawn(_) => None,
         });
         let asked = space.clauses[row.action].iter().flat_map(|clause| clause.bearers.iter().copied());

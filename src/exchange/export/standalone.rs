@@ -138,9 +138,9 @@ impl<'a> Actions<'a> {
         let cover = request.cover.map(|cover| name(cover, request.cover_own.map(|own| own.index)));
         let cover = cover.map_or_else(String::new, |cover| format!(" from behind {cover}"));
         let name = request.bearer.map_or_else(String::new, |who| format!(" as {}", space.bearers[who]));
-        let direction = if request.verb == Verb::Overtake { "behind" } else { "ahead" };
+        let direction = if request.verb.begins_behind() { "behind" } else { "ahead" };
         let mut fields = vec![format!("does: {}", request.verb.name())];
-        if matches!(request.verb, Verb::DriveAhead | Verb::Overtake) {
+        if matches!(request.verb, Verb::DriveAhead | Verb::DriveBehind | Verb::Overtake) {
             fields.push(format!("lane: {}", request.lane.name()));
         }
         if matches!(request.verb, Verb::CrossRoad | Verb::Walk) {
@@ -157,6 +157,9 @@ impl<'a> Actions<'a> {
         }
         if let Some(meet) = request.meet {
             fields.push(format!("meet: {}", decimal(meet, false)));
+        }
+        if let Some(waits_s) = request.waits_s {
+            fields.push(format!("waits: {} s", decimal(waits_s, false)));
         }
         if request.siren {
             fields.push("siren: true".to_owned());
@@ -277,8 +280,21 @@ fn ignored_field(ignores: IgnoredRules) -> String {
 
 /// What a command says, as the fields of an order.
 fn command_fields(command: &Command) -> String {
-    let Command { speed_mps, rate_mps2, lane, offset_m, aside_mps, headway_s, ignores, siren, turn } =
-        command;
+    let Command {
+        speed_mps,
+        rate_mps2,
+        lane,
+        offset_m,
+        aside_mps,
+        time_gap_s,
+        keep_m,
+        keep_s,
+        early_s,
+        at_m,
+        ignores,
+        siren,
+        turn,
+    } = command;
     let figure = |name: &str, value: &Option<f64>, unit: &str| {
         value.map(|value| format!("{name}: {} {unit}", decimal(value, false)))
     };
@@ -288,7 +304,11 @@ fn command_fields(command: &Command) -> String {
         lane.map(|lane| format!("lane: {}", lane.name())),
         figure("offset", offset_m, "m"),
         figure("aside", aside_mps, "m/s"),
-        figure("headway", headway_s, "s"),
+        figure("time_gap", time_gap_s, "s"),
+        figure("keep", keep_m, "m"),
+        figure("keep", keep_s, "s"),
+        figure("early", early_s, "s"),
+        figure("at", at_m, "m"),
         ignores.map(ignored_field),
         siren.map(|siren| format!("siren: {siren}")),
         turn.map(|turn| format!("turn: {}", turn.name())),

@@ -9,7 +9,7 @@ use crate::check::operator::with_range;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of, field};
 use crate::check::rule::locals;
-use crate::model::command::CommandDef;
+use crate::model::command::{CommandDef, Needs};
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::rules_by_action;
 use crate::model::vocabulary::{
@@ -182,6 +182,11 @@ impl Checker {
             Some(within) => self.domain(within, ty)?,
             None => match ty {
                 Type::Bool => Domain::Values(vec![Value::Bool(false), Value::Bool(true)]),
+                Type::Enum(of) if self.enums[of.0].variants.is_empty() => {
+                    let error = Diagnostic::error(code::UNKNOWN, "no road user has a name here");
+                    let error = error.at(declared.ty.span, "a type without values");
+                    return self.reject(error.help("name one: `spawn BoxTruck as truck ahead …`"));
+                }
                 Type::Enum(of) => {
                     let count = self.enums[of.0].variants.len();
                     Domain::Values((0..count).map(|variant| Value::Variant(of, variant)).collect())
@@ -401,7 +406,7 @@ impl Checker {
         let needs = |verbs: &[Verb]| verb_words.iter().any(|verb| verbs.contains(verb));
         let lane = match find(SpawnField::Lane) {
             Some(value) => self.word::<LaneChoice>("lane", value, place),
-            None if needs(&[Verb::DriveAhead, Verb::Overtake]) => {
+            None if needs(&[Verb::DriveAhead, Verb::DriveBehind, Verb::Overtake]) => {
                 self.missing_field(SpawnField::Lane, span, lacks("its lane"))
             }
             None => Some(WordExpr::Fixed(LaneChoice::Current)),
@@ -449,6 +454,10 @@ impl Checker {
             Some(value) => self.typed(value, place, Type::Quantity(Dimension::RATIO)).map(Some),
             None => Some(None),
         };
+        let waits = match find(SpawnField::Waits) {
+            Some(value) => self.typed(value, place, Type::Quantity(Dimension::DURATION)).map(Some),
+            None => Some(None),
+        };
         let (body, verb, (then, manoeuvre)) = (body_word?, verb?, then?);
         self.check_verb(&body, &verb, behind, span);
         self.check_fields(&fields, &verb, manoeuvre.as_ref(), span);
@@ -466,6 +475,7 @@ impl Checker {
             offset: offset?,
             ignores: ignores?,
             meet: meet?,
+            waits: waits?,
             siren: siren?,
             turn: turn?,
             bearer: None,
@@ -487,10 +497,10 @@ impl Checker {
             manoeuvre.is_some_and(|call| self.has_command(call.manoeuvre, is_so))
         };
         let changes_lanes = has(|command| command.lane.is_some());
-        let for_vehicles = has(|command| !command.is_for_feet());
+        let needs = manoeuvre.map_or(Needs::Legs, |call| self.needs(call.manoeuvre));
         let goes_back = has(CommandDef::goes_back);
         for verb in possible(verb) {
-            let on_foot = matches!(verb, Verb::Walk | Verb::Stand);
+            let on_foot = verb.is_on_foot();
             let other_way = matches!(verb, Verb::DriveOpposite | Verb::CrossRoad);
             let says = |wanted: SpawnField| field(fields, wanted).is_some();
             let (what, help) = match () {
@@ -498,8 +508,12 @@ impl Checker {
                     "does no manoeuvre",
                     "leave `then` out, or let it `Walk`, with `speed: 0 m/s` until it is told",
                 ),
-                () if on_foot && for_vehicles => (
+                () if needs.lacked_by(verb).is_some() && verb == Verb::Walk => (
                     "is told a `speed` alone",
+                    "the other fields of its manoeuvre are not for who crosses the road; leave them out",
+                ),
+                () if needs.lacked_by(verb).is_some() => (
+                    "is told a `speed`, an `offset` and an `aside` alone",
                     "the other fields of its manoeuvre are for vehicles; leave them out",
                 ),
                 () if !on_foot && goes_back => {
@@ -515,6 +529,12 @@ impl Checker {
                 }
                 () if verb != Verb::Walk && says(SpawnField::Meet) => {
                     ("is met at no point of the ego vehicle", "`meet` is for `Walk`; leave it out")
+                }
+                () if verb != Verb::Walk && says(SpawnField::Waits) => {
+                    ("waits at no kerb", "`waits` is for `Walk`; leave it out")
+                }
+                () if says(SpawnField::Meet) && says(SpawnField::Waits) => {
+                    ("sets out after a time or for a meeting", "leave `waits` or `meet` out")
                 }
                 () if other_way && changes_lanes => (
                     "drives in no lane of the ego vehicle's direction",
@@ -559,7 +579,7 @@ impl Checker {
     /// Reports a vehicle that walks, a pedestrian that drives, and a wrong `ahead` or `behind`: only a vehicle that
     /// overtakes spawns behind the ego vehicle.
     fn check_verb(&mut self, body: &WordExpr<BodyWord>, verb: &WordExpr<Verb>, behind: bool, span: Span) {
-        let on_foot = |verb: &Verb| matches!(verb, Verb::Walk | Verb::Stand);
+        let on_foot = |verb: &Verb| verb.is_on_foot();
         let verbs = possible(verb);
         let clash = possible(body).into_iter().find_map(|body| {
             verbs.iter().find(|verb| on_foot(verb) == body.like.is_vehicle()).map(|verb| (body, *verb))
@@ -568,13 +588,15 @@ impl Checker {
             let message = format!("a `{}` cannot `{}`", self.body_name(body), verb.name());
             let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here");
             self.report(
-                error.help("`Walk` and `Stand` are for a `Pedestrian`, all other verbs for vehicles"),
+                error.help(
+                    "`Stand` and those with `Walk` are for a `Pedestrian`, all other verbs for vehicles",
+                ),
             );
             return;
         }
         for verb in verbs {
-            if (verb == Verb::Overtake) != behind {
-                let (is, should) = if behind { ("behind", "ahead") } else { ("ahead", "behind") };
+            if verb.begins_behind() != behind {
+                let (is, should) = if behind { ("behind", "ahead") } else { ("ahead of", "behind") };
                 let message = format!("`{}` does not begin {is} the ego vehicle", verb.name());
                 let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here");
                 self.report(error.help(format!("write `{should}`")));

@@ -3,6 +3,7 @@
 //! It goes on after a mistake, so that one run shows all mistakes: a broken declaration becomes `None`, and
 //! no diagnostic is reported for what depends on it.
 
+use crate::model::vocabulary::ROAD_USER;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
@@ -11,6 +12,7 @@ use crate::check::references::{References, Symbol};
 use crate::check::report::Report;
 use crate::check::road::Maps;
 use crate::check::{style, unused};
+use crate::model::command::Needs;
 use crate::model::effort;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{bounds, clauses, rules_by_action};
@@ -46,8 +48,8 @@ pub(super) struct Checker {
     pub(super) bodies: Vec<BodyDef>,
     /// Names that the spawns of all actions give.
     pub(super) bearers: Vec<String>,
-    /// Those of them that are given to a vehicle somewhere.
-    pub(super) drivers: BTreeSet<String>,
+    /// What at most can be told to who bears them.
+    pub(super) obeys: BTreeMap<String, Needs>,
     pub(super) manoeuvre_names: Names,
     /// `None` stands for a broken one.
     pub(super) manoeuvres: Vec<Option<ManoeuvreDef>>,
@@ -151,6 +153,7 @@ pub(super) fn space(
     checker.declare_functions(items);
     checker.declare_states(items);
     checker.declare_bearers(items);
+    checker.declare_road_users(items);
     checker.declare_manoeuvres(items);
     checker.declare_actions(items);
     checker.declare_groups(items);
@@ -363,12 +366,24 @@ impl Checker {
     pub(super) fn named_type(&mut self, name: &ast::Name) -> Option<Type> {
         let found = self.references.type_named(&name.text);
         match found {
+            _ if name.text == ROAD_USER.0 => {
+                self.references.note(name.span, Symbol::Engine(ROAD_USER.0, ROAD_USER.1), false);
+            }
             None | Some(Type::Enum(_)) => self.references.uses(name.span, Symbol::Enum(name.text.clone())),
             Some(_) => self.references.note(name.span, Symbol::Type(name.text.clone()), false),
         }
         found.or_else(|| {
-            let candidates = TYPES.iter().map(|(word, ..)| *word).chain(self.enum_names.all());
-            let error = self.unknown("type", &name.text, name.span, candidates);
+            let error = match name.text == ROAD_USER.0 {
+                true => Diagnostic::error(
+                    code::NOT_HERE,
+                    "only parameters of actions and manoeuvres name road users",
+                )
+                .at(name.span, "not in this place"),
+                false => {
+                    let candidates = TYPES.iter().map(|(word, ..)| *word).chain(self.enum_names.all());
+                    self.unknown("type", &name.text, name.span, candidates)
+                }
+            };
             self.reject(error)
         })
     }

@@ -8,7 +8,7 @@ use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of};
 use crate::check::rule::names_in;
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::vocabulary::{Level, Phenomenon, Site, SpaceClaim, TimeOfDay, Word, WorldState};
+use crate::model::vocabulary::{Level, Phenomenon, ROAD_USER, Site, SpaceClaim, TimeOfDay, Word, WorldState};
 use crate::model::{ACTION_ODDS_MAX, EnumDef, EnumIndex, FnDef, Initial, StateDef, StateMeaning, Type, code};
 use crate::prove::{VARIANTS_MAX, odds_out_of_bounds};
 use crate::syntax::ast::{ItemKind, Span};
@@ -51,6 +51,12 @@ impl Checker {
         self.enum_names = names;
         for (item, declared) in enums {
             self.once("variant", &declared.variants);
+            if declared.name.text == ROAD_USER.0 {
+                let message = format!("`{}` cannot be the name of an enum", ROAD_USER.0);
+                let error = Diagnostic::error(code::NOT_HERE, message)
+                    .at(declared.name.span, "a type of the language");
+                self.report(error.help("choose another name"));
+            }
             if declared.variants.len() > VARIANTS_MAX {
                 let message = format!("`{}` has {} variants", declared.name.text, declared.variants.len());
                 let error = Diagnostic::error(code::TOO_MANY_VARIANTS, message);

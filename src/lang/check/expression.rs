@@ -8,9 +8,9 @@ use crate::check::names::unknown;
 use crate::check::operator::Sides;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
-use crate::model::expr::{Expr, ExprKind};
+use crate::model::expr::{Expr, ExprKind, Who};
 use crate::model::vocabulary::{
-    Fact, Known, ROAD_LANES, Site, THERE, Word, WordFact, parts_of, thing_of, things,
+    Fact, Known, ROAD_LANES, SINCE, Site, THERE, Word, WordFact, parts_of, thing_of, things,
 };
 use crate::model::{EnumIndex, STATE_MAX, StateDef, Type, code};
 use crate::syntax::ast::{Span, UnaryOp};
@@ -358,9 +358,8 @@ impl Checker {
             return self.part_of_road_user((name, number, base.span), part, place, span);
         }
         if let ast::ExprKind::Name(name) = &base.kind
-            && let Some(who) = self.bearers.iter().position(|bearer| bearer == name)
+            && let Some(who) = self.who(name, base.span, place)
         {
-            self.references.uses(base.span, Symbol::RoadUser(name.clone()));
             return self.part_of_bearer(who, part, place, span);
         }
         self.note_part(base, part);
@@ -427,13 +426,7 @@ impl Checker {
     }
 
     /// `truck.gap`: a fact about a road user by its name.
-    fn part_of_bearer(
-        &mut self,
-        who: usize,
-        part: &ast::Name,
-        place: &Place<'_>,
-        span: Span,
-    ) -> Option<Expr> {
+    fn part_of_bearer(&mut self, who: Who, part: &ast::Name, place: &Place<'_>, span: Span) -> Option<Expr> {
         if !place.site.knows(Known::World) || place.site == Site::Change {
             let error = Diagnostic::error(code::NOT_HERE, "no road user is looked up here");
             let error = error.at(span, "about one that is there at a moment");
@@ -499,7 +492,35 @@ impl Checker {
         Some(Expr { kind, ty, span })
     }
 
+    /// `since(vehicles)`: the time since one of these actions last happened.
+    fn since(&mut self, call: &ast::Call, place: &Place<'_>) -> Option<Expr> {
+        self.references.note(call.name.span, Symbol::Engine(SINCE.0, SINCE.1), false);
+        if !place.site.knows_actions() {
+            let error = Diagnostic::error(code::NOT_HERE, "`since` cannot be asked here");
+            let error = error.at(call.span, "not in this place");
+            return self.reject(error.help("ask in a rule, in `each step` or in `odds actions`"));
+        }
+        let [ast::Arg { name: None, value }] = call.args.as_slice() else {
+            let error = Diagnostic::error(code::ARGUMENTS, "`since` takes one name").at(call.span, "");
+            return self.reject(error.help("write an action or a group: `since(vehicles) >= 10 s`"));
+        };
+        let ast::ExprKind::Name(name) = &value.kind else {
+            let error = Diagnostic::error(code::TYPE_MISMATCH, "`since` is about actions");
+            let error = error.at(value.span, "no name of one");
+            return self.reject(error.help("write an action or a group: `since(vehicles) >= 10 s`"));
+        };
+        let actions = self.targets(&ast::Name::new(name, value.span));
+        if actions.is_empty() {
+            return None;
+        }
+        let ty = Type::Quantity(Dimension::DURATION);
+        Some(Expr { kind: ExprKind::Since(actions, name.clone()), ty, span: call.span })
+    }
+
     fn call(&mut self, call: &ast::Call, place: &Place<'_>) -> Option<Expr> {
+        if call.name.text == SINCE.0 && self.function_names.get(SINCE.0).is_none() {
+            return self.since(call, place);
+        }
         let symbol = Symbol::Function(call.name.text.clone());
         let named = call.args.iter().filter_map(|argument| argument.name.as_ref());
         for name in named {

@@ -1,21 +1,24 @@
 //! Orders and manoeuvres: what a vehicle is told, phase by phase, and how spawns and orders name manoeuvres.
 
+use crate::prove::VARIANTS_MAX;
 use core::ops::RangeInclusive;
 
 use crate::check::checker::{Checker, docs, each};
 use crate::check::expression::Place;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of, field};
-use crate::model::command::CommandDef;
-use crate::model::expr::{Expr, ExprKind};
+use crate::model::command::{CommandDef, Needs};
+use crate::model::expr::{Expr, ExprKind, Who};
 use crate::model::vocabulary::{
-    Body, CHANGE, CommandField, Fact, LaneChoice, Site, TrafficRule, Turning, Word,
+    Body, CHANGE, CommandField, Fact, LaneChoice, ROAD_USER, Site, SpawnField, TrafficRule, Turning, Verb,
+    Word,
 };
-use crate::model::{ManoeuvreCall, ManoeuvreDef, OrderDef, PhaseDef, REPEAT, Type, WordExpr, code};
+use crate::model::{EnumDef, ManoeuvreCall, ManoeuvreDef, OrderDef, PhaseDef, REPEAT, Type, WordExpr, code};
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
 use avastra_base::units::Dimension;
 
+const LENGTH: Type = Type::Quantity(Dimension::LENGTH);
 const DURATION: Type = Type::Quantity(Dimension::DURATION);
 
 /// Times that a phase waits, s.
@@ -29,17 +32,28 @@ impl Checker {
     pub(super) fn declare_bearers(&mut self, items: &[&ast::Item]) {
         let effects = each(items, ItemKind::as_action).flat_map(|(_, action)| &action.effects);
         let named = effects.filter_map(|effect| match &effect.kind {
-            ast::EffectKind::Spawn { bearers, body, .. } => Some((bearers, body)),
+            ast::EffectKind::Spawn { bearers, body, fields, .. } => Some((bearers, (body, fields))),
             ast::EffectKind::Set { .. } | ast::EffectKind::Order { .. } => None,
         });
-        for (name, body) in named.flat_map(|(bearers, body)| bearers.iter().map(move |name| (name, body))) {
+        for (name, (body, fields)) in
+            named.flat_map(|(names, spawn)| names.iter().map(move |name| (name, spawn)))
+        {
             let is_on_foot = |name: &String| {
                 let own = self.bodies.iter().find(|body| body.name == *name);
                 own.map_or(name == Body::Pedestrian.name(), |own| own.like == Body::Pedestrian)
             };
-            if !matches!(&body.kind, ast::ExprKind::Name(body) if is_on_foot(body)) {
-                self.drivers.insert(name.text.clone());
-            }
+            let does = fields.iter().find(|field| field.name.text == SpawnField::Does.name());
+            let verb = does.and_then(|field| match &field.value.kind {
+                ast::ExprKind::Name(verb) => Verb::from_name(verb),
+                _ => None,
+            });
+            let has = match (&body.kind, verb) {
+                (ast::ExprKind::Name(body), Some(verb)) if is_on_foot(body) => Needs::of(verb),
+                (ast::ExprKind::Name(body), None) if is_on_foot(body) => Needs::LegsAlong,
+                _ => Needs::Wheels,
+            };
+            let most = self.obeys.entry(name.text.clone()).or_insert(has);
+            *most = has.max(*most);
             if Fact::ALL.iter().any(|fact| fact.name().split('.').next() == Some(name.text.as_str())) {
                 let message = format!("`{}` cannot be the name of a road user", name.text);
                 let error = Diagnostic::error(code::NOT_HERE, message);
@@ -48,6 +62,44 @@ impl Checker {
                 self.bearers.push(name.text.clone());
             }
         }
+    }
+
+    /// The names of road users are the values of a type of their own, if a parameter is of that type.
+    pub(super) fn declare_road_users(&mut self, items: &[&ast::Item]) {
+        let of_actions =
+            each(items, ItemKind::as_action).flat_map(|(_, action)| &action.params).map(|it| &it.ty);
+        let of_manoeuvres =
+            each(items, ItemKind::as_manoeuvre).flat_map(|(_, it)| &it.params).map(|it| &it.ty);
+        let is_of_them =
+            |ty: &ast::Type| matches!(&ty.kind, ast::TypeKind::Named(name) if name.text == ROAD_USER.0);
+        let is_taken = self.enum_names.get(ROAD_USER.0).is_some();
+        if is_taken || !of_actions.chain(of_manoeuvres).any(is_of_them) {
+            return;
+        }
+        let span = Span::NONE;
+        let variants: Vec<String> = self.bearers.iter().take(VARIANTS_MAX).cloned().collect();
+        let odds = vec![1; variants.len()];
+        let name = ROAD_USER.0.to_owned();
+        self.enums.push(EnumDef { name, docs: Vec::new(), variants, ordered: false, odds, span });
+        self.references.set_enums(self.enums.clone());
+    }
+
+    pub(super) fn is_road_user(&self, ty: Type) -> bool {
+        matches!(ty, Type::Enum(of) if self.enums[of.0].name == ROAD_USER.0)
+    }
+
+    /// The road user that a name stands for: a parameter, or a name that a spawn gives.
+    pub(super) fn who(&mut self, name: &str, span: Span, place: &Place<'_>) -> Option<Who> {
+        let is_given = |(local, ty): &(String, Type)| local == name && self.is_road_user(*ty);
+        if let Some(local) = place.locals.iter().position(is_given) {
+            if let Some(owner) = place.owner {
+                self.references.uses_parameter(&ast::Name::new(name, span), owner);
+            }
+            return Some(Who::Given(local));
+        }
+        let bearer = self.bearers.iter().position(|bearer| bearer == name)?;
+        self.references.uses(span, Symbol::RoadUser(name.to_owned()));
+        Some(Who::Named(bearer))
     }
 
     pub(super) fn declare_manoeuvres(&mut self, items: &[&ast::Item]) {
@@ -135,6 +187,7 @@ impl Checker {
             found.flatten()
         };
         let once = part(self, declared.once.as_ref(), Type::Bool);
+        let held = part(self, declared.held.as_ref(), DURATION);
         let within = part(self, declared.within.as_ref(), DURATION);
         let after = part(self, declared.after.as_ref(), DURATION);
         self.note_fields::<CommandField>(&declared.fields, place);
@@ -150,7 +203,7 @@ impl Checker {
                 self.check_figure(figure.expr, figure.field.name(), figure.unit, &figure.bounds);
             }
         }
-        for (expr, name) in [(&within, "within"), (&after, "after")] {
+        for (expr, name) in [(&held, "for"), (&within, "within"), (&after, "after")] {
             expr.iter().for_each(|expr| self.check_figure(expr, name, "s", &TIME_S));
         }
         if matches!(&command, Some(command) if *command == CommandDef::default()) {
@@ -169,13 +222,13 @@ impl Checker {
             );
         }
         let command = command.filter(|_| all)?;
-        Some(PhaseDef { once, within, after, command })
+        Some(PhaseDef { once, held, within, after, command })
     }
 
     /// Reports a figure of a phase that is written out, out of its bounds. What is computed is brought into them later.
     fn check_figure(&mut self, expr: &Expr, name: &str, unit: &str, bounds: &RangeInclusive<f64>) {
         if self.written_out(expr).is_some_and(|value| !bounds.contains(&value)) {
-            let message = format!("the {name} of a phase lies out of bounds");
+            let message = format!("the `{name}` of a phase lies out of bounds");
             let range = match bounds.end().is_finite() {
                 true => format!("must lie within {} .. {} {unit}", bounds.start(), bounds.end()),
                 false => format!("must be at least {} {unit}", bounds.start()),
@@ -200,11 +253,12 @@ impl Checker {
         place: &Place<'_>,
         span: Span,
     ) -> Option<OrderDef> {
-        self.references.uses(who.span, Symbol::RoadUser(who.text.clone()));
-        let bearer = self.bearers.iter().position(|name| *name == who.text);
+        let bearer = self.who(&who.text, who.span, place);
         if bearer.is_none() {
-            let mut error =
-                self.unknown("road user", &who.text, who.span, self.bearers.iter().map(String::as_str));
+            self.references.uses(who.span, Symbol::RoadUser(who.text.clone()));
+            let of_type = place.locals.iter().filter(|(_, ty)| self.is_road_user(*ty));
+            let known = of_type.map(|(name, _)| name).chain(&self.bearers).map(String::as_str);
+            let mut error = self.unknown("road user", &who.text, who.span, known);
             let name_it = || format!("name it where it appears: `spawn … as {} ahead …`", who.text);
             error.help = error.help.or_else(|| Some(name_it()));
             self.report(error);
@@ -227,17 +281,20 @@ impl Checker {
             let message = "the order tells the vehicle nothing".to_owned();
             return self.missing_field(CommandField::Speed, span, message);
         }
-        let for_vehicles = !command.is_for_feet()
-            || manoeuvre
-                .as_ref()
-                .is_some_and(|call| self.has_command(call.manoeuvre, |it| !it.is_for_feet()));
-        let may_drive = self.drivers.contains(&who.text);
-        if bearer.is_some() && for_vehicles && !may_drive {
+        let needs = manoeuvre.as_ref().map_or(Needs::Legs, |call| self.needs(call.manoeuvre));
+        let has = match bearer {
+            Some(Who::Given(_)) => self.obeys.values().max().copied(),
+            Some(Who::Named(_)) | None => self.obeys.get(&who.text).copied(),
+        };
+        let has = has.unwrap_or(Needs::Wheels);
+        let may_drive = has == Needs::Wheels;
+        if bearer.is_some() && needs.max(command.needs()) > has {
             let message = format!("`{}` is always on foot", who.text);
             let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(who.span, "drives no vehicle");
-            self.report(error.help("tell it a `speed` alone; the other fields are for vehicles"));
+            let help = format!("it can be told {}", has.told());
+            self.report(error.help(help));
         }
-        Some(OrderDef { bearer: bearer?, command, manoeuvre, may_drive, span })
+        Some(OrderDef { who: bearer?, command, manoeuvre, may_drive, span })
     }
 
     fn no_manoeuvre<T>(&mut self, value: &ast::Expr, place: &Place<'_>) -> Option<T> {
@@ -259,7 +316,13 @@ impl Checker {
         let rate = figure(CommandField::Rate, Dimension::ACCEL);
         let offset = figure(CommandField::Offset, Dimension::LENGTH);
         let aside = figure(CommandField::Aside, Dimension::SPEED);
-        let headway = figure(CommandField::Headway, Dimension::DURATION);
+        let time_gap = figure(CommandField::TimeGap, Dimension::DURATION);
+        let early = figure(CommandField::Early, Dimension::DURATION);
+        let at = figure(CommandField::At, Dimension::LENGTH);
+        let keep = match field(fields, CommandField::Keep) {
+            Some(value) => Some(self.gap(value, place)?),
+            None => None,
+        };
         let lane = match field(fields, CommandField::Lane) {
             Some(value) => Some(self.word::<LaneChoice>("lane", value, place)?),
             None => None,
@@ -278,8 +341,20 @@ impl Checker {
         };
         let says = |wanted: CommandField| field(fields, wanted).is_some();
         let goes_aside = says(CommandField::Lane) || says(CommandField::Offset);
+        let (keeps, is_early) = (says(CommandField::Keep), says(CommandField::Early));
+        if let Some(value) = field(fields, CommandField::Early).filter(|_| keeps) {
+            let error = Diagnostic::error(code::NOT_HERE, "`keep` and `early` both say the speed");
+            let error = error.at(value.span, "beside `keep`");
+            self.report(error.help("leave one of the two out, or write them in two phases"));
+            all = false;
+        }
         for (part, of, is_there) in [
-            (CommandField::Rate, "a `speed`", says(CommandField::Speed)),
+            (CommandField::At, "an `early`", is_early),
+            (
+                CommandField::Rate,
+                "a `speed`, a `keep` or an `early`",
+                says(CommandField::Speed) || keeps || is_early,
+            ),
             (CommandField::Aside, "a `lane` or an `offset`", goes_aside),
         ] {
             if let Some(value) = field(fields, part).filter(|_| !is_there) {
@@ -290,7 +365,35 @@ impl Checker {
                 all = false;
             }
         }
-        all.then_some(CommandDef { speed, rate, lane, offset, aside, headway, ignores, siren, turn })
+        all.then_some(CommandDef {
+            speed,
+            rate,
+            lane,
+            offset,
+            aside,
+            time_gap,
+            keep,
+            early,
+            at,
+            ignores,
+            siren,
+            turn,
+        })
+    }
+
+    /// The gap that is kept: a way or a time.
+    fn gap(&mut self, value: &ast::Expr, place: &Place<'_>) -> Option<Expr> {
+        let found = self.expr(value, place, None)?;
+        match found.ty {
+            LENGTH | DURATION => Some(found),
+            ty => {
+                let error = Diagnostic::error(code::UNIT_MISMATCH, "`keep` is a gap");
+                let found = format!("this is a `{}`", self.references.type_name(ty));
+                self.reject(
+                    error.at(value.span, found).help("write a way or a time: `keep: 20 m`, `keep: 1.5 s`"),
+                )
+            }
+        }
     }
 
     /// The rules of the road that are ignored: `[Signals, Ego]`.
@@ -306,6 +409,11 @@ impl Checker {
             return self.reject(error.help("write them in brackets: `ignores: [Signals]`; `[]` for none"));
         };
         all_of(items.iter().map(|item| self.word::<TrafficRule>("rule of the road", item, place)))
+    }
+
+    /// What the phases of a manoeuvre need; little, if it is broken.
+    pub(super) fn needs(&self, manoeuvre: usize) -> Needs {
+        self.manoeuvres[manoeuvre].as_ref().map_or(Needs::Legs, ManoeuvreDef::needs)
     }
 
     /// Whether a phase of a manoeuvre has such a command.

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use crate::check::action::PARAMETERS_MAX;
 use crate::check::checker::docs;
 use crate::check::load::{LoadedFile, maps_named, path_from, used_path, uses};
-use crate::model::vocabulary::{TYPES, Word};
+use crate::model::vocabulary::{ROAD_USER, TYPES, Word};
 use crate::model::{EnumDef, EnumIndex, Type};
 use crate::syntax::ast::{FileId, Item, ItemKind, Name, Number, ParamMode, Span};
 use crate::syntax::{Sources, ast};
@@ -366,7 +366,10 @@ impl References {
             _ => None,
         });
         if let Some(of) = of {
-            let symbol = Symbol::Variant(self.enums[of].name.clone(), name.text.clone());
+            let symbol = match self.enums[of].name.as_str() {
+                of if of == ROAD_USER.0 => Symbol::RoadUser(name.text.clone()),
+                of => Symbol::Variant(of.to_owned(), name.text.clone()),
+            };
             self.uses(name.span, symbol);
         }
     }

@@ -341,7 +341,7 @@ impl Checker {
         }
         let (index, definition) = (index?, definition?);
         let Some(of) = of else {
-            let message = format!("`{}` does not move from value to value", state.text);
+            let message = format!("transitions are for states of an enum, and `{}` is none", state.text);
             let error = Diagnostic::error(code::TYPE_MISMATCH, message);
             return self.reject(
                 error.at(state.span, "its values must be those of an enum").beside(definition.span, ""),

@@ -342,6 +342,7 @@ impl<'a> Reader<'a> {
             let expr = condition(self.space, once).map_err(|errors| self.diagnostics.extend(errors)).ok()?;
             Some(Condition { expr, text: print_expr(once) })
         });
+        let held_ticks = step.held.as_ref().map_or(Some(0), |held| self.after_ticks(held))?;
         let after_ticks = step.after.as_ref().map_or(Some(0), |after| self.after_ticks(after))?;
         let clause = step.once.as_ref().or(step.after.as_ref());
         if let Some(clause) = clause.filter(|_| !self.space.each_step.is_empty()) {
@@ -350,7 +351,7 @@ impl<'a> Reader<'a> {
             let error = error.at(clause.span, "what `each step` does would come before it");
             return self.reject(error.help("write the action in a later step"));
         }
-        let trigger = Trigger { once, after_ticks };
+        let trigger = Trigger { once, held_ticks, after_ticks };
         (trigger.once.is_some() || trigger.after_ticks > 0).then(|| Arc::new(trigger))
     }
 

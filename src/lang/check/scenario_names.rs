@@ -31,7 +31,11 @@ impl References {
             for field in &step.drawn {
                 self.note_argument(&step.action.name.text, &field.name, &field.value);
             }
-            step.once.iter().chain(&step.after).for_each(|clause| self.note_value(clause, None));
+            step.once
+                .iter()
+                .chain(&step.held)
+                .chain(&step.after)
+                .for_each(|clause| self.note_value(clause, None));
         }
         for expect in &scenario.expects {
             self.note_claim(&expect.claim);

@@ -134,7 +134,7 @@ fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
             names.extend(declared.params.iter().flat_map(|param| names_of_type(&param.ty)));
             exprs.extend(&declared.repeat);
             for phase in &declared.phases {
-                exprs.extend(phase.once.iter().chain(&phase.within).chain(&phase.after));
+                exprs.extend(phase.once.iter().chain(&phase.held).chain(&phase.within).chain(&phase.after));
                 fields.extend(&phase.fields);
             }
         }
@@ -156,7 +156,10 @@ fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
                 names.push(state);
                 exprs.extend(key.iter().chain([value]));
             }
-            ast::EffectKind::Order { fields: of_order, .. } => fields.extend(of_order),
+            ast::EffectKind::Order { who, fields: of_order } => {
+                names.push(who);
+                fields.extend(of_order);
+            }
             ast::EffectKind::Spawn { body, distance, apart, cover, fields: of_spawn, .. } => {
                 exprs.extend([body, distance].into_iter().chain(apart.as_deref()).chain(cover.as_deref()));
                 fields.extend(of_spawn);

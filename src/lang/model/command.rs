@@ -7,7 +7,8 @@ use crate::model::eval::{Facts, evaluate};
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::limits::{SPEED_MPS_MAX, out_of_bounds, rounded_into};
 use crate::model::space::{FnDef, WordExpr};
-use avastra_base::units::Rational;
+use crate::model::value::Type;
+use avastra_base::units::{Dimension, Rational};
 
 use crate::model::vocabulary::{CommandField, LaneChoice, TrafficRule, Turning, Verb, Word};
 
@@ -17,8 +18,42 @@ const SPEED_MPS: RangeInclusive<f64> = -ON_FOOT_MPS_MAX..=SPEED_MPS_MAX;
 /// Nobody on foot is told to go faster, m/s: below a sprinter's 12 m/s.
 const ON_FOOT_MPS_MAX: f64 = 10.0;
 
-/// Why nobody on foot is told anything else.
-pub const ON_FOOT: &str = "it is on foot, and can be told a speed alone";
+/// What a road user needs to do what it is told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Needs {
+    /// Two legs: it is told a speed alone.
+    Legs,
+    /// A way along the road: it is told a place beside the middle of the lane, too.
+    LegsAlong,
+    Wheels,
+}
+
+impl Needs {
+    pub(crate) fn of(verb: Verb) -> Needs {
+        match verb {
+            Verb::Walk | Verb::Stand => Needs::Legs,
+            Verb::WalkAhead | Verb::WalkOpposite => Needs::LegsAlong,
+            Verb::DriveAhead | Verb::DriveBehind | Verb::Overtake | Verb::DriveOpposite | Verb::CrossRoad => {
+                Needs::Wheels
+            }
+        }
+    }
+
+    /// What can be told to who has no more than this, in words.
+    pub fn told(self) -> &'static str {
+        match self {
+            Needs::Legs => "a `speed` alone",
+            Needs::LegsAlong => "a `speed`, an `offset` and an `aside` alone",
+            Needs::Wheels => "all",
+        }
+    }
+
+    /// Why somebody who does that cannot be told what needs this; `None` if they can.
+    pub fn lacked_by(self, verb: Verb) -> Option<String> {
+        let has = Needs::of(verb);
+        (self > has).then(|| format!("it is on foot, and can be told {}", has.told()))
+    }
+}
 
 /// Speeds that somebody can be told, m/s: on foot below 0 for the way back.
 pub fn speeds_mps(on_foot: bool) -> RangeInclusive<f64> {
@@ -35,7 +70,16 @@ pub const OFFSET_M: RangeInclusive<f64> = -5.0..=5.0;
 const ASIDE_MPS: RangeInclusive<f64> = 0.1..=4.0;
 
 /// Time gaps that a vehicle may be told to keep, s: from bumper on bumper to the sight of a town.
-const HEADWAY_S: RangeInclusive<f64> = 0.1..=10.0;
+const TIME_GAP_S: RangeInclusive<f64> = 0.1..=10.0;
+
+/// Gaps that a vehicle may be told to keep to the ego vehicle, m.
+const KEEP_M: RangeInclusive<f64> = 0.5..=200.0;
+
+/// How much before the ego vehicle a vehicle may be told to be somewhere, s; below 0 after it.
+const EARLY_S: RangeInclusive<f64> = -30.0..=30.0;
+
+/// Stations of the ego vehicle's route, m.
+const AT_M: RangeInclusive<f64> = 0.0..=1e6;
 
 /// A command whose values are still to be computed.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -50,7 +94,13 @@ pub struct CommandDef {
     /// m/s; without it the driver moves over as it would by itself.
     pub aside: Option<Expr>,
     /// s; without it as before.
-    pub headway: Option<Expr>,
+    pub time_gap: Option<Expr>,
+    /// The gap to the ego vehicle: m, or s.
+    pub keep: Option<Expr>,
+    /// How much before the ego vehicle it is somewhere, s.
+    pub early: Option<Expr>,
+    /// Where, m along the ego vehicle's route; without it where the two ways cross.
+    pub at: Option<Expr>,
     pub ignores: Option<Vec<WordExpr<TrafficRule>>>,
     pub siren: Option<Expr>,
     pub turn: Option<WordExpr<Turning>>,
@@ -64,7 +114,11 @@ pub struct Command {
     pub lane: Option<LaneChoice>,
     pub offset_m: Option<f64>,
     pub aside_mps: Option<f64>,
-    pub headway_s: Option<f64>,
+    pub time_gap_s: Option<f64>,
+    pub keep_m: Option<f64>,
+    pub keep_s: Option<f64>,
+    pub early_s: Option<f64>,
+    pub at_m: Option<f64>,
     pub ignores: Option<IgnoredRules>,
     pub siren: Option<bool>,
     /// Where it goes at the next junction.
@@ -108,7 +162,7 @@ struct Figure {
     value: fn(&mut Command) -> &mut Option<f64>,
 }
 
-const FIGURES: [Figure; 5] = [
+const FIGURES: [Figure; 9] = [
     Figure {
         field: CommandField::Speed,
         unit: "m/s",
@@ -142,12 +196,44 @@ const FIGURES: [Figure; 5] = [
         value: |command| &mut command.aside_mps,
     },
     Figure {
-        field: CommandField::Headway,
+        field: CommandField::TimeGap,
         unit: "s",
-        bounds: HEADWAY_S,
+        bounds: TIME_GAP_S,
         may_be_left_out: true,
-        written: |def| def.headway.as_ref(),
-        value: |command| &mut command.headway_s,
+        written: |def| def.time_gap.as_ref(),
+        value: |command| &mut command.time_gap_s,
+    },
+    Figure {
+        field: CommandField::Keep,
+        unit: "m",
+        bounds: KEEP_M,
+        may_be_left_out: false,
+        written: |def| def.keep.as_ref().filter(|keep| keep.ty == Type::Quantity(Dimension::LENGTH)),
+        value: |command| &mut command.keep_m,
+    },
+    Figure {
+        field: CommandField::Keep,
+        unit: "s",
+        bounds: TIME_GAP_S,
+        may_be_left_out: false,
+        written: |def| def.keep.as_ref().filter(|keep| keep.ty == Type::Quantity(Dimension::DURATION)),
+        value: |command| &mut command.keep_s,
+    },
+    Figure {
+        field: CommandField::Early,
+        unit: "s",
+        bounds: EARLY_S,
+        may_be_left_out: false,
+        written: |def| def.early.as_ref(),
+        value: |command| &mut command.early_s,
+    },
+    Figure {
+        field: CommandField::At,
+        unit: "m",
+        bounds: AT_M,
+        may_be_left_out: false,
+        written: |def| def.at.as_ref(),
+        value: |command| &mut command.at_m,
     },
 ];
 
@@ -159,6 +245,14 @@ pub struct WrittenFigure<'a> {
     pub bounds: RangeInclusive<f64>,
 }
 
+fn needs(goes_aside: bool, drives: bool) -> Needs {
+    match (goes_aside, drives) {
+        (_, true) => Needs::Wheels,
+        (true, false) => Needs::LegsAlong,
+        (false, false) => Needs::Legs,
+    }
+}
+
 impl CommandDef {
     pub fn figures(&self) -> impl Iterator<Item = WrittenFigure<'_>> {
         FIGURES.into_iter().filter_map(|Figure { field, unit, bounds, written, .. }| {
@@ -166,9 +260,26 @@ impl CommandDef {
         })
     }
 
-    /// Whether it can be told to somebody on foot: it says a speed alone.
-    pub fn is_for_feet(&self) -> bool {
-        *self == CommandDef { speed: self.speed.clone(), ..CommandDef::default() }
+    pub fn needs(&self) -> Needs {
+        let CommandDef {
+            speed: _,
+            rate,
+            lane,
+            offset,
+            aside,
+            time_gap,
+            keep,
+            early,
+            at,
+            ignores,
+            siren,
+            turn,
+        } = self;
+        let wheels = [rate, time_gap, keep, early, at, siren].into_iter().any(Option::is_some)
+            || lane.is_some()
+            || ignores.is_some()
+            || turn.is_some();
+        needs(aside.is_some() || offset.is_some(), wheels)
     }
 
     /// Whether it is written as a speed below 0. One that is computed may still be.
@@ -219,7 +330,7 @@ impl Command {
         out_of_bounds("order", figures)
     }
 
-    /// Brings every figure into its range. Drops a `rate`, an `aside` or a `headway` without a value; `None` if the speed or the offset
+    /// Brings every figure into its range. Drops a `rate`, an `aside` or a `time_gap` without a value; `None` if the speed or the offset
     /// has none.
     pub fn within_bounds(mut self) -> Option<Command> {
         for Figure { bounds, may_be_left_out, value, .. } in FIGURES {
@@ -243,19 +354,29 @@ impl Command {
 
     /// Why nobody of that kind can be told this, in words; `None` if they can.
     pub fn impossible(&self, verb: Verb) -> Option<String> {
-        let on_foot = matches!(verb, Verb::Walk | Verb::Stand);
+        let on_foot = verb.is_on_foot();
         let is_out = |mps: f64| !speeds_mps(on_foot).contains(&mps);
-        match (verb, self.speed_mps) {
-            (Verb::Stand, _) => Some("it stands, and does not walk".to_owned()),
-            (Verb::Walk, speed_mps) if *self != (Command { speed_mps, ..Command::default() }) => {
-                Some(ON_FOOT.to_owned())
-            }
-            (Verb::Walk, Some(mps)) if is_out(mps) => {
+        if verb == Verb::Stand {
+            return Some("it stands, and does not walk".to_owned());
+        }
+        self.needs().lacked_by(verb).or_else(|| match self.speed_mps {
+            Some(mps) if is_out(mps) && on_foot => {
                 Some(format!("nobody on foot is told more than {ON_FOOT_MPS_MAX} m/s"))
             }
-            (_, Some(mps)) if is_out(mps) => Some("it does not drive backwards".to_owned()),
-            _ => None,
-        }
+            Some(mps) if is_out(mps) => Some("it does not drive backwards".to_owned()),
+            Some(_) | None => None,
+        })
+    }
+
+    fn needs(&self) -> Needs {
+        let Command { speed_mps, offset_m, aside_mps, .. } = *self;
+        let on_foot = Command { speed_mps, offset_m, aside_mps, ..Command::default() };
+        needs(self.goes_aside(), *self != on_foot)
+    }
+
+    /// Whether it says where beside the ego vehicle.
+    pub fn pursues(&self) -> bool {
+        self.keep_m.is_some() || self.keep_s.is_some() || self.early_s.is_some()
     }
 
     /// Whether it says where to the side.

@@ -47,7 +47,12 @@ pub struct WorldFacts {
     pub road_users: Vec<(u32, NpcFacts)>,
     /// Those that are asked for by name and are there.
     pub bearers: Vec<(usize, NpcFacts)>,
+    /// When each action last happened, s since the episode began; empty if nothing asks for that.
+    pub happened_s: Vec<f64>,
 }
+
+/// The longest time that `since` tells, s: also of actions that never happened.
+pub const SINCE_S_MAX: f64 = 1000.0;
 
 /// What can be asked about the ego vehicle and its surroundings at a moment.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -58,6 +63,7 @@ pub struct MomentFacts {
     pub ego_limit_mps: f64,
     /// Along the route to the next junction: 0 inside one, at most [`JUNCTION_AHEAD_M_MAX`].
     pub ego_junction_ahead_m: f64,
+    pub ego_crosswalk_ahead_m: f64,
     pub ego_route_left_m: f64,
     /// Positive to the left of the route.
     pub ego_offset_m: f64,
@@ -160,8 +166,14 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
             let mut users = facts.world.into_iter().flat_map(|world| &world.road_users);
             fact_of(users.find(|(known, _)| known == id).map(|(_, npc)| *npc), *fact, facts)
         }
-        ExprKind::OfBearer(who, fact) => fact_of(bearer(*who, facts), *fact, facts),
-        ExprKind::IsThere(who) => Value::Bool(bearer(*who, facts).is_some()),
+        ExprKind::OfBearer(who, fact) => fact_of(bearer(who.bearer(facts.locals), facts), *fact, facts),
+        ExprKind::Since(actions, _) => Value::Number(facts.world.map_or(f64::NAN, |world| {
+            let happened_s = |action: &usize| world.happened_s.get(*action).copied();
+            let last_s = actions.iter().filter_map(happened_s).fold(f64::NEG_INFINITY, f64::max);
+            // As near as `elapsed` to the exact time.
+            ((world.moment.elapsed_s - last_s) * 1000.0).round().min(SINCE_S_MAX * 1000.0) / 1000.0
+        })),
+        ExprKind::IsThere(who) => Value::Bool(bearer(who.bearer(facts.locals), facts).is_some()),
         ExprKind::Call(function, arguments) => {
             let body = &functions[*function].body;
             let mut few = [Value::Bool(false); FEW];
@@ -228,6 +240,7 @@ fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
         Fact::EgoAcceleration => moment(|moment| moment.ego_acceleration_mps2),
         Fact::EgoLimit => moment(|moment| moment.ego_limit_mps),
         Fact::EgoJunctionAhead => moment(|moment| moment.ego_junction_ahead_m),
+        Fact::EgoCrosswalkAhead => moment(|moment| moment.ego_crosswalk_ahead_m),
         Fact::EgoRouteLeft => moment(|moment| moment.ego_route_left_m),
         Fact::EgoOffset => moment(|moment| moment.ego_offset_m),
         Fact::EgoFront => moment(|moment| moment.ego_front_m),

@@ -1,11 +1,30 @@
 //! Typed expressions: names are resolved, units are gone (all numbers are SI), every type fits.
 
 use crate::model::space::BodyWord;
-use crate::model::value::{EnumIndex, Type};
+use crate::model::value::{EnumIndex, Type, Value};
 use crate::model::vocabulary::{Fact, Known, LaneChoice, WordFact};
 use crate::syntax::ast::Span;
 pub use crate::syntax::ast::{Arithmetic, Comparison};
 use avastra_base::units::Rational;
+
+/// Whom a fact is about, or an order is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Who {
+    /// The latest bearer of a name, by index in `Space::bearers`.
+    Named(usize),
+    /// The bearer of the name that is the value of this parameter, by position.
+    Given(usize),
+}
+
+impl Who {
+    /// The name, by index in `Space::bearers`: the names are the variants of their type, in the same order.
+    pub fn bearer(self, locals: &[Value]) -> usize {
+        match self {
+            Who::Named(who) => who,
+            Who::Given(local) => locals[local].variant(),
+        }
+    }
+}
 
 /// An expression with its type and the place where it was written.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,10 +48,12 @@ pub enum ExprKind {
     Fact(Fact),
     /// `npc#2.speed`: a fact about the road user with that number. NaN while it is not there.
     OfRoadUser(u32, Fact),
-    /// `truck.speed`: a fact about the latest bearer of a name, by index in `Space::bearers`. NaN while none is there.
-    OfBearer(usize, Fact),
+    /// `truck.speed`: a fact about the latest bearer of a name. NaN while none is there.
+    OfBearer(Who, Fact),
     /// `truck.there`: whether there is a bearer of that name.
-    IsThere(usize),
+    IsThere(Who),
+    /// `since(vehicles)`: the time since one of these actions last happened, and how they are called.
+    Since(Vec<usize>, String),
     /// A function by its index in `Space::functions`.
     Call(usize, Vec<Expr>),
     Not(Box<Expr>),
@@ -68,7 +89,7 @@ impl ExprKind {
         match self {
             ExprKind::Fact(fact) => fact.known(),
             ExprKind::IsWord(fact, _) | ExprKind::IsBody(fact, _) => fact.known(),
-            ExprKind::OfBearer(..) | ExprKind::IsThere(_) => Known::World,
+            ExprKind::OfBearer(..) | ExprKind::IsThere(_) | ExprKind::Since(..) => Known::World,
             _ => Known::Road,
         }
     }
@@ -96,6 +117,7 @@ impl Expr {
             | ExprKind::OfRoadUser(..)
             | ExprKind::OfBearer(..)
             | ExprKind::IsThere(_)
+            | ExprKind::Since(..)
             | ExprKind::Fact(_) => {}
             ExprKind::CellAt(_, inner)
             | ExprKind::Not(inner)
@@ -178,12 +200,21 @@ impl Expr {
         self.asks_the_world() || self.any(|kind| kind.known() == Known::Spawn && !is_gap(kind))
     }
 
-    /// The names of road users that it asks about, by index in `Space::bearers`.
-    pub fn bearers(&self) -> Vec<usize> {
+    /// Whom of the named road users it asks about.
+    pub fn asked(&self) -> Vec<Who> {
         self.filter_map(|kind| match kind {
             ExprKind::OfBearer(who, _) | ExprKind::IsThere(who) => Some(*who),
             _ => None,
         })
+    }
+
+    /// The names of road users that it may ask about, by index in `Space::bearers`, of which there are so many.
+    pub fn bearers(&self, count: usize) -> Vec<usize> {
+        let of = |who: Who| match who {
+            Who::Named(who) => who..who + 1,
+            Who::Given(_) => 0..count,
+        };
+        self.asked().into_iter().flat_map(of).collect()
     }
 
     pub fn reads_memory(&self) -> bool {

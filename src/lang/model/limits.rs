@@ -30,6 +30,9 @@ pub const SPAWN_DISTANCE_M: RangeInclusive<f64> = 0.0..=1000.0;
 /// Parts of the ego vehicle's front at which somebody may be met.
 pub const MEET: RangeInclusive<f64> = 0.0..=1.0;
 
+/// Times for which somebody may wait at the kerb, s.
+pub const WAITS_S: RangeInclusive<f64> = 0.0..=600.0;
+
 /// Offsets at which the cycle of the signals may begin, s.
 pub const SIGNAL_PHASE_S: RangeInclusive<f64> = 0.0..=3600.0;
 
@@ -55,28 +58,30 @@ pub fn rounded_into(figure: f64, bounds: RangeInclusive<f64>) -> f64 {
     }
 }
 
-/// Why the world must not be asked for a spawn with these figures, whatever the rules say; `None` if it
-/// may. NaN is out of bounds, too.
-pub fn spawn_out_of_bounds(
-    speed_mps: f64,
-    distance_m: f64,
-    offset_m: f64,
-    meet: Option<f64>,
-) -> Option<String> {
-    let all_lie_within = SPAWN_SPEED_MPS.contains(&speed_mps)
-        && SPAWN_DISTANCE_M.contains(&distance_m)
-        && OFFSET_M.contains(&offset_m)
-        && meet.is_none_or(|part| MEET.contains(&part));
-    if all_lie_within {
-        return None;
+/// The figures of a spawn.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SpawnFigures {
+    pub speed_mps: f64,
+    pub distance_m: f64,
+    pub offset_m: f64,
+    pub meet: Option<f64>,
+    pub waits_s: Option<f64>,
+}
+
+impl SpawnFigures {
+    /// Why the world must not be asked for a spawn with them, whatever the rules say; `None` if it may. NaN is out of bounds,
+    /// too.
+    pub fn out_of_bounds(self) -> Option<String> {
+        let SpawnFigures { speed_mps, distance_m, offset_m, meet, waits_s } = self;
+        let figures = [
+            Some(("speed", speed_mps, "m/s", SPAWN_SPEED_MPS)),
+            Some(("distance", distance_m, "m", SPAWN_DISTANCE_M)),
+            Some(("offset", offset_m, "m", OFFSET_M)),
+            meet.map(|part| ("meet", part, "", MEET)),
+            waits_s.map(|waits_s| ("wait", waits_s, "s", WAITS_S)),
+        ];
+        out_of_bounds("spawn", figures.into_iter().flatten())
     }
-    let distance = ("distance", distance_m, "m", SPAWN_DISTANCE_M);
-    let offset = ("offset", offset_m, "m", OFFSET_M);
-    let meet = meet.map(|part| ("meet", part, "", MEET));
-    out_of_bounds(
-        "spawn",
-        [("speed", speed_mps, "m/s", SPAWN_SPEED_MPS), distance, offset].into_iter().chain(meet),
-    )
 }
 
 pub(super) fn out_of_bounds(
@@ -96,22 +101,19 @@ mod tests {
 
     #[test]
     fn no_spawn_lies_out_of_bounds() {
+        let out = |speed_mps, distance_m| {
+            SpawnFigures { speed_mps, distance_m, ..SpawnFigures::default() }.out_of_bounds()
+        };
         for (speed_mps, distance_m) in [(0.0, 0.0), (70.0, 1000.0)] {
-            assert_eq!(spawn_out_of_bounds(speed_mps, distance_m, 0.0, None), None);
+            assert_eq!(out(speed_mps, distance_m), None);
         }
         let rounded = |speed_mps| rounded_into(speed_mps, SPAWN_SPEED_MPS);
         assert_eq!([70.0 * (0.1 + 0.2) / 0.3, 70.0, 69.9, 70.1].map(rounded), [70.0, 70.0, 69.9, 70.1]);
         for speed_mps in [-0.1, 70.1, f64::NAN] {
-            assert!(
-                spawn_out_of_bounds(speed_mps, 10.0, 0.0, None)
-                    .is_some_and(|reason| reason.contains("speed"))
-            );
+            assert!(out(speed_mps, 10.0).is_some_and(|reason| reason.contains("speed")));
         }
         for distance_m in [-0.1, 1000.1, f64::NAN] {
-            assert!(
-                spawn_out_of_bounds(5.0, distance_m, 0.0, None)
-                    .is_some_and(|reason| reason.contains("distance"))
-            );
+            assert!(out(5.0, distance_m).is_some_and(|reason| reason.contains("distance")));
         }
     }
 }

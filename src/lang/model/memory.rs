@@ -6,7 +6,9 @@ use crate::model::effort;
 use crate::model::eval::{Facts, WorldFacts, evaluate};
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Combinations, RulesInForce, cells_read};
-use crate::model::space::{Initial, Road, RoadFacts, RuleBody, SetDef, Space, StateDef, StateMeaning};
+use crate::model::space::{
+    Initial, Road, RoadFacts, RuleBody, RuleDef, SetDef, Space, StateDef, StateMeaning,
+};
 use crate::model::value::{Memory, Type, Value};
 use crate::model::vocabulary::{Level, TimeOfDay};
 use avastra_base::rng;
@@ -163,9 +165,21 @@ impl Space {
         self.each_step.iter().any(SetDef::asks_the_world)
     }
 
+    /// Whether a rule, what every step does, or the odds of an action ask how long ago an action happened.
+    pub fn asks_when_actions_happened(&self) -> bool {
+        let asks = |expr: &Expr| expr.any(|kind| matches!(kind, ExprKind::Since(..)));
+        let rule_asks = |rule: &RuleDef| match &rule.body {
+            RuleBody::Holds(bindings) => bindings.iter().any(|binding| asks(&binding.condition)),
+            RuleBody::During(_) | RuleBody::Phases { .. } | RuleBody::Moves { .. } => false,
+        };
+        self.rules.iter().any(rule_asks)
+            || self.each_step.iter().flat_map(SetDef::parts).any(asks)
+            || self.actions.iter().any(|action| asks(&action.odds))
+    }
+
     /// The named road users about which what every step does asks.
     pub fn bearers_of_each_step(&self) -> impl Iterator<Item = usize> {
-        self.each_step.iter().flat_map(SetDef::parts).flat_map(Expr::bearers)
+        self.each_step.iter().flat_map(SetDef::parts).flat_map(|part| part.bearers(self.bearers.len()))
     }
 
     /// The cells whose value the moment decides at which a step begins: all that every step sets, if a part of that asks about

@@ -27,13 +27,14 @@ pub mod vocabulary;
 
 pub use digest::{digest, digest_text};
 pub use eval::{
-    Facts, JUNCTION_AHEAD_M_MAX, MomentFacts, NpcFacts, OutcomeFacts, SpawnFacts, TIME_S_MAX, WorldFacts,
-    evaluate,
+    Facts, JUNCTION_AHEAD_M_MAX, MomentFacts, NpcFacts, OutcomeFacts, SINCE_S_MAX, SpawnFacts, TIME_S_MAX,
+    WorldFacts, evaluate,
 };
 pub use interval::{End, Interval};
 pub use limits::{
     AMBIENT_MAX, COMMANDED_MAX, EGO_ACCELERATION_MPS2_MAX, LIMIT_PART_MAX, MEET, REPEAT, SIGNAL_PHASE_S,
-    SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, TICK_MS, rounded_into, spawn_out_of_bounds,
+    SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, SpawnFigures, TICK_MS, WAITS_S,
+    rounded_into,
 };
 pub use meaning::Meaning;
 pub(crate) use on_route::stretches;

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::model::expr::Who;
 use crate::model::interval::Interval;
 use crate::model::space::{ActionDef, Parameter};
 use crate::model::value::Value;
@@ -37,6 +38,19 @@ impl Reach {
         match self {
             Reach::Open(ranges) => Some(ranges),
             Reach::Dead { .. } => None,
+        }
+    }
+}
+
+impl Row {
+    /// The name that an order or a fact is about; `None` where it is drawn.
+    pub fn bearer(&self, who: Who, action: &ActionDef) -> Option<usize> {
+        match who {
+            Who::Named(bearer) => Some(bearer),
+            Who::Given(local) => {
+                let name = &action.parameters[local].name;
+                self.axes.iter().find(|(axis, _)| axis == name).map(|(_, value)| value.variant())
+            }
         }
     }
 }

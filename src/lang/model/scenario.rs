@@ -73,11 +73,13 @@ pub struct ScenarioStep {
     pub trigger: Option<Arc<Trigger>>,
 }
 
-/// The moment within a step at which an action happens: some ticks after the first at which a condition holds.
+/// The moment within a step at which an action happens: some ticks after a condition has held for others.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trigger {
     /// `None` holds from the beginning of the step.
     pub once: Option<Condition>,
+    /// How long it must have held without a break.
+    pub held_ticks: u32,
     pub after_ticks: u32,
 }
 
@@ -100,15 +102,15 @@ impl Trigger {
 
     /// The names of road users that the condition asks about, by index in `Space::bearers`.
     pub fn bearers(&self) -> Vec<usize> {
-        self.once.iter().flat_map(|condition| condition.expr.bearers()).collect()
+        self.once.iter().flat_map(|condition| condition.expr.bearers(0)).collect()
     }
 
     /// The trigger as a file spells it.
     pub fn text(&self) -> String {
         let once = self.once.as_ref().map(|once| format!("once {}", once.text));
-        let after_s = ticks_s(self.after_ticks);
-        let after = (self.after_ticks > 0).then(|| format!("after {after_s} s"));
-        once.into_iter().chain(after).collect::<Vec<_>>().join(" ")
+        let time = |word: &str, ticks: u32| (ticks > 0).then(|| format!("{word} {} s", ticks_s(ticks)));
+        let (held, after) = (time("for", self.held_ticks), time("after", self.after_ticks));
+        once.into_iter().chain(held).chain(after).collect::<Vec<_>>().join(" ")
     }
 }
 

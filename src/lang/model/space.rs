@@ -1,11 +1,12 @@
 //! The checked space: what may happen around the car. If a [`Space`] exists, it is sound: every name
 //! resolves, every type fits, every rule can be enforced.
 
+use crate::model::expr::Who;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::model::body::BodyParameters;
-use crate::model::command::CommandDef;
+use crate::model::command::{CommandDef, Needs};
 use crate::model::eval::{Facts, evaluate};
 use crate::model::expr::Expr;
 use crate::model::interval::Interval;
@@ -327,6 +328,8 @@ pub struct SpawnDef {
     pub ignores: Vec<WordExpr<TrafficRule>>,
     /// The part of the ego vehicle's front at which it is met, from the side that it comes from.
     pub meet: Option<Expr>,
+    /// How long it stands at the kerb, s; without it it sets out so as to meet the ego vehicle.
+    pub waits: Option<Expr>,
     /// Whether it is an emergency vehicle under way.
     pub siren: Option<Expr>,
     pub turn: Option<WordExpr<Turning>>,
@@ -352,10 +355,18 @@ pub struct ManoeuvreDef {
     pub phases: Vec<PhaseDef>,
 }
 
-/// A phase begins when `once` holds, and `after` some more time. It ends when the road user has done what it is told.
+impl ManoeuvreDef {
+    pub fn needs(&self) -> Needs {
+        self.phases.iter().map(|phase| phase.command.needs()).max().unwrap_or(Needs::Legs)
+    }
+}
+
+/// A phase begins when `once` has held for long enough, and `after` some more time. It ends when the road user has done what it is told.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhaseDef {
     pub once: Option<Expr>,
+    /// How long `once` must have held, s.
+    pub held: Option<Expr>,
     /// How long it waits for `once` to hold, s; then the manoeuvre ends.
     pub within: Option<Expr>,
     /// s.
@@ -383,8 +394,7 @@ impl SpawnDef {
 /// What the latest bearer of a name is told to do.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OrderDef {
-    /// The name, by index in `Space::bearers`.
-    pub bearer: usize,
+    pub who: Who,
     /// Empty for an order of a manoeuvre alone.
     pub command: CommandDef,
     pub manoeuvre: Option<ManoeuvreCall>,

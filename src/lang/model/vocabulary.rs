@@ -159,6 +159,11 @@ impl Site {
         self.knows(fact.known()) && !(is_of_spawn && matches!(self, Site::Change | Site::Phase))
     }
 
+    /// Whether it is known here when actions happened.
+    pub fn knows_actions(self) -> bool {
+        matches!(self, Site::Rule | Site::StepBegins)
+    }
+
     /// The facts that are known here.
     pub fn facts(self) -> impl Iterator<Item = Fact> {
         Fact::ALL.iter().copied().filter(move |fact| self.knows_fact(*fact))
@@ -189,6 +194,12 @@ pub const TYPES: &[(&str, Type, &str)] = &[
     ("Ratio", RATIO, "A number without a unit, or with `%`."),
 ];
 
+/// The type whose values are the names of road users.
+pub const ROAD_USER: (&str, &str) = (
+    "RoadUser",
+    "The name that a spawn gives to a road user: `each who: RoadUser in [truck, van]`, `order who { … }`.",
+);
+
 const ACCEL: Type = Type::Quantity(Dimension::ACCEL);
 const DURATION: Type = Type::Quantity(Dimension::DURATION);
 const LENGTH: Type = Type::Quantity(Dimension::LENGTH);
@@ -202,6 +213,7 @@ facts! {
     EgoAcceleration "ego.acceleration" ACCEL, World = "A `Accel`: of the ego vehicle, negative when it brakes.";
     EgoLimit "ego.limit" SPEED, World = "A `Speed`: the limit of the lane that the ego vehicle is in.";
     EgoJunctionAhead "ego.junction_ahead" LENGTH, World = "A `Length`: along the route to the next junction; 0 in one, 1000 m if there is none nearer.";
+    EgoCrosswalkAhead "ego.crosswalk_ahead" LENGTH, World = "A `Length`: along the route to the next crosswalk; 0 on one, 1000 m if there is none nearer.";
     EgoRouteLeft "ego.route_left" LENGTH, World = "A `Length`: along the route to the goal.";
     EgoOffset "ego.offset" LENGTH, World = "A `Length`: how far the ego vehicle is to the left of its route.";
     EgoFront "ego.front" LENGTH, World = "A `Length`: where the ego vehicle's front is along its route, whose start has 0 m.";
@@ -243,6 +255,12 @@ pub const ROAD_LANES: (&str, &str) =
 
 /// `truck.there`: what may be asked of a named road user beside the facts of `npc`.
 pub const THERE: (&str, &str) = ("there", "Whether a road user of that name is there.");
+
+/// `since(vehicles)`: spelt like a function, but of an action or a group.
+pub const SINCE: (&str, &str) = (
+    "since",
+    "A `Duration`: since an action, or one of a group, last happened; 1000 s if it never has: `since(vehicles) >= 10 s`.",
+);
 
 word_facts! {
     EgoLight "ego.light" Light, World = "The next traffic light within 100 m: `ego.light == Red`, `ego.light in [Yellow, Red]`.";
@@ -330,6 +348,7 @@ words! {
     Ignores "ignores" = "The rules of the road that it ignores: `ignores: [Signals]`.",
     Siren "siren" = "Whether it is an emergency vehicle under way, for which all others wait: `siren: true`.",
     Turn "turn" = "Where it goes at the next junction: `Left`, `Straight` or `Right`.",
+    Waits "waits" = "How long it stands at the kerb before it sets out: `waits: 2 s`.",
     Meet "meet" = "The part of the ego vehicle's front at which it is met, from the side that it comes from: `meet: 25 %`.",
     Colour "colour" = "Its paint.",
 }
@@ -341,7 +360,10 @@ words! {
     Lane "lane" = "The lane that it changes to, seen from the ego vehicle: `Left`, `Current` or `Right`.",
     Offset "offset" = "How far to the left of its lane's middle it drives from then on; negative to the right.",
     Aside "aside" = "Its greatest speed to the side on the way there, as far as the road allows.",
-    Headway "headway" = "The time gap that it keeps behind whoever is ahead of it.",
+    TimeGap "time_gap" = "The time gap that its driver keeps behind whoever is ahead of it.",
+    Keep "keep" = "The gap that it keeps to the ego vehicle, ahead of it or behind it: `keep: 1.5 s`, `keep: 20 m`.",
+    Early "early" = "How much before the ego vehicle it is where the two ways cross, or `at` a station: `early: 1 s`.",
+    At "at" = "The station of the ego vehicle's route at which it is `early`: `at: van.rear`.",
     Ignores "ignores" = "The rules of the road that it ignores from then on: `ignores: [Signals]`; `[]` for none.",
     Siren "siren" = "Whether it is an emergency vehicle under way from then on: `siren: false`.",
     Turn "turn" = "Where it goes at the next junction: `Left`, `Straight` or `Right`.",
@@ -438,6 +460,38 @@ words! {
     CrossRoad = "Crosses the ego vehicle's way at a junction.",
     Walk = "A pedestrian who crosses the road on foot.",
     Stand = "A pedestrian who stands in the lane.",
+    WalkAhead = "A pedestrian who walks along the road in the ego vehicle's direction.",
+    WalkOpposite = "A pedestrian who walks along the road towards the ego vehicle.",
+    DriveBehind = "Drives behind the ego vehicle in the same direction.",
+}
+
+impl Verb {
+    pub fn is_on_foot(self) -> bool {
+        matches!(self, Verb::Walk | Verb::Stand | Verb::WalkAhead | Verb::WalkOpposite)
+    }
+
+    /// Whether it appears behind the ego vehicle.
+    pub fn begins_behind(self) -> bool {
+        matches!(self, Verb::Overtake | Verb::DriveBehind)
+    }
+
+    /// The verb that stands for it where policies see road users: they know those of the paper.
+    pub fn as_policies_know(self) -> Verb {
+        match self {
+            Verb::WalkAhead | Verb::WalkOpposite => Verb::Walk,
+            Verb::DriveBehind => Verb::Overtake,
+            Verb::DriveAhead
+            | Verb::Overtake
+            | Verb::DriveOpposite
+            | Verb::CrossRoad
+            | Verb::Walk
+            | Verb::Stand => self,
+        }
+    }
+
+    pub fn walks_along(self) -> bool {
+        matches!(self, Verb::WalkAhead | Verb::WalkOpposite)
+    }
 }
 
 words! {

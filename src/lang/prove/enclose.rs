@@ -8,7 +8,7 @@ use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::vocabulary::Fact;
 use crate::model::{
     AMBIENT_MAX, COMMANDED_MAX, EGO_ACCELERATION_MPS2_MAX, FnDef, Interval, JUNCTION_AHEAD_M_MAX, RoadFacts,
-    SPEED_MPS_MAX, TIME_S_MAX, Type, Value,
+    SINCE_S_MAX, SPEED_MPS_MAX, TIME_S_MAX, Type, Value,
 };
 use crate::prove::moment::Case;
 use crate::prove::sums::{difference, is_same, lacks_value, may_lack_a_value};
@@ -170,6 +170,7 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
         // While it is not there, it has no value: as after a division by 0, no comparison is certain.
         ExprKind::OfBearer(..) => Values::Number(Interval::ALL),
         ExprKind::IsThere(_) => Values::UNKNOWN_TRUTH,
+        ExprKind::Since(..) => Values::Number(between(0.0, SINCE_S_MAX)),
         ExprKind::Call(function, arguments) => {
             let locals: Vec<Values> = arguments.iter().map(values).collect();
             enclose(&known.functions[*function].body, &Known { locals: &locals, ..*known })
@@ -246,16 +247,21 @@ fn fact_values(fact: Fact, known: &Known<'_>) -> Values {
     }
 }
 
-/// What a fact that is a number may be, on any road and at any moment.
-pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
-    let between = |low: f64, high: f64| match (Rational::from_f64(low), Rational::from_f64(high)) {
+fn between(low: f64, high: f64) -> Interval {
+    match (Rational::from_f64(low), Rational::from_f64(high)) {
         (Some(low), Some(high)) => Interval::closed(low, high),
         _ => Interval::ALL,
-    };
+    }
+}
+
+/// What a fact that is a number may be, on any road and at any moment.
+pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
     Some(match fact {
         Fact::EgoSpeed => between(0.0, SPEED_MPS_MAX),
         Fact::EgoAcceleration => between(-EGO_ACCELERATION_MPS2_MAX, EGO_ACCELERATION_MPS2_MAX),
-        Fact::EgoJunctionAhead | Fact::NpcJunctionAhead => between(0.0, JUNCTION_AHEAD_M_MAX),
+        Fact::EgoJunctionAhead | Fact::EgoCrosswalkAhead | Fact::NpcJunctionAhead => {
+            between(0.0, JUNCTION_AHEAD_M_MAX)
+        }
         Fact::NpcTtc | Fact::NpcHeadway => between(0.0, TIME_S_MAX),
         Fact::EgoOffset
         | Fact::EgoRouteLeft

@@ -146,7 +146,8 @@ fn newcomer(spawn: &SpawnDef, known: &Known<'_>, lands: bool) -> Case {
         numbers.push((Fact::NpcSpeed, speed));
     }
     let distance = enclose(&spawn.distance, known).interval().intersect(&Interval::NOT_NEGATIVE);
-    let is_on_route = |verb: &Verb| !matches!(verb, Verb::Walk | Verb::CrossRoad);
+    let is_on_route =
+        |verb: &Verb| !matches!(verb, Verb::Walk | Verb::WalkAhead | Verb::WalkOpposite | Verb::CrossRoad);
     if lands && spawn.offset.is_none() && verbs.iter().all(is_on_route) && !distance.is_empty() {
         numbers.extend([(Fact::NpcGap, distance), (Fact::SpawnGap, distance)]);
     }

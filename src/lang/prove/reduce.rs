@@ -1,6 +1,6 @@
 //! Expressions computed as far as possible beforehand: calls are replaced by bodies, constants are folded.
 
-use crate::model::expr::{Expr, ExprKind};
+use crate::model::expr::{Expr, ExprKind, Who};
 use crate::model::{FnDef, Type, effort};
 use crate::prove::enclose::{Known, enclose};
 use crate::syntax::ast::Span;
@@ -31,9 +31,9 @@ pub(super) fn reduce(expr: &Expr, functions: &[FnDef], locals: &[Expr]) -> Expr 
         | ExprKind::Variant(..)
         | ExprKind::Cell(_)
         | ExprKind::Fact(_)
-        | ExprKind::OfRoadUser(..)
-        | ExprKind::OfBearer(..)
-        | ExprKind::IsThere(_) => expr.kind.clone(),
+        | ExprKind::OfRoadUser(..) => expr.kind.clone(),
+        ExprKind::OfBearer(who, fact) => ExprKind::OfBearer(reduced_who(*who, locals), *fact),
+        ExprKind::IsThere(who) => ExprKind::IsThere(reduced_who(*who, locals)),
         ExprKind::CellAt(first, key) => {
             let key = inner(key);
             match key.kind {
@@ -50,7 +50,7 @@ pub(super) fn reduce(expr: &Expr, functions: &[FnDef], locals: &[Expr]) -> Expr 
         ExprKind::Implies(left, right) => ExprKind::Implies(inner(left), inner(right)),
         ExprKind::InRange(of, low, high) => ExprKind::InRange(inner(of), inner(low), inner(high)),
         ExprKind::InList(of, list) => ExprKind::InList(inner(of), all(list)),
-        ExprKind::OnRoad(names) => ExprKind::OnRoad(names.clone()),
+        ExprKind::OnRoad(_) | ExprKind::Since(..) => expr.kind.clone(),
         ExprKind::IsWord(fact, words) => ExprKind::IsWord(*fact, words.clone()),
         ExprKind::IsBody(fact, bodies) => ExprKind::IsBody(*fact, bodies.clone()),
         ExprKind::InLanes(of, lanes) => ExprKind::InLanes(inner(of), lanes.clone()),
@@ -70,6 +70,16 @@ pub(super) fn reduce(expr: &Expr, functions: &[FnDef], locals: &[Expr]) -> Expr 
     fold(Expr { kind, ty: expr.ty, span: Span::NONE })
 }
 
+/// The name itself, once the parameter is known.
+pub(super) fn reduced_who(who: Who, locals: &[Expr]) -> Who {
+    let Who::Given(local) = who else { return who };
+    match locals[local].kind {
+        ExprKind::Variant(_, bearer) => Who::Named(bearer),
+        ExprKind::Local(local) => Who::Given(local),
+        _ => who,
+    }
+}
+
 /// A literal, if the expression depends on nothing that is open.
 fn fold(expr: Expr) -> Expr {
     let open = |kind: &ExprKind| {
@@ -84,6 +94,7 @@ fn fold(expr: Expr) -> Expr {
                 | ExprKind::IsThere(_)
                 | ExprKind::InLanes(..)
                 | ExprKind::OnRoad(_)
+                | ExprKind::Since(..)
                 | ExprKind::IsWord(..)
                 | ExprKind::IsBody(..)
         )

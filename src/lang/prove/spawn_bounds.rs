@@ -7,7 +7,8 @@ use crate::model::command::{OFFSET_M, speeds_mps};
 use crate::model::expr::ExprKind;
 use crate::model::vocabulary::{CommandField, Word};
 use crate::model::{
-    ACTION_ODDS_MAX, ActionDef, Interval, MEET, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, code, effort,
+    ACTION_ODDS_MAX, ActionDef, Interval, MEET, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, WAITS_S, code,
+    effort,
 };
 use crate::prove::enclose::{Known, enclose};
 use crate::prove::reach::spawn_figures;
@@ -59,6 +60,7 @@ fn errors(space: &Space, action: usize) -> impl Iterator<Item = Diagnostic> {
             Some(("distance", "a spawn", "m", &spawn.distance, SPAWN_DISTANCE_M)),
             spawn.offset.as_ref().map(|offset| ("offset", "a spawn", "m", offset, OFFSET_M)),
             spawn.meet.as_ref().map(|meet| ("meet", "a spawn", "", meet, MEET)),
+            spawn.waits.as_ref().map(|waits| ("wait", "a spawn", "s", waits, WAITS_S)),
             spawn
                 .row
                 .as_ref()

@@ -130,7 +130,11 @@ fn error(space: &Space, broken: &BrokenByTime) -> Diagnostic {
             if cells.len() == 1 { "it" } else { "them" }
         ),
     };
-    Diagnostic::error(code::BROKEN_BY_TIME, message).at(rule.span, label).help(help)
+    let error = Diagnostic::error(code::BROKEN_BY_TIME, message).at(rule.span, label).help(help);
+    match space.each_step_asks_the_world() {
+        true => error.note("what `each step` sets by facts of the moment may have any value in a proof"),
+        false => error,
+    }
 }
 
 /// Whether the rules in force on states and time hold at every step of every episode on the road.

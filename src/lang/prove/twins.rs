@@ -4,6 +4,7 @@
 //! same effects and are bound by the same conditions. Forms are compared, not meanings, so equal rows that
 //! are written differently may be missed.
 
+use crate::prove::reduce::reduced_who;
 use std::collections::BTreeMap;
 
 use crate::model::command::WrittenFigure;
@@ -131,7 +132,10 @@ impl<'a> RowText<'a> {
                 let ignores = ignores.map(|ignores| ignored_form(ignores, &|expr| self.reduced(expr)));
                 let turn =
                     order.command.turn.as_ref().map(|turn| word_form(turn, &|expr| self.reduced(expr)));
-                format!("order {} {figures:?} {lane:?} {ignores:?} {siren:?} {turn:?} {then:?}", order.bearer)
+                format!(
+                    "order {:?} {figures:?} {lane:?} {ignores:?} {siren:?} {turn:?} {then:?}",
+                    reduced_who(order.who, &self.locals)
+                )
             }
         });
         effects.collect::<Vec<_>>().join("\n")
@@ -185,7 +189,7 @@ fn ignored_form(ignores: &[WordExpr<TrafficRule>], reduced: &impl Fn(&Expr) -> E
 
 fn spawn_form(spawn: &SpawnDef, reduced: &impl Fn(&Expr) -> Expr) -> String {
     format!(
-        "spawn {} {} {} {} {} {} {:?} {:?} {:?} {:?} {:?} {:?} {} {} {} {:?} {:?}",
+        "spawn {} {} {} {} {} {} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {} {} {} {:?} {:?}",
         word_form(&spawn.body, reduced),
         word_form(&spawn.colour, reduced),
         word_form(&spawn.verb, reduced),
@@ -196,6 +200,7 @@ fn spawn_form(spawn: &SpawnDef, reduced: &impl Fn(&Expr) -> Expr) -> String {
         reduced(&spawn.distance).kind,
         spawn.offset.as_ref().map(|offset| reduced(offset).kind),
         spawn.meet.as_ref().map(|meet| reduced(meet).kind),
+        spawn.waits.as_ref().map(|waits| reduced(waits).kind),
         spawn.siren.as_ref().map(|siren| reduced(siren).kind),
         spawn.turn.as_ref().map(|turn| word_form(turn, reduced)),
         ignored_form(&spawn.ignores, reduced),

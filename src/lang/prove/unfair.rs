@@ -72,13 +72,13 @@ fn figures(space: &Space, road: &Road, spawn: &SpawnDef, values: &[Value], memor
     let (speed_mps, distance_m) = (number(&spawn.speed), number(&spawn.distance));
     let ego_mps = road.facts.limit_mps;
     let needed_m = match spawn.verb.word(&space.functions, &facts) {
-        Verb::DriveAhead => braked_m((ego_mps - speed_mps).max(0.0)),
-        Verb::DriveOpposite => {
+        Verb::DriveAhead | Verb::WalkAhead => braked_m((ego_mps - speed_mps).max(0.0)),
+        Verb::DriveOpposite | Verb::WalkOpposite => {
             braked_m(ego_mps) + speed_mps * (CAREFUL_DELAY_S + ego_mps / CAREFUL_BRAKING_MPS2)
         }
         Verb::CrossRoad | Verb::Walk | Verb::Stand => braked_m(ego_mps),
         // A vehicle from behind sees the ego vehicle, which need do nothing.
-        Verb::Overtake => 0.0,
+        Verb::Overtake | Verb::DriveBehind => 0.0,
     };
     Figures { speed_mps, distance_m, needed_m }
 }

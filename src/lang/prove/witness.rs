@@ -18,8 +18,8 @@ use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Before, Candidate, Choose, Demand, Nearest, Room, RowRules, cells_read};
 use crate::model::{
     ActionDef, Domain, End, Facts, Interval, Memory, Parameter, Road, Row, RulesInForce, SPAWN_DISTANCE_M,
-    SPAWN_SPEED_MPS, SetDef, Space, SpawnFacts, Type, Value, WorldFacts, effort, evaluate, locals,
-    rounded_into, spawn_out_of_bounds,
+    SPAWN_SPEED_MPS, SetDef, Space, SpawnFacts, SpawnFigures, Type, Value, WorldFacts, effort, evaluate,
+    locals, rounded_into,
 };
 use crate::prove::enclose::{Known, Values};
 use crate::prove::moment::{Case, may_hold_together, newcomers};
@@ -308,7 +308,8 @@ impl Search<'_> {
             let more_m = spawn.behind_first_m(shape.length_m, &space.functions, &facts);
             let distance_m = rounded_into(number(&spawn.distance) + more_m, SPAWN_DISTANCE_M);
             let offset_m = spawn.offset.as_ref().map_or(0.0, |offset| rounded_into(number(offset), OFFSET_M));
-            if spawn_out_of_bounds(speed_mps, distance_m, offset_m, None).is_some() {
+            let figures = SpawnFigures { speed_mps, distance_m, offset_m, ..SpawnFigures::default() };
+            if figures.out_of_bounds().is_some() {
                 return false;
             }
             // The spawn lands where it was asked to, and no gap is unfair.

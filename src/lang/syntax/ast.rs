@@ -282,10 +282,12 @@ pub struct Manoeuvre {
     pub phases: Vec<Phase>,
 }
 
-/// `once npc.gap <= 20 m within 10 s after 1 s { speed: 0 m/s }`.
+/// `once npc.gap <= 20 m for 0.5 s within 10 s after 1 s { speed: 0 m/s }`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Phase {
     pub once: Option<Expr>,
+    /// How long `once` must have held.
+    pub held: Option<Expr>,
     pub within: Option<Expr>,
     pub after: Option<Expr>,
     pub fields: Vec<Field>,
@@ -481,8 +483,9 @@ pub struct Step {
     pub action: Call,
     /// The drawn parameters.
     pub drawn: Vec<Field>,
-    /// The condition that the action waits for, and how long it waits from then on.
+    /// The condition that the action waits for, how long it must have held, and how long the action waits from then on.
     pub once: Option<Expr>,
+    pub held: Option<Expr>,
     pub after: Option<Expr>,
     #[serde(skip)]
     pub span: Span,

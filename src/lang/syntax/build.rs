@@ -234,9 +234,18 @@ impl Builder {
     fn phase(&self, pair: Pair<'_, Rule>) -> Built<Phase> {
         let span = self.span(&pair);
         let mut parts = Parts::of(pair);
+        let (once, held) = self.once(&mut parts)?;
         let mut clause = |rule| parts.take(rule).map(|clause| self.only_expression(clause)).transpose();
-        let (once, within, after) = (clause(Rule::once)?, clause(Rule::within_time)?, clause(Rule::after)?);
-        Ok(Phase { once, within, after, fields: self.fields(parts.next())?, span })
+        let (within, after) = (clause(Rule::within_time)?, clause(Rule::after)?);
+        Ok(Phase { once, held, within, after, fields: self.fields(parts.next())?, span })
+    }
+
+    /// `once npc.speed <= 1 m/s for 2 s`: the condition, and how long it must have held.
+    fn once(&self, parts: &mut Parts<'_>) -> Built<(Option<Expr>, Option<Expr>)> {
+        let Some(once) = parts.take(Rule::once) else { return Ok((None, None)) };
+        let mut parts = Parts::of(once);
+        let condition = self.expression(parts.next())?;
+        Ok((Some(condition), parts.take(Rule::held).map(|held| self.only_expression(held)).transpose()?))
     }
 
     fn action(&self, mut parts: Parts<'_>) -> Built<Action> {
@@ -420,9 +429,9 @@ impl Builder {
             let fields = drawn.into_inner().find(|part| part.as_rule() == Rule::fields);
             self.fields(fields.expect("`with` has fields"))
         })?;
-        let once = parts.take(Rule::once).map(|once| self.only_expression(once)).transpose()?;
+        let (once, held) = self.once(&mut parts)?;
         let after = parts.take(Rule::after).map(|after| self.only_expression(after)).transpose()?;
-        Ok(Step { number, action, drawn, once, after, span })
+        Ok(Step { number, action, drawn, once, held, after, span })
     }
 
     fn policy(&self, mut parts: Parts<'_>) -> Built<Policy> {

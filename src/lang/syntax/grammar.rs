@@ -137,6 +137,7 @@ pub fn role(rule: Rule) -> Role {
         Rule::kw_with | Rule::drawn => Role::Said("`with`"),
         Rule::kw_by => Role::Said("`by`"),
         Rule::kw_during | Rule::during => Role::Said("`during`"),
+        Rule::kw_for | Rule::held => Role::Said("`for`"),
         Rule::kw_once | Rule::once => Role::Said("`once`"),
         Rule::kw_after | Rule::after => Role::Said("`after`"),
         Rule::kw_expect | Rule::expect => Role::Said("`expect`"),

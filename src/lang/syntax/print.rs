@@ -662,7 +662,8 @@ fn fn_params(params: &[FnParam]) -> Layout {
 
 fn phase(phase: &Phase) -> Layout {
     let mut parts = Vec::new();
-    for (keyword, clause) in [("once ", &phase.once), ("within ", &phase.within), ("after ", &phase.after)] {
+    let Phase { once, held, within, after, .. } = phase;
+    for (keyword, clause) in [("once ", once), ("for ", held), ("within ", within), ("after ", after)] {
         parts.extend(
             clause.iter().flat_map(|clause| [Layout::text(keyword), expression(clause), Layout::text(" ")]),
         );
@@ -689,7 +690,7 @@ fn step(step: &Step) -> Layout {
     if !step.drawn.is_empty() {
         parts.extend([Layout::text(" with "), fields(&step.drawn)]);
     }
-    for (keyword, clause) in [(" once ", &step.once), (" after ", &step.after)] {
+    for (keyword, clause) in [(" once ", &step.once), (" for ", &step.held), (" after ", &step.after)] {
         parts.extend(clause.iter().flat_map(|clause| [Layout::text(keyword), expression(clause)]));
     }
     Layout::Row(parts)

@@ -255,17 +255,23 @@ fn item() -> impl Strategy<Value = ItemKind> {
         span: Span::NONE,
     });
     let entries = || entries(expr());
-    let scenario =
-        (name(), name(), entries(), entries(), entries(), prop::option::of(expr()), prop::option::of(expr()))
-            .prop_map(|(name, road, origin, start, drawn, once, after)| {
-                let args = start
-                    .iter()
-                    .map(|entry| Arg { name: Some(entry.name.clone()), value: entry.value.clone() });
-                let action = Call { name: name.clone(), args: args.collect(), span: Span::NONE };
-                let number = Number { digits: "0".to_owned(), unit: None, span: Span::NONE };
-                let steps = vec![Step { number, action, drawn, once, after, span: Span::NONE }];
-                ItemKind::Scenario(Scenario { name, origin, road, start, steps, expects: Vec::new() })
-            });
+    let when = || {
+        let maybe = || prop::option::of(expr());
+        (maybe(), maybe(), maybe()).prop_map(|(once, held, after)| {
+            let held = held.filter(|_| once.is_some());
+            (once, held, after)
+        })
+    };
+    let scenario = (name(), name(), entries(), entries(), entries(), when()).prop_map(
+        |(name, road, origin, start, drawn, (once, held, after))| {
+            let args =
+                start.iter().map(|entry| Arg { name: Some(entry.name.clone()), value: entry.value.clone() });
+            let action = Call { name: name.clone(), args: args.collect(), span: Span::NONE };
+            let number = Number { digits: "0".to_owned(), unit: None, span: Span::NONE };
+            let steps = vec![Step { number, action, drawn, once, held, after, span: Span::NONE }];
+            ItemKind::Scenario(Scenario { name, origin, road, start, steps, expects: Vec::new() })
+        },
+    );
     prop_oneof![
         (name(), expr()).prop_map(|(name, value)| ItemKind::Let(Let { name, value })),
         (name(), expr())

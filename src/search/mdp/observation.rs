@@ -109,7 +109,7 @@ fn beyond(world: &World, moment: &MomentFacts) -> [f64; BEYOND_LEN] {
         world.conflict_ahead_m().unwrap_or(LOOK_AHEAD_M).min(LOOK_AHEAD_M),
         second_ahead_m,
         second_left_m,
-        newest.map_or(0.0, |obstacle| 1.0 + f64::from(obstacle.verb as u8)),
+        newest.map_or(0.0, |obstacle| 1.0 + f64::from(obstacle.verb.as_policies_know() as u8)),
         newest_ahead_m,
         newest_left_m,
         newest_age_s.min(LOOK_AHEAD_S),

@@ -2,7 +2,7 @@
 //! no state itself.
 
 use avastra_lang::model::command::Command;
-use avastra_lang::model::expr::Expr;
+use avastra_lang::model::expr::{Expr, Who};
 use avastra_lang::model::{PhaseDef, Value};
 
 use super::later::{Later, LaterMoment};
@@ -37,17 +37,24 @@ impl Course {
 
     /// The names of road users that its phases and their rules ask about: several phases may be asked in one tick.
     pub fn bearers(&self) -> Vec<usize> {
+        let name = |who: Who| who.bearer(&self.later.locals);
+        let asked = |expr: &Expr| expr.asked().into_iter().map(name).collect::<Vec<_>>();
         let parts = |phase: &'_ PhaseDef| -> Vec<usize> {
-            let PhaseDef { once, within, after, command } = phase;
-            let parts = once.iter().chain(within).chain(after).chain(command.parts());
-            parts.flat_map(Expr::bearers).collect()
+            let PhaseDef { once, held, within, after, command } = phase;
+            let parts = once.iter().chain(held).chain(within).chain(after).chain(command.parts());
+            parts.flat_map(asked).collect()
         };
-        self.phases.iter().flat_map(parts).chain(self.rules.iter().flat_map(Expr::bearers)).collect()
+        self.phases.iter().flat_map(parts).chain(self.rules.iter().flat_map(asked)).collect()
     }
 
     /// Whether what a phase waits for has come.
     pub fn has_come(&self, phase: usize, moment: &LaterMoment) -> bool {
         self.phase(phase).once.as_ref().is_none_or(|once| self.later.value(once, moment).truth())
+    }
+
+    /// How long that must have held without a break, s.
+    pub fn held_s(&self, phase: usize, moment: &LaterMoment) -> f64 {
+        self.time_s(self.phase(phase).held.as_ref(), moment)
     }
 
     /// How long a phase waits for that, s; `None` if it waits for ever. A time without a value (a division by 0) is over.
@@ -57,7 +64,11 @@ impl Course {
 
     /// How long a phase waits after that, s.
     pub fn after_s(&self, phase: usize, moment: &LaterMoment) -> f64 {
-        self.phase(phase).after.as_ref().map_or(0.0, |after| not_negative(self.later.value(after, moment)))
+        self.time_s(self.phase(phase).after.as_ref(), moment)
+    }
+
+    fn time_s(&self, written: Option<&Expr>, moment: &LaterMoment) -> f64 {
+        written.map_or(0.0, |time| not_negative(self.later.value(time, moment)))
     }
 
     /// Whether the rules let a phase begin.
@@ -66,7 +77,7 @@ impl Course {
     }
 
     /// What a phase tells the vehicle, within what an order may say. `None` if its speed or its offset has no value; a
-    /// `rate`, an `aside` or a `headway` without one is left out.
+    /// `rate`, an `aside` or a `time_gap` without one is left out.
     pub fn command(&self, phase: usize, moment: &LaterMoment) -> Option<Command> {
         self.later.command(&self.phase(phase).command, moment).within_bounds()
     }

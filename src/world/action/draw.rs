@@ -9,7 +9,7 @@ use crate::action::{Course, Effect, LaneChangeRules, OrderRequest, SpawnRequest}
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 use avastra_lang::model::body::{OwnBody, parameters};
-use avastra_lang::model::command::{IgnoredRules, OFFSET_M};
+use avastra_lang::model::command::{IgnoredRules, Needs, OFFSET_M};
 use avastra_lang::model::expr::Expr;
 use avastra_lang::model::rules::{
     Before, Candidate, Choose, Clause, Nearest, Room, RowRules, TRIES_MAX, Unsolved,
@@ -17,7 +17,7 @@ use avastra_lang::model::rules::{
 use avastra_lang::model::{
     ActionDef, BodyWord, Domain, EffectDef, Facts, MEET, ManoeuvreCall, ManoeuvreDef, Memory, MomentFacts,
     NpcFacts, OrderDef, Parameter, REPEAT, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value,
-    WorldFacts, evaluate, locals, rounded_into, spawn_out_of_bounds,
+    WAITS_S, WorldFacts, evaluate, locals, rounded_into,
 };
 
 /// Draws of one row in a step before the row is refused. Every draw obeys what can be known before; a further one
@@ -165,9 +165,7 @@ impl<'a> Judge<'a> {
                     continue;
                 }
             };
-            if let Some(reason) =
-                spawn_out_of_bounds(request.speed_mps, request.distance_m, request.offset_m, request.meet)
-            {
+            if let Some(reason) = request.figures().out_of_bounds() {
                 refusals.push(refuse(None, reason));
                 continue;
             }
@@ -309,6 +307,10 @@ impl<'a> Judge<'a> {
                 .meet
                 .as_ref()
                 .map(|meet| rounded_into(evaluate(meet, functions, &facts).number(), MEET)),
+            waits_s: spawn
+                .waits
+                .as_ref()
+                .map(|waits| rounded_into(evaluate(waits, functions, &facts).number(), WAITS_S)),
             siren: spawn.siren.as_ref().is_some_and(|siren| evaluate(siren, functions, &facts).truth()),
             turn: spawn.turn.as_ref().map(|turn| turn.word(functions, &facts)),
             bearer: spawn.bearer,
@@ -318,11 +320,9 @@ impl<'a> Judge<'a> {
     fn order(&self, order: &OrderDef, locals: &[Value], after: &Memory) -> OrderRequest {
         let facts = self.facts(locals, after);
         let command = order.command.evaluate(&self.row.space.functions, &facts);
-        let drives = order.manoeuvre.as_ref().is_some_and(|call| {
-            let ManoeuvreDef { phases, .. } = &self.row.space.manoeuvres[call.manoeuvre];
-            phases.iter().any(|phase| !phase.command.is_for_feet())
-        });
-        OrderRequest { bearer: order.bearer, command, drives }
+        let needs = |call: &ManoeuvreCall| self.row.space.manoeuvres[call.manoeuvre].needs();
+        let needs = order.manoeuvre.as_ref().map_or(Needs::Legs, needs);
+        OrderRequest { bearer: order.who.bearer(locals), command, needs }
     }
 
     /// Why an order cannot be given after the effects before it. Somebody whom one of them spawns under that name is there.
@@ -351,8 +351,9 @@ impl<'a> Judge<'a> {
 
     /// What the world says before it is asked about spawns.
     fn world(&self) -> WorldFacts {
-        let bearers = self.bearers.clone();
-        WorldFacts { moment: self.moment, step: self.situation.step, bearers, ..WorldFacts::default() }
+        let (bearers, happened_s) = (self.bearers.clone(), self.situation.happened_s.to_vec());
+        let step = self.situation.step;
+        WorldFacts { moment: self.moment, step, bearers, happened_s, ..WorldFacts::default() }
     }
 
     /// Why there are no values, in words.

@@ -1,12 +1,14 @@
 //! What a row does to the world once its parameters are drawn.
 
 use avastra_lang::model::body::OwnBody;
-use avastra_lang::model::command::{Command, IgnoredRules, ON_FOOT};
+use avastra_lang::model::command::{Command, IgnoredRules, Needs};
 use avastra_lang::model::expr::Expr;
 use avastra_lang::model::vocabulary::{
     Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Turning, Verb,
 };
-use avastra_lang::model::{Memory, MomentFacts, NpcFacts, Space, SpawnFacts, StateDef, StateMeaning};
+use avastra_lang::model::{
+    Memory, MomentFacts, NpcFacts, Space, SpawnFacts, SpawnFigures, StateDef, StateMeaning,
+};
 
 use super::later::{Later, LaterMoment};
 
@@ -27,15 +29,14 @@ pub struct OrderRequest {
     pub bearer: usize,
     /// Empty for an order of a manoeuvre alone.
     pub command: Command,
-    /// Whether a phase of its manoeuvre says more than a speed, so that nobody on foot can do it.
-    pub drives: bool,
+    /// What the phases of its manoeuvre need.
+    pub needs: Needs,
 }
 
 impl OrderRequest {
     /// Why nobody of that kind can be told this, in words; `None` if they can.
     pub fn impossible(&self, verb: Verb) -> Option<String> {
-        let drives = || (self.drives && verb == Verb::Walk).then(|| ON_FOOT.to_owned());
-        self.command.impossible(verb).or_else(drives)
+        self.command.impossible(verb).or_else(|| self.needs.lacked_by(verb))
     }
 }
 
@@ -66,12 +67,22 @@ pub struct SpawnRequest {
     pub ignores: IgnoredRules,
     /// The part of the ego vehicle's front at which it is met, from the side that it comes from; for `Walk` alone.
     pub meet: Option<f64>,
+    /// How long it stands at the kerb before it sets out, s; for `Walk` alone. Without it it sets out so as to meet the ego
+    /// vehicle.
+    pub waits_s: Option<f64>,
     /// Whether it is an emergency vehicle under way.
     pub siren: bool,
     /// Where it goes at the next junction; with `CrossRoad` at the one where it crosses the ego vehicle's way.
     pub turn: Option<Turning>,
     /// The name that it bears, by its index in the space.
     pub bearer: Option<usize>,
+}
+
+impl SpawnRequest {
+    pub fn figures(&self) -> SpawnFigures {
+        let SpawnRequest { speed_mps, distance_m, offset_m, meet, waits_s, .. } = *self;
+        SpawnFigures { speed_mps, distance_m, offset_m, meet, waits_s }
+    }
 }
 
 impl Effect {

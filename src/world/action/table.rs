@@ -25,6 +25,8 @@ pub struct Situation<'a> {
     pub seed: u64,
     /// Number of the step, from 0.
     pub step: u64,
+    /// When each action last happened, s since the episode began, minus infinity for never; empty if the space does not ask.
+    pub happened_s: &'a [f64],
 }
 
 /// What choosing a legal row would do now, or why the row is refused.
@@ -95,7 +97,7 @@ impl ActionTable {
         let Situation { memory, road, .. } = *situation;
         let space = &self.space;
         let asks = |action: &ActionDef| action.odds.asks_the_world();
-        let bearers = || space.actions.iter().flat_map(|action| action.odds.bearers());
+        let bearers = || space.actions.iter().flat_map(|action| action.odds.bearers(space.bearers.len()));
         let world = space.actions.iter().any(asks).then(|| world_facts(situation, bearers()));
         let facts = Facts { road: Some(&road.facts), world: world.as_ref(), ..Facts::new(&[], memory) };
         let odds = |action: &ActionDef| evaluate(&action.odds, &space.functions, &facts).number() as u32;
@@ -164,5 +166,11 @@ impl ActionTable {
 fn world_facts(situation: &Situation<'_>, bearers: impl Iterator<Item = usize>) -> WorldFacts {
     let Situation { surroundings, step, .. } = *situation;
     let bearers = bearers.filter_map(|who| Some((who, surroundings.bearer(who)?))).collect();
-    WorldFacts { moment: surroundings.moment(), step, bearers, ..WorldFacts::default() }
+    WorldFacts {
+        moment: surroundings.moment(),
+        step,
+        bearers,
+        happened_s: situation.happened_s.to_vec(),
+        ..WorldFacts::default()
+    }
 }

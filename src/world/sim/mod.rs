@@ -40,6 +40,7 @@ mod sense;
 #[macro_use]
 mod settings;
 mod signals;
+mod stroller;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 #[cfg(test)]

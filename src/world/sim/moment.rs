@@ -2,7 +2,9 @@
 //! user. Rules, policies and the paper's state variables read the same ones.
 
 use avastra_lang::model::vocabulary::Light;
-use avastra_lang::model::{MomentFacts, NpcFacts, OnRoute, TIME_S_MAX, junction_ahead_m};
+use avastra_lang::model::{
+    JUNCTION_AHEAD_M_MAX, MomentFacts, NpcFacts, OnRoute, TIME_S_MAX, junction_ahead_m,
+};
 
 use super::around::Around;
 use super::ego::VehicleParameters;
@@ -54,6 +56,7 @@ impl Around<'_> {
             ego_acceleration_mps2: self.ego.acceleration_mps2,
             ego_limit_mps: limit_mps,
             ego_junction_ahead_m: junction_ahead_m,
+            ego_crosswalk_ahead_m: self.crosswalk_ahead_m(),
             ego_route_left_m: route_left_m,
             ego_offset_m: self.ego_offset_m,
             ego_front_m: VehicleParameters::MKZ.front_m(self.ego_station_m),
@@ -70,6 +73,14 @@ impl Around<'_> {
             // The number nearest to the exact time, so that `elapsed >= 0.7 s` holds at 0.7 s.
             elapsed_s: (self.tick as f64 * DT_S * 1000.0).round() / 1000.0,
         }
+    }
+
+    /// Along the route to the next crosswalk, m: 0 on one, [`JUNCTION_AHEAD_M_MAX`] if there is none nearer.
+    fn crosswalk_ahead_m(&self) -> f64 {
+        let from_m = self.ego_station_m;
+        let mut ahead = self.scene.route.crosswalks_m.iter().filter(|(_, end_m)| *end_m >= from_m);
+        let begin_m = ahead.next().map_or(f64::INFINITY, |(begin_m, _)| *begin_m);
+        (begin_m - from_m).clamp(0.0, JUNCTION_AHEAD_M_MAX)
     }
 
     /// What the ego vehicle's place says.
@@ -112,7 +123,7 @@ pub(super) fn npc_facts(around: &Around, obstacle: &Obstacle, motion: &Motion) -
     let scene = around.scene;
     match motion {
         Motion::Drive(driver) => driver_facts(around, obstacle, driver),
-        Motion::Walk(_) | Motion::Stand => {
+        Motion::Walk(_) | Motion::Stroll(_) | Motion::Stand => {
             let station_m = scene.route.path.project(obstacle.outline.pose.position).station_m;
             let beside = OnRoute::at(&scene.map, &scene.route, station_m);
             facts(around, obstacle, beside.limit_mps, beside.junction_ahead_m)
@@ -240,8 +251,15 @@ mod tests {
             let scene = Arc::new(Scene::new(road.map.clone(), road.route.clone()));
             let world = World::new(scene, &testing::start());
             let memory = space.initial_memory(1);
-            let situation =
-                Situation { memory: &memory, road, rules: &rules, surroundings: &world, seed: 1, step: 0 };
+            let situation = Situation {
+                memory: &memory,
+                road,
+                rules: &rules,
+                surroundings: &world,
+                seed: 1,
+                step: 0,
+                happened_s: &[],
+            };
             for row in space.rows.iter().filter(is_changer) {
                 let Ok(draw) = table.offer(&situation, row.index) else { continue };
                 assert!(draw.lane_changes.is_some(), "the rule binds it");

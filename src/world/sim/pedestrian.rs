@@ -112,6 +112,8 @@ impl Meeting {
 pub(super) struct Walk {
     /// To be met at a point, rather than in the middle and for any manner.
     pub meeting: Option<Meeting>,
+    /// How long it waits at the kerb, s, rather than for a meeting.
+    pub waits_s: Option<f64>,
     /// Where it begins, facing its end.
     pub from: Pose,
     /// From kerb to kerb, m.
@@ -160,11 +162,12 @@ pub(super) struct Walker {
 impl Walker {
     /// A pedestrian who is to walk; the manner is drawn.
     pub fn new(walk: Walk, spawn_tick: u64, rng: &mut Rng) -> Walker {
-        let Walk { meeting, from, way_m, beyond_m, speed_mps, meets_s } = walk;
-        let waits_s = if meeting.is_some() { MEETING_S_MAX } else { meets_s.clamp(WAIT_S, WAIT_S_MAX) };
-        let begins_tick = spawn_tick + ticks(waits_s);
+        let Walk { meeting, waits_s, from, way_m, beyond_m, speed_mps, meets_s } = walk;
+        let is_told = meeting.is_some() || waits_s.is_some();
+        let for_meeting_s = if meeting.is_some() { MEETING_S_MAX } else { meets_s.clamp(WAIT_S, WAIT_S_MAX) };
+        let begins_tick = spawn_tick + ticks(waits_s.unwrap_or(for_meeting_s));
         let drawn = Manner::draw(rng);
-        let manner = if meeting.is_some() { Manner::Steady } else { drawn };
+        let manner = if is_told { Manner::Steady } else { drawn };
         Walker {
             meeting,
             from,
@@ -320,7 +323,9 @@ impl Walker {
         let right_m = if self.returns { ASIDE_M } else { -ASIDE_M };
         self.wants_aside_m = if self.meets_pedestrian(around) { right_m } else { 0.0 };
         let startled = self.manner == Manner::Startled && self.startle_ticks > 0;
-        if self.is_blocked(this, around) {
+        // One that was told to turn round has not done so yet.
+        let pose = if self.is_told { self.moved(this).pose } else { this.outline.pose };
+        if is_blocked(pose, this, around) {
             self.pace_mps = 0.0;
         } else if startled
             && (self.pace_mps == 0.0 || soonest_s(&this.outline, this.elevation_m, around) < STARTLE_S)
@@ -334,20 +339,6 @@ impl Walker {
         }
     }
 
-    /// Whether something stands or passes right before its feet.
-    fn is_blocked(&self, this: &Obstacle, around: &Around) -> bool {
-        // One that was told to turn round has not done so yet.
-        let pose = if self.is_told { self.moved(this).pose } else { this.outline.pose };
-        let next = OrientedBox { pose: pose.offset(STEP_M, 0.0), ..this.outline };
-        around.others().any(|Other { outline, elevation_m, .. }| {
-            let reach_m = outline.half_length_m + outline.half_width_m + 2.0;
-            let away = outline.pose.position - next.pose.position;
-            away.norm_squared() < reach_m * reach_m
-                && distance_m(&next, outline) < ROOM_M
-                && !is_apart(this.elevation_m, elevation_m)
-        })
-    }
-
     /// Whether another pedestrian is ahead on about the same line.
     fn meets_pedestrian(&self, around: &Around) -> bool {
         around.obstacles().filter(|other| !other.body.is_vehicle()).any(|other| {
@@ -357,6 +348,18 @@ impl Walker {
             (-1.0..MEET_M).contains(&ahead_m) && self.along.perp(&away).abs() < 2.0 * ASIDE_M
         })
     }
+}
+
+/// Whether something stands or passes right before the feet of somebody at a pose.
+pub(super) fn is_blocked(pose: Pose, this: &Obstacle, around: &Around) -> bool {
+    let next = OrientedBox { pose: pose.offset(STEP_M, 0.0), ..this.outline };
+    around.others().any(|Other { outline, elevation_m, .. }| {
+        let reach_m = outline.half_length_m + outline.half_width_m + 2.0;
+        let away = outline.pose.position - next.pose.position;
+        away.norm_squared() < reach_m * reach_m
+            && distance_m(&next, outline) < ROOM_M
+            && !is_apart(this.elevation_m, elevation_m)
+    })
 }
 
 /// Time until the first vehicle would reach an outline at a height (m) if all vehicles keep their velocity, s.

@@ -235,7 +235,9 @@ impl Rights {
                 self.is_foreseen = stands && (self.is_foreseen || has_time());
                 self.watch_driver(this, driver, ego_passed, around);
             }
-            Motion::Walk(_) | Motion::Stand => self.watch_pedestrian(this, in_sight, around),
+            Motion::Walk(_) | Motion::Stroll(_) | Motion::Stand => {
+                self.watch_pedestrian(this, in_sight, around)
+            }
         }
     }
 
@@ -269,7 +271,7 @@ impl Rights {
                 };
                 (found.or_else(by_lane).unwrap_or(Priority::None), self.is_foreseen)
             }
-            Motion::Walk(_) | Motion::Stand => {
+            Motion::Walk(_) | Motion::Stroll(_) | Motion::Stand => {
                 let by_time = || on_foot(&Strip::of(this, around), around);
                 (found.unwrap_or_else(by_time), around.ego.speed_mps <= WALKING_MPS)
             }

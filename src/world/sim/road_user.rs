@@ -16,8 +16,9 @@ use super::body::BodyParameters;
 use super::npc::{Driver, View};
 use super::pedestrian::Walker;
 use super::right_of_way::{Rights, SIDEWAYS_MPS};
+use super::stroller::Stroller;
 use super::trace::Trace;
-use super::world::DT_S;
+use super::world::{DT_S, ticks};
 
 /// How long a wreck stays where it came to rest, s; longer while the ego vehicle sees it.
 const WRECK_S: f64 = 2.0;
@@ -111,8 +112,8 @@ pub(super) struct Running {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stage {
-    /// Until what the phase waits for has come.
-    Waiting,
+    /// Until what the phase waits for has held for long enough: the tick since which it has held.
+    Waiting(Option<u64>),
     /// Until this tick, and until the rules let the phase begin.
     Holding(u64),
     /// Until the road user has done what it was told.
@@ -128,6 +129,8 @@ pub(super) struct Progress {
     pub is_aside: bool,
     /// Whether the junction at which it was told to turn is behind it.
     pub has_turned: bool,
+    /// Whether it is beside the ego vehicle as it was told, or was.
+    pub has_met: bool,
     pub on_foot: bool,
     /// Whether it is where its walk ends, this way or back: no speed would get it farther.
     pub is_over: bool,
@@ -136,7 +139,9 @@ pub(super) struct Progress {
 impl Progress {
     /// Whether it has done what a command says.
     pub fn meets(&self, command: &Command) -> bool {
-        command.speed_mps.is_none_or(|mps| self.is_over || has_speed(self.speed_mps, mps))
+        let speed_mps = command.speed_mps.filter(|_| !command.pursues());
+        speed_mps.is_none_or(|mps| self.is_over || has_speed(self.speed_mps, mps))
+            && (self.has_met || !command.pursues())
             && (self.is_aside || !command.goes_aside())
             && (self.has_turned || command.turn.is_none())
     }
@@ -154,7 +159,7 @@ pub(super) struct Advance {
 
 impl Running {
     pub fn new(course: Arc<Course>, tick: u64) -> Running {
-        Running { course, phase: 0, stage: Stage::Waiting, since: tick }
+        Running { course, phase: 0, stage: Stage::Waiting(None), since: tick }
     }
 
     /// The phase that is under way: its manoeuvre, by its index in the space, its number from 1, and the tick in which it
@@ -175,11 +180,15 @@ impl Running {
         let over = |ended| Advance { rest: None, command: None, ended };
         loop {
             match self.stage {
-                Stage::Waiting if self.course.has_come(self.phase, moment) => {
-                    let holds = super::world::ticks(self.course.after_s(self.phase, moment));
-                    (self.stage, self.since) = (Stage::Holding(tick.saturating_add(holds)), tick);
-                }
-                Stage::Waiting => {
+                Stage::Waiting(held) => {
+                    let held = self.course.has_come(self.phase, moment).then(|| held.unwrap_or(tick));
+                    let is_long = |since: u64| tick - since >= ticks(self.course.held_s(self.phase, moment));
+                    if held.is_some_and(is_long) {
+                        let holds = ticks(self.course.after_s(self.phase, moment));
+                        (self.stage, self.since) = (Stage::Holding(tick.saturating_add(holds)), tick);
+                        continue;
+                    }
+                    self.stage = Stage::Waiting(held);
                     let waited_s = (tick - self.since) as f64 * DT_S;
                     let is_over =
                         self.course.within_s(self.phase, moment).is_some_and(|most_s| waited_s >= most_s);
@@ -194,7 +203,7 @@ impl Running {
                 Stage::UnderWay(command) if tick > self.since && progress.meets(&command) => {
                     self.phase += 1;
                     ended += 1;
-                    (self.stage, self.since) = (Stage::Waiting, tick);
+                    (self.stage, self.since) = (Stage::Waiting(None), tick);
                     if self.phase == self.course.phases() {
                         return over(ended);
                     }
@@ -209,7 +218,7 @@ impl Running {
     fn trace(&self, trace: &mut Trace) {
         trace.words([self.phase as u64, self.since]);
         match self.stage {
-            Stage::Waiting => trace.words([0, 0]),
+            Stage::Waiting(held) => trace.words([0, held.map_or(0, |tick| tick + 1)]),
             Stage::Holding(until) => trace.words([1, until]),
             Stage::UnderWay(command) => {
                 trace.words([2, command.speed_mps.map_or(u64::MAX, f64::to_bits)]);
@@ -218,6 +227,9 @@ impl Running {
                 }
                 if command.turn.is_some() {
                     trace.word(2);
+                }
+                if command.pursues() {
+                    trace.word(3);
                 }
             }
         }
@@ -236,21 +248,35 @@ fn has_speed(now_mps: f64, wanted_mps: f64) -> bool {
 pub(super) enum Motion {
     Drive(Driver),
     Walk(Walker),
+    Stroll(Stroller),
     Stand,
 }
 
 impl Motion {
     /// How far it is with what it was told; `None` for who only stands.
-    pub fn progress(&self) -> Option<Progress> {
+    pub fn progress(&self, around: &Around) -> Option<Progress> {
+        let on_foot = |speed_mps, is_aside, is_over| Progress {
+            speed_mps,
+            is_aside,
+            has_turned: true,
+            has_met: true,
+            on_foot: true,
+            is_over,
+        };
         match self {
             Motion::Drive(driver) => {
                 let (is_aside, has_turned) = (driver.is_aside_as_told(), driver.has_turned());
-                let speed_mps = driver.speed_mps;
-                Some(Progress { speed_mps, is_aside, has_turned, on_foot: false, is_over: false })
+                let (speed_mps, has_met) = (driver.speed_mps, driver.has_met());
+                Some(Progress { speed_mps, is_aside, has_turned, has_met, on_foot: false, is_over: false })
             }
             Motion::Walk(walker) => {
                 let (speed_mps, is_over) = (walker.pace_mps(), walker.is_over());
-                Some(Progress { speed_mps, is_aside: true, has_turned: true, on_foot: true, is_over })
+                Some(on_foot(speed_mps, true, is_over))
+            }
+            Motion::Stroll(stroller) => {
+                let (speed_mps, is_aside) = (stroller.pace_mps(), stroller.is_aside());
+                let is_over = stroller.is_over(around);
+                Some(on_foot(speed_mps, is_aside, is_over))
             }
             Motion::Stand => None,
         }
@@ -263,6 +289,7 @@ impl Motion {
             Motion::Walk(walker) => {
                 command.speed_mps.iter().for_each(|speed_mps| walker.order(*speed_mps, tick));
             }
+            Motion::Stroll(stroller) => stroller.order(command),
             Motion::Stand => {}
         }
     }
@@ -357,7 +384,7 @@ impl Mover {
     pub fn elevation_m(&self) -> Option<f64> {
         match &self.motion {
             Motion::Drive(driver) => Some(driver.way.height_at(driver.station_m)),
-            Motion::Walk(_) | Motion::Stand => None,
+            Motion::Walk(_) | Motion::Stroll(_) | Motion::Stand => None,
         }
     }
 
@@ -388,7 +415,7 @@ impl Mover {
             _ if self.is_wreck() => this.velocity_mps == Vec2::zeros(),
             // One that stands within a manoeuvre may go on by itself.
             Motion::Drive(driver) => driver.has_given_up() || self.course.is_none() && driver.is_parked(),
-            Motion::Walk(_) | Motion::Stand => false,
+            Motion::Walk(_) | Motion::Stroll(_) | Motion::Stand => false,
         }
     }
 
@@ -413,16 +440,17 @@ impl Mover {
                 }
                 moved
             }
-            Motion::Walk(_) if self.touched => Some(rest),
+            Motion::Walk(_) | Motion::Stroll(_) if self.touched => Some(rest),
             // Who has still something to do does not leave.
             Motion::Walk(walker) => walker.step(this, in_sight || self.course.is_some(), around),
+            Motion::Stroll(stroller) => stroller.step(this, in_sight || self.course.is_some(), around),
             Motion::Stand => Some(rest),
         }
     }
 
     /// The area that it sweeps within a tick.
     pub fn sweep(&self, mut start: OrientedBox, end: Pose) -> Sweep {
-        if let Motion::Walk(_) = self.motion {
+        if let Motion::Walk(_) | Motion::Stroll(_) = self.motion {
             // A person turns round on the spot, so the corners of its box must not sweep half a circle within a tick.
             start.pose.heading_rad = end.heading_rad;
         }
@@ -460,6 +488,7 @@ impl Mover {
         match &self.motion {
             Motion::Drive(driver) => driver.trace(trace),
             Motion::Walk(walker) => walker.trace(trace),
+            Motion::Stroll(stroller) => stroller.trace(trace),
             Motion::Stand => {}
         }
     }

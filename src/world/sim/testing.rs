@@ -71,7 +71,7 @@ pub fn digest(world: &World) -> [u8; 32] {
 
 /// A road user that appears in the ego vehicle's lane, or from the right: on foot if the verb is.
 pub fn request(verb: Verb, distance_m: f64, speed_mps: f64) -> SpawnRequest {
-    let on_foot = matches!(verb, Verb::Walk | Verb::Stand);
+    let on_foot = verb.is_on_foot();
     SpawnRequest {
         body: if on_foot { Body::Pedestrian } else { Body::Sedan },
         colour: Colour::Red,
@@ -89,6 +89,7 @@ pub fn request(verb: Verb, distance_m: f64, speed_mps: f64) -> SpawnRequest {
         siren: false,
         turn: None,
         meet: None,
+        waits_s: None,
         bearer: None,
     }
 }

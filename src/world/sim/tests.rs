@@ -1,6 +1,7 @@
 //! What road users do: every verb on a hand-made road, and what must hold of all of them.
 
 mod levels;
+mod told;
 mod vehicles;
 
 use std::sync::Arc;
@@ -90,7 +91,7 @@ fn impossible_spawns_are_refused() {
         assert_eq!(refusal, format!("the spawn's distance is {distance_m} m, possible is 0 .. 1000 m"));
     }
     for verb in Verb::ALL {
-        let on_foot = matches!(verb, Verb::Walk | Verb::Stand);
+        let on_foot = verb.is_on_foot();
         let body = if on_foot { Body::SUV } else { Body::Pedestrian };
         let refusal = world.survey(&SpawnRequest { verb: *verb, body, ..ahead }).expect_err("no such body");
         assert_eq!(refusal, if on_foot { "only a pedestrian walks" } else { "a pedestrian does not drive" });

@@ -314,7 +314,7 @@ impl World {
     /// beside its middle, and the junction of its turn is behind it.
     pub fn has_done(&self, id: u32, command: &Command) -> bool {
         let user = self.users.iter().find(|user| user.obstacle.id == id);
-        let progress = user.and_then(|user| user.mover.motion.progress());
+        let progress = user.and_then(|user| user.mover.motion.progress(&self.alone()));
         progress.is_some_and(|progress| progress.meets(command))
     }
 

@@ -162,7 +162,8 @@ mod tests {
             VariableKind::Words { words, .. } => words.iter().map(|(word, _)| *word).collect(),
             VariableKind::Quantity { .. } => Vec::new(),
         };
-        let verbs: Vec<&str> = Verb::ALL.iter().map(|verb| verb.name()).collect();
+        let known = |verb: &&Verb| verb.as_policies_know() == **verb;
+        let verbs: Vec<&str> = Verb::ALL.iter().filter(known).map(|verb| verb.name()).collect();
         assert_eq!(spelt("newest"), [&["None"], verbs.as_slice()].concat());
         let by_day = TimeOfDay::ALL.iter().filter(|time| !time.is_twilight());
         assert_eq!(spelt("time"), by_day.map(|time| time.name()).collect::<Vec<_>>());

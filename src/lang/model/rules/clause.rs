@@ -32,9 +32,15 @@ pub enum Source {
 }
 
 impl Clause {
-    fn new(source: Source, condition: Option<&Expr>, needs: Vec<usize>, reads_effects: bool) -> Clause {
+    fn new(
+        source: Source,
+        condition: Option<&Expr>,
+        needs: Vec<usize>,
+        reads_effects: bool,
+        count: usize,
+    ) -> Clause {
         let asks_the_world = condition.is_some_and(Expr::asks_the_world);
-        let bearers = condition.map(Expr::bearers).unwrap_or_default();
+        let bearers = condition.map(|condition| condition.bearers(count)).unwrap_or_default();
         Clause { source, needs, reads_effects, asks_the_world, bearers }
     }
 
@@ -57,7 +63,7 @@ impl Clause {
 
 /// By action: its `where`s, then the rules that bind it, in the order of their declarations.
 pub(crate) fn clauses(space: &Space) -> Vec<Vec<Clause>> {
-    let Space { actions, rules, states, .. } = space;
+    let Space { actions, rules, states, bearers, .. } = space;
     let binding = rules_by_action(rules, actions.len());
     let of_action = |(index, action): (usize, &ActionDef)| {
         let sets: Vec<&SetDef> = space.sets(Some(index)).collect();
@@ -67,7 +73,7 @@ pub(crate) fn clauses(space: &Space) -> Vec<Vec<Clause>> {
                 let (source, mut needs) = (Source::Where(parameter), locals(condition));
                 let read = states_read(condition, states);
                 let reads_effects = add_effects(&sets, states, read, &mut needs);
-                found.push(Clause::new(source, Some(condition), needs, reads_effects));
+                found.push(Clause::new(source, Some(condition), needs, reads_effects, bearers.len()));
             }
         }
         for &rule in &binding[index] {
@@ -83,7 +89,7 @@ pub(crate) fn clauses(space: &Space) -> Vec<Vec<Clause>> {
             };
             let reads_effects = add_effects(&sets, states, read, &mut needs);
             let condition = demand.and_then(Demand::condition);
-            found.push(Clause::new(Source::Rule(rule), condition, needs, reads_effects));
+            found.push(Clause::new(Source::Rule(rule), condition, needs, reads_effects, bearers.len()));
         }
         found
     };

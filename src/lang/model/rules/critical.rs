@@ -124,6 +124,7 @@ impl Reader<'_> {
             | ExprKind::OfRoadUser(..)
             | ExprKind::OfBearer(..)
             | ExprKind::IsThere(_)
+            | ExprKind::Since(..)
             | ExprKind::OnRoad(_)
             | ExprKind::IsWord(..)
             | ExprKind::IsBody(..) => Form::Known(evaluate(expr, self.functions, &self.facts)),

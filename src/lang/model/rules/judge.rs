@@ -1,7 +1,7 @@
 //! The judgement: which rules a complete choice of values breaks.
 
 use crate::model::eval::{Facts, SpawnFacts, WorldFacts, compare, evaluate, word_of};
-use crate::model::expr::{Expr, ExprKind};
+use crate::model::expr::{Expr, ExprKind, Who};
 use crate::model::rules::{Bound, Clause, Demand, RowRules, Source};
 use crate::model::space::Parameter;
 use crate::model::value::{Memory, Value};
@@ -229,6 +229,7 @@ impl<'a> RowRules<'a> {
             other => self.space.show(other, expr.ty),
         };
         let is_known = |expr: &Expr| evaluate(expr, &self.space.functions, &facts).number().is_finite();
+        let name = |who: Who| &self.space.bearers[who.bearer(&candidate.values)];
         condition.walk(&mut |part| {
             let figure = match &part.kind {
                 ExprKind::Fact(fact) if matches!(fact.known(), Known::World | Known::Spawn) => {
@@ -236,12 +237,13 @@ impl<'a> RowRules<'a> {
                 }
                 ExprKind::OfBearer(who, fact) if is_known(part) => {
                     let fact = fact.name().trim_start_matches("npc.");
-                    format!("{}.{fact} = {}", self.space.bearers[*who], measured(part))
+                    format!("{}.{fact} = {}", name(*who), measured(part))
                 }
+                ExprKind::Since(_, name) => format!("since({name}) = {}", measured(part)),
                 ExprKind::IsThere(who) => {
                     let is_there = evaluate(part, &self.space.functions, &facts).truth();
                     let fate = if is_there { "is there" } else { "is not there" };
-                    format!("`{}` {fate}", self.space.bearers[*who])
+                    format!("`{}` {fate}", name(*who))
                 }
                 ExprKind::Cell(cell) => format!("{} = {}", self.space.cell_name(*cell), value(part)),
                 ExprKind::CellAt(first, key) => {
@@ -288,7 +290,11 @@ impl<'a> RowRules<'a> {
             let is_there = |who: &usize| {
                 facts.world.is_some_and(|world| world.bearers.iter().any(|(known, _)| known == who))
             };
-            let absent = condition.bearers().into_iter().find(|who| !is_there(who));
+            let absent = condition
+                .asked()
+                .into_iter()
+                .map(|who| who.bearer(&candidate.values))
+                .find(|who| !is_there(who));
             let why = match absent {
                 Some(who) => format!("`{}` is not there", self.space.bearers[who]),
                 None => "a division by 0 has no value".to_owned(),

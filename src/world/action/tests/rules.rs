@@ -15,8 +15,15 @@ fn draws_are_short_and_independent_of_each_other() {
     let memory = table.space().initial_memory(3);
     let rules = RulesInForce::by_default(table.space());
     let road = &table.space().roads[0];
-    let situation =
-        Situation { memory: &memory, road, rules: &rules, surroundings: &Plain(0.0), seed: 3, step: 4 };
+    let situation = Situation {
+        memory: &memory,
+        road,
+        rules: &rules,
+        surroundings: &Plain(0.0),
+        seed: 3,
+        step: 4,
+        happened_s: &[],
+    };
     for (row, offer) in table.offers(&situation).iter().enumerate() {
         assert_eq!(*offer, table.offer(&situation, row));
         let Ok(draw) = offer else { continue };
@@ -33,8 +40,15 @@ fn given_values_are_judged_by_the_same_rules() {
     let memory = table.space().initial_memory(3);
     let rules = RulesInForce::by_default(table.space());
     let road = &table.space().roads[0];
-    let situation =
-        Situation { memory: &memory, road, rules: &rules, surroundings: &Plain(0.0), seed: 3, step: 4 };
+    let situation = Situation {
+        memory: &memory,
+        road,
+        rules: &rules,
+        surroundings: &Plain(0.0),
+        seed: 3,
+        step: 4,
+        happened_s: &[],
+    };
     let row = table.rows().iter().position(|row| row.label.starts_with("drive_ahead(lane: Current")).unwrap();
     let mut draw = table.offer(&situation, row).unwrap();
     for (name, value) in &mut draw.values {
@@ -54,8 +68,15 @@ fn a_first_draw_lies_where_its_shares_say() {
     let memory = table.space().initial_memory(3);
     let rules = RulesInForce::by_default(table.space());
     let road = &table.space().roads[0];
-    let situation =
-        Situation { memory: &memory, road, rules: &rules, surroundings: &Plain(0.0), seed: 3, step: 4 };
+    let situation = Situation {
+        memory: &memory,
+        road,
+        rules: &rules,
+        surroundings: &Plain(0.0),
+        seed: 3,
+        step: 4,
+        happened_s: &[],
+    };
     let row = table.rows().iter().position(|row| row.label.starts_with("pedestrian(from: Left")).unwrap();
     let drawn = |shares: &[f64]| {
         let draw = table.offers_at(&situation, shares).swap_remove(row).unwrap();

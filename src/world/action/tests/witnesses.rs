@@ -53,8 +53,15 @@ fn a_chain_of_equalities_is_solved_from_its_end() {
     let rules = RulesInForce::by_default(&space);
     let memory = space.initial_memory(0);
     for step in 0..8 {
-        let situation =
-            Situation { memory: &memory, road, rules: &rules, surroundings: &Plain(0.0), seed: 0, step };
+        let situation = Situation {
+            memory: &memory,
+            road,
+            rules: &rules,
+            surroundings: &Plain(0.0),
+            seed: 0,
+            step,
+            happened_s: &[],
+        };
         let offer = ActionTable::new(space.clone()).offer(&situation, row.index);
         assert!(offer.is_ok(), "{offer:?}");
     }
@@ -75,8 +82,15 @@ fn shipped_rows_have_witnesses_that_run() {
                 let found =
                     witness(space, row, road).unwrap_or_else(|| panic!("{} on {}", row.label, road.name));
                 let memory = &found.memory;
-                let situation =
-                    Situation { memory, road, rules: &rules, surroundings: &Plain(0.0), seed: 0, step: 0 };
+                let situation = Situation {
+                    memory,
+                    road,
+                    rules: &rules,
+                    surroundings: &Plain(0.0),
+                    seed: 0,
+                    step: 0,
+                    happened_s: &[],
+                };
                 let judged = table.check(&situation, row.index, &found.values);
                 assert!(judged.is_ok(), "{} on {}: {judged:?}", row.label, road.name);
             }

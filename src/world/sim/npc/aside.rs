@@ -14,6 +14,7 @@ use crate::sim::trace::Trace;
 
 use super::change::{Whose, duration_s, per_m};
 use super::driver::{Driver, View};
+use super::pursuit::Pursuit;
 
 /// Lanes of one street that are looked through for the one that is meant.
 const LANES_MAX: usize = 8;
@@ -90,10 +91,13 @@ impl Driver {
     /// From now on it does what it is told, as soon as it can. A command that says where to the side replaces all of the last
     /// one that has not begun; what is under way is finished first.
     pub fn order(&mut self, command: &Command) {
-        if let Some(speed_mps) = command.speed_mps {
+        if let Some(pursuit) = Pursuit::told(command) {
+            (self.pursuit, self.ordered_mps2) = (Some(Box::new(pursuit)), command.rate_mps2);
+        } else if let Some(speed_mps) = command.speed_mps {
             (self.cruise_mps, self.ordered_mps2) = (speed_mps, command.rate_mps2);
+            self.pursuit = None;
         }
-        self.time_gap_s = command.headway_s.unwrap_or(self.time_gap_s);
+        self.time_gap_s = command.time_gap_s.unwrap_or(self.time_gap_s);
         self.ignores = command.ignores.unwrap_or(self.ignores);
         self.has_siren = command.siren.unwrap_or(self.has_siren);
         command.turn.iter().for_each(|to| self.mean_to_turn(*to, None));

@@ -29,6 +29,7 @@ use super::aside::Aside;
 use super::change::{Change, PlannedChange};
 use super::leader::{Leader, TIME_GAP_S, following};
 use super::manners::GIVE_UP_S;
+use super::pursuit::Pursuit;
 use super::turn::MeantTurn;
 
 /// IDM: comfortable deceleration, m/s². Ours.
@@ -87,6 +88,8 @@ pub(in crate::sim) struct Driver {
     pub ignores: IgnoredRules,
     /// Whether it is an emergency vehicle under way: it passes lights and signs, and all others wait for it.
     pub has_siren: bool,
+    /// What it was told to do beside the ego vehicle. It says the speed, in place of `cruise_mps`.
+    pub(super) pursuit: Option<Box<Pursuit>>,
     /// Where it was told to go at the next junction.
     pub(super) turn: Option<MeantTurn>,
     pub(super) last_change: Option<Side>,
@@ -139,6 +142,7 @@ impl Driver {
             aside: None,
             ignores: IgnoredRules::default(),
             has_siren: false,
+            pursuit: None,
             turn: None,
             last_change: None,
             plan,
@@ -184,7 +188,7 @@ impl Driver {
         let acceleration_mps2 = if touched {
             -braking_mps2
         } else {
-            self.wanted_mps2(size, around, braking_mps2).clamp(-braking_mps2, size.acceleration_mps2_max)
+            self.wanted_mps2(view, braking_mps2).clamp(-braking_mps2, size.acceleration_mps2_max)
         };
         let speed_mps = (self.speed_mps + acceleration_mps2 * DT_S).max(0.0);
         let way_m = (self.speed_mps + speed_mps) / 2.0 * DT_S;
@@ -250,11 +254,13 @@ impl Driver {
     }
 
     /// The lowest acceleration that the cruising speed, bends, the leader, a light or a wait demands.
-    fn wanted_mps2(&self, size: &BodyParameters, around: &Around, braking_mps2: f64) -> f64 {
+    fn wanted_mps2(&mut self, view: &View, braking_mps2: f64) -> f64 {
+        let View { size, around, .. } = *view;
         let mut bend_mps = self.way.speed_mps_max(self.station_m);
         if let Some(change) = &self.change {
             bend_mps = bend_mps.min(change.to.speed_mps_max(change.to_station_m));
         }
+        let pursued_mps2 = if self.pursuit.is_some() { self.pursue_mps2(view, bend_mps) } else { None };
         let wish_mps = self.cruise_mps.min(bend_mps);
         let front_m = self.station_m + size.length_m / 2.0;
         let end_m = if self.change.is_none() { self.way.end_m } else { None };
@@ -266,11 +272,15 @@ impl Driver {
         ];
         let line_ahead_m = line_ahead_m.into_iter().flatten().fold(f64::INFINITY, f64::min);
         let is_free = self.leader.is_none() && line_ahead_m == f64::INFINITY;
-        if around.traffic.rays && !(is_free && self.ordered_mps2.is_some()) {
+        let is_told = self.ordered_mps2.is_some() || pursued_mps2.is_some();
+        if around.traffic.rays && !(is_free && is_told) {
             return self.tending_mps2(size, around, wish_mps, line_ahead_m);
         }
         // To be too fast is no emergency.
-        let free_mps2 = if let Some(rate_mps2) = self.ordered_mps2 {
+        let free_mps2 = if let Some(pursued_mps2) = pursued_mps2 {
+            let braking_mps2 = self.ordered_mps2.unwrap_or(COMFORT_MPS2).max(COMFORT_MPS2);
+            pursued_mps2.clamp(-braking_mps2, self.ordered_mps2.unwrap_or(size.acceleration_mps2_max))
+        } else if let Some(rate_mps2) = self.ordered_mps2 {
             let braking_mps2 =
                 if bend_mps < self.cruise_mps { rate_mps2.max(COMFORT_MPS2) } else { rate_mps2 };
             ((wish_mps - self.speed_mps) / DT_S).clamp(-braking_mps2, rate_mps2)
@@ -284,6 +294,11 @@ impl Driver {
         let mut wanted_mps2 = free_mps2;
         if let Some(leader) = &self.leader {
             wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, leader, free_mps2));
+        }
+        if self.keeps_gap()
+            && let Some(braking_mps2) = self.braking_for_ego_mps2(size, around)
+        {
+            wanted_mps2 = wanted_mps2.min(-braking_mps2);
         }
         if line_ahead_m < f64::INFINITY {
             wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, &Leader::line(line_ahead_m), free_mps2));
@@ -350,6 +365,9 @@ impl Driver {
         }
         if self.has_siren {
             trace.word(1);
+        }
+        if let Some(pursuit) = &self.pursuit {
+            pursuit.trace(trace);
         }
         if let Some(turn) = self.turn {
             turn.trace(trace);

@@ -32,6 +32,19 @@ pub(super) fn drive_ahead(asked: &Asked) -> Result<Driver, String> {
     let beside_ego = around.scene.route.path.pose_at(station_m).position;
     let station_m = around.scene.map.lane(lane).centre.project(beside_ego).station_m;
     let (way, turns_in) = way_of(asked, &[lane], &mut rng)?;
+    let plan = change_soon(asked, &way, station_m, lane, &mut rng)?;
+    Ok(commanded(asked, way, turns_in, station_m, plan))
+}
+
+/// The lane change of a vehicle that drives in the ego vehicle's direction, if it was asked for one.
+fn change_soon(
+    asked: &Asked,
+    way: &Way,
+    station_m: f64,
+    lane: LaneIndex,
+    rng: &mut Rng,
+) -> Result<Vec<PlannedChange>, String> {
+    let Asked { around, request, .. } = *asked;
     let mut plan = Vec::new();
     if request.then == Then::Change {
         let sides: &[Side] = match request.lane {
@@ -40,16 +53,46 @@ pub(super) fn drive_ahead(asked: &Asked) -> Result<Driver, String> {
             LaneChoice::Current => &[Side::Left, Side::Right],
         };
         let begin_m = station_m + request.speed_mps * CHANGE_AFTER_S;
-        let possible = |side: &Side| can_change(around, &way, begin_m, *side, request);
+        let possible = |side: &Side| can_change(around, way, begin_m, *side, request);
         let sides: Vec<Side> = sides.iter().copied().filter(possible).collect();
         if sides.is_empty() {
             return Err(no_change(around, lane).into());
         }
-        let towards = Towards::To(sides[rng::below(&mut rng, sides.len() as u32) as usize]);
+        let towards = Towards::To(sides[rng::below(rng, sides.len() as u32) as usize]);
         let when = When::Tick(around.tick + ticks(CHANGE_AFTER_S));
         plan.push(PlannedChange { when, towards });
     }
+    Ok(plan)
+}
+
+pub(super) fn drive_behind(asked: &Asked) -> Result<Driver, String> {
+    let Asked { around, request, id, .. } = *asked;
+    let mut rng = choices(around.seed, id, 0);
+    let lane = chosen_lane(around, around.ego_station_m, request.lane)?;
+    let (lanes, station_m) = from_behind(asked, lane)?;
+    let (way, turns_in) = way_of(asked, &lanes, &mut rng)?;
+    let plan = change_soon(asked, &way, station_m, lane, &mut rng)?;
     Ok(commanded(asked, way, turns_in, station_m, plan))
+}
+
+/// The lanes that lead to this one beside the ego vehicle, itself the last, and the station on them at which a vehicle's front
+/// bumper is `distance_m` behind the ego vehicle's rear bumper, measured in its own lane.
+fn from_behind(asked: &Asked, lane: LaneIndex) -> Result<(Vec<LaneIndex>, f64), String> {
+    let Asked { around, request, size, .. } = *asked;
+    let rear = around.ego.rear_axle.offset(-VehicleParameters::MKZ.rear_axle_to_back_m, 0.0);
+    let map = &around.scene.map;
+    let centre = &map.lane(lane).centre;
+    let beside_m = centre.project(rear.position).station_m;
+    // A lane that begins farther ahead, like a bay for turning, is continued backwards to the ego vehicle.
+    let before_m = centre.pose_at(beside_m).to_local(rear.position).x.min(0.0);
+    let mut station_m = beside_m + before_m - request.distance_m - size.length_m / 2.0;
+    let mut lanes = vec![lane];
+    while station_m < size.length_m / 2.0 {
+        let previous = lane_before(around, lanes[0]).ok_or("the road begins too near behind")?;
+        station_m += map.lane(previous).centre.length_m();
+        lanes.insert(0, previous);
+    }
+    Ok((lanes, station_m))
 }
 
 /// The way along these lanes, to where the request asks to go at the first junction after them, and the lane in which it goes
@@ -83,7 +126,7 @@ fn no_change(around: &Around, lane: LaneIndex) -> &'static str {
 }
 
 pub(super) fn overtake(asked: &Asked) -> Result<Driver, String> {
-    let Asked { around, request, size, id, .. } = *asked;
+    let Asked { around, request, id, .. } = *asked;
     if request.speed_mps <= around.ego.speed_mps {
         return Err("it would be no faster than the ego vehicle".into());
     }
@@ -101,20 +144,7 @@ pub(super) fn overtake(asked: &Asked) -> Result<Driver, String> {
         (LaneChoice::Right, Then::Change) => plan.push(when_ahead(CUT_IN_M, Towards::To(Side::Left))),
         (LaneChoice::Left | LaneChoice::Right, Then::Keep) => {}
     }
-    // Its front bumper is `distance_m` behind the ego vehicle's rear bumper, measured in its own lane.
-    let rear = around.ego.rear_axle.offset(-VehicleParameters::MKZ.rear_axle_to_back_m, 0.0);
-    let map = &around.scene.map;
-    let centre = &map.lane(lane).centre;
-    let beside_m = centre.project(rear.position).station_m;
-    // A lane that begins farther ahead, like a bay for turning, is continued backwards to the ego vehicle.
-    let before_m = centre.pose_at(beside_m).to_local(rear.position).x.min(0.0);
-    let mut station_m = beside_m + before_m - request.distance_m - size.length_m / 2.0;
-    let mut lanes = vec![lane];
-    while station_m < size.length_m / 2.0 {
-        let previous = lane_before(around, lanes[0]).ok_or("the road begins too near behind")?;
-        station_m += map.lane(previous).centre.length_m();
-        lanes.insert(0, previous);
-    }
+    let (lanes, station_m) = from_behind(asked, lane)?;
     let (way, turns_in) = way_of(asked, &lanes, &mut rng)?;
     let passes = |side| can_change(around, &way, station_m, side, request);
     if request.lane == LaneChoice::Current && !passes(Side::Left) && !passes(Side::Right) {

@@ -14,7 +14,6 @@ use std::sync::Arc;
 
 use crate::action::{SpawnFacts, SpawnRequest};
 use avastra_base::kinematics::braking_m;
-use avastra_lang::model::spawn_out_of_bounds;
 use avastra_lang::model::vocabulary::Verb;
 use avastra_road::LaneIndex;
 
@@ -32,7 +31,7 @@ use crate::sim::{body, safety};
 pub(super) use arrival::Arrivals;
 
 use crossing::cross_road;
-use driving::{drive_ahead, drive_opposite, overtake};
+use driving::{drive_ahead, drive_behind, drive_opposite, overtake};
 use on_foot::on_foot;
 
 /// Least gap between a newcomer and any other road user, m.
@@ -69,10 +68,11 @@ pub(super) fn place(
     let asked = Asked { around, arrivals, request, size, id };
     let mut driver = match request.verb {
         Verb::DriveAhead => drive_ahead(&asked)?,
+        Verb::DriveBehind => drive_behind(&asked)?,
         Verb::Overtake => overtake(&asked)?,
         Verb::DriveOpposite => drive_opposite(&asked)?,
         Verb::CrossRoad => cross_road(&asked)?,
-        Verb::Walk | Verb::Stand => return on_foot(&asked),
+        Verb::Walk | Verb::Stand | Verb::WalkAhead | Verb::WalkOpposite => return on_foot(&asked),
     };
     let (lane, _) = driver.way.lane_at(driver.station_m);
     if !may_use(around, lane, request.body, request.ignores) {
@@ -88,19 +88,16 @@ pub(super) fn place(
 /// Refuses what no road user could do. Requests of scripts come from outside, so nothing is taken for
 /// granted; NaN is in no range.
 fn check(request: &SpawnRequest) -> Result<(), String> {
-    let SpawnRequest { speed_mps, distance_m, offset_m, meet, .. } = *request;
-    if let Some(reason) = spawn_out_of_bounds(speed_mps, distance_m, offset_m, meet) {
+    if let Some(reason) = request.figures().out_of_bounds() {
         return Err(reason);
     }
     if request.cover.is_some_and(|cover| !cover.is_vehicle() || request.verb != Verb::Walk) {
         return Err("only a pedestrian who walks comes from behind a vehicle".into());
     }
-    match request.verb {
-        Verb::Walk | Verb::Stand if request.body.is_vehicle() => Err("only a pedestrian walks".into()),
-        Verb::Walk | Verb::Stand => Ok(()),
-        Verb::DriveAhead | Verb::Overtake | Verb::DriveOpposite | Verb::CrossRoad => {
-            if request.body.is_vehicle() { Ok(()) } else { Err("a pedestrian does not drive".into()) }
-        }
+    match (request.verb.is_on_foot(), request.body.is_vehicle()) {
+        (true, true) => Err("only a pedestrian walks".into()),
+        (false, false) => Err("a pedestrian does not drive".into()),
+        (true, false) | (false, true) => Ok(()),
     }
 }
 
@@ -123,8 +120,8 @@ pub(super) fn facts(around: &Around, request: &SpawnRequest, newcomers: &Newcome
     let along_mps = around.ego_outline.pose.forward().dot(&newcomer.obstacle.velocity_mps);
     let (ego_mps, friction) = (around.ego.speed_mps, around.friction);
     let braking_gap_m = match request.verb {
-        Verb::DriveAhead => safety::behind_leader_m(ego_mps, along_mps, friction),
-        Verb::Overtake => {
+        Verb::DriveAhead | Verb::WalkAhead => safety::behind_leader_m(ego_mps, along_mps, friction),
+        Verb::Overtake | Verb::DriveBehind => {
             let braking_mps2 = around.braking_mps2(&newcomer.mover.size, along_mps.max(0.0));
             safety::from_behind_m(along_mps, ego_mps, braking_mps2)
         }
@@ -132,11 +129,12 @@ pub(super) fn facts(around: &Around, request: &SpawnRequest, newcomers: &Newcome
             safety::oncoming_m(ego_mps, -along_mps, friction)
         }
         Verb::DriveOpposite => 0.0,
+        Verb::WalkOpposite => safety::oncoming_m(ego_mps, -along_mps, friction),
         Verb::CrossRoad | Verb::Walk | Verb::Stand => safety::behind_leader_m(ego_mps, 0.0, friction),
     };
     let cover_m = newcomers.cover.as_ref().map_or(f64::INFINITY, |cover| cover.obstacle.distance_m);
     let spawn_gap_m = newcomer.obstacle.distance_m.min(cover_m);
-    let is_behind = request.verb == Verb::Overtake;
+    let is_behind = request.verb.begins_behind();
     let sight_m = around.scene.range_m.min(around.visibility_m);
     let in_view = || {
         let eye = around.ego_outline.pose.position;

@@ -14,6 +14,7 @@ use crate::sim::npc::choices;
 use crate::sim::pedestrian::{Meeting, Walk, Walker};
 use crate::sim::road_user::{Motion, Moved, Mover, Obstacle, RoadUser};
 use crate::sim::sense::visible_fraction;
+use crate::sim::stroller::Stroller;
 
 use super::{Asked, Newcomers, ROOM_M, ahead_m, finish};
 
@@ -38,7 +39,7 @@ struct Crossing {
     to: Kerb,
 }
 
-/// A pedestrian who crosses the whole road, or who stands on the route.
+/// A pedestrian who crosses the whole road, who walks along it, or who stands on it.
 pub(super) fn on_foot(asked: &Asked) -> Result<Newcomers, String> {
     let Asked { around, request, .. } = *asked;
     if around.scene.is_motorway {
@@ -50,6 +51,12 @@ pub(super) fn on_foot(asked: &Asked) -> Result<Newcomers, String> {
         let turn_rad = if request.side == Side::Left { -FRAC_PI_2 } else { FRAC_PI_2 };
         let pose = Pose { heading_rad: wrap_angle(lane.heading_rad + turn_rad), ..lane };
         return Ok(Newcomers { asked: finish(asked, Motion::Stand, at(pose))?, cover: None });
+    }
+    if request.verb.walks_along() {
+        let comes = request.verb == Verb::WalkOpposite;
+        let stroller = Stroller::new(asked_m, request.offset_m, comes, request.speed_mps);
+        let begins = stroller.begins(around);
+        return Ok(Newcomers { asked: finish(asked, Motion::Stroll(stroller), begins)?, cover: None });
     }
     let mut refusal = None;
     for station_m in stations(around, asked_m) {
@@ -119,6 +126,7 @@ fn walk(asked: &Asked, way: &Crossing) -> Result<RoadUser, String> {
     }
     let walk = Walk {
         meeting,
+        waits_s: request.waits_s,
         from,
         way_m,
         beyond_m: way.to.beyond_m,

@@ -1,6 +1,6 @@
 //! How other vehicles move: on bends, after a crash, at stop signs, by each traffic profile.
 
-use avastra_lang::model::command::{Command, IgnoredRules, ON_FOOT};
+use avastra_lang::model::command::{Command, IgnoredRules, Needs};
 use std::sync::Arc;
 
 use crate::action::{Effect, OrderRequest, SpawnRequest, Surroundings};
@@ -90,7 +90,7 @@ fn an_order_changes_speed_at_its_rate() {
         let user = spawn(&mut world, named);
         let command =
             Command { speed_mps: Some(speed_mps), rate_mps2: Some(rate_mps2), ..Command::default() };
-        let order = OrderRequest { bearer: 7, command, drives: false };
+        let order = OrderRequest { bearer: 7, command, needs: Needs::Legs };
         world.apply(&Effect::Order(order)).expect("it is there and drives");
         let from_m = user.outline.pose.position.x;
         let (mut ticks, mut now) = (0, user);
@@ -133,21 +133,23 @@ fn who_ignores_others_runs_into_the_one_ahead() {
 }
 
 #[test]
-fn a_told_headway_is_kept_as_the_driver_model_has_it() {
-    for headway_s in [0.3, 1.2, 2.5] {
+fn a_told_time_gap_is_kept_as_the_driver_model_has_it() {
+    for gap_s in [0.3, 1.2, 2.5] {
         let mut world = driven(&testing::straight(), 5.0, 1.0);
         let leader = spawn(&mut world, request(Verb::DriveAhead, 120.0, 10.0));
         let named = SpawnRequest { bearer: Some(0), ..request(Verb::DriveAhead, 60.0, 10.0) };
         let follower = spawn(&mut world, named);
-        let command = Command { speed_mps: Some(20.0), headway_s: Some(headway_s), ..Command::default() };
-        world.apply(&Effect::Order(OrderRequest { bearer: 0, command, drives: false })).expect("it is there");
+        let command = Command { speed_mps: Some(20.0), time_gap_s: Some(gap_s), ..Command::default() };
+        world
+            .apply(&Effect::Order(OrderRequest { bearer: 0, command, needs: Needs::Legs }))
+            .expect("it is there");
         drive(&mut world, 8.0, 32.0);
         let [ahead, behind] =
             [leader, follower].map(|user| world.obstacle(user.id).expect("it is there").outline);
         let gap_m = distance_m(&ahead, &behind);
         // IDM's gap at rest: s* / √(1 - (v/v0)⁴) at half of the wished speed.
-        let wanted_m = (2.0 + 10.0 * headway_s) / (15.0_f64 / 16.0).sqrt();
-        assert!((gap_m - wanted_m).abs() < 0.05 * wanted_m, "{headway_s} s: {gap_m} m, {wanted_m} m");
+        let wanted_m = (2.0 + 10.0 * gap_s) / (15.0_f64 / 16.0).sqrt();
+        assert!((gap_m - wanted_m).abs() < 0.05 * wanted_m, "{gap_s} s: {gap_m} m, {wanted_m} m");
     }
 }
 
@@ -157,7 +159,7 @@ fn an_order_is_for_the_latest_bearer_and_no_wreck_obeys() {
     let order = OrderRequest {
         bearer: 0,
         command: Command { speed_mps: Some(3.0), ..Command::default() },
-        drives: false,
+        needs: Needs::Legs,
     };
     assert_eq!(world.order_refusal(&order).as_deref(), Some("no road user of that name is there"));
     let named = |distance_m| SpawnRequest { bearer: Some(0), ..request(Verb::DriveAhead, distance_m, 9.0) };
@@ -174,13 +176,16 @@ fn an_order_is_for_the_latest_bearer_and_no_wreck_obeys() {
     assert_eq!(world.order_refusal(&order).as_deref(), Some("it stands, and does not walk"));
     let walker = SpawnRequest { bearer: Some(2), ..request(Verb::Walk, 50.0, 1.0) };
     spawn(&mut world, walker);
-    let manoeuvre = OrderRequest { bearer: 2, command: Command::default(), drives: true };
-    assert_eq!(world.order_refusal(&manoeuvre).as_deref(), Some(ON_FOOT));
-    assert_eq!(world.order_refusal(&OrderRequest { drives: false, ..manoeuvre }), None);
+    let manoeuvre = OrderRequest { bearer: 2, command: Command::default(), needs: Needs::Wheels };
+    assert_eq!(
+        world.order_refusal(&manoeuvre).as_deref(),
+        Some("it is on foot, and can be told a `speed` alone")
+    );
+    assert_eq!(world.order_refusal(&OrderRequest { needs: Needs::Legs, ..manoeuvre }), None);
     let backwards = Command { speed_mps: Some(-1.0), ..Command::default() };
     let car = SpawnRequest { bearer: Some(1), ..request(Verb::DriveOpposite, 60.0, 9.0) };
     spawn(&mut world, car);
-    let refusal = world.order_refusal(&OrderRequest { bearer: 1, command: backwards, drives: false });
+    let refusal = world.order_refusal(&OrderRequest { bearer: 1, command: backwards, needs: Needs::Legs });
     assert_eq!(refusal.as_deref(), Some("it does not drive backwards"));
 }
 

@@ -115,6 +115,11 @@ impl World {
             if let (Some(to), None) = (command.turn, side.flatten()) {
                 driver.can_turn(to, &around, &mover.size)?;
             }
+            let crosses =
+                || driver.ways_to_crossing(&mover.size, &around).is_some_and(|(_, ego_m)| ego_m > 0.0);
+            if command.early_s.is_some() && command.at_m.is_none() && command.turn.is_none() && !crosses() {
+                return Err("its way does not cross the ego vehicle's ahead of it".to_owned());
+            }
         }
         Ok(index)
     }
@@ -141,10 +146,10 @@ impl World {
             if mover.is_wreck() {
                 continue;
             }
-            let Some(progress) = mover.motion.progress() else { continue };
+            let Some(progress) = mover.motion.progress(&self.alone()) else { continue };
             let speed_mps = match &mover.motion {
                 Motion::Drive(driver) => driver.speed_mps,
-                Motion::Walk(_) | Motion::Stand => obstacle.velocity_mps.norm(),
+                Motion::Walk(_) | Motion::Stroll(_) | Motion::Stand => obstacle.velocity_mps.norm(),
             };
             let npc = NpcFacts { speed_mps, ..npc_facts(&self.alone(), obstacle, &mover.motion) };
             let facts = |who: usize| Some((who, self.bearer_facts(who)?));

@@ -277,8 +277,15 @@ fn witnesses_run(space: &Arc<Space>, made: &Made) {
         for (road, reach) in space.roads.iter().zip(&row.roads) {
             let Some(found) = witness(space, row, road) else { continue };
             let memory = &found.memory;
-            let situation =
-                Situation { memory, road, rules: &rules, surroundings: &Plain(0.0), seed: 0, step: 0 };
+            let situation = Situation {
+                memory,
+                road,
+                rules: &rules,
+                surroundings: &Plain(0.0),
+                seed: 0,
+                step: 0,
+                happened_s: &[],
+            };
             let judged = table.check(&situation, row.index, &found.values);
             assert!(judged.is_ok(), "{} on {}: {judged:?}\n{}", row.label, road.name, made.text());
             assert!(matches!(reach, Reach::Open(_)), "{} has a witness\n{}", row.label, made.text());
@@ -349,6 +356,7 @@ fn played(space: &Arc<Space>, made: &Made, found: &[Diagnostic], draws: u32, see
                     surroundings: &Plain(6.0 * step as f64),
                     seed: episode,
                     step,
+                    happened_s: &[],
                 };
                 for row in 0..space.rows.len() {
                     tried(&table, &situation, row, found, made);

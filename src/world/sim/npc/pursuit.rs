@@ -1,0 +1,193 @@
+//! What drivers are told to do beside the ego vehicle: to keep a gap to it, ahead of it or behind it, or to be at a place so
+//! much before it. Both say the speed, from tick to tick, as OpenSCENARIO's continuous `LongitudinalDistanceAction` and its
+//! `SynchronizeAction` do. Lights, bends and others may still make a vehicle slower.
+
+use avastra_base::kinematics::{braking_m, needed_mps2};
+use avastra_lang::model::command::Command;
+
+use crate::sim::around::Around;
+use crate::sim::body::BodyParameters;
+use crate::sim::ego::VehicleParameters;
+use crate::sim::trace::Trace;
+use crate::sim::world::DT_S;
+
+use super::driver::{COMFORT_MPS2, Driver, View};
+
+/// How fast an error of the gap is made up for, 1/s² and 1/s: critically damped. Ours.
+const GAP_PER_S2: f64 = 0.25;
+const CLOSING_PER_S: f64 = 1.0;
+/// How fast a vehicle takes on the speed that brings it to its place in time, s. Ours.
+const TAKES_S: f64 = 0.5;
+/// A gap within this of the wanted one, m, or this part of it, is kept.
+const KEPT_M: f64 = 0.5;
+const KEPT_PART: f64 = 0.05;
+/// Room that a vehicle behind the ego vehicle leaves when it has to brake hard, m.
+const ROOM_M: f64 = 1.0;
+
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pursuit {
+    aim: Aim,
+    /// The fastest that it drives for this, m/s; without it the limit of its lane.
+    most_mps: Option<f64>,
+    /// Whether the place was found: as long as its way crosses that of the ego vehicle nowhere, it drives on as it does.
+    is_found: bool,
+    /// Whether the gap was as wanted once.
+    is_met: bool,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Aim {
+    Gap(Gap),
+    /// Its front is there so much before that of the ego vehicle, s: at this station of the ego vehicle's route, or where its way
+    /// crosses that.
+    Place {
+        early_s: f64,
+        station_m: Option<f64>,
+    },
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Gap {
+    /// m.
+    Way(f64),
+    /// s, of the one behind.
+    Time(f64),
+}
+
+/// Where the ego vehicle is beside the driver, along the ego vehicle's route.
+struct Beside {
+    /// From bumper to bumper, m; negative if they are side by side.
+    gap_m: f64,
+    is_ahead: bool,
+}
+
+impl Pursuit {
+    pub fn told(command: &Command) -> Option<Pursuit> {
+        let Command { keep_m, keep_s, early_s, at_m, .. } = *command;
+        let gap = keep_m.map(Gap::Way).or(keep_s.map(Gap::Time)).map(Aim::Gap);
+        let place = early_s.map(|early_s| Aim::Place { early_s, station_m: at_m });
+        let most_mps = command.speed_mps;
+        Some(Pursuit { aim: gap.or(place)?, most_mps, is_found: false, is_met: false })
+    }
+
+    pub fn trace(&self, trace: &mut Trace) {
+        let (kind, numbers) = match self.aim {
+            Aim::Gap(Gap::Way(gap_m)) => (1, [gap_m, 0.0]),
+            Aim::Gap(Gap::Time(gap_s)) => (2, [gap_s, 0.0]),
+            Aim::Place { early_s, station_m } => (3, [early_s, station_m.unwrap_or(f64::INFINITY)]),
+        };
+        trace.words([kind, u64::from(self.is_met), u64::from(self.is_found)]);
+        trace.numbers(numbers);
+        trace.number(self.most_mps.unwrap_or(f64::INFINITY));
+    }
+}
+
+impl Driver {
+    /// Whether it keeps the gap, or was at the place, that it was told.
+    pub fn has_met(&self) -> bool {
+        self.pursuit.as_ref().is_none_or(|pursuit| pursuit.is_met)
+    }
+
+    /// Whether it keeps a gap to the ego vehicle and does not follow it by itself.
+    pub(super) fn keeps_gap(&self) -> bool {
+        matches!(self.pursuit.as_deref(), Some(Pursuit { aim: Aim::Gap(_), .. }))
+    }
+
+    /// The acceleration that brings it where it was told to be beside the ego vehicle, m/s²; `None` if it was told nothing.
+    pub(super) fn pursue_mps2(&mut self, view: &View, bend_mps: f64) -> Option<f64> {
+        let mut pursuit = **self.pursuit.as_ref()?;
+        let around = view.around;
+        let most_mps = pursuit.most_mps.unwrap_or_else(|| self.way.limit_mps(around.scene, self.station_m));
+        let most_mps2 = (most_mps.min(bend_mps) - self.speed_mps) / DT_S;
+        let wanted_mps2 = match pursuit.aim {
+            Aim::Gap(gap) => {
+                let Beside { gap_m, is_ahead } = beside(view);
+                let behind_mps = if is_ahead { around.ego.speed_mps } else { self.speed_mps };
+                let wanted_m = match gap {
+                    Gap::Way(way_m) => way_m,
+                    Gap::Time(gap_s) => behind_mps * gap_s,
+                };
+                pursuit.is_met |= (gap_m - wanted_m).abs() < KEPT_M.max(KEPT_PART * wanted_m);
+                let lacks_m = if is_ahead { wanted_m - gap_m } else { gap_m - wanted_m };
+                GAP_PER_S2 * lacks_m + CLOSING_PER_S * (around.ego.speed_mps - self.speed_mps)
+            }
+            Aim::Place { early_s, station_m } => {
+                let ways = match station_m {
+                    Some(station_m) => Some(ways_to(view, station_m)),
+                    None => self.ways_to_crossing(view.size, around),
+                };
+                let Some((own_m, ego_m)) = ways.filter(|(own_m, _)| *own_m > 0.0) else {
+                    // Behind the place it keeps the speed that it has.
+                    if pursuit.is_found || station_m.is_some() {
+                        self.cruise_mps = self.speed_mps;
+                        self.pursuit = None;
+                    }
+                    return None;
+                };
+                pursuit.is_found = true;
+                // An ego vehicle that stands does not come: neither does this one.
+                let left_s = ego_m / around.ego.speed_mps - early_s;
+                // The ego vehicle has moved in this tick already.
+                let left_s = left_s + DT_S;
+                let needed_mps = if left_s > DT_S { own_m / left_s } else { f64::INFINITY };
+                (needed_mps.min(most_mps) - self.speed_mps) / TAKES_S
+            }
+        };
+        self.pursuit = Some(Box::new(pursuit));
+        Some(wanted_mps2.min(most_mps2))
+    }
+
+    /// How hard it must brake not to run into an ego vehicle to which it keeps a gap, m/s², if that one goes on braking as it
+    /// does; `None` if gentle braking will do.
+    pub(super) fn braking_for_ego_mps2(&self, size: &BodyParameters, around: &Around) -> Option<f64> {
+        let (gap_m, ego_mps) = self.gap_to(size, around.ego())?;
+        let room_m = (gap_m - ROOM_M).max(0.1);
+        let closing_mps = (self.speed_mps - ego_mps).max(0.0);
+        let ego_braking_mps2 = -around.ego.acceleration_mps2;
+        let until_it_stands_mps2 = match ego_braking_mps2 > COMFORT_MPS2 {
+            true => needed_mps2(self.speed_mps, room_m + braking_m(ego_mps.max(0.0), ego_braking_mps2)),
+            false => 0.0,
+        };
+        let needed_mps2 = needed_mps2(closing_mps, room_m).max(until_it_stands_mps2);
+        (needed_mps2 > COMFORT_MPS2).then_some(needed_mps2)
+    }
+
+    /// From its front to where its way next crosses the ego vehicle's route, and from the ego vehicle's front to there, m;
+    /// below 0 if that one is past it.
+    pub(in crate::sim) fn ways_to_crossing(
+        &self,
+        size: &BodyParameters,
+        around: &Around,
+    ) -> Option<(f64, f64)> {
+        let front_m = self.station_m + size.length_m / 2.0;
+        let ego_front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
+        let ahead = around.scene.route.conflicts.iter().filter_map(|conflict| {
+            let own_m = self.way.lane_begin_m(conflict.lane)? + conflict.lane_station_m - front_m;
+            (own_m > 0.0).then_some((own_m, conflict.station_m - ego_front_m))
+        });
+        ahead.min_by(|(a_m, _), (b_m, _)| a_m.total_cmp(b_m))
+    }
+}
+
+/// From its front to a station of the ego vehicle's route, and from the ego vehicle's front to there, m: along that route.
+fn ways_to(view: &View, station_m: f64) -> (f64, f64) {
+    let View { this, around, .. } = *view;
+    let (here_m, _, along) = around.beside_route(this.outline.pose.position);
+    let (half_length_m, _) = this.outline.half_extent_m(this.forward, along);
+    let way_m = station_m - here_m;
+    let own_m = if along.dot(&this.forward) < 0.0 { -way_m } else { way_m };
+    (own_m - half_length_m, station_m - VehicleParameters::MKZ.front_m(around.ego_station_m))
+}
+
+fn beside(view: &View) -> Beside {
+    let View { this, around, .. } = *view;
+    let (here_m, _, along) = around.beside_route(this.outline.pose.position);
+    let (half_length_m, _) = this.outline.half_extent_m(this.forward, along);
+    let ego = VehicleParameters::MKZ;
+    let (front_m, rear_m) = (ego.front_m(around.ego_station_m), ego.rear_m(around.ego_station_m));
+    // The ego vehicle has moved in this tick already.
+    let here_m = here_m + along.dot(&this.velocity_mps) * DT_S;
+    let is_ahead = here_m > (front_m + rear_m) / 2.0;
+    let gap_m = if is_ahead { here_m - half_length_m - front_m } else { rear_m - here_m - half_length_m };
+    Beside { gap_m, is_ahead }
+}
