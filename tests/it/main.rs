@@ -42,6 +42,7 @@ mod studies;
 mod suites;
 mod surveys;
 mod tables;
+mod told;
 mod traces;
 mod torch;
 mod tour;

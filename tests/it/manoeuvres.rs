@@ -255,7 +255,7 @@ fn phases_come_as_often_as_they_are_repeated() {
         }
     }
     assert_eq!(by_times, BTreeSet::from([1, 2, 3]), "how often they stopped");
-    let mut whole = 0;
+    let (table, mut whole) = (wish("weaves"), 0);
     for seen in watched(&table, &["weaves()"], &[], 4, &[]) {
         let places = seen.moments.iter().map(|(_, npc)| npc.offset_m);
         // In a bend a long vehicle's middle is not where its axles are.
@@ -269,23 +269,28 @@ fn phases_come_as_often_as_they_are_repeated() {
 
 #[test]
 fn who_is_told_to_turn_does_so_at_the_next_junction() {
-    let table = wish("turns_across");
-    let run = run_of(table.space().clone(), 15, 3, &[]);
-    let plans: [(&[&str], f64); 6] = [
-        (&["turns_across()"], 1.0),
+    let across: (&[&str], f64) = (&["turns_across()"], 1.0);
+    turn_as_told(&wish("turns_across"), &[across]);
+    let plans: [(&[&str], f64); 5] = [
         (&["drives()", "goes(way: Left)"], 1.0),
         (&["drives()", "goes(way: Right)"], -1.0),
         (&["drives()", "goes(way: Straight)"], 0.0),
         (&["drives()", "goes(way: Left)", "turns_and_stops(turn: Left)"], 1.0),
         (&["drives()", "goes(way: Right)", "turns_and_stops(turn: Right)"], -1.0),
     ];
-    for (plan, left) in plans {
+    turn_as_told(&wish("turns_as_told"), &plans);
+}
+
+/// Whether who does what the rows say, one after another, has turned so, to the left above 0, behind the junction.
+fn turn_as_told(table: &ActionTable, plans: &[(&[&str], f64)]) {
+    let run = run_of(table.space().clone(), 15, 3, &[]);
+    for &(plan, left) in plans {
         let (mut passed, mut stood) = (0, 0);
         for episode in 0..run.episodes() {
             let done = Cell::new(0);
             let mut choose = |moment: &Moment| {
                 let Some(label) = plan.get(done.get()) else { return Choice::Pass };
-                let Ok(draw) = table.offer(moment.situation, row(&table, label)) else { return Choice::Pass };
+                let Ok(draw) = table.offer(moment.situation, row(table, label)) else { return Choice::Pass };
                 done.set(done.get() + 1);
                 Choice::Act(draw)
             };

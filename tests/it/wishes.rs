@@ -336,7 +336,7 @@ fn a_leader_stops_and_goes() {
 fn a_leader_slows_down_and_then_stops() {
     let table = wish("slows_and_stops");
     let run = run_of(table.space().clone(), 8, 4, &[]);
-    for (action, stops) in [("slows()", true), ("gives_up()", false), ("waits()", false)] {
+    for (action, stops) in [("slows()", true), ("gives_up()", false)] {
         let wanted = row(&table, action);
         let mut stood = 0;
         for episode in 0..run.episodes() {
@@ -358,7 +358,7 @@ fn a_leader_slows_down_and_then_stops() {
 
 #[test]
 fn a_leader_brakes_when_it_is_near() {
-    let table = wish("stop_and_go");
+    let table = wish("brakes_when_near");
     let [waits, hurries] = [row(&table, "waits()"), row(&table, "hurries()")];
     let run = run_of(table.space().clone(), 8, 6, &[]);
     let (mut braked, mut ordered) = (0, 0);

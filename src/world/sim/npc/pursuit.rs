@@ -109,7 +109,13 @@ impl Driver {
                 };
                 pursuit.is_met |= (gap_m - wanted_m).abs() < KEPT_M.max(KEPT_PART * wanted_m);
                 let lacks_m = if is_ahead { wanted_m - gap_m } else { gap_m - wanted_m };
-                GAP_PER_S2 * lacks_m + CLOSING_PER_S * (around.ego.speed_mps - self.speed_mps)
+                // A wanted gap that grows with its own speed damps by itself.
+                let damps_per_s = match gap {
+                    Gap::Time(gap_s) if !is_ahead => GAP_PER_S2 * gap_s,
+                    Gap::Way(_) | Gap::Time(_) => 0.0,
+                };
+                let closing_per_s = (CLOSING_PER_S - damps_per_s).max(0.0);
+                GAP_PER_S2 * lacks_m + closing_per_s * (around.ego.speed_mps - self.speed_mps)
             }
             Aim::Place { early_s, station_m } => {
                 let ways = match station_m {

@@ -1,0 +1,183 @@
+//! Wishes of road users that are told where to be beside the ego vehicle, whom to heed, and for how long something must have
+//! held: what was written, seen at the ticks of episodes that replay.
+
+use avastra::episode::{Choice, Moment, Outcome};
+use avastra::model::NpcFacts;
+use avastra::sim::{DT_S, World};
+
+use crate::wishes::{number, row, wish};
+use crate::world::{assert_replays, run_of};
+
+/// What was seen at a tick of an episode, before the ego vehicle touched anybody.
+struct Tick {
+    at_s: f64,
+    ego_mps: f64,
+    ego_front_m: f64,
+    ego_rear_m: f64,
+    /// The first and the second road user.
+    npcs: [Option<NpcFacts>; 2],
+}
+
+/// Plays episodes in which a row is chosen in the first step in which it is legal; calls `see` with what was seen and the draw's
+/// values of these names.
+fn played(name: &str, label: &str, values: &[&str], mut see: impl FnMut(&[Tick], &[f64])) {
+    let table = wish(name);
+    let wanted = row(&table, label);
+    let run = run_of(table.space().clone(), 8, 6, &[]);
+    for episode in 0..run.episodes() {
+        let mut drawn = None;
+        let mut choose = |moment: &Moment| match table.offer(moment.situation, wanted) {
+            Ok(draw) if drawn.is_none() => {
+                drawn = Some(values.iter().map(|value| number(&draw, value)).collect::<Vec<f64>>());
+                Choice::Act(draw)
+            }
+            _ => Choice::Pass,
+        };
+        let (mut ticks, mut is_whole) = (Vec::new(), true);
+        let log = run.play(episode, &mut choose, &mut |world, _, contacts| {
+            is_whole &= contacts.is_empty();
+            if is_whole {
+                ticks.push(tick(world));
+            }
+        });
+        assert_replays(&run, episode, &log);
+        if let Some(drawn) = drawn {
+            see(&ticks, &drawn);
+        }
+    }
+}
+
+fn tick(world: &World) -> Tick {
+    let moment = world.moment_facts();
+    Tick {
+        at_s: world.time_s(),
+        ego_mps: world.ego().speed_mps,
+        ego_front_m: moment.ego_front_m,
+        ego_rear_m: moment.ego_rear_m,
+        npcs: [1, 2].map(|id| world.npc_facts(id)),
+    }
+}
+
+#[test]
+fn a_tailgater_keeps_its_time_gap_and_passes() {
+    let (mut kept, mut passed) = (0, 0);
+    played("tailgates", "tailgates()", &["gap"], |ticks, drawn| {
+        let gap_s = |tick: &Tick, npc: &NpcFacts| (tick.ego_rear_m - npc.front_m) / npc.speed_mps;
+        let behind = |tick: &&Tick| {
+            tick.npcs[0].is_some_and(|npc| npc.front_m < tick.ego_rear_m && npc.offset_m.abs() < 1e-6)
+        };
+        let Some(last) = ticks.iter().filter(behind).next_back() else { return };
+        // In the last of its 6 s behind the ego vehicle, whose speed changes little then.
+        let second = ticks.iter().filter(behind).filter(|tick| tick.at_s > last.at_s - 1.0);
+        let steady: Vec<&Tick> = second.collect();
+        let change_mps = steady.iter().map(|tick| tick.ego_mps).fold(0.0, f64::max) - steady[0].ego_mps;
+        if steady.len() > 40 && change_mps.abs() < 0.2 && steady[0].ego_mps > 5.0 {
+            for tick in &steady {
+                let npc = tick.npcs[0].expect("it is behind");
+                assert!(
+                    (gap_s(tick, &npc) - drawn[0]).abs() < 0.15,
+                    "{} s of {} s",
+                    gap_s(tick, &npc),
+                    drawn[0]
+                );
+            }
+            kept += 1;
+        }
+        let end = ticks.last().expect("it drove");
+        passed += usize::from(
+            end.npcs[0].is_some_and(|npc| npc.rear_m > end.ego_front_m && npc.offset_m.abs() < 0.1),
+        );
+    });
+    assert!(kept >= 2 && passed >= 1, "{kept} kept their gap, {passed} came in before the ego vehicle");
+}
+
+#[test]
+fn who_walks_along_the_road_steps_out_when_the_ego_vehicle_comes() {
+    for label in ["walks(going: WalkAhead)", "walks(going: WalkOpposite)"] {
+        let mut stepped = 0;
+        played("steps_off_the_kerb", label, &["ttc"], |ticks, drawn| {
+            let there = |tick: &Tick| tick.npcs[0].map(|npc| (tick.at_s, npc));
+            let seen: Vec<(f64, NpcFacts)> = ticks.iter().filter_map(there).collect();
+            let Some(begin) = seen.iter().position(|(_, npc)| npc.ttc_s <= drawn[0]) else { return };
+            assert!(seen[..begin].iter().all(|(_, npc)| (npc.offset_m + 4.0).abs() < 1e-6), "{label}");
+            let begin_s = seen[begin].0;
+            // Before an ego vehicle that is about to pass it stops.
+            for (at_s, npc) in seen[begin..].iter().take_while(|(_, npc)| npc.gap_m > 2.0) {
+                // From 4 m beside the middle of the lane into it, at 1.5 m/s, beginning with the next tick.
+                let wanted_m = (-4.0 + 1.5 * (at_s - begin_s)).min(0.0);
+                assert!(
+                    (npc.offset_m - wanted_m).abs() <= 1.5 * DT_S + 1e-6,
+                    "{label}: {npc:?}, {wanted_m} m"
+                );
+                stepped += usize::from(npc.offset_m == 0.0);
+            }
+        });
+        assert!(stepped > 0, "{label}: nobody came into the lane");
+    }
+}
+
+#[test]
+fn a_car_makes_way_for_the_ambulance_that_it_was_told_of() {
+    let (mut made_way, mut back) = (0, 0);
+    played("makes_way", "comes()", &[], |ticks, _| {
+        let both = |tick: &Tick| Some((tick.npcs[0]?, tick.npcs[1]?));
+        let mut was_near = false;
+        for (car, ambulance) in ticks.iter().filter_map(both) {
+            let is_near = car.rear_m - ambulance.front_m <= 25.0;
+            assert!(was_near || is_near || car.offset_m.abs() < 1e-6, "{car:?} {ambulance:?}");
+            was_near |= is_near;
+            made_way += usize::from((car.offset_m - 0.8).abs() < 1e-6);
+            back += usize::from(ambulance.rear_m > car.front_m + 20.0 && car.offset_m.abs() < 1e-6);
+        }
+    });
+    assert!(made_way > 0 && back > 0, "{made_way} ticks at the side, {back} back behind it");
+}
+
+#[test]
+fn somebody_crosses_when_the_ego_vehicle_has_stood_for_so_long() {
+    let mut crossed = 0;
+    played("waits_for_a_stop", "waits()", &[], |ticks, _| {
+        let walks = |tick: &Tick| tick.npcs[0].is_some_and(|npc| npc.speed_mps > 0.0);
+        let Some(begin) = ticks.iter().position(walks) else { return };
+        let stood = ticks[..begin].iter().rev().take_while(|tick| tick.ego_mps <= 0.1).count();
+        let stood_s = stood as f64 * DT_S;
+        // It sets out in the tick after the condition has held for 1.5 s.
+        assert!((stood_s - 1.5).abs() <= 2.5 * DT_S, "it had stood for {stood_s} s");
+        crossed += 1;
+    });
+    assert!(crossed >= 2, "{crossed} crossed");
+}
+
+#[test]
+fn actions_come_after_each_other_as_a_rule_says() {
+    let table = wish("one_of_them_brakes");
+    let run = run_of(table.space().clone(), 12, 4, &[]);
+    let (mut gaps, mut braked) = (0, 0);
+    for episode in 0..run.episodes() {
+        let mut choose = |moment: &Moment| {
+            let legal = (0..4).rev().find_map(|row| table.offer(moment.situation, row).ok());
+            legal.map_or(Choice::Pass, Choice::Act)
+        };
+        let log = run.play(episode, &mut choose, &mut |_, _, _| {});
+        assert_replays(&run, episode, &log);
+        let times = |first: bool| {
+            let is_one = move |row: usize| (row == 0) == first;
+            let steps = log.steps.iter();
+            let done =
+                steps.filter(|step| matches!(&step.outcome, Outcome::Done { draw, .. } if is_one(draw.row)));
+            done.map(|step| step.time_s).collect::<Vec<f64>>()
+        };
+        let (came, brakes) = (times(true), times(false));
+        braked += brakes.len();
+        for pair in brakes.windows(2) {
+            assert!(pair[1] - pair[0] >= 20.0 - 1e-9, "{brakes:?}");
+            gaps += 1;
+        }
+        for brake_s in &brakes {
+            let before =
+                came.iter().filter(|came_s| *came_s < brake_s).next_back().expect("they came before");
+            assert!(brake_s - before >= 5.0 - 1e-9, "{came:?} {brakes:?}");
+        }
+    }
+    assert!(braked > 4 && gaps > 0, "{braked} brakes, {gaps} gaps");
+}
