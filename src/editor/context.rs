@@ -261,15 +261,12 @@ impl<'a> Place<'a> {
                 let key = key.as_ref().and_then(|key| self.within(key, of_key, None));
                 key.or_else(|| self.within(value, known.and_then(|state| state.ty), None))
             }
-            EffectKind::Order { who, .. } if is_here(who) => {
-                let given = self.locals.iter().filter(|(_, ty)| self.is_road_user(*ty));
-                let given = given.map(|(name, ty)| Kind::Local(name.clone(), *ty, true));
-                Some(given.chain([Kind::RoadUsers]).collect())
-            }
+            EffectKind::Order { who, .. } if is_here(who) => Some(self.road_users()),
             EffectKind::Order { fields, .. } => fields.iter().find_map(|field| match is_here(&field.name) {
                 true => Some(unused::<CommandField>(fields)),
                 false => self.in_command(field),
             }),
+            EffectKind::Spawn { of: Some(of), .. } if is_here(of) => Some(self.road_users()),
             EffectKind::Spawn { body, distance, apart, cover, fields, .. } => {
                 let mut bodies = [Some(body), cover.as_deref()].into_iter().flatten();
                 bodies
@@ -279,6 +276,13 @@ impl<'a> Place<'a> {
                     .or_else(|| self.in_spawn(fields))
             }
         })
+    }
+
+    /// The names of road users, and the parameters that hold one.
+    fn road_users(&self) -> Vec<Kind> {
+        let given = self.locals.iter().filter(|(_, ty)| self.is_road_user(*ty));
+        let given = given.map(|(name, ty)| Kind::Local(name.clone(), *ty, true));
+        given.chain([Kind::RoadUsers]).collect()
     }
 
     fn is_road_user(&self, ty: Option<Type>) -> bool {

@@ -196,7 +196,12 @@ fn without_place<'a>(
         let asks =
             action.drawn().filter_map(|parameter| parameter.condition.as_ref()).any(|c| c.asks_the_world());
         // Nobody is there to be ordered in the worlds that are searched.
-        let orders = action.effects.iter().any(|effect| matches!(effect, EffectDef::Order(_)));
+        let is_about_others = |effect: &EffectDef| match effect {
+            EffectDef::Order(_) => true,
+            EffectDef::Spawn(spawn) => spawn.of.is_some(),
+            EffectDef::Set(_) => false,
+        };
+        let orders = action.effects.iter().any(is_about_others);
         // What a `where` asks of the moment cannot be left out, nor states that it decides.
         !asks
             && !orders

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use avastra::action::{ActionTable, Situation};
+use avastra::action::{ActionTable, RowOdds, Situation};
 use avastra::episode::{Choice, Moment};
 use avastra::model::vocabulary::{Body, Level, TimeOfDay};
 use avastra::model::{Memory, RulesInForce};
@@ -13,11 +13,21 @@ use crate::wishes::{row, wish};
 use crate::world::{Wide, assert_replays, run_of, space_at};
 
 /// The odds of all rows in a state, on the first road.
+fn shares(odds: Vec<RowOdds>) -> Vec<u32> {
+    let share = |odds: RowOdds| match odds {
+        RowOdds::Share(share) => share,
+        RowOdds::Chance { .. } => panic!("a rate"),
+    };
+    odds.into_iter().map(share).collect()
+}
+
 fn odds_of(table: &ActionTable, memory: &Memory) -> Vec<u32> {
     let rules = RulesInForce::new(table.space(), &[], &[]).expect("no rule is named");
     let surroundings = &Wide { safety_gap_m: 0.0 };
     let road = &table.space().roads[0];
-    table.odds(&Situation { memory, road, rules: &rules, surroundings, seed: 1, step: 0, happened_s: &[] })
+    let situation =
+        Situation { memory, road, rules: &rules, surroundings, seed: 1, step: 0, happened_s: &[] };
+    shares(table.odds(&situation))
 }
 
 #[test]
@@ -56,7 +66,7 @@ fn more_cars_come_in_the_rush_hour() {
             // What a step does at its end is known to the next one.
             assert!(!is_rush || (60.0..=126.0).contains(&elapsed_s), "{elapsed_s} s");
             assert!(is_rush || !(66.1..=120.0).contains(&elapsed_s), "{elapsed_s} s");
-            let odds = table.odds(moment.situation);
+            let odds = shares(table.odds(moment.situation));
             assert_eq!(odds, if is_rush { [100, 20, 5] } else { [100, 2, 1] });
             if table.offer(moment.situation, car).is_ok() {
                 steps[usize::from(is_rush)] += 1;

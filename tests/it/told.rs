@@ -149,6 +149,92 @@ fn somebody_crosses_when_the_ego_vehicle_has_stood_for_so_long() {
 }
 
 #[test]
+fn a_child_appears_beside_a_bus_that_has_stopped() {
+    let table = wish("child_before_the_bus");
+    let rows = [row(&table, "bus()"), row(&table, "child()")];
+    let run = run_of(table.space().clone(), 8, 4, &[]);
+    let mut appeared = 0;
+    for episode in 0..run.episodes() {
+        let (mut done, mut gap_m) = (0, f64::NAN);
+        let mut choose = |moment: &Moment| {
+            let Some(Ok(draw)) = rows.get(done).map(|row| table.offer(moment.situation, *row)) else {
+                return Choice::Pass;
+            };
+            done += 1;
+            if done == 2 {
+                gap_m = number(&draw, "gap");
+            }
+            Choice::Act(draw)
+        };
+        let mut came: Option<(f64, f64)> = None;
+        let mut went_s: Option<f64> = None;
+        let log = run.play(episode, &mut choose, &mut |world, _, _| {
+            let (Some(bus), Some(child)) = (world.npc_facts(1), world.npc_facts(2)) else { return };
+            came.get_or_insert((world.time_s(), child.rear_m - bus.front_m));
+            went_s = went_s.or((child.speed_mps > 0.0).then(|| world.time_s()));
+        });
+        assert_replays(&run, episode, &log);
+        let Some((came_s, found_m)) = came else { continue };
+        // A crosswalk within 5 m would be taken; there is none here.
+        assert!((found_m - gap_m).abs() < 0.05, "{found_m} m before the bus, not {gap_m} m");
+        let Some(went_s) = went_s else { continue };
+        assert!((went_s - came_s - 2.0).abs() <= 2.0 * DT_S, "it went after {} s", went_s - came_s);
+        appeared += 1;
+    }
+    assert!(appeared >= 2, "{appeared} children");
+}
+
+#[test]
+fn rates_are_those_of_the_clock_and_not_of_the_rows() {
+    let table = wish("jaywalkers");
+    let hour = table.space().state("time").expect("it is declared").first_cell;
+    let run = run_of(table.space().clone(), 400, 5, &[]);
+    // Steps in which each could come, and did: jaywalkers by day and by night, cars.
+    let (mut steps, mut came) = ([0_u32; 3], [0_u32; 3]);
+    for episode in 0..run.episodes() {
+        let mut random = match avastra::agent::by_name("random").expect("it is there").kind {
+            avastra::agent::Kind::Ready(build) => build(),
+            _ => panic!("it learns nothing"),
+        };
+        let mut choose = |moment: &Moment| {
+            let (choice, _) = avastra::run::choose(random.as_mut(), moment);
+            let at_night = moment.situation.memory.cells()[hour].variant() == 1;
+            let legal = |row: usize| table.offer(moment.situation, row).is_ok();
+            let did = |rows: &[usize]| matches!(&choice, Choice::Act(draw) if rows.contains(&draw.row));
+            if legal(0) || legal(1) {
+                steps[usize::from(at_night)] += 1;
+                came[usize::from(at_night)] += u32::from(did(&[0, 1]));
+            }
+            steps[2] += u32::from(legal(2));
+            came[2] += u32::from(did(&[2]));
+            choice
+        };
+        run.play(episode, &mut choose, &mut |_, _, _| {});
+    }
+    for ((steps, came), an_hour) in steps.into_iter().zip(came).zip([30.0, 90.0, 60.0]) {
+        // Steps of 6 s, and three standard deviations of a count.
+        let wanted = f64::from(steps) * an_hour / 600.0;
+        let off = (f64::from(came) - wanted).abs();
+        assert!(wanted > 40.0 && off < 3.0 * wanted.sqrt(), "{came} of {wanted} in {steps} steps");
+    }
+}
+
+#[test]
+fn a_red_light_runner_starts_under_both_lights_and_crosses_first() {
+    let mut crossed = 0;
+    played("red_light_runner", "runner()", &[], |ticks, _| {
+        let seen: Vec<(f64, NpcFacts)> =
+            ticks.iter().filter_map(|tick| Some((tick.ego_front_m, tick.npcs[0]?))).collect();
+        // Where its middle comes over the ego vehicle's route, that one's front is still before that place.
+        let over = seen.windows(2).find(|pair| pair[0].1.offset_m < 0.0 && pair[1].1.offset_m >= 0.0);
+        let Some([_, (front_m, npc)]) = over else { return };
+        assert!(*front_m < npc.front_m, "{front_m} m, {npc:?}");
+        crossed += 1;
+    });
+    assert!(crossed >= 1, "nobody crossed");
+}
+
+#[test]
 fn actions_come_after_each_other_as_a_rule_says() {
     let table = wish("one_of_them_brakes");
     let run = run_of(table.space().clone(), 12, 4, &[]);

@@ -15,6 +15,8 @@ impl Dimension {
     pub const RATIO: Dimension = Dimension::of(0, 0, 0);
     pub const LENGTH: Dimension = Dimension::of(1, 0, 0);
     pub const DURATION: Dimension = Dimension::of(0, 1, 0);
+    /// How often something happens.
+    pub const RATE: Dimension = Dimension::of(0, -1, 0);
     pub const SPEED: Dimension = Dimension::of(1, -1, 0);
     pub const ACCEL: Dimension = Dimension::of(1, -2, 0);
     pub const ANGLE: Dimension = Dimension::of(0, 0, 1);

@@ -34,6 +34,7 @@ pub const UNITS: &[Unit] = &[
     Unit::exact("s", Dimension::DURATION, 1, 1),
     Unit::exact("ms", Dimension::DURATION, 1, 1000),
     Unit::exact("min", Dimension::DURATION, 60, 1),
+    Unit::exact("h", Dimension::DURATION, 3600, 1),
     Unit::exact("m/s", Dimension::SPEED, 1, 1),
     Unit::exact("km/h", Dimension::SPEED, 5, 18),
     // The international mile is 1609.344 m by definition.

@@ -75,6 +75,14 @@ fn does_phases(phases: usize, seen: &Sighting) -> Result<(), String> {
     }
 }
 
+/// Whether it appeared where it was asked to; what it does from then on is told otherwise.
+pub(super) fn appears(scene: &Scene, request: &SpawnRequest, seen: &Sighting) -> Result<(), String> {
+    match request.verb {
+        Verb::DriveAhead => appears_ahead(scene, request, &seen.frames[0]),
+        _ => Ok(()),
+    }
+}
+
 /// Whether it did what its verb says, or the phases of its manoeuvre, if it has one; if not, what was wrong, in words.
 pub(super) fn verdict(
     scene: &Scene,
@@ -84,9 +92,7 @@ pub(super) fn verdict(
 ) -> Result<(), String> {
     let first = &seen.frames[0];
     if let Some(phases) = phases {
-        if request.verb == Verb::DriveAhead {
-            appears_ahead(scene, request, first)?;
-        }
+        appears(scene, request, seen)?;
         return does_phases(phases, seen);
     }
     let drives = || seen.frames.iter().try_for_each(|frame| stays_on_road(scene, frame));

@@ -16,7 +16,7 @@ use avastra_drivers::Ads;
 use avastra_lang::model::command::Command;
 use avastra_lang::model::vocabulary::Phenomenon;
 use avastra_lang::model::{EffectDef, Row};
-use avastra_world::action::{ActionTable, Count, Draw, Effect, Offer};
+use avastra_world::action::{ActionTable, Count, Draw, Effect, Offer, SpawnRequest};
 use avastra_world::sim::{Sensed, World};
 
 use crate::run::Arena;
@@ -159,7 +159,8 @@ impl<'a> Trials<'a> {
         };
         let ordered = space.actions[row.action].effects.iter().filter_map(|effect| match effect {
             EffectDef::Order(order) => row.bearer(order.who, &space.actions[row.action]),
-            EffectDef::Set(_) | EffectDef::Spawn(_) => None,
+            EffectDef::Spawn(spawn) => row.bearer(spawn.of?, &space.actions[row.action]),
+            EffectDef::Set(_) => None,
         });
         let asked = space.clauses[row.action].iter().flat_map(|clause| clause.bearers.iter().copied());
         let own = names(row);
@@ -295,6 +296,11 @@ fn attempt(moment: &Moment, draw: &Draw) -> Try {
         Effect::Order(order) => Some((nth, world.bearer_id(order.bearer)?)),
         Effect::Time(_) | Effect::Sky(..) | Effect::Spawn(_) => None,
     });
+    let is_told = |request: &SpawnRequest| {
+        let is_for_it =
+            |effect: &Effect| matches!(effect, Effect::Order(order) if Some(order.bearer) == request.bearer);
+        draw.effects.iter().any(is_for_it)
+    };
     for (nth, id) in newcomers.into_iter().chain(ordered) {
         let (request, told) = match &draw.effects[nth] {
             Effect::Spawn(request) => (Some(request), Command { turn: request.turn, ..Command::default() }),
@@ -315,6 +321,8 @@ fn attempt(moment: &Moment, draw: &Draw) -> Try {
         let nearest_m = seen.frames.iter().map(|frame| frame.gap_m).fold(f64::INFINITY, f64::min);
         found.nearest_m = Some(found.nearest_m.map_or(nearest_m, |other| other.min(nearest_m)));
         let verdict = match request {
+            // What the same action orders it to do is judged by itself.
+            Some(request) if is_told(request) => judge::appears(&scene, request, &seen),
             Some(request) => judge::verdict(&scene, request, phases, &seen),
             None => judge::obeys(phases, &seen),
         };

@@ -135,6 +135,7 @@ impl Checker {
             let error = Diagnostic::error(code::NO_EFFECT, message).at(declared.name.span, "does nothing");
             self.report(error.help("give it a `set` or a `spawn`, or remove it"));
         }
+        self.check_beside(&declared.effects);
         let effects: Vec<Option<Vec<EffectDef>>> =
             declared.effects.iter().map(|effect| self.effect(effect, &place)).collect();
         let is_whole = effects.iter().all(Option::is_some);
@@ -148,6 +149,24 @@ impl Checker {
             span: declared.name.span,
         };
         Some((action, is_whole))
+    }
+
+    /// Reports places beside somebody whom the same action makes appear: nobody of that name is there when places are found.
+    fn check_beside(&mut self, effects: &[ast::Effect]) {
+        let spawns = || {
+            effects.iter().filter_map(|effect| match &effect.kind {
+                ast::EffectKind::Spawn { bearers, of, .. } => Some((bearers, of)),
+                ast::EffectKind::Set { .. } | ast::EffectKind::Order { .. } => None,
+            })
+        };
+        let own =
+            |name: &ast::Name| spawns().any(|(bearers, _)| bearers.iter().any(|own| own.text == name.text));
+        for name in spawns().filter_map(|(_, of)| of.as_ref()).filter(|name| own(name)) {
+            let message = format!("`{}` appears in the same action", name.text);
+            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message);
+            let error = error.at(name.span, "not there yet, or another one");
+            self.report(error.help("say both distances from the ego vehicle, or make two actions of it"));
+        }
     }
 
     fn parameter(
@@ -331,17 +350,25 @@ impl Checker {
                 let order = self.order(who, fields, place, effect.span)?;
                 Some(vec![EffectDef::Order(Box::new(order))])
             }
-            ast::EffectKind::Spawn { body, bearers, place: side, distance, apart, cover, fields } => {
+            ast::EffectKind::Spawn { body, bearers, place: side, distance, of, apart, cover, fields } => {
                 let behind = *side == ast::Place::Behind;
+                let of = match of {
+                    Some(of) => Some(self.named_road_user(of, place)),
+                    None => None,
+                };
                 let cover = cover.as_ref().map(|cover| self.body_word(cover, place));
                 let apart = apart.as_ref().map(|apart| self.apart(apart, bearers, place));
-                let spawn = self.spawn(body, behind, distance, fields, place, effect.span)?;
+                let spawn = self.spawn(body, (behind, of.is_some()), distance, fields, place, effect.span)?;
+                let of = match of {
+                    Some(of) => Some(of?),
+                    None => None,
+                };
                 let cover = match cover {
                     Some(cover) => Some(cover?),
                     None => None,
                 };
                 self.check_cover(cover.as_ref(), &spawn.verb, effect.span);
-                let spawn = SpawnDef { cover, ..spawn };
+                let spawn = SpawnDef { cover, of, ..spawn };
                 let bearer = |name: &ast::Name| self.bearers.iter().position(|one| *one == name.text);
                 let one = |spawn: SpawnDef| EffectDef::Spawn(Box::new(spawn));
                 match (apart, bearers.as_slice()) {
@@ -386,7 +413,7 @@ impl Checker {
     fn spawn(
         &mut self,
         body: &ast::Expr,
-        behind: bool,
+        (behind, is_beside): (bool, bool),
         distance: &ast::Expr,
         fields: &[ast::Field],
         place: &Place<'_>,
@@ -459,7 +486,10 @@ impl Checker {
             None => Some(None),
         };
         let (body, verb, (then, manoeuvre)) = (body_word?, verb?, then?);
-        self.check_verb(&body, &verb, behind, span);
+        if !is_beside {
+            self.check_side(&verb, behind, span);
+        }
+        self.check_verb(&body, &verb, span);
         self.check_fields(&fields, &verb, manoeuvre.as_ref(), span);
         Some(SpawnDef {
             body,
@@ -471,6 +501,7 @@ impl Checker {
             speed: speed?,
             distance: distance?,
             behind,
+            of: None,
             cover: None,
             offset: offset?,
             ignores: ignores?,
@@ -576,9 +607,8 @@ impl Checker {
         }
     }
 
-    /// Reports a vehicle that walks, a pedestrian that drives, and a wrong `ahead` or `behind`: only a vehicle that
-    /// overtakes spawns behind the ego vehicle.
-    fn check_verb(&mut self, body: &WordExpr<BodyWord>, verb: &WordExpr<Verb>, behind: bool, span: Span) {
+    /// Reports a vehicle that walks, and a pedestrian that drives.
+    fn check_verb(&mut self, body: &WordExpr<BodyWord>, verb: &WordExpr<Verb>, span: Span) {
         let on_foot = |verb: &Verb| verb.is_on_foot();
         let verbs = possible(verb);
         let clash = possible(body).into_iter().find_map(|body| {
@@ -592,9 +622,12 @@ impl Checker {
                     "`Stand` and those with `Walk` are for a `Pedestrian`, all other verbs for vehicles",
                 ),
             );
-            return;
         }
-        for verb in verbs {
+    }
+
+    /// Reports a wrong `ahead` or `behind` of the ego vehicle: only some verbs begin behind it.
+    fn check_side(&mut self, verb: &WordExpr<Verb>, behind: bool, span: Span) {
+        for verb in possible(verb) {
             if verb.begins_behind() != behind {
                 let (is, should) = if behind { ("behind", "ahead") } else { ("ahead of", "behind") };
                 let message = format!("`{}` does not begin {is} the ego vehicle", verb.name());

@@ -13,7 +13,7 @@ use crate::model::{ACTION_ODDS_MAX, EnumDef, EnumIndex, FnDef, Initial, StateDef
 use crate::prove::{VARIANTS_MAX, odds_out_of_bounds};
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast, listed, nearest};
-use avastra_base::units::Rational;
+use avastra_base::units::{Dimension, Rational};
 
 /// Most values that states hold together: proofs copy them.
 const CELLS_MAX: usize = 10_000;
@@ -107,7 +107,13 @@ impl Checker {
         self.references.word(declared.name.span, SpaceClaim::Actions);
         let place = Place { states: true, site: Site::StepBegins, ..Place::default() };
         let value = |checker: &mut Checker, value: &ast::Expr| {
-            let odds = checker.typed(value, &place, Type::Int)?;
+            let odds = checker.expr(value, &place, None)?;
+            if odds.ty == Type::Quantity(Dimension::RATE) {
+                return Some(odds);
+            }
+            let odds = checker.fit(odds, Type::Int, || {
+                Some("write a whole number, or a rate: `nothing => 30`, `walker => 10 / 1 h`".to_owned())
+            })?;
             let is_out = |number: &Rational| {
                 *number < Rational::ZERO || *number > Rational::integer(i64::from(ACTION_ODDS_MAX))
             };

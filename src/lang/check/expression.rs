@@ -436,6 +436,11 @@ impl Checker {
             self.references.note(part.span, Symbol::Engine(THERE.0, THERE.1), false);
             return Some(Expr { kind: ExprKind::IsThere(who), ty: Type::Bool, span });
         }
+        if WordFact::from_name(&format!("npc.{}", part.text)).is_some() {
+            let message = format!("`{}` is a word of the engine", part.text);
+            let error = Diagnostic::error(code::TYPE_MISMATCH, message).at(span, "no value");
+            return self.reject(error.help(format!("compare it: `.{} == Red`", part.text)));
+        }
         let Some(fact) = Fact::from_name(&format!("npc.{}", part.text)) else {
             let parts = parts_of("npc").into_iter().map(|(part, _)| part).chain([THERE.0]);
             return self.reject(unknown("fact of a road user", &part.text, part.span, parts));

@@ -253,16 +253,7 @@ impl Checker {
         place: &Place<'_>,
         span: Span,
     ) -> Option<OrderDef> {
-        let bearer = self.who(&who.text, who.span, place);
-        if bearer.is_none() {
-            self.references.uses(who.span, Symbol::RoadUser(who.text.clone()));
-            let of_type = place.locals.iter().filter(|(_, ty)| self.is_road_user(*ty));
-            let known = of_type.map(|(name, _)| name).chain(&self.bearers).map(String::as_str);
-            let mut error = self.unknown("road user", &who.text, who.span, known);
-            let name_it = || format!("name it where it appears: `spawn … as {} ahead …`", who.text);
-            error.help = error.help.or_else(|| Some(name_it()));
-            self.report(error);
-        }
+        let bearer = self.named_road_user(who, place);
         self.note_fields::<CommandField>(fields, place);
         let (declared, fields) = (fields.len(), self.fields_known(fields));
         let manoeuvre = match field(&fields, CommandField::Then) {
@@ -295,6 +286,19 @@ impl Checker {
             self.report(error.help(help));
         }
         Some(OrderDef { who: bearer?, command, manoeuvre, may_drive, span })
+    }
+
+    /// The road user that an order is for, or beside whom another one appears.
+    pub(super) fn named_road_user(&mut self, who: &ast::Name, place: &Place<'_>) -> Option<Who> {
+        self.who(&who.text, who.span, place).or_else(|| {
+            self.references.uses(who.span, Symbol::RoadUser(who.text.clone()));
+            let of_type = place.locals.iter().filter(|(_, ty)| self.is_road_user(*ty));
+            let known = of_type.map(|(name, _)| name).chain(&self.bearers).map(String::as_str);
+            let mut error = self.unknown("road user", &who.text, who.span, known);
+            let name_it = || format!("name it where it appears: `spawn … as {} ahead …`", who.text);
+            error.help = error.help.or_else(|| Some(name_it()));
+            self.reject(error)
+        })
     }
 
     fn no_manoeuvre<T>(&mut self, value: &ast::Expr, place: &Place<'_>) -> Option<T> {

@@ -8,8 +8,8 @@ use crate::check::expression::{
 use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of};
-use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
-use crate::model::vocabulary::{Body, Known, LaneChoice, Word, WordFact};
+use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind, Who};
+use crate::model::vocabulary::{Body, Known, LaneChoice, Site, Word, WordFact};
 use crate::model::{BodyWord, Type, code};
 use crate::syntax::ast::{BinaryOp, Span};
 use crate::syntax::{Diagnostic, ast, one_of, print_expr};
@@ -116,7 +116,7 @@ impl Checker {
             return Some(equal_or_not(op, self.on_road(core::slice::from_ref(road), place, span)?));
         }
         let facts = [self.word_fact(left, place), self.word_fact(right, place)];
-        if let Some(fact) = facts[0].or(facts[1]) {
+        if let Some((who, fact)) = facts[0].or(facts[1]) {
             let word = if facts[0].is_some() { right } else { left };
             if op.orders() {
                 let words = fact.words();
@@ -128,7 +128,10 @@ impl Checker {
                 );
                 return self.unordered(&format!("`{}` has no order", fact.name()), op, span, &help);
             }
-            return Some(equal_or_not(op, self.is_word(fact, core::slice::from_ref(word), place, span)?));
+            return Some(equal_or_not(
+                op,
+                self.is_word(who, fact, core::slice::from_ref(word), place, span)?,
+            ));
         }
         let (left, right) = self.both_sides(left, right, place)?;
         if !fits(left.ty, right.ty) && !fits(right.ty, left.ty) {
@@ -178,8 +181,8 @@ impl Checker {
         if let (true, ast::ExprKind::List(roads)) = (self.names_road(left, place), &right.kind) {
             return self.on_road(roads, place, span);
         }
-        if let (ast::ExprKind::List(words), Some(fact)) = (&right.kind, self.word_fact(left, place)) {
-            return self.is_word(fact, words, place, span);
+        if let (ast::ExprKind::List(words), Some((who, fact))) = (&right.kind, self.word_fact(left, place)) {
+            return self.is_word(who, fact, words, place, span);
         }
         let Some(value) = self.expr(left, place, None) else {
             self.look_at(right, place, None);
@@ -252,12 +255,17 @@ impl Checker {
     /// `priority == ego`, `ego.light in [Yellow, Red]`: whether the fact is one of these words.
     fn is_word(
         &mut self,
+        who: Option<Who>,
         fact: WordFact,
         words: &[ast::Expr],
         place: &Place<'_>,
         span: Span,
     ) -> Option<Expr> {
-        if !place.site.knows(fact.known()) {
+        let knows = match who {
+            Some(_) => place.site.knows(Known::World) && place.site != Site::Change,
+            None => place.site.knows(fact.known()),
+        };
+        if !knows {
             let error = Diagnostic::error(code::NOT_HERE, format!("`{}` is not known here", fact.name()));
             let who = match fact.known() {
                 Known::Road | Known::World | Known::Spawn => format!("{SEEN_BY} the moment"),
@@ -271,7 +279,10 @@ impl Checker {
             return Some(Expr { kind: ExprKind::IsBody(fact, bodies), ty: Type::Bool, span });
         }
         let words = all_of(words.iter().map(|word| self.word_of(fact, word)))?;
-        let kind = ExprKind::IsWord(fact, words);
+        let kind = match who {
+            Some(who) => ExprKind::IsWordOf(who, fact, words),
+            None => ExprKind::IsWord(fact, words),
+        };
         Some(Expr { kind, ty: Type::Bool, span })
     }
 
@@ -313,18 +324,23 @@ impl Checker {
     }
 
     /// The fact that is compared with words, if the expression names one, which is then noted.
-    fn word_fact(&mut self, expr: &ast::Expr, place: &Place<'_>) -> Option<WordFact> {
+    fn word_fact(&mut self, expr: &ast::Expr, place: &Place<'_>) -> Option<(Option<Who>, WordFact)> {
         match &expr.kind {
             ast::ExprKind::Name(name) => {
                 let fact = WordFact::from_name(name).filter(|_| self.is_bare_variant(expr, place))?;
                 self.references.note(expr.span, Symbol::Engine(fact.name(), fact.meaning()), false);
-                Some(fact)
+                Some((None, fact))
             }
             ast::ExprKind::Field { base, field } => {
                 let ast::ExprKind::Name(thing) = &base.kind else { return None };
-                let fact = WordFact::from_name(&format!("{thing}.{}", field.text))?;
+                let Some(fact) = WordFact::from_name(&format!("{thing}.{}", field.text)) else {
+                    let fact = WordFact::from_name(&format!("npc.{}", field.text))?;
+                    let who = self.who(thing, base.span, place)?;
+                    self.references.note(field.span, Symbol::Engine(fact.name(), fact.meaning()), false);
+                    return Some((Some(who), fact));
+                };
                 self.note_part(base, field);
-                Some(fact)
+                Some((None, fact))
             }
             _ => None,
         }

@@ -160,7 +160,8 @@ fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
                 names.push(who);
                 fields.extend(of_order);
             }
-            ast::EffectKind::Spawn { body, distance, apart, cover, fields: of_spawn, .. } => {
+            ast::EffectKind::Spawn { body, distance, of, apart, cover, fields: of_spawn, .. } => {
+                names.extend(of);
                 exprs.extend([body, distance].into_iter().chain(apart.as_deref()).chain(cover.as_deref()));
                 fields.extend(of_spawn);
             }

@@ -94,6 +94,8 @@ pub struct NpcFacts {
     pub junction_ahead_m: f64,
     /// Limit of the lane that it is in.
     pub limit_mps: f64,
+    /// The next light on its way; none for who is on foot.
+    pub light: Light,
     /// Stations of its ends on the ego vehicle's route.
     pub front_m: f64,
     pub rear_m: f64,
@@ -211,6 +213,12 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
         ExprKind::IsWord(fact, words) => {
             Value::Bool(word_of(*fact, facts).is_some_and(|word| words.iter().any(|one| one == word)))
         }
+        ExprKind::IsWordOf(who, fact, words) => {
+            let npc = bearer(who.bearer(facts.locals), facts);
+            let spawn = npc.map(|npc| SpawnFacts { npc, ..SpawnFacts::default() });
+            let word = spawn.and_then(|spawn| word_of(*fact, &Facts { spawn: Some(spawn), ..*facts }));
+            Value::Bool(word.is_some_and(|word| words.iter().any(|one| one == word)))
+        }
         ExprKind::IsBody(fact, bodies) => {
             let found = if *fact == WordFact::Hit { facts.outcome.hit } else { facts.outcome.near };
             Value::Bool(found.is_some_and(|found| bodies.iter().any(|named| found.is(*named))))
@@ -276,6 +284,7 @@ pub(crate) fn word_of(fact: WordFact, facts: &Facts<'_>) -> Option<&'static str>
     match fact {
         WordFact::EgoLight => facts.world.map(|world| world.moment.ego_light.name()),
         WordFact::EgoRoad => facts.world.map(|world| world.moment.ego_road.name()),
+        WordFact::NpcLight => facts.spawn.map(|spawn| spawn.npc.light.name()),
         WordFact::Priority => Some(facts.outcome.priority.name()),
         WordFact::Hit => facts.outcome.hit.map(|body| body.like.name()),
         WordFact::Near => facts.outcome.near.map(|body| body.like.name()),

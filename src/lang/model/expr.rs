@@ -73,6 +73,8 @@ pub enum ExprKind {
     OnRoad(Vec<String>),
     /// `priority == ego`, `ego.light in [Yellow, Red]`: whether the fact is one of these words.
     IsWord(WordFact, Vec<String>),
+    /// `van.light == Red`: the same of the latest bearer of a name.
+    IsWordOf(Who, WordFact, Vec<String>),
     /// `hit == Scooter`, `near in [Sedan, SUV]`: whether the fact is one of these bodies.
     IsBody(WordFact, Vec<BodyWord>),
     /// The arm for each variant of the subject's enum is `arms[arm_of[variant]]`.
@@ -89,7 +91,9 @@ impl ExprKind {
         match self {
             ExprKind::Fact(fact) => fact.known(),
             ExprKind::IsWord(fact, _) | ExprKind::IsBody(fact, _) => fact.known(),
-            ExprKind::OfBearer(..) | ExprKind::IsThere(_) | ExprKind::Since(..) => Known::World,
+            ExprKind::OfBearer(..) | ExprKind::IsWordOf(..) | ExprKind::IsThere(_) | ExprKind::Since(..) => {
+                Known::World
+            }
             _ => Known::Road,
         }
     }
@@ -113,6 +117,7 @@ impl Expr {
             | ExprKind::Cell(_)
             | ExprKind::OnRoad(_)
             | ExprKind::IsWord(..)
+            | ExprKind::IsWordOf(..)
             | ExprKind::IsBody(..)
             | ExprKind::OfRoadUser(..)
             | ExprKind::OfBearer(..)
@@ -203,7 +208,7 @@ impl Expr {
     /// Whom of the named road users it asks about.
     pub fn asked(&self) -> Vec<Who> {
         self.filter_map(|kind| match kind {
-            ExprKind::OfBearer(who, _) | ExprKind::IsThere(who) => Some(*who),
+            ExprKind::OfBearer(who, _) | ExprKind::IsWordOf(who, ..) | ExprKind::IsThere(who) => Some(*who),
             _ => None,
         })
     }

@@ -10,7 +10,7 @@ use crate::model::vocabulary::RoadKind;
 use avastra_road::{LaneIndex, RoadMap, Route, RouteLane};
 
 /// How far ahead a traffic light is searched for, m.
-const LIGHT_AHEAD_M: f64 = 100.0;
+pub const LIGHT_AHEAD_M: f64 = 100.0;
 /// The ego vehicle is at a junction that is nearer than this, m, as in the published package.
 pub const NEAR_JUNCTION_M: f64 = 20.0;
 

@@ -211,7 +211,7 @@ impl ActionDef {
     }
 
     /// Its spawns, in the order in which they happen.
-    pub(crate) fn spawns(&self) -> impl Iterator<Item = &SpawnDef> {
+    pub fn spawns(&self) -> impl Iterator<Item = &SpawnDef> {
         self.effects.iter().filter_map(|effect| match effect {
             EffectDef::Spawn(spawn) => Some(&**spawn),
             EffectDef::Set(_) | EffectDef::Order(_) => None,
@@ -321,6 +321,8 @@ pub struct SpawnDef {
     pub distance: Expr,
     /// Whether the file says `behind`; the verb decides which place that is.
     pub behind: bool,
+    /// The road user from which the distance is measured, in place of the ego vehicle.
+    pub of: Option<Who>,
     /// The parked vehicle from behind which a pedestrian steps.
     pub cover: Option<WordExpr<BodyWord>>,
     /// m to the left of the middle of its lane.

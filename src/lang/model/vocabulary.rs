@@ -186,7 +186,7 @@ pub const TYPES: &[(&str, Type, &str)] = &[
     ("Bool", Type::Bool, "`true` or `false`."),
     ("Int", Type::Int, "A whole number; may stand wherever a ratio may."),
     ("Length", LENGTH, "In `m` or `km`."),
-    ("Duration", Type::Quantity(Dimension::DURATION), "In `s`, `ms` or `min`."),
+    ("Duration", Type::Quantity(Dimension::DURATION), "In `s`, `ms`, `min` or `h`."),
     ("Speed", SPEED, "In `m/s`, `km/h` or `mph`."),
     ("Accel", Type::Quantity(Dimension::ACCEL), "In `m/s^2`."),
     ("Angle", Type::Quantity(Dimension::ANGLE), "In `deg` or `rad`."),
@@ -265,6 +265,7 @@ pub const SINCE: (&str, &str) = (
 word_facts! {
     EgoLight "ego.light" Light, World = "The next traffic light within 100 m: `ego.light == Red`, `ego.light in [Yellow, Red]`.";
     EgoRoad "ego.road" RoadKind, World = "Where the ego vehicle drives: `ego.road == InJunction`.";
+    NpcLight "npc.light" Light, Spawn = "The next traffic light within 100 m on the way of a vehicle: `npc.light == Red`, `van.light == Green`.";
     Priority "priority" Priority, Step = "Whether the ego vehicle or the road user that was hit had to give way: `priority == ego`, `priority in [other, none]`.";
     Hit "hit" Body, Step = "What was hit: `hit == Pedestrian`; nothing if there was no collision.";
     Near "near" Body, Step = "The road user with the greatest collision probability of the step: `near == Pedestrian`.";

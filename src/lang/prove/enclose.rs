@@ -223,7 +223,7 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
             Some(word) => Values::truth(words.iter().any(|one| one == word)),
             None => Values::UNKNOWN_TRUTH,
         },
-        ExprKind::IsBody(..) => Values::UNKNOWN_TRUTH,
+        ExprKind::IsWordOf(..) | ExprKind::IsBody(..) => Values::UNKNOWN_TRUTH,
         ExprKind::Match { subject, arm_of, arms } => {
             // Each arm is looked at once, however many variants take it, because nested `match`es would multiply.
             let mut taken: u128 = 0;

@@ -148,7 +148,12 @@ fn newcomer(spawn: &SpawnDef, known: &Known<'_>, lands: bool) -> Case {
     let distance = enclose(&spawn.distance, known).interval().intersect(&Interval::NOT_NEGATIVE);
     let is_on_route =
         |verb: &Verb| !matches!(verb, Verb::Walk | Verb::WalkAhead | Verb::WalkOpposite | Verb::CrossRoad);
-    if lands && spawn.offset.is_none() && verbs.iter().all(is_on_route) && !distance.is_empty() {
+    if lands
+        && spawn.of.is_none()
+        && spawn.offset.is_none()
+        && verbs.iter().all(is_on_route)
+        && !distance.is_empty()
+    {
         numbers.extend([(Fact::NpcGap, distance), (Fact::SpawnGap, distance)]);
     }
     Case { numbers, words, not_words }

@@ -52,6 +52,9 @@ pub(super) fn reduce(expr: &Expr, functions: &[FnDef], locals: &[Expr]) -> Expr 
         ExprKind::InList(of, list) => ExprKind::InList(inner(of), all(list)),
         ExprKind::OnRoad(_) | ExprKind::Since(..) => expr.kind.clone(),
         ExprKind::IsWord(fact, words) => ExprKind::IsWord(*fact, words.clone()),
+        ExprKind::IsWordOf(who, fact, words) => {
+            ExprKind::IsWordOf(reduced_who(*who, locals), *fact, words.clone())
+        }
         ExprKind::IsBody(fact, bodies) => ExprKind::IsBody(*fact, bodies.clone()),
         ExprKind::InLanes(of, lanes) => ExprKind::InLanes(inner(of), lanes.clone()),
         ExprKind::Match { subject, arm_of, arms } => {
@@ -96,6 +99,7 @@ fn fold(expr: Expr) -> Expr {
                 | ExprKind::OnRoad(_)
                 | ExprKind::Since(..)
                 | ExprKind::IsWord(..)
+                | ExprKind::IsWordOf(..)
                 | ExprKind::IsBody(..)
         )
     };

@@ -7,14 +7,14 @@ use crate::model::command::{OFFSET_M, speeds_mps};
 use crate::model::expr::ExprKind;
 use crate::model::vocabulary::{CommandField, Word};
 use crate::model::{
-    ACTION_ODDS_MAX, ActionDef, Interval, MEET, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, WAITS_S, code,
-    effort,
+    ACTION_ODDS_MAX, ActionDef, Interval, MEET, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, Type, WAITS_S,
+    code, effort,
 };
 use crate::prove::enclose::{Known, enclose};
 use crate::prove::reach::spawn_figures;
 use crate::syntax::Diagnostic;
 use crate::syntax::ast::Span;
-use avastra_base::units::Rational;
+use avastra_base::units::{Dimension, Rational};
 
 /// One error for each figure of a spawn, an order or odds that may leave its bounds, with the first row that shows it. Rules
 /// are ignored, because `--without` can switch them off.
@@ -31,14 +31,21 @@ pub(crate) fn odds_out_of_bounds(span: Span) -> Diagnostic {
 
 /// One error for the odds of each action that may leave their bounds, once for a line that names several.
 fn of_odds(space: &Space) -> Vec<Diagnostic> {
-    let range = 0.0..=f64::from(ACTION_ODDS_MAX);
+    let step_s = space.episode.step_s;
     let cells = space.cells_unknown();
     let known = Known { functions: &space.functions, locals: &[], cells: &cells, road: None, case: None };
     let mut found: Vec<Diagnostic> = Vec::new();
     let mut seen = BTreeSet::new();
     for ActionDef { odds, .. } in &space.actions {
         let may_be = enclose(odds, &known).interval();
+        let is_rate = odds.ty == Type::Quantity(Dimension::RATE);
+        let range = 0.0..=if is_rate { 1.0 / step_s } else { f64::from(ACTION_ODDS_MAX) };
         if lies_in(&may_be, &range) || !seen.insert((odds.span.file, odds.span.start)) {
+            continue;
+        }
+        if is_rate {
+            let error = Diagnostic::error(code::SETTING, "rates of actions lie from 0 to one a step");
+            found.push(error.at(odds.span, format!("wanted at most 1 / ({step_s} s)")));
             continue;
         }
         let error = odds_out_of_bounds(odds.span);

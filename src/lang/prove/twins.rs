@@ -117,7 +117,7 @@ impl<'a> RowText<'a> {
             }
             EffectDef::Spawn(spawn) => {
                 let then = spawn.manoeuvre.as_ref().map(|then| self.call_form(then));
-                format!("{} {then:?}", spawn_form(spawn, &|expr| self.reduced(expr)))
+                format!("{} {then:?}", spawn_form(spawn, &self.locals, &|expr| self.reduced(expr)))
             }
             EffectDef::Order(order) => {
                 let figure = |figure: WrittenFigure<'_>| {
@@ -187,9 +187,9 @@ fn ignored_form(ignores: &[WordExpr<TrafficRule>], reduced: &impl Fn(&Expr) -> E
     ignored.join(" ")
 }
 
-fn spawn_form(spawn: &SpawnDef, reduced: &impl Fn(&Expr) -> Expr) -> String {
+fn spawn_form(spawn: &SpawnDef, locals: &[Expr], reduced: &impl Fn(&Expr) -> Expr) -> String {
     format!(
-        "spawn {} {} {} {} {} {} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {} {} {} {:?} {:?}",
+        "spawn {} {} {} {} {} {} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {} {} {:?} {} {:?} {:?}",
         word_form(&spawn.body, reduced),
         word_form(&spawn.colour, reduced),
         word_form(&spawn.verb, reduced),
@@ -205,6 +205,7 @@ fn spawn_form(spawn: &SpawnDef, reduced: &impl Fn(&Expr) -> Expr) -> String {
         spawn.turn.as_ref().map(|turn| word_form(turn, reduced)),
         ignored_form(&spawn.ignores, reduced),
         spawn.behind,
+        spawn.of.map(|who| reduced_who(who, locals)),
         spawn.cover.as_ref().map_or(String::new(), |cover| word_form(cover, reduced)),
         spawn.bearer,
         spawn.row.as_ref().map(|(nth, apart)| (nth, reduced(apart).kind)),

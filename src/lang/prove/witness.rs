@@ -312,8 +312,10 @@ impl Search<'_> {
             if figures.out_of_bounds().is_some() {
                 return false;
             }
-            // The spawn lands where it was asked to, and no gap is unfair.
-            spawns.push(SpawnFacts { spawn_gap_m: distance_m, ..SpawnFacts::default() });
+            // The spawn lands where it was asked to, and no gap is unfair. Where somebody else is that it is asked for beside,
+            // nobody knows here.
+            let spawn_gap_m = if spawn.of.is_some() { f64::INFINITY } else { distance_m };
+            spawns.push(SpawnFacts { spawn_gap_m, ..SpawnFacts::default() });
         }
         let world = WorldFacts { spawns, ..WorldFacts::default() };
         let candidate = Candidate { values, before, after, world: Some(&world) };

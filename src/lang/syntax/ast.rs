@@ -347,6 +347,8 @@ pub enum EffectKind {
         bearers: Vec<Name>,
         place: Place,
         distance: Expr,
+        /// Whose distance it is; that to the ego vehicle without it.
+        of: Option<Name>,
         apart: Option<Box<Expr>>,
         cover: Option<Box<Expr>>,
         fields: Vec<Field>,

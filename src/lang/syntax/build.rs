@@ -311,6 +311,7 @@ impl Builder {
                 _ => Place::Behind,
             };
             let distance = self.expression(parts.next())?;
+            let of = parts.take(Rule::of_whom).map(|of| self.name(Parts::of(of).next()));
             let apart = parts.take(Rule::apart).map(|apart| self.only_expression(apart).map(Box::new));
             let apart = apart.transpose()?;
             let cover = parts.take(Rule::cover).map(|cover| {
@@ -320,7 +321,7 @@ impl Builder {
             });
             let cover = cover.transpose()?;
             let fields = self.fields(parts.next())?;
-            EffectKind::Spawn { body, bearers, place, distance, apart, cover, fields }
+            EffectKind::Spawn { body, bearers, place, distance, of, apart, cover, fields }
         };
         Ok(Effect { kind, span })
     }

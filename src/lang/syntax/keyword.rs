@@ -54,6 +54,10 @@ pub const CLAUSES: &[Keyword] = &[
         "A name for what is spawned, by which orders find it: `spawn BoxTruck as truck ahead 40 m { … }`.",
     ),
     (
+        "of",
+        "The named road user from which the distance of a spawn is measured: `spawn Pedestrian ahead 2 m of bus { … }`.",
+    ),
+    (
         "apart",
         "The gaps within a row of road users: `spawn BoxTruck as [last, first] ahead 40 m apart 15 m { … }`.",
     ),

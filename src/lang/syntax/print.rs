@@ -630,7 +630,7 @@ fn effect(effect: &Effect) -> Layout {
         EffectKind::Order { who, fields: entries } => {
             Layout::row([Layout::text(format!("order {} ", who.text)), fields(entries)])
         }
-        EffectKind::Spawn { body, bearers, place, distance, apart, cover, fields: entries } => {
+        EffectKind::Spawn { body, bearers, place, distance, of, apart, cover, fields: entries } => {
             let place = match place {
                 Place::Ahead => " ahead ",
                 Place::Behind => " behind ",
@@ -643,6 +643,9 @@ fn effect(effect: &Effect) -> Layout {
                 _ => parts.push(Layout::text(format!(" as [{}]", names.join(", ")))),
             }
             parts.extend([Layout::text(place), expression(distance)]);
+            if let Some(of) = of {
+                parts.push(Layout::text(format!(" of {}", of.text)));
+            }
             if let Some(apart) = apart {
                 parts.extend([Layout::text(" apart "), expression(apart)]);
             }

@@ -1,38 +1,81 @@
 //! Random search, the paper's first baseline: with the rules' mask and the odds of rows, and without as published.
 
+use std::collections::BTreeMap;
+
 use ndarray::{Array1, ArrayView1};
 
 use crate::mdp::Observation;
 use avastra_base::rng;
 use avastra_base::rng::Rng;
+use avastra_world::action::RowOdds;
 
 use super::registry::Agent;
 
-/// Draws among the legal rows by their odds, each as likely until it is told others.
+/// Draws among the legal rows by their odds, each as likely until it is told others. Actions with a rate come first: each in
+/// its part of the steps, shared by its legal rows; the rows with shares have what is left of a step.
 #[derive(Default)]
 pub struct MaskedRandom {
-    odds: Vec<u32>,
+    odds: Vec<RowOdds>,
 }
 
 impl MaskedRandom {
-    /// The odds of the legal rows, 0 for others.
-    fn legal_odds<'a>(&'a self, legal: ArrayView1<'a, bool>) -> impl Iterator<Item = u32> + 'a {
-        (0..legal.len()).map(move |row| if legal[row] { self.odds.get(row).copied().unwrap_or(1) } else { 0 })
+    /// The shares of the legal rows, 0 for others.
+    fn legal_shares<'a>(&'a self, legal: ArrayView1<'a, bool>) -> impl Iterator<Item = u32> + 'a {
+        (0..legal.len()).map(move |row| match self.odds.get(row) {
+            _ if !legal[row] => 0,
+            None => 1,
+            Some(RowOdds::Share(share)) => *share,
+            Some(RowOdds::Chance { .. }) => 0,
+        })
+    }
+
+    /// The chances of the legal rows whose actions have rates, 0 for others. None, if no action has one.
+    fn legal_rates(&self, legal: ArrayView1<bool>) -> Option<Vec<f64>> {
+        let mut rows: BTreeMap<usize, u32> = BTreeMap::new();
+        for (row, odds) in self.odds.iter().enumerate() {
+            if let RowOdds::Chance { action, .. } = odds {
+                *rows.entry(*action).or_default() += u32::from(legal[row]);
+            }
+        }
+        if rows.is_empty() {
+            return None;
+        }
+        let chance = |(row, odds): (usize, &RowOdds)| match odds {
+            RowOdds::Chance { action, chance } if legal[row] => chance / f64::from(rows[action]),
+            RowOdds::Chance { .. } | RowOdds::Share(_) => 0.0,
+        };
+        let mut chances: Vec<f64> = self.odds.iter().enumerate().map(chance).collect();
+        let sum: f64 = chances.iter().sum();
+        // More than one action a step there cannot be.
+        if sum > 1.0 {
+            chances.iter_mut().for_each(|chance| *chance /= sum);
+        }
+        Some(chances)
     }
 }
 
 impl Agent for MaskedRandom {
-    fn weigh(&mut self, odds: &dyn Fn() -> Vec<u32>) {
+    fn weigh(&mut self, odds: &dyn Fn() -> Vec<RowOdds>) {
         self.odds = odds();
     }
 
     fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
-        let sum: u32 = self.legal_odds(legal).sum();
+        if let Some(rates) = self.legal_rates(legal) {
+            let mut ticket = rng::unit(rng);
+            let by_rate = rates.iter().position(|chance| {
+                ticket -= chance;
+                ticket < 0.0
+            });
+            if by_rate.is_some() {
+                return by_rate;
+            }
+        }
+        let sum: u32 = self.legal_shares(legal).sum();
         if sum == 0 {
             return None;
         }
         let mut ticket = rng::below(rng, sum);
-        self.legal_odds(legal).position(|odds| match ticket.checked_sub(odds) {
+        self.legal_shares(legal).position(|share| match ticket.checked_sub(share) {
             Some(left) => {
                 ticket = left;
                 false
@@ -42,8 +85,11 @@ impl Agent for MaskedRandom {
     }
 
     fn chances(&self, legal: ArrayView1<bool>) -> Option<Array1<f64>> {
-        let sum = f64::from(self.legal_odds(legal).sum::<u32>().max(1));
-        Some(self.legal_odds(legal).map(|odds| f64::from(odds) / sum).collect())
+        let rates = self.legal_rates(legal).unwrap_or_else(|| vec![0.0; legal.len()]);
+        let left = (1.0 - rates.iter().sum::<f64>()).max(0.0);
+        let sum = f64::from(self.legal_shares(legal).sum::<u32>().max(1));
+        let shares = self.legal_shares(legal).map(|share| left * f64::from(share) / sum);
+        Some(shares.zip(rates).map(|(share, rate)| share + rate).collect())
     }
 }
 
@@ -76,7 +122,7 @@ mod tests {
     fn rows_come_by_their_odds() {
         let mut rng = stream(3, Stream::Exploration, 0);
         let mut agent = MaskedRandom::default();
-        agent.weigh(&|| vec![1, 7, 0, 3]);
+        agent.weigh(&|| [1, 7, 0, 3].map(RowOdds::Share).to_vec());
         let legal = Array1::from_vec(vec![true, false, true, true]);
         let chances = agent.chances(legal.view()).unwrap();
         assert_eq!(chances.to_vec(), [0.25, 0.0, 0.0, 0.75]);
@@ -96,6 +142,33 @@ mod tests {
         // Where all that is legal has no odds, nothing happens.
         let none = Array1::from_vec(vec![false, false, true, false]);
         assert_eq!(agent.choose(&Observation::zeros(), none.view(), &mut rng), None);
+    }
+
+    #[test]
+    fn actions_with_rates_come_in_their_part_of_the_steps() {
+        let mut rng = stream(4, Stream::Exploration, 0);
+        let mut agent = MaskedRandom::default();
+        let rate = |action, chance| RowOdds::Chance { action, chance };
+        agent
+            .weigh(&|| vec![rate(0, 0.1), rate(0, 0.1), rate(1, 0.05), RowOdds::Share(1), RowOdds::Share(3)]);
+        for (legal, wanted) in [
+            ([true; 5], [0.05, 0.05, 0.05, 0.2125, 0.6375]),
+            // One of its rows has all of an action's rate; the share of what is not legal is the others'.
+            ([true, false, false, false, true], [0.1, 0.0, 0.0, 0.0, 0.9]),
+            // What is left is no action.
+            ([false, false, true, false, false], [0.0, 0.0, 0.05, 0.0, 0.0]),
+        ] {
+            let legal = Array1::from_vec(legal.to_vec());
+            let chances = agent.chances(legal.view()).unwrap();
+            assert!(chances.iter().zip(wanted).all(|(chance, wanted)| (chance - wanted).abs() < 1e-12));
+            let mut seen = [0.0; 5];
+            for _ in 0..20_000 {
+                if let Some(row) = agent.choose(&Observation::zeros(), legal.view(), &mut rng) {
+                    seen[row] += 1.0 / 20_000.0;
+                }
+            }
+            assert!(seen.iter().zip(wanted).all(|(seen, wanted)| (seen - wanted).abs() < 0.01), "{seen:?}");
+        }
     }
 
     #[test]

@@ -6,6 +6,7 @@ use serde_json::{Map, Value};
 
 use crate::mdp::Observation;
 use avastra_base::rng::Rng;
+use avastra_world::action::RowOdds;
 
 use super::branch::Branch;
 use super::presets::Preset;
@@ -19,7 +20,7 @@ pub trait Agent: Send {
     fn begin(&mut self) {}
 
     /// A step begins, in which the space gives the rows these odds.
-    fn weigh(&mut self, _odds: &dyn Fn() -> Vec<u32>) {}
+    fn weigh(&mut self, _odds: &dyn Fn() -> Vec<RowOdds>) {}
 
     /// The row to carry out next, or none. `legal` has shape `(rows,)`; at least one is true.
     fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize>;

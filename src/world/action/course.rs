@@ -47,6 +47,11 @@ impl Course {
         self.phases.iter().flat_map(parts).chain(self.rules.iter().flat_map(asked)).collect()
     }
 
+    /// Whether a phase waits for something.
+    pub fn waits(&self, phase: usize) -> bool {
+        self.phase(phase).once.is_some()
+    }
+
     /// Whether what a phase waits for has come.
     pub fn has_come(&self, phase: usize, moment: &LaterMoment) -> bool {
         self.phase(phase).once.as_ref().is_none_or(|once| self.later.value(once, moment).truth())

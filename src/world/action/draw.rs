@@ -1,5 +1,6 @@
 //! Drawing the values of a row, and judging given values. Both end in `Judge::judge`.
 
+use avastra_lang::model::vocabulary::Verb;
 use std::cell::Cell;
 use std::sync::Arc;
 
@@ -10,7 +11,7 @@ use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 use avastra_lang::model::body::{OwnBody, parameters};
 use avastra_lang::model::command::{IgnoredRules, Needs, OFFSET_M};
-use avastra_lang::model::expr::Expr;
+use avastra_lang::model::expr::{Expr, Who};
 use avastra_lang::model::rules::{
     Before, Candidate, Choose, Clause, Nearest, Room, RowRules, TRIES_MAX, Unsolved,
 };
@@ -36,6 +37,10 @@ pub(super) struct Judge<'a> {
     bearers: Vec<(usize, NpcFacts)>,
 }
 
+/// Why there is no place beside somebody else.
+const ABSENT: &str = "the road user beside whom it would appear is not there";
+const PASSED: &str = "that place is on the other side of the ego vehicle";
+
 impl<'a> Judge<'a> {
     pub fn new(space: &'a Space, situation: &'a Situation<'a>, row: usize) -> Judge<'a> {
         let row = &space.rows[row];
@@ -43,13 +48,22 @@ impl<'a> Judge<'a> {
         let row = RowRules { space, row, road: Some(&situation.road.facts), in_force: situation.rules };
         let in_force = |clause: &&Clause| clause.rule().is_none_or(|rule| situation.rules.contains(rule));
         let asked = || space.clauses[row.row.action].iter().filter(in_force);
+        let beside = || space.actions[row.row.action].spawns().filter_map(|spawn| spawn.of);
+        let is_beside = |who: &usize| {
+            beside().any(|of| match of {
+                Who::Named(bearer) => bearer == *who,
+                Who::Given(_) => true,
+            })
+        };
         let asks_who = |who: &usize| {
-            asked().any(|clause| clause.bearers.contains(who))
+            is_beside(who)
+                || asked().any(|clause| clause.bearers.contains(who))
                 || space.bearers_of_each_step().any(|asked| asked == *who)
         };
         let facts = |who: usize| Some((who, situation.surroundings.bearer(who)?));
         let bearers = (0..space.bearers.len()).filter(asks_who).filter_map(facts).collect();
-        let moment = match asked().any(|clause| clause.asks_the_world) || space.each_step_asks_the_world() {
+        let asks = asked().any(|clause| clause.asks_the_world) || beside().next().is_some();
+        let moment = match asks || space.each_step_asks_the_world() {
             true => situation.surroundings.moment(),
             false => MomentFacts::default(),
         };
@@ -165,6 +179,11 @@ impl<'a> Judge<'a> {
                     continue;
                 }
             };
+            if request.distance_m.is_nan() || request.distance_m < 0.0 {
+                let why = if request.distance_m.is_nan() { ABSENT } else { PASSED };
+                refusals.push(refuse(None, format!("cannot spawn: {why}")));
+                continue;
+            }
             if let Some(reason) = request.figures().out_of_bounds() {
                 refusals.push(refuse(None, reason));
                 continue;
@@ -271,6 +290,28 @@ impl<'a> Judge<'a> {
         effects
     }
 
+    /// The distance from the ego vehicle of a place that is asked for beside somebody else, m; NaN while that one is not there.
+    fn beside_m(
+        &self,
+        of: Who,
+        spawn: &SpawnDef,
+        distance_m: f64,
+        length_m: f64,
+        verb: Verb,
+        locals: &[Value],
+    ) -> f64 {
+        let who = of.bearer(locals);
+        let Some((_, npc)) = self.bearers.iter().find(|(known, _)| *known == who) else { return f64::NAN };
+        let rear_m = match spawn.behind {
+            true => npc.rear_m - distance_m - length_m,
+            false => npc.front_m + distance_m,
+        };
+        match verb.begins_behind() {
+            true => self.moment.ego_rear_m - rear_m - length_m,
+            false => rear_m - self.moment.ego_front_m,
+        }
+    }
+
     fn request(&self, spawn: &SpawnDef, locals: &[Value], after: &Memory) -> SpawnRequest {
         let functions = &self.row.space.functions;
         let facts = self.facts(locals, after);
@@ -283,20 +324,22 @@ impl<'a> Judge<'a> {
         // The bodies of a row are all of one kind.
         let shape = own(body).map_or_else(|| parameters(body.like), |own| own.shape);
         let before_m = spawn.behind_first_m(shape.length_m, functions, &facts);
+        let asked_m = evaluate(&spawn.distance, functions, &facts).number() + before_m;
+        let verb = spawn.verb.word(functions, &facts);
         SpawnRequest {
             body: body.like,
             own: own(body),
             cover_own: cover.and_then(own),
             colour: spawn.colour.word(functions, &facts),
-            verb: spawn.verb.word(functions, &facts),
+            verb,
             lane: spawn.lane.word(functions, &facts),
             side: spawn.side.word(functions, &facts),
             then: spawn.then.word(functions, &facts),
             speed_mps: rounded_into(evaluate(&spawn.speed, functions, &facts).number(), SPAWN_SPEED_MPS),
-            distance_m: rounded_into(
-                evaluate(&spawn.distance, functions, &facts).number() + before_m,
-                SPAWN_DISTANCE_M,
-            ),
+            distance_m: match spawn.of {
+                None => rounded_into(asked_m, SPAWN_DISTANCE_M),
+                Some(of) => self.beside_m(of, spawn, asked_m, shape.length_m, verb, locals),
+            },
             cover: cover.map(|cover| cover.like),
             offset_m: spawn
                 .offset

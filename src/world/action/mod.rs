@@ -32,7 +32,7 @@ pub use course::Course;
 pub use effect::{Effect, LaneChangeRules, OrderRequest, SpawnRequest, Surroundings};
 pub use file::{AxisRecord, DrawRecord, RoadRecord, RowRecord, RuleRecord, TableFile};
 pub use later::LaterMoment;
-pub use table::{ActionTable, Draw, Offer, Refusal, Situation};
+pub use table::{ActionTable, Draw, Offer, Refusal, RowOdds, Situation};
 
 #[cfg(test)]
 mod tests;

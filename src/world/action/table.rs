@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::action::draw::Judge;
 use crate::action::{Course, Effect, LaneChangeRules, Surroundings};
 use avastra_lang::model::{
-    ActionDef, Facts, Memory, Road, Row, RulesInForce, Space, Value, WorldFacts, evaluate,
+    ActionDef, Facts, Memory, Road, Row, RulesInForce, Space, Type, Value, WorldFacts, evaluate,
 };
 
 /// The rows that an agent chooses from.
@@ -27,6 +27,15 @@ pub struct Situation<'a> {
     pub step: u64,
     /// When each action last happened, s since the episode began, minus infinity for never; empty if the space does not ask.
     pub happened_s: &'a [f64],
+}
+
+/// How often a row is drawn by chance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RowOdds {
+    /// Relative to the other rows that have shares.
+    Share(u32),
+    /// Its action comes in this part of the steps, whichever of its rows is legal.
+    Chance { action: usize, chance: f64 },
 }
 
 /// What choosing a legal row would do now, or why the row is refused.
@@ -92,16 +101,25 @@ impl ActionTable {
         &self.space.rows
     }
 
-    /// How often each row is drawn by chance, relative to the others.
-    pub fn odds(&self, situation: &Situation<'_>) -> Vec<u32> {
+    /// How often each row is drawn by chance.
+    pub fn odds(&self, situation: &Situation<'_>) -> Vec<RowOdds> {
         let Situation { memory, road, .. } = *situation;
         let space = &self.space;
         let asks = |action: &ActionDef| action.odds.asks_the_world();
         let bearers = || space.actions.iter().flat_map(|action| action.odds.bearers(space.bearers.len()));
         let world = space.actions.iter().any(asks).then(|| world_facts(situation, bearers()));
         let facts = Facts { road: Some(&road.facts), world: world.as_ref(), ..Facts::new(&[], memory) };
-        let odds = |action: &ActionDef| evaluate(&action.odds, &space.functions, &facts).number() as u32;
-        let of_actions: Vec<u32> = space.actions.iter().map(odds).collect();
+        let odds = |(action, ActionDef { odds, .. }): (usize, &ActionDef)| {
+            let value = evaluate(odds, &space.functions, &facts).number();
+            match odds.ty {
+                // What has no value (a division by 0) never comes.
+                Type::Quantity(_) => {
+                    RowOdds::Chance { action, chance: (value * space.episode.step_s).max(0.0) }
+                }
+                Type::Int | Type::Bool | Type::Enum(_) => RowOdds::Share(value as u32),
+            }
+        };
+        let of_actions: Vec<RowOdds> = space.actions.iter().enumerate().map(odds).collect();
         self.rows().iter().map(|row| of_actions[row.action]).collect()
     }
 

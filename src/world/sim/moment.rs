@@ -3,7 +3,7 @@
 
 use avastra_lang::model::vocabulary::Light;
 use avastra_lang::model::{
-    JUNCTION_AHEAD_M_MAX, MomentFacts, NpcFacts, OnRoute, TIME_S_MAX, junction_ahead_m,
+    JUNCTION_AHEAD_M_MAX, LIGHT_AHEAD_M, MomentFacts, NpcFacts, OnRoute, TIME_S_MAX, junction_ahead_m,
 };
 
 use super::around::Around;
@@ -126,7 +126,7 @@ pub(super) fn npc_facts(around: &Around, obstacle: &Obstacle, motion: &Motion) -
         Motion::Walk(_) | Motion::Stroll(_) | Motion::Stand => {
             let station_m = scene.route.path.project(obstacle.outline.pose.position).station_m;
             let beside = OnRoute::at(&scene.map, &scene.route, station_m);
-            facts(around, obstacle, beside.limit_mps, beside.junction_ahead_m)
+            facts(around, obstacle, beside.limit_mps, beside.junction_ahead_m, Light::None)
         }
     }
 }
@@ -142,10 +142,19 @@ pub(super) fn driver_facts(around: &Around, obstacle: &Obstacle, driver: &Driver
         (lane, from_m)
     });
     let ahead_m = junction_ahead_m(&scene.map, ahead, station_m);
-    facts(around, obstacle, way.limit_mps(scene, station_m), ahead_m)
+    let reach = station_m..=station_m + LIGHT_AHEAD_M;
+    let line = way.stop_lines.iter().find(|line| reach.contains(&line.station_m));
+    let light = around.light(line.map(|line| line.signal));
+    facts(around, obstacle, way.limit_mps(scene, station_m), ahead_m, light)
 }
 
-fn facts(around: &Around, obstacle: &Obstacle, limit_mps: f64, junction_ahead_m: f64) -> NpcFacts {
+fn facts(
+    around: &Around,
+    obstacle: &Obstacle,
+    limit_mps: f64,
+    junction_ahead_m: f64,
+    light: Light,
+) -> NpcFacts {
     let (station_m, offset_m, along) = around.beside_route(obstacle.outline.pose.position);
     let (half_length_m, _) = obstacle.outline.half_extent_m(obstacle.forward, along);
     let (front_m, rear_m) = (station_m + half_length_m, station_m - half_length_m);
@@ -167,6 +176,7 @@ fn facts(around: &Around, obstacle: &Obstacle, limit_mps: f64, junction_ahead_m:
         gap_m: obstacle.distance_m,
         junction_ahead_m,
         limit_mps,
+        light,
         front_m,
         rear_m,
         offset_m,

@@ -200,7 +200,10 @@ impl Running {
                     (self.stage, self.since) = (Stage::UnderWay(command), tick);
                     return Advance { rest: Some(self), command: Some(command), ended };
                 }
-                Stage::UnderWay(command) if tick > self.since && progress.meets(&command) => {
+                Stage::UnderWay(command)
+                    if tick > self.since
+                        && (progress.meets(&command) || self.is_let_go(&command, moment)) =>
+                {
                     self.phase += 1;
                     ended += 1;
                     (self.stage, self.since) = (Stage::Waiting(None), tick);
@@ -213,6 +216,15 @@ impl Running {
                 }
             }
         }
+    }
+
+    /// Whether what is told beside the ego vehicle, which has no end of its own, ends because what the next phase waits for
+    /// has come.
+    fn is_let_go(&self, command: &Command, moment: &LaterMoment) -> bool {
+        command.pursues()
+            && self.phase + 1 < self.course.phases()
+            && self.course.waits(self.phase + 1)
+            && self.course.has_come(self.phase + 1, moment)
     }
 
     fn trace(&self, trace: &mut Trace) {

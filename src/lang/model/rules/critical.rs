@@ -127,6 +127,7 @@ impl Reader<'_> {
             | ExprKind::Since(..)
             | ExprKind::OnRoad(_)
             | ExprKind::IsWord(..)
+            | ExprKind::IsWordOf(..)
             | ExprKind::IsBody(..) => Form::Known(evaluate(expr, self.functions, &self.facts)),
             ExprKind::Local(local) => locals[*local].clone(),
             ExprKind::Cell(cell) => self.cells[*cell].clone(),

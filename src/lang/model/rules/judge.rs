@@ -250,6 +250,14 @@ impl<'a> RowRules<'a> {
                     let key = evaluate(key, &self.space.functions, &facts).variant();
                     format!("{} = {}", self.space.cell_name(first + key), value(part))
                 }
+                ExprKind::IsWordOf(who, fact, _) => {
+                    let known = facts.world.into_iter().flat_map(|world| &world.bearers);
+                    let bearer = who.bearer(candidate.values);
+                    let Some((_, npc)) = known.clone().find(|(one, _)| *one == bearer) else { return };
+                    let spawn = Some(SpawnFacts { npc: *npc, ..SpawnFacts::default() });
+                    let Some(word) = word_of(*fact, &Facts { spawn, ..facts }) else { return };
+                    format!("{}.{} = {word}", name(*who), fact.name().trim_start_matches("npc."))
+                }
                 ExprKind::IsWord(fact, _) => {
                     let Some(word) = word_of(*fact, &facts) else { return };
                     format!("{} = {word}", fact.name())

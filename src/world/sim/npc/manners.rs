@@ -157,7 +157,8 @@ impl Driver {
         // Worked out only if needed: most areas are on no other vehicle's way.
         let own = LazyCell::new(|| self.passage(area.from_m, area.to_m, size, around));
         let impatient = f64::from(self.waited_ticks) * DT_S >= PATIENCE_S;
-        let mut others = around.drivers();
+        let minds_others = !self.ignores.contains(TrafficRule::Others);
+        let mut others = around.drivers().take_while(|_| minds_others);
         let for_others = others.any(|(obstacle, body, driver)| {
             // Most others take no lane that meets this area.
             if !driver.way.may_take(area.other) {
