@@ -295,6 +295,7 @@ impl<'a> Place<'a> {
             (&phase.held, None),
             (&phase.within, None),
             (&phase.after, None),
+            (&phase.only_if, Some(Type::Bool)),
         ];
         let clause = |(clause, ty): (&Option<Expr>, Option<Type>)| self.within(clause.as_ref()?, ty, ty);
         let of_field = |field: &Field| match is_here(&field.name) {

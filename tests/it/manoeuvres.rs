@@ -608,7 +608,7 @@ fn audit(from: u64, spaces: u64, episodes: u32) -> Audited {
                     begun.remove(id);
                 }
                 for id in &ids {
-                    let now = world.phases(*id).0;
+                    let now = world.phases(*id).begun;
                     let was = begun.insert(*id, now).unwrap_or(0);
                     let Some(npc) = facts.get(id) else { continue };
                     if now > was {

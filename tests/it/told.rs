@@ -235,6 +235,35 @@ fn a_red_light_runner_starts_under_both_lights_and_crosses_first() {
 }
 
 #[test]
+fn a_cyclist_swerves_or_waits_by_who_is_behind() {
+    let (mut went_round, mut waited) = (0, 0);
+    played("swerves_or_waits", "cyclist()", &[], |ticks, _| {
+        let both = |tick: &Tick| Some((tick.ego_rear_m, tick.npcs[0]?, tick.npcs[1]?));
+        let seen: Vec<(f64, NpcFacts, NpcFacts)> = ticks.iter().filter_map(both).collect();
+        // What the branch saw: the first moment at which the van was near.
+        let Some(at) = seen.iter().position(|(_, van, cyclist)| van.rear_m - cyclist.front_m <= 15.0) else {
+            return;
+        };
+        let goes_round = seen[at].2.headway_s >= 2.0;
+        // It begins 1 m to the right of the middle of its lane, which lies 3.5 m to the right of the route.
+        let moves = seen.iter().position(|(_, _, cyclist)| cyclist.offset_m > -4.4);
+        let Some(moves) = moves else { return };
+        let (ego_rear_m, _, cyclist) = seen[moves];
+        match goes_round {
+            true => {
+                assert!(ego_rear_m < cyclist.front_m, "it waited though the ego vehicle was far behind");
+                went_round += 1;
+            }
+            false => {
+                assert!(ego_rear_m >= cyclist.front_m, "it did not wait: {ego_rear_m} m, {cyclist:?}");
+                waited += 1;
+            }
+        }
+    });
+    assert!(went_round > 0 && waited > 0, "{went_round} went round the van, {waited} waited behind it");
+}
+
+#[test]
 fn actions_come_after_each_other_as_a_rule_says() {
     let table = wish("one_of_them_brakes");
     let run = run_of(table.space().clone(), 12, 4, &[]);

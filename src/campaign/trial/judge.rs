@@ -28,7 +28,7 @@ use avastra_base::geometry::wrap_angle;
 use avastra_lang::model::vocabulary::{LaneChoice, Side, Then, Verb};
 use avastra_road::{LaneIndex, RoadMap};
 use avastra_world::action::SpawnRequest;
-use avastra_world::sim::{Scene, VehicleParameters};
+use avastra_world::sim::{PhaseCount, Scene, VehicleParameters};
 
 use crate::trial::sighting::{Ending, Frame, Sighting};
 
@@ -58,16 +58,16 @@ pub(super) fn horizon_s(has_manoeuvre: bool) -> f64 {
 }
 
 /// Whether it did what an order says: its phases, or all that it was told.
-pub(super) fn obeys(phases: Option<usize>, seen: &Sighting) -> Result<(), String> {
-    match phases {
-        Some(phases) => does_phases(phases, seen),
-        None if seen.has_done => Ok(()),
-        None => Err(ended(seen, "it had done what it was told")),
+pub(super) fn obeys(has_phases: bool, seen: &Sighting) -> Result<(), String> {
+    match has_phases {
+        true => does_phases(seen),
+        false if seen.has_done => Ok(()),
+        false => Err(ended(seen, "it had done what it was told")),
     }
 }
 
-fn does_phases(phases: usize, seen: &Sighting) -> Result<(), String> {
-    let (begun, over) = (seen.phases.0 as usize, seen.phases.1 as usize);
+fn does_phases(seen: &Sighting) -> Result<(), String> {
+    let PhaseCount { begun, ended: over, all: phases } = seen.phases;
     match () {
         () if over == phases || begun == phases && seen.ending == Ending::TouchedEgo => Ok(()),
         () if begun > over => Err(ended(seen, &format!("phase {begun} of {phases} had ended"))),
@@ -87,13 +87,13 @@ pub(super) fn appears(scene: &Scene, request: &SpawnRequest, seen: &Sighting) ->
 pub(super) fn verdict(
     scene: &Scene,
     request: &SpawnRequest,
-    phases: Option<usize>,
+    has_phases: bool,
     seen: &Sighting,
 ) -> Result<(), String> {
     let first = &seen.frames[0];
-    if let Some(phases) = phases {
+    if has_phases {
         appears(scene, request, seen)?;
-        return does_phases(phases, seen);
+        return does_phases(seen);
     }
     let drives = || seen.frames.iter().try_for_each(|frame| stays_on_road(scene, frame));
     let asked = usize::from(request.then == Then::Change);

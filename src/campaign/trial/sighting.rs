@@ -4,7 +4,7 @@ use avastra_base::geometry::{OrientedBox, Vec2};
 use avastra_drivers::Ads;
 use avastra_lang::model::command::Command;
 use avastra_road::LaneIndex;
-use avastra_world::sim::{Contact, DT_S, FRAME_TICKS, Scene, Sensed, World};
+use avastra_world::sim::{Contact, DT_S, FRAME_TICKS, PhaseCount, Scene, Sensed, World};
 
 /// How far beside its nearest lane a vehicle still counts as on the road, m.
 const LANE_REACH_M: f64 = 5.0;
@@ -51,7 +51,7 @@ pub(super) struct Sighting {
     pub frames: Vec<Frame>,
     pub ending: Ending,
     /// How many phases of its manoeuvre began, and ended.
-    pub phases: (u32, u32),
+    pub phases: PhaseCount,
     /// Whether it has done what it was told.
     pub has_done: bool,
 }
@@ -69,7 +69,7 @@ pub(super) fn watch(
     let begin_s = world.time_s();
     let drives = world.obstacle(id)?.body.is_vehicle();
     let mut frames = vec![frame(&scene, &world, id, begin_s)?];
-    let mut phases = (0, 0);
+    let mut phases = PhaseCount::default();
     let mut has_done = false;
     let ending = loop {
         if world.time_s() - begin_s >= horizon_s - DT_S / 2.0 {

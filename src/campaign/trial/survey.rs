@@ -311,8 +311,8 @@ fn attempt(moment: &Moment, draw: &Draw) -> Try {
         found.unfair = found.unfair.or_else(complaint);
         let mut ads = moment.ads.clone();
         let mut sensed: Sensed = world.sensed();
-        let phases = draw.course(nth).map(|course| course.phases());
-        let horizon_s = judge::horizon_s(phases.is_some());
+        let has_phases = draw.course(nth).is_some();
+        let horizon_s = judge::horizon_s(has_phases);
         let Some(seen) = sighting::watch(world.clone(), ads.as_mut(), &mut sensed, id, &told, horizon_s)
         else {
             found.failure = Some("it is gone at once".to_owned());
@@ -323,8 +323,8 @@ fn attempt(moment: &Moment, draw: &Draw) -> Try {
         let verdict = match request {
             // What the same action orders it to do is judged by itself.
             Some(request) if is_told(request) => judge::appears(&scene, request, &seen),
-            Some(request) => judge::verdict(&scene, request, phases, &seen),
-            None => judge::obeys(phases, &seen),
+            Some(request) => judge::verdict(&scene, request, has_phases, &seen),
+            None => judge::obeys(has_phases, &seen),
         };
         if let Err(why) = verdict {
             found.failure.get_or_insert(why);

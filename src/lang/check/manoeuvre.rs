@@ -13,7 +13,9 @@ use crate::model::vocabulary::{
     Body, CHANGE, CommandField, Fact, LaneChoice, ROAD_USER, Site, SpawnField, TrafficRule, Turning, Verb,
     Word,
 };
-use crate::model::{EnumDef, ManoeuvreCall, ManoeuvreDef, OrderDef, PhaseDef, REPEAT, Type, WordExpr, code};
+use crate::model::{
+    EnumDef, ManoeuvreCall, ManoeuvreDef, OrderDef, PhaseDef, REPEAT, Type, WordExpr, code, needs, reached,
+};
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
 use avastra_base::units::Dimension;
@@ -105,16 +107,74 @@ impl Checker {
     pub(super) fn declare_manoeuvres(&mut self, items: &[&ast::Item]) {
         let (names, declared) = self.declared("manoeuvre", items, ItemKind::as_manoeuvre);
         self.manoeuvre_names = names;
-        for (item, manoeuvre) in declared {
+        self.manoeuvres = vec![None; declared.len()];
+        for index in self.by_hand_over(&declared) {
+            let (item, manoeuvre) = declared[index];
             if manoeuvre.name.text == CHANGE.0 {
                 let message = format!("`{}` cannot be the name of a manoeuvre", CHANGE.0);
                 let error = Diagnostic::error(code::NOT_HERE, message);
                 let error = error.at(manoeuvre.name.span, "`during change` means lane changes");
                 self.report(error.help("choose another name"));
             }
-            let found = self.manoeuvre(item, manoeuvre);
-            self.manoeuvres.push(found);
+            self.manoeuvres[index] = self.manoeuvre(item, manoeuvre);
         }
+    }
+
+    /// The manoeuvres, each after those to which it hands over. Reports those that come back to themselves, and leaves them
+    /// out.
+    fn by_hand_over(&mut self, declared: &[(&ast::Item, &ast::Manoeuvre)]) -> Vec<usize> {
+        let next: Vec<Vec<(usize, Span)>> = declared
+            .iter()
+            .map(|(_, manoeuvre)| {
+                let fields = manoeuvre.phases.iter().flat_map(|phase| &phase.fields);
+                let then = fields.filter(|field| field.name.text == CommandField::Then.name());
+                let calls = then.filter_map(|field| match &field.value.kind {
+                    ast::ExprKind::Call(call) => {
+                        Some((self.manoeuvre_names.get(&call.name.text)?, call.span))
+                    }
+                    _ => None,
+                });
+                calls.collect()
+            })
+            .collect();
+        // Rounds, in each of which those come whose next ones have come.
+        let mut order: Vec<usize> = Vec::new();
+        loop {
+            let is_due = |index: &usize| {
+                !order.contains(index) && next[*index].iter().all(|(next, _)| order.contains(next))
+            };
+            let due: Vec<usize> = (0..declared.len()).filter(is_due).collect();
+            if due.is_empty() {
+                break;
+            }
+            order.extend(due);
+        }
+        let reaches = |from: usize, to: usize| {
+            let (mut found, mut looked) = (vec![from], 0);
+            while let Some(one) = found.get(looked).copied() {
+                looked += 1;
+                let fresh = next[one].iter().map(|(next, _)| *next).filter(|next| !found.contains(next));
+                let fresh: Vec<usize> = fresh.collect();
+                found.extend(fresh);
+            }
+            found.contains(&to)
+        };
+        for index in (0..declared.len()).filter(|index| !order.contains(index)) {
+            // Others lead to a circle, and are no part of it.
+            let Some((_, span)) = next[index].iter().find(|(next, _)| reaches(*next, index)) else {
+                continue;
+            };
+            let message = format!("`{}` comes back to itself", declared[index].1.name.text);
+            let error =
+                Diagnostic::error(code::RECURSION, message).at(*span, "by this, or by what follows it");
+            self.report(error.help("write `repeat N` for phases that come several times"));
+        }
+        order
+    }
+
+    /// A manoeuvre, and all to which it hands over.
+    pub(super) fn reached(&self, manoeuvre: usize) -> Vec<usize> {
+        reached(manoeuvre, |index| self.manoeuvres.get(index)?.as_ref())
     }
 
     pub(super) fn manoeuvre(&mut self, item: &ast::Item, declared: &ast::Manoeuvre) -> Option<ManoeuvreDef> {
@@ -155,6 +215,14 @@ impl Checker {
             }
         };
         let repeat = self.repeat(declared, &parameters, &owner);
+        let hands_over = |phase: &Option<PhaseDef>| {
+            phase.as_ref().is_some_and(|phase| phase.then.is_some() && phase.only_if.is_none())
+        };
+        if let Some(at) = phases.iter().position(hands_over).filter(|at| at + 1 < phases.len()) {
+            let error = Diagnostic::error(code::NEVER_REACHED, "the phases after this one never come");
+            let error = error.at(declared.phases[at].span, "it hands over to another manoeuvre");
+            self.report(error.help("leave them out, or write `if …` before its fields"));
+        }
         let phases: Vec<PhaseDef> = phases.into_iter().collect::<Option<_>>()?;
         let name = declared.name.text.clone();
         Some(ManoeuvreDef { name, docs: docs(item), parameters, repeat: repeat?, phases })
@@ -190,13 +258,16 @@ impl Checker {
         let held = part(self, declared.held.as_ref(), DURATION);
         let within = part(self, declared.within.as_ref(), DURATION);
         let after = part(self, declared.after.as_ref(), DURATION);
+        let only_if = part(self, declared.only_if.as_ref(), Type::Bool);
         self.note_fields::<CommandField>(&declared.fields, place);
         let fields = self.fields_known(&declared.fields);
-        if let Some(then) = field(&fields, CommandField::Then) {
-            self.look_at(then, place, None);
-            let error = Diagnostic::error(code::NOT_HERE, "a phase has no `then`").at(then.span, "not here");
-            return self.reject(error.help("write the phases of that manoeuvre here"));
-        }
+        let then = match field(&fields, CommandField::Then) {
+            Some(value) => match self.manoeuvre_call(value, place) {
+                Some(call) => Some(call),
+                None => return self.no_manoeuvre(value, place),
+            },
+            None => None,
+        };
         let command = self.command(&fields, place);
         if let Some(command) = &command {
             for figure in command.figures() {
@@ -206,7 +277,9 @@ impl Checker {
         for (expr, name) in [(&held, "for"), (&within, "within"), (&after, "after")] {
             expr.iter().for_each(|expr| self.check_figure(expr, name, "s", &TIME_S));
         }
-        if matches!(&command, Some(command) if *command == CommandDef::default()) {
+        let waits = declared.fields.is_empty() && (declared.once.is_some() || declared.after.is_some());
+        let tells_nothing = matches!(&command, Some(command) if *command == CommandDef::default());
+        if tells_nothing && then.is_none() && !waits {
             // A misspelt field was reported.
             if fields.len() < declared.fields.len() {
                 return None;
@@ -222,7 +295,11 @@ impl Checker {
             );
         }
         let command = command.filter(|_| all)?;
-        Some(PhaseDef { once, held, within, after, command })
+        let then = match then {
+            Some(call) => Some(call?),
+            None => None,
+        };
+        Some(PhaseDef { once, held, within, after, only_if, command, then })
     }
 
     /// Reports a figure of a phase that is written out, out of its bounds. What is computed is brought into them later.
@@ -303,7 +380,8 @@ impl Checker {
 
     fn no_manoeuvre<T>(&mut self, value: &ast::Expr, place: &Place<'_>) -> Option<T> {
         self.look_at(value, place, None);
-        let error = Diagnostic::error(code::TYPE_MISMATCH, "an order's `then` is a manoeuvre");
+        let error =
+            Diagnostic::error(code::TYPE_MISMATCH, "the `then` of an order or a phase is a manoeuvre");
         let error = error.at(value.span, "no call of one");
         self.reject(error.help("write its name and what it is given: `then: brake(4 m/s^2)`"))
     }
@@ -417,13 +495,14 @@ impl Checker {
 
     /// What the phases of a manoeuvre need; little, if it is broken.
     pub(super) fn needs(&self, manoeuvre: usize) -> Needs {
-        self.manoeuvres[manoeuvre].as_ref().map_or(Needs::Legs, ManoeuvreDef::needs)
+        needs(manoeuvre, |index| self.manoeuvres.get(index)?.as_ref())
     }
 
     /// Whether a phase of a manoeuvre has such a command.
     pub(super) fn has_command(&self, manoeuvre: usize, is_so: impl Fn(&CommandDef) -> bool) -> bool {
-        let phases = self.manoeuvres[manoeuvre].iter().flat_map(|manoeuvre| &manoeuvre.phases);
-        phases.into_iter().any(|phase| is_so(&phase.command))
+        let all = self.reached(manoeuvre);
+        let mut phases = all.iter().flat_map(|one| &self.manoeuvres[*one]).flat_map(|one| &one.phases);
+        phases.any(|phase| is_so(&phase.command))
     }
 
     /// `brake(4 m/s^2)` in the `then` of a spawn or an order; `None` if the value is no call. The inner `None` stands for a

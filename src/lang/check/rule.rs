@@ -136,7 +136,10 @@ impl Checker {
         let place = Place { locals: &locals, owner: Some(&owner), site: Site::Phase, ..Place::default() };
         let found = self.typed(condition, &place, Type::Bool);
         self.compiled += condition_size(found.as_ref());
-        let gives = |action: &ActionDef| action.manoeuvres().any(|given| given == manoeuvre);
+        // All that come to it.
+        let before: Vec<usize> =
+            (0..self.manoeuvres.len()).filter(|given| self.reached(*given).contains(&manoeuvre)).collect();
+        let gives = |action: &ActionDef| action.manoeuvres().any(|given| before.contains(&given));
         let mut actions = match on.is_empty() {
             true => (0..self.actions.len()).collect(),
             false => self.all_targets(on),

@@ -85,7 +85,7 @@ fn conditions(kind: &ItemKind, into: &mut Vec<Diagnostic>) {
         ItemKind::Verdict(declared) => vec![&declared.condition],
         ItemKind::Fn(declared) => vec![&declared.body],
         ItemKind::Manoeuvre(declared) => {
-            declared.phases.iter().filter_map(|phase| phase.once.as_ref()).collect()
+            declared.phases.iter().flat_map(|phase| phase.once.iter().chain(&phase.only_if)).collect()
         }
         ItemKind::Reward(cases) => cases.iter().filter_map(|case| case.condition.as_ref()).collect(),
         ItemKind::Action(declared) => declared.params.iter().filter_map(|p| p.condition.as_ref()).collect(),

@@ -135,6 +135,7 @@ fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
             exprs.extend(&declared.repeat);
             for phase in &declared.phases {
                 exprs.extend(phase.once.iter().chain(&phase.held).chain(&phase.within).chain(&phase.after));
+                exprs.extend(&phase.only_if);
                 fields.extend(&phase.fields);
             }
         }

@@ -358,9 +358,32 @@ pub struct ManoeuvreDef {
 }
 
 impl ManoeuvreDef {
-    pub fn needs(&self) -> Needs {
-        self.phases.iter().map(|phase| phase.command.needs()).max().unwrap_or(Needs::Legs)
+    /// The manoeuvres to which its phases hand over.
+    pub fn next(&self) -> impl Iterator<Item = usize> {
+        self.phases.iter().filter_map(|phase| phase.then.as_ref()).map(|call| call.manoeuvre)
     }
+}
+
+/// A manoeuvre, and all to which it hands over, itself first. None hands over to itself; `of` gives one by its index.
+pub fn reached<'a>(manoeuvre: usize, of: impl Fn(usize) -> Option<&'a ManoeuvreDef>) -> Vec<usize> {
+    let mut found = vec![manoeuvre];
+    let mut looked = 0;
+    while let Some(next) = found.get(looked).copied() {
+        looked += 1;
+        for next in of(next).into_iter().flat_map(ManoeuvreDef::next) {
+            if !found.contains(&next) {
+                found.push(next);
+            }
+        }
+    }
+    found
+}
+
+/// What all that a manoeuvre may come to needs.
+pub fn needs<'a>(manoeuvre: usize, of: impl Fn(usize) -> Option<&'a ManoeuvreDef>) -> Needs {
+    let all = reached(manoeuvre, &of);
+    let phases = all.iter().filter_map(|one| of(*one)).flat_map(|one| &one.phases);
+    phases.map(|phase| phase.command.needs()).max().unwrap_or(Needs::Legs)
 }
 
 /// A phase begins when `once` has held for long enough, and `after` some more time. It ends when the road user has done what it is told.
@@ -373,7 +396,11 @@ pub struct PhaseDef {
     pub within: Option<Expr>,
     /// s.
     pub after: Option<Expr>,
+    /// Whether it comes at all, asked when it would begin.
+    pub only_if: Option<Expr>,
     pub command: CommandDef,
+    /// The manoeuvre that the road user does from then on, in place of the phases that are left.
+    pub then: Option<ManoeuvreCall>,
 }
 
 /// A manoeuvre by its index in `Space::manoeuvres`, and the values that it is given.

@@ -290,6 +290,8 @@ pub struct Phase {
     pub held: Option<Expr>,
     pub within: Option<Expr>,
     pub after: Option<Expr>,
+    /// Without it the phase always comes.
+    pub only_if: Option<Expr>,
     pub fields: Vec<Field>,
     #[serde(skip)]
     pub span: Span,

@@ -236,8 +236,9 @@ impl Builder {
         let mut parts = Parts::of(pair);
         let (once, held) = self.once(&mut parts)?;
         let mut clause = |rule| parts.take(rule).map(|clause| self.only_expression(clause)).transpose();
-        let (within, after) = (clause(Rule::within_time)?, clause(Rule::after)?);
-        Ok(Phase { once, held, within, after, fields: self.fields(parts.next())?, span })
+        let (within, after, only_if) =
+            (clause(Rule::within_time)?, clause(Rule::after)?, clause(Rule::only_if)?);
+        Ok(Phase { once, held, within, after, only_if, fields: self.fields(parts.next())?, span })
     }
 
     /// `once npc.speed <= 1 m/s for 2 s`: the condition, and how long it must have held.

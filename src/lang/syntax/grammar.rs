@@ -138,6 +138,7 @@ pub fn role(rule: Rule) -> Role {
         Rule::kw_with | Rule::drawn => Role::Said("`with`"),
         Rule::kw_by => Role::Said("`by`"),
         Rule::kw_during | Rule::during => Role::Said("`during`"),
+        Rule::kw_if | Rule::only_if => Role::Said("`if`"),
         Rule::kw_for | Rule::held => Role::Said("`for`"),
         Rule::kw_once | Rule::once => Role::Said("`once`"),
         Rule::kw_after | Rule::after => Role::Said("`after`"),
@@ -244,7 +245,7 @@ pub fn opening_words(rule: Rule) -> Vec<&'static str> {
     match rule {
         Rule::action_param => vec!["each", "any"],
         Rule::effect => vec!["set", "spawn", "order"],
-        Rule::phase => vec!["once", "within", "after"],
+        Rule::phase => vec!["once", "within", "after", "if"],
         Rule::clause => vec!["with", "at", "by"],
         Rule::named_rule => vec!["optional", "rule"],
         Rule::policy_line => vec!["when"],

@@ -79,6 +79,10 @@ pub const CLAUSES: &[Keyword] = &[
     ("by", "The reference drivers that a claim names."),
     ("during", "What a rule restricts instead of the draw: `rule calm on vehicles during change: …`."),
     ("once", "The moment of a scenario's action, or of a phase: `once ego.junction_ahead <= 40 m`."),
+    (
+        "if",
+        "Leaves a phase out where its condition does not hold: `if npc.headway <= 2 s { then: swerve() }`.",
+    ),
     ("for", "How long the condition of `once` must have held: `once ego.speed <= 1 m/s for 2 s`."),
     ("repeat", "How often a manoeuvre goes through its phases: `manoeuvre stop_and_go() repeat 3 { … }`."),
     ("within", "How long a phase waits for its moment: `once npc.gap <= 20 m within 10 s`."),

@@ -665,8 +665,10 @@ fn fn_params(params: &[FnParam]) -> Layout {
 
 fn phase(phase: &Phase) -> Layout {
     let mut parts = Vec::new();
-    let Phase { once, held, within, after, .. } = phase;
-    for (keyword, clause) in [("once ", once), ("for ", held), ("within ", within), ("after ", after)] {
+    let Phase { once, held, within, after, only_if, .. } = phase;
+    for (keyword, clause) in
+        [("once ", once), ("for ", held), ("within ", within), ("after ", after), ("if ", only_if)]
+    {
         parts.extend(
             clause.iter().flat_map(|clause| [Layout::text(keyword), expression(clause), Layout::text(" ")]),
         );

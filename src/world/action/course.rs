@@ -1,9 +1,11 @@
 //! The manoeuvre that a road user does, with the values that its action gave it. The world asks it at every tick; it holds
 //! no state itself.
 
+use std::sync::Arc;
+
 use avastra_lang::model::command::Command;
 use avastra_lang::model::expr::{Expr, Who};
-use avastra_lang::model::{PhaseDef, Value};
+use avastra_lang::model::{ManoeuvreDef, MomentFacts, NpcFacts, PhaseDef, REPEAT, Value};
 
 use super::later::{Later, LaterMoment};
 
@@ -12,22 +14,50 @@ use super::later::{Later, LaterMoment};
 pub struct Course {
     /// Which manoeuvre it is, by its index in the space.
     pub manoeuvre: usize,
-    pub(super) phases: Vec<PhaseDef>,
-    /// How often it goes through them.
-    pub(super) times: usize,
-    /// The rules in force on the moments at which phases begin.
-    pub(super) rules: Vec<Expr>,
-    pub(super) later: Later,
+    /// It and all to which it may hand over, and which of them it is.
+    parts: Arc<[Part]>,
+    part: usize,
+    /// How often it goes through its phases.
+    times: usize,
+    later: Later,
+}
+
+/// A manoeuvre, by its index in the space, with the rules in force on the moments at which its phases begin.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Part {
+    pub manoeuvre: usize,
+    pub definition: ManoeuvreDef,
+    pub rules: Vec<Expr>,
 }
 
 impl Course {
+    /// The part of that place, with the values of its arguments.
+    pub(super) fn new(parts: Arc<[Part]>, part: usize, later: Later) -> Course {
+        let Part { manoeuvre, definition, .. } = &parts[part];
+        let moment =
+            LaterMoment { moment: MomentFacts::default(), npc: NpcFacts::default(), bearers: Vec::new() };
+        // It asks for no moment. What has no value counts as once.
+        let times = definition.repeat.as_ref().map_or(1.0, |times| later.value(times, &moment).number());
+        let times = times.clamp(*REPEAT.start(), *REPEAT.end()).max(*REPEAT.start()) as usize;
+        Course { manoeuvre: *manoeuvre, parts, part, times, later }
+    }
+
+    fn definition(&self) -> &ManoeuvreDef {
+        &self.parts[self.part].definition
+    }
+
+    fn rules(&self) -> &[Expr] {
+        &self.parts[self.part].rules
+    }
+
     /// How many phases it has, each counted as often as it comes.
     pub fn phases(&self) -> usize {
-        self.phases.len() * self.times
+        self.definition().phases.len() * self.times
     }
 
     fn phase(&self, phase: usize) -> &PhaseDef {
-        &self.phases[phase % self.phases.len()]
+        let phases = &self.definition().phases;
+        &phases[phase % phases.len()]
     }
 
     /// The values of the arguments, in bits.
@@ -40,11 +70,13 @@ impl Course {
         let name = |who: Who| who.bearer(&self.later.locals);
         let asked = |expr: &Expr| expr.asked().into_iter().map(name).collect::<Vec<_>>();
         let parts = |phase: &'_ PhaseDef| -> Vec<usize> {
-            let PhaseDef { once, held, within, after, command } = phase;
-            let parts = once.iter().chain(held).chain(within).chain(after).chain(command.parts());
-            parts.flat_map(asked).collect()
+            let PhaseDef { once, held, within, after, only_if, command, then } = phase;
+            let given = then.iter().flat_map(|call| &call.arguments);
+            let parts = once.iter().chain(held).chain(within).chain(after).chain(only_if);
+            parts.chain(command.parts()).chain(given).flat_map(asked).collect()
         };
-        self.phases.iter().flat_map(parts).chain(self.rules.iter().flat_map(asked)).collect()
+        let phases = &self.definition().phases;
+        phases.iter().flat_map(parts).chain(self.rules().iter().flat_map(asked)).collect()
     }
 
     /// Whether a phase waits for something.
@@ -78,7 +110,22 @@ impl Course {
 
     /// Whether the rules let a phase begin.
     pub fn may_begin(&self, moment: &LaterMoment) -> bool {
-        self.rules.iter().all(|rule| self.later.value(rule, moment).truth())
+        self.rules().iter().all(|rule| self.later.value(rule, moment).truth())
+    }
+
+    /// Whether a phase that may begin comes at all.
+    pub fn comes(&self, phase: usize, moment: &LaterMoment) -> bool {
+        let only_if = self.phase(phase).only_if.as_ref();
+        only_if.is_none_or(|condition| self.later.value(condition, moment).truth())
+    }
+
+    /// The manoeuvre to which a phase hands over.
+    pub fn next(&self, phase: usize, moment: &LaterMoment) -> Option<Course> {
+        let call = self.phase(phase).then.as_ref()?;
+        let part = self.parts.iter().position(|part| part.manoeuvre == call.manoeuvre)?;
+        let value = |argument: &Expr| self.later.value(argument, moment);
+        let locals = call.arguments.iter().map(value).collect();
+        Some(Course::new(Arc::clone(&self.parts), part, Later { locals, ..self.later.clone() }))
     }
 
     /// What a phase tells the vehicle, within what an order may say. `None` if its speed or its offset has no value; a

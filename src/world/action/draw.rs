@@ -1,9 +1,9 @@
 //! Drawing the values of a row, and judging given values. Both end in `Judge::judge`.
 
-use avastra_lang::model::vocabulary::Verb;
 use std::cell::Cell;
 use std::sync::Arc;
 
+use crate::action::course::Part;
 use crate::action::later::Later;
 use crate::action::table::{Draw, Refusal, Situation};
 use crate::action::{Course, Effect, LaneChangeRules, OrderRequest, SpawnRequest};
@@ -15,10 +15,11 @@ use avastra_lang::model::expr::{Expr, Who};
 use avastra_lang::model::rules::{
     Before, Candidate, Choose, Clause, Nearest, Room, RowRules, TRIES_MAX, Unsolved,
 };
+use avastra_lang::model::vocabulary::Verb;
 use avastra_lang::model::{
-    ActionDef, BodyWord, Domain, EffectDef, Facts, MEET, ManoeuvreCall, ManoeuvreDef, Memory, MomentFacts,
-    NpcFacts, OrderDef, Parameter, REPEAT, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value,
-    WAITS_S, WorldFacts, evaluate, locals, rounded_into,
+    ActionDef, BodyWord, Domain, EffectDef, Facts, MEET, ManoeuvreCall, Memory, MomentFacts, NpcFacts,
+    OrderDef, Parameter, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value, WAITS_S,
+    WorldFacts, evaluate, locals, needs, reached, rounded_into,
 };
 
 /// Draws of one row in a step before the row is refused. Every draw obeys what can be known before; a further one
@@ -238,14 +239,14 @@ impl<'a> Judge<'a> {
             let facts = self.facts(values, after);
             let value = |argument: &Expr| evaluate(argument, &space.functions, &facts);
             let later = self.later(call.arguments.iter().map(value).collect());
-            let rules = self.row.on_phases(call.manoeuvre).cloned().collect();
-            let ManoeuvreDef { phases, repeat, .. } = &space.manoeuvres[call.manoeuvre];
-            let times = repeat.as_ref().map_or(1.0, |times| {
-                evaluate(times, &space.functions, &self.facts(&later.locals, after)).number()
-            });
-            // What has no value counts as once.
-            let times = times.clamp(*REPEAT.start(), *REPEAT.end()).max(*REPEAT.start()) as usize;
-            Arc::new(Course { manoeuvre: call.manoeuvre, phases: phases.clone(), times, rules, later })
+            let part = |manoeuvre: usize| Part {
+                manoeuvre,
+                definition: space.manoeuvres[manoeuvre].clone(),
+                rules: self.row.on_phases(manoeuvre).cloned().collect(),
+            };
+            let all = reached(call.manoeuvre, |manoeuvre| space.manoeuvres.get(manoeuvre));
+            let parts: Arc<[Part]> = all.into_iter().map(part).collect();
+            Arc::new(Course::new(parts, 0, later))
         };
         places.zip(calls).filter_map(|(at, call)| Some((at, course(call?)))).collect()
     }
@@ -363,8 +364,9 @@ impl<'a> Judge<'a> {
     fn order(&self, order: &OrderDef, locals: &[Value], after: &Memory) -> OrderRequest {
         let facts = self.facts(locals, after);
         let command = order.command.evaluate(&self.row.space.functions, &facts);
-        let needs = |call: &ManoeuvreCall| self.row.space.manoeuvres[call.manoeuvre].needs();
-        let needs = order.manoeuvre.as_ref().map_or(Needs::Legs, needs);
+        let of = |manoeuvre: usize| self.row.space.manoeuvres.get(manoeuvre);
+        let needed = |call: &ManoeuvreCall| needs(call.manoeuvre, of);
+        let needs = order.manoeuvre.as_ref().map_or(Needs::Legs, needed);
         OrderRequest { bearer: order.who.bearer(locals), command, needs }
     }
 

@@ -57,7 +57,7 @@ pub use ego::{Control, VehicleParameters, pedal_acceleration_mps2, pedals_for};
 pub use environment::friction_scale;
 pub use incident::Incident;
 pub use right_of_way::right_of_way;
-pub use road_user::Obstacle;
+pub use road_user::{Obstacle, PhaseCount};
 pub use scene::{RANGE_M, Scene};
 pub use sense::{Conditions, EgoMotion, FRAME_S, FRAME_TICKS, Sensed, SensedObject, SignalColour};
 pub use trace::Trace;

@@ -95,9 +95,16 @@ pub(super) struct Mover {
     pub bearer: Option<usize>,
     /// The manoeuvre that it does, until it ends or an order replaces it.
     pub course: Option<Running>,
-    /// How many phases of its last manoeuvre have begun, and ended. Nothing depends on them.
-    pub phases_begun: u32,
-    pub phases_ended: u32,
+    /// How many phases of its last manoeuvre have begun, and ended, and how many there are. Nothing depends on them.
+    pub phases: PhaseCount,
+}
+
+/// How far somebody is with a manoeuvre. To be handed over to another one adds that one's phases.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub struct PhaseCount {
+    pub begun: u32,
+    pub ended: u32,
+    pub all: u32,
 }
 
 /// A manoeuvre under way.
@@ -140,9 +147,11 @@ impl Progress {
     /// Whether it has done what a command says.
     pub fn meets(&self, command: &Command) -> bool {
         let speed_mps = command.speed_mps.filter(|_| !command.pursues());
+        // Who stands as told moves no farther to the side.
+        let stands = speed_mps == Some(0.0) && self.speed_mps == 0.0;
         speed_mps.is_none_or(|mps| self.is_over || has_speed(self.speed_mps, mps))
             && (self.has_met || !command.pursues())
-            && (self.is_aside || !command.goes_aside())
+            && (self.is_aside || stands || !command.goes_aside())
             && (self.has_turned || command.turn.is_none())
     }
 }
@@ -153,8 +162,11 @@ pub(super) struct Advance {
     pub rest: Option<Running>,
     /// What a phase tells the driver that begins now.
     pub command: Option<Command>,
-    /// How many phases have ended.
+    /// How many phases have begun, and ended. One that is left out has done both.
+    pub begun: u32,
     pub ended: u32,
+    /// Whether what is left is another manoeuvre.
+    pub hands_over: bool,
 }
 
 impl Running {
@@ -169,6 +181,11 @@ impl Running {
         is_under_way.then_some((self.course.manoeuvre, self.phase as u32 + 1, self.since))
     }
 
+    /// How many phases it has.
+    pub fn phases(&self) -> u32 {
+        self.course.phases() as u32
+    }
+
     /// The names of road users that its phases ask about.
     pub fn bearers(&self) -> Vec<usize> {
         self.course.bearers()
@@ -176,8 +193,8 @@ impl Running {
 
     /// Advances by one tick. `progress`: how far the road user is with what it was told.
     pub fn advance(mut self, moment: &LaterMoment, progress: Progress, tick: u64) -> Advance {
-        let mut ended = 0;
-        let over = |ended| Advance { rest: None, command: None, ended };
+        let (mut begun, mut ended) = (0, 0);
+        let over = |begun, ended| Advance { rest: None, command: None, begun, ended, hands_over: false };
         loop {
             match self.stage {
                 Stage::Waiting(held) => {
@@ -192,37 +209,67 @@ impl Running {
                     let waited_s = (tick - self.since) as f64 * DT_S;
                     let is_over =
                         self.course.within_s(self.phase, moment).is_some_and(|most_s| waited_s >= most_s);
-                    return Advance { rest: (!is_over).then_some(self), command: None, ended };
+                    let rest = (!is_over).then_some(self);
+                    return Advance { rest, command: None, begun, ended, hands_over: false };
+                }
+                Stage::Holding(until)
+                    if tick >= until
+                        && self.course.may_begin(moment)
+                        && !self.course.comes(self.phase, moment) =>
+                {
+                    begun += 1;
+                    ended += 1;
+                    self.phase += 1;
+                    (self.stage, self.since) = (Stage::Waiting(None), tick);
+                    if self.phase == self.course.phases() {
+                        return over(begun, ended);
+                    }
                 }
                 Stage::Holding(until) if tick >= until && self.course.may_begin(moment) => {
-                    let Some(command) = self.course.command(self.phase, moment) else { return over(ended) };
+                    let Some(command) = self.course.command(self.phase, moment) else {
+                        return over(begun, ended);
+                    };
+                    begun += 1;
                     let command = command.for_body(progress.on_foot);
+                    if let Some(next) = self.course.next(self.phase, moment) {
+                        let rest = Some(Running::new(Arc::new(next), tick));
+                        return Advance {
+                            rest,
+                            command: Some(command),
+                            begun,
+                            ended: ended + 1,
+                            hands_over: true,
+                        };
+                    }
                     (self.stage, self.since) = (Stage::UnderWay(command), tick);
-                    return Advance { rest: Some(self), command: Some(command), ended };
+                    return Advance {
+                        rest: Some(self),
+                        command: Some(command),
+                        begun,
+                        ended,
+                        hands_over: false,
+                    };
                 }
                 Stage::UnderWay(command)
-                    if tick > self.since
-                        && (progress.meets(&command) || self.is_let_go(&command, moment)) =>
+                    if tick > self.since && (progress.meets(&command) || self.next_has_come(moment)) =>
                 {
                     self.phase += 1;
                     ended += 1;
                     (self.stage, self.since) = (Stage::Waiting(None), tick);
                     if self.phase == self.course.phases() {
-                        return over(ended);
+                        return over(begun, ended);
                     }
                 }
                 Stage::Holding(_) | Stage::UnderWay(_) => {
-                    return Advance { rest: Some(self), command: None, ended };
+                    return Advance { rest: Some(self), command: None, begun, ended, hands_over: false };
                 }
             }
         }
     }
 
-    /// Whether what is told beside the ego vehicle, which has no end of its own, ends because what the next phase waits for
-    /// has come.
-    fn is_let_go(&self, command: &Command, moment: &LaterMoment) -> bool {
-        command.pursues()
-            && self.phase + 1 < self.course.phases()
+    /// Whether what the next phase waits for has come: it does not wait for the end of this one.
+    fn next_has_come(&self, moment: &LaterMoment) -> bool {
+        self.phase + 1 < self.course.phases()
             && self.course.waits(self.phase + 1)
             && self.course.has_come(self.phase + 1, moment)
     }
@@ -387,8 +434,7 @@ impl Mover {
             rights: Rights::default(),
             bearer: None,
             course: None,
-            phases_begun: 0,
-            phases_ended: 0,
+            phases: PhaseCount::default(),
         }
     }
 

@@ -28,7 +28,7 @@ use super::environment::Environment;
 use super::incident::{Bump, Incident, bump, exchange, impact};
 use super::moment::npc_facts;
 use super::right_of_way::PassedLight;
-use super::road_user::{Moved, Obstacle, RoadUser};
+use super::road_user::{Moved, Obstacle, PhaseCount, RoadUser};
 use super::scene::Scene;
 use super::sense::{
     Conditions, EgoMotion, FRAME_S, FRAME_TICKS, Sensed, SensedObject, SignalColour, visible_fraction,
@@ -297,10 +297,10 @@ impl World {
         Some(npc_facts(&self.alone(), &user.obstacle, &user.mover.motion))
     }
 
-    /// How many phases of its manoeuvre the road user with an id has begun, and ended; 0 if it is not there.
-    pub fn phases(&self, id: u32) -> (u32, u32) {
+    /// How far the road user with an id is with its manoeuvre; 0 if it is not there.
+    pub fn phases(&self, id: u32) -> PhaseCount {
         let user = self.users.iter().find(|user| user.obstacle.id == id);
-        user.map_or((0, 0), |user| (user.mover.phases_begun, user.mover.phases_ended))
+        user.map_or(PhaseCount::default(), |user| user.mover.phases)
     }
 
     /// The phase that the road user with an id is in: its manoeuvre, by its index in the space, its number from 1, and the tick

@@ -6,7 +6,7 @@ use crate::action::{Draw, Effect, LaterMoment, OrderRequest, SpawnRequest};
 use crate::sim::moment::npc_facts;
 use crate::sim::placement;
 use crate::sim::placement::Arrivals;
-use crate::sim::road_user::{Advance, Motion, RoadUser, Running};
+use crate::sim::road_user::{Advance, Motion, PhaseCount, RoadUser, Running};
 use avastra_lang::model::{COMMANDED_MAX, NpcFacts};
 
 use super::{DT_S, World};
@@ -49,8 +49,9 @@ impl World {
                 Effect::Time(_) | Effect::Sky(..) | Effect::Spawn(_) => true,
             };
             if let Some(course) = course {
-                mover.course = Some(Running::new(Arc::clone(course), self.ticks));
-                (mover.phases_begun, mover.phases_ended) = (0, 0);
+                let running = Running::new(Arc::clone(course), self.ticks);
+                mover.phases = PhaseCount { all: running.phases(), ..PhaseCount::default() };
+                mover.course = Some(running);
             }
             if let (Some(rules), Motion::Drive(driver), true) =
                 (&draw.lane_changes, &mut mover.motion, may_change)
@@ -155,11 +156,15 @@ impl World {
             let facts = |who: usize| Some((who, self.bearer_facts(who)?));
             let bearers = running.bearers().into_iter().filter_map(facts).collect();
             let moment = LaterMoment { moment, npc, bearers };
-            let Advance { rest, command, ended } = running.advance(&moment, progress, self.ticks);
+            let Advance { rest, command, begun, ended, hands_over } =
+                running.advance(&moment, progress, self.ticks);
             let mover = &mut self.users[index].mover;
+            mover.phases.begun += begun;
+            mover.phases.ended += ended;
+            if let Some(next) = rest.as_ref().filter(|_| hands_over) {
+                mover.phases.all = mover.phases.begun + next.phases();
+            }
             mover.course = rest;
-            mover.phases_ended += ended;
-            mover.phases_begun += u32::from(command.is_some());
             if let Some(command) = command {
                 mover.motion.order(&command, self.ticks);
             }
