@@ -66,7 +66,7 @@ fn a_tailgater_keeps_its_time_gap_and_passes() {
         let behind = |tick: &&Tick| {
             tick.npcs[0].is_some_and(|npc| npc.front_m < tick.ego_rear_m && npc.offset_m.abs() < 1e-6)
         };
-        let Some(last) = ticks.iter().filter(behind).next_back() else { return };
+        let Some(last) = ticks.iter().rfind(behind) else { return };
         // In the last of its 6 s behind the ego vehicle, whose speed changes little then.
         let second = ticks.iter().filter(behind).filter(|tick| tick.at_s > last.at_s - 1.0);
         let steady: Vec<&Tick> = second.collect();
@@ -289,8 +289,7 @@ fn actions_come_after_each_other_as_a_rule_says() {
             gaps += 1;
         }
         for brake_s in &brakes {
-            let before =
-                came.iter().filter(|came_s| *came_s < brake_s).next_back().expect("they came before");
+            let before = came.iter().rfind(|came_s| *came_s < brake_s).expect("they came before");
             assert!(brake_s - before >= 5.0 - 1e-9, "{came:?} {brakes:?}");
         }
     }

@@ -352,10 +352,7 @@ impl Checker {
             }
             ast::EffectKind::Spawn { body, bearers, place: side, distance, of, apart, cover, fields } => {
                 let behind = *side == ast::Place::Behind;
-                let of = match of {
-                    Some(of) => Some(self.named_road_user(of, place)),
-                    None => None,
-                };
+                let of = of.as_ref().map(|of| self.named_road_user(of, place));
                 let cover = cover.as_ref().map(|cover| self.body_word(cover, place));
                 let apart = apart.as_ref().map(|apart| self.apart(apart, bearers, place));
                 let spawn = self.spawn(body, (behind, of.is_some()), distance, fields, place, effect.span)?;

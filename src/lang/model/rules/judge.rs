@@ -229,7 +229,7 @@ impl<'a> RowRules<'a> {
             other => self.space.show(other, expr.ty),
         };
         let is_known = |expr: &Expr| evaluate(expr, &self.space.functions, &facts).number().is_finite();
-        let name = |who: Who| &self.space.bearers[who.bearer(&candidate.values)];
+        let name = |who: Who| &self.space.bearers[who.bearer(candidate.values)];
         condition.walk(&mut |part| {
             let figure = match &part.kind {
                 ExprKind::Fact(fact) if matches!(fact.known(), Known::World | Known::Spawn) => {
@@ -301,7 +301,7 @@ impl<'a> RowRules<'a> {
             let absent = condition
                 .asked()
                 .into_iter()
-                .map(|who| who.bearer(&candidate.values))
+                .map(|who| who.bearer(candidate.values))
                 .find(|who| !is_there(who));
             let why = match absent {
                 Some(who) => format!("`{}` is not there", self.space.bearers[who]),
