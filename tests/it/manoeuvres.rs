@@ -523,6 +523,9 @@ fn random_space(rng: &mut Rng) -> (String, [Guard; 2], Guard) {
             if chance(rng) {
                 text += &format!("after {} s ", number(rng, 0.0, 3.0));
             }
+            if rng::below(rng, 5) == 0 {
+                text += &format!("if {} ", Guard::of("npc", rng).text);
+            }
             text += &format!("{{ {} }}\n", fields(rng));
         }
         text += "}\n";

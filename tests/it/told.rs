@@ -1,12 +1,13 @@
 //! Wishes of road users that are told where to be beside the ego vehicle, whom to heed, and for how long something must have
 //! held: what was written, seen at the ticks of episodes that replay.
 
+use avastra::action::ActionTable;
 use avastra::episode::{Choice, Moment, Outcome};
 use avastra::model::NpcFacts;
 use avastra::sim::{DT_S, World};
 
 use crate::wishes::{number, row, wish};
-use crate::world::{assert_replays, run_of};
+use crate::world::{assert_replays, loaded, run_of};
 
 /// What was seen at a tick of an episode, before the ego vehicle touched anybody.
 struct Tick {
@@ -294,4 +295,35 @@ fn actions_come_after_each_other_as_a_rule_says() {
         }
     }
     assert!(braked > 4 && gaps > 0, "{braked} brakes, {gaps} gaps");
+}
+
+#[test]
+fn a_drawn_road_user_is_one_that_the_rules_allow() {
+    let text = "language 1\nuse \"../../../scenarios/roads.ava\"\n\
+        action first() { spawn Sedan as a ahead 90 m { does: DriveAhead, lane: Current, speed: 5 m/s } }\n\
+        action second() { spawn Sedan as b ahead 40 m { does: DriveAhead, lane: Current, speed: 5 m/s } }\n\
+        action slows(any who: RoadUser where who.there) { order who { speed: 2 m/s } }\n\
+        rule near on slows: who.gap <= 60 m\n";
+    let found = loaded("tests/cases/wishes/random.ava", text);
+    let table = ActionTable::new(found.space.expect("it is sound"));
+    let [second, slows] = [row(&table, "second()"), row(&table, "slows()")];
+    let run = run_of(table.space().clone(), 4, 2, &[]);
+    let mut ordered = 0;
+    for episode in 0..run.episodes() {
+        let mut choose = |moment: &Moment| {
+            let wanted = if moment.step == 0 { second } else { slows };
+            table.offer(moment.situation, wanted).map_or(Choice::Pass, Choice::Act)
+        };
+        let log = run.play(episode, &mut choose, &mut |_, _, _| {});
+        assert_replays(&run, episode, &log);
+        for step in &log.steps {
+            if let Outcome::Done { draw, .. } = &step.outcome
+                && draw.row == slows
+            {
+                assert_eq!(draw.values[0].1.variant(), 1, "nobody else is there");
+                ordered += 1;
+            }
+        }
+    }
+    assert!(ordered > 4, "{ordered} orders");
 }

@@ -524,6 +524,7 @@ impl Checker {
         let has = |is_so: fn(&CommandDef) -> bool| {
             manoeuvre.is_some_and(|call| self.has_command(call.manoeuvre, is_so))
         };
+        let keeps = has(|command| command.keep.is_some());
         let changes_lanes = has(|command| command.lane.is_some());
         let needs = manoeuvre.map_or(Needs::Legs, |call| self.needs(call.manoeuvre));
         let goes_back = has(CommandDef::goes_back);
@@ -564,6 +565,10 @@ impl Checker {
                 () if says(SpawnField::Meet) && says(SpawnField::Waits) => {
                     ("sets out after a time or for a meeting", "leave `waits` or `meet` out")
                 }
+                () if other_way && keeps => (
+                    "does not drive in the ego vehicle's direction",
+                    "a gap is kept ahead of it or behind it; write `early` in its manoeuvre",
+                ),
                 () if other_way && changes_lanes => (
                     "drives in no lane of the ego vehicle's direction",
                     "in its manoeuvre, write `offset` for `lane`",

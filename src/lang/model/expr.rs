@@ -86,6 +86,17 @@ pub enum ExprKind {
 }
 
 impl ExprKind {
+    /// The parameter that it names, also as the one who is asked about.
+    pub fn local(&self) -> Option<usize> {
+        match self {
+            ExprKind::Local(local)
+            | ExprKind::OfBearer(Who::Given(local), _)
+            | ExprKind::IsThere(Who::Given(local))
+            | ExprKind::IsWordOf(Who::Given(local), ..) => Some(*local),
+            _ => None,
+        }
+    }
+
     /// From when on the fact is known that it is itself; [`Known::Road`] if it is none.
     fn known(&self) -> Known {
         match self {

@@ -186,7 +186,7 @@ fn why(rules: &[&RuleDef]) -> &'static str {
 /// Whether the rules are about states alone, and nothing that is drawn decides them.
 fn are_of_states(rules: &[&RuleDef]) -> bool {
     let is_state = |kind: &ExprKind| matches!(kind, ExprKind::Cell(_) | ExprKind::CellAt(..));
-    let is_drawn = |kind: &ExprKind| matches!(kind, ExprKind::Local(_));
+    let is_drawn = |kind: &ExprKind| kind.local().is_some();
     !rules.is_empty() && rules.iter().all(|rule| has(rule, is_state) && !has(rule, is_drawn))
 }
 

@@ -39,12 +39,12 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
 
 /// Values with which a row spawns within the stopping distance on a road; `None` if none are found, or if a
 /// rule asks the world, about the gap or the speed of the ego vehicle, and so decides by itself. What appears beside the
-/// middle of a lane need not be in the way.
+/// middle of a lane need not be in the way, and how far somebody else is away nobody knows here.
 fn unfair(space: &Space, row: &Row, road: &Road, spawn: &SpawnDef, left: &Left) -> Option<Witness> {
     let in_force = RulesInForce::by_default(space);
     let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };
     let asks = |demand| matches!(demand, Demand::Holds(condition) if condition.known() > Known::Road);
-    if spawn.offset.is_some() || rules.demands().any(|(_, demand)| asks(demand)) {
+    if spawn.offset.is_some() || spawn.of.is_some() || rules.demands().any(|(_, demand)| asks(demand)) {
         return None;
     }
     Search { rules, left, moment: None }.find(&|values, memory| {

@@ -69,6 +69,10 @@ impl Agent for MaskedRandom {
             if by_rate.is_some() {
                 return by_rate;
             }
+            // Nothing is left of the step but what the sum was rounded by.
+            if rates.iter().sum::<f64>() >= 1.0 - 1e-12 {
+                return rates.iter().rposition(|chance| *chance > 0.0);
+            }
         }
         let sum: u32 = self.legal_shares(legal).sum();
         if sum == 0 {

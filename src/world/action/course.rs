@@ -16,7 +16,7 @@ pub struct Course {
     pub manoeuvre: usize,
     /// It and all to which it may hand over, and which of them it is.
     parts: Arc<[Part]>,
-    part: usize,
+    pub part: usize,
     /// How often it goes through its phases.
     times: usize,
     later: Later,

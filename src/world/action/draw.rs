@@ -162,6 +162,7 @@ impl<'a> Judge<'a> {
         let mut effects = self.effects(values, &after);
         let mut refusals = Vec::new();
         let mut spawns = Vec::new();
+        let mut spawn_defs = self.action.spawns();
         for (nth, effect) in effects.iter().enumerate() {
             if refusals.len() >= refusals_max {
                 return Err(refusals);
@@ -180,7 +181,8 @@ impl<'a> Judge<'a> {
                     continue;
                 }
             };
-            if request.distance_m.is_nan() || request.distance_m < 0.0 {
+            let is_beside = spawn_defs.next().is_some_and(|spawn| spawn.of.is_some());
+            if is_beside && (request.distance_m.is_nan() || request.distance_m < 0.0) {
                 let why = if request.distance_m.is_nan() { ABSENT } else { PASSED };
                 refusals.push(refuse(None, format!("cannot spawn: {why}")));
                 continue;

@@ -148,7 +148,7 @@ impl Progress {
     pub fn meets(&self, command: &Command) -> bool {
         let speed_mps = command.speed_mps.filter(|_| !command.pursues());
         // Who stands as told moves no farther to the side.
-        let stands = speed_mps == Some(0.0) && self.speed_mps == 0.0;
+        let stands = !self.on_foot && speed_mps == Some(0.0) && self.speed_mps == 0.0;
         speed_mps.is_none_or(|mps| self.is_over || has_speed(self.speed_mps, mps))
             && (self.has_met || !command.pursues())
             && (self.is_aside || stands || !command.goes_aside())
@@ -276,6 +276,8 @@ impl Running {
 
     fn trace(&self, trace: &mut Trace) {
         trace.words([self.phase as u64, self.since]);
+        // Nothing is fed for the manoeuvre that was given, as before there were others.
+        trace.words((self.course.part > 0).then_some(self.course.part as u64));
         match self.stage {
             Stage::Waiting(held) => trace.words([0, held.map_or(0, |tick| tick + 1)]),
             Stage::Holding(until) => trace.words([1, until]),
@@ -442,7 +444,8 @@ impl Mover {
     pub fn elevation_m(&self) -> Option<f64> {
         match &self.motion {
             Motion::Drive(driver) => Some(driver.way.height_at(driver.station_m)),
-            Motion::Walk(_) | Motion::Stroll(_) | Motion::Stand => None,
+            Motion::Stroll(stroller) => Some(stroller.height_m()),
+            Motion::Walk(_) | Motion::Stand => None,
         }
     }
 

@@ -22,6 +22,8 @@ pub(super) struct Stroller {
     /// Where it is along the ego vehicle's route, and to the left of it, m.
     station_m: f64,
     left_m: f64,
+    /// Height of the road there, m.
+    height_m: f64,
     /// Whether it comes towards the ego vehicle. One that is told to go back turns round.
     comes: bool,
     /// As told; below 0 it goes back.
@@ -35,10 +37,21 @@ pub(super) struct Stroller {
 }
 
 impl Stroller {
-    pub fn new(station_m: f64, left_m: f64, comes: bool, speed_mps: f64) -> Stroller {
+    pub fn new(station_m: f64, left_m: f64, comes: bool, speed_mps: f64, around: &Around) -> Stroller {
+        let height_m = around.scene.route.height_at(&around.scene.map, station_m);
         let (wants_left_m, aside_mps) = (left_m, ASIDE_MPS);
         let (is_blocked, looks_now) = (false, true);
-        Stroller { station_m, left_m, comes, speed_mps, wants_left_m, aside_mps, is_blocked, looks_now }
+        Stroller {
+            station_m,
+            left_m,
+            height_m,
+            comes,
+            speed_mps,
+            wants_left_m,
+            aside_mps,
+            is_blocked,
+            looks_now,
+        }
     }
 
     /// Where it begins.
@@ -63,6 +76,11 @@ impl Stroller {
         if self.is_blocked { 0.0 } else { self.speed_mps }
     }
 
+    /// Height of the road where it is, m.
+    pub fn height_m(&self) -> f64 {
+        self.height_m
+    }
+
     pub fn is_aside(&self) -> bool {
         self.left_m == self.wants_left_m
     }
@@ -82,7 +100,7 @@ impl Stroller {
 
     /// Where it is at the end of a tick; `None` once it has left, which the ego vehicle does not see (`in_sight`).
     pub fn step(&mut self, this: &Obstacle, in_sight: bool, around: &Around) -> Option<Moved> {
-        if self.is_over(around) {
+        if self.is_over(around) && self.is_aside() {
             return in_sight.then_some(Moved::at_rest(this));
         }
         let (station_m, left_m) = self.next(this, around);
@@ -98,6 +116,7 @@ impl Stroller {
             return Some(Moved::at_rest(this));
         }
         (self.station_m, self.left_m) = (station_m, left_m);
+        self.height_m = around.scene.route.height_at(&around.scene.map, station_m);
         let position = place(station_m, left_m, around);
         let way = position - this.outline.pose.position;
         if way == Vec2::zeros() {

@@ -108,8 +108,5 @@ fn collect(condition: &Expr, rule: Option<usize>, guards: &mut Vec<Expr>, into: 
 
 /// The parameters that an expression names.
 pub fn locals(expr: &Expr) -> Vec<usize> {
-    expr.filter_map(|kind| match kind {
-        ExprKind::Local(local) => Some(*local),
-        _ => None,
-    })
+    expr.filter_map(ExprKind::local)
 }

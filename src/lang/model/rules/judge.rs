@@ -214,7 +214,7 @@ impl<'a> RowRules<'a> {
         let parameters = &self.space.actions[self.row.action].parameters;
         let mut shown = Vec::new();
         for (index, parameter) in parameters.iter().enumerate() {
-            if condition.any(|kind| matches!(kind, ExprKind::Local(local) if *local == index)) {
+            if condition.any(|kind| kind.local() == Some(index)) {
                 let value = self.space.show(candidate.values[index], parameter.ty);
                 shown.push(format!("{} = {value}", parameter.name));
             }

@@ -14,7 +14,7 @@ use avastra_base::kinematics::STANDING_MPS;
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 use avastra_lang::model::command::IgnoredRules;
-use avastra_lang::model::vocabulary::Side;
+use avastra_lang::model::vocabulary::{Side, TrafficRule};
 
 use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
@@ -296,6 +296,7 @@ impl Driver {
             wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, leader, free_mps2));
         }
         if self.keeps_gap()
+            && !self.ignores.contains(TrafficRule::Ego)
             && let Some(braking_mps2) = self.braking_for_ego_mps2(size, around)
         {
             wanted_mps2 = wanted_mps2.min(-braking_mps2);
@@ -324,7 +325,7 @@ impl Driver {
 
     /// Whether it was asked to stand, and does.
     pub fn is_parked(&self) -> bool {
-        self.cruise_mps == 0.0 && self.speed_mps == 0.0
+        self.cruise_mps == 0.0 && self.speed_mps == 0.0 && self.pursuit.is_none()
     }
 
     /// Whether no action commanded it.

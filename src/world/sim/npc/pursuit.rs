@@ -5,6 +5,8 @@
 use avastra_base::kinematics::{braking_m, needed_mps2};
 use avastra_lang::model::command::Command;
 
+use avastra_road::LaneIndex;
+
 use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
@@ -29,8 +31,8 @@ pub(super) struct Pursuit {
     aim: Aim,
     /// The fastest that it drives for this, m/s; without it the limit of its lane.
     most_mps: Option<f64>,
-    /// Whether the place was found: as long as its way crosses that of the ego vehicle nowhere, it drives on as it does.
-    is_found: bool,
+    /// The lane in which its way crosses that of the ego vehicle, once that is known; until then it drives on as it does.
+    crosses_in: Option<LaneIndex>,
     /// Whether the gap was as wanted once.
     is_met: bool,
 }
@@ -67,7 +69,7 @@ impl Pursuit {
         let gap = keep_m.map(Gap::Way).or(keep_s.map(Gap::Time)).map(Aim::Gap);
         let place = early_s.map(|early_s| Aim::Place { early_s, station_m: at_m });
         let most_mps = command.speed_mps;
-        Some(Pursuit { aim: gap.or(place)?, most_mps, is_found: false, is_met: false })
+        Some(Pursuit { aim: gap.or(place)?, most_mps, crosses_in: None, is_met: false })
     }
 
     pub fn trace(&self, trace: &mut Trace) {
@@ -76,7 +78,7 @@ impl Pursuit {
             Aim::Gap(Gap::Time(gap_s)) => (2, [gap_s, 0.0]),
             Aim::Place { early_s, station_m } => (3, [early_s, station_m.unwrap_or(f64::INFINITY)]),
         };
-        trace.words([kind, u64::from(self.is_met), u64::from(self.is_found)]);
+        trace.words([kind, u64::from(self.is_met), self.crosses_in.map_or(0, |lane| lane.0 as u64 + 1)]);
         trace.numbers(numbers);
         trace.number(self.most_mps.unwrap_or(f64::INFINITY));
     }
@@ -120,18 +122,21 @@ impl Driver {
             Aim::Place { early_s, station_m } => {
                 let ways = match station_m {
                     Some(station_m) => Some(ways_to(view, station_m)),
-                    None => self.ways_to_crossing(view.size, around),
+                    None => {
+                        let crossing = self.next_crossing(view.size, around, pursuit.crosses_in);
+                        pursuit.crosses_in = pursuit.crosses_in.or(crossing.map(|(lane, _)| lane));
+                        crossing.map(|(_, ways)| ways)
+                    }
                 };
                 let Some((own_m, ego_m)) = ways.filter(|(own_m, _)| *own_m > 0.0) else {
                     // Behind the place it keeps the speed that it has.
-                    if pursuit.is_found || station_m.is_some() {
+                    if pursuit.crosses_in.is_some() || station_m.is_some() {
                         self.cruise_mps = self.speed_mps;
                         self.pursuit = None;
                     }
                     return None;
                 };
-                pursuit.is_found = true;
-                // An ego vehicle that stands does not come: neither does this one.
+                // Before a place to which the ego vehicle does not come, because it stands, this one waits, too.
                 let left_s = ego_m / around.ego.speed_mps - early_s;
                 // The ego vehicle has moved in this tick already.
                 let left_s = left_s + DT_S;
@@ -165,13 +170,25 @@ impl Driver {
         size: &BodyParameters,
         around: &Around,
     ) -> Option<(f64, f64)> {
+        self.next_crossing(size, around, None).map(|(_, ways)| ways)
+    }
+
+    /// The lane of that crossing, with the two ways; of the crossings in one lane, if that is given.
+    fn next_crossing(
+        &self,
+        size: &BodyParameters,
+        around: &Around,
+        within: Option<LaneIndex>,
+    ) -> Option<(LaneIndex, (f64, f64))> {
         let front_m = self.station_m + size.length_m / 2.0;
         let ego_front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
-        let ahead = around.scene.route.conflicts.iter().filter_map(|conflict| {
+        let is_meant = |lane: LaneIndex| within.is_none_or(|within| lane == within);
+        let ahead = around.scene.route.conflicts.iter().filter(|conflict| is_meant(conflict.lane));
+        let ahead = ahead.filter_map(|conflict| {
             let own_m = self.way.lane_begin_m(conflict.lane)? + conflict.lane_station_m - front_m;
-            (own_m > 0.0).then_some((own_m, conflict.station_m - ego_front_m))
+            (own_m > 0.0).then_some((conflict.lane, (own_m, conflict.station_m - ego_front_m)))
         });
-        ahead.min_by(|(a_m, _), (b_m, _)| a_m.total_cmp(b_m))
+        ahead.min_by(|(_, (a_m, _)), (_, (b_m, _))| a_m.total_cmp(b_m))
     }
 }
 

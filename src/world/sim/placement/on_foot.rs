@@ -54,7 +54,7 @@ pub(super) fn on_foot(asked: &Asked) -> Result<Newcomers, String> {
     }
     if request.verb.walks_along() {
         let comes = request.verb == Verb::WalkOpposite;
-        let stroller = Stroller::new(asked_m, request.offset_m, comes, request.speed_mps);
+        let stroller = Stroller::new(asked_m, request.offset_m, comes, request.speed_mps, around);
         let begins = stroller.begins(around);
         return Ok(Newcomers { asked: finish(asked, Motion::Stroll(stroller), begins)?, cover: None });
     }
