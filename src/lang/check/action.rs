@@ -352,6 +352,13 @@ impl Checker {
             }
             ast::EffectKind::Spawn { body, bearers, place: side, distance, of, apart, cover, fields } => {
                 let behind = *side == ast::Place::Behind;
+                let is_taken = |name: &&ast::Name| place.locals.iter().any(|(local, _)| *local == name.text);
+                if let Some(name) = bearers.iter().find(is_taken) {
+                    let message = format!("`{}` is a parameter, and no new name", name.text);
+                    let error =
+                        Diagnostic::error(code::DUPLICATE, message).at(name.span, "a parameter already");
+                    self.report(error.help("give what appears a name of its own"));
+                }
                 let of = of.as_ref().map(|of| self.named_road_user(of, place));
                 let cover = cover.as_ref().map(|cover| self.body_word(cover, place));
                 let apart = apart.as_ref().map(|apart| self.apart(apart, bearers, place));

@@ -29,6 +29,12 @@ const TIME_S: RangeInclusive<f64> = 0.0..=f64::INFINITY;
 /// Largest number of phases of a manoeuvre.
 const PHASES_MAX: usize = 100;
 
+/// Most manoeuvres that hand over one to another.
+const HAND_OVERS_MAX: usize = 100;
+
+/// Of more that lead to no end not each is told.
+const CIRCLES_MAX: usize = 100;
+
 impl Checker {
     /// Notes the names that actions give to what they spawn. Phases, orders and rules may stand before them.
     pub(super) fn declare_bearers(&mut self, items: &[&ast::Item]) {
@@ -139,14 +145,15 @@ impl Checker {
             .collect();
         // Rounds, in each of which those come whose next ones have come.
         let mut order: Vec<usize> = Vec::new();
-        loop {
-            let is_due = |index: &usize| {
-                !order.contains(index) && next[*index].iter().all(|(next, _)| order.contains(next))
-            };
+        let mut has_come = vec![false; declared.len()];
+        for _ in 0..HAND_OVERS_MAX {
+            let is_due =
+                |index: &usize| !has_come[*index] && next[*index].iter().all(|(next, _)| has_come[*next]);
             let due: Vec<usize> = (0..declared.len()).filter(is_due).collect();
             if due.is_empty() {
                 break;
             }
+            due.iter().for_each(|index| has_come[*index] = true);
             order.extend(due);
         }
         let reaches = |from: usize, to: usize| {
@@ -159,9 +166,22 @@ impl Checker {
             }
             found.contains(&to)
         };
-        for index in (0..declared.len()).filter(|index| !order.contains(index)) {
-            // Others lead to a circle, and are no part of it.
+        // What is left is part of a circle, leads to one, or hands over too often.
+        let left: Vec<usize> = (0..declared.len()).filter(|index| !has_come[*index]).collect();
+        if let Some(first) = left.first().filter(|_| left.len() > CIRCLES_MAX) {
+            let message = format!("{} manoeuvres hand over more than {HAND_OVERS_MAX} times", left.len());
+            let error = Diagnostic::error(code::TOO_MUCH, message);
+            self.report(error.at(declared[*first].1.name.span, "the first of them, or in a circle"));
+            return order;
+        }
+        for index in left {
             let Some((_, span)) = next[index].iter().find(|(next, _)| reaches(*next, index)) else {
+                if let Some((_, span)) = next[index].iter().find(|(next, _)| !has_come[*next]) {
+                    let message = format!("`{}` leads to no end", declared[index].1.name.text);
+                    let error = Diagnostic::error(code::TOO_MUCH, message);
+                    let most = format!("at most {HAND_OVERS_MAX} hand over one to another, in no circle");
+                    self.report(error.at(*span, most));
+                }
                 continue;
             };
             let message = format!("`{}` comes back to itself", declared[index].1.name.text);

@@ -90,6 +90,11 @@ impl Driver {
         self.pursuit.as_ref().is_none_or(|pursuit| pursuit.is_met)
     }
 
+    /// Whether its front is past a station of the ego vehicle's route.
+    pub(in crate::sim) fn is_past(&self, view: &View, station_m: f64) -> bool {
+        ways_to(view, station_m).0 <= 0.0
+    }
+
     /// Whether it keeps a gap to the ego vehicle and does not follow it by itself.
     pub(super) fn keeps_gap(&self) -> bool {
         matches!(self.pursuit.as_deref(), Some(Pursuit { aim: Aim::Gap(_), .. }))

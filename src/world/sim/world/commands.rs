@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::action::{Draw, Effect, LaterMoment, OrderRequest, SpawnRequest};
 use crate::sim::moment::npc_facts;
+use crate::sim::npc::View;
 use crate::sim::placement;
 use crate::sim::placement::Arrivals;
 use crate::sim::road_user::{Advance, Motion, PhaseCount, RoadUser, Running};
@@ -115,6 +116,10 @@ impl World {
             // One that is to change its lane will turn from another one.
             if let (Some(to), None) = (command.turn, side.flatten()) {
                 driver.can_turn(to, &around, &mover.size)?;
+            }
+            let view = View { this: obstacle, size: &mover.size, around: &around };
+            if command.early_s.is_some() && command.at_m.is_some_and(|at_m| driver.is_past(&view, at_m)) {
+                return Err("it is past that place already".to_owned());
             }
             let crosses =
                 || driver.ways_to_crossing(&mover.size, &around).is_some_and(|(_, ego_m)| ego_m > 0.0);
