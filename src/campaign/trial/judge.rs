@@ -79,7 +79,14 @@ fn does_phases(seen: &Sighting) -> Result<(), String> {
 pub(super) fn appears(scene: &Scene, request: &SpawnRequest, seen: &Sighting) -> Result<(), String> {
     match request.verb {
         Verb::DriveAhead => appears_ahead(scene, request, &seen.frames[0]),
-        _ => Ok(()),
+        Verb::DriveBehind
+        | Verb::Overtake
+        | Verb::DriveOpposite
+        | Verb::CrossRoad
+        | Verb::Walk
+        | Verb::Stand
+        | Verb::WalkAhead
+        | Verb::WalkOpposite => Ok(()),
     }
 }
 

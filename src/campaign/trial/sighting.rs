@@ -50,7 +50,7 @@ pub(super) struct Sighting {
     /// Never empty; the first is of the moment at which it appeared.
     pub frames: Vec<Frame>,
     pub ending: Ending,
-    /// How many phases of its manoeuvre began, and ended.
+    /// How many phases of its manoeuvre began, and ended, and how many there are.
     pub phases: PhaseCount,
     /// Whether it has done what it was told.
     pub has_done: bool,

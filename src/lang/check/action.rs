@@ -7,7 +7,7 @@ use crate::check::declaration::{even_odds, unknown_word};
 use crate::check::expression::{NUMBER_MAX, Place, is_beyond_states, is_number};
 use crate::check::operator::with_range;
 use crate::check::references::Symbol;
-use crate::check::report::{Report, all_of, field};
+use crate::check::report::{Report, all_of, as_written, field};
 use crate::check::rule::locals;
 use crate::model::command::{CommandDef, Needs};
 use crate::model::expr::{Expr, ExprKind};
@@ -363,14 +363,7 @@ impl Checker {
                 let cover = cover.as_ref().map(|cover| self.body_word(cover, place));
                 let apart = apart.as_ref().map(|apart| self.apart(apart, bearers, place));
                 let spawn = self.spawn(body, (behind, of.is_some()), distance, fields, place, effect.span)?;
-                let of = match of {
-                    Some(of) => Some(of?),
-                    None => None,
-                };
-                let cover = match cover {
-                    Some(cover) => Some(cover?),
-                    None => None,
-                };
+                let (of, cover) = (as_written(of)?, as_written(cover)?);
                 self.check_cover(cover.as_ref(), &spawn.verb, effect.span);
                 let spawn = SpawnDef { cover, of, ..spawn };
                 let bearer = |name: &ast::Name| self.bearers.iter().position(|one| *one == name.text);

@@ -3,7 +3,6 @@
 //! It goes on after a mistake, so that one run shows all mistakes: a broken declaration becomes `None`, and
 //! no diagnostic is reported for what depends on it.
 
-use crate::model::vocabulary::ROAD_USER;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
@@ -16,7 +15,7 @@ use crate::model::command::Needs;
 use crate::model::effort;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{bounds, clauses, rules_by_action};
-use crate::model::vocabulary::TYPES;
+use crate::model::vocabulary::{ROAD_USER, TYPES};
 use crate::model::{
     ActionDef, BodyDef, EnumDef, FnDef, GroupDef, ManoeuvreDef, Meaning, SetDef, Space, StateDef, Type,
     Value, code,
@@ -48,7 +47,7 @@ pub(super) struct Checker {
     pub(super) bodies: Vec<BodyDef>,
     /// Names that the spawns of all actions give.
     pub(super) bearers: Vec<String>,
-    /// What at most can be told to who bears them.
+    /// What the road users of each name can be told at most.
     pub(super) obeys: BTreeMap<String, Needs>,
     pub(super) manoeuvre_names: Names,
     /// `None` stands for a broken one.

@@ -1,12 +1,11 @@
 //! Orders and manoeuvres: what a vehicle is told, phase by phase, and how spawns and orders name manoeuvres.
 
-use crate::prove::VARIANTS_MAX;
 use core::ops::RangeInclusive;
 
 use crate::check::checker::{Checker, docs, each};
 use crate::check::expression::Place;
 use crate::check::references::Symbol;
-use crate::check::report::{Report, all_of, field};
+use crate::check::report::{Report, all_of, as_written, field};
 use crate::model::command::{CommandDef, Needs};
 use crate::model::expr::{Expr, ExprKind, Who};
 use crate::model::vocabulary::{
@@ -16,6 +15,7 @@ use crate::model::vocabulary::{
 use crate::model::{
     EnumDef, ManoeuvreCall, ManoeuvreDef, OrderDef, PhaseDef, REPEAT, Type, WordExpr, code, needs, reached,
 };
+use crate::prove::VARIANTS_MAX;
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
 use avastra_base::units::Dimension;
@@ -315,11 +315,7 @@ impl Checker {
             );
         }
         let command = command.filter(|_| all)?;
-        let then = match then {
-            Some(call) => Some(call?),
-            None => None,
-        };
-        Some(PhaseDef { once, held, within, after, only_if, command, then })
+        Some(PhaseDef { once, held, within, after, only_if, command, then: as_written(then)? })
     }
 
     /// Reports a figure of a phase that is written out, out of its bounds. What is computed is brought into them later.

@@ -99,6 +99,14 @@ pub(super) fn all_of<T>(found: impl Iterator<Item = Option<T>>) -> Option<Vec<T>
     found.into_iter().collect()
 }
 
+/// What was written, or nothing where nothing was; `None` if it is broken.
+pub(super) fn as_written<T>(found: Option<Option<T>>) -> Option<Option<T>> {
+    match found {
+        Some(found) => found.map(Some),
+        None => Some(None),
+    }
+}
+
 /// The value of the first field of that name.
 pub(super) fn field<'a, W: Word>(fields: &[(W, &'a ast::Expr)], wanted: W) -> Option<&'a ast::Expr> {
     fields.iter().find(|(field, _)| *field == wanted).map(|(_, value)| *value)

@@ -30,13 +30,7 @@ pub enum Needs {
 
 impl Needs {
     pub(crate) fn of(verb: Verb) -> Needs {
-        match verb {
-            Verb::Walk | Verb::Stand => Needs::Legs,
-            Verb::WalkAhead | Verb::WalkOpposite => Needs::LegsAlong,
-            Verb::DriveAhead | Verb::DriveBehind | Verb::Overtake | Verb::DriveOpposite | Verb::CrossRoad => {
-                Needs::Wheels
-            }
-        }
+        needs(verb.walks_along(), !verb.is_on_foot())
     }
 
     /// What can be told to who has no more than this, in words.
@@ -330,8 +324,8 @@ impl Command {
         out_of_bounds("order", figures)
     }
 
-    /// Brings every figure into its range. Drops a `rate`, an `aside` or a `time_gap` without a value; `None` if the speed or the offset
-    /// has none.
+    /// Brings every figure into its range, and drops what goes without a value: a `rate`, an `aside`, a `time_gap`. `None` if
+    /// another figure has none.
     pub fn within_bounds(mut self) -> Option<Command> {
         for Figure { bounds, may_be_left_out, value, .. } in FIGURES {
             let figure = value(&mut self);

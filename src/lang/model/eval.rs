@@ -4,7 +4,7 @@
 //! value (a division by 0, a number too large) is NaN, which satisfies no comparison but `!=`.
 
 use crate::model::effort;
-use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
+use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind, Who};
 use crate::model::space::{BodyWord, COUNTED, FnDef, RoadFacts, Space, WordExpr};
 use crate::model::value::{Memory, Value};
 use crate::model::vocabulary::{Fact, LaneChoice, Light, Priority, RoadKind, Word, WordFact};
@@ -166,9 +166,11 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
         ExprKind::Fact(fact) => fact_value(*fact, facts),
         ExprKind::OfRoadUser(id, fact) => {
             let mut users = facts.world.into_iter().flat_map(|world| &world.road_users);
-            fact_of(users.find(|(known, _)| known == id).map(|(_, npc)| *npc), *fact, facts)
+            fact_value(*fact, &about(users.find(|(known, _)| known == id).map(|(_, npc)| *npc), facts))
         }
-        ExprKind::OfBearer(who, fact) => fact_of(bearer(who.bearer(facts.locals), facts), *fact, facts),
+        ExprKind::OfBearer(who, fact) => {
+            fact_value(*fact, &about(bearer(who.bearer(facts.locals), facts), facts))
+        }
         ExprKind::Since(actions, _) => Value::Number(facts.world.map_or(f64::NAN, |world| {
             let happened_s = |action: &usize| world.happened_s.get(*action).copied();
             let last_s = actions.iter().filter_map(happened_s).fold(f64::NEG_INFINITY, f64::max);
@@ -214,9 +216,7 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
             Value::Bool(word_of(*fact, facts).is_some_and(|word| words.iter().any(|one| one == word)))
         }
         ExprKind::IsWordOf(who, fact, words) => {
-            let npc = bearer(who.bearer(facts.locals), facts);
-            let spawn = npc.map(|npc| SpawnFacts { npc, ..SpawnFacts::default() });
-            let word = spawn.and_then(|spawn| word_of(*fact, &Facts { spawn: Some(spawn), ..*facts }));
+            let word = word_of_bearer(*who, *fact, facts);
             Value::Bool(word.is_some_and(|word| words.iter().any(|one| one == word)))
         }
         ExprKind::IsBody(fact, bodies) => {
@@ -232,10 +232,9 @@ fn bearer(who: usize, facts: &Facts<'_>) -> Option<NpcFacts> {
     bearers.find(|(known, _)| *known == who).map(|(_, npc)| *npc)
 }
 
-/// A fact about a road user that may be there.
-fn fact_of(npc: Option<NpcFacts>, fact: Fact, facts: &Facts<'_>) -> Value {
-    let spawn = npc.map(|npc| SpawnFacts { npc, ..SpawnFacts::default() });
-    fact_value(fact, &Facts { spawn, ..*facts })
+/// The facts, as of a newcomer that is this road user, which may be there.
+fn about<'a>(npc: Option<NpcFacts>, facts: &Facts<'a>) -> Facts<'a> {
+    Facts { spawn: npc.map(|npc| SpawnFacts { npc, ..SpawnFacts::default() }), ..*facts }
 }
 
 fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
@@ -289,6 +288,11 @@ pub(crate) fn word_of(fact: WordFact, facts: &Facts<'_>) -> Option<&'static str>
         WordFact::Hit => facts.outcome.hit.map(|body| body.like.name()),
         WordFact::Near => facts.outcome.near.map(|body| body.like.name()),
     }
+}
+
+/// The word that a fact about the latest bearer of a name is; `None` where there is none.
+pub(crate) fn word_of_bearer(who: Who, fact: WordFact, facts: &Facts<'_>) -> Option<&'static str> {
+    word_of(fact, &about(bearer(who.bearer(facts.locals), facts), facts))
 }
 
 fn has_lane(facts: &Facts<'_>, lane: LaneChoice) -> bool {

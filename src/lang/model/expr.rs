@@ -1,5 +1,7 @@
 //! Typed expressions: names are resolved, units are gone (all numbers are SI), every type fits.
 
+use core::ops::Range;
+
 use crate::model::space::BodyWord;
 use crate::model::value::{EnumIndex, Type, Value};
 use crate::model::vocabulary::{Fact, Known, LaneChoice, WordFact};
@@ -22,6 +24,14 @@ impl Who {
         match self {
             Who::Named(who) => who,
             Who::Given(local) => locals[local].variant(),
+        }
+    }
+
+    /// The names that it may be, by index in `Space::bearers`, of which there are so many.
+    pub fn bearers(self, count: usize) -> Range<usize> {
+        match self {
+            Who::Named(who) => who..who + 1,
+            Who::Given(_) => 0..count,
         }
     }
 }
@@ -226,11 +236,7 @@ impl Expr {
 
     /// The names of road users that it may ask about, by index in `Space::bearers`, of which there are so many.
     pub fn bearers(&self, count: usize) -> Vec<usize> {
-        let of = |who: Who| match who {
-            Who::Named(who) => who..who + 1,
-            Who::Given(_) => 0..count,
-        };
-        self.asked().into_iter().flat_map(of).collect()
+        self.asked().into_iter().flat_map(|who| who.bearers(count)).collect()
     }
 
     pub fn reads_memory(&self) -> bool {

@@ -102,6 +102,7 @@ impl Trigger {
 
     /// The names of road users that the condition asks about, by index in `Space::bearers`.
     pub fn bearers(&self) -> Vec<usize> {
+        // A scenario has no parameters that could hold one.
         self.once.iter().flat_map(|condition| condition.expr.bearers(0)).collect()
     }
 

@@ -1,14 +1,13 @@
 //! The checked space: what may happen around the car. If a [`Space`] exists, it is sound: every name
 //! resolves, every type fits, every rule can be enforced.
 
-use crate::model::expr::Who;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::model::body::BodyParameters;
 use crate::model::command::{CommandDef, Needs};
 use crate::model::eval::{Facts, evaluate};
-use crate::model::expr::Expr;
+use crate::model::expr::{Expr, Who};
 use crate::model::interval::Interval;
 use crate::model::meaning::Meaning;
 use crate::model::on_route::Stretch;
@@ -386,7 +385,8 @@ pub fn needs<'a>(manoeuvre: usize, of: impl Fn(usize) -> Option<&'a ManoeuvreDef
     phases.map(|phase| phase.command.needs()).max().unwrap_or(Needs::Legs)
 }
 
-/// A phase begins when `once` has held for long enough, and `after` some more time. It ends when the road user has done what it is told.
+/// A phase begins when `once` has held for long enough, and `after` some more time. It ends when the road user has done what
+/// it is told, or when the `once` of the next phase holds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhaseDef {
     pub once: Option<Expr>,

@@ -368,7 +368,7 @@ words! {
     Ignores "ignores" = "The rules of the road that it ignores from then on: `ignores: [Signals]`; `[]` for none.",
     Siren "siren" = "Whether it is an emergency vehicle under way from then on: `siren: false`.",
     Turn "turn" = "Where it goes at the next junction: `Left`, `Straight` or `Right`.",
-    Then "then" = "The manoeuvre that it does, in an order: `then: brake(4 m/s^2)`.",
+    Then "then" = "The manoeuvre that it does from then on: `then: brake(4 m/s^2)`.",
 }
 
 words! {
@@ -490,6 +490,7 @@ impl Verb {
         }
     }
 
+    /// Whether it walks along the road, rather than over it.
     pub fn walks_along(self) -> bool {
         matches!(self, Verb::WalkAhead | Verb::WalkOpposite)
     }

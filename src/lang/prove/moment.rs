@@ -3,8 +3,8 @@
 //!
 //! What a fact may be is cut into pieces where a condition compares it with something known. If in every combination
 //! of pieces some condition fails, no moment meets them all. What is known of facts together stands in [`Case::is_possible`], of
-//! a newcomer in [`newcomers`], and of a road in its stretches, one of which the ego vehicle is on; otherwise facts are taken to be independent, so a combination that is possible here may
-//! still never come.
+//! a newcomer in [`newcomers`], and of a road in its stretches, one of which the ego vehicle is on; otherwise facts are taken to
+//! be independent, so a combination that is possible here may still never come.
 
 use core::ops::RangeInclusive;
 
@@ -137,7 +137,7 @@ fn newcomer(spawn: &SpawnDef, known: &Known<'_>, lands: bool) -> Case {
     };
     let Case { mut numbers, words, not_words } = known.case.cloned().unwrap_or_default();
     let asked = enclose(&spawn.speed, known).interval().intersect(&at_most(*SPAWN_SPEED_MPS.end()));
-    // On foot one waits at first, or stands for good.
+    // Who crosses on foot waits at first, and who stands does so for good.
     let speed = match verbs.iter().all(|verb| matches!(verb, Verb::Walk | Verb::Stand)) {
         true => Interval::point(Rational::ZERO),
         false => Interval { low: End::At(Rational::ZERO, true), high: asked.high },
@@ -146,8 +146,7 @@ fn newcomer(spawn: &SpawnDef, known: &Known<'_>, lands: bool) -> Case {
         numbers.push((Fact::NpcSpeed, speed));
     }
     let distance = enclose(&spawn.distance, known).interval().intersect(&Interval::NOT_NEGATIVE);
-    let is_on_route =
-        |verb: &Verb| !matches!(verb, Verb::Walk | Verb::WalkAhead | Verb::WalkOpposite | Verb::CrossRoad);
+    let is_on_route = |verb: &Verb| !verb.walks_along() && !matches!(verb, Verb::Walk | Verb::CrossRoad);
     if lands
         && spawn.of.is_none()
         && spawn.offset.is_none()

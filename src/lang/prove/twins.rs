@@ -4,7 +4,6 @@
 //! same effects and are bound by the same conditions. Forms are compared, not meanings, so equal rows that
 //! are written differently may be missed.
 
-use crate::prove::reduce::reduced_who;
 use std::collections::BTreeMap;
 
 use crate::model::command::WrittenFigure;
@@ -13,7 +12,7 @@ use crate::model::vocabulary::TrafficRule;
 use crate::model::{
     Domain, EffectDef, ManoeuvreCall, Row, RuleBody, Space, SpawnDef, Value, WordExpr, code, effort,
 };
-use crate::prove::reduce::reduce;
+use crate::prove::reduce::{reduce, reduced_who};
 use crate::syntax::Diagnostic;
 use crate::syntax::ast::Span;
 use avastra_base::units::Rational;

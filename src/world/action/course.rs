@@ -89,7 +89,7 @@ impl Course {
         self.phase(phase).once.as_ref().is_none_or(|once| self.later.value(once, moment).truth())
     }
 
-    /// How long that must have held without a break, s.
+    /// How long that must have held without a break, s; 0 if nothing is written.
     pub fn held_s(&self, phase: usize, moment: &LaterMoment) -> f64 {
         self.time_s(self.phase(phase).held.as_ref(), moment)
     }
@@ -128,8 +128,8 @@ impl Course {
         Some(Course::new(Arc::clone(&self.parts), part, Later { locals, ..self.later.clone() }))
     }
 
-    /// What a phase tells the vehicle, within what an order may say. `None` if its speed or its offset has no value; a
-    /// `rate`, an `aside` or a `time_gap` without one is left out.
+    /// What a phase tells the road user, within what an order may say; `None` if a figure has no value that it cannot go
+    /// without.
     pub fn command(&self, phase: usize, moment: &LaterMoment) -> Option<Command> {
         self.later.command(&self.phase(phase).command, moment).within_bounds()
     }

@@ -50,12 +50,7 @@ impl<'a> Judge<'a> {
         let in_force = |clause: &&Clause| clause.rule().is_none_or(|rule| situation.rules.contains(rule));
         let asked = || space.clauses[row.row.action].iter().filter(in_force);
         let beside = || space.actions[row.row.action].spawns().filter_map(|spawn| spawn.of);
-        let is_beside = |who: &usize| {
-            beside().any(|of| match of {
-                Who::Named(bearer) => bearer == *who,
-                Who::Given(_) => true,
-            })
-        };
+        let is_beside = |who: &usize| beside().any(|of| of.bearers(space.bearers.len()).contains(who));
         let asks_who = |who: &usize| {
             is_beside(who)
                 || asked().any(|clause| clause.bearers.contains(who))
@@ -293,7 +288,8 @@ impl<'a> Judge<'a> {
         effects
     }
 
-    /// The distance from the ego vehicle of a place that is asked for beside somebody else, m; NaN while that one is not there.
+    /// The distance from the ego vehicle of a place that is asked for beside another road user, m: NaN while that one is not
+    /// there, and below 0 on the other side of the ego vehicle.
     fn beside_m(
         &self,
         of: Who,

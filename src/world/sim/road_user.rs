@@ -99,7 +99,7 @@ pub(super) struct Mover {
     pub phases: PhaseCount,
 }
 
-/// How far somebody is with a manoeuvre. To be handed over to another one adds that one's phases.
+/// How far a road user is with a manoeuvre. To be handed over to another one adds that one's phases.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub struct PhaseCount {
     pub begun: u32,
@@ -194,7 +194,7 @@ impl Running {
     /// Advances by one tick. `progress`: how far the road user is with what it was told.
     pub fn advance(mut self, moment: &LaterMoment, progress: Progress, tick: u64) -> Advance {
         let (mut begun, mut ended) = (0, 0);
-        let over = |begun, ended| Advance { rest: None, command: None, begun, ended, hands_over: false };
+        let stays = |rest, command, begun, ended| Advance { rest, command, begun, ended, hands_over: false };
         loop {
             match self.stage {
                 Stage::Waiting(held) => {
@@ -209,62 +209,50 @@ impl Running {
                     let waited_s = (tick - self.since) as f64 * DT_S;
                     let is_over =
                         self.course.within_s(self.phase, moment).is_some_and(|most_s| waited_s >= most_s);
-                    let rest = (!is_over).then_some(self);
-                    return Advance { rest, command: None, begun, ended, hands_over: false };
-                }
-                Stage::Holding(until)
-                    if tick >= until
-                        && self.course.may_begin(moment)
-                        && !self.course.comes(self.phase, moment) =>
-                {
-                    begun += 1;
-                    ended += 1;
-                    self.phase += 1;
-                    (self.stage, self.since) = (Stage::Waiting(None), tick);
-                    if self.phase == self.course.phases() {
-                        return over(begun, ended);
-                    }
+                    return stays((!is_over).then_some(self), None, begun, ended);
                 }
                 Stage::Holding(until) if tick >= until && self.course.may_begin(moment) => {
+                    if !self.course.comes(self.phase, moment) {
+                        begun += 1;
+                        ended += 1;
+                        if !self.goes_on(tick) {
+                            return stays(None, None, begun, ended);
+                        }
+                        continue;
+                    }
                     let Some(command) = self.course.command(self.phase, moment) else {
-                        return over(begun, ended);
+                        return stays(None, None, begun, ended);
                     };
                     begun += 1;
                     let command = command.for_body(progress.on_foot);
                     if let Some(next) = self.course.next(self.phase, moment) {
                         let rest = Some(Running::new(Arc::new(next), tick));
-                        return Advance {
-                            rest,
-                            command: Some(command),
-                            begun,
-                            ended: ended + 1,
-                            hands_over: true,
-                        };
+                        let command = Some(command);
+                        return Advance { hands_over: true, ..stays(rest, command, begun, ended + 1) };
                     }
                     (self.stage, self.since) = (Stage::UnderWay(command), tick);
-                    return Advance {
-                        rest: Some(self),
-                        command: Some(command),
-                        begun,
-                        ended,
-                        hands_over: false,
-                    };
+                    return stays(Some(self), Some(command), begun, ended);
                 }
                 Stage::UnderWay(command)
                     if tick > self.since && (progress.meets(&command) || self.next_has_come(moment)) =>
                 {
-                    self.phase += 1;
                     ended += 1;
-                    (self.stage, self.since) = (Stage::Waiting(None), tick);
-                    if self.phase == self.course.phases() {
-                        return over(begun, ended);
+                    if !self.goes_on(tick) {
+                        return stays(None, None, begun, ended);
                     }
                 }
                 Stage::Holding(_) | Stage::UnderWay(_) => {
-                    return Advance { rest: Some(self), command: None, begun, ended, hands_over: false };
+                    return stays(Some(self), None, begun, ended);
                 }
             }
         }
+    }
+
+    /// Goes on to the next phase, if there is one.
+    fn goes_on(&mut self, tick: u64) -> bool {
+        self.phase += 1;
+        (self.stage, self.since) = (Stage::Waiting(None), tick);
+        self.phase < self.course.phases()
     }
 
     /// Whether what the next phase waits for has come: it does not wait for the end of this one.

@@ -25,7 +25,7 @@ pub(super) struct Stroller {
     /// Height of the road there, m.
     height_m: f64,
     /// Whether it comes towards the ego vehicle. One that is told to go back turns round.
-    comes: bool,
+    is_oncoming: bool,
     /// As told; below 0 it goes back.
     speed_mps: f64,
     wants_left_m: f64,
@@ -37,7 +37,7 @@ pub(super) struct Stroller {
 }
 
 impl Stroller {
-    pub fn new(station_m: f64, left_m: f64, comes: bool, speed_mps: f64, around: &Around) -> Stroller {
+    pub fn new(station_m: f64, left_m: f64, is_oncoming: bool, speed_mps: f64, around: &Around) -> Stroller {
         let height_m = around.scene.route.height_at(&around.scene.map, station_m);
         let (wants_left_m, aside_mps) = (left_m, ASIDE_MPS);
         let (is_blocked, looks_now) = (false, true);
@@ -45,7 +45,7 @@ impl Stroller {
             station_m,
             left_m,
             height_m,
-            comes,
+            is_oncoming,
             speed_mps,
             wants_left_m,
             aside_mps,
@@ -57,7 +57,7 @@ impl Stroller {
     /// Where it begins.
     pub fn begins(&self, around: &Around) -> Moved {
         let way = around.scene.route.path.pose_at(self.station_m);
-        let turn_rad = if self.comes { core::f64::consts::PI } else { 0.0 };
+        let turn_rad = if self.is_oncoming { core::f64::consts::PI } else { 0.0 };
         let pose = Pose { heading_rad: way.heading_rad + turn_rad, ..way.offset(0.0, self.left_m) };
         let forward = pose.forward();
         Moved { pose, forward, lane_heading_rad: pose.heading_rad, velocity_mps: forward * self.speed_mps }
@@ -95,7 +95,7 @@ impl Stroller {
     /// Its way along the route in a tick, m.
     fn step_m(&self) -> f64 {
         let way_m = self.speed_mps * DT_S;
-        if self.comes { -way_m } else { way_m }
+        if self.is_oncoming { -way_m } else { way_m }
     }
 
     /// Where it is at the end of a tick; `None` once it has left, which the ego vehicle does not see (`in_sight`).
@@ -142,7 +142,7 @@ impl Stroller {
     pub fn trace(&self, trace: &mut Trace) {
         let Stroller { station_m, left_m, speed_mps, wants_left_m, aside_mps, .. } = *self;
         trace.numbers([station_m, left_m, speed_mps, wants_left_m, aside_mps]);
-        trace.words([self.comes, self.is_blocked, self.looks_now].map(u64::from));
+        trace.words([self.is_oncoming, self.is_blocked, self.looks_now].map(u64::from));
     }
 }
 

@@ -1,6 +1,6 @@
 //! The judgement: which rules a complete choice of values breaks.
 
-use crate::model::eval::{Facts, SpawnFacts, WorldFacts, compare, evaluate, word_of};
+use crate::model::eval::{Facts, SpawnFacts, WorldFacts, compare, evaluate, word_of, word_of_bearer};
 use crate::model::expr::{Expr, ExprKind, Who};
 use crate::model::rules::{Bound, Clause, Demand, RowRules, Source};
 use crate::model::space::Parameter;
@@ -251,11 +251,7 @@ impl<'a> RowRules<'a> {
                     format!("{} = {}", self.space.cell_name(first + key), value(part))
                 }
                 ExprKind::IsWordOf(who, fact, _) => {
-                    let known = facts.world.into_iter().flat_map(|world| &world.bearers);
-                    let bearer = who.bearer(candidate.values);
-                    let Some((_, npc)) = known.clone().find(|(one, _)| *one == bearer) else { return };
-                    let spawn = Some(SpawnFacts { npc: *npc, ..SpawnFacts::default() });
-                    let Some(word) = word_of(*fact, &Facts { spawn, ..facts }) else { return };
+                    let Some(word) = word_of_bearer(*who, *fact, &facts) else { return };
                     format!("{}.{} = {word}", name(*who), fact.name().trim_start_matches("npc."))
                 }
                 ExprKind::IsWord(fact, _) => {

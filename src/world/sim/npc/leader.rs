@@ -59,7 +59,7 @@ impl Driver {
             + self.speed_mps * (self.time_gap_s + self.speed_mps / (2.0 * COMFORT_MPS2))
             + size.length_m / 2.0;
         let mut nearest: Option<Leader> = None;
-        // The gap that it keeps to the ego vehicle is not that of following.
+        // The gap that it keeps to the ego vehicle, the first of all that it minds, is not that of following.
         let skips = usize::from(self.keeps_gap() && !self.ignores.contains(TrafficRule::Ego));
         for other in self.minded(around).skip(skips) {
             let outline = other.outline;

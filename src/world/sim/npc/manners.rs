@@ -158,21 +158,21 @@ impl Driver {
         let own = LazyCell::new(|| self.passage(area.from_m, area.to_m, size, around));
         let impatient = f64::from(self.waited_ticks) * DT_S >= PATIENCE_S;
         let minds_others = !self.ignores.contains(TrafficRule::Others);
-        let mut others = around.drivers().take_while(|_| minds_others);
-        let for_others = others.any(|(obstacle, body, driver)| {
-            // Most others take no lane that meets this area.
-            if !driver.way.may_take(area.other) {
-                return false;
-            }
-            let reach_m = APPROACH_M + JUNCTION_M;
-            let away = obstacle.outline.pose.position - this.outline.pose.position;
-            if away.norm_squared() > reach_m * reach_m {
-                return false;
-            }
-            let other = driver.passage_through(area, body, around);
-            let goes_first = area.goes_first && !driver.has_siren;
-            other.is_some_and(|other| waits(&own, &other, goes_first, impatient))
-        });
+        let for_others = minds_others
+            && around.drivers().any(|(obstacle, body, driver)| {
+                // Most others take no lane that meets this area.
+                if !driver.way.may_take(area.other) {
+                    return false;
+                }
+                let reach_m = APPROACH_M + JUNCTION_M;
+                let away = obstacle.outline.pose.position - this.outline.pose.position;
+                if away.norm_squared() > reach_m * reach_m {
+                    return false;
+                }
+                let other = driver.passage_through(area, body, around);
+                let goes_first = area.goes_first && !driver.has_siren;
+                other.is_some_and(|other| waits(&own, &other, goes_first, impatient))
+            });
         let for_ego = || {
             let other = ego_passage(area, around);
             other.is_some_and(|other| waits(&own, &other, area.goes_first, impatient))

@@ -30,7 +30,7 @@ const ROOM_M: f64 = 1.0;
 pub(super) struct Pursuit {
     aim: Aim,
     /// The fastest that it drives for this, m/s; without it the limit of its lane.
-    most_mps: Option<f64>,
+    speed_mps_max: Option<f64>,
     /// The lane in which its way crosses that of the ego vehicle, once that is known; until then it drives on as it does.
     crosses_in: Option<LaneIndex>,
     /// Whether the gap was as wanted once.
@@ -65,11 +65,10 @@ struct Beside {
 
 impl Pursuit {
     pub fn told(command: &Command) -> Option<Pursuit> {
-        let Command { keep_m, keep_s, early_s, at_m, .. } = *command;
+        let Command { speed_mps: speed_mps_max, keep_m, keep_s, early_s, at_m, .. } = *command;
         let gap = keep_m.map(Gap::Way).or(keep_s.map(Gap::Time)).map(Aim::Gap);
         let place = early_s.map(|early_s| Aim::Place { early_s, station_m: at_m });
-        let most_mps = command.speed_mps;
-        Some(Pursuit { aim: gap.or(place)?, most_mps, crosses_in: None, is_met: false })
+        Some(Pursuit { aim: gap.or(place)?, speed_mps_max, crosses_in: None, is_met: false })
     }
 
     pub fn trace(&self, trace: &mut Trace) {
@@ -80,7 +79,7 @@ impl Pursuit {
         };
         trace.words([kind, u64::from(self.is_met), self.crosses_in.map_or(0, |lane| lane.0 as u64 + 1)]);
         trace.numbers(numbers);
-        trace.number(self.most_mps.unwrap_or(f64::INFINITY));
+        trace.number(self.speed_mps_max.unwrap_or(f64::INFINITY));
     }
 }
 
@@ -104,8 +103,9 @@ impl Driver {
     pub(super) fn pursue_mps2(&mut self, view: &View, bend_mps: f64) -> Option<f64> {
         let mut pursuit = **self.pursuit.as_ref()?;
         let around = view.around;
-        let most_mps = pursuit.most_mps.unwrap_or_else(|| self.way.limit_mps(around.scene, self.station_m));
-        let most_mps2 = (most_mps.min(bend_mps) - self.speed_mps) / DT_S;
+        let speed_mps_max =
+            pursuit.speed_mps_max.unwrap_or_else(|| self.way.limit_mps(around.scene, self.station_m));
+        let mps2_max = (speed_mps_max.min(bend_mps) - self.speed_mps) / DT_S;
         let wanted_mps2 = match pursuit.aim {
             Aim::Gap(gap) => {
                 let Beside { gap_m, is_ahead } = beside(view);
@@ -146,11 +146,13 @@ impl Driver {
                 // The ego vehicle has moved in this tick already.
                 let left_s = left_s + DT_S;
                 let needed_mps = if left_s > DT_S { own_m / left_s } else { f64::INFINITY };
-                (needed_mps.min(most_mps) - self.speed_mps) / TAKES_S
+                (needed_mps.min(speed_mps_max) - self.speed_mps) / TAKES_S
             }
         };
-        self.pursuit = Some(Box::new(pursuit));
-        Some(wanted_mps2.min(most_mps2))
+        if let Some(kept) = &mut self.pursuit {
+            **kept = pursuit;
+        }
+        Some(wanted_mps2.min(mps2_max))
     }
 
     /// How hard it must brake not to run into an ego vehicle to which it keeps a gap, m/s², if that one goes on braking as it

@@ -53,8 +53,8 @@ pub(super) fn on_foot(asked: &Asked) -> Result<Newcomers, String> {
         return Ok(Newcomers { asked: finish(asked, Motion::Stand, at(pose))?, cover: None });
     }
     if request.verb.walks_along() {
-        let comes = request.verb == Verb::WalkOpposite;
-        let stroller = Stroller::new(asked_m, request.offset_m, comes, request.speed_mps, around);
+        let is_oncoming = request.verb == Verb::WalkOpposite;
+        let stroller = Stroller::new(asked_m, request.offset_m, is_oncoming, request.speed_mps, around);
         let begins = stroller.begins(around);
         return Ok(Newcomers { asked: finish(asked, Motion::Stroll(stroller), begins)?, cover: None });
     }
