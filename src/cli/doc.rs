@@ -31,6 +31,14 @@ fn page(space: &Space) -> String {
     for (index, rule) in space.rules.iter().enumerate() {
         rule_section(&mut text, space, index, rule);
     }
+    if !space.requirements.is_empty() {
+        text.push_str("## Requirements\n\n");
+        for required in &space.requirements {
+            let optional = if required.optional { ", optional" } else { "" };
+            let _ = writeln!(text, "- `{}`{optional}: {}", required.name, inline(&required.docs));
+        }
+        text.push('\n');
+    }
     if !space.states.is_empty() {
         text.push_str("## State\n\n| state | values | begins as | meaning |\n|---|---|---|---|\n");
         for state in &space.states {

@@ -47,7 +47,13 @@ fn grammar() -> Value {
     let mut engine: Vec<&str> = engine.iter().flatten().map(|(word, _)| *word).collect();
     engine.sort_unstable();
     engine.dedup();
-    let facts = [words::facts(Site::Rule), words::facts(Site::Verdict), words::of::<StopReason>()].concat();
+    let facts = [
+        words::facts(Site::Requirement),
+        words::facts(Site::Rule),
+        words::facts(Site::Verdict),
+        words::of::<StopReason>(),
+    ]
+    .concat();
     // No name follows these keywords.
     let nameless = ["language", "use", "optional", "episode", "reward", "expect", "override"];
     let mut naming = names(keyword::DECLARATIONS);

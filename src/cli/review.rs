@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use avastra_campaign::emit;
-use avastra_campaign::episode::{EpisodeLog, Outcome};
+use avastra_campaign::episode::{Breach, EpisodeLog, Outcome};
 use avastra_campaign::oracle::{self, ClaimResult};
 use avastra_campaign::run::{Asked, EpisodeSummary, RunError, Stage, recorded_traffic};
 use avastra_drivers::external;
@@ -105,8 +105,8 @@ pub fn review(
     let results = &results[results.len() - scenario.claims.len()..];
     let refuted = || scenario.claims.iter().zip(results).filter(|(_, result)| result.is_refuted());
 
-    // A scenario that claims no collision, but how its driving system fails, has nothing to be rewritten by.
-    if !scenario.claims.iter().any(Claim::is_of_a_collision) {
+    // A scenario that claims neither collision nor breach, but how its driving system fails, has nothing to be rewritten by.
+    if !scenario.claims.iter().any(Claim::is_of_a_collision) && scenario.breached().next().is_none() {
         let is_same = refuted().count() == 0 && illegal.is_none();
         let change = if is_same { Change::Same } else { Change::Gone };
         differences.extend(refuted().map(|(_, result)| in_words(result)));
@@ -120,7 +120,7 @@ pub fn review(
     let episode = scenario.origin.episode.unwrap_or(0) as usize;
     let mut summary = EpisodeSummary::judged(&setup, episode, &log);
     let change = match &illegal {
-        None => change(&scenario, &summary, results),
+        None => change(&scenario, (&log, &summary), table, results),
         // Whatever it crashes with: it is not this scenario that does.
         Some(_) => Change::Gone,
     };
@@ -202,12 +202,29 @@ fn in_words(result: &ClaimResult) -> String {
 }
 
 /// The largest difference between what a scenario claims and what was found.
-fn change(scenario: &Scenario, summary: &EpisodeSummary, results: &[ClaimResult]) -> Change {
+fn change(
+    scenario: &Scenario,
+    (log, summary): (&EpisodeLog, &EpisodeSummary),
+    table: &ActionTable,
+    results: &[ClaimResult],
+) -> Change {
+    let is_breached = |claim: &Claim| match claim {
+        Claim::Breach { requirement, .. } => {
+            let of = |breach: &Breach| &table.space().requirements[breach.requirement].name;
+            log.breaches.iter().any(|breach| of(breach) == requirement)
+        }
+        _ => false,
+    };
     let mut counted = summary.collisions.iter().filter(|found| found.counted).peekable();
-    if counted.peek().is_none() {
+    let is_of_breaches = !scenario.claims.iter().any(Claim::is_of_a_collision);
+    let is_left = counted.peek().is_some() && !is_of_breaches || scenario.claims.iter().any(is_breached);
+    if !is_left {
         return Change::Gone;
     }
-    if !counted.any(|found| scenario.crashes_with(found.collision.contact.obstacle)) {
+    if counted.peek().is_some()
+        && !is_of_breaches
+        && !counted.any(|found| scenario.crashes_with(found.collision.contact.obstacle))
+    {
         return Change::OtherObstacle;
     }
     let is_hit =
@@ -219,6 +236,8 @@ fn change(scenario: &Scenario, summary: &EpisodeSummary, results: &[ClaimResult]
         }
         Claim::Proc(_) | Claim::Trace(_) | Claim::End(_) | Claim::Minimal { .. } => Change::OtherDrive,
         Claim::Collision { .. } => Change::OtherTime,
+        Claim::Breach { .. } if is_breached(claim) => Change::OtherTime,
+        Claim::Breach { .. } | Claim::Kept { .. } => Change::OtherVerdict,
         Claim::Verdict { .. } | Claim::Avoidability { .. } | Claim::Cause { .. } | Claim::Priority { .. } => {
             Change::OtherVerdict
         }
@@ -236,7 +255,9 @@ fn newly_hit(scenario: &Scenario, summary: &EpisodeSummary) -> Vec<String> {
             | Claim::Cause { obstacle, .. }
             | Claim::Priority { obstacle, .. }
             | Claim::Minimal { obstacle } => obstacle.is_some_and(|obstacle| obstacle.number == number),
-            Claim::Proc(_) | Claim::Trace(_) | Claim::End(_) => false,
+            Claim::Proc(_) | Claim::Trace(_) | Claim::End(_) | Claim::Breach { .. } | Claim::Kept { .. } => {
+                false
+            }
         })
     };
     let contacts = summary.collisions.iter().map(|found| &found.collision.contact);
@@ -305,6 +326,14 @@ fn about(expect: &Expect) -> About<'_> {
     let kind = match &expect.claim.kind {
         ExprKind::Name(name) if Avoidability::from_name(name).is_some() => "avoidable",
         ExprKind::Name(name) => name,
+        // A requirement takes the place of the obstacle: a claim of one is not about another.
+        ExprKind::Field { base, field } => {
+            let requirement = match &base.kind {
+                ExprKind::Name(name) => Some(name.as_str()),
+                _ => None,
+            };
+            return (&field.text, requirement);
+        }
         ExprKind::Binary { left, .. } => match &left.kind {
             ExprKind::Name(name) => name,
             _ => "",

@@ -7,8 +7,8 @@ use std::sync::atomic::Ordering;
 use avastra_campaign::emit;
 use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::run::{
-    Database, DatabaseError, EpisodeSummary, Group, Numbered, PolicyReference, RefusalCount, Run,
-    RunSettings, Totals, play,
+    Database, DatabaseError, EpisodeSummary, Group, Numbered, PolicyReference, RefusalCount,
+    RequirementCount, Run, RunSettings, Totals, play,
 };
 use avastra_drivers::external::{Conversation, Problem};
 use avastra_lang::model::Policy;
@@ -136,6 +136,10 @@ fn play_all(
     if !groups.is_empty() {
         output.say(&groups_text(&groups));
     }
+    let requirements = directory.read(Database::requirements)?;
+    if !requirements.is_empty() {
+        output.say(&requirements_text(&requirements));
+    }
     let never = Never::new(run.table(), &directory.read(Database::rows)?);
     output.say(&never.in_words(output.verbose));
     let critical = directory.critical(output)?;
@@ -154,7 +158,8 @@ fn play_all(
     let is_reproducible = is_reproducible(output, program);
     cut_off(program).iter().for_each(|note| output.warn(note));
     output.result(serde_json::json!({
-        "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups, "never": never,
+        "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups, "requirements": requirements,
+        "never": never,
         "critical": critical, "failures": failures, "reproducible": is_reproducible,
     }));
     share.end(output, directory, is_over, program)?;
@@ -271,7 +276,7 @@ fn keep(
 ) -> Result<(), Failure> {
     let RunSettings { agent, without, with, .. } = run.settings();
     let player = Player { command: "run", table: run.table(), agent, without, with };
-    let is_critical = summary.counted() > 0;
+    let is_critical = summary.counted() > 0 || !log.breaches.is_empty();
     let scenario = is_critical.then(|| directory.write_critical(&player, (log, summary))).transpose()?;
     directory.write_failure(&player, (log, summary))?;
     let table = run.table();
@@ -386,11 +391,37 @@ pub fn groups_text(groups: &[Group]) -> String {
     cut_short(head, groups, line, |more| format!("and {more} others"))
 }
 
+/// Each requirement with its breaches, or with how near it came to one.
+pub fn requirements_text(requirements: &[RequirementCount]) -> String {
+    let figure = |of: &RequirementCount| match (of.smallest, of.unit.as_deref()) {
+        (Some(smallest), Some(unit)) => format!("{smallest:.2} {unit}").trim_end().to_owned(),
+        (Some(_) | None, _) => String::new(),
+    };
+    let line = |of: &RequirementCount| match (&of.scenario, figure(of)) {
+        (Some(scenario), figure) => format!(
+            "{} × {} in {} ({} of them kept by a careful driver){}: {scenario}",
+            of.breaches,
+            of.requirement,
+            plural(of.breached_in as usize, "episode"),
+            of.kept_in,
+            if figure.is_empty() { figure } else { format!(", by up to {}", figure.trim_start_matches('-')) },
+        ),
+        (None, figure) if figure.is_empty() => format!("{} kept", of.requirement),
+        (None, figure) => {
+            let nearest = of.nearest.as_deref().unwrap_or_default();
+            format!("{} kept, by at least {figure}: {nearest}", of.requirement)
+        }
+    };
+    let breached = requirements.iter().filter(|of| of.breaches > 0).count();
+    let head = format!("{} of {} breached:", breached, plural(requirements.len(), "requirement"));
+    cut_short(head, requirements, line, |more| format!("and {more} others"))
+}
+
 pub fn critical_text(directory: &Path, files: &[PathBuf]) -> String {
     if files.is_empty() {
         return "no critical scenario".to_owned();
     }
-    let head = format!("\n{} with a counted collision:", plural(files.len(), "scenario"));
+    let head = format!("\n{} with a counted collision or a breach:", plural(files.len(), "scenario"));
     let mut text =
         cut_short(head, files, |file| file.display().to_string(), |more| format!("and {more} more"));
     // The star stands outside of the quotes: the shell must expand it.

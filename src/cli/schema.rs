@@ -122,7 +122,8 @@ run
   never.legal[] object a row that no step allowed; what `refused` it, and how often
   never.chosen[] object a row that was legal, but that the agent never chose
   never.realised[] object a row that was chosen, but never carried out
-  critical[] text scenarios with a counted collision
+  requirements[] object a requirement in force: `breaches`, `breached_in` and `kept_in` (episodes), the `smallest` margin in its `unit`, the `nearest` episode, a `scenario` with the worst breach
+  critical[] text scenarios with a counted collision or a breach
   failures[] object what went wrong with a driving system of your own: `kind`, `problem`, `times`, `detail`, `scenario`
   REPRODUCIBLE
 ads check

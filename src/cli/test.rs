@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use avastra_campaign::episode::{Breach, EpisodeLog};
 use avastra_campaign::files;
 use avastra_campaign::oracle::{self, Regression};
 use avastra_campaign::run::{self, Asked, RunError, Stage};
@@ -39,6 +40,11 @@ enum Outcome {
     Played(Regression),
     /// Another crash than the scenario's, which `--allow-changed` lets pass.
     Allowed(Regression),
+    /// A requirement that it was found with is not kept again.
+    Breached {
+        requirement: String,
+        time_s: f64,
+    },
     /// A review finds no crash of it any more, and why.
     Gone(String),
     /// Why the scenario could not be played, and whether that is a mistake in a source.
@@ -261,7 +267,9 @@ impl Suite<'_> {
             "file": file, "scenario": scenario.name, "change": change.in_words(), "differences": differences,
         }));
         let Some(Now { text, answers }) = now else {
-            let why = illegal.unwrap_or_else(|| "no collision of it counts any more".to_owned());
+            let why = illegal.unwrap_or_else(|| {
+                "no collision of it counts any more, and it breaches nothing that it did".to_owned()
+            });
             let gone = Outcome::Gone(format!("{why}; it is kept as it was"));
             return Ok((emitted, (change == Change::Gone).then_some(gone)));
         };
@@ -303,8 +311,30 @@ impl Suite<'_> {
         }
         let log = stage.play(&recorded, &mut |_, _, _| {});
         let counted = stage.counted(&recorded, &log);
+        let breached_by = |log: &EpisodeLog| {
+            let name = |breach: &Breach| &table.space().requirements[breach.requirement].name;
+            let own =
+                log.breaches.iter().find(|breach| scenario.breached().any(|known| known == name(breach)));
+            own.map(|breach| Outcome::Breached { requirement: name(breach).clone(), time_s: breach.time_s })
+        };
+        let is_breached = breached_by(&log).is_some();
+        let breached_again = || match self.asked.is_nothing() {
+            true => (breached_by(&log), None),
+            false => {
+                let again = stage.play(&ads, &mut |_, _, _| {});
+                (breached_by(&again), again.failure.as_ref().map(AdsFailure::kind))
+            }
+        };
+        if counted.is_empty() && is_breached {
+            return Ok(match breached_again() {
+                (Some(breached), _) => breached,
+                (None, Some(kind)) => Outcome::Played(Regression::AdsFailed(kind)),
+                (None, None) => Outcome::Played(Regression::Fixed),
+            });
+        }
         if counted.is_empty() {
-            let reason = "it has no counted collision with the driving system that it was found with";
+            let reason =
+                "it has no counted collision or breach with the driving system that it was found with";
             return Ok(Outcome::NotPlayed { reason: reason.to_owned(), in_source: false });
         }
         let is_own = |index: &usize| scenario.crashes_with(log.collisions[*index].contact.obstacle);
@@ -317,7 +347,8 @@ impl Suite<'_> {
             // Already with the driving system that it was found with.
             None => Regression::OtherCrash,
         };
-        Ok(self.outcome(found))
+        let may_breach = is_breached && matches!(found, Regression::Fixed | Regression::NeverMet);
+        Ok(breached_again().0.filter(|_| may_breach).unwrap_or_else(|| self.outcome(found)))
     }
 
     fn outcome(&self, found: Regression) -> Outcome {
@@ -363,6 +394,7 @@ impl Outcome {
             Outcome::Played(
                 Regression::StillFails { .. } | Regression::AdsFailed(_) | Regression::FailsAgain(_),
             ) => true,
+            Outcome::Breached { .. } => true,
             Outcome::Played(found) => found.is_other_crash(),
             Outcome::Allowed(_) | Outcome::Gone(_) | Outcome::NotPlayed { .. } => false,
         }
@@ -378,6 +410,9 @@ impl Outcome {
         let (found, more) = match self {
             Outcome::Played(found) => (found, ""),
             Outcome::Allowed(found) => (found, ", which is allowed"),
+            Outcome::Breached { requirement, time_s } => {
+                return ("still fails", format!("`{requirement}` is breached at {time_s:.2} s"));
+            }
             Outcome::Gone(reason) => return ("gone", reason.clone()),
             Outcome::NotPlayed { reason, .. } => return ("error", reason.clone()),
         };
@@ -424,7 +459,7 @@ fn junit(suite: &str, cases: &[Case]) -> String {
             Outcome::NotPlayed { .. } => Some("error"),
             outcome if outcome.is_failure() => Some("failure"),
             outcome if outcome.is_skipped() => Some("skipped"),
-            Outcome::Played(_) | Outcome::Allowed(_) | Outcome::Gone(_) => None,
+            Outcome::Played(_) | Outcome::Breached { .. } | Outcome::Allowed(_) | Outcome::Gone(_) => None,
         };
         let inside = element.map_or_else(String::new, |element| {
             format!("\n      <{element} type=\"{word}\" message=\"{reason}\"/>\n    ")

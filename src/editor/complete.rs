@@ -113,6 +113,9 @@ impl List<'_> {
                 self.symbols(ProposalKind::Variable, |symbol| matches!(symbol, Symbol::RoadUser(_)))
             }
             Kind::Rules => self.symbols(ProposalKind::Operator, |symbol| matches!(symbol, Symbol::Rule(_))),
+            Kind::Requirements => {
+                self.symbols(ProposalKind::Operator, |symbol| matches!(symbol, Symbol::Requirement(_)))
+            }
             Kind::Verdicts => {
                 self.symbols(ProposalKind::Operator, |symbol| matches!(symbol, Symbol::Verdict(_)))
             }

@@ -4,8 +4,8 @@
 use avastra_lang::check::{Declaration, References, Symbol};
 use avastra_lang::model::Type;
 use avastra_lang::model::vocabulary::{
-    CHANGE, CommandField, EpisodeField, ROAD_USER, RoadField, SINCE, ScenarioClaim, Site, SpaceClaim,
-    SpawnField, StartField, StopReason, THERE, WAIT, Word, parts_of, things,
+    BREACHED, CHANGE, CommandField, EpisodeField, Fact, KEPT, Known, ROAD_USER, RoadField, SINCE,
+    ScenarioClaim, Site, SpaceClaim, SpawnField, StartField, StopReason, THERE, WAIT, Word, parts_of, things,
 };
 use avastra_lang::syntax::ast::{
     Action, ActionParam, Arm, BinaryOp, Call, Effect, EffectKind, Expr, ExprKind, Field, Initial, ItemKind,
@@ -36,6 +36,7 @@ pub enum Kind {
     Roads,
     Rules,
     Verdicts,
+    Requirements,
     Functions,
     Constants,
     /// The parts of an expression; the variants of this type come first.
@@ -95,6 +96,7 @@ fn replaceable(item: &ItemKind) -> Vec<Kind> {
         ItemKind::Action(_) => vec![Kind::Actions],
         ItemKind::Group(_) => vec![Kind::Groups],
         ItemKind::Rule(_) => vec![Kind::Rules],
+        ItemKind::Require(_) => vec![Kind::Requirements],
         ItemKind::Road(_) => vec![Kind::Roads],
         ItemKind::Verdict(_) => vec![Kind::Verdicts],
         _ => Vec::new(),
@@ -132,7 +134,7 @@ fn unused<W: Word>(fields: &[Field]) -> Vec<Kind> {
 enum About {
     Value,
     Rule,
-    /// A reward, a verdict, what every step does, or the odds of actions.
+    /// A reward, a verdict, a requirement, what every step does, or the odds of actions.
     Facts(Site),
     /// A claim about the space.
     Space,
@@ -156,6 +158,7 @@ impl<'a> Place<'a> {
             ItemKind::Rule(_) | ItemKind::Manoeuvre(_) => About::Rule,
             ItemKind::Reward(_) => About::Facts(Site::Reward),
             ItemKind::Verdict(_) => About::Facts(Site::Verdict),
+            ItemKind::Require(_) => About::Facts(Site::Requirement),
             ItemKind::EachStep(_) => About::Facts(Site::StepBegins),
             ItemKind::Odds(of) if of.name.text == SpaceClaim::Actions.name() => {
                 About::Facts(Site::StepBegins)
@@ -178,9 +181,8 @@ impl<'a> Place<'a> {
             ItemKind::Use(of) if of.path.value == HERE => {
                 Some(vec![Kind::Files("ava", self.written.to_owned())])
             }
-            ItemKind::Use(of) => {
-                any_here(&of.without).then(|| vec![Kind::Actions, Kind::Groups, Kind::Rules])
-            }
+            ItemKind::Use(of) => any_here(&of.without)
+                .then(|| vec![Kind::Actions, Kind::Groups, Kind::Rules, Kind::Requirements]),
             ItemKind::Odds(of) if is_here(&of.name) => Some(vec![Kind::Enums]),
             ItemKind::Odds(of) => {
                 let rows = of.name.text == SpaceClaim::Actions.name();
@@ -213,6 +215,7 @@ impl<'a> Place<'a> {
                 let condition = case.condition.as_ref().and_then(|when| self.within(when, None, None));
                 condition.or_else(|| self.within(&case.value, None, None))
             }),
+            ItemKind::Require(of) => of.parts().find_map(|part| self.within(part, None, None)),
             ItemKind::Verdict(of) => self.within(&of.condition, None, None),
             ItemKind::Expect(of) => self.within(&of.claim, bool, bool),
             ItemKind::Scenario(of) => self.in_scenario(of),
@@ -472,9 +475,16 @@ impl<'a> Place<'a> {
                 let name = name_of(base)?;
                 let is_named = self.references.declaration(&Symbol::RoadUser(name.to_owned())).is_some()
                     || self.locals.iter().any(|(local, ty)| local == name && self.is_road_user(*ty));
+                // Some facts are for requirements alone.
+                let is_here = |part: &str| {
+                    let fact = Fact::from_name(&format!("{name}.{part}"));
+                    self.about == About::Facts(Site::Requirement)
+                        || fact.is_none_or(|fact| fact.known() != Known::Tick)
+                };
                 let parts = match things().contains(&name) {
-                    true => parts_of(name),
+                    true => parts_of(name).into_iter().filter(|(part, _)| is_here(part)).collect(),
                     false if is_named => parts_of("npc").into_iter().chain([THERE]).collect(),
+                    false if self.declared(Symbol::Requirement, name).is_some() => vec![BREACHED, KEPT],
                     false => return Some(Vec::new()),
                 };
                 Some(vec![Kind::Words(parts)])
@@ -577,8 +587,8 @@ impl<'a> Place<'a> {
                 kinds.extend(things().into_iter().map(Kind::Keyword));
                 kinds
             }
-            About::Facts(Site::StepBegins) => {
-                kinds.push(Kind::Words(words::facts(Site::StepBegins)));
+            About::Facts(site @ (Site::StepBegins | Site::Requirement)) => {
+                kinds.push(Kind::Words(words::facts(site)));
                 kinds.extend(things().into_iter().map(Kind::Keyword));
                 kinds
             }
@@ -586,7 +596,7 @@ impl<'a> Place<'a> {
             About::Space => vec![Kind::Words(words::of::<SpaceClaim>())],
             About::Scenario => {
                 let facts = [words::facts(Site::Verdict), words::of::<ScenarioClaim>()].concat();
-                vec![Kind::Words(facts), Kind::Verdicts]
+                vec![Kind::Words(facts), Kind::Verdicts, Kind::Requirements]
             }
         }
     }

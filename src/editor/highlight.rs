@@ -59,7 +59,9 @@ fn kind(symbol: &Symbol) -> Option<NameKind> {
         Symbol::Argument(..) | Symbol::Given(..) | Symbol::Parameter(..) => NameKind::Parameter,
         Symbol::Action(_) => NameKind::Action,
         Symbol::Group(_) | Symbol::Road(_) | Symbol::Scenario(_) | Symbol::Policy(_) => NameKind::Namespace,
-        Symbol::Rule(_) | Symbol::Verdict(_) | Symbol::Engine(..) => NameKind::Property,
+        Symbol::Rule(_) | Symbol::Requirement(_) | Symbol::Verdict(_) | Symbol::Engine(..) => {
+            NameKind::Property
+        }
         Symbol::Type(_) => NameKind::Type,
         Symbol::File(_) | Symbol::Number(..) => return None,
     })

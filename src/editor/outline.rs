@@ -60,7 +60,7 @@ fn kind(item: &Item) -> Option<OutlineKind> {
         ItemKind::Let(_) => OutlineKind::Constant,
         ItemKind::Fn(_) | ItemKind::Manoeuvre(_) => OutlineKind::Function,
         ItemKind::Action(_) | ItemKind::Also(_) | ItemKind::EachStep(_) => OutlineKind::Action,
-        ItemKind::Rule(_) | ItemKind::Verdict(_) => OutlineKind::Rule,
+        ItemKind::Rule(_) | ItemKind::Require(_) | ItemKind::Verdict(_) => OutlineKind::Rule,
         ItemKind::Body(_) | ItemKind::Road(_) | ItemKind::Episode(_) | ItemKind::Reward(_) => {
             OutlineKind::Block
         }

@@ -34,6 +34,7 @@ mod profiles;
 mod r157;
 mod references;
 mod report;
+mod requirements;
 mod road;
 mod rules;
 mod scaling_maps;

@@ -4,11 +4,12 @@
 use std::sync::Arc;
 
 use crate::episode::{Collision, EpisodeLog, Outcome};
+use crate::oracle::Breached;
 use crate::run::{EpisodeSummary, Finding};
 use avastra_base::units::Dimension;
 use avastra_drivers::external;
 use avastra_drivers::external::Conversation;
-use avastra_lang::model::vocabulary::Word;
+use avastra_lang::model::vocabulary::{BREACHED, KEPT, Word};
 use avastra_lang::model::{ActionDef, START_MPS, Space, StateDef, Value, digest_text, ticks_s};
 use avastra_lang::syntax::ast::{
     ClauseKind, Expect, Expr, Field, File, ItemKind, Name, Scenario, Span, Step,
@@ -35,7 +36,7 @@ pub struct Provenance<'a> {
     pub with: &'a [String],
 }
 
-/// The scenario of an episode, cut after the step of its last counted collision; there must be one.
+/// The scenario of an episode, cut after the step of its last counted collision or breach; there must be one.
 pub fn scenario(
     table: &ActionTable,
     log: &EpisodeLog,
@@ -43,19 +44,21 @@ pub fn scenario(
     source: &Provenance,
 ) -> File {
     let counted: Vec<&Finding> = summary.collisions.iter().filter(|finding| finding.counted).collect();
-    let last = counted.last().expect("an episode without a counted collision is not emitted");
-    let steps = last.collision.step + 1;
-    let headline = headline(table.space(), log, &counted[0].collision);
-    file(table, log, source, [REPLAY, &headline], steps, expects(log, summary, steps))
+    let of_collisions = counted.last().map(|last| last.collision.step);
+    let of_breaches = log.breaches.iter().map(|breach| breach.step).max();
+    let last = of_collisions.max(of_breaches).expect("an episode without a finding is not emitted");
+    let steps = last + 1;
+    let headline = headline_of(table.space(), log, counted.first().copied());
+    file(table, log, source, [REPLAY, &headline], steps, expects(table, log, summary, steps))
 }
 
 /// The scenario of an episode that played an emitted scenario again. It keeps all steps, because they are the scenario,
 /// and says how the episode ended.
 pub fn retold(table: &ActionTable, log: &EpisodeLog, summary: &EpisodeSummary, source: &Provenance) -> File {
     let counted = summary.collisions.iter().find(|finding| finding.counted);
-    let headline = counted.map_or_else(String::new, |first| headline(table.space(), log, &first.collision));
+    let headline = headline_of(table.space(), log, counted);
     let steps = log.steps.len();
-    let mut expects = expects(log, summary, steps);
+    let mut expects = expects(table, log, summary, steps);
     expects.push(end(log));
     file(table, log, source, [REPLAY, &headline], steps, expects)
 }
@@ -217,8 +220,22 @@ fn literal(space: &Space, action: &ActionDef, parameter: &str, value: Value) -> 
     tree::value(space, value, found.expect("values are of the action's own parameters").ty)
 }
 
-fn expects(log: &EpisodeLog, summary: &EpisodeSummary, steps: usize) -> Vec<Expect> {
+fn expects(table: &ActionTable, log: &EpisodeLog, summary: &EpisodeSummary, steps: usize) -> Vec<Expect> {
     let mut expects = Vec::new();
+    for (index, breach) in log.breaches.iter().enumerate() {
+        // A claim is about the first breach of its requirement.
+        if log.breaches[..index].iter().any(|before| before.requirement == breach.requirement) {
+            continue;
+        }
+        let name = &table.space().requirements[breach.requirement].name;
+        let at = tree::clause(ClauseKind::At, tree::rounded(breach.time_s, 2, Dimension::DURATION));
+        expects.push(tree::expect(tree::part(name, BREACHED.0), vec![at]));
+        let of = |found: &&Breached| found.requirement == breach.requirement;
+        if let Some(found) = summary.breached.iter().find(of) {
+            let by = tree::list(found.kept_by.iter().map(|driver| tree::name(driver)).collect());
+            expects.push(tree::expect(tree::part(name, KEPT.0), vec![tree::clause(ClauseKind::By, by)]));
+        }
+    }
     for finding in summary.collisions.iter().filter(|finding| finding.collision.step < steps) {
         let contact = &finding.collision.contact;
         let obstacle = || tree::clause(ClauseKind::With, tree::road_user(contact.obstacle));
@@ -259,6 +276,18 @@ fn expects(log: &EpisodeLog, summary: &EpisodeSummary, steps: usize) -> Vec<Expe
 /// How it ends.
 fn end(log: &EpisodeLog) -> Expect {
     tree::expect(tree::equal(tree::name("end"), tree::name(log.end.name())), Vec::new())
+}
+
+/// What is found, in a sentence for the reader: the first counted collision, else the first breach.
+fn headline_of(space: &Space, log: &EpisodeLog, counted: Option<&Finding>) -> String {
+    match (counted, log.breaches.first()) {
+        (Some(first), _) => headline(space, log, &first.collision),
+        (None, Some(breach)) => {
+            let name = &space.requirements[breach.requirement].name;
+            format!("The ego vehicle does not keep `{name}` at {:.2} s on {}.", breach.time_s, log.road)
+        }
+        (None, None) => String::new(),
+    }
 }
 
 /// What happens, in a sentence for the reader.

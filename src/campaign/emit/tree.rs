@@ -84,6 +84,11 @@ pub fn field(field: &str, value: Expr) -> Field {
     Field { name: Name::built(field), value, span: Span::NONE }
 }
 
+/// `stops_at_red.breached`.
+pub fn part(of: &str, part: &str) -> Expr {
+    Expr::built(ExprKind::Field { base: Box::new(name(of)), field: Name::built(part) })
+}
+
 pub fn record(fields: Vec<Field>) -> Expr {
     Expr::built(ExprKind::Record(fields))
 }

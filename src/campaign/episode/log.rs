@@ -11,6 +11,8 @@ use avastra_search::mdp::{PerceptionCounts, StateVector};
 use avastra_world::action::Draw;
 use avastra_world::sim::{Contact, Incident, Start};
 
+use super::monitor::{Breach, Margin};
+
 /// One episode, from start to end.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EpisodeLog {
@@ -32,6 +34,10 @@ pub struct EpisodeLog {
     pub collisions: Vec<Collision>,
     /// Contacts of obstacles with each other.
     pub incidents: Vec<Incident>,
+    /// What the ego vehicle did not keep of the space's requirements, by rising time.
+    pub breaches: Vec<Breach>,
+    /// For each requirement in force.
+    pub margins: Vec<Margin>,
     pub end: End,
     pub duration_s: f64,
     /// Distance driven by the ego vehicle, m.

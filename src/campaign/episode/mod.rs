@@ -6,6 +6,7 @@
 
 mod facts;
 mod log;
+mod monitor;
 mod recorder;
 mod run;
 mod script;
@@ -13,6 +14,7 @@ mod setup;
 
 pub use facts::{at_fault, collision_facts, run_into_from_behind, side, struck};
 pub use log::{Collision, End, EpisodeLog, Held, Outcome, StepLog};
+pub use monitor::{Breach, Margin};
 pub use recorder::{Actor, Lights, Phase, Recorder, Sample, Sky, Touch};
 pub use run::{Choice, Moment, Play, Watch, run, run_from};
 pub use script::{Script, ScriptedAction};

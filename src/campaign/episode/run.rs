@@ -13,6 +13,7 @@ use avastra_world::sim::{Contact, DT_S, Incident, Sensed, Trace, World};
 
 use super::facts::collision_facts;
 use super::log::{Collision, End, EpisodeLog, Held, Outcome, StepLog};
+use super::monitor::Monitor;
 use super::script::ScriptedAction;
 use super::setup::Setup;
 
@@ -194,6 +195,8 @@ pub struct Play {
     own_bodies: BTreeMap<u32, usize>,
     collisions: Vec<Collision>,
     incidents: Vec<Incident>,
+    /// `None` where nothing is required.
+    monitor: Option<Monitor>,
     /// Seed of the draws of actions, and of the agent's choices.
     seed: u64,
     trace: Trace,
@@ -223,6 +226,7 @@ impl Play {
             own_bodies: BTreeMap::new(),
             collisions: Vec::new(),
             incidents: Vec::new(),
+            monitor: Monitor::new(setup),
             seed: setup.seed,
             trace: Trace::default(),
             distance_m: 0.0,
@@ -413,6 +417,9 @@ impl Play {
             self.collisions.push(self.collision(contact));
         }
         self.incidents.extend_from_slice(self.world.incidents());
+        if let Some(monitor) = self.monitor.as_mut().filter(|_| self.collisions.is_empty()) {
+            monitor.judge(setup, &self.world, &self.memory, self.steps.len());
+        }
         self.distance_m += self.world.ego().speed_mps * DT_S;
         self.world.trace(&mut self.trace);
         watch(&self.world, self.ads.as_ref(), &contacts);
@@ -486,6 +493,7 @@ impl Play {
 
     /// The log of the episode, which ended so.
     pub fn into_log(self, setup: &Setup, end: End) -> EpisodeLog {
+        let (breaches, margins) = self.monitor.map_or_else(Default::default, Monitor::found);
         EpisodeLog {
             road: setup.road.name.clone(),
             ads: setup.ads.name().to_owned(),
@@ -497,6 +505,8 @@ impl Play {
             memory: setup.memory.clone(),
             collisions: self.collisions,
             incidents: self.incidents,
+            breaches,
+            margins,
             end,
             duration_s: self.world.time_s(),
             distance_m: self.distance_m,

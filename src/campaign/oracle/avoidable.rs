@@ -49,7 +49,7 @@ use crate::episode::{run_into_from_behind, struck};
 /// A driver that is held to a speed comes near to it in about this time, s. Ours: longer than the pedal's lag.
 const CATCH_UP_S: f64 = 0.6;
 /// The careful drivers: a collision that one of them avoids is avoidable. UN R157's two performance models.
-const CAREFUL: [&str; 2] = ["cc", "fsm"];
+pub(super) const CAREFUL: [&str; 2] = ["cc", "fsm"];
 /// Other drivers that are tried and reported.
 const REPORTED: [&str; 2] = ["rss", "r157"];
 /// No onset is earlier than this before the contact, s. Ours: from 20 m/s a careful driver is at rest within 5 s.

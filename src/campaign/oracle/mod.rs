@@ -7,6 +7,7 @@ mod crash;
 mod evidence;
 mod counted;
 mod hazard;
+mod kept;
 mod measured;
 mod mechanisms;
 mod severity;
@@ -25,6 +26,7 @@ pub use crash::{Fate, Regression, regression};
 pub use evidence::{
     Chance, Comparison, Diagnosis, Evidence, ModuleFinding, PairFinding, Verdict, WeaknessFinding,
 };
+pub use kept::{Breached, breached};
 pub use measured::Measure;
 pub use mechanisms::{
     MechanismShare, Mechanisms, Share, WithoutMechanism, mechanism_shares, mechanisms, placebo,

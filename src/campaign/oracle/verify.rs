@@ -1,6 +1,6 @@
 //! The claims of an emitted scenario against what a replay finds.
 
-use crate::episode::{Collision, EpisodeLog};
+use crate::episode::{Breach, Collision, EpisodeLog};
 use avastra_drivers::Module;
 use avastra_lang::model::vocabulary::Word;
 use avastra_lang::model::{Claim, Obstacle, Scenario, Space, digest_text};
@@ -8,6 +8,7 @@ use avastra_lang::model::{Claim, Obstacle, Scenario, Space, digest_text};
 use super::avoidable::Judgement;
 use super::cause::NoModules;
 use super::facts;
+use super::kept::Breached;
 
 /// One claim, and what the replay says of it.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -35,6 +36,8 @@ pub struct NoTries;
 pub struct Replays<'a> {
     /// The modules at fault.
     pub cause: &'a dyn Fn(usize) -> Result<Vec<Module>, NoModules>,
+    /// What was breached, and who would have kept it; `None` if that is not tried.
+    pub breached: &'a dyn Fn() -> Option<Vec<Breached>>,
     /// Steps that could be left out with the same crash; an external driving system must be there to try.
     pub spare_steps: &'a dyn Fn(usize) -> Result<Vec<usize>, NoTries>,
 }
@@ -87,6 +90,30 @@ fn check(
                 }
             };
             judged(format!("{name}{}", with(*obstacle)), collision(log, *obstacle).and_then(judge))
+        }
+        Claim::Breach { requirement, time } => {
+            let is_meant = |breach: &&Breach| space.requirements[breach.requirement].name == *requirement;
+            let at = time.as_ref().map_or(String::new(), |time| format!(" at {time}"));
+            let outcome = match (log.breaches.iter().find(is_meant), time) {
+                (None, _) => Err("kept, or not in force".to_owned()),
+                (Some(breach), Some(claimed)) if !claimed.rounds(breach.time_s) => {
+                    Err(format!("at {:.2} s", breach.time_s))
+                }
+                (Some(_), _) => Ok(()),
+            };
+            judged(format!("{requirement}.breached{at}"), outcome)
+        }
+        Claim::Kept { requirement, by } => {
+            let is_meant = |found: &&Breached| space.requirements[found.requirement].name == *requirement;
+            let claim = format!("{requirement}.kept by [{}]", by.join(", "));
+            let Some(found) = (replays.breached)() else {
+                return ClaimResult { claim, confirmed: None, found: "not tried".to_owned() };
+            };
+            match found.iter().find(is_meant) {
+                None => judged(claim, Err("not breached".to_owned())),
+                Some(found) if found.kept_by == *by => judged(claim, Ok(())),
+                Some(found) => judged(claim, Err(format!("kept by [{}]", found.kept_by.join(", ")))),
+            }
         }
         Claim::Avoidability { class, by, obstacle } => {
             let judge = |index: usize| {

@@ -7,13 +7,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use rusqlite::{Connection, Transaction, params};
 use sha2::{Digest, Sha256};
 
-use crate::episode::{EpisodeLog, Outcome};
+use crate::episode::{Breach, EpisodeLog, Margin, Outcome};
 use crate::files::PlainName;
 use crate::oracle;
 use avastra_drivers::external::Failure;
 use avastra_lang::model::policy::VARIABLES;
 use avastra_lang::model::vocabulary::Word;
-use avastra_lang::model::{Memory, Space, StateMeaning, Value};
+use avastra_lang::model::{Memory, RequirementDef, Space, StateMeaning, Type, Value};
 use avastra_search::mdp::STATE_LEN;
 use avastra_world::action::Draw;
 
@@ -24,10 +24,21 @@ use crate::run::shape::Shape;
 use crate::run::summary::{EpisodeSummary, Finding};
 
 pub(crate) const LAYOUT: Layout = Layout {
-    version: 11,
+    version: 12,
     schema: || format!("{SCHEMA}{}", step_table()),
     unit: "episode",
-    tables: &["episode", "step", "held", "offer", "collision", "failure", "learning", "scenario"],
+    tables: &[
+        "episode",
+        "step",
+        "held",
+        "offer",
+        "collision",
+        "breach",
+        "margin",
+        "failure",
+        "learning",
+        "scenario",
+    ],
     naming: Some(("offer", "reason")),
     // A scenario names its space by a path from the file.
     local: &["scenario"],
@@ -66,6 +77,16 @@ CREATE TABLE collision (
   obstacle_delta_v_mps REAL NOT NULL, cause TEXT, shape TEXT, priority TEXT NOT NULL, r157_letter TEXT NOT NULL,
   PRIMARY KEY (episode, number)
 ) STRICT;
+CREATE TABLE breach (
+  episode INTEGER NOT NULL REFERENCES episode, number INTEGER NOT NULL, requirement TEXT NOT NULL,
+  time_s REAL NOT NULL, until_s REAL NOT NULL, step INTEGER NOT NULL, margin REAL,
+  kept_by TEXT NOT NULL,
+  PRIMARY KEY (episode, number)
+) STRICT;
+CREATE TABLE margin (
+  episode INTEGER NOT NULL REFERENCES episode, requirement TEXT NOT NULL, smallest REAL, unit TEXT,
+  PRIMARY KEY (episode, requirement)
+) STRICT, WITHOUT ROWID;
 CREATE TABLE scenario (episode INTEGER PRIMARY KEY REFERENCES episode, text TEXT NOT NULL) STRICT;
 CREATE TABLE failure (
   episode INTEGER PRIMARY KEY REFERENCES episode, kind TEXT NOT NULL, problem TEXT NOT NULL, stage TEXT NOT NULL,
@@ -229,6 +250,43 @@ impl Database {
         })
     }
 
+    /// The requirements that were in force, by name: how often each was breached, and how near it came to that.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn requirements(&self) -> Result<Vec<RequirementCount>, DatabaseError> {
+        // The bare columns of an aggregate query with `min` are those of the row that has the minimum.
+        let query = "SELECT margin.requirement, unit, count(*), min(smallest), episode.episode, road,
+                    (SELECT count(*) FROM breach WHERE breach.requirement = margin.requirement),
+                    (SELECT count(DISTINCT episode) FROM breach WHERE breach.requirement = margin.requirement),
+                    (SELECT count(DISTINCT episode) FROM breach
+                     WHERE breach.requirement = margin.requirement AND kept_by != ''),
+                    (SELECT road || '/' || episode.episode FROM breach JOIN episode USING (episode)
+                     WHERE breach.requirement = margin.requirement
+                     ORDER BY coalesce(breach.margin, 0), episode LIMIT 1)
+             FROM margin JOIN episode USING (episode) GROUP BY margin.requirement
+             ORDER BY 7 DESC, margin.requirement";
+        let named = |at: Option<String>| {
+            let (road, episode) = at.as_deref().and_then(|at| at.split_once('/'))?;
+            Some(format!("{road}_{:04}", episode.parse::<i64>().ok()?))
+        };
+        query_all(&self.connection, query, |row| {
+            let (episode, road): (i64, String) = (row.get(4)?, row.get(5)?);
+            let smallest: Option<f64> = row.get(3)?;
+            Ok(RequirementCount {
+                requirement: row.get(0)?,
+                unit: row.get(1)?,
+                episodes: row.get(2)?,
+                smallest,
+                nearest: smallest.map(|_| format!("{road}_{episode:04}")),
+                breaches: row.get(6)?,
+                breached_in: row.get(7)?,
+                kept_in: row.get(8)?,
+                scenario: named(row.get(9)?),
+            })
+        })
+    }
+
     /// Totals over all episodes.
     ///
     /// # Errors
@@ -284,6 +342,25 @@ impl Database {
             },
         )?)
     }
+}
+
+/// How a requirement was kept over all episodes.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct RequirementCount {
+    pub requirement: String,
+    /// Episodes in which it was in force.
+    pub episodes: i64,
+    pub breaches: i64,
+    /// Episodes with a breach of it.
+    pub breached_in: i64,
+    /// Of these, episodes in which a careful driver would have kept it.
+    pub kept_in: i64,
+    /// The smallest margin of all episodes, in the unit; `None` if it has none or was never asked.
+    pub smallest: Option<f64>,
+    pub unit: Option<String>,
+    /// Name of the episode with the smallest margin, and name of the scenario with the worst breach.
+    pub nearest: Option<String>,
+    pub scenario: Option<String>,
 }
 
 /// How often a reason kept an action from being carried out.
@@ -413,6 +490,7 @@ pub(crate) fn add_all(
     for finding in &summary.collisions {
         add_collision(transaction, summary.episode, finding)?;
     }
+    add_breaches(transaction, summary, log, space)?;
     if let Some(failure) = &log.failure {
         let Failure { problem, stage, detail, exit, stderr } = failure;
         let (kind, problem) = (problem.kind().name(), problem.name());
@@ -422,6 +500,34 @@ pub(crate) fn add_all(
     add_offers(transaction, summary)?;
     if let Some(text) = scenario {
         insert_row(transaction, "scenario", params![summary.episode as i64, text])?;
+    }
+    Ok(())
+}
+
+/// The breaches of an episode, and the smallest margin of each requirement, in SI.
+fn add_breaches(
+    transaction: &Transaction,
+    summary: &EpisodeSummary,
+    log: &EpisodeLog,
+    space: &Space,
+) -> Result<(), rusqlite::Error> {
+    let episode = summary.episode;
+    for (number, breach) in log.breaches.iter().enumerate() {
+        let Breach { requirement, time_s, until_s, margin, step } = *breach;
+        let name = &space.requirements[requirement].name;
+        let found = summary.breached.iter().find(|found| found.requirement == requirement);
+        let kept_by = found.map_or_else(String::new, |found| found.kept_by.join(" "));
+        let values =
+            params![episode as i64, number as i64, name, time_s, until_s, step as i64, margin, kept_by];
+        insert_row(transaction, "breach", values)?;
+    }
+    for Margin { requirement, smallest } in &log.margins {
+        let RequirementDef { name, margin, .. } = &space.requirements[*requirement];
+        let unit = margin.and_then(|ty| match ty {
+            Type::Quantity(dimension) => Some(dimension.si_unit()),
+            Type::Bool | Type::Int | Type::Enum(_) => None,
+        });
+        insert_row(transaction, "margin", params![episode as i64, name, smallest, unit])?;
     }
     Ok(())
 }

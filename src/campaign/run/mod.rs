@@ -28,7 +28,7 @@ pub use arena::{Arena, choose, road_named};
 pub(crate) use arena::{carry_out, legal, offers};
 pub use columns::{Column, Values, columns};
 pub use coverage::{CoverageCell, LearningPoint};
-pub use database::{Database, FailureCount, RefusalCount, Totals};
+pub use database::{Database, FailureCount, RefusalCount, RequirementCount, Totals};
 pub(crate) use database::{LAYOUT, add_all};
 pub use gauges::Gauges;
 pub(crate) use groups::PEDESTRIAN;

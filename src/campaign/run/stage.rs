@@ -98,6 +98,7 @@ impl<'a> Stage<'a> {
         let judgements = self.judge(ads, log);
         let replays = Replays {
             cause: &|index| Ok(oracle::diagnose(&setup, log, index, &ModularConfig::default())?.cause),
+            breached: &|| Some(oracle::breached(&setup, &Script::of_scenario(self.scenario), log)),
             spare_steps: &|index| {
                 if ads.program().is_some_and(|program| !program.can_start()) {
                     return Err(NoTries);
@@ -120,8 +121,11 @@ impl<'a> Stage<'a> {
     ) -> Vec<ClaimResult> {
         let claims = self.scenario.claims.iter().filter(|claim| asked(claim)).cloned().collect();
         let scenario = Scenario { claims, ..self.scenario.clone() };
-        let replays =
-            Replays { cause: &|_| Err(NoModules { ads: ads.title() }), spare_steps: &|_| Err(NoTries) };
+        let replays = Replays {
+            cause: &|_| Err(NoModules { ads: ads.title() }),
+            breached: &|| None,
+            spare_steps: &|_| Err(NoTries),
+        };
         let mut results = oracle::verify(self.table.space(), &scenario, log, judgements, &replays);
         results.retain(ClaimResult::is_refuted);
         results

@@ -2,7 +2,7 @@
 
 use crate::episode::{Collision, EpisodeLog, Script, Setup};
 use crate::oracle;
-use crate::oracle::{Judgement, NoModules};
+use crate::oracle::{Breached, Judgement, NoModules};
 use avastra_drivers::{ModularConfig, Module};
 use avastra_lang::model::{OutcomeFacts, Space};
 use avastra_search::mdp::Criticality;
@@ -17,6 +17,8 @@ pub struct EpisodeSummary {
     /// Number of the episode in its run, from 0.
     pub episode: usize,
     pub collisions: Vec<Finding>,
+    /// The requirements that were breached, and who would have kept them.
+    pub breached: Vec<Breached>,
     /// Measures of danger for each step; empty if the episode was not measured.
     pub criticality: Vec<Criticality>,
     /// Least post-encroachment time over the obstacles that were not hit, s; `None` above 5 s.
@@ -59,8 +61,10 @@ impl Finding {
 impl EpisodeSummary {
     /// Judges every collision of a log by playing it again from its setup, and applies the space's verdict.
     pub fn judged(setup: &Setup, number: usize, log: &EpisodeLog) -> EpisodeSummary {
-        let judgements = oracle::judge(setup, &Script::of_log(log), log);
-        EpisodeSummary::new(setup.table.space(), number, log, judgements)
+        let script = Script::of_log(log);
+        let judgements = oracle::judge(setup, &script, log);
+        let breached = oracle::breached(setup, &script, log);
+        EpisodeSummary { breached, ..EpisodeSummary::new(setup.table.space(), number, log, judgements) }
     }
 
     /// Applies the space's verdict to every collision of a log. `judgements` has one for each.

@@ -128,6 +128,11 @@ fn fact(claim: &Claim) -> Option<(String, String)> {
             (of("collision", obstacle), time)
         }
         Claim::Verdict { name, obstacle } => (of("verdict", obstacle), name.clone()),
+        Claim::Breach { requirement, time } => {
+            let time = time.map_or_else(|| "at any time".to_owned(), |time| time.to_string());
+            (format!("breach of {requirement}"), time)
+        }
+        Claim::Kept { requirement, by } => (format!("{requirement} kept by"), by.join(", ")),
         Claim::Avoidability { class, by, obstacle } => {
             let by = by.as_ref().map_or_else(String::new, |by| format!(" by {}", by.join(", ")));
             (of("avoidability", obstacle), format!("{}{by}", class.name()))

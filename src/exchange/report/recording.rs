@@ -12,7 +12,7 @@ use avastra_base::geometry::{Pose, wrap_angle};
 use avastra_campaign::emit;
 use avastra_campaign::episode;
 use avastra_campaign::episode::{
-    Actor, End, EpisodeLog, Held, Moment, Outcome, Phase, Recorder, Sample, Script, Sky,
+    Actor, Breach, End, EpisodeLog, Held, Moment, Outcome, Phase, Recorder, Sample, Script, Sky,
 };
 use avastra_campaign::oracle;
 use avastra_campaign::oracle::{ClaimResult, ReferenceDrive, Regression};
@@ -20,7 +20,7 @@ use avastra_campaign::run;
 use avastra_campaign::run::{Gauges, RunError, Shape, Stage, refusal_in_words};
 use avastra_drivers::Selected;
 use avastra_lang::model::vocabulary::Word;
-use avastra_lang::model::{Claim, Scenario};
+use avastra_lang::model::{Claim, RequirementDef, Scenario, Type};
 use avastra_world::action::{ActionTable, Offer};
 use avastra_world::sim::{DT_S, FRAME_TICKS, SignalColour};
 
@@ -187,7 +187,7 @@ fn played(
         "name": scenario.name, "road": log.road, "ads": ads.name(), "duration_s": log.duration_s, "end": log.end.name(),
         "steps": log.steps.len(), "actions": log.steps.iter().filter(|step| matches!(step.outcome, Outcome::Done { .. })).count(),
         "collisions": collisions.iter().map(without_ways).collect::<Vec<_>>(),
-        "refuted": refuted, "same": is_same,
+        "refuted": refuted, "same": is_same, "breaches": breaches(table, scenario, &log),
     });
     let steps: Vec<Value> =
         log.steps.iter().enumerate().map(|(index, _)| step(table, &log, index, offers.get(index))).collect();
@@ -284,6 +284,26 @@ fn collision(
         "other_delta_v_mps": severity.obstacle_delta_v_mps, "sudden": facts.sudden, "struck": facts.struck, "cause": cause,
         "held": log.held_at(contact.time_s).map(Held::text), "ways": ways,
     })
+}
+
+/// What the ego vehicle did not keep, and which careful drivers would have, as the file claims.
+fn breaches(table: &ActionTable, scenario: &Scenario, log: &EpisodeLog) -> Vec<Value> {
+    let told = |breach: &Breach| {
+        let RequirementDef { name, docs, margin, .. } = &table.space().requirements[breach.requirement];
+        let kept_by = scenario.claims.iter().find_map(|claim| match claim {
+            Claim::Kept { requirement, by } if requirement == name => Some(by),
+            _ => None,
+        });
+        let unit = margin.and_then(|ty| match ty {
+            Type::Quantity(dimension) => Some(dimension.si_unit()),
+            Type::Bool | Type::Int | Type::Enum(_) => None,
+        });
+        json!({
+            "requirement": name, "docs": docs.join(" "), "at_s": breach.time_s, "until_s": breach.until_s,
+            "margin": breach.margin.map(rounded), "unit": unit, "kept_by": kept_by,
+        })
+    };
+    log.breaches.iter().map(told).collect()
 }
 
 fn without_ways(collision: &Value) -> Value {

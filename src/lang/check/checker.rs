@@ -160,6 +160,7 @@ pub(super) fn space(
     checker.declare_also(items);
     checker.declare_each_step(items);
     let rules = checker.rules(items);
+    let requirements = checker.requirements(items, &rules);
     let reward = checker.reward(items);
     let verdicts = checker.verdicts(items);
     let (episode, road_names) = checker.episode(items);
@@ -190,6 +191,7 @@ pub(super) fn space(
         groups: core::mem::take(&mut checker.groups),
         each_step: core::mem::take(&mut checker.each_step),
         rules,
+        requirements,
         episode,
         reward,
         verdicts,
@@ -328,6 +330,7 @@ impl Checker {
             ItemKind::Also(declared) => drop(self.also(declared)),
             ItemKind::EachStep(effects) => drop(self.sets(effects)),
             ItemKind::Rule(declared) => drop(self.rule(declared)),
+            ItemKind::Require(declared) => drop(self.requirement(item, declared)),
             ItemKind::Episode(fields) => drop(self.settings(fields)),
             ItemKind::Reward(cases) => drop(self.cases(item, cases)),
             ItemKind::Verdict(declared) => drop(self.verdict(declared)),

@@ -382,6 +382,9 @@ impl Checker {
         let is_known = |known: Known| place.site.knows(known);
         if let Some(fact) = place.fact(&name) {
             return Some(Expr { kind: ExprKind::Fact(fact), ty: fact.ty(), span });
+        } else if Fact::from_name(&name).is_some_and(|fact| fact.known() == Known::Tick) {
+            let error = Diagnostic::error(code::NOT_HERE, format!("`{name}` is not known here"));
+            self.report(error.at(span, "only requirements see it: it is watched at every tick"));
         } else if !place.knows(thing) || Fact::from_name(&name).is_some_and(|fact| !is_known(fact.known())) {
             self.report(unknown_here(thing, span, place.site));
         } else if let Some(fact) = WordFact::from_name(&name) {
@@ -763,7 +766,7 @@ impl Checker {
 
 /// Where facts of the world are known, in words that a thing follows.
 pub(super) const SEEN_BY: &str =
-    "only rules, the `where` of a drawn parameter, `each step`, phases and `once` see";
+    "only rules, the `where` of a drawn parameter, `each step`, phases, requirements and `once` see";
 
 /// A thing that is asked where no fact about it is known.
 pub(super) fn unknown_here(thing: &str, span: Span, site: Site) -> Diagnostic {
@@ -776,7 +779,7 @@ pub(super) fn unknown_here(thing: &str, span: Span, site: Site) -> Diagnostic {
         Site::Trigger if thing == "npc" => {
             error.at(span, "which road user?").help("name it by its number, as it appeared: `npc#1.gap`")
         }
-        Site::StepBegins if thing == "npc" => error
+        Site::StepBegins | Site::Requirement if thing == "npc" => error
             .at(span, "which road user?")
             .help("give it a name where it is spawned, and ask for that: `truck.gap`"),
         Site::Axis => error

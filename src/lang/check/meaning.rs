@@ -77,6 +77,7 @@ fn has_free_order(kind: &ItemKind) -> bool {
             | ItemKind::Manoeuvre(_)
             | ItemKind::Body(_)
             | ItemKind::Group(_)
+            | ItemKind::Require(_)
     )
 }
 

@@ -37,6 +37,7 @@ pub mod policy;
 mod report;
 mod references;
 mod road;
+mod requirement;
 mod rule;
 mod scenario;
 mod scenario_claim;

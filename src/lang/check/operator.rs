@@ -268,7 +268,7 @@ impl Checker {
         if !knows {
             let error = Diagnostic::error(code::NOT_HERE, format!("`{}` is not known here", fact.name()));
             let who = match fact.known() {
-                Known::Road | Known::World | Known::Spawn => format!("{SEEN_BY} the moment"),
+                Known::Road | Known::World | Known::Spawn | Known::Tick => format!("{SEEN_BY} the moment"),
                 Known::Step => "only rewards and verdicts see what happened in the step".to_owned(),
                 Known::Judgement => "only verdicts see how a collision was judged".to_owned(),
             };

@@ -1,5 +1,5 @@
 //! Which declarations of the used files stand: `override` replaces the declaration of the same kind and name,
-//! `use … without` leaves actions, groups and rules out.
+//! `use … without` leaves actions, groups, rules and requirements out.
 //!
 //! The new declaration takes the place of the old one, so that the rows of a table keep their numbers.
 //! Everything that used the old declaration uses the new one, in the used file too, and is checked with it.
@@ -108,7 +108,11 @@ fn is_offered(standing: &Standing<'_>, offered: &[bool]) -> bool {
     offered[standing.file]
         && matches!(
             standing.item.kind,
-            ItemKind::Action(_) | ItemKind::Group(_) | ItemKind::Also(_) | ItemKind::Rule(_)
+            ItemKind::Action(_)
+                | ItemKind::Group(_)
+                | ItemKind::Also(_)
+                | ItemKind::Rule(_)
+                | ItemKind::Require(_)
         )
 }
 

@@ -39,6 +39,7 @@ pub enum Symbol {
     /// A name that spawns give to a road user.
     RoadUser(String),
     Rule(String),
+    Requirement(String),
     Body(String),
     Road(String),
     Verdict(String),
@@ -259,6 +260,7 @@ impl Symbol {
             | Symbol::Group(name)
             | Symbol::RoadUser(name)
             | Symbol::Rule(name)
+            | Symbol::Requirement(name)
             | Symbol::Body(name)
             | Symbol::Road(name)
             | Symbol::Verdict(name)
@@ -283,6 +285,7 @@ impl References {
                 for name in &used.without {
                     references.uses_target(name.span, &name.text);
                     references.uses(name.span, Symbol::Rule(name.text.clone()));
+                    references.uses(name.span, Symbol::Requirement(name.text.clone()));
                 }
             }
             for (path, span) in maps_named(file) {
@@ -437,6 +440,7 @@ impl References {
                 self.declare(item, Symbol::Group, parts.collect());
             }
             ItemKind::Rule(_) => self.declare(item, Symbol::Rule, Vec::new()),
+            ItemKind::Require(_) => self.declare(item, Symbol::Requirement, Vec::new()),
             ItemKind::Body(_) => self.declare(item, Symbol::Body, Vec::new()),
             ItemKind::Road(_) => self.declare(item, Symbol::Road, Vec::new()),
             ItemKind::Verdict(_) => self.declare(item, Symbol::Verdict, Vec::new()),

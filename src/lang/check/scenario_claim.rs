@@ -6,7 +6,9 @@ use crate::check::scenario::Reader;
 use crate::check::scenario_value::figure;
 use crate::model::code;
 use crate::model::scenario::{Claim, DRIVERS, ENDS, Figure, MODULES, Obstacle};
-use crate::model::vocabulary::{Avoidability, Fact, ObstacleKind, Priority, ScenarioClaim, Word};
+use crate::model::vocabulary::{
+    Avoidability, BREACHED, Fact, KEPT, ObstacleKind, Priority, ScenarioClaim, Word,
+};
 use crate::syntax::ast::{BinaryOp, ClauseKind, Comparison};
 use crate::syntax::{Diagnostic, ast, listed};
 use avastra_base::units::Dimension;
@@ -18,7 +20,7 @@ impl Reader<'_> {
             Diagnostic::error(code::UNKNOWN_CLAIM, "unknown claim").at(expect.span, "cannot be checked").help(
                 "claims are `collision with npc#2 at 14.22 s`, `proc == [0.5]`, `trace == \"sha256:…\"`, \
                  `end == arrived`, `avoidable by [cc, fsm]`, `cause == perception`, `priority == other`, \
-                 `minimal`, or the name of a verdict",
+                 `minimal`, the name of a verdict, or `NAME.breached at 14.22 s` with that of a requirement",
             )
         };
         match &expect.claim.kind {
@@ -29,6 +31,10 @@ impl Reader<'_> {
             ast::ExprKind::Name(name) if self.space.verdicts.iter().any(|verdict| verdict.name == *name) => {
                 let (obstacle, _) = self.clauses(&expect.clauses, false)?;
                 Some(Claim::Verdict { name: name.clone(), obstacle })
+            }
+            ast::ExprKind::Field { base, field } if field.text == KEPT.0 => self.kept(base, expect),
+            ast::ExprKind::Field { base, field } if field.text == BREACHED.0 => {
+                self.breach(base, &expect.clauses)
             }
             ast::ExprKind::Name(name) if name == ScenarioClaim::Minimal.name() => {
                 let (obstacle, _) = self.clauses(&expect.clauses, false)?;
@@ -80,6 +86,50 @@ impl Reader<'_> {
                 }
             }
             _ => self.reject(unclear()),
+        }
+    }
+
+    /// `stops_at_red.breached at 14.22 s`.
+    fn breach(&mut self, requirement: &ast::Expr, clauses: &[ast::Clause]) -> Option<Claim> {
+        let name = self.requirement(requirement)?;
+        match self.clauses(clauses, true)? {
+            (None, time) => Some(Claim::Breach { requirement: name, time }),
+            (Some(_), _) => {
+                let error = Diagnostic::error(code::UNKNOWN_CLAIM, "a breach is not about one road user");
+                let span = clauses.first().map_or(requirement.span, |clause| clause.span);
+                self.reject(error.at(span, "").help("write `stops_at_red.breached at 14.22 s`"))
+            }
+        }
+    }
+
+    /// `stops_at_red.kept by [cc, fsm]`.
+    fn kept(&mut self, requirement: &ast::Expr, expect: &ast::Expect) -> Option<Claim> {
+        let name = self.requirement(requirement)?;
+        match expect.clauses.as_slice() {
+            [ast::Clause { kind: ClauseKind::By, value, .. }]
+                if let ast::ExprKind::List(items) = &value.kind =>
+            {
+                let by = self.words(items, "reference driver", "a reference driver", &DRIVERS)?;
+                Some(Claim::Kept { requirement: name, by })
+            }
+            _ => {
+                let error = Diagnostic::error(code::UNKNOWN_CLAIM, "wanted one list of reference drivers");
+                let help = format!("write `{name}.kept by [cc, fsm]`, or `by []` for none");
+                self.reject(error.at(expect.span, "by whom?").help(help))
+            }
+        }
+    }
+
+    /// The name of a requirement of the space.
+    fn requirement(&mut self, requirement: &ast::Expr) -> Option<String> {
+        let name = self.name_of(requirement, "the name of a requirement")?.to_owned();
+        let known = || self.space.requirements.iter().map(|required| required.name.as_str());
+        match known().any(|known| known == name) {
+            true => Some(name),
+            false => {
+                let error = unknown("requirement", &name, requirement.span, known());
+                self.reject(error)
+            }
         }
     }
 

@@ -6,7 +6,7 @@
 use crate::check::expression::enum_of;
 use crate::check::references::{References, Symbol};
 use crate::model::Type;
-use crate::model::vocabulary::{Fact, ScenarioClaim, StartField, WAIT};
+use crate::model::vocabulary::{BREACHED, Fact, KEPT, ScenarioClaim, StartField, WAIT};
 use crate::syntax::ast;
 use crate::syntax::ast::{Expr, ExprKind, Field, ItemKind, Name};
 
@@ -127,6 +127,16 @@ impl References {
                 self.uses(claim.span, Symbol::Verdict(name.clone()));
                 self.word_named::<ScenarioClaim>(claim.span, name);
                 self.word_named::<Fact>(claim.span, name);
+            }
+            ExprKind::Field { base, field } => {
+                if let ExprKind::Name(name) = &base.kind {
+                    self.uses(base.span, Symbol::Requirement(name.clone()));
+                }
+                if let Some((word, meaning)) =
+                    [BREACHED, KEPT].into_iter().find(|(word, _)| *word == field.text)
+                {
+                    self.note(field.span, Symbol::Engine(word, meaning), false);
+                }
             }
             ExprKind::Binary { left, right, .. } => {
                 self.note_claim(left);

@@ -129,6 +129,7 @@ fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
         ItemKind::Reward(cases) => {
             exprs.extend(cases.iter().flat_map(|case| case.condition.iter().chain([&case.value])));
         }
+        ItemKind::Require(declared) => exprs.extend(declared.parts()),
         ItemKind::Verdict(declared) => exprs.push(&declared.condition),
         ItemKind::Manoeuvre(declared) => {
             names.extend(declared.params.iter().flat_map(|param| names_of_type(&param.ty)));

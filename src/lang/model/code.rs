@@ -107,6 +107,10 @@ pub const LATER: &str = "AV0412";
 pub const NO_CHANGE: &str = "AV0413";
 /// A rule on states and time that a step without an action breaks.
 pub const BROKEN_BY_TIME: &str = "AV0414";
+/// A requirement that nothing can breach.
+pub const ALWAYS_KEPT: &str = "AV0415";
+/// A requirement that divides by what may be 0.
+pub const OPEN_DIVISOR: &str = "AV0416";
 /// A value that a transition rule does not lead out of.
 pub const DEADLOCK: &str = "AV0501";
 /// A value that a transition rule does not lead to.

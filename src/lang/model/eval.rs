@@ -47,8 +47,26 @@ pub struct WorldFacts {
     pub road_users: Vec<(u32, NpcFacts)>,
     /// Those that are asked for by name and are there.
     pub bearers: Vec<(usize, NpcFacts)>,
+    /// What requirements alone may ask.
+    pub tick: TickFacts,
     /// When each action last happened, s since the episode began; empty if nothing asks for that.
     pub happened_s: Vec<f64>,
+}
+
+/// Stands for a road user ahead that is farther away, and for none at all, m.
+pub const LEAD_GAP_M_MAX: f64 = 1000.0;
+
+/// What is watched over time for requirements ([`Known::Tick`]).
+///
+/// [`Known::Tick`]: crate::model::vocabulary::Known::Tick
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct TickFacts {
+    /// To the next road user ahead in the ego vehicle's way, and its speed along the route.
+    pub lead_gap_m: f64,
+    pub lead_speed_mps: f64,
+    pub lead_since_s: f64,
+    pub over_red_m: f64,
+    pub over_oncoming_m: f64,
 }
 
 /// The longest time that `since` tells, s: also of actions that never happened.
@@ -240,6 +258,8 @@ fn about<'a>(npc: Option<NpcFacts>, facts: &Facts<'a>) -> Facts<'a> {
 fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
     let moment =
         |of: fn(&MomentFacts) -> f64| Value::Number(facts.world.map_or(f64::NAN, |world| of(&world.moment)));
+    let tick =
+        |of: fn(&TickFacts) -> f64| Value::Number(facts.world.map_or(f64::NAN, |world| of(&world.tick)));
     let spawn = |of: fn(&SpawnFacts) -> f64| Value::Number(facts.spawn.as_ref().map_or(f64::NAN, of));
     match fact {
         Fact::RoadLimit => Value::Number(facts.road.map_or(f64::NAN, |road| road.limit_mps)),
@@ -269,6 +289,11 @@ fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
         Fact::NpcHeadway => spawn(|spawn| spawn.npc.headway_s),
         Fact::SpawnGap => spawn(|spawn| spawn.spawn_gap_m),
         Fact::SafetyGap => spawn(|spawn| spawn.safety_gap_m),
+        Fact::EgoLeadGap => tick(|tick| tick.lead_gap_m),
+        Fact::EgoLeadSpeed => tick(|tick| tick.lead_speed_mps),
+        Fact::EgoLeadSince => tick(|tick| tick.lead_since_s),
+        Fact::EgoOverRed => tick(|tick| tick.over_red_m),
+        Fact::EgoOverOncoming => tick(|tick| tick.over_oncoming_m),
         Fact::Proc => Value::Number(facts.outcome.proc),
         Fact::Collision => Value::Bool(facts.outcome.collision),
         Fact::Repeated => Value::Bool(facts.outcome.repeated),

@@ -128,8 +128,14 @@ impl Expr {
         self.each_part(&mut |part| part.walk(visit));
     }
 
+    /// As [`Expr::walk`], for a caller that keeps what it visits.
+    pub(crate) fn walk_all<'a>(&'a self, visit: &mut dyn FnMut(&'a Expr)) {
+        visit(self);
+        self.each_part(&mut |part| part.walk_all(visit));
+    }
+
     /// Calls `visit` for the expressions of which this one is made.
-    fn each_part(&self, visit: &mut dyn FnMut(&Expr)) {
+    fn each_part<'a>(&'a self, visit: &mut dyn FnMut(&'a Expr)) {
         match &self.kind {
             ExprKind::Bool(_)
             | ExprKind::Number(_)

@@ -19,6 +19,7 @@ mod memory;
 mod on_route;
 pub mod policy;
 mod row;
+pub(crate) mod requirement;
 pub mod rules;
 pub mod scenario;
 mod space;
@@ -27,8 +28,8 @@ pub mod vocabulary;
 
 pub use digest::{digest, digest_text};
 pub use eval::{
-    Facts, JUNCTION_AHEAD_M_MAX, MomentFacts, NpcFacts, OutcomeFacts, SINCE_S_MAX, SpawnFacts, TIME_S_MAX,
-    WorldFacts, evaluate,
+    Facts, JUNCTION_AHEAD_M_MAX, LEAD_GAP_M_MAX, MomentFacts, NpcFacts, OutcomeFacts, SINCE_S_MAX,
+    SpawnFacts, TIME_S_MAX, TickFacts, WorldFacts, evaluate,
 };
 pub use interval::{End, Interval};
 pub use limits::{
@@ -40,6 +41,7 @@ pub use meaning::Meaning;
 pub(crate) use on_route::stretches;
 pub use on_route::{LIGHT_AHEAD_M, NEAR_JUNCTION_M, OnRoute, Stretch, junction_ahead_m};
 pub use policy::Policy;
+pub use requirement::Kept;
 pub use row::locals;
 pub use row::{Reach, Row};
 pub use rules::{NoStart, RulesInForce, UnknownRule};
@@ -49,9 +51,9 @@ pub use scenario::{
 };
 pub use space::{
     ACTION_ODDS_MAX, ActionDef, BodyDef, BodyWord, COUNTED, Domain, EffectDef, EnumDef, EpisodeDef, FnDef,
-    GroupDef, Initial, ManoeuvreCall, ManoeuvreDef, OrderDef, Parameter, PhaseDef, RewardCase, Road,
-    RoadFacts, RuleBinding, RuleBody, RuleDef, SetDef, Space, SpawnDef, StateDef, StateMeaning, VerdictDef,
-    WordExpr, needs, reached,
+    GroupDef, Initial, ManoeuvreCall, ManoeuvreDef, OrderDef, Parameter, PhaseDef, RequirementDef,
+    RewardCase, Road, RoadFacts, RuleBinding, RuleBody, RuleDef, SetDef, Space, SpawnDef, StateDef,
+    StateMeaning, VerdictDef, WordExpr, needs, reached,
 };
 pub(crate) use value::STATE_MAX;
 pub use value::{EnumIndex, Memory, Type, Value};

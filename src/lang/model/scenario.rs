@@ -131,6 +131,10 @@ pub enum Claim {
     Trace(String),
     /// `expect counted with npc#2`: the named verdict holds of the collision.
     Verdict { name: String, obstacle: Option<Obstacle> },
+    /// `expect stops_at_red.breached at 14.22 s`: the requirement is not kept, for the first time then.
+    Breach { requirement: String, time: Option<Figure> },
+    /// `expect stops_at_red.kept by [cc, fsm]`: the careful drivers that keep the requirement in the same steps.
+    Kept { requirement: String, by: Vec<String> },
     /// `expect avoidable by [cc, fsm] with npc#2`: the class of the collision, and the reference drivers
     /// that avoid it.
     Avoidability { class: Avoidability, by: Option<Vec<String>>, obstacle: Option<Obstacle> },
@@ -149,11 +153,29 @@ pub enum Claim {
 impl Claim {
     /// Whether it is about a collision, and not about the drive as a whole.
     pub fn is_of_a_collision(&self) -> bool {
-        !matches!(self, Claim::Proc(_) | Claim::Trace(_) | Claim::End(_))
+        match self {
+            Claim::Collision { .. }
+            | Claim::Verdict { .. }
+            | Claim::Avoidability { .. }
+            | Claim::Cause { .. }
+            | Claim::Priority { .. }
+            | Claim::Minimal { .. } => true,
+            Claim::Proc(_) | Claim::Trace(_) | Claim::Breach { .. } | Claim::Kept { .. } | Claim::End(_) => {
+                false
+            }
+        }
     }
 }
 
 impl Scenario {
+    /// The requirements that it says are breached.
+    pub fn breached(&self) -> impl Iterator<Item = &str> {
+        self.claims.iter().filter_map(|claim| match claim {
+            Claim::Breach { requirement, .. } => Some(requirement.as_str()),
+            _ => None,
+        })
+    }
+
     /// Whether a crash with an obstacle is one that the scenario is about. If the scenario has claims that name a
     /// `counted` obstacle, only those obstacles matter; otherwise those that its claims say are hit; with neither, any
     /// obstacle.

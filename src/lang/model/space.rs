@@ -46,6 +46,8 @@ pub struct Space {
     /// What happens at the end of every step, after the effects of its action.
     pub each_step: Vec<SetDef>,
     pub rules: Vec<RuleDef>,
+    /// What the ego vehicle must keep, in the order of declaration.
+    pub requirements: Vec<RequirementDef>,
     pub episode: EpisodeDef,
     /// The first case that applies gives the reward.
     pub reward: Vec<RewardCase>,
@@ -479,6 +481,25 @@ pub enum RuleBody {
 pub struct RuleBinding {
     pub action: usize,
     pub condition: Expr,
+}
+
+/// What the ego vehicle must keep, judged at every tick.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RequirementDef {
+    pub name: String,
+    pub docs: Vec<String>,
+    /// Off unless `--with` names it.
+    pub optional: bool,
+    /// Where this does not hold, nothing is asked.
+    pub when: Option<Expr>,
+    pub condition: Expr,
+    /// The requirement is breached at a tick if the condition failed at every tick of so many before it, and at it.
+    pub within_ticks: u32,
+    /// The road users that it names, by index in `Space::bearers`.
+    pub bearers: Vec<usize>,
+    /// The type of its margin; `None` if the condition has none.
+    pub margin: Option<Type>,
+    pub span: Span,
 }
 
 /// How episodes run.

@@ -107,6 +107,8 @@ pub enum Known {
     World,
     /// At the draw, for each spawn, once the world has found a place for it.
     Spawn,
+    /// At every tick, where requirements are judged: what must be watched over time, or costs too much elsewhere.
+    Tick,
     /// After the step.
     Step,
     /// After a collision was judged.
@@ -130,6 +132,8 @@ pub enum Site {
     Phase,
     /// In what every step does, and in the odds of actions: at the moment at which a step begins.
     StepBegins,
+    /// In a requirement, at every tick.
+    Requirement,
     /// In `once` of a scenario's step.
     Trigger,
     Reward,
@@ -144,10 +148,17 @@ impl Site {
             Known::Road | Known::World => {
                 matches!(
                     self,
-                    Site::Where | Site::Rule | Site::Change | Site::Phase | Site::StepBegins | Site::Trigger
+                    Site::Where
+                        | Site::Rule
+                        | Site::Change
+                        | Site::Phase
+                        | Site::StepBegins
+                        | Site::Requirement
+                        | Site::Trigger
                 )
             }
             Known::Spawn => matches!(self, Site::Rule | Site::Change | Site::Phase),
+            Known::Tick => self == Site::Requirement,
             Known::Step => matches!(self, Site::Reward | Site::Verdict),
             Known::Judgement => self == Site::Verdict,
         }
@@ -235,6 +246,11 @@ facts! {
     NpcHeadway "npc.headway" DURATION, Spawn = "A `Duration`: until whichever of it and the ego vehicle is behind, at its present speed, is where the other one is now; 100 s if not sooner.";
     SpawnGap "spawn_gap" LENGTH, Spawn = "A `Length`: the gap from the ego vehicle to the road user that appears.";
     SafetyGap "safety_gap" LENGTH, Spawn = "A `Length`: the gap that a careful driver needs.";
+    EgoLeadGap "ego.lead_gap" LENGTH, Tick = "A `Length`: to the next road user ahead in its way that does not come towards it; 1000 m if there is none nearer.";
+    EgoLeadSpeed "ego.lead_speed" SPEED, Tick = "A `Speed`: of that road user along the route; 0 if there is none.";
+    EgoLeadSince "ego.lead_since" DURATION, Tick = "A `Duration`: since when it has been that one; 0 if there is none.";
+    EgoOverRed "ego.over_red" LENGTH, Tick = "A `Length`: how far its front is beyond the stop line of a light that was red as it passed, until its rear has passed, too; else minus the way to a red light; at least -100 m.";
+    EgoOverOncoming "ego.over_oncoming" LENGTH, Tick = "A `Length`: how far its outline reaches into a lane of the other direction; below 0 the room that is left; -100 m in junctions and where there is no such lane.";
     Proc "proc" RATIO, Step = "A `Ratio`: the collision probability of the step.";
     Collision "collision" Type::Bool, Step = "A `Bool`: the ego vehicle collided.";
     Repeated "repeated" Type::Bool, Step = "A `Bool`: with an obstacle that it has hit before.";
@@ -255,6 +271,16 @@ pub const ROAD_LANES: (&str, &str) =
 
 /// `truck.there`: what may be asked of a named road user beside the facts of `npc`.
 pub const THERE: (&str, &str) = ("there", "Whether a road user of that name is there.");
+
+/// `stops_at_red.breached`: what may be asked of a requirement.
+pub const BREACHED: (&str, &str) =
+    ("breached", "Whether the requirement was not kept: `expect stops_at_red.breached at 14.22 s`.");
+
+/// `stops_at_red.kept by [cc, fsm]`: who would have kept it.
+pub const KEPT: (&str, &str) = (
+    "kept",
+    "Which careful drivers keep the requirement in the same steps: `expect stops_at_red.kept by [cc, fsm]`.",
+);
 
 /// `since(vehicles)`: spelt like a function, but of an action or a group.
 pub const SINCE: (&str, &str) = (

@@ -7,8 +7,8 @@ use crate::model::effort;
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::vocabulary::Fact;
 use crate::model::{
-    AMBIENT_MAX, COMMANDED_MAX, EGO_ACCELERATION_MPS2_MAX, FnDef, Interval, JUNCTION_AHEAD_M_MAX, RoadFacts,
-    SINCE_S_MAX, SPEED_MPS_MAX, TIME_S_MAX, Type, Value,
+    AMBIENT_MAX, COMMANDED_MAX, EGO_ACCELERATION_MPS2_MAX, FnDef, Interval, JUNCTION_AHEAD_M_MAX,
+    LEAD_GAP_M_MAX, RoadFacts, SINCE_S_MAX, SPEED_MPS_MAX, TIME_S_MAX, Type, Value,
 };
 use crate::prove::moment::Case;
 use crate::prove::sums::{difference, is_same, lacks_value, may_lack_a_value};
@@ -269,7 +269,11 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
         | Fact::EgoRear
         | Fact::NpcFront
         | Fact::NpcRear
-        | Fact::NpcOffset => Interval::ALL,
+        | Fact::NpcOffset
+        | Fact::EgoLeadSpeed
+        | Fact::EgoOverRed
+        | Fact::EgoOverOncoming => Interval::ALL,
+        Fact::EgoLeadGap => between(0.0, LEAD_GAP_M_MAX),
         Fact::RoadUsers | Fact::RuleBreakers => between(0.0, f64::from(COMMANDED_MAX + AMBIENT_MAX)),
         Fact::RoadLimit
         | Fact::EgoLimit
@@ -280,6 +284,7 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
         | Fact::NpcSpeed
         | Fact::NpcGap
         | Fact::NpcLimit
+        | Fact::EgoLeadSince
         | Fact::SpawnGap
         | Fact::SafetyGap => Interval::NOT_NEGATIVE,
         Fact::Proc => between(0.0, 1.0),

@@ -15,6 +15,7 @@ mod clock;
 mod cut;
 mod enclose;
 mod implied;
+mod kept;
 mod moment;
 mod never_drawn;
 mod reach;
@@ -88,7 +89,7 @@ fn product<T: Clone, V: Copy>(all: &[T], values: &[V], put: impl Fn(&mut T, V)) 
 
 /// Errors, warnings and remarks about a space whose names and types are right.
 pub(crate) fn report(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> {
-    let proofs: [&dyn Fn() -> Vec<Diagnostic>; 12] = [
+    let proofs: [&dyn Fn() -> Vec<Diagnostic>; 13] = [
         &|| reach::report(space),
         &|| start::report(space),
         &|| time::report(space),
@@ -101,6 +102,7 @@ pub(crate) fn report(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> 
         &|| unfair::report(space),
         &|| moment::report(space),
         &|| clock::report(space),
+        &|| kept::report(space),
     ];
     // Once the steps are spent, the checker drops all findings.
     proofs.into_iter().take_while(|_| !effort::is_spent()).flat_map(|report| report()).collect()

@@ -159,6 +159,7 @@ kinds! {
     Also(Also) "on" as_also;
     EachStep(Vec<Effect>) "each step" as_each_step;
     Rule(Rule) "rule" as_rule name;
+    Require(Box<Require>) "require" as_require name;
     Body(Block) "body" as_body name;
     Road(Block) "road" as_road name;
     Episode(Vec<Field>) "episode" as_episode;
@@ -407,6 +408,24 @@ pub struct Move {
     pub to: Vec<Name>,
     #[serde(skip)]
     pub span: Span,
+}
+
+/// `require distance when ego.lead_since >= 3 s: ego.lead_gap >= 0.8 s * ego.speed within 2 s`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Require {
+    /// Whether it is off unless `--with` names it.
+    pub optional: bool,
+    pub name: Name,
+    pub when: Option<Expr>,
+    pub condition: Expr,
+    pub within: Option<Expr>,
+}
+
+impl Require {
+    /// Its expressions, in the order of the text.
+    pub fn parts(&self) -> impl Iterator<Item = &Expr> {
+        self.when.iter().chain([&self.condition]).chain(&self.within)
+    }
 }
 
 /// `name { field: value … }`.

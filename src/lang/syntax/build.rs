@@ -10,8 +10,8 @@ use pest::iterators::Pair;
 use crate::syntax::ast::{
     Action, ActionParam, Also, Block, Case, Clause, ClauseKind, Effect, EffectKind, Enum, Expect, Expr,
     Field, FileId, Fn, FnParam, Group, Initial, InitialKey, ItemKind, Let, Manoeuvre, Move, Name, Number,
-    Odds, ParamMode, Phase, Place, Policy, PolicyLine, Rule as NamedRule, RuleBody, Scenario, Span, State,
-    Step, Text, Type, TypeKind, Use, Verdict,
+    Odds, ParamMode, Phase, Place, Policy, PolicyLine, Require, Rule as NamedRule, RuleBody, Scenario, Span,
+    State, Step, Text, Type, TypeKind, Use, Verdict,
 };
 use crate::syntax::grammar::{Rule, is_plain_terminal};
 use crate::syntax::{Diagnostic, code};
@@ -149,6 +149,21 @@ impl Builder {
                 ItemKind::EachStep(self.all(parts, Builder::effect)?)
             }
             Rule::named_rule => ItemKind::Rule(self.rule(parts, span)?),
+            Rule::requirement => {
+                let optional = parts.take(Rule::kw_optional).is_some();
+                let name = self.name(parts.next());
+                let when =
+                    parts.take(Rule::while_holds).map(|when| self.only_expression(when)).transpose()?;
+                let condition = self.only_expression(parts.next())?;
+                let within = parts.take(Rule::within_time).map(|within| self.only_expression(within));
+                ItemKind::Require(Box::new(Require {
+                    optional,
+                    name,
+                    when,
+                    condition,
+                    within: within.transpose()?,
+                }))
+            }
             Rule::body => {
                 let name = self.name(parts.next());
                 ItemKind::Body(Block { name, fields: self.fields(parts.next())? })

@@ -149,7 +149,7 @@ pub fn role(rule: Rule) -> Role {
         Rule::kw_net | Rule::net => Role::Said("`net`"),
         Rule::kw_claims | Rule::claims => Role::Said("`claims`"),
         Rule::kw_rules | Rule::policy_rules => Role::Said("`rules`"),
-        Rule::kw_when => Role::Said("`when`"),
+        Rule::kw_when | Rule::while_holds => Role::Said("`when`"),
         Rule::EOI
         | Rule::WHITESPACE
         | Rule::COMMENT
@@ -173,6 +173,7 @@ pub fn role(rule: Rule) -> Role {
         | Rule::each_step
         | Rule::group
         | Rule::named_rule
+        | Rule::requirement
         | Rule::body
         | Rule::road
         | Rule::episode
@@ -193,6 +194,7 @@ pub fn role(rule: Rule) -> Role {
         | Rule::numbered
         | Rule::boolean
         | Rule::unit
+        | Rule::known_unit
         | Rule::unit_stop
         | Rule::reserved
         | Rule::operator_word
@@ -212,6 +214,7 @@ pub fn role(rule: Rule) -> Role {
         | Rule::kw_from
         | Rule::kw_group
         | Rule::kw_optional
+        | Rule::kw_require
         | Rule::kw_body
         | Rule::kw_manoeuvre
         | Rule::kw_episode
@@ -248,6 +251,7 @@ pub fn opening_words(rule: Rule) -> Vec<&'static str> {
         Rule::phase => vec!["once", "within", "after", "if"],
         Rule::clause => vec!["with", "at", "by"],
         Rule::named_rule => vec!["optional", "rule"],
+        Rule::requirement => vec!["optional", "require"],
         Rule::policy_line => vec!["when"],
         Rule::drawn_initially => vec!["any"],
         // The rule of a keyword is `kw_` and the word.

@@ -20,8 +20,12 @@ pub const DECLARATIONS: &[Keyword] = &[
         "What may be done in a step. Its `each` parameters make rows of the action table, its `any` parameters are drawn.",
     ),
     ("group", "A name for several actions: `group vehicles = drive_ahead, overtake`."),
-    ("optional", "A rule that is off unless asked for with `--with NAME`: `optional rule …`."),
+    ("optional", "A rule or requirement that is off unless asked for with `--with NAME`: `optional rule …`."),
     ("rule", "A named constraint, enforced on every action that it binds; `--without NAME` switches it off."),
+    (
+        "require",
+        "What the ego vehicle must keep, judged at every tick: `require calm: ego.speed <= ego.limit within 1 s`.",
+    ),
     ("body", "A body of your own for road users: `body Scooter { like: Motorcycle, mass: 180 kg }`."),
     (
         "manoeuvre",

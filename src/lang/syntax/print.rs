@@ -8,7 +8,7 @@
 use crate::syntax::ast::{
     Action, ActionParam, Case, ClauseKind, Doc, Effect, EffectKind, Expect, Expr, ExprKind, Field, File,
     FnParam, Initial, InitialKey, Item, ItemKind, Move, Name, ParamMode, Phase, Place, Policy, PolicyLine,
-    Rule, RuleBody, Scenario, Span, Step, Type, TypeKind,
+    Require, Rule, RuleBody, Scenario, Span, Step, Type, TypeKind,
 };
 use crate::syntax::layout::{INDENT, Layout, WIDTH};
 use crate::syntax::print_expression::{
@@ -291,6 +291,7 @@ impl Printer<'_> {
             }
             ItemKind::EachStep(effects) => self.sets("each step ", effects, span),
             ItemKind::Rule(item) => self.rule(item, span),
+            ItemKind::Require(item) => self.require(item),
             ItemKind::Body(item) => {
                 self.words(&format!("body {} ", item.name.text));
                 self.braced(span, field_entries(&item.fields).collect());
@@ -482,6 +483,23 @@ impl Printer<'_> {
         }
     }
 
+    fn require(&mut self, item: &Require) {
+        if item.optional {
+            self.words("optional ");
+        }
+        self.words(&format!("require {}", item.name.text));
+        if let Some(when) = &item.when {
+            self.words(" when ");
+            self.put(&expression(when));
+        }
+        self.words(":");
+        self.value(&item.condition);
+        if let Some(within) = &item.within {
+            self.words(" within ");
+            self.put(&expression(within));
+        }
+    }
+
     /// `origin { … }` in a block: on one line if it fits, absent if it is empty.
     fn section(&mut self, keyword: &str, entries: &[Field]) {
         let (Some(first), Some(last)) = (entries.first(), entries.last()) else { return };
@@ -547,6 +565,7 @@ fn one_line(kind: &ItemKind) -> bool {
         ItemKind::Rule(item) => {
             matches!(&item.body, RuleBody::Holds { condition, .. } if plain(condition))
         }
+        ItemKind::Require(item) => item.parts().all(plain),
         ItemKind::Verdict(item) => plain(&item.condition),
         ItemKind::Expect(_) => true,
         ItemKind::Action(_)

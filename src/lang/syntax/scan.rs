@@ -151,7 +151,9 @@ impl Scanner<'_> {
             "match" => self.opens_match(self.span(start)),
             // A word that begins a declaration ends every expression.
             "language" | "use" | "enum" | "odds" | "state" | "let" | "fn" | "action" | "group"
-            | "optional" | "rule" | "verdict" | "scenario" | "policy" | "override" => self.open_matches = 0,
+            | "optional" | "rule" | "require" | "verdict" | "scenario" | "policy" | "override" => {
+                self.open_matches = 0;
+            }
             _ => {}
         }
     }

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use crate::syntax::ast::{
     Arg, Arm, BinaryOp, Call, Case, Expr, ExprKind, Field, File, FileId, Item, ItemKind, Let, Name, Number,
-    Odds, Scenario, Span, Step, Text, UnaryOp, Use, Verdict,
+    Odds, Require, Scenario, Span, Step, Text, UnaryOp, Use, Verdict,
 };
 use crate::syntax::{DEPTH_MAX, OPERATORS_MAX, Sources, Style, format, parse, print, render, same_meaning};
 
@@ -277,6 +277,11 @@ fn item() -> impl Strategy<Value = ItemKind> {
         (name(), expr())
             .prop_map(|(name, value)| { ItemKind::Override(Box::new(ItemKind::Let(Let { name, value }))) }),
         (name(), expr()).prop_map(|(name, condition)| ItemKind::Verdict(Verdict { name, condition })),
+        (any::<bool>(), name(), proptest::option::of(expr()), expr(), proptest::option::of(expr())).prop_map(
+            |(optional, name, when, condition, within)| {
+                ItemKind::Require(Box::new(Require { optional, name, when, condition, within }))
+            }
+        ),
         prop::collection::vec(case, 0..4).prop_map(ItemKind::Reward),
         (name(), arms(expr())).prop_map(|(name, arms)| ItemKind::Odds(Odds { name, arms })),
         ("\\PC{0,5}", proptest::option::of("[a-f0-9]{0,4}"), prop::collection::vec(name(), 0..3)).prop_map(

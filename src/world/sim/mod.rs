@@ -18,7 +18,7 @@
 //! `traffic` holds the manners that a run can change;
 //! `safety` says how much room a careful driver would need. `junction` knows where lanes cross and which
 //! goes first, `signals` the colour of every light at every tick. `moment` says what can be asked about a moment,
-//! `trace` digests the states of all ticks.
+//! `watched` what requirements ask beside it, `trace` digests the states of all ticks.
 
 mod ambient;
 mod around;
@@ -47,6 +47,7 @@ pub mod testing;
 mod tests;
 mod trace;
 mod traffic;
+mod watched;
 mod way;
 mod world;
 
@@ -62,4 +63,5 @@ pub use scene::{RANGE_M, Scene};
 pub use sense::{Conditions, EgoMotion, FRAME_S, FRAME_TICKS, Sensed, SensedObject, SignalColour};
 pub use trace::Trace;
 pub use traffic::{TrafficError, TrafficProfile};
+pub use watched::Watched;
 pub use world::{DT_S, ENGINE, Start, World};

@@ -1,13 +1,14 @@
 //! A road as the world needs it: the map, the ego vehicle's route, and what follows from both.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use avastra_lang::model::Road;
 use avastra_road::{FootWay, LaneIndex, RoadMap, Route};
 
 use super::junction::ConflictAreas;
 use super::right_of_way::{RouteArea, route_areas};
+use super::watched::{OncomingEdge, oncoming_edges};
 use super::way::Ways;
 
 /// Objects farther away than this are not sensed at all, m: the clear-day range for cars of the LiDAR and the camera that
@@ -37,6 +38,8 @@ pub struct Scene {
     foot_ways: FootWays,
     /// Lanes outside junctions, each with the sum of the lengths up to its end, m.
     streets: Vec<(LaneIndex, f64)>,
+    /// At every metre of the route. Only requirements ask for them.
+    oncoming: OnceLock<Vec<Option<OncomingEdge>>>,
 }
 
 impl Scene {
@@ -61,6 +64,7 @@ impl Scene {
             ways: Ways::default(),
             foot_ways: FootWays::default(),
             streets,
+            oncoming: OnceLock::new(),
             is_motorway,
             range_m: if is_motorway { MOTORWAY_RANGE_M } else { RANGE_M },
             map,
@@ -73,6 +77,12 @@ impl Scene {
     pub fn half_width_m(&self, station_m: f64) -> f64 {
         let here = self.route.lane_at(station_m);
         self.map.lane(here.lane).width_at(station_m - here.from_m) / 2.0
+    }
+
+    /// The near edge of the oncoming lane beside a station of the route, to the metre.
+    pub(super) fn oncoming_at(&self, station_m: f64) -> Option<OncomingEdge> {
+        let edges = self.oncoming.get_or_init(|| oncoming_edges(self));
+        *edges.get(station_m.max(0.0).round() as usize)?
     }
 
     /// The place at a fraction of all streets laid end to end, so that every metre is equally likely.

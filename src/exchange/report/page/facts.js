@@ -8,6 +8,7 @@ import {
   VERDICTS,
   atTime,
   causeInWords,
+  breachInWords,
   collisionInWords,
   driverInWords,
   figure,
@@ -21,10 +22,35 @@ export function showVerdict(place, recording, seek, watchDrivers) {
   const parts = collisions.map((collision) => verdict(recording, collision, seek, watchDrivers));
   if (parts.length === 0)
     parts.push(el("p", {}, `No collision: ${ENDS[summary.end] ?? `it ended with ${summary.end}`}.`));
+  parts.push(...summary.breaches.map((breach) => broken(breach, seek)));
   if (summary.same && summary.refuted.length === 0) {
     parts.push(el("p", { class: "muted" }, "This replay equals the recorded episode in every bit of every tick."));
   }
   refill(place, parts);
+}
+
+/** A requirement that was not kept: what it asks, for how long it was broken, who keeps it. */
+function broken(breach, seek) {
+  const jump = el("button", { type: "button", onclick: () => seek(breach.at_s) }, `Go to ${atTime(breach.at_s)}`);
+  const rows = [
+    ["Required", breach.docs || breach.requirement],
+    ["Broken", `from ${atTime(breach.at_s)} to ${atTime(breach.until_s)}`],
+  ];
+  if (breach.kept_by) {
+    const keepers = breach.kept_by.map(driverInWords).join(", ");
+    rows.push(["Kept in the same steps by", keepers || "no careful driver"]);
+  }
+  return el(
+    "section",
+    { class: "verdict counted" },
+    el("p", { class: "lead" }, `${breachInWords(breach)}.`),
+    el("p", { class: "buttons" }, jump),
+    el(
+      "dl",
+      {},
+      rows.map(([name, text]) => [el("dt", {}, name), el("dd", {}, text)]),
+    ),
+  );
 }
 
 function verdict(recording, collision, seek, watchDrivers) {

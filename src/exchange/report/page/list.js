@@ -8,6 +8,7 @@ import { CHANGES, VERDICTS, atTime, causeInWords, changeInWords, kmh, mainCollis
 export const FILTERS = [
   ["road", "Road", (entry) => entry.summary.road],
   ["verdict", "Verdict", (entry) => mainCollision(entry.summary)?.class ?? "no collision"],
+  ["breach", "Breach", (entry) => entry.summary.breaches[0]?.requirement ?? "none"],
   ["priority", "Priority", (entry) => mainCollision(entry.summary)?.priority ?? "–"],
   ["hit", "Obstacle", (entry) => mainCollision(entry.summary)?.body ?? "–"],
   ["manoeuvre", "Manoeuvre", (entry) => mainCollision(entry.summary)?.verb ?? "–"],
@@ -39,7 +40,8 @@ export function filtered(scenarios) {
 /** What makes two failures alike, as `avastra run` groups them. */
 export function kindOf(entry) {
   const collision = mainCollision(entry.summary);
-  if (!collision) return `ended: ${entry.summary.end}`;
+  const [breach] = entry.summary.breaches;
+  if (!collision) return breach ? `breach of ${breach.requirement}` : `ended: ${entry.summary.end}`;
   const { kind, verb, approach, side, shape, priority, cause } = collision;
   const first = { ego: ", ego first", other: ", the other first" }[priority] ?? "";
   const because = cause ? `, ${causeInWords(cause)}` : "";
@@ -125,12 +127,14 @@ const COLUMNS = [
   ["Verdict", (entry, hit) => hit && el("span", { title: VERDICTS[hit.class] }, REACHES[hit.class])],
   ["Priority", (entry, hit) => hit?.priority],
   ["Cause", (entry, hit) => hit && causeInWords(hit.cause)],
-  ["At", ({ summary }, hit) => atTime(hit ? hit.at_s : summary.duration_s), "number"],
+  ["At", ({ summary }, hit) => atTime((hit ?? summary.breaches[0])?.at_s ?? summary.duration_s), "number"],
 ];
 
 /** Whether it counts, by a sign and in words; how it ended, if nothing was hit; and whether the replay is another. */
 function counts({ summary }, hit) {
-  const end = hit ? (hit.counted ? "● counts" : "○ does not count") : `– ${summary.end}`;
+  const [breach] = summary.breaches;
+  const without = breach ? `● ${breach.requirement}` : `– ${summary.end}`;
+  const end = hit ? (hit.counted ? "● counts" : "○ does not count") : without;
   return summary.refuted.length > 0 ? `${end}, replays otherwise` : end;
 }
 

@@ -10,7 +10,7 @@ import { Plots } from "./plots.js";
 import { showSource } from "./source.js";
 import { drawStrip } from "./strip.js";
 import { LAYERS_AT_FIRST, View } from "./view.js";
-import { atTime, changeInWords, collisionInWords, driverInWords, mainCollision } from "./words.js";
+import { atTime, breachInWords, changeInWords, collisionInWords, driverInWords, mainCollision } from "./words.js";
 
 let open = null;
 /** How often something was asked for: of two quick clicks the later one counts. */
@@ -106,7 +106,7 @@ class Watch {
       place,
       el("p", { class: "crumbs" }, el("a", { href: linkToList() }, "← All scenarios")),
       el("h1", {}, nameOf(entry).replace(/^.*\//, ""), entry.shrunk_from ? " (shrunk)" : ""),
-      el("p", { class: "lead" }, collision ? `${collisionInWords(collision, header.summary.road)}.` : "No collision."),
+      el("p", { class: "lead" }, foundInWords(collision, header.summary)),
       entry.changed && el("p", { class: "warning", id: "changed" }, entry.changed),
       refutedClaims(entry.summary),
       origin(header),
@@ -193,10 +193,18 @@ class Watch {
 
   toCollision() {
     const collision = this.recording.collision();
-    if (!collision) return announce("There is no collision");
+    if (!collision) return this.#toBreach();
     this.clock.pause();
     this.clock.seek(collision.at_s);
     return announce(`Collision at ${atTime(collision.at_s)}`);
+  }
+
+  #toBreach() {
+    const [breach] = this.recording.header.summary.breaches;
+    if (!breach) return announce("There is no collision");
+    this.clock.pause();
+    this.clock.seek(breach.at_s);
+    return announce(`${breachInWords(breach)}`);
   }
 
   /** Opens another drive beside this one, at the same moment. */
@@ -236,6 +244,12 @@ class Watch {
     this.views.forEach((view) => view.draw(Math.min(this.clock.timeS, view.recording.endS)));
     this.plots.draw(this.clock.timeS);
   }
+}
+
+/** What was found, in a sentence: the collision, else the first breach. */
+function foundInWords(collision, { road, breaches }) {
+  if (collision) return `${collisionInWords(collision, road)}.`;
+  return breaches.length > 0 ? `${breachInWords(breaches[0])} on ${road}.` : "No collision.";
 }
 
 function precision(steps) {

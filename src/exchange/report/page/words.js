@@ -71,6 +71,12 @@ export function collisionInWords(collision, road) {
   );
 }
 
+/** A breach of a requirement in a sentence. */
+export function breachInWords({ requirement, at_s: atS, margin, unit }) {
+  const by = margin === null ? "" : `, by ${figure(Math.abs(margin), unit ?? "", 2).trim()} at most`;
+  return `The ego vehicle does not keep ${requirement} at ${atTime(atS)}${by}`;
+}
+
 /** What another driving system makes of a scenario, by the word of the page's data. */
 export const CHANGES = {
   same: "same crash",

@@ -12,6 +12,8 @@ const RULES_A_STEP: usize = 16;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RulesInForce {
     in_force: Vec<bool>,
+    /// By index in `Space::requirements`.
+    required: Vec<bool>,
 }
 
 /// A rule was named that the space does not have.
@@ -32,8 +34,13 @@ impl RulesInForce {
         let mut rules = RulesInForce::by_default(space);
         for (names, on) in [(with, true), (without, false)] {
             for name in names {
-                let found = space.rules.iter().position(|rule| rule.name == *name);
-                rules.in_force[found.ok_or_else(|| unknown(space, name))?] = on;
+                let rule = space.rules.iter().position(|rule| rule.name == *name);
+                let requirement = space.requirements.iter().position(|required| required.name == *name);
+                match (rule, requirement) {
+                    (Some(rule), _) => rules.in_force[rule] = on,
+                    (None, Some(requirement)) => rules.required[requirement] = on,
+                    (None, None) => return Err(unknown(space, name)),
+                }
             }
         }
         Ok(rules)
@@ -41,12 +48,18 @@ impl RulesInForce {
 
     /// Every rule that is not `optional`.
     pub fn by_default(space: &Space) -> RulesInForce {
-        RulesInForce { in_force: space.rules.iter().map(|rule| !rule.optional).collect() }
+        RulesInForce {
+            in_force: space.rules.iter().map(|rule| !rule.optional).collect(),
+            required: space.requirements.iter().map(|required| !required.optional).collect(),
+        }
     }
 
     /// No rule at all.
     pub(crate) fn none(space: &Space) -> RulesInForce {
-        RulesInForce { in_force: vec![false; space.rules.len()] }
+        RulesInForce {
+            in_force: vec![false; space.rules.len()],
+            required: vec![false; space.requirements.len()],
+        }
     }
 
     /// One rule, and no other.
@@ -77,6 +90,11 @@ impl RulesInForce {
         self.in_force[rule]
     }
 
+    /// The requirements in force, by index, in the order of their declarations.
+    pub fn required(&self) -> impl Iterator<Item = usize> {
+        (0..self.required.len()).filter(|requirement| self.required[*requirement])
+    }
+
     /// The rules in force, in the order of their declarations.
     pub(crate) fn all(&self) -> impl Iterator<Item = usize> {
         effort::spend(1 + self.in_force.len() / RULES_A_STEP);
@@ -90,10 +108,11 @@ impl RulesInForce {
 }
 
 fn unknown(space: &Space, name: &str) -> UnknownRule {
-    let names = || space.rules.iter().map(|rule: &RuleDef| rule.name.as_str());
+    let required = || space.requirements.iter().map(|required| required.name.as_str());
+    let names = || space.rules.iter().map(|rule: &RuleDef| rule.name.as_str()).chain(required());
     let hint = match nearest(name, names()) {
         Some(near) => format!("did you mean `{near}`?"),
-        None if space.rules.is_empty() => "the space has no rules".to_owned(),
+        None if names().next().is_none() => "the space has no rules".to_owned(),
         None => format!("the space has {}", listed(&names().collect::<Vec<_>>())),
     };
     UnknownRule { name: name.to_owned(), hint }

@@ -96,7 +96,9 @@ impl<'a> RowRules<'a> {
                         };
                         Some(Breach::Spawn { rule, condition, spawn: spawns.find(is_broken)? })
                     }
-                    Known::Step | Known::Judgement => unreachable!("no rule may read what comes after it"),
+                    Known::Tick | Known::Step | Known::Judgement => {
+                        unreachable!("no rule may read what comes after it")
+                    }
                 }
             }
             Demand::Moves { state, cell, allowed } => {

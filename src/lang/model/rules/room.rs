@@ -3,6 +3,10 @@
 /// Drawn numbers are multiples of this where the rules allow it, SI: short in text and exact in binary.
 const GRID: f64 = 1.0 / 64.0;
 
+/// In a part that holds fewer steps of the grid than this, the grid is finer: `any wait: Duration in 0 ms .. 40 ms` would
+/// else have three values.
+const FEWEST_STEPS: f64 = 8.0;
+
 /// What is left of a range: parts in rising order that do not touch.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Room {
@@ -114,8 +118,12 @@ impl Part {
     /// A number of the part near `wanted`, on the grid where the part holds a point of it. In a part of one number,
     /// or between two neighbours, it is the middle.
     fn on_grid(&self, wanted: f64) -> f64 {
-        let down = (wanted / GRID).floor() * GRID;
-        let near = [down, down + GRID, wanted];
+        let mut grid = GRID;
+        while self.high > self.low && self.high - self.low < FEWEST_STEPS * grid && grid > f64::EPSILON {
+            grid /= 2.0;
+        }
+        let down = (wanted / grid).floor() * grid;
+        let near = [down, down + grid, wanted];
         near.into_iter().find(|number| self.contains(*number)).unwrap_or_else(|| self.middle())
     }
 }
@@ -133,6 +141,15 @@ mod tests {
         assert_eq!(room.nearest(3.0), Some(2.0));
         assert_eq!(room.nearest(3.9), Some(4.015625));
         assert_eq!(room.nearest(8.0), Some(6.0));
+    }
+
+    #[test]
+    fn a_narrow_room_has_more_than_its_ends() {
+        let room = Room::where_holds(0.02, 0.04, Vec::new(), |_| true);
+        let drawn: Vec<f64> = (0..100).filter_map(|share| room.at(f64::from(share) / 100.0)).collect();
+        let mut different = drawn.clone();
+        different.dedup();
+        assert!(different.len() >= 8 && drawn.iter().all(|number| room.contains(*number)), "{different:?}");
     }
 
     #[test]

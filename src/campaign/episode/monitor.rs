@@ -1,0 +1,357 @@
+//! Whether the ego vehicle keeps what the space requires, judged at every tick up to the first contact.
+//!
+//! A requirement with `within D` is breached at a tick if its condition failed at every tick of the D before it and at
+//! itself; its margin there is the largest one of these ticks. One unbroken stretch of such ticks is one breach. Nothing
+//! is asked where `when` does not hold, and what is asked only since less than D cannot be breached yet.
+
+use std::collections::VecDeque;
+
+use avastra_lang::model::expr::ExprKind;
+use avastra_lang::model::vocabulary::{Fact, Known};
+use avastra_lang::model::{Facts, Memory, RequirementDef, WorldFacts};
+use avastra_world::sim::{Watched, World};
+
+use super::setup::Setup;
+
+/// A stretch of time in which the ego vehicle did not keep a requirement.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Breach {
+    /// By index in `Space::requirements`.
+    pub requirement: usize,
+    /// When it became a breach, s: at the end of the time that `within` grants.
+    pub time_s: f64,
+    /// The last moment of it, s.
+    pub until_s: f64,
+    /// The smallest margin of it, SI; `None` for a requirement without one.
+    pub margin: Option<f64>,
+    /// Index of the step in which it began.
+    pub step: usize,
+}
+
+/// The smallest margin of a requirement over an episode.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Margin {
+    /// By index in `Space::requirements`.
+    pub requirement: usize,
+    /// SI; `None` if it was never asked for long enough, or has no margin.
+    pub smallest: Option<f64>,
+}
+
+/// Watches the requirements that are in force.
+#[derive(Debug, Clone)]
+pub(super) struct Monitor {
+    watched: Watched,
+    watches: Vec<Watch>,
+    /// The facts that are watched for them.
+    asked: Vec<Fact>,
+    /// The road users that requirements name, by index in `Space::bearers`.
+    bearers: Vec<usize>,
+    breaches: Vec<Breach>,
+}
+
+#[derive(Debug, Clone)]
+struct Watch {
+    requirement: usize,
+    /// Ticks up to now in which it was asked without a break, and in which it failed without a break.
+    asked: u32,
+    failed: u32,
+    window: Window,
+    smallest: Option<f64>,
+    /// The breach that goes on, by index.
+    open: Option<usize>,
+}
+
+impl Monitor {
+    /// `None` where no requirement is in force.
+    pub fn new(setup: &Setup) -> Option<Monitor> {
+        let watches: Vec<Watch> = setup.rules.required().map(Watch::new).collect();
+        let of = |watch: &Watch| &setup.table.space().requirements[watch.requirement].bearers;
+        let mut bearers: Vec<usize> = watches.iter().flat_map(|watch| of(watch).iter().copied()).collect();
+        bearers.sort_unstable();
+        bearers.dedup();
+        let asked = watches.iter().flat_map(|watch| {
+            let RequirementDef { when, condition, .. } = &setup.table.space().requirements[watch.requirement];
+            when.iter().chain([condition]).flat_map(|expr| {
+                expr.filter_map(|kind| match kind {
+                    ExprKind::Fact(fact) => Some(*fact).filter(|fact| fact.known() == Known::Tick),
+                    _ => None,
+                })
+            })
+        });
+        let asked = asked.collect();
+        let monitor = Monitor { asked, watched: Watched::default(), watches, bearers, breaches: Vec::new() };
+        (!monitor.watches.is_empty()).then_some(monitor)
+    }
+
+    /// Judges the moment after a tick without a contact; `step` is the one that is driven.
+    pub fn judge(&mut self, setup: &Setup, world: &World, memory: &Memory, step: usize) {
+        let facts = WorldFacts {
+            moment: world.moment_facts(),
+            step: step as u64,
+            bearers: self.bearers.iter().filter_map(|who| Some((*who, world.bearer_facts(*who)?))).collect(),
+            tick: self.watched.look(world, &self.asked),
+            ..WorldFacts::default()
+        };
+        let facts = Facts { road: Some(&setup.road.facts), world: Some(&facts), ..Facts::new(&[], memory) };
+        let space = setup.table.space();
+        for watch in &mut self.watches {
+            let required = &space.requirements[watch.requirement];
+            let Some(kept) = required.at(&space.functions, &facts) else {
+                watch.pause();
+                continue;
+            };
+            let margin = watch.take(kept.holds, kept.margin, required.within_ticks);
+            if watch.failed <= required.within_ticks {
+                watch.open = None;
+                continue;
+            }
+            let margin = margin.filter(|_| required.margin.is_some());
+            match watch.open.and_then(|open| self.breaches.get_mut(open)) {
+                Some(breach) => {
+                    breach.until_s = world.time_s();
+                    breach.margin = smaller(breach.margin, margin);
+                }
+                None => {
+                    let (requirement, time_s) = (watch.requirement, world.time_s());
+                    watch.open = Some(self.breaches.len());
+                    self.breaches.push(Breach { requirement, time_s, until_s: time_s, margin, step });
+                }
+            }
+        }
+    }
+
+    /// What was found up to now, breaches by rising time.
+    pub fn found(self) -> (Vec<Breach>, Vec<Margin>) {
+        let margin = |watch: &Watch| Margin { requirement: watch.requirement, smallest: watch.smallest };
+        (self.breaches, self.watches.iter().map(margin).collect())
+    }
+}
+
+impl Watch {
+    fn new(requirement: usize) -> Watch {
+        Watch { requirement, asked: 0, failed: 0, window: Window::default(), smallest: None, open: None }
+    }
+
+    /// Nothing is asked now.
+    fn pause(&mut self) {
+        (self.asked, self.failed, self.open) = (0, 0, None);
+        self.window.clear();
+    }
+
+    /// Takes the answer of a tick. Returns the margin of the time that `within` grants, once that has been asked.
+    fn take(&mut self, holds: bool, margin: f64, within_ticks: u32) -> Option<f64> {
+        self.asked += 1;
+        self.failed = if holds { 0 } else { self.failed + 1 };
+        let largest = self.window.largest(margin, within_ticks);
+        let margin = Some(largest).filter(|margin| self.asked > within_ticks && !margin.is_nan());
+        self.smallest = smaller(self.smallest, margin);
+        margin
+    }
+}
+
+fn smaller(one: Option<f64>, other: Option<f64>) -> Option<f64> {
+    match (one, other) {
+        (Some(one), Some(other)) => Some(one.min(other)),
+        (one, other) => one.or(other),
+    }
+}
+
+/// The largest of the last margins (Lemire 2006: those that a later, larger one outlives are dropped).
+#[derive(Debug, Clone, Default)]
+struct Window {
+    tick: u32,
+    /// Ticks with falling margins.
+    falling: VecDeque<(u32, f64)>,
+}
+
+impl Window {
+    fn clear(&mut self) {
+        self.falling.clear();
+    }
+
+    /// Takes one more; the largest of it and so many before it.
+    fn largest(&mut self, margin: f64, before: u32) -> f64 {
+        self.tick += 1;
+        while self.falling.back().is_some_and(|(_, last)| *last <= margin) {
+            self.falling.pop_back();
+        }
+        self.falling.push_back((self.tick, margin));
+        while self.falling.front().is_some_and(|(tick, _)| self.tick - tick > before) {
+            self.falling.pop_front();
+        }
+        self.falling[0].1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    use avastra_base::rng::{self, Stream, below, stream};
+    use avastra_lang::check::{ReadError, load};
+
+    /// Breaches as (first tick, last tick) and the smallest margin, by the definition.
+    fn naive(answers: &[Option<f64>], within: usize) -> (Vec<(usize, usize)>, Option<f64>) {
+        let at = |tick: usize| -> Option<f64> {
+            let window = &answers[tick.checked_sub(within)?..=tick];
+            window
+                .iter()
+                .copied()
+                .collect::<Option<Vec<f64>>>()
+                .map(|all| all.into_iter().fold(f64::NEG_INFINITY, f64::max))
+        };
+        let mut breaches: Vec<(usize, usize)> = Vec::new();
+        for tick in (0..answers.len()).filter(|tick| at(*tick).is_some_and(|margin| margin < 0.0)) {
+            match breaches.last_mut() {
+                Some((_, last)) if *last + 1 == tick => *last = tick,
+                _ => breaches.push((tick, tick)),
+            }
+        }
+        let margins = (0..answers.len()).filter_map(at);
+        (breaches, margins.reduce(f64::min))
+    }
+
+    #[test]
+    fn breaches_and_margins_are_those_of_the_definition() {
+        let mut rng = stream(11, Stream::Episode, 0);
+        for _ in 0..10_000 {
+            let within = below(&mut rng, 6);
+            let answers: Vec<Option<f64>> = (0..=below(&mut rng, 39))
+                .map(|_| (below(&mut rng, 8) > 0).then(|| f64::from(below(&mut rng, 8)) - 4.5))
+                .collect();
+            let mut watch = Watch::new(0);
+            let mut breaches: Vec<(usize, usize)> = Vec::new();
+            let mut is_open = false;
+            for (tick, answer) in answers.iter().enumerate() {
+                match answer {
+                    None => {
+                        watch.pause();
+                        is_open = false;
+                    }
+                    Some(margin) => {
+                        watch.take(*margin >= 0.0, *margin, within);
+                        let is_breached = watch.failed > within;
+                        match breaches.last_mut() {
+                            Some((_, last)) if is_breached && is_open => *last = tick,
+                            _ if is_breached => breaches.push((tick, tick)),
+                            _ => {}
+                        }
+                        is_open = is_breached;
+                    }
+                }
+            }
+            let expected = naive(&answers, within as usize);
+            assert_eq!((breaches, watch.smallest), expected, "{answers:?} within {within}");
+        }
+    }
+
+    /// A condition that a seed makes up: its text, and what it means, once more and apart from the language.
+    struct MadeUp {
+        text: String,
+        margin: Box<dyn Fn(f64, f64) -> f64>,
+    }
+
+    /// Over the speed `v` and the acceleration-like number `w` of a moment, both in m/s.
+    fn made_up(rng: &mut rng::Rng, depth: u32) -> MadeUp {
+        let number = f64::from(below(rng, 80)) / 4.0;
+        let side = |rng: &mut rng::Rng| -> (String, Box<dyn Fn(f64, f64) -> f64>) {
+            let part = f64::from(below(rng, 8)) / 4.0;
+            match below(rng, 4) {
+                0 => ("ego.speed".to_owned(), Box::new(|v, _| v)),
+                1 => ("ego.limit".to_owned(), Box::new(|_, w| w)),
+                2 => (format!("({part} * ego.speed)"), Box::new(move |v, _| part * v)),
+                _ => ("(ego.limit - ego.speed)".to_owned(), Box::new(|v, w| w - v)),
+            }
+        };
+        let (text, of) = side(rng);
+        let kind = below(rng, if depth == 0 { 5 } else { 9 });
+        let mut two = || (made_up(rng, depth.saturating_sub(1)), made_up(rng, depth.saturating_sub(1)));
+        let (text, margin): (String, Box<dyn Fn(f64, f64) -> f64>) = match kind {
+            0 => (format!("{text} < {number} m/s"), Box::new(move |v, w| number - of(v, w))),
+            1 => (format!("{text} <= {number} m/s"), Box::new(move |v, w| number - of(v, w))),
+            2 => (format!("{text} > {number} m/s"), Box::new(move |v, w| of(v, w) - number)),
+            3 => (format!("{text} >= {number} m/s"), Box::new(move |v, w| of(v, w) - number)),
+            4 => (
+                format!("{text} in {number} m/s .. {} m/s", number + 3.5),
+                Box::new(move |v, w| (of(v, w) - number).min(number + 3.5 - of(v, w))),
+            ),
+            5 => {
+                let (one, _) = two();
+                (format!("not ({})", one.text), Box::new(move |v, w| -(one.margin)(v, w)))
+            }
+            6 => {
+                let (a, b) = two();
+                let text = format!("({}) and ({})", a.text, b.text);
+                (text, Box::new(move |v, w| (a.margin)(v, w).min((b.margin)(v, w))))
+            }
+            7 => {
+                let (a, b) = two();
+                let text = format!("({}) or ({})", a.text, b.text);
+                (text, Box::new(move |v, w| (a.margin)(v, w).max((b.margin)(v, w))))
+            }
+            _ => {
+                let (a, b) = two();
+                let text = format!("({}) implies ({})", a.text, b.text);
+                (text, Box::new(move |v, w| (-(a.margin)(v, w)).max((b.margin)(v, w))))
+            }
+        };
+        MadeUp { text, margin }
+    }
+
+    /// 10,000 conditions, each over a trace of its own, against a monitor that follows the definition.
+    #[test]
+    fn margins_are_those_of_a_naive_monitor() {
+        const AT_ONCE: usize = 250;
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
+        for part in 0..40 {
+            let mut rng = stream(5, Stream::Episode, part);
+            let all: Vec<(MadeUp, u32)> =
+                (0..AT_ONCE).map(|_| (made_up(&mut rng, 3), below(&mut rng, 5))).collect();
+            let mut text = "language 1\nuse \"roads.ava\"\nstate told: Bool = false\naction tell() { set told = true }\n\
+                            rule at_last on tell: elapsed >= 6 s or told\n"
+                .to_owned();
+            for (index, (one, within)) in all.iter().enumerate() {
+                let within = if *within == 0 { String::new() } else { format!(" within {} ms", within * 20) };
+                text.push_str(&format!("require r{index}: {}{within}\n", one.text));
+            }
+            let made_up = folder.join("made_up.ava");
+            let read = |path: &Path| match path.ends_with("made_up.ava") {
+                true => Ok(text.clone()),
+                false => std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string())),
+            };
+            let loaded = load(&made_up, &read).expect("it can be read");
+            let Some(space) = loaded.space else { panic!("{:?}", loaded.diagnostics) };
+            let memory = space.initial_memory(1);
+            for (required, (one, within)) in space.requirements.iter().zip(&all) {
+                let trace: Vec<(f64, f64)> = (0..30)
+                    .map(|_| (f64::from(below(&mut rng, 60)) / 3.0, f64::from(below(&mut rng, 60)) / 3.0))
+                    .collect();
+                let mut watch = Watch::new(0);
+                for (tick, (v, w)) in trace.iter().enumerate() {
+                    let mut world = WorldFacts::default();
+                    (world.moment.ego_speed_mps, world.moment.ego_limit_mps) = (*v, *w);
+                    let facts = Facts { world: Some(&world), ..Facts::new(&[], &memory) };
+                    let kept = required.at(&space.functions, &facts).expect("it is always asked");
+                    let found = watch.take(kept.holds, kept.margin, required.within_ticks);
+                    let first = tick.checked_sub(*within as usize);
+                    let window =
+                        first.map(|first| trace[first..=tick].iter().map(|(v, w)| (one.margin)(*v, *w)));
+                    let wanted = window.map(|margins| margins.fold(f64::NEG_INFINITY, f64::max));
+                    let same = match (found, wanted) {
+                        (Some(found), Some(wanted)) => (found - wanted).abs() <= 1e-9 * (1.0 + wanted.abs()),
+                        (found, wanted) => found.is_none() && wanted.is_none(),
+                    };
+                    assert!(same, "{}: {found:?} in place of {wanted:?}", one.text);
+                    let is_breached = watch.failed > *within;
+                    let is_clear = wanted.is_none_or(|wanted| wanted.abs() > 1e-6);
+                    assert!(
+                        !is_clear || is_breached == wanted.is_some_and(|wanted| wanted < 0.0),
+                        "{}",
+                        one.text
+                    );
+                }
+            }
+        }
+    }
+}

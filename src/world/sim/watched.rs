@@ -1,0 +1,188 @@
+//! What requirements may ask beside the moment: what must be watched from tick to tick, and what costs too much to be
+//! looked up where nobody asks.
+
+use avastra_base::geometry::Vec2;
+use avastra_base::kinematics::STANDING_MPS;
+use avastra_lang::model::vocabulary::Fact;
+use avastra_lang::model::{LEAD_GAP_M_MAX, LIGHT_AHEAD_M, TickFacts};
+
+use super::around::Around;
+use super::ego::VehicleParameters;
+use super::road_user::Obstacle;
+use super::scene::Scene;
+use super::sense::SignalColour;
+use super::world::{DT_S, World};
+
+/// A road user ahead is looked for as near as this, m: as far as vehicles are sensed on motorways.
+const LEAD_REACH_M: f64 = 250.0;
+/// Stands for no red light and for no oncoming lane near, m.
+const FAR_M: f64 = -100.0;
+
+/// The ego vehicle's drive up to now, as far as requirements ask for it.
+#[derive(Debug, Clone, Default)]
+pub struct Watched {
+    /// The road user ahead, and the tick since when it is that one.
+    lead: Option<(u32, u64)>,
+    red_runs: u32,
+    /// The stop line that its front passed at red, until its rear has passed it.
+    red_line_m: Option<f64>,
+}
+
+impl Watched {
+    /// Looks at the world after a tick, for those of these facts that are asked. To be called at every tick.
+    pub fn look(&mut self, world: &World, asked: &[Fact]) -> TickFacts {
+        let asks = |fact: Fact| asked.contains(&fact);
+        let around = world.alone();
+        let asks_lead = [Fact::EgoLeadGap, Fact::EgoLeadSpeed, Fact::EgoLeadSince].into_iter().any(asks);
+        let lead = if asks_lead { lead(&around) } else { None };
+        self.lead = lead.as_ref().map(|&Lead { id, .. }| match self.lead {
+            Some((known, since)) if known == id => (id, since),
+            _ => (id, world.ticks()),
+        });
+        let since_s = |tick: u64| (world.ticks() - tick) as f64 * DT_S;
+        TickFacts {
+            lead_gap_m: lead.as_ref().map_or(LEAD_GAP_M_MAX, |lead| lead.gap_m),
+            lead_speed_mps: lead.map_or(0.0, |lead| lead.speed_mps),
+            lead_since_s: self.lead.map_or(0.0, |(_, tick)| since_s(tick)),
+            over_red_m: if asks(Fact::EgoOverRed) { self.over_red_m(world, &around) } else { f64::NAN },
+            over_oncoming_m: if asks(Fact::EgoOverOncoming) { over_oncoming_m(&around) } else { f64::NAN },
+        }
+    }
+
+    fn over_red_m(&mut self, world: &World, around: &Around) -> f64 {
+        let ego = VehicleParameters::MKZ;
+        let (front_m, rear_m) = (ego.front_m(around.ego_station_m), ego.rear_m(around.ego_station_m));
+        let lines = &around.scene.route.stop_lines;
+        if world.red_runs() > self.red_runs {
+            self.red_runs = world.red_runs();
+            let passed = lines.iter().rfind(|line| line.station_m <= front_m);
+            self.red_line_m = passed.map(|line| line.station_m);
+        }
+        self.red_line_m = self.red_line_m.filter(|line_m| rear_m < *line_m);
+        if let Some(line_m) = self.red_line_m {
+            return front_m - line_m;
+        }
+        let reach = front_m..=front_m + LIGHT_AHEAD_M;
+        let next = lines.iter().find(|line| reach.contains(&line.station_m));
+        let red = next.filter(|line| {
+            around.signals.colour(&around.scene.map, line.signal, around.tick) == SignalColour::Red
+        });
+        red.map_or(FAR_M, |line| front_m - line.station_m)
+    }
+}
+
+struct Lead {
+    id: u32,
+    gap_m: f64,
+    speed_mps: f64,
+}
+
+/// The next road user ahead whose outline reaches into the ego vehicle's way, and which does not come towards it.
+fn lead(around: &Around) -> Option<Lead> {
+    let front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
+    let position = around.ego_outline.pose.position;
+    let ahead = around.obstacles_on_level().filter_map(|obstacle| {
+        let Obstacle { outline, forward, velocity_mps, .. } = obstacle;
+        if (outline.pose.position - position).norm() > LEAD_REACH_M {
+            return None;
+        }
+        let (station_m, offset_m, along) = around.beside_route(outline.pose.position);
+        let (half_length_m, half_width_m) = outline.half_extent_m(*forward, along);
+        let aside_m = (offset_m - around.ego_offset_m).abs();
+        let speed_mps = along.dot(velocity_mps);
+        let is_ahead = station_m > front_m
+            && aside_m < half_width_m + ego_half_width_m(around, along)
+            && speed_mps > -STANDING_MPS;
+        let gap_m = (station_m - half_length_m - front_m).max(0.0);
+        is_ahead.then_some(Lead { id: obstacle.id, gap_m, speed_mps })
+    });
+    ahead.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))
+}
+
+/// Half the width of the ego vehicle across a direction, m.
+fn ego_half_width_m(around: &Around, along: Vec2) -> f64 {
+    around.ego_outline.half_extent_m(around.ego_forward, along).1
+}
+
+/// How far the ego vehicle's outline reaches into an oncoming lane, m.
+fn over_oncoming_m(around: &Around) -> f64 {
+    let Some(edge) = around.scene.oncoming_at(around.ego_station_m) else { return FAR_M };
+    let (_, along) = around.scene.route.path.along(around.ego_station_m);
+    let towards_m = if edge.is_left { around.ego_offset_m } else { -around.ego_offset_m };
+    (towards_m + ego_half_width_m(around, along) - edge.away_m).max(FAR_M)
+}
+
+/// The near edge of the nearest oncoming lane beside a place of the route.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct OncomingEdge {
+    /// From the middle of the route, m.
+    pub away_m: f64,
+    pub is_left: bool,
+}
+
+/// The edges at every metre of a route; none in junctions, and where there is no oncoming lane.
+pub(super) fn oncoming_edges(scene: &Scene) -> Vec<Option<OncomingEdge>> {
+    let Scene { map, route, .. } = scene;
+    let edge = |station_m: f64| {
+        let lane = route.lane_at(station_m).lane;
+        if map.lane(lane).junction.is_some() {
+            return None;
+        }
+        let here = route.path.pose_at(station_m);
+        let on_lane_m = map.lane(lane).centre.project(here.position).station_m;
+        let opposing = map.opposing(lane, on_lane_m)?;
+        let other = map.lane(opposing.lane);
+        let aside_m = here.to_local(other.centre.position_at(opposing.station_m)).y;
+        let away_m = aside_m.abs() - other.width_at(opposing.station_m) / 2.0;
+        Some(OncomingEdge { away_m, is_left: aside_m > 0.0 })
+    };
+    (0..=route.path.length_m() as usize).map(|metre| edge(metre as f64)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::{Control, testing};
+    use avastra_lang::model::vocabulary::Word;
+
+    #[test]
+    fn what_is_ahead_is_watched() {
+        let mut world = testing::world(&testing::straight());
+        let mut watched = Watched::default();
+        let alone = watched.look(&world, Fact::ALL);
+        assert_eq!((alone.lead_gap_m, alone.lead_speed_mps, alone.lead_since_s), (LEAD_GAP_M_MAX, 0.0, 0.0));
+        let request = testing::request(avastra_lang::model::vocabulary::Verb::DriveAhead, 30.0, 4.0);
+        world.apply(&crate::action::Effect::Spawn(request)).expect("there is room");
+        let first = watched.look(&world, Fact::ALL);
+        assert!((first.lead_gap_m - 30.0).abs() < 1e-6, "{first:?}");
+        assert_eq!(first.lead_speed_mps, 4.0);
+        for _ in 0..50 {
+            world.tick(&Control { throttle_pct: 10.0, ..Control::default() });
+            watched.look(&world, Fact::ALL);
+        }
+        let later = watched.look(&world, Fact::ALL);
+        assert!((later.lead_since_s - 1.0).abs() < 1e-9, "{later:?}");
+        let rear_m = world.npc_facts(1).expect("it is there").rear_m;
+        assert!((later.lead_gap_m - (rear_m - world.moment_facts().ego_front_m)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_red_light_is_remembered_until_the_rear_has_passed() {
+        let mut world = testing::world(&testing::crossing());
+        let mut watched = Watched::default();
+        let line_m = world.scene().route.stop_lines[0].station_m;
+        let (mut before_m, mut over) = (f64::NEG_INFINITY, Vec::new());
+        for _ in 0..3000 {
+            world.tick(&Control { throttle_pct: 15.0, ..Control::default() });
+            let found_m = watched.look(&world, Fact::ALL).over_red_m;
+            let facts = world.moment_facts();
+            if found_m > 0.0 {
+                over.push((facts.ego_front_m - line_m, facts.ego_rear_m));
+                assert!((facts.ego_front_m - line_m - found_m).abs() < 1e-9 && facts.ego_rear_m < line_m);
+            }
+            assert!(found_m >= FAR_M && (found_m <= 0.0 || found_m > before_m || before_m <= 0.0));
+            before_m = found_m;
+        }
+        assert_eq!(over.is_empty(), world.red_runs() == 0, "{} reds", world.red_runs());
+    }
+}
