@@ -20,6 +20,8 @@ pub enum Failure {
     Refuted { claims: usize },
     #[error("{count} found", count = super::output::plural(*collisions, "counted collision"))]
     Collision { collisions: usize },
+    #[error("requirements were breached in {count}", count = super::output::plural(*episodes, "episode"))]
+    Breach { episodes: usize },
     /// A driving system of one's own is not the one that was begun with.
     #[error("{message}")]
     OtherProgram { message: String },
@@ -67,7 +69,7 @@ impl Failure {
             | Failure::OtherProgram { .. }
             | Failure::NotPlayed { in_source: true, .. } => 2,
             Failure::Refuted { .. } => 3,
-            Failure::Collision { .. } | Failure::Failing { .. } => 4,
+            Failure::Collision { .. } | Failure::Breach { .. } | Failure::Failing { .. } => 4,
             Failure::Ads { .. } | Failure::Unreached { .. } => 5,
             // What a shell reports for a process that SIGINT ended.
             Failure::Stopped | Failure::Interrupted { .. } => 130,

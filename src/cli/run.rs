@@ -80,6 +80,9 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     if arguments.fail_on_collision && found.counted > 0 {
         return Err(Failure::Collision { collisions: found.counted as usize });
     }
+    if arguments.fail_on_breach && found.episodes_with_breach > 0 {
+        return Err(Failure::Breach { episodes: found.episodes_with_breach as usize });
+    }
     // If no episode was driven to its end, nothing was tested, so the command fails without `--fail-on-collision`, too.
     if found.failed > 0 && (arguments.fail_on_collision || found.failed == found.episodes) {
         return Err(Failure::Ads { findings: found.failed as usize });
@@ -406,6 +409,9 @@ pub fn requirements_text(requirements: &[RequirementCount]) -> String {
             of.kept_in,
             if figure.is_empty() { figure } else { format!(", by up to {}", figure.trim_start_matches('-')) },
         ),
+        (None, figure) if figure.is_empty() && of.unit.is_some() => {
+            format!("{} never asked for long enough", of.requirement)
+        }
         (None, figure) if figure.is_empty() => format!("{} kept", of.requirement),
         (None, figure) => {
             let nearest = of.nearest.as_deref().unwrap_or_default();

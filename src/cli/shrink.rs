@@ -1,10 +1,10 @@
-//! `avastra shrink`: the smallest scenario that still makes the same crash.
+//! `avastra shrink`: the smallest scenario that still makes the same crash or breach.
 
 use std::path::{Path, PathBuf};
 
 use avastra_campaign::emit;
-use avastra_campaign::episode::{Outcome, Script, Setup};
-use avastra_campaign::oracle;
+use avastra_campaign::episode::{Breach, Outcome, Script, Setup};
+use avastra_campaign::oracle::{self, Found};
 use avastra_campaign::run::{self, Asked, EpisodeSummary, Stage};
 use avastra_drivers::Selected;
 use avastra_lang::model::Claim;
@@ -135,11 +135,18 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
     }
     let stage = Stage::new(&table, &scenario)?;
     let (log, judgements, first) = stage.first_counted(&ads);
-    let Some(index) = first else {
-        let name = &scenario.name;
-        return Err(Failure::usage(format!("`{name}` has no counted collision that could be kept")));
+    let own = |breach: &Breach| {
+        let name = &table.space().requirements[breach.requirement].name;
+        scenario.breached().any(|claimed| claimed == name)
     };
-    let shrunk = oracle::shrink(&stage.setup(&ads), &log, index, &judgements);
+    // A crash is more than a breach that led to it.
+    let breach = || log.breaches.iter().position(own).map(Found::Breach);
+    let Some(found) = first.map(Found::Collision).or_else(breach) else {
+        let name = &scenario.name;
+        let message = format!("`{name}` has no counted collision and no claimed breach that could be kept");
+        return Err(Failure::usage(message));
+    };
+    let shrunk = oracle::shrink(&stage.setup(&ads), &log, found, &judgements);
 
     let path = named.map_or_else(|| apart(file), |path| Ok(path.clone()))?;
     let path = path.as_path();
@@ -157,9 +164,16 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
         with: &origin.with,
     };
     let setup = Setup { start: shrunk.start, memory: shrunk.memory, ..stage.setup(&ads) };
-    let spare = oracle::spare_steps(&setup, &shrunk.log, shrunk.index, &shrunk.judgements);
-    let mut summary = EpisodeSummary::new(table.space(), source.episode, &shrunk.log, shrunk.judgements);
-    summary.collisions[shrunk.index].minimal = spare.is_empty();
+    let spare = match shrunk.found {
+        Found::Collision(index) => oracle::spare_steps(&setup, &shrunk.log, index, &shrunk.judgements),
+        Found::Breach(_) => Vec::new(),
+    };
+    let breached = oracle::breached(&setup, &Script::of_log(&shrunk.log), &shrunk.log);
+    let judged = EpisodeSummary::new(table.space(), source.episode, &shrunk.log, shrunk.judgements);
+    let mut summary = EpisodeSummary { breached, ..judged };
+    if let Found::Collision(index) = shrunk.found {
+        summary.collisions[index].minimal = spare.is_empty();
+    }
     if scenario.claims.iter().any(|claim| matches!(claim, Claim::Cause { .. })) {
         summary.find_causes(&setup, &shrunk.log).map_err(Failure::usage)?;
     }

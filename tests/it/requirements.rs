@@ -102,6 +102,18 @@ fn breaches_are_those_of_a_naive_monitor() {
         assert_eq!(smallest("slow"), largest_of_second.reduce(f64::min), "episode {number}");
         assert_eq!(smallest("no_yellow"), None, "words have no margin");
         assert!(log.margins.iter().all(|one| space.requirements[one.requirement].name != "crawls"));
+        // A step is paid for what is breached at some moment of it.
+        for (index, step) in log.steps.iter().enumerate() {
+            let end_s = log.steps.get(index + 1).map_or(log.duration_s, |next| next.time_s);
+            let is_in = |(from_s, until_s): &(f64, f64)| *until_s > step.time_s && *from_s <= end_s + 1e-9;
+            let of_step = |name: &str| of(name).iter().any(is_in);
+            let reward = match (of_step("slow"), of_step("slow_in_rain")) {
+                (true, true) => 3.0,
+                (true, false) => 2.0,
+                (false, _) => 0.0,
+            };
+            assert_eq!(step.reward, reward, "step {index} of episode {number}");
+        }
         replayed += usize::from(!log.breaches.is_empty());
         assert_replays(&run, number, &log);
     }
@@ -112,8 +124,8 @@ fn breaches_are_those_of_a_naive_monitor() {
 fn a_breach_is_a_finding_that_replays() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let out = scratch.path().join("found").display().to_string();
-    let run = ["run", SPACE, "--ads", "idm", "--episodes", "2", "--seed", "3", "--out", &out];
-    let found = last_line(&done(&[&run[..], &["--format", "json"]].concat()));
+    let run = ["run", SPACE, "--ads", "idm", "--episodes", "2", "--seed", "3"];
+    let found = last_line(&done(&[&run[..], &["--format", "json", "--out", &out]].concat()));
     let requirements = found["requirements"].as_array().expect("a list");
     let of = |name: &str| requirements.iter().find(|one| one["requirement"] == name).unwrap_or(&Value::Null);
     let breaches = of("slow")["breaches"].as_i64().expect("a number");
@@ -139,6 +151,18 @@ fn a_breach_is_a_finding_that_replays() {
     assert!(other.contains("still fail"), "modular is as fast: {other}");
     let reviewed = outcome(&mut avastra(&["test", "--review", first])).1;
     assert!(reviewed.contains(": same\n"), "{reviewed}");
+
+    // It becomes smaller, and is the same breach.
+    let said = done(&["shrink", first]);
+    assert!(said.contains(" became "), "{said}");
+    let shrunk = first.replace("/critical/", "/shrunk/");
+    let smaller = fs::read_to_string(&shrunk).expect("it was written");
+    assert!(smaller.contains("  expect slow.breached at ") && smaller.len() < text.len(), "{smaller}");
+    assert!(done(&["replay", &shrunk]).contains(" holds, "));
+    let (status, ..) = outcome(
+        avastra(&run).args(["--fail-on-breach", "--quiet"]).arg("--out").arg(scratch.path().join("again")),
+    );
+    assert_eq!(status, 4);
 
     // A claim that does not hold is refuted.
     let lie = text.replacen("slow.breached at ", "slow.breached at 1", 1);

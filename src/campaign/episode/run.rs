@@ -381,7 +381,8 @@ impl Play {
             Some(first) => collision_facts(first, &self.collisions[..met]),
             None => OutcomeFacts { proc, near: body, ..OutcomeFacts::default() },
         };
-        let reward = setup.table.space().reward(facts, &self.memory);
+        let breached = self.monitor.as_ref().map_or(0, |monitor| monitor.breached_since(time_s));
+        let reward = setup.table.space().reward(OutcomeFacts { breached, ..facts }, &self.memory);
         let trace = self.trace.digest();
         let state = observation.state;
         let perception = mdp::perception_counts(&self.world, self.ads.status());

@@ -32,6 +32,6 @@ pub use mechanisms::{
     MechanismShare, Mechanisms, Share, WithoutMechanism, mechanism_shares, mechanisms, placebo,
 };
 pub use severity::{Severity, severity};
-pub use shrink::{Shrunk, shrink, spare_steps};
+pub use shrink::{Found, Shrunk, shrink, spare_steps};
 pub use variation::{Likelihood, likelihood};
 pub use verify::{ClaimResult, NoTries, Replays, verify};

@@ -1,10 +1,11 @@
-//! The smallest scenario that still makes the same crash.
+//! The smallest scenario that still makes the same crash, or the same breach.
 //!
 //! Fewest actions first (ddmin, Zeller and Hildebrandt 2002), then fewest steps, ambient vehicles and
 //! effects, then the plainest start (noon under a clear sky) and values; all passes repeat until nothing
 //! changes. Every candidate is played, and every action in it must be legal by the rules of the space. The
 //! crash is the same if the ego vehicle hits an obstacle with the same body and verb, the class of the
-//! verdict is the same, and the space's verdict still counts it, or still does not. The result is
+//! verdict is the same, and the space's verdict still counts it, or still does not. A breach is the same if it is one of
+//! the same requirement, and a careful driver still keeps that, or still none does. The result is
 //! 1-minimal: if any one step is removed, or replaced by waiting, the crash is gone or is another one.
 
 use crate::episode;
@@ -16,6 +17,7 @@ use avastra_world::sim::Start;
 
 use super::avoidable::{Judgement, judge};
 use super::counted::counts;
+use super::kept::breached;
 
 /// Most rounds of all passes. Each round makes something smaller or plainer; most crashes need two.
 const ROUNDS_MAX: usize = 8;
@@ -30,16 +32,35 @@ pub struct Shrunk {
     pub log: EpisodeLog,
     /// One for each collision of the log.
     pub judgements: Vec<Judgement>,
-    /// Index of the crash among the collisions of the log.
-    pub index: usize,
+    /// What was kept, in the log.
+    pub found: Found,
     /// Episodes that were played to find it.
     pub plays: u32,
 }
 
-/// Shrinks what led to the nth collision of a log that was played from `setup`.
-pub fn shrink(setup: &Setup, log: &EpisodeLog, index: usize, judgements: &[Judgement]) -> Shrunk {
-    let mut search = Search::new(setup, log, index, judgements);
-    let mut best = Candidate::of(setup, log, index);
+/// What was found in an episode.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Found {
+    /// By index among the collisions of the log.
+    Collision(usize),
+    /// By index among the breaches of the log.
+    Breach(usize),
+}
+
+impl Found {
+    /// The step in which it happened.
+    fn step(self, log: &EpisodeLog) -> usize {
+        match self {
+            Found::Collision(index) => log.collisions[index].step,
+            Found::Breach(index) => log.breaches[index].step,
+        }
+    }
+}
+
+/// Shrinks what led to a finding in a log that was played from `setup`; `judgements` has one for each collision.
+pub fn shrink(setup: &Setup, log: &EpisodeLog, found: Found, judgements: &[Judgement]) -> Shrunk {
+    let mut search = Search::new(setup, log, found, judgements);
+    let mut best = Candidate::of(setup, log, found);
     for _ in 0..ROUNDS_MAX {
         let before = best.clone();
         search.fewest_actions(&mut best);
@@ -60,7 +81,7 @@ pub fn shrink(setup: &Setup, log: &EpisodeLog, index: usize, judgements: &[Judge
         memory: best.memory,
         log: kept.log,
         judgements: kept.judgements,
-        index: kept.index,
+        found: kept.found,
         plays: search.plays,
     }
 }
@@ -68,8 +89,9 @@ pub fn shrink(setup: &Setup, log: &EpisodeLog, index: usize, judgements: &[Judge
 /// Steps that are not needed for the nth collision of a log: each alone could be removed, or replaced by waiting, and
 /// the collision stays the same. Empty if the scenario is 1-minimal.
 pub fn spare_steps(setup: &Setup, log: &EpisodeLog, index: usize, judgements: &[Judgement]) -> Vec<usize> {
-    let mut search = Search::new(setup, log, index, judgements);
-    let whole = Candidate::of(setup, log, index);
+    let found = Found::Collision(index);
+    let mut search = Search::new(setup, log, found, judgements);
+    let whole = Candidate::of(setup, log, found);
     let steps = whole.script.steps.len();
     let is_spare = |&step: &usize| {
         let mut waiting = whole.clone();
@@ -91,29 +113,40 @@ struct Candidate {
 }
 
 impl Candidate {
-    /// What led to the nth collision of a log.
-    fn of(setup: &Setup, log: &EpisodeLog, index: usize) -> Candidate {
+    /// What led to a finding in a log.
+    fn of(setup: &Setup, log: &EpisodeLog, found: Found) -> Candidate {
         let mut script = Script::of_log(log);
-        script.steps.truncate(log.collisions[index].step + 1);
+        script.steps.truncate(found.step(log) + 1);
         Candidate { script, start: setup.start, memory: setup.memory.clone() }
     }
 }
 
-/// A candidate that makes the crash.
+/// A candidate that makes the crash or the breach.
 struct Kept {
     log: EpisodeLog,
     judgements: Vec<Judgement>,
-    /// Index of the crash among the collisions.
-    index: usize,
+    found: Found,
 }
 
-/// The crash that must stay, and the number of plays so far.
+/// What must stay.
+enum Wanted {
+    Crash {
+        body: BodyWord,
+        verb: Verb,
+        class: Avoidability,
+        counts: bool,
+    },
+    Breach {
+        requirement: usize,
+        /// Whether a careful driver keeps it.
+        is_kept: bool,
+    },
+}
+
+/// What must stay, and the number of plays so far.
 struct Search<'a> {
     setup: &'a Setup<'a>,
-    body: BodyWord,
-    verb: Verb,
-    class: Avoidability,
-    counts: bool,
+    wanted: Wanted,
     plays: u32,
 }
 
@@ -121,16 +154,20 @@ struct Search<'a> {
 type Wish<'w> = Option<(usize, &'w ScriptedAction)>;
 
 impl<'a> Search<'a> {
-    fn new(setup: &'a Setup<'a>, log: &EpisodeLog, index: usize, judgements: &[Judgement]) -> Search<'a> {
-        let collision = &log.collisions[index];
-        Search {
-            setup,
-            body: collision.body,
-            verb: collision.verb,
-            class: judgements[index].class,
-            counts: counts(setup.table.space(), log, index, &judgements[index]),
-            plays: 0,
-        }
+    fn new(setup: &'a Setup<'a>, log: &EpisodeLog, found: Found, judgements: &[Judgement]) -> Search<'a> {
+        let wanted = match found {
+            Found::Collision(index) => Wanted::Crash {
+                body: log.collisions[index].body,
+                verb: log.collisions[index].verb,
+                class: judgements[index].class,
+                counts: counts(setup.table.space(), log, index, &judgements[index]),
+            },
+            Found::Breach(index) => {
+                let requirement = log.breaches[index].requirement;
+                Wanted::Breach { requirement, is_kept: is_kept(setup, log, requirement) }
+            }
+        };
+        Search { setup, wanted, plays: 0 }
     }
 
     /// Plays a candidate; `None` if the crash is another or none, or an action is not legal. With a wish,
@@ -140,19 +177,37 @@ impl<'a> Search<'a> {
         self.plays += 1;
         let log = self.play(candidate, wish);
         let is_refused = |step: &episode::StepLog| matches!(step.outcome, Outcome::Refused { .. });
-        let alike = |collision: &Collision| collision.body == self.body && collision.verb == self.verb;
-        if log.steps.iter().any(is_refused) || !log.collisions.iter().any(alike) {
+        if log.steps.iter().any(is_refused) {
             return None;
         }
         let mut script = Script::of_log(&log);
-        let judgements = judge(&self.begin(candidate), &script, &log);
-        let same = |index: &usize| {
-            let counts = counts(self.setup.table.space(), &log, *index, &judgements[*index]);
-            alike(&log.collisions[*index]) && judgements[*index].class == self.class && counts == self.counts
+        let setup = self.begin(candidate);
+        let judged = || judge(&setup, &script, &log);
+        let (found, judgements) = match self.wanted {
+            Wanted::Crash { body, verb, class, counts: is_counted } => {
+                let alike = |collision: &Collision| collision.body == body && collision.verb == verb;
+                if !log.collisions.iter().any(alike) {
+                    return None;
+                }
+                let judgements = judged();
+                let same = |index: &usize| {
+                    let counts = counts(self.setup.table.space(), &log, *index, &judgements[*index]);
+                    alike(&log.collisions[*index])
+                        && judgements[*index].class == class
+                        && counts == is_counted
+                };
+                (Found::Collision((0..log.collisions.len()).find(same)?), judgements)
+            }
+            Wanted::Breach { requirement, is_kept: was_kept } => {
+                let index = log.breaches.iter().position(|breach| breach.requirement == requirement)?;
+                if is_kept(&setup, &log, requirement) != was_kept {
+                    return None;
+                }
+                (Found::Breach(index), judged())
+            }
         };
-        let index = (0..log.collisions.len()).find(same)?;
-        script.steps.truncate(log.collisions[index].step + 1);
-        Some((Kept { log, judgements, index }, script))
+        script.steps.truncate(found.step(&log) + 1);
+        Some((Kept { log, judgements, found }, script))
     }
 
     fn play(&self, candidate: &Candidate, wish: Wish) -> EpisodeLog {
@@ -350,6 +405,12 @@ impl<'a> Search<'a> {
             Outcome::Passed | Outcome::Refused { .. } => None,
         }
     }
+}
+
+/// Whether a careful driver keeps a requirement that is breached in a log.
+fn is_kept(setup: &Setup, log: &EpisodeLog, requirement: usize) -> bool {
+    let found = breached(setup, &Script::of_log(log), log);
+    found.iter().any(|found| found.requirement == requirement && !found.kept_by.is_empty())
 }
 
 /// Number of effects that a row has in its space.

@@ -308,7 +308,8 @@ impl Database {
                         (SELECT coalesce(sum(priority = 'ego'), 0) FROM collision),
                         (SELECT coalesce(sum(priority = 'other'), 0) FROM collision),
                         coalesce(sum(ended = 'blocked'), 0), (SELECT count(*) FROM failure),
-                        coalesce(sum(ended = 'astray'), 0), coalesce(sum(ended = 'left_the_map'), 0)
+                        coalesce(sum(ended = 'astray'), 0), coalesce(sum(ended = 'left_the_map'), 0),
+                        (SELECT count(DISTINCT episode) FROM breach)
                  FROM episode",
             [],
             |row| {
@@ -338,6 +339,7 @@ impl Database {
                     failed: row.get(22)?,
                     astray: row.get(23)?,
                     left_map: row.get(24)?,
+                    episodes_with_breach: row.get(25)?,
                 })
             },
         )?)
@@ -391,6 +393,8 @@ pub struct Totals {
     pub counted: i64,
     pub episodes_with_collision: i64,
     pub episodes_with_counted: i64,
+    /// Episodes in which a requirement was breached.
+    pub episodes_with_breach: i64,
     pub arrived: i64,
     /// Ended without progress: for a reason of the driving system's own, because others blocked its way, and
     /// because it had left its lane.

@@ -92,6 +92,9 @@ pub struct RunArguments {
     /// Exit with status 4 if a counted collision was found.
     #[arg(long)]
     pub fail_on_collision: bool,
+    /// Exit with status 4 if a requirement of the space was breached.
+    #[arg(long)]
+    pub fail_on_breach: bool,
 }
 
 #[derive(Debug, Args)]

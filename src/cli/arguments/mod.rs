@@ -140,7 +140,7 @@ mod tests {
     use super::Arguments;
 
     /// What may be said anew when a directory is gone on with: it changes no result.
-    const ANEW: [&str; 5] = ["resume", "jobs", "reuse", "fail_on_collision", "help"];
+    const ANEW: [&str; 6] = ["resume", "jobs", "reuse", "fail_on_collision", "fail_on_breach", "help"];
 
     #[test]
     fn a_directory_that_is_gone_on_with_keeps_its_settings() {

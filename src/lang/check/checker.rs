@@ -85,6 +85,8 @@ pub(super) struct Checker {
     pub(super) compiled: usize,
     /// The effects of every step.
     pub(super) each_step: Vec<SetDef>,
+    /// Names of all requirements. Empty until they are checked.
+    pub(super) requirement_names: Names,
     /// Number of rows of each action; `None` if an axis is broken.
     pub(super) row_counts: Vec<Option<u64>>,
     /// What each name stands for.

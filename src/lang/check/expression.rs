@@ -362,6 +362,9 @@ impl Checker {
         {
             return self.part_of_bearer(who, part, place, span);
         }
+        if let Some(found) = self.breached(base, part, place, span) {
+            return found;
+        }
         self.note_part(base, part);
         let things = things();
         let thing = match &base.kind {

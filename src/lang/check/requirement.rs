@@ -2,14 +2,18 @@
 
 use crate::check::checker::{Checker, docs};
 use crate::check::expression::Place;
+use crate::check::references::Symbol;
 use crate::check::report::Report;
-use crate::model::expr::ExprKind;
+use crate::model::expr::{Expr, ExprKind};
 use crate::model::requirement::{margin_type, open_divisor};
-use crate::model::vocabulary::Site;
+use crate::model::vocabulary::{BREACHED, Site};
 use crate::model::{RequirementDef, RuleDef, TICK_MS, Type, code};
-use crate::syntax::ast::ItemKind;
+use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
 use avastra_base::units::{Dimension, Rational};
+
+/// The most requirements of a space: a set of them fits one integer, and each is judged at every tick.
+const REQUIREMENTS_MAX: usize = 64;
 
 /// The longest `within`, s: that of an observation period.
 const WITHIN_S_MAX: i64 = 600;
@@ -18,7 +22,16 @@ impl Checker {
     /// All requirements. `--with` and `--without` name them as they do rules, so no rule has the name of one.
     pub(super) fn requirements(&mut self, items: &[&ast::Item], rules: &[RuleDef]) -> Vec<RequirementDef> {
         let mut requirements = Vec::new();
-        for (item, declared) in self.declared("requirement", items, ItemKind::as_require).1 {
+        let (names, all) = self.declared("requirement", items, ItemKind::as_require);
+        self.requirement_names = names;
+        if let Some((_, first)) = all.get(REQUIREMENTS_MAX) {
+            let message = format!("more than {REQUIREMENTS_MAX} requirements");
+            let error = Diagnostic::error(code::TOO_MUCH, message).at(first.name.span, "one too many");
+            self.report(
+                error.help("join some by `and`, or leave out those of a used file by `use … without`"),
+            );
+        }
+        for (item, declared) in all {
             if let Some(rule) = rules.iter().find(|rule| rule.name == declared.name.text) {
                 let message = format!("`{}` is a rule and a requirement", rule.name);
                 let error = Diagnostic::error(code::DUPLICATE, message).at(declared.name.span, "again here");
@@ -79,6 +92,32 @@ impl Checker {
             bearers,
             span: declared.name.span,
         })
+    }
+
+    /// `stops_at_red.breached` in a reward; `None` if this is no requirement.
+    pub(super) fn breached(
+        &mut self,
+        base: &ast::Expr,
+        part: &ast::Name,
+        place: &Place<'_>,
+        span: Span,
+    ) -> Option<Option<Expr>> {
+        let ast::ExprKind::Name(name) = &base.kind else { return None };
+        let index = self.requirement_names.get(name)?;
+        self.references.uses(base.span, Symbol::Requirement(name.clone()));
+        if part.text != BREACHED.0 {
+            let error =
+                Diagnostic::error(code::UNKNOWN, format!("unknown fact of a requirement `{}`", part.text));
+            return Some(
+                self.reject(error.at(part.span, "not known").help(format!("write `{name}.breached`"))),
+            );
+        }
+        self.references.note(part.span, Symbol::Engine(BREACHED.0, BREACHED.1), false);
+        if place.site != Site::Reward {
+            let error = Diagnostic::error(code::NOT_HERE, format!("`{name}.breached` is not known here"));
+            return Some(self.reject(error.at(span, "only rewards, and claims of scenarios, see it")));
+        }
+        Some(Some(Expr { kind: ExprKind::Breached(index), ty: Type::Bool, span }))
     }
 
     /// How many ticks `within` lasts: a part of a tick is one more.

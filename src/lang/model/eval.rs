@@ -161,6 +161,8 @@ pub struct OutcomeFacts {
     pub avoidable: bool,
     /// Collision probability of the step, in `[0, 1]`.
     pub proc: f64,
+    /// Bit `i` is set if requirement `i` was breached in the step.
+    pub breached: u64,
 }
 
 impl<'a> Facts<'a> {
@@ -195,6 +197,7 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
             // As near as `elapsed` to the exact time.
             ((world.moment.elapsed_s - last_s) * 1000.0).round().min(SINCE_S_MAX * 1000.0) / 1000.0
         })),
+        ExprKind::Breached(requirement) => Value::Bool(facts.outcome.breached >> requirement & 1 == 1),
         ExprKind::IsThere(who) => Value::Bool(bearer(who.bearer(facts.locals), facts).is_some()),
         ExprKind::Call(function, arguments) => {
             let body = &functions[*function].body;
@@ -256,27 +259,29 @@ fn about<'a>(npc: Option<NpcFacts>, facts: &Facts<'a>) -> Facts<'a> {
 }
 
 fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
-    let moment =
-        |of: fn(&MomentFacts) -> f64| Value::Number(facts.world.map_or(f64::NAN, |world| of(&world.moment)));
-    let tick =
-        |of: fn(&TickFacts) -> f64| Value::Number(facts.world.map_or(f64::NAN, |world| of(&world.tick)));
     let spawn = |of: fn(&SpawnFacts) -> f64| Value::Number(facts.spawn.as_ref().map_or(f64::NAN, of));
+    let world = |of: Option<f64>| Value::Number(of.unwrap_or(f64::NAN));
     match fact {
+        Fact::EgoSpeed
+        | Fact::EgoAcceleration
+        | Fact::EgoLimit
+        | Fact::EgoJunctionAhead
+        | Fact::EgoCrosswalkAhead
+        | Fact::EgoRouteLeft
+        | Fact::EgoOffset
+        | Fact::EgoFront
+        | Fact::EgoRear
+        | Fact::RoadUsers
+        | Fact::RuleBreakers
+        | Fact::NearestGap
+        | Fact::NearestSpeed
+        | Fact::Elapsed => world(facts.world.zip(of_moment(fact)).map(|(world, of)| of(&world.moment))),
+        Fact::EgoLeadGap
+        | Fact::EgoLeadSpeed
+        | Fact::EgoLeadSince
+        | Fact::EgoOverRed
+        | Fact::EgoOverOncoming => world(facts.world.zip(of_tick(fact)).map(|(world, of)| of(&world.tick))),
         Fact::RoadLimit => Value::Number(facts.road.map_or(f64::NAN, |road| road.limit_mps)),
-        Fact::EgoSpeed => moment(|moment| moment.ego_speed_mps),
-        Fact::EgoAcceleration => moment(|moment| moment.ego_acceleration_mps2),
-        Fact::EgoLimit => moment(|moment| moment.ego_limit_mps),
-        Fact::EgoJunctionAhead => moment(|moment| moment.ego_junction_ahead_m),
-        Fact::EgoCrosswalkAhead => moment(|moment| moment.ego_crosswalk_ahead_m),
-        Fact::EgoRouteLeft => moment(|moment| moment.ego_route_left_m),
-        Fact::EgoOffset => moment(|moment| moment.ego_offset_m),
-        Fact::EgoFront => moment(|moment| moment.ego_front_m),
-        Fact::EgoRear => moment(|moment| moment.ego_rear_m),
-        Fact::RoadUsers => moment(|moment| f64::from(moment.road_users)),
-        Fact::RuleBreakers => moment(|moment| f64::from(moment.rule_breakers)),
-        Fact::NearestGap => moment(|moment| moment.nearest_gap_m),
-        Fact::NearestSpeed => moment(|moment| moment.nearest_speed_mps),
-        Fact::Elapsed => moment(|moment| moment.elapsed_s),
         Fact::StepNumber => Value::Number(facts.world.map_or(f64::NAN, |world| world.step as f64)),
         Fact::NpcSpeed => spawn(|spawn| spawn.npc.speed_mps),
         Fact::NpcGap => spawn(|spawn| spawn.npc.gap_m),
@@ -289,11 +294,6 @@ fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
         Fact::NpcHeadway => spawn(|spawn| spawn.npc.headway_s),
         Fact::SpawnGap => spawn(|spawn| spawn.spawn_gap_m),
         Fact::SafetyGap => spawn(|spawn| spawn.safety_gap_m),
-        Fact::EgoLeadGap => tick(|tick| tick.lead_gap_m),
-        Fact::EgoLeadSpeed => tick(|tick| tick.lead_speed_mps),
-        Fact::EgoLeadSince => tick(|tick| tick.lead_since_s),
-        Fact::EgoOverRed => tick(|tick| tick.over_red_m),
-        Fact::EgoOverOncoming => tick(|tick| tick.over_oncoming_m),
         Fact::Proc => Value::Number(facts.outcome.proc),
         Fact::Collision => Value::Bool(facts.outcome.collision),
         Fact::Repeated => Value::Bool(facts.outcome.repeated),
@@ -301,6 +301,39 @@ fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
         Fact::Struck => Value::Bool(facts.outcome.struck),
         Fact::Avoidable => Value::Bool(facts.outcome.avoidable),
     }
+}
+
+/// What a fact of the moment is; `None` for another one.
+pub(crate) fn of_moment(fact: Fact) -> Option<fn(&MomentFacts) -> f64> {
+    Some(match fact {
+        Fact::EgoSpeed => |moment| moment.ego_speed_mps,
+        Fact::EgoAcceleration => |moment| moment.ego_acceleration_mps2,
+        Fact::EgoLimit => |moment| moment.ego_limit_mps,
+        Fact::EgoJunctionAhead => |moment| moment.ego_junction_ahead_m,
+        Fact::EgoCrosswalkAhead => |moment| moment.ego_crosswalk_ahead_m,
+        Fact::EgoRouteLeft => |moment| moment.ego_route_left_m,
+        Fact::EgoOffset => |moment| moment.ego_offset_m,
+        Fact::EgoFront => |moment| moment.ego_front_m,
+        Fact::EgoRear => |moment| moment.ego_rear_m,
+        Fact::RoadUsers => |moment| f64::from(moment.road_users),
+        Fact::RuleBreakers => |moment| f64::from(moment.rule_breakers),
+        Fact::NearestGap => |moment| moment.nearest_gap_m,
+        Fact::NearestSpeed => |moment| moment.nearest_speed_mps,
+        Fact::Elapsed => |moment| moment.elapsed_s,
+        _ => return None,
+    })
+}
+
+/// What a fact that is watched at every tick is; `None` for another one.
+pub(crate) fn of_tick(fact: Fact) -> Option<fn(&TickFacts) -> f64> {
+    Some(match fact {
+        Fact::EgoLeadGap => |tick| tick.lead_gap_m,
+        Fact::EgoLeadSpeed => |tick| tick.lead_speed_mps,
+        Fact::EgoLeadSince => |tick| tick.lead_since_s,
+        Fact::EgoOverRed => |tick| tick.over_red_m,
+        Fact::EgoOverOncoming => |tick| tick.over_oncoming_m,
+        _ => return None,
+    })
 }
 
 /// The word that a fact is; `None` where it is not known.
@@ -361,7 +394,7 @@ fn are_equal(left: f64, right: f64) -> bool {
 }
 
 /// Compares with that tolerance. Of less, equal and greater exactly one holds, unless a number is NaN.
-fn compare_numbers(op: Comparison, left: f64, right: f64) -> bool {
+pub(crate) fn compare_numbers(op: Comparison, left: f64, right: f64) -> bool {
     let equal = are_equal(left, right);
     match op {
         Comparison::Equal => equal,

@@ -64,6 +64,8 @@ pub enum ExprKind {
     IsThere(Who),
     /// `since(vehicles)`: the time since one of these actions last happened, and how they are called.
     Since(Vec<usize>, String),
+    /// `stops_at_red.breached`: whether a requirement was breached in the step.
+    Breached(usize),
     /// A function by its index in `Space::functions`.
     Call(usize, Vec<Expr>),
     Not(Box<Expr>),
@@ -115,6 +117,7 @@ impl ExprKind {
             ExprKind::OfBearer(..) | ExprKind::IsWordOf(..) | ExprKind::IsThere(_) | ExprKind::Since(..) => {
                 Known::World
             }
+            ExprKind::Breached(_) => Known::Step,
             _ => Known::Road,
         }
     }
@@ -150,6 +153,7 @@ impl Expr {
             | ExprKind::OfBearer(..)
             | ExprKind::IsThere(_)
             | ExprKind::Since(..)
+            | ExprKind::Breached(_)
             | ExprKind::Fact(_) => {}
             ExprKind::CellAt(_, inner)
             | ExprKind::Not(inner)

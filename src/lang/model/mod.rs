@@ -41,7 +41,7 @@ pub use meaning::Meaning;
 pub(crate) use on_route::stretches;
 pub use on_route::{LIGHT_AHEAD_M, NEAR_JUNCTION_M, OnRoute, Stretch, junction_ahead_m};
 pub use policy::Policy;
-pub use requirement::Kept;
+pub use requirement::{Kept, ReadyRequirement};
 pub use row::locals;
 pub use row::{Reach, Row};
 pub use rules::{NoStart, RulesInForce, UnknownRule};

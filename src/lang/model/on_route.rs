@@ -48,11 +48,11 @@ impl OnRoute {
         let reach = station_m..=station_m + LIGHT_AHEAD_M;
         let line = route.stop_lines.iter().find(|line| reach.contains(&line.station_m));
         OnRoute {
-            limit_mps: map.lane(route.lane_at(station_m).lane).speed_limit_mps,
+            limit_mps: map.lane(route.lanes[first].lane).speed_limit_mps,
             junction_ahead_m: junction_ahead_m(map, ahead, station_m),
             route_left_m: route.goal_m - station_m,
             signal: line.map(|line| line.signal),
-            road: road_kind(map, route, station_m),
+            road: road_kind(map, &route.lanes[first..], station_m),
         }
     }
 }
@@ -68,9 +68,10 @@ pub fn junction_ahead_m(
     junction.map_or(JUNCTION_AHEAD_M_MAX, |(_, from_m)| (from_m - station_m).clamp(0.0, JUNCTION_AHEAD_M_MAX))
 }
 
-fn road_kind(map: &RoadMap, route: &Route, station_m: f64) -> RoadKind {
-    let here = map.lane(route.lane_at(station_m).lane);
-    let soon = map.lane(route.lane_at(station_m + NEAR_JUNCTION_M).lane);
+/// `ahead` has the lanes of the route from the station on.
+fn road_kind(map: &RoadMap, ahead: &[RouteLane], station_m: f64) -> RoadKind {
+    let entered = ahead.iter().take_while(|lane| lane.enter_m <= station_m + NEAR_JUNCTION_M).count();
+    let (here, soon) = (map.lane(ahead[0].lane), map.lane(ahead[entered.max(1) - 1].lane));
     if here.junction.is_some() {
         return RoadKind::InJunction;
     }

@@ -4,10 +4,13 @@
 //! a comparison the difference of its sides, of `and` the smaller of two, of `or` the larger. Above 0 it implies that
 //! the condition holds, below 0 that it does not.
 
-use crate::model::eval::{Facts, evaluate};
+use crate::model::eval::{
+    Facts, MomentFacts, TickFacts, arithmetic, compare_numbers, evaluate, of_moment, of_tick,
+};
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::space::{FnDef, RequirementDef};
 use crate::model::value::Type;
+use crate::model::vocabulary::{Light, Word, WordFact};
 
 /// How a requirement stands at a moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,22 +20,191 @@ pub struct Kept {
     pub margin: f64,
 }
 
+/// A requirement as it is asked at every tick: its numbers are fractions no more, and what they come to is known.
+#[derive(Debug, Clone)]
+pub struct ReadyRequirement {
+    when: Option<Node>,
+    condition: Node,
+    has_margin: bool,
+    bearers: Vec<usize>,
+}
+
+/// An expression. What is asked often has a node of its own, the rest is left to the evaluator of all expressions.
+#[derive(Debug, Clone)]
+enum Node {
+    Number(f64),
+    Moment(fn(&MomentFacts) -> f64),
+    Tick(fn(&TickFacts) -> f64),
+    Arithmetic(Arithmetic, Box<Node>, Box<Node>),
+    /// Compares numbers.
+    Compare(Comparison, Box<Node>, Box<Node>),
+    InRange(Box<Node>, Box<Node>, Box<Node>),
+    Not(Box<Node>),
+    /// Joined by `and`, in their order.
+    And(Vec<Node>),
+    Or(Box<Node>, Box<Node>),
+    Implies(Box<Node>, Box<Node>),
+    /// Whether the next light is one of these.
+    IsLight(Vec<Light>),
+    Other(Expr),
+}
+
 impl RequirementDef {
+    /// Made ready to be asked often.
+    pub fn ready(&self) -> ReadyRequirement {
+        ReadyRequirement {
+            when: self.when.as_ref().map(Node::of),
+            condition: Node::of(&self.condition),
+            has_margin: self.margin.is_some(),
+            bearers: self.bearers.clone(),
+        }
+    }
+}
+
+impl ReadyRequirement {
     /// How it stands; `None` where nothing is asked, because `when` does not hold or a road user that it names is not
     /// there.
     pub fn at(&self, functions: &[FnDef], facts: &Facts<'_>) -> Option<Kept> {
         let is_there = |who: &usize| {
             facts.world.is_some_and(|world| world.bearers.iter().any(|(known, _)| known == who))
         };
-        if !self.bearers.iter().all(is_there) {
+        let at = At { functions, facts };
+        if !self.bearers.iter().all(is_there) || self.when.as_ref().is_some_and(|when| !at.holds(when)) {
             return None;
         }
-        if self.when.as_ref().is_some_and(|when| !evaluate(when, functions, facts).truth()) {
-            return None;
+        Some(match self.has_margin {
+            true => at.kept(&self.condition),
+            false => Kept { holds: at.holds(&self.condition), margin: f64::NAN },
+        })
+    }
+}
+
+impl Node {
+    fn of(expr: &Expr) -> Node {
+        let node = |expr: &Expr| Box::new(Node::of(expr));
+        let is_number = |expr: &Expr| matches!(expr.ty, Type::Int | Type::Quantity(_));
+        match &expr.kind {
+            ExprKind::Number(number) => Node::Number(number.to_f64()),
+            ExprKind::Fact(fact) => match (of_moment(*fact), of_tick(*fact)) {
+                (Some(of), _) => Node::Moment(of),
+                (None, Some(of)) => Node::Tick(of),
+                (None, None) => Node::Other(expr.clone()),
+            },
+            ExprKind::Arithmetic(op, left, right) => match (Node::of(left), Node::of(right)) {
+                (Node::Number(left), Node::Number(right)) => Node::Number(arithmetic(*op, left, right)),
+                (left, right) => Node::Arithmetic(*op, Box::new(left), Box::new(right)),
+            },
+            ExprKind::Compare(op, left, right) if is_number(left) => {
+                Node::Compare(*op, node(left), node(right))
+            }
+            ExprKind::InRange(value, low, high) if is_number(value) => {
+                Node::InRange(node(value), node(low), node(high))
+            }
+            ExprKind::IsWord(WordFact::EgoLight, words) => {
+                Node::IsLight(words.iter().filter_map(|word| Light::from_name(word)).collect())
+            }
+            ExprKind::Not(inner) => Node::Not(node(inner)),
+            ExprKind::And(left, right) => {
+                let parts = |node: Node| match node {
+                    Node::And(parts) => parts,
+                    node => vec![node],
+                };
+                Node::And([parts(Node::of(left)), parts(Node::of(right))].concat())
+            }
+            ExprKind::Or(left, right) => Node::Or(node(left), node(right)),
+            ExprKind::Implies(left, right) => Node::Implies(node(left), node(right)),
+            _ => Node::Other(expr.clone()),
         }
-        let holds = evaluate(&self.condition, functions, facts).truth();
-        let margin = self.margin.map_or(f64::NAN, |_| margin(&self.condition, functions, facts));
-        Some(Kept { holds, margin })
+    }
+}
+
+/// A moment at which nodes are asked.
+#[derive(Clone, Copy)]
+struct At<'a> {
+    functions: &'a [FnDef],
+    facts: &'a Facts<'a>,
+}
+
+impl At<'_> {
+    fn number(self, node: &Node) -> f64 {
+        match node {
+            Node::Number(number) => *number,
+            Node::Moment(of) => self.facts.world.map_or(f64::NAN, |world| of(&world.moment)),
+            Node::Tick(of) => self.facts.world.map_or(f64::NAN, |world| of(&world.tick)),
+            Node::Arithmetic(op, left, right) => arithmetic(*op, self.number(left), self.number(right)),
+            Node::Other(expr) => evaluate(expr, self.functions, self.facts).number(),
+            Node::Compare(..)
+            | Node::InRange(..)
+            | Node::Not(_)
+            | Node::And(..)
+            | Node::Or(..)
+            | Node::Implies(..)
+            | Node::IsLight(_) => f64::NAN,
+        }
+    }
+
+    fn holds(self, node: &Node) -> bool {
+        match node {
+            Node::Compare(op, left, right) => compare_numbers(*op, self.number(left), self.number(right)),
+            Node::InRange(value, low, high) => {
+                let value = self.number(value);
+                compare_numbers(Comparison::GreaterEqual, value, self.number(low))
+                    && compare_numbers(Comparison::LessEqual, value, self.number(high))
+            }
+            Node::Not(inner) => !self.holds(inner),
+            Node::And(parts) => parts.iter().all(|part| self.holds(part)),
+            Node::Or(left, right) => self.holds(left) || self.holds(right),
+            Node::Implies(left, right) => !self.holds(left) || self.holds(right),
+            Node::IsLight(lights) => {
+                self.facts.world.is_some_and(|world| lights.contains(&world.moment.ego_light))
+            }
+            Node::Other(expr) => evaluate(expr, self.functions, self.facts).truth(),
+            Node::Number(_) | Node::Moment(_) | Node::Tick(_) | Node::Arithmetic(..) => false,
+        }
+    }
+
+    /// Truth and margin of a condition that has one.
+    fn kept(self, node: &Node) -> Kept {
+        let two = |left: &Node, right: &Node| (self.kept(left), self.kept(right));
+        match node {
+            Node::Compare(op, left, right) => {
+                let (left, right) = (self.number(left), self.number(right));
+                let is_less = matches!(op, Comparison::Less | Comparison::LessEqual);
+                let margin = if is_less { right - left } else { left - right };
+                Kept { holds: compare_numbers(*op, left, right), margin }
+            }
+            Node::InRange(value, low, high) => {
+                let [value, low, high] = [value, low, high].map(|node| self.number(node));
+                let holds = compare_numbers(Comparison::GreaterEqual, value, low)
+                    && compare_numbers(Comparison::LessEqual, value, high);
+                Kept { holds, margin: (value - low).min(high - value) }
+            }
+            Node::Not(inner) => {
+                let Kept { holds, margin } = self.kept(inner);
+                Kept { holds: !holds, margin: -margin }
+            }
+            Node::And(parts) => {
+                let all = Kept { holds: true, margin: f64::INFINITY };
+                parts.iter().map(|part| self.kept(part)).fold(all, |all, part| Kept {
+                    holds: all.holds && part.holds,
+                    margin: all.margin.min(part.margin),
+                })
+            }
+            Node::Or(left, right) => {
+                let (left, right) = two(left, right);
+                Kept { holds: left.holds || right.holds, margin: left.margin.max(right.margin) }
+            }
+            Node::Implies(left, right) => {
+                let (left, right) = two(left, right);
+                Kept { holds: !left.holds || right.holds, margin: (-left.margin).max(right.margin) }
+            }
+            Node::Number(_)
+            | Node::Moment(_)
+            | Node::Tick(_)
+            | Node::Arithmetic(..)
+            | Node::IsLight(_)
+            | Node::Other(_) => Kept { holds: self.holds(node), margin: f64::NAN },
+        }
     }
 }
 
@@ -63,27 +235,6 @@ pub(crate) fn margin_type(condition: &Expr) -> Option<Type> {
 fn margin_type_of_whole(other: Type) -> Option<Type> {
     matches!(other, Type::Int | Type::Quantity(_))
         .then_some(Type::Quantity(avastra_base::units::Dimension::RATIO))
-}
-
-/// The margin of a condition that has one.
-fn margin(condition: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> f64 {
-    let number = |expr: &Expr| evaluate(expr, functions, facts).number();
-    let of = |expr: &Expr| margin(expr, functions, facts);
-    match &condition.kind {
-        ExprKind::Compare(Comparison::Less | Comparison::LessEqual, left, right) => {
-            number(right) - number(left)
-        }
-        ExprKind::Compare(_, left, right) => number(left) - number(right),
-        ExprKind::InRange(value, low, high) => {
-            let value = number(value);
-            (value - number(low)).min(number(high) - value)
-        }
-        ExprKind::Not(inner) => -of(inner),
-        ExprKind::And(left, right) => of(left).min(of(right)),
-        ExprKind::Or(left, right) => of(left).max(of(right)),
-        ExprKind::Implies(left, right) => (-of(left)).max(of(right)),
-        _ => f64::NAN,
-    }
 }
 
 /// Where a condition divides by something that is not a number of its own, here or in a function that it calls.
@@ -157,11 +308,16 @@ mod tests {
         for _ in 0..2_000 {
             let condition = *made_up(&mut seed, 4);
             assert_eq!(margin_type(&condition), Some(Type::Quantity(Dimension::SPEED)));
+            let ready = Node::of(&condition);
             let at = |value: f64| {
                 let mut world = WorldFacts::default();
                 world.moment.ego_speed_mps = value;
                 let facts = Facts { world: Some(&world), ..Facts::new(&[], &memory) };
-                (evaluate(&condition, &[], &facts).truth(), margin(&condition, &[], &facts))
+                let Kept { holds, margin } = At { functions: &[], facts: &facts }.kept(&ready);
+                // It is the evaluator's answer, and that of the way without a margin.
+                assert_eq!(holds, evaluate(&condition, &[], &facts).truth());
+                assert_eq!(holds, At { functions: &[], facts: &facts }.holds(&ready));
+                (holds, margin)
             };
             for half in 0..50 {
                 let value = f64::from(half) * 0.5;

@@ -169,7 +169,7 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
         ExprKind::OfRoadUser(_, fact) => fact_values(*fact, known),
         // While it is not there, it has no value: as after a division by 0, no comparison is certain.
         ExprKind::OfBearer(..) => Values::Number(Interval::ALL),
-        ExprKind::IsThere(_) => Values::UNKNOWN_TRUTH,
+        ExprKind::IsThere(_) | ExprKind::Breached(_) => Values::UNKNOWN_TRUTH,
         ExprKind::Since(..) => Values::Number(between(0.0, SINCE_S_MAX)),
         ExprKind::Call(function, arguments) => {
             let locals: Vec<Values> = arguments.iter().map(values).collect();

@@ -50,7 +50,7 @@ pub(super) fn reduce(expr: &Expr, functions: &[FnDef], locals: &[Expr]) -> Expr 
         ExprKind::Implies(left, right) => ExprKind::Implies(inner(left), inner(right)),
         ExprKind::InRange(of, low, high) => ExprKind::InRange(inner(of), inner(low), inner(high)),
         ExprKind::InList(of, list) => ExprKind::InList(inner(of), all(list)),
-        ExprKind::OnRoad(_) | ExprKind::Since(..) => expr.kind.clone(),
+        ExprKind::OnRoad(_) | ExprKind::Since(..) | ExprKind::Breached(_) => expr.kind.clone(),
         ExprKind::IsWord(fact, words) => ExprKind::IsWord(*fact, words.clone()),
         ExprKind::IsWordOf(who, fact, words) => {
             ExprKind::IsWordOf(reduced_who(*who, locals), *fact, words.clone())
@@ -98,6 +98,7 @@ fn fold(expr: Expr) -> Expr {
                 | ExprKind::InLanes(..)
                 | ExprKind::OnRoad(_)
                 | ExprKind::Since(..)
+                | ExprKind::Breached(_)
                 | ExprKind::IsWord(..)
                 | ExprKind::IsWordOf(..)
                 | ExprKind::IsBody(..)

@@ -57,6 +57,7 @@ pub use contact::Contact;
 pub use ego::{Control, VehicleParameters, pedal_acceleration_mps2, pedals_for};
 pub use environment::friction_scale;
 pub use incident::Incident;
+pub use moment::MomentParts;
 pub use right_of_way::right_of_way;
 pub use road_user::{Obstacle, PhaseCount};
 pub use scene::{RANGE_M, Scene};

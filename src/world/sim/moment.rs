@@ -1,7 +1,7 @@
 //! What can be asked about a moment: the facts of the ego vehicle and its surroundings, and those of another road
 //! user. Rules, policies and the paper's state variables read the same ones.
 
-use avastra_lang::model::vocabulary::Light;
+use avastra_lang::model::vocabulary::{Fact, Light, WordFact};
 use avastra_lang::model::{
     JUNCTION_AHEAD_M_MAX, LIGHT_AHEAD_M, MomentFacts, NpcFacts, OnRoute, TIME_S_MAX, junction_ahead_m,
 };
@@ -16,10 +16,49 @@ use super::world::{DT_S, World};
 /// Distance that stands for "no road user around", m, as in the published package.
 const NO_ROAD_USER_M: f64 = 100.0;
 
+/// Facts of the moment that are looked up together.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct MomentParts {
+    pub limit: bool,
+    /// What the place on the route says, the limit included.
+    pub route: bool,
+    pub crosswalks: bool,
+    /// How many others there are, and the nearest of them.
+    pub users: bool,
+    pub rule_breakers: bool,
+}
+
+impl MomentParts {
+    /// The parts that these facts are in.
+    pub fn of(
+        facts: impl IntoIterator<Item = Fact>,
+        words: impl IntoIterator<Item = WordFact>,
+    ) -> MomentParts {
+        let mut parts = MomentParts::default();
+        for fact in facts {
+            match fact {
+                Fact::EgoLimit => parts.limit = true,
+                Fact::EgoJunctionAhead | Fact::EgoRouteLeft => parts.route = true,
+                Fact::EgoCrosswalkAhead => parts.crosswalks = true,
+                Fact::RoadUsers | Fact::NearestGap | Fact::NearestSpeed => parts.users = true,
+                Fact::RuleBreakers => parts.rule_breakers = true,
+                _ => {}
+            }
+        }
+        parts.route |= words.into_iter().any(|word| matches!(word, WordFact::EgoLight | WordFact::EgoRoad));
+        parts
+    }
+}
+
 impl World {
     /// The facts of this moment.
     pub fn moment_facts(&self) -> MomentFacts {
         self.alone().moment_facts()
+    }
+
+    /// These parts of the facts of this moment; the others have no meaning.
+    pub fn moment_facts_of(&self, parts: MomentParts) -> MomentFacts {
+        self.alone().moment_facts_of(parts)
     }
 
     /// Time until the next traffic light on the route changes its colour, s, in steps of half a second and at most
@@ -47,32 +86,51 @@ impl World {
 impl Around<'_> {
     /// The facts of this moment. A road user that looks around does not count itself: see [`MomentFacts::with`].
     pub fn moment_facts(&self) -> MomentFacts {
-        let OnRoute { limit_mps, junction_ahead_m, route_left_m, signal, road } = self.on_route();
-        let gaps =
-            self.obstacles_on_level().map(|obstacle| (obstacle.distance_m, obstacle.velocity_mps.norm()));
-        let nearest = gaps.min_by(|a, b| a.0.total_cmp(&b.0));
-        MomentFacts {
+        self.moment_facts_of(MomentParts {
+            limit: true,
+            route: true,
+            crosswalks: true,
+            users: true,
+            rule_breakers: true,
+        })
+    }
+
+    fn moment_facts_of(&self, parts: MomentParts) -> MomentFacts {
+        let mut facts = MomentFacts {
             ego_speed_mps: self.ego.speed_mps,
             ego_acceleration_mps2: self.ego.acceleration_mps2,
-            ego_limit_mps: limit_mps,
-            ego_junction_ahead_m: junction_ahead_m,
-            ego_crosswalk_ahead_m: self.crosswalk_ahead_m(),
-            ego_route_left_m: route_left_m,
             ego_offset_m: self.ego_offset_m,
             ego_front_m: VehicleParameters::MKZ.front_m(self.ego_station_m),
             ego_rear_m: VehicleParameters::MKZ.rear_m(self.ego_station_m),
-            ego_light: self.light(signal),
-            ego_road: road,
-            road_users: self.obstacles_on_level().count() as u32,
-            rule_breakers: self
-                .drivers()
-                .filter(|(obstacle, _, driver)| !obstacle.is_apart && !driver.ignores.is_empty())
-                .count() as u32,
-            nearest_gap_m: nearest.map_or(NO_ROAD_USER_M, |(gap_m, _)| gap_m),
-            nearest_speed_mps: nearest.map_or(0.0, |(_, speed_mps)| speed_mps),
             // The number nearest to the exact time, so that `elapsed >= 0.7 s` holds at 0.7 s.
             elapsed_s: (self.tick as f64 * DT_S * 1000.0).round() / 1000.0,
+            ..MomentFacts::default()
+        };
+        if parts.route {
+            let OnRoute { limit_mps, junction_ahead_m, route_left_m, signal, road } = self.on_route();
+            (facts.ego_limit_mps, facts.ego_junction_ahead_m) = (limit_mps, junction_ahead_m);
+            (facts.ego_route_left_m, facts.ego_light, facts.ego_road) =
+                (route_left_m, self.light(signal), road);
+        } else if parts.limit {
+            let lane = self.scene.route.lane_at(self.ego_station_m).lane;
+            facts.ego_limit_mps = self.scene.map.lane(lane).speed_limit_mps;
         }
+        if parts.crosswalks {
+            facts.ego_crosswalk_ahead_m = self.crosswalk_ahead_m();
+        }
+        if parts.users {
+            let nearest = self.obstacles_on_level().min_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
+            facts.road_users = self.obstacles_on_level().count() as u32;
+            facts.nearest_gap_m = nearest.map_or(NO_ROAD_USER_M, |obstacle| obstacle.distance_m);
+            facts.nearest_speed_mps = nearest.map_or(0.0, |obstacle| obstacle.velocity_mps.norm());
+        }
+        if parts.rule_breakers {
+            let breaks = |(obstacle, _, driver): &(&Obstacle, _, &Driver)| {
+                !obstacle.is_apart && !driver.ignores.is_empty()
+            };
+            facts.rule_breakers = self.drivers().filter(breaks).count() as u32;
+        }
+        facts
     }
 
     /// Along the route to the next crosswalk, m: 0 on one, [`JUNCTION_AHEAD_M_MAX`] if there is none nearer.

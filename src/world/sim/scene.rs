@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use avastra_base::geometry::Vec2;
 use avastra_lang::model::Road;
 use avastra_road::{FootWay, LaneIndex, RoadMap, Route};
 
 use super::junction::ConflictAreas;
 use super::right_of_way::{RouteArea, route_areas};
-use super::watched::{OncomingEdge, oncoming_edges};
+use super::watched::{OncomingEdge, WAY_STEP_M, oncoming_edges};
 use super::way::Ways;
 
 /// Objects farther away than this are not sensed at all, m: the clear-day range for cars of the LiDAR and the camera that
@@ -18,6 +19,13 @@ pub const RANGE_M: f64 = 120.0;
 /// How far vehicles are sensed on a motorway, m: as far as the long-range radar that Apollo takes reaches (Continental ARS
 /// 408-21).
 const MOTORWAY_RANGE_M: f64 = 250.0;
+
+/// Points of the route, [`WAY_STEP_M`] apart.
+pub(super) struct WayPoints<'a> {
+    /// Station of the first one, m.
+    pub first_m: f64,
+    pub points: &'a [Vec2],
+}
 
 /// What stays the same during all episodes of one road. Shared, never copied.
 #[derive(Debug)]
@@ -38,7 +46,9 @@ pub struct Scene {
     foot_ways: FootWays,
     /// Lanes outside junctions, each with the sum of the lengths up to its end, m.
     streets: Vec<(LaneIndex, f64)>,
-    /// At every metre of the route. Only requirements ask for them.
+    /// Points of the route, [`WAY_STEP_M`] apart, and the edges of oncoming lanes at every metre of it. Only requirements
+    /// ask for them.
+    way_points: OnceLock<Vec<Vec2>>,
     oncoming: OnceLock<Vec<Option<OncomingEdge>>>,
 }
 
@@ -64,6 +74,7 @@ impl Scene {
             ways: Ways::default(),
             foot_ways: FootWays::default(),
             streets,
+            way_points: OnceLock::new(),
             oncoming: OnceLock::new(),
             is_motorway,
             range_m: if is_motorway { MOTORWAY_RANGE_M } else { RANGE_M },
@@ -77,6 +88,21 @@ impl Scene {
     pub fn half_width_m(&self, station_m: f64) -> f64 {
         let here = self.route.lane_at(station_m);
         self.map.lane(here.lane).width_at(station_m - here.from_m) / 2.0
+    }
+
+    /// Points of the route from a station on, as far as it goes.
+    pub(super) fn points_ahead(&self, station_m: f64, reach_m: f64) -> WayPoints<'_> {
+        let points = self.way_points.get_or_init(|| {
+            let path = &self.route.path;
+            let count = (path.length_m() / WAY_STEP_M) as usize;
+            (0..=count).map(|nth| path.position_at(nth as f64 * WAY_STEP_M)).collect()
+        });
+        let nth = |station_m: f64| ((station_m / WAY_STEP_M).max(0.0) as usize).min(points.len());
+        let first = nth(station_m);
+        WayPoints {
+            first_m: first as f64 * WAY_STEP_M,
+            points: &points[first..nth(station_m + reach_m).max(first)],
+        }
     }
 
     /// The near edge of the oncoming lane beside a station of the route, to the metre.

@@ -1,7 +1,7 @@
 //! What requirements may ask beside the moment: what must be watched from tick to tick, and what costs too much to be
 //! looked up where nobody asks.
 
-use avastra_base::geometry::Vec2;
+use avastra_base::geometry::{Vec2, unit_vector};
 use avastra_base::kinematics::STANDING_MPS;
 use avastra_lang::model::vocabulary::Fact;
 use avastra_lang::model::{LEAD_GAP_M_MAX, LIGHT_AHEAD_M, TickFacts};
@@ -10,19 +10,24 @@ use super::around::Around;
 use super::ego::VehicleParameters;
 use super::road_user::Obstacle;
 use super::scene::Scene;
-use super::sense::SignalColour;
+use super::sense::{FRAME_TICKS, SignalColour};
 use super::world::{DT_S, World};
 
 /// A road user ahead is looked for as near as this, m: as far as vehicles are sensed on motorways.
 const LEAD_REACH_M: f64 = 250.0;
+/// The route is looked at in points this far from each other, m.
+pub(super) const WAY_STEP_M: f64 = 10.0;
+/// Whoever is in the ego vehicle's way is nearer to a point than this and half of both outlines, m: half a step, half the
+/// width of the ego vehicle on any heading, and what a bend adds.
+const WAY_ASIDE_M: f64 = 9.0;
 /// Stands for no red light and for no oncoming lane near, m.
 const FAR_M: f64 = -100.0;
 
 /// The ego vehicle's drive up to now, as far as requirements ask for it.
 #[derive(Debug, Clone, Default)]
 pub struct Watched {
-    /// The road user ahead, and the tick since when it is that one.
-    lead: Option<(u32, u64)>,
+    /// The road user ahead, the tick since when it is that one, and where it was on the route.
+    lead: Option<(u32, u64, f64)>,
     red_runs: u32,
     /// The stop line that its front passed at red, until its rear has passed it.
     red_line_m: Option<f64>,
@@ -34,19 +39,30 @@ impl Watched {
         let asks = |fact: Fact| asked.contains(&fact);
         let around = world.alone();
         let asks_lead = [Fact::EgoLeadGap, Fact::EgoLeadSpeed, Fact::EgoLeadSince].into_iter().any(asks);
-        let lead = if asks_lead { lead(&around) } else { None };
-        self.lead = lead.as_ref().map(|&Lead { id, .. }| match self.lead {
-            Some((known, since)) if known == id => (id, since),
-            _ => (id, world.ticks()),
-        });
+        let lead = if asks_lead { self.lead(world, &around) } else { None };
         let since_s = |tick: u64| (world.ticks() - tick) as f64 * DT_S;
         TickFacts {
             lead_gap_m: lead.as_ref().map_or(LEAD_GAP_M_MAX, |lead| lead.gap_m),
             lead_speed_mps: lead.map_or(0.0, |lead| lead.speed_mps),
-            lead_since_s: self.lead.map_or(0.0, |(_, tick)| since_s(tick)),
+            lead_since_s: self.lead.map_or(0.0, |(_, tick, _)| since_s(tick)),
             over_red_m: if asks(Fact::EgoOverRed) { self.over_red_m(world, &around) } else { f64::NAN },
             over_oncoming_m: if asks(Fact::EgoOverOncoming) { over_oncoming_m(&around) } else { f64::NAN },
         }
+    }
+
+    /// The road user ahead. Somebody new is looked for ten times a second, as drivers look around.
+    fn lead(&mut self, world: &World, around: &Around) -> Option<Lead> {
+        let known = self.lead.filter(|_| !world.ticks().is_multiple_of(FRAME_TICKS));
+        let still = known.and_then(|(id, _, station_m)| {
+            in_the_way(around, around.obstacles_on_level().find(|obstacle| obstacle.id == id)?, station_m)
+        });
+        let looks = world.ticks().is_multiple_of(FRAME_TICKS) || known.is_some();
+        let lead = still.or_else(|| looks.then(|| next_ahead(around)).flatten());
+        self.lead = lead.as_ref().map(|&Lead { id, station_m, .. }| match self.lead {
+            Some((known, since, _)) if known == id => (id, since, station_m),
+            _ => (id, world.ticks(), station_m),
+        });
+        lead
     }
 
     fn over_red_m(&mut self, world: &World, around: &Around) -> f64 {
@@ -73,30 +89,49 @@ impl Watched {
 
 struct Lead {
     id: u32,
+    station_m: f64,
     gap_m: f64,
     speed_mps: f64,
 }
 
 /// The next road user ahead whose outline reaches into the ego vehicle's way, and which does not come towards it.
-fn lead(around: &Around) -> Option<Lead> {
-    let front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
-    let position = around.ego_outline.pose.position;
+fn next_ahead(around: &Around) -> Option<Lead> {
+    let points = around.scene.points_ahead(around.ego_station_m, LEAD_REACH_M);
+    let from_m = points.first_m;
+    let none = Vec2::new(f64::INFINITY, f64::INFINITY);
+    let least = points.points.iter().fold(none, |least, point| least.inf(point));
+    let greatest = points.points.iter().fold(-none, |greatest, point| greatest.sup(point));
     let ahead = around.obstacles_on_level().filter_map(|obstacle| {
-        let Obstacle { outline, forward, velocity_mps, .. } = obstacle;
-        if (outline.pose.position - position).norm() > LEAD_REACH_M {
+        let outline = &obstacle.outline;
+        // Whoever is in the way is no farther from one of the points.
+        let reach_m = outline.half_length_m + outline.half_width_m + around.ego_offset_m.abs() + WAY_ASIDE_M;
+        let place = outline.pose.position;
+        let is_within =
+            |at: f64, least: f64, greatest: f64| (least - reach_m..=greatest + reach_m).contains(&at);
+        if !is_within(place.x, least.x, greatest.x) || !is_within(place.y, least.y, greatest.y) {
             return None;
         }
-        let (station_m, offset_m, along) = around.beside_route(outline.pose.position);
-        let (half_length_m, half_width_m) = outline.half_extent_m(*forward, along);
-        let aside_m = (offset_m - around.ego_offset_m).abs();
-        let speed_mps = along.dot(velocity_mps);
-        let is_ahead = station_m > front_m
-            && aside_m < half_width_m + ego_half_width_m(around, along)
-            && speed_mps > -STANDING_MPS;
-        let gap_m = (station_m - half_length_m - front_m).max(0.0);
-        is_ahead.then_some(Lead { id: obstacle.id, gap_m, speed_mps })
+        let away_m2 = |point: &Vec2| (place - point).norm_squared();
+        let near = points.points.iter().map(away_m2).enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+        let (nth, _) = near.filter(|(_, away_m2)| *away_m2 <= reach_m * reach_m)?;
+        in_the_way(around, obstacle, from_m + nth as f64 * WAY_STEP_M)
     });
     ahead.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))
+}
+
+/// A road user about at a station of the route, if it is ahead in the ego vehicle's way.
+fn in_the_way(around: &Around, obstacle: &Obstacle, guess_m: f64) -> Option<Lead> {
+    let front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
+    let Obstacle { id, outline, forward, velocity_mps, .. } = obstacle;
+    let beside = around.scene.route.path.project_from(outline.pose.position, guess_m)?;
+    let (half_length_m, half_width_m) = outline.half_extent_m(*forward, beside.forward);
+    let aside_m = (beside.offset_m - around.ego_offset_m).abs();
+    let speed_mps = beside.forward.dot(velocity_mps);
+    let is_ahead = beside.station_m > front_m
+        && aside_m < half_width_m + ego_half_width_m(around, beside.forward)
+        && speed_mps > -STANDING_MPS;
+    let gap_m = (beside.station_m - half_length_m - front_m).max(0.0);
+    is_ahead.then_some(Lead { id: *id, station_m: beside.station_m, gap_m, speed_mps })
 }
 
 /// Half the width of the ego vehicle across a direction, m.
@@ -107,9 +142,8 @@ fn ego_half_width_m(around: &Around, along: Vec2) -> f64 {
 /// How far the ego vehicle's outline reaches into an oncoming lane, m.
 fn over_oncoming_m(around: &Around) -> f64 {
     let Some(edge) = around.scene.oncoming_at(around.ego_station_m) else { return FAR_M };
-    let (_, along) = around.scene.route.path.along(around.ego_station_m);
     let towards_m = if edge.is_left { around.ego_offset_m } else { -around.ego_offset_m };
-    (towards_m + ego_half_width_m(around, along) - edge.away_m).max(FAR_M)
+    (towards_m + ego_half_width_m(around, edge.along) - edge.away_m).max(FAR_M)
 }
 
 /// The near edge of the nearest oncoming lane beside a place of the route.
@@ -118,6 +152,8 @@ pub(super) struct OncomingEdge {
     /// From the middle of the route, m.
     pub away_m: f64,
     pub is_left: bool,
+    /// Unit vector along the route.
+    pub along: Vec2,
 }
 
 /// The edges at every metre of a route; none in junctions, and where there is no oncoming lane.
@@ -134,7 +170,7 @@ pub(super) fn oncoming_edges(scene: &Scene) -> Vec<Option<OncomingEdge>> {
         let other = map.lane(opposing.lane);
         let aside_m = here.to_local(other.centre.position_at(opposing.station_m)).y;
         let away_m = aside_m.abs() - other.width_at(opposing.station_m) / 2.0;
-        Some(OncomingEdge { away_m, is_left: aside_m > 0.0 })
+        Some(OncomingEdge { away_m, is_left: aside_m > 0.0, along: unit_vector(here.heading_rad) })
     };
     (0..=route.path.length_m() as usize).map(|metre| edge(metre as f64)).collect()
 }

@@ -125,6 +125,7 @@ impl Reader<'_> {
             | ExprKind::OfBearer(..)
             | ExprKind::IsThere(_)
             | ExprKind::Since(..)
+            | ExprKind::Breached(_)
             | ExprKind::OnRoad(_)
             | ExprKind::IsWord(..)
             | ExprKind::IsWordOf(..)
