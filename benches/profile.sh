@@ -4,6 +4,7 @@
 # on processors with them. `sh benches/profile.sh BINARIES` takes `avastra` and `marks` from a folder instead of building.
 # `sh benches/profile.sh tick AVASTRA…` counts instructions within ticks alone, of a town without actions, for each program
 # (built with symbols): what a change costs those who do not use it.
+# `sh benches/profile.sh law AVASTRA` counts those of whole drives without requirements, with one, and with `law.ava`.
 set -eu
 cd "$(dirname "$0")/.."
 for needed in valgrind python3; do
@@ -32,6 +33,18 @@ if [ "${1-}" = tick ]; then
             counted within_ticks --toggle-collect='*World::tick*' "$avastra" run scenarios/avastra45.ava --road boulevard \
                 --ads "$ads" --agent none --ambient 8 --seed 3 --episodes 3 --jobs 1 --quiet --out "$work/run"
             echo "$avastra $ads: $(sed -n 's/.*Collected : //p' "$work/within_ticks.log") instructions within ticks"
+        done
+    done
+    exit
+fi
+if [ "${1-}" = law ]; then
+    for ads in modular idm; do
+        for requires in '' 'require one: ego.speed <= ego.limit + 1 m/s within 2 s' 'use "../../scenarios/law.ava"'; do
+            rm -rf "$work/run"
+            printf 'language 1\nuse "../../scenarios/avastra45.ava"\n%s\n' "$requires" > "$work/law.ava"
+            counted law --toggle-collect='*observation_period*' "$2" run "$work/law.ava" --road boulevard \
+                --ads "$ads" --agent none --ambient 8 --seed 3 --episodes 12 --jobs 1 --quiet --out "$work/run"
+            echo "$ads, '$requires': $(sed -n 's/.*Collected : //p' "$work/law.log") instructions"
         done
     done
     exit

@@ -67,6 +67,8 @@ struct Tally {
     asked: u32,
     failed: u32,
     window: Window,
+    /// Ticks for which the window still holds a margin above the smallest one, which is not in it.
+    above: u32,
     smallest: Option<f64>,
 }
 
@@ -168,15 +170,26 @@ impl Monitor {
 impl Tally {
     /// Nothing is asked now.
     fn pause(&mut self) {
-        (self.asked, self.failed) = (0, 0);
+        (self.asked, self.failed, self.above) = (0, 0, 0);
         self.window.clear();
     }
 
-    /// Takes the answer of a tick. Returns the margin of the time that `within` grants, once that has been asked.
+    /// Takes the answer of a tick. Returns the margin of the time that `within` grants, if it can be that of a breach or
+    /// smaller than all before.
     fn take(&mut self, kept: Kept, within_ticks: u32) -> Option<f64> {
         self.asked += 1;
         self.failed = if kept.holds { 0 } else { self.failed + 1 };
+        // As long as it is in the window, nothing there becomes the smallest, and nothing is breached: the usual case.
+        if kept.holds && self.smallest.is_some_and(|smallest| kept.margin > smallest) {
+            self.window.clear();
+            self.above = within_ticks;
+            return None;
+        }
         let largest = self.window.largest(kept.margin, within_ticks);
+        if self.above > 0 {
+            self.above -= 1;
+            return None;
+        }
         let margin = Some(largest).filter(|margin| self.asked > within_ticks && !margin.is_nan());
         self.smallest = smaller(self.smallest, margin);
         margin
@@ -365,22 +378,23 @@ mod tests {
                 let trace: Vec<(f64, f64)> = (0..30)
                     .map(|_| (f64::from(below(&mut rng, 60)) / 3.0, f64::from(below(&mut rng, 60)) / 3.0))
                     .collect();
-                let (mut watch, ready) = (Tally::default(), required.ready());
+                let (mut watch, ready, mut smallest) = (Tally::default(), required.ready(), None);
                 for (tick, (v, w)) in trace.iter().enumerate() {
                     let mut world = WorldFacts::default();
                     (world.moment.ego_speed_mps, world.moment.ego_limit_mps) = (*v, *w);
                     let facts = Facts { world: Some(&world), ..Facts::new(&[], &memory) };
                     let kept = ready.at(&space.functions, &facts).expect("it is always asked");
-                    let found = watch.take(kept, required.within_ticks);
+                    watch.take(kept, required.within_ticks);
                     let first = tick.checked_sub(*within as usize);
                     let window =
                         first.map(|first| trace[first..=tick].iter().map(|(v, w)| (one.margin)(*v, *w)));
                     let wanted = window.map(|margins| margins.fold(f64::NEG_INFINITY, f64::max));
-                    let same = match (found, wanted) {
+                    smallest = smaller(smallest, wanted);
+                    let same = match (watch.smallest, smallest) {
                         (Some(found), Some(wanted)) => (found - wanted).abs() <= 1e-9 * (1.0 + wanted.abs()),
                         (found, wanted) => found.is_none() && wanted.is_none(),
                     };
-                    assert!(same, "{}: {found:?} in place of {wanted:?}", one.text);
+                    assert!(same, "{}: {:?} in place of {smallest:?}", one.text, watch.smallest);
                     let is_breached = watch.failed > *within;
                     let is_clear = wanted.is_none_or(|wanted| wanted.abs() > 1e-6);
                     assert!(

@@ -33,9 +33,10 @@ pub struct ReadyRequirement {
 #[derive(Debug, Clone)]
 enum Node {
     Number(f64),
-    Moment(fn(&MomentFacts) -> f64),
-    Tick(fn(&TickFacts) -> f64),
+    Fact(Of),
     Arithmetic(Arithmetic, Box<Node>, Box<Node>),
+    /// Compares a fact with a number, which is what most conditions do.
+    Bound(Of, Comparison, f64),
     /// Compares numbers.
     Compare(Comparison, Box<Node>, Box<Node>),
     InRange(Box<Node>, Box<Node>, Box<Node>),
@@ -47,6 +48,13 @@ enum Node {
     /// Whether the next light is one of these.
     IsLight(Vec<Light>),
     Other(Expr),
+}
+
+/// How a fact is read.
+#[derive(Debug, Clone, Copy)]
+enum Of {
+    Moment(fn(&MomentFacts) -> f64),
+    Tick(fn(&TickFacts) -> f64),
 }
 
 impl RequirementDef {
@@ -86,8 +94,8 @@ impl Node {
         match &expr.kind {
             ExprKind::Number(number) => Node::Number(number.to_f64()),
             ExprKind::Fact(fact) => match (of_moment(*fact), of_tick(*fact)) {
-                (Some(of), _) => Node::Moment(of),
-                (None, Some(of)) => Node::Tick(of),
+                (Some(of), _) => Node::Fact(Of::Moment(of)),
+                (None, Some(of)) => Node::Fact(Of::Tick(of)),
                 (None, None) => Node::Other(expr.clone()),
             },
             ExprKind::Arithmetic(op, left, right) => match (Node::of(left), Node::of(right)) {
@@ -95,7 +103,10 @@ impl Node {
                 (left, right) => Node::Arithmetic(*op, Box::new(left), Box::new(right)),
             },
             ExprKind::Compare(op, left, right) if is_number(left) => {
-                Node::Compare(*op, node(left), node(right))
+                match (Node::of(left), Node::of(right)) {
+                    (Node::Fact(of), Node::Number(number)) => Node::Bound(of, *op, number),
+                    (left, right) => Node::Compare(*op, Box::new(left), Box::new(right)),
+                }
             }
             ExprKind::InRange(value, low, high) if is_number(value) => {
                 Node::InRange(node(value), node(low), node(high))
@@ -129,11 +140,11 @@ impl At<'_> {
     fn number(self, node: &Node) -> f64 {
         match node {
             Node::Number(number) => *number,
-            Node::Moment(of) => self.facts.world.map_or(f64::NAN, |world| of(&world.moment)),
-            Node::Tick(of) => self.facts.world.map_or(f64::NAN, |world| of(&world.tick)),
+            Node::Fact(of) => self.fact(*of),
             Node::Arithmetic(op, left, right) => arithmetic(*op, self.number(left), self.number(right)),
             Node::Other(expr) => evaluate(expr, self.functions, self.facts).number(),
-            Node::Compare(..)
+            Node::Bound(..)
+            | Node::Compare(..)
             | Node::InRange(..)
             | Node::Not(_)
             | Node::And(..)
@@ -143,8 +154,16 @@ impl At<'_> {
         }
     }
 
+    fn fact(self, of: Of) -> f64 {
+        self.facts.world.map_or(f64::NAN, |world| match of {
+            Of::Moment(of) => of(&world.moment),
+            Of::Tick(of) => of(&world.tick),
+        })
+    }
+
     fn holds(self, node: &Node) -> bool {
         match node {
+            Node::Bound(of, op, number) => compare_numbers(*op, self.fact(*of), *number),
             Node::Compare(op, left, right) => compare_numbers(*op, self.number(left), self.number(right)),
             Node::InRange(value, low, high) => {
                 let value = self.number(value);
@@ -159,7 +178,7 @@ impl At<'_> {
                 self.facts.world.is_some_and(|world| lights.contains(&world.moment.ego_light))
             }
             Node::Other(expr) => evaluate(expr, self.functions, self.facts).truth(),
-            Node::Number(_) | Node::Moment(_) | Node::Tick(_) | Node::Arithmetic(..) => false,
+            Node::Number(_) | Node::Fact(_) | Node::Arithmetic(..) => false,
         }
     }
 
@@ -167,12 +186,8 @@ impl At<'_> {
     fn kept(self, node: &Node) -> Kept {
         let two = |left: &Node, right: &Node| (self.kept(left), self.kept(right));
         match node {
-            Node::Compare(op, left, right) => {
-                let (left, right) = (self.number(left), self.number(right));
-                let is_less = matches!(op, Comparison::Less | Comparison::LessEqual);
-                let margin = if is_less { right - left } else { left - right };
-                Kept { holds: compare_numbers(*op, left, right), margin }
-            }
+            Node::Bound(of, op, number) => compared(*op, self.fact(*of), *number),
+            Node::Compare(op, left, right) => compared(*op, self.number(left), self.number(right)),
             Node::InRange(value, low, high) => {
                 let [value, low, high] = [value, low, high].map(|node| self.number(node));
                 let holds = compare_numbers(Comparison::GreaterEqual, value, low)
@@ -198,14 +213,17 @@ impl At<'_> {
                 let (left, right) = two(left, right);
                 Kept { holds: !left.holds || right.holds, margin: (-left.margin).max(right.margin) }
             }
-            Node::Number(_)
-            | Node::Moment(_)
-            | Node::Tick(_)
-            | Node::Arithmetic(..)
-            | Node::IsLight(_)
-            | Node::Other(_) => Kept { holds: self.holds(node), margin: f64::NAN },
+            Node::Number(_) | Node::Fact(_) | Node::Arithmetic(..) | Node::IsLight(_) | Node::Other(_) => {
+                Kept { holds: self.holds(node), margin: f64::NAN }
+            }
         }
     }
+}
+
+fn compared(op: Comparison, left: f64, right: f64) -> Kept {
+    let is_less = matches!(op, Comparison::Less | Comparison::LessEqual);
+    let margin = if is_less { right - left } else { left - right };
+    Kept { holds: compare_numbers(op, left, right), margin }
 }
 
 /// The type of a condition's margin; `None` if it has none: truth values, words and `==` have no distance, and distances of

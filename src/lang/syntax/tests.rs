@@ -4,8 +4,8 @@
 use proptest::prelude::*;
 
 use crate::syntax::ast::{
-    Arg, Arm, BinaryOp, Call, Case, Expr, ExprKind, Field, File, FileId, Item, ItemKind, Let, Name, Number,
-    Odds, Require, Scenario, Span, Step, Text, UnaryOp, Use, Verdict,
+    Arg, Arm, BinaryOp, Call, Case, Comparison, Expr, ExprKind, Field, File, FileId, Item, ItemKind, Let,
+    Name, Number, Odds, Require, Scenario, Span, Step, Text, UnaryOp, Use, Verdict,
 };
 use crate::syntax::{DEPTH_MAX, OPERATORS_MAX, Sources, Style, format, parse, print, render, same_meaning};
 
@@ -272,12 +272,18 @@ fn item() -> impl Strategy<Value = ItemKind> {
             ItemKind::Scenario(Scenario { name, origin, road, start, steps, expects: Vec::new() })
         },
     );
+    let asked = (name(), name()).prop_map(|(left, right)| {
+        let named = |name: Name| Box::new(Expr::built(ExprKind::Name(name.text)));
+        let op = BinaryOp::Compare(Comparison::Equal);
+        Expr::built(ExprKind::Binary { op, op_span: Span::NONE, left: named(left), right: named(right) })
+    });
     prop_oneof![
         (name(), expr()).prop_map(|(name, value)| ItemKind::Let(Let { name, value })),
         (name(), expr())
             .prop_map(|(name, value)| { ItemKind::Override(Box::new(ItemKind::Let(Let { name, value }))) }),
         (name(), expr()).prop_map(|(name, condition)| ItemKind::Verdict(Verdict { name, condition })),
-        (any::<bool>(), name(), proptest::option::of(expr()), expr(), proptest::option::of(expr())).prop_map(
+        // A word that is no unit, after a number and before the colon of a condition, would be the name of a field.
+        (any::<bool>(), name(), proptest::option::of(asked), expr(), proptest::option::of(expr())).prop_map(
             |(optional, name, when, condition, within)| {
                 ItemKind::Require(Box::new(Require { optional, name, when, condition, within }))
             }
