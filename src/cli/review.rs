@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use avastra_campaign::emit;
-use avastra_campaign::episode::{Breach, EpisodeLog, Outcome};
+use avastra_campaign::episode::{EpisodeLog, Outcome};
 use avastra_campaign::oracle::{self, ClaimResult};
 use avastra_campaign::run::{Asked, EpisodeSummary, RunError, Stage, recorded_traffic};
 use avastra_drivers::external;
@@ -119,6 +119,7 @@ pub fn review(
     let setup = stage.setup(&ads);
     let episode = scenario.origin.episode.unwrap_or(0) as usize;
     let mut summary = EpisodeSummary::judged(&setup, episode, &log);
+    summary.find_keepers(&setup, &log);
     let change = match &illegal {
         None => change(&scenario, (&log, &summary), table, results),
         // Whatever it crashes with: it is not this scenario that does.
@@ -209,22 +210,16 @@ fn change(
     results: &[ClaimResult],
 ) -> Change {
     let is_breached = |claim: &Claim| match claim {
-        Claim::Breach { requirement, .. } => {
-            let of = |breach: &Breach| &table.space().requirements[breach.requirement].name;
-            log.breaches.iter().any(|breach| of(breach) == requirement)
-        }
+        Claim::Breach { requirement, .. } => log.breach_of(table.space(), requirement).is_some(),
         _ => false,
     };
     let mut counted = summary.collisions.iter().filter(|found| found.counted).peekable();
     let is_of_breaches = !scenario.claims.iter().any(Claim::is_of_a_collision);
-    let is_left = counted.peek().is_some() && !is_of_breaches || scenario.claims.iter().any(is_breached);
-    if !is_left {
+    let crashes = counted.peek().is_some() && !is_of_breaches;
+    if !crashes && !scenario.claims.iter().any(is_breached) {
         return Change::Gone;
     }
-    if counted.peek().is_some()
-        && !is_of_breaches
-        && !counted.any(|found| scenario.crashes_with(found.collision.contact.obstacle))
-    {
+    if crashes && !counted.any(|found| scenario.crashes_with(found.collision.contact.obstacle)) {
         return Change::OtherObstacle;
     }
     let is_hit =

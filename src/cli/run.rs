@@ -161,9 +161,8 @@ fn play_all(
     let is_reproducible = is_reproducible(output, program);
     cut_off(program).iter().for_each(|note| output.warn(note));
     output.result(serde_json::json!({
-        "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups, "requirements": requirements,
-        "never": never,
-        "critical": critical, "failures": failures, "reproducible": is_reproducible,
+        "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups,
+        "requirements": requirements, "never": never, "critical": critical, "failures": failures, "reproducible": is_reproducible,
     }));
     share.end(output, directory, is_over, program)?;
     Ok(totals)
@@ -395,7 +394,7 @@ pub fn groups_text(groups: &[Group]) -> String {
 }
 
 /// Each requirement with its breaches, or with how near it came to one.
-pub fn requirements_text(requirements: &[RequirementCount]) -> String {
+fn requirements_text(requirements: &[RequirementCount]) -> String {
     let figure = |of: &RequirementCount| match (of.smallest, of.unit.as_deref()) {
         (Some(smallest), Some(unit)) => format!("{smallest:.2} {unit}").trim_end().to_owned(),
         (Some(_) | None, _) => String::new(),

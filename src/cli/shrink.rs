@@ -168,9 +168,8 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
         Found::Collision(index) => oracle::spare_steps(&setup, &shrunk.log, index, &shrunk.judgements),
         Found::Breach(_) => Vec::new(),
     };
-    let breached = oracle::breached(&setup, &Script::of_log(&shrunk.log), &shrunk.log);
-    let judged = EpisodeSummary::new(table.space(), source.episode, &shrunk.log, shrunk.judgements);
-    let mut summary = EpisodeSummary { breached, ..judged };
+    let mut summary = EpisodeSummary::new(table.space(), source.episode, &shrunk.log, shrunk.judgements);
+    summary.find_keepers(&setup, &shrunk.log);
     if let Found::Collision(index) = shrunk.found {
         summary.collisions[index].minimal = spare.is_empty();
     }

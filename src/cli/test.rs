@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use avastra_campaign::episode::{Breach, EpisodeLog};
+use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::files;
 use avastra_campaign::oracle::{self, Regression};
 use avastra_campaign::run::{self, Asked, RunError, Stage};
@@ -312,10 +312,10 @@ impl Suite<'_> {
         let log = stage.play(&recorded, &mut |_, _, _| {});
         let counted = stage.counted(&recorded, &log);
         let breached_by = |log: &EpisodeLog| {
-            let name = |breach: &Breach| &table.space().requirements[breach.requirement].name;
-            let own =
-                log.breaches.iter().find(|breach| scenario.breached().any(|known| known == name(breach)));
-            own.map(|breach| Outcome::Breached { requirement: name(breach).clone(), time_s: breach.time_s })
+            scenario.breached().find_map(|requirement| {
+                let time_s = log.breach_of(table.space(), requirement)?.time_s;
+                Some(Outcome::Breached { requirement: requirement.to_owned(), time_s })
+            })
         };
         let is_breached = breached_by(&log).is_some();
         let breached_again = || match self.asked.is_nothing() {
@@ -347,8 +347,11 @@ impl Suite<'_> {
             // Already with the driving system that it was found with.
             None => Regression::OtherCrash,
         };
-        let may_breach = is_breached && matches!(found, Regression::Fixed | Regression::NeverMet);
-        Ok(breached_again().0.filter(|_| may_breach).unwrap_or_else(|| self.outcome(found)))
+        let again = match found {
+            Regression::Fixed | Regression::NeverMet if is_breached => breached_again().0,
+            _ => None,
+        };
+        Ok(again.unwrap_or_else(|| self.outcome(found)))
     }
 
     fn outcome(&self, found: Regression) -> Outcome {

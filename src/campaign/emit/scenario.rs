@@ -222,11 +222,7 @@ fn literal(space: &Space, action: &ActionDef, parameter: &str, value: Value) -> 
 
 fn expects(table: &ActionTable, log: &EpisodeLog, summary: &EpisodeSummary, steps: usize) -> Vec<Expect> {
     let mut expects = Vec::new();
-    for (index, breach) in log.breaches.iter().enumerate() {
-        // A claim is about the first breach of its requirement.
-        if log.breaches[..index].iter().any(|before| before.requirement == breach.requirement) {
-            continue;
-        }
+    for breach in log.first_breaches() {
         let name = &table.space().requirements[breach.requirement].name;
         let at = tree::clause(ClauseKind::At, tree::rounded(breach.time_s, 2, Dimension::DURATION));
         expects.push(tree::expect(tree::part(name, BREACHED.0), vec![at]));

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use avastra_drivers::external::{Conversation, Failure, FailureKind};
 use avastra_drivers::{ModularConfig, Reason, Status};
 use avastra_lang::model::vocabulary::Verb;
-use avastra_lang::model::{BodyWord, Memory};
+use avastra_lang::model::{BodyWord, Memory, Space};
 use avastra_search::mdp::{PerceptionCounts, StateVector};
 use avastra_world::action::Draw;
 use avastra_world::sim::{Contact, Incident, Start};
@@ -134,6 +134,19 @@ impl EpisodeLog {
     /// The states of the space after the action of a step; those at the start if there is no such step.
     pub fn memory_after(&self, step: usize) -> &Memory {
         self.steps.get(step).map_or(&self.memory, |step| &step.memory)
+    }
+
+    /// The first breach of each requirement that was breached, by rising time.
+    pub fn first_breaches(&self) -> impl Iterator<Item = &Breach> {
+        let is_first = |(index, breach): &(usize, &Breach)| {
+            !self.breaches[..*index].iter().any(|before| before.requirement == breach.requirement)
+        };
+        self.breaches.iter().enumerate().filter(is_first).map(|(_, breach)| breach)
+    }
+
+    /// The first breach of a requirement of the space that was played, by its name.
+    pub fn breach_of(&self, space: &Space, requirement: &str) -> Option<&Breach> {
+        self.breaches.iter().find(|breach| space.requirements[breach.requirement].name == requirement)
     }
 
     /// The numbers of the steps whose action was refused, each with the reason.

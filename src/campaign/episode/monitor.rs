@@ -8,9 +8,9 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use avastra_lang::model::expr::{Expr, ExprKind};
-use avastra_lang::model::vocabulary::{Fact, Known};
+use avastra_lang::model::vocabulary::Fact;
 use avastra_lang::model::{Facts, Kept, Memory, ReadyRequirement, RequirementDef, WorldFacts};
-use avastra_world::sim::{MomentParts, Watched, World};
+use avastra_world::sim::{MomentParts, Watched, WatchedParts, World};
 
 use super::setup::Setup;
 
@@ -43,9 +43,9 @@ pub struct Margin {
 pub(super) struct Monitor {
     watched: Watched,
     watches: Vec<Watch>,
-    /// The facts that are watched for them, and the parts of the moment that they ask for.
-    asked: Vec<Fact>,
-    parts: MomentParts,
+    /// What of the moment, and of what is watched, they ask for.
+    moment: MomentParts,
+    tick: WatchedParts,
     /// The road users that requirements name, by index in `Space::bearers`.
     bearers: Vec<usize>,
     breaches: Vec<Breach>,
@@ -108,20 +108,20 @@ impl Monitor {
             })
         });
         let facts: Vec<Fact> = facts.collect();
-        let parts = MomentParts::of(facts.iter().copied(), words);
-        let asked = facts.into_iter().filter(|fact| fact.known() == Known::Tick).collect();
+        let moment = MomentParts::of(facts.iter().copied(), words);
+        let tick = WatchedParts::of(facts);
         let monitor =
-            Monitor { asked, parts, watched: Watched::default(), watches, bearers, breaches: Vec::new() };
+            Monitor { moment, tick, watched: Watched::default(), watches, bearers, breaches: Vec::new() };
         (!monitor.watches.is_empty()).then_some(monitor)
     }
 
     /// Judges the moment after a tick without a contact; `step` is the one that is driven.
     pub fn judge(&mut self, setup: &Setup, world: &World, memory: &Memory, step: usize) {
         let facts = WorldFacts {
-            moment: world.moment_facts_of(self.parts),
+            moment: world.moment_facts_of(self.moment),
             step: step as u64,
             bearers: self.bearers.iter().filter_map(|who| Some((*who, world.bearer_facts(*who)?))).collect(),
-            tick: self.watched.look(world, &self.asked),
+            tick: self.watched.look(world, self.tick),
             ..WorldFacts::default()
         };
         let facts = Facts { road: Some(&setup.road.facts), world: Some(&facts), ..Facts::new(&[], memory) };
@@ -138,7 +138,6 @@ impl Monitor {
                 watch.open = None;
                 continue;
             }
-            let margin = margin.filter(|_| required.margin.is_some());
             match watch.open.and_then(|open| self.breaches.get_mut(open)) {
                 Some(breach) => {
                     breach.until_s = world.time_s();
@@ -179,6 +178,9 @@ impl Tally {
     fn take(&mut self, kept: Kept, within_ticks: u32) -> Option<f64> {
         self.asked += 1;
         self.failed = if kept.holds { 0 } else { self.failed + 1 };
+        if kept.margin.is_nan() {
+            return None;
+        }
         // As long as it is in the window, nothing there becomes the smallest, and nothing is breached: the usual case.
         if kept.holds && self.smallest.is_some_and(|smallest| kept.margin > smallest) {
             self.window.clear();
@@ -190,7 +192,7 @@ impl Tally {
             self.above -= 1;
             return None;
         }
-        let margin = Some(largest).filter(|margin| self.asked > within_ticks && !margin.is_nan());
+        let margin = Some(largest).filter(|_| self.asked > within_ticks);
         self.smallest = smaller(self.smallest, margin);
         margin
     }
@@ -303,7 +305,7 @@ mod tests {
         margin: Box<dyn Fn(f64, f64) -> f64>,
     }
 
-    /// Over the speed `v` and the acceleration-like number `w` of a moment, both in m/s.
+    /// Over the speed `v` and the limit `w` of a moment, both in m/s.
     fn made_up(rng: &mut rng::Rng, depth: u32) -> MadeUp {
         let number = f64::from(below(rng, 80)) / 4.0;
         let side = |rng: &mut rng::Rng| -> (String, Box<dyn Fn(f64, f64) -> f64>) {

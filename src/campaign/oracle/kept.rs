@@ -5,7 +5,7 @@
 //! than about a last moment, so the question begins at the start, and not at a hazard as that of a collision does. It ends
 //! with the breach: up to then the careful driver must not have breached the requirement, nor touched anybody.
 
-use crate::episode::{self, EpisodeLog, Script, Setup};
+use crate::episode::{self, Breach, Choice, EpisodeLog, Moment, Script, Setup};
 use avastra_drivers as ads;
 use avastra_drivers::Selected;
 
@@ -23,32 +23,29 @@ pub struct Breached {
 /// Every requirement of which a log has a breach, in the order of their first ones, judged by playing the episode again with
 /// each careful driver.
 pub fn breached(setup: &Setup, script: &Script, log: &EpisodeLog) -> Vec<Breached> {
-    let mut found: Vec<(Breached, f64)> = Vec::new();
-    for breach in &log.breaches {
-        if !found.iter().any(|(known, _)| known.requirement == breach.requirement) {
-            found.push((Breached { requirement: breach.requirement, kept_by: Vec::new() }, breach.time_s));
-        }
-    }
-    let Some(last) = log.breaches.last().filter(|_| !found.is_empty()) else { return Vec::new() };
+    let firsts: Vec<&Breach> = log.first_breaches().collect();
+    // No step after the last of them.
+    let Some(last) = firsts.last() else { return Vec::new() };
+    let breached = |first: &&Breach| Breached { requirement: first.requirement, kept_by: Vec::new() };
+    let mut found: Vec<Breached> = firsts.iter().map(breached).collect();
     for name in CAREFUL {
         let entry = ads::by_name(name).expect("careful drivers are driving systems of avastra");
-        let mut setup = setup.clone();
-        setup.ads = Selected::new(entry);
-        // No step after the last breach.
-        let mut choose = |moment: &episode::Moment| match moment.step <= last.step {
-            true => script.choose(moment.setup().table, moment),
-            false => episode::Choice::Stop,
+        let setup = Setup { ads: Selected::new(entry), ..setup.clone() };
+        let mut choose = |moment: &Moment| match moment.step <= last.step {
+            true => script.choose(setup.table, moment),
+            false => Choice::Stop,
         };
         let again = episode::run(&setup, &mut choose, &mut |_, _, _| {});
-        for (breached, time_s) in &mut found {
-            let is_by = |time: f64| time <= *time_s;
-            let breaks =
-                again.breaches.iter().any(|b| b.requirement == breached.requirement && is_by(b.time_s));
-            let crashes = again.collisions.iter().any(|collision| is_by(collision.contact.time_s));
+        for (breached, first) in found.iter_mut().zip(&firsts) {
+            let breaks = again
+                .breaches
+                .iter()
+                .any(|breach| breach.requirement == first.requirement && breach.time_s <= first.time_s);
+            let crashes = again.collisions.iter().any(|crash| crash.contact.time_s <= first.time_s);
             if !breaks && !crashes {
                 breached.kept_by.push(name.to_owned());
             }
         }
     }
-    found.into_iter().map(|(breached, _)| breached).collect()
+    found
 }

@@ -1,6 +1,6 @@
 //! The claims of an emitted scenario against what a replay finds.
 
-use crate::episode::{Breach, Collision, EpisodeLog};
+use crate::episode::{Collision, EpisodeLog};
 use avastra_drivers::Module;
 use avastra_lang::model::vocabulary::Word;
 use avastra_lang::model::{Claim, Obstacle, Scenario, Space, digest_text};
@@ -92,9 +92,8 @@ fn check(
             judged(format!("{name}{}", with(*obstacle)), collision(log, *obstacle).and_then(judge))
         }
         Claim::Breach { requirement, time } => {
-            let is_meant = |breach: &&Breach| space.requirements[breach.requirement].name == *requirement;
             let at = time.as_ref().map_or(String::new(), |time| format!(" at {time}"));
-            let outcome = match (log.breaches.iter().find(is_meant), time) {
+            let outcome = match (log.breach_of(space, requirement), time) {
                 (None, _) => Err("kept, or not in force".to_owned()),
                 (Some(breach), Some(claimed)) if !claimed.rounds(breach.time_s) => {
                     Err(format!("at {:.2} s", breach.time_s))

@@ -13,7 +13,7 @@ use crate::oracle;
 use avastra_drivers::external::Failure;
 use avastra_lang::model::policy::VARIABLES;
 use avastra_lang::model::vocabulary::Word;
-use avastra_lang::model::{Memory, RequirementDef, Space, StateMeaning, Type, Value};
+use avastra_lang::model::{Memory, RequirementDef, Space, StateMeaning, Value};
 use avastra_search::mdp::STATE_LEN;
 use avastra_world::action::Draw;
 
@@ -57,7 +57,8 @@ pub(crate) const LAYOUT: Layout = Layout {
 
 /// `held` says what held the speed of the ego vehicle back, from the row's time to that of the next row. `offer`
 /// counts, per episode and row, the steps in which the row was legal (`reason` 0) or refused (other reasons); training
-/// writes nothing there. `scenario` has the text of the file that was written of an episode. `learning`, `checkpoint`
+/// writes nothing there. `breach.kept_by` has the careful drivers that keep the
+/// requirement, NULL where none was asked (in a training). `scenario` has the text of the file that was written of an episode. `learning`, `checkpoint`
 /// and `result` belong to a training (`train::record`) and stay empty in a run.
 const SCHEMA: &str = "
 CREATE TABLE episode (
@@ -80,7 +81,7 @@ CREATE TABLE collision (
 CREATE TABLE breach (
   episode INTEGER NOT NULL REFERENCES episode, number INTEGER NOT NULL, requirement TEXT NOT NULL,
   time_s REAL NOT NULL, until_s REAL NOT NULL, step INTEGER NOT NULL, margin REAL,
-  kept_by TEXT NOT NULL,
+  kept_by TEXT,
   PRIMARY KEY (episode, number)
 ) STRICT;
 CREATE TABLE margin (
@@ -520,17 +521,14 @@ fn add_breaches(
         let Breach { requirement, time_s, until_s, margin, step } = *breach;
         let name = &space.requirements[requirement].name;
         let found = summary.breached.iter().find(|found| found.requirement == requirement);
-        let kept_by = found.map_or_else(String::new, |found| found.kept_by.join(" "));
+        let kept_by = found.map(|found| found.kept_by.join(" "));
         let values =
             params![episode as i64, number as i64, name, time_s, until_s, step as i64, margin, kept_by];
         insert_row(transaction, "breach", values)?;
     }
     for Margin { requirement, smallest } in &log.margins {
         let RequirementDef { name, margin, .. } = &space.requirements[*requirement];
-        let unit = margin.and_then(|ty| match ty {
-            Type::Quantity(dimension) => Some(dimension.si_unit()),
-            Type::Bool | Type::Int | Type::Enum(_) => None,
-        });
+        let unit = margin.map(|dimension| dimension.si_unit());
         insert_row(transaction, "margin", params![episode as i64, name, smallest, unit])?;
     }
     Ok(())

@@ -127,6 +127,7 @@ impl Run {
         let log = self.play(number, &mut choose, &mut |world, _, contacts| gauges.note(world, contacts));
         let setup = self.setup(number);
         let mut summary = EpisodeSummary::judged(&setup, number, &log);
+        summary.find_keepers(&setup, &log);
         (summary.criticality, summary.pet_s) = gauges.of_steps(&log);
         for (finding, shape) in summary.collisions.iter_mut().zip(gauges.shapes()) {
             finding.shape = *shape;

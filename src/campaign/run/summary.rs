@@ -17,7 +17,7 @@ pub struct EpisodeSummary {
     /// Number of the episode in its run, from 0.
     pub episode: usize,
     pub collisions: Vec<Finding>,
-    /// The requirements that were breached, and who would have kept them.
+    /// The requirements that were breached, and who would have kept them; empty if that was not asked.
     pub breached: Vec<Breached>,
     /// Measures of danger for each step; empty if the episode was not measured.
     pub criticality: Vec<Criticality>,
@@ -61,10 +61,8 @@ impl Finding {
 impl EpisodeSummary {
     /// Judges every collision of a log by playing it again from its setup, and applies the space's verdict.
     pub fn judged(setup: &Setup, number: usize, log: &EpisodeLog) -> EpisodeSummary {
-        let script = Script::of_log(log);
-        let judgements = oracle::judge(setup, &script, log);
-        let breached = oracle::breached(setup, &script, log);
-        EpisodeSummary { breached, ..EpisodeSummary::new(setup.table.space(), number, log, judgements) }
+        let judgements = oracle::judge(setup, &Script::of_log(log), log);
+        EpisodeSummary::new(setup.table.space(), number, log, judgements)
     }
 
     /// Applies the space's verdict to every collision of a log. `judgements` has one for each.
@@ -87,6 +85,11 @@ impl EpisodeSummary {
         };
         let collisions = judgements.into_iter().enumerate().map(find).collect();
         EpisodeSummary { episode: number, collisions, ..EpisodeSummary::default() }
+    }
+
+    /// Asks which careful drivers keep what was breached.
+    pub fn find_keepers(&mut self, setup: &Setup, log: &EpisodeLog) {
+        self.breached = oracle::breached(setup, &Script::of_log(log), log);
     }
 
     /// Looks for the cause of every counted collision.

@@ -20,7 +20,7 @@ use avastra_campaign::run;
 use avastra_campaign::run::{Gauges, RunError, Shape, Stage, refusal_in_words};
 use avastra_drivers::Selected;
 use avastra_lang::model::vocabulary::Word;
-use avastra_lang::model::{Claim, RequirementDef, Scenario, Type};
+use avastra_lang::model::{Claim, RequirementDef, Scenario};
 use avastra_world::action::{ActionTable, Offer};
 use avastra_world::sim::{DT_S, FRAME_TICKS, SignalColour};
 
@@ -294,10 +294,7 @@ fn breaches(table: &ActionTable, scenario: &Scenario, log: &EpisodeLog) -> Vec<V
             Claim::Kept { requirement, by } if requirement == name => Some(by),
             _ => None,
         });
-        let unit = margin.and_then(|ty| match ty {
-            Type::Quantity(dimension) => Some(dimension.si_unit()),
-            Type::Bool | Type::Int | Type::Enum(_) => None,
-        });
+        let unit = margin.map(|dimension| dimension.si_unit());
         json!({
             "requirement": name, "docs": docs.join(" "), "at_s": breach.time_s, "until_s": breach.until_s,
             "margin": breach.margin.map(rounded), "unit": unit, "kept_by": kept_by,

@@ -5,8 +5,8 @@ use crate::check::expression::Place;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::requirement::{margin_type, open_divisor};
-use crate::model::vocabulary::{BREACHED, Site};
+use crate::model::requirement::{margin_dimension, open_divisor};
+use crate::model::vocabulary::{BREACHED, Site, things};
 use crate::model::{RequirementDef, RuleDef, TICK_MS, Type, code};
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
@@ -68,6 +68,7 @@ impl Checker {
             let help = "multiply the other side instead: `ego.lead_gap >= 0.8 s * ego.speed`";
             return self.reject(error.help(help));
         }
+        // Who asks `truck.there` wants an answer while it is not there.
         let mut bearers: Vec<usize> = when
             .iter()
             .chain([&condition])
@@ -85,7 +86,7 @@ impl Checker {
             name: declared.name.text.clone(),
             docs: docs(item),
             optional: declared.optional,
-            margin: margin_type(&condition),
+            margin: margin_dimension(&condition),
             when,
             condition,
             within_ticks: within_ticks?,
@@ -103,7 +104,8 @@ impl Checker {
         span: Span,
     ) -> Option<Option<Expr>> {
         let ast::ExprKind::Name(name) = &base.kind else { return None };
-        let index = self.requirement_names.get(name)?;
+        // A requirement that is called `ego` takes nothing from the ego vehicle.
+        let index = self.requirement_names.get(name).filter(|_| !things().contains(&name.as_str()))?;
         self.references.uses(base.span, Symbol::Requirement(name.clone()));
         if part.text != BREACHED.0 {
             let error =

@@ -11,6 +11,7 @@ use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::space::{FnDef, RequirementDef};
 use crate::model::value::Type;
 use crate::model::vocabulary::{Light, Word, WordFact};
+use avastra_base::units::Dimension;
 
 /// How a requirement stands at a moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -226,33 +227,22 @@ fn compared(op: Comparison, left: f64, right: f64) -> Kept {
     Kept { holds: compare_numbers(op, left, right), margin }
 }
 
-/// The type of a condition's margin; `None` if it has none: truth values, words and `==` have no distance, and distances of
-/// different types cannot be compared.
-pub(crate) fn margin_type(condition: &Expr) -> Option<Type> {
+/// The dimension of a condition's margin; `None` if it has none: truth values, words and `==` have no distance, and distances
+/// of different dimensions cannot be compared.
+pub(crate) fn margin_dimension(condition: &Expr) -> Option<Dimension> {
     match &condition.kind {
         ExprKind::Compare(Comparison::Equal | Comparison::NotEqual, ..) => None,
-        ExprKind::Compare(_, left, _) => match left.ty {
-            Type::Int => Some(Type::Quantity(avastra_base::units::Dimension::RATIO)),
-            Type::Quantity(_) => Some(left.ty),
+        ExprKind::Compare(_, value, _) | ExprKind::InRange(value, ..) => match value.ty {
+            Type::Int => Some(Dimension::RATIO),
+            Type::Quantity(dimension) => Some(dimension),
             Type::Bool | Type::Enum(_) => None,
         },
-        ExprKind::InRange(value, low, _) => match value.ty {
-            Type::Quantity(_) => Some(value.ty),
-            Type::Int => margin_type_of_whole(low.ty),
-            Type::Bool | Type::Enum(_) => None,
-        },
-        ExprKind::Not(inner) => margin_type(inner),
+        ExprKind::Not(inner) => margin_dimension(inner),
         ExprKind::And(left, right) | ExprKind::Or(left, right) | ExprKind::Implies(left, right) => {
-            margin_type(left).filter(|ty| margin_type(right) == Some(*ty))
+            margin_dimension(left).filter(|dimension| margin_dimension(right) == Some(*dimension))
         }
         _ => None,
     }
-}
-
-/// A whole number may be compared with ratios.
-fn margin_type_of_whole(other: Type) -> Option<Type> {
-    matches!(other, Type::Int | Type::Quantity(_))
-        .then_some(Type::Quantity(avastra_base::units::Dimension::RATIO))
 }
 
 /// Where a condition divides by something that is not a number of its own, here or in a function that it calls.
@@ -285,7 +275,7 @@ mod tests {
     use crate::model::vocabulary::Fact;
     use crate::model::{Memory, WorldFacts};
     use crate::syntax::ast::Span;
-    use avastra_base::units::{Dimension, Rational};
+    use avastra_base::units::Rational;
 
     fn expr(kind: ExprKind) -> Box<Expr> {
         Box::new(Expr { kind, ty: Type::Bool, span: Span::NONE })
@@ -325,7 +315,7 @@ mod tests {
         let mut seed = 7;
         for _ in 0..2_000 {
             let condition = *made_up(&mut seed, 4);
-            assert_eq!(margin_type(&condition), Some(Type::Quantity(Dimension::SPEED)));
+            assert_eq!(margin_dimension(&condition), Some(Dimension::SPEED));
             let ready = Node::of(&condition);
             let at = |value: f64| {
                 let mut world = WorldFacts::default();

@@ -18,7 +18,9 @@ use crate::model::vocabulary::{
     Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, TrafficRule, Turning, Verb, Word,
 };
 use crate::syntax::ast::Span;
-use avastra_base::units::{Rational, Unit, decimal, quantity, quantity_in, quantity_short, unit_of_all};
+use avastra_base::units::{
+    Dimension, Rational, Unit, decimal, quantity, quantity_in, quantity_short, unit_of_all,
+};
 use avastra_road::{LanePlace, RoadMap, Route};
 
 /// Name of the verdict that decides which collisions count. Every space has it: the checker adds the
@@ -497,8 +499,8 @@ pub struct RequirementDef {
     pub within_ticks: u32,
     /// The road users that it names, by index in `Space::bearers`.
     pub bearers: Vec<usize>,
-    /// The type of its margin; `None` if the condition has none.
-    pub margin: Option<Type>,
+    /// The dimension of its margin; `None` if the condition has none.
+    pub margin: Option<Dimension>,
     pub span: Span,
 }
 

@@ -301,6 +301,18 @@ fn item() -> impl Strategy<Value = ItemKind> {
     ]
 }
 
+/// The grammar spells the units once more, to know them before a colon.
+#[test]
+fn every_unit_may_stand_before_a_colon() {
+    for unit in avastra_base::units::UNITS {
+        let text = format!("language 1\nrequire r when a >= 1 {}: b < 2\n", unit.word);
+        let (file, diagnostics) = parse(FileId::default(), &text);
+        assert!(diagnostics.is_empty(), "{}: {diagnostics:?}", unit.word);
+        let when = file.items[1].kind.as_require().and_then(|required| required.when.as_ref());
+        assert!(format!("{when:?}").contains(&format!("{:?}", unit.word)), "{}: {when:?}", unit.word);
+    }
+}
+
 fn file_of(kinds: Vec<ItemKind>) -> File {
     let version = Number { digits: "1".to_owned(), unit: None, span: Span::NONE };
     let kinds = std::iter::once(ItemKind::Language(version)).chain(kinds);

@@ -64,5 +64,5 @@ pub use scene::{RANGE_M, Scene};
 pub use sense::{Conditions, EgoMotion, FRAME_S, FRAME_TICKS, Sensed, SensedObject, SignalColour};
 pub use trace::Trace;
 pub use traffic::{TrafficError, TrafficProfile};
-pub use watched::Watched;
+pub use watched::{Watched, WatchedParts};
 pub use world::{DT_S, ENGINE, Start, World};

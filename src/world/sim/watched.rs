@@ -33,20 +33,42 @@ pub struct Watched {
     red_line_m: Option<f64>,
 }
 
+/// Watched facts that are looked up together.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct WatchedParts {
+    pub lead: bool,
+    pub red: bool,
+    pub oncoming: bool,
+}
+
+impl WatchedParts {
+    /// The parts that these facts are in.
+    pub fn of(facts: impl IntoIterator<Item = Fact>) -> WatchedParts {
+        let mut parts = WatchedParts::default();
+        for fact in facts {
+            match fact {
+                Fact::EgoLeadGap | Fact::EgoLeadSpeed | Fact::EgoLeadSince => parts.lead = true,
+                Fact::EgoOverRed => parts.red = true,
+                Fact::EgoOverOncoming => parts.oncoming = true,
+                _ => {}
+            }
+        }
+        parts
+    }
+}
+
 impl Watched {
-    /// Looks at the world after a tick, for those of these facts that are asked. To be called at every tick.
-    pub fn look(&mut self, world: &World, asked: &[Fact]) -> TickFacts {
-        let asks = |fact: Fact| asked.contains(&fact);
+    /// Looks at the world after a tick, for these parts; the other facts have no meaning. To be called at every tick.
+    pub fn look(&mut self, world: &World, parts: WatchedParts) -> TickFacts {
         let around = world.alone();
-        let asks_lead = [Fact::EgoLeadGap, Fact::EgoLeadSpeed, Fact::EgoLeadSince].into_iter().any(asks);
-        let lead = if asks_lead { self.lead(world, &around) } else { None };
+        let lead = if parts.lead { self.lead(world, &around) } else { None };
         let since_s = |tick: u64| (world.ticks() - tick) as f64 * DT_S;
         TickFacts {
             lead_gap_m: lead.as_ref().map_or(LEAD_GAP_M_MAX, |lead| lead.gap_m),
             lead_speed_mps: lead.map_or(0.0, |lead| lead.speed_mps),
             lead_since_s: self.lead.map_or(0.0, |(_, tick, _)| since_s(tick)),
-            over_red_m: if asks(Fact::EgoOverRed) { self.over_red_m(world, &around) } else { f64::NAN },
-            over_oncoming_m: if asks(Fact::EgoOverOncoming) { over_oncoming_m(&around) } else { f64::NAN },
+            over_red_m: if parts.red { self.over_red_m(world, &around) } else { f64::NAN },
+            over_oncoming_m: if parts.oncoming { over_oncoming_m(&around) } else { f64::NAN },
         }
     }
 
@@ -179,24 +201,25 @@ pub(super) fn oncoming_edges(scene: &Scene) -> Vec<Option<OncomingEdge>> {
 mod tests {
     use super::*;
     use crate::sim::{Control, testing};
-    use avastra_lang::model::vocabulary::Word;
+
+    const ALL: WatchedParts = WatchedParts { lead: true, red: true, oncoming: true };
 
     #[test]
     fn what_is_ahead_is_watched() {
         let mut world = testing::world(&testing::straight());
         let mut watched = Watched::default();
-        let alone = watched.look(&world, Fact::ALL);
+        let alone = watched.look(&world, ALL);
         assert_eq!((alone.lead_gap_m, alone.lead_speed_mps, alone.lead_since_s), (LEAD_GAP_M_MAX, 0.0, 0.0));
         let request = testing::request(avastra_lang::model::vocabulary::Verb::DriveAhead, 30.0, 4.0);
         world.apply(&crate::action::Effect::Spawn(request)).expect("there is room");
-        let first = watched.look(&world, Fact::ALL);
+        let first = watched.look(&world, ALL);
         assert!((first.lead_gap_m - 30.0).abs() < 1e-6, "{first:?}");
         assert_eq!(first.lead_speed_mps, 4.0);
         for _ in 0..50 {
             world.tick(&Control { throttle_pct: 10.0, ..Control::default() });
-            watched.look(&world, Fact::ALL);
+            watched.look(&world, ALL);
         }
-        let later = watched.look(&world, Fact::ALL);
+        let later = watched.look(&world, ALL);
         assert!((later.lead_since_s - 1.0).abs() < 1e-9, "{later:?}");
         let rear_m = world.npc_facts(1).expect("it is there").rear_m;
         assert!((later.lead_gap_m - (rear_m - world.moment_facts().ego_front_m)).abs() < 1e-9);
@@ -210,7 +233,7 @@ mod tests {
         let (mut before_m, mut over) = (f64::NEG_INFINITY, Vec::new());
         for _ in 0..3000 {
             world.tick(&Control { throttle_pct: 15.0, ..Control::default() });
-            let found_m = watched.look(&world, Fact::ALL).over_red_m;
+            let found_m = watched.look(&world, ALL).over_red_m;
             let facts = world.moment_facts();
             if found_m > 0.0 {
                 over.push((facts.ego_front_m - line_m, facts.ego_rear_m));
