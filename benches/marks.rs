@@ -106,6 +106,7 @@ fn load() -> Arc<Space> {
 /// A world with as many obstacles as find room, at most ten.
 fn crowded(scene: &Arc<Scene>) -> World {
     let start = Start {
+        reactions: 0,
         ego_mps: avastra::model::START_MPS,
         time: TimeOfDay::Noon,
         sky: [Level::None; 3],
@@ -318,6 +319,7 @@ impl Attached {
 
 fn run(space: Arc<Space>) -> Run {
     let settings = RunSettings {
+        replays: 0,
         avastra: String::new(),
         engine: String::new(),
         space: String::new(),

@@ -1,19 +1,20 @@
-//! `avastra diagnose`: which module of the driving system is at fault for a scenario's collision.
+//! `avastra diagnose`: which module of the driving system is at fault for a scenario's collision or breach.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use avastra_base::statistics::Estimate;
-use avastra_campaign::episode::{Collision, EpisodeLog};
+use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::oracle::{
-    self, Comparison, Diagnosis, Evidence, Fate, Likelihood, Measure, MechanismShare, Mechanisms,
-    ModuleFinding, Verdict, WeaknessFinding,
+    self, Comparison, Diagnosis, Evidence, Fate, Found, Likelihood, Measure, MechanismShare, Mechanisms,
+    ModuleFinding, Verdict,
 };
 use avastra_campaign::run::{Asked, Stage};
 use avastra_drivers::{ModularConfig, Module, Selected};
 use avastra_lang::model::Scenario;
 use avastra_lang::model::vocabulary::Word;
 use avastra_world::action::ActionTable;
+use avastra_world::sim::Contact;
 
 use super::arguments::DiagnoseArguments;
 use super::error::Failure;
@@ -23,8 +24,9 @@ use super::output::{Output, plural};
 use super::parallel::each_file;
 use super::replay::priority_text;
 
-/// Says which module is at fault for every file's first counted collision or, with `--mechanisms`, which share of
-/// all collisions each documented weakness causes.
+/// Says which module is at fault for what every file is about: its first counted collision, or else the first breach that it
+/// claims. Or, with
+/// `--mechanisms`, which share of all of these each documented weakness causes.
 pub fn diagnose(output: &Output, arguments: &DiagnoseArguments) -> Result<(), Failure> {
     let asked = load::asked(arguments.against.ads.as_deref())?;
     if arguments.mechanisms {
@@ -41,7 +43,7 @@ pub fn diagnose(output: &Output, arguments: &DiagnoseArguments) -> Result<(), Fa
     }
     let causes = causes(&found.done);
     if !found.is_single() {
-        output.say(&format!("\n{}, at fault:", plural(found.done.len(), "collision")));
+        output.say(&format!("\n{}, at fault:", plural(found.done.len(), "finding")));
         causes.iter().for_each(|(cause, count)| output.say(&format!("{count:>6}  {cause}")));
     }
     let causes = causes.iter().map(|(cause, count)| serde_json::json!({ "cause": cause, "count": count }));
@@ -62,40 +64,42 @@ fn causes(found: &[Explained]) -> Vec<(String, usize)> {
     causes
 }
 
-/// All about one collision.
+/// All about one finding.
 fn tell_one(output: &Output, found: &Explained) {
-    output.tell(&heading(&found.body, &found.collision));
+    output.tell(&found.heading);
     let evidence = &found.diagnosis.evidence;
     output.say(&table_text(evidence));
-    output.say(&weaknesses_text(&evidence.weaknesses));
-    output.say(&measured_text(&evidence.measured));
+    output.say(&weaknesses_text(evidence));
+    if !evidence.measured.is_empty() {
+        output.say(&measured_text(&evidence.measured));
+    }
     output.say(&format!("\n{}", sentence(&found.diagnosis)));
     if let Some(likelihood) = &found.likelihood {
-        output.say(&likelihood_text(likelihood));
+        output.say(&likelihood_text(likelihood, evidence.noun));
     }
 }
 
-/// A scenario that was played, with its first counted collision.
+/// A scenario that was played, with what it is about.
 struct Case<'a> {
     stage: Stage<'a>,
     ads: Selected,
     log: EpisodeLog,
-    index: usize,
+    found: Found,
 }
 
 impl Case<'_> {
     fn of<'a>(table: &'a ActionTable, scenario: &'a Scenario, asked: &Asked) -> Result<Case<'a>, Failure> {
         let (ads, _) = asked.selected_for(scenario)?;
         let stage = Stage::new(table, scenario)?;
-        let (log, _, first) = stage.first_counted(&ads);
-        let Some(index) = first else {
+        let (log, _, found) = stage.first_found(&ads);
+        let Some(found) = found else {
             let count = plural(log.collisions.len(), "collision");
             return Err(Failure::usage(format!(
-                "`{}` has no counted collision to explain with this driving system ({count} in all)",
+                "`{}` has no counted collision and no claimed breach to explain with this driving system ({count} in all)",
                 scenario.name
             )));
         };
-        Ok(Case { stage, ads, log, index })
+        Ok(Case { stage, ads, log, found })
     }
 }
 
@@ -104,21 +108,23 @@ struct Explained {
     file: PathBuf,
     scenario: String,
     ads: &'static str,
-    collision: Collision,
-    /// What the author calls the obstacle.
-    body: String,
+    /// What was found, in words and in JSON.
+    heading: String,
+    what: serde_json::Value,
     diagnosis: Diagnosis,
     likelihood: Option<Likelihood>,
 }
 
 impl Explained {
     fn in_json(&self) -> serde_json::Value {
-        serde_json::json!({
-            "file": self.file, "scenario": self.scenario, "ads": self.ads,
-            "obstacle": self.collision.contact.obstacle, "time_s": self.collision.contact.time_s,
-            "priority": self.collision.contact.priority.name(),
-            "diagnosis": self.diagnosis, "likelihood": self.likelihood,
-        })
+        let mut told = serde_json::json!({
+            "file": self.file, "scenario": self.scenario, "ads": self.ads, "diagnosis": self.diagnosis,
+            "likelihood": self.likelihood,
+        });
+        if let (Some(told), Some(what)) = (told.as_object_mut(), self.what.as_object()) {
+            told.extend(what.clone());
+        }
+        told
     }
 
     /// The cause in a word or two.
@@ -141,22 +147,21 @@ fn explain(
     file: &Path,
 ) -> Result<Explained, Failure> {
     let (table, scenario) = look::unchanged(output, file)?;
-    let Case { stage, ads, log, index } = Case::of(&table, &scenario, asked)?;
+    let Case { stage, ads, log, found } = Case::of(&table, &scenario, asked)?;
     let setup = stage.setup(&ads);
-    let diagnosis = oracle::diagnose(&setup, &log, index, baseline).map_err(Failure::usage)?;
-    let likelihood = arguments.likelihood.map(|count| oracle::likelihood(&setup, &log, index, count));
-    let collision = log.collisions[index];
-    let body = table.space().body_name(collision.body).to_owned();
+    let diagnosis = oracle::diagnose(&setup, &log, found, baseline).map_err(Failure::usage)?;
+    let likelihood = arguments.likelihood.map(|count| oracle::likelihood(&setup, &log, found, count));
+    let (heading, what) = told(&table, &log, found);
     let (file, scenario) = (file.to_owned(), scenario.name.clone());
-    Ok(Explained { file, scenario, ads: ads.name(), collision, body, diagnosis, likelihood })
+    Ok(Explained { file, scenario, ads: ads.name(), heading, what, diagnosis, likelihood })
 }
 
 /// The share of all files' crashes that vanish without each documented weakness, and by chance.
 fn mechanisms(output: &Output, arguments: &DiagnoseArguments, asked: &Asked) -> Result<(), Failure> {
     let found = each_file(output, &arguments.many, None, |file| {
         let (table, scenario) = look::unchanged(output, file)?;
-        let Case { stage, ads, log, index } = Case::of(&table, &scenario, asked)?;
-        let found = oracle::mechanisms(&stage.setup(&ads), &log, index).map_err(Failure::usage)?;
+        let Case { stage, ads, log, found } = Case::of(&table, &scenario, asked)?;
+        let found = oracle::mechanisms(&stage.setup(&ads), &log, found).map_err(Failure::usage)?;
         Ok((file.clone(), scenario.name.clone(), found))
     })?;
     let crashes: Vec<Mechanisms> = found.done.iter().map(|(_, _, crash)| crash.clone()).collect();
@@ -178,7 +183,7 @@ fn shares_text(crashes: usize, shares: &[MechanismShare], placebo: Option<&Estim
     let mut text = format!(
         "{}; each weakness switched off alone when the obstacle appears, what vanishes (95 %):\n\
          {:<34}{:<24}{:<24}{}",
-        plural(crashes, "collision"),
+        plural(crashes, "finding"),
         "weakness",
         "with the crash's noise",
         "with other noise",
@@ -208,41 +213,53 @@ fn percent_text(share: &Estimate) -> String {
     format!("{:>4.0} %{interval}", percent(share.mean))
 }
 
-fn heading(body: &str, collision: &Collision) -> String {
-    format!(
-        "{body} npc#{} ({}) is hit at {:.2} s; {}",
-        collision.contact.obstacle,
-        collision.verb.name(),
-        collision.contact.time_s,
-        priority_text(collision.contact.priority)
-    )
+/// What was found, in words and in JSON.
+fn told(table: &ActionTable, log: &EpisodeLog, found: Found) -> (String, serde_json::Value) {
+    match found {
+        Found::Collision(index) => {
+            let collision = &log.collisions[index];
+            let Contact { obstacle, time_s, priority, .. } = collision.contact;
+            let body = table.space().body_name(collision.body);
+            let (verb, first) = (collision.verb.name(), priority_text(priority));
+            let heading = format!("{body} npc#{obstacle} ({verb}) is hit at {time_s:.2} s; {first}");
+            let priority = priority.name();
+            (heading, serde_json::json!({ "obstacle": obstacle, "time_s": time_s, "priority": priority }))
+        }
+        Found::Breach(index) => {
+            let breach = &log.breaches[index];
+            let (name, time_s) = (&table.space().requirements[breach.requirement].name, breach.time_s);
+            let heading = format!("`{name}` is not kept at {time_s:.2} s");
+            (heading, serde_json::json!({ "requirement": name, "time_s": time_s }))
+        }
+    }
 }
 
 fn table_text(evidence: &Evidence) -> String {
+    let noun = evidence.noun;
     let mut text = format!(
         "\n{:<14}{:<20}{:<20}{:<18}{}",
         "module", "as in the baseline", "without its errors", "its errors alone", "with other noise"
     );
     let mut line = |name: &str, restored: Option<Fate>, idealised: Fate, alone: &str, noise: &str| {
-        let restored = restored.map_or("the same", Fate::in_words);
-        let idealised = idealised.in_words();
+        let restored = restored.map_or_else(|| "the same".to_owned(), |fate| fate.in_words(noun));
+        let idealised = idealised.in_words(noun);
         let line = format!("{name:<14}{restored:<20}{idealised:<20}{alone:<18}{noise}");
         text.push('\n');
         text.push_str(line.trim_end());
     };
     for found in &evidence.modules {
         let noise = found.noise.map_or(String::new(), noise_text);
-        line(found.module.name(), found.restored, found.idealised, found.alone.in_words(), &noise);
+        line(found.module.name(), found.restored, found.idealised, &found.alone.in_words(noun), &noise);
     }
     line("all of them", evidence.baseline, evidence.ideal, "", "");
     if let Some(chance) = evidence.chance {
-        let count = format!("no crash in {} of {}", chance.vanished, chance.replays);
+        let count = format!("no {noun} in {} of {}", chance.vanished, chance.replays);
         text.push_str(&format!("\n{:<72}{count}", "nothing changed (chance)"));
     }
     for found in &evidence.pairs {
         let [first, second] = found.modules.map(|module| module.name());
         let noise = found.noise.map_or(String::new(), |noise| format!("; {}", noise_text(noise)));
-        text.push_str(&format!("\n{first} and {second}: no crash {}{noise}", changed_text(evidence)));
+        text.push_str(&format!("\n{first} and {second}: no {noun} {}{noise}", changed_text(evidence)));
     }
     text
 }
@@ -264,11 +281,11 @@ fn noise_text(noise: Comparison) -> String {
     )
 }
 
-fn weaknesses_text(weaknesses: &[WeaknessFinding]) -> String {
+fn weaknesses_text(evidence: &Evidence) -> String {
     let mut text = format!("\n{:<34}{:<14}{}", "weakness", "without it", "with other noise");
-    for found in weaknesses {
+    for found in &evidence.weaknesses {
         let noise = found.noise.map_or(String::new(), noise_text);
-        let line = format!("{:<34}{:<14}{noise}", found.weakness, found.without.in_words());
+        let line = format!("{:<34}{:<14}{noise}", found.weakness, found.without.in_words(evidence.noun));
         text.push('\n');
         text.push_str(line.trim_end());
     }
@@ -289,7 +306,7 @@ fn measured_text(measured: &[Measure]) -> String {
 fn sentence(diagnosis: &Diagnosis) -> String {
     let Diagnosis { cause, verdict, weakness, evidence } = diagnosis;
     let name = cause.iter().map(|module| module.name()).collect::<Vec<_>>().join(joint(*verdict));
-    let changed = changed_text(evidence);
+    let (changed, noun) = (changed_text(evidence), evidence.noun);
     // Other modules that prevent it, told apart from chance.
     let told_apart: Vec<&str> = evidence
         .told_apart()
@@ -303,7 +320,7 @@ fn sentence(diagnosis: &Diagnosis) -> String {
     match verdict {
         Verdict::Outside => {
             let mut found = evidence.modules.iter().filter(|found| cause.contains(&found.module));
-            let is_alone = |found: &ModuleFinding| found.alone == Fate::Crash;
+            let is_alone = |found: &ModuleFinding| found.alone == Fate::Same;
             let alone = if evidence.baseline == Some(Fate::Vanished) && found.all(is_alone) {
                 format!(
                     ", and {} alone lead to it",
@@ -313,35 +330,36 @@ fn sentence(diagnosis: &Diagnosis) -> String {
                 String::new()
             };
             let crash = perfect_text(evidence, cause);
-            format!("{name} is at fault: {}{alone}{crash}{others}", mended_text(cause, changed))
+            format!("{name} is at fault: {}{alone}{crash}{others}", mended_text(cause, changed, noun))
         }
         Verdict::Weakness => {
             let weakness = weakness.unwrap_or_default();
-            format!("{name} is at fault by a documented weakness: without `{weakness}` there is no crash")
+            format!("{name} is at fault by a documented weakness: without `{weakness}` there is no {noun}")
         }
         Verdict::Measured => {
             let error = evidence.beyond_specification().map_or(String::new(), |found| {
                 format!("{} was {:.2}, and {:.2} is specified", found.what, found.worst, found.bound)
             });
-            format!("{name} is at fault by what it gave this time: {error}; {changed}, there is no crash")
+            format!("{name} is at fault by what it gave this time: {error}; {changed}, there is no {noun}")
         }
-        Verdict::Deciding => format!("{name} is at fault: {}{others}", mended_text(cause, changed)),
+        Verdict::Deciding => format!("{name} is at fault: {}{others}", mended_text(cause, changed, noun)),
         Verdict::Brittle => format!(
             "{name} is brittle: it could not bear the errors of {}, which are within their specification",
             told_apart.join(", ")
         ),
         Verdict::Together => {
-            format!("{name} are at fault together: both {changed}, there is no crash")
+            format!("{name} are at fault together: both {changed}, there is no {noun}")
         }
         Verdict::Baseline => {
-            let baseline = evidence.baseline.map_or("the same", Fate::in_words);
+            let baseline =
+                evidence.baseline.map_or_else(|| "the same".to_owned(), |fate| fate.in_words(noun));
             format!(
                 "no module is at fault by what differs from the baseline: with all as in the baseline, there is {}",
-                if baseline == "crash" { "the crash as well" } else { baseline }
+                if baseline == noun { format!("the {noun} as well") } else { baseline }
             )
         }
         Verdict::Chance => format!(
-            "no module is named: what prevents the crash with its own noise ({}) is not told apart from chance{}",
+            "no module is named: what prevents the {noun} with its own noise ({}) is not told apart from chance{}",
             preventing(evidence).join(", "),
             chance_text(evidence)
         ),
@@ -350,24 +368,25 @@ fn sentence(diagnosis: &Diagnosis) -> String {
 }
 
 /// That the collision is gone if the module at fault is changed, whichever of several it is.
-fn mended_text(cause: &[Module], changed: &str) -> String {
+fn mended_text(cause: &[Module], changed: &str, noun: &str) -> String {
     let one = match cause {
-        [_] => return format!("{changed}, there is no crash"),
+        [_] => return format!("{changed}, there is no {noun}"),
         [_, _] => "either",
         _ => "any of them",
     };
-    format!("with {one} {changed} there is no crash, and the replays do not tell them apart")
+    format!("with {one} {changed} there is no {noun}, and the replays do not tell them apart")
 }
 
 /// That a module which crashes by what differs from the baseline crashes without any errors as well: the collision hangs
 /// on how it errs, and not on how much.
 fn perfect_text(evidence: &Evidence, cause: &[Module]) -> String {
-    let crashes = |found: &&ModuleFinding| matches!(found.idealised, Fate::Crash | Fate::Other);
+    let crashes = |found: &&ModuleFinding| matches!(found.idealised, Fate::Same | Fate::Other);
     let found = evidence.modules.iter().filter(|found| cause.contains(&found.module)).filter(crashes);
     let names: Vec<&str> = found.map(|found| found.module.name()).collect();
+    let noun = evidence.noun;
     match names.as_slice() {
         [] => String::new(),
-        names => format!("; but with {} free of errors there is a crash as well", names.join(" or ")),
+        names => format!("; but with {} free of errors there is a {noun} as well", names.join(" or ")),
     }
 }
 
@@ -392,9 +411,9 @@ fn preventing(evidence: &Evidence) -> Vec<String> {
     modules.chain(weaknesses).chain(pairs).collect()
 }
 
-fn likelihood_text(likelihood: &Likelihood) -> String {
+fn likelihood_text(likelihood: &Likelihood, noun: &str) -> String {
     format!(
-        "\n{} of {} small variations crash: {:.0} %, between {:.0} and {:.0} % (95 %)",
+        "\n{} of {} small variations have the {noun}: {:.0} %, between {:.0} and {:.0} % (95 %)",
         likelihood.crashes,
         likelihood.variations,
         likelihood.share * 100.0,
@@ -416,8 +435,8 @@ mod tests {
             ModuleFinding {
                 module,
                 restored: (differs && is_asked).then_some(Fate::Vanished),
-                idealised: if is_asked { Fate::Vanished } else { Fate::Crash },
-                alone: Fate::Crash,
+                idealised: if is_asked { Fate::Vanished } else { Fate::Same },
+                alone: Fate::Same,
                 noise: (is_asked && verdict != Verdict::Chance).then_some(told_apart),
                 noise_alone: None,
                 signs: Vec::new(),
@@ -425,6 +444,7 @@ mod tests {
         };
         let measure = Measure { module: Module::Perception, what: "error, m", worst: 2.0, bound: 1.0 };
         let evidence = Evidence {
+            noun: "crash",
             modules: Module::ALL.into_iter().map(finding).collect(),
             baseline: differs.then_some(Fate::Vanished),
             ideal: Fate::Vanished,
@@ -468,7 +488,7 @@ mod tests {
     #[test]
     fn a_sentence_says_what_weakens_it() {
         let mut found = diagnosis(Verdict::Outside, &[Module::Perception], true);
-        found.evidence.modules[Module::Perception as usize].idealised = Fate::Crash;
+        found.evidence.modules[Module::Perception as usize].idealised = Fate::Same;
         assert_eq!(
             sentence(&found),
             "perception is at fault: as in the baseline, there is no crash, and its errors alone lead to it; but \

@@ -35,7 +35,9 @@ fn page(space: &Space) -> String {
         text.push_str("## Requirements\n\n");
         for required in &space.requirements {
             let optional = if required.optional { ", optional" } else { "" };
-            let _ = writeln!(text, "- `{}`{optional}: {}", required.name, inline(&required.docs));
+            let on: Vec<&str> = required.on.iter().map(|body| space.body_name(*body)).collect();
+            let on = if on.is_empty() { String::new() } else { format!(", of each {}", on.join(", ")) };
+            let _ = writeln!(text, "- `{}`{optional}{on}: {}", required.name, inline(&required.docs));
         }
         text.push('\n');
     }

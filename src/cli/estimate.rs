@@ -6,8 +6,9 @@ use std::sync::atomic::AtomicBool;
 
 use avastra_base::statistics::Interval;
 use avastra_campaign::estimate::{
-    Comparison, ComparisonResults, Estimate, EstimateDatabase, EstimateResults, EstimateSettings, Found,
-    Mass, Met, Method, PILOT, Part, Pilot, Plan, Played, Probability, Stopping, compared, pilot, play_parts,
+    Comparison, ComparisonResults, Estimate, EstimateDatabase, EstimateResults, EstimateSettings, EventKind,
+    Found, Mass, Met, Method, PILOT, Part, Pilot, Plan, Played, Probability, Stopping, compared, pilot,
+    play_parts,
 };
 use avastra_campaign::run::{DatabaseError, Run, RunSettings, Shard, Units};
 use avastra_world::action::ActionTable;
@@ -152,7 +153,7 @@ fn play_all(
     write(&path.join("results.json"), &format!("{text}\n"))?;
     output.say(&estimate_text(&results, is_unfinished, share.shard));
     let critical = directory.critical(output)?;
-    output.say(&critical_text(&path, &critical));
+    output.say(&critical_text(&path, &critical, &[]));
     let is_reproducible = is_reproducible(output, estimate.run().arena().program());
     output.result(serde_json::json!({
         "directory": path, "results": results, "critical": critical, "reproducible": is_reproducible,
@@ -330,7 +331,9 @@ fn write_scenarios(
     let player = Player { command: "estimate", table: estimate.run().table(), agent, without, with };
     let critical = directory.join("critical");
     let write_one = |met: &Met| {
-        if met.summary.counted() == 0 {
+        // Of breaches there is a scenario only where they are asked for.
+        let is_breach = estimate.settings().event.is_breach();
+        if met.summary.counted() == 0 && !is_breach {
             return Ok(None);
         }
         // An episode and the trials beside it have one number, and differ by step and row.
@@ -355,7 +358,7 @@ fn wanted(output: &Output, arguments: &EstimateArguments) -> Result<(Estimate, S
     let under_test = load::named(&arguments.under_test.ads)?;
     let (conditions, episodes) = (&arguments.conditions, arguments.episodes.unwrap_or(EPISODES));
     let settings = EstimateSettings {
-        event: arguments.event,
+        event: EventKind::from(arguments.event.clone()),
         method: arguments.method,
         parts: arguments.parts,
         stopping: Stopping { precision: arguments.precision, hours: arguments.hours },
@@ -388,7 +391,9 @@ fn compare(
         Ok::<_, Failure>(Run::new(table.clone(), settings)?)
     };
     let (first, second) = (side(sides[0])?, side(sides[1])?);
-    let comparison = Comparison { first, second, event: arguments.event };
+    let event = EventKind::from(arguments.event.clone());
+    event.check(table.space(), first.arena().rules()).map_err(Failure::usage)?;
+    let comparison = Comparison { first, second, event };
     let numbers: Vec<usize> = (0..comparison.pairs()).collect();
     output.tell(&format!(
         "{}: {} and {} in the same {}",
@@ -416,7 +421,8 @@ fn compare(
         output.say("no comparison: a driving system failed; `avastra run` with it says how");
         return Err(Failure::Ads { findings: failed });
     }
-    let results = ComparisonResults::new(comparison.event, &pairs).expect("there is at least one episode");
+    let results =
+        ComparisonResults::new(comparison.event.clone(), &pairs).expect("there is at least one episode");
     output.say(&comparison_text(&results, sides));
     let sides_repeat =
         [&comparison.first, &comparison.second].map(|run| is_reproducible(output, run.arena().program()));

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use avastra_campaign::run::{Asked, Database, DatabaseError, RunSettings, Units, recorded};
+use avastra_campaign::run::{Asked, Database, DatabaseError, FoundIn, RunSettings, Units, recorded};
 use avastra_campaign::study::StudyResults;
 use avastra_campaign::train::TrainSettings;
 use avastra_exchange::report::{self, Page, Scene, record, record_another};
@@ -270,8 +270,7 @@ fn of_run(
     let groups = database.groups().map_err(unread)?;
     let name = |road: &str, episode: i64| format!("{road}_{episode:04}");
     found.examples = groups.iter().map(|group| name(&group.road, group.episode)).collect();
-    let worst = database.worst().map_err(unread)?;
-    found.worst = worst.iter().map(|(road, episode)| name(road, *episode)).collect();
+    found.worst = database.found().map_err(unread)?.iter().map(FoundIn::name).collect();
     Ok(remarks)
 }
 

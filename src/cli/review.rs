@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use avastra_campaign::emit;
-use avastra_campaign::episode::{EpisodeLog, Outcome};
+use avastra_campaign::episode::{EpisodeLog, Outcome, Script};
 use avastra_campaign::oracle::{self, ClaimResult};
 use avastra_campaign::run::{Asked, EpisodeSummary, RunError, Stage, recorded_traffic};
 use avastra_drivers::external;
@@ -120,6 +120,8 @@ pub fn review(
     let episode = scenario.origin.episode.unwrap_or(0) as usize;
     let mut summary = EpisodeSummary::judged(&setup, episode, &log);
     summary.find_keepers(&setup, &log);
+    let replays = scenario.replays();
+    summary.find_recurrence(&setup, &Script::of_scenario(&scenario), &log, replays);
     let change = match &illegal {
         None => change(&scenario, (&log, &summary), table, results),
         // Whatever it crashes with: it is not this scenario that does.
@@ -233,6 +235,7 @@ fn change(
         Claim::Collision { .. } => Change::OtherTime,
         Claim::Breach { .. } if is_breached(claim) => Change::OtherTime,
         Claim::Breach { .. } | Claim::Kept { .. } => Change::OtherVerdict,
+        Claim::Recurrence { .. } => Change::OtherDrive,
         Claim::Verdict { .. } | Claim::Avoidability { .. } | Claim::Cause { .. } | Claim::Priority { .. } => {
             Change::OtherVerdict
         }
@@ -249,6 +252,7 @@ fn newly_hit(scenario: &Scenario, summary: &EpisodeSummary) -> Vec<String> {
             | Claim::Avoidability { obstacle, .. }
             | Claim::Cause { obstacle, .. }
             | Claim::Priority { obstacle, .. }
+            | Claim::Recurrence { obstacle, .. }
             | Claim::Minimal { obstacle } => obstacle.is_some_and(|obstacle| obstacle.number == number),
             Claim::Proc(_) | Claim::Trace(_) | Claim::End(_) | Claim::Breach { .. } | Claim::Kept { .. } => {
                 false

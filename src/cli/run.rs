@@ -1,5 +1,6 @@
 //! `avastra run`: plays episodes and writes their crashes as scenarios.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -7,7 +8,7 @@ use std::sync::atomic::Ordering;
 use avastra_campaign::emit;
 use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::run::{
-    Database, DatabaseError, EpisodeSummary, Group, Numbered, PolicyReference, RefusalCount,
+    Database, DatabaseError, EpisodeSummary, FoundIn, Group, Numbered, PolicyReference, RefusalCount,
     RequirementCount, Run, RunSettings, Totals, play,
 };
 use avastra_drivers::external::{Conversation, Problem};
@@ -136,8 +137,9 @@ fn play_all(
         output.say(&refusals_text(&refusals));
     }
     let groups = directory.read(Database::groups)?;
+    let found = directory.read(Database::found)?;
     if !groups.is_empty() {
-        output.say(&groups_text(&groups));
+        output.say(&groups_text(&groups, &found));
     }
     let requirements = directory.read(Database::requirements)?;
     if !requirements.is_empty() {
@@ -145,8 +147,8 @@ fn play_all(
     }
     let never = Never::new(run.table(), &directory.read(Database::rows)?);
     output.say(&never.in_words(output.verbose));
-    let critical = directory.critical(output)?;
-    output.say(&critical_text(&directory.path, &critical));
+    let critical = worst_first(directory.critical(output)?, &found);
+    output.say(&critical_text(&directory.path, &critical, &found));
     let failures = directory.read(Database::failures)?;
     if !failures.is_empty() {
         let place = format!("; each is in {}/failures", directory.path.display());
@@ -162,7 +164,7 @@ fn play_all(
     cut_off(program).iter().for_each(|note| output.warn(note));
     output.result(serde_json::json!({
         "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups,
-        "requirements": requirements, "never": never, "critical": critical, "failures": failures, "reproducible": is_reproducible,
+        "requirements": requirements, "never": never, "critical": critical, "found": found, "failures": failures, "reproducible": is_reproducible,
     }));
     share.end(output, directory, is_over, program)?;
     Ok(totals)
@@ -183,7 +185,7 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<Option<(Run, Direc
     let agent = policy.as_ref().map_or(&arguments.conditions.agent, |(_, policy)| &policy.name);
     let under_test = load::named(&arguments.under_test.ads)?;
     let settings = conditions::settings(space, &arguments.conditions, agent, under_test, arguments.episodes)?;
-    let settings = RunSettings { causes: arguments.causes, ..settings };
+    let settings = RunSettings { causes: arguments.causes, replays: arguments.replays, ..settings };
     let settings = settings.started_unless(arguments.shard.dry_run);
     let run = ready(table, settings, policy.as_ref(), face)?;
     if arguments.shard.dry_run {
@@ -341,6 +343,13 @@ fn totals_text(totals: &Totals, elapsed_s: f64, played: usize) -> String {
     if let Some(first_s) = totals.first_counted_s_mean {
         text.push_str(&format!(", the first after {first_s:.1} s on average"));
     }
+    if totals.replayed > 0 {
+        text.push_str(&format!(
+            "\n{} of {} happen again in more than half of their replays under other noise",
+            totals.recurring,
+            plural(totals.replayed as usize, "finding")
+        ));
+    }
     if totals.red_runs > 0 {
         text.push_str(&format!("\n{} passed", plural(totals.red_runs as usize, "red light")));
     }
@@ -370,8 +379,8 @@ fn refusals_text(refusals: &[RefusalCount]) -> String {
     cut_short(head, refusals, line, |more| format!("and for {more} other reasons"))
 }
 
-/// Distinct failures, each with how often it was found and a scenario that shows it.
-pub fn groups_text(groups: &[Group]) -> String {
+/// Distinct failures, each with how often it was found and a scenario that shows it, and how often that recurs.
+pub fn groups_text(groups: &[Group], found: &[FoundIn]) -> String {
     let line = |group: &Group| {
         let cause = match group.cause.as_deref() {
             None => String::new(),
@@ -384,8 +393,10 @@ pub fn groups_text(groups: &[Group]) -> String {
             "other" => ", the other first",
             _ => "",
         };
+        let example = found.iter().find(|of| of.episode == group.episode);
+        let again = example.and_then(|of| of.recurrence).map_or(String::new(), |again| format!(", {again}"));
         format!(
-            "{} × {} ({}, {}{priority}), hit by the {}{shape}{cause}: {}_{:04}",
+            "{} × {} ({}, {}{priority}), hit by the {}{shape}{cause}: {}_{:04}{again}",
             group.count, group.kind, group.manoeuvre, group.approach, group.side, group.road, group.episode
         )
     };
@@ -399,22 +410,29 @@ fn requirements_text(requirements: &[RequirementCount]) -> String {
         (Some(smallest), Some(unit)) => format!("{smallest:.2} {unit}").trim_end().to_owned(),
         (Some(_) | None, _) => String::new(),
     };
+    // That it is kept says little where it is hardly ever asked.
+    let asked = |of: &RequirementCount| {
+        let episodes = plural(of.asked_in as usize, "episode");
+        format!("asked for {:.1} s in {episodes}", of.asked_s)
+    };
     let line = |of: &RequirementCount| match (&of.scenario, figure(of)) {
         (Some(scenario), figure) => format!(
-            "{} × {} in {} ({} of them kept by a careful driver){}: {scenario}",
+            "{} × {} in {} ({} of these kept by a careful driver){}: {scenario}; {}",
             of.breaches,
             of.requirement,
             plural(of.breached_in as usize, "episode"),
             of.kept_in,
             if figure.is_empty() { figure } else { format!(", by up to {}", figure.trim_start_matches('-')) },
+            asked(of),
         ),
+        (None, _) if of.asked_in == 0 => format!("{} never asked", of.requirement),
         (None, figure) if figure.is_empty() && of.unit.is_some() => {
-            format!("{} never asked for long enough", of.requirement)
+            format!("{} never asked for long enough; {}", of.requirement, asked(of))
         }
-        (None, figure) if figure.is_empty() => format!("{} kept", of.requirement),
+        (None, figure) if figure.is_empty() => format!("{} kept; {}", of.requirement, asked(of)),
         (None, figure) => {
             let nearest = of.nearest.as_deref().unwrap_or_default();
-            format!("{} kept, by at least {figure}: {nearest}", of.requirement)
+            format!("{} kept, by at least {figure}: {nearest}; {}", of.requirement, asked(of))
         }
     };
     let breached = requirements.iter().filter(|of| of.breaches > 0).count();
@@ -422,13 +440,36 @@ fn requirements_text(requirements: &[RequirementCount]) -> String {
     cut_short(head, requirements, line, |more| format!("and {more} others"))
 }
 
-pub fn critical_text(directory: &Path, files: &[PathBuf]) -> String {
+/// Files of scenarios in the order of what was found in them.
+fn worst_first(mut files: Vec<PathBuf>, found: &[FoundIn]) -> Vec<PathBuf> {
+    files.sort_by_cached_key(|file| {
+        found.iter().position(|of| file.file_stem().is_some_and(|stem| *stem == *of.name()))
+    });
+    files
+}
+
+/// Lists scenarios in the order of their files. What was found in them says how sure and how bad it is.
+pub fn critical_text(directory: &Path, files: &[PathBuf], found: &[FoundIn]) -> String {
     if files.is_empty() {
         return "no critical scenario".to_owned();
     }
+    let by_name: BTreeMap<String, &FoundIn> = found.iter().map(|of| (of.name(), of)).collect();
+    let line = |file: &PathBuf| {
+        let of = file.file_stem().and_then(|stem| by_name.get(&*stem.to_string_lossy()));
+        let recurrence = of.and_then(|of| of.recurrence);
+        let told = [
+            recurrence.map(|recurrence| match recurrence.is_fluke() {
+                true => format!("a fluke: recurs in {recurrence}"),
+                false => format!("recurs in {recurrence}"),
+            }),
+            of.and_then(|of| of.harm.clone()),
+        ];
+        let told: Vec<String> = told.into_iter().flatten().collect();
+        let told = if told.is_empty() { String::new() } else { format!("  {}", told.join(", ")) };
+        format!("{}{told}", file.display())
+    };
     let head = format!("\n{} with a counted collision or a breach:", plural(files.len(), "scenario"));
-    let mut text =
-        cut_short(head, files, |file| file.display().to_string(), |more| format!("and {more} more"));
+    let mut text = cut_short(head, files, line, |more| format!("and {more} more"));
     // The star stands outside of the quotes: the shell must expand it.
     let directory = for_shell(directory);
     text.push_str(&format!("\nreplay them with: avastra replay {directory}/critical/*.ava"));

@@ -122,8 +122,9 @@ run
   never.legal[] object a row that no step allowed; what `refused` it, and how often
   never.chosen[] object a row that was legal, but that the agent never chose
   never.realised[] object a row that was chosen, but never carried out
-  requirements[] object a requirement in force: `breaches`, `breached_in` and `kept_in` (episodes), the `smallest` margin in its `unit`, the `nearest` episode, a `scenario` with the worst breach
-  critical[] text scenarios with a counted collision or a breach
+  requirements[] object a requirement in force: for how long it was asked (`asked_s`, `asked_in` episodes), `breaches`, `breached_in` and `kept_in` (episodes), the `smallest` margin in its `unit`, the `nearest` episode, a `scenario` with the worst breach
+  critical[] text scenarios with a counted collision or a breach, the surest and worst first
+  found[] object an episode with a finding: `road`, `episode`, whether something of it is `counted`, its `recurrence` (`recurred` of `replays`), the `harm` of its worst collision
   failures[] object what went wrong with a driving system of your own: `kind`, `problem`, `times`, `detail`, `scenario`
   REPRODUCIBLE
 ads check
@@ -157,7 +158,7 @@ estimate
   PLANNED
   directory text where the estimate stands
   results.schema number of `results`, as in results.json
-  results.event text `counted` or `collision`
+  results.event text `counted`, `collision`, `breach` or the name of a requirement
   results.method text `count` or `probe`
   results.parts number parts that are done
   results.parts_wanted number all parts, if it does not stop before
@@ -190,7 +191,7 @@ merge
 estimate --than
   sides[] text the two driving systems
   results.schema number of `results`
-  results.event text `counted` or `collision`
+  results.event text `counted`, `collision`, `breach` or the name of a requirement
   results.episodes number pairs
   results.both number pairs with the event under both
   results.first_only number under the first alone

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use avastra_campaign::emit;
-use avastra_campaign::episode::{Breach, Outcome, Script, Setup};
+use avastra_campaign::episode::{Outcome, Script, Setup};
 use avastra_campaign::oracle::{self, Found};
 use avastra_campaign::run::{self, Asked, EpisodeSummary, Stage};
 use avastra_drivers::Selected;
@@ -134,14 +134,8 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
         )));
     }
     let stage = Stage::new(&table, &scenario)?;
-    let (log, judgements, first) = stage.first_counted(&ads);
-    let own = |breach: &Breach| {
-        let name = &table.space().requirements[breach.requirement].name;
-        scenario.breached().any(|claimed| claimed == name)
-    };
-    // A crash is more than a breach that led to it.
-    let breach = || log.breaches.iter().position(own).map(Found::Breach);
-    let Some(found) = first.map(Found::Collision).or_else(breach) else {
+    let (log, judgements, found) = stage.first_found(&ads);
+    let Some(found) = found else {
         let name = &scenario.name;
         let message = format!("`{name}` has no counted collision and no claimed breach that could be kept");
         return Err(Failure::usage(message));
@@ -170,6 +164,7 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
     };
     let mut summary = EpisodeSummary::new(table.space(), source.episode, &shrunk.log, shrunk.judgements);
     summary.find_keepers(&setup, &shrunk.log);
+    summary.find_recurrence(&setup, &shrunk.script, &shrunk.log, scenario.replays());
     if let Found::Collision(index) = shrunk.found {
         summary.collisions[index].minimal = spare.is_empty();
     }

@@ -4,7 +4,11 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use avastra_campaign::emit;
-use avastra_campaign::run::{Database, RunSettings, Shard, TrafficRecord};
+use avastra_campaign::episode::Script;
+use avastra_campaign::oracle;
+use avastra_campaign::run::{
+    Database, EpisodeSummary, Group, RunSettings, Shard, Stage, TrafficRecord, Units,
+};
 use avastra_campaign::train::{Evaluation, TrainSettings, TrainedEpisode, Training, evaluate, rounded};
 use avastra_drivers::external::Attached;
 use avastra_lang::model::policy::{PolicyClaims, PolicyOrigin};
@@ -13,7 +17,7 @@ use avastra_lang::syntax::listed;
 use avastra_search::agent::{self, Kind, QPolicy, Settings};
 use avastra_world::action::Draw;
 
-use super::arguments::TrainArguments;
+use super::arguments::{REPLAYS, TrainArguments};
 use super::campaign::{self, Campaign, Outside, as_they_are};
 use super::conditions::roads_or_all;
 use super::error::Failure;
@@ -207,8 +211,10 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
         plural(evaluation.colliding as usize, "episode"),
     ));
     let groups = directory.read(Database::groups)?;
+    find_recurrence(output, training, &mut directory, &groups)?;
+    let found = directory.read(Database::found)?;
     if !groups.is_empty() {
-        output.say(&groups_text(&groups));
+        output.say(&groups_text(&groups, &found));
     }
     let critical = directory.critical(output)?;
     let rules = kept.as_ref().and_then(|(_, policy)| policy.claims.as_ref()?.rules.as_ref());
@@ -262,6 +268,40 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
     }));
     // If no episode was driven to its end, nothing was learned, so the command fails.
     if failed > 0 && failed == all { Err(Failure::Ads { findings: failed }) } else { Ok(()) }
+}
+
+/// Says of the example of each distinct failure how often it recurs, in its scenario and in the database. A training finds
+/// the same failure over and over, so one of each is played again and not all.
+fn find_recurrence(
+    output: &Output,
+    training: &Training,
+    directory: &mut Directory,
+    groups: &[Group],
+) -> Result<(), Failure> {
+    let TrainSettings { agent, without, with, .. } = training.settings();
+    let player = Player { command: "train", table: training.table(), agent, without, with };
+    let known = directory.read(Database::found)?;
+    let is_known = |episode| known.iter().any(|found| found.episode == episode && found.recurrence.is_some());
+    let written = directory.read(Units::scenarios)?;
+    let examples: Vec<i64> = groups.iter().map(|group| group.episode).filter(|&one| !is_known(one)).collect();
+    let examples = written.into_iter().filter(|one| examples.contains(&one.unit));
+    let files = run_directory::written(&directory.path, examples.collect());
+    if files.is_empty() || !oracle::can_replay(training.arena().ads()) {
+        return Ok(());
+    }
+    let _working = Working::new(output, "playing what it found again");
+    // What is edited or gone is the user's.
+    for (path, _) in files.iter().filter(|file| !run_directory::is_edited(file) && file.0.is_file()) {
+        let (table, scenario) = load::scenario(&Output::silent(), path)?;
+        let (stage, ads) = (Stage::new(&table, &scenario)?, training.arena().ads());
+        let (setup, log) = (stage.setup(ads), stage.play(ads, &mut |_, _, _| {}));
+        let episode = scenario.origin.episode.unwrap_or(0) as usize;
+        let mut summary = EpisodeSummary::judged(&setup, episode, &log);
+        summary.find_recurrence(&setup, &Script::of_scenario(&scenario), &log, REPLAYS);
+        let text = directory.write_critical(&player, (&log, &summary))?;
+        directory.write(|database| database.add_recurrence(&summary, &text))?;
+    }
+    Ok(())
 }
 
 /// Where to find what a search found, which has no policy file.

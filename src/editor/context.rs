@@ -4,7 +4,7 @@
 use avastra_lang::check::{Declaration, References, Symbol};
 use avastra_lang::model::Type;
 use avastra_lang::model::vocabulary::{
-    BREACHED, CHANGE, CommandField, EpisodeField, Fact, KEPT, Known, ROAD_USER, RoadField, SINCE,
+    BREACHED, CHANGE, CommandField, EpisodeField, Fact, KEPT, Known, RECURRENCE, ROAD_USER, RoadField, SINCE,
     ScenarioClaim, Site, SpaceClaim, SpawnField, StartField, StopReason, THERE, WAIT, Word, parts_of, things,
 };
 use avastra_lang::syntax::ast::{
@@ -158,7 +158,8 @@ impl<'a> Place<'a> {
             ItemKind::Rule(_) | ItemKind::Manoeuvre(_) => About::Rule,
             ItemKind::Reward(_) => About::Facts(Site::Reward),
             ItemKind::Verdict(_) => About::Facts(Site::Verdict),
-            ItemKind::Require(_) => About::Facts(Site::Requirement),
+            ItemKind::Require(of) if of.on.is_empty() => About::Facts(Site::Requirement),
+            ItemKind::Require(_) => About::Facts(Site::RequirementOn),
             ItemKind::EachStep(_) => About::Facts(Site::StepBegins),
             ItemKind::Odds(of) if of.name.text == SpaceClaim::Actions.name() => {
                 About::Facts(Site::StepBegins)
@@ -215,6 +216,7 @@ impl<'a> Place<'a> {
                 let condition = case.condition.as_ref().and_then(|when| self.within(when, None, None));
                 condition.or_else(|| self.within(&case.value, None, None))
             }),
+            ItemKind::Require(of) if any_here(&of.on) => Some(vec![Kind::Bodies]),
             ItemKind::Require(of) => of.parts().find_map(|part| self.within(part, None, None)),
             ItemKind::Verdict(of) => self.within(&of.condition, None, None),
             ItemKind::Expect(of) => self.within(&of.claim, bool, bool),
@@ -478,13 +480,15 @@ impl<'a> Place<'a> {
                 // Some facts are for requirements alone.
                 let is_here = |part: &str| {
                     let fact = Fact::from_name(&format!("{name}.{part}"));
-                    self.about == About::Facts(Site::Requirement)
+                    matches!(self.about, About::Facts(site) if site.is_requirement())
                         || fact.is_none_or(|fact| fact.known() != Known::Tick)
                 };
                 let parts = match things().contains(&name) {
                     true => parts_of(name).into_iter().filter(|(part, _)| is_here(part)).collect(),
                     false if is_named => parts_of("npc").into_iter().chain([THERE]).collect(),
-                    false if self.declared(Symbol::Requirement, name).is_some() => vec![BREACHED, KEPT],
+                    false if self.declared(Symbol::Requirement, name).is_some() => {
+                        vec![BREACHED, KEPT, RECURRENCE]
+                    }
                     false => return Some(Vec::new()),
                 };
                 Some(vec![Kind::Words(parts)])
@@ -587,7 +591,7 @@ impl<'a> Place<'a> {
                 kinds.extend(things().into_iter().map(Kind::Keyword));
                 kinds
             }
-            About::Facts(site @ (Site::StepBegins | Site::Requirement)) => {
+            About::Facts(site @ (Site::StepBegins | Site::Requirement | Site::RequirementOn)) => {
                 kinds.push(Kind::Words(words::facts(site)));
                 kinds.extend(things().into_iter().map(Kind::Keyword));
                 kinds

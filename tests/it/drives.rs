@@ -76,6 +76,7 @@ pub fn start(seed: u64) -> Start {
     let signal_phase_s = (seed * 7 % 60) as f64;
     let traffic = TrafficProfile::default();
     Start {
+        reactions: 0,
         ego_mps: avastra::model::START_MPS,
         time,
         sky: [3, 12, 5].map(pick),

@@ -74,8 +74,12 @@ fn emitted_scenarios_keep_every_claim() {
         let script = Script::of_scenario(scenario);
         let again = run.play(number, &mut |moment| script.choose(run.table(), moment), &mut |_, _, _| {});
         let judgements = oracle::judge(&run.setup(number), &script, &again);
-        let replays =
-            Replays { cause: &|_| Ok(Vec::new()), breached: &|| None, spare_steps: &|_| Ok(Vec::new()) };
+        let replays = Replays {
+            cause: &|_| Ok(Vec::new()),
+            breached: &|| None,
+            recurrence: &|_, _| Err(oracle::NoTries),
+            spare_steps: &|_| Ok(Vec::new()),
+        };
         for verdict in oracle::verify(run.space(), scenario, &again, &judgements, &replays) {
             assert_eq!(verdict.confirmed, Some(true), "{verdict:?}\n{text}");
         }

@@ -6,7 +6,7 @@ use avastra::ads::{ModularConfig, Module};
 use avastra::episode::EpisodeLog;
 use avastra::model::Space;
 use avastra::oracle;
-use avastra::oracle::{Diagnosis, Fate, Verdict};
+use avastra::oracle::{Diagnosis, Fate, Found, Verdict};
 use avastra::run::{Profile, Run, RunSettings};
 
 use crate::cases::root;
@@ -77,7 +77,12 @@ fn the_module_at_fault_is_named() {
         let run = Run::new(usual.table().clone(), settings).expect("the settings name what exists");
         let crashes = (begin..run.episodes()).filter_map(|number| crash(&run, number, module));
         let mut named = crashes.take(CRASHES).map(|(number, log, index)| {
-            let found = oracle::diagnose(&run.setup(number), &log, index, &ModularConfig::default());
+            let found = oracle::diagnose(
+                &run.setup(number),
+                &log,
+                Found::Collision(index),
+                &ModularConfig::default(),
+            );
             (number, found.expect("it has modules").cause)
         });
         // What is not told apart from chance, or from another module's part in it, is no mistake; but one of the crashes
@@ -106,7 +111,7 @@ fn what_is_as_in_the_baseline_is_not_blamed() {
         let Some(index) = summary.collisions.iter().find(|finding| finding.counted) else { continue };
         let (setup, index) = (run.setup(number), index.number);
         let against = |baseline: &ModularConfig| {
-            oracle::diagnose(&setup, &log, index, baseline).expect("it has modules")
+            oracle::diagnose(&setup, &log, Found::Collision(index), baseline).expect("it has modules")
         };
         let found = against(&default);
         let as_default = |module: &Module| planted.with_module_of(*module, &default) == planted;
@@ -160,8 +165,9 @@ fn crash(run: &Run, number: usize, module: Module) -> Option<(usize, EpisodeLog,
     let setup = run.setup(number);
     let planted = setup.ads.profile().expect("it has modules");
     let healthy = planted.with_module_of(module, &ModularConfig::default());
-    let fate = oracle::fate(&setup, &log, index, &healthy).expect("it has modules");
-    let likely = || 2 * oracle::likelihood(&setup, &log, index, VARIATIONS).crashes >= VARIATIONS;
+    let fate = oracle::fate(&setup, &log, Found::Collision(index), &healthy).expect("it has modules");
+    let likely =
+        || 2 * oracle::likelihood(&setup, &log, Found::Collision(index), VARIATIONS).crashes >= VARIATIONS;
     (fate == Fate::Vanished && likely()).then_some((number, log, index))
 }
 

@@ -79,6 +79,7 @@ fn a_step_out_from_behind_is_an_action_that_replays() {
 /// Tries spawns of all distances all along a road and follows each to its end; returns how many there were.
 fn walks(scene: &Arc<Scene>, side: Side, covers: &[Option<Body>]) -> usize {
     let start = Start {
+        reactions: 0,
         ego_mps: avastra::model::START_MPS,
         time: TimeOfDay::Noon,
         sky: [Level::None; 3],

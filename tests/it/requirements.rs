@@ -1,15 +1,25 @@
 //! What the ego vehicle must keep: breaches and margins against the definition, and what becomes of a breach.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::path::Path;
 
+use avastra::action::ActionTable;
+use avastra::check::Loaded;
 use avastra::episode::{Breach, EpisodeLog};
-use avastra::model::vocabulary::Light;
-use avastra::run::Run;
+use avastra::model::Claim;
+use avastra::model::vocabulary::{Body, Light};
+use avastra::rng::{Stream, child_seed};
+use avastra::run::{Run, Stage};
 use avastra::sim::{DT_S, World};
 use serde_json::Value;
 
 use crate::command::{avastra, done, fails, last_line, outcome};
-use crate::world::{assert_replays, run_against, space_at};
+use crate::world::{FLICKER, assert_replays, read, run_against, space_at};
+
+fn load(path: &str) -> Loaded {
+    avastra::check::load(Path::new(path), &read).expect("it is there")
+}
 
 const SPACE: &str = "tests/cases/spaces/requirements.ava";
 
@@ -118,6 +128,233 @@ fn breaches_are_those_of_a_naive_monitor() {
         assert_replays(&run, number, &log);
     }
     assert!(found.iter().all(|count| *count > 0) && replayed > 4, "{found:?} in {replayed} episodes");
+}
+
+/// What of a road user's gap, or of the ego vehicle, a naive monitor notes at every tick: `None` where nothing is asked.
+type Margins = Vec<(f64, Option<f64>)>;
+
+/// The breaches of margins by the definition, with the smallest margin that `within` leaves.
+fn of_margins(margins: &Margins, within: usize) -> (Vec<(f64, f64)>, Option<f64>) {
+    let ticks: Vec<Tick> = margins
+        .iter()
+        .map(|(time_s, margin)| Tick {
+            time_s: *time_s,
+            speed_mps: margin.unwrap_or(f64::NAN),
+            rains: margin.is_some(),
+            is_yellow: false,
+        })
+        .collect();
+    let breaches = naive(&ticks, |tick| tick.rains, |tick| tick.speed_mps >= 0.0, within);
+    let windows = margins.windows(within + 1).filter_map(|window| {
+        let all: Option<Vec<f64>> = window.iter().map(|(_, margin)| *margin).collect();
+        Some(all?.into_iter().fold(f64::NEG_INFINITY, f64::max))
+    });
+    (breaches, windows.reduce(f64::min))
+}
+
+/// The ticks in which a requirement of that name was asked, in ms.
+fn series_asked(gaps: &BTreeMap<u32, Margins>, jerks: &Margins, name: &str) -> BTreeSet<u64> {
+    let all: Vec<&Margins> = if name == "smooth" { vec![jerks] } else { gaps.values().collect() };
+    let asked = all.into_iter().flatten().filter(|(_, margin)| margin.is_some());
+    asked.map(|(time_s, _)| (time_s * 1000.0).round() as u64).collect()
+}
+
+#[test]
+fn what_is_asked_of_each_road_user_near_is_asked_of_each_by_itself() {
+    let run = run_against("idm", space_at("tests/cases/spaces/requirements_near.ava"), 10, 5, &[]);
+    let space = run.space().clone();
+    let mut found = [0; 3];
+    for number in 0..run.episodes() {
+        let log = run.episode(number);
+        let script = avastra::episode::Script::of_log(&log);
+        let (mut gaps, mut jerks): (BTreeMap<u32, Margins>, Margins) = Default::default();
+        let (mut accelerations, mut touched) = (Vec::new(), false);
+        let mut watch = |world: &World, _: &dyn avastra::ads::Ads, contacts: &[avastra::sim::Contact]| {
+            touched |= !contacts.is_empty();
+            if touched || world.ticks() == 0 {
+                return;
+            }
+            let (time_s, drives) = (world.time_s(), world.ego().speed_mps >= 2.0);
+            for obstacle in
+                world.obstacles().filter(|obstacle| !obstacle.is_apart && obstacle.distance_m <= 100.0)
+            {
+                if matches!(obstacle.body, Body::Pedestrian | Body::BoxTruck) {
+                    let margin = drives.then_some(obstacle.distance_m - 12.0);
+                    gaps.entry(obstacle.id).or_default().push((time_s, margin));
+                }
+            }
+            accelerations.push(world.ego().acceleration_mps2);
+            let before = accelerations.len().checked_sub(51).map(|at| accelerations[at]);
+            let jerk = before.map_or(0.0, |before| accelerations[accelerations.len() - 1] - before);
+            jerks.push((time_s, Some(jerk + 2.0)));
+        };
+        let again = run.play(number, &mut |moment| script.choose(run.table(), moment), &mut watch);
+        assert_eq!(again.breaches, log.breaches);
+        for (index, (name, within)) in
+            [("keeps_off", 0), ("keeps_off_long", 25), ("smooth", 0)].into_iter().enumerate()
+        {
+            let is_of = |breach: &&Breach| space.requirements[breach.requirement].name == name;
+            let of: Vec<(Option<u32>, f64, f64)> = log
+                .breaches
+                .iter()
+                .filter(is_of)
+                .map(|one| (one.obstacle, one.time_s, one.until_s))
+                .collect();
+            let series = match name {
+                "smooth" => vec![(None, &jerks)],
+                _ => gaps.iter().map(|(id, margins)| (Some(*id), margins)).collect(),
+            };
+            let mut expected = Vec::new();
+            let mut smallest: Option<f64> = None;
+            for (id, margins) in series {
+                let (breaches, least) = of_margins(margins, within);
+                expected.extend(breaches.into_iter().map(|(from_s, until_s)| (id, from_s, until_s)));
+                smallest = smallest.into_iter().chain(least).reduce(f64::min);
+            }
+            expected.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+            let mut of = of;
+            of.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+            assert_eq!(of, expected, "{name} in episode {number}");
+            let margin = log.margins.iter().find(|one| space.requirements[one.requirement].name == name);
+            let margin = margin.expect("it is in force");
+            assert_eq!(margin.smallest, smallest, "{name} in episode {number}");
+            // Of several at once it is asked once.
+            let asked: BTreeSet<u64> = series_asked(&gaps, &jerks, name);
+            assert!((margin.asked_s - asked.len() as f64 * DT_S).abs() < 1e-9, "{name} in episode {number}");
+            found[index] += expected.len();
+        }
+        assert_replays(&run, number, &log);
+    }
+    assert!(found.iter().all(|count| *count > 3), "{found:?}");
+}
+
+#[test]
+fn a_finding_says_how_often_it_recurs() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let out = scratch.path().join("found").display().to_string();
+    // Sensors that miss, so that much depends on the draw of their noise.
+    let run = [
+        "run",
+        SPACE,
+        "--ads",
+        FLICKER,
+        "--episodes",
+        "12",
+        "--seed",
+        "3",
+        "--road",
+        "crossroad",
+        "--replays",
+        "6",
+    ];
+    let found = last_line(&done(&[&run[..], &["--format", "json", "--out", &out]].concat()));
+    let all = found["found"].as_array().expect("a list");
+    let recurred = |of: &Value| of["recurrence"]["recurred"].as_i64().expect("it was tried");
+    assert!(all.iter().all(|of| of["recurrence"]["replays"] == 6 && (0..=6).contains(&recurred(of))));
+    let counts = ["replayed", "recurring"].map(|name| found["totals"][name].as_i64().expect("a number"));
+    assert!(counts[0] as usize >= all.len() && counts[1] <= counts[0], "{counts:?}");
+    // Flukes come last, in the list and on the page.
+    let flukes: Vec<bool> = all.iter().map(|of| 2 * recurred(of) <= 6).collect();
+    assert!(flukes.is_sorted(), "{flukes:?}");
+
+    let critical = found["critical"].as_array().expect("a list");
+    assert_eq!(critical.len(), all.len());
+    let first = critical[0].as_str().expect("a path");
+    assert!(first.contains(all[0]["road"].as_str().expect("a name")));
+    let text = fs::read_to_string(first).expect("it was written");
+    assert!(text.contains("recurrence == ") && text.contains(" It recurs in "), "{text}");
+    assert!(done(&["replay", first]).contains(" holds, "));
+    // The replays are counted here once more, by hand.
+    let scenario = load(first);
+    let table = ActionTable::new(scenario.space.clone().expect("a space without mistakes"));
+    let scenario = scenario.scenario.expect("it has a scenario");
+    let stage = Stage::new(&table, &scenario).expect("it plays");
+    let ads = avastra::run::recorded(&scenario).expect("it is known");
+    let script = avastra::episode::Script::of_scenario(&scenario);
+    let log = stage.play(&ads, &mut |_, _, _| {});
+    for claim in &scenario.claims {
+        let Claim::Recurrence { requirement: Some(name), recurred, replays, .. } = claim else { continue };
+        let again = |number: &u32| {
+            let mut setup = stage.setup(&ads.clone().with_other_noise(*number));
+            setup.start.reactions = child_seed(setup.seed, Stream::Noise, u64::from(*number)) | 1;
+            let mut steps = 0..=script.steps.len();
+            let choose = &mut |moment: &avastra::episode::Moment| match steps.next() {
+                Some(step) if step < script.steps.len() => script.choose(&table, moment),
+                Some(_) => avastra::episode::Choice::Pass,
+                None => avastra::episode::Choice::Stop,
+            };
+            avastra::episode::run(&setup, choose, &mut |_, _, _| {}).breach_of(table.space(), name).is_some()
+        };
+        assert_eq!((1..=*replays).filter(again).count(), *recurred as usize, "{name}");
+    }
+    assert!(log.breach_of(table.space(), "slow").is_some());
+
+    // A claim that does not hold is refuted, and a review mends it.
+    let lie: String = text
+        .lines()
+        .map(|line| match line.split_once("slow.recurrence == ") {
+            Some((before, _)) => format!("{before}slow.recurrence == 0 / 6\n"),
+            None => format!("{line}\n"),
+        })
+        .collect();
+    assert_ne!(lie, text, "the first one is a breach that recurs");
+    fs::write(first, &lie).expect("it can be written");
+    let (status, said, _) = outcome(&mut avastra(&["replay", first]));
+    assert!(status != 0 && said.contains("  claimed slow.recurrence 0 of 6"), "{said}");
+    let (_, said, _) = outcome(&mut avastra(&["test", "--accept", first]));
+    assert!(said.contains("1 scenario written anew"), "{said}");
+    assert_eq!(fs::read_to_string(first).expect("it is there"), text);
+
+    // Where nothing is asked, nothing is claimed.
+    let none = scratch.path().join("none").display().to_string();
+    let found =
+        last_line(&done(&[&run[..10], &["--replays", "0", "--format", "json", "--out", &none]].concat()));
+    assert_eq!(
+        (&found["totals"]["replayed"], &found["found"][0]["recurrence"]),
+        (&Value::from(0), &Value::Null)
+    );
+}
+
+#[test]
+fn a_breach_is_explained_and_estimated() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let out = scratch.path().join("found").display().to_string();
+    let space = "tests/cases/spaces/requirements_near.ava";
+    let run = ["run", space, "--ads", FLICKER, "--episodes", "20", "--seed", "3", "--replays", "0"];
+    let found = last_line(&done(&[&run[..], &["--format", "json", "--out", &out]].concat()));
+    let critical: Vec<&str> =
+        found["critical"].as_array().expect("a list").iter().filter_map(Value::as_str).collect();
+    let breach = critical.iter().find(|file| {
+        let text = fs::read_to_string(file).expect("it was written");
+        text.contains("smooth.breached") && !text.contains("expect counted")
+    });
+    let breach = breach.expect("a driver that sees little brakes hard");
+    let told = last_line(&done(&["diagnose", breach, "--format", "json"]));
+    let told = &told["scenarios"][0];
+    assert_eq!(
+        (&told["requirement"].is_string(), &told["diagnosis"]["noun"]),
+        (&true, &Value::from("breach"))
+    );
+    let said = done(&["diagnose", breach]);
+    assert!(said.contains("is not kept at ") && !said.contains("crash"), "{said}");
+
+    let estimate = |event: &str, out: &str| {
+        let out = scratch.path().join(out).display().to_string();
+        let asked =
+            ["estimate", space, "--ads", "idm", "--road", "corner", "--parts", "2", "--episodes", "10"];
+        last_line(&done(&[&asked[..], &["--event", event, "--out", &out, "--format", "json"]].concat()))
+    };
+    let of = |found: &Value| found["results"]["together"]["probability"].as_f64().expect("a number");
+    let [any, one] = [("breach", "any"), ("keeps_off", "one")].map(|(event, out)| estimate(event, out));
+    assert!(of(&one) > 0.0 && of(&any) >= of(&one), "{any} {one}");
+    assert_eq!(one["results"]["event"], "keeps_off");
+    let first = one["critical"][0].as_str().expect("it met some");
+    assert!(done(&["replay", first]).contains(" holds, "));
+    let asked = ["estimate", space, "--out", "never"];
+    fails(&[&asked[..], &["--event", "keeps_of"]].concat(), "no event `keeps_of`: did you mean `keeps_off`?");
+    fails(&[&asked[..], &["--event", "breach", "--method", "probe"]].concat(), "estimate by counting");
+    let none = ["estimate", "scenarios/avastra45.ava", "--event", "breach", "--out", "never"];
+    fails(&none, "no requirement of this space is in force");
 }
 
 #[test]

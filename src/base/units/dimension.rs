@@ -19,6 +19,7 @@ impl Dimension {
     pub const RATE: Dimension = Dimension::of(0, -1, 0);
     pub const SPEED: Dimension = Dimension::of(1, -1, 0);
     pub const ACCEL: Dimension = Dimension::of(1, -2, 0);
+    pub const JERK: Dimension = Dimension::of(1, -3, 0);
     pub const ANGLE: Dimension = Dimension::of(0, 0, 1);
     pub const MASS: Dimension = Dimension { kilograms: 1, ..Dimension::RATIO };
 
@@ -29,6 +30,7 @@ impl Dimension {
         (Dimension::DURATION, "Duration", "s"),
         (Dimension::SPEED, "Speed", "m/s"),
         (Dimension::ACCEL, "Accel", "m/s^2"),
+        (Dimension::JERK, "Jerk", "m/s^3"),
         (Dimension::ANGLE, "Angle", "rad"),
         (Dimension::MASS, "Mass", "kg"),
     ];

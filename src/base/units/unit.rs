@@ -40,6 +40,7 @@ pub const UNITS: &[Unit] = &[
     // The international mile is 1609.344 m by definition.
     Unit::exact("mph", Dimension::SPEED, 1_609_344, 3_600_000),
     Unit::exact("m/s^2", Dimension::ACCEL, 1, 1),
+    Unit::exact("m/s^3", Dimension::JERK, 1, 1),
     // π has no fraction. This convergent errs by 2e-18, less than the spacing of f64 near π/180,
     // so that `deg` becomes the same f64 as with the true value.
     Unit::exact("deg", Dimension::ANGLE, 1_068_966_896, 340_262_731 * 180),

@@ -4,15 +4,15 @@
 use std::sync::Arc;
 
 use crate::episode::{Collision, EpisodeLog, Outcome};
-use crate::oracle::Breached;
+use crate::oracle::{Breached, Recurrence};
 use crate::run::{EpisodeSummary, Finding};
 use avastra_base::units::Dimension;
 use avastra_drivers::external;
 use avastra_drivers::external::Conversation;
-use avastra_lang::model::vocabulary::{BREACHED, KEPT, Word};
+use avastra_lang::model::vocabulary::{BREACHED, KEPT, RECURRENCE, Word};
 use avastra_lang::model::{ActionDef, START_MPS, Space, StateDef, Value, digest_text, ticks_s};
 use avastra_lang::syntax::ast::{
-    ClauseKind, Expect, Expr, Field, File, ItemKind, Name, Scenario, Span, Step,
+    Arithmetic, BinaryOp, ClauseKind, Expect, Expr, Field, File, ItemKind, Name, Scenario, Span, Step,
 };
 use avastra_world::action::{ActionTable, Draw};
 use avastra_world::sim::{ENGINE, TrafficProfile};
@@ -44,11 +44,8 @@ pub fn scenario(
     source: &Provenance,
 ) -> File {
     let counted: Vec<&Finding> = summary.collisions.iter().filter(|finding| finding.counted).collect();
-    let of_collisions = counted.last().map(|last| last.collision.step);
-    let of_breaches = log.breaches.iter().map(|breach| breach.step).max();
-    let last = of_collisions.max(of_breaches).expect("an episode without a finding is not emitted");
-    let steps = last + 1;
-    let headline = headline_of(table.space(), log, counted.first().copied());
+    let steps = summary.last_step(log).expect("an episode without a finding is not emitted") + 1;
+    let headline = headline_of(table.space(), log, (summary, counted.first().copied()));
     file(table, log, source, [REPLAY, &headline], steps, expects(table, log, summary, steps))
 }
 
@@ -56,7 +53,7 @@ pub fn scenario(
 /// and says how the episode ended.
 pub fn retold(table: &ActionTable, log: &EpisodeLog, summary: &EpisodeSummary, source: &Provenance) -> File {
     let counted = summary.collisions.iter().find(|finding| finding.counted);
-    let headline = headline_of(table.space(), log, counted);
+    let headline = headline_of(table.space(), log, (summary, counted));
     let steps = log.steps.len();
     let mut expects = expects(table, log, summary, steps);
     expects.push(end(log));
@@ -230,6 +227,8 @@ fn expects(table: &ActionTable, log: &EpisodeLog, summary: &EpisodeSummary, step
         if let Some(found) = summary.breached.iter().find(of) {
             let by = tree::list(found.kept_by.iter().map(|driver| tree::name(driver)).collect());
             expects.push(tree::expect(tree::part(name, KEPT.0), vec![tree::clause(ClauseKind::By, by)]));
+            let again = found.recurrence.map(|of| tree::equal(tree::part(name, RECURRENCE.0), share(of)));
+            expects.extend(again.map(|claim| tree::expect(claim, Vec::new())));
         }
     }
     for finding in summary.collisions.iter().filter(|finding| finding.collision.step < steps) {
@@ -258,6 +257,10 @@ fn expects(table: &ActionTable, log: &EpisodeLog, summary: &EpisodeSummary, step
             };
             expects.push(tree::expect(tree::equal(tree::name("cause"), modules), vec![obstacle()]));
         }
+        if let Some(recurrence) = finding.recurrence {
+            let claim = tree::equal(tree::name(RECURRENCE.0), share(recurrence));
+            expects.push(tree::expect(claim, vec![obstacle()]));
+        }
         if finding.minimal {
             expects.push(tree::expect(tree::name("minimal"), vec![obstacle()]));
         }
@@ -269,21 +272,40 @@ fn expects(table: &ActionTable, log: &EpisodeLog, summary: &EpisodeSummary, step
     expects
 }
 
+/// `14 / 20`.
+fn share(Recurrence { recurred, replays }: Recurrence) -> Expr {
+    tree::binary(
+        BinaryOp::Arithmetic(Arithmetic::Divide),
+        tree::whole(recurred.into()),
+        tree::whole(replays.into()),
+    )
+}
+
 /// How it ends.
 fn end(log: &EpisodeLog) -> Expect {
     tree::expect(tree::equal(tree::name("end"), tree::name(log.end.name())), Vec::new())
 }
 
 /// What is found, in a sentence for the reader: the first counted collision, else the first breach.
-fn headline_of(space: &Space, log: &EpisodeLog, counted: Option<&Finding>) -> String {
-    match (counted, log.breaches.first()) {
-        (Some(first), _) => headline(space, log, &first.collision),
+fn headline_of(
+    space: &Space,
+    log: &EpisodeLog,
+    (summary, counted): (&EpisodeSummary, Option<&Finding>),
+) -> String {
+    let (what, recurrence) = match (counted, log.breaches.first()) {
+        (Some(first), _) => (headline(space, log, &first.collision), first.recurrence),
         (None, Some(breach)) => {
             let name = &space.requirements[breach.requirement].name;
-            format!("The ego vehicle does not keep `{name}` at {:.2} s on {}.", breach.time_s, log.road)
+            let found = summary.breached.iter().find(|found| found.requirement == breach.requirement);
+            let at_s = breach.time_s;
+            let of = breach.obstacle.map_or(String::new(), |obstacle| format!(" of npc#{obstacle}"));
+            let what = format!("The ego vehicle does not keep `{name}`{of} at {at_s:.2} s on {}.", log.road);
+            (what, found.and_then(|found| found.recurrence))
         }
-        (None, None) => String::new(),
-    }
+        (None, None) => (String::new(), None),
+    };
+    let again = |of| format!("{what} It recurs in {of} under other noise.");
+    recurrence.map_or_else(|| what.clone(), again)
 }
 
 /// What happens, in a sentence for the reader.

@@ -2,17 +2,23 @@
 //!
 //! A requirement with `within D` is breached at a tick if its condition failed at every tick of the D before it and at
 //! itself; its margin there is the largest one of these ticks. One unbroken stretch of such ticks is one breach. Nothing
-//! is asked where `when` does not hold, and what is asked only since less than D cannot be breached yet.
+//! is asked where `when` does not hold, and what is asked only since less than D cannot be breached yet. A requirement `on`
+//! bodies is asked of each road user near, and all of this holds for each of them by itself.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
 use avastra_lang::model::expr::{Expr, ExprKind};
 use avastra_lang::model::vocabulary::Fact;
-use avastra_lang::model::{Facts, Kept, Memory, ReadyRequirement, RequirementDef, WorldFacts};
-use avastra_world::sim::{MomentParts, Watched, WatchedParts, World};
+use avastra_lang::model::{
+    BodyWord, Facts, Kept, Memory, ReadyRequirement, RequirementDef, SpawnFacts, WorldFacts,
+};
+use avastra_world::sim::{DT_S, MomentParts, Watched, WatchedParts, World};
 
 use super::setup::Setup;
+
+/// A requirement `on` bodies is asked of road users at most this far away, m: as far as `nearest` looks.
+const NEAR_M: f64 = 100.0;
 
 /// A stretch of time in which the ego vehicle did not keep a requirement.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,6 +33,8 @@ pub struct Breach {
     pub margin: Option<f64>,
     /// Index of the step in which it began.
     pub step: usize,
+    /// The number of the road user that it is about, if the requirement is about some.
+    pub obstacle: Option<u32>,
 }
 
 /// The smallest margin of a requirement over an episode.
@@ -36,6 +44,8 @@ pub struct Margin {
     pub requirement: usize,
     /// SI; `None` if it was never asked for long enough, or has no margin.
     pub smallest: Option<f64>,
+    /// For how long it was asked, s; of several road users at once only once.
+    pub asked_s: f64,
 }
 
 /// Watches the requirements that are in force.
@@ -55,6 +65,18 @@ pub(super) struct Monitor {
 struct Watch {
     requirement: usize,
     ready: Arc<ReadyRequirement>,
+    /// About the ego vehicle alone there is one; otherwise one for each road user near.
+    stretches: Vec<Stretch>,
+    /// The smallest margin of those that are over.
+    smallest: Option<f64>,
+    /// Ticks in which it was asked.
+    asked: u32,
+}
+
+/// A requirement, of one road user or of none.
+#[derive(Debug, Clone, Default)]
+struct Stretch {
+    obstacle: Option<u32>,
     tally: Tally,
     /// The breach that goes on, by index.
     open: Option<usize>,
@@ -82,8 +104,9 @@ impl Monitor {
             .map(|requirement| Watch {
                 requirement,
                 ready: Arc::new(ready(requirement)),
-                tally: Tally::default(),
-                open: None,
+                stretches: Vec::new(),
+                smallest: None,
+                asked: 0,
             })
             .collect();
         let of = |watch: &Watch| &setup.table.space().requirements[watch.requirement].bearers;
@@ -115,8 +138,15 @@ impl Monitor {
         (!monitor.watches.is_empty()).then_some(monitor)
     }
 
-    /// Judges the moment after a tick without a contact; `step` is the one that is driven.
-    pub fn judge(&mut self, setup: &Setup, world: &World, memory: &Memory, step: usize) {
+    /// Judges the moment after a tick without a contact; `step` is the one that is driven. Beside the world stand the own
+    /// bodies of road users, by their numbers.
+    pub fn judge(
+        &mut self,
+        setup: &Setup,
+        (world, own_bodies): (&World, &BTreeMap<u32, usize>),
+        memory: &Memory,
+        step: usize,
+    ) {
         let facts = WorldFacts {
             moment: world.moment_facts_of(self.moment),
             step: step as u64,
@@ -126,29 +156,45 @@ impl Monitor {
         };
         let facts = Facts { road: Some(&setup.road.facts), world: Some(&facts), ..Facts::new(&[], memory) };
         let space = setup.table.space();
+        let moment = Judged { time_s: world.time_s(), step };
         for watch in &mut self.watches {
-            let required = &space.requirements[watch.requirement];
-            let Some(kept) = watch.ready.at(&space.functions, &facts) else {
-                watch.tally.pause();
-                watch.open = None;
-                continue;
-            };
-            let margin = watch.tally.take(kept, required.within_ticks);
-            if watch.tally.failed <= required.within_ticks {
-                watch.open = None;
+            let RequirementDef { on, within_ticks, .. } = &space.requirements[watch.requirement];
+            if on.is_empty() {
+                if watch.stretches.is_empty() {
+                    watch.stretches.push(Stretch::default());
+                }
+                let kept = watch.ready.at(&space.functions, &facts);
+                watch.asked += u32::from(kept.is_some());
+                watch.stretches[0].take(kept, *within_ticks, watch.requirement, &moment, &mut self.breaches);
                 continue;
             }
-            match watch.open.and_then(|open| self.breaches.get_mut(open)) {
-                Some(breach) => {
-                    breach.until_s = world.time_s();
-                    breach.margin = smaller(breach.margin, margin);
+            let near = world.obstacles().filter(|obstacle| {
+                let body = BodyWord { like: obstacle.body, own: own_bodies.get(&obstacle.id).copied() };
+                obstacle.distance_m <= NEAR_M && !obstacle.is_apart && on.iter().any(|named| body.is(*named))
+            });
+            let near: Vec<u32> = near.map(|obstacle| obstacle.id).collect();
+            // Who is no longer near is asked nothing, and begins anew if it comes back.
+            watch.stretches.retain(|stretch| {
+                let stays = stretch.obstacle.is_some_and(|id| near.contains(&id));
+                if !stays {
+                    watch.smallest = smaller(watch.smallest, stretch.tally.smallest);
                 }
-                None => {
-                    let (requirement, time_s) = (watch.requirement, world.time_s());
-                    watch.open = Some(self.breaches.len());
-                    self.breaches.push(Breach { requirement, time_s, until_s: time_s, margin, step });
-                }
+                stays
+            });
+            let mut is_asked = false;
+            for id in near {
+                let Some(npc) = world.npc_facts(id) else { continue };
+                let spawn = Some(SpawnFacts { npc, ..SpawnFacts::default() });
+                let kept = watch.ready.at(&space.functions, &Facts { spawn, ..facts });
+                is_asked |= kept.is_some();
+                let known = watch.stretches.iter().position(|stretch| stretch.obstacle == Some(id));
+                let at = known.unwrap_or_else(|| {
+                    watch.stretches.push(Stretch { obstacle: Some(id), ..Stretch::default() });
+                    watch.stretches.len() - 1
+                });
+                watch.stretches[at].take(kept, *within_ticks, watch.requirement, &moment, &mut self.breaches);
             }
+            watch.asked += u32::from(is_asked);
         }
     }
 
@@ -160,9 +206,52 @@ impl Monitor {
 
     /// What was found up to now, breaches by rising time.
     pub fn found(self) -> (Vec<Breach>, Vec<Margin>) {
-        let margin =
-            |watch: &Watch| Margin { requirement: watch.requirement, smallest: watch.tally.smallest };
+        let margin = |watch: &Watch| {
+            let smallest =
+                watch.stretches.iter().map(|stretch| stretch.tally.smallest).fold(watch.smallest, smaller);
+            Margin { requirement: watch.requirement, smallest, asked_s: f64::from(watch.asked) * DT_S }
+        };
         (self.breaches, self.watches.iter().map(margin).collect())
+    }
+}
+
+/// The moment that is judged.
+struct Judged {
+    time_s: f64,
+    step: usize,
+}
+
+impl Stretch {
+    /// Takes the answer of a tick, if something is asked, and keeps what of `breaches` follows from it.
+    fn take(
+        &mut self,
+        kept: Option<Kept>,
+        within_ticks: u32,
+        requirement: usize,
+        &Judged { time_s, step }: &Judged,
+        breaches: &mut Vec<Breach>,
+    ) {
+        let Some(kept) = kept else {
+            self.tally.pause();
+            self.open = None;
+            return;
+        };
+        let margin = self.tally.take(kept, within_ticks);
+        if self.tally.failed <= within_ticks {
+            self.open = None;
+            return;
+        }
+        match self.open.and_then(|open| breaches.get_mut(open)) {
+            Some(breach) => {
+                breach.until_s = time_s;
+                breach.margin = smaller(breach.margin, margin);
+            }
+            None => {
+                self.open = Some(breaches.len());
+                let obstacle = self.obstacle;
+                breaches.push(Breach { requirement, time_s, until_s: time_s, margin, step, obstacle });
+            }
+        }
     }
 }
 

@@ -419,7 +419,7 @@ impl Play {
         }
         self.incidents.extend_from_slice(self.world.incidents());
         if let Some(monitor) = self.monitor.as_mut().filter(|_| self.collisions.is_empty()) {
-            monitor.judge(setup, &self.world, &self.memory, self.steps.len());
+            monitor.judge(setup, (&self.world, &self.own_bodies), &self.memory, self.steps.len());
         }
         self.distance_m += self.world.ego().speed_mps * DT_S;
         self.world.trace(&mut self.trace);

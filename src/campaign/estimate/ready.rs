@@ -2,9 +2,10 @@
 
 use ndarray::Array1;
 
-use crate::episode::{EpisodeLog, Setup, StepLog};
+use crate::episode::{EpisodeLog, Setup};
 use crate::estimate::part::Part;
 use crate::estimate::settings::{EstimateError, EstimateSettings, Method};
+use crate::oracle::Found;
 use crate::run::{EpisodeSummary, Run};
 use avastra_base::rng;
 use avastra_base::rng::Stream;
@@ -13,9 +14,9 @@ use avastra_world::action::ActionTable;
 /// Where the event of an episode is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct EventPlace {
-    /// The step that it belongs to: the one whose action made appear what was hit, else the one in which it was hit.
+    /// The step that it belongs to: the one whose action made appear what was hit, else the one in which it happened.
     pub step: usize,
-    /// The step in which it was hit.
+    /// The step in which it happened.
     pub hit_step: usize,
 }
 
@@ -33,6 +34,7 @@ impl Estimate {
     pub fn new(table: ActionTable, settings: EstimateSettings) -> Result<Estimate, EstimateError> {
         settings.check()?;
         let run = Run::new(table, settings.run.clone())?;
+        settings.event.check(run.space(), run.arena().rules())?;
         let rows = run.table().rows().len();
         if settings.method == Method::Probe
             && run.agent().chances(Array1::from_elem(rows, true).view()).is_none()
@@ -63,15 +65,26 @@ impl Estimate {
 
     /// Where the event of an episode is, if it is there.
     pub(super) fn event(&self, setup: &Setup, log: &EpisodeLog) -> Option<EventPlace> {
-        let first = self.settings.event.first(setup, log)?;
-        let hit = &log.collisions[first];
-        let made_it = |step: &StepLog| step.outcome.spawned().contains(&hit.contact.obstacle);
-        Some(EventPlace { step: log.steps.iter().position(made_it).unwrap_or(hit.step), hit_step: hit.step })
+        let found = self.settings.event.first(setup, log)?;
+        let happened = found.step(log);
+        let made_it = match found {
+            Found::Collision(index) => {
+                let obstacle = log.collisions[index].contact.obstacle;
+                log.steps.iter().position(|step| step.outcome.spawned().contains(&obstacle))
+            }
+            Found::Breach(_) => None,
+        };
+        Some(EventPlace { step: made_it.unwrap_or(happened), hit_step: happened })
     }
 
     /// An episode of a part, judged, under a number that no other episode of the estimate on its road has.
     pub(super) fn judged(&self, part: Part, number: u32, log: &EpisodeLog) -> EpisodeSummary {
         let of_estimate = part.number as usize * self.settings.run.episodes as usize + number as usize;
-        EpisodeSummary::judged(&self.setup(part, number), of_estimate, log)
+        let setup = self.setup(part, number);
+        let mut summary = EpisodeSummary::judged(&setup, of_estimate, log);
+        if self.settings.event.is_breach() {
+            summary.find_keepers(&setup, log);
+        }
+        summary
     }
 }

@@ -113,7 +113,7 @@ impl EstimateResults {
             |by_road, pilot_s| Sample { method: settings.method, by_road, pilot_s, missing: missing_at_look };
         EstimateResults {
             schema: 2,
-            event: settings.event,
+            event: settings.event.clone(),
             method: settings.method,
             parts: found.records.len(),
             parts_wanted: settings.parts as usize * roads.len(),

@@ -1,48 +1,112 @@
 //! The settings of an estimate in full, as `estimate.yaml` keeps them.
 
-use crate::episode::{EpisodeLog, Setup};
+use crate::episode::{Breach, EpisodeLog, Setup};
+use crate::oracle::Found;
 use crate::run::{EpisodeSummary, RunError, RunSettings};
+use avastra_lang::model::{RulesInForce, Space};
+use avastra_lang::syntax::{listed, nearest};
 
 use crate::estimate::part::Part;
 use crate::estimate::results::Probability;
 
-/// What is counted: whether it happens in an episode.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
+/// What is counted: whether it happens in an episode. In words `counted`, `collision`, `breach`, or the name of a requirement.
+#[derive(Debug, Clone, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(from = "String", into = "String")]
 pub enum EventKind {
     /// A collision that the space's verdict counts.
     #[default]
     Counted,
     /// Any collision.
     Collision,
+    /// A breach of any requirement that is in force.
+    Breach,
+    /// A breach of the requirement of that name.
+    Requirement(String),
+}
+
+impl From<String> for EventKind {
+    fn from(word: String) -> EventKind {
+        match word.as_str() {
+            "counted" => EventKind::Counted,
+            "collision" => EventKind::Collision,
+            "breach" => EventKind::Breach,
+            _ => EventKind::Requirement(word),
+        }
+    }
+}
+
+impl From<EventKind> for String {
+    fn from(event: EventKind) -> String {
+        match event {
+            EventKind::Counted => "counted".to_owned(),
+            EventKind::Collision => "collision".to_owned(),
+            EventKind::Breach => "breach".to_owned(),
+            EventKind::Requirement(name) => name,
+        }
+    }
 }
 
 impl EventKind {
-    /// The first collision of an episode that is the event.
-    pub(super) fn first(self, setup: &Setup, log: &EpisodeLog) -> Option<usize> {
+    /// The first of the event in an episode.
+    pub(super) fn first(&self, setup: &Setup, log: &EpisodeLog) -> Option<Found> {
         match self {
-            _ if log.collisions.is_empty() => None,
-            EventKind::Collision => Some(0),
+            EventKind::Collision if log.collisions.is_empty() => None,
+            EventKind::Collision => Some(Found::Collision(0)),
+            EventKind::Counted if log.collisions.is_empty() => None,
             EventKind::Counted => {
                 let summary = EpisodeSummary::judged(setup, 0, log);
-                summary.collisions.iter().position(|finding| finding.counted)
+                summary.collisions.iter().position(|finding| finding.counted).map(Found::Collision)
+            }
+            EventKind::Breach if log.breaches.is_empty() => None,
+            EventKind::Breach => Some(Found::Breach(0)),
+            EventKind::Requirement(name) => {
+                let required = &setup.table.space().requirements;
+                let is_meant = |breach: &Breach| required[breach.requirement].name == *name;
+                log.breaches.iter().position(is_meant).map(Found::Breach)
             }
         }
     }
 
+    /// Whether it is about a requirement.
+    pub fn is_breach(&self) -> bool {
+        matches!(self, EventKind::Breach | EventKind::Requirement(_))
+    }
+
     /// What so many of them are called, after their number.
-    pub fn noun(self) -> &'static str {
+    pub fn noun(&self) -> &'static str {
         match self {
             EventKind::Counted => "counted",
             EventKind::Collision => "met",
+            EventKind::Breach | EventKind::Requirement(_) => "breached",
         }
     }
 
     /// The event in words.
-    pub fn in_words(self) -> &'static str {
+    pub fn in_words(&self) -> String {
         match self {
-            EventKind::Counted => "a counted collision",
-            EventKind::Collision => "a collision",
+            EventKind::Counted => "a counted collision".to_owned(),
+            EventKind::Collision => "a collision".to_owned(),
+            EventKind::Breach => "a breach".to_owned(),
+            EventKind::Requirement(name) => format!("a breach of `{name}`"),
+        }
+    }
+
+    /// # Errors
+    /// If it is about a requirement that is not in force.
+    pub fn check(&self, space: &Space, rules: &RulesInForce) -> Result<(), EstimateError> {
+        let in_force = || rules.required().map(|index| space.requirements[index].name.as_str());
+        let known: Vec<&str> = in_force().collect();
+        match self {
+            EventKind::Counted | EventKind::Collision => Ok(()),
+            EventKind::Breach if known.is_empty() => Err(EstimateError::NoRequirement),
+            EventKind::Requirement(name) if !known.contains(&name.as_str()) => {
+                let words = ["counted", "collision", "breach"];
+                let all: Vec<&str> = words.into_iter().chain(known).collect();
+                let meant = nearest(name, all.iter().copied());
+                let meant = meant.map_or(String::new(), |meant| format!("did you mean `{meant}`? "));
+                Err(EstimateError::Event { name: name.clone(), meant, known: listed(&all) })
+            }
+            EventKind::Breach | EventKind::Requirement(_) => Ok(()),
         }
     }
 }
@@ -111,6 +175,15 @@ pub enum EstimateError {
     )]
     External,
     #[error(
+        "this method tries out what actions make appear, and a breach is of no road user: estimate by counting (`--method \
+         count`)"
+    )]
+    BreachProbed,
+    #[error("no requirement of this space is in force, so none can be breached")]
+    NoRequirement,
+    #[error("no event `{name}`: {meant}there are {known}")]
+    Event { name: String, meant: String, known: String },
+    #[error(
         "`{agent}` does not say how likely it chooses a row, so what is tried out beside it has no weight: estimate by \
          counting (`--method count`), or with `--agent random`"
     )]
@@ -168,6 +241,9 @@ impl EstimateSettings {
         }
         if self.method != Method::Count && self.run.external.is_some() {
             return Err(EstimateError::External);
+        }
+        if self.method != Method::Count && self.event.is_breach() {
+            return Err(EstimateError::BreachProbed);
         }
         Ok(())
     }

@@ -1,6 +1,6 @@
-//! Which module of a driving system is at fault for a collision: the replays that show it.
+//! Which module of a driving system is at fault for a collision or a breach: the replays that show it.
 //!
-//! The ego vehicle drives as it did until the obstacle appears. From then on the same system drives with one
+//! The ego vehicle drives as it did until the obstacle appears (before a breach, until 15 s before it). From then on the same system drives with one
 //! module changed (`ads::Module`), which has watched from the start, so that the hazard is the same to the bit;
 //! other road users decide for themselves. The changes are:
 //!
@@ -12,14 +12,14 @@
 //! A change that prevents the collision is played again with other sensor noise, and so is the noise alone, to tell the
 //! change apart from chance. `evidence` draws the conclusions.
 //!
-//! Left out: errors from before the obstacle appeared.
+//! In what follows "collision" stands for the finding, whichever it is. Left out: errors from before the obstacle appeared.
 
 use std::sync::Arc;
 
 use crate::episode::{EpisodeLog, Setup};
 use avastra_drivers::{Foresight, ModularConfig, Module};
 
-use super::crash::{Crash, Fate, play};
+use super::case::{Case, Fate, Found, What, play};
 use super::evidence::{
     Chance, Comparison, Diagnosis, Evidence, ModuleFinding, PairFinding, WeaknessFinding, is_told_apart,
 };
@@ -46,56 +46,59 @@ pub struct NoModules {
     pub ads: String,
 }
 
-/// What becomes of the nth collision of a log if another profile of the driving system takes over.
+/// What becomes of a finding of a log if another profile of the driving system takes over.
 ///
 /// # Errors
 /// If the driving system has no modules.
 pub fn fate(
     setup: &Setup,
     log: &EpisodeLog,
-    index: usize,
+    found: Found,
     profile: &ModularConfig,
 ) -> Result<Fate, NoModules> {
-    Ok(Inquiry::new(&Crash::new(setup, log, index))?.fate(profile))
+    Ok(Inquiry::new(&Case::new(setup, log, found))?.fate(profile))
 }
 
-/// Finds the cause of the nth collision of a log that was played from `setup`.
+/// Finds the cause of a finding of a log that was played from `setup`.
 ///
 /// # Errors
 /// If the driving system has no modules.
 pub fn diagnose(
     setup: &Setup,
     log: &EpisodeLog,
-    index: usize,
+    found: Found,
     baseline: &ModularConfig,
 ) -> Result<Diagnosis, NoModules> {
-    let crash = Crash::new(setup, log, index);
-    Ok(Diagnosis::of(Inquiry::new(&crash)?.evidence(baseline)))
+    let case = Case::new(setup, log, found);
+    Ok(Diagnosis::of(Inquiry::new(&case)?.evidence(found.noun(), baseline)))
 }
 
 /// The collision driven up to by its own driving system, and from then on by others.
 pub(super) struct Inquiry<'a> {
-    crash: &'a Crash<'a>,
+    case: &'a Case<'a>,
     pub profile: ModularConfig,
     foresight: Arc<Foresight>,
     from_s: f64,
 }
 
 impl<'a> Inquiry<'a> {
-    pub fn new(crash: &'a Crash<'a>) -> Result<Inquiry<'a>, NoModules> {
-        let ads = &crash.setup.ads;
+    pub fn new(case: &'a Case<'a>) -> Result<Inquiry<'a>, NoModules> {
+        let ads = &case.setup.ads;
         let profile = *ads.profile().ok_or_else(|| NoModules { ads: ads.title() })?;
-        let (_, foresight) = play(crash.setup, |moment| crash.script.choose(crash.setup.table, moment));
-        let collision = &crash.collision;
-        let from_s = collision.spawned_s.max(collision.contact.time_s - LOOK_BACK_S);
-        Ok(Inquiry { crash, profile, foresight, from_s })
+        let (_, foresight) = play(case.setup, |moment| case.script.choose(case.setup.table, moment));
+        let begun_s = match case.what {
+            What::Collision { collision, .. } => collision.spawned_s,
+            What::Breach(_) => 0.0,
+        };
+        let from_s = begun_s.max(case.time_s() - LOOK_BACK_S);
+        Ok(Inquiry { case, profile, foresight, from_s })
     }
 
     /// What becomes of the collision if another profile takes over when its obstacle appears.
     pub fn fate(&self, profile: &ModularConfig) -> Fate {
         // The same settings make the same drive.
         if *profile == self.profile {
-            return Fate::Crash;
+            return Fate::Same;
         }
         self.play(profile, None)
     }
@@ -106,7 +109,7 @@ impl<'a> Inquiry<'a> {
     }
 
     fn play(&self, profile: &ModularConfig, noise: Option<u32>) -> Fate {
-        let ads = self.crash.setup.ads.clone();
+        let ads = self.case.setup.ads.clone();
         let successor =
             ads.clone().with_profile(*profile).expect("a driving system with a profile takes another");
         let successor = successor.with_foresight(self.foresight.clone());
@@ -114,20 +117,21 @@ impl<'a> Inquiry<'a> {
             None => successor,
             Some(number) => successor.with_other_noise(number),
         };
-        self.crash.fate(&self.crash.play(&ads.until(self.from_s, successor)))
+        self.case.fate(&self.case.play(&ads.until(self.from_s, successor)))
     }
 
-    fn evidence(&self, baseline: &ModularConfig) -> Evidence {
+    fn evidence(&self, noun: &'static str, baseline: &ModularConfig) -> Evidence {
         let own = self.profile;
         let ideal = Module::ALL.into_iter().fold(own, |config, module| config.idealised(module));
         let mut evidence = Evidence {
+            noun,
             modules: Module::ALL.into_iter().map(|module| self.finding(module, baseline)).collect(),
             baseline: (*baseline != own).then(|| self.fate(baseline)),
             ideal: self.fate(&ideal),
             weaknesses: self.weaknesses(),
             pairs: Vec::new(),
             chance: None,
-            measured: measure(self.crash, &own, baseline),
+            measured: measure(self.case, &own, baseline),
             from_s: self.from_s,
         };
         let differs = evidence.differs();
@@ -209,7 +213,7 @@ impl<'a> Inquiry<'a> {
         let mut found = Vec::new();
         for (index, first) in asked.iter().enumerate() {
             for second in &asked[index + 1..] {
-                let sufficient = [first, second].iter().filter(|one| one.alone == Fate::Crash).count();
+                let sufficient = [first, second].iter().filter(|one| one.alone == Fate::Same).count();
                 let both = [first.module, second.module];
                 let changed = both
                     .into_iter()

@@ -37,7 +37,7 @@ use core::cmp::Reverse;
 use avastra_base::statistics::binomial_missing;
 use avastra_drivers::Module;
 
-use super::crash::Fate;
+use super::case::Fate;
 use super::measured::Measure;
 
 /// Share of changes without effect that are wrongly told apart from chance: an interval of 95 %.
@@ -84,6 +84,8 @@ pub enum Verdict {
 /// The results of all replays of a collision.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Evidence {
+    /// What is explained: `crash` or `breach`. In the other fields "collision" stands for it.
+    pub noun: &'static str,
     pub modules: Vec<ModuleFinding>,
     /// The collision if all modules are as in the baseline; `None` if the driving system is the baseline.
     pub baseline: Option<Fate>,
@@ -354,9 +356,10 @@ mod tests {
 
     /// Evidence of a driving system that is the baseline, or that differs from it in some modules.
     fn evidence(differ: &[Module]) -> Evidence {
-        let restored = |module| differ.contains(&module).then_some(Fate::Crash);
-        let findings = Module::ALL.into_iter().map(|module| finding(module, restored(module), Fate::Crash));
+        let restored = |module| differ.contains(&module).then_some(Fate::Same);
+        let findings = Module::ALL.into_iter().map(|module| finding(module, restored(module), Fate::Same));
         Evidence {
+            noun: "crash",
             modules: findings.collect(),
             baseline: (!differ.is_empty()).then_some(Fate::Vanished),
             ideal: Fate::Vanished,
@@ -381,7 +384,7 @@ mod tests {
             vec![Measure { module: Module::Prediction, what: "error, m", worst: 9.0, bound: 1.0 }];
         found.modules[Module::Prediction as usize].idealised = Fate::Vanished;
         assert_eq!(named(&found), (Verdict::Unexplained, vec![]));
-        found.baseline = Some(Fate::Crash);
+        found.baseline = Some(Fate::Same);
         assert_eq!(named(&found), (Verdict::Baseline, vec![]));
         let perception = &mut found.modules[Module::Perception as usize];
         perception.restored = Some(Fate::Vanished);
@@ -447,7 +450,7 @@ mod tests {
 
     /// Any evidence: fates, replays and measures by lot.
     fn any(rng: &mut Rng) -> Evidence {
-        let fates = [Fate::Crash, Fate::Other, Fate::Vanished, Fate::Absent];
+        let fates = [Fate::Same, Fate::Other, Fate::Vanished, Fate::Absent];
         let fate = |rng: &mut Rng| fates[rng::below(rng, 4) as usize];
         let is = |rng: &mut Rng| rng::below(rng, 2) == 0;
         let noise = |rng: &mut Rng| {

@@ -10,6 +10,7 @@ use avastra_drivers as ads;
 use avastra_drivers::Selected;
 
 use super::avoidable::CAREFUL;
+use super::recurrence::Recurrence;
 
 /// A requirement that the ego vehicle did not keep, and who would have.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,6 +19,8 @@ pub struct Breached {
     pub requirement: usize,
     /// The careful drivers that keep it up to its first breach.
     pub kept_by: Vec<String>,
+    /// How often it is breached again under other chance, if that was tried.
+    pub recurrence: Option<Recurrence>,
 }
 
 /// Every requirement of which a log has a breach, in the order of their first ones, judged by playing the episode again with
@@ -26,7 +29,8 @@ pub fn breached(setup: &Setup, script: &Script, log: &EpisodeLog) -> Vec<Breache
     let firsts: Vec<&Breach> = log.first_breaches().collect();
     // No step after the last of them.
     let Some(last) = firsts.last() else { return Vec::new() };
-    let breached = |first: &&Breach| Breached { requirement: first.requirement, kept_by: Vec::new() };
+    let breached =
+        |first: &&Breach| Breached { requirement: first.requirement, kept_by: Vec::new(), recurrence: None };
     let mut found: Vec<Breached> = firsts.iter().map(breached).collect();
     for name in CAREFUL {
         let entry = ads::by_name(name).expect("careful drivers are driving systems of avastra");

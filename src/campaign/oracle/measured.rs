@@ -20,7 +20,7 @@ use avastra_base::geometry::Vec2;
 use avastra_drivers::{Ads, ModularConfig, Module, in_sight};
 use avastra_world::sim::{DT_S, FRAME_S, FRAME_TICKS, Obstacle, Sensed, World};
 
-use super::crash::Crash;
+use super::case::{Case, What};
 
 /// Errors are measured in this time before the collision, s: longer than publication and braking to rest.
 const WINDOW_S: f64 = 5.0;
@@ -53,13 +53,14 @@ impl Measure {
 }
 
 /// Measures the modules in the seconds before a collision of a driving system with the profile `own`; `baseline` is
-/// their specification.
-pub(super) fn measure(crash: &Crash, own: &ModularConfig, baseline: &ModularConfig) -> Vec<Measure> {
-    let contact = &crash.collision.contact;
+/// their specification. Nothing is measured before a breach, because most of this is about one obstacle.
+pub(super) fn measure(case: &Case, own: &ModularConfig, baseline: &ModularConfig) -> Vec<Measure> {
+    let What::Collision { collision, .. } = case.what else { return Vec::new() };
+    let contact = &collision.contact;
     let mut gauge = Gauge { obstacle: contact.obstacle, contact_s: contact.time_s, ..Gauge::default() };
     episode::run(
-        crash.setup,
-        &mut |moment| crash.script.choose(crash.setup.table, moment),
+        case.setup,
+        &mut |moment| case.script.choose(case.setup.table, moment),
         &mut |world, ads, _| gauge.look(world, ads),
     );
     gauge.measures(own, baseline)

@@ -13,8 +13,8 @@ use avastra_base::statistics;
 use avastra_base::statistics::{Estimate, proportion};
 use avastra_drivers::{ModularConfig, Weaknesses};
 
+use super::case::{Case, Fate, Found};
 use super::cause::{Inquiry, NoModules};
-use super::crash::{Crash, Fate};
 
 /// Number of replays with other sensor noise, of each crash and each weakness.
 const NOISES: u32 = 8;
@@ -36,14 +36,14 @@ pub struct WithoutMechanism {
     pub vanished: f64,
 }
 
-/// The nth collision of a log that was played from `setup`, without each of the weaknesses that are
+/// A finding of a log that was played from `setup`, without each of the weaknesses that are
 /// switched on.
 ///
 /// # Errors
 /// If the driving system has no modules.
-pub fn mechanisms(setup: &Setup, log: &EpisodeLog, index: usize) -> Result<Mechanisms, NoModules> {
-    let crash = Crash::new(setup, log, index);
-    let inquiry = Inquiry::new(&crash)?;
+pub fn mechanisms(setup: &Setup, log: &EpisodeLog, found: Found) -> Result<Mechanisms, NoModules> {
+    let case = Case::new(setup, log, found);
+    let inquiry = Inquiry::new(&case)?;
     let vanished = |profile: &ModularConfig| {
         let vanished = (1..=NOISES).filter(|noise| inquiry.vanishes(profile, *noise)).count();
         vanished as f64 / f64::from(NOISES)
@@ -127,7 +127,7 @@ mod tests {
         let crashes = [
             Mechanisms {
                 placebo: 0.5,
-                without: vec![without(a, Fate::Vanished, 0.75), without(b, Fate::Crash, 0.5)],
+                without: vec![without(a, Fate::Vanished, 0.75), without(b, Fate::Same, 0.5)],
             },
             Mechanisms { placebo: 0.25, without: vec![without(a, Fate::Vanished, 1.0)] },
             Mechanisms { placebo: 0.0, without: vec![without(a, Fate::Other, 0.0)] },

@@ -2,14 +2,15 @@
 //! claims hold.
 
 mod avoidable;
+mod case;
 mod cause;
-mod crash;
 mod evidence;
 mod counted;
 mod hazard;
 mod kept;
 mod measured;
 mod mechanisms;
+mod recurrence;
 mod severity;
 mod shrink;
 #[cfg(test)]
@@ -20,9 +21,9 @@ mod verify;
 pub use avoidable::{
     AvoidabilitySettings, DrivenPlace, Judgement, ReferenceDrive, judge, judge_one, judge_with_drives,
 };
+pub use case::{Fate, Found, Regression, regression};
 pub use cause::{NoModules, diagnose, fate};
 pub use counted::{counted, counted_at_need, counts, facts};
-pub use crash::{Fate, Regression, regression};
 pub use evidence::{
     Chance, Comparison, Diagnosis, Evidence, ModuleFinding, PairFinding, Verdict, WeaknessFinding,
 };
@@ -31,7 +32,8 @@ pub use measured::Measure;
 pub use mechanisms::{
     MechanismShare, Mechanisms, Share, WithoutMechanism, mechanism_shares, mechanisms, placebo,
 };
-pub use severity::{Severity, severity};
-pub use shrink::{Found, Shrunk, shrink, spare_steps};
+pub use recurrence::{Recurrence, Replayed, can_replay};
+pub use severity::{Harm, Severity, severity};
+pub use shrink::{Shrunk, shrink, spare_steps};
 pub use variation::{Likelihood, likelihood};
 pub use verify::{ClaimResult, NoTries, Replays, verify};

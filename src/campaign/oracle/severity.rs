@@ -4,12 +4,16 @@
 //! `m2 / (m1 + m2)` of the speed at which it closes where they meet. What slides along the contact changes nothing,
 //! so a scrape at 20 m/s is no crash at 20 m/s. Both are taken to be hit in line with their centres; an impact
 //! beside them turns the bodies and changes their velocity less, so this is an upper bound. The world carries the same
-//! impact out (`sim::contact`), as far as a car can follow: neither backwards nor sideways. Injury models are left out:
-//! their curves describe whole populations.
+//! impact out (`sim::contact`), as far as a car can follow: neither backwards nor sideways.
+//!
+//! What that means for people is told in three classes ([`Harm`]), by the speed at which one in ten is seriously injured
+//! (MAIS 3 and more). Such speeds describe whole populations of people and cars, so they order findings, and tell of no
+//! single crash what came of it.
 
 use crate::episode::Collision;
 use avastra_base::geometry::Vec2;
 use avastra_base::kinematics::STANDING_MPS;
+use avastra_lang::model::vocabulary::Body;
 use avastra_world::sim::VehicleParameters;
 
 use crate::episode::side;
@@ -31,6 +35,58 @@ pub struct Severity {
     /// How the obstacle moved, seen from the ego vehicle: `standing`, `along` with it, `oncoming`,
     /// `from the left` or `from the right`.
     pub approach: &'static str,
+    /// The speed of the impact as a share of that at which one person in ten is seriously injured.
+    pub harm_share: f64,
+    pub harm: Harm,
+}
+
+/// What an impact means for people.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Harm {
+    /// Between vehicles, or with a thing, below walking pace.
+    Minor,
+    Moderate,
+    /// At least one person in ten is seriously injured at such a speed.
+    Serious,
+}
+
+impl Harm {
+    pub fn name(self) -> &'static str {
+        match self {
+            Harm::Minor => "minor",
+            Harm::Moderate => "moderate",
+            Harm::Serious => "serious",
+        }
+    }
+}
+
+/// Closing speeds at which one in ten is seriously injured by the front of a car, m/s: Lubbe, Wu and Jeppsson 2022 (Traffic
+/// Safety Research 2, 000006), from German crashes.
+const PEDESTRIAN_MPS: f64 = 29.0 / 3.6;
+const CYCLIST_MPS: f64 = 44.0 / 3.6;
+const MOTORCYCLIST_MPS: f64 = 48.0 / 3.6;
+/// The same among cars, m/s, front to front and front to side: Campolettano and others ("TARGET setting for high severity
+/// collisions", Traffic Safety Research), from crashes in the United States. Front to rear they have 126 km/h for those in
+/// front; the front's speed holds for those behind.
+const FRONT_MPS: f64 = 99.0 / 3.6;
+const SIDE_MPS: f64 = 73.0 / 3.6;
+/// Walking pace, m/s. Ours.
+const WALKING_MPS: f64 = 1.4;
+
+/// The speed of an impact, and that at which one in ten is seriously injured, m/s. Cars of unequal mass are hit as if by their
+/// like at twice the larger delta-v.
+fn harm(severity: &Severity, body: Body) -> (f64, f64) {
+    let car_mps = 2.0 * severity.delta_v_mps.max(severity.obstacle_delta_v_mps);
+    let is_side = matches!(severity.side, "left" | "right") || severity.approach.starts_with("from");
+    match body {
+        Body::Pedestrian => (severity.closing_speed_mps, PEDESTRIAN_MPS),
+        Body::Bicycle => (severity.closing_speed_mps, CYCLIST_MPS),
+        Body::Motorcycle => (severity.closing_speed_mps, MOTORCYCLIST_MPS),
+        Body::BoxTruck | Body::SchoolBus | Body::Jeep | Body::Sedan | Body::SUV | Body::Hatchback => {
+            (car_mps, if is_side { SIDE_MPS } else { FRONT_MPS })
+        }
+    }
 }
 
 /// The severity of a collision.
@@ -41,14 +97,25 @@ pub fn severity(collision: &Collision) -> Severity {
     let relative_speed_mps = (ahead_mps * ahead_mps + left_mps * left_mps).sqrt();
     let (ego_t, other_t) = (VehicleParameters::MKZ.mass_t, collision.mass_t);
     let part = |mass_t: f64| mass_t / (ego_t + other_t) * contact.closing_speed_mps;
-    Severity {
+    let mut severity = Severity {
         closing_speed_mps: contact.closing_speed_mps,
         relative_speed_mps,
         delta_v_mps: part(other_t),
         obstacle_delta_v_mps: part(ego_t),
         side: side(contact.on_ego, &VehicleParameters::MKZ),
         approach: approach(obstacle_mps),
-    }
+        harm_share: 0.0,
+        harm: Harm::Moderate,
+    };
+    let body = collision.body.like;
+    let (speed_mps, serious_mps) = harm(&severity, body);
+    severity.harm_share = speed_mps / serious_mps;
+    severity.harm = match () {
+        () if severity.harm_share >= 1.0 => Harm::Serious,
+        () if speed_mps < WALKING_MPS && body.is_vehicle() && !body.has_two_wheels() => Harm::Minor,
+        () => Harm::Moderate,
+    };
+    severity
 }
 
 /// How the obstacle moves, by its velocity in the ego vehicle's frame: x ahead, y left.

@@ -16,6 +16,7 @@ use avastra_world::action::ActionTable;
 use avastra_world::sim::Start;
 
 use super::avoidable::{Judgement, judge};
+use super::case::Found;
 use super::counted::counts;
 use super::kept::breached;
 
@@ -36,25 +37,6 @@ pub struct Shrunk {
     pub found: Found,
     /// Episodes that were played to find it.
     pub plays: u32,
-}
-
-/// What was found in an episode.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Found {
-    /// By index among the collisions of the log.
-    Collision(usize),
-    /// By index among the breaches of the log.
-    Breach(usize),
-}
-
-impl Found {
-    /// The step in which it happened.
-    fn step(self, log: &EpisodeLog) -> usize {
-        match self {
-            Found::Collision(index) => log.collisions[index].step,
-            Found::Breach(index) => log.breaches[index].step,
-        }
-    }
 }
 
 /// Shrinks what led to a finding in a log that was played from `setup`; `judgements` has one for each collision.

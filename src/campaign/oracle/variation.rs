@@ -1,4 +1,4 @@
-//! Small changes of a scenario, and how often it crashes under them.
+//! Small changes of a scenario, and how often it crashes, or breaches a requirement, under them.
 //!
 //! On a street, no value of a scenario repeats to the last digit. A variation changes, each by its own
 //! draw: when an action happens (normal, 0.1 s, cut at 0.3 s; the first stays at the start), every
@@ -17,7 +17,7 @@ use avastra_base::units::Dimension;
 use avastra_lang::model::{Type, Value};
 use avastra_world::sim::DT_S;
 
-use super::crash::{Crash, play};
+use super::case::{Case, Found, play};
 
 /// Standard deviation of times, s.
 const TIME_S: f64 = 0.1;
@@ -28,7 +28,7 @@ const CUT: f64 = 3.0;
 /// Draws that are tried for a step; if all are illegal, the step is carried out as it was.
 const DRAWS_MAX: u32 = 8;
 
-/// How often a collision happens under variations.
+/// How often a finding happens under variations.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Likelihood {
     pub variations: u32,
@@ -41,38 +41,38 @@ pub struct Likelihood {
     pub high: f64,
 }
 
-/// The nth collision of a log under `variations` small changes; `setup` is what it was played from.
-/// A variation crashes if the ego vehicle runs into the same obstacle.
-pub fn likelihood(setup: &Setup, log: &EpisodeLog, index: usize, variations: u32) -> Likelihood {
-    let crash = Crash::new(setup, log, index);
-    let crashes = (1..=variations).filter(|&number| crash.again(&varied(&crash, number)).is_some());
+/// A finding of a log under `variations` small changes; `setup` is what it was played from. A variation crashes if the ego
+/// vehicle runs into the same obstacle, or breaches the same requirement.
+pub fn likelihood(setup: &Setup, log: &EpisodeLog, found: Found, variations: u32) -> Likelihood {
+    let case = Case::new(setup, log, found);
+    let crashes = (1..=variations).filter(|&number| case.is_again(&varied(&case, number)));
     let crashes = crashes.count() as u32;
     let (share, [low, high]) = proportion(crashes, variations);
     Likelihood { variations, crashes, share, low, high }
 }
 
 /// Plays a scenario with small changes. A number selects the changes.
-fn varied(crash: &Crash, number: u32) -> EpisodeLog {
-    let seed = rng::child_seed(crash.setup.seed, Stream::Variation, u64::from(number));
+fn varied(case: &Case, number: u32) -> EpisodeLog {
+    let seed = rng::child_seed(case.setup.seed, Stream::Variation, u64::from(number));
     let mut rng = rng::stream(seed, Stream::Variation, 0);
-    let mut setup = crash.setup.clone();
+    let mut setup = case.setup.clone();
     setup.seed = seed;
     setup.start.signal_phase_s = (setup.start.signal_phase_s + cut_normal(&mut rng) * TIME_S).max(0.0);
     let mut late_ticks = 0;
-    for _ in 1..crash.script.steps.len() {
+    for _ in 1..case.script.steps.len() {
         let next_ticks = (cut_normal(&mut rng) * TIME_S / DT_S).round() as i32;
         setup.period_shifts.push(next_ticks - late_ticks);
         late_ticks = next_ticks;
     }
-    play(&setup, |moment| choose(crash, seed, moment)).0
+    play(&setup, |moment| choose(case, seed, moment)).0
 }
 
 /// The action of a step with other speeds. Where none of several draws is legal, the action is tried as it
 /// was written.
-fn choose(crash: &Crash, seed: u64, moment: &Moment) -> Choice {
-    let table = crash.setup.table;
-    let Some(Some(action)) = crash.script.steps.get(moment.step) else {
-        return crash.script.choose(table, moment);
+fn choose(case: &Case, seed: u64, moment: &Moment) -> Choice {
+    let table = case.setup.table;
+    let Some(Some(action)) = case.script.steps.get(moment.step) else {
+        return case.script.choose(table, moment);
     };
     let parameters = &table.space().actions[table.rows()[action.row].action].parameters;
     let is_speed =
@@ -94,7 +94,7 @@ fn choose(crash: &Crash, seed: u64, moment: &Moment) -> Choice {
             return Choice::Act(draw);
         }
     }
-    crash.script.choose(table, moment)
+    case.script.choose(table, moment)
 }
 
 /// Standard normal, no farther out than [`CUT`].

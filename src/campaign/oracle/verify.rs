@@ -1,14 +1,16 @@
 //! The claims of an emitted scenario against what a replay finds.
 
-use crate::episode::{Collision, EpisodeLog};
+use crate::episode::{Breach, Collision, EpisodeLog};
 use avastra_drivers::Module;
 use avastra_lang::model::vocabulary::Word;
 use avastra_lang::model::{Claim, Obstacle, Scenario, Space, digest_text};
 
 use super::avoidable::Judgement;
+use super::case::Found;
 use super::cause::NoModules;
 use super::facts;
 use super::kept::Breached;
+use super::recurrence::Recurrence;
 
 /// One claim, and what the replay says of it.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -38,6 +40,8 @@ pub struct Replays<'a> {
     pub cause: &'a dyn Fn(usize) -> Result<Vec<Module>, NoModules>,
     /// What was breached, and who would have kept it; `None` if that is not tried.
     pub breached: &'a dyn Fn() -> Option<Vec<Breached>>,
+    /// How often a finding happens again under other chance, in so many replays.
+    pub recurrence: &'a dyn Fn(Found, u32) -> Result<Recurrence, NoTries>,
     /// Steps that could be left out with the same crash; an external driving system must be there to try.
     pub spare_steps: &'a dyn Fn(usize) -> Result<Vec<usize>, NoTries>,
 }
@@ -140,6 +144,24 @@ fn check(
             };
             let claim = format!("priority {}{}", priority.name(), with(*obstacle));
             judged(claim, collision(log, *obstacle).and_then(judge))
+        }
+        Claim::Recurrence { requirement, obstacle, recurred, replays: wanted } => {
+            let of = requirement.as_ref().map_or_else(String::new, |name| format!("{name}."));
+            let claim = format!("{of}recurrence {recurred} of {wanted}{}", with(*obstacle));
+            let found = match requirement {
+                None => collision(log, *obstacle).map(Found::Collision),
+                Some(name) => {
+                    let is_meant = |breach: &Breach| space.requirements[breach.requirement].name == *name;
+                    let first = log.breaches.iter().position(is_meant);
+                    first.map(Found::Breach).ok_or_else(|| "not breached".to_owned())
+                }
+            };
+            match found.map(|found| (replays.recurrence)(found, *wanted)) {
+                Err(none) => judged(claim, Err(none)),
+                Ok(Ok(found)) if found.recurred == *recurred => judged(claim, Ok(())),
+                Ok(Ok(found)) => judged(claim, Err(found.to_string())),
+                Ok(Err(no_tries)) => ClaimResult { claim, confirmed: None, found: no_tries.to_string() },
+            }
         }
         Claim::Minimal { obstacle } => {
             let claim = format!("minimal{}", with(*obstacle));

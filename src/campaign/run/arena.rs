@@ -73,6 +73,15 @@ impl Arena {
         &self.table
     }
 
+    pub fn rules(&self) -> &RulesInForce {
+        &self.rules
+    }
+
+    /// The driving system under test.
+    pub fn ads(&self) -> &Selected {
+        &self.ads
+    }
+
     /// The driving system: its name here, or what an external one calls itself.
     pub fn ads_name(&self) -> String {
         self.ads.title()

@@ -10,6 +10,7 @@ use sha2::{Digest, Sha256};
 use crate::episode::{Breach, EpisodeLog, Margin, Outcome};
 use crate::files::PlainName;
 use crate::oracle;
+use crate::oracle::Recurrence;
 use avastra_drivers::external::Failure;
 use avastra_lang::model::policy::VARIABLES;
 use avastra_lang::model::vocabulary::Word;
@@ -24,7 +25,7 @@ use crate::run::shape::Shape;
 use crate::run::summary::{EpisodeSummary, Finding};
 
 pub(crate) const LAYOUT: Layout = Layout {
-    version: 12,
+    version: 13,
     schema: || format!("{SCHEMA}{}", step_table()),
     unit: "episode",
     tables: &[
@@ -51,6 +52,16 @@ pub(crate) const LAYOUT: Layout = Layout {
            AND coalesce(first_counted_s, 0) BETWEEN 0 AND 1e9",
         ),
         ("collision", "time_s BETWEEN 0 AND 1e9 AND max(abs(ego_speed_mps), abs(delta_v_mps)) <= 1e9"),
+        (
+            "collision",
+            "harm_share BETWEEN 0 AND 1e9 AND coalesce(replays, 1) BETWEEN 1 AND 1000
+           AND coalesce(recurred, 0) BETWEEN 0 AND coalesce(replays, 0)",
+        ),
+        (
+            "breach",
+            "coalesce(replays, 1) BETWEEN 1 AND 1000 AND coalesce(recurred, 0) BETWEEN 0 AND coalesce(replays, 0)",
+        ),
+        ("margin", "asked_s BETWEEN 0 AND 1e9"),
         ("learning", "simulated_s BETWEEN 0 AND 1e9 AND abs(return) <= 1e12"),
     ],
 };
@@ -58,7 +69,8 @@ pub(crate) const LAYOUT: Layout = Layout {
 /// `held` says what held the speed of the ego vehicle back, from the row's time to that of the next row. `offer`
 /// counts, per episode and row, the steps in which the row was legal (`reason` 0) or refused (other reasons); training
 /// writes nothing there. `breach.kept_by` has the careful drivers that keep the
-/// requirement, NULL where none was asked (in a training). `scenario` has the text of the file that was written of an episode. `learning`, `checkpoint`
+/// requirement, NULL where none was asked (in a training). `recurred` of `replays` under other chance found the same, NULL where
+/// that was not tried. `scenario` has the text of the file that was written of an episode. `learning`, `checkpoint`
 /// and `result` belong to a training (`train::record`) and stay empty in a run.
 const SCHEMA: &str = "
 CREATE TABLE episode (
@@ -76,16 +88,17 @@ CREATE TABLE collision (
   avoidability TEXT NOT NULL, hazard_onset_s REAL NOT NULL, avoided_by TEXT NOT NULL, evasion TEXT,
   side TEXT NOT NULL, approach TEXT NOT NULL, relative_speed_mps REAL NOT NULL, delta_v_mps REAL NOT NULL,
   obstacle_delta_v_mps REAL NOT NULL, cause TEXT, shape TEXT, priority TEXT NOT NULL, r157_letter TEXT NOT NULL,
+  harm TEXT NOT NULL, harm_share REAL NOT NULL, recurred INTEGER, replays INTEGER,
   PRIMARY KEY (episode, number)
 ) STRICT;
 CREATE TABLE breach (
   episode INTEGER NOT NULL REFERENCES episode, number INTEGER NOT NULL, requirement TEXT NOT NULL,
   time_s REAL NOT NULL, until_s REAL NOT NULL, step INTEGER NOT NULL, margin REAL,
-  kept_by TEXT,
+  kept_by TEXT, recurred INTEGER, replays INTEGER, obstacle INTEGER,
   PRIMARY KEY (episode, number)
 ) STRICT;
 CREATE TABLE margin (
-  episode INTEGER NOT NULL REFERENCES episode, requirement TEXT NOT NULL, smallest REAL, unit TEXT,
+  episode INTEGER NOT NULL REFERENCES episode, requirement TEXT NOT NULL, smallest REAL, unit TEXT, asked_s REAL NOT NULL,
   PRIMARY KEY (episode, requirement)
 ) STRICT, WITHOUT ROWID;
 CREATE TABLE scenario (episode INTEGER PRIMARY KEY REFERENCES episode, text TEXT NOT NULL) STRICT;
@@ -166,6 +179,25 @@ impl Database {
         let transaction = self.connection.transaction()?;
         add_all(&transaction, summary, log, space, in_words, scenario)?;
         LAYOUT.seal(&transaction, summary.episode as i64)?;
+        transaction.commit()?;
+        Ok(())
+    }
+
+    /// Says of an episode that is in it how often its counted collisions recur, with another text of its scenario, which
+    /// claims so.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn add_recurrence(&mut self, summary: &EpisodeSummary, scenario: &str) -> Result<(), DatabaseError> {
+        let transaction = self.connection.transaction()?;
+        let episode = summary.episode as i64;
+        for finding in &summary.collisions {
+            let [recurred, replays] = in_columns(finding.recurrence);
+            let change = "UPDATE collision SET recurred = ?, replays = ? WHERE episode = ? AND number = ?";
+            transaction.execute(change, params![recurred, replays, episode, finding.number as i64])?;
+        }
+        transaction.execute("UPDATE scenario SET text = ? WHERE episode = ?", params![scenario, episode])?;
+        LAYOUT.seal_anew(&transaction, episode)?;
         transaction.commit()?;
         Ok(())
     }
@@ -264,7 +296,8 @@ impl Database {
                      WHERE breach.requirement = margin.requirement AND kept_by != ''),
                     (SELECT road || '/' || episode.episode FROM breach JOIN episode USING (episode)
                      WHERE breach.requirement = margin.requirement
-                     ORDER BY coalesce(breach.margin, 0), episode LIMIT 1)
+                     ORDER BY coalesce(breach.margin, 0), episode LIMIT 1),
+                    sum(asked_s), sum(asked_s > 0)
              FROM margin JOIN episode USING (episode) GROUP BY margin.requirement
              ORDER BY 7 DESC, margin.requirement";
         let named = |at: Option<String>| {
@@ -284,6 +317,8 @@ impl Database {
                 breached_in: row.get(7)?,
                 kept_in: row.get(8)?,
                 scenario: named(row.get(9)?),
+                asked_s: row.get(10)?,
+                asked_in: row.get(11)?,
             })
         })
     }
@@ -294,7 +329,11 @@ impl Database {
     /// If the file cannot be read.
     pub fn totals(&self) -> Result<Totals, DatabaseError> {
         Ok(self.connection.query_row(
-            "SELECT count(*), coalesce(sum(collisions), 0), coalesce(sum(counted), 0),
+            // A requirement that is breached several times in an episode is one finding.
+            "WITH finding AS (
+               SELECT recurred, replays FROM collision WHERE counted
+               UNION ALL SELECT min(recurred), min(replays) FROM breach GROUP BY episode, requirement)
+             SELECT count(*), coalesce(sum(collisions), 0), coalesce(sum(counted), 0),
                         coalesce(sum(collisions > 0), 0), coalesce(sum(counted > 0), 0),
                         coalesce(sum(ended = 'arrived'), 0), coalesce(sum(ended = 'stalled'), 0),
                         coalesce(sum(ended = 'limit'), 0), coalesce(sum(duration_s), 0.0),
@@ -310,7 +349,8 @@ impl Database {
                         (SELECT coalesce(sum(priority = 'other'), 0) FROM collision),
                         coalesce(sum(ended = 'blocked'), 0), (SELECT count(*) FROM failure),
                         coalesce(sum(ended = 'astray'), 0), coalesce(sum(ended = 'left_the_map'), 0),
-                        (SELECT count(DISTINCT episode) FROM breach)
+                        (SELECT count(DISTINCT episode) FROM breach),
+                        (SELECT count(replays) FROM finding), (SELECT coalesce(sum(2 * recurred > replays), 0) FROM finding)
                  FROM episode",
             [],
             |row| {
@@ -341,6 +381,8 @@ impl Database {
                     astray: row.get(23)?,
                     left_map: row.get(24)?,
                     episodes_with_breach: row.get(25)?,
+                    replayed: row.get(26)?,
+                    recurring: row.get(27)?,
                 })
             },
         )?)
@@ -353,6 +395,9 @@ pub struct RequirementCount {
     pub requirement: String,
     /// Episodes in which it was in force.
     pub episodes: i64,
+    /// For how long it was asked in all of them, s, and in how many of them at all.
+    pub asked_s: f64,
+    pub asked_in: i64,
     pub breaches: i64,
     /// Episodes with a breach of it.
     pub breached_in: i64,
@@ -396,6 +441,10 @@ pub struct Totals {
     pub episodes_with_counted: i64,
     /// Episodes in which a requirement was breached.
     pub episodes_with_breach: i64,
+    /// Counted collisions and requirements breached, one for each episode, that were played again under other chance, and
+    /// those of them that recur in more than half of the replays.
+    pub replayed: i64,
+    pub recurring: i64,
     pub arrived: i64,
     /// Ended without progress: for a reason of the driving system's own, because others blocked its way, and
     /// because it had left its lane.
@@ -518,18 +567,21 @@ fn add_breaches(
 ) -> Result<(), rusqlite::Error> {
     let episode = summary.episode;
     for (number, breach) in log.breaches.iter().enumerate() {
-        let Breach { requirement, time_s, until_s, margin, step } = *breach;
+        let Breach { requirement, time_s, until_s, margin, step, obstacle } = *breach;
         let name = &space.requirements[requirement].name;
         let found = summary.breached.iter().find(|found| found.requirement == requirement);
         let kept_by = found.map(|found| found.kept_by.join(" "));
-        let values =
-            params![episode as i64, number as i64, name, time_s, until_s, step as i64, margin, kept_by];
+        let [recurred, replays] = in_columns(found.and_then(|found| found.recurrence));
+        let (episode, number, step) = (episode as i64, number as i64, step as i64);
+        let values = params![
+            episode, number, name, time_s, until_s, step, margin, kept_by, recurred, replays, obstacle
+        ];
         insert_row(transaction, "breach", values)?;
     }
-    for Margin { requirement, smallest } in &log.margins {
+    for Margin { requirement, smallest, asked_s } in &log.margins {
         let RequirementDef { name, margin, .. } = &space.requirements[*requirement];
         let unit = margin.map(|dimension| dimension.si_unit());
-        insert_row(transaction, "margin", params![episode as i64, name, smallest, unit])?;
+        insert_row(transaction, "margin", params![episode as i64, name, smallest, unit, asked_s])?;
     }
     Ok(())
 }
@@ -600,6 +652,11 @@ fn add_episode(
     insert_row(transaction, "episode", values)
 }
 
+/// Its two columns, empty where it was not tried.
+fn in_columns(recurrence: Option<Recurrence>) -> [Option<u32>; 2] {
+    recurrence.map_or([None, None], |found| [Some(found.recurred), Some(found.replays)])
+}
+
 fn add_collision(
     transaction: &Transaction,
     episode: usize,
@@ -608,6 +665,7 @@ fn add_collision(
     let Finding { collision, facts, judgement, .. } = finding;
     let contact = &collision.contact;
     let severity = oracle::severity(collision);
+    let [recurred, replays] = in_columns(finding.recurrence);
     let values = params![
         episode as i64,
         finding.number as i64,
@@ -638,6 +696,10 @@ fn add_collision(
         finding.shape.map(Shape::name),
         facts.priority.name(),
         judgement.r157_letter.join(" "),
+        severity.harm.name(),
+        severity.harm_share,
+        recurred,
+        replays,
     ];
     insert_row(transaction, "collision", values)
 }

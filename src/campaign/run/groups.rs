@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use avastra_lang::model::vocabulary::{Body, Word};
 
 use crate::run::database::Database;
-use crate::run::sealed::{DatabaseError, query_all};
+use crate::run::sealed::DatabaseError;
 
 /// Counted collisions that are alike.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
@@ -76,20 +76,6 @@ impl Database {
         let mut groups: Vec<Group> = found.into_values().map(|(group, _)| group).collect();
         groups.sort_by_key(|group| core::cmp::Reverse(group.count));
         Ok(groups)
-    }
-
-    /// Road and number of each episode with a collision, the worst first: episodes with a counted collision, then by
-    /// the larger delta-v of the two bodies.
-    ///
-    /// # Errors
-    /// If the database cannot be read.
-    pub fn worst(&self) -> Result<Vec<(String, i64)>, DatabaseError> {
-        let query = "WITH hardest AS (
-               SELECT episode, collision.counted AS counts, max(max(delta_v_mps, obstacle_delta_v_mps)) AS delta_v_mps
-               FROM collision GROUP BY episode, counts)
-             SELECT road, episode FROM hardest JOIN episode USING (episode) GROUP BY episode
-             ORDER BY max(counts) DESC, max(CASE counts WHEN counted > 0 THEN delta_v_mps END) DESC, episode";
-        query_all(&self.connection, query, |row| Ok((row.get(0)?, row.get(1)?)))
     }
 }
 

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use crate::episode;
-use crate::episode::{Choice, EpisodeLog, Moment, Watch};
+use crate::episode::{Choice, EpisodeLog, Moment, Script, Watch};
 use crate::oracle;
 use crate::oracle::AvoidabilitySettings;
 use avastra_base::rng;
@@ -128,6 +128,11 @@ impl Run {
         let setup = self.setup(number);
         let mut summary = EpisodeSummary::judged(&setup, number, &log);
         summary.find_keepers(&setup, &log);
+        if let Some(last) = summary.last_step(&log) {
+            let mut script = Script::of_log(&log);
+            script.steps.truncate(last + 1);
+            summary.find_recurrence(&setup, &script, &log, self.settings.replays);
+        }
         (summary.criticality, summary.pet_s) = gauges.of_steps(&log);
         for (finding, shape) in summary.collisions.iter_mut().zip(gauges.shapes()) {
             finding.shape = *shape;

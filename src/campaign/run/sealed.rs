@@ -249,6 +249,12 @@ impl Layout {
         insert_row(connection, "seal", params![number, digest])
     }
 
+    /// Seals the rows of a unit that is sealed already; called in the transaction that changes them.
+    pub(super) fn seal_anew(&self, connection: &Connection, number: i64) -> Result<(), rusqlite::Error> {
+        connection.prepare_cached("DELETE FROM seal WHERE unit = ?")?.execute([number])?;
+        self.seal(connection, number)
+    }
+
     /// Deletes the rows of a unit.
     pub(super) fn delete(&self, connection: &Connection, number: i64) -> Result<(), rusqlite::Error> {
         for table in self.tables.iter().rev() {

@@ -51,6 +51,9 @@ pub struct RunSettings {
     /// Whether each counted collision is diagnosed.
     #[serde(default)]
     pub causes: bool,
+    /// Replays of each finding under other chance, to say how often it recurs; 0 for none.
+    #[serde(default)]
+    pub replays: u32,
     /// Rules switched off.
     pub without: Vec<String>,
     /// Optional rules switched on.
@@ -80,6 +83,7 @@ impl RunSettings {
             ambient: 0,
             traffic: None,
             causes: false,
+            replays: 0,
             without: Vec::new(),
             with: Vec::new(),
             avoidability: AvoidabilitySettings::default(),

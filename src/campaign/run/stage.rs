@@ -1,11 +1,12 @@
 //! An emitted scenario played again, and its claims checked.
 
+use std::cell::LazyCell;
 use std::sync::Arc;
 
 use crate::episode;
-use crate::episode::{EpisodeLog, Script, Watch};
+use crate::episode::{Breach, EpisodeLog, Script, Watch};
 use crate::oracle;
-use crate::oracle::{ClaimResult, Judgement, NoModules, NoTries, Replays};
+use crate::oracle::{ClaimResult, Found, Judgement, NoModules, NoTries, Replayed, Replays, can_replay};
 use avastra_drivers::{ModularConfig, Selected};
 use avastra_lang::model::{Claim, RulesInForce, Scenario, digest_text};
 use avastra_search::mdp::ProcKind;
@@ -79,6 +80,19 @@ impl<'a> Stage<'a> {
         (log, judgements, first)
     }
 
+    /// Plays it, and finds what it is about: its first counted collision, because a crash is more than a breach that led to
+    /// it, or else the first breach that the file claims.
+    pub fn first_found(&self, ads: &Selected) -> (EpisodeLog, Vec<Judgement>, Option<Found>) {
+        let (log, judgements, counted) = self.first_counted(ads);
+        let is_claimed = |breach: &Breach| {
+            let name = &self.table.space().requirements[breach.requirement].name;
+            self.scenario.breached().any(|claimed| claimed == name)
+        };
+        let breach = || log.breaches.iter().position(is_claimed).map(Found::Breach);
+        let found = counted.map(Found::Collision).or_else(breach);
+        (log, judgements, found)
+    }
+
     /// Indices of the collisions that the space's verdict counts, in a log of this scenario.
     pub fn counted(&self, ads: &Selected, log: &EpisodeLog) -> Vec<usize> {
         oracle::counted_at_need(self.table.space(), log, || self.judge(ads, log))
@@ -96,9 +110,18 @@ impl<'a> Stage<'a> {
     pub fn verify(&self, ads: &Selected, log: &EpisodeLog) -> Vec<ClaimResult> {
         let setup = self.setup(ads);
         let judgements = self.judge(ads, log);
+        let script = Script::of_scenario(self.scenario);
+        // Played once, for all claims that need it.
+        let again = LazyCell::new(|| Replayed::new(&setup, &script, log, self.scenario.replays()));
         let replays = Replays {
-            cause: &|index| Ok(oracle::diagnose(&setup, log, index, &ModularConfig::default())?.cause),
-            breached: &|| Some(oracle::breached(&setup, &Script::of_scenario(self.scenario), log)),
+            recurrence: &|found, replays| match can_replay(ads) {
+                true => Ok(again.recurrence(found, replays)),
+                false => Err(NoTries),
+            },
+            cause: &|index| {
+                Ok(oracle::diagnose(&setup, log, Found::Collision(index), &ModularConfig::default())?.cause)
+            },
+            breached: &|| Some(oracle::breached(&setup, &script, log)),
             spare_steps: &|index| {
                 if ads.program().is_some_and(|program| !program.can_start()) {
                     return Err(NoTries);
@@ -110,7 +133,7 @@ impl<'a> Stage<'a> {
     }
 
     /// The claims that a log of it refutes, among those that `asked` selects. Claims that need further plays (causes,
-    /// minimality) count as not tried. `judgements` has one for each collision, if one of these claims is about
+    /// recurrence, minimality) count as not tried. `judgements` has one for each collision, if one of these claims is about
     /// verdicts.
     pub fn refuted(
         &self,
@@ -124,6 +147,7 @@ impl<'a> Stage<'a> {
         let replays = Replays {
             cause: &|_| Err(NoModules { ads: ads.title() }),
             breached: &|| None,
+            recurrence: &|_, _| Err(NoTries),
             spare_steps: &|_| Err(NoTries),
         };
         let mut results = oracle::verify(self.table.space(), &scenario, log, judgements, &replays);

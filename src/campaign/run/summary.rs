@@ -2,7 +2,7 @@
 
 use crate::episode::{Collision, EpisodeLog, Script, Setup};
 use crate::oracle;
-use crate::oracle::{Breached, Judgement, NoModules};
+use crate::oracle::{Breached, Found, Judgement, NoModules, Recurrence, Replayed, can_replay};
 use avastra_drivers::{ModularConfig, Module};
 use avastra_lang::model::{OutcomeFacts, Space};
 use avastra_search::mdp::Criticality;
@@ -42,6 +42,8 @@ pub struct Finding {
     /// Modules at fault, if they were looked for.
     pub cause: Option<Vec<Module>>,
     pub counted: bool,
+    /// How often it happens again under other chance, if that was tried.
+    pub recurrence: Option<Recurrence>,
     /// Whether it is proved that no step before it can be left out.
     pub minimal: bool,
     /// What the author calls the obstacle, if it is a body of the author's own.
@@ -79,6 +81,7 @@ impl EpisodeSummary {
                 judgement,
                 cause: None,
                 counted,
+                recurrence: None,
                 minimal: false,
                 shape: None,
             }
@@ -92,13 +95,40 @@ impl EpisodeSummary {
         self.breached = oracle::breached(setup, &Script::of_log(log), log);
     }
 
+    /// The step of the last counted collision or breach: what comes later is not part of the scenario.
+    pub fn last_step(&self, log: &EpisodeLog) -> Option<usize> {
+        let counted = self.collisions.iter().filter(|finding| finding.counted);
+        let of_collisions = counted.map(|finding| finding.collision.step).max();
+        of_collisions.max(log.breaches.iter().map(|breach| breach.step).max())
+    }
+
+    /// Plays the scenario of the log so many times more, to say of every counted collision and of every requirement that was
+    /// breached how often it happens again. Says nothing if the driving system cannot be asked.
+    pub fn find_recurrence(&mut self, setup: &Setup, script: &Script, log: &EpisodeLog, replays: u32) {
+        if replays == 0 || self.last_step(log).is_none() || !can_replay(&setup.ads) {
+            return;
+        }
+        let again = Replayed::new(setup, script, log, replays);
+        if !can_replay(&setup.ads) {
+            return;
+        }
+        for finding in self.collisions.iter_mut().filter(|finding| finding.counted) {
+            finding.recurrence = Some(again.recurrence(Found::Collision(finding.number), replays));
+        }
+        for found in &mut self.breached {
+            let first = log.breaches.iter().position(|breach| breach.requirement == found.requirement);
+            found.recurrence = first.map(|first| again.recurrence(Found::Breach(first), replays));
+        }
+    }
+
     /// Looks for the cause of every counted collision.
     ///
     /// # Errors
     /// If the driving system has no modules.
     pub fn find_causes(&mut self, setup: &Setup, log: &EpisodeLog) -> Result<(), NoModules> {
         for finding in self.collisions.iter_mut().filter(|finding| finding.counted) {
-            let diagnosis = oracle::diagnose(setup, log, finding.number, &ModularConfig::default())?;
+            let diagnosis =
+                oracle::diagnose(setup, log, Found::Collision(finding.number), &ModularConfig::default())?;
             finding.cause = Some(diagnosis.cause);
         }
         Ok(())

@@ -7,9 +7,12 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::language::RuleArguments;
 use crate::cli::help::Named;
-use avastra_campaign::estimate::{EventKind, Method};
+use avastra_campaign::estimate::Method;
 use avastra_campaign::run::Shard;
 use avastra_search::agent::Face;
+
+/// Replays of a finding where nothing else is asked for.
+pub const REPLAYS: u32 = 20;
 
 /// The driving system under test.
 #[derive(Debug, Args)]
@@ -75,6 +78,10 @@ pub struct RunArguments {
     /// replays for each.
     #[arg(long)]
     pub causes: bool,
+    /// Replays of each finding with other sensor errors, and others who react a little sooner or later, to say how often it
+    /// recurs; 0 for none.
+    #[arg(long, value_name = "N", default_value_t = REPLAYS, value_parser = clap::value_parser!(u32).range(0..=i64::from(avastra_lang::model::REPLAYS_MAX)))]
+    pub replays: u32,
     /// Worker threads; the result does not depend on it [default: one for each core].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub jobs: Option<u32>,
@@ -87,7 +94,7 @@ pub struct RunArguments {
     #[command(flatten)]
     pub shard: ShardArguments,
     /// Go on with an interrupted run directory; its own settings hold, and the program that they name is started.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "policy", "face", "episodes", "seed", "ambient", "traffic", "causes", "out", "self_contained", "shard", "dry_run", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "policy", "face", "episodes", "seed", "ambient", "traffic", "causes", "replays", "out", "self_contained", "shard", "dry_run", "without", "with"])]
     pub resume: Option<PathBuf>,
     /// Exit with status 4 if a counted collision was found.
     #[arg(long)]
@@ -102,9 +109,10 @@ pub struct EstimateArguments {
     /// The space.
     #[arg(required_unless_present = "resume")]
     pub file: Option<PathBuf>,
-    /// What is looked for in an episode.
-    #[arg(long, default_value = "counted", value_parser = one_of::<EventKind>(["counted", "collision"]))]
-    pub event: EventKind,
+    /// What is looked for in an episode: `counted` (a collision that the space counts), `collision` (any), `breach` (of any
+    /// requirement), or the name of a requirement.
+    #[arg(long, value_name = "EVENT", default_value = "counted")]
+    pub event: String,
     /// How: `count` plays every episode from its start; `probe` tries dangerous rows out beside those that chance chooses, each
     /// with its weight, which pays where a crash comes in fewer than one of a hundred episodes or so, and says what it
     /// gained or lost. Both are unbiased with a fixed number of parts.

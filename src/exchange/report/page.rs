@@ -75,7 +75,10 @@ impl Page {
     pub fn html(mut self) -> String {
         self.scenes.sort_by(|a, b| {
             let (a_key, b_key) = (badness(&a.recording.summary), badness(&b.recording.summary));
-            b_key.0.cmp(&a_key.0).then(b_key.1.total_cmp(&a_key.1)).then(a.file.cmp(&b.file))
+            (b_key.0, b_key.1)
+                .cmp(&(a_key.0, a_key.1))
+                .then(b_key.2.total_cmp(&a_key.2))
+                .then(a.file.cmp(&b.file))
         });
         let mut blobs = String::new();
         let mut grounds: BTreeMap<String, String> = BTreeMap::new();
@@ -123,15 +126,18 @@ impl Page {
     }
 }
 
-/// The larger, the worse: whether it counts, then the larger change of velocity of the two (m/s), 0 without a collision.
-fn badness(summary: &Value) -> (bool, f64) {
-    let collisions = summary["collisions"].as_array().map_or(&[][..], Vec::as_slice);
-    let hardness = |collision: &Value| {
-        let of = |name: &str| collision[name].as_f64().unwrap_or(0.0);
-        (collision["counted"] == true, of("delta_v_mps").max(of("other_delta_v_mps")))
-    };
-    let worse = |a: (bool, f64), b: (bool, f64)| if (b.0, b.1) > (a.0, a.1) { b } else { a };
-    collisions.iter().map(hardness).fold((false, 0.0), worse)
+/// The larger, the worse: whether something of it counts, whether that is no fluke, and how fast the impact was beside what
+/// people bear, 0 without a collision.
+fn badness(summary: &Value) -> (bool, bool, f64) {
+    let all = |name: &str| summary[name].as_array().map_or(&[][..], Vec::as_slice);
+    let of_collisions = all("collisions").iter().map(|collision| (collision["counted"] == true, collision));
+    let findings: Vec<(bool, &Value)> =
+        of_collisions.chain(all("breaches").iter().map(|breach| (true, breach))).collect();
+    let counts = findings.iter().any(|(counts, _)| *counts);
+    let meant = || findings.iter().filter(|found| found.0 == counts).map(|(_, finding)| finding);
+    let recurs = meant().any(|finding| finding["recurrence"]["fluke"] != true);
+    let harm = meant().filter_map(|finding| finding["harm_share"].as_f64()).fold(0.0, f64::max);
+    (counts, recurs, harm)
 }
 
 /// The number of a road's shape: scenarios of one road share it.

@@ -15,12 +15,12 @@ use avastra_campaign::episode::{
     Actor, Breach, End, EpisodeLog, Held, Moment, Outcome, Phase, Recorder, Sample, Script, Sky,
 };
 use avastra_campaign::oracle;
-use avastra_campaign::oracle::{ClaimResult, ReferenceDrive, Regression};
+use avastra_campaign::oracle::{ClaimResult, Recurrence, ReferenceDrive, Regression};
 use avastra_campaign::run;
 use avastra_campaign::run::{Gauges, RunError, Shape, Stage, refusal_in_words};
 use avastra_drivers::Selected;
 use avastra_lang::model::vocabulary::Word;
-use avastra_lang::model::{Claim, RequirementDef, Scenario};
+use avastra_lang::model::{Claim, Obstacle, RequirementDef, Scenario};
 use avastra_world::action::{ActionTable, Offer};
 use avastra_world::sim::{DT_S, FRAME_TICKS, SignalColour};
 
@@ -74,7 +74,7 @@ pub struct Recording {
 }
 
 /// Plays a scenario with the driving system that it was recorded with, and keeps everything. `source` is the text of its
-/// file. What only further plays could show, causes and minimality, is not checked.
+/// file. What only further plays could show, causes, recurrence and minimality, is not checked.
 ///
 /// # Errors
 /// If it cannot be played any more, as [`Stage::new`] tells.
@@ -84,7 +84,9 @@ pub fn record(
     ads: &Selected,
     source: &str,
 ) -> Result<Recording, RunError> {
-    let asked = |claim: &Claim| !matches!(claim, Claim::Cause { .. } | Claim::Minimal { .. });
+    let asked = |claim: &Claim| {
+        !matches!(claim, Claim::Cause { .. } | Claim::Recurrence { .. } | Claim::Minimal { .. })
+    };
     played(&Stage::new(table, scenario)?, (table, scenario), ads, source, asked)
 }
 
@@ -274,6 +276,9 @@ fn collision(
         }
         _ => None,
     });
+    let recurrence = recurrence(scenario, |requirement, obstacle| {
+        requirement.is_none() && obstacle.is_none_or(|named| named.number == contact.obstacle)
+    });
     json!({
         "at_s": contact.time_s, "obstacle": contact.obstacle, "body": table.space().body_name(found.body),
         "kind": run::kind(found.body.like.name()), "shape": shape, "verb": found.verb.name(),
@@ -281,7 +286,8 @@ fn collision(
         "onset_s": judgement.onset_s, "avoided_by": judgement.avoided_by, "letter": judgement.r157_letter,
         "evasion": judgement.evasion, "priority": contact.priority.name(), "side": severity.side, "approach": severity.approach,
         "ego_mps": contact.ego_speed_mps, "closing_mps": severity.closing_speed_mps, "delta_v_mps": severity.delta_v_mps,
-        "other_delta_v_mps": severity.obstacle_delta_v_mps, "sudden": facts.sudden, "struck": facts.struck, "cause": cause,
+        "other_delta_v_mps": severity.obstacle_delta_v_mps, "harm": severity.harm.name(), "harm_share": rounded(severity.harm_share),
+        "recurrence": recurrence, "sudden": facts.sudden, "struck": facts.struck, "cause": cause,
         "held": log.held_at(contact.time_s).map(Held::text), "ways": ways,
     })
 }
@@ -296,11 +302,28 @@ fn breaches(table: &ActionTable, scenario: &Scenario, log: &EpisodeLog) -> Vec<V
         });
         let unit = margin.map(|dimension| dimension.si_unit());
         json!({
-            "requirement": name, "docs": docs.join(" "), "at_s": breach.time_s, "until_s": breach.until_s,
+            "requirement": name, "obstacle": breach.obstacle, "docs": docs.join(" "), "at_s": breach.time_s, "until_s": breach.until_s,
             "margin": breach.margin.map(rounded), "unit": unit, "kept_by": kept_by,
+            "recurrence": recurrence(scenario, |requirement, _| requirement == Some(name)),
         })
     };
     log.breaches.iter().map(told).collect()
+}
+
+/// How often a finding recurs, as the file claims of the one that is meant.
+fn recurrence(
+    scenario: &Scenario,
+    is_meant: impl Fn(Option<&str>, Option<Obstacle>) -> bool,
+) -> Option<Value> {
+    scenario.claims.iter().find_map(|claim| match claim {
+        Claim::Recurrence { requirement, obstacle, recurred, replays }
+            if is_meant(requirement.as_deref(), *obstacle) =>
+        {
+            let found = Recurrence { recurred: *recurred, replays: *replays };
+            Some(json!({ "recurred": recurred, "replays": replays, "text": found.to_string(), "fluke": found.is_fluke() }))
+        }
+        _ => None,
+    })
 }
 
 fn without_ways(collision: &Value) -> Value {

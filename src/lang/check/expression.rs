@@ -782,7 +782,10 @@ pub(super) fn unknown_here(thing: &str, span: Span, site: Site) -> Diagnostic {
         Site::Trigger if thing == "npc" => {
             error.at(span, "which road user?").help("name it by its number, as it appeared: `npc#1.gap`")
         }
-        Site::StepBegins | Site::Requirement if thing == "npc" => error
+        Site::Requirement if thing == "npc" => error.at(span, "which road user?").help(
+            "say whom it is asked of, `require … on Bicycle: npc.gap >= 1 m`, or name one where it is spawned: `truck.gap`",
+        ),
+        Site::StepBegins if thing == "npc" => error
             .at(span, "which road user?")
             .help("give it a name where it is spawned, and ask for that: `truck.gap`"),
         Site::Axis => error

@@ -2,12 +2,13 @@
 
 use crate::check::checker::{Checker, docs};
 use crate::check::expression::Place;
+use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::requirement::{margin_dimension, open_divisor};
-use crate::model::vocabulary::{BREACHED, Site, things};
-use crate::model::{RequirementDef, RuleDef, TICK_MS, Type, code};
+use crate::model::vocabulary::{BREACHED, Body, Site, Word, things};
+use crate::model::{BodyWord, RequirementDef, RuleDef, TICK_MS, Type, code};
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
 use avastra_base::units::{Dimension, Rational};
@@ -48,7 +49,9 @@ impl Checker {
         item: &ast::Item,
         declared: &ast::Require,
     ) -> Option<RequirementDef> {
-        let place = Place { states: true, site: Site::Requirement, ..Place::default() };
+        let on = declared.on.iter().map(|name| self.body_required(name)).collect::<Option<Vec<_>>>();
+        let site = if declared.on.is_empty() { Site::Requirement } else { Site::RequirementOn };
+        let place = Place { states: true, site, ..Place::default() };
         let when = declared.when.as_ref().map(|when| self.typed(when, &place, Type::Bool));
         let condition = self.typed(&declared.condition, &place, Type::Bool);
         let within_ticks = match &declared.within {
@@ -86,6 +89,7 @@ impl Checker {
             name: declared.name.text.clone(),
             docs: docs(item),
             optional: declared.optional,
+            on: on?,
             margin: margin_dimension(&condition),
             when,
             condition,
@@ -93,6 +97,17 @@ impl Checker {
             bearers,
             span: declared.name.span,
         })
+    }
+
+    /// A body that a requirement is about.
+    fn body_required(&mut self, name: &ast::Name) -> Option<BodyWord> {
+        let Some(body) = self.body_named(&name.text) else {
+            let names = Body::names().chain(self.bodies.iter().map(|body| body.name.as_str()));
+            let error = unknown("body", &name.text, name.span, names);
+            return self.reject(error);
+        };
+        self.note_body(name.span, &name.text);
+        Some(body)
     }
 
     /// `stops_at_red.breached` in a reward; `None` if this is no requirement.

@@ -5,11 +5,11 @@ use crate::check::report::Report;
 use crate::check::scenario::Reader;
 use crate::check::scenario_value::figure;
 use crate::model::code;
-use crate::model::scenario::{Claim, DRIVERS, ENDS, Figure, MODULES, Obstacle};
+use crate::model::scenario::{Claim, DRIVERS, ENDS, Figure, MODULES, Obstacle, REPLAYS_MAX};
 use crate::model::vocabulary::{
-    Avoidability, BREACHED, Fact, KEPT, ObstacleKind, Priority, ScenarioClaim, Word,
+    Avoidability, BREACHED, Fact, KEPT, ObstacleKind, Priority, RECURRENCE, ScenarioClaim, Word,
 };
-use crate::syntax::ast::{BinaryOp, ClauseKind, Comparison};
+use crate::syntax::ast::{Arithmetic, BinaryOp, ClauseKind, Comparison};
 use crate::syntax::{Diagnostic, ast, listed};
 use avastra_base::units::Dimension;
 
@@ -20,7 +20,7 @@ impl Reader<'_> {
             Diagnostic::error(code::UNKNOWN_CLAIM, "unknown claim").at(expect.span, "cannot be checked").help(
                 "claims are `collision with npc#2 at 14.22 s`, `proc == [0.5]`, `trace == \"sha256:…\"`, \
                  `end == arrived`, `avoidable by [cc, fsm]`, `cause == perception`, `priority == other`, \
-                 `minimal`, the name of a verdict, or `NAME.breached at 14.22 s` with that of a requirement",
+                 `recurrence == 14 / 20`, `minimal`, the name of a verdict, or `NAME.breached at 14.22 s` with that of a requirement",
             )
         };
         match &expect.claim.kind {
@@ -48,6 +48,21 @@ impl Reader<'_> {
                     (ast::ExprKind::Name(name), ast::ExprKind::List(items)) if name == "proc" => {
                         let values = items.iter().map(|item| self.take(figure(item, Dimension::RATIO)));
                         values.collect::<Option<_>>().map(Claim::Proc)
+                    }
+                    (ast::ExprKind::Name(name), _) if name == ScenarioClaim::Recurrence.name() => {
+                        let (recurred, replays) = self.share(right)?;
+                        let (obstacle, _) = self.clauses(&expect.clauses, false)?;
+                        Some(Claim::Recurrence { requirement: None, obstacle, recurred, replays })
+                    }
+                    (ast::ExprKind::Field { base, field }, _) if field.text == RECURRENCE.0 => {
+                        let requirement = Some(self.requirement(base)?);
+                        let (recurred, replays) = self.share(right)?;
+                        match self.clauses(&expect.clauses, false)? {
+                            (None, _) => {
+                                Some(Claim::Recurrence { requirement, obstacle: None, recurred, replays })
+                            }
+                            (Some(_), _) => self.not_of_one(&expect.clauses, base),
+                        }
                     }
                     (ast::ExprKind::Name(name), ast::ExprKind::Text(text))
                         if name == ScenarioClaim::Trace.name() =>
@@ -94,12 +109,33 @@ impl Reader<'_> {
         let name = self.requirement(requirement)?;
         match self.clauses(clauses, true)? {
             (None, time) => Some(Claim::Breach { requirement: name, time }),
-            (Some(_), _) => {
-                let error = Diagnostic::error(code::UNKNOWN_CLAIM, "a breach is not about one road user");
-                let span = clauses.first().map_or(requirement.span, |clause| clause.span);
-                self.reject(error.at(span, "").help("write `stops_at_red.breached at 14.22 s`"))
-            }
+            (Some(_), _) => self.not_of_one(clauses, requirement),
         }
+    }
+
+    fn not_of_one<T>(&mut self, clauses: &[ast::Clause], requirement: &ast::Expr) -> Option<T> {
+        let error = Diagnostic::error(code::UNKNOWN_CLAIM, "a breach is not about one road user");
+        let span = clauses.first().map_or(requirement.span, |clause| clause.span);
+        self.reject(error.at(span, "").help("write `stops_at_red.breached at 14.22 s`"))
+    }
+
+    /// `14 / 20`: in how many of how many replays.
+    fn share(&mut self, value: &ast::Expr) -> Option<(u32, u32)> {
+        let whole = |expr: &ast::Expr| match &expr.kind {
+            ast::ExprKind::Number(number) if number.unit.is_none() => number.digits.parse::<u32>().ok(),
+            _ => None,
+        };
+        if let ast::ExprKind::Binary { op: BinaryOp::Arithmetic(Arithmetic::Divide), left, right, .. } =
+            &value.kind
+            && let (Some(recurred), Some(replays)) = (whole(left), whole(right))
+            && recurred <= replays
+            && (1..=REPLAYS_MAX).contains(&replays)
+        {
+            return Some((recurred, replays));
+        }
+        let error = Diagnostic::error(code::UNKNOWN_CLAIM, "wanted in how many of how many replays");
+        let help = format!("write `recurrence == 14 / 20`, with at most {REPLAYS_MAX} replays");
+        self.reject(error.at(value.span, "").help(help))
     }
 
     /// `stops_at_red.kept by [cc, fsm]`.

@@ -6,7 +6,7 @@
 use crate::check::expression::enum_of;
 use crate::check::references::{References, Symbol};
 use crate::model::Type;
-use crate::model::vocabulary::{BREACHED, Fact, KEPT, ScenarioClaim, StartField, WAIT};
+use crate::model::vocabulary::{BREACHED, Fact, KEPT, RECURRENCE, ScenarioClaim, StartField, WAIT};
 use crate::syntax::ast;
 use crate::syntax::ast::{Expr, ExprKind, Field, ItemKind, Name};
 
@@ -133,7 +133,7 @@ impl References {
                     self.uses(base.span, Symbol::Requirement(name.clone()));
                 }
                 if let Some((word, meaning)) =
-                    [BREACHED, KEPT].into_iter().find(|(word, _)| *word == field.text)
+                    [BREACHED, KEPT, RECURRENCE].into_iter().find(|(word, _)| *word == field.text)
                 {
                     self.note(field.span, Symbol::Engine(word, meaning), false);
                 }

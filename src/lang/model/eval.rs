@@ -67,6 +67,9 @@ pub struct TickFacts {
     pub lead_since_s: f64,
     pub over_red_m: f64,
     pub over_oncoming_m: f64,
+    pub over_lane_m: f64,
+    pub visibility_m: f64,
+    pub jerk_mps3: f64,
 }
 
 /// The longest time that `since` tells, s: also of actions that never happened.
@@ -280,7 +283,10 @@ fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
         | Fact::EgoLeadSpeed
         | Fact::EgoLeadSince
         | Fact::EgoOverRed
-        | Fact::EgoOverOncoming => world(facts.world.zip(of_tick(fact)).map(|(world, of)| of(&world.tick))),
+        | Fact::EgoOverOncoming
+        | Fact::EgoOverLane
+        | Fact::EgoVisibility
+        | Fact::EgoJerk => world(facts.world.zip(of_tick(fact)).map(|(world, of)| of(&world.tick))),
         Fact::RoadLimit => Value::Number(facts.road.map_or(f64::NAN, |road| road.limit_mps)),
         Fact::StepNumber => Value::Number(facts.world.map_or(f64::NAN, |world| world.step as f64)),
         Fact::NpcSpeed => spawn(|spawn| spawn.npc.speed_mps),
@@ -332,6 +338,9 @@ pub(crate) fn of_tick(fact: Fact) -> Option<fn(&TickFacts) -> f64> {
         Fact::EgoLeadSince => |tick| tick.lead_since_s,
         Fact::EgoOverRed => |tick| tick.over_red_m,
         Fact::EgoOverOncoming => |tick| tick.over_oncoming_m,
+        Fact::EgoOverLane => |tick| tick.over_lane_m,
+        Fact::EgoVisibility => |tick| tick.visibility_m,
+        Fact::EgoJerk => |tick| tick.jerk_mps3,
         _ => return None,
     })
 }

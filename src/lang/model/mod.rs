@@ -46,8 +46,8 @@ pub use row::locals;
 pub use row::{Reach, Row};
 pub use rules::{NoStart, RulesInForce, UnknownRule};
 pub use scenario::{
-    Claim, DRIVERS, ENDS, Figure, MODULES, Obstacle, Origin, Scenario, ScenarioStart, ScenarioStep, Trigger,
-    ticks_s,
+    Claim, DRIVERS, ENDS, Figure, MODULES, Obstacle, Origin, REPLAYS_MAX, Scenario, ScenarioStart,
+    ScenarioStep, Trigger, ticks_s,
 };
 pub use space::{
     ACTION_ODDS_MAX, ActionDef, BodyDef, BodyWord, COUNTED, Domain, EffectDef, EnumDef, EpisodeDef, FnDef,

@@ -143,6 +143,9 @@ pub enum Claim {
     Cause { modules: Vec<String>, obstacle: Option<Obstacle> },
     /// `expect priority == other with npc#2`: who had priority in the collision.
     Priority { priority: Priority, obstacle: Option<Obstacle> },
+    /// `expect recurrence == 14 / 20 with npc#2`, `expect stops_at_red.recurrence == 14 / 20`: in how many replays under other
+    /// chance the collision, or the breach of a requirement, happens again.
+    Recurrence { requirement: Option<String>, obstacle: Option<Obstacle>, recurred: u32, replays: u32 },
     /// `expect minimal with npc#2`: if any one step is left out, with its time or without, there is no such
     /// collision.
     Minimal { obstacle: Option<Obstacle> },
@@ -160,6 +163,7 @@ impl Claim {
             | Claim::Cause { .. }
             | Claim::Priority { .. }
             | Claim::Minimal { .. } => true,
+            Claim::Recurrence { requirement, .. } => requirement.is_none(),
             Claim::Proc(_) | Claim::Trace(_) | Claim::Breach { .. } | Claim::Kept { .. } | Claim::End(_) => {
                 false
             }
@@ -174,6 +178,15 @@ impl Scenario {
             Claim::Breach { requirement, .. } => Some(requirement.as_str()),
             _ => None,
         })
+    }
+
+    /// The replays that its claims of recurrence are about; 0 without one.
+    pub fn replays(&self) -> u32 {
+        let replays = self.claims.iter().map(|claim| match claim {
+            Claim::Recurrence { replays, .. } => *replays,
+            _ => 0,
+        });
+        replays.max().unwrap_or(0)
     }
 
     /// Whether a crash with an obstacle is one that the scenario is about. If the scenario has claims that name a
@@ -196,6 +209,9 @@ impl Scenario {
         claimed.is_empty() || claimed.contains(&number)
     }
 }
+
+/// Most replays that a claim of recurrence is about.
+pub const REPLAYS_MAX: u32 = 1000;
 
 /// The modules of a driving system that can be at fault, in the words of `expect cause == …`.
 pub const MODULES: [&str; 8] =

@@ -142,7 +142,7 @@ impl BodyWord {
 
     /// Whether this is what a body of that name means: one of the engine's names stands for the author's own that are
     /// like it, too.
-    pub(crate) fn is(self, named: BodyWord) -> bool {
+    pub fn is(self, named: BodyWord) -> bool {
         self.like == named.like && (named.own.is_none() || self.own == named.own)
     }
 }
@@ -492,6 +492,9 @@ pub struct RequirementDef {
     pub docs: Vec<String>,
     /// Off unless `--with` names it.
     pub optional: bool,
+    /// The bodies of the road users that it is about: it is asked of each that is near, by itself. Empty if it is about the
+    /// ego vehicle alone.
+    pub on: Vec<BodyWord>,
     /// Where this does not hold, nothing is asked.
     pub when: Option<Expr>,
     pub condition: Expr,

@@ -134,6 +134,8 @@ pub enum Site {
     StepBegins,
     /// In a requirement, at every tick.
     Requirement,
+    /// In a requirement `on` bodies, of each road user near that has one.
+    RequirementOn,
     /// In `once` of a scenario's step.
     Trigger,
     Reward,
@@ -154,11 +156,12 @@ impl Site {
                         | Site::Phase
                         | Site::StepBegins
                         | Site::Requirement
+                        | Site::RequirementOn
                         | Site::Trigger
                 )
             }
-            Known::Spawn => matches!(self, Site::Rule | Site::Change | Site::Phase),
-            Known::Tick => self == Site::Requirement,
+            Known::Spawn => matches!(self, Site::Rule | Site::Change | Site::Phase | Site::RequirementOn),
+            Known::Tick => self.is_requirement(),
             Known::Step => matches!(self, Site::Reward | Site::Verdict),
             Known::Judgement => self == Site::Verdict,
         }
@@ -167,7 +170,12 @@ impl Site {
     /// Whether a fact is known here. What a spawn asks for is known at the draw alone.
     pub fn knows_fact(self, fact: Fact) -> bool {
         let is_of_spawn = matches!(fact, Fact::SpawnGap | Fact::SafetyGap);
-        self.knows(fact.known()) && !(is_of_spawn && matches!(self, Site::Change | Site::Phase))
+        self.knows(fact.known())
+            && !(is_of_spawn && matches!(self, Site::Change | Site::Phase | Site::RequirementOn))
+    }
+
+    pub fn is_requirement(self) -> bool {
+        matches!(self, Site::Requirement | Site::RequirementOn)
     }
 
     /// Whether it is known here when actions happened.
@@ -200,6 +208,7 @@ pub const TYPES: &[(&str, Type, &str)] = &[
     ("Duration", Type::Quantity(Dimension::DURATION), "In `s`, `ms`, `min` or `h`."),
     ("Speed", SPEED, "In `m/s`, `km/h` or `mph`."),
     ("Accel", Type::Quantity(Dimension::ACCEL), "In `m/s^2`."),
+    ("Jerk", Type::Quantity(Dimension::JERK), "In `m/s^3`."),
     ("Angle", Type::Quantity(Dimension::ANGLE), "In `deg` or `rad`."),
     ("Mass", Type::Quantity(Dimension::MASS), "In `kg`."),
     ("Ratio", RATIO, "A number without a unit, or with `%`."),
@@ -212,6 +221,7 @@ pub const ROAD_USER: (&str, &str) = (
 );
 
 const ACCEL: Type = Type::Quantity(Dimension::ACCEL);
+const JERK: Type = Type::Quantity(Dimension::JERK);
 const DURATION: Type = Type::Quantity(Dimension::DURATION);
 const LENGTH: Type = Type::Quantity(Dimension::LENGTH);
 const RATIO: Type = Type::Quantity(Dimension::RATIO);
@@ -251,6 +261,9 @@ facts! {
     EgoLeadSince "ego.lead_since" DURATION, Tick = "A `Duration`: since when it has been that one; 0 if there is none.";
     EgoOverRed "ego.over_red" LENGTH, Tick = "A `Length`: how far its front is beyond the stop line of a light that was red as it passed, until its rear has passed, too; else minus the way to a red light; at least -100 m.";
     EgoOverOncoming "ego.over_oncoming" LENGTH, Tick = "A `Length`: how far its outline reaches into a lane of the other direction; below 0 the room that is left; -100 m in junctions and where there is no such lane.";
+    EgoOverLane "ego.over_lane" LENGTH, Tick = "A `Length`: how far its outline reaches beyond the lines of its route's lane; below 0 the room that is left; -100 m in junctions.";
+    EgoVisibility "ego.visibility" LENGTH, Tick = "A `Length`: how far the fog lets one see; 10 km in clear air.";
+    EgoJerk "ego.jerk" JERK, Tick = "A `Jerk`: the change of the ego vehicle's acceleration over the last second, by that second; 0 in the first one.";
     Proc "proc" RATIO, Step = "A `Ratio`: the collision probability of the step.";
     Collision "collision" Type::Bool, Step = "A `Bool`: the ego vehicle collided.";
     Repeated "repeated" Type::Bool, Step = "A `Bool`: with an obstacle that it has hit before.";
@@ -280,6 +293,12 @@ pub const BREACHED: (&str, &str) =
 pub const KEPT: (&str, &str) = (
     "kept",
     "Which careful drivers keep the requirement in the same steps: `expect stops_at_red.kept by [cc, fsm]`.",
+);
+
+/// `stops_at_red.recurrence == 14 / 20`: how often it is breached again, as [`ScenarioClaim::Recurrence`] of a collision.
+pub const RECURRENCE: (&str, &str) = (
+    "recurrence",
+    "How often it is breached again with other sensor errors and reactions: `expect stops_at_red.recurrence == 14 / 20`.",
 );
 
 /// `since(vehicles)`: spelt like a function, but of an action or a group.
@@ -435,6 +454,7 @@ words! {
     Cause "cause" = "The module at fault: `expect cause == perception`.",
     Priority "priority" = "Who had priority in a collision: `expect priority == other with npc#2`.",
     End "end" = "How the episode ends: `expect end == arrived`.",
+    Recurrence "recurrence" = "How often the collision happens again with other sensor errors and reactions: `expect recurrence == 14 / 20 with npc#2`.",
     Minimal "minimal" = "Without any one of its steps the scenario loses its crash.",
     Trace "trace" = "The digest of the whole state stream: `expect trace == \"sha256:…\"`.",
 }

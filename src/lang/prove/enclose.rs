@@ -272,7 +272,10 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
         | Fact::NpcOffset
         | Fact::EgoLeadSpeed
         | Fact::EgoOverRed
-        | Fact::EgoOverOncoming => Interval::ALL,
+        | Fact::EgoOverOncoming
+        | Fact::EgoOverLane
+        | Fact::EgoVisibility
+        | Fact::EgoJerk => Interval::ALL,
         Fact::EgoLeadGap => between(0.0, LEAD_GAP_M_MAX),
         Fact::RoadUsers | Fact::RuleBreakers => between(0.0, f64::from(COMMANDED_MAX + AMBIENT_MAX)),
         Fact::RoadLimit

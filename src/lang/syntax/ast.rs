@@ -416,6 +416,8 @@ pub struct Require {
     /// Whether it is off unless `--with` names it.
     pub optional: bool,
     pub name: Name,
+    /// The bodies of the road users that it is about, each by itself; empty if it is about the ego vehicle alone.
+    pub on: Vec<Name>,
     pub when: Option<Expr>,
     pub condition: Expr,
     pub within: Option<Expr>,

@@ -152,6 +152,7 @@ impl Builder {
             Rule::requirement => {
                 let optional = parts.take(Rule::kw_optional).is_some();
                 let name = self.name(parts.next());
+                let on = self.targets(&mut parts);
                 let when =
                     parts.take(Rule::while_holds).map(|when| self.only_expression(when)).transpose()?;
                 let condition = self.only_expression(parts.next())?;
@@ -159,6 +160,7 @@ impl Builder {
                 ItemKind::Require(Box::new(Require {
                     optional,
                     name,
+                    on,
                     when,
                     condition,
                     within: within.transpose()?,
@@ -342,12 +344,17 @@ impl Builder {
         Ok(Effect { kind, span })
     }
 
+    /// `on vehicles, pedestrian`; nothing without it.
+    fn targets(&self, parts: &mut Parts<'_>) -> Vec<Name> {
+        parts.take(Rule::targets).map_or_else(Vec::new, |targets| {
+            Parts::of(targets).rest().flat_map(|names| self.names(names)).collect()
+        })
+    }
+
     fn rule(&self, mut parts: Parts<'_>, span: Span) -> Built<NamedRule> {
         let optional = parts.take(Rule::kw_optional).is_some();
         let name = self.name(parts.next());
-        let on = parts.take(Rule::targets).map_or_else(Vec::new, |targets| {
-            Parts::of(targets).rest().flat_map(|names| self.names(names)).collect()
-        });
+        let on = self.targets(&mut parts);
         let key = parts.take(Rule::moved_key).map(|key| self.name(Parts::of(key).next()));
         let during = parts.take(Rule::during).map(|during| self.name(Parts::of(during).next()));
         let body = parts.next();

@@ -488,6 +488,9 @@ impl Printer<'_> {
             self.words("optional ");
         }
         self.words(&format!("require {}", item.name.text));
+        if !item.on.is_empty() {
+            self.words(&format!(" on {}", names(&item.on, ", ")));
+        }
         if let Some(when) = &item.when {
             self.words(" when ");
             self.put(&expression(when));

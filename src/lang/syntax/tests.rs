@@ -283,11 +283,15 @@ fn item() -> impl Strategy<Value = ItemKind> {
             .prop_map(|(name, value)| { ItemKind::Override(Box::new(ItemKind::Let(Let { name, value }))) }),
         (name(), expr()).prop_map(|(name, condition)| ItemKind::Verdict(Verdict { name, condition })),
         // A word that is no unit, after a number and before the colon of a condition, would be the name of a field.
-        (any::<bool>(), name(), proptest::option::of(asked), expr(), proptest::option::of(expr())).prop_map(
-            |(optional, name, when, condition, within)| {
-                ItemKind::Require(Box::new(Require { optional, name, when, condition, within }))
-            }
-        ),
+        (
+            (any::<bool>(), name(), prop::collection::vec(name(), 0..3)),
+            proptest::option::of(asked),
+            expr(),
+            proptest::option::of(expr())
+        )
+            .prop_map(|((optional, name, on), when, condition, within)| {
+                ItemKind::Require(Box::new(Require { optional, name, on, when, condition, within }))
+            }),
         prop::collection::vec(case, 0..4).prop_map(ItemKind::Reward),
         (name(), arms(expr())).prop_map(|(name, arms)| ItemKind::Odds(Odds { name, arms })),
         ("\\PC{0,5}", proptest::option::of("[a-f0-9]{0,4}"), prop::collection::vec(name(), 0..3)).prop_map(

@@ -53,6 +53,8 @@ pub(super) struct Around<'a> {
     pub traffic: &'a TrafficProfile,
     /// Seed of the choices of road users.
     pub seed: u64,
+    /// As [`Start::reactions`](super::Start).
+    pub reactions: u64,
 }
 
 /// What a driver has to know of another road user, or of the ego vehicle, so as not to run into it.
@@ -74,6 +76,16 @@ impl<'a> From<&'a Obstacle> for Other<'a> {
 }
 
 impl Around<'_> {
+    /// Whether a road user does in this tick what it does every so many ticks.
+    pub fn is_due(&self, id: u32, every_ticks: u64) -> bool {
+        let own = match self.reactions {
+            0 => u64::from(id),
+            // Fibonacci hashing (Knuth, TAOCP 6.4): neighbouring numbers are spread over the upper bits.
+            seed => (seed ^ u64::from(id)).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32,
+        };
+        (self.tick + own).is_multiple_of(every_ticks)
+    }
+
     /// All other road users but the ego vehicle, as seen.
     pub fn obstacles(&self) -> impl Iterator<Item = &Obstacle> + Clone {
         self.users().map(|user| &user.obstacle)

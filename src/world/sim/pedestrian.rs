@@ -225,7 +225,7 @@ impl Walker {
         if self.is_over() {
             return in_sight.then_some(Moved::at_rest(this));
         }
-        let is_due = (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS);
+        let is_due = around.is_due(this.id, FRAME_TICKS);
         if core::mem::take(&mut self.looks_now) || is_due {
             self.look(this, around);
         }

@@ -104,7 +104,7 @@ impl Stroller {
             return in_sight.then_some(Moved::at_rest(this));
         }
         let (station_m, left_m) = self.next(this, around);
-        let is_due = (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS);
+        let is_due = around.is_due(this.id, FRAME_TICKS);
         if core::mem::take(&mut self.looks_now) || is_due {
             let to = place(station_m, left_m, around) - this.outline.pose.position;
             let heading_rad =

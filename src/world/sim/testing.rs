@@ -57,6 +57,7 @@ pub fn start() -> Start {
         sky: [Level::None; 3],
         signal_phase_s: 0.0,
         seed: 7,
+        reactions: 0,
         ambient: 0,
         traffic: TrafficProfile::default(),
     }

@@ -1,6 +1,8 @@
 //! What requirements may ask beside the moment: what must be watched from tick to tick, and what costs too much to be
 //! looked up where nobody asks.
 
+use std::collections::VecDeque;
+
 use avastra_base::geometry::{Vec2, unit_vector};
 use avastra_base::kinematics::STANDING_MPS;
 use avastra_lang::model::vocabulary::Fact;
@@ -20,6 +22,8 @@ pub(super) const WAY_STEP_M: f64 = 10.0;
 /// Whoever is in the ego vehicle's way is nearer to a point than this and half of both outlines, m: half a step, half the
 /// width of the ego vehicle on any heading, and what a bend adds.
 const WAY_ASIDE_M: f64 = 9.0;
+/// Ticks of a second.
+const TICKS_PER_S: usize = (1.0 / DT_S) as usize;
 /// Stands for no red light and for no oncoming lane near, m.
 const FAR_M: f64 = -100.0;
 
@@ -31,6 +35,8 @@ pub struct Watched {
     red_runs: u32,
     /// The stop line that its front passed at red, until its rear has passed it.
     red_line_m: Option<f64>,
+    /// The accelerations of the last second, the latest last, m/s².
+    accelerations: VecDeque<f64>,
 }
 
 /// Watched facts that are looked up together.
@@ -39,6 +45,8 @@ pub struct WatchedParts {
     pub lead: bool,
     pub red: bool,
     pub oncoming: bool,
+    pub lane: bool,
+    pub jerk: bool,
 }
 
 impl WatchedParts {
@@ -50,6 +58,8 @@ impl WatchedParts {
                 Fact::EgoLeadGap | Fact::EgoLeadSpeed | Fact::EgoLeadSince => parts.lead = true,
                 Fact::EgoOverRed => parts.red = true,
                 Fact::EgoOverOncoming => parts.oncoming = true,
+                Fact::EgoOverLane => parts.lane = true,
+                Fact::EgoJerk => parts.jerk = true,
                 _ => {}
             }
         }
@@ -69,6 +79,9 @@ impl Watched {
             lead_since_s: self.lead.map_or(0.0, |(_, tick, _)| since_s(tick)),
             over_red_m: if parts.red { self.over_red_m(world, &around) } else { f64::NAN },
             over_oncoming_m: if parts.oncoming { over_oncoming_m(&around) } else { f64::NAN },
+            over_lane_m: if parts.lane { over_lane_m(&around) } else { f64::NAN },
+            visibility_m: around.visibility_m,
+            jerk_mps3: if parts.jerk { self.jerk_mps3(around.ego.acceleration_mps2) } else { f64::NAN },
         }
     }
 
@@ -85,6 +98,16 @@ impl Watched {
             _ => (id, world.ticks(), station_m),
         });
         lead
+    }
+
+    /// The change of the acceleration over the last second, m/s³.
+    fn jerk_mps3(&mut self, acceleration_mps2: f64) -> f64 {
+        self.accelerations.push_back(acceleration_mps2);
+        if self.accelerations.len() <= TICKS_PER_S {
+            return 0.0;
+        }
+        let before = self.accelerations.pop_front();
+        before.map_or(0.0, |before_mps2| acceleration_mps2 - before_mps2)
     }
 
     fn over_red_m(&mut self, world: &World, around: &Around) -> f64 {
@@ -168,6 +191,19 @@ fn over_oncoming_m(around: &Around) -> f64 {
     (towards_m + ego_half_width_m(around, edge.along) - edge.away_m).max(FAR_M)
 }
 
+/// How far the ego vehicle's outline reaches beyond the lines of its route's lane, at its rear axle, m.
+fn over_lane_m(around: &Around) -> f64 {
+    let Scene { map, route, .. } = around.scene;
+    let lane = map.lane(route.lane_at(around.ego_station_m).lane);
+    if lane.junction.is_some() {
+        return FAR_M;
+    }
+    let beside = lane.centre.project(around.ego.rear_axle.position);
+    let along = unit_vector(lane.centre.heading_at(beside.station_m));
+    let half_width_m = ego_half_width_m(around, along);
+    (beside.offset_m.abs() + half_width_m - lane.width_at(beside.station_m) / 2.0).max(FAR_M)
+}
+
 /// The near edge of the nearest oncoming lane beside a place of the route.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct OncomingEdge {
@@ -202,7 +238,7 @@ mod tests {
     use super::*;
     use crate::sim::{Control, testing};
 
-    const ALL: WatchedParts = WatchedParts { lead: true, red: true, oncoming: true };
+    const ALL: WatchedParts = WatchedParts { lead: true, red: true, oncoming: true, lane: true, jerk: true };
 
     #[test]
     fn what_is_ahead_is_watched() {
@@ -223,6 +259,26 @@ mod tests {
         assert!((later.lead_since_s - 1.0).abs() < 1e-9, "{later:?}");
         let rear_m = world.npc_facts(1).expect("it is there").rear_m;
         assert!((later.lead_gap_m - (rear_m - world.moment_facts().ego_front_m)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn who_leaves_its_lane_is_over_its_line_by_the_way_of_its_corner() {
+        let mut world = testing::world(&testing::straight());
+        let mut watched = Watched::default();
+        let lane = world.scene().route.lane_at(0.0).lane;
+        let half_lane_m = world.scene().map.lane(lane).width_at(0.0) / 2.0;
+        let in_the_middle = watched.look(&world, ALL).over_lane_m;
+        let half_width_m = VehicleParameters::MKZ.width_m / 2.0;
+        assert!((in_the_middle - (half_width_m - half_lane_m)).abs() < 1e-9, "{in_the_middle}");
+        let mut before_m = in_the_middle;
+        for _ in 0..200 {
+            world.tick(&Control { throttle_pct: 20.0, steer_rad: 0.02, ..Control::default() });
+            let over_m = watched.look(&world, ALL).over_lane_m;
+            assert!(over_m >= before_m - 1e-9, "it drives to the left all the time");
+            before_m = over_m;
+        }
+        let offset_m = world.moment_facts().ego_offset_m;
+        assert!(before_m > 0.0 && before_m >= offset_m + half_width_m - half_lane_m - 1e-6, "{before_m}");
     }
 
     #[test]

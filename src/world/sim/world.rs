@@ -81,6 +81,9 @@ pub struct Start {
     pub signal_phase_s: f64,
     /// Seed of the choices of other road users.
     pub seed: u64,
+    /// Which of the moments of a frame (0.1 s) each of them looks at the world in: 0 by their numbers, otherwise by chance
+    /// from this seed. So others react by up to a frame sooner or later.
+    pub reactions: u64,
     /// Vehicles of ambient traffic that are kept around the ego vehicle, at most `model::AMBIENT_MAX`.
     pub ambient: u32,
     /// How other vehicles drive.
@@ -100,6 +103,7 @@ impl Start {
             sky,
             signal_phase_s,
             seed,
+            reactions: 0,
             ambient: 0,
             traffic: TrafficProfile::default(),
         }
@@ -130,8 +134,9 @@ pub struct World {
     traffic: TrafficProfile,
     /// Tick from which time of day and weather may change.
     weather_tick: u64,
-    /// Seed of the choices of other road users.
+    /// Seed of the choices of other road users, and that of when they look.
     seed: u64,
+    reactions: u64,
     // What the last tick has to tell. No later tick reads it.
     contacts: Vec<Contact>,
     incidents: Vec<Incident>,
@@ -172,6 +177,7 @@ impl World {
             traffic: start.traffic,
             weather_tick: 0,
             seed: start.seed,
+            reactions: start.reactions,
             contacts: Vec::new(),
             incidents: Vec::new(),
             scene,
@@ -415,6 +421,10 @@ impl World {
         trace.word(u64::from(self.next_id));
         self.ambient.trace(trace);
         trace.words([self.weather_tick, self.seed]);
+        // Nothing is fed for the usual order, as before there was another.
+        if self.reactions != 0 {
+            trace.word(self.reactions);
+        }
         for user in &self.users {
             user.trace(trace);
         }
@@ -503,6 +513,7 @@ impl World {
             visibility_m: self.conditions.visibility_m,
             traffic: &self.traffic,
             seed: self.seed,
+            reactions: self.reactions,
         }
     }
 

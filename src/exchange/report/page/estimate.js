@@ -3,7 +3,7 @@ import { el, table } from "./dom.js";
 import { intervals } from "./charts.js";
 import { figure, plural, short, simulated } from "./words.js";
 
-const EVENTS = { counted: "a collision that counts", collision: "a collision" };
+const EVENTS = { counted: "a collision that counts", collision: "a collision", breach: "a breach" };
 
 /** An interval in brackets, ∞ without an upper end. */
 const bounds = (found) => (found ? ` [${short(found.low)}, ${found.high === null ? "∞" : short(found.high)}]` : "");
@@ -13,7 +13,7 @@ const withBounds = (value, found) => (value === null ? "–" : `${short(value)}$
 export function estimate(results) {
   const { event, parts, parts_wanted: wanted, roads, together, mass } = results;
   const all = together && roads.length > 1 ? [...roads, { road: "all roads", ...together }] : roads;
-  const title = `Probability of an episode with ${EVENTS[event] ?? event}`;
+  const title = `Probability of an episode with ${EVENTS[event] ?? `a breach of ${event}`}`;
   const plotted = all.map((one) => [one.road, one.probability, one.interval.low, one.interval.high]);
   const rows = all.map((one) => [
     one.road,

@@ -3,6 +3,7 @@ import { el, refill, table } from "./dom.js";
 import { linkOf, nameOf } from "./link.js";
 import {
   ENDS,
+  HARMS,
   PRIORITIES,
   PROC,
   VERDICTS,
@@ -35,6 +36,7 @@ function broken(breach, seek) {
   const rows = [
     ["Required", breach.docs || breach.requirement],
     ["Broken", `from ${atTime(breach.at_s)} to ${atTime(breach.until_s)}`],
+    ...again(breach),
   ];
   if (breach.kept_by) {
     const keepers = breach.kept_by.map(driverInWords).join(", ");
@@ -51,6 +53,12 @@ function broken(breach, seek) {
       rows.map(([name, text]) => [el("dt", {}, name), el("dd", {}, text)]),
     ),
   );
+}
+
+/** How often a finding happens again under other noise, if that was tried. */
+function again({ recurrence }) {
+  if (!recurrence) return [];
+  return [["Under other noise", `recurs in ${recurrence.text}${recurrence.fluke ? ": a fluke" : ""}`]];
 }
 
 function verdict(recording, collision, seek, watchDrivers) {
@@ -71,7 +79,9 @@ function verdict(recording, collision, seek, watchDrivers) {
   );
   const rows = [
     ["Verdict", `${says}: ${VERDICTS[collision.class]}`],
+    ...again(collision),
     ["Priority", PRIORITIES[collision.priority]],
+    ["Harm", `${collision.harm}: ${HARMS[collision.harm]}`],
     ["Cause", causeInWords(collision.cause)],
     ["Held by, at contact", collision.held ?? "nothing"],
     [

@@ -2,12 +2,26 @@
 import { el, refill } from "./dom.js";
 import { linkOf, linked, nameOf, relink } from "./link.js";
 import { bars } from "./charts.js";
-import { CHANGES, VERDICTS, atTime, causeInWords, changeInWords, kmh, mainCollision, plural } from "./words.js";
+import {
+  CHANGES,
+  HARMS,
+  VERDICTS,
+  atTime,
+  causeInWords,
+  changeInWords,
+  kmh,
+  mainCollision,
+  mainFinding,
+  plural,
+  recursInWords,
+} from "./words.js";
 
 /** What one can filter by: name in the link, heading, and the value of a scenario. */
 export const FILTERS = [
   ["road", "Road", (entry) => entry.summary.road],
   ["verdict", "Verdict", (entry) => mainCollision(entry.summary)?.class ?? "no collision"],
+  ["recurs", "Under other noise", (entry) => recursInWords(mainFinding(entry.summary))],
+  ["harm", "Harm", (entry) => mainCollision(entry.summary)?.harm ?? "–"],
   ["breach", "Breach", (entry) => entry.summary.breaches[0]?.requirement ?? "none"],
   ["priority", "Priority", (entry) => mainCollision(entry.summary)?.priority ?? "–"],
   ["hit", "Obstacle", (entry) => mainCollision(entry.summary)?.body ?? "–"],
@@ -124,6 +138,8 @@ const COLUMNS = [
   ["Side", (entry, hit) => hit?.side],
   ["Closing", (entry, hit) => hit && kmh(hit.closing_mps), "number"],
   ["Worst Δv", (entry, hit) => hit && kmh(Math.max(hit.delta_v_mps, hit.other_delta_v_mps)), "number"],
+  ["Harm", (entry, hit) => hit && el("span", { title: HARMS[hit.harm] }, hit.harm)],
+  ["Recurs in", ({ summary }) => mainFinding(summary)?.recurrence?.text],
   ["Verdict", (entry, hit) => hit && el("span", { title: VERDICTS[hit.class] }, REACHES[hit.class])],
   ["Priority", (entry, hit) => hit?.priority],
   ["Cause", (entry, hit) => hit && causeInWords(hit.cause)],
@@ -138,6 +154,12 @@ function counts({ summary }, hit) {
   return summary.refuted.length > 0 ? `${end}, replays otherwise` : end;
 }
 
+/** Whether it counts, and whether it is a fluke. */
+function rowClass(summary, hit) {
+  const isFluke = mainFinding(summary)?.recurrence?.fluke;
+  return [hit?.counted && "counted", isFluke && "fluke"].filter(Boolean).join(" ") || null;
+}
+
 function listing(list) {
   const shown = COLUMNS.filter(([name]) => name !== "Compared" || list.some((entry) => entry.change));
   const rows = list.map((entry) => {
@@ -145,13 +167,15 @@ function listing(list) {
     const name = el("a", { href: linkOf({ ...linked(), s: nameOf(entry) }) }, nameOf(entry).replace(/^critical\//, ""));
     return el(
       "tr",
-      { class: hit?.counted ? "counted" : null },
+      { class: rowClass(entry.summary, hit) },
       el("th", { scope: "row" }, name),
       shown.map(([, of, kind]) => el("td", { class: kind }, of(entry, hit) ?? "–")),
     );
   });
   const heads = [["Scenario"], ...shown].map(([name, , kind]) => el("th", { scope: "col", class: kind }, name));
-  const caption = "Scenarios, worst first: those that count, then by the larger change of velocity of the two.";
+  const caption =
+    "Scenarios, worst first: those that count, then flukes after those that recur in more than half of their replays under " +
+    "other noise, then by the speed of the impact beside what people bear.";
   return el(
     "div",
     { class: "scroll", tabindex: "0", role: "region", "aria-label": "Scenarios, worst first" },
@@ -169,7 +193,7 @@ function listing(list) {
 function barCharts(list) {
   const charts = [
     ["Kinds of failure", "group", kindOf],
-    ...FILTERS.filter(([name]) => ["verdict", "priority", "manoeuvre", "side", "cause", "change"].includes(name)).map(
+    ...FILTERS.filter(([name]) => ["verdict", "recurs", "harm", "priority", "manoeuvre", "side", "cause", "change"].includes(name)).map(
       ([name, title, value]) => [title, name, value],
     ),
   ];

@@ -146,7 +146,11 @@ function totals(sums, simulatedH) {
       { class: "muted" },
       `Episodes ended: ${said}. Of all collisions, a careful driver would have avoided ${sums.avoidable}, ` +
         `only one without delay ${sums.beyond_reference}, none ${sums.unavoidable}; the ego vehicle had priority in ` +
-        `${sums.wronged}, the other in ${sums.wrong}.`,
+        `${sums.wronged}, the other in ${sums.wrong}.` +
+        (sums.replayed > 0
+          ? ` Of ${plural(sums.replayed, "finding")} played again under other noise, ${sums.recurring} recur in more than half ` +
+            `of the replays, ${sums.replayed - sums.recurring} are flukes.`
+          : ""),
     ),
   );
 }

@@ -60,6 +60,26 @@ export function mainCollision(summary) {
   return summary.collisions.find((collision) => collision.counted) ?? summary.collisions[0] ?? null;
 }
 
+/** What a scenario is about: its main collision, or else its first breach. */
+export const mainFinding = (summary) => {
+  const collision = mainCollision(summary);
+  return collision?.counted ? collision : (summary.breaches[0] ?? collision);
+};
+
+/** Whether a finding is more than one draw of the noise. */
+export function recursInWords(finding) {
+  const recurrence = finding?.recurrence;
+  if (!recurrence) return "not tried";
+  return recurrence.fluke ? "fluke" : "recurs";
+}
+
+/** What an impact means for people, by the word of the page's data. */
+export const HARMS = {
+  minor: "between vehicles, below walking pace",
+  moderate: "fewer than one person in ten is seriously injured at such a speed",
+  serious: "at least one person in ten is seriously injured at such a speed",
+};
+
 /** A collision in a sentence. */
 export function collisionInWords(collision, road) {
   const others = { standing: "standing", along: "moving along", oncoming: "oncoming" };
@@ -72,9 +92,10 @@ export function collisionInWords(collision, road) {
 }
 
 /** A breach of a requirement in a sentence. */
-export function breachInWords({ requirement, at_s: atS, margin, unit }) {
+export function breachInWords({ requirement, obstacle, at_s: atS, margin, unit }) {
+  const of = obstacle === null ? "" : ` of #${obstacle}`;
   const by = margin === null ? "" : `, by ${figure(Math.abs(margin), unit ?? "", 2).trim()} at most`;
-  return `The ego vehicle does not keep ${requirement} at ${atTime(atS)}${by}`;
+  return `The ego vehicle does not keep ${requirement}${of} at ${atTime(atS)}${by}`;
 }
 
 /** What another driving system makes of a scenario, by the word of the page's data. */

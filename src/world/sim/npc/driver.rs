@@ -177,7 +177,7 @@ impl Driver {
     /// (`in_sight`). One that has `touched` the ego vehicle only brakes.
     pub fn step(&mut self, view: &View, touched: bool, in_sight: bool) -> Option<Moved> {
         let View { this, size, around } = *view;
-        let looks = !touched && (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS);
+        let looks = !touched && around.is_due(this.id, FRAME_TICKS);
         if looks {
             self.look(view);
         }

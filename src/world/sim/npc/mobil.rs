@@ -45,7 +45,7 @@ impl Driver {
     pub(super) fn wants_side(&self, view: &View) -> Option<Side> {
         let View { this, size, around } = *view;
         let profile = around.traffic;
-        let is_due = (around.tick + u64::from(this.id)).is_multiple_of(CONSIDER_TICKS);
+        let is_due = around.is_due(this.id, CONSIDER_TICKS);
         if !profile.mobil || !self.is_ambient() || !is_due || self.speed_mps < CONSIDER_MPS_MIN {
             return None;
         }

@@ -1,0 +1,89 @@
+//! What a run found, by how sure and how bad it is.
+
+use std::collections::BTreeMap;
+
+use crate::oracle::Recurrence;
+use crate::run::database::Database;
+use crate::run::sealed::{DatabaseError, query_all};
+
+/// An episode with a collision or a breach.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct FoundIn {
+    pub road: String,
+    pub episode: i64,
+    /// Whether it has a counted collision or a breach. If so, the rest is about those alone.
+    pub counted: bool,
+    /// The finding that recurs most often, if that was tried.
+    pub recurrence: Option<Recurrence>,
+    /// What the worst collision means for people, in the words of `oracle::Harm`; `None` of a breach alone.
+    pub harm: Option<String>,
+    /// As `oracle::Severity::harm_share`; 0 of a breach alone.
+    pub harm_share: f64,
+}
+
+impl FoundIn {
+    /// The name of its scenario.
+    pub fn name(&self) -> String {
+        format!("{}_{:04}", self.road, self.episode)
+    }
+
+    /// Whether none of its findings recurs in more than half of the replays.
+    pub fn is_fluke(&self) -> bool {
+        self.recurrence.is_some_and(Recurrence::is_fluke)
+    }
+
+    /// Takes in another finding of the same episode.
+    fn with(self, other: FoundIn) -> FoundIn {
+        if self.counted != other.counted {
+            return if self.counted { self } else { other };
+        }
+        let recurrence =
+            [self.recurrence, other.recurrence].into_iter().flatten().max_by_key(|of| of.recurred);
+        let worst = if other.harm_share > self.harm_share { other } else { self };
+        FoundIn { recurrence, ..worst }
+    }
+}
+
+impl Database {
+    /// Each episode with a collision or a breach: those that count first, flukes after the others, then the worst first.
+    ///
+    /// # Errors
+    /// If the database cannot be read, or says that something recurred more often than it was tried.
+    pub fn found(&self) -> Result<Vec<FoundIn>, DatabaseError> {
+        let query = "WITH finding AS (
+               SELECT episode, counted, recurred, replays, harm, harm_share FROM collision
+               UNION ALL SELECT episode, 1, recurred, replays, NULL, 0.0 FROM breach)
+             SELECT road, episode, finding.counted, recurred, replays, harm, harm_share
+             FROM finding JOIN episode USING (episode) ORDER BY episode";
+        let rows = query_all(&self.connection, query, |row| {
+            let tried: (Option<u32>, Option<u32>) = (row.get(3)?, row.get(4)?);
+            Ok(FoundIn {
+                road: row.get(0)?,
+                episode: row.get(1)?,
+                counted: row.get(2)?,
+                recurrence: match tried {
+                    (Some(recurred), Some(replays)) if replays > 0 && recurred <= replays => {
+                        Some(Recurrence { recurred, replays })
+                    }
+                    _ => None,
+                },
+                harm: row.get(5)?,
+                harm_share: row.get(6)?,
+            })
+        })?;
+        let mut found: BTreeMap<i64, FoundIn> = BTreeMap::new();
+        for one in rows {
+            let all = match found.remove(&one.episode) {
+                Some(known) => known.with(one),
+                None => one,
+            };
+            found.insert(all.episode, all);
+        }
+        let mut found: Vec<FoundIn> = found.into_values().collect();
+        found.sort_by(|a, b| {
+            let order = |of: &FoundIn| (!of.counted, of.is_fluke());
+            order(a).cmp(&order(b)).then(b.harm_share.total_cmp(&a.harm_share))
+        });
+        Ok(found)
+    }
+}
