@@ -320,6 +320,7 @@ impl Attached {
 fn run(space: Arc<Space>) -> Run {
     let settings = RunSettings {
         replays: 0,
+        keep: 0,
         avastra: String::new(),
         engine: String::new(),
         space: String::new(),

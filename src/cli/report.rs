@@ -28,7 +28,7 @@ use super::{estimate, run_directory, shrink, study};
 const NAME: &str = "report.html";
 
 /// The folders of a run directory that hold scenarios.
-const FOLDERS: [&str; 3] = ["critical", "failures", shrink::FOLDER];
+const FOLDERS: [&str; 4] = ["critical", "failures", run_directory::KEPT, shrink::FOLDER];
 
 /// Writes the page of a directory or of files. A scenario that does not play as its file claims is shown, said so of before
 /// all else, and fails the command.

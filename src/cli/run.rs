@@ -7,6 +7,7 @@ use std::sync::atomic::Ordering;
 
 use avastra_campaign::emit;
 use avastra_campaign::episode::EpisodeLog;
+use avastra_campaign::oracle;
 use avastra_campaign::run::{
     Database, DatabaseError, EpisodeSummary, FoundIn, Group, Numbered, PolicyReference, RefusalCount,
     RequirementCount, Run, RunSettings, Totals, play,
@@ -149,6 +150,14 @@ fn play_all(
     output.say(&never.in_words(output.verbose));
     let critical = worst_first(directory.critical(output)?, &found);
     output.say(&critical_text(&directory.path, &critical, &found));
+    let kept = if is_over { keep_near(&run, &directory)? } else { Vec::new() };
+    if !kept.is_empty() {
+        let kept = plural(kept.len(), "episode");
+        output.say(&format!(
+            "{kept} without a finding, the nearest misses first, in {}/kept",
+            directory.path.display()
+        ));
+    }
     let failures = directory.read(Database::failures)?;
     if !failures.is_empty() {
         let place = format!("; each is in {}/failures", directory.path.display());
@@ -164,7 +173,7 @@ fn play_all(
     cut_off(program).iter().for_each(|note| output.warn(note));
     output.result(serde_json::json!({
         "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups,
-        "requirements": requirements, "never": never, "critical": critical, "found": found, "failures": failures, "reproducible": is_reproducible,
+        "requirements": requirements, "never": never, "critical": critical, "found": found, "kept": kept, "failures": failures, "reproducible": is_reproducible,
     }));
     share.end(output, directory, is_over, program)?;
     Ok(totals)
@@ -185,7 +194,12 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<Option<(Run, Direc
     let agent = policy.as_ref().map_or(&arguments.conditions.agent, |(_, policy)| &policy.name);
     let under_test = load::named(&arguments.under_test.ads)?;
     let settings = conditions::settings(space, &arguments.conditions, agent, under_test, arguments.episodes)?;
-    let settings = RunSettings { causes: arguments.causes, replays: arguments.replays, ..settings };
+    let settings = RunSettings {
+        causes: arguments.causes,
+        replays: arguments.replays,
+        keep: arguments.keep,
+        ..settings
+    };
     let settings = settings.started_unless(arguments.shard.dry_run);
     let run = ready(table, settings, policy.as_ref(), face)?;
     if arguments.shard.dry_run {
@@ -286,6 +300,23 @@ fn keep(
     let table = run.table();
     let in_words = |draw: &Draw| emit::action_text(table, draw);
     directory.write(|database| database.add(summary, log, table.space(), in_words, scenario.as_deref()))
+}
+
+/// Writes the episodes without a finding that are to be kept. An attached driving system that cannot be started drives none of
+/// them again.
+fn keep_near(run: &Run, directory: &Directory) -> Result<Vec<PathBuf>, Failure> {
+    let RunSettings { agent, without, with, keep, .. } = run.settings();
+    if !oracle::can_replay(run.arena().ads()) {
+        return Ok(Vec::new());
+    }
+    let player = Player { command: "run", table: run.table(), agent, without, with };
+    let near = directory.read(|database| database.near(*keep as usize))?;
+    near.iter()
+        .map(|near| {
+            let episode = near.episode as usize;
+            directory.write_kept(&player, episode, near, &run.episode(episode))
+        })
+        .collect()
 }
 
 fn heading(run: &Run, arguments: &RunArguments) -> String {

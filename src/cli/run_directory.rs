@@ -16,7 +16,7 @@ use avastra_campaign::emit;
 use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::files;
 use avastra_campaign::run::{
-    DatabaseError, EpisodeSummary, Numbered, Shard, Units, VERSION, WrittenScenario,
+    DatabaseError, EpisodeSummary, Near, Numbered, Shard, Units, VERSION, WrittenScenario,
 };
 use avastra_drivers::external::{Attached, ExternalSettings};
 use avastra_lang::check::normal;
@@ -32,7 +32,10 @@ use super::output::{Output, for_shell, plural};
 use super::{pack, shard};
 
 /// The folders that a run, a training or an estimate writes into.
-const FOLDERS: [&str; 3] = ["critical", "failures", "policy"];
+const FOLDERS: [&str; 4] = ["critical", "failures", KEPT, "policy"];
+
+/// The folder of episodes in which nothing was found, and which were asked for all the same.
+pub const KEPT: &str = "kept";
 
 /// A directory that no other process works in while this lives.
 pub struct Held {
@@ -558,11 +561,31 @@ impl<C: Campaign> Directory<C> {
         }
         let path = folder.join(format!("{}_{:04}.ava", log.road, summary.episode));
         let file = player.file(&path, summary.episode, &|source| {
-            emit::failure(player.table, log, &failure.in_words(), source)
+            emit::whole(player.table, log, &failure.in_words(), source)
         })?;
         write(&path.with_extension("txt"), &text)?;
         write_answers(&path, log)?;
         write(&path, &file)
+    }
+
+    /// Writes a whole episode in which nothing was found, `kept/ROAD_NNNN.ava`, unless there is such a file. Returns its path.
+    pub fn write_kept(
+        &self,
+        player: &Player,
+        episode: usize,
+        near: &Near,
+        log: &EpisodeLog,
+    ) -> Result<PathBuf, Failure> {
+        let path = folder(&self.path, KEPT)?.join(format!("{}_{episode:04}.ava", log.road));
+        if path.exists() {
+            return Ok(path);
+        }
+        let headline = near.in_words();
+        let text =
+            player.file(&path, episode, &|source| emit::whole(player.table, log, &headline, source))?;
+        write_answers(&path, log)?;
+        write(&path, &text)?;
+        Ok(path)
     }
 
     /// Writes the counted collisions of an episode as a scenario, `critical/ROAD_NNNN.ava`, and gives the text of the

@@ -316,6 +316,49 @@ fn a_finding_says_how_often_it_recurs() {
 }
 
 #[test]
+fn near_misses_are_kept_as_scenarios_that_end_as_they_did() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let kept = |name: &str, more: &[&str]| -> Vec<(String, String)> {
+        let out = scratch.path().join(name).display().to_string();
+        let run = [
+            "run",
+            "scenarios/avastra45_law.ava",
+            "--ads",
+            "idm",
+            "--episodes",
+            "3",
+            "--keep",
+            "8",
+            "--out",
+            &out,
+        ];
+        let found = last_line(&done(&[&run[..], more, &["--format", "json"]].concat()));
+        let files = found["kept"].as_array().expect("a list").iter().filter_map(Value::as_str);
+        files
+            .map(|file| (file.replace(&out, ""), fs::read_to_string(file).expect("it was written")))
+            .collect()
+    };
+    let all = kept("one", &[]);
+    assert_eq!(all.len(), 8);
+    // First come the nearest misses of each requirement that was asked.
+    let named: BTreeSet<&str> = all[..6].iter().filter_map(|(_, text)| text.split('`').nth(5)).collect();
+    assert!(named.len() >= 4, "an episode may be the nearest one of two: {named:?}");
+    for (_, text) in &all {
+        assert!(text.contains("/// Nothing is found here: `") && text.contains("  expect end == "), "{text}");
+    }
+    assert_eq!(kept("again", &["--jobs", "1"]), all, "they depend on no number of threads");
+    let first = format!("{}{}", scratch.path().join("one").display(), all[0].0);
+    assert!(done(&["replay", &first]).contains(" holds, "));
+    let page = done(&["report", &scratch.path().join("one").display().to_string()]);
+    assert!(page.contains("8 scenarios"), "{page}");
+
+    // What somebody has edited stays.
+    fs::write(&first, "mine").expect("it can be written");
+    done(&["run", "--resume", &scratch.path().join("one").display().to_string()]);
+    assert_eq!(fs::read_to_string(&first).expect("it is there"), "mine");
+}
+
+#[test]
 fn a_breach_is_explained_and_estimated() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let out = scratch.path().join("found").display().to_string();

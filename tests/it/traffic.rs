@@ -71,7 +71,10 @@ fn unknown_names_and_bad_files_are_refused() {
         stderr
     };
     let told = refused("wild");
-    assert!(told.contains("no traffic profile `wild`: there are `careful` and `released`"), "{told}");
+    assert!(
+        told.contains("no traffic profile `wild`: there are `careful`, `rightful` and `released`"),
+        "{told}"
+    );
     refused("no/such.yaml");
     let file = scratch.path().join("mine.yaml");
     for (text, message) in [

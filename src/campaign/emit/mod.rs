@@ -11,4 +11,4 @@ mod tree;
 pub use place::{identifier, lane_point, quoted};
 pub use policy::policy_text;
 pub use safetensors::safetensors;
-pub use scenario::{Provenance, action_text, failure, retold, scenario, unclaimed};
+pub use scenario::{Provenance, action_text, retold, scenario, unclaimed, whole};

@@ -60,9 +60,9 @@ pub fn retold(table: &ActionTable, log: &EpisodeLog, summary: &EpisodeSummary, s
     file(table, log, source, [REPLAY, &headline], steps, expects)
 }
 
-/// An episode in which an external driving system failed, as a scenario that ends so. If it failed before the first step, the
-/// scenario has no step.
-pub fn failure(table: &ActionTable, log: &EpisodeLog, headline: &str, source: &Provenance) -> File {
+/// A whole episode, as a scenario that ends as it did: one in which an external driving system failed, or one in which nothing
+/// was found. If it failed before the first step, the scenario has no step.
+pub fn whole(table: &ActionTable, log: &EpisodeLog, headline: &str, source: &Provenance) -> File {
     let trace = tree::text(digest_text(&log.trace()));
     let trace = tree::expect(tree::equal(tree::name("trace"), trace), Vec::new());
     file(table, log, source, [REPLAY, headline], log.steps.len(), vec![end(log), trace])

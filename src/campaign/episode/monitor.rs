@@ -11,9 +11,9 @@ use std::sync::Arc;
 use avastra_lang::model::expr::{Expr, ExprKind};
 use avastra_lang::model::vocabulary::Fact;
 use avastra_lang::model::{
-    BodyWord, Facts, Kept, Memory, ReadyRequirement, RequirementDef, SpawnFacts, WorldFacts,
+    BodyWord, Facts, Kept, Memory, NpcFacts, ReadyRequirement, RequirementDef, Space, SpawnFacts, WorldFacts,
 };
-use avastra_world::sim::{DT_S, MomentParts, Watched, WatchedParts, World};
+use avastra_world::sim::{DT_S, MomentParts, Obstacle, Watched, WatchedParts, World};
 
 use super::setup::Setup;
 
@@ -155,45 +155,24 @@ impl Monitor {
             ..WorldFacts::default()
         };
         let facts = Facts { road: Some(&setup.road.facts), world: Some(&facts), ..Facts::new(&[], memory) };
-        let space = setup.table.space();
-        let moment = Judged { time_s: world.time_s(), step };
+        let moment = Judged { space: setup.table.space(), facts, time_s: world.time_s(), step };
         for watch in &mut self.watches {
-            let RequirementDef { on, within_ticks, .. } = &space.requirements[watch.requirement];
-            if on.is_empty() {
-                if watch.stretches.is_empty() {
-                    watch.stretches.push(Stretch::default());
+            let is_asked = match moment.space.requirements[watch.requirement].on.as_slice() {
+                [] => watch.ask_of_ego(&moment, &mut self.breaches),
+                on => {
+                    let is_meant = |obstacle: &&Obstacle| {
+                        let own = own_bodies.get(&obstacle.id).copied();
+                        let body = BodyWord { like: obstacle.body, own };
+                        obstacle.distance_m <= NEAR_M
+                            && !obstacle.is_apart
+                            && on.iter().any(|named| body.is(*named))
+                    };
+                    let near = world.obstacles().filter(is_meant).map(|obstacle| obstacle.id);
+                    let near: Vec<(u32, NpcFacts)> =
+                        near.filter_map(|id| Some((id, world.npc_facts(id)?))).collect();
+                    watch.ask_of_each(&near, &moment, &mut self.breaches)
                 }
-                let kept = watch.ready.at(&space.functions, &facts);
-                watch.asked += u32::from(kept.is_some());
-                watch.stretches[0].take(kept, *within_ticks, watch.requirement, &moment, &mut self.breaches);
-                continue;
-            }
-            let near = world.obstacles().filter(|obstacle| {
-                let body = BodyWord { like: obstacle.body, own: own_bodies.get(&obstacle.id).copied() };
-                obstacle.distance_m <= NEAR_M && !obstacle.is_apart && on.iter().any(|named| body.is(*named))
-            });
-            let near: Vec<u32> = near.map(|obstacle| obstacle.id).collect();
-            // Who is no longer near is asked nothing, and begins anew if it comes back.
-            watch.stretches.retain(|stretch| {
-                let stays = stretch.obstacle.is_some_and(|id| near.contains(&id));
-                if !stays {
-                    watch.smallest = smaller(watch.smallest, stretch.tally.smallest);
-                }
-                stays
-            });
-            let mut is_asked = false;
-            for id in near {
-                let Some(npc) = world.npc_facts(id) else { continue };
-                let spawn = Some(SpawnFacts { npc, ..SpawnFacts::default() });
-                let kept = watch.ready.at(&space.functions, &Facts { spawn, ..facts });
-                is_asked |= kept.is_some();
-                let known = watch.stretches.iter().position(|stretch| stretch.obstacle == Some(id));
-                let at = known.unwrap_or_else(|| {
-                    watch.stretches.push(Stretch { obstacle: Some(id), ..Stretch::default() });
-                    watch.stretches.len() - 1
-                });
-                watch.stretches[at].take(kept, *within_ticks, watch.requirement, &moment, &mut self.breaches);
-            }
+            };
             watch.asked += u32::from(is_asked);
         }
     }
@@ -216,42 +195,79 @@ impl Monitor {
 }
 
 /// The moment that is judged.
-struct Judged {
+struct Judged<'a> {
+    space: &'a Space,
+    facts: Facts<'a>,
     time_s: f64,
     step: usize,
 }
 
-impl Stretch {
-    /// Takes the answer of a tick, if something is asked, and keeps what of `breaches` follows from it.
-    fn take(
-        &mut self,
-        kept: Option<Kept>,
-        within_ticks: u32,
-        requirement: usize,
-        &Judged { time_s, step }: &Judged,
-        breaches: &mut Vec<Breach>,
-    ) {
-        let Some(kept) = kept else {
-            self.tally.pause();
-            self.open = None;
-            return;
-        };
-        let margin = self.tally.take(kept, within_ticks);
-        if self.tally.failed <= within_ticks {
-            self.open = None;
-            return;
+impl Watch {
+    /// Judges a requirement about the ego vehicle alone. Returns whether it is asked now.
+    fn ask_of_ego(&mut self, moment: &Judged, breaches: &mut Vec<Breach>) -> bool {
+        if self.stretches.is_empty() {
+            self.stretches.push(Stretch::default());
         }
-        match self.open.and_then(|open| breaches.get_mut(open)) {
+        self.ask(0, &moment.facts, moment, breaches)
+    }
+
+    /// Judges a requirement about each of the road users that are near. Returns whether it is asked of any now.
+    fn ask_of_each(&mut self, near: &[(u32, NpcFacts)], moment: &Judged, breaches: &mut Vec<Breach>) -> bool {
+        // Who is no longer near is asked nothing, and begins anew if it comes back.
+        let smallest = &mut self.smallest;
+        self.stretches.retain(|stretch| {
+            let stays = near.iter().any(|(id, _)| stretch.obstacle == Some(*id));
+            if !stays {
+                *smallest = smaller(*smallest, stretch.tally.smallest);
+            }
+            stays
+        });
+        let mut is_asked = false;
+        for (id, npc) in near {
+            let known = self.stretches.iter().position(|stretch| stretch.obstacle == Some(*id));
+            let index = known.unwrap_or_else(|| {
+                self.stretches.push(Stretch { obstacle: Some(*id), ..Stretch::default() });
+                self.stretches.len() - 1
+            });
+            let spawn = Some(SpawnFacts { npc: *npc, ..SpawnFacts::default() });
+            is_asked |= self.ask(index, &Facts { spawn, ..moment.facts }, moment, breaches);
+        }
+        is_asked
+    }
+
+    /// Asks by these facts, and keeps what of `breaches` follows for the nth stretch. Returns whether anything is asked.
+    fn ask(
+        &mut self,
+        index: usize,
+        facts: &Facts,
+        &Judged { space, time_s, step, .. }: &Judged,
+        breaches: &mut Vec<Breach>,
+    ) -> bool {
+        let requirement = self.requirement;
+        let within_ticks = space.requirements[requirement].within_ticks;
+        let stretch = &mut self.stretches[index];
+        let Some(kept) = self.ready.at(&space.functions, facts) else {
+            stretch.tally.pause();
+            stretch.open = None;
+            return false;
+        };
+        let margin = stretch.tally.take(kept, within_ticks);
+        if stretch.tally.failed <= within_ticks {
+            stretch.open = None;
+            return true;
+        }
+        match stretch.open.and_then(|open| breaches.get_mut(open)) {
             Some(breach) => {
                 breach.until_s = time_s;
                 breach.margin = smaller(breach.margin, margin);
             }
             None => {
-                self.open = Some(breaches.len());
-                let obstacle = self.obstacle;
+                stretch.open = Some(breaches.len());
+                let obstacle = stretch.obstacle;
                 breaches.push(Breach { requirement, time_s, until_s: time_s, margin, step, obstacle });
             }
         }
+        true
     }
 }
 

@@ -44,7 +44,66 @@ impl FoundIn {
     }
 }
 
+/// An episode in which nothing was found, and how near it came to that.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Near {
+    pub road: String,
+    pub episode: i64,
+    /// The requirement that came nearest to a breach there, with its margin and its unit; `None` if nothing was near.
+    pub requirement: Option<(String, f64, String)>,
+    /// The shortest time to a collision with somebody ahead, at the speeds of the moment, s.
+    pub ttc_s: Option<f64>,
+}
+
+impl Near {
+    /// For the reader of its scenario.
+    pub fn in_words(&self) -> String {
+        match (&self.requirement, self.ttc_s) {
+            (Some((name, margin, unit)), _) => {
+                format!("Nothing is found here: `{name}` is kept by {margin:.2} {unit}.").replace(" .", ".")
+            }
+            (None, Some(ttc_s)) => {
+                format!("Nothing is found here: the time to a collision is at least {ttc_s:.2} s.")
+            }
+            (None, None) => "Nothing is found here.".to_owned(),
+        }
+    }
+}
+
 impl Database {
+    /// Up to `most` episodes in which nothing was found, the nearest misses first: of each requirement the one that came
+    /// nearest to a breach, then of each the second, and so on; then those with the shortest time to a collision.
+    ///
+    /// # Errors
+    /// If the database cannot be read.
+    pub fn near(&self, most: usize) -> Result<Vec<Near>, DatabaseError> {
+        // The rank is among the episodes of a requirement. An episode may be near a breach of several.
+        let query = "WITH calm AS (
+               SELECT episode, road, (SELECT min(ttc_s) FROM step WHERE step.episode = episode.episode) AS ttc_s
+               FROM episode
+               WHERE counted = 0 AND episode NOT IN (SELECT episode FROM breach)
+                 AND episode NOT IN (SELECT episode FROM failure)),
+             near AS (
+               SELECT episode, requirement, smallest, coalesce(unit, '') AS unit,
+                      row_number() OVER (PARTITION BY requirement ORDER BY smallest, episode) AS rank
+               FROM margin WHERE smallest IS NOT NULL AND episode IN (SELECT episode FROM calm))
+             SELECT road, episode, requirement, smallest, unit, ttc_s FROM calm LEFT JOIN near USING (episode)
+             ORDER BY rank IS NULL, rank, requirement, ttc_s IS NULL, ttc_s, episode";
+        let rows = query_all(&self.connection, query, |row| {
+            let (name, margin): (Option<String>, Option<f64>) = (row.get(2)?, row.get(3)?);
+            let unit: Option<String> = row.get(4)?;
+            let requirement = name.zip(margin).zip(unit).map(|((name, margin), unit)| (name, margin, unit));
+            Ok(Near { road: row.get(0)?, episode: row.get(1)?, requirement, ttc_s: row.get(5)? })
+        })?;
+        let mut found: Vec<Near> = Vec::new();
+        for near in rows {
+            if found.len() < most && found.iter().all(|known| known.episode != near.episode) {
+                found.push(near);
+            }
+        }
+        Ok(found)
+    }
+
     /// Each episode with a collision or a breach: those that count first, flukes after the others, then the worst first.
     ///
     /// # Errors

@@ -31,7 +31,7 @@ pub use columns::{Column, Values, columns};
 pub use coverage::{CoverageCell, LearningPoint};
 pub use database::{Database, FailureCount, RefusalCount, RequirementCount, Totals};
 pub(crate) use database::{LAYOUT, add_all};
-pub use findings::FoundIn;
+pub use findings::{FoundIn, Near};
 pub use gauges::Gauges;
 pub(crate) use groups::PEDESTRIAN;
 pub use groups::{Group, kind};

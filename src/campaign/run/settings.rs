@@ -54,6 +54,9 @@ pub struct RunSettings {
     /// Replays of each finding under other chance, to say how often it recurs; 0 for none.
     #[serde(default)]
     pub replays: u32,
+    /// Episodes in which nothing was found that are kept as scenarios, too, the nearest misses first.
+    #[serde(default)]
+    pub keep: u32,
     /// Rules switched off.
     pub without: Vec<String>,
     /// Optional rules switched on.
@@ -84,6 +87,7 @@ impl RunSettings {
             traffic: None,
             causes: false,
             replays: 0,
+            keep: 0,
             without: Vec::new(),
             with: Vec::new(),
             avoidability: AvoidabilitySettings::default(),

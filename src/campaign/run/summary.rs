@@ -109,6 +109,7 @@ impl EpisodeSummary {
             return;
         }
         let again = Replayed::new(setup, script, log, replays);
+        // A driving system that was given up meanwhile drove only some of them.
         if !can_replay(&setup.ads) {
             return;
         }

@@ -82,6 +82,9 @@ pub struct RunArguments {
     /// recurs; 0 for none.
     #[arg(long, value_name = "N", default_value_t = REPLAYS, value_parser = clap::value_parser!(u32).range(0..=i64::from(avastra_lang::model::REPLAYS_MAX)))]
     pub replays: u32,
+    /// Keep N episodes in which nothing was found as scenarios in `kept`, too, the nearest misses first.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=1000))]
+    pub keep: u32,
     /// Worker threads; the result does not depend on it [default: one for each core].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub jobs: Option<u32>,
@@ -94,7 +97,7 @@ pub struct RunArguments {
     #[command(flatten)]
     pub shard: ShardArguments,
     /// Go on with an interrupted run directory; its own settings hold, and the program that they name is started.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "policy", "face", "episodes", "seed", "ambient", "traffic", "causes", "replays", "out", "self_contained", "shard", "dry_run", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "policy", "face", "episodes", "seed", "ambient", "traffic", "causes", "replays", "keep", "out", "self_contained", "shard", "dry_run", "without", "with"])]
     pub resume: Option<PathBuf>,
     /// Exit with status 4 if a counted collision was found.
     #[arg(long)]

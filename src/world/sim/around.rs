@@ -8,6 +8,7 @@ use super::body::BodyParameters;
 use super::environment::Grip;
 use super::npc::Driver;
 use super::pedestrian::Walker;
+use super::right_of_way::PassedLight;
 use super::road_user::{Motion, Obstacle, RoadUser};
 use super::scene::Scene;
 use super::sense::EgoMotion;
@@ -42,6 +43,8 @@ pub(super) struct Around<'a> {
     pub ego_elevation_m: f64,
     pub ego_station_m: f64,
     pub ego_offset_m: f64,
+    /// The light that the ego vehicle passed last.
+    pub ego_passed: Option<PassedLight>,
     /// All other road users: those before it in the world's order, and those after it.
     pub users: [&'a [RoadUser]; 2],
     pub signals: &'a SignalClock,
@@ -126,6 +129,11 @@ impl Around<'_> {
         let (point, along) = path.along(near_m);
         let aside = position - point;
         (near_m + along.dot(&aside), along.perp(&aside), along)
+    }
+
+    /// Whether the ego vehicle is in a junction that it entered at red.
+    pub fn ego_runs_red(&self) -> bool {
+        self.ego_passed.is_some_and(|passed| passed.is_being_run(&self.scene.map, self.ego_outline))
     }
 
     /// The ego vehicle and every obstacle.

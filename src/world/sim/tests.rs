@@ -10,11 +10,12 @@ use proptest::prelude::*;
 
 use super::testing::{digest, request};
 use super::{
-    Contact, Control, DT_S, Incident, Obstacle, Scene, Start, VehicleParameters, World, pedals_for, testing,
+    Contact, Control, DT_S, Incident, Obstacle, Scene, Start, TrafficProfile, VehicleParameters, World,
+    pedals_for, testing,
 };
 use crate::action::{Effect, SpawnRequest, Surroundings};
 use avastra_base::geometry::{Vec2, distance_m, wrap_angle};
-use avastra_lang::model::vocabulary::{Body, LaneChoice, Level, Phenomenon, Side, Then, Verb, Word};
+use avastra_lang::model::vocabulary::{Body, LaneChoice, Level, Light, Phenomenon, Side, Then, Verb, Word};
 
 /// Holds a speed and the route, whatever is in the way, by aiming at a point ahead (pure pursuit).
 pub(super) fn hold(world: &World, speed_mps: f64) -> Control {
@@ -450,6 +451,39 @@ fn a_crosser_that_cannot_go_on_does_not_vanish_in_sight() {
     }
     let stands = world.obstacle(across.id).expect("it is in sight");
     assert!(stands.distance_m < 20.0 && stands.velocity_mps.norm() < 0.1, "{stands:?}");
+}
+
+#[test]
+fn who_takes_its_right_does_not_save_an_ego_vehicle_that_runs_a_red_light() {
+    let crashes = |traffic: TrafficProfile, keeps_lights: bool| {
+        let crashes = |seed: u64| {
+            // Lights change every few seconds; the ego vehicle comes to them at any moment of the cycle.
+            let start = Start { seed, signal_phase_s: seed as f64, ambient: 12, traffic, ..testing::start() };
+            let mut world = World::new(testing::crossing(), &start);
+            let mut has_crashed = false;
+            while world.time_s() < 60.0 && !has_crashed {
+                let line_m = world.scene().route.stop_lines[0].station_m - world.moment_facts().ego_front_m;
+                let speed_mps = world.ego().speed_mps;
+                let stops = keeps_lights
+                    && world.moment_facts().ego_light != Light::Green
+                    && (0.0..speed_mps * speed_mps / 4.0 + 2.0).contains(&line_m);
+                let contacts = world.tick(&if stops {
+                    Control { brake_pct: 60.0, ..Control::default() }
+                } else {
+                    hold(&world, 12.0)
+                });
+                // Only those who cross: whoever drives ahead is rammed by an ego vehicle that looks at nobody.
+                has_crashed = contacts.iter().any(|contact| contact.obstacle_velocity_mps.y.abs() > 1.0);
+            }
+            has_crashed
+        };
+        (0..40).filter(|seed| crashes(*seed)).count()
+    };
+    let rightful = TrafficProfile::shipped("rightful").expect("it is shipped");
+    let [saved, taken] = [TrafficProfile::default(), rightful].map(|traffic| crashes(traffic, false));
+    assert!(taken >= saved + 5, "{saved} with those who save it, {taken} with those who do not");
+    let [saved, taken] = [TrafficProfile::default(), rightful].map(|traffic| crashes(traffic, true));
+    assert!(taken <= saved + 1, "who keeps to the lights is not run into: {saved}, {taken}");
 }
 
 #[test]

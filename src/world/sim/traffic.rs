@@ -1,6 +1,7 @@
 //! Traffic profiles: how other vehicles drive, as settings that a run can change.
 //!
 //! The default, `scenarios/traffic/careful.yaml`, is how they drive unless a run says otherwise.
+//! `scenarios/traffic/rightful.yaml` does not save an ego vehicle that breaks the rules,
 //! `scenarios/traffic/released.yaml` is what the vehicles of LGSVL did, as far as its published constants tell.
 //! What no profile changes: signals, conflict areas among other vehicles, bodies and friction.
 
@@ -12,6 +13,8 @@ section! {
     pub struct TrafficProfile {
         /// Whether ambient vehicles yield to the ego vehicle at junctions. Commanded ones never do: see `npc::manners`.
         yields_to_ego: bool = true;
+        /// Whether ambient vehicles take their right of way before the ego vehicle: they expect that it keeps the rules, and brake for one that does not only once it is where their ways cross. Ours.
+        takes_right: bool = false;
         /// Ambient vehicles drive at least at this part of each lane's limit, in `[0.1, 1.5]`. Ours.
         limit_part_min: f64 = 0.8, 0.1..=LIMIT_PART_MAX;
         /// And at most at this part, in `[0.1, 1.5]`. Ours.
@@ -56,8 +59,9 @@ section! {
 }
 
 /// The profiles that come with avastra: name and text.
-const SHIPPED: [(&str, &str); 2] = [
+const SHIPPED: [(&str, &str); 3] = [
     ("careful", include_str!("../../../scenarios/traffic/careful.yaml")),
+    ("rightful", include_str!("../../../scenarios/traffic/rightful.yaml")),
     ("released", include_str!("../../../scenarios/traffic/released.yaml")),
 ];
 
@@ -144,7 +148,9 @@ impl TrafficProfile {
 
     /// Digest of all settings, `sha256:` and 64 digits.
     pub fn digest(&self) -> String {
-        digest(serde_json::to_string(self).expect("a profile is plain data").as_bytes())
+        let text = serde_json::to_string(self).expect("a profile is plain data");
+        // Profiles that were recorded before there was this setting keep their digests.
+        digest(text.replace("\"takes_right\":false,", "").as_bytes())
     }
 }
 

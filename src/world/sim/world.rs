@@ -505,6 +505,7 @@ impl World {
             ego_elevation_m: self.ego_elevation_m,
             ego_station_m: self.ego_station_m,
             ego_offset_m: self.ego_offset_m,
+            ego_passed: self.ego_passed,
             users,
             signals: &self.signals,
             tick: self.ticks,

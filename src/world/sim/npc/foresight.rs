@@ -51,7 +51,8 @@ impl Driver {
             })
         });
         let mut free_m = f64::INFINITY;
-        if self.yields_to_ego && matters(around.ego_outline, around.ego_elevation_m, around.ego.speed_mps) {
+        let foresees_ego = self.yields_to_ego && !around.traffic.takes_right;
+        if foresees_ego && matters(around.ego_outline, around.ego_elevation_m, around.ego.speed_mps) {
             let ego = |time_s| Pose {
                 position: around.ego_outline.pose.position + around.ego_velocity_mps * time_s,
                 ..around.ego_outline.pose

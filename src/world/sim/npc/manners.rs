@@ -19,7 +19,8 @@
 //! towards all other vehicles, but never yields to the ego vehicle at a junction: to cross or to turn
 //! before it is what its verb means. It follows, brakes for and does not push an ego vehicle that is
 //! ahead of it. Ambient vehicles yield to the ego vehicle as to all others, and expect that it will not
-//! stop whenever it moves and no red light holds it.
+//! stop whenever it moves and no red light holds it; those of a traffic profile that takes its right expect that it stops
+//! where they go first, and that it has not passed a red light.
 
 use core::cell::LazyCell;
 
@@ -175,6 +176,9 @@ impl Driver {
             });
         let for_ego = || {
             let other = ego_passage(area, around);
+            // Whoever takes its right waits for an ego vehicle without one only where that is in its way already.
+            let is_wronged = || around.traffic.takes_right && (area.goes_first || around.ego_runs_red());
+            let other = other.filter(|other| other.in_m <= 0.0 || !is_wronged());
             other.is_some_and(|other| waits(&own, &other, area.goes_first, impatient))
         };
         for_others || (self.yields_to_ego && for_ego())
