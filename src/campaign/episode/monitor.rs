@@ -11,7 +11,7 @@ use std::sync::Arc;
 use avastra_lang::model::expr::{Expr, ExprKind};
 use avastra_lang::model::vocabulary::Fact;
 use avastra_lang::model::{
-    BodyWord, Facts, Kept, Memory, NpcFacts, ReadyRequirement, RequirementDef, Space, SpawnFacts, WorldFacts,
+    BodyWord, Facts, FnDef, Kept, Memory, NpcFacts, ReadyRequirement, RequirementDef, SpawnFacts, WorldFacts,
 };
 use avastra_world::sim::{DT_S, MomentParts, Obstacle, Watched, WatchedParts, World};
 
@@ -52,6 +52,8 @@ pub struct Margin {
 #[derive(Debug, Clone)]
 pub(super) struct Monitor {
     watched: Watched,
+    /// The facts of the moment, filled anew at every tick.
+    facts: WorldFacts,
     watches: Vec<Watch>,
     /// What of the moment, and of what is watched, they ask for.
     moment: MomentParts,
@@ -61,16 +63,27 @@ pub(super) struct Monitor {
     breaches: Vec<Breach>,
 }
 
+/// A requirement with its answers up to now.
 #[derive(Debug, Clone)]
 struct Watch {
-    requirement: usize,
-    ready: Arc<ReadyRequirement>,
-    /// About the ego vehicle alone there is one; otherwise one for each road user near.
-    stretches: Vec<Stretch>,
+    required: Arc<Required>,
+    /// About the ego vehicle alone, or about each of the road users near.
+    ego: Stretch,
+    each: Vec<Stretch>,
     /// The smallest margin of those that are over.
     smallest: Option<f64>,
     /// Ticks in which it was asked.
     asked: u32,
+}
+
+/// What of a requirement is looked at in every tick.
+#[derive(Debug)]
+struct Required {
+    /// By index in `Space::requirements`.
+    index: usize,
+    within_ticks: u32,
+    on: Vec<BodyWord>,
+    ready: ReadyRequirement,
 }
 
 /// A requirement, of one road user or of none.
@@ -97,24 +110,26 @@ struct Tally {
 impl Monitor {
     /// `None` where no requirement is in force.
     pub fn new(setup: &Setup) -> Option<Monitor> {
-        let ready = |requirement: usize| setup.table.space().requirements[requirement].ready();
-        let watches: Vec<Watch> = setup
-            .rules
-            .required()
-            .map(|requirement| Watch {
-                requirement,
-                ready: Arc::new(ready(requirement)),
-                stretches: Vec::new(),
+        let watch = |index: usize| {
+            let requirement = &setup.table.space().requirements[index];
+            let RequirementDef { within_ticks, ref on, .. } = *requirement;
+            let required = Required { index, within_ticks, on: on.clone(), ready: requirement.ready() };
+            Watch {
+                required: Arc::new(required),
+                ego: Stretch::default(),
+                each: Vec::new(),
                 smallest: None,
                 asked: 0,
-            })
-            .collect();
-        let of = |watch: &Watch| &setup.table.space().requirements[watch.requirement].bearers;
+            }
+        };
+        let watches: Vec<Watch> = setup.rules.required().map(watch).collect();
+        let of = |watch: &Watch| &setup.table.space().requirements[watch.required.index].bearers;
         let mut bearers: Vec<usize> = watches.iter().flat_map(|watch| of(watch).iter().copied()).collect();
         bearers.sort_unstable();
         bearers.dedup();
         let all = watches.iter().flat_map(|watch| {
-            let RequirementDef { when, condition, .. } = &setup.table.space().requirements[watch.requirement];
+            let RequirementDef { when, condition, .. } =
+                &setup.table.space().requirements[watch.required.index];
             when.iter().chain([condition])
         });
         let all: Vec<&Expr> = all.collect();
@@ -133,8 +148,15 @@ impl Monitor {
         let facts: Vec<Fact> = facts.collect();
         let moment = MomentParts::of(facts.iter().copied(), words);
         let tick = WatchedParts::of(facts);
-        let monitor =
-            Monitor { moment, tick, watched: Watched::default(), watches, bearers, breaches: Vec::new() };
+        let monitor = Monitor {
+            moment,
+            tick,
+            watched: Watched::default(),
+            facts: WorldFacts::default(),
+            watches,
+            bearers,
+            breaches: Vec::new(),
+        };
         (!monitor.watches.is_empty()).then_some(monitor)
     }
 
@@ -147,31 +169,25 @@ impl Monitor {
         memory: &Memory,
         step: usize,
     ) {
-        let facts = WorldFacts {
-            moment: world.moment_facts_of(self.moment),
-            step: step as u64,
-            bearers: self.bearers.iter().filter_map(|who| Some((*who, world.bearer_facts(*who)?))).collect(),
-            tick: self.watched.look(world, self.tick),
-            ..WorldFacts::default()
-        };
-        let facts = Facts { road: Some(&setup.road.facts), world: Some(&facts), ..Facts::new(&[], memory) };
-        let moment = Judged { space: setup.table.space(), facts, time_s: world.time_s(), step };
+        self.facts.moment = world.moment_facts_of(self.moment);
+        self.facts.step = step as u64;
+        self.facts.tick = self.watched.look(world, self.tick);
+        if !self.bearers.is_empty() {
+            self.facts.bearers.clear();
+            let there = self.bearers.iter().filter_map(|who| Some((*who, world.bearer_facts(*who)?)));
+            self.facts.bearers.extend(there);
+        }
+        let facts =
+            Facts { road: Some(&setup.road.facts), world: Some(&self.facts), ..Facts::new(&[], memory) };
+        let functions = &setup.table.space().functions;
+        let moment = Judged { functions, facts: &facts, time_s: world.time_s(), step };
         for watch in &mut self.watches {
-            let is_asked = match moment.space.requirements[watch.requirement].on.as_slice() {
-                [] => watch.ask_of_ego(&moment, &mut self.breaches),
-                on => {
-                    let is_meant = |obstacle: &&Obstacle| {
-                        let own = own_bodies.get(&obstacle.id).copied();
-                        let body = BodyWord { like: obstacle.body, own };
-                        obstacle.distance_m <= NEAR_M
-                            && !obstacle.is_apart
-                            && on.iter().any(|named| body.is(*named))
-                    };
-                    let near = world.obstacles().filter(is_meant).map(|obstacle| obstacle.id);
-                    let near: Vec<(u32, NpcFacts)> =
-                        near.filter_map(|id| Some((id, world.npc_facts(id)?))).collect();
-                    watch.ask_of_each(&near, &moment, &mut self.breaches)
-                }
+            let required = &watch.required;
+            let is_asked = if required.on.is_empty() {
+                watch.ego.ask(required, &facts, &moment, &mut self.breaches)
+            } else {
+                let near = near(world, own_bodies, &required.on);
+                watch.ask_of_each(&near, &moment, &mut self.breaches)
             };
             watch.asked += u32::from(is_asked);
         }
@@ -186,9 +202,9 @@ impl Monitor {
     /// What was found up to now, breaches by rising time.
     pub fn found(self) -> (Vec<Breach>, Vec<Margin>) {
         let margin = |watch: &Watch| {
-            let smallest =
-                watch.stretches.iter().map(|stretch| stretch.tally.smallest).fold(watch.smallest, smaller);
-            Margin { requirement: watch.requirement, smallest, asked_s: f64::from(watch.asked) * DT_S }
+            let all = watch.each.iter().chain([&watch.ego]);
+            let smallest = all.map(|stretch| stretch.tally.smallest).fold(watch.smallest, smaller);
+            Margin { requirement: watch.required.index, smallest, asked_s: f64::from(watch.asked) * DT_S }
         };
         (self.breaches, self.watches.iter().map(margin).collect())
     }
@@ -196,26 +212,28 @@ impl Monitor {
 
 /// The moment that is judged.
 struct Judged<'a> {
-    space: &'a Space,
-    facts: Facts<'a>,
+    functions: &'a [FnDef],
+    facts: &'a Facts<'a>,
     time_s: f64,
     step: usize,
 }
 
-impl Watch {
-    /// Judges a requirement about the ego vehicle alone. Returns whether it is asked now.
-    fn ask_of_ego(&mut self, moment: &Judged, breaches: &mut Vec<Breach>) -> bool {
-        if self.stretches.is_empty() {
-            self.stretches.push(Stretch::default());
-        }
-        self.ask(0, &moment.facts, moment, breaches)
-    }
+/// The road users near that have one of these bodies, with what may be asked of them.
+fn near(world: &World, own_bodies: &BTreeMap<u32, usize>, on: &[BodyWord]) -> Vec<(u32, NpcFacts)> {
+    let is_meant = |obstacle: &&Obstacle| {
+        let body = BodyWord { like: obstacle.body, own: own_bodies.get(&obstacle.id).copied() };
+        obstacle.distance_m <= NEAR_M && !obstacle.is_apart && on.iter().any(|named| body.is(*named))
+    };
+    let near = world.obstacles().filter(is_meant).map(|obstacle| obstacle.id);
+    near.filter_map(|id| Some((id, world.npc_facts(id)?))).collect()
+}
 
+impl Watch {
     /// Judges a requirement about each of the road users that are near. Returns whether it is asked of any now.
     fn ask_of_each(&mut self, near: &[(u32, NpcFacts)], moment: &Judged, breaches: &mut Vec<Breach>) -> bool {
         // Who is no longer near is asked nothing, and begins anew if it comes back.
         let smallest = &mut self.smallest;
-        self.stretches.retain(|stretch| {
+        self.each.retain(|stretch| {
             let stays = near.iter().any(|(id, _)| stretch.obstacle == Some(*id));
             if !stays {
                 *smallest = smaller(*smallest, stretch.tally.smallest);
@@ -224,46 +242,48 @@ impl Watch {
         });
         let mut is_asked = false;
         for (id, npc) in near {
-            let known = self.stretches.iter().position(|stretch| stretch.obstacle == Some(*id));
+            let known = self.each.iter().position(|stretch| stretch.obstacle == Some(*id));
             let index = known.unwrap_or_else(|| {
-                self.stretches.push(Stretch { obstacle: Some(*id), ..Stretch::default() });
-                self.stretches.len() - 1
+                self.each.push(Stretch { obstacle: Some(*id), ..Stretch::default() });
+                self.each.len() - 1
             });
             let spawn = Some(SpawnFacts { npc: *npc, ..SpawnFacts::default() });
-            is_asked |= self.ask(index, &Facts { spawn, ..moment.facts }, moment, breaches);
+            let facts = Facts { spawn, ..*moment.facts };
+            is_asked |= self.each[index].ask(&self.required, &facts, moment, breaches);
         }
         is_asked
     }
+}
 
-    /// Asks by these facts, and keeps what of `breaches` follows for the nth stretch. Returns whether anything is asked.
+impl Stretch {
+    /// Asks by these facts, and keeps what of `breaches` follows. Returns whether anything is asked.
+    #[inline]
     fn ask(
         &mut self,
-        index: usize,
+        required: &Required,
         facts: &Facts,
-        &Judged { space, time_s, step, .. }: &Judged,
+        moment: &Judged,
         breaches: &mut Vec<Breach>,
     ) -> bool {
-        let requirement = self.requirement;
-        let within_ticks = space.requirements[requirement].within_ticks;
-        let stretch = &mut self.stretches[index];
-        let Some(kept) = self.ready.at(&space.functions, facts) else {
-            stretch.tally.pause();
-            stretch.open = None;
+        let Some(kept) = required.ready.at(moment.functions, facts) else {
+            self.tally.pause();
+            self.open = None;
             return false;
         };
-        let margin = stretch.tally.take(kept, within_ticks);
-        if stretch.tally.failed <= within_ticks {
-            stretch.open = None;
+        let margin = self.tally.take(kept, required.within_ticks);
+        if self.tally.failed <= required.within_ticks {
+            self.open = None;
             return true;
         }
-        match stretch.open.and_then(|open| breaches.get_mut(open)) {
+        let Judged { time_s, step, .. } = *moment;
+        match self.open.and_then(|open| breaches.get_mut(open)) {
             Some(breach) => {
                 breach.until_s = time_s;
                 breach.margin = smaller(breach.margin, margin);
             }
             None => {
-                stretch.open = Some(breaches.len());
-                let obstacle = stretch.obstacle;
+                self.open = Some(breaches.len());
+                let (requirement, obstacle) = (required.index, self.obstacle);
                 breaches.push(Breach { requirement, time_s, until_s: time_s, margin, step, obstacle });
             }
         }
@@ -320,7 +340,9 @@ struct Window {
 
 impl Window {
     fn clear(&mut self) {
-        self.falling.clear();
+        if !self.falling.is_empty() {
+            self.falling.clear();
+        }
     }
 
     /// Takes one more; the largest of it and so many before it.

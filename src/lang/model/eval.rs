@@ -404,12 +404,13 @@ fn are_equal(left: f64, right: f64) -> bool {
 
 /// Compares with that tolerance. Of less, equal and greater exactly one holds, unless a number is NaN.
 pub(crate) fn compare_numbers(op: Comparison, left: f64, right: f64) -> bool {
-    let equal = are_equal(left, right);
+    // The tolerance is asked for only where it decides.
+    let equal = || are_equal(left, right);
     match op {
-        Comparison::Equal => equal,
-        Comparison::NotEqual => !equal,
-        Comparison::Less | Comparison::Greater => !equal && op.holds(left, right),
-        Comparison::LessEqual | Comparison::GreaterEqual => equal || op.holds(left, right),
+        Comparison::Equal => equal(),
+        Comparison::NotEqual => !equal(),
+        Comparison::Less | Comparison::Greater => op.holds(left, right) && !equal(),
+        Comparison::LessEqual | Comparison::GreaterEqual => op.holds(left, right) || equal(),
     }
 }
 
