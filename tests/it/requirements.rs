@@ -316,6 +316,30 @@ fn a_finding_says_how_often_it_recurs() {
 }
 
 #[test]
+fn a_training_plays_an_example_of_each_failure_again() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let out = scratch.path().join("trained").display().to_string();
+    let train = ["train", "scenarios/avastra45.ava", "--road", "corner", "--episodes", "16", "--seed", "2"];
+    let found =
+        last_line(&done(&[&train[..], &["--ads", FLICKER, "--format", "json", "--out", &out]].concat()));
+    let groups = found["groups"].as_array().expect("a list");
+    assert!(!groups.is_empty(), "such sensors make crashes");
+    for group in groups {
+        let file = format!("{out}/critical/corner_{:04}.ava", group["episode"].as_i64().expect("a number"));
+        let text = fs::read_to_string(&file).expect("it was written");
+        assert!(text.contains("  expect recurrence == ") && text.contains(" / 20 with npc#"), "{text}");
+        assert!(done(&["replay", &file]).contains(" holds, "));
+    }
+    // The database is sound, and a second end changes nothing.
+    let read = || fs::read(format!("{out}/run.db")).expect("it is there");
+    let before = read();
+    let (_, _, said) = outcome(&mut avastra(&["report", &out]));
+    assert!(!said.contains("were changed"), "{said}");
+    done(&["train", "--resume", &out]);
+    assert!(read() == before, "nothing is played again");
+}
+
+#[test]
 fn near_misses_are_kept_as_scenarios_that_end_as_they_did() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let kept = |name: &str, more: &[&str]| -> Vec<(String, String)> {
