@@ -185,7 +185,7 @@ fn shares_text(crashes: usize, shares: &[MechanismShare], placebo: Option<&Estim
          {:<34}{:<24}{:<24}{}",
         plural(crashes, "finding"),
         "weakness",
-        "with the crash's noise",
+        "with its own noise",
         "with other noise",
         "beyond chance"
     );

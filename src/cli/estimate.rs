@@ -332,10 +332,11 @@ fn write_scenarios(
     let critical = directory.join("critical");
     let write_one = |met: &Met| {
         // Of breaches there is a scenario only where they are asked for.
-        let is_breach = estimate.settings().event.is_breach();
-        if met.summary.counted() == 0 && !is_breach {
+        let breach = estimate.settings().event.first_breach(estimate.run().table().space(), &met.log);
+        if met.summary.counted() == 0 && breach.is_none() {
             return Ok(None);
         }
+        let about = breach.or_else(|| met.summary.first_found(&met.log)).expect("it has a finding");
         // An episode and the trials beside it have one number, and differ by step and row.
         let tried = match met.event.row {
             Some(row) if estimate.settings().method == Method::Probe => {
@@ -344,7 +345,7 @@ fn write_scenarios(
             _ => String::new(),
         };
         let name = format!("{}_{:04}{tried}.ava", met.log.road, met.summary.episode);
-        let text = player.write_scenario(&critical.join(&name), (&met.log, &met.summary))?;
+        let text = player.write_scenario(&critical.join(&name), (&met.log, &met.summary), about)?;
         Ok(Some((name, text)))
     };
     played.met.iter().map(write_one).collect()

@@ -1,5 +1,6 @@
 //! Printing: results on stdout, everything else on stderr, in the form that was asked for.
 
+use std::collections::BTreeSet;
 use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::sync::Mutex;
@@ -18,6 +19,8 @@ pub struct Output {
     pub verbose: bool,
     /// Diagnostics for SARIF, which prints them in one piece at the end.
     collected: Mutex<Vec<DiagnosticRecord>>,
+    /// The diagnostics that were printed for people.
+    told: Mutex<BTreeSet<String>>,
     /// What the command found, for JSON, which prints it at the end.
     result: Mutex<Fields>,
     /// Why something that was printed is lost.
@@ -74,6 +77,7 @@ impl Output {
             quiet: false,
             verbose: false,
             collected: Mutex::default(),
+            told: Mutex::default(),
             result: Mutex::default(),
             lost: Mutex::default(),
         }
@@ -198,7 +202,8 @@ impl Output {
         }
     }
 
-    /// Diagnostics on stderr; in JSON one object a line.
+    /// Diagnostics on stderr; in JSON one object a line. For people each is there once, however many files use the file that it
+    /// is about.
     pub fn diagnostics(&self, sources: &Sources, diagnostics: &[Diagnostic]) {
         for diagnostic in diagnostics {
             match self.format {
@@ -210,10 +215,10 @@ impl Output {
                 }
                 Format::Human | Format::Plain => {
                     let style = if self.colour { Style::Human } else { Style::Plain };
-                    drawn(&format!(
-                        "{}\n",
-                        avastra_lang::syntax::render(diagnostic, sources, style).trim_end()
-                    ));
+                    let text = avastra_lang::syntax::render(diagnostic, sources, style);
+                    if self.told.lock().expect("no thread panics while telling").insert(text.clone()) {
+                        drawn(&format!("{}\n", text.trim_end()));
+                    }
                 }
             }
         }

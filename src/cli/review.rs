@@ -25,11 +25,11 @@ const DRIVEN_BY: [&str; 4] = ["ads", "profile", "profile_digest", "answers"];
 /// Fields of an origin that say in which world it drove.
 const PLAYED_IN: [&str; 2] = ["engine", "traffic_digest"];
 
-/// How the crash of a scenario differs from what the scenario says; the larger difference comes later.
+/// How what a scenario is about differs from what the scenario says; the larger difference comes later.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Change {
     Same,
-    /// The same crash at the same time, by a drive that is not the same to the bit.
+    /// The same at the same time, by a drive that is not the same to the bit.
     OtherDrive,
     OtherTime,
     OtherVerdict,
@@ -42,9 +42,9 @@ impl Change {
     pub fn in_words(self) -> &'static str {
         match self {
             Change::Same => "same",
-            Change::OtherDrive => "same crash, another drive",
-            Change::OtherTime => "same crash, other time",
-            Change::OtherVerdict => "same crash, other verdict",
+            Change::OtherDrive => "same finding, another drive",
+            Change::OtherTime => "same finding, other time",
+            Change::OtherVerdict => "same finding, other verdict",
             Change::OtherObstacle => "another crash",
             Change::Gone => "gone",
         }
@@ -297,7 +297,7 @@ fn rewritten(text: &str, anew: &str, is_refuted: &[bool], fields: &[&str]) -> St
     result + &text[at..]
 }
 
-/// What a claim is about: its kind, and the number of the obstacle.
+/// What a claim is about: its kind, and the number of the obstacle or the requirement.
 type About<'a> = (&'a str, Option<&'a str>);
 
 /// How claims that do not hold become what is so now: the new text's claim of the same kind about the same obstacle, else one
@@ -325,16 +325,10 @@ fn about(expect: &Expect) -> About<'_> {
     let kind = match &expect.claim.kind {
         ExprKind::Name(name) if Avoidability::from_name(name).is_some() => "avoidable",
         ExprKind::Name(name) => name,
-        // A requirement takes the place of the obstacle: a claim of one is not about another.
-        ExprKind::Field { base, field } => {
-            let requirement = match &base.kind {
-                ExprKind::Name(name) => Some(name.as_str()),
-                _ => None,
-            };
-            return (&field.text, requirement);
-        }
+        ExprKind::Field { .. } => return about_requirement(&expect.claim),
         ExprKind::Binary { left, .. } => match &left.kind {
             ExprKind::Name(name) => name,
+            ExprKind::Field { .. } => return about_requirement(left),
             _ => "",
         },
         _ => "",
@@ -345,6 +339,17 @@ fn about(expect: &Expect) -> About<'_> {
         _ => None,
     });
     (kind, number)
+}
+
+/// `NAME.breached`: a claim about one requirement is not about another.
+fn about_requirement(claim: &ast::Expr) -> About<'_> {
+    match &claim.kind {
+        ExprKind::Field { base, field } => match &base.kind {
+            ExprKind::Name(requirement) => (&field.text, Some(requirement)),
+            _ => (&field.text, None),
+        },
+        _ => ("", None),
+    }
 }
 
 /// How one field of an origin becomes what it is now.

@@ -376,7 +376,7 @@ fn totals_text(totals: &Totals, elapsed_s: f64, played: usize) -> String {
     }
     if totals.replayed > 0 {
         text.push_str(&format!(
-            "\n{} of {} happen again in more than half of their replays under other noise",
+            "\nagain in more than half of the replays under other noise: {} of {}",
             totals.recurring,
             plural(totals.replayed as usize, "finding")
         ));

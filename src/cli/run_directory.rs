@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 use avastra_campaign::emit;
 use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::files;
+use avastra_campaign::oracle::Found;
 use avastra_campaign::run::{
     DatabaseError, EpisodeSummary, Near, Numbered, Shard, Units, VERSION, WrittenScenario,
 };
@@ -592,7 +593,8 @@ impl<C: Campaign> Directory<C> {
     /// file.
     pub fn write_critical(&self, player: &Player, (log, summary): Judged) -> Result<String, Failure> {
         let name = format!("{}_{:04}.ava", log.road, summary.episode);
-        player.write_scenario(&self.path.join("critical").join(name), (log, summary))
+        let found = summary.first_found(log).expect("a critical episode has a finding");
+        player.write_scenario(&self.path.join("critical").join(name), (log, summary), found)
     }
 }
 
@@ -610,10 +612,15 @@ pub struct Player<'a> {
 }
 
 impl Player<'_> {
-    /// Writes the counted collisions of an episode as a scenario that has the name of the file, and gives its text.
-    pub fn write_scenario(&self, path: &Path, (log, summary): Judged) -> Result<String, Failure> {
-        let text =
-            self.file(path, summary.episode, &|source| emit::scenario(self.table, log, summary, source))?;
+    /// Writes what was found in an episode, `about` first, as a scenario that has the name of the file, and gives its text.
+    pub fn write_scenario(
+        &self,
+        path: &Path,
+        (log, summary): Judged,
+        about: Found,
+    ) -> Result<String, Failure> {
+        let emitted = |source: &emit::Provenance| emit::scenario(self.table, (log, summary), about, source);
+        let text = self.file(path, summary.episode, &emitted)?;
         write_answers(path, log)?;
         write(path, &text)?;
         Ok(text)

@@ -124,7 +124,7 @@ run
   never.realised[] object a row that was chosen, but never carried out
   requirements[] object a requirement in force: for how long it was asked (`asked_s`, `asked_in` episodes), `breaches`, `breached_in` and `kept_in` (episodes), the `smallest` margin in its `unit`, the `nearest` episode, a `scenario` with the worst breach
   critical[] text scenarios with a counted collision or a breach, the surest and worst first
-  found[] object an episode with a finding: `road`, `episode`, whether something of it is `counted`, its `recurrence` (`recurred` of `replays`), the `harm` of its worst collision
+  found[] object an episode with a finding: `road`, `episode`, whether it has a counted collision or a breach (`critical`), the `recurrence` (`recurred` of `replays`) of the finding that recurs most often, the `harm` of its worst collision
   kept[] text with `--keep`: paths of episodes without a finding, the nearest misses first
   failures[] object what went wrong with a driving system of your own: `kind`, `problem`, `times`, `detail`, `scenario`
   REPRODUCIBLE

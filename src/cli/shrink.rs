@@ -171,7 +171,8 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
     if scenario.claims.iter().any(|claim| matches!(claim, Claim::Cause { .. })) {
         summary.find_causes(&setup, &shrunk.log).map_err(Failure::usage)?;
     }
-    let text = avastra_lang::syntax::print(&emit::scenario(&table, &shrunk.log, &summary, &source));
+    let text =
+        avastra_lang::syntax::print(&emit::scenario(&table, (&shrunk.log, &summary), shrunk.found, &source));
     write_result(named, path, &text)?;
     write_answers(path, &shrunk.log)?;
     let actions = shrunk.log.steps.iter().filter_map(|step| match &step.outcome {

@@ -319,18 +319,20 @@ impl Suite<'_> {
         };
         let is_breached = breached_by(&log).is_some();
         let breached_again = || match self.asked.is_nothing() {
-            true => (breached_by(&log), None),
+            true => (breached_by(&log), Regression::OtherCrash),
             false => {
                 let again = stage.play(&ads, &mut |_, _, _| {});
-                (breached_by(&again), again.failure.as_ref().map(AdsFailure::kind))
+                let otherwise = match again.failure.as_ref().map(AdsFailure::kind) {
+                    Some(kind) => Regression::AdsFailed(kind),
+                    None if !stage.counted(&ads, &again).is_empty() => Regression::OtherCrash,
+                    None => Regression::Fixed,
+                };
+                (breached_by(&again), otherwise)
             }
         };
-        if counted.is_empty() && is_breached {
-            return Ok(match breached_again() {
-                (Some(breached), _) => breached,
-                (None, Some(kind)) => Outcome::Played(Regression::AdsFailed(kind)),
-                (None, None) => Outcome::Played(Regression::Fixed),
-            });
+        if is_breached && (counted.is_empty() || scenario.is_about_a_breach()) {
+            let (breached, otherwise) = breached_again();
+            return Ok(breached.unwrap_or_else(|| self.outcome(otherwise)));
         }
         if counted.is_empty() {
             let reason =

@@ -2,7 +2,7 @@
 //! engine's words in `model::vocabulary`.
 
 use avastra_lang::model::vocabulary::{
-    Body, Colour, CommandField, EpisodeField, LaneChoice, ROAD_USER, RoadField, SINCE, Side, Site,
+    Body, Colour, CommandField, EpisodeField, LaneChoice, PastWord, ROAD_USER, RoadField, SINCE, Side, Site,
     SpawnField, StartField, TYPES, Then, TrafficRule, Turning, Verb, Word,
 };
 use avastra_lang::model::{ENDS, MODULES};
@@ -25,7 +25,9 @@ pub fn facts(site: Site) -> Vec<Entry> {
     let facts = site.facts().map(|fact| (fact.name(), fact.meaning()));
     let words = site.word_facts().map(|fact| (fact.name(), fact.meaning()));
     let since = site.knows_actions().then_some(SINCE);
-    facts.chain(words).filter(|(name, _)| !name.contains('.')).chain(since).collect()
+    let remembers = matches!(site, Site::Requirement | Site::RequirementOn);
+    let past = if remembers { of::<PastWord>() } else { Vec::new() };
+    facts.chain(words).filter(|(name, _)| !name.contains('.')).chain(since).chain(past).collect()
 }
 
 /// The words for a field of a spawn; `body` is what stands before `ahead` or `behind`.

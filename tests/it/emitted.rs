@@ -97,7 +97,8 @@ fn text(run: &Run, summary: &EpisodeSummary, log: &EpisodeLog) -> String {
         without: &[],
         with: &[],
     };
-    avastra::syntax::print(&emit::scenario(run.table(), log, summary, &source))
+    let about = summary.first_found(log).expect("it has a finding");
+    avastra::syntax::print(&emit::scenario(run.table(), (log, summary), about, &source))
 }
 
 fn judged(run: &Run, jobs: usize) -> BTreeMap<usize, (EpisodeSummary, EpisodeLog)> {

@@ -494,4 +494,70 @@ fn requirements_are_switched_as_rules_are() {
     let switched = run("switched", &["--with", "crawls", "--without", "slow"]);
     assert!(!switched.contains(&"slow".to_owned()) && switched.contains(&"crawls".to_owned()));
     fails(&["run", SPACE, "--without", "slo"], "unknown rule `slo`; did you mean `slow`?");
+
+    // A scenario keeps what was switched, and is taken by all that take scenarios.
+    let file = format!("{}/switched/critical/corner_0000.ava", scratch.path().display());
+    let text = fs::read_to_string(&file).expect("it was written");
+    assert!(text.contains("without: [slow]") && text.contains("with: [crawls]"), "{text}");
+    assert!(text.contains("crawls.breached") && !text.contains("expect slow."), "{text}");
+    done(&["check", &file]);
+    assert!(done(&["replay", &file]).contains(" holds, "));
+    assert!(outcome(&mut avastra(&["test", &file])).1.contains("1 still fail"));
+    done(&["shrink", &file]);
+    done(&["export", "--to", "csv", &file]);
+    fs::write(&file, text.replace("without: [slow]", "without: [slo]")).expect("it can be written");
+    let (status, _, error) = outcome(&mut avastra(&["check", &file]));
+    assert_ne!(status, 0);
+    assert!(error.contains("unknown rule or requirement `slo`"), "{error}");
+}
+
+#[test]
+fn a_scenario_is_about_what_it_claims_first() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let out = scratch.path().join("found").display().to_string();
+    let asked = [
+        "run",
+        SPACE,
+        "--ads",
+        "idm",
+        "--episodes",
+        "2",
+        "--seed",
+        "3",
+        "--replays",
+        "3",
+        "--road",
+        "corner",
+    ];
+    let found = last_line(&done(&[&asked[..], &["--format", "json", "--out", &out]].concat()));
+    let first = found["critical"][0].as_str().expect("a path").to_owned();
+    let text = fs::read_to_string(&first).expect("it was written");
+    let groups: Vec<&str> = text.matches(".breached at").collect();
+    assert!(groups.len() >= 2, "{text}");
+
+    // Each claim of a recurrence is mended by that of its own requirement.
+    let wrong = text.replace(".recurrence == 3 / 3", ".recurrence == 1 / 3");
+    assert_ne!(wrong, text);
+    fs::write(&first, &wrong).expect("it can be written");
+    outcome(&mut avastra(&["test", "--accept", &first]));
+    assert_eq!(fs::read_to_string(&first).expect("it is there"), text);
+
+    // Whoever claims the other one first has it shrunk.
+    let lines: Vec<&str> = text.lines().collect();
+    let is_of = |line: &str, name: &str| line.starts_with(&format!("  expect {name}."));
+    let name_of = |line: &str| {
+        line.trim().strip_prefix("expect ").and_then(|rest| rest.split('.').next().map(str::to_owned))
+    };
+    let names: Vec<String> =
+        lines.iter().filter(|line| line.contains(".breached at")).filter_map(|line| name_of(line)).collect();
+    let last = names.last().expect("two are breached");
+    let (own, others): (Vec<&str>, Vec<&str>) = lines.iter().partition(|line| is_of(line, last));
+    let at = others.iter().position(|line| line.starts_with("  expect")).expect("it has claims");
+    let turned = [&others[..at], &own, &others[at..]].concat().join("\n") + "\n";
+    fs::write(&first, turned).expect("it can be written");
+    done(&["shrink", &first]);
+    let shrunk = fs::read_to_string(first.replace("/critical/", "/shrunk/")).expect("it was written");
+    let claim = shrunk.lines().find(|line| line.starts_with("  expect")).expect("it has claims");
+    assert!(is_of(claim, last), "{shrunk}");
+    assert!(shrunk.contains(&format!("does not keep `{last}`")), "{shrunk}");
 }

@@ -212,7 +212,7 @@ fn a_review_says_what_differs_in_meaning() {
     assert_eq!(found.test(&[&second]).0, 4, "another obstacle is hit than it claims");
     assert_eq!(found.test(&["--allow-changed", &second]).0, 0);
     let (status, tested, stderr) = found.test(&["--review", &run]);
-    assert_eq!(changes(&tested)[..2], ["same crash, other time", "another crash"], "{stderr}");
+    assert_eq!(changes(&tested)[..2], ["same finding, other time", "another crash"], "{stderr}");
     assert_eq!(of_second(&tested), "changed", "what it would claim is not what it claims: {tested}");
     let told = tested["reviewed"][0]["differences"].to_string();
     assert!(told.contains("in place of `plane/0") && told.contains("at 1.00 s: at "), "{told}");
@@ -234,7 +234,7 @@ fn a_review_says_what_differs_in_meaning() {
     let other = if priority == "other" { "none" } else { "other" };
     edit(0, &format!("expect priority == {priority} "), &format!("expect priority == {other} "));
     let (_, tested, _) = found.test(&["--accept", &run]);
-    assert_eq!(changes(&tested)[0], "same crash, other verdict");
+    assert_eq!(changes(&tested)[0], "same finding, other verdict");
     assert_eq!(found.texts(), authored);
     edit(0, "\r\n", "\n");
     edit(0, "  // who had to wait\n", "");

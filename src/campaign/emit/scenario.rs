@@ -3,8 +3,8 @@
 
 use std::sync::Arc;
 
-use crate::episode::{Collision, EpisodeLog, Outcome};
-use crate::oracle::{Breached, Recurrence};
+use crate::episode::{Breach, Collision, EpisodeLog, Outcome};
+use crate::oracle::{Found, Recurrence};
 use crate::run::{EpisodeSummary, Finding};
 use avastra_base::units::Dimension;
 use avastra_drivers::external;
@@ -36,26 +36,27 @@ pub struct Provenance<'a> {
     pub with: &'a [String],
 }
 
-/// The scenario of an episode, cut after the step of its last counted collision or breach; there must be one.
+/// The scenario of an episode, cut after the step of its last counted collision or breach; there must be one. Its first
+/// claims are about `about`, because that is what commands take it for.
 pub fn scenario(
     table: &ActionTable,
-    log: &EpisodeLog,
-    summary: &EpisodeSummary,
+    (log, summary): (&EpisodeLog, &EpisodeSummary),
+    about: Found,
     source: &Provenance,
 ) -> File {
-    let counted: Vec<&Finding> = summary.collisions.iter().filter(|finding| finding.counted).collect();
     let steps = summary.last_step(log).expect("an episode without a finding is not emitted") + 1;
-    let headline = headline_of(table.space(), log, (summary, counted.first().copied()));
-    file(table, log, source, [REPLAY, &headline], steps, expects(table, log, summary, steps))
+    let headline = headline_of(table.space(), log, summary, about);
+    let expects = expects(table, (log, summary), Some(about), steps);
+    file(table, log, source, [REPLAY, &headline], steps, expects)
 }
 
 /// The scenario of an episode that played an emitted scenario again. It keeps all steps, because they are the scenario,
 /// and says how the episode ended.
 pub fn retold(table: &ActionTable, log: &EpisodeLog, summary: &EpisodeSummary, source: &Provenance) -> File {
-    let counted = summary.collisions.iter().find(|finding| finding.counted);
-    let headline = headline_of(table.space(), log, (summary, counted));
+    let about = summary.first_found(log);
+    let headline = about.map_or_else(String::new, |about| headline_of(table.space(), log, summary, about));
     let steps = log.steps.len();
-    let mut expects = expects(table, log, summary, steps);
+    let mut expects = expects(table, (log, summary), about, steps);
     expects.push(end(log));
     file(table, log, source, [REPLAY, &headline], steps, expects)
 }
@@ -217,58 +218,79 @@ fn literal(space: &Space, action: &ActionDef, parameter: &str, value: Value) -> 
     tree::value(space, value, found.expect("values are of the action's own parameters").ty)
 }
 
-fn expects(table: &ActionTable, log: &EpisodeLog, summary: &EpisodeSummary, steps: usize) -> Vec<Expect> {
-    let mut expects = Vec::new();
-    for breach in log.first_breaches() {
-        let name = &table.space().requirements[breach.requirement].name;
-        let at = tree::clause(ClauseKind::At, tree::rounded(breach.time_s, 2, Dimension::DURATION));
-        expects.push(tree::expect(tree::part(name, BREACHED.0), vec![at]));
-        let of = |found: &&Breached| found.requirement == breach.requirement;
-        if let Some(found) = summary.breached.iter().find(of) {
-            let by = tree::list(found.kept_by.iter().map(|driver| tree::name(driver)).collect());
-            expects.push(tree::expect(tree::part(name, KEPT.0), vec![tree::clause(ClauseKind::By, by)]));
-            let again = found.recurrence.map(|of| tree::equal(tree::part(name, RECURRENCE.0), share(of)));
-            expects.extend(again.map(|claim| tree::expect(claim, Vec::new())));
-        }
-    }
-    for finding in summary.collisions.iter().filter(|finding| finding.collision.step < steps) {
-        let contact = &finding.collision.contact;
-        let obstacle = || tree::clause(ClauseKind::With, tree::road_user(contact.obstacle));
-        let at = tree::clause(ClauseKind::At, tree::rounded(contact.time_s, 2, Dimension::DURATION));
-        expects.push(tree::expect(tree::name("collision"), vec![obstacle(), at]));
-        if finding.counted {
-            expects.push(tree::expect(tree::name("counted"), vec![obstacle()]));
-        }
-        let drivers = &finding.judgement.avoided_by;
-        let by = (!drivers.is_empty()).then(|| {
-            let drivers = drivers.iter().map(|driver| tree::name(driver));
-            tree::clause(ClauseKind::By, tree::list(drivers.collect()))
-        });
-        let class = tree::name(finding.judgement.class.name());
-        expects.push(tree::expect(class, by.into_iter().chain([obstacle()]).collect()));
-        let priority = tree::name(contact.priority.name());
-        expects.push(tree::expect(tree::equal(tree::name("priority"), priority), vec![obstacle()]));
-        if let Some([first, rest @ ..]) = finding.cause.as_deref() {
-            let first = tree::name(first.name());
-            let modules = rest.iter().map(|module| tree::name(module.name()));
-            let modules = match rest {
-                [] => first,
-                _ => tree::list(core::iter::once(first).chain(modules).collect()),
-            };
-            expects.push(tree::expect(tree::equal(tree::name("cause"), modules), vec![obstacle()]));
-        }
-        if let Some(recurrence) = finding.recurrence {
-            let claim = tree::equal(tree::name(RECURRENCE.0), share(recurrence));
-            expects.push(tree::expect(claim, vec![obstacle()]));
-        }
-        if finding.minimal {
-            expects.push(tree::expect(tree::name("minimal"), vec![obstacle()]));
-        }
-    }
+/// All claims, those about `about` first.
+fn expects(
+    table: &ActionTable,
+    (log, summary): (&EpisodeLog, &EpisodeSummary),
+    about: Option<Found>,
+    steps: usize,
+) -> Vec<Expect> {
+    let of_breaches = log.first_breaches().map(|breach| {
+        let is_about = matches!(about, Some(Found::Breach(index))
+            if log.breaches[index].requirement == breach.requirement);
+        (is_about, of_breach(table.space(), breach, summary))
+    });
+    let findings = summary.collisions.iter().filter(|finding| finding.collision.step < steps);
+    let of_collisions =
+        findings.map(|finding| (about == Some(Found::Collision(finding.number)), of_collision(finding)));
+    let mut groups: Vec<(bool, Vec<Expect>)> = of_breaches.chain(of_collisions).collect();
+    groups.sort_by_key(|(is_about, _)| !is_about);
+    let mut expects: Vec<Expect> = groups.into_iter().flat_map(|(_, claims)| claims).collect();
     let proc = log.steps[..steps].iter().map(|step| tree::rounded(step.proc, 3, Dimension::RATIO));
     expects.push(tree::expect(tree::equal(tree::name("proc"), tree::list(proc.collect())), Vec::new()));
     let trace = tree::text(digest_text(&log.steps[steps - 1].trace));
     expects.push(tree::expect(tree::equal(tree::name("trace"), trace), Vec::new()));
+    expects
+}
+
+/// The claims about a requirement that is breached.
+fn of_breach(space: &Space, breach: &Breach, summary: &EpisodeSummary) -> Vec<Expect> {
+    let name = &space.requirements[breach.requirement].name;
+    let at = tree::clause(ClauseKind::At, tree::rounded(breach.time_s, 2, Dimension::DURATION));
+    let mut expects = vec![tree::expect(tree::part(name, BREACHED.0), vec![at])];
+    if let Some(found) = summary.breached.iter().find(|found| found.requirement == breach.requirement) {
+        let by = tree::list(found.kept_by.iter().map(|driver| tree::name(driver)).collect());
+        expects.push(tree::expect(tree::part(name, KEPT.0), vec![tree::clause(ClauseKind::By, by)]));
+        let again = found.recurrence.map(|of| tree::equal(tree::part(name, RECURRENCE.0), share(of)));
+        expects.extend(again.map(|claim| tree::expect(claim, Vec::new())));
+    }
+    expects
+}
+
+/// The claims about a collision.
+fn of_collision(finding: &Finding) -> Vec<Expect> {
+    let contact = &finding.collision.contact;
+    let obstacle = || tree::clause(ClauseKind::With, tree::road_user(contact.obstacle));
+    let at = tree::clause(ClauseKind::At, tree::rounded(contact.time_s, 2, Dimension::DURATION));
+    let mut expects = vec![tree::expect(tree::name("collision"), vec![obstacle(), at])];
+    if finding.counted {
+        expects.push(tree::expect(tree::name("counted"), vec![obstacle()]));
+    }
+    let drivers = &finding.judgement.avoided_by;
+    let by = (!drivers.is_empty()).then(|| {
+        let drivers = drivers.iter().map(|driver| tree::name(driver));
+        tree::clause(ClauseKind::By, tree::list(drivers.collect()))
+    });
+    let class = tree::name(finding.judgement.class.name());
+    expects.push(tree::expect(class, by.into_iter().chain([obstacle()]).collect()));
+    let priority = tree::name(contact.priority.name());
+    expects.push(tree::expect(tree::equal(tree::name("priority"), priority), vec![obstacle()]));
+    if let Some([first, rest @ ..]) = finding.cause.as_deref() {
+        let first = tree::name(first.name());
+        let modules = rest.iter().map(|module| tree::name(module.name()));
+        let modules = match rest {
+            [] => first,
+            _ => tree::list(core::iter::once(first).chain(modules).collect()),
+        };
+        expects.push(tree::expect(tree::equal(tree::name("cause"), modules), vec![obstacle()]));
+    }
+    if let Some(recurrence) = finding.recurrence {
+        let claim = tree::equal(tree::name(RECURRENCE.0), share(recurrence));
+        expects.push(tree::expect(claim, vec![obstacle()]));
+    }
+    if finding.minimal {
+        expects.push(tree::expect(tree::name("minimal"), vec![obstacle()]));
+    }
     expects
 }
 
@@ -286,15 +308,14 @@ fn end(log: &EpisodeLog) -> Expect {
     tree::expect(tree::equal(tree::name("end"), tree::name(log.end.name())), Vec::new())
 }
 
-/// What is found, in a sentence for the reader: the first counted collision, else the first breach.
-fn headline_of(
-    space: &Space,
-    log: &EpisodeLog,
-    (summary, counted): (&EpisodeSummary, Option<&Finding>),
-) -> String {
-    let (what, recurrence) = match (counted, log.breaches.first()) {
-        (Some(first), _) => (headline(space, log, &first.collision), first.recurrence),
-        (None, Some(breach)) => {
+/// What is found, in a sentence for the reader.
+fn headline_of(space: &Space, log: &EpisodeLog, summary: &EpisodeSummary, about: Found) -> String {
+    let (what, recurrence) = match about {
+        Found::Collision(index) => {
+            (headline(space, log, &log.collisions[index]), summary.collisions[index].recurrence)
+        }
+        Found::Breach(index) => {
+            let breach = &log.breaches[index];
             let name = &space.requirements[breach.requirement].name;
             let found = summary.breached.iter().find(|found| found.requirement == breach.requirement);
             let at_s = breach.time_s;
@@ -302,7 +323,6 @@ fn headline_of(
             let what = format!("The ego vehicle does not keep `{name}`{of} at {at_s:.2} s on {}.", log.road);
             (what, found.and_then(|found| found.recurrence))
         }
-        (None, None) => (String::new(), None),
     };
     let again = |of| format!("{what} It recurs in {of} under other noise.");
     recurrence.map_or_else(|| what.clone(), again)

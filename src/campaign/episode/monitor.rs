@@ -3,7 +3,9 @@
 //! A requirement with `within D` is breached at a tick if its condition failed at every tick of the D before it and at
 //! itself; its margin there is the largest one of these ticks. One unbroken stretch of such ticks is one breach. Nothing
 //! is asked where `when` does not hold, and what is asked only since less than D cannot be breached yet. A requirement `on`
-//! bodies is asked of each road user near, and all of this holds for each of them by itself.
+//! bodies is asked of each road user near, and all of this holds for each of them by itself. A requirement with `after` is
+//! breached D after that began to hold, if its condition failed at every tick from then on; its margin is the largest one
+//! of these ticks.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -11,7 +13,8 @@ use std::sync::Arc;
 use avastra_lang::model::expr::{Expr, ExprKind};
 use avastra_lang::model::vocabulary::Fact;
 use avastra_lang::model::{
-    BodyWord, Facts, FnDef, Kept, Memory, NpcFacts, ReadyRequirement, RequirementDef, SpawnFacts, WorldFacts,
+    Asked, BodyWord, Facts, FnDef, Kept, Memory, NpcFacts, ReadyRequirement, RequirementDef,
+    RequirementMemory, Sliding, SpawnFacts, WorldFacts,
 };
 use avastra_world::sim::{DT_S, MomentParts, Obstacle, Watched, WatchedParts, World};
 
@@ -90,6 +93,7 @@ struct Required {
 #[derive(Debug, Clone, Default)]
 struct Stretch {
     obstacle: Option<u32>,
+    memory: RequirementMemory,
     tally: Tally,
     /// The breach that goes on, by index.
     open: Option<usize>,
@@ -101,10 +105,14 @@ struct Tally {
     /// Ticks in which it was asked without a break, and in which it failed without a break.
     asked: u32,
     failed: u32,
-    window: Window,
+    window: Sliding,
     /// Ticks for which the window still holds a margin above the smallest one, which is not in it.
     above: u32,
     smallest: Option<f64>,
+    /// Of a requirement with `after`: the ticks at which that began to hold, by `asked`, for which no answer is due yet; and
+    /// the last one at which the condition held.
+    begun: VecDeque<u32>,
+    held: Option<u32>,
 }
 
 impl Monitor {
@@ -113,7 +121,8 @@ impl Monitor {
         let watch = |index: usize| {
             let requirement = &setup.table.space().requirements[index];
             let RequirementDef { within_ticks, ref on, .. } = *requirement;
-            let required = Required { index, within_ticks, on: on.clone(), ready: requirement.ready() };
+            let ready = requirement.ready();
+            let required = Required { index, within_ticks, on: on.clone(), ready };
             Watch {
                 required: Arc::new(required),
                 ego: Stretch::default(),
@@ -127,11 +136,9 @@ impl Monitor {
         let mut bearers: Vec<usize> = watches.iter().flat_map(|watch| of(watch).iter().copied()).collect();
         bearers.sort_unstable();
         bearers.dedup();
-        let all = watches.iter().flat_map(|watch| {
-            let RequirementDef { when, condition, .. } =
-                &setup.table.space().requirements[watch.required.index];
-            when.iter().chain([condition])
-        });
+        let all = watches
+            .iter()
+            .flat_map(|watch| setup.table.space().requirements[watch.required.index].conditions());
         let all: Vec<&Expr> = all.collect();
         let facts = all.iter().flat_map(|expr| {
             expr.filter_map(|kind| match kind {
@@ -265,15 +272,27 @@ impl Stretch {
         moment: &Judged,
         breaches: &mut Vec<Breach>,
     ) -> bool {
-        let Some(kept) = required.ready.at(moment.functions, facts) else {
+        let is_begun = !self.tally.begun.is_empty();
+        let is_awaited = is_begun || self.open.is_some();
+        let Some(asked) = required.ready.at(&mut self.memory, is_awaited, moment.functions, facts) else {
             self.tally.pause();
             self.open = None;
             return false;
         };
-        let margin = self.tally.take(kept, required.within_ticks);
-        if self.tally.failed <= required.within_ticks {
+        let (margin, is_breached, is_asked) = match required.ready.is_response() {
+            false => {
+                let margin = self.tally.take(asked.kept, required.within_ticks);
+                (margin, self.tally.failed > required.within_ticks, true)
+            }
+            true => {
+                let (margin, is_breached) = self.tally.respond(asked, required.within_ticks);
+                let goes_on = self.open.is_some() && !asked.kept.holds;
+                (margin, is_breached || goes_on, is_begun || asked.begins)
+            }
+        };
+        if !is_breached {
             self.open = None;
-            return true;
+            return is_asked;
         }
         let Judged { time_s, step, .. } = *moment;
         match self.open.and_then(|open| breaches.get_mut(open)) {
@@ -287,7 +306,7 @@ impl Stretch {
                 breaches.push(Breach { requirement, time_s, until_s: time_s, margin, step, obstacle });
             }
         }
-        true
+        is_asked
     }
 }
 
@@ -296,6 +315,28 @@ impl Tally {
     fn pause(&mut self) {
         (self.asked, self.failed, self.above) = (0, 0, 0);
         self.window.clear();
+        self.begun.clear();
+        self.held = None;
+    }
+
+    /// Takes the answer of a tick of a requirement with `after`. Returns what of an answer that is due now its margin is, and
+    /// whether it is a breach.
+    fn respond(&mut self, asked: Asked, within_ticks: u32) -> (Option<f64>, bool) {
+        self.asked += 1;
+        if asked.begins {
+            self.begun.push_back(self.asked);
+        }
+        if asked.kept.holds {
+            self.held = Some(self.asked);
+        }
+        let margin = asked.kept.margin;
+        let largest = (!margin.is_nan()).then(|| self.window.largest(margin, within_ticks));
+        let Some(&began) = self.begun.front().filter(|began| **began + within_ticks == self.asked) else {
+            return (None, false);
+        };
+        self.begun.pop_front();
+        self.smallest = smaller(self.smallest, largest);
+        (largest, self.held.is_none_or(|held| held < began))
     }
 
     /// Takes the answer of a tick. Returns the margin of the time that `within` grants, if it can be that of a breach or
@@ -327,39 +368,6 @@ fn smaller(one: Option<f64>, other: Option<f64>) -> Option<f64> {
     match (one, other) {
         (Some(one), Some(other)) => Some(one.min(other)),
         (one, other) => one.or(other),
-    }
-}
-
-/// The largest of the last margins (Lemire 2006: those that a later, larger one outlives are dropped).
-#[derive(Debug, Clone, Default)]
-struct Window {
-    tick: u32,
-    /// Ticks with falling margins.
-    falling: VecDeque<(u32, f64)>,
-}
-
-impl Window {
-    fn clear(&mut self) {
-        if !self.falling.is_empty() {
-            self.falling.clear();
-        }
-    }
-
-    /// Takes one more; the largest of it and so many before it.
-    fn largest(&mut self, margin: f64, before: u32) -> f64 {
-        // Without anything before it, it is the largest.
-        if before == 0 {
-            return margin;
-        }
-        self.tick += 1;
-        while self.falling.back().is_some_and(|(_, last)| *last <= margin) {
-            self.falling.pop_back();
-        }
-        self.falling.push_back((self.tick, margin));
-        while self.falling.front().is_some_and(|(tick, _)| self.tick - tick > before) {
-            self.falling.pop_front();
-        }
-        self.falling[0].1
     }
 }
 
@@ -426,15 +434,29 @@ mod tests {
         }
     }
 
+    /// The speed `v` and the limit `w` of each tick, both in m/s.
+    type Trace = [(f64, f64)];
+
+    /// A margin at a tick of a trace.
+    type MarginAt = Box<dyn Fn(&Trace, usize) -> f64>;
+
     /// A condition that a seed makes up: its text, and what it means, once more and apart from the language.
     struct MadeUp {
         text: String,
-        margin: Box<dyn Fn(f64, f64) -> f64>,
+        margin: MarginAt,
+        /// The first tick at which it can be asked.
+        known_from: usize,
     }
 
-    /// Over the speed `v` and the limit `w` of a moment, both in m/s.
+    impl MadeUp {
+        fn holds(&self, trace: &Trace, tick: usize) -> bool {
+            (self.margin)(trace, tick) >= 0.0
+        }
+    }
+
     fn made_up(rng: &mut rng::Rng, depth: u32) -> MadeUp {
-        let number = f64::from(below(rng, 80)) / 4.0;
+        // No margin is 0: whether a condition holds is known by its sign.
+        let number = f64::from(below(rng, 80)) / 4.0 + 0.1234;
         let side = |rng: &mut rng::Rng| -> (String, Box<dyn Fn(f64, f64) -> f64>) {
             let part = f64::from(below(rng, 8)) / 4.0;
             match below(rng, 4) {
@@ -444,56 +466,152 @@ mod tests {
                 _ => ("(ego.limit - ego.speed)".to_owned(), Box::new(|v, w| w - v)),
             }
         };
-        let (text, of) = side(rng);
-        let kind = below(rng, if depth == 0 { 5 } else { 9 });
+        let (text, side) = side(rng);
+        let of = move |trace: &Trace, tick: usize| side(trace[tick].0, trace[tick].1);
+        let kind = below(rng, if depth == 0 { 5 } else { 11 });
+        let ticks = below(rng, 6) as usize + 1;
         let mut two = || (made_up(rng, depth.saturating_sub(1)), made_up(rng, depth.saturating_sub(1)));
-        let (text, margin): (String, Box<dyn Fn(f64, f64) -> f64>) = match kind {
-            0 => (format!("{text} < {number} m/s"), Box::new(move |v, w| number - of(v, w))),
-            1 => (format!("{text} <= {number} m/s"), Box::new(move |v, w| number - of(v, w))),
-            2 => (format!("{text} > {number} m/s"), Box::new(move |v, w| of(v, w) - number)),
-            3 => (format!("{text} >= {number} m/s"), Box::new(move |v, w| of(v, w) - number)),
+        let (a, b) = if kind > 4 { two() } else { (never(), never()) };
+        let mut known_from = a.known_from.max(if (6..9).contains(&kind) { b.known_from } else { 0 });
+        let first = move |tick: usize| tick.saturating_sub(ticks);
+        let (text, margin): (String, MarginAt) = match kind {
+            0 => (format!("{text} < {number} m/s"), Box::new(move |all, t| number - of(all, t))),
+            1 => (format!("{text} <= {number} m/s"), Box::new(move |all, t| number - of(all, t))),
+            2 => (format!("{text} > {number} m/s"), Box::new(move |all, t| of(all, t) - number)),
+            3 => (format!("{text} >= {number} m/s"), Box::new(move |all, t| of(all, t) - number)),
             4 => (
                 format!("{text} in {number} m/s .. {} m/s", number + 3.5),
-                Box::new(move |v, w| (of(v, w) - number).min(number + 3.5 - of(v, w))),
+                Box::new(move |all, t| (of(all, t) - number).min(number + 3.5 - of(all, t))),
             ),
-            5 => {
-                let (one, _) = two();
-                (format!("not ({})", one.text), Box::new(move |v, w| -(one.margin)(v, w)))
-            }
+            5 => (format!("not ({})", a.text), Box::new(move |all, t| -(a.margin)(all, t))),
             6 => {
-                let (a, b) = two();
                 let text = format!("({}) and ({})", a.text, b.text);
-                (text, Box::new(move |v, w| (a.margin)(v, w).min((b.margin)(v, w))))
+                (text, Box::new(move |all, t| (a.margin)(all, t).min((b.margin)(all, t))))
             }
             7 => {
-                let (a, b) = two();
                 let text = format!("({}) or ({})", a.text, b.text);
-                (text, Box::new(move |v, w| (a.margin)(v, w).max((b.margin)(v, w))))
+                (text, Box::new(move |all, t| (a.margin)(all, t).max((b.margin)(all, t))))
             }
-            _ => {
-                let (a, b) = two();
+            8 => {
                 let text = format!("({}) implies ({})", a.text, b.text);
-                (text, Box::new(move |v, w| (-(a.margin)(v, w)).max((b.margin)(v, w))))
+                (text, Box::new(move |all, t| (-(a.margin)(all, t)).max((b.margin)(all, t))))
+            }
+            9 => (
+                format!("recently({}, {} ms)", a.text, ticks * 20),
+                Box::new(move |all, t| {
+                    (first(t)..=t).map(|at| (a.margin)(all, at)).fold(f64::NEG_INFINITY, f64::max)
+                }),
+            ),
+            _ => {
+                known_from = known_from.max(ticks);
+                let text = format!("throughout({}, {} ms)", a.text, ticks * 20);
+                let least = move |all: &Trace, t: usize| {
+                    (first(t)..=t).map(|at| (a.margin)(all, at)).fold(f64::INFINITY, f64::min)
+                };
+                (text, Box::new(least))
             }
         };
-        MadeUp { text, margin }
+        MadeUp { text, margin, known_from }
     }
 
-    /// 10,000 conditions, each over a trace of its own, against a monitor that follows the definition.
+    fn never() -> MadeUp {
+        MadeUp { text: String::new(), margin: Box::new(|_, _| f64::NAN), known_from: 0 }
+    }
+
+    /// A requirement that a seed makes up.
+    struct MadeUpRequirement {
+        when: Option<MadeUp>,
+        until: Option<MadeUp>,
+        after: Option<MadeUp>,
+        condition: MadeUp,
+        within: usize,
+    }
+
+    impl MadeUpRequirement {
+        fn new(rng: &mut rng::Rng) -> MadeUpRequirement {
+            let mut maybe = |share: u32, depth: u32| (below(rng, 4) < share).then(|| made_up(rng, depth));
+            let when = maybe(2, 1);
+            let until = maybe(2, 1).filter(|_| when.is_some());
+            let after = maybe(2, 1);
+            MadeUpRequirement {
+                when,
+                until,
+                after,
+                condition: made_up(rng, 3),
+                within: below(rng, 5) as usize,
+            }
+        }
+
+        fn parts(&self) -> impl Iterator<Item = &MadeUp> {
+            self.when.iter().chain(&self.until).chain(&self.after).chain([&self.condition])
+        }
+
+        fn text(&self) -> String {
+            let part = |word: &str, part: &Option<MadeUp>| {
+                part.as_ref().map_or(String::new(), |part| format!(" {word} {}", part.text))
+            };
+            let (when, until) = (part("when", &self.when), part("until", &self.until));
+            let within = match self.within {
+                0 => String::new(),
+                ticks => format!(" within {} ms", ticks * 20),
+            };
+            format!("{when}{until}{}: {}{within}", part("after", &self.after), self.condition.text)
+        }
+
+        /// By the definition: the smallest margin up to each tick, and whether there is a breach then.
+        fn answers(&self, trace: &Trace) -> Vec<(Option<f64>, bool)> {
+            let known_from = self.parts().map(|part| part.known_from).max().unwrap_or(0);
+            let holds =
+                |part: &Option<MadeUp>, tick: usize| part.as_ref().is_none_or(|part| part.holds(trace, tick));
+            let mut asked = vec![false; trace.len()];
+            for tick in 0..trace.len() {
+                asked[tick] = match &self.until {
+                    None => holds(&self.when, tick),
+                    Some(until) => {
+                        let is_latched = tick > 0 && asked[tick - 1];
+                        !until.holds(trace, tick) && (is_latched || holds(&self.when, tick))
+                    }
+                };
+            }
+            let largest = |from: usize, to: usize| {
+                (from..=to).map(|at| (self.condition.margin)(trace, at)).fold(f64::NEG_INFINITY, f64::max)
+            };
+            let (mut smallest, mut was_breached) = (None, false);
+            let answer = |tick: usize| {
+                let from = tick.checked_sub(self.within).filter(|from| *from >= known_from);
+                let margin = match &self.after {
+                    None => from
+                        .filter(|from| asked[*from..=tick].iter().all(|asked| *asked))
+                        .map(|from| largest(from, tick)),
+                    Some(after) => from
+                        .filter(|from| asked[*from] && after.holds(trace, *from))
+                        .filter(|from| *from == 0 || !after.holds(trace, from - 1))
+                        .map(|from| largest(from, tick)),
+                };
+                smallest = smaller(smallest, margin);
+                let goes_on = self.after.is_some() && was_breached && !self.condition.holds(trace, tick);
+                was_breached = margin.is_some_and(|margin| margin < 0.0) || goes_on;
+                (smallest, was_breached)
+            };
+            (0..trace.len()).map(answer).collect()
+        }
+    }
+
+    /// 10,000 requirements, each over a trace of its own, against a monitor that follows the definition.
     #[test]
-    fn margins_are_those_of_a_naive_monitor() {
+    fn breaches_and_margins_are_those_of_a_naive_monitor() {
         const AT_ONCE: usize = 50;
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
+        let mut breached = [0, 0];
         for part in 0..200 {
             let mut rng = stream(5, Stream::Episode, part);
-            let all: Vec<(MadeUp, u32)> =
-                (0..AT_ONCE).map(|_| (made_up(&mut rng, 3), below(&mut rng, 5))).collect();
+            let all: Vec<MadeUpRequirement> =
+                (0..AT_ONCE).map(|_| MadeUpRequirement::new(&mut rng)).collect();
             let mut text = "language 1\nuse \"roads.ava\"\nstate told: Bool = false\naction tell() { set told = true }\n\
                             rule at_last on tell: elapsed >= 6 s or told\n"
                 .to_owned();
-            for (index, (one, within)) in all.iter().enumerate() {
-                let within = if *within == 0 { String::new() } else { format!(" within {} ms", within * 20) };
-                text.push_str(&format!("require r{index}: {}{within}\n", one.text));
+            for (index, one) in all.iter().enumerate() {
+                text.push_str(&format!("require r{index}{}\n", one.text()));
             }
             let made_up = folder.join("made_up.ava");
             let read = |path: &Path| match path.ends_with("made_up.ava") {
@@ -503,36 +621,32 @@ mod tests {
             let loaded = load(&made_up, &read).expect("it can be read");
             let Some(space) = loaded.space else { panic!("{:?}", loaded.diagnostics) };
             let memory = space.initial_memory(1);
-            for (required, (one, within)) in space.requirements.iter().zip(&all) {
-                let trace: Vec<(f64, f64)> = (0..30)
+            for (index, (requirement, one)) in space.requirements.iter().zip(&all).enumerate() {
+                let trace: Vec<(f64, f64)> = (0..40)
                     .map(|_| (f64::from(below(&mut rng, 60)) / 3.0, f64::from(below(&mut rng, 60)) / 3.0))
                     .collect();
-                let (mut watch, ready, mut smallest) = (Tally::default(), required.ready(), None);
-                for (tick, (v, w)) in trace.iter().enumerate() {
+                let within_ticks = requirement.within_ticks;
+                let required = Required { index, within_ticks, on: Vec::new(), ready: requirement.ready() };
+                let (mut stretch, mut breaches) = (Stretch::default(), Vec::new());
+                for (tick, (wanted, is_breached)) in one.answers(&trace).into_iter().enumerate() {
                     let mut world = WorldFacts::default();
-                    (world.moment.ego_speed_mps, world.moment.ego_limit_mps) = (*v, *w);
+                    (world.moment.ego_speed_mps, world.moment.ego_limit_mps) = trace[tick];
                     let facts = Facts { world: Some(&world), ..Facts::new(&[], &memory) };
-                    let kept = ready.at(&space.functions, &facts).expect("it is always asked");
-                    watch.take(kept, required.within_ticks);
-                    let first = tick.checked_sub(*within as usize);
-                    let window =
-                        first.map(|first| trace[first..=tick].iter().map(|(v, w)| (one.margin)(*v, *w)));
-                    let wanted = window.map(|margins| margins.fold(f64::NEG_INFINITY, f64::max));
-                    smallest = smaller(smallest, wanted);
-                    let same = match (watch.smallest, smallest) {
+                    let time_s = tick as f64;
+                    let moment = Judged { functions: &space.functions, facts: &facts, time_s, step: 0 };
+                    stretch.ask(&required, &facts, &moment, &mut breaches);
+                    let found = stretch.tally.smallest;
+                    let same = match (found, wanted) {
                         (Some(found), Some(wanted)) => (found - wanted).abs() <= 1e-9 * (1.0 + wanted.abs()),
                         (found, wanted) => found.is_none() && wanted.is_none(),
                     };
-                    assert!(same, "{}: {:?} in place of {smallest:?}", one.text, watch.smallest);
-                    let is_breached = watch.failed > *within;
-                    let is_clear = wanted.is_none_or(|wanted| wanted.abs() > 1e-6);
-                    assert!(
-                        !is_clear || is_breached == wanted.is_some_and(|wanted| wanted < 0.0),
-                        "{}",
-                        one.text
-                    );
+                    assert!(same, "{} at {tick}: {found:?} in place of {wanted:?}", one.text());
+                    let until_s = breaches.last().map(|breach: &Breach| breach.until_s);
+                    assert_eq!(until_s == Some(time_s), is_breached, "{} at {tick}", one.text());
                 }
+                breached[usize::from(one.after.is_some())] += usize::from(!breaches.is_empty());
             }
         }
+        assert!(breached.iter().all(|count| *count > 1000), "{breached:?} are of both kinds");
     }
 }

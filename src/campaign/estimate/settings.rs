@@ -3,6 +3,7 @@
 use crate::episode::{Breach, EpisodeLog, Setup};
 use crate::oracle::Found;
 use crate::run::{EpisodeSummary, RunError, RunSettings};
+use avastra_lang::model::vocabulary::EVENTS;
 use avastra_lang::model::{RulesInForce, Space};
 use avastra_lang::syntax::{listed, nearest};
 
@@ -57,14 +58,18 @@ impl EventKind {
                 let summary = EpisodeSummary::judged(setup, 0, log);
                 summary.collisions.iter().position(|finding| finding.counted).map(Found::Collision)
             }
-            EventKind::Breach if log.breaches.is_empty() => None,
-            EventKind::Breach => Some(Found::Breach(0)),
-            EventKind::Requirement(name) => {
-                let required = &setup.table.space().requirements;
-                let is_meant = |breach: &Breach| required[breach.requirement].name == *name;
-                log.breaches.iter().position(is_meant).map(Found::Breach)
-            }
+            EventKind::Breach | EventKind::Requirement(_) => self.first_breach(setup.table.space(), log),
         }
+    }
+
+    /// The first breach that is meant, if a requirement is.
+    pub fn first_breach(&self, space: &Space, log: &EpisodeLog) -> Option<Found> {
+        let is_meant = |breach: &Breach| match self {
+            EventKind::Breach => true,
+            EventKind::Requirement(name) => space.requirements[breach.requirement].name == *name,
+            EventKind::Collision | EventKind::Counted => false,
+        };
+        log.breaches.iter().position(is_meant).map(Found::Breach)
     }
 
     /// Whether it is about a requirement.
@@ -100,8 +105,7 @@ impl EventKind {
             EventKind::Counted | EventKind::Collision => Ok(()),
             EventKind::Breach if known.is_empty() => Err(EstimateError::NoRequirement),
             EventKind::Requirement(name) if !known.contains(&name.as_str()) => {
-                let words = ["counted", "collision", "breach"];
-                let all: Vec<&str> = words.into_iter().chain(known).collect();
+                let all: Vec<&str> = EVENTS.into_iter().chain(known).collect();
                 let meant = nearest(name, all.iter().copied());
                 let meant = meant.map_or(String::new(), |meant| format!("did you mean `{meant}`? "));
                 Err(EstimateError::Event { name: name.clone(), meant, known: listed(&all) })
@@ -175,8 +179,8 @@ pub enum EstimateError {
     )]
     External,
     #[error(
-        "this method tries out what actions make appear, and a breach is of no road user: estimate by counting (`--method \
-         count`)"
+        "this method tries out the actions that make appear whom the ego vehicle hits; what makes it breach a requirement \
+         cannot be told so: estimate by counting (`--method count`)"
     )]
     BreachProbed,
     #[error("no requirement of this space is in force, so none can be breached")]

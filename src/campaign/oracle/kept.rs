@@ -2,8 +2,11 @@
 //!
 //! A careful driver drives the same steps from the start of the episode, under the same rules: an action happens at the
 //! same time with the same values, if it is legal there, too. Most requirements are about the drive up to then rather
-//! than about a last moment, so the question begins at the start, and not at a hazard as that of a collision does. It ends
-//! with the breach: up to then the careful driver must not have breached the requirement, nor touched anybody.
+//! than about a last moment, so the question begins at the start, and not at a hazard as that of a collision does. Who
+//! comes to the same place a little later must keep it there, too: the question ends one step after that of the breach. Up
+//! to then the careful driver must not have breached the requirement, nor touched anybody.
+
+use std::cmp::Ordering;
 
 use crate::episode::{self, Breach, Choice, EpisodeLog, Moment, Script, Setup};
 use avastra_drivers as ads;
@@ -17,7 +20,7 @@ use super::recurrence::Recurrence;
 pub struct Breached {
     /// By index in `Space::requirements`.
     pub requirement: usize,
-    /// The careful drivers that keep it up to its first breach.
+    /// The careful drivers that keep it up to the end of the step after its first breach.
     pub kept_by: Vec<String>,
     /// How often it is breached again under other chance, if that was tried.
     pub recurrence: Option<Recurrence>,
@@ -35,17 +38,18 @@ pub fn breached(setup: &Setup, script: &Script, log: &EpisodeLog) -> Vec<Breache
     for name in CAREFUL {
         let entry = ads::by_name(name).expect("careful drivers are driving systems of avastra");
         let setup = Setup { ads: Selected::new(entry), ..setup.clone() };
-        let mut choose = |moment: &Moment| match moment.step <= last.step {
-            true => script.choose(setup.table, moment),
-            false => Choice::Stop,
+        let mut choose = |moment: &Moment| match moment.step.cmp(&(last.step + 1)) {
+            Ordering::Less => script.choose(setup.table, moment),
+            Ordering::Equal => Choice::Pass,
+            Ordering::Greater => Choice::Stop,
         };
         let again = episode::run(&setup, &mut choose, &mut |_, _, _| {});
         for (breached, first) in found.iter_mut().zip(&firsts) {
             let breaks = again
                 .breaches
                 .iter()
-                .any(|breach| breach.requirement == first.requirement && breach.time_s <= first.time_s);
-            let crashes = again.collisions.iter().any(|crash| crash.contact.time_s <= first.time_s);
+                .any(|breach| breach.requirement == first.requirement && breach.step <= first.step + 1);
+            let crashes = again.collisions.iter().any(|crash| crash.step <= first.step + 1);
             if !breaks && !crashes {
                 breached.kept_by.push(name.to_owned());
             }

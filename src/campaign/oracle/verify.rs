@@ -12,6 +12,9 @@ use super::facts;
 use super::kept::Breached;
 use super::recurrence::Recurrence;
 
+/// Of a claim about a breach where there is none.
+const NO_BREACH: &str = "kept, or not in force";
+
 /// One claim, and what the replay says of it.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct ClaimResult {
@@ -98,7 +101,7 @@ fn check(
         Claim::Breach { requirement, time } => {
             let at = time.as_ref().map_or(String::new(), |time| format!(" at {time}"));
             let outcome = match (log.breach_of(space, requirement), time) {
-                (None, _) => Err("kept, or not in force".to_owned()),
+                (None, _) => Err(NO_BREACH.to_owned()),
                 (Some(breach), Some(claimed)) if !claimed.rounds(breach.time_s) => {
                     Err(format!("at {:.2} s", breach.time_s))
                 }
@@ -113,7 +116,7 @@ fn check(
                 return ClaimResult { claim, confirmed: None, found: "not tried".to_owned() };
             };
             match found.iter().find(is_meant) {
-                None => judged(claim, Err("not breached".to_owned())),
+                None => judged(claim, Err(NO_BREACH.to_owned())),
                 Some(found) if found.kept_by == *by => judged(claim, Ok(())),
                 Some(found) => judged(claim, Err(format!("kept by [{}]", found.kept_by.join(", ")))),
             }
@@ -153,7 +156,7 @@ fn check(
                 Some(name) => {
                     let is_meant = |breach: &Breach| space.requirements[breach.requirement].name == *name;
                     let first = log.breaches.iter().position(is_meant);
-                    first.map(Found::Breach).ok_or_else(|| "not breached".to_owned())
+                    first.map(Found::Breach).ok_or_else(|| NO_BREACH.to_owned())
                 }
             };
             match found.map(|found| (replays.recurrence)(found, *wanted)) {

@@ -12,7 +12,7 @@ pub struct FoundIn {
     pub road: String,
     pub episode: i64,
     /// Whether it has a counted collision or a breach. If so, the rest is about those alone.
-    pub counted: bool,
+    pub critical: bool,
     /// The finding that recurs most often, if that was tried.
     pub recurrence: Option<Recurrence>,
     /// What the worst collision means for people, in the words of `oracle::Harm`; `None` of a breach alone.
@@ -34,8 +34,8 @@ impl FoundIn {
 
     /// Takes in another finding of the same episode.
     fn with(self, other: FoundIn) -> FoundIn {
-        if self.counted != other.counted {
-            return if self.counted { self } else { other };
+        if self.critical != other.critical {
+            return if self.critical { self } else { other };
         }
         let recurrence =
             [self.recurrence, other.recurrence].into_iter().flatten().max_by_key(|of| of.recurred);
@@ -119,7 +119,7 @@ impl Database {
             Ok(FoundIn {
                 road: row.get(0)?,
                 episode: row.get(1)?,
-                counted: row.get(2)?,
+                critical: row.get(2)?,
                 recurrence: match tried {
                     (Some(recurred), Some(replays)) if replays > 0 && recurred <= replays => {
                         Some(Recurrence { recurred, replays })
@@ -140,7 +140,7 @@ impl Database {
         }
         let mut found: Vec<FoundIn> = found.into_values().collect();
         found.sort_by(|a, b| {
-            let order = |of: &FoundIn| (!of.counted, of.is_fluke());
+            let order = |of: &FoundIn| (!of.critical, of.is_fluke());
             order(a).cmp(&order(b)).then(b.harm_share.total_cmp(&a.harm_share))
         });
         Ok(found)

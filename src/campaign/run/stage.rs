@@ -80,16 +80,30 @@ impl<'a> Stage<'a> {
         (log, judgements, first)
     }
 
-    /// Plays it, and finds what it is about: its first counted collision, because a crash is more than a breach that led to
-    /// it, or else the first breach that the file claims.
+    /// Plays it, and finds what it is about: the first of the counted collisions and breaches that the file claims and that
+    /// happen, or else its first counted collision.
     pub fn first_found(&self, ads: &Selected) -> (EpisodeLog, Vec<Judgement>, Option<Found>) {
-        let (log, judgements, counted) = self.first_counted(ads);
-        let is_claimed = |breach: &Breach| {
-            let name = &self.table.space().requirements[breach.requirement].name;
-            self.scenario.breached().any(|claimed| claimed == name)
+        let log = self.play(ads, &mut |_, _, _| {});
+        let judgements = self.judge(ads, &log);
+        let counted = oracle::counted(self.table.space(), &log, &judgements);
+        let claimed = |claim: &Claim| match claim {
+            Claim::Breach { requirement, .. } => {
+                let is_meant = |breach: &Breach| {
+                    self.table.space().requirements[breach.requirement].name == *requirement
+                };
+                log.breaches.iter().position(is_meant).map(Found::Breach)
+            }
+            Claim::Collision { obstacle, .. } => {
+                let is_meant = |index: &&usize| {
+                    let hit = log.collisions[**index].contact.obstacle;
+                    obstacle.is_none_or(|obstacle| obstacle.number == hit)
+                };
+                counted.iter().find(is_meant).copied().map(Found::Collision)
+            }
+            _ => None,
         };
-        let breach = || log.breaches.iter().position(is_claimed).map(Found::Breach);
-        let found = counted.map(Found::Collision).or_else(breach);
+        let first = || counted.first().copied().map(Found::Collision);
+        let found = self.scenario.claims.iter().find_map(claimed).or_else(first);
         (log, judgements, found)
     }
 

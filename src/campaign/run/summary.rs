@@ -95,6 +95,14 @@ impl EpisodeSummary {
         self.breached = oracle::breached(setup, &Script::of_log(log), log);
     }
 
+    /// What its scenario is about: the first counted collision, because a crash is more than a breach that led to it, or
+    /// else the first breach.
+    pub fn first_found(&self, log: &EpisodeLog) -> Option<Found> {
+        let counted = self.collisions.iter().find(|finding| finding.counted);
+        let breach = (!log.breaches.is_empty()).then_some(Found::Breach(0));
+        counted.map(|finding| Found::Collision(finding.number)).or(breach)
+    }
+
     /// The step of the last counted collision or breach: what comes later is not part of the scenario.
     pub fn last_step(&self, log: &EpisodeLog) -> Option<usize> {
         let counted = self.collisions.iter().filter(|finding| finding.counted);

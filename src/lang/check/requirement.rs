@@ -6,8 +6,8 @@ use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::requirement::{margin_dimension, open_divisor};
-use crate::model::vocabulary::{BREACHED, Body, Site, Word, things};
+use crate::model::requirement::{margin_dimension, open_divisor, past_inside};
+use crate::model::vocabulary::{BREACHED, Body, EVENTS, PastWord, Site, Word, things};
 use crate::model::{BodyWord, RequirementDef, RuleDef, TICK_MS, Type, code};
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
@@ -49,16 +49,34 @@ impl Checker {
         item: &ast::Item,
         declared: &ast::Require,
     ) -> Option<RequirementDef> {
-        let on = declared.on.iter().map(|name| self.body_required(name)).collect::<Option<Vec<_>>>();
+        if EVENTS.contains(&declared.name.text.as_str()) {
+            let message = format!("no requirement is called `{}`", declared.name.text);
+            let error = Diagnostic::error(code::DUPLICATE, message).at(declared.name.span, "taken");
+            self.report(
+                error.help("`avastra estimate --event` has another meaning for that word: rename it"),
+            );
+        }
+        let on: Vec<Option<BodyWord>> = declared.on.iter().map(|name| self.body_required(name)).collect();
+        for (at, name) in declared.on.iter().enumerate() {
+            if let Some(first) = declared.on[..at].iter().find(|first| first.text == name.text) {
+                let message = format!("the body `{}` is named twice", name.text);
+                let error = Diagnostic::error(code::DUPLICATE, message).at(name.span, "again here");
+                self.report(error.beside(first.span, "first here").help("name it once"));
+            }
+        }
         let site = if declared.on.is_empty() { Site::Requirement } else { Site::RequirementOn };
         let place = Place { states: true, site, ..Place::default() };
-        let when = declared.when.as_ref().map(|when| self.typed(when, &place, Type::Bool));
-        let condition = self.typed(&declared.condition, &place, Type::Bool);
+        let mut part = |part: &Option<ast::Expr>| match part {
+            None => Some(None),
+            Some(part) => self.condition(part, &place).map(Some),
+        };
+        let (when, until, after) = (part(&declared.when), part(&declared.until), part(&declared.after));
+        let condition = self.condition(&declared.condition, &place);
         let within_ticks = match &declared.within {
             None => Some(0),
-            Some(within) => self.within_ticks(within),
+            Some(within) => self.ticks(within, "leave `within` out to judge every moment by itself"),
         };
-        let (when, condition) = (when.map_or(Some(None), |when| when.map(Some))?, condition?);
+        let (when, until, after, condition) = (when?, until?, after?, condition?);
         if let Some(divisor) = open_divisor(&condition, &self.functions) {
             let message = format!("`{}` divides by what may be 0", declared.name.text);
             let error = Diagnostic::error(code::OPEN_DIVISOR, message).at(divisor.span, "may be 0");
@@ -72,9 +90,8 @@ impl Checker {
             return self.reject(error.help(help));
         }
         // Who asks `truck.there` wants an answer while it is not there.
-        let mut bearers: Vec<usize> = when
-            .iter()
-            .chain([&condition])
+        let all = when.iter().chain(&until).chain(&after).chain([&condition]);
+        let mut bearers: Vec<usize> = all
             .flat_map(|expr| {
                 expr.filter_map(|kind| match kind {
                     ExprKind::OfBearer(who, _) | ExprKind::IsWordOf(who, ..) => Some(*who),
@@ -89,9 +106,11 @@ impl Checker {
             name: declared.name.text.clone(),
             docs: docs(item),
             optional: declared.optional,
-            on: on?,
+            on: on.into_iter().collect::<Option<_>>()?,
             margin: margin_dimension(&condition),
             when,
+            until,
+            after,
             condition,
             within_ticks: within_ticks?,
             bearers,
@@ -137,21 +156,51 @@ impl Checker {
         Some(Some(Expr { kind: ExprKind::Breached(index), ty: Type::Bool, span }))
     }
 
-    /// How many ticks `within` lasts: a part of a tick is one more.
-    fn within_ticks(&mut self, within: &ast::Expr) -> Option<u32> {
-        let found = self.typed(within, &Place::default(), Type::Quantity(Dimension::DURATION))?;
+    /// A condition of a requirement.
+    fn condition(&mut self, condition: &ast::Expr, place: &Place<'_>) -> Option<Expr> {
+        let found = self.typed(condition, place, Type::Bool)?;
+        let Some(inside) = past_inside(&found) else { return Some(found) };
+        let message = "what was cannot be asked inside of this";
+        let error = Diagnostic::error(code::NOT_HERE, message).at(inside.span, "within something else");
+        self.reject(error.help("join it by `and`, `or`, `not` and `implies` alone"))
+    }
+
+    /// `recently(npc.gap <= 5 m, 2 s)`: whether a condition held at some moment of the last seconds, or at each of them.
+    pub(super) fn past(&mut self, word: PastWord, call: &ast::Call, place: &Place<'_>) -> Option<Expr> {
+        let name = word.name();
+        self.references.note(call.name.span, Symbol::Engine(name, word.meaning()), false);
+        if !matches!(place.site, Site::Requirement | Site::RequirementOn) {
+            let error = Diagnostic::error(code::NOT_HERE, format!("`{name}` cannot be asked here"));
+            return self.reject(error.at(call.span, "only requirements remember what was"));
+        }
+        let example = format!("write a condition and a time: `{name}(nearest.gap <= 5 m, 2 s)`");
+        let [ast::Arg { name: None, value: condition }, ast::Arg { name: None, value: time }] =
+            call.args.as_slice()
+        else {
+            let message = format!("`{name}` takes a condition and a time");
+            let error = Diagnostic::error(code::ARGUMENTS, message).at(call.span, "");
+            return self.reject(error.help(example));
+        };
+        let condition = self.typed(condition, place, Type::Bool);
+        let ticks = self.ticks(time, &example);
+        let kind = ExprKind::Past(Box::new(condition?), word, ticks?);
+        Some(Expr { kind, ty: Type::Bool, span: call.span })
+    }
+
+    /// How many ticks a time lasts: a part of a tick is one more.
+    fn ticks(&mut self, time: &ast::Expr, help: &str) -> Option<u32> {
+        let found = self.typed(time, &Place::default(), Type::Quantity(Dimension::DURATION))?;
         let exact_s = self.fold_number(&found)?;
-        let ticks =
-            exact_s.checked_mul(Rational::new(1000, TICK_MS.into())?).map(|ticks| ticks.to_f64().ceil());
-        match ticks {
-            Some(ticks) if ticks > 0.0 && exact_s <= Rational::integer(WITHIN_S_MAX) => Some(ticks as u32),
-            _ => {
+        let ticks = exact_s.checked_mul(Rational::new(1000, TICK_MS.into())?);
+        let is_possible =
+            |ticks: &Rational| *ticks >= Rational::integer(1) && exact_s <= Rational::integer(WITHIN_S_MAX);
+        match ticks.filter(is_possible) {
+            Some(ticks) => Some(ticks.to_f64().ceil() as u32),
+            None => {
                 let message = format!("a requirement cannot wait {} s", exact_s.to_f64());
                 let error = Diagnostic::error(code::SETTING, message);
-                let wanted = format!("must be more than 0 s and at most {WITHIN_S_MAX} s");
-                self.reject(
-                    error.at(found.span, wanted).help("leave `within` out to judge every moment by itself"),
-                )
+                let wanted = format!("must be at least a tick of {TICK_MS} ms and at most {WITHIN_S_MAX} s");
+                self.reject(error.at(found.span, wanted).help(help))
             }
         }
     }

@@ -114,17 +114,19 @@ impl<'a> Reader<'a> {
 
     fn rule_names(&mut self, list: &ast::Expr) -> Vec<String> {
         let ast::ExprKind::List(items) = &list.kind else {
-            let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted a list of rules");
+            let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted a list of rules and requirements");
             self.report(error.at(list.span, "not a list"));
             return Vec::new();
         };
         let mut names = Vec::new();
         for item in items {
-            let Some(name) = self.name_of(item, "a rule") else { continue };
+            let Some(name) = self.name_of(item, "a rule or a requirement") else { continue };
             let rules = self.space.rules.iter().map(|rule| rule.name.as_str());
-            match rules.clone().any(|rule| rule == name) {
+            let required = self.space.requirements.iter().map(|required| required.name.as_str());
+            let known = rules.chain(required);
+            match known.clone().any(|known| known == name) {
                 true => names.push(name.to_owned()),
-                false => self.report(unknown("rule", name, item.span, rules)),
+                false => self.report(unknown("rule or requirement", name, item.span, known)),
             }
         }
         names

@@ -61,7 +61,10 @@ impl Reader<'_> {
                             (None, _) => {
                                 Some(Claim::Recurrence { requirement, obstacle: None, recurred, replays })
                             }
-                            (Some(_), _) => self.not_of_one(&expect.clauses, base),
+                            (Some(_), _) => {
+                                let example = format!("{}.{} == 14 / 20", name_in(base), RECURRENCE.0);
+                                self.names_a_road_user(&expect.clauses, &example)
+                            }
                         }
                     }
                     (ast::ExprKind::Name(name), ast::ExprKind::Text(text))
@@ -109,14 +112,22 @@ impl Reader<'_> {
         let name = self.requirement(requirement)?;
         match self.clauses(clauses, true)? {
             (None, time) => Some(Claim::Breach { requirement: name, time }),
-            (Some(_), _) => self.not_of_one(clauses, requirement),
+            (Some(_), _) => {
+                let example = format!("{}.{} at 14.22 s", name_in(requirement), BREACHED.0);
+                self.names_a_road_user(clauses, &example)
+            }
         }
     }
 
-    fn not_of_one<T>(&mut self, clauses: &[ast::Clause], requirement: &ast::Expr) -> Option<T> {
-        let error = Diagnostic::error(code::UNKNOWN_CLAIM, "a breach is not about one road user");
-        let span = clauses.first().map_or(requirement.span, |clause| clause.span);
-        self.reject(error.at(span, "").help("write `stops_at_red.breached at 14.22 s`"))
+    /// `stops_at_red.breached with npc#1`: what a scenario claims of a requirement, it claims of all whom it is about.
+    fn names_a_road_user<T>(&mut self, clauses: &[ast::Clause], example: &str) -> Option<T> {
+        let message = "a claim about a requirement does not name a road user";
+        let error = Diagnostic::error(code::UNKNOWN_CLAIM, message);
+        let with = clauses.iter().find(|clause| clause.kind == ClauseKind::With);
+        let with = with.expect("only clauses `with` name one");
+        self.reject(
+            error.at(with.span, "it is about whomever the requirement is").help(format!("write `{example}`")),
+        )
     }
 
     /// `14 / 20`: in how many of how many replays.
@@ -266,4 +277,12 @@ impl Reader<'_> {
 fn is_digest(text: &str) -> bool {
     let digits = text.strip_prefix("sha256:").unwrap_or("");
     digits.len() == 64 && digits.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
+}
+
+/// The name that an expression is.
+fn name_in(expr: &ast::Expr) -> &str {
+    match &expr.kind {
+        ast::ExprKind::Name(name) => name,
+        _ => "NAME",
+    }
 }

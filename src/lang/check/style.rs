@@ -82,7 +82,7 @@ fn small(name: &str) -> String {
 fn conditions(kind: &ItemKind, into: &mut Vec<Diagnostic>) {
     let conditions: Vec<&Expr> = match kind {
         ItemKind::Rule(ast::Rule { body: ast::RuleBody::Holds { condition, .. }, .. }) => vec![condition],
-        ItemKind::Require(declared) => declared.when.iter().chain([&declared.condition]).collect(),
+        ItemKind::Require(declared) => declared.conditions().collect(),
         ItemKind::Verdict(declared) => vec![&declared.condition],
         ItemKind::Fn(declared) => vec![&declared.body],
         ItemKind::Manoeuvre(declared) => {

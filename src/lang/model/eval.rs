@@ -66,10 +66,12 @@ pub struct TickFacts {
     pub lead_speed_mps: f64,
     pub lead_since_s: f64,
     pub over_red_m: f64,
+    pub over_stop_m: f64,
     pub over_oncoming_m: f64,
     pub over_lane_m: f64,
     pub visibility_m: f64,
     pub jerk_mps3: f64,
+    pub lateral_mps2: f64,
 }
 
 /// The longest time that `since` tells, s: also of actions that never happened.
@@ -200,6 +202,8 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
             // As near as `elapsed` to the exact time.
             ((world.moment.elapsed_s - last_s) * 1000.0).round().min(SINCE_S_MAX * 1000.0) / 1000.0
         })),
+        // What was, only requirements remember.
+        ExprKind::Past(condition, ..) => evaluate(condition, functions, facts),
         ExprKind::Breached(requirement) => Value::Bool(facts.outcome.breached >> requirement & 1 == 1),
         ExprKind::IsThere(who) => Value::Bool(bearer(who.bearer(facts.locals), facts).is_some()),
         ExprKind::Call(function, arguments) => {
@@ -283,6 +287,8 @@ fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
         | Fact::EgoLeadSpeed
         | Fact::EgoLeadSince
         | Fact::EgoOverRed
+        | Fact::EgoOverStop
+        | Fact::EgoLateralAcceleration
         | Fact::EgoOverOncoming
         | Fact::EgoOverLane
         | Fact::EgoVisibility
@@ -337,10 +343,12 @@ pub(crate) fn of_tick(fact: Fact) -> Option<fn(&TickFacts) -> f64> {
         Fact::EgoLeadSpeed => |tick| tick.lead_speed_mps,
         Fact::EgoLeadSince => |tick| tick.lead_since_s,
         Fact::EgoOverRed => |tick| tick.over_red_m,
+        Fact::EgoOverStop => |tick| tick.over_stop_m,
         Fact::EgoOverOncoming => |tick| tick.over_oncoming_m,
         Fact::EgoOverLane => |tick| tick.over_lane_m,
         Fact::EgoVisibility => |tick| tick.visibility_m,
         Fact::EgoJerk => |tick| tick.jerk_mps3,
+        Fact::EgoLateralAcceleration => |tick| tick.lateral_mps2,
         _ => return None,
     })
 }

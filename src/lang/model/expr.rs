@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use crate::model::space::BodyWord;
 use crate::model::value::{EnumIndex, Type, Value};
-use crate::model::vocabulary::{Fact, Known, LaneChoice, WordFact};
+use crate::model::vocabulary::{Fact, Known, LaneChoice, PastWord, WordFact};
 use crate::syntax::ast::Span;
 pub use crate::syntax::ast::{Arithmetic, Comparison};
 use avastra_base::units::Rational;
@@ -64,6 +64,9 @@ pub enum ExprKind {
     IsThere(Who),
     /// `since(vehicles)`: the time since one of these actions last happened, and how they are called.
     Since(Vec<usize>, String),
+    /// `recently(npc.gap <= 5 m, 2 s)`: whether it held at some tick of so many before, and at this one;
+    /// `throughout(…)`: whether it held at all of them.
+    Past(Box<Expr>, PastWord, u32),
     /// `stops_at_red.breached`: whether a requirement was breached in the step.
     Breached(usize),
     /// A function by its index in `Space::functions`.
@@ -157,6 +160,7 @@ impl Expr {
             | ExprKind::Fact(_) => {}
             ExprKind::CellAt(_, inner)
             | ExprKind::Not(inner)
+            | ExprKind::Past(inner, ..)
             | ExprKind::Negate(inner)
             | ExprKind::InLanes(inner, _) => visit(inner),
             ExprKind::Call(_, arguments) => arguments.iter().for_each(visit),

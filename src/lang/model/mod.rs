@@ -22,6 +22,7 @@ mod row;
 pub(crate) mod requirement;
 pub mod rules;
 pub mod scenario;
+mod sliding;
 mod space;
 mod value;
 pub mod vocabulary;
@@ -41,7 +42,7 @@ pub use meaning::Meaning;
 pub(crate) use on_route::stretches;
 pub use on_route::{LIGHT_AHEAD_M, NEAR_JUNCTION_M, OnRoute, Stretch, junction_ahead_m};
 pub use policy::Policy;
-pub use requirement::{Kept, ReadyRequirement};
+pub use requirement::{Asked, Kept, ReadyRequirement, RequirementMemory};
 pub use row::locals;
 pub use row::{Reach, Row};
 pub use rules::{NoStart, RulesInForce, UnknownRule};
@@ -49,6 +50,7 @@ pub use scenario::{
     Claim, DRIVERS, ENDS, Figure, MODULES, Obstacle, Origin, REPLAYS_MAX, Scenario, ScenarioStart,
     ScenarioStep, Trigger, ticks_s,
 };
+pub use sliding::Sliding;
 pub use space::{
     ACTION_ODDS_MAX, ActionDef, BodyDef, BodyWord, COUNTED, Domain, EffectDef, EnumDef, EpisodeDef, FnDef,
     GroupDef, Initial, ManoeuvreCall, ManoeuvreDef, OrderDef, Parameter, PhaseDef, RequirementDef,

@@ -1,16 +1,17 @@
 //! What the ego vehicle must keep, at a moment: whether it is asked for, whether it holds, and by how much.
 //!
 //! The margin is the quantitative meaning of signal temporal logic (Fainekos and Pappas 2009, Donzé and Maler 2010): of
-//! a comparison the difference of its sides, of `and` the smaller of two, of `or` the larger. Above 0 it implies that
-//! the condition holds, below 0 that it does not.
+//! a comparison the difference of its sides, of `and` the smaller of two, of `or` the larger; of `recently` the largest of
+//! the last ticks, of `throughout` the smallest. Above 0 it implies that the condition holds, below 0 that it does not.
 
 use crate::model::eval::{
     Facts, MomentFacts, TickFacts, arithmetic, compare_numbers, evaluate, of_moment, of_tick,
 };
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
+use crate::model::sliding::Sliding;
 use crate::model::space::{FnDef, RequirementDef};
 use crate::model::value::Type;
-use crate::model::vocabulary::{Light, Word, WordFact};
+use crate::model::vocabulary::{Light, PastWord, Word, WordFact};
 use avastra_base::units::Dimension;
 
 /// How a requirement stands at a moment.
@@ -25,9 +26,53 @@ pub struct Kept {
 #[derive(Debug, Clone)]
 pub struct ReadyRequirement {
     when: Option<Node>,
+    until: Option<Node>,
+    after: Option<Node>,
     condition: Node,
     has_margin: bool,
     bearers: Vec<usize>,
+    /// What it asks of the past, those within others first.
+    pasts: Vec<PastNode>,
+}
+
+/// `recently(condition, …)` or `throughout(condition, …)`.
+#[derive(Debug, Clone)]
+struct PastNode {
+    condition: Node,
+    has_margin: bool,
+    word: PastWord,
+    ticks: u32,
+}
+
+/// What a requirement remembers from tick to tick, about the ego vehicle or about one road user.
+#[derive(Debug, Clone, Default)]
+pub struct RequirementMemory {
+    /// For each `recently` and `throughout`.
+    pasts: Vec<Past>,
+    /// Whether `when` held at some tick since which `until` did not.
+    is_latched: bool,
+    /// Whether `after` held at the tick before.
+    was: bool,
+}
+
+/// The last ticks of a condition.
+#[derive(Debug, Clone, Default)]
+struct Past {
+    /// Ticks up to now, and those since it last held, and since it last failed.
+    known: u32,
+    since_true: Option<u32>,
+    since_false: Option<u32>,
+    extreme: Sliding,
+    /// What `recently` or `throughout` says now.
+    now: Option<Kept>,
+}
+
+/// How a requirement is asked at a moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Asked {
+    pub kept: Kept,
+    /// Whether its `after` begins to hold now.
+    pub begins: bool,
 }
 
 /// An expression. What is asked often has a node of its own, the rest is left to the evaluator of all expressions.
@@ -48,6 +93,8 @@ enum Node {
     Implies(Box<Node>, Box<Node>),
     /// Whether the next light is one of these.
     IsLight(Vec<Light>),
+    /// By index in `ReadyRequirement::pasts`.
+    Past(usize),
     Other(Expr),
 }
 
@@ -61,36 +108,95 @@ enum Of {
 impl RequirementDef {
     /// Made ready to be asked often.
     pub fn ready(&self) -> ReadyRequirement {
+        let mut pasts = Vec::new();
+        let mut of = |expr: &Expr| Node::of(expr, &mut pasts);
         ReadyRequirement {
-            when: self.when.as_ref().map(Node::of),
-            condition: Node::of(&self.condition),
+            when: self.when.as_ref().map(&mut of),
+            until: self.until.as_ref().map(&mut of),
+            after: self.after.as_ref().map(&mut of),
+            condition: of(&self.condition),
             has_margin: self.margin.is_some(),
             bearers: self.bearers.clone(),
+            pasts,
         }
     }
 }
 
 impl ReadyRequirement {
-    /// How it stands; `None` where nothing is asked, because `when` does not hold or a road user that it names is not
-    /// there.
-    pub fn at(&self, functions: &[FnDef], facts: &Facts<'_>) -> Option<Kept> {
+    /// Whether it is asked only after something begins to hold.
+    pub fn is_response(&self) -> bool {
+        self.after.is_some()
+    }
+
+    /// How it stands at the next tick; `None` where nothing is asked, because `when` does not hold, `after` does not begin to,
+    /// a road user that it names is not there, or less is past than a `throughout` asks for. Of a requirement with `after` the
+    /// condition is asked, too, while it `is_awaited`.
+    pub fn at(
+        &self,
+        memory: &mut RequirementMemory,
+        is_awaited: bool,
+        functions: &[FnDef],
+        facts: &Facts<'_>,
+    ) -> Option<Asked> {
         let is_there = |who: &usize| {
             facts.world.is_some_and(|world| world.bearers.iter().any(|(known, _)| known == who))
         };
-        let at = At { functions, facts };
-        if !self.bearers.iter().all(is_there) || self.when.as_ref().is_some_and(|when| !at.holds(when)) {
+        if !self.bearers.iter().all(is_there) {
+            if !self.pasts.is_empty() || self.until.is_some() || self.after.is_some() {
+                *memory = RequirementMemory::default();
+            }
             return None;
         }
-        Some(match self.has_margin {
-            true => at.kept(&self.condition),
-            false => Kept { holds: at.holds(&self.condition), margin: f64::NAN },
-        })
+        let mut is_known = true;
+        if !self.pasts.is_empty() {
+            memory.pasts.resize_with(self.pasts.len(), Past::default);
+            for (index, node) in self.pasts.iter().enumerate() {
+                let kept =
+                    At { functions, facts, pasts: &memory.pasts }.kept_of(&node.condition, node.has_margin);
+                is_known &= memory.pasts[index].take(kept, node);
+            }
+        }
+        let at = At { functions, facts, pasts: &memory.pasts };
+        let holds = |node: &Option<Node>| node.as_ref().is_none_or(|node| at.holds(node));
+        let is_asked = match &self.until {
+            None => holds(&self.when),
+            Some(until) => !at.holds(until) && (memory.is_latched || holds(&self.when)),
+        };
+        let is_now = self.after.as_ref().is_some_and(|after| at.holds(after));
+        let begins = is_now && !memory.was && is_asked && is_known;
+        let asks = if self.is_response() { begins || is_awaited } else { is_asked && is_known };
+        let asked = asks.then(|| Asked { kept: at.kept_of(&self.condition, self.has_margin), begins });
+        (memory.is_latched, memory.was) = (is_asked, is_now);
+        asked
+    }
+}
+
+impl Past {
+    /// Takes the answer of a tick. Returns whether enough is past to say something.
+    fn take(&mut self, kept: Kept, node: &PastNode) -> bool {
+        self.known = self.known.saturating_add(1);
+        let next = |since: Option<u32>| since.map(|ticks| ticks.saturating_add(1));
+        self.since_true = if kept.holds { Some(0) } else { next(self.since_true) };
+        self.since_false = if kept.holds { next(self.since_false) } else { Some(0) };
+        let lately = |since: Option<u32>| since.is_some_and(|ticks| ticks <= node.ticks);
+        self.now = Some(match node.word {
+            PastWord::Recently => {
+                let margin = self.extreme.largest(kept.margin, node.ticks);
+                Kept { holds: lately(self.since_true), margin }
+            }
+            PastWord::Throughout => {
+                let margin = -self.extreme.largest(-kept.margin, node.ticks);
+                Kept { holds: !lately(self.since_false), margin }
+            }
+        });
+        node.word == PastWord::Recently || self.known > node.ticks
     }
 }
 
 impl Node {
-    fn of(expr: &Expr) -> Node {
-        let node = |expr: &Expr| Box::new(Node::of(expr));
+    /// Of an expression; what it asks of the past goes to `pasts`.
+    fn of(expr: &Expr, pasts: &mut Vec<PastNode>) -> Node {
+        let mut node = |expr: &Expr| Node::of(expr, pasts);
         let is_number = |expr: &Expr| matches!(expr.ty, Type::Int | Type::Quantity(_));
         match &expr.kind {
             ExprKind::Number(number) => Node::Number(number.to_f64()),
@@ -99,33 +205,57 @@ impl Node {
                 (None, Some(of)) => Node::Fact(Of::Tick(of)),
                 (None, None) => Node::Other(expr.clone()),
             },
-            ExprKind::Arithmetic(op, left, right) => match (Node::of(left), Node::of(right)) {
+            ExprKind::Arithmetic(op, left, right) => match (node(left), node(right)) {
                 (Node::Number(left), Node::Number(right)) => Node::Number(arithmetic(*op, left, right)),
                 (left, right) => Node::Arithmetic(*op, Box::new(left), Box::new(right)),
             },
-            ExprKind::Compare(op, left, right) if is_number(left) => {
-                match (Node::of(left), Node::of(right)) {
-                    (Node::Fact(of), Node::Number(number)) => Node::Bound(of, *op, number),
-                    (left, right) => Node::Compare(*op, Box::new(left), Box::new(right)),
-                }
-            }
+            ExprKind::Compare(op, left, right) if is_number(left) => match (node(left), node(right)) {
+                (Node::Fact(of), Node::Number(number)) => Node::Bound(of, *op, number),
+                (left, right) => Node::Compare(*op, Box::new(left), Box::new(right)),
+            },
             ExprKind::InRange(value, low, high) if is_number(value) => {
-                Node::InRange(node(value), node(low), node(high))
+                Node::InRange(Box::new(node(value)), Box::new(node(low)), Box::new(node(high)))
             }
             ExprKind::IsWord(WordFact::EgoLight, words) => {
                 Node::IsLight(words.iter().filter_map(|word| Light::from_name(word)).collect())
             }
-            ExprKind::Not(inner) => Node::Not(node(inner)),
+            ExprKind::Not(inner) => Node::Not(Box::new(node(inner))),
             ExprKind::And(left, right) => {
                 let parts = |node: Node| match node {
                     Node::And(parts) => parts,
                     node => vec![node],
                 };
-                Node::And([parts(Node::of(left)), parts(Node::of(right))].concat())
+                Node::And([parts(node(left)), parts(node(right))].concat())
             }
-            ExprKind::Or(left, right) => Node::Or(node(left), node(right)),
-            ExprKind::Implies(left, right) => Node::Implies(node(left), node(right)),
+            ExprKind::Or(left, right) => Node::Or(Box::new(node(left)), Box::new(node(right))),
+            ExprKind::Implies(left, right) => Node::Implies(Box::new(node(left)), Box::new(node(right))),
+            ExprKind::Past(inner, word, ticks) => {
+                let condition = node(inner);
+                let has_margin = margin_dimension(inner).is_some();
+                pasts.push(PastNode { condition, has_margin, word: *word, ticks: *ticks });
+                Node::Past(pasts.len() - 1)
+            }
             _ => Node::Other(expr.clone()),
+        }
+    }
+}
+
+/// Where a condition asks of the past in a way that is not followed: only `and`, `or`, `not`, `implies` and the past itself
+/// may stand around it.
+pub(crate) fn past_inside(condition: &Expr) -> Option<&Expr> {
+    match &condition.kind {
+        ExprKind::Not(inner) | ExprKind::Past(inner, ..) => past_inside(inner),
+        ExprKind::And(left, right) | ExprKind::Or(left, right) | ExprKind::Implies(left, right) => {
+            past_inside(left).or_else(|| past_inside(right))
+        }
+        _ => {
+            let mut found = None;
+            condition.walk_all(&mut |part| {
+                if matches!(part.kind, ExprKind::Past(..)) {
+                    found.get_or_insert(part);
+                }
+            });
+            found
         }
     }
 }
@@ -135,6 +265,7 @@ impl Node {
 struct At<'a> {
     functions: &'a [FnDef],
     facts: &'a Facts<'a>,
+    pasts: &'a [Past],
 }
 
 impl At<'_> {
@@ -151,6 +282,7 @@ impl At<'_> {
             | Node::And(..)
             | Node::Or(..)
             | Node::Implies(..)
+            | Node::Past(_)
             | Node::IsLight(_) => f64::NAN,
         }
     }
@@ -178,8 +310,22 @@ impl At<'_> {
             Node::IsLight(lights) => {
                 self.facts.world.is_some_and(|world| lights.contains(&world.moment.ego_light))
             }
+            Node::Past(index) => self.past(*index).holds,
             Node::Other(expr) => evaluate(expr, self.functions, self.facts).truth(),
             Node::Number(_) | Node::Fact(_) | Node::Arithmetic(..) => false,
+        }
+    }
+
+    /// What was said of the past at this tick. Those within others are known before them.
+    fn past(self, index: usize) -> Kept {
+        self.pasts.get(index).and_then(|past| past.now).unwrap_or(Kept { holds: false, margin: f64::NAN })
+    }
+
+    /// Truth of a condition, and its margin if it has one.
+    fn kept_of(self, node: &Node, has_margin: bool) -> Kept {
+        match has_margin {
+            true => self.kept(node),
+            false => Kept { holds: self.holds(node), margin: f64::NAN },
         }
     }
 
@@ -214,6 +360,7 @@ impl At<'_> {
                 let (left, right) = two(left, right);
                 Kept { holds: !left.holds || right.holds, margin: (-left.margin).max(right.margin) }
             }
+            Node::Past(index) => self.past(*index),
             Node::Number(_) | Node::Fact(_) | Node::Arithmetic(..) | Node::IsLight(_) | Node::Other(_) => {
                 Kept { holds: self.holds(node), margin: f64::NAN }
             }
@@ -237,7 +384,7 @@ pub(crate) fn margin_dimension(condition: &Expr) -> Option<Dimension> {
             Type::Quantity(dimension) => Some(dimension),
             Type::Bool | Type::Enum(_) => None,
         },
-        ExprKind::Not(inner) => margin_dimension(inner),
+        ExprKind::Not(inner) | ExprKind::Past(inner, ..) => margin_dimension(inner),
         ExprKind::And(left, right) | ExprKind::Or(left, right) | ExprKind::Implies(left, right) => {
             margin_dimension(left).filter(|dimension| margin_dimension(right) == Some(*dimension))
         }
@@ -316,15 +463,15 @@ mod tests {
         for _ in 0..2_000 {
             let condition = *made_up(&mut seed, 4);
             assert_eq!(margin_dimension(&condition), Some(Dimension::SPEED));
-            let ready = Node::of(&condition);
+            let ready = Node::of(&condition, &mut Vec::new());
             let at = |value: f64| {
                 let mut world = WorldFacts::default();
                 world.moment.ego_speed_mps = value;
                 let facts = Facts { world: Some(&world), ..Facts::new(&[], &memory) };
-                let Kept { holds, margin } = At { functions: &[], facts: &facts }.kept(&ready);
+                let Kept { holds, margin } = At { functions: &[], facts: &facts, pasts: &[] }.kept(&ready);
                 // It is the evaluator's answer, and that of the way without a margin.
                 assert_eq!(holds, evaluate(&condition, &[], &facts).truth());
-                assert_eq!(holds, At { functions: &[], facts: &facts }.holds(&ready));
+                assert_eq!(holds, At { functions: &[], facts: &facts, pasts: &[] }.holds(&ready));
                 (holds, margin)
             };
             for half in 0..50 {

@@ -180,6 +180,12 @@ impl Scenario {
         })
     }
 
+    /// Whether the first of its claims about a collision or a breach is about a breach.
+    pub fn is_about_a_breach(&self) -> bool {
+        let is_found = |claim: &&Claim| claim.is_of_a_collision() || matches!(claim, Claim::Breach { .. });
+        self.claims.iter().find(is_found).is_some_and(|claim| matches!(claim, Claim::Breach { .. }))
+    }
+
     /// The replays that its claims of recurrence are about; 0 without one.
     pub fn replays(&self) -> u32 {
         let replays = self.claims.iter().map(|claim| match claim {

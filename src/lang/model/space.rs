@@ -497,14 +497,26 @@ pub struct RequirementDef {
     pub on: Vec<BodyWord>,
     /// Where this does not hold, nothing is asked.
     pub when: Option<Expr>,
+    /// If there is one, what began to be asked by `when` is asked until this holds.
+    pub until: Option<Expr>,
+    /// If there is one, the condition is asked only after it begins to hold, once each time.
+    pub after: Option<Expr>,
     pub condition: Expr,
-    /// The requirement is breached at a tick if the condition failed at every tick of so many before it, and at it.
+    /// The requirement is breached at a tick if the condition failed at every tick of so many before it, and at it. With
+    /// `after`: if it failed at the tick of that, and at every tick of so many after it.
     pub within_ticks: u32,
     /// The road users that it names, by index in `Space::bearers`.
     pub bearers: Vec<usize>,
     /// The dimension of its margin; `None` if the condition has none.
     pub margin: Option<Dimension>,
     pub span: Span,
+}
+
+impl RequirementDef {
+    /// Its conditions, in the order of the text.
+    pub fn conditions(&self) -> impl Iterator<Item = &Expr> {
+        self.when.iter().chain(&self.until).chain(&self.after).chain([&self.condition])
+    }
 }
 
 /// How episodes run.

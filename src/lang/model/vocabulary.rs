@@ -260,10 +260,12 @@ facts! {
     EgoLeadSpeed "ego.lead_speed" SPEED, Tick = "A `Speed`: of that road user along the route; 0 if there is none.";
     EgoLeadSince "ego.lead_since" DURATION, Tick = "A `Duration`: since when it has been that one; 0 if there is none.";
     EgoOverRed "ego.over_red" LENGTH, Tick = "A `Length`: how far its front is beyond the stop line of a light that was red as it passed, until its rear has passed, too; else minus the way to a red light; at least -100 m.";
+    EgoOverStop "ego.over_stop" LENGTH, Tick = "A `Length`: how far its front is beyond the line of a stop sign, until its rear has passed, too; else minus the way to the next one; at least -100 m.";
     EgoOverOncoming "ego.over_oncoming" LENGTH, Tick = "A `Length`: how far its outline reaches into a lane of the other direction; below 0 the room that is left; -100 m in junctions and where there is no such lane.";
-    EgoOverLane "ego.over_lane" LENGTH, Tick = "A `Length`: how far its outline reaches beyond the lines of its route's lane; below 0 the room that is left; -100 m in junctions.";
+    EgoOverLane "ego.over_lane" LENGTH, Tick = "A `Length`: how far its outline reaches beyond the lines of its route's lane (of both lanes where the route may change lanes); below 0 the room that is left; -100 m in junctions.";
     EgoVisibility "ego.visibility" LENGTH, Tick = "A `Length`: how far the fog lets one see; 10 km in clear air.";
     EgoJerk "ego.jerk" JERK, Tick = "A `Jerk`: the change of the ego vehicle's acceleration over the last second, by that second; 0 in the first one.";
+    EgoLateralAcceleration "ego.lateral_acceleration" ACCEL, Tick = "A `Accel`: of the ego vehicle to its left, negative to its right.";
     Proc "proc" RATIO, Step = "A `Ratio`: the collision probability of the step.";
     Collision "collision" Type::Bool, Step = "A `Bool`: the ego vehicle collided.";
     Repeated "repeated" Type::Bool, Step = "A `Bool`: with an obstacle that it has hit before.";
@@ -284,6 +286,9 @@ pub const ROAD_LANES: (&str, &str) =
 
 /// `truck.there`: what may be asked of a named road user beside the facts of `npc`.
 pub const THERE: (&str, &str) = ("there", "Whether a road user of that name is there.");
+
+/// Events of estimates that are no requirement, so that no requirement has their names.
+pub const EVENTS: [&str; 3] = ["counted", "collision", "breach"];
 
 /// `stops_at_red.breached`: what may be asked of a requirement.
 pub const BREACHED: (&str, &str) =
@@ -306,6 +311,12 @@ pub const SINCE: (&str, &str) = (
     "since",
     "A `Duration`: since an action, or one of a group, last happened; 1000 s if it never has: `since(vehicles) >= 10 s`.",
 );
+
+words! {
+    PastWord "What a requirement may ask of the last seconds: spelt like a function of a condition and a time.":
+    Recently "recently" = "Whether a condition held at some moment of the last seconds: `recently(npc.gap <= 5 m, 2 s)`.",
+    Throughout "throughout" = "Whether a condition held at every moment of the last seconds: `throughout(ego.speed <= 0.1 m/s, 3 s)`.",
+}
 
 word_facts! {
     EgoLight "ego.light" Light, World = "The next traffic light within 100 m: `ego.light == Red`, `ego.light in [Yellow, Red]`.";

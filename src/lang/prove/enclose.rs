@@ -170,6 +170,8 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
         // While it is not there, it has no value: as after a division by 0, no comparison is certain.
         ExprKind::OfBearer(..) => Values::Number(Interval::ALL),
         ExprKind::IsThere(_) | ExprKind::Breached(_) => Values::UNKNOWN_TRUTH,
+        // What is known of this moment says nothing of those before it.
+        ExprKind::Past(condition, ..) => enclose(condition, &Known { case: None, ..*known }),
         ExprKind::Since(..) => Values::Number(between(0.0, SINCE_S_MAX)),
         ExprKind::Call(function, arguments) => {
             let locals: Vec<Values> = arguments.iter().map(values).collect();
@@ -272,6 +274,8 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
         | Fact::NpcOffset
         | Fact::EgoLeadSpeed
         | Fact::EgoOverRed
+        | Fact::EgoOverStop
+        | Fact::EgoLateralAcceleration
         | Fact::EgoOverOncoming
         | Fact::EgoOverLane
         | Fact::EgoVisibility

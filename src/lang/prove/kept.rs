@@ -1,10 +1,13 @@
-//! Requirements that nothing can breach: most are a mistake in a unit or a sign.
+//! Requirements that nothing can breach, or everything does: most are a mistake in a unit or a sign.
 
+use crate::model::expr::Expr;
 use crate::model::{Space, code};
+use crate::prove::moment::{Case, may_hold_together};
 use crate::prove::{Known, enclose};
 use crate::syntax::Diagnostic;
 
-/// One warning for each requirement whose condition holds at every moment on every road, or whose `when` at none.
+/// One warning for each requirement whose condition holds at every moment on every road, or which is asked at none; and for
+/// each whose condition cannot hold where it is asked, so that it is breached by everybody.
 pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let cells = space.cells_unknown();
     let mut diagnostics = Vec::new();
@@ -17,12 +20,22 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
                     holds(&Known { functions, locals: &[], cells: &cells, road, case: None })
                 })
         };
-        let never_asked =
-            required.when.as_ref().filter(|when| on_all(&|known| !enclose(when, known).may_hold()));
-        let (message, span, why) = match never_asked {
-            Some(when) => ("is asked at no moment", when.span, "never holds"),
+        let never = |condition: &&Expr| on_all(&|known| !enclose(condition, known).may_hold());
+        let together = |known: &Known<'_>| {
+            let when: Vec<&Expr> = required.when.iter().chain([&required.condition]).collect();
+            may_hold_together(&when, known, &space.episode, || vec![Case::default()])
+        };
+        let is_opposed = || {
+            // What is asked later, or somewhere else, may hold there.
+            required.until.is_none() && required.after.is_none() && on_all(&|known| !together(known))
+        };
+        let (message, span, why) = match required.when.iter().chain(&required.after).find(never) {
+            Some(never) => ("is asked at no moment", never.span, "never holds"),
             None if on_all(&|known| !enclose(&required.condition, known).may_fail()) => {
                 ("can never be breached", required.condition.span, "always holds")
+            }
+            None if is_opposed() => {
+                ("is breached whenever it is asked", required.condition.span, "never holds there")
             }
             None => continue,
         };

@@ -419,6 +419,10 @@ pub struct Require {
     /// The bodies of the road users that it is about, each by itself; empty if it is about the ego vehicle alone.
     pub on: Vec<Name>,
     pub when: Option<Expr>,
+    /// The end of what began by `when`.
+    pub until: Option<Expr>,
+    /// What must begin to hold for the condition to be asked.
+    pub after: Option<Expr>,
     pub condition: Expr,
     pub within: Option<Expr>,
 }
@@ -426,7 +430,12 @@ pub struct Require {
 impl Require {
     /// Its expressions, in the order of the text.
     pub fn parts(&self) -> impl Iterator<Item = &Expr> {
-        self.when.iter().chain([&self.condition]).chain(&self.within)
+        self.conditions().chain(&self.within)
+    }
+
+    /// Its conditions, in the order of the text.
+    pub fn conditions(&self) -> impl Iterator<Item = &Expr> {
+        self.when.iter().chain(&self.until).chain(&self.after).chain([&self.condition])
     }
 }
 

@@ -153,18 +153,16 @@ impl Builder {
                 let optional = parts.take(Rule::kw_optional).is_some();
                 let name = self.name(parts.next());
                 let on = self.targets(&mut parts);
-                let when =
-                    parts.take(Rule::while_holds).map(|when| self.only_expression(when)).transpose()?;
-                let condition = self.only_expression(parts.next())?;
-                let within = parts.take(Rule::within_time).map(|within| self.only_expression(within));
-                ItemKind::Require(Box::new(Require {
-                    optional,
-                    name,
-                    on,
-                    when,
-                    condition,
-                    within: within.transpose()?,
-                }))
+                let part = |parts: &mut Parts<'_>, rule: Rule| {
+                    parts.take(rule).map(|part| self.only_expression(part)).transpose()
+                };
+                let when = part(&mut parts, Rule::while_holds)?;
+                let until = part(&mut parts, Rule::until_holds)?;
+                let after = part(&mut parts, Rule::after_event)?;
+                let condition = part(&mut parts, Rule::holds)?.expect("the grammar asks for one");
+                let within = part(&mut parts, Rule::within_time)?;
+                let required = Require { optional, name, on, when, until, after, condition, within };
+                ItemKind::Require(Box::new(required))
             }
             Rule::body => {
                 let name = self.name(parts.next());

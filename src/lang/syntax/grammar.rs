@@ -141,7 +141,7 @@ pub fn role(rule: Rule) -> Role {
         Rule::kw_if | Rule::only_if => Role::Said("`if`"),
         Rule::kw_for | Rule::held => Role::Said("`for`"),
         Rule::kw_once | Rule::once => Role::Said("`once`"),
-        Rule::kw_after | Rule::after => Role::Said("`after`"),
+        Rule::kw_after | Rule::after | Rule::after_event => Role::Said("`after`"),
         Rule::kw_expect | Rule::expect => Role::Said("`expect`"),
         Rule::kw_origin | Rule::origin => Role::Said("`origin`"),
         Rule::kw_start | Rule::start => Role::Said("`start`"),
@@ -150,6 +150,7 @@ pub fn role(rule: Rule) -> Role {
         Rule::kw_claims | Rule::claims => Role::Said("`claims`"),
         Rule::kw_rules | Rule::policy_rules => Role::Said("`rules`"),
         Rule::kw_when | Rule::while_holds => Role::Said("`when`"),
+        Rule::kw_until | Rule::until_holds => Role::Said("`until`"),
         Rule::EOI
         | Rule::WHITESPACE
         | Rule::COMMENT

@@ -89,15 +89,26 @@ pub const CLAUSES: &[Keyword] = &[
     ),
     ("for", "How long the condition of `once` must have held: `once ego.speed <= 1 m/s for 2 s`."),
     ("repeat", "How often a manoeuvre goes through its phases: `manoeuvre stop_and_go() repeat 3 { … }`."),
-    ("within", "How long a phase waits for its moment: `once npc.gap <= 20 m within 10 s`."),
-    ("after", "How long a scenario's action or a phase waits: `after 2.5 s`."),
+    (
+        "within",
+        "How long a phase waits for its moment, or a requirement for its condition: `once npc.gap <= 20 m within 10 s`.",
+    ),
+    (
+        "after",
+        "How long a scenario's action or a phase waits: `after 2.5 s`; in a requirement, what must begin to hold for it to be \
+         asked.",
+    ),
     ("origin", "Where a file that avastra wrote came from."),
     ("start", "The states at the start of a scenario; in a road, where the ego vehicle starts."),
     ("steps", "The actions of a scenario, by number of the step."),
     ("net", "The exact face of a policy: its network."),
     ("claims", "What a policy's rules say of themselves."),
     ("rules", "The readable face of a policy: the first line that applies acts."),
-    ("when", "The condition of a line of a policy."),
+    ("when", "The condition of a line of a policy, or where a requirement is asked."),
+    (
+        "until",
+        "The end of what a requirement asks from `when` on: `when ego.lead_gap <= 5 m until ego.lead_gap >= 10 m`.",
+    ),
     ("lane", "A place on a map: `lane 7/-1 at 80 m`, the road's id, the lane's id and the station."),
     ("match", "One value for each variant: `match mode { Near => 12 m, Far => 50 m }`."),
 ];

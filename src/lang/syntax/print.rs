@@ -491,9 +491,11 @@ impl Printer<'_> {
         if !item.on.is_empty() {
             self.words(&format!(" on {}", names(&item.on, ", ")));
         }
-        if let Some(when) = &item.when {
-            self.words(" when ");
-            self.put(&expression(when));
+        for (word, part) in [("when", &item.when), ("until", &item.until), ("after", &item.after)] {
+            if let Some(part) = part {
+                self.words(&format!(" {word} "));
+                self.put(&expression(part));
+            }
         }
         self.words(":");
         self.value(&item.condition);

@@ -285,12 +285,14 @@ fn item() -> impl Strategy<Value = ItemKind> {
         // A word that is no unit, after a number and before the colon of a condition, would be the name of a field.
         (
             (any::<bool>(), name(), prop::collection::vec(name(), 0..3)),
-            proptest::option::of(asked),
+            prop::array::uniform3(proptest::option::of(asked)),
             expr(),
             proptest::option::of(expr())
         )
-            .prop_map(|((optional, name, on), when, condition, within)| {
-                ItemKind::Require(Box::new(Require { optional, name, on, when, condition, within }))
+            .prop_map(|((optional, name, on), [when, until, after], condition, within)| {
+                let until = until.filter(|_| when.is_some());
+                let required = Require { optional, name, on, when, until, after, condition, within };
+                ItemKind::Require(Box::new(required))
             }),
         prop::collection::vec(case, 0..4).prop_map(ItemKind::Reward),
         (name(), arms(expr())).prop_map(|(name, arms)| ItemKind::Odds(Odds { name, arms })),

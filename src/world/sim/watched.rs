@@ -7,6 +7,7 @@ use avastra_base::geometry::{Vec2, unit_vector};
 use avastra_base::kinematics::STANDING_MPS;
 use avastra_lang::model::vocabulary::Fact;
 use avastra_lang::model::{LEAD_GAP_M_MAX, LIGHT_AHEAD_M, TickFacts};
+use avastra_road::SignKind;
 
 use super::around::Around;
 use super::ego::VehicleParameters;
@@ -44,6 +45,7 @@ pub struct Watched {
 pub struct WatchedParts {
     pub lead: bool,
     pub red: bool,
+    pub stop: bool,
     pub oncoming: bool,
     pub lane: bool,
     pub jerk: bool,
@@ -57,6 +59,7 @@ impl WatchedParts {
             match fact {
                 Fact::EgoLeadGap | Fact::EgoLeadSpeed | Fact::EgoLeadSince => parts.lead = true,
                 Fact::EgoOverRed => parts.red = true,
+                Fact::EgoOverStop => parts.stop = true,
                 Fact::EgoOverOncoming => parts.oncoming = true,
                 Fact::EgoOverLane => parts.lane = true,
                 Fact::EgoJerk => parts.jerk = true,
@@ -78,10 +81,12 @@ impl Watched {
             lead_speed_mps: lead.map_or(0.0, |lead| lead.speed_mps),
             lead_since_s: self.lead.map_or(0.0, |(_, tick, _)| since_s(tick)),
             over_red_m: if parts.red { self.over_red_m(world, &around) } else { f64::NAN },
+            over_stop_m: if parts.stop { over_stop_m(&around) } else { f64::NAN },
             over_oncoming_m: if parts.oncoming { over_oncoming_m(&around) } else { f64::NAN },
             over_lane_m: if parts.lane { over_lane_m(&around) } else { f64::NAN },
             visibility_m: around.visibility_m,
             jerk_mps3: if parts.jerk { self.jerk_mps3(around.ego.acceleration_mps2) } else { f64::NAN },
+            lateral_mps2: around.ego.speed_mps * around.ego.yaw_rate_radps,
         }
     }
 
@@ -184,6 +189,16 @@ fn ego_half_width_m(around: &Around, along: Vec2) -> f64 {
     around.ego_outline.half_extent_m(around.ego_forward, along).1
 }
 
+/// How far the ego vehicle's front is beyond the line of a stop sign that its rear has not passed, m; else minus the way to the
+/// next one.
+fn over_stop_m(around: &Around) -> f64 {
+    let ego = VehicleParameters::MKZ;
+    let (front_m, rear_m) = (ego.front_m(around.ego_station_m), ego.rear_m(around.ego_station_m));
+    let lines = around.scene.route.sign_lines.iter().filter(|line| line.kind == SignKind::Stop);
+    let next = lines.map(|line| line.station_m).find(|line_m| rear_m < *line_m);
+    next.map_or(FAR_M, |line_m| (front_m - line_m).max(FAR_M))
+}
+
 /// How far the ego vehicle's outline reaches into an oncoming lane, m.
 fn over_oncoming_m(around: &Around) -> f64 {
     let Some(edge) = around.scene.oncoming_at(around.ego_station_m) else { return FAR_M };
@@ -191,17 +206,29 @@ fn over_oncoming_m(around: &Around) -> f64 {
     (towards_m + ego_half_width_m(around, edge.along) - edge.away_m).max(FAR_M)
 }
 
-/// How far the ego vehicle's outline reaches beyond the lines of its route's lane, at its rear axle, m.
+/// How far the ego vehicle's outline reaches beyond the lines of its route's lane, at its rear axle, m. Where the route may
+/// change lanes, it is the outer lines of both lanes that count.
 fn over_lane_m(around: &Around) -> f64 {
     let Scene { map, route, .. } = around.scene;
-    let lane = map.lane(route.lane_at(around.ego_station_m).lane);
+    let station_m = around.ego_station_m;
+    let lane = map.lane(route.lane_at(station_m).lane);
     if lane.junction.is_some() {
         return FAR_M;
     }
     let beside = lane.centre.project(around.ego.rear_axle.position);
     let along = unit_vector(lane.centre.heading_at(beside.station_m));
-    let half_width_m = ego_half_width_m(around, along);
-    (beside.offset_m.abs() + half_width_m - lane.width_at(beside.station_m) / 2.0).max(FAR_M)
+    let room_m = lane.width_at(beside.station_m) / 2.0 - ego_half_width_m(around, along);
+    let change = route.changes.iter().find(|change| (change.begin_m..=change.latest_m).contains(&station_m));
+    let beyond_m = match change {
+        None => beside.offset_m.abs(),
+        Some(change) => {
+            let from_m = change.source_offset_m(station_m);
+            let to_m = change.postponed_offset_m(station_m, f64::NEG_INFINITY);
+            let offset_m = around.ego_offset_m;
+            (offset_m - from_m.max(to_m)).max(from_m.min(to_m) - offset_m)
+        }
+    };
+    (beyond_m - room_m).max(FAR_M)
 }
 
 /// The near edge of the nearest oncoming lane beside a place of the route.
@@ -236,9 +263,10 @@ pub(super) fn oncoming_edges(scene: &Scene) -> Vec<Option<OncomingEdge>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::{Control, testing};
+    use crate::sim::{Control, Start, testing};
 
-    const ALL: WatchedParts = WatchedParts { lead: true, red: true, oncoming: true, lane: true, jerk: true };
+    const ALL: WatchedParts =
+        WatchedParts { lead: true, red: true, stop: true, oncoming: true, lane: true, jerk: true };
 
     #[test]
     fn what_is_ahead_is_watched() {
@@ -282,22 +310,46 @@ mod tests {
     }
 
     #[test]
-    fn a_red_light_is_remembered_until_the_rear_has_passed() {
-        let mut world = testing::world(&testing::crossing());
+    fn a_stop_sign_is_passed_from_the_front_to_the_rear() {
+        let mut world = testing::world(&testing::crossing_of("206", "274"));
         let mut watched = Watched::default();
-        let line_m = world.scene().route.stop_lines[0].station_m;
-        let (mut before_m, mut over) = (f64::NEG_INFINITY, Vec::new());
+        let line_m = world.scene().route.sign_lines[0].station_m;
+        let mut straddled = 0;
         for _ in 0..3000 {
-            world.tick(&Control { throttle_pct: 15.0, ..Control::default() });
-            let found_m = watched.look(&world, ALL).over_red_m;
+            world.tick(&Control { throttle_pct: 30.0, ..Control::default() });
+            let found_m = watched.look(&world, ALL).over_stop_m;
             let facts = world.moment_facts();
-            if found_m > 0.0 {
-                over.push((facts.ego_front_m - line_m, facts.ego_rear_m));
-                assert!((facts.ego_front_m - line_m - found_m).abs() < 1e-9 && facts.ego_rear_m < line_m);
-            }
-            assert!(found_m >= FAR_M && (found_m <= 0.0 || found_m > before_m || before_m <= 0.0));
-            before_m = found_m;
+            let expected_m = if facts.ego_rear_m >= line_m { FAR_M } else { facts.ego_front_m - line_m };
+            assert!((found_m - expected_m.max(FAR_M)).abs() < 1e-9, "{found_m} in place of {expected_m}");
+            straddled += u32::from(found_m > 0.0);
         }
-        assert_eq!(over.is_empty(), world.red_runs() == 0, "{} reds", world.red_runs());
+        assert!(straddled >= 5, "it drives over the line");
+    }
+
+    #[test]
+    fn a_red_light_is_remembered_until_the_rear_has_passed() {
+        let mut reds = 0;
+        for phase in 0..12 {
+            let start = Start { signal_phase_s: f64::from(phase) * 5.0, ..testing::start() };
+            let mut world = World::new(testing::crossing(), &start);
+            let mut watched = Watched::default();
+            let line_m = world.scene().route.stop_lines[0].station_m;
+            let mut before_m = f64::NEG_INFINITY;
+            let mut straddled = 0;
+            for _ in 0..1500 {
+                world.tick(&Control { throttle_pct: 30.0, ..Control::default() });
+                let found_m = watched.look(&world, ALL).over_red_m;
+                let facts = world.moment_facts();
+                if found_m > 0.0 {
+                    straddled += 1;
+                    assert!((facts.ego_front_m - line_m - found_m).abs() < 1e-9 && facts.ego_rear_m < line_m);
+                }
+                assert!(found_m >= FAR_M && (found_m <= 0.0 || found_m > before_m || before_m <= 0.0));
+                before_m = found_m;
+            }
+            assert_eq!(straddled >= 5, world.red_runs() == 1, "{straddled} ticks");
+            reds += world.red_runs();
+        }
+        assert!((2..=10).contains(&reds), "it passes red and green lights: {reds}");
     }
 }
