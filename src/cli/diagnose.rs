@@ -16,7 +16,7 @@ use avastra_lang::model::vocabulary::Word;
 use avastra_world::action::ActionTable;
 use avastra_world::sim::Contact;
 
-use super::arguments::DiagnoseArguments;
+use super::arguments::{CountedBy, DiagnoseArguments};
 use super::error::Failure;
 use super::load;
 use super::look;
@@ -41,27 +41,33 @@ pub fn diagnose(output: &Output, arguments: &DiagnoseArguments) -> Result<(), Fa
             output.tell(&format!("{}: {}", found.file.display(), sentence(&found.diagnosis)));
         }),
     }
-    let causes = causes(&found.done);
+    let [causes, cures] = [Explained::cause, Explained::cure].map(|of| counted(&found.done, of));
     if !found.is_single() {
-        output.say(&format!("\n{}, at fault:", plural(found.done.len(), "finding")));
-        causes.iter().for_each(|(cause, count)| output.say(&format!("{count:>6}  {cause}")));
+        let (head, counts) = match arguments.by {
+            CountedBy::Cause => ("at fault", &causes),
+            CountedBy::Cure => ("removed by", &cures),
+        };
+        output.say(&format!("\n{}, {head}:", plural(found.done.len(), "finding")));
+        counts.iter().for_each(|(of, count)| output.say(&format!("{count:>6}  {of}")));
     }
-    let causes = causes.iter().map(|(cause, count)| serde_json::json!({ "cause": cause, "count": count }));
+    let told = |name: &str, counts: &[(String, usize)]| -> Vec<serde_json::Value> {
+        counts.iter().map(|(of, count)| serde_json::json!({ name: of, "count": count })).collect()
+    };
     output.result(serde_json::json!({
-        "causes": causes.collect::<Vec<_>>(), "mechanisms": null, "placebo": null,
+        "causes": told("cause", &causes), "cures": told("cure", &cures), "mechanisms": null, "placebo": null,
         "scenarios": found.done.iter().map(Explained::in_json).collect::<Vec<_>>(),
         "failed": found.failed_in_json(),
     }));
     found.complete("explained")
 }
 
-/// How often each cause was found; the most frequent first.
-fn causes(found: &[Explained]) -> Vec<(String, usize)> {
-    let mut causes: BTreeMap<String, usize> = BTreeMap::new();
-    found.iter().for_each(|found| *causes.entry(found.cause()).or_default() += 1);
-    let mut causes: Vec<(String, usize)> = causes.into_iter().collect();
-    causes.sort_by_key(|(_, count)| core::cmp::Reverse(*count));
-    causes
+/// How often each cause, or each cure, was found; the most frequent first.
+fn counted(found: &[Explained], of: fn(&Explained) -> String) -> Vec<(String, usize)> {
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    found.iter().for_each(|found| *counts.entry(of(found)).or_default() += 1);
+    let mut counts: Vec<(String, usize)> = counts.into_iter().collect();
+    counts.sort_by_key(|(_, count)| core::cmp::Reverse(*count));
+    counts
 }
 
 /// All about one finding.
@@ -132,6 +138,19 @@ impl Explained {
         let names: Vec<&str> = self.diagnosis.cause.iter().map(|module| module.name()).collect();
         if names.is_empty() { "none".to_owned() } else { names.join(joint(self.diagnosis.verdict)) }
     }
+
+    /// The smallest change that removes the finding, told apart from chance: a weakness that is switched off, or else modules
+    /// that are as in the baseline or without errors.
+    fn cure(&self) -> String {
+        let change = match (self.diagnosis.weakness, self.diagnosis.verdict) {
+            (Some(weakness), _) => return format!("without `{weakness}`"),
+            (None, Verdict::Outside) => "as in the baseline",
+            (None, Verdict::Brittle) => return "none of one module".to_owned(),
+            (None, _) if self.diagnosis.cause.is_empty() => return "none".to_owned(),
+            (None, _) => "without errors",
+        };
+        format!("{} {change}", self.cause())
+    }
 }
 
 /// What stands between the names of several modules: two prevent the collision together, or they are not told apart.
@@ -173,7 +192,7 @@ fn mechanisms(output: &Output, arguments: &DiagnoseArguments, asked: &Asked) -> 
         })
     });
     output.result(serde_json::json!({
-        "causes": null, "mechanisms": shares, "placebo": placebo, "scenarios": scenarios.collect::<Vec<_>>(),
+        "causes": null, "cures": null, "mechanisms": shares, "placebo": placebo, "scenarios": scenarios.collect::<Vec<_>>(),
         "failed": found.failed_in_json(),
     }));
     found.complete("explained")

@@ -125,6 +125,12 @@ fn words(map: &RoadMap, route: Option<&Route>, warnings: &[String]) -> String {
         let groups = plural(junction.groups, "signal group");
         lines.push(format!("junction `{title}`: {groups}; {}", listed(&ways)));
     }
+    for (index, lane) in map.lanes.iter().enumerate() {
+        lines.extend(lane.sign_lines.iter().map(|line| {
+            let what = if line.kind == SignKind::Stop { "stop sign" } else { "yield sign" };
+            format!("{what} at {:.1} m of {}", line.station_m, name(map, LaneIndex(index)))
+        }));
+    }
     for signal in &map.signals {
         let (x, y) = (signal.position.x, signal.position.y);
         lines.push(format!(

@@ -410,7 +410,8 @@ fn refusals_text(refusals: &[RefusalCount]) -> String {
     cut_short(head, refusals, line, |more| format!("and for {more} other reasons"))
 }
 
-/// Distinct failures, each with how often it was found and a scenario that shows it, and how often that recurs.
+/// Distinct failures by pre-crash type, each with how often it was found and a scenario that shows it, how often that recurs,
+/// and what happened there.
 pub fn groups_text(groups: &[Group], found: &[FoundIn]) -> String {
     let line = |group: &Group| {
         let cause = match group.cause.as_deref() {
@@ -418,7 +419,6 @@ pub fn groups_text(groups: &[Group], found: &[FoundIn]) -> String {
             Some("") => ", no cause found".to_owned(),
             Some(modules) => format!(", {}", modules.replace(' ', " and ")),
         };
-        let shape = group.shape.as_ref().map_or(String::new(), |shape| format!(" ({shape})"));
         let priority = match group.priority.as_str() {
             "ego" => ", ego first",
             "other" => ", the other first",
@@ -426,12 +426,14 @@ pub fn groups_text(groups: &[Group], found: &[FoundIn]) -> String {
         };
         let example = found.iter().find(|of| of.episode == group.episode);
         let again = example.and_then(|of| of.recurrence).map_or(String::new(), |again| format!(", {again}"));
+        let number = group.precrash_number.map_or(String::new(), |number| format!("{number} "));
+        let Group { count, precrash, kind, manoeuvre, approach, side, shape, road, episode, .. } = group;
         format!(
-            "{} × {} ({}, {}{priority}), hit by the {}{shape}{cause}: {}_{:04}{again}",
-            group.count, group.kind, group.manoeuvre, group.approach, group.side, group.road, group.episode
+            "{count} × {number}{precrash}{cause}: {road}_{episode:04}{again}; {kind} ({manoeuvre}, {approach}{priority}), hit \
+             by the {side} ({shape})"
         )
     };
-    let head = format!("{}:", plural(groups.len(), "distinct failure"));
+    let head = format!("{} (NHTSA's pre-crash types):", plural(groups.len(), "distinct failure"));
     cut_short(head, groups, line, |more| format!("and {more} others"))
 }
 

@@ -116,7 +116,7 @@ run
   directory text the run directory
   totals object sums over all episodes: how they ended, collisions by kind
   refusals[] object a reason why actions were refused: `reason` and `times`
-  groups[] object a distinct failure: how it came about, `count`, an episode that shows it
+  groups[] object a distinct failure: its type among NHTSA's pre-crash types (`precrash`, `precrash_number`), the modules at fault, `count`, an episode that shows it, what happened there
   never.rows number rows of the table
   never.steps number steps of all episodes, in each of which every row is offered
   never.legal[] object a row that no step allowed; what `refused` it, and how often
@@ -226,6 +226,7 @@ replay
   FAILED
 diagnose
   causes[] object? `cause` (one or two modules, or none) and `count`
+  cures[] object? `cure` (the smallest change that removes a finding) and `count`
   mechanisms[] object? with `--mechanisms`: a weakness and what vanishes without it
   placebo object? with `--mechanisms`: what vanishes by other sensor noise alone
   scenarios[] object `file`, `scenario`; its `diagnosis`, or with `--mechanisms` `without` and `placebo`

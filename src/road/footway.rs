@@ -85,6 +85,15 @@ impl RoadMap {
         (length_m > 1e-6).then(|| longest / length_m)
     }
 
+    /// Distance from a point to one of the map's crosswalks, m: 0 on it.
+    pub fn crosswalk_gap_m(&self, crosswalk: usize, point: Vec2) -> f64 {
+        let outline = &self.crosswalks[crosswalk].outline;
+        if holds(outline, point) {
+            return 0.0;
+        }
+        edges(outline).map(|(a, b)| distance_m2(point, *a, *b)).fold(f64::INFINITY, f64::min).sqrt()
+    }
+
     /// Distance from a point to the nearest driving lane, m: negative on it, at most 3.
     pub fn lane_room_m(&self, point: Vec2) -> f64 {
         let ground = self.ground(point);

@@ -223,6 +223,19 @@ fn what_is_asked_of_each_road_user_near_is_asked_of_each_by_itself() {
             assert!((margin.asked_s - asked.len() as f64 * DT_S).abs() < 1e-9, "{name} in episode {number}");
             found[index] += expected.len();
         }
+        // Of some of them means: there is one of them.
+        let ticks_of = |name: &str| -> BTreeSet<u64> {
+            let ticks = |s: f64| (s / DT_S).round() as u64;
+            let is_of = |breach: &&Breach| space.requirements[breach.requirement].name == name;
+            let of = log.breaches.iter().filter(is_of);
+            of.flat_map(|one| ticks(one.time_s)..=ticks(one.until_s)).collect()
+        };
+        assert_eq!(ticks_of("nobody_near"), ticks_of("keeps_off"), "episode {number}");
+        let smallest = |name: &str| {
+            let is_of = |one: &&avastra::episode::Margin| space.requirements[one.requirement].name == name;
+            log.margins.iter().find(is_of).expect("it is in force").smallest
+        };
+        assert_eq!(smallest("nobody_near"), smallest("keeps_off"));
         assert_replays(&run, number, &log);
     }
     assert!(found.iter().all(|count| *count > 3), "{found:?}");

@@ -131,6 +131,7 @@ fn outline_side(point: Vec2, ego: &VehicleParameters) -> OutlineSide {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::episode::{PreCrash, Shape};
     use avastra_lang::model::BodyWord;
     use avastra_lang::model::vocabulary::{Body, Priority, Verb};
 
@@ -147,6 +148,8 @@ mod tests {
             priority: Priority::None,
         };
         Collision {
+            shape: Shape::Straight,
+            kind: PreCrash::Other,
             contact,
             step: 0,
             body: BodyWord::engine(Body::Sedan),

@@ -12,6 +12,8 @@ use avastra_world::action::Draw;
 use avastra_world::sim::{Contact, Incident, Start};
 
 use super::monitor::{Breach, Margin};
+use super::precrash::PreCrash;
+use super::shape::Shape;
 
 /// One episode, from start to end.
 #[derive(Debug, Clone, PartialEq)]
@@ -128,6 +130,9 @@ pub struct Collision {
     pub verb: Verb,
     /// When the obstacle appeared, s.
     pub spawned_s: f64,
+    /// The shape of the ego vehicle's way to it.
+    pub shape: Shape,
+    pub kind: PreCrash,
 }
 
 impl EpisodeLog {

@@ -7,15 +7,20 @@
 mod facts;
 mod log;
 mod monitor;
+mod precrash;
 mod recorder;
 mod run;
 mod script;
 mod setup;
+mod shape;
+mod trails;
 
 pub use facts::{at_fault, collision_facts, run_into_from_behind, side, struck};
 pub use log::{Collision, End, EpisodeLog, Held, Outcome, StepLog};
 pub use monitor::{Breach, Margin};
+pub use precrash::PreCrash;
 pub use recorder::{Actor, Lights, Phase, Recorder, Sample, Sky, Touch};
 pub use run::{Choice, Moment, Play, Watch, run, run_from};
 pub use script::{Script, ScriptedAction};
 pub use setup::Setup;
+pub use shape::Shape;

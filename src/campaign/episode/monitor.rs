@@ -4,8 +4,8 @@
 //! itself; its margin there is the largest one of these ticks. One unbroken stretch of such ticks is one breach. Nothing
 //! is asked where `when` does not hold, and what is asked only since less than D cannot be breached yet. A requirement `on`
 //! bodies is asked of each road user near, and all of this holds for each of them by itself. A requirement with `after` is
-//! breached D after that began to hold, if its condition failed at every tick from then on; its margin is the largest one
-//! of these ticks.
+//! breached D after that began to hold, if its condition failed at every tick from then on: a breach of that tick. Its margin
+//! is the largest one of these ticks.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use std::sync::Arc;
 use avastra_lang::model::expr::{Expr, ExprKind};
 use avastra_lang::model::vocabulary::Fact;
 use avastra_lang::model::{
-    Asked, BodyWord, Facts, FnDef, Kept, Memory, NpcFacts, ReadyRequirement, RequirementDef,
+    Asked, BodyWord, Facts, FnDef, Kept, Memory, NearFacts, NpcFacts, ReadyRequirement, RequirementDef,
     RequirementMemory, Sliding, SpawnFacts, WorldFacts,
 };
 use avastra_world::sim::{DT_S, MomentParts, Obstacle, Watched, WatchedParts, World};
@@ -63,6 +63,8 @@ pub(super) struct Monitor {
     tick: WatchedParts,
     /// The road users that requirements name, by index in `Space::bearers`.
     bearers: Vec<usize>,
+    /// The bodies of the road users near of which they ask; `None`: of nobody.
+    asks_of: Option<Vec<BodyWord>>,
     breaches: Vec<Breach>,
 }
 
@@ -153,6 +155,19 @@ impl Monitor {
             })
         });
         let facts: Vec<Fact> = facts.collect();
+        let some = all.iter().flat_map(|expr| {
+            expr.filter_map(|kind| match kind {
+                ExprKind::Some(bodies, _) => Some(bodies.clone()),
+                _ => None,
+            })
+        });
+        let on = watches.iter().map(|watch| watch.required.on.clone()).filter(|on| !on.is_empty());
+        let of: Vec<Vec<BodyWord>> = on.chain(some).collect();
+        // Who asks of any body asks of all of them.
+        let asks_of = (!of.is_empty()).then(|| match of.iter().any(Vec::is_empty) {
+            true => Vec::new(),
+            false => of.concat(),
+        });
         let moment = MomentParts::of(facts.iter().copied(), words);
         let tick = WatchedParts::of(facts);
         let monitor = Monitor {
@@ -162,6 +177,7 @@ impl Monitor {
             facts: WorldFacts::default(),
             watches,
             bearers,
+            asks_of,
             breaches: Vec::new(),
         };
         (!monitor.watches.is_empty()).then_some(monitor)
@@ -184,6 +200,10 @@ impl Monitor {
             let there = self.bearers.iter().filter_map(|who| Some((*who, world.bearer_facts(*who)?)));
             self.facts.bearers.extend(there);
         }
+        if let Some(bodies) = &self.asks_of {
+            self.facts.near.clear();
+            self.facts.near.extend(near(world, own_bodies, bodies));
+        }
         let facts =
             Facts { road: Some(&setup.road.facts), world: Some(&self.facts), ..Facts::new(&[], memory) };
         let functions = &setup.table.space().functions;
@@ -193,8 +213,7 @@ impl Monitor {
             let is_asked = if required.on.is_empty() {
                 watch.ego.ask(required, &facts, &moment, &mut self.breaches)
             } else {
-                let near = near(world, own_bodies, &required.on);
-                watch.ask_of_each(&near, &moment, &mut self.breaches)
+                watch.ask_of_each(world, &self.facts.near, &moment, &mut self.breaches)
             };
             watch.asked += u32::from(is_asked);
         }
@@ -211,6 +230,8 @@ impl Monitor {
         let margin = |watch: &Watch| {
             let all = watch.each.iter().chain([&watch.ego]);
             let smallest = all.map(|stretch| stretch.tally.smallest).fold(watch.smallest, smaller);
+            // Where nobody was near, `some` was as far as can be from holding, and `not some` from failing.
+            let smallest = smallest.filter(|smallest| smallest.is_finite());
             Margin { requirement: watch.required.index, smallest, asked_s: f64::from(watch.asked) * DT_S }
         };
         (self.breaches, self.watches.iter().map(margin).collect())
@@ -225,36 +246,57 @@ struct Judged<'a> {
     step: usize,
 }
 
-/// The road users near that have one of these bodies, with what may be asked of them.
-fn near(world: &World, own_bodies: &BTreeMap<u32, usize>, on: &[BodyWord]) -> Vec<(u32, NpcFacts)> {
-    let is_meant = |obstacle: &&Obstacle| {
+/// The road users near that have one of these bodies, or any if there are none, with what may be asked of them.
+fn near(
+    world: &World,
+    own_bodies: &BTreeMap<u32, usize>,
+    bodies: &[BodyWord],
+) -> impl Iterator<Item = NearFacts> {
+    let is_near = |obstacle: &&Obstacle| obstacle.distance_m <= NEAR_M && !obstacle.is_apart;
+    world.obstacles().filter(is_near).filter_map(move |obstacle| {
         let body = BodyWord { like: obstacle.body, own: own_bodies.get(&obstacle.id).copied() };
-        obstacle.distance_m <= NEAR_M && !obstacle.is_apart && on.iter().any(|named| body.is(*named))
-    };
-    let near = world.obstacles().filter(is_meant).map(|obstacle| obstacle.id);
-    near.filter_map(|id| Some((id, world.npc_facts(id)?))).collect()
+        let is_meant = bodies.is_empty() || bodies.iter().any(|named| body.is(*named));
+        is_meant
+            .then(|| Some(NearFacts { id: obstacle.id, body, npc: world.npc_facts(obstacle.id)? }))
+            .flatten()
+    })
 }
 
 impl Watch {
-    /// Judges a requirement about each of the road users that are near. Returns whether it is asked of any now.
-    fn ask_of_each(&mut self, near: &[(u32, NpcFacts)], moment: &Judged, breaches: &mut Vec<Breach>) -> bool {
+    /// Judges a requirement about each of the road users that are near, or that still have to do what it asks after
+    /// something. Returns whether it is asked of any now.
+    fn ask_of_each(
+        &mut self,
+        world: &World,
+        near: &[NearFacts],
+        moment: &Judged,
+        breaches: &mut Vec<Breach>,
+    ) -> bool {
+        let is_meant = |near: &&NearFacts| near.is_of(&self.required.on);
+        let mut asked: Vec<(u32, NpcFacts)> =
+            near.iter().filter(is_meant).map(|near| (near.id, near.npc)).collect();
         // Who is no longer near is asked nothing, and begins anew if it comes back.
         let smallest = &mut self.smallest;
         self.each.retain(|stretch| {
-            let stays = near.iter().any(|(id, _)| stretch.obstacle == Some(*id));
+            let id = stretch.obstacle.expect("each is about a road user");
+            let is_awaited = !stretch.tally.begun.is_empty();
+            let is_near = asked.iter().any(|(known, _)| *known == id);
+            let far = (!is_near && is_awaited).then(|| world.npc_facts(id)).flatten();
+            asked.extend(far.map(|npc| (id, npc)));
+            let stays = is_near || far.is_some();
             if !stays {
                 *smallest = smaller(*smallest, stretch.tally.smallest);
             }
             stays
         });
         let mut is_asked = false;
-        for (id, npc) in near {
-            let known = self.each.iter().position(|stretch| stretch.obstacle == Some(*id));
+        for (id, npc) in asked {
+            let known = self.each.iter().position(|stretch| stretch.obstacle == Some(id));
             let index = known.unwrap_or_else(|| {
-                self.each.push(Stretch { obstacle: Some(*id), ..Stretch::default() });
+                self.each.push(Stretch { obstacle: Some(id), ..Stretch::default() });
                 self.each.len() - 1
             });
-            let spawn = Some(SpawnFacts { npc: *npc, ..SpawnFacts::default() });
+            let spawn = Some(SpawnFacts { npc, ..SpawnFacts::default() });
             let facts = Facts { spawn, ..*moment.facts };
             is_asked |= self.each[index].ask(&self.required, &facts, moment, breaches);
         }
@@ -272,8 +314,7 @@ impl Stretch {
         moment: &Judged,
         breaches: &mut Vec<Breach>,
     ) -> bool {
-        let is_begun = !self.tally.begun.is_empty();
-        let is_awaited = is_begun || self.open.is_some();
+        let is_awaited = !self.tally.begun.is_empty();
         let Some(asked) = required.ready.at(&mut self.memory, is_awaited, moment.functions, facts) else {
             self.tally.pause();
             self.open = None;
@@ -285,9 +326,10 @@ impl Stretch {
                 (margin, self.tally.failed > required.within_ticks, true)
             }
             true => {
+                // What was not done in time is a breach of that moment.
+                self.open = None;
                 let (margin, is_breached) = self.tally.respond(asked, required.within_ticks);
-                let goes_on = self.open.is_some() && !asked.kept.holds;
-                (margin, is_breached || goes_on, is_begun || asked.begins)
+                (margin, is_breached, is_awaited || asked.begins)
             }
         };
         if !is_breached {
@@ -298,10 +340,11 @@ impl Stretch {
         match self.open.and_then(|open| breaches.get_mut(open)) {
             Some(breach) => {
                 breach.until_s = time_s;
-                breach.margin = smaller(breach.margin, margin);
+                breach.margin = smaller(breach.margin, margin.filter(|margin| margin.is_finite()));
             }
             None => {
                 self.open = Some(breaches.len());
+                let margin = margin.filter(|margin| margin.is_finite());
                 let (requirement, obstacle) = (required.index, self.obstacle);
                 breaches.push(Breach { requirement, time_s, until_s: time_s, margin, step, obstacle });
             }
@@ -457,23 +500,33 @@ mod tests {
     fn made_up(rng: &mut rng::Rng, depth: u32) -> MadeUp {
         // No margin is 0: whether a condition holds is known by its sign.
         let number = f64::from(below(rng, 80)) / 4.0 + 0.1234;
-        let side = |rng: &mut rng::Rng| -> (String, Box<dyn Fn(f64, f64) -> f64>) {
+        let side = |rng: &mut rng::Rng| -> (String, MarginAt, usize) {
             let part = f64::from(below(rng, 8)) / 4.0;
-            match below(rng, 4) {
-                0 => ("ego.speed".to_owned(), Box::new(|v, _| v)),
-                1 => ("ego.limit".to_owned(), Box::new(|_, w| w)),
-                2 => (format!("({part} * ego.speed)"), Box::new(move |v, _| part * v)),
-                _ => ("(ego.limit - ego.speed)".to_owned(), Box::new(|v, w| w - v)),
+            let ticks = below(rng, 6) as usize + 1;
+            match below(rng, 5) {
+                0 => ("ego.speed".to_owned(), Box::new(|all, t| all[t].0), 0),
+                1 => ("ego.limit".to_owned(), Box::new(|all, t| all[t].1), 0),
+                2 => (format!("({part} * ego.speed)"), Box::new(move |all, t| part * all[t].0), 0),
+                3 => ("-(ego.limit - ego.speed)".to_owned(), Box::new(|all, t| all[t].0 - all[t].1), 0),
+                _ => (
+                    format!("change(ego.speed, {} ms)", ticks * 20),
+                    Box::new(move |all, t| all[t].0 - all[t - ticks].0),
+                    ticks,
+                ),
             }
         };
-        let (text, side) = side(rng);
-        let of = move |trace: &Trace, tick: usize| side(trace[tick].0, trace[tick].1);
+        let (text, of, known) = side(rng);
         let kind = below(rng, if depth == 0 { 5 } else { 11 });
         let ticks = below(rng, 6) as usize + 1;
         let mut two = || (made_up(rng, depth.saturating_sub(1)), made_up(rng, depth.saturating_sub(1)));
         let (a, b) = if kind > 4 { two() } else { (never(), never()) };
-        let mut known_from = a.known_from.max(if (6..9).contains(&kind) { b.known_from } else { 0 });
-        let first = move |tick: usize| tick.saturating_sub(ticks);
+        let mut known_from = match kind {
+            0..=4 => known,
+            6..=8 => a.known_from.max(b.known_from),
+            _ => a.known_from,
+        };
+        let since = a.known_from;
+        let first = move |tick: usize| tick.saturating_sub(ticks).max(since);
         let (text, margin): (String, MarginAt) = match kind {
             0 => (format!("{text} < {number} m/s"), Box::new(move |all, t| number - of(all, t))),
             1 => (format!("{text} <= {number} m/s"), Box::new(move |all, t| number - of(all, t))),
@@ -503,7 +556,7 @@ mod tests {
                 }),
             ),
             _ => {
-                known_from = known_from.max(ticks);
+                known_from += ticks;
                 let text = format!("throughout({}, {} ms)", a.text, ticks * 20);
                 let least = move |all: &Trace, t: usize| {
                     (first(t)..=t).map(|at| (a.margin)(all, at)).fold(f64::INFINITY, f64::min)
@@ -564,7 +617,7 @@ mod tests {
             let holds =
                 |part: &Option<MadeUp>, tick: usize| part.as_ref().is_none_or(|part| part.holds(trace, tick));
             let mut asked = vec![false; trace.len()];
-            for tick in 0..trace.len() {
+            for tick in known_from..trace.len() {
                 asked[tick] = match &self.until {
                     None => holds(&self.when, tick),
                     Some(until) => {
@@ -576,7 +629,7 @@ mod tests {
             let largest = |from: usize, to: usize| {
                 (from..=to).map(|at| (self.condition.margin)(trace, at)).fold(f64::NEG_INFINITY, f64::max)
             };
-            let (mut smallest, mut was_breached) = (None, false);
+            let mut smallest = None;
             let answer = |tick: usize| {
                 let from = tick.checked_sub(self.within).filter(|from| *from >= known_from);
                 let margin = match &self.after {
@@ -585,13 +638,11 @@ mod tests {
                         .map(|from| largest(from, tick)),
                     Some(after) => from
                         .filter(|from| asked[*from] && after.holds(trace, *from))
-                        .filter(|from| *from == 0 || !after.holds(trace, from - 1))
+                        .filter(|from| *from == known_from || !after.holds(trace, from - 1))
                         .map(|from| largest(from, tick)),
                 };
                 smallest = smaller(smallest, margin);
-                let goes_on = self.after.is_some() && was_breached && !self.condition.holds(trace, tick);
-                was_breached = margin.is_some_and(|margin| margin < 0.0) || goes_on;
-                (smallest, was_breached)
+                (smallest, margin.is_some_and(|margin| margin < 0.0))
             };
             (0..trace.len()).map(answer).collect()
         }

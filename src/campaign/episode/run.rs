@@ -16,6 +16,7 @@ use super::log::{Collision, End, EpisodeLog, Held, Outcome, StepLog};
 use super::monitor::Monitor;
 use super::script::ScriptedAction;
 use super::setup::Setup;
+use super::trails::Trails;
 
 /// A step with less progress than this counts as stalled, m. The published package: 3 m in five steps.
 const PROGRESS_M_MIN: f64 = 1.0;
@@ -195,6 +196,7 @@ pub struct Play {
     own_bodies: BTreeMap<u32, usize>,
     collisions: Vec<Collision>,
     incidents: Vec<Incident>,
+    trails: Trails,
     /// `None` where nothing is required.
     monitor: Option<Monitor>,
     /// Seed of the draws of actions, and of the agent's choices.
@@ -216,6 +218,8 @@ impl Play {
         // The driving system looks once before the first step, so that the first observation can show its state.
         ads.drive(&sensed);
         world.sense(&mut sensed);
+        let mut trails = Trails::default();
+        trails.note(&world);
         Play {
             world,
             ads,
@@ -226,6 +230,7 @@ impl Play {
             own_bodies: BTreeMap::new(),
             collisions: Vec::new(),
             incidents: Vec::new(),
+            trails,
             monitor: Monitor::new(setup),
             seed: setup.seed,
             trace: Trace::default(),
@@ -418,6 +423,7 @@ impl Play {
             self.collisions.push(self.collision(contact));
         }
         self.incidents.extend_from_slice(self.world.incidents());
+        self.trails.note(&self.world);
         if let Some(monitor) = self.monitor.as_mut().filter(|_| self.collisions.is_empty()) {
             monitor.judge(setup, (&self.world, &self.own_bodies), &self.memory, self.steps.len());
         }
@@ -456,8 +462,15 @@ impl Play {
     fn collision(&self, contact: Contact) -> Collision {
         let obstacle =
             self.world.obstacle(contact.obstacle).expect("an obstacle stays for some time after it is hit");
+        let has_crashed = self
+            .incidents
+            .iter()
+            .any(|incident| [incident.obstacle, incident.other].contains(&contact.obstacle));
+        let (shape, kind) = self.trails.kind(&self.world, &contact, has_crashed);
         Collision {
             contact,
+            shape,
+            kind,
             step: self.steps.len(),
             body: BodyWord { like: obstacle.body, own: self.own_bodies.get(&contact.obstacle).copied() },
             mass_t: self.world.body(contact.obstacle).map_or(0.0, |body| body.mass_t),

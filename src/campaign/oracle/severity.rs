@@ -132,6 +132,7 @@ fn approach(velocity_mps: Vec2) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::episode::{PreCrash, Shape};
     use avastra_lang::model::BodyWord;
     use avastra_lang::model::body::parameters;
     use avastra_lang::model::vocabulary::{Body, Priority, Verb};
@@ -153,6 +154,8 @@ mod tests {
         for body in [Body::SchoolBus, Body::Hatchback, Body::Pedestrian] {
             let mass_t = parameters(body).mass_t;
             let collision = Collision {
+                shape: Shape::Straight,
+                kind: PreCrash::Other,
                 contact,
                 step: 0,
                 body: BodyWord::engine(body),

@@ -1,6 +1,6 @@
 //! Collisions made by hand, whose verdicts are known beforehand.
 
-use crate::episode::Collision;
+use crate::episode::{Collision, PreCrash, Shape};
 use avastra_base::geometry::{OrientedBox, Vec2};
 use avastra_drivers as ads;
 use avastra_drivers::{Ads, Status};
@@ -94,7 +94,8 @@ fn the_change_of_velocity_that_is_told_is_the_one_that_was_driven() {
         };
         let mass_t = world.body(contact.obstacle).expect("it is still there").mass_t;
         let body = BodyWord::engine(Body::Sedan);
-        let collision = Collision { contact, step: 0, body, mass_t, verb, spawned_s: 12.0 };
+        let (shape, kind) = (Shape::Straight, PreCrash::Other);
+        let collision = Collision { contact, shape, kind, step: 0, body, mass_t, verb, spawned_s: 12.0 };
         let told = severity(&collision);
         let driven_mps = contact.ego_speed_mps - world.ego().speed_mps;
         assert!(contact.closing_speed_mps > 1.0, "{contact:?}");

@@ -21,11 +21,10 @@ use avastra_world::action::Draw;
 use crate::run::offered::{RowCount, without_figures};
 use crate::run::sealed::{DatabaseError, Layout, insert_row, query_all};
 use crate::run::settled::{Units, WrittenScenario};
-use crate::run::shape::Shape;
 use crate::run::summary::{EpisodeSummary, Finding};
 
 pub(crate) const LAYOUT: Layout = Layout {
-    version: 13,
+    version: 14,
     schema: || format!("{SCHEMA}{}", step_table()),
     unit: "episode",
     tables: &[
@@ -87,7 +86,7 @@ CREATE TABLE collision (
   repeated INTEGER NOT NULL, sudden INTEGER NOT NULL, struck INTEGER NOT NULL, counted INTEGER NOT NULL,
   avoidability TEXT NOT NULL, hazard_onset_s REAL NOT NULL, avoided_by TEXT NOT NULL, evasion TEXT,
   side TEXT NOT NULL, approach TEXT NOT NULL, relative_speed_mps REAL NOT NULL, delta_v_mps REAL NOT NULL,
-  obstacle_delta_v_mps REAL NOT NULL, cause TEXT, shape TEXT, priority TEXT NOT NULL, r157_letter TEXT NOT NULL,
+  obstacle_delta_v_mps REAL NOT NULL, cause TEXT, shape TEXT NOT NULL, precrash TEXT NOT NULL, precrash_number INTEGER, priority TEXT NOT NULL, r157_letter TEXT NOT NULL,
   harm TEXT NOT NULL, harm_share REAL NOT NULL, recurred INTEGER, replays INTEGER,
   PRIMARY KEY (episode, number)
 ) STRICT;
@@ -693,7 +692,9 @@ fn add_collision(
         severity.delta_v_mps,
         severity.obstacle_delta_v_mps,
         finding.cause_in_words(),
-        finding.shape.map(Shape::name),
+        collision.shape.name(),
+        collision.kind.name(),
+        collision.kind.number(),
         facts.priority.name(),
         judgement.r157_letter.join(" "),
         severity.harm.name(),

@@ -1,11 +1,9 @@
-//! What is measured tick by tick while an episode is played: danger (criticality, post-encroachment time), how the
-//! ego vehicle kept to limit and lane, and the shape of its way to each collision.
+//! What is measured tick by tick while an episode is played: danger (criticality, post-encroachment time), and how the
+//! ego vehicle kept to limit and lane.
 
 use crate::episode::EpisodeLog;
 use avastra_search::mdp::{Criticality, Encroachment};
 use avastra_world::sim::{Contact, DT_S, Scene, World};
-
-use crate::run::shape::{Shape, Trail};
 
 /// Half the width of a lane marking of 12 cm, m: a wheel on the line has not left the lane. Ours.
 const ON_THE_LINE_M: f64 = 0.06;
@@ -28,8 +26,6 @@ pub struct Gauges {
     moments: Vec<(f64, Criticality)>,
     encroachment: Encroachment,
     hit: Vec<u32>,
-    trail: Trail,
-    shapes: Vec<Option<Shape>>,
     /// Ticks that count as [`Manners::speeding_s`] and [`Manners::astray_s`].
     speeding: u64,
     astray: u64,
@@ -38,8 +34,6 @@ pub struct Gauges {
 impl Gauges {
     /// Takes in a tick.
     pub fn note(&mut self, world: &World, contacts: &[Contact]) {
-        self.trail.note(world);
-        self.shapes.extend(contacts.iter().map(|_| self.trail.shape()));
         self.hit.extend(contacts.iter().map(|contact| contact.obstacle));
         let mut now = Criticality::default();
         now.note(world, &|id| self.hit.contains(&id));
@@ -81,10 +75,5 @@ impl Gauges {
             }
         }
         (steps, self.encroachment.least_s(&|id| self.hit.contains(&id)))
-    }
-
-    /// The shape of the ego vehicle's way to each collision.
-    pub fn shapes(&self) -> &[Option<Shape>] {
-        &self.shapes
     }
 }

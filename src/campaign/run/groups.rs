@@ -1,8 +1,7 @@
 //! Groups of similar failures: what a run found, by what happened and not by how often.
 //!
-//! Two counted collisions are alike if these are equal: kind of obstacle, its verb, how it moved, where the ego
-//! vehicle was hit, which of the two had priority, the shape of the ego vehicle's way (see `shape`) and the modules
-//! at fault. The last two are compared only if they were recorded.
+//! Two counted collisions are alike if they are of one pre-crash type (`episode::PreCrash`) and the same modules are at
+//! fault, if these were looked for. Angles, bodies and sides are details of the example.
 
 use std::collections::BTreeMap;
 
@@ -14,24 +13,26 @@ use crate::run::sealed::DatabaseError;
 /// Counted collisions that are alike.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Group {
-    /// `pedestrian`, `car` or `large vehicle`.
-    pub kind: String,
-    /// The obstacle's verb, for example `CrossRoad`.
-    pub manoeuvre: String,
-    /// How the obstacle moved, in the words of `oracle::Severity`.
-    pub approach: String,
-    /// Where the ego vehicle was hit.
-    pub side: String,
-    /// Which of the two had priority: `ego`, `other` or `none`.
-    pub priority: String,
-    /// The shape of the ego vehicle's way to the collision, if it was recorded: `straight`, `left turn` and so on.
-    pub shape: Option<String>,
+    /// The pre-crash type, and its number among NHTSA's 37; a wreck has none.
+    pub precrash: String,
+    pub precrash_number: Option<u32>,
     /// Modules at fault, if they were looked for; empty if none was found.
     pub cause: Option<String>,
     pub count: usize,
     /// The group's example: the episode with the shortest scenario, the first among equals.
     pub episode: i64,
     pub road: String,
+    /// Of the example: what was hit (`pedestrian`, `two-wheeler`, `car` or `large vehicle`), and its verb, for example
+    /// `CrossRoad`.
+    pub kind: String,
+    pub manoeuvre: String,
+    /// How the obstacle moved, in the words of `oracle::Severity`, and where the ego vehicle was hit.
+    pub approach: String,
+    pub side: String,
+    /// Which of the two had priority: `ego`, `other` or `none`.
+    pub priority: String,
+    /// The shape of the ego vehicle's way to the collision: `straight`, `left turn` and so on.
+    pub shape: String,
 }
 
 impl Database {
@@ -42,12 +43,14 @@ impl Database {
     pub fn groups(&self) -> Result<Vec<Group>, DatabaseError> {
         let mut statement = self.connection.prepare(
             "SELECT body, verb, approach, side, shape, cause, collision.episode, road, collision.step,
-                    priority
+                    priority, precrash, precrash_number
              FROM collision JOIN episode ON episode.episode = collision.episode
              WHERE collision.counted ORDER BY collision.episode, number",
         )?;
         let rows = statement.query_map([], |row| {
             let group = Group {
+                precrash: row.get(10)?,
+                precrash_number: row.get(11)?,
                 kind: kind(&row.get::<_, String>(0)?).to_owned(),
                 manoeuvre: row.get(1)?,
                 approach: row.get(2)?,
@@ -64,9 +67,7 @@ impl Database {
         let mut found: BTreeMap<_, (Group, i64)> = BTreeMap::new();
         for row in rows {
             let (group, step) = row?;
-            let Group { kind, manoeuvre, approach, side, priority, .. } = &group;
-            let key = [kind, manoeuvre, approach, side, priority].map(Clone::clone);
-            let key = (key, group.shape.clone(), group.cause.clone());
+            let key = (group.precrash_number, group.precrash.clone(), group.cause.clone());
             let (known, shortest) = found.entry(key).or_insert_with(|| (group.clone(), step));
             known.count += 1;
             if step < *shortest {

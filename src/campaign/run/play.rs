@@ -134,9 +134,6 @@ impl Run {
             summary.find_recurrence(&setup, &script, &log, self.settings.replays);
         }
         (summary.criticality, summary.pet_s) = gauges.of_steps(&log);
-        for (finding, shape) in summary.collisions.iter_mut().zip(gauges.shapes()) {
-            finding.shape = *shape;
-        }
         summary.manners = gauges.manners();
         summary.offered = offered;
         summary.branched_s = agent.branched_s();

@@ -9,7 +9,6 @@ use avastra_search::mdp::Criticality;
 
 use crate::run::gauges::Manners;
 use crate::run::offered::Offered;
-use crate::run::shape::Shape;
 
 /// An episode, judged.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -48,8 +47,6 @@ pub struct Finding {
     pub minimal: bool,
     /// What the author calls the obstacle, if it is a body of the author's own.
     pub own_body: Option<String>,
-    /// The shape of the ego vehicle's way to it, if the episode was measured.
-    pub shape: Option<Shape>,
 }
 
 impl Finding {
@@ -83,7 +80,6 @@ impl EpisodeSummary {
                 counted,
                 recurrence: None,
                 minimal: false,
-                shape: None,
             }
         };
         let collisions = judgements.into_iter().enumerate().map(find).collect();

@@ -48,8 +48,17 @@ pub struct DiagnoseArguments {
     /// alone makes vanish.
     #[arg(long)]
     pub mechanisms: bool,
+    /// What several findings are counted by: the modules at fault, or the smallest change that removes each.
+    #[arg(long, value_enum, value_name = "WHAT", default_value_t = CountedBy::Cause, conflicts_with = "mechanisms")]
+    pub by: CountedBy,
     #[command(flatten)]
     pub many: FilesArguments,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum CountedBy {
+    Cause,
+    Cure,
 }
 
 #[derive(Debug, Args)]

@@ -17,7 +17,7 @@ use avastra_campaign::episode::{
 use avastra_campaign::oracle;
 use avastra_campaign::oracle::{ClaimResult, Recurrence, ReferenceDrive, Regression};
 use avastra_campaign::run;
-use avastra_campaign::run::{Gauges, RunError, Shape, Stage, refusal_in_words};
+use avastra_campaign::run::{Gauges, RunError, Stage, refusal_in_words};
 use avastra_drivers::Selected;
 use avastra_lang::model::vocabulary::Word;
 use avastra_lang::model::{Claim, Obstacle, RequirementDef, Scenario};
@@ -178,8 +178,7 @@ fn played(
         .enumerate()
         .map(|(index, (judgement, drives))| {
             let ways: Vec<Value> = drives.iter().map(|drive| way(&mut columns, drive)).collect();
-            let shape = gauges.shapes().get(index).copied().flatten().map(Shape::name);
-            let told = (judgement, counted.contains(&index), shape);
+            let told = (judgement, counted.contains(&index));
             collision(table, scenario, (&log, index), told, ways)
         })
         .collect();
@@ -261,7 +260,7 @@ fn collision(
     table: &ActionTable,
     scenario: &Scenario,
     (log, index): (&EpisodeLog, usize),
-    (judgement, counted, shape): (&oracle::Judgement, bool, Option<&str>),
+    (judgement, counted): (&oracle::Judgement, bool),
     ways: Vec<Value>,
 ) -> Value {
     let found = &log.collisions[index];
@@ -281,7 +280,8 @@ fn collision(
     });
     json!({
         "at_s": contact.time_s, "obstacle": contact.obstacle, "body": table.space().body_name(found.body),
-        "kind": run::kind(found.body.like.name()), "shape": shape, "verb": found.verb.name(),
+        "kind": run::kind(found.body.like.name()), "shape": found.shape.name(), "precrash": found.kind.name(),
+        "precrash_number": found.kind.number(), "verb": found.verb.name(),
         "x_m": contact.point.x, "y_m": contact.point.y, "counted": counted, "class": judgement.class.name(),
         "onset_s": judgement.onset_s, "avoided_by": judgement.avoided_by, "letter": judgement.r157_letter,
         "evasion": judgement.evasion, "priority": contact.priority.name(), "side": severity.side, "approach": severity.approach,

@@ -10,7 +10,7 @@ use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind, Who};
 use crate::model::vocabulary::{
-    Fact, Known, PastWord, ROAD_LANES, SINCE, Site, THERE, Word, WordFact, parts_of, thing_of, things,
+    Fact, Known, PastWord, ROAD_LANES, SINCE, SOME, Site, THERE, Word, WordFact, parts_of, thing_of, things,
 };
 use crate::model::{EnumIndex, STATE_MAX, StateDef, Type, code};
 use crate::syntax::ast::{Span, UnaryOp};
@@ -536,6 +536,9 @@ impl Checker {
             && self.function_names.get(&call.name.text).is_none()
         {
             return self.past(word, call, place);
+        }
+        if call.name.text == SOME.0 && self.function_names.get(SOME.0).is_none() {
+            return self.some(call, place);
         }
         let symbol = Symbol::Function(call.name.text.clone());
         let named = call.args.iter().filter_map(|argument| argument.name.as_ref());

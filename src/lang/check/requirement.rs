@@ -7,7 +7,7 @@ use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::requirement::{margin_dimension, open_divisor, past_inside};
-use crate::model::vocabulary::{BREACHED, Body, EVENTS, PastWord, Site, Word, things};
+use crate::model::vocabulary::{BREACHED, Body, EVENTS, PastWord, SOME, Site, Word, things};
 use crate::model::{BodyWord, RequirementDef, RuleDef, TICK_MS, Type, code};
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
@@ -89,7 +89,12 @@ impl Checker {
             let help = "multiply the other side instead: `ego.lead_gap >= 0.8 s * ego.speed`";
             return self.reject(error.help(help));
         }
-        // Who asks `truck.there` wants an answer while it is not there.
+        // Who asks `truck.there` wants an answer while it is not there, too.
+        let asked_for = |who: usize| {
+            let asks =
+                |kind: &ExprKind| matches!(kind, ExprKind::IsThere(of) if of.bearers(0).contains(&who));
+            when.iter().chain(&until).chain(&after).chain([&condition]).any(|expr| expr.any(asks))
+        };
         let all = when.iter().chain(&until).chain(&after).chain([&condition]);
         let mut bearers: Vec<usize> = all
             .flat_map(|expr| {
@@ -99,6 +104,7 @@ impl Checker {
                 })
             })
             .flat_map(|who| who.bearers(0))
+            .filter(|who| !asked_for(*who))
             .collect();
         bearers.sort_unstable();
         bearers.dedup();
@@ -165,26 +171,72 @@ impl Checker {
         self.reject(error.help("join it by `and`, `or`, `not` and `implies` alone"))
     }
 
-    /// `recently(npc.gap <= 5 m, 2 s)`: whether a condition held at some moment of the last seconds, or at each of them.
+    /// `recently(npc.gap <= 5 m, 2 s)`: whether a condition held at some moment of the last seconds, or at each of them, or by
+    /// how much a number has changed.
     pub(super) fn past(&mut self, word: PastWord, call: &ast::Call, place: &Place<'_>) -> Option<Expr> {
         let name = word.name();
         self.references.note(call.name.span, Symbol::Engine(name, word.meaning()), false);
-        if !matches!(place.site, Site::Requirement | Site::RequirementOn) {
+        if !place.site.is_requirement() {
             let error = Diagnostic::error(code::NOT_HERE, format!("`{name}` cannot be asked here"));
             return self.reject(error.at(call.span, "only requirements remember what was"));
         }
-        let example = format!("write a condition and a time: `{name}(nearest.gap <= 5 m, 2 s)`");
+        let is_change = word == PastWord::Change;
+        let example = match is_change {
+            true => format!("write a number and a time: `{name}(ego.acceleration, 0.5 s)`"),
+            false => format!("write a condition and a time: `{name}(nearest.gap <= 5 m, 2 s)`"),
+        };
         let [ast::Arg { name: None, value: condition }, ast::Arg { name: None, value: time }] =
             call.args.as_slice()
         else {
-            let message = format!("`{name}` takes a condition and a time");
+            let message =
+                format!("`{name}` takes a {} and a time", if is_change { "number" } else { "condition" });
             let error = Diagnostic::error(code::ARGUMENTS, message).at(call.span, "");
             return self.reject(error.help(example));
         };
-        let condition = self.typed(condition, place, Type::Bool);
+        let of = match is_change {
+            true => self.numeric(condition, place),
+            false => self.typed(condition, place, Type::Bool),
+        };
         let ticks = self.ticks(time, &example);
-        let kind = ExprKind::Past(Box::new(condition?), word, ticks?);
-        Some(Expr { kind, ty: Type::Bool, span: call.span })
+        let of = of?;
+        let ty = of.ty;
+        Some(Expr { kind: ExprKind::Past(Box::new(of), word, ticks?), ty, span: call.span })
+    }
+
+    /// `some(Pedestrian, npc.gap <= 5 m)`, `some([Bicycle, Motorcycle], …)`, `some(npc.gap <= 5 m)`: whether a condition
+    /// holds of a road user near.
+    pub(super) fn some(&mut self, call: &ast::Call, place: &Place<'_>) -> Option<Expr> {
+        self.references.note(call.name.span, Symbol::Engine(SOME.0, SOME.1), false);
+        if !place.site.is_requirement() {
+            let error = Diagnostic::error(code::NOT_HERE, "`some` cannot be asked here");
+            return self.reject(error.at(call.span, "only requirements look at each road user near"));
+        }
+        let (bodies, condition) = match call.args.as_slice() {
+            [ast::Arg { name: None, value }] => (Vec::new(), value),
+            [ast::Arg { name: None, value: bodies }, ast::Arg { name: None, value }] => {
+                let named = match &bodies.kind {
+                    ast::ExprKind::List(items) => items.iter().collect(),
+                    _ => vec![bodies],
+                };
+                let body = |named: &ast::Expr| match &named.kind {
+                    ast::ExprKind::Name(name) => self.body_required(&ast::Name::new(name, named.span)),
+                    _ => {
+                        let error = Diagnostic::error(code::TYPE_MISMATCH, "`some` is about bodies");
+                        let error = error.at(named.span, "no name of one");
+                        self.reject(error.help("write `some(Pedestrian, npc.gap <= 5 m)`"))
+                    }
+                };
+                (named.into_iter().map(body).collect::<Option<Vec<BodyWord>>>()?, value)
+            }
+            _ => {
+                let message = "`some` takes bodies and a condition, or a condition alone";
+                let error = Diagnostic::error(code::ARGUMENTS, message).at(call.span, "");
+                return self.reject(error.help("write `some(Pedestrian, npc.gap <= 5 m)`"));
+            }
+        };
+        let place = Place { site: Site::RequirementOn, ..*place };
+        let condition = self.typed(condition, &place, Type::Bool)?;
+        Some(Expr { kind: ExprKind::Some(bodies, Box::new(condition)), ty: Type::Bool, span: call.span })
     }
 
     /// How many ticks a time lasts: a part of a tick is one more.

@@ -7,7 +7,7 @@ use crate::model::effort;
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind, Who};
 use crate::model::space::{BodyWord, COUNTED, FnDef, RoadFacts, Space, WordExpr};
 use crate::model::value::{Memory, Value};
-use crate::model::vocabulary::{Fact, LaneChoice, Light, Priority, RoadKind, Word, WordFact};
+use crate::model::vocabulary::{Fact, LaneChoice, Light, PastWord, Priority, RoadKind, Word, WordFact};
 
 /// Numbers that differ by at most this part of the larger one are equal, and their difference is 0, unless both are whole.
 /// This tolerates the digits that an author rounds away and those of binary fractions, but no measurable distance.
@@ -47,10 +47,27 @@ pub struct WorldFacts {
     pub road_users: Vec<(u32, NpcFacts)>,
     /// Those that are asked for by name and are there.
     pub bearers: Vec<(usize, NpcFacts)>,
+    /// Those near, if a requirement asks of them.
+    pub near: Vec<NearFacts>,
     /// What requirements alone may ask.
     pub tick: TickFacts,
     /// When each action last happened, s since the episode began; empty if nothing asks for that.
     pub happened_s: Vec<f64>,
+}
+
+/// A road user near the ego vehicle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NearFacts {
+    pub id: u32,
+    pub body: BodyWord,
+    pub npc: NpcFacts,
+}
+
+impl NearFacts {
+    /// Whether it has one of these bodies; any will do where there is none.
+    pub fn is_of(&self, bodies: &[BodyWord]) -> bool {
+        bodies.is_empty() || bodies.iter().any(|named| self.body.is(*named))
+    }
 }
 
 /// Stands for a road user ahead that is farther away, and for none at all, m.
@@ -67,6 +84,8 @@ pub struct TickFacts {
     pub lead_since_s: f64,
     pub over_red_m: f64,
     pub over_stop_m: f64,
+    pub over_line_m: f64,
+    pub lane_offset_m: f64,
     pub over_oncoming_m: f64,
     pub over_lane_m: f64,
     pub visibility_m: f64,
@@ -119,6 +138,8 @@ pub struct NpcFacts {
     pub limit_mps: f64,
     /// The next light on its way; none for who is on foot.
     pub light: Light,
+    /// Which of it and the ego vehicle goes first, since one of them came into the other's way.
+    pub priority: Priority,
     /// Stations of its ends on the ego vehicle's route.
     pub front_m: f64,
     pub rear_m: f64,
@@ -128,7 +149,19 @@ pub struct NpcFacts {
     pub ttc_s: f64,
     /// Way between the two, by the speed of the one behind, at most [`TIME_S_MAX`].
     pub headway_s: f64,
+    /// Its speed along that route, and to the left across it.
+    pub along_mps: f64,
+    pub across_mps: f64,
+    /// The room between the two across the route; below 0 they overlap.
+    pub aside_m: f64,
+    /// How far it reaches into the lane that the route has there; below 0 what is missing.
+    pub in_lane_m: f64,
+    /// From its middle to the nearest crosswalk, at most [`CROSSWALK_GAP_M_MAX`].
+    pub crosswalk_gap_m: f64,
 }
+
+/// Stands for a crosswalk that is farther away, and for none at all, m.
+pub const CROSSWALK_GAP_M_MAX: f64 = 100.0;
 
 /// Stands for a time that is longer, and for one that does not come at all, s.
 pub const TIME_S_MAX: f64 = 100.0;
@@ -203,7 +236,14 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
             ((world.moment.elapsed_s - last_s) * 1000.0).round().min(SINCE_S_MAX * 1000.0) / 1000.0
         })),
         // What was, only requirements remember.
+        ExprKind::Past(_, PastWord::Change, _) => Value::Number(0.0),
         ExprKind::Past(condition, ..) => evaluate(condition, functions, facts),
+        ExprKind::Some(bodies, condition) => {
+            let near = facts.world.map_or(&[][..], |world| &world.near);
+            let holds =
+                |near: &NearFacts| evaluate(condition, functions, &about(Some(near.npc), facts)).truth();
+            Value::Bool(near.iter().filter(|near| near.is_of(bodies)).any(holds))
+        }
         ExprKind::Breached(requirement) => Value::Bool(facts.outcome.breached >> requirement & 1 == 1),
         ExprKind::IsThere(who) => Value::Bool(bearer(who.bearer(facts.locals), facts).is_some()),
         ExprKind::Call(function, arguments) => {
@@ -261,7 +301,8 @@ fn bearer(who: usize, facts: &Facts<'_>) -> Option<NpcFacts> {
 }
 
 /// The facts, as of a newcomer that is this road user, which may be there.
-fn about<'a>(npc: Option<NpcFacts>, facts: &Facts<'a>) -> Facts<'a> {
+/// The same facts, about this road user.
+pub(crate) fn about<'a>(npc: Option<NpcFacts>, facts: &Facts<'a>) -> Facts<'a> {
     Facts { spawn: npc.map(|npc| SpawnFacts { npc, ..SpawnFacts::default() }), ..*facts }
 }
 
@@ -289,6 +330,8 @@ fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
         | Fact::EgoOverRed
         | Fact::EgoOverStop
         | Fact::EgoLateralAcceleration
+        | Fact::EgoOverLine
+        | Fact::EgoLaneOffset
         | Fact::EgoOverOncoming
         | Fact::EgoOverLane
         | Fact::EgoVisibility
@@ -304,6 +347,11 @@ fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
         Fact::NpcOffset => spawn(|spawn| spawn.npc.offset_m),
         Fact::NpcTtc => spawn(|spawn| spawn.npc.ttc_s),
         Fact::NpcHeadway => spawn(|spawn| spawn.npc.headway_s),
+        Fact::NpcAlong => spawn(|spawn| spawn.npc.along_mps),
+        Fact::NpcAcross => spawn(|spawn| spawn.npc.across_mps),
+        Fact::NpcAside => spawn(|spawn| spawn.npc.aside_m),
+        Fact::NpcInLane => spawn(|spawn| spawn.npc.in_lane_m),
+        Fact::NpcCrosswalkGap => spawn(|spawn| spawn.npc.crosswalk_gap_m),
         Fact::SpawnGap => spawn(|spawn| spawn.spawn_gap_m),
         Fact::SafetyGap => spawn(|spawn| spawn.safety_gap_m),
         Fact::Proc => Value::Number(facts.outcome.proc),
@@ -344,6 +392,8 @@ pub(crate) fn of_tick(fact: Fact) -> Option<fn(&TickFacts) -> f64> {
         Fact::EgoLeadSince => |tick| tick.lead_since_s,
         Fact::EgoOverRed => |tick| tick.over_red_m,
         Fact::EgoOverStop => |tick| tick.over_stop_m,
+        Fact::EgoOverLine => |tick| tick.over_line_m,
+        Fact::EgoLaneOffset => |tick| tick.lane_offset_m,
         Fact::EgoOverOncoming => |tick| tick.over_oncoming_m,
         Fact::EgoOverLane => |tick| tick.over_lane_m,
         Fact::EgoVisibility => |tick| tick.visibility_m,
@@ -359,6 +409,7 @@ pub(crate) fn word_of(fact: WordFact, facts: &Facts<'_>) -> Option<&'static str>
         WordFact::EgoLight => facts.world.map(|world| world.moment.ego_light.name()),
         WordFact::EgoRoad => facts.world.map(|world| world.moment.ego_road.name()),
         WordFact::NpcLight => facts.spawn.map(|spawn| spawn.npc.light.name()),
+        WordFact::NpcPriority => facts.spawn.map(|spawn| spawn.npc.priority.name()),
         WordFact::Priority => Some(facts.outcome.priority.name()),
         WordFact::Hit => facts.outcome.hit.map(|body| body.like.name()),
         WordFact::Near => facts.outcome.near.map(|body| body.like.name()),

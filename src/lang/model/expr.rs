@@ -65,8 +65,11 @@ pub enum ExprKind {
     /// `since(vehicles)`: the time since one of these actions last happened, and how they are called.
     Since(Vec<usize>, String),
     /// `recently(npc.gap <= 5 m, 2 s)`: whether it held at some tick of so many before, and at this one;
-    /// `throughout(…)`: whether it held at all of them.
+    /// `throughout(…)`: whether it held at all of them; `change(ego.speed, 1 s)`: by how much it is more than so many ticks ago.
     Past(Box<Expr>, PastWord, u32),
+    /// `some(Pedestrian, npc.gap <= 5 m)`: whether it holds of a road user near that has one of these bodies; of any, if there
+    /// is none.
+    Some(Vec<BodyWord>, Box<Expr>),
     /// `stops_at_red.breached`: whether a requirement was breached in the step.
     Breached(usize),
     /// A function by its index in `Space::functions`.
@@ -161,6 +164,7 @@ impl Expr {
             ExprKind::CellAt(_, inner)
             | ExprKind::Not(inner)
             | ExprKind::Past(inner, ..)
+            | ExprKind::Some(_, inner)
             | ExprKind::Negate(inner)
             | ExprKind::InLanes(inner, _) => visit(inner),
             ExprKind::Call(_, arguments) => arguments.iter().for_each(visit),

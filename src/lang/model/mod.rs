@@ -29,8 +29,8 @@ pub mod vocabulary;
 
 pub use digest::{digest, digest_text};
 pub use eval::{
-    Facts, JUNCTION_AHEAD_M_MAX, LEAD_GAP_M_MAX, MomentFacts, NpcFacts, OutcomeFacts, SINCE_S_MAX,
-    SpawnFacts, TIME_S_MAX, TickFacts, WorldFacts, evaluate,
+    CROSSWALK_GAP_M_MAX, Facts, JUNCTION_AHEAD_M_MAX, LEAD_GAP_M_MAX, MomentFacts, NearFacts, NpcFacts,
+    OutcomeFacts, SINCE_S_MAX, SpawnFacts, TIME_S_MAX, TickFacts, WorldFacts, evaluate,
 };
 pub use interval::{End, Interval};
 pub use limits::{

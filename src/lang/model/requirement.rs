@@ -4,12 +4,15 @@
 //! a comparison the difference of its sides, of `and` the smaller of two, of `or` the larger; of `recently` the largest of
 //! the last ticks, of `throughout` the smallest. Above 0 it implies that the condition holds, below 0 that it does not.
 
+use std::collections::VecDeque;
+
 use crate::model::eval::{
-    Facts, MomentFacts, TickFacts, arithmetic, compare_numbers, evaluate, of_moment, of_tick,
+    Facts, MomentFacts, NearFacts, TickFacts, about, arithmetic, compare_numbers, evaluate, of_moment,
+    of_tick,
 };
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::sliding::Sliding;
-use crate::model::space::{FnDef, RequirementDef};
+use crate::model::space::{BodyWord, FnDef, RequirementDef};
 use crate::model::value::Type;
 use crate::model::vocabulary::{Light, PastWord, Word, WordFact};
 use avastra_base::units::Dimension;
@@ -35,19 +38,21 @@ pub struct ReadyRequirement {
     pasts: Vec<PastNode>,
 }
 
-/// `recently(condition, …)` or `throughout(condition, …)`.
+/// `recently(condition, …)`, `throughout(condition, …)` or `change(number, …)`.
 #[derive(Debug, Clone)]
 struct PastNode {
-    condition: Node,
+    of: Node,
     has_margin: bool,
     word: PastWord,
     ticks: u32,
+    /// The first of those within it, which stand before it; its own index if there is none.
+    first: usize,
 }
 
 /// What a requirement remembers from tick to tick, about the ego vehicle or about one road user.
 #[derive(Debug, Clone, Default)]
 pub struct RequirementMemory {
-    /// For each `recently` and `throughout`.
+    /// For each `recently`, `throughout` and `change`.
     pasts: Vec<Past>,
     /// Whether `when` held at some tick since which `until` did not.
     is_latched: bool,
@@ -55,16 +60,21 @@ pub struct RequirementMemory {
     was: bool,
 }
 
-/// The last ticks of a condition.
+/// The last ticks of a condition, or of a number.
 #[derive(Debug, Clone, Default)]
 struct Past {
+    /// Whether enough is past to say something.
+    is_known: bool,
     /// Ticks up to now, and those since it last held, and since it last failed.
-    known: u32,
+    ticks: u32,
     since_true: Option<u32>,
     since_false: Option<u32>,
     extreme: Sliding,
-    /// What `recently` or `throughout` says now.
+    /// The numbers of these ticks.
+    numbers: VecDeque<f64>,
+    /// What is said of them now: of a condition, and of a number.
     now: Option<Kept>,
+    change: f64,
 }
 
 /// How a requirement is asked at a moment.
@@ -95,6 +105,8 @@ enum Node {
     IsLight(Vec<Light>),
     /// By index in `ReadyRequirement::pasts`.
     Past(usize),
+    /// Whether it holds of a road user near with one of these bodies.
+    Some(Vec<BodyWord>, Box<Node>),
     Other(Expr),
 }
 
@@ -147,13 +159,24 @@ impl ReadyRequirement {
             }
             return None;
         }
-        let mut is_known = true;
         if !self.pasts.is_empty() {
             memory.pasts.resize_with(self.pasts.len(), Past::default);
             for (index, node) in self.pasts.iter().enumerate() {
-                let kept =
-                    At { functions, facts, pasts: &memory.pasts }.kept_of(&node.condition, node.has_margin);
-                is_known &= memory.pasts[index].take(kept, node);
+                // What is said of the past begins once all within it is known.
+                if memory.pasts[node.first..index].iter().any(|past| !past.is_known) {
+                    continue;
+                }
+                let at = At { functions, facts, pasts: &memory.pasts };
+                if node.word == PastWord::Change {
+                    let number = at.number(&node.of);
+                    memory.pasts[index].take_number(number, node.ticks);
+                } else {
+                    let kept = at.kept_of(&node.of, node.has_margin);
+                    memory.pasts[index].take(kept, node);
+                }
+            }
+            if memory.pasts.iter().any(|past| !past.is_known) {
+                return None;
             }
         }
         let at = At { functions, facts, pasts: &memory.pasts };
@@ -163,8 +186,8 @@ impl ReadyRequirement {
             Some(until) => !at.holds(until) && (memory.is_latched || holds(&self.when)),
         };
         let is_now = self.after.as_ref().is_some_and(|after| at.holds(after));
-        let begins = is_now && !memory.was && is_asked && is_known;
-        let asks = if self.is_response() { begins || is_awaited } else { is_asked && is_known };
+        let begins = is_now && !memory.was && is_asked;
+        let asks = if self.is_response() { begins || is_awaited } else { is_asked };
         let asked = asks.then(|| Asked { kept: at.kept_of(&self.condition, self.has_margin), begins });
         (memory.is_latched, memory.was) = (is_asked, is_now);
         asked
@@ -172,24 +195,35 @@ impl ReadyRequirement {
 }
 
 impl Past {
-    /// Takes the answer of a tick. Returns whether enough is past to say something.
-    fn take(&mut self, kept: Kept, node: &PastNode) -> bool {
-        self.known = self.known.saturating_add(1);
+    /// Takes the answer of a tick.
+    fn take(&mut self, kept: Kept, node: &PastNode) {
+        self.ticks = self.ticks.saturating_add(1);
         let next = |since: Option<u32>| since.map(|ticks| ticks.saturating_add(1));
         self.since_true = if kept.holds { Some(0) } else { next(self.since_true) };
         self.since_false = if kept.holds { next(self.since_false) } else { Some(0) };
         let lately = |since: Option<u32>| since.is_some_and(|ticks| ticks <= node.ticks);
-        self.now = Some(match node.word {
-            PastWord::Recently => {
+        let is_some = node.word == PastWord::Recently;
+        self.now = Some(match is_some {
+            true => {
                 let margin = self.extreme.largest(kept.margin, node.ticks);
                 Kept { holds: lately(self.since_true), margin }
             }
-            PastWord::Throughout => {
+            false => {
                 let margin = -self.extreme.largest(-kept.margin, node.ticks);
                 Kept { holds: !lately(self.since_false), margin }
             }
         });
-        node.word == PastWord::Recently || self.known > node.ticks
+        self.is_known = is_some || self.ticks > node.ticks;
+    }
+
+    /// Takes the number of a tick.
+    fn take_number(&mut self, number: f64, ticks: u32) {
+        self.numbers.push_back(number);
+        if self.numbers.len() > ticks as usize {
+            let before = self.numbers.pop_front();
+            self.change = before.map_or(f64::NAN, |before| number - before);
+            self.is_known = true;
+        }
     }
 }
 
@@ -230,27 +264,40 @@ impl Node {
             ExprKind::Or(left, right) => Node::Or(Box::new(node(left)), Box::new(node(right))),
             ExprKind::Implies(left, right) => Node::Implies(Box::new(node(left)), Box::new(node(right))),
             ExprKind::Past(inner, word, ticks) => {
-                let condition = node(inner);
+                let first = pasts.len();
+                let of = Node::of(inner, pasts);
                 let has_margin = margin_dimension(inner).is_some();
-                pasts.push(PastNode { condition, has_margin, word: *word, ticks: *ticks });
+                pasts.push(PastNode { of, has_margin, word: *word, ticks: *ticks, first });
                 Node::Past(pasts.len() - 1)
             }
+            ExprKind::Negate(inner) => {
+                Node::Arithmetic(Arithmetic::Subtract, Box::new(Node::Number(0.0)), Box::new(node(inner)))
+            }
+            ExprKind::Some(bodies, condition) => Node::Some(bodies.clone(), Box::new(node(condition))),
             _ => Node::Other(expr.clone()),
         }
     }
 }
 
-/// Where a condition asks of the past in a way that is not followed: only `and`, `or`, `not`, `implies` and the past itself
-/// may stand around it.
-pub(crate) fn past_inside(condition: &Expr) -> Option<&Expr> {
-    match &condition.kind {
-        ExprKind::Not(inner) | ExprKind::Past(inner, ..) => past_inside(inner),
-        ExprKind::And(left, right) | ExprKind::Or(left, right) | ExprKind::Implies(left, right) => {
+/// Where an expression asks of the past in a way that is not followed: only `and`, `or`, `not`, `implies`, comparisons of
+/// numbers, arithmetic and the past itself may stand around it.
+pub(crate) fn past_inside(of: &Expr) -> Option<&Expr> {
+    let is_number = |expr: &Expr| matches!(expr.ty, Type::Int | Type::Quantity(_));
+    match &of.kind {
+        ExprKind::Not(inner) | ExprKind::Past(inner, ..) | ExprKind::Negate(inner) => past_inside(inner),
+        ExprKind::And(left, right)
+        | ExprKind::Or(left, right)
+        | ExprKind::Implies(left, right)
+        | ExprKind::Arithmetic(_, left, right) => past_inside(left).or_else(|| past_inside(right)),
+        ExprKind::Compare(_, left, right) if is_number(left) => {
             past_inside(left).or_else(|| past_inside(right))
+        }
+        ExprKind::InRange(value, low, high) if is_number(value) => {
+            [value, low, high].into_iter().find_map(|part| past_inside(part))
         }
         _ => {
             let mut found = None;
-            condition.walk_all(&mut |part| {
+            of.walk_all(&mut |part| {
                 if matches!(part.kind, ExprKind::Past(..)) {
                     found.get_or_insert(part);
                 }
@@ -268,13 +315,14 @@ struct At<'a> {
     pasts: &'a [Past],
 }
 
-impl At<'_> {
+impl<'a> At<'a> {
     fn number(self, node: &Node) -> f64 {
         match node {
             Node::Number(number) => *number,
             Node::Fact(of) => self.fact(*of),
             Node::Arithmetic(op, left, right) => arithmetic(*op, self.number(left), self.number(right)),
             Node::Other(expr) => evaluate(expr, self.functions, self.facts).number(),
+            Node::Past(index) => self.pasts.get(*index).map_or(f64::NAN, |past| past.change),
             Node::Bound(..)
             | Node::Compare(..)
             | Node::InRange(..)
@@ -282,7 +330,7 @@ impl At<'_> {
             | Node::And(..)
             | Node::Or(..)
             | Node::Implies(..)
-            | Node::Past(_)
+            | Node::Some(..)
             | Node::IsLight(_) => f64::NAN,
         }
     }
@@ -311,9 +359,19 @@ impl At<'_> {
                 self.facts.world.is_some_and(|world| lights.contains(&world.moment.ego_light))
             }
             Node::Past(index) => self.past(*index).holds,
+            Node::Some(bodies, condition) => {
+                self.each_near(bodies).any(|facts| At { facts: &facts, ..self }.holds(condition))
+            }
             Node::Other(expr) => evaluate(expr, self.functions, self.facts).truth(),
             Node::Number(_) | Node::Fact(_) | Node::Arithmetic(..) => false,
         }
+    }
+
+    /// The facts about each road user near with one of these bodies.
+    fn each_near<'b>(self, bodies: &'b [BodyWord]) -> impl Iterator<Item = Facts<'a>> + use<'a, 'b> {
+        let facts = self.facts;
+        let near: &'a [NearFacts] = facts.world.map_or(&[][..], |world| &world.near);
+        near.iter().filter(move |near| near.is_of(bodies)).map(move |near| about(Some(near.npc), facts))
     }
 
     /// What was said of the past at this tick. Those within others are known before them.
@@ -361,6 +419,14 @@ impl At<'_> {
                 Kept { holds: !left.holds || right.holds, margin: (-left.margin).max(right.margin) }
             }
             Node::Past(index) => self.past(*index),
+            // Where nobody is near it is as far as can be from holding.
+            Node::Some(bodies, condition) => {
+                let nobody = Kept { holds: false, margin: f64::NEG_INFINITY };
+                self.each_near(bodies).fold(nobody, |some, facts| {
+                    let one = At { facts: &facts, ..self }.kept(condition);
+                    Kept { holds: some.holds || one.holds, margin: some.margin.max(one.margin) }
+                })
+            }
             Node::Number(_) | Node::Fact(_) | Node::Arithmetic(..) | Node::IsLight(_) | Node::Other(_) => {
                 Kept { holds: self.holds(node), margin: f64::NAN }
             }
@@ -384,7 +450,9 @@ pub(crate) fn margin_dimension(condition: &Expr) -> Option<Dimension> {
             Type::Quantity(dimension) => Some(dimension),
             Type::Bool | Type::Enum(_) => None,
         },
-        ExprKind::Not(inner) | ExprKind::Past(inner, ..) => margin_dimension(inner),
+        ExprKind::Not(inner) | ExprKind::Past(inner, ..) | ExprKind::Some(_, inner) => {
+            margin_dimension(inner)
+        }
         ExprKind::And(left, right) | ExprKind::Or(left, right) | ExprKind::Implies(left, right) => {
             margin_dimension(left).filter(|dimension| margin_dimension(right) == Some(*dimension))
         }

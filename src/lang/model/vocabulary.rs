@@ -254,6 +254,11 @@ facts! {
     NpcOffset "npc.offset" LENGTH, Spawn = "A `Length`: how far its middle is to the left of the ego vehicle's route.";
     NpcTtc "npc.ttc" DURATION, Spawn = "A `Duration`: until it and the ego vehicle are beside each other at their present speeds; 0 if they are, 100 s if they do not get there sooner.";
     NpcHeadway "npc.headway" DURATION, Spawn = "A `Duration`: until whichever of it and the ego vehicle is behind, at its present speed, is where the other one is now; 100 s if not sooner.";
+    NpcAlong "npc.along" SPEED, Spawn = "A `Speed`: along the ego vehicle's route, below 0 of one that comes towards it.";
+    NpcAcross "npc.across" SPEED, Spawn = "A `Speed`: to the left across the ego vehicle's route, below 0 to the right.";
+    NpcAside "npc.aside" LENGTH, Spawn = "A `Length`: the room between its outline and the ego vehicle's, across the route; below 0 they overlap.";
+    NpcInLane "npc.in_lane" LENGTH, Spawn = "A `Length`: how far its outline reaches into the lane that the ego vehicle's route has beside it; below 0 what is missing.";
+    NpcCrosswalkGap "npc.crosswalk_gap" LENGTH, Spawn = "A `Length`: from its middle to the nearest crosswalk; 0 on one, 100 m if there is none nearer.";
     SpawnGap "spawn_gap" LENGTH, Spawn = "A `Length`: the gap from the ego vehicle to the road user that appears.";
     SafetyGap "safety_gap" LENGTH, Spawn = "A `Length`: the gap that a careful driver needs.";
     EgoLeadGap "ego.lead_gap" LENGTH, Tick = "A `Length`: to the next road user ahead in its way that does not come towards it; 1000 m if there is none nearer.";
@@ -261,6 +266,8 @@ facts! {
     EgoLeadSince "ego.lead_since" DURATION, Tick = "A `Duration`: since when it has been that one; 0 if there is none.";
     EgoOverRed "ego.over_red" LENGTH, Tick = "A `Length`: how far its front is beyond the stop line of a light that was red as it passed, until its rear has passed, too; else minus the way to a red light; at least -100 m.";
     EgoOverStop "ego.over_stop" LENGTH, Tick = "A `Length`: how far its front is beyond the line of a stop sign, until its rear has passed, too; else minus the way to the next one; at least -100 m.";
+    EgoOverLine "ego.over_line" LENGTH, Tick = "A `Length`: how far its front is beyond the stop line of a traffic light, whatever its colour, until its rear has passed, too; else minus the way to the next one; at least -100 m.";
+    EgoLaneOffset "ego.lane_offset" LENGTH, Tick = "A `Length`: how far its rear axle is to the left of the middle of its route's lane.";
     EgoOverOncoming "ego.over_oncoming" LENGTH, Tick = "A `Length`: how far its outline reaches into a lane of the other direction; below 0 the room that is left; -100 m in junctions and where there is no such lane.";
     EgoOverLane "ego.over_lane" LENGTH, Tick = "A `Length`: how far its outline reaches beyond the lines of its route's lane (of both lanes where the route may change lanes); below 0 the room that is left; -100 m in junctions.";
     EgoVisibility "ego.visibility" LENGTH, Tick = "A `Length`: how far the fog lets one see; 10 km in clear air.";
@@ -316,12 +323,20 @@ words! {
     PastWord "What a requirement may ask of the last seconds: spelt like a function of a condition and a time.":
     Recently "recently" = "Whether a condition held at some moment of the last seconds: `recently(npc.gap <= 5 m, 2 s)`.",
     Throughout "throughout" = "Whether a condition held at every moment of the last seconds: `throughout(ego.speed <= 0.1 m/s, 3 s)`.",
+    Change "change" = "By how much a number is more than so many seconds ago: `change(ego.acceleration, 0.5 s) <= 1 m/s^2`.",
 }
+
+/// `some(Pedestrian, npc.gap <= 5 m)`: spelt like a function, of bodies and a condition.
+pub const SOME: (&str, &str) = (
+    "some",
+    "Whether a condition holds of a road user near, with one of these bodies if they are named: `some(Pedestrian, npc.gap <= 5 m)`.",
+);
 
 word_facts! {
     EgoLight "ego.light" Light, World = "The next traffic light within 100 m: `ego.light == Red`, `ego.light in [Yellow, Red]`.";
     EgoRoad "ego.road" RoadKind, World = "Where the ego vehicle drives: `ego.road == InJunction`.";
     NpcLight "npc.light" Light, Spawn = "The next traffic light within 100 m on the way of a vehicle: `npc.light == Red`, `van.light == Green`.";
+    NpcPriority "npc.priority" Priority, Spawn = "Which of it and the ego vehicle goes first, once one of them has come into the other's way: `npc.priority == other` is that it does.";
     Priority "priority" Priority, Step = "Whether the ego vehicle or the road user that was hit had to give way: `priority == ego`, `priority in [other, none]`.";
     Hit "hit" Body, Step = "What was hit: `hit == Pedestrian`; nothing if there was no collision.";
     Near "near" Body, Step = "The road user with the greatest collision probability of the step: `near == Pedestrian`.";

@@ -5,10 +5,10 @@
 
 use crate::model::effort;
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
-use crate::model::vocabulary::Fact;
+use crate::model::vocabulary::{Fact, PastWord};
 use crate::model::{
-    AMBIENT_MAX, COMMANDED_MAX, EGO_ACCELERATION_MPS2_MAX, FnDef, Interval, JUNCTION_AHEAD_M_MAX,
-    LEAD_GAP_M_MAX, RoadFacts, SINCE_S_MAX, SPEED_MPS_MAX, TIME_S_MAX, Type, Value,
+    AMBIENT_MAX, COMMANDED_MAX, CROSSWALK_GAP_M_MAX, EGO_ACCELERATION_MPS2_MAX, FnDef, Interval,
+    JUNCTION_AHEAD_M_MAX, LEAD_GAP_M_MAX, RoadFacts, SINCE_S_MAX, SPEED_MPS_MAX, TIME_S_MAX, Type, Value,
 };
 use crate::prove::moment::Case;
 use crate::prove::sums::{difference, is_same, lacks_value, may_lack_a_value};
@@ -171,6 +171,14 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
         ExprKind::OfBearer(..) => Values::Number(Interval::ALL),
         ExprKind::IsThere(_) | ExprKind::Breached(_) => Values::UNKNOWN_TRUTH,
         // What is known of this moment says nothing of those before it.
+        ExprKind::Past(_, PastWord::Change, _) => Values::Number(Interval::ALL),
+        // Of whom it is asked, is not known; there may be nobody.
+        ExprKind::Some(_, condition) => {
+            match enclose(condition, &Known { case: None, ..*known }).may_hold() {
+                true => Values::UNKNOWN_TRUTH,
+                false => Values::truth(false),
+            }
+        }
         ExprKind::Past(condition, ..) => enclose(condition, &Known { case: None, ..*known }),
         ExprKind::Since(..) => Values::Number(between(0.0, SINCE_S_MAX)),
         ExprKind::Call(function, arguments) => {
@@ -276,10 +284,17 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
         | Fact::EgoOverRed
         | Fact::EgoOverStop
         | Fact::EgoLateralAcceleration
+        | Fact::EgoLaneOffset
+        | Fact::EgoOverLine
+        | Fact::NpcAlong
+        | Fact::NpcAcross
+        | Fact::NpcAside
+        | Fact::NpcInLane
         | Fact::EgoOverOncoming
         | Fact::EgoOverLane
         | Fact::EgoVisibility
         | Fact::EgoJerk => Interval::ALL,
+        Fact::NpcCrosswalkGap => between(0.0, CROSSWALK_GAP_M_MAX),
         Fact::EgoLeadGap => between(0.0, LEAD_GAP_M_MAX),
         Fact::RoadUsers | Fact::RuleBreakers => between(0.0, f64::from(COMMANDED_MAX + AMBIENT_MAX)),
         Fact::RoadLimit

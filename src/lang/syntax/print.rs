@@ -491,14 +491,21 @@ impl Printer<'_> {
         if !item.on.is_empty() {
             self.words(&format!(" on {}", names(&item.on, ", ")));
         }
-        for (word, part) in [("when", &item.when), ("until", &item.until), ("after", &item.after)] {
-            if let Some(part) = part {
-                self.words(&format!(" {word} "));
-                self.put(&expression(part));
-            }
+        let clauses = [("when", &item.when), ("until", &item.until), ("after", &item.after)];
+        let clauses = clauses.into_iter().filter_map(|(word, part)| {
+            let part = expression(part.as_ref()?);
+            Some(Layout::row([Layout::Line(" "), Layout::text(format!("{word} ")), part]))
+        });
+        let mut parts: Vec<Layout> = clauses.collect();
+        if parts.is_empty() || matches!(item.condition.kind, ExprKind::Match { .. }) {
+            self.put(&Layout::group([Layout::nest(parts)]));
+            self.words(":");
+            self.value(&item.condition);
+        } else {
+            // What does not fit on one line has a line for each of them, and for the condition.
+            parts.extend([Layout::text(":"), Layout::Line(" "), expression(&item.condition)]);
+            self.put(&Layout::group([Layout::nest(parts)]));
         }
-        self.words(":");
-        self.value(&item.condition);
         if let Some(within) = &item.within {
             self.words(" within ");
             self.put(&expression(within));

@@ -1,7 +1,7 @@
 //! What can be asked about a moment: the facts of the ego vehicle and its surroundings, and those of another road
 //! user. Rules, policies and the paper's state variables read the same ones.
 
-use avastra_lang::model::vocabulary::{Fact, Light, WordFact};
+use avastra_lang::model::vocabulary::{Fact, Light, Priority, WordFact};
 use avastra_lang::model::{
     JUNCTION_AHEAD_M_MAX, LIGHT_AHEAD_M, MomentFacts, NpcFacts, OnRoute, TIME_S_MAX, junction_ahead_m,
 };
@@ -214,7 +214,7 @@ fn facts(
     light: Light,
 ) -> NpcFacts {
     let (station_m, offset_m, along) = around.beside_route(obstacle.outline.pose.position);
-    let (half_length_m, _) = obstacle.outline.half_extent_m(obstacle.forward, along);
+    let (half_length_m, half_width_m) = obstacle.outline.half_extent_m(obstacle.forward, along);
     let (front_m, rear_m) = (station_m + half_length_m, station_m - half_length_m);
     let ego = VehicleParameters::MKZ;
     let (ego_front_m, ego_rear_m) = (ego.front_m(around.ego_station_m), ego.rear_m(around.ego_station_m));
@@ -229,12 +229,19 @@ fn facts(
         false if speed_mps > 0.0 => (between_m / speed_mps).min(TIME_S_MAX),
         false => TIME_S_MAX,
     };
+    let (_, ego_half_width_m) = around.ego_outline.half_extent_m(around.ego_forward, along);
     NpcFacts {
+        along_mps: other_mps,
+        across_mps: along.perp(&obstacle.velocity_mps),
+        aside_m: (offset_m - around.ego_offset_m).abs() - half_width_m - ego_half_width_m,
+        in_lane_m: around.scene.half_width_m(station_m) + half_width_m - offset_m.abs(),
+        crosswalk_gap_m: around.scene.crosswalk_gap_m(obstacle.outline.pose.position),
         speed_mps: obstacle.velocity_mps.norm(),
         gap_m: obstacle.distance_m,
         junction_ahead_m,
         limit_mps,
         light,
+        priority: Priority::None,
         front_m,
         rear_m,
         offset_m,
@@ -250,6 +257,7 @@ mod tests {
 
     use crate::action::{ActionTable, Draw, Situation};
     use crate::sim::{Control, DT_S, Scene, World, testing};
+    use avastra_base::geometry::Vec2;
     use avastra_lang::check::{ReadError, load};
     use avastra_lang::model::vocabulary::{Light, RoadKind, Verb};
     use avastra_lang::model::{NpcFacts, Row, RulesInForce};
@@ -300,6 +308,44 @@ mod tests {
         let ahead_m = ego_m - facts.npc.junction_ahead_m;
         assert!((40.0..50.0).contains(&ahead_m), "{ahead_m}");
         assert_eq!(facts.npc.speed_mps, 8.0);
+    }
+
+    #[test]
+    fn where_others_are_and_go_is_told_along_and_across_the_route() {
+        use crate::action::Effect;
+        let mut world = testing::world(&testing::straight());
+        // One ahead in the lane, one that comes towards the ego vehicle, and one on foot who crosses from the right.
+        for (verb, distance_m, speed_mps) in
+            [(Verb::DriveAhead, 30.0, 8.0), (Verb::DriveOpposite, 80.0, 6.0), (Verb::Walk, 40.0, 1.5)]
+        {
+            world
+                .apply(&Effect::Spawn(testing::request(verb, distance_m, speed_mps)))
+                .expect("there is room");
+        }
+        for _ in 0..400 {
+            world.tick(&Control { brake_pct: 100.0, ..Control::default() });
+            let ego_half_m = world.ego_outline().half_width_m;
+            for id in 1..=3 {
+                let (Some(npc), Some(obstacle)) = (world.npc_facts(id), world.obstacle(id)) else { continue };
+                // The route leads along +x, at y = -1.75 m; its lane is 3.5 m wide.
+                let velocity = obstacle.velocity_mps;
+                assert!(
+                    (npc.along_mps - velocity.x).abs() < 1e-9 && (npc.across_mps - velocity.y).abs() < 1e-9
+                );
+                let left_m = obstacle.outline.pose.position.y + 1.75;
+                let (_, half_m) = obstacle.outline.half_extent_m(obstacle.forward, Vec2::x());
+                assert!((npc.in_lane_m - (1.75 + half_m - left_m.abs())).abs() < 1e-6, "{npc:?}");
+                let aside_m = (left_m - world.ego_offset_m()).abs() - half_m - ego_half_m;
+                assert!((npc.aside_m - aside_m).abs() < 1e-6, "{npc:?} {aside_m}");
+                assert_eq!(npc.crosswalk_gap_m, 100.0);
+            }
+        }
+        let [ahead, oncoming] = [1, 2].map(|id| world.npc_facts(id).expect("it is there"));
+        assert!(ahead.along_mps > 1.0 && ahead.in_lane_m > 0.0 && ahead.aside_m < 0.0, "{ahead:?}");
+        assert!(
+            oncoming.along_mps < -1.0 && oncoming.in_lane_m < 0.0 && oncoming.aside_m > 0.0,
+            "{oncoming:?}"
+        );
     }
 
     /// A lane change that an action commands begins only while the rules `during change` hold; without them others

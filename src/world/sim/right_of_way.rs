@@ -251,6 +251,12 @@ impl Rights {
         }
     }
 
+    /// Who goes first, as long as what was found about the two holds.
+    pub fn now(&self, tick: u64) -> Priority {
+        let holds = |meeting: &Meeting| (tick - meeting.tick) as f64 * DT_S <= HOLDS_S;
+        self.wreck.or(self.meeting.filter(holds).map(|meeting| meeting.priority)).unwrap_or(Priority::None)
+    }
+
     /// Who had priority, now that the road user, which has crashed, and the ego vehicle touch.
     pub fn at_contact_with_wreck(&self, this: &Obstacle) -> Priority {
         // The ego vehicle came to where it stood, or it slid to where the ego vehicle drove.

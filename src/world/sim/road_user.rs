@@ -447,9 +447,14 @@ impl Mover {
         matches!(&self.motion, Motion::Drive(driver) if driver.has_siren)
     }
 
+    /// Whether it drives, and ignores a rule of the road.
+    pub fn ignores(&self, rule: TrafficRule) -> bool {
+        matches!(&self.motion, Motion::Drive(driver) if driver.ignores.contains(rule))
+    }
+
     /// Whether it drives without lights.
     pub fn is_unlit(&self) -> bool {
-        matches!(&self.motion, Motion::Drive(driver) if driver.ignores.contains(TrafficRule::Headlights))
+        self.ignores(TrafficRule::Headlights)
     }
 
     /// Whether it has crashed into another obstacle, or another into it.

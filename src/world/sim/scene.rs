@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use avastra_base::geometry::Vec2;
-use avastra_lang::model::Road;
+use avastra_lang::model::{CROSSWALK_GAP_M_MAX, Road};
 use avastra_road::{FootWay, LaneIndex, RoadMap, Route};
 
 use super::junction::ConflictAreas;
@@ -50,6 +50,8 @@ pub struct Scene {
     /// ask for them.
     way_points: OnceLock<Vec<Vec2>>,
     oncoming: OnceLock<Vec<Option<OncomingEdge>>>,
+    /// A circle around each crosswalk of the map: its middle and its radius, m.
+    crosswalk_circles: Vec<(Vec2, f64)>,
 }
 
 impl Scene {
@@ -68,7 +70,13 @@ impl Scene {
         let is_motorway = route.lanes.iter().all(|part| map.lane(part.lane).is_motorway);
         let areas = ConflictAreas::new(&map);
         let route_areas = route_areas(&areas, &route);
+        let circle = |outline: &[Vec2]| {
+            let middle = outline.iter().sum::<Vec2>() / outline.len().max(1) as f64;
+            (middle, outline.iter().map(|corner| (corner - middle).norm()).fold(0.0, f64::max))
+        };
+        let crosswalk_circles = map.crosswalks.iter().map(|crosswalk| circle(&crosswalk.outline)).collect();
         Scene {
+            crosswalk_circles,
             areas,
             route_areas,
             ways: Ways::default(),
@@ -88,6 +96,17 @@ impl Scene {
     pub fn half_width_m(&self, station_m: f64) -> f64 {
         let here = self.route.lane_at(station_m);
         self.map.lane(here.lane).width_at(station_m - here.from_m) / 2.0
+    }
+
+    /// Distance from a point to the nearest crosswalk, m: 0 on one, at most [`CROSSWALK_GAP_M_MAX`].
+    pub(super) fn crosswalk_gap_m(&self, point: Vec2) -> f64 {
+        self.crosswalk_circles.iter().enumerate().fold(CROSSWALK_GAP_M_MAX, |least_m, (crosswalk, circle)| {
+            let (middle, radius_m) = circle;
+            match (point - middle).norm() - radius_m < least_m {
+                true => least_m.min(self.map.crosswalk_gap_m(crosswalk, point)),
+                false => least_m,
+            }
+        })
     }
 
     /// Points of the route from a station on, as far as it goes.

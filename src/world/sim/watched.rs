@@ -46,6 +46,7 @@ pub struct WatchedParts {
     pub lead: bool,
     pub red: bool,
     pub stop: bool,
+    pub line: bool,
     pub oncoming: bool,
     pub lane: bool,
     pub jerk: bool,
@@ -61,7 +62,8 @@ impl WatchedParts {
                 Fact::EgoOverRed => parts.red = true,
                 Fact::EgoOverStop => parts.stop = true,
                 Fact::EgoOverOncoming => parts.oncoming = true,
-                Fact::EgoOverLane => parts.lane = true,
+                Fact::EgoOverLine => parts.line = true,
+                Fact::EgoOverLane | Fact::EgoLaneOffset => parts.lane = true,
                 Fact::EgoJerk => parts.jerk = true,
                 _ => {}
             }
@@ -81,6 +83,8 @@ impl Watched {
             lead_speed_mps: lead.map_or(0.0, |lead| lead.speed_mps),
             lead_since_s: self.lead.map_or(0.0, |(_, tick, _)| since_s(tick)),
             over_red_m: if parts.red { self.over_red_m(world, &around) } else { f64::NAN },
+            over_line_m: if parts.line { over_line_m(&around) } else { f64::NAN },
+            lane_offset_m: if parts.lane { lane_offset_m(&around) } else { f64::NAN },
             over_stop_m: if parts.stop { over_stop_m(&around) } else { f64::NAN },
             over_oncoming_m: if parts.oncoming { over_oncoming_m(&around) } else { f64::NAN },
             over_lane_m: if parts.lane { over_lane_m(&around) } else { f64::NAN },
@@ -189,14 +193,30 @@ fn ego_half_width_m(around: &Around, along: Vec2) -> f64 {
     around.ego_outline.half_extent_m(around.ego_forward, along).1
 }
 
-/// How far the ego vehicle's front is beyond the line of a stop sign that its rear has not passed, m; else minus the way to the
-/// next one.
-fn over_stop_m(around: &Around) -> f64 {
+/// How far the ego vehicle's front is beyond the first of these lines that its rear has not passed, m; below 0 the way to it.
+fn over_m(around: &Around, lines: impl Iterator<Item = f64>) -> f64 {
     let ego = VehicleParameters::MKZ;
     let (front_m, rear_m) = (ego.front_m(around.ego_station_m), ego.rear_m(around.ego_station_m));
-    let lines = around.scene.route.sign_lines.iter().filter(|line| line.kind == SignKind::Stop);
-    let next = lines.map(|line| line.station_m).find(|line_m| rear_m < *line_m);
+    let next = { lines }.find(|line_m| rear_m < *line_m);
     next.map_or(FAR_M, |line_m| (front_m - line_m).max(FAR_M))
+}
+
+/// Of the lines of stop signs.
+fn over_stop_m(around: &Around) -> f64 {
+    let lines = around.scene.route.sign_lines.iter().filter(|line| line.kind == SignKind::Stop);
+    over_m(around, lines.map(|line| line.station_m))
+}
+
+/// Of the stop lines of lights.
+fn over_line_m(around: &Around) -> f64 {
+    over_m(around, around.scene.route.stop_lines.iter().map(|line| line.station_m))
+}
+
+/// How far the ego vehicle's rear axle is to the left of the middle of its route's lane, m.
+fn lane_offset_m(around: &Around) -> f64 {
+    let Scene { map, route, .. } = around.scene;
+    let lane = map.lane(route.lane_at(around.ego_station_m).lane);
+    lane.centre.project(around.ego.rear_axle.position).offset_m
 }
 
 /// How far the ego vehicle's outline reaches into an oncoming lane, m.
@@ -265,8 +285,15 @@ mod tests {
     use super::*;
     use crate::sim::{Control, Start, testing};
 
-    const ALL: WatchedParts =
-        WatchedParts { lead: true, red: true, stop: true, oncoming: true, lane: true, jerk: true };
+    const ALL: WatchedParts = WatchedParts {
+        lead: true,
+        red: true,
+        stop: true,
+        line: true,
+        oncoming: true,
+        lane: true,
+        jerk: true,
+    };
 
     #[test]
     fn what_is_ahead_is_watched() {

@@ -16,7 +16,7 @@ use avastra_base::rng;
 use avastra_base::rng::Stream;
 use avastra_lang::model::body::BodyParameters;
 use avastra_lang::model::command::Command;
-use avastra_lang::model::vocabulary::{Level, TimeOfDay};
+use avastra_lang::model::vocabulary::{Level, TimeOfDay, TrafficRule};
 use avastra_lang::model::{COMMANDED_MAX, Memory, NpcFacts, Road, Space, TICK_MS};
 use avastra_road::{RouteLaneChange, is_apart};
 
@@ -300,7 +300,13 @@ impl World {
     /// What can be asked about the road user with an id, if it is there.
     pub fn npc_facts(&self, id: u32) -> Option<NpcFacts> {
         let user = self.users.iter().find(|user| user.obstacle.id == id)?;
-        Some(npc_facts(&self.alone(), &user.obstacle, &user.mover.motion))
+        let facts = npc_facts(&self.alone(), &user.obstacle, &user.mover.motion);
+        Some(NpcFacts { priority: user.mover.rights.now(self.ticks), ..facts })
+    }
+
+    /// Whether the road user with an id ignores a rule of the road; false if it is not there, or on foot.
+    pub fn ignores(&self, id: u32, rule: TrafficRule) -> bool {
+        self.users.iter().any(|user| user.obstacle.id == id && user.mover.ignores(rule))
     }
 
     /// How far the road user with an id is with its manoeuvre; 0 if it is not there.

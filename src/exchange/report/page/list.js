@@ -56,10 +56,9 @@ export function kindOf(entry) {
   const collision = mainCollision(entry.summary);
   const [breach] = entry.summary.breaches;
   if (!collision) return breach ? `breach of ${breach.requirement}` : `ended: ${entry.summary.end}`;
-  const { kind, verb, approach, side, shape, priority, cause } = collision;
-  const first = { ego: ", ego first", other: ", the other first" }[priority] ?? "";
+  const { precrash, precrash_number, cause } = collision;
   const because = cause ? `, ${causeInWords(cause)}` : "";
-  return `${kind} (${verb}, ${approach}${first}), hit by the ${side}${shape ? ` (${shape})` : ""}${because}`;
+  return `${precrash_number ? `${precrash_number} ` : ""}${precrash}${because}`;
 }
 
 /** The filters, the list and its charts; they stay in step with the link. */

@@ -1,16 +1,11 @@
-//! The shape of the ego vehicle's way up to a collision, in one word.
+//! The shape of a way up to a collision, in one word.
 //!
-//! Coarse on purpose: it separates failures and does not describe them. It looks at the last 5 s, or less in a
+//! Coarse on purpose: it separates failures and does not describe them. It looks at the last 5 s (up to 5.5 s), or less in a
 //! younger episode: how far the vehicle has turned, how far it has moved aside, how much of its speed is left. A
 //! bend of the road is a turn like one at a junction. The bounds are ours.
 
-use std::collections::VecDeque;
-
 use avastra_base::geometry::{Pose, Vec2, unit_vector, wrap_angle};
-use avastra_world::sim::{DT_S, World};
 
-/// Length of the way that is looked at, s.
-const PAST_S: f64 = 5.0;
 /// A vehicle that has turned by more than this makes a turn, rad (20°).
 const TURN_RAD: f64 = core::f64::consts::PI / 9.0;
 /// A vehicle that has moved aside by more than this, seen along its heading before and after, changes lanes, m: a
@@ -42,7 +37,7 @@ impl Shape {
     }
 
     /// The way from one pose and speed (m/s) to another.
-    fn between((from, from_mps): (Pose, f64), (to, to_mps): (Pose, f64)) -> Shape {
+    pub(super) fn between((from, from_mps): (Pose, f64), (to, to_mps): (Pose, f64)) -> Shape {
         let turned_rad = wrap_angle(to.heading_rad - from.heading_rad);
         let left_m = |heading_rad| {
             let forward = unit_vector(heading_rad);
@@ -63,28 +58,6 @@ impl Shape {
         } else {
             Shape::Straight
         }
-    }
-}
-
-/// The last 5 s of the ego vehicle's way.
-#[derive(Debug, Clone, Default)]
-pub struct Trail {
-    poses: VecDeque<(Pose, f64)>,
-}
-
-impl Trail {
-    /// Takes in a tick.
-    pub fn note(&mut self, world: &World) {
-        if self.poses.len() > (PAST_S / DT_S) as usize {
-            self.poses.pop_front();
-        }
-        let ego = world.ego();
-        self.poses.push_back((ego.rear_axle, ego.speed_mps));
-    }
-
-    /// Its shape; `None` before the first tick.
-    pub fn shape(&self) -> Option<Shape> {
-        Some(Shape::between(*self.poses.front()?, *self.poses.back()?))
     }
 }
 
