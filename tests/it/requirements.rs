@@ -236,6 +236,9 @@ fn what_is_asked_of_each_road_user_near_is_asked_of_each_by_itself() {
             log.margins.iter().find(is_of).expect("it is in force").smallest
         };
         assert_eq!(smallest("nobody_near"), smallest("keeps_off"));
+        // What is excused is as what is not asked, as long as every tick counts by itself.
+        assert_eq!(ticks_of("keeps_off_unless"), ticks_of("keeps_off"), "episode {number}");
+        assert_eq!(smallest("keeps_off_unless"), smallest("keeps_off"));
         assert_replays(&run, number, &log);
     }
     assert!(found.iter().all(|count| *count > 3), "{found:?}");

@@ -16,6 +16,7 @@ use avastra_lang::model::{
     Asked, BodyWord, Facts, FnDef, Kept, Memory, NearFacts, NpcFacts, ReadyRequirement, RequirementDef,
     RequirementMemory, Sliding, SpawnFacts, WorldFacts,
 };
+use avastra_lang::prove::is_never_asked;
 use avastra_world::sim::{DT_S, MomentParts, Obstacle, Watched, WatchedParts, World};
 
 use super::setup::Setup;
@@ -58,13 +59,15 @@ pub(super) struct Monitor {
     /// The facts of the moment, filled anew at every tick.
     facts: WorldFacts,
     watches: Vec<Watch>,
+    /// The requirements that nothing is asked of on this road, by index in `Space::requirements`.
+    idle: Vec<usize>,
     /// What of the moment, and of what is watched, they ask for.
     moment: MomentParts,
     tick: WatchedParts,
     /// The road users that requirements name, by index in `Space::bearers`.
     bearers: Vec<usize>,
-    /// The bodies of the road users near of which they ask; `None`: of nobody.
-    asks_of: Option<Vec<BodyWord>>,
+    /// The bodies of the road users near of which they ask, by bit.
+    asks_of: u32,
     breaches: Vec<Breach>,
 }
 
@@ -89,6 +92,9 @@ struct Required {
     within_ticks: u32,
     on: Vec<BodyWord>,
     ready: ReadyRequirement,
+    /// Whether it looks at ticks before, and whether it has an `after`.
+    remembers: bool,
+    is_response: bool,
 }
 
 /// A requirement, of one road user or of none.
@@ -124,7 +130,8 @@ impl Monitor {
             let requirement = &setup.table.space().requirements[index];
             let RequirementDef { within_ticks, ref on, .. } = *requirement;
             let ready = requirement.ready();
-            let required = Required { index, within_ticks, on: on.clone(), ready };
+            let (remembers, is_response) = (ready.remembers(), requirement.after.is_some());
+            let required = Required { index, within_ticks, on: on.clone(), ready, remembers, is_response };
             Watch {
                 required: Arc::new(required),
                 ego: Stretch::default(),
@@ -133,7 +140,10 @@ impl Monitor {
                 asked: 0,
             }
         };
-        let watches: Vec<Watch> = setup.rules.required().map(watch).collect();
+        // A requirement about stop signs costs nothing where there is none.
+        let is_idle = |index: &usize| is_never_asked(setup.table.space(), *index, &setup.road.facts);
+        let (idle, asked): (Vec<usize>, Vec<usize>) = setup.rules.required().partition(is_idle);
+        let watches: Vec<Watch> = asked.into_iter().map(watch).collect();
         let of = |watch: &Watch| &setup.table.space().requirements[watch.required.index].bearers;
         let mut bearers: Vec<usize> = watches.iter().flat_map(|watch| of(watch).iter().copied()).collect();
         bearers.sort_unstable();
@@ -163,10 +173,9 @@ impl Monitor {
         });
         let on = watches.iter().map(|watch| watch.required.on.clone()).filter(|on| !on.is_empty());
         let of: Vec<Vec<BodyWord>> = on.chain(some).collect();
-        // Who asks of any body asks of all of them.
-        let asks_of = (!of.is_empty()).then(|| match of.iter().any(Vec::is_empty) {
-            true => Vec::new(),
-            false => of.concat(),
+        let asks_of = of.iter().fold(0, |all, bodies| match bodies.as_slice() {
+            [] => u32::MAX,
+            named => named.iter().fold(all, |all, body| all | 1 << body.like as u32),
         });
         let moment = MomentParts::of(facts.iter().copied(), words);
         let tick = WatchedParts::of(facts);
@@ -176,11 +185,12 @@ impl Monitor {
             watched: Watched::default(),
             facts: WorldFacts::default(),
             watches,
+            idle,
             bearers,
             asks_of,
             breaches: Vec::new(),
         };
-        (!monitor.watches.is_empty()).then_some(monitor)
+        (!monitor.watches.is_empty() || !monitor.idle.is_empty()).then_some(monitor)
     }
 
     /// Judges the moment after a tick without a contact; `step` is the one that is driven. Beside the world stand the own
@@ -200,9 +210,9 @@ impl Monitor {
             let there = self.bearers.iter().filter_map(|who| Some((*who, world.bearer_facts(*who)?)));
             self.facts.bearers.extend(there);
         }
-        if let Some(bodies) = &self.asks_of {
+        if self.asks_of != 0 {
             self.facts.near.clear();
-            self.facts.near.extend(near(world, own_bodies, bodies));
+            self.facts.near.extend(near(world, own_bodies, self.asks_of));
         }
         let facts =
             Facts { road: Some(&setup.road.facts), world: Some(&self.facts), ..Facts::new(&[], memory) };
@@ -234,7 +244,10 @@ impl Monitor {
             let smallest = smallest.filter(|smallest| smallest.is_finite());
             Margin { requirement: watch.required.index, smallest, asked_s: f64::from(watch.asked) * DT_S }
         };
-        (self.breaches, self.watches.iter().map(margin).collect())
+        let idle = self.idle.iter().map(|&requirement| Margin { requirement, smallest: None, asked_s: 0.0 });
+        let mut margins: Vec<Margin> = self.watches.iter().map(margin).chain(idle).collect();
+        margins.sort_by_key(|margin| margin.requirement);
+        (self.breaches, margins)
     }
 }
 
@@ -246,19 +259,14 @@ struct Judged<'a> {
     step: usize,
 }
 
-/// The road users near that have one of these bodies, or any if there are none, with what may be asked of them.
-fn near(
-    world: &World,
-    own_bodies: &BTreeMap<u32, usize>,
-    bodies: &[BodyWord],
-) -> impl Iterator<Item = NearFacts> {
-    let is_near = |obstacle: &&Obstacle| obstacle.distance_m <= NEAR_M && !obstacle.is_apart;
-    world.obstacles().filter(is_near).filter_map(move |obstacle| {
+/// The road users near that are like one of these bodies, by bit, with what may be asked of them.
+fn near(world: &World, own_bodies: &BTreeMap<u32, usize>, asks_of: u32) -> impl Iterator<Item = NearFacts> {
+    let is_meant = move |obstacle: &&Obstacle| {
+        asks_of >> obstacle.body as u32 & 1 == 1 && obstacle.distance_m <= NEAR_M && !obstacle.is_apart
+    };
+    world.obstacles().filter(is_meant).filter_map(|obstacle| {
         let body = BodyWord { like: obstacle.body, own: own_bodies.get(&obstacle.id).copied() };
-        let is_meant = bodies.is_empty() || bodies.iter().any(|named| body.is(*named));
-        is_meant
-            .then(|| Some(NearFacts { id: obstacle.id, body, npc: world.npc_facts(obstacle.id)? }))
-            .flatten()
+        Some(NearFacts { id: obstacle.id, body, npc: world.npc_facts(obstacle.id)? })
     })
 }
 
@@ -272,6 +280,9 @@ impl Watch {
         moment: &Judged,
         breaches: &mut Vec<Breach>,
     ) -> bool {
+        if near.is_empty() && self.each.is_empty() {
+            return false;
+        }
         let is_meant = |near: &&NearFacts| near.is_of(&self.required.on);
         let mut asked: Vec<(u32, NpcFacts)> =
             near.iter().filter(is_meant).map(|near| (near.id, near.npc)).collect();
@@ -314,23 +325,13 @@ impl Stretch {
         moment: &Judged,
         breaches: &mut Vec<Breach>,
     ) -> bool {
-        let is_awaited = !self.tally.begun.is_empty();
-        let Some(asked) = required.ready.at(&mut self.memory, is_awaited, moment.functions, facts) else {
+        let Some((margin, is_breached, is_asked)) = (match required.remembers {
+            false => self.answer(required, facts, moment),
+            true => self.answer_next(required, facts, moment),
+        }) else {
             self.tally.pause();
             self.open = None;
             return false;
-        };
-        let (margin, is_breached, is_asked) = match required.ready.is_response() {
-            false => {
-                let margin = self.tally.take(asked.kept, required.within_ticks);
-                (margin, self.tally.failed > required.within_ticks, true)
-            }
-            true => {
-                // What was not done in time is a breach of that moment.
-                self.open = None;
-                let (margin, is_breached) = self.tally.respond(asked, required.within_ticks);
-                (margin, is_breached, is_awaited || asked.begins)
-            }
         };
         if !is_breached {
             self.open = None;
@@ -353,9 +354,47 @@ impl Stretch {
     }
 }
 
+impl Stretch {
+    /// Of a requirement that does not remember: the margin, whether it is a breach, and whether anything is asked.
+    #[inline]
+    fn answer(
+        &mut self,
+        required: &Required,
+        facts: &Facts,
+        moment: &Judged,
+    ) -> Option<(Option<f64>, bool, bool)> {
+        let kept = required.ready.at(moment.functions, facts)?;
+        let margin = self.tally.take(kept, required.within_ticks);
+        Some((margin, self.tally.failed > required.within_ticks, true))
+    }
+
+    /// Of one that does.
+    #[inline(never)]
+    fn answer_next(
+        &mut self,
+        required: &Required,
+        facts: &Facts,
+        moment: &Judged,
+    ) -> Option<(Option<f64>, bool, bool)> {
+        let is_awaited = !self.tally.begun.is_empty();
+        let asked = required.ready.at_next(&mut self.memory, is_awaited, moment.functions, facts)?;
+        if !required.is_response {
+            let margin = self.tally.take(asked.kept, required.within_ticks);
+            return Some((margin, self.tally.failed > required.within_ticks, true));
+        }
+        // What was not done in time is a breach of that moment.
+        self.open = None;
+        let (margin, is_breached) = self.tally.respond(asked, required.within_ticks);
+        Some((margin, is_breached, is_awaited || asked.begins))
+    }
+}
+
 impl Tally {
     /// Nothing is asked now.
     fn pause(&mut self) {
+        if self.asked == 0 {
+            return;
+        }
         (self.asked, self.failed, self.above) = (0, 0, 0);
         self.window.clear();
         self.begun.clear();
@@ -577,6 +616,7 @@ mod tests {
         until: Option<MadeUp>,
         after: Option<MadeUp>,
         condition: MadeUp,
+        unless: Option<MadeUp>,
         within: usize,
     }
 
@@ -586,17 +626,24 @@ mod tests {
             let when = maybe(2, 1);
             let until = maybe(2, 1).filter(|_| when.is_some());
             let after = maybe(2, 1);
+            let unless = maybe(1, 1);
             MadeUpRequirement {
                 when,
                 until,
                 after,
+                unless,
                 condition: made_up(rng, 3),
                 within: below(rng, 5) as usize,
             }
         }
 
         fn parts(&self) -> impl Iterator<Item = &MadeUp> {
-            self.when.iter().chain(&self.until).chain(&self.after).chain([&self.condition])
+            self.when
+                .iter()
+                .chain(&self.until)
+                .chain(&self.after)
+                .chain([&self.condition])
+                .chain(&self.unless)
         }
 
         fn text(&self) -> String {
@@ -608,7 +655,8 @@ mod tests {
                 0 => String::new(),
                 ticks => format!(" within {} ms", ticks * 20),
             };
-            format!("{when}{until}{}: {}{within}", part("after", &self.after), self.condition.text)
+            let (after, unless) = (part("after", &self.after), part("unless", &self.unless));
+            format!("{when}{until}{after}: {}{unless}{within}", self.condition.text)
         }
 
         /// By the definition: the smallest margin up to each tick, and whether there is a breach then.
@@ -627,7 +675,12 @@ mod tests {
                 };
             }
             let largest = |from: usize, to: usize| {
-                (from..=to).map(|at| (self.condition.margin)(trace, at)).fold(f64::NEG_INFINITY, f64::max)
+                let margin =
+                    |at: usize| match self.unless.as_ref().is_some_and(|unless| unless.holds(trace, at)) {
+                        true => f64::INFINITY,
+                        false => (self.condition.margin)(trace, at),
+                    };
+                (from..=to).map(margin).fold(f64::NEG_INFINITY, f64::max)
             };
             let mut smallest = None;
             let answer = |tick: usize| {
@@ -677,7 +730,9 @@ mod tests {
                     .map(|_| (f64::from(below(&mut rng, 60)) / 3.0, f64::from(below(&mut rng, 60)) / 3.0))
                     .collect();
                 let within_ticks = requirement.within_ticks;
-                let required = Required { index, within_ticks, on: Vec::new(), ready: requirement.ready() };
+                let (ready, is_response) = (requirement.ready(), requirement.after.is_some());
+                let (on, remembers) = (Vec::new(), ready.remembers());
+                let required = Required { index, within_ticks, on, ready, remembers, is_response };
                 let (mut stretch, mut breaches) = (Stretch::default(), Vec::new());
                 for (tick, (wanted, is_breached)) in one.answers(&trace).into_iter().enumerate() {
                     let mut world = WorldFacts::default();
@@ -688,7 +743,9 @@ mod tests {
                     stretch.ask(&required, &facts, &moment, &mut breaches);
                     let found = stretch.tally.smallest;
                     let same = match (found, wanted) {
-                        (Some(found), Some(wanted)) => (found - wanted).abs() <= 1e-9 * (1.0 + wanted.abs()),
+                        (Some(found), Some(wanted)) => {
+                            found == wanted || (found - wanted).abs() <= 1e-9 * (1.0 + wanted.abs())
+                        }
                         (found, wanted) => found.is_none() && wanted.is_none(),
                     };
                     assert!(same, "{} at {tick}: {found:?} in place of {wanted:?}", one.text());

@@ -71,12 +71,13 @@ impl Checker {
             Some(part) => self.condition(part, &place).map(Some),
         };
         let (when, until, after) = (part(&declared.when), part(&declared.until), part(&declared.after));
+        let unless = part(&declared.unless);
         let condition = self.condition(&declared.condition, &place);
         let within_ticks = match &declared.within {
             None => Some(0),
             Some(within) => self.ticks(within, "leave `within` out to judge every moment by itself"),
         };
-        let (when, until, after, condition) = (when?, until?, after?, condition?);
+        let (when, until, after, condition, unless) = (when?, until?, after?, condition?, unless?);
         if let Some(divisor) = open_divisor(&condition, &self.functions) {
             let message = format!("`{}` divides by what may be 0", declared.name.text);
             let error = Diagnostic::error(code::OPEN_DIVISOR, message).at(divisor.span, "may be 0");
@@ -93,9 +94,14 @@ impl Checker {
         let asked_for = |who: usize| {
             let asks =
                 |kind: &ExprKind| matches!(kind, ExprKind::IsThere(of) if of.bearers(0).contains(&who));
-            when.iter().chain(&until).chain(&after).chain([&condition]).any(|expr| expr.any(asks))
+            when.iter()
+                .chain(&until)
+                .chain(&after)
+                .chain([&condition])
+                .chain(&unless)
+                .any(|expr| expr.any(asks))
         };
-        let all = when.iter().chain(&until).chain(&after).chain([&condition]);
+        let all = when.iter().chain(&until).chain(&after).chain([&condition]).chain(&unless);
         let mut bearers: Vec<usize> = all
             .flat_map(|expr| {
                 expr.filter_map(|kind| match kind {
@@ -118,6 +124,7 @@ impl Checker {
             until,
             after,
             condition,
+            unless,
             within_ticks: within_ticks?,
             bearers,
             span: declared.name.span,

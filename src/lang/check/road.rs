@@ -12,7 +12,7 @@ use crate::model::{Road, RoadFacts, SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, T
 use crate::syntax::ast::ItemKind;
 use crate::syntax::{Diagnostic, ast, print_expr};
 use avastra_base::units::{Dimension, Rational};
-use avastra_road::{LanePlace, RoadError, RoadMap, Route};
+use avastra_road::{LanePlace, RoadError, RoadMap, Route, SignKind};
 
 /// Least speed that an ego vehicle may want, m/s: it has to arrive.
 const SET_MPS_MIN: f64 = 1.0;
@@ -276,6 +276,7 @@ fn facts(name: &str, map: &RoadMap, route: &Route) -> RoadFacts {
         limited_at,
         lanes,
         map_limits_mps: [all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max)],
+        has_stop_sign: route.sign_lines.iter().any(|line| line.kind == SignKind::Stop),
         stretches: stretches(map, route).into(),
     }
 }

@@ -462,14 +462,17 @@ fn are_equal(left: f64, right: f64) -> bool {
 }
 
 /// Compares with that tolerance. Of less, equal and greater exactly one holds, unless a number is NaN.
+#[inline]
 pub(crate) fn compare_numbers(op: Comparison, left: f64, right: f64) -> bool {
     // The tolerance is asked for only where it decides.
     let equal = || are_equal(left, right);
     match op {
         Comparison::Equal => equal(),
         Comparison::NotEqual => !equal(),
-        Comparison::Less | Comparison::Greater => op.holds(left, right) && !equal(),
-        Comparison::LessEqual | Comparison::GreaterEqual => op.holds(left, right) || equal(),
+        Comparison::Less => left < right && !equal(),
+        Comparison::Greater => left > right && !equal(),
+        Comparison::LessEqual => left <= right || equal(),
+        Comparison::GreaterEqual => left >= right || equal(),
     }
 }
 

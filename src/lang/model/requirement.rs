@@ -32,6 +32,7 @@ pub struct ReadyRequirement {
     until: Option<Node>,
     after: Option<Node>,
     condition: Node,
+    unless: Option<Node>,
     has_margin: bool,
     bearers: Vec<usize>,
     /// What it asks of the past, those within others first.
@@ -65,15 +66,17 @@ pub struct RequirementMemory {
 struct Past {
     /// Whether enough is past to say something.
     is_known: bool,
-    /// Ticks up to now, and those since it last held, and since it last failed.
+    /// Ticks up to now, and the last one that decides: at which it held (`recently`), or failed (`throughout`).
     ticks: u32,
-    since_true: Option<u32>,
-    since_false: Option<u32>,
-    extreme: Sliding,
-    /// The numbers of these ticks.
+    decided: Option<u32>,
+    /// What is said of these ticks now, and by which margin: that of all but `margins`, which were not looked at yet. Of
+    /// `throughout` they have the other sign.
+    holds: bool,
+    margin: f64,
+    largest: Sliding,
+    margins: VecDeque<f64>,
+    /// The numbers of these ticks, and their change.
     numbers: VecDeque<f64>,
-    /// What is said of them now: of a condition, and of a number.
-    now: Option<Kept>,
     change: f64,
 }
 
@@ -127,6 +130,7 @@ impl RequirementDef {
             until: self.until.as_ref().map(&mut of),
             after: self.after.as_ref().map(&mut of),
             condition: of(&self.condition),
+            unless: self.unless.as_ref().map(&mut of),
             has_margin: self.margin.is_some(),
             bearers: self.bearers.clone(),
             pasts,
@@ -135,85 +139,121 @@ impl RequirementDef {
 }
 
 impl ReadyRequirement {
-    /// Whether it is asked only after something begins to hold.
-    pub fn is_response(&self) -> bool {
-        self.after.is_some()
+    /// Whether what it says depends on ticks before: by `until`, `after` or a word for the past.
+    pub fn remembers(&self) -> bool {
+        self.after.is_some() || self.until.is_some() || !self.pasts.is_empty()
     }
 
-    /// How it stands at the next tick; `None` where nothing is asked, because `when` does not hold, `after` does not begin to,
-    /// a road user that it names is not there, or less is past than a `throughout` asks for. Of a requirement with `after` the
-    /// condition is asked, too, while it `is_awaited`.
-    pub fn at(
+    /// How one stands at a moment that does not remember; `None` where nothing is asked, because `when` does not hold or a
+    /// road user that it names is not there.
+    #[inline]
+    pub fn at(&self, functions: &[FnDef], facts: &Facts<'_>) -> Option<Kept> {
+        let at = At { functions, facts, pasts: &[] };
+        if !self.are_there(facts) || self.when.as_ref().is_some_and(|when| !at.holds(when)) {
+            return None;
+        }
+        Some(self.kept(&at))
+    }
+
+    /// How its condition stands. What is excused is kept, as far as can be from failing.
+    fn kept(&self, at: &At<'_>) -> Kept {
+        match self.unless.as_ref().is_some_and(|unless| at.holds(unless)) {
+            true => Kept { holds: true, margin: if self.has_margin { f64::INFINITY } else { f64::NAN } },
+            false => at.kept_of(&self.condition, self.has_margin),
+        }
+    }
+
+    /// Whether the road users are there that it names.
+    fn are_there(&self, facts: &Facts<'_>) -> bool {
+        let is_there = |who: &usize| {
+            facts.world.is_some_and(|world| world.bearers.iter().any(|(known, _)| known == who))
+        };
+        self.bearers.iter().all(is_there)
+    }
+
+    /// How one stands at the next tick that remembers; `None` as in [`ReadyRequirement::at`], and where `after` does not begin
+    /// to hold or too little is past. Of a requirement with `after` the condition is asked, too, while it `is_awaited`.
+    pub fn at_next(
         &self,
         memory: &mut RequirementMemory,
         is_awaited: bool,
         functions: &[FnDef],
         facts: &Facts<'_>,
     ) -> Option<Asked> {
-        let is_there = |who: &usize| {
-            facts.world.is_some_and(|world| world.bearers.iter().any(|(known, _)| known == who))
-        };
-        if !self.bearers.iter().all(is_there) {
-            if !self.pasts.is_empty() || self.until.is_some() || self.after.is_some() {
-                *memory = RequirementMemory::default();
-            }
+        if !self.are_there(facts) {
+            *memory = RequirementMemory::default();
             return None;
         }
-        if !self.pasts.is_empty() {
-            memory.pasts.resize_with(self.pasts.len(), Past::default);
-            for (index, node) in self.pasts.iter().enumerate() {
-                // What is said of the past begins once all within it is known.
-                if memory.pasts[node.first..index].iter().any(|past| !past.is_known) {
-                    continue;
-                }
-                let at = At { functions, facts, pasts: &memory.pasts };
-                if node.word == PastWord::Change {
-                    let number = at.number(&node.of);
-                    memory.pasts[index].take_number(number, node.ticks);
-                } else {
-                    let kept = at.kept_of(&node.of, node.has_margin);
-                    memory.pasts[index].take(kept, node);
-                }
+        let RequirementMemory { pasts, is_latched, was } = memory;
+        pasts.resize_with(self.pasts.len(), Past::default);
+        for (index, node) in self.pasts.iter().enumerate() {
+            let (within, from) = pasts.split_at_mut(index);
+            // What is said of the past begins once all within it is known.
+            if within[node.first..].iter().any(|past| !past.is_known) {
+                continue;
             }
-            if memory.pasts.iter().any(|past| !past.is_known) {
-                return None;
+            if node.has_margin {
+                within[node.first..]
+                    .iter_mut()
+                    .zip(&self.pasts[node.first..])
+                    .for_each(|(past, node)| past.settle(node));
+            }
+            let at = At { functions, facts, pasts: within };
+            match node.word {
+                PastWord::Change => from[0].take_number(at.number(&node.of), node.ticks),
+                PastWord::Recently | PastWord::Throughout => {
+                    from[0].take(at.kept_of(&node.of, node.has_margin), node);
+                }
             }
         }
-        let at = At { functions, facts, pasts: &memory.pasts };
+        if pasts.iter().any(|past| !past.is_known) {
+            return None;
+        }
+        let at = At { functions, facts, pasts };
         let holds = |node: &Option<Node>| node.as_ref().is_none_or(|node| at.holds(node));
         let is_asked = match &self.until {
             None => holds(&self.when),
-            Some(until) => !at.holds(until) && (memory.is_latched || holds(&self.when)),
+            Some(until) => !at.holds(until) && (*is_latched || holds(&self.when)),
         };
         let is_now = self.after.as_ref().is_some_and(|after| at.holds(after));
-        let begins = is_now && !memory.was && is_asked;
-        let asks = if self.is_response() { begins || is_awaited } else { is_asked };
-        let asked = asks.then(|| Asked { kept: at.kept_of(&self.condition, self.has_margin), begins });
-        (memory.is_latched, memory.was) = (is_asked, is_now);
-        asked
+        let begins = is_now && !*was && is_asked;
+        (*is_latched, *was) = (is_asked, is_now);
+        let asks = if self.after.is_some() { begins || is_awaited } else { is_asked };
+        asks.then(|| {
+            if self.has_margin {
+                pasts.iter_mut().zip(&self.pasts).for_each(|(past, node)| past.settle(node));
+            }
+            let at = At { functions, facts, pasts };
+            Asked { kept: self.kept(&at), begins }
+        })
     }
 }
 
 impl Past {
     /// Takes the answer of a tick.
     fn take(&mut self, kept: Kept, node: &PastNode) {
-        self.ticks = self.ticks.saturating_add(1);
-        let next = |since: Option<u32>| since.map(|ticks| ticks.saturating_add(1));
-        self.since_true = if kept.holds { Some(0) } else { next(self.since_true) };
-        self.since_false = if kept.holds { next(self.since_false) } else { Some(0) };
-        let lately = |since: Option<u32>| since.is_some_and(|ticks| ticks <= node.ticks);
         let is_some = node.word == PastWord::Recently;
-        self.now = Some(match is_some {
-            true => {
-                let margin = self.extreme.largest(kept.margin, node.ticks);
-                Kept { holds: lately(self.since_true), margin }
-            }
-            false => {
-                let margin = -self.extreme.largest(-kept.margin, node.ticks);
-                Kept { holds: !lately(self.since_false), margin }
-            }
-        });
+        self.ticks = self.ticks.saturating_add(1);
+        if kept.holds == is_some {
+            self.decided = Some(self.ticks);
+        }
+        let lately = self.decided.is_some_and(|tick| self.ticks - tick <= node.ticks);
+        self.holds = lately == is_some;
         self.is_known = is_some || self.ticks > node.ticks;
+        if node.has_margin {
+            self.margins.push_back(if is_some { kept.margin } else { -kept.margin });
+            if self.margins.len() > node.ticks as usize + 1 {
+                self.margins.pop_front();
+            }
+        }
+    }
+
+    /// Finds the margin of these ticks, which is seldom asked for.
+    fn settle(&mut self, node: &PastNode) {
+        while let Some(margin) = self.margins.pop_front() {
+            let largest = self.largest.largest(margin, node.ticks);
+            self.margin = if node.word == PastWord::Recently { largest } else { -largest };
+        }
     }
 
     /// Takes the number of a tick.
@@ -316,13 +356,13 @@ struct At<'a> {
 }
 
 impl<'a> At<'a> {
-    fn number(self, node: &Node) -> f64 {
+    fn number(&self, node: &Node) -> f64 {
         match node {
             Node::Number(number) => *number,
             Node::Fact(of) => self.fact(*of),
             Node::Arithmetic(op, left, right) => arithmetic(*op, self.number(left), self.number(right)),
             Node::Other(expr) => evaluate(expr, self.functions, self.facts).number(),
-            Node::Past(index) => self.pasts.get(*index).map_or(f64::NAN, |past| past.change),
+            Node::Past(index) => self.pasts[*index].change,
             Node::Bound(..)
             | Node::Compare(..)
             | Node::InRange(..)
@@ -335,14 +375,14 @@ impl<'a> At<'a> {
         }
     }
 
-    fn fact(self, of: Of) -> f64 {
+    fn fact(&self, of: Of) -> f64 {
         self.facts.world.map_or(f64::NAN, |world| match of {
             Of::Moment(of) => of(&world.moment),
             Of::Tick(of) => of(&world.tick),
         })
     }
 
-    fn holds(self, node: &Node) -> bool {
+    fn holds(&self, node: &Node) -> bool {
         match node {
             Node::Bound(of, op, number) => compare_numbers(*op, self.fact(*of), *number),
             Node::Compare(op, left, right) => compare_numbers(*op, self.number(left), self.number(right)),
@@ -360,7 +400,7 @@ impl<'a> At<'a> {
             }
             Node::Past(index) => self.past(*index).holds,
             Node::Some(bodies, condition) => {
-                self.each_near(bodies).any(|facts| At { facts: &facts, ..self }.holds(condition))
+                self.each_near(bodies).any(|facts| At { facts: &facts, ..*self }.holds(condition))
             }
             Node::Other(expr) => evaluate(expr, self.functions, self.facts).truth(),
             Node::Number(_) | Node::Fact(_) | Node::Arithmetic(..) => false,
@@ -368,19 +408,20 @@ impl<'a> At<'a> {
     }
 
     /// The facts about each road user near with one of these bodies.
-    fn each_near<'b>(self, bodies: &'b [BodyWord]) -> impl Iterator<Item = Facts<'a>> + use<'a, 'b> {
+    fn each_near<'b>(&self, bodies: &'b [BodyWord]) -> impl Iterator<Item = Facts<'a>> + use<'a, 'b> {
         let facts = self.facts;
         let near: &'a [NearFacts] = facts.world.map_or(&[][..], |world| &world.near);
         near.iter().filter(move |near| near.is_of(bodies)).map(move |near| about(Some(near.npc), facts))
     }
 
     /// What was said of the past at this tick. Those within others are known before them.
-    fn past(self, index: usize) -> Kept {
-        self.pasts.get(index).and_then(|past| past.now).unwrap_or(Kept { holds: false, margin: f64::NAN })
+    fn past(&self, index: usize) -> Kept {
+        let Past { holds, margin, .. } = self.pasts[index];
+        Kept { holds, margin }
     }
 
     /// Truth of a condition, and its margin if it has one.
-    fn kept_of(self, node: &Node, has_margin: bool) -> Kept {
+    fn kept_of(&self, node: &Node, has_margin: bool) -> Kept {
         match has_margin {
             true => self.kept(node),
             false => Kept { holds: self.holds(node), margin: f64::NAN },
@@ -388,7 +429,7 @@ impl<'a> At<'a> {
     }
 
     /// Truth and margin of a condition that has one.
-    fn kept(self, node: &Node) -> Kept {
+    fn kept(&self, node: &Node) -> Kept {
         let two = |left: &Node, right: &Node| (self.kept(left), self.kept(right));
         match node {
             Node::Bound(of, op, number) => compared(*op, self.fact(*of), *number),
@@ -423,7 +464,7 @@ impl<'a> At<'a> {
             Node::Some(bodies, condition) => {
                 let nobody = Kept { holds: false, margin: f64::NEG_INFINITY };
                 self.each_near(bodies).fold(nobody, |some, facts| {
-                    let one = At { facts: &facts, ..self }.kept(condition);
+                    let one = At { facts: &facts, ..*self }.kept(condition);
                     Kept { holds: some.holds || one.holds, margin: some.margin.max(one.margin) }
                 })
             }

@@ -502,6 +502,8 @@ pub struct RequirementDef {
     /// If there is one, the condition is asked only after it begins to hold, once each time.
     pub after: Option<Expr>,
     pub condition: Expr,
+    /// Where this holds, the condition is excused.
+    pub unless: Option<Expr>,
     /// The requirement is breached at a tick if the condition failed at every tick of so many before it, and at it. With
     /// `after`: if it failed at the tick of that, and at every tick of so many after it.
     pub within_ticks: u32,
@@ -515,7 +517,7 @@ pub struct RequirementDef {
 impl RequirementDef {
     /// Its conditions, in the order of the text.
     pub fn conditions(&self) -> impl Iterator<Item = &Expr> {
-        self.when.iter().chain(&self.until).chain(&self.after).chain([&self.condition])
+        self.when.iter().chain(&self.until).chain(&self.after).chain([&self.condition]).chain(&self.unless)
     }
 }
 
@@ -587,6 +589,8 @@ pub struct RoadFacts {
     pub lanes: [bool; 3],
     /// The lowest and the highest limit of any lane of the map, m/s.
     pub map_limits_mps: [f64; 2],
+    /// Whether a stop sign stands at the route.
+    pub has_stop_sign: bool,
     /// The route, by what each part of it says of a moment; none, if that is not known.
     pub stretches: Arc<[Stretch]>,
 }

@@ -253,9 +253,15 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
 fn fact_values(fact: Fact, known: &Known<'_>) -> Values {
     match (fact, known.road) {
         (Fact::RoadLimit, Some(road)) => Values::Number(Interval::point(road.limit)),
+        (Fact::EgoOverStop, Some(road)) if !road.has_stop_sign => {
+            Values::Number(between(NO_LINE_M, NO_LINE_M))
+        }
         _ => fact_range(fact).map_or(Values::UNKNOWN_TRUTH, Values::Number),
     }
 }
+
+/// What facts of lines say where there is none, m.
+const NO_LINE_M: f64 = -100.0;
 
 fn between(low: f64, high: f64) -> Interval {
     match (Rational::from_f64(low), Rational::from_f64(high)) {

@@ -1,7 +1,7 @@
 //! Requirements that nothing can breach, or everything does: most are a mistake in a unit or a sign.
 
 use crate::model::expr::Expr;
-use crate::model::{Space, code};
+use crate::model::{RoadFacts, Space, code};
 use crate::prove::moment::{Case, may_hold_together};
 use crate::prove::{Known, enclose};
 use crate::syntax::Diagnostic;
@@ -16,7 +16,9 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
             !space.roads.is_empty()
                 && space.roads.iter().all(|road| {
                     let functions = &space.functions;
-                    let road = Some(&road.facts);
+                    // A file of laws may ask for stop signs where there is none.
+                    let road = &RoadFacts { has_stop_sign: true, ..road.facts.clone() };
+                    let road = Some(road);
                     holds(&Known { functions, locals: &[], cells: &cells, road, case: None })
                 })
         };
@@ -27,7 +29,10 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
         };
         let is_opposed = || {
             // What is asked later, or somewhere else, may hold there.
-            required.until.is_none() && required.after.is_none() && on_all(&|known| !together(known))
+            required.until.is_none()
+                && required.after.is_none()
+                && required.unless.is_none()
+                && on_all(&|known| !together(known))
         };
         let (message, span, why) = match required.when.iter().chain(&required.after).find(never) {
             Some(never) => ("is asked at no moment", never.span, "never holds"),
@@ -44,4 +49,13 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
         diagnostics.push(warning.help("look at its units and at the direction of its comparison"));
     }
     diagnostics
+}
+
+/// Whether a requirement can be asked at no moment on a road, because its `when` or its `after` holds at none there.
+pub fn is_never_asked(space: &Space, requirement: usize, road: &RoadFacts) -> bool {
+    let cells = space.cells_unknown();
+    let known =
+        Known { functions: &space.functions, locals: &[], cells: &cells, road: Some(road), case: None };
+    let required = &space.requirements[requirement];
+    required.when.iter().chain(&required.after).any(|condition| !enclose(condition, &known).may_hold())
 }

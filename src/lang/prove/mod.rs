@@ -33,6 +33,7 @@ mod witness;
 pub(crate) use clock::{forbids, next_rows, shortest_way};
 pub use cut::{Removal, removals};
 pub(crate) use enclose::{Known, VARIANTS_MAX, enclose};
+pub use kept::is_never_asked;
 pub(crate) use reach::{product_size, rows};
 pub(crate) use realise::mark_dead;
 pub use realise::{Realisable, Realised, RunsIn, realise};

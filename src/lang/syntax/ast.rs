@@ -424,6 +424,8 @@ pub struct Require {
     /// What must begin to hold for the condition to be asked.
     pub after: Option<Expr>,
     pub condition: Expr,
+    /// What excuses that the condition does not hold.
+    pub unless: Option<Expr>,
     pub within: Option<Expr>,
 }
 
@@ -435,7 +437,7 @@ impl Require {
 
     /// Its conditions, in the order of the text.
     pub fn conditions(&self) -> impl Iterator<Item = &Expr> {
-        self.when.iter().chain(&self.until).chain(&self.after).chain([&self.condition])
+        self.when.iter().chain(&self.until).chain(&self.after).chain([&self.condition]).chain(&self.unless)
     }
 }
 

@@ -160,8 +160,9 @@ impl Builder {
                 let until = part(&mut parts, Rule::until_holds)?;
                 let after = part(&mut parts, Rule::after_event)?;
                 let condition = part(&mut parts, Rule::holds)?.expect("the grammar asks for one");
+                let unless = part(&mut parts, Rule::unless_holds)?;
                 let within = part(&mut parts, Rule::within_time)?;
-                let required = Require { optional, name, on, when, until, after, condition, within };
+                let required = Require { optional, name, on, when, until, after, condition, unless, within };
                 ItemKind::Require(Box::new(required))
             }
             Rule::body => {

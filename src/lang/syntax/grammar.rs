@@ -150,6 +150,7 @@ pub fn role(rule: Rule) -> Role {
         Rule::kw_claims | Rule::claims => Role::Said("`claims`"),
         Rule::kw_rules | Rule::policy_rules => Role::Said("`rules`"),
         Rule::kw_when | Rule::while_holds => Role::Said("`when`"),
+        Rule::kw_unless | Rule::unless_holds => Role::Said("`unless`"),
         Rule::kw_until | Rule::until_holds => Role::Said("`until`"),
         Rule::EOI
         | Rule::WHITESPACE

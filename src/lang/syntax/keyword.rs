@@ -106,6 +106,10 @@ pub const CLAUSES: &[Keyword] = &[
     ("rules", "The readable face of a policy: the first line that applies acts."),
     ("when", "The condition of a line of a policy, or where a requirement is asked."),
     (
+        "unless",
+        "Where a requirement that does not hold is excused: `npc.aside >= 1.5 m unless ego.speed < 1 m/s`.",
+    ),
+    (
         "until",
         "The end of what a requirement asks from `when` on: `when ego.lead_gap <= 5 m until ego.lead_gap >= 10 m`.",
     ),

@@ -506,6 +506,10 @@ impl Printer<'_> {
             parts.extend([Layout::text(":"), Layout::Line(" "), expression(&item.condition)]);
             self.put(&Layout::group([Layout::nest(parts)]));
         }
+        if let Some(unless) = &item.unless {
+            let parts = [Layout::Line(" "), Layout::text("unless "), expression(unless)];
+            self.put(&Layout::group([Layout::nest(parts)]));
+        }
         if let Some(within) = &item.within {
             self.words(" within ");
             self.put(&expression(within));

@@ -287,11 +287,11 @@ fn item() -> impl Strategy<Value = ItemKind> {
             (any::<bool>(), name(), prop::collection::vec(name(), 0..3)),
             prop::array::uniform3(proptest::option::of(asked)),
             expr(),
-            proptest::option::of(expr())
+            prop::array::uniform2(proptest::option::of(expr()))
         )
-            .prop_map(|((optional, name, on), [when, until, after], condition, within)| {
+            .prop_map(|((optional, name, on), [when, until, after], condition, [unless, within])| {
                 let until = until.filter(|_| when.is_some());
-                let required = Require { optional, name, on, when, until, after, condition, within };
+                let required = Require { optional, name, on, when, until, after, condition, unless, within };
                 ItemKind::Require(Box::new(required))
             }),
         prop::collection::vec(case, 0..4).prop_map(ItemKind::Reward),

@@ -119,8 +119,13 @@ impl Around<'_> {
             facts.ego_crosswalk_ahead_m = self.crosswalk_ahead_m();
         }
         if parts.users {
-            let nearest = self.obstacles_on_level().min_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
-            facts.road_users = self.obstacles_on_level().count() as u32;
+            let mut nearest: Option<&Obstacle> = None;
+            for obstacle in self.obstacles_on_level() {
+                facts.road_users += 1;
+                if nearest.is_none_or(|nearest| obstacle.distance_m < nearest.distance_m) {
+                    nearest = Some(obstacle);
+                }
+            }
             facts.nearest_gap_m = nearest.map_or(NO_ROAD_USER_M, |obstacle| obstacle.distance_m);
             facts.nearest_speed_mps = nearest.map_or(0.0, |obstacle| obstacle.velocity_mps.norm());
         }
