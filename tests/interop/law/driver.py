@@ -42,7 +42,9 @@ class Follower(avastra.Driver):
     def on_the_way(self, step, front):
         for other in step.objects:
             beside = self.way.path.project(other.x, other.y)
-            if beside.station > front and abs(beside.offset) < (self.vehicle.width + other.width) / 2.0 + 0.3:
+            # Who drives along a lane keeps to it; a person may take a step.
+            room = 1.2 if other.kind == "pedestrian" else 0.3
+            if beside.station > front and abs(beside.offset) < (self.vehicle.width + other.width) / 2.0 + room:
                 yield beside.station - other.length / 2.0 - front, other
 
     def step(self, step):
