@@ -4,8 +4,9 @@
 use avastra_lang::check::{Declaration, References, Symbol};
 use avastra_lang::model::Type;
 use avastra_lang::model::vocabulary::{
-    BREACHED, CHANGE, CommandField, EpisodeField, Fact, KEPT, Known, RECURRENCE, ROAD_USER, RoadField, SINCE,
-    ScenarioClaim, Site, SpaceClaim, SpawnField, StartField, StopReason, THERE, WAIT, Word, parts_of, things,
+    BREACHED, BodyClass, CHANGE, CommandField, EpisodeField, Fact, KEPT, Known, RECURRENCE, ROAD_USER,
+    RoadField, SINCE, ScenarioClaim, Site, SpaceClaim, SpawnField, StartField, StopReason, THERE, WAIT, Word,
+    parts_of, things,
 };
 use avastra_lang::syntax::ast::{
     Action, ActionParam, Arm, BinaryOp, Call, Effect, EffectKind, Expr, ExprKind, Field, Initial, ItemKind,
@@ -70,6 +71,11 @@ pub fn wanted(references: &References, text: &str, byte: usize) -> (Vec<Kind>, u
         kinds.insert(0, Kind::Declarations);
     }
     (kinds, start)
+}
+
+/// Bodies where several may be listed.
+fn bodies_together() -> Vec<Kind> {
+    vec![Kind::Bodies, Kind::Words(words::of::<BodyClass>())]
 }
 
 /// What may come where no name may stand.
@@ -216,7 +222,7 @@ impl<'a> Place<'a> {
                 let condition = case.condition.as_ref().and_then(|when| self.within(when, None, None));
                 condition.or_else(|| self.within(&case.value, None, None))
             }),
-            ItemKind::Require(of) if any_here(&of.on) => Some(vec![Kind::Bodies]),
+            ItemKind::Require(of) if any_here(&of.on) => Some(bodies_together()),
             ItemKind::Require(of) => of.parts().find_map(|part| self.within(part, None, None)),
             ItemKind::Verdict(of) => self.within(&of.condition, None, None),
             ItemKind::Expect(of) => self.within(&of.claim, bool, bool),
@@ -481,7 +487,7 @@ impl<'a> Place<'a> {
                 let is_here = |part: &str| {
                     let fact = Fact::from_name(&format!("{name}.{part}"));
                     matches!(self.about, About::Facts(site) if site.is_requirement())
-                        || fact.is_none_or(|fact| fact.known() != Known::Tick)
+                        || fact.is_none_or(|fact| !matches!(fact.known(), Known::Tick | Known::Near))
                 };
                 let parts = match things().contains(&name) {
                     true => parts_of(name).into_iter().filter(|(part, _)| is_here(part)).collect(),
@@ -528,7 +534,7 @@ impl<'a> Place<'a> {
         };
         match (self.about, name_of(left).filter(|_| is_compared)?) {
             (About::Rule, "road") => Some(vec![Kind::Roads]),
-            (About::Facts(_), "hit" | "near") => Some(vec![Kind::Bodies]),
+            (About::Facts(_), "hit" | "near") => Some(bodies_together()),
             (About::Scenario, claim) => {
                 let words = words::claim_words(claim).iter().map(|word| (*word, ""));
                 Some(vec![Kind::Words(words.collect())])

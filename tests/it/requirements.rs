@@ -7,11 +7,12 @@ use std::path::Path;
 use avastra::action::ActionTable;
 use avastra::check::Loaded;
 use avastra::episode::{Breach, EpisodeLog};
+use avastra::geometry::{OrientedBox, distance_m};
 use avastra::model::Claim;
 use avastra::model::vocabulary::{Body, Light};
 use avastra::rng::{Stream, child_seed};
 use avastra::run::{Run, Stage};
-use avastra::sim::{DT_S, World};
+use avastra::sim::{DT_S, Obstacle, World};
 use serde_json::Value;
 
 use crate::command::{avastra, done, fails, last_line, outcome};
@@ -163,12 +164,15 @@ fn series_asked(gaps: &BTreeMap<u32, Margins>, jerks: &Margins, name: &str) -> B
 fn what_is_asked_of_each_road_user_near_is_asked_of_each_by_itself() {
     let run = run_against("idm", space_at("tests/cases/spaces/requirements_near.ava"), 10, 5, &[]);
     let space = run.space().clone();
-    let mut found = [0; 3];
+    let (mut found, mut lately) = ([0; 3], 0);
     for number in 0..run.episodes() {
         let log = run.episode(number);
         let script = avastra::episode::Script::of_log(&log);
         let (mut gaps, mut jerks): (BTreeMap<u32, Margins>, Margins) = Default::default();
         let (mut accelerations, mut touched) = (Vec::new(), false);
+        // The outlines of all ticks, the least time since one of two left the place of the other, and whether somebody is close.
+        let mut past: Vec<(OrientedBox, BTreeMap<u32, OrientedBox>)> = Vec::new();
+        let (mut left_s, mut close): (Option<f64>, Vec<bool>) = (None, Vec::new());
         let mut watch = |world: &World, _: &dyn avastra::ads::Ads, contacts: &[avastra::sim::Contact]| {
             touched |= !contacts.is_empty();
             if touched || world.ticks() == 0 {
@@ -183,6 +187,23 @@ fn what_is_asked_of_each_road_user_near_is_asked_of_each_by_itself() {
                     gaps.entry(obstacle.id).or_default().push((time_s, margin));
                 }
             }
+            let near = world.obstacles().filter(|one| !one.is_apart && one.distance_m <= 100.0);
+            for obstacle in near.clone().filter(|_| drives) {
+                let (ego, other) = (world.ego_outline(), obstacle.outline);
+                let overlaps = |(then, others): &&(OrientedBox, BTreeMap<u32, OrientedBox>)| {
+                    let was = others.get(&obstacle.id);
+                    distance_m(then, &other) <= 0.0 || was.is_some_and(|was| distance_m(was, &ego) <= 0.0)
+                };
+                let ago = past.iter().rev().take(250).position(|then| overlaps(&then));
+                let ago_s = ago.map_or(100.0, |ago| (ago + 1) as f64 * DT_S);
+                left_s = left_s.into_iter().chain([ago_s]).reduce(f64::min);
+            }
+            let is_close = |one: &Obstacle| {
+                matches!(one.body, Body::Pedestrian | Body::BoxTruck) && one.distance_m < 12.0
+            };
+            close.push(near.clone().any(is_close));
+            let others = world.obstacles().map(|one| (one.id, one.outline)).collect();
+            past.push((world.ego_outline(), others));
             accelerations.push(world.ego().acceleration_mps2);
             let before = accelerations.len().checked_sub(51).map(|at| accelerations[at]);
             let jerk = before.map_or(0.0, |before| accelerations[accelerations.len() - 1] - before);
@@ -236,12 +257,20 @@ fn what_is_asked_of_each_road_user_near_is_asked_of_each_by_itself() {
             log.margins.iter().find(is_of).expect("it is in force").smallest
         };
         assert_eq!(smallest("nobody_near"), smallest("keeps_off"));
+        // As often as it looks back over all outlines.
+        assert_eq!(smallest("left_long_ago"), left_s.map(|left_s| left_s - 1.5), "episode {number}");
+        lately += usize::from(left_s.is_some_and(|left_s| left_s < 5.0));
+        // More than 2 s in 10 s are 101 ticks of 500.
+        let close_in =
+            |tick: usize| close[tick.saturating_sub(499)..=tick].iter().filter(|one| **one).count();
+        let wanted = (0..close.len()).filter(|tick| close_in(*tick) > 100).map(|tick| tick as u64 + 1);
+        assert_eq!(ticks_of("keeps_off_half"), wanted.collect(), "episode {number}");
         // What is excused is as what is not asked, as long as every tick counts by itself.
         assert_eq!(ticks_of("keeps_off_unless"), ticks_of("keeps_off"), "episode {number}");
         assert_eq!(smallest("keeps_off_unless"), smallest("keeps_off"));
         assert_replays(&run, number, &log);
     }
-    assert!(found.iter().all(|count| *count > 3), "{found:?}");
+    assert!(found.iter().all(|count| *count > 3) && lately > 3, "{found:?}, {lately}");
 }
 
 #[test]

@@ -17,7 +17,7 @@ use avastra_lang::model::{
     RequirementMemory, Sliding, SpawnFacts, WorldFacts,
 };
 use avastra_lang::prove::is_never_asked;
-use avastra_world::sim::{DT_S, MomentParts, Obstacle, Watched, WatchedParts, World};
+use avastra_world::sim::{DT_S, Encroachment, MomentParts, Obstacle, Watched, WatchedParts, World};
 
 use super::setup::Setup;
 
@@ -56,6 +56,8 @@ pub struct Margin {
 #[derive(Debug, Clone)]
 pub(super) struct Monitor {
     watched: Watched,
+    /// Where everybody was, if that is asked for.
+    encroachment: Option<Encroachment>,
     /// The facts of the moment, filled anew at every tick.
     facts: WorldFacts,
     watches: Vec<Watch>,
@@ -177,12 +179,14 @@ impl Monitor {
             [] => u32::MAX,
             named => named.iter().fold(all, |all, body| all | 1 << body.like as u32),
         });
+        let encroachment = facts.contains(&Fact::NpcPet).then(Encroachment::default);
         let moment = MomentParts::of(facts.iter().copied(), words);
         let tick = WatchedParts::of(facts);
         let monitor = Monitor {
             moment,
             tick,
             watched: Watched::default(),
+            encroachment,
             facts: WorldFacts::default(),
             watches,
             idle,
@@ -213,6 +217,12 @@ impl Monitor {
         if self.asks_of != 0 {
             self.facts.near.clear();
             self.facts.near.extend(near(world, own_bodies, self.asks_of));
+            if let Some(encroachment) = &mut self.encroachment {
+                encroachment.note(world);
+                for near in &mut self.facts.near {
+                    near.npc.pet_s = encroachment.pet_s(near.id);
+                }
+            }
         }
         let facts =
             Facts { road: Some(&setup.road.facts), world: Some(&self.facts), ..Facts::new(&[], memory) };
@@ -293,6 +303,7 @@ impl Watch {
             let is_awaited = !stretch.tally.begun.is_empty();
             let is_near = asked.iter().any(|(known, _)| *known == id);
             let far = (!is_near && is_awaited).then(|| world.npc_facts(id)).flatten();
+            // Who is farther away than is looked for met nobody here lately.
             asked.extend(far.map(|npc| (id, npc)));
             let stays = is_near || far.is_some();
             if !stays {
@@ -542,16 +553,45 @@ mod tests {
         let side = |rng: &mut rng::Rng| -> (String, MarginAt, usize) {
             let part = f64::from(below(rng, 8)) / 4.0;
             let ticks = below(rng, 6) as usize + 1;
-            match below(rng, 5) {
+            match below(rng, if depth == 0 { 5 } else { 7 }) {
                 0 => ("ego.speed".to_owned(), Box::new(|all, t| all[t].0), 0),
                 1 => ("ego.limit".to_owned(), Box::new(|all, t| all[t].1), 0),
                 2 => (format!("({part} * ego.speed)"), Box::new(move |all, t| part * all[t].0), 0),
                 3 => ("-(ego.limit - ego.speed)".to_owned(), Box::new(|all, t| all[t].0 - all[t].1), 0),
-                _ => (
+                4 => (
                     format!("change(ego.speed, {} ms)", ticks * 20),
                     Box::new(move |all, t| all[t].0 - all[t - ticks].0),
                     ticks,
                 ),
+                5 => {
+                    let of = made_up(rng, depth - 1);
+                    let (text, since) = (of.text.clone(), of.known_from);
+                    let held = move |all: &Trace, t: usize| {
+                        (t.saturating_sub(ticks - 1).max(of.known_from)..=t)
+                            .filter(|at| of.holds(all, *at))
+                            .count()
+                    };
+                    (
+                        format!("(total({text}, {} ms) * 50 m/s^2)", ticks * 20),
+                        Box::new(move |all, t| held(all, t) as f64),
+                        since,
+                    )
+                }
+                _ => {
+                    let of = made_up(rng, depth - 1);
+                    let (text, since) = (of.text.clone(), of.known_from);
+                    let begins = move |all: &Trace, t: usize| {
+                        of.holds(all, t) && (t == of.known_from || !of.holds(all, t - 1))
+                    };
+                    let begun = move |all: &Trace, t: usize| {
+                        (t.saturating_sub(ticks - 1).max(since)..=t).filter(|at| begins(all, *at)).count()
+                    };
+                    (
+                        format!("(times({text}, {} ms) * 1 m/s)", ticks * 20),
+                        Box::new(move |all, t| begun(all, t) as f64),
+                        since,
+                    )
+                }
             }
         };
         let (text, of, known) = side(rng);

@@ -3,10 +3,11 @@
 use crate::check::checker::{Checker, docs};
 use crate::check::declaration::unknown_word;
 use crate::check::expression::Place;
+use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, field};
 use crate::model::body::{Changes, parameters};
-use crate::model::vocabulary::{Body, BodyField, Word};
+use crate::model::vocabulary::{Body, BodyClass, BodyField, Word};
 use crate::model::{BodyDef, BodyWord, Type, WordExpr, code};
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast, nearest};
@@ -122,7 +123,24 @@ impl Checker {
         Some(BodyWord { like, own })
     }
 
-    pub(super) fn note_body(&mut self, span: Span, name: &str) {
+    /// The bodies that a name in a list stands for: one, or all of a class.
+    pub(super) fn bodies_named(&mut self, name: &str, span: Span) -> Option<Vec<BodyWord>> {
+        if let Some(body) = self.body_named(name) {
+            self.note_body(span, name);
+            return Some(vec![body]);
+        }
+        if let Some(class) = BodyClass::from_name(name) {
+            self.references.note(span, Symbol::Engine(class.name(), class.meaning()), false);
+            let held = Body::ALL.iter().copied().filter(|body| class.holds(*body));
+            return Some(held.map(BodyWord::engine).collect());
+        }
+        let names =
+            Body::names().chain(BodyClass::names()).chain(self.bodies.iter().map(|body| body.name.as_str()));
+        let error = unknown("body", name, span, names);
+        self.reject(error)
+    }
+
+    fn note_body(&mut self, span: Span, name: &str) {
         self.references.uses(span, Symbol::Body(name.to_owned()));
         self.references.word_named::<Body>(span, name);
     }

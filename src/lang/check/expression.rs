@@ -10,7 +10,8 @@ use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind, Who};
 use crate::model::vocabulary::{
-    Fact, Known, PastWord, ROAD_LANES, SINCE, SOME, Site, THERE, Word, WordFact, parts_of, thing_of, things,
+    BEGINS, Fact, Known, PastWord, ROAD_LANES, SINCE, SOME, Site, THERE, Word, WordFact, parts_of, thing_of,
+    things,
 };
 use crate::model::{EnumIndex, STATE_MAX, StateDef, Type, code};
 use crate::syntax::ast::{Span, UnaryOp};
@@ -40,6 +41,18 @@ impl Place<'_> {
     pub(super) fn knows(&self, thing: &str) -> bool {
         self.site.knows_thing(thing)
     }
+}
+
+/// A fact of a road user that is named, or told by its number. Where two were lately is watched for requirements `on` bodies.
+fn fact_of_named(part: &str) -> Option<Fact> {
+    Fact::from_name(&format!("npc.{part}")).filter(|fact| *fact != Fact::NpcPet)
+}
+
+fn parts_of_named() -> impl Iterator<Item = &'static str> {
+    parts_of("npc")
+        .into_iter()
+        .map(|(part, _)| part)
+        .filter(|part| format!("npc.{part}") != Fact::NpcPet.name())
 }
 
 /// Most enums that the error about an ambiguous variant names.
@@ -385,7 +398,9 @@ impl Checker {
         let is_known = |known: Known| place.site.knows(known);
         if let Some(fact) = place.fact(&name) {
             return Some(Expr { kind: ExprKind::Fact(fact), ty: fact.ty(), span });
-        } else if Fact::from_name(&name).is_some_and(|fact| fact.known() == Known::Tick) {
+        } else if Fact::from_name(&name).is_some_and(|fact| {
+            fact.known() == Known::Tick || fact.known() == Known::Near && !place.site.is_requirement()
+        }) {
             let error = Diagnostic::error(code::NOT_HERE, format!("`{name}` is not known here"));
             self.report(error.at(span, "only requirements see it: it is watched at every tick"));
         } else if !place.knows(thing) || Fact::from_name(&name).is_some_and(|fact| !is_known(fact.known())) {
@@ -417,15 +432,13 @@ impl Checker {
             let error = Diagnostic::error(code::NOT_HERE, "road users have no numbers here");
             return self.reject(error.at(at, "only a scenario's `once` asks for one by its number"));
         }
-        let parts = || parts_of("npc").into_iter().map(|(part, _)| part);
-        let fact = Fact::from_name(&format!("npc.{}", part.text));
         let id = number.parse::<u32>().ok().filter(|id| *id > 0 && name.text == "npc");
         let Some(id) = id else {
             let error = Diagnostic::error(code::UNKNOWN, "no such road user").at(at, "none has this number");
             return self.reject(error.help("road users are `npc#1`, `npc#2` and so on, as they appear"));
         };
-        let Some(fact) = fact else {
-            return self.reject(unknown("npc fact", &part.text, part.span, parts()));
+        let Some(fact) = fact_of_named(&part.text) else {
+            return self.reject(unknown("npc fact", &part.text, part.span, parts_of_named()));
         };
         self.references.note(part.span, Symbol::Engine(fact.name(), fact.meaning()), false);
         Some(Expr { kind: ExprKind::OfRoadUser(id, fact), ty: fact.ty(), span })
@@ -447,8 +460,8 @@ impl Checker {
             let error = Diagnostic::error(code::TYPE_MISMATCH, message).at(span, "no value");
             return self.reject(error.help(format!("compare it: `.{} == Red`", part.text)));
         }
-        let Some(fact) = Fact::from_name(&format!("npc.{}", part.text)) else {
-            let parts = parts_of("npc").into_iter().map(|(part, _)| part).chain([THERE.0]);
+        let Some(fact) = fact_of_named(&part.text) else {
+            let parts = parts_of_named().chain([THERE.0]);
             return self.reject(unknown("fact of a road user", &part.text, part.span, parts));
         };
         self.references.note(part.span, Symbol::Engine(fact.name(), fact.meaning()), false);
@@ -536,6 +549,9 @@ impl Checker {
             && self.function_names.get(&call.name.text).is_none()
         {
             return self.past(word, call, place);
+        }
+        if call.name.text == BEGINS.0 && self.function_names.get(BEGINS.0).is_none() {
+            return self.begins(call, place);
         }
         if call.name.text == SOME.0 && self.function_names.get(SOME.0).is_none() {
             return self.some(call, place);

@@ -68,7 +68,7 @@ pub(crate) fn unknown<'a>(
     match nearest(name, candidates.iter().copied()) {
         Some(near) => error.meant(span, near),
         // All facts, because whoever asks for one that is missing needs to know what there is.
-        None if !candidates.is_empty() && (candidates.len() <= 12 || kind.ends_with(" fact")) => {
+        None if !candidates.is_empty() && (candidates.len() <= 16 || kind.ends_with(" fact")) => {
             error.help(format!("there is {}", listed(&candidates)))
         }
         None => error,

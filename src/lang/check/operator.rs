@@ -9,7 +9,7 @@ use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of};
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind, Who};
-use crate::model::vocabulary::{Body, Known, LaneChoice, Site, Word, WordFact};
+use crate::model::vocabulary::{Known, LaneChoice, Site, Word, WordFact};
 use crate::model::{BodyWord, Type, code};
 use crate::syntax::ast::{BinaryOp, Span};
 use crate::syntax::{Diagnostic, ast, one_of, print_expr};
@@ -268,14 +268,16 @@ impl Checker {
         if !knows {
             let error = Diagnostic::error(code::NOT_HERE, format!("`{}` is not known here", fact.name()));
             let who = match fact.known() {
-                Known::Road | Known::World | Known::Spawn | Known::Tick => format!("{SEEN_BY} the moment"),
+                Known::Road | Known::World | Known::Spawn | Known::Tick | Known::Near => {
+                    format!("{SEEN_BY} the moment")
+                }
                 Known::Step => "only rewards and verdicts see what happened in the step".to_owned(),
                 Known::Judgement => "only verdicts see how a collision was judged".to_owned(),
             };
             return self.reject(error.at(span, who));
         }
         if matches!(fact, WordFact::Hit | WordFact::Near) {
-            let bodies = all_of(words.iter().map(|word| self.body_of(word)))?;
+            let bodies = all_of(words.iter().map(|word| self.bodies_of(word)))?.concat();
             return Some(Expr { kind: ExprKind::IsBody(fact, bodies), ty: Type::Bool, span });
         }
         let words = all_of(words.iter().map(|word| self.word_of(fact, word)))?;
@@ -287,15 +289,9 @@ impl Checker {
     }
 
     /// A body beside `hit` or `near`: of the engine, or of the author's own.
-    fn body_of(&mut self, word: &ast::Expr) -> Option<BodyWord> {
+    fn bodies_of(&mut self, word: &ast::Expr) -> Option<Vec<BodyWord>> {
         let name = self.name_of(word, "the name of a body")?;
-        let Some(body) = self.body_named(name) else {
-            let names = Body::names().chain(self.bodies.iter().map(|body| body.name.as_str()));
-            let error = unknown("body", name, word.span, names);
-            return self.reject(error);
-        };
-        self.note_body(word.span, name);
-        Some(body)
+        self.bodies_named(name, word.span)
     }
 
     fn word_of(&mut self, fact: WordFact, word: &ast::Expr) -> Option<String> {

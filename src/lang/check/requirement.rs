@@ -2,12 +2,11 @@
 
 use crate::check::checker::{Checker, docs};
 use crate::check::expression::Place;
-use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
-use crate::model::expr::{Expr, ExprKind};
+use crate::model::expr::{Comparison, Expr, ExprKind};
 use crate::model::requirement::{margin_dimension, open_divisor, past_inside};
-use crate::model::vocabulary::{BREACHED, Body, EVENTS, PastWord, SOME, Site, Word, things};
+use crate::model::vocabulary::{BEGINS, BREACHED, EVENTS, PastWord, SOME, Site, Word, things};
 use crate::model::{BodyWord, RequirementDef, RuleDef, TICK_MS, Type, code};
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
@@ -56,7 +55,8 @@ impl Checker {
                 error.help("`avastra estimate --event` has another meaning for that word: rename it"),
             );
         }
-        let on: Vec<Option<BodyWord>> = declared.on.iter().map(|name| self.body_required(name)).collect();
+        let on = declared.on.iter().map(|name| self.bodies_named(&name.text, name.span));
+        let on: Vec<Option<Vec<BodyWord>>> = on.collect();
         for (at, name) in declared.on.iter().enumerate() {
             if let Some(first) = declared.on[..at].iter().find(|first| first.text == name.text) {
                 let message = format!("the body `{}` is named twice", name.text);
@@ -118,7 +118,7 @@ impl Checker {
             name: declared.name.text.clone(),
             docs: docs(item),
             optional: declared.optional,
-            on: on.into_iter().collect::<Option<_>>()?,
+            on: on.into_iter().collect::<Option<Vec<_>>>()?.concat(),
             margin: margin_dimension(&condition),
             when,
             until,
@@ -129,17 +129,6 @@ impl Checker {
             bearers,
             span: declared.name.span,
         })
-    }
-
-    /// A body that a requirement is about.
-    fn body_required(&mut self, name: &ast::Name) -> Option<BodyWord> {
-        let Some(body) = self.body_named(&name.text) else {
-            let names = Body::names().chain(self.bodies.iter().map(|body| body.name.as_str()));
-            let error = unknown("body", &name.text, name.span, names);
-            return self.reject(error);
-        };
-        self.note_body(name.span, &name.text);
-        Some(body)
     }
 
     /// `stops_at_red.breached` in a reward; `None` if this is no requirement.
@@ -178,8 +167,8 @@ impl Checker {
         self.reject(error.help("join it by `and`, `or`, `not` and `implies` alone"))
     }
 
-    /// `recently(npc.gap <= 5 m, 2 s)`: whether a condition held at some moment of the last seconds, or at each of them, or by
-    /// how much a number has changed.
+    /// `recently(npc.gap <= 5 m, 2 s)`: whether a condition held at some moment of the last seconds, or at each of them, how
+    /// long in all and how often; or by how much a number has changed.
     pub(super) fn past(&mut self, word: PastWord, call: &ast::Call, place: &Place<'_>) -> Option<Expr> {
         let name = word.name();
         self.references.note(call.name.span, Symbol::Engine(name, word.meaning()), false);
@@ -188,15 +177,16 @@ impl Checker {
             return self.reject(error.at(call.span, "only requirements remember what was"));
         }
         let is_change = word == PastWord::Change;
-        let example = match is_change {
-            true => format!("write a number and a time: `{name}(ego.acceleration, 0.5 s)`"),
-            false => format!("write a condition and a time: `{name}(nearest.gap <= 5 m, 2 s)`"),
+        let (wants, example) = match is_change {
+            true => ("number", format!("write a number and a time: `{name}(ego.acceleration, 0.5 s)`")),
+            false => {
+                ("condition", format!("write a condition and a time: `{name}(nearest.gap <= 5 m, 2 s)`"))
+            }
         };
         let [ast::Arg { name: None, value: condition }, ast::Arg { name: None, value: time }] =
             call.args.as_slice()
         else {
-            let message =
-                format!("`{name}` takes a {} and a time", if is_change { "number" } else { "condition" });
+            let message = format!("`{name}` takes a {wants} and a time");
             let error = Diagnostic::error(code::ARGUMENTS, message).at(call.span, "");
             return self.reject(error.help(example));
         };
@@ -206,8 +196,34 @@ impl Checker {
         };
         let ticks = self.ticks(time, &example);
         let of = of?;
-        let ty = of.ty;
+        let ty = match word {
+            PastWord::Recently | PastWord::Throughout | PastWord::Change => of.ty,
+            PastWord::Total => Type::Quantity(Dimension::DURATION),
+            PastWord::Times => Type::Int,
+        };
         Some(Expr { kind: ExprKind::Past(Box::new(of), word, ticks?), ty, span: call.span })
+    }
+
+    /// `begins(ego.light == Red)`: it did so once in the last tick.
+    pub(super) fn begins(&mut self, call: &ast::Call, place: &Place<'_>) -> Option<Expr> {
+        self.references.note(call.name.span, Symbol::Engine(BEGINS.0, BEGINS.1), false);
+        if !place.site.is_requirement() {
+            let error = Diagnostic::error(code::NOT_HERE, "`begins` cannot be asked here");
+            return self.reject(error.at(call.span, "only requirements remember what was"));
+        }
+        let [ast::Arg { name: None, value: condition }] = call.args.as_slice() else {
+            let error = Diagnostic::error(code::ARGUMENTS, "`begins` takes a condition").at(call.span, "");
+            return self.reject(error.help("write `begins(ego.light == Red)`"));
+        };
+        let of = self.typed(condition, place, Type::Bool)?;
+        let whole = |kind| Box::new(Expr { kind, ty: Type::Int, span: call.span });
+        let times = whole(ExprKind::Past(Box::new(of), PastWord::Times, 1));
+        let once = whole(ExprKind::Number(Rational::integer(1)));
+        Some(Expr {
+            kind: ExprKind::Compare(Comparison::Equal, times, once),
+            ty: Type::Bool,
+            span: call.span,
+        })
     }
 
     /// `some(Pedestrian, npc.gap <= 5 m)`, `some([Bicycle, Motorcycle], …)`, `some(npc.gap <= 5 m)`: whether a condition
@@ -226,14 +242,14 @@ impl Checker {
                     _ => vec![bodies],
                 };
                 let body = |named: &ast::Expr| match &named.kind {
-                    ast::ExprKind::Name(name) => self.body_required(&ast::Name::new(name, named.span)),
+                    ast::ExprKind::Name(name) => self.bodies_named(name, named.span),
                     _ => {
                         let error = Diagnostic::error(code::TYPE_MISMATCH, "`some` is about bodies");
                         let error = error.at(named.span, "no name of one");
                         self.reject(error.help("write `some(Pedestrian, npc.gap <= 5 m)`"))
                     }
                 };
-                (named.into_iter().map(body).collect::<Option<Vec<BodyWord>>>()?, value)
+                (named.into_iter().map(body).collect::<Option<Vec<_>>>()?.concat(), value)
             }
             _ => {
                 let message = "`some` takes bodies and a condition, or a condition alone";

@@ -7,7 +7,7 @@ use crate::model::effort;
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind, Who};
 use crate::model::space::{BodyWord, COUNTED, FnDef, RoadFacts, Space, WordExpr};
 use crate::model::value::{Memory, Value};
-use crate::model::vocabulary::{Fact, LaneChoice, Light, PastWord, Priority, RoadKind, Word, WordFact};
+use crate::model::vocabulary::{Fact, LaneChoice, Light, PastWord, Priority, RoadKind, Turn, Word, WordFact};
 
 /// Numbers that differ by at most this part of the larger one are equal, and their difference is 0, unless both are whole.
 /// This tolerates the digits that an author rounds away and those of binary fractions, but no measurable distance.
@@ -114,6 +114,8 @@ pub struct MomentFacts {
     pub ego_rear_m: f64,
     pub ego_light: Light,
     pub ego_road: RoadKind,
+    /// Where the route goes at the next junction.
+    pub ego_turn: Turn,
     pub road_users: u32,
     /// Those that were told to ignore a rule of the road.
     pub rule_breakers: u32,
@@ -158,6 +160,15 @@ pub struct NpcFacts {
     pub in_lane_m: f64,
     /// From its middle to the nearest crosswalk, at most [`CROSSWALK_GAP_M_MAX`].
     pub crosswalk_gap_m: f64,
+    /// The same of the crosswalk that is the next one on the ego vehicle's route.
+    pub next_crosswalk_gap_m: f64,
+    /// Until the two touch, if both go on along and across the route as now, at most [`TIME_S_MAX`].
+    pub contact_in_s: f64,
+    /// Since one of the two left the place where the other is, at most [`TIME_S_MAX`]. Known only to who watches.
+    pub pet_s: f64,
+    pub has_siren: bool,
+    /// Where it means to go at the next junction; nowhere for who is on foot.
+    pub turn: Turn,
 }
 
 /// Stands for a crosswalk that is farther away, and for none at all, m.
@@ -236,7 +247,7 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
             ((world.moment.elapsed_s - last_s) * 1000.0).round().min(SINCE_S_MAX * 1000.0) / 1000.0
         })),
         // What was, only requirements remember.
-        ExprKind::Past(_, PastWord::Change, _) => Value::Number(0.0),
+        ExprKind::Past(_, PastWord::Change | PastWord::Total | PastWord::Times, _) => Value::Number(0.0),
         ExprKind::Past(condition, ..) => evaluate(condition, functions, facts),
         ExprKind::Some(bodies, condition) => {
             let near = facts.world.map_or(&[][..], |world| &world.near);
@@ -352,6 +363,10 @@ fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
         Fact::NpcAside => spawn(|spawn| spawn.npc.aside_m),
         Fact::NpcInLane => spawn(|spawn| spawn.npc.in_lane_m),
         Fact::NpcCrosswalkGap => spawn(|spawn| spawn.npc.crosswalk_gap_m),
+        Fact::NpcNextCrosswalkGap => spawn(|spawn| spawn.npc.next_crosswalk_gap_m),
+        Fact::NpcContactIn => spawn(|spawn| spawn.npc.contact_in_s),
+        Fact::NpcPet => spawn(|spawn| spawn.npc.pet_s),
+        Fact::NpcSiren => Value::Bool(facts.spawn.is_some_and(|spawn| spawn.npc.has_siren)),
         Fact::SpawnGap => spawn(|spawn| spawn.spawn_gap_m),
         Fact::SafetyGap => spawn(|spawn| spawn.safety_gap_m),
         Fact::Proc => Value::Number(facts.outcome.proc),
@@ -408,6 +423,8 @@ pub(crate) fn word_of(fact: WordFact, facts: &Facts<'_>) -> Option<&'static str>
     match fact {
         WordFact::EgoLight => facts.world.map(|world| world.moment.ego_light.name()),
         WordFact::EgoRoad => facts.world.map(|world| world.moment.ego_road.name()),
+        WordFact::EgoTurn => facts.world.map(|world| world.moment.ego_turn.name()),
+        WordFact::NpcTurn => facts.spawn.map(|spawn| spawn.npc.turn.name()),
         WordFact::NpcLight => facts.spawn.map(|spawn| spawn.npc.light.name()),
         WordFact::NpcPriority => facts.spawn.map(|spawn| spawn.npc.priority.name()),
         WordFact::Priority => Some(facts.outcome.priority.name()),

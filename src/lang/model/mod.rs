@@ -40,7 +40,7 @@ pub use limits::{
 };
 pub use meaning::Meaning;
 pub(crate) use on_route::stretches;
-pub use on_route::{LIGHT_AHEAD_M, NEAR_JUNCTION_M, OnRoute, Stretch, junction_ahead_m};
+pub use on_route::{LIGHT_AHEAD_M, NEAR_JUNCTION_M, OnRoute, Stretch, junction_ahead};
 pub use policy::Policy;
 pub use requirement::{Asked, Kept, ReadyRequirement, RequirementMemory};
 pub use row::locals;

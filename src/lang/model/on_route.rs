@@ -6,7 +6,7 @@
 use core::ops::RangeInclusive;
 
 use crate::model::JUNCTION_AHEAD_M_MAX;
-use crate::model::vocabulary::RoadKind;
+use crate::model::vocabulary::{RoadKind, Turn};
 use avastra_road::{LaneIndex, RoadMap, Route, RouteLane};
 
 /// How far ahead a traffic light is searched for, m.
@@ -29,6 +29,8 @@ pub struct OnRoute {
     /// The next traffic light within reach, by index in `RoadMap::signals`.
     pub signal: Option<usize>,
     pub road: RoadKind,
+    /// Where the route goes at that junction.
+    pub turn: Turn,
 }
 
 /// A part of a route on which the ego vehicle meets one limit, one kind of road, and a light or none.
@@ -39,6 +41,7 @@ pub struct Stretch {
     pub route_left_m: RangeInclusive<f64>,
     pub has_light: bool,
     pub road: RoadKind,
+    pub turn: Turn,
 }
 
 impl OnRoute {
@@ -47,9 +50,11 @@ impl OnRoute {
         let ahead = route.lanes[first..].iter().map(|RouteLane { lane, enter_m, .. }| (*lane, *enter_m));
         let reach = station_m..=station_m + LIGHT_AHEAD_M;
         let line = route.stop_lines.iter().find(|line| reach.contains(&line.station_m));
+        let (junction_ahead_m, turn) = junction_ahead(map, ahead, station_m);
         OnRoute {
             limit_mps: map.lane(route.lanes[first].lane).speed_limit_mps,
-            junction_ahead_m: junction_ahead_m(map, ahead, station_m),
+            junction_ahead_m,
+            turn,
             route_left_m: route.goal_m - station_m,
             signal: line.map(|line| line.signal),
             road: road_kind(map, &route.lanes[first..], station_m),
@@ -57,15 +62,23 @@ impl OnRoute {
     }
 }
 
-/// Distance from a station to the first lane inside a junction, m. `ahead` has the lanes from the station on, each
-/// with the station at which it begins.
-pub fn junction_ahead_m(
+/// Distance from a station to the first lane inside a junction, m, and where it leads there. `ahead` has the lanes from the
+/// station on, each with the station at which it begins. Through a junction of several lanes in a row the first one tells.
+pub fn junction_ahead(
     map: &RoadMap,
     mut ahead: impl Iterator<Item = (LaneIndex, f64)>,
     station_m: f64,
-) -> f64 {
+) -> (f64, Turn) {
     let junction = ahead.find(|(lane, _)| map.lane(*lane).junction.is_some());
-    junction.map_or(JUNCTION_AHEAD_M_MAX, |(_, from_m)| (from_m - station_m).clamp(0.0, JUNCTION_AHEAD_M_MAX))
+    let near = junction.filter(|(_, from_m)| from_m - station_m < JUNCTION_AHEAD_M_MAX);
+    let Some((lane, from_m)) = near else { return (JUNCTION_AHEAD_M_MAX, Turn::None) };
+    let turn = match map.lane(lane).turn {
+        avastra_road::Turn::Left => Turn::Left,
+        avastra_road::Turn::Straight => Turn::Straight,
+        avastra_road::Turn::Right => Turn::Right,
+        avastra_road::Turn::UTurn => Turn::Back,
+    };
+    ((from_m - station_m).max(0.0), turn)
 }
 
 /// `ahead` has the lanes of the route from the station on.
@@ -113,7 +126,7 @@ pub(crate) fn stretches(map: &RoadMap, route: &Route) -> Vec<Stretch> {
 /// What is known between two stations, between which nothing changes but the distances.
 fn stretch(map: &RoadMap, route: &Route, from_m: f64, to_m: f64) -> Stretch {
     let (middle_m, half_m) = ((from_m + to_m) / 2.0, (to_m - from_m) / 2.0);
-    let OnRoute { limit_mps, junction_ahead_m, route_left_m, signal, road } =
+    let OnRoute { limit_mps, junction_ahead_m, route_left_m, signal, road, turn } =
         OnRoute::at(map, route, middle_m);
     let around = |value_m: f64, low_m: f64, high_m: f64| {
         (value_m - half_m).clamp(low_m, high_m)..=(value_m + half_m).clamp(low_m, high_m)
@@ -125,5 +138,5 @@ fn stretch(map: &RoadMap, route: &Route, from_m: f64, to_m: f64) -> Stretch {
         ahead_m => around(ahead_m, 0.0, JUNCTION_AHEAD_M_MAX),
     };
     let route_left_m = around(route_left_m, f64::NEG_INFINITY, f64::INFINITY);
-    Stretch { limit_mps, junction_ahead_m, route_left_m, has_light: signal.is_some(), road }
+    Stretch { limit_mps, junction_ahead_m, route_left_m, has_light: signal.is_some(), road, turn }
 }

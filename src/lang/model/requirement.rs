@@ -11,6 +11,7 @@ use crate::model::eval::{
     of_tick,
 };
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
+use crate::model::limits::TICK_MS;
 use crate::model::sliding::Sliding;
 use crate::model::space::{BodyWord, FnDef, RequirementDef};
 use crate::model::value::Type;
@@ -39,7 +40,7 @@ pub struct ReadyRequirement {
     pasts: Vec<PastNode>,
 }
 
-/// `recently(condition, …)`, `throughout(condition, …)` or `change(number, …)`.
+/// A word for the past with what it is asked of: `recently(condition, …)`, `change(number, …)`.
 #[derive(Debug, Clone)]
 struct PastNode {
     of: Node,
@@ -53,7 +54,7 @@ struct PastNode {
 /// What a requirement remembers from tick to tick, about the ego vehicle or about one road user.
 #[derive(Debug, Clone, Default)]
 pub struct RequirementMemory {
-    /// For each `recently`, `throughout` and `change`.
+    /// For each word for the past.
     pasts: Vec<Past>,
     /// Whether `when` held at some tick since which `until` did not.
     is_latched: bool,
@@ -75,9 +76,12 @@ struct Past {
     margin: f64,
     largest: Sliding,
     margins: VecDeque<f64>,
-    /// The numbers of these ticks, and their change.
+    /// The numbers of these ticks; or for those at which the condition counts 1, and 0 for the others.
     numbers: VecDeque<f64>,
-    change: f64,
+    /// By how much the number changed, or the time or the number of times that it counts.
+    number: f64,
+    /// Whether the condition held at the tick before.
+    held: bool,
 }
 
 /// How a requirement is asked at a moment.
@@ -201,6 +205,12 @@ impl ReadyRequirement {
             let at = At { functions, facts, pasts: within };
             match node.word {
                 PastWord::Change => from[0].take_number(at.number(&node.of), node.ticks),
+                PastWord::Total => from[0].count(at.holds(&node.of), node.ticks, TICK_MS as f64 / 1000.0),
+                PastWord::Times => {
+                    let holds = at.holds(&node.of);
+                    let held = core::mem::replace(&mut from[0].held, holds);
+                    from[0].count(holds && !held, node.ticks, 1.0);
+                }
                 PastWord::Recently | PastWord::Throughout => {
                     from[0].take(at.kept_of(&node.of, node.has_margin), node);
                 }
@@ -261,9 +271,20 @@ impl Past {
         self.numbers.push_back(number);
         if self.numbers.len() > ticks as usize {
             let before = self.numbers.pop_front();
-            self.change = before.map_or(f64::NAN, |before| number - before);
+            self.number = before.map_or(f64::NAN, |before| number - before);
             self.is_known = true;
         }
+    }
+
+    /// Takes whether a tick counts; what each of the last ones that count is worth, is the number.
+    fn count(&mut self, counts: bool, ticks: u32, worth: f64) {
+        self.ticks += u32::from(counts);
+        self.numbers.push_back(f64::from(u8::from(counts)));
+        if self.numbers.len() > ticks as usize {
+            self.ticks -= u32::from(self.numbers.pop_front() == Some(1.0));
+        }
+        self.number = f64::from(self.ticks) * worth;
+        self.is_known = true;
     }
 }
 
@@ -362,7 +383,7 @@ impl<'a> At<'a> {
             Node::Fact(of) => self.fact(*of),
             Node::Arithmetic(op, left, right) => arithmetic(*op, self.number(left), self.number(right)),
             Node::Other(expr) => evaluate(expr, self.functions, self.facts).number(),
-            Node::Past(index) => self.pasts[*index].change,
+            Node::Past(index) => self.pasts[*index].number,
             Node::Bound(..)
             | Node::Compare(..)
             | Node::InRange(..)
@@ -491,9 +512,9 @@ pub(crate) fn margin_dimension(condition: &Expr) -> Option<Dimension> {
             Type::Quantity(dimension) => Some(dimension),
             Type::Bool | Type::Enum(_) => None,
         },
-        ExprKind::Not(inner) | ExprKind::Past(inner, ..) | ExprKind::Some(_, inner) => {
-            margin_dimension(inner)
-        }
+        ExprKind::Not(inner)
+        | ExprKind::Past(inner, PastWord::Recently | PastWord::Throughout, _)
+        | ExprKind::Some(_, inner) => margin_dimension(inner),
         ExprKind::And(left, right) | ExprKind::Or(left, right) | ExprKind::Implies(left, right) => {
             margin_dimension(left).filter(|dimension| margin_dimension(right) == Some(*dimension))
         }

@@ -109,6 +109,8 @@ pub enum Known {
     Spawn,
     /// At every tick, where requirements are judged: what must be watched over time, or costs too much elsewhere.
     Tick,
+    /// The same of each road user near.
+    Near,
     /// After the step.
     Step,
     /// After a collision was judged.
@@ -162,6 +164,7 @@ impl Site {
             }
             Known::Spawn => matches!(self, Site::Rule | Site::Change | Site::Phase | Site::RequirementOn),
             Known::Tick => self.is_requirement(),
+            Known::Near => self == Site::RequirementOn,
             Known::Step => matches!(self, Site::Reward | Site::Verdict),
             Known::Judgement => self == Site::Verdict,
         }
@@ -259,6 +262,10 @@ facts! {
     NpcAside "npc.aside" LENGTH, Spawn = "A `Length`: the room between its outline and the ego vehicle's, across the route; below 0 they overlap.";
     NpcInLane "npc.in_lane" LENGTH, Spawn = "A `Length`: how far its outline reaches into the lane that the ego vehicle's route has beside it; below 0 what is missing.";
     NpcCrosswalkGap "npc.crosswalk_gap" LENGTH, Spawn = "A `Length`: from its middle to the nearest crosswalk; 0 on one, 100 m if there is none nearer.";
+    NpcNextCrosswalkGap "npc.next_crosswalk_gap" LENGTH, Spawn = "A `Length`: from its middle to the crosswalk that is the next one on the ego vehicle's route, or on which that is; 0 on it, 100 m if there is none or it is farther away.";
+    NpcContactIn "npc.contact_in" DURATION, Spawn = "A `Duration`: until it and the ego vehicle touch, if both go on along and across the route as fast as now; 0 if they touch, 100 s if they do not.";
+    NpcPet "npc.pet" DURATION, Near = "A `Duration`: since the other of the two left the place where one of them is now (post-encroachment time); 100 s if that is more than 5 s ago.";
+    NpcSiren "npc.siren" Type::Bool, Near = "A `Bool`: whether it is an emergency vehicle under way, for which all others wait.";
     SpawnGap "spawn_gap" LENGTH, Spawn = "A `Length`: the gap from the ego vehicle to the road user that appears.";
     SafetyGap "safety_gap" LENGTH, Spawn = "A `Length`: the gap that a careful driver needs.";
     EgoLeadGap "ego.lead_gap" LENGTH, Tick = "A `Length`: to the next road user ahead in its way that does not come towards it; 1000 m if there is none nearer.";
@@ -323,8 +330,16 @@ words! {
     PastWord "What a requirement may ask of the last seconds: spelt like a function of a condition and a time.":
     Recently "recently" = "Whether a condition held at some moment of the last seconds: `recently(npc.gap <= 5 m, 2 s)`.",
     Throughout "throughout" = "Whether a condition held at every moment of the last seconds: `throughout(ego.speed <= 0.1 m/s, 3 s)`.",
+    Total "total" = "For how long in all a condition held during the last seconds: `total(ego.acceleration <= -3 m/s^2, 10 s) <= 2 s`.",
+    Times "times" = "How often a condition began to hold during the last seconds: `times(ego.acceleration <= -3 m/s^2, 60 s) <= 2`.",
     Change "change" = "By how much a number is more than so many seconds ago: `change(ego.acceleration, 0.5 s) <= 1 m/s^2`.",
 }
+
+/// `begins(ego.light == Red)`: spelt like a function of a condition.
+pub const BEGINS: (&str, &str) = (
+    "begins",
+    "Whether a condition begins to hold at this moment, or holds as it is first looked at: `recently(begins(ego.light == Red), 3 s)`.",
+);
 
 /// `some(Pedestrian, npc.gap <= 5 m)`: spelt like a function, of bodies and a condition.
 pub const SOME: (&str, &str) = (
@@ -335,7 +350,9 @@ pub const SOME: (&str, &str) = (
 word_facts! {
     EgoLight "ego.light" Light, World = "The next traffic light within 100 m: `ego.light == Red`, `ego.light in [Yellow, Red]`.";
     EgoRoad "ego.road" RoadKind, World = "Where the ego vehicle drives: `ego.road == InJunction`.";
+    EgoTurn "ego.turn" Turn, World = "Where the route goes at the junction that it is in, or at the next one: `ego.turn == Left`.";
     NpcLight "npc.light" Light, Spawn = "The next traffic light within 100 m on the way of a vehicle: `npc.light == Red`, `van.light == Green`.";
+    NpcTurn "npc.turn" Turn, Spawn = "Where a vehicle means to go at the junction that it is in, or at the next one: `npc.turn in [Left, Right]`.";
     NpcPriority "npc.priority" Priority, Spawn = "Which of it and the ego vehicle goes first, once one of them has come into the other's way: `npc.priority == other` is that it does.";
     Priority "priority" Priority, Step = "Whether the ego vehicle or the road user that was hit had to give way: `priority == ego`, `priority in [other, none]`.";
     Hit "hit" Body, Step = "What was hit: `hit == Pedestrian`; nothing if there was no collision.";
@@ -521,6 +538,25 @@ words! {
 }
 
 words! {
+    BodyClass "Bodies of road users together, where they are compared or listed.":
+    RoadUser "RoadUser" = "All of them.",
+    Vehicle "Vehicle" = "All but `Pedestrian`.",
+    MotorVehicle "MotorVehicle" = "All vehicles but `Bicycle`.",
+    TwoWheeler "TwoWheeler" = "`Motorcycle` and `Bicycle`.",
+}
+
+impl BodyClass {
+    pub fn holds(self, body: Body) -> bool {
+        match self {
+            BodyClass::RoadUser => true,
+            BodyClass::Vehicle => body.is_vehicle(),
+            BodyClass::MotorVehicle => body.is_vehicle() && body != Body::Bicycle,
+            BodyClass::TwoWheeler => body.has_two_wheels(),
+        }
+    }
+}
+
+words! {
     /// Paint changes nothing but the picture, yet it is part of the scenario.
     Colour "A paint.": Pink, Red, Yellow, Black, White, Skyblue
 }
@@ -589,6 +625,17 @@ words! {
     Green = "The next traffic light is green.",
     #[default]
     None = "No traffic light within 100 m.",
+}
+
+words! {
+    #[derive(Default)]
+    Turn "Where somebody goes at the next junction.":
+    Left = "To the left.",
+    Straight = "Straight on.",
+    Right = "To the right.",
+    Back = "Back to where it came from.",
+    #[default]
+    None = "No junction within 1000 m.",
 }
 
 words! {

@@ -8,7 +8,8 @@ use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::vocabulary::{Fact, PastWord};
 use crate::model::{
     AMBIENT_MAX, COMMANDED_MAX, CROSSWALK_GAP_M_MAX, EGO_ACCELERATION_MPS2_MAX, FnDef, Interval,
-    JUNCTION_AHEAD_M_MAX, LEAD_GAP_M_MAX, RoadFacts, SINCE_S_MAX, SPEED_MPS_MAX, TIME_S_MAX, Type, Value,
+    JUNCTION_AHEAD_M_MAX, LEAD_GAP_M_MAX, RoadFacts, SINCE_S_MAX, SPEED_MPS_MAX, TICK_MS, TIME_S_MAX, Type,
+    Value,
 };
 use crate::prove::moment::Case;
 use crate::prove::sums::{difference, is_same, lacks_value, may_lack_a_value};
@@ -172,6 +173,10 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
         ExprKind::IsThere(_) | ExprKind::Breached(_) => Values::UNKNOWN_TRUTH,
         // What is known of this moment says nothing of those before it.
         ExprKind::Past(_, PastWord::Change, _) => Values::Number(Interval::ALL),
+        ExprKind::Past(_, PastWord::Total, ticks) => {
+            Values::Number(between(0.0, f64::from(*ticks * TICK_MS) / 1000.0))
+        }
+        ExprKind::Past(_, PastWord::Times, ticks) => Values::Number(between(0.0, f64::from(*ticks))),
         // Of whom it is asked, is not known; there may be nobody.
         ExprKind::Some(_, condition) => {
             match enclose(condition, &Known { case: None, ..*known }).may_hold() {
@@ -278,7 +283,7 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
         Fact::EgoJunctionAhead | Fact::EgoCrosswalkAhead | Fact::NpcJunctionAhead => {
             between(0.0, JUNCTION_AHEAD_M_MAX)
         }
-        Fact::NpcTtc | Fact::NpcHeadway => between(0.0, TIME_S_MAX),
+        Fact::NpcTtc | Fact::NpcHeadway | Fact::NpcContactIn | Fact::NpcPet => between(0.0, TIME_S_MAX),
         Fact::EgoOffset
         | Fact::EgoRouteLeft
         | Fact::EgoFront
@@ -300,7 +305,7 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
         | Fact::EgoOverLane
         | Fact::EgoVisibility
         | Fact::EgoJerk => Interval::ALL,
-        Fact::NpcCrosswalkGap => between(0.0, CROSSWALK_GAP_M_MAX),
+        Fact::NpcCrosswalkGap | Fact::NpcNextCrosswalkGap => between(0.0, CROSSWALK_GAP_M_MAX),
         Fact::EgoLeadGap => between(0.0, LEAD_GAP_M_MAX),
         Fact::RoadUsers | Fact::RuleBreakers => between(0.0, f64::from(COMMANDED_MAX + AMBIENT_MAX)),
         Fact::RoadLimit
@@ -316,7 +321,9 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
         | Fact::SpawnGap
         | Fact::SafetyGap => Interval::NOT_NEGATIVE,
         Fact::Proc => between(0.0, 1.0),
-        Fact::Collision | Fact::Repeated | Fact::Sudden | Fact::Struck | Fact::Avoidable => return None,
+        Fact::NpcSiren | Fact::Collision | Fact::Repeated | Fact::Sudden | Fact::Struck | Fact::Avoidable => {
+            return None;
+        }
     })
 }
 

@@ -57,7 +57,7 @@ impl Case {
 
     /// What a stretch of a route says of a moment.
     fn of_stretch(stretch: &Stretch) -> Case {
-        let Stretch { limit_mps, junction_ahead_m, route_left_m, has_light, road } = stretch;
+        let Stretch { limit_mps, junction_ahead_m, route_left_m, has_light, road, turn } = stretch;
         let numbers = vec![
             (Fact::EgoLimit, measured(*limit_mps, *limit_mps)),
             (Fact::EgoJunctionAhead, measured(*junction_ahead_m.start(), *junction_ahead_m.end())),
@@ -66,7 +66,10 @@ impl Case {
         let no_light = (WordFact::EgoLight, Light::None.name());
         let (lights, not_words) =
             if *has_light { (None, vec![no_light]) } else { (Some(no_light), Vec::new()) };
-        let words = lights.into_iter().chain([(WordFact::EgoRoad, road.name())]).collect();
+        let words = lights
+            .into_iter()
+            .chain([(WordFact::EgoRoad, road.name()), (WordFact::EgoTurn, turn.name())])
+            .collect();
         Case { numbers, words, not_words }
     }
 
@@ -190,7 +193,7 @@ fn places<'a>(asking: &[&Expr], known: &Known<'a>) -> impl Iterator<Item = Case>
         matches!(
             kind,
             ExprKind::Fact(Fact::EgoLimit | Fact::EgoJunctionAhead | Fact::EgoRouteLeft)
-                | ExprKind::IsWord(WordFact::EgoRoad | WordFact::EgoLight, _)
+                | ExprKind::IsWord(WordFact::EgoRoad | WordFact::EgoLight | WordFact::EgoTurn, _)
         )
     };
     let asks = asking.iter().any(|condition| condition.any(is_of_place));

@@ -18,12 +18,13 @@
 //! `traffic` holds the manners that a run can change;
 //! `safety` says how much room a careful driver would need. `junction` knows where lanes cross and which
 //! goes first, `signals` the colour of every light at every tick. `moment` says what can be asked about a moment,
-//! `watched` what requirements ask beside it, `trace` digests the states of all ticks.
+//! `watched` and `encroachment` what requirements ask beside it, `trace` digests the states of all ticks.
 
 mod ambient;
 mod around;
 mod contact;
 mod ego;
+mod encroachment;
 mod environment;
 mod incident;
 mod junction;
@@ -55,6 +56,7 @@ use avastra_lang::model::body;
 
 pub use contact::Contact;
 pub use ego::{Control, VehicleParameters, pedal_acceleration_mps2, pedals_for};
+pub use encroachment::Encroachment;
 pub use environment::friction_scale;
 pub use incident::Incident;
 pub use moment::MomentParts;

@@ -1,9 +1,11 @@
 //! What can be asked about a moment: the facts of the ego vehicle and its surroundings, and those of another road
 //! user. Rules, policies and the paper's state variables read the same ones.
 
-use avastra_lang::model::vocabulary::{Fact, Light, Priority, WordFact};
+use avastra_base::geometry::Vec2;
+use avastra_lang::model::vocabulary::{Fact, Light, Priority, Turn, WordFact};
 use avastra_lang::model::{
-    JUNCTION_AHEAD_M_MAX, LIGHT_AHEAD_M, MomentFacts, NpcFacts, OnRoute, TIME_S_MAX, junction_ahead_m,
+    CROSSWALK_GAP_M_MAX, JUNCTION_AHEAD_M_MAX, LIGHT_AHEAD_M, MomentFacts, NpcFacts, OnRoute, TIME_S_MAX,
+    junction_ahead,
 };
 
 use super::around::Around;
@@ -45,7 +47,8 @@ impl MomentParts {
                 _ => {}
             }
         }
-        parts.route |= words.into_iter().any(|word| matches!(word, WordFact::EgoLight | WordFact::EgoRoad));
+        let is_of_route = |word| matches!(word, WordFact::EgoLight | WordFact::EgoRoad | WordFact::EgoTurn);
+        parts.route |= words.into_iter().any(is_of_route);
         parts
     }
 }
@@ -107,8 +110,9 @@ impl Around<'_> {
             ..MomentFacts::default()
         };
         if parts.route {
-            let OnRoute { limit_mps, junction_ahead_m, route_left_m, signal, road } = self.on_route();
+            let OnRoute { limit_mps, junction_ahead_m, route_left_m, signal, road, turn } = self.on_route();
             (facts.ego_limit_mps, facts.ego_junction_ahead_m) = (limit_mps, junction_ahead_m);
+            facts.ego_turn = turn;
             (facts.ego_route_left_m, facts.ego_light, facts.ego_road) =
                 (route_left_m, self.light(signal), road);
         } else if parts.limit {
@@ -144,6 +148,12 @@ impl Around<'_> {
         let mut ahead = self.scene.route.crosswalks_m.iter().filter(|(_, end_m)| *end_m >= from_m);
         let begin_m = ahead.next().map_or(f64::INFINITY, |(begin_m, _)| *begin_m);
         (begin_m - from_m).clamp(0.0, JUNCTION_AHEAD_M_MAX)
+    }
+
+    /// From a point to the next crosswalk on the route, m: at most [`CROSSWALK_GAP_M_MAX`].
+    fn next_crosswalk_gap_m(&self, point: Vec2) -> f64 {
+        let next = self.scene.route.crosswalks_m.iter().position(|(_, end_m)| *end_m >= self.ego_station_m);
+        next.map_or(CROSSWALK_GAP_M_MAX, |nth| self.scene.route_crosswalk_gap_m(nth, point))
     }
 
     /// What the ego vehicle's place says.
@@ -189,7 +199,8 @@ pub(super) fn npc_facts(around: &Around, obstacle: &Obstacle, motion: &Motion) -
         Motion::Walk(_) | Motion::Stroll(_) | Motion::Stand => {
             let station_m = scene.route.path.project(obstacle.outline.pose.position).station_m;
             let beside = OnRoute::at(&scene.map, &scene.route, station_m);
-            facts(around, obstacle, beside.limit_mps, beside.junction_ahead_m, Light::None)
+            let junction = (beside.junction_ahead_m, Turn::None);
+            facts(around, obstacle, beside.limit_mps, junction, Light::None)
         }
     }
 }
@@ -204,18 +215,19 @@ pub(super) fn driver_facts(around: &Around, obstacle: &Obstacle, driver: &Driver
         begin_m += scene.map.lane(lane).centre.length_m() - on_lane_m;
         (lane, from_m)
     });
-    let ahead_m = junction_ahead_m(&scene.map, ahead, station_m);
+    let junction = junction_ahead(&scene.map, ahead, station_m);
     let reach = station_m..=station_m + LIGHT_AHEAD_M;
     let line = way.stop_lines.iter().find(|line| reach.contains(&line.station_m));
     let light = around.light(line.map(|line| line.signal));
-    facts(around, obstacle, way.limit_mps(scene, station_m), ahead_m, light)
+    let facts = facts(around, obstacle, way.limit_mps(scene, station_m), junction, light);
+    NpcFacts { has_siren: driver.has_siren, ..facts }
 }
 
 fn facts(
     around: &Around,
     obstacle: &Obstacle,
     limit_mps: f64,
-    junction_ahead_m: f64,
+    (junction_ahead_m, turn): (f64, Turn),
     light: Light,
 ) -> NpcFacts {
     let (station_m, offset_m, along) = around.beside_route(obstacle.outline.pose.position);
@@ -235,10 +247,23 @@ fn facts(
         false => TIME_S_MAX,
     };
     let (_, ego_half_width_m) = around.ego_outline.half_extent_m(around.ego_forward, along);
+    let across_mps = along.perp(&obstacle.velocity_mps);
+    let (_, ego_along) = around.scene.route.path.along(around.ego_station_m);
+    let lengthwise = Closing {
+        from_m: rear_m - ego_front_m,
+        to_m: front_m - ego_rear_m,
+        by_mps: other_mps - ego_along.dot(&around.ego_velocity_mps),
+    };
+    let (aside_m, both_m) = (offset_m - around.ego_offset_m, half_width_m + ego_half_width_m);
+    let sideways = Closing {
+        from_m: aside_m - both_m,
+        to_m: aside_m + both_m,
+        by_mps: across_mps - ego_along.perp(&around.ego_velocity_mps),
+    };
     NpcFacts {
         along_mps: other_mps,
-        across_mps: along.perp(&obstacle.velocity_mps),
-        aside_m: (offset_m - around.ego_offset_m).abs() - half_width_m - ego_half_width_m,
+        across_mps,
+        aside_m: aside_m.abs() - both_m,
         in_lane_m: around.scene.half_width_m(station_m) + half_width_m - offset_m.abs(),
         crosswalk_gap_m: around.scene.crosswalk_gap_m(obstacle.outline.pose.position),
         speed_mps: obstacle.velocity_mps.norm(),
@@ -247,12 +272,46 @@ fn facts(
         limit_mps,
         light,
         priority: Priority::None,
+        next_crosswalk_gap_m: around.next_crosswalk_gap_m(obstacle.outline.pose.position),
+        contact_in_s: contact_in_s(lengthwise, sideways),
+        pet_s: TIME_S_MAX,
+        has_siren: false,
+        turn,
         front_m,
         rear_m,
         offset_m,
         ttc_s: takes_s(behind_mps - before_mps),
         headway_s: takes_s(behind_mps),
     }
+}
+
+/// Where another stretch lies beside that of the ego vehicle in one direction: they overlap while one of its ends is below 0
+/// and the other above it.
+#[derive(Debug, Clone, Copy)]
+struct Closing {
+    from_m: f64,
+    to_m: f64,
+    by_mps: f64,
+}
+
+impl Closing {
+    /// From when until when they overlap, s; an empty time if never.
+    fn overlap_s(self) -> (f64, f64) {
+        let Closing { from_m, to_m, by_mps } = self;
+        match by_mps {
+            by_mps if by_mps > 0.0 => (-to_m / by_mps, -from_m / by_mps),
+            by_mps if by_mps < 0.0 => (-from_m / by_mps, -to_m / by_mps),
+            _ if from_m < 0.0 && to_m > 0.0 => (f64::NEG_INFINITY, f64::INFINITY),
+            _ => (f64::INFINITY, f64::NEG_INFINITY),
+        }
+    }
+}
+
+/// When two touch that go on as now, s.
+fn contact_in_s(lengthwise: Closing, sideways: Closing) -> f64 {
+    let ((from_s, to_s), (aside_from_s, aside_to_s)) = (lengthwise.overlap_s(), sideways.overlap_s());
+    let (begin_s, end_s) = (from_s.max(aside_from_s), to_s.min(aside_to_s));
+    if begin_s < end_s && end_s > 0.0 { begin_s.clamp(0.0, TIME_S_MAX) } else { TIME_S_MAX }
 }
 
 #[cfg(test)]
@@ -264,7 +323,7 @@ mod tests {
     use crate::sim::{Control, DT_S, Scene, World, testing};
     use avastra_base::geometry::Vec2;
     use avastra_lang::check::{ReadError, load};
-    use avastra_lang::model::vocabulary::{Light, RoadKind, Verb};
+    use avastra_lang::model::vocabulary::{Light, RoadKind, Turn, Verb};
     use avastra_lang::model::{NpcFacts, Row, RulesInForce};
 
     #[test]
@@ -277,7 +336,26 @@ mod tests {
         assert_eq!(facts.ego_junction_ahead_m, begin_m);
         assert_eq!((facts.ego_road, facts.ego_light), (RoadKind::OneWay, Light::None));
         assert_eq!((facts.road_users, facts.nearest_gap_m), (0, 100.0));
-        assert_eq!(testing::world(&testing::straight()).moment_facts().ego_junction_ahead_m, 1000.0);
+        assert_eq!(facts.ego_turn, Turn::Straight);
+        let (corner, mut turns) = (testing::corner(), Vec::new());
+        let world = testing::world(&corner);
+        for lane in &corner.route.lanes {
+            let Some(_) = corner.map.lane(lane.lane).junction else { continue };
+            // By the headings at both ends of the way through.
+            let length_m = corner.map.lane(lane.lane).centre.length_m();
+            let [from_rad, to_rad] =
+                [0.0, length_m].map(|at_m| corner.map.lane(lane.lane).centre.heading_at(at_m));
+            let by_rad = avastra_base::geometry::wrap_angle(to_rad - from_rad);
+            turns.push(match by_rad {
+                by_rad if by_rad > 0.5 => Turn::Left,
+                by_rad if by_rad < -0.5 => Turn::Right,
+                _ => Turn::Straight,
+            });
+        }
+        assert_eq!(world.moment_facts().ego_turn, turns[0], "{turns:?}");
+        assert!(turns[0] != Turn::Straight);
+        let straight = testing::world(&testing::straight()).moment_facts();
+        assert_eq!((straight.ego_junction_ahead_m, straight.ego_turn), (1000.0, Turn::None));
     }
 
     #[test]
@@ -351,6 +429,43 @@ mod tests {
             oncoming.along_mps < -1.0 && oncoming.in_lane_m < 0.0 && oncoming.aside_m > 0.0,
             "{oncoming:?}"
         );
+    }
+
+    #[test]
+    fn a_contact_comes_when_outlines_meet_that_go_on_as_now() {
+        use crate::action::Effect;
+        let mut world = testing::world(&testing::straight());
+        for (verb, distance_m, speed_mps) in
+            [(Verb::DriveAhead, 30.0, 3.0), (Verb::DriveOpposite, 80.0, 6.0), (Verb::Walk, 40.0, 1.5)]
+        {
+            let effect = Effect::Spawn(testing::request(verb, distance_m, speed_mps));
+            world.apply(&effect).expect("there is room");
+        }
+        let mut touches = 0;
+        for tick in 0..400 {
+            world.tick(&Control { throttle_pct: 25.0, ..Control::default() });
+            for id in 1..=3 {
+                let (Some(npc), Some(obstacle)) = (world.npc_facts(id), world.obstacle(id)) else { continue };
+                if tick % 20 > 0 || obstacle.distance_m <= 0.0 {
+                    continue;
+                }
+                let ego = world.ego_outline();
+                let ego_mps = ego.pose.forward() * world.ego().speed_mps;
+                // On a straight road that is along its lanes and across them.
+                let touch_s = (0..2000).map(|nth| f64::from(nth) * 0.005).find(|later_s| {
+                    let mut there = [ego, obstacle.outline];
+                    there[0].pose.position += ego_mps * *later_s;
+                    there[1].pose.position += obstacle.velocity_mps * *later_s;
+                    avastra_base::geometry::distance_m(&there[0], &there[1]) <= 0.0
+                });
+                match touch_s {
+                    Some(touch_s) => assert!((npc.contact_in_s - touch_s).abs() < 0.01, "{npc:?} {touch_s}"),
+                    None => assert!(npc.contact_in_s > 9.9, "{npc:?}"),
+                }
+                touches += usize::from(touch_s.is_some());
+            }
+        }
+        assert!(touches > 10, "{touches}");
     }
 
     /// A lane change that an action commands begins only while the rules `during change` hold; without them others

@@ -52,6 +52,8 @@ pub struct Scene {
     oncoming: OnceLock<Vec<Option<OncomingEdge>>>,
     /// A circle around each crosswalk of the map: its middle and its radius, m.
     crosswalk_circles: Vec<(Vec2, f64)>,
+    /// For each crosswalk of the route, the one of the map, by index.
+    route_crosswalks: Vec<Option<usize>>,
 }
 
 impl Scene {
@@ -75,8 +77,14 @@ impl Scene {
             (middle, outline.iter().map(|corner| (corner - middle).norm()).fold(0.0, f64::max))
         };
         let crosswalk_circles = map.crosswalks.iter().map(|crosswalk| circle(&crosswalk.outline)).collect();
+        let on_route = |(from_m, to_m): &(f64, f64)| {
+            let middle = route.path.position_at((from_m + to_m) / 2.0);
+            (0..map.crosswalks.len()).find(|crosswalk| map.crosswalk_gap_m(*crosswalk, middle) <= 0.0)
+        };
+        let route_crosswalks = route.crosswalks_m.iter().map(on_route).collect();
         Scene {
             crosswalk_circles,
+            route_crosswalks,
             areas,
             route_areas,
             ways: Ways::default(),
@@ -107,6 +115,18 @@ impl Scene {
                 false => least_m,
             }
         })
+    }
+
+    /// Distance from a point to the nth crosswalk of the route, m: 0 on it, at most [`CROSSWALK_GAP_M_MAX`].
+    pub(super) fn route_crosswalk_gap_m(&self, nth: usize, point: Vec2) -> f64 {
+        let Some(crosswalk) = self.route_crosswalks.get(nth).copied().flatten() else {
+            return CROSSWALK_GAP_M_MAX;
+        };
+        let (middle, radius_m) = self.crosswalk_circles[crosswalk];
+        match (point - middle).norm() - radius_m < CROSSWALK_GAP_M_MAX {
+            true => self.map.crosswalk_gap_m(crosswalk, point).min(CROSSWALK_GAP_M_MAX),
+            false => CROSSWALK_GAP_M_MAX,
+        }
     }
 
     /// Points of the route from a station on, as far as it goes.

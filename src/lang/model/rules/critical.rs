@@ -75,7 +75,7 @@ pub(super) fn polynomials<'c>(
         let is_asked = |condition: &&Expr| match condition.known() {
             Known::Road => true,
             Known::World => facts.world.is_some(),
-            Known::Spawn | Known::Tick | Known::Step | Known::Judgement => false,
+            Known::Spawn | Known::Tick | Known::Near | Known::Step | Known::Judgement => false,
         };
         if let Some(condition) = condition.filter(is_asked) {
             reader.read(condition, &locals)?;

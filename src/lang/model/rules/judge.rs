@@ -96,7 +96,7 @@ impl<'a> RowRules<'a> {
                         };
                         Some(Breach::Spawn { rule, condition, spawn: spawns.find(is_broken)? })
                     }
-                    Known::Tick | Known::Step | Known::Judgement => {
+                    Known::Tick | Known::Near | Known::Step | Known::Judgement => {
                         unreachable!("no rule may read what comes after it")
                     }
                 }
