@@ -4,9 +4,9 @@
 use avastra_lang::check::{Declaration, References, Symbol};
 use avastra_lang::model::Type;
 use avastra_lang::model::vocabulary::{
-    BREACHED, BodyClass, CHANGE, CommandField, EpisodeField, Fact, KEPT, Known, RECURRENCE, ROAD_USER,
-    RoadField, SINCE, ScenarioClaim, Site, SpaceClaim, SpawnField, StartField, StopReason, THERE, WAIT, Word,
-    parts_of, things,
+    BREACHED, BodyClass, CHANGE, CommandField, EpisodeField, Fact, KEPT, Known, MARGIN, RECURRENCE,
+    ROAD_USER, RoadField, SINCE, ScenarioClaim, Site, SpaceClaim, SpawnField, StartField, StopReason, THERE,
+    WAIT, Word, parts_of, things,
 };
 use avastra_lang::syntax::ast::{
     Action, ActionParam, Arm, BinaryOp, Call, Effect, EffectKind, Expr, ExprKind, Field, Initial, ItemKind,
@@ -492,9 +492,11 @@ impl<'a> Place<'a> {
                 let parts = match things().contains(&name) {
                     true => parts_of(name).into_iter().filter(|(part, _)| is_here(part)).collect(),
                     false if is_named => parts_of("npc").into_iter().chain([THERE]).collect(),
-                    false if self.declared(Symbol::Requirement, name).is_some() => {
-                        vec![BREACHED, KEPT, RECURRENCE]
-                    }
+                    false if self.declared(Symbol::Requirement, name).is_some() => match self.about {
+                        About::Facts(Site::Reward) => vec![BREACHED, MARGIN],
+                        About::Facts(_) => vec![BREACHED],
+                        _ => vec![BREACHED, KEPT, RECURRENCE],
+                    },
                     false => return Some(Vec::new()),
                 };
                 Some(vec![Kind::Words(parts)])

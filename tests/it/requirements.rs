@@ -87,7 +87,7 @@ fn naive(
 fn breaches_are_those_of_a_naive_monitor() {
     let run = run_against("idm", space_at(SPACE), 8, 3, &[]);
     let space = run.space().clone();
-    let (mut found, mut replayed) = ([0; 3], 0);
+    let (mut found, mut replayed, mut by_margin) = ([0; 3], 0, 0);
     for number in 0..run.episodes() {
         let (log, ticks) = watched(&run, number);
         let of = |name: &str| -> Vec<(f64, f64)> {
@@ -118,17 +118,34 @@ fn breaches_are_those_of_a_naive_monitor() {
             let end_s = log.steps.get(index + 1).map_or(log.duration_s, |next| next.time_s);
             let is_in = |(from_s, until_s): &(f64, f64)| *until_s > step.time_s && *from_s <= end_s + 1e-9;
             let of_step = |name: &str| of(name).iter().any(is_in);
+            // So do verdicts on its collisions.
+            for name in ["slow", "slow_in_rain", "no_yellow"] {
+                let bit = space.requirements.iter().position(|of| of.name == name).expect("it is there");
+                assert_eq!(log.breached_in(index) >> bit & 1 == 1, of_step(name), "{name} in step {index}");
+            }
             let reward = match (of_step("slow"), of_step("slow_in_rain")) {
                 (true, true) => 3.0,
                 (true, false) => 2.0,
-                (false, _) => 0.0,
+                (false, _) => {
+                    let is_in = |window: &&[Tick]| {
+                        let at_s = window[50].time_s;
+                        at_s > step.time_s + 1e-9 && at_s <= end_s + 1e-9
+                    };
+                    let margin = |window: &[Tick]| {
+                        window.iter().map(|tick| 9.0 - tick.speed_mps).fold(f64::NEG_INFINITY, f64::max)
+                    };
+                    let least = ticks.windows(51).filter(is_in).map(margin).reduce(f64::min);
+                    least.filter(|least| *least < 0.5).unwrap_or(0.0)
+                }
             };
+            by_margin += usize::from(reward > 0.0 && reward < 0.5);
             assert_eq!(step.reward, reward, "step {index} of episode {number}");
         }
         replayed += usize::from(!log.breaches.is_empty());
         assert_replays(&run, number, &log);
     }
     assert!(found.iter().all(|count| *count > 0) && replayed > 4, "{found:?} in {replayed} episodes");
+    assert!(by_margin > 2, "{by_margin} steps");
 }
 
 /// What of a road user's gap, or of the ego vehicle, a naive monitor notes at every tick: `None` where nothing is asked.

@@ -537,9 +537,11 @@ fn the_reward_is_the_authors_own() {
     let rules: Vec<&str> = table.space().rules.iter().map(|rule| rule.name.as_str()).collect();
     assert_eq!(rules, ["chronology", "ped_gap", "walking_pace", "no_teleport", "wet_needs_cause"]);
     let reward = |collision, struck, proc| {
-        table
-            .space()
-            .reward(OutcomeFacts { collision, struck, proc, ..OutcomeFacts::default() }, &Memory::default())
+        table.space().reward(
+            OutcomeFacts { collision, struck, proc, ..OutcomeFacts::default() },
+            &Memory::default(),
+            &[],
+        )
     };
     assert_eq!(reward(true, false, 1.0), 10.0);
     assert_eq!(reward(true, true, 1.0), 2.0);

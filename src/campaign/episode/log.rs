@@ -141,6 +141,13 @@ impl EpisodeLog {
         self.steps.get(step).map_or(&self.memory, |step| &step.memory)
     }
 
+    /// The requirements that were breached at some moment of a step, by bit.
+    pub fn breached_in(&self, step: usize) -> u64 {
+        let begins_s = self.steps.get(step).map_or(f64::INFINITY, |step| step.time_s);
+        let is_in = |breach: &&Breach| breach.step <= step && breach.until_s > begins_s;
+        self.breaches.iter().filter(is_in).fold(0, |set, breach| set | 1 << breach.requirement)
+    }
+
     /// The first breach of each requirement that was breached, by rising time.
     pub fn first_breaches(&self) -> impl Iterator<Item = &Breach> {
         let is_first = |(index, breach): &(usize, &Breach)| {

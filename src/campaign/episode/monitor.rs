@@ -71,6 +71,8 @@ pub(super) struct Monitor {
     /// The bodies of the road users near of which they ask, by bit.
     asks_of: u32,
     breaches: Vec<Breach>,
+    /// Of each requirement the smallest margin of the step that ended last, if rewards ask for it; else NaN.
+    of_step: Vec<f64>,
 }
 
 /// A requirement with its answers up to now.
@@ -80,8 +82,10 @@ struct Watch {
     /// About the ego vehicle alone, or about each of the road users near.
     ego: Stretch,
     each: Vec<Stretch>,
-    /// The smallest margin of those that are over.
+    /// The smallest margin of the steps that are over, if rewards ask for that of each; and of the road users of this one that
+    /// are gone.
     smallest: Option<f64>,
+    over: Option<f64>,
     /// Ticks in which it was asked.
     asked: u32,
 }
@@ -97,6 +101,8 @@ struct Required {
     /// Whether it looks at ticks before, and whether it has an `after`.
     remembers: bool,
     is_response: bool,
+    /// Whether rewards ask for its margin of each step.
+    is_paid: bool,
 }
 
 /// A requirement, of one road user or of none.
@@ -128,17 +134,20 @@ struct Tally {
 impl Monitor {
     /// `None` where no requirement is in force.
     pub fn new(setup: &Setup) -> Option<Monitor> {
+        let paid = setup.table.space().margins_paid();
         let watch = |index: usize| {
             let requirement = &setup.table.space().requirements[index];
             let RequirementDef { within_ticks, ref on, .. } = *requirement;
             let ready = requirement.ready();
             let (remembers, is_response) = (ready.remembers(), requirement.after.is_some());
-            let required = Required { index, within_ticks, on: on.clone(), ready, remembers, is_response };
+            let (on, is_paid) = (on.clone(), paid >> index & 1 == 1);
+            let required = Required { index, within_ticks, on, ready, remembers, is_response, is_paid };
             Watch {
                 required: Arc::new(required),
                 ego: Stretch::default(),
                 each: Vec::new(),
                 smallest: None,
+                over: None,
                 asked: 0,
             }
         };
@@ -193,6 +202,7 @@ impl Monitor {
             bearers,
             asks_of,
             breaches: Vec::new(),
+            of_step: vec![f64::NAN; setup.table.space().requirements.len()],
         };
         (!monitor.watches.is_empty() || !monitor.idle.is_empty()).then_some(monitor)
     }
@@ -245,11 +255,25 @@ impl Monitor {
         since.fold(0, |set, breach| set | 1 << breach.requirement)
     }
 
+    /// Ends a step. Of each requirement its smallest margin, if rewards ask for it; else NaN.
+    pub fn end_step(&mut self) -> &[f64] {
+        for watch in self.watches.iter_mut().filter(|watch| watch.required.is_paid) {
+            let over = core::mem::take(&mut watch.over);
+            let stretches = watch.each.iter_mut().chain([&mut watch.ego]);
+            let smallest = stretches.map(|stretch| stretch.tally.smallest.take()).fold(over, smaller);
+            watch.smallest = smaller(watch.smallest, smallest);
+            let is_known = smallest.filter(|smallest| smallest.is_finite());
+            self.of_step[watch.required.index] = is_known.unwrap_or(f64::NAN);
+        }
+        &self.of_step
+    }
+
     /// What was found up to now, breaches by rising time.
     pub fn found(self) -> (Vec<Breach>, Vec<Margin>) {
         let margin = |watch: &Watch| {
             let all = watch.each.iter().chain([&watch.ego]);
-            let smallest = all.map(|stretch| stretch.tally.smallest).fold(watch.smallest, smaller);
+            let over = smaller(watch.smallest, watch.over);
+            let smallest = all.map(|stretch| stretch.tally.smallest).fold(over, smaller);
             // Where nobody was near, `some` was as far as can be from holding, and `not some` from failing.
             let smallest = smallest.filter(|smallest| smallest.is_finite());
             Margin { requirement: watch.required.index, smallest, asked_s: f64::from(watch.asked) * DT_S }
@@ -297,7 +321,7 @@ impl Watch {
         let mut asked: Vec<(u32, NpcFacts)> =
             near.iter().filter(is_meant).map(|near| (near.id, near.npc)).collect();
         // Who is no longer near is asked nothing, and begins anew if it comes back.
-        let smallest = &mut self.smallest;
+        let over = &mut self.over;
         self.each.retain(|stretch| {
             let id = stretch.obstacle.expect("each is about a road user");
             let is_awaited = !stretch.tally.begun.is_empty();
@@ -307,7 +331,7 @@ impl Watch {
             asked.extend(far.map(|npc| (id, npc)));
             let stays = is_near || far.is_some();
             if !stays {
-                *smallest = smaller(*smallest, stretch.tally.smallest);
+                *over = smaller(*over, stretch.tally.smallest);
             }
             stays
         });
@@ -375,7 +399,7 @@ impl Stretch {
         moment: &Judged,
     ) -> Option<(Option<f64>, bool, bool)> {
         let kept = required.ready.at(moment.functions, facts)?;
-        let margin = self.tally.take(kept, required.within_ticks);
+        let margin = self.tally.take(kept, required.within_ticks, required.is_paid);
         Some((margin, self.tally.failed > required.within_ticks, true))
     }
 
@@ -390,7 +414,7 @@ impl Stretch {
         let is_awaited = !self.tally.begun.is_empty();
         let asked = required.ready.at_next(&mut self.memory, is_awaited, moment.functions, facts)?;
         if !required.is_response {
-            let margin = self.tally.take(asked.kept, required.within_ticks);
+            let margin = self.tally.take(asked.kept, required.within_ticks, required.is_paid);
             return Some((margin, self.tally.failed > required.within_ticks, true));
         }
         // What was not done in time is a breach of that moment.
@@ -433,15 +457,15 @@ impl Tally {
     }
 
     /// Takes the answer of a tick. Returns the margin of the time that `within` grants, if it can be that of a breach or
-    /// smaller than all before.
-    fn take(&mut self, kept: Kept, within_ticks: u32) -> Option<f64> {
+    /// smaller than all before; where each one is paid for, in any case.
+    fn take(&mut self, kept: Kept, within_ticks: u32, is_paid: bool) -> Option<f64> {
         self.asked += 1;
         self.failed = if kept.holds { 0 } else { self.failed + 1 };
         if kept.margin.is_nan() {
             return None;
         }
         // As long as it is in the window, nothing there becomes the smallest, and nothing is breached: the usual case.
-        if kept.holds && self.smallest.is_some_and(|smallest| kept.margin > smallest) {
+        if !is_paid && kept.holds && self.smallest.is_some_and(|smallest| kept.margin > smallest) {
             self.window.clear();
             self.above = within_ticks;
             return None;
@@ -511,7 +535,7 @@ mod tests {
                         is_open = false;
                     }
                     Some(margin) => {
-                        watch.take(Kept { holds: *margin >= 0.0, margin: *margin }, within);
+                        watch.take(Kept { holds: *margin >= 0.0, margin: *margin }, within, false);
                         let is_breached = watch.failed > within;
                         match breaches.last_mut() {
                             Some((_, last)) if is_breached && is_open => *last = tick,
@@ -772,7 +796,8 @@ mod tests {
                 let within_ticks = requirement.within_ticks;
                 let (ready, is_response) = (requirement.ready(), requirement.after.is_some());
                 let (on, remembers) = (Vec::new(), ready.remembers());
-                let required = Required { index, within_ticks, on, ready, remembers, is_response };
+                let is_paid = false;
+                let required = Required { index, within_ticks, on, ready, remembers, is_response, is_paid };
                 let (mut stretch, mut breaches) = (Stretch::default(), Vec::new());
                 for (tick, (wanted, is_breached)) in one.answers(&trace).into_iter().enumerate() {
                     let mut world = WorldFacts::default();

@@ -387,7 +387,8 @@ impl Play {
             None => OutcomeFacts { proc, near: body, ..OutcomeFacts::default() },
         };
         let breached = self.monitor.as_ref().map_or(0, |monitor| monitor.breached_since(time_s));
-        let reward = setup.table.space().reward(OutcomeFacts { breached, ..facts }, &self.memory);
+        let margins = self.monitor.as_mut().map_or(&[][..], Monitor::end_step);
+        let reward = setup.table.space().reward(OutcomeFacts { breached, ..facts }, &self.memory, margins);
         let trace = self.trace.digest();
         let state = observation.state;
         let perception = mdp::perception_counts(&self.world, self.ads.status());

@@ -14,7 +14,9 @@ pub fn facts(log: &EpisodeLog, index: usize, judgement: &Judgement) -> OutcomeFa
 }
 
 fn facts_if(log: &EpisodeLog, index: usize, avoidable: bool) -> OutcomeFacts {
-    OutcomeFacts { avoidable, ..episode::collision_facts(&log.collisions[index], &log.collisions[..index]) }
+    let breached = log.breached_in(log.collisions[index].step);
+    let facts = episode::collision_facts(&log.collisions[index], &log.collisions[..index]);
+    OutcomeFacts { avoidable, breached, ..facts }
 }
 
 /// Whether the space's verdict counts a collision of a log.

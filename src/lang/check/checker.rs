@@ -24,7 +24,7 @@ use crate::prove;
 use crate::prove::{Known, RunsIn, enclose, product_size};
 use crate::syntax::ast::{FileId, ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
-use avastra_base::units::Rational;
+use avastra_base::units::{Dimension, Rational};
 
 /// The most diagnostics of a file: more are of no use, and each is found in the text by its place.
 pub(super) const DIAGNOSTICS_MAX: usize = 1_000;
@@ -87,6 +87,8 @@ pub(super) struct Checker {
     pub(super) each_step: Vec<SetDef>,
     /// Names of all requirements. Empty until they are checked.
     pub(super) requirement_names: Names,
+    /// Those without a mistake, each with the dimension of its margin.
+    pub(super) requirement_margins: Vec<(String, Option<Dimension>)>,
     /// Number of rows of each action; `None` if an axis is broken.
     pub(super) row_counts: Vec<Option<u64>>,
     /// What each name stands for.

@@ -6,7 +6,7 @@ use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Comparison, Expr, ExprKind};
 use crate::model::requirement::{margin_dimension, open_divisor, past_inside};
-use crate::model::vocabulary::{BEGINS, BREACHED, EVENTS, PastWord, SOME, Site, Word, things};
+use crate::model::vocabulary::{BEGINS, BREACHED, EVENTS, MARGIN, PastWord, SOME, Site, Word, things};
 use crate::model::{BodyWord, RequirementDef, RuleDef, TICK_MS, Type, code};
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
@@ -38,7 +38,10 @@ impl Checker {
                 let error = error.beside(rule.span, "first here");
                 self.report(error.help("rename one of them: `--without` switches both kinds off by name"));
             }
-            requirements.extend(self.requirement(item, declared));
+            let requirement = self.requirement(item, declared);
+            let margin = requirement.as_ref().map(|of| (of.name.clone(), of.margin));
+            self.requirement_margins.extend(margin);
+            requirements.extend(requirement);
         }
         requirements
     }
@@ -131,7 +134,7 @@ impl Checker {
         })
     }
 
-    /// `stops_at_red.breached` in a reward; `None` if this is no requirement.
+    /// `stops_at_red.breached` in a reward or verdict, `stops_at_red.margin` in a reward; `None` if this is no requirement.
     pub(super) fn breached(
         &mut self,
         base: &ast::Expr,
@@ -143,19 +146,39 @@ impl Checker {
         // A requirement that is called `ego` takes nothing from the ego vehicle.
         let index = self.requirement_names.get(name).filter(|_| !things().contains(&name.as_str()))?;
         self.references.uses(base.span, Symbol::Requirement(name.clone()));
-        if part.text != BREACHED.0 {
+        let (known, sites) = match part.text.as_str() {
+            word if word == BREACHED.0 => {
+                (BREACHED, "only rewards, verdicts, and claims of scenarios, see it")
+            }
+            word if word == MARGIN.0 => (MARGIN, "only rewards see it"),
+            _ => {
+                let message = format!("unknown fact of a requirement `{}`", part.text);
+                let error = Diagnostic::error(code::UNKNOWN, message).at(part.span, "not known");
+                let help = format!("write `{name}.{}` or `{name}.{}`", BREACHED.0, MARGIN.0);
+                return Some(self.reject(error.help(help)));
+            }
+        };
+        self.references.note(part.span, Symbol::Engine(known.0, known.1), false);
+        let is_margin = known == MARGIN;
+        if place.site != Site::Reward && (is_margin || place.site != Site::Verdict) {
+            let message = format!("`{name}.{}` is not known here", part.text);
+            let error = Diagnostic::error(code::NOT_HERE, message);
+            return Some(self.reject(error.at(span, sites)));
+        }
+        if !is_margin {
+            return Some(Some(Expr { kind: ExprKind::Breached(index), ty: Type::Bool, span }));
+        }
+        // A requirement with a mistake in it has none yet.
+        let Some((_, dimension)) = self.requirement_margins.iter().find(|(of, _)| of == name) else {
+            return Some(None);
+        };
+        let Some(dimension) = *dimension else {
+            let message = format!("`{name}` has no margin");
             let error =
-                Diagnostic::error(code::UNKNOWN, format!("unknown fact of a requirement `{}`", part.text));
-            return Some(
-                self.reject(error.at(part.span, "not known").help(format!("write `{name}.breached`"))),
-            );
-        }
-        self.references.note(part.span, Symbol::Engine(BREACHED.0, BREACHED.1), false);
-        if place.site != Site::Reward {
-            let error = Diagnostic::error(code::NOT_HERE, format!("`{name}.breached` is not known here"));
-            return Some(self.reject(error.at(span, "only rewards, and claims of scenarios, see it")));
-        }
-        Some(Some(Expr { kind: ExprKind::Breached(index), ty: Type::Bool, span }))
+                Diagnostic::error(code::NOT_HERE, message).at(span, "words and `==` have no distance");
+            return Some(self.reject(error.help(format!("ask for `{name}.{}`", BREACHED.0))));
+        };
+        Some(Some(Expr { kind: ExprKind::Margin(index), ty: Type::Quantity(dimension), span }))
     }
 
     /// A condition of a requirement.

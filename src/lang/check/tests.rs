@@ -342,7 +342,7 @@ fn rewards_and_verdicts_are_computed() {
     let crash = OutcomeFacts { collision: true, ..quiet };
     let hit = OutcomeFacts { struck: true, ..crash };
     assert_eq!(
-        [crash, quiet, Default::default()].map(|outcome| space.reward(outcome, &states)),
+        [crash, quiet, Default::default()].map(|outcome| space.reward(outcome, &states, &[])),
         [7.5, 0.5, -1.0]
     );
     assert_eq!([crash, quiet, hit].map(|outcome| space.counts(outcome, &states)), [true, false, false]);
@@ -579,7 +579,7 @@ reward {
     ));
     let scooter = BodyWord { like: Body::Motorcycle, own: Some(0) };
     let reward = |hit: Option<BodyWord>, near: Option<BodyWord>| {
-        space.reward(OutcomeFacts { hit, near, ..OutcomeFacts::default() }, &space.initial_memory(0))
+        space.reward(OutcomeFacts { hit, near, ..OutcomeFacts::default() }, &space.initial_memory(0), &[])
     };
     let motorcycle = BodyWord::engine(Body::Motorcycle);
     assert_eq!(reward(None, Some(scooter)), 3.0);

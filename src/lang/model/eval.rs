@@ -31,6 +31,8 @@ pub struct Facts<'a> {
     /// The spawn that the expression is about.
     pub spawn: Option<SpawnFacts>,
     pub outcome: OutcomeFacts,
+    /// Of each requirement the smallest margin of the step, NaN for one that was not asked.
+    pub margins: &'a [f64],
 }
 
 /// What rules may ask the world at a draw ([`Known::World`] and later).
@@ -217,7 +219,7 @@ pub struct OutcomeFacts {
 impl<'a> Facts<'a> {
     pub fn new(locals: &'a [Value], memory: &'a Memory) -> Facts<'a> {
         let outcome = OutcomeFacts::default();
-        Facts { locals, memory, road: None, world: None, spawn: None, outcome }
+        Facts { locals, memory, road: None, world: None, spawn: None, outcome, margins: &[] }
     }
 }
 
@@ -254,6 +256,9 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
             let holds =
                 |near: &NearFacts| evaluate(condition, functions, &about(Some(near.npc), facts)).truth();
             Value::Bool(near.iter().filter(|near| near.is_of(bodies)).any(holds))
+        }
+        ExprKind::Margin(requirement) => {
+            Value::Number(facts.margins.get(*requirement).copied().unwrap_or(f64::NAN))
         }
         ExprKind::Breached(requirement) => Value::Bool(facts.outcome.breached >> requirement & 1 == 1),
         ExprKind::IsThere(who) => Value::Bool(bearer(who.bearer(facts.locals), facts).is_some()),
@@ -515,15 +520,29 @@ impl<W: Copy> WordExpr<W> {
 
 impl Space {
     /// Reward of a step: the value of the first case that applies; 0 if none does, or if it has no value (a division
-    /// by 0), so that neither a database nor a network meets it. `memory` holds the states after the action of the step.
-    pub fn reward(&self, outcome: OutcomeFacts, memory: &Memory) -> f64 {
-        let facts = Facts { outcome, ..Facts::new(&[], memory) };
+    /// by 0), so that neither a database nor a network meets it. `memory` holds the states after the action of the step,
+    /// `margins` the smallest one of each requirement in it (SI, NaN for one that was not asked).
+    pub fn reward(&self, outcome: OutcomeFacts, memory: &Memory, margins: &[f64]) -> f64 {
+        let facts = Facts { outcome, margins, ..Facts::new(&[], memory) };
         let applies = |condition: &Option<Expr>| {
             condition.as_ref().is_none_or(|c| evaluate(c, &self.functions, &facts).truth())
         };
         let case = self.reward.iter().find(|case| applies(&case.condition));
         let value = case.map(|case| evaluate(&case.value, &self.functions, &facts).number());
         value.filter(|value| value.is_finite()).unwrap_or(0.0)
+    }
+
+    /// The requirements whose margins rewards ask for, by bit.
+    pub fn margins_paid(&self) -> u64 {
+        let asked = self.reward.iter().flat_map(|case| case.condition.iter().chain([&case.value]));
+        let of = |expr: &Expr| -> Vec<usize> {
+            let margins = expr.filter_map(|kind| match kind {
+                ExprKind::Margin(requirement) => Some(*requirement),
+                _ => None,
+            });
+            margins.into_iter().collect()
+        };
+        asked.flat_map(of).fold(0, |set, requirement| set | 1 << requirement)
     }
 
     /// Whether a collision passes the verdict of that name; `None` if there is no such verdict. `memory` is as for

@@ -72,6 +72,8 @@ pub enum ExprKind {
     Some(Vec<BodyWord>, Box<Expr>),
     /// `stops_at_red.breached`: whether a requirement was breached in the step.
     Breached(usize),
+    /// `keeps_distance.margin`: the smallest margin of a requirement in the step.
+    Margin(usize),
     /// A function by its index in `Space::functions`.
     Call(usize, Vec<Expr>),
     Not(Box<Expr>),
@@ -123,7 +125,7 @@ impl ExprKind {
             ExprKind::OfBearer(..) | ExprKind::IsWordOf(..) | ExprKind::IsThere(_) | ExprKind::Since(..) => {
                 Known::World
             }
-            ExprKind::Breached(_) => Known::Step,
+            ExprKind::Breached(_) | ExprKind::Margin(_) => Known::Step,
             _ => Known::Road,
         }
     }
@@ -160,6 +162,7 @@ impl Expr {
             | ExprKind::IsThere(_)
             | ExprKind::Since(..)
             | ExprKind::Breached(_)
+            | ExprKind::Margin(_)
             | ExprKind::Fact(_) => {}
             ExprKind::CellAt(_, inner)
             | ExprKind::Not(inner)

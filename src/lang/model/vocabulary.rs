@@ -308,6 +308,12 @@ pub const EVENTS: [&str; 3] = ["counted", "collision", "breach"];
 pub const BREACHED: (&str, &str) =
     ("breached", "Whether the requirement was not kept: `expect stops_at_red.breached at 14.22 s`.");
 
+/// `keeps_distance.margin` in a reward.
+pub const MARGIN: (&str, &str) = (
+    "margin",
+    "By how much the requirement was kept in the step, at least; below 0 it was not: `keeps_distance.margin < 2 m => 1`.",
+);
+
 /// `stops_at_red.kept by [cc, fsm]`: who would have kept it.
 pub const KEPT: (&str, &str) = (
     "kept",

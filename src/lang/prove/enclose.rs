@@ -172,7 +172,7 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
         ExprKind::OfBearer(..) => Values::Number(Interval::ALL),
         ExprKind::IsThere(_) | ExprKind::Breached(_) => Values::UNKNOWN_TRUTH,
         // What is known of this moment says nothing of those before it.
-        ExprKind::Past(_, PastWord::Change, _) => Values::Number(Interval::ALL),
+        ExprKind::Past(_, PastWord::Change, _) | ExprKind::Margin(_) => Values::Number(Interval::ALL),
         ExprKind::Past(_, PastWord::Total, ticks) => {
             Values::Number(between(0.0, f64::from(*ticks * TICK_MS) / 1000.0))
         }

@@ -52,7 +52,9 @@ pub(super) fn reduce(expr: &Expr, functions: &[FnDef], locals: &[Expr]) -> Expr 
         ExprKind::Implies(left, right) => ExprKind::Implies(inner(left), inner(right)),
         ExprKind::InRange(of, low, high) => ExprKind::InRange(inner(of), inner(low), inner(high)),
         ExprKind::InList(of, list) => ExprKind::InList(inner(of), all(list)),
-        ExprKind::OnRoad(_) | ExprKind::Since(..) | ExprKind::Breached(_) => expr.kind.clone(),
+        ExprKind::OnRoad(_) | ExprKind::Since(..) | ExprKind::Breached(_) | ExprKind::Margin(_) => {
+            expr.kind.clone()
+        }
         ExprKind::IsWord(fact, words) => ExprKind::IsWord(*fact, words.clone()),
         ExprKind::IsWordOf(who, fact, words) => {
             ExprKind::IsWordOf(reduced_who(*who, locals), *fact, words.clone())
@@ -103,6 +105,7 @@ fn fold(expr: Expr) -> Expr {
                 | ExprKind::Past(..)
                 | ExprKind::Some(..)
                 | ExprKind::Breached(_)
+                | ExprKind::Margin(_)
                 | ExprKind::IsWord(..)
                 | ExprKind::IsWordOf(..)
                 | ExprKind::IsBody(..)

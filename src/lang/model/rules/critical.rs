@@ -126,6 +126,7 @@ impl Reader<'_> {
             | ExprKind::IsThere(_)
             | ExprKind::Since(..)
             | ExprKind::Breached(_)
+            | ExprKind::Margin(_)
             | ExprKind::OnRoad(_)
             | ExprKind::IsWord(..)
             | ExprKind::IsWordOf(..)
