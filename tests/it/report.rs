@@ -178,6 +178,53 @@ scenario told {
 }
 
 #[test]
+fn a_page_draws_the_margins_of_what_was_breached() {
+    const TOLD: &str = "language 1
+use \"roads.ava\"
+require slow when ego.speed >= 2 m/s: ego.speed <= 9 m/s within 1 s
+require near: ego.route_left <= 1000 m
+action nothing() { spawn Sedan ahead 80 m { does: DriveAhead, lane: Current, speed: 12 m/s } }
+scenario told {
+  road: boulevard
+  start { }
+  steps { 0: nothing() 2: wait() }
+}
+";
+    let loaded = loaded("scenarios/told.ava", TOLD);
+    let scenario = loaded.scenario.expect("it has a scenario");
+    let table = ActionTable::new(loaded.space.expect("its space is sound"));
+    let ads = recorded(&scenario).expect("its driving system exists");
+    let html = page_of(record(&table, &scenario, &ads, TOLD).expect("it plays"));
+    let (header, columns) = unpacked(&html, "s0");
+    let column = |number: &Value| &columns[number.as_u64().unwrap() as usize];
+    let speeds = column(&header["ego"]["speed_mps"]);
+    let [drawn] = &header["margins"].as_array().expect("a list")[..] else { panic!("{}", header["margins"]) };
+    assert_eq!((drawn["requirement"].as_str(), drawn["unit"].as_str()), (Some("slow"), Some("m/s")));
+    let mut is_drawn = vec![false; speeds.len()];
+    let mut failed = 0;
+    for part in drawn["parts"].as_array().expect("a list") {
+        let from = part[0].as_u64().unwrap() as usize;
+        for (tick, margin) in (from..).zip(column(&part[1])) {
+            is_drawn[tick] = true;
+            failed += usize::from(*margin < 0.0);
+            assert!((margin - (9.0 - speeds[tick])).abs() <= 0.011, "{margin} at tick {tick}");
+        }
+    }
+    for (tick, speed_mps) in speeds.iter().enumerate().skip(1) {
+        assert!(is_drawn[tick] == (*speed_mps >= 2.0) || (speed_mps - 2.0).abs() < 0.01, "tick {tick}");
+    }
+    let breaches = header["summary"]["breaches"].as_array().expect("a list");
+    let breached_s: f64 =
+        breaches.iter().map(|one| one["until_s"].as_f64().unwrap() - one["at_s"].as_f64().unwrap()).sum();
+    // Each breach begins a second after its condition fails.
+    assert!(
+        (failed as f64 * 0.02 - breached_s - breaches.len() as f64 * 1.02).abs()
+            < 0.05 * breaches.len() as f64
+    );
+    assert!(failed > 50 && !breaches.is_empty());
+}
+
+#[test]
 fn a_page_holds_everything_and_repeats_itself() {
     let (table, scenario, ads) = walk();
     let page = || page_of(record(&table, &scenario, &ads, SOURCE).expect("it plays"));

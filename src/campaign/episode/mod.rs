@@ -6,6 +6,7 @@
 
 mod facts;
 mod log;
+mod margins;
 mod monitor;
 mod precrash;
 mod recorder;
@@ -17,6 +18,7 @@ mod trails;
 
 pub use facts::{at_fault, collision_facts, run_into_from_behind, side, struck};
 pub use log::{Collision, End, EpisodeLog, Held, Outcome, StepLog};
+pub use margins::{MarginSeries, margins_over_time};
 pub use monitor::{Breach, Margin};
 pub use precrash::PreCrash;
 pub use recorder::{Actor, Lights, Phase, Recorder, Sample, Sky, Touch};

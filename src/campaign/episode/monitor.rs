@@ -111,6 +111,8 @@ struct Stretch {
     obstacle: Option<u32>,
     memory: RequirementMemory,
     tally: Tally,
+    /// The margin of its condition at the last tick, if it was asked.
+    now: Option<f64>,
     /// The breach that goes on, by index.
     open: Option<usize>,
 }
@@ -255,6 +257,19 @@ impl Monitor {
         since.fold(0, |set, breach| set | 1 << breach.requirement)
     }
 
+    /// The requirements that it asks, by index in `Space::requirements`.
+    pub fn asked(&self) -> impl Iterator<Item = usize> {
+        self.watches.iter().map(|watch| watch.required.index)
+    }
+
+    /// The margin of a requirement's condition at the tick that was judged last, of the worst of several road users; `None` where
+    /// nothing was asked, or nothing could fail.
+    pub fn now(&self, requirement: usize) -> Option<f64> {
+        let watch = self.watches.iter().find(|watch| watch.required.index == requirement)?;
+        let all = watch.each.iter().chain([&watch.ego]).filter_map(|stretch| stretch.now);
+        all.filter(|margin| margin.is_finite()).reduce(f64::min)
+    }
+
     /// Ends a step. Of each requirement its smallest margin, if rewards ask for it; else NaN.
     pub fn end_step(&mut self) -> &[f64] {
         for watch in self.watches.iter_mut().filter(|watch| watch.required.is_paid) {
@@ -365,7 +380,7 @@ impl Stretch {
             true => self.answer_next(required, facts, moment),
         }) else {
             self.tally.pause();
-            self.open = None;
+            (self.open, self.now) = (None, None);
             return false;
         };
         if !is_breached {
@@ -399,6 +414,7 @@ impl Stretch {
         moment: &Judged,
     ) -> Option<(Option<f64>, bool, bool)> {
         let kept = required.ready.at(moment.functions, facts)?;
+        self.now = Some(kept.margin);
         let margin = self.tally.take(kept, required.within_ticks, required.is_paid);
         Some((margin, self.tally.failed > required.within_ticks, true))
     }
@@ -413,6 +429,7 @@ impl Stretch {
     ) -> Option<(Option<f64>, bool, bool)> {
         let is_awaited = !self.tally.begun.is_empty();
         let asked = required.ready.at_next(&mut self.memory, is_awaited, moment.functions, facts)?;
+        self.now = Some(asked.kept.margin);
         if !required.is_response {
             let margin = self.tally.take(asked.kept, required.within_ticks, required.is_paid);
             return Some((margin, self.tally.failed > required.within_ticks, true));

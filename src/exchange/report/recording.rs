@@ -12,7 +12,7 @@ use avastra_base::geometry::{Pose, wrap_angle};
 use avastra_campaign::emit;
 use avastra_campaign::episode;
 use avastra_campaign::episode::{
-    Actor, Breach, End, EpisodeLog, Held, Moment, Outcome, Phase, Recorder, Sample, Script, Sky,
+    Actor, Breach, End, EpisodeLog, Held, MarginSeries, Moment, Outcome, Phase, Recorder, Sample, Script, Sky,
 };
 use avastra_campaign::oracle;
 use avastra_campaign::oracle::{ClaimResult, Recurrence, ReferenceDrive, Regression};
@@ -34,6 +34,8 @@ const SAME_S: f64 = 0.005;
 
 /// Steps of the columns; half a step is how far a number may be off.
 const PLACE_M: f64 = 0.01;
+/// Of margins, SI.
+const MARGIN_STEP: f64 = 0.01;
 const HEADING_RAD: f64 = 0.001;
 pub(super) const SPEED_MPS: f64 = 0.01;
 pub(super) const ACCELERATION_MPS2: f64 = 0.02;
@@ -198,6 +200,7 @@ fn played(
         "held": log.held.iter().map(|held| json!([held.from_s, held.text()])).collect::<Vec<_>>(),
         "ego": ego(&recorder.ego, &mind, &mut columns), "obstacles": obstacles(table, &log, &recorder, &mut columns),
         "tracks": mind.tracks(&mut columns), "plans": mind.plans(&mut columns),
+        "margins": margins(table, &log, &episode::margins_over_time(&setup, &log), &mut columns),
         "signals": signals(&recorder), "skies": recorder.skies.iter().map(sky).collect::<Vec<_>>(),
     });
     let main = counted.first().copied().or((!log.collisions.is_empty()).then_some(0));
@@ -308,6 +311,31 @@ fn breaches(table: &ActionTable, scenario: &Scenario, log: &EpisodeLog) -> Vec<V
         })
     };
     log.breaches.iter().map(told).collect()
+}
+
+/// The most requirements whose margins are drawn, if none is breached.
+const DRAWN_MAX: usize = 6;
+
+/// The margins of what was breached; if nothing was, of what was asked: each in stretches of ticks in which it was asked.
+fn margins(table: &ActionTable, log: &EpisodeLog, all: &[MarginSeries], columns: &mut Columns) -> Vec<Value> {
+    let is_breached = |one: &&MarginSeries| log.breaches.iter().any(|of| of.requirement == one.requirement);
+    let asked = all.iter().filter(|one| one.margins.iter().any(Option::is_some));
+    let breached: Vec<&MarginSeries> = asked.clone().filter(is_breached).collect();
+    let drawn = if breached.is_empty() { asked.take(DRAWN_MAX).collect() } else { breached };
+    let told = |one: &MarginSeries| {
+        let RequirementDef { name, margin, .. } = &table.space().requirements[one.requirement];
+        let mut from = 0;
+        let mut parts = Vec::new();
+        for part in one.margins.chunk_by(|one, next| one.is_some() == next.is_some()) {
+            if part[0].is_some() {
+                // The first tick is the one after the start.
+                parts.push(json!([from + 1, columns.add(MARGIN_STEP, part.iter().copied().flatten())]));
+            }
+            from += part.len();
+        }
+        json!({ "requirement": name, "unit": margin.map(|dimension| dimension.si_unit()), "parts": parts })
+    };
+    drawn.into_iter().map(told).collect()
 }
 
 /// How often a finding recurs, as the file claims of the one that is meant.

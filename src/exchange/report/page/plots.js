@@ -1,4 +1,4 @@
-// What happened over time: speed, acceleration, ProC, the reason lane and the actions, under one cursor.
+// What happened over time: speed, acceleration, ProC, margins, the reason lane and the actions, under one cursor.
 import { palette, Canvas } from "./paint.js";
 import { figure } from "./words.js";
 
@@ -21,7 +21,9 @@ export class Plots {
     this.recording = recording;
     this.other = other;
     this.still = document.createElement("canvas");
-    element.style.height = `${ROWS.reduce((sum, [, height]) => sum + height + 8, 22)}px`;
+    const margins = recording.header.margins.map(({ requirement }) => [requirement, 44]);
+    this.rows = [...ROWS.slice(0, 3), ...margins, ...ROWS.slice(3)];
+    element.style.height = `${this.rows.reduce((sum, [, height]) => sum + height + 8, 22)}px`;
     const to = (event) => {
       const box = element.getBoundingClientRect();
       const share = (event.clientX - box.left - LEFT) / (box.width - LEFT - RIGHT);
@@ -78,7 +80,7 @@ export class Plots {
     canvas.context = this.still.getContext("2d");
     canvas.enterScreen();
     let top = 4;
-    for (const [name, height] of ROWS) {
+    for (const [name, height] of this.rows) {
       this.#row(name, top, height);
       top += height + 8;
     }
@@ -92,13 +94,11 @@ export class Plots {
     context.fillStyle = colours.ink;
     context.textAlign = "left";
     context.textBaseline = "top";
-    context.fillText(
-      { speed: "Speed", acceleration: "Accel.", ProC: "ProC", reason: "Held by", steps: "Actions" }[name],
-      2,
-      top,
-    );
+    const label = { speed: "Speed", acceleration: "Accel.", ProC: "ProC", reason: "Held by", steps: "Actions" }[name];
+    context.fillText(label ?? name, 2, top, LEFT - 6);
     if (name === "reason") return this.#reasons(top, height);
     if (name === "steps") return this.#steps(top, height);
+    if (!label) return this.#margin(name, top, height);
     const [column, unit, factor] = {
       speed: ["speed_mps", "km/h", 3.6],
       acceleration: ["acceleration_mps2", "m/s²", 1],
@@ -142,6 +142,38 @@ export class Plots {
     }
     context.stroke();
     context.setLineDash([]);
+  }
+
+  /** By how much a requirement was kept, where it was asked; below 0 it was not. Its breaches are shaded. */
+  #margin(name, top, height) {
+    const { context, colours } = this.canvas;
+    const { header, columns, tickS } = this.recording;
+    const { unit, parts } = header.margins.find(({ requirement }) => requirement === name);
+    const all = parts.flatMap(([, column]) => Array.from(columns[column]));
+    const [low, high] = [Math.min(0, ...all.map((m) => Math.max(m, -100))), Math.max(0.1, median(all) * 2)];
+    const y = (margin) => top + height - ((Math.min(Math.max(margin, low), high) - low) / (high - low)) * height;
+    context.fillStyle = `color-mix(in srgb, ${colours.danger} 25%, ${colours.paper})`;
+    for (const breach of header.summary.breaches.filter(({ requirement }) => requirement === name)) {
+      const [left, right] = [this.#x(breach.at_s), this.#x(breach.until_s)];
+      context.fillRect(left - 1, top, Math.max(right - left, 2), height);
+    }
+    context.strokeStyle = colours.danger;
+    context.lineWidth = 1;
+    context.beginPath();
+    context.moveTo(LEFT, y(0));
+    context.lineTo(this.canvas.width - RIGHT, y(0));
+    context.stroke();
+    context.strokeStyle = colours.accent;
+    context.lineWidth = 1.6;
+    for (const [from, column] of parts) {
+      context.beginPath();
+      columns[column].forEach((margin, i) => context.lineTo(this.#x((from + i) * tickS), y(margin)));
+      context.stroke();
+    }
+    context.font = "11px system-ui, sans-serif";
+    context.fillStyle = colours.muted;
+    context.fillText(`${figure(high, "", 1)} ${unit}`, 2, top + 15);
+    if (low < 0) context.fillText(figure(low, "", 1), 2, top + height - 12);
   }
 
   #reasons(top, height) {
@@ -209,6 +241,11 @@ export class Plots {
     const stride = [1, 2, 5, 10, 20, 50, 100].find((s) => (s / endS) * (this.canvas.width - LEFT) > 46) ?? 200;
     for (let t = 0; t <= endS; t += stride) context.fillText(`${t} s`, this.#x(t), top + 2);
   }
+}
+
+function median(numbers) {
+  const sorted = [...numbers].sort((a, b) => a - b);
+  return sorted[Math.floor(sorted.length / 2)] ?? 0;
 }
 
 /** A reason has one colour everywhere; what makes it brake hard is red. */
