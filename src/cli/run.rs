@@ -438,7 +438,7 @@ pub fn groups_text(groups: &[Group], found: &[FoundIn]) -> String {
 }
 
 /// Each requirement with its breaches, or with how near it came to one.
-fn requirements_text(requirements: &[RequirementCount]) -> String {
+pub fn requirements_text(requirements: &[RequirementCount]) -> String {
     let figure = |of: &RequirementCount| match (of.smallest, of.unit.as_deref()) {
         (Some(smallest), Some(unit)) => format!("{smallest:.2} {unit}").trim_end().to_owned(),
         (Some(_) | None, _) => String::new(),
@@ -450,11 +450,12 @@ fn requirements_text(requirements: &[RequirementCount]) -> String {
     };
     let line = |of: &RequirementCount| match (&of.scenario, figure(of)) {
         (Some(scenario), figure) => format!(
-            "{} × {} in {} ({} of these kept by a careful driver){}: {scenario}; {}",
+            "{} × {} in {} ({} of {} kept by a careful driver){}: {scenario}; {}",
             of.breaches,
             of.requirement,
             plural(of.breached_in as usize, "episode"),
             of.kept_in,
+            if of.tried_in == of.breached_in { "these".to_owned() } else { of.tried_in.to_string() },
             if figure.is_empty() { figure } else { format!(", by up to {}", figure.trim_start_matches('-')) },
             asked(of),
         ),

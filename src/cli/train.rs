@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use avastra_campaign::emit;
-use avastra_campaign::episode::Script;
+use avastra_campaign::episode::{Breach, Script};
 use avastra_campaign::oracle;
 use avastra_campaign::run::{
     Database, EpisodeSummary, Group, RunSettings, Shard, Stage, TrafficRecord, Units,
@@ -28,7 +28,7 @@ use super::load::UnderTest;
 use super::output::{Output, for_shell, plural};
 use super::policy::distil::{self, rules_text};
 use super::progress::{TrainingProgress, Working};
-use super::run::groups_text;
+use super::run::{groups_text, requirements_text};
 use super::run_directory::{Player, Resumed};
 use super::{load, run_directory};
 
@@ -149,7 +149,7 @@ fn resumed(output: &Output, path: &Path) -> Result<(Training, Directory), Failur
     Ok((training, directory))
 }
 
-/// Writes an episode's counted collisions as a scenario and commits it. A checkpoint goes with it every so often, at
+/// Writes an episode's counted collisions as a scenario, and the first breach of each requirement, and commits it. A checkpoint goes with it every so often, at
 /// the end, and when the user stops.
 fn keep(
     training: &Training,
@@ -161,10 +161,15 @@ fn keep(
     let TrainSettings { agent, without, with, .. } = settings;
     let player = Player { command: "train", table: training.table(), agent, without, with };
     directory.write_failure(&player, (&trained.log, &trained.summary))?;
+    let is_first = || {
+        let known = directory.read(Database::first_breaches)?;
+        let name = |breach: &Breach| &training.table().space().requirements[breach.requirement].name;
+        Ok::<_, Failure>(trained.log.breaches.iter().any(|breach| !known.contains_key(name(breach))))
+    };
+    let is_critical = trained.summary.counted() > 0 || !trained.log.breaches.is_empty() && is_first()?;
     // A training with an observation period of its own writes no scenario, because a replay would use the period
     // of the space.
-    let has_scenario =
-        trained.summary.counted() > 0 && settings.hyperparameters.observation_period_s().is_none();
+    let has_scenario = is_critical && settings.hyperparameters.observation_period_s().is_none();
     let scenario = has_scenario
         .then(|| directory.write_critical(&player, (&training.log_of_space(&trained.log), &trained.summary)));
     let scenario = scenario.transpose()?;
@@ -216,6 +221,10 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
     if !groups.is_empty() {
         output.say(&groups_text(&groups, &found));
     }
+    let requirements = directory.read(Database::requirements)?;
+    if !requirements.is_empty() {
+        output.say(&requirements_text(&requirements));
+    }
     let critical = directory.critical(output)?;
     let rules = kept.as_ref().and_then(|(_, policy)| policy.claims.as_ref()?.rules.as_ref());
     match &kept {
@@ -263,14 +272,14 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
     write(&directory.path.join("results.json"), &format!("{text}\n"))?;
     output.result(serde_json::json!({
         "reproducible": is_reproducible,
-        "directory": directory.path, "totals": totals, "groups": groups, "policy": kept.as_ref().map(|(path, _)| path),
+        "directory": directory.path, "totals": totals, "groups": groups, "requirements": requirements, "policy": kept.as_ref().map(|(path, _)| path),
         "rules": rules, "simulated_h": simulated_h, "failures": failures, "evaluation": evaluation,
     }));
     // If no episode was driven to its end, nothing was learned, so the command fails.
     if failed > 0 && failed == all { Err(Failure::Ads { findings: failed }) } else { Ok(()) }
 }
 
-/// Says of the example of each distinct failure how often it recurs, in its scenario and in the database. A training finds
+/// Says of the example of each distinct failure, and of each requirement, how often it recurs, in its scenario and in the database. A training finds
 /// the same failure over and over, so one of each is played again and not all.
 fn find_recurrence(
     output: &Output,
@@ -283,7 +292,9 @@ fn find_recurrence(
     let known = directory.read(Database::found)?;
     let is_known = |episode| known.iter().any(|found| found.episode == episode && found.recurrence.is_some());
     let written = directory.read(Units::scenarios)?;
-    let examples: Vec<i64> = groups.iter().map(|group| group.episode).filter(|&one| !is_known(one)).collect();
+    let breaches = directory.read(Database::first_breaches)?;
+    let all = groups.iter().map(|group| group.episode).chain(breaches.into_values());
+    let examples: Vec<i64> = all.filter(|&one| !is_known(one)).collect();
     let examples = written.into_iter().filter(|one| examples.contains(&one.unit));
     let files = run_directory::written(&directory.path, examples.collect());
     if files.is_empty() || !oracle::can_replay(training.arena().ads()) {
@@ -297,9 +308,10 @@ fn find_recurrence(
         let (setup, log) = (stage.setup(ads), stage.play(ads, &mut |_, _, _| {}));
         let episode = scenario.origin.episode.unwrap_or(0) as usize;
         let mut summary = EpisodeSummary::judged(&setup, episode, &log);
+        summary.find_keepers(&setup, &log);
         summary.find_recurrence(&setup, &Script::of_scenario(&scenario), &log, REPLAYS);
         let text = directory.write_critical(&player, (&log, &summary))?;
-        directory.write(|database| database.add_recurrence(&summary, &text))?;
+        directory.write(|database| database.add_recurrence(&summary, table.space(), &text))?;
     }
     Ok(())
 }

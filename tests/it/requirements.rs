@@ -402,6 +402,40 @@ fn a_training_plays_an_example_of_each_failure_again() {
 }
 
 #[test]
+fn a_training_writes_the_first_breach_of_each_requirement() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let out = scratch.path().join("trained").display().to_string();
+    let train = ["train", SPACE, "--road", "corner", "--episodes", "8", "--seed", "2", "--ads", "idm"];
+    let found = last_line(&done(&[&train[..], &["--format", "json", "--out", &out]].concat()));
+    let requirements = found["requirements"].as_array().expect("a list");
+    let breached: Vec<&Value> =
+        requirements.iter().filter(|of| of["breaches"].as_i64().is_some_and(|count| count > 0)).collect();
+    assert!(breached.len() > 1, "{requirements:?}");
+    for of in &breached {
+        let [requirement, scenario] =
+            ["requirement", "scenario"].map(|word| of[word].as_str().expect("a name"));
+        let file = format!("{out}/critical/{scenario}.ava");
+        let text = fs::read_to_string(&file).expect("it was written");
+        assert!(text.contains(&format!("  expect {requirement}.breached at ")), "{text}");
+        assert!(text.contains(&format!("  expect {requirement}.recurrence == ")), "{text}");
+        assert!(done(&["replay", &file]).contains(" holds, "));
+        let [breached_in, tried_in] =
+            ["breached_in", "tried_in"].map(|word| of[word].as_i64().expect("a number"));
+        assert!((1..=breached_in).contains(&tried_in), "{of}");
+    }
+    // One of each is enough: most episodes breach something.
+    let written = fs::read_dir(format!("{out}/critical")).expect("it is there");
+    let is_scenario = |name: &str| name.starts_with("corner_") && name.ends_with(".ava");
+    let files = written
+        .filter(|entry| is_scenario(&entry.as_ref().expect("it can be read").file_name().to_string_lossy()));
+    assert!(files.count() <= breached.len());
+    let read = || fs::read(format!("{out}/run.db")).expect("it is there");
+    let before = read();
+    done(&["train", "--resume", &out]);
+    assert!(read() == before, "nothing is played again");
+}
+
+#[test]
 fn near_misses_are_kept_as_scenarios_that_end_as_they_did() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let kept = |name: &str, more: &[&str]| -> Vec<(String, String)> {

@@ -187,13 +187,24 @@ impl Database {
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn add_recurrence(&mut self, summary: &EpisodeSummary, scenario: &str) -> Result<(), DatabaseError> {
+    pub fn add_recurrence(
+        &mut self,
+        summary: &EpisodeSummary,
+        space: &Space,
+        scenario: &str,
+    ) -> Result<(), DatabaseError> {
         let transaction = self.connection.transaction()?;
         let episode = summary.episode as i64;
         for finding in &summary.collisions {
             let [recurred, replays] = in_columns(finding.recurrence);
             let change = "UPDATE collision SET recurred = ?, replays = ? WHERE episode = ? AND number = ?";
             transaction.execute(change, params![recurred, replays, episode, finding.number as i64])?;
+        }
+        for found in &summary.breached {
+            let [recurred, replays] = in_columns(found.recurrence);
+            let change = "UPDATE breach SET kept_by = ?, recurred = ?, replays = ? WHERE episode = ? AND requirement = ?";
+            let (kept_by, name) = (found.kept_by.join(" "), &space.requirements[found.requirement].name);
+            transaction.execute(change, params![kept_by, recurred, replays, episode, name])?;
         }
         transaction.execute("UPDATE scenario SET text = ? WHERE episode = ?", params![scenario, episode])?;
         LAYOUT.seal_anew(&transaction, episode)?;
@@ -282,6 +293,15 @@ impl Database {
         })
     }
 
+    /// The requirements that were breached, each with the first episode in which it was.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn first_breaches(&self) -> Result<BTreeMap<String, i64>, DatabaseError> {
+        let query = "SELECT requirement, min(episode) FROM breach GROUP BY requirement";
+        Ok(query_all(&self.connection, query, |row| Ok((row.get(0)?, row.get(1)?)))?.into_iter().collect())
+    }
+
     /// The requirements that were in force, by name: how often each was breached, and how near it came to that.
     ///
     /// # Errors
@@ -293,10 +313,13 @@ impl Database {
                     (SELECT count(DISTINCT episode) FROM breach WHERE breach.requirement = margin.requirement),
                     (SELECT count(DISTINCT episode) FROM breach
                      WHERE breach.requirement = margin.requirement AND kept_by != ''),
-                    (SELECT road || '/' || episode.episode FROM breach JOIN episode USING (episode)
+                    (SELECT road || '/' || episode.episode
+                     FROM breach JOIN episode USING (episode) JOIN scenario USING (episode)
                      WHERE breach.requirement = margin.requirement
                      ORDER BY coalesce(breach.margin, 0), episode LIMIT 1),
-                    sum(asked_s), sum(asked_s > 0)
+                    sum(asked_s), sum(asked_s > 0),
+                    (SELECT count(DISTINCT episode) FROM breach
+                     WHERE breach.requirement = margin.requirement AND kept_by IS NOT NULL)
              FROM margin JOIN episode USING (episode) GROUP BY margin.requirement
              ORDER BY 7 DESC, margin.requirement";
         let named = |at: Option<String>| {
@@ -318,6 +341,7 @@ impl Database {
                 scenario: named(row.get(9)?),
                 asked_s: row.get(10)?,
                 asked_in: row.get(11)?,
+                tried_in: row.get(12)?,
             })
         })
     }
@@ -400,7 +424,8 @@ pub struct RequirementCount {
     pub breaches: i64,
     /// Episodes with a breach of it.
     pub breached_in: i64,
-    /// Of these, episodes in which a careful driver would have kept it.
+    /// Of these, episodes in which careful drivers were tried, and in which one would have kept it.
+    pub tried_in: i64,
     pub kept_in: i64,
     /// The smallest margin of all episodes, in the unit; `None` if it has none or was never asked.
     pub smallest: Option<f64>,
