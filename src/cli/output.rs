@@ -30,7 +30,7 @@ pub struct Output {
 type Fields = serde_json::Map<String, serde_json::Value>;
 
 /// Raised whenever a field of a command's result changes its meaning or goes away.
-const SCHEMA: u32 = 3;
+const SCHEMA: u32 = 4;
 
 /// The end of a command in JSON: its last line on stdout, whether it failed or not. `avastra explain json` says which
 /// fields a result has (`schema`).

@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use avastra_campaign::episode::{Collision, EpisodeLog};
+use avastra_campaign::episode::{Breach, Collision, EpisodeLog};
 use avastra_campaign::oracle;
 use avastra_campaign::run::{Asked, Gauges, Stage};
 use avastra_drivers::Selected;
 use avastra_lang::check::Loaded;
 use avastra_lang::model::vocabulary::{Priority, Word};
-use avastra_lang::model::{Avoidability, Policy, Scenario, Space};
+use avastra_lang::model::{Avoidability, Policy, RequirementDef, Scenario, Space};
 use avastra_world::action::ActionTable;
 
 use super::arguments::ReplayArguments;
@@ -197,8 +197,9 @@ fn play(
             });
             let refused = log.refused().map(|(step, reason)| format!("\n  step {step} is refused: {reason}"));
             let refused: String = refused.collect();
+            let breaches = breaches_text(table.space(), scenario, &log);
             format!(
-                "{name}: {collisions}, {} counted, {avoidable} avoidable{failed}{refused}",
+                "{name}: {collisions}, {} counted, {avoidable} avoidable{breaches}{failed}{refused}",
                 counted.unwrap_or(0)
             )
         }
@@ -213,16 +214,33 @@ fn play(
     };
     let is_same = if other.is_none() { stage.is_as_recorded(&log) } else { None };
     let banner = changed.map(|changed| changed.banner(is_same));
+    let breach = |found: &Breach| {
+        let RequirementDef { name, margin, .. } = &table.space().requirements[found.requirement];
+        serde_json::json!({
+            "requirement": name, "obstacle": found.obstacle, "at_s": found.time_s, "until_s": found.until_s,
+            "margin": found.margin, "unit": margin.map(|dimension| dimension.si_unit()),
+        })
+    };
     let result = serde_json::json!({
         "file": path, "changed": banner, "scenario": scenario.name, "ads": other.as_deref().unwrap_or(ads.name()),
         "claims": claims, "end": log.end.name(), "collisions": log.collisions.len(), "counted": counted, "judgements": judgements,
         "reproducible": doubted.is_none(), "failure": log.failure.as_ref().map(|failure| failure.in_words()),
         "held": log.held.iter().map(|held| serde_json::json!({ "from_s": held.from_s, "by": held.text() })).collect::<Vec<_>>(),
-        "severities": severities, "priorities": priorities, "criticality": criticality, "pet_s": pet_s,
+        "breaches": log.breaches.iter().map(breach).collect::<Vec<_>>(), "severities": severities, "priorities": priorities, "criticality": criticality, "pet_s": pet_s,
     });
     let has_ads_failed = other.is_some() && log.failure.is_some();
     let (path, name) = (path.to_owned(), scenario.name.clone());
     Ok(Played { path, name, claims, banner, told, has_ads_failed, result })
+}
+
+/// What another driving system breaches, and what of the claimed breaches it does not.
+fn breaches_text(space: &Space, scenario: &Scenario, log: &EpisodeLog) -> String {
+    let name = |breach: &Breach| space.requirements[breach.requirement].name.as_str();
+    let breached =
+        log.first_breaches().map(|breach| format!("; breaches {} at {:.2} s", name(breach), breach.time_s));
+    let is_kept = |requirement: &&str| log.breach_of(space, requirement).is_none();
+    let kept = scenario.breached().filter(is_kept).map(|requirement| format!("; keeps {requirement}"));
+    breached.chain(kept).collect()
 }
 
 /// How hard a collision was, in a line.

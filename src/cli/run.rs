@@ -461,7 +461,7 @@ pub fn requirements_text(requirements: &[RequirementCount]) -> String {
         ),
         (None, _) if of.asked_in == 0 => format!("{} never asked", of.requirement),
         (None, figure) if figure.is_empty() && of.unit.is_some() => {
-            format!("{} never asked for long enough; {}", of.requirement, asked(of))
+            format!("{} kept, never asked for all the time that it grants; {}", of.requirement, asked(of))
         }
         (None, figure) if figure.is_empty() => format!("{} kept; {}", of.requirement, asked(of)),
         (None, figure) => {

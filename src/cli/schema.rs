@@ -223,7 +223,7 @@ replay
   policies[] object `file`, `policy` and the claims `refuted`, in words
   scenarios[] object `file`, `scenario`, what has `changed` since it was written, `ads`, `claims`, `end`, the \
     `failure` of a driving system of your own, whether it is `reproducible`; what its speed was `held` by, from when \
-    on; collisions and how hard they were
+    on; collisions and how hard they were; the `breaches` of requirements: which, from when to when, the smallest `margin`
   FAILED
 diagnose
   causes[] object? `cause` (one or two modules, or none) and `count`

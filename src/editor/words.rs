@@ -2,8 +2,8 @@
 //! engine's words in `model::vocabulary`.
 
 use avastra_lang::model::vocabulary::{
-    BEGINS, Body, Colour, CommandField, EpisodeField, LaneChoice, PastWord, ROAD_USER, RoadField, SINCE,
-    SOME, Side, Site, SpawnField, StartField, TYPES, Then, TrafficRule, Turning, Verb, Word,
+    BEGINS, Body, Colour, CommandField, EpisodeField, LaneChoice, NearWord, PastWord, ROAD_USER, RoadField,
+    SINCE, Side, Site, SpawnField, StartField, TYPES, Then, TrafficRule, Turning, Verb, Word,
 };
 use avastra_lang::model::{ENDS, MODULES};
 
@@ -25,8 +25,11 @@ pub fn facts(site: Site) -> Vec<Entry> {
     let facts = site.facts().map(|fact| (fact.name(), fact.meaning()));
     let words = site.word_facts().map(|fact| (fact.name(), fact.meaning()));
     let since = site.knows_actions().then_some(SINCE);
-    let past =
-        if site.is_requirement() { [of::<PastWord>(), vec![BEGINS, SOME]].concat() } else { Vec::new() };
+    let past = if site.is_requirement() {
+        [of::<PastWord>(), of::<NearWord>(), vec![BEGINS]].concat()
+    } else {
+        Vec::new()
+    };
     facts.chain(words).filter(|(name, _)| !name.contains('.')).chain(since).chain(past).collect()
 }
 

@@ -269,6 +269,7 @@ fn what_is_asked_of_each_road_user_near_is_asked_of_each_by_itself() {
             of.flat_map(|one| ticks(one.time_s)..=ticks(one.until_s)).collect()
         };
         assert_eq!(ticks_of("nobody_near"), ticks_of("keeps_off"), "episode {number}");
+        assert_eq!(ticks_of("few_near"), ticks_of("keeps_off"), "episode {number}");
         let smallest = |name: &str| {
             let is_of = |one: &&avastra::episode::Margin| space.requirements[one.requirement].name == name;
             log.margins.iter().find(is_of).expect("it is in force").smallest
@@ -547,6 +548,8 @@ fn a_breach_is_a_finding_that_replays() {
     assert!(replayed.contains(" holds, "), "{replayed}");
     let (status, said, _) = outcome(&mut avastra(&["test", first]));
     assert!(status != 0 && said.contains("1 scenario: 1 still fail"), "{said}");
+    let said = done(&["replay", first, "--ads", "modular"]);
+    assert!(said.contains("; breaches no_yellow at ") && said.contains("; keeps slow;"), "{said}");
     let (_, other, _) = outcome(&mut avastra(&["test", first, "--ads", "modular"]));
     assert!(other.contains("still fail"), "modular is as fast: {other}");
     let reviewed = outcome(&mut avastra(&["test", "--review", first])).1;

@@ -111,8 +111,6 @@ struct Stretch {
     obstacle: Option<u32>,
     memory: RequirementMemory,
     tally: Tally,
-    /// The margin of its condition at the last tick, if it was asked.
-    now: Option<f64>,
     /// The breach that goes on, by index.
     open: Option<usize>,
 }
@@ -123,6 +121,8 @@ struct Tally {
     /// Ticks in which it was asked without a break, and in which it failed without a break.
     asked: u32,
     failed: u32,
+    /// The margin of the condition at the last tick, if `asked` is not 0.
+    now: f64,
     window: Sliding,
     /// Ticks for which the window still holds a margin above the smallest one, which is not in it.
     above: u32,
@@ -180,7 +180,7 @@ impl Monitor {
         let facts: Vec<Fact> = facts.collect();
         let some = all.iter().flat_map(|expr| {
             expr.filter_map(|kind| match kind {
-                ExprKind::Some(bodies, _) => Some(bodies.clone()),
+                ExprKind::Near(_, bodies, _) => Some(bodies.clone()),
                 _ => None,
             })
         });
@@ -266,8 +266,8 @@ impl Monitor {
     /// nothing was asked, or nothing could fail.
     pub fn now(&self, requirement: usize) -> Option<f64> {
         let watch = self.watches.iter().find(|watch| watch.required.index == requirement)?;
-        let all = watch.each.iter().chain([&watch.ego]).filter_map(|stretch| stretch.now);
-        all.filter(|margin| margin.is_finite()).reduce(f64::min)
+        let asked = watch.each.iter().chain([&watch.ego]).filter(|stretch| stretch.tally.asked > 0);
+        asked.map(|stretch| stretch.tally.now).filter(|margin| margin.is_finite()).reduce(f64::min)
     }
 
     /// Ends a step. Of each requirement its smallest margin, if rewards ask for it; else NaN.
@@ -380,7 +380,7 @@ impl Stretch {
             true => self.answer_next(required, facts, moment),
         }) else {
             self.tally.pause();
-            (self.open, self.now) = (None, None);
+            self.open = None;
             return false;
         };
         if !is_breached {
@@ -414,7 +414,6 @@ impl Stretch {
         moment: &Judged,
     ) -> Option<(Option<f64>, bool, bool)> {
         let kept = required.ready.at(moment.functions, facts)?;
-        self.now = Some(kept.margin);
         let margin = self.tally.take(kept, required.within_ticks, required.is_paid);
         Some((margin, self.tally.failed > required.within_ticks, true))
     }
@@ -429,7 +428,6 @@ impl Stretch {
     ) -> Option<(Option<f64>, bool, bool)> {
         let is_awaited = !self.tally.begun.is_empty();
         let asked = required.ready.at_next(&mut self.memory, is_awaited, moment.functions, facts)?;
-        self.now = Some(asked.kept.margin);
         if !required.is_response {
             let margin = self.tally.take(asked.kept, required.within_ticks, required.is_paid);
             return Some((margin, self.tally.failed > required.within_ticks, true));
@@ -464,6 +462,7 @@ impl Tally {
             self.held = Some(self.asked);
         }
         let margin = asked.kept.margin;
+        self.now = margin;
         let largest = (!margin.is_nan()).then(|| self.window.largest(margin, within_ticks));
         let Some(&began) = self.begun.front().filter(|began| **began + within_ticks == self.asked) else {
             return (None, false);
@@ -478,6 +477,7 @@ impl Tally {
     fn take(&mut self, kept: Kept, within_ticks: u32, is_paid: bool) -> Option<f64> {
         self.asked += 1;
         self.failed = if kept.holds { 0 } else { self.failed + 1 };
+        self.now = kept.margin;
         if kept.margin.is_nan() {
             return None;
         }
@@ -594,7 +594,7 @@ mod tests {
         let side = |rng: &mut rng::Rng| -> (String, MarginAt, usize) {
             let part = f64::from(below(rng, 8)) / 4.0;
             let ticks = below(rng, 6) as usize + 1;
-            match below(rng, if depth == 0 { 5 } else { 7 }) {
+            match below(rng, if depth == 0 { 6 } else { 8 }) {
                 0 => ("ego.speed".to_owned(), Box::new(|all, t| all[t].0), 0),
                 1 => ("ego.limit".to_owned(), Box::new(|all, t| all[t].1), 0),
                 2 => (format!("({part} * ego.speed)"), Box::new(move |all, t| part * all[t].0), 0),
@@ -604,7 +604,12 @@ mod tests {
                     Box::new(move |all, t| all[t].0 - all[t - ticks].0),
                     ticks,
                 ),
-                5 => {
+                5 => (
+                    format!("ago(ego.limit, {} ms)", ticks * 20),
+                    Box::new(move |all, t| all[t - ticks].1),
+                    ticks,
+                ),
+                6 => {
                     let of = made_up(rng, depth - 1);
                     let (text, since) = (of.text.clone(), of.known_from);
                     let held = move |all: &Trace, t: usize| {
@@ -636,7 +641,7 @@ mod tests {
             }
         };
         let (text, of, known) = side(rng);
-        let kind = below(rng, if depth == 0 { 5 } else { 11 });
+        let kind = below(rng, if depth == 0 { 5 } else { 12 });
         let ticks = below(rng, 6) as usize + 1;
         let mut two = || (made_up(rng, depth.saturating_sub(1)), made_up(rng, depth.saturating_sub(1)));
         let (a, b) = if kind > 4 { two() } else { (never(), never()) };
@@ -675,6 +680,11 @@ mod tests {
                     (first(t)..=t).map(|at| (a.margin)(all, at)).fold(f64::NEG_INFINITY, f64::max)
                 }),
             ),
+            10 => {
+                known_from += ticks;
+                let text = format!("ago({}, {} ms)", a.text, ticks * 20);
+                (text, Box::new(move |all, t| (a.margin)(all, t - ticks)))
+            }
             _ => {
                 known_from += ticks;
                 let text = format!("throughout({}, {} ms)", a.text, ticks * 20);

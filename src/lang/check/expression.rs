@@ -10,8 +10,8 @@ use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind, Who};
 use crate::model::vocabulary::{
-    BEGINS, Fact, Known, PastWord, ROAD_LANES, SINCE, SOME, Site, THERE, Word, WordFact, parts_of, thing_of,
-    things,
+    BEGINS, Fact, Known, NearWord, PastWord, ROAD_LANES, SINCE, Site, THERE, Word, WordFact, parts_of,
+    thing_of, things,
 };
 use crate::model::{EnumIndex, STATE_MAX, StateDef, Type, code};
 use crate::syntax::ast::{Span, UnaryOp};
@@ -553,8 +553,10 @@ impl Checker {
         if call.name.text == BEGINS.0 && self.function_names.get(BEGINS.0).is_none() {
             return self.begins(call, place);
         }
-        if call.name.text == SOME.0 && self.function_names.get(SOME.0).is_none() {
-            return self.some(call, place);
+        if let Some(word) = NearWord::from_name(&call.name.text)
+            && self.function_names.get(&call.name.text).is_none()
+        {
+            return self.near(word, call, place);
         }
         let symbol = Symbol::Function(call.name.text.clone());
         let named = call.args.iter().filter_map(|argument| argument.name.as_ref());

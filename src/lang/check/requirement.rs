@@ -6,7 +6,7 @@ use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Comparison, Expr, ExprKind};
 use crate::model::requirement::{margin_dimension, open_divisor, past_inside};
-use crate::model::vocabulary::{BEGINS, BREACHED, EVENTS, MARGIN, PastWord, SOME, Site, Word, things};
+use crate::model::vocabulary::{BEGINS, BREACHED, EVENTS, MARGIN, NearWord, PastWord, Site, Word, things};
 use crate::model::{BodyWord, RequirementDef, RuleDef, TICK_MS, Type, code};
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
@@ -199,10 +199,14 @@ impl Checker {
             let error = Diagnostic::error(code::NOT_HERE, format!("`{name}` cannot be asked here"));
             return self.reject(error.at(call.span, "only requirements remember what was"));
         }
-        let is_change = word == PastWord::Change;
-        let (wants, example) = match is_change {
-            true => ("number", format!("write a number and a time: `{name}(ego.acceleration, 0.5 s)`")),
-            false => {
+        let (wants, example) = match word {
+            PastWord::Ago => {
+                ("number or a condition", format!("write what and when: `{name}(ego.speed, 2 s)`"))
+            }
+            PastWord::Change => {
+                ("number", format!("write a number and a time: `{name}(ego.acceleration, 0.5 s)`"))
+            }
+            PastWord::Recently | PastWord::Throughout | PastWord::Total | PastWord::Times => {
                 ("condition", format!("write a condition and a time: `{name}(nearest.gap <= 5 m, 2 s)`"))
             }
         };
@@ -213,14 +217,22 @@ impl Checker {
             let error = Diagnostic::error(code::ARGUMENTS, message).at(call.span, "");
             return self.reject(error.help(example));
         };
-        let of = match is_change {
-            true => self.numeric(condition, place),
-            false => self.typed(condition, place, Type::Bool),
+        let of = match word {
+            PastWord::Ago => self.expr(condition, place, None),
+            PastWord::Change => self.numeric(condition, place),
+            PastWord::Recently | PastWord::Throughout | PastWord::Total | PastWord::Times => {
+                self.typed(condition, place, Type::Bool)
+            }
         };
         let ticks = self.ticks(time, &example);
         let of = of?;
+        if let Type::Enum(_) = of.ty {
+            let message = format!("`{name}` takes a {wants} and a time");
+            let error = Diagnostic::error(code::TYPE_MISMATCH, message).at(of.span, "a word");
+            return self.reject(error.help("compare it: `ago(time == Night, 2 s)`"));
+        }
         let ty = match word {
-            PastWord::Recently | PastWord::Throughout | PastWord::Change => of.ty,
+            PastWord::Recently | PastWord::Throughout | PastWord::Change | PastWord::Ago => of.ty,
             PastWord::Total => Type::Quantity(Dimension::DURATION),
             PastWord::Times => Type::Int,
         };
@@ -250,11 +262,13 @@ impl Checker {
     }
 
     /// `some(Pedestrian, npc.gap <= 5 m)`, `some([Bicycle, Motorcycle], …)`, `some(npc.gap <= 5 m)`: whether a condition
-    /// holds of a road user near.
-    pub(super) fn some(&mut self, call: &ast::Call, place: &Place<'_>) -> Option<Expr> {
-        self.references.note(call.name.span, Symbol::Engine(SOME.0, SOME.1), false);
+    /// holds of a road user near; and `count` of how many.
+    pub(super) fn near(&mut self, word: NearWord, call: &ast::Call, place: &Place<'_>) -> Option<Expr> {
+        let name = word.name();
+        let help = format!("write `{name}(Pedestrian, npc.gap <= 5 m)`");
+        self.references.note(call.name.span, Symbol::Engine(name, word.meaning()), false);
         if !place.site.is_requirement() {
-            let error = Diagnostic::error(code::NOT_HERE, "`some` cannot be asked here");
+            let error = Diagnostic::error(code::NOT_HERE, format!("`{name}` cannot be asked here"));
             return self.reject(error.at(call.span, "only requirements look at each road user near"));
         }
         let (bodies, condition) = match call.args.as_slice() {
@@ -267,22 +281,22 @@ impl Checker {
                 let body = |named: &ast::Expr| match &named.kind {
                     ast::ExprKind::Name(name) => self.bodies_named(name, named.span),
                     _ => {
-                        let error = Diagnostic::error(code::TYPE_MISMATCH, "`some` is about bodies");
-                        let error = error.at(named.span, "no name of one");
-                        self.reject(error.help("write `some(Pedestrian, npc.gap <= 5 m)`"))
+                        let error =
+                            Diagnostic::error(code::TYPE_MISMATCH, format!("`{name}` is about bodies"));
+                        self.reject(error.at(named.span, "no name of one").help(&help))
                     }
                 };
                 (named.into_iter().map(body).collect::<Option<Vec<_>>>()?.concat(), value)
             }
             _ => {
-                let message = "`some` takes bodies and a condition, or a condition alone";
-                let error = Diagnostic::error(code::ARGUMENTS, message).at(call.span, "");
-                return self.reject(error.help("write `some(Pedestrian, npc.gap <= 5 m)`"));
+                let message = format!("`{name}` takes bodies and a condition, or a condition alone");
+                return self.reject(Diagnostic::error(code::ARGUMENTS, message).at(call.span, "").help(help));
             }
         };
         let place = Place { site: Site::RequirementOn, ..*place };
         let condition = self.typed(condition, &place, Type::Bool)?;
-        Some(Expr { kind: ExprKind::Some(bodies, Box::new(condition)), ty: Type::Bool, span: call.span })
+        let ty = if word == NearWord::Some { Type::Bool } else { Type::Int };
+        Some(Expr { kind: ExprKind::Near(word, bodies, Box::new(condition)), ty, span: call.span })
     }
 
     /// How many ticks a time lasts: a part of a tick is one more.

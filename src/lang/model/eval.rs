@@ -7,7 +7,9 @@ use crate::model::effort;
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind, Who};
 use crate::model::space::{BodyWord, COUNTED, FnDef, RoadFacts, Space, WordExpr};
 use crate::model::value::{Memory, Value};
-use crate::model::vocabulary::{Fact, LaneChoice, Light, PastWord, Priority, RoadKind, Turn, Word, WordFact};
+use crate::model::vocabulary::{
+    Fact, LaneChoice, Light, NearWord, PastWord, Priority, RoadKind, Turn, Word, WordFact,
+};
 
 /// Numbers that differ by at most this part of the larger one are equal, and their difference is 0, unless both are whole.
 /// This tolerates the digits that an author rounds away and those of binary fractions, but no measurable distance.
@@ -158,7 +160,7 @@ pub struct NpcFacts {
     pub across_mps: f64,
     /// The room between the two across the route; below 0 they overlap.
     pub aside_m: f64,
-    /// How far it reaches into the lane that the route has there; below 0 what is missing.
+    /// How far it reaches into the ego vehicle's lane there; below 0 what is missing.
     pub in_lane_m: f64,
     /// From its middle to the nearest crosswalk, at most [`CROSSWALK_GAP_M_MAX`].
     pub crosswalk_gap_m: f64,
@@ -169,6 +171,8 @@ pub struct NpcFacts {
     /// Since one of the two left the place where the other is, at most [`TIME_S_MAX`]. Known only to who watches.
     pub pet_s: f64,
     pub has_siren: bool,
+    /// Whether it drives in the junction that is the next one of the ego vehicle's route.
+    pub in_next_junction: bool,
     /// Where it means to go at the next junction; nowhere for who is on foot.
     pub turn: Turn,
 }
@@ -251,11 +255,15 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
         // What was, only requirements remember.
         ExprKind::Past(_, PastWord::Change | PastWord::Total | PastWord::Times, _) => Value::Number(0.0),
         ExprKind::Past(condition, ..) => evaluate(condition, functions, facts),
-        ExprKind::Some(bodies, condition) => {
+        ExprKind::Near(word, bodies, condition) => {
             let near = facts.world.map_or(&[][..], |world| &world.near);
             let holds =
                 |near: &NearFacts| evaluate(condition, functions, &about(Some(near.npc), facts)).truth();
-            Value::Bool(near.iter().filter(|near| near.is_of(bodies)).any(holds))
+            let mut meant = near.iter().filter(|near| near.is_of(bodies));
+            match word {
+                NearWord::Some => Value::Bool(meant.any(holds)),
+                NearWord::Count => Value::Number(meant.filter(|near| holds(near)).count() as f64),
+            }
         }
         ExprKind::Margin(requirement) => {
             Value::Number(facts.margins.get(*requirement).copied().unwrap_or(f64::NAN))
@@ -371,6 +379,7 @@ fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
         Fact::NpcNextCrosswalkGap => spawn(|spawn| spawn.npc.next_crosswalk_gap_m),
         Fact::NpcContactIn => spawn(|spawn| spawn.npc.contact_in_s),
         Fact::NpcPet => spawn(|spawn| spawn.npc.pet_s),
+        Fact::NpcInNextJunction => Value::Bool(facts.spawn.is_some_and(|spawn| spawn.npc.in_next_junction)),
         Fact::NpcSiren => Value::Bool(facts.spawn.is_some_and(|spawn| spawn.npc.has_siren)),
         Fact::SpawnGap => spawn(|spawn| spawn.spawn_gap_m),
         Fact::SafetyGap => spawn(|spawn| spawn.safety_gap_m),

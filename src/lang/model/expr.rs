@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use crate::model::space::BodyWord;
 use crate::model::value::{EnumIndex, Type, Value};
-use crate::model::vocabulary::{Fact, Known, LaneChoice, PastWord, WordFact};
+use crate::model::vocabulary::{Fact, Known, LaneChoice, NearWord, PastWord, WordFact};
 use crate::syntax::ast::Span;
 pub use crate::syntax::ast::{Arithmetic, Comparison};
 use avastra_base::units::Rational;
@@ -69,7 +69,7 @@ pub enum ExprKind {
     Past(Box<Expr>, PastWord, u32),
     /// `some(Pedestrian, npc.gap <= 5 m)`: whether it holds of a road user near that has one of these bodies; of any, if there
     /// is none.
-    Some(Vec<BodyWord>, Box<Expr>),
+    Near(NearWord, Vec<BodyWord>, Box<Expr>),
     /// `stops_at_red.breached`: whether a requirement was breached in the step.
     Breached(usize),
     /// `keeps_distance.margin`: the smallest margin of a requirement in the step.
@@ -167,7 +167,7 @@ impl Expr {
             ExprKind::CellAt(_, inner)
             | ExprKind::Not(inner)
             | ExprKind::Past(inner, ..)
-            | ExprKind::Some(_, inner)
+            | ExprKind::Near(_, _, inner)
             | ExprKind::Negate(inner)
             | ExprKind::InLanes(inner, _) => visit(inner),
             ExprKind::Call(_, arguments) => arguments.iter().for_each(visit),

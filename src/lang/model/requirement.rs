@@ -15,7 +15,7 @@ use crate::model::limits::TICK_MS;
 use crate::model::sliding::Sliding;
 use crate::model::space::{BodyWord, FnDef, RequirementDef};
 use crate::model::value::Type;
-use crate::model::vocabulary::{Light, PastWord, Word, WordFact};
+use crate::model::vocabulary::{Light, NearWord, PastWord, Word, WordFact};
 use avastra_base::units::Dimension;
 
 /// How a requirement stands at a moment.
@@ -44,6 +44,7 @@ pub struct ReadyRequirement {
 #[derive(Debug, Clone)]
 struct PastNode {
     of: Node,
+    is_number: bool,
     has_margin: bool,
     word: PastWord,
     ticks: u32,
@@ -76,6 +77,8 @@ struct Past {
     margin: f64,
     largest: Sliding,
     margins: VecDeque<f64>,
+    /// The answers of these ticks, if one is recalled.
+    answers: VecDeque<Kept>,
     /// The numbers of these ticks; or for those at which the condition counts 1, and 0 for the others.
     numbers: VecDeque<f64>,
     /// By how much the number changed, or the time or the number of times that it counts.
@@ -114,6 +117,8 @@ enum Node {
     Past(usize),
     /// Whether it holds of a road user near with one of these bodies.
     Some(Vec<BodyWord>, Box<Node>),
+    /// Of how many of them it holds.
+    Count(Vec<BodyWord>, Box<Node>),
     Other(Expr),
 }
 
@@ -204,7 +209,12 @@ impl ReadyRequirement {
             }
             let at = At { functions, facts, pasts: within };
             match node.word {
-                PastWord::Change => from[0].take_number(at.number(&node.of), node.ticks),
+                PastWord::Change | PastWord::Ago if node.is_number => {
+                    from[0].take_number(at.number(&node.of), node);
+                }
+                PastWord::Change | PastWord::Ago => {
+                    from[0].recall(at.kept_of(&node.of, node.has_margin), node)
+                }
                 PastWord::Total => from[0].count(at.holds(&node.of), node.ticks, TICK_MS as f64 / 1000.0),
                 PastWord::Times => {
                     let holds = at.holds(&node.of);
@@ -267,11 +277,22 @@ impl Past {
     }
 
     /// Takes the number of a tick.
-    fn take_number(&mut self, number: f64, ticks: u32) {
+    fn take_number(&mut self, number: f64, node: &PastNode) {
         self.numbers.push_back(number);
-        if self.numbers.len() > ticks as usize {
-            let before = self.numbers.pop_front();
-            self.number = before.map_or(f64::NAN, |before| number - before);
+        if self.numbers.len() > node.ticks as usize {
+            let before = self.numbers.pop_front().unwrap_or(f64::NAN);
+            self.number = if node.word == PastWord::Ago { before } else { number - before };
+            self.is_known = true;
+        }
+    }
+
+    /// Takes the answer of a tick, and finds that of the one so many before.
+    fn recall(&mut self, kept: Kept, node: &PastNode) {
+        self.answers.push_back(kept);
+        if self.answers.len() > node.ticks as usize
+            && let Some(before) = self.answers.pop_front()
+        {
+            (self.holds, self.margin) = (before.holds, before.margin);
             self.is_known = true;
         }
     }
@@ -328,13 +349,20 @@ impl Node {
                 let first = pasts.len();
                 let of = Node::of(inner, pasts);
                 let has_margin = margin_dimension(inner).is_some();
-                pasts.push(PastNode { of, has_margin, word: *word, ticks: *ticks, first });
+                let is_number = is_number(inner);
+                pasts.push(PastNode { of, is_number, has_margin, word: *word, ticks: *ticks, first });
                 Node::Past(pasts.len() - 1)
             }
             ExprKind::Negate(inner) => {
                 Node::Arithmetic(Arithmetic::Subtract, Box::new(Node::Number(0.0)), Box::new(node(inner)))
             }
-            ExprKind::Some(bodies, condition) => Node::Some(bodies.clone(), Box::new(node(condition))),
+            ExprKind::Near(word, bodies, condition) => {
+                let (bodies, condition) = (bodies.clone(), Box::new(node(condition)));
+                match word {
+                    NearWord::Some => Node::Some(bodies, condition),
+                    NearWord::Count => Node::Count(bodies, condition),
+                }
+            }
             _ => Node::Other(expr.clone()),
         }
     }
@@ -384,6 +412,10 @@ impl<'a> At<'a> {
             Node::Arithmetic(op, left, right) => arithmetic(*op, self.number(left), self.number(right)),
             Node::Other(expr) => evaluate(expr, self.functions, self.facts).number(),
             Node::Past(index) => self.pasts[*index].number,
+            Node::Count(bodies, condition) => {
+                let holds = |facts: &Facts<'_>| At { facts, ..*self }.holds(condition);
+                self.each_near(bodies).filter(holds).count() as f64
+            }
             Node::Bound(..)
             | Node::Compare(..)
             | Node::InRange(..)
@@ -424,7 +456,7 @@ impl<'a> At<'a> {
                 self.each_near(bodies).any(|facts| At { facts: &facts, ..*self }.holds(condition))
             }
             Node::Other(expr) => evaluate(expr, self.functions, self.facts).truth(),
-            Node::Number(_) | Node::Fact(_) | Node::Arithmetic(..) => false,
+            Node::Number(_) | Node::Fact(_) | Node::Arithmetic(..) | Node::Count(..) => false,
         }
     }
 
@@ -489,9 +521,12 @@ impl<'a> At<'a> {
                     Kept { holds: some.holds || one.holds, margin: some.margin.max(one.margin) }
                 })
             }
-            Node::Number(_) | Node::Fact(_) | Node::Arithmetic(..) | Node::IsLight(_) | Node::Other(_) => {
-                Kept { holds: self.holds(node), margin: f64::NAN }
-            }
+            Node::Number(_)
+            | Node::Fact(_)
+            | Node::Arithmetic(..)
+            | Node::Count(..)
+            | Node::IsLight(_)
+            | Node::Other(_) => Kept { holds: self.holds(node), margin: f64::NAN },
         }
     }
 }
@@ -513,8 +548,8 @@ pub(crate) fn margin_dimension(condition: &Expr) -> Option<Dimension> {
             Type::Bool | Type::Enum(_) => None,
         },
         ExprKind::Not(inner)
-        | ExprKind::Past(inner, PastWord::Recently | PastWord::Throughout, _)
-        | ExprKind::Some(_, inner) => margin_dimension(inner),
+        | ExprKind::Past(inner, PastWord::Recently | PastWord::Throughout | PastWord::Ago, _)
+        | ExprKind::Near(NearWord::Some, _, inner) => margin_dimension(inner),
         ExprKind::And(left, right) | ExprKind::Or(left, right) | ExprKind::Implies(left, right) => {
             margin_dimension(left).filter(|dimension| margin_dimension(right) == Some(*dimension))
         }

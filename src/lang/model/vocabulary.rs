@@ -260,11 +260,12 @@ facts! {
     NpcAlong "npc.along" SPEED, Spawn = "A `Speed`: along the ego vehicle's route, below 0 of one that comes towards it.";
     NpcAcross "npc.across" SPEED, Spawn = "A `Speed`: to the left across the ego vehicle's route, below 0 to the right.";
     NpcAside "npc.aside" LENGTH, Spawn = "A `Length`: the room between its outline and the ego vehicle's, across the route; below 0 they overlap.";
-    NpcInLane "npc.in_lane" LENGTH, Spawn = "A `Length`: how far its outline reaches into the lane that the ego vehicle's route has beside it; below 0 what is missing.";
+    NpcInLane "npc.in_lane" LENGTH, Spawn = "A `Length`: how far its outline reaches into the ego vehicle's lane beside it; below 0 what is missing.";
     NpcCrosswalkGap "npc.crosswalk_gap" LENGTH, Spawn = "A `Length`: from its middle to the nearest crosswalk; 0 on one, 100 m if there is none nearer.";
     NpcNextCrosswalkGap "npc.next_crosswalk_gap" LENGTH, Spawn = "A `Length`: from its middle to the crosswalk that is the next one on the ego vehicle's route, or on which that is; 0 on it, 100 m if there is none or it is farther away.";
     NpcContactIn "npc.contact_in" DURATION, Spawn = "A `Duration`: until it and the ego vehicle touch, if both go on along and across the route as fast as now; 0 if they touch, 100 s if they do not.";
     NpcPet "npc.pet" DURATION, Near = "A `Duration`: since the other of the two left the place where one of them is now (post-encroachment time); 100 s if that is more than 5 s ago.";
+    NpcInNextJunction "npc.in_next_junction" Type::Bool, Near = "A `Bool`: whether a vehicle is in the junction that `ego.junction_ahead` is about.";
     NpcSiren "npc.siren" Type::Bool, Near = "A `Bool`: whether it is an emergency vehicle under way, for which all others wait.";
     SpawnGap "spawn_gap" LENGTH, Spawn = "A `Length`: the gap from the ego vehicle to the road user that appears.";
     SafetyGap "safety_gap" LENGTH, Spawn = "A `Length`: the gap that a careful driver needs.";
@@ -338,6 +339,7 @@ words! {
     Throughout "throughout" = "Whether a condition held at every moment of the last seconds: `throughout(ego.speed <= 0.1 m/s, 3 s)`.",
     Total "total" = "For how long in all a condition held during the last seconds: `total(ego.acceleration <= -3 m/s^2, 10 s) <= 2 s`.",
     Times "times" = "How often a condition began to hold during the last seconds: `times(ego.acceleration <= -3 m/s^2, 60 s) <= 2`.",
+    Ago "ago" = "What a condition or a number was so many seconds ago: `ago(ego.speed, 2 s)`.",
     Change "change" = "By how much a number is more than so many seconds ago: `change(ego.acceleration, 0.5 s) <= 1 m/s^2`.",
 }
 
@@ -347,11 +349,11 @@ pub const BEGINS: (&str, &str) = (
     "Whether a condition begins to hold at this moment, or holds as it is first looked at: `recently(begins(ego.light == Red), 3 s)`.",
 );
 
-/// `some(Pedestrian, npc.gap <= 5 m)`: spelt like a function, of bodies and a condition.
-pub const SOME: (&str, &str) = (
-    "some",
-    "Whether a condition holds of a road user near, with one of these bodies if they are named: `some(Pedestrian, npc.gap <= 5 m)`.",
-);
+words! {
+    NearWord "What a requirement may ask of the road users near: spelt like a function of bodies and a condition.":
+    Some "some" = "Whether a condition holds of a road user near, with one of these bodies if they are named: `some(Pedestrian, npc.gap <= 5 m)`.",
+    Count "count" = "Of how many road users near a condition holds: `count(Vehicle, npc.gap <= 20 m) <= 3`.",
+}
 
 word_facts! {
     EgoLight "ego.light" Light, World = "The next traffic light within 100 m: `ego.light == Red`, `ego.light in [Yellow, Red]`.";

@@ -5,7 +5,7 @@
 
 use crate::model::effort;
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
-use crate::model::vocabulary::{Fact, PastWord};
+use crate::model::vocabulary::{Fact, NearWord, PastWord};
 use crate::model::{
     AMBIENT_MAX, COMMANDED_MAX, CROSSWALK_GAP_M_MAX, EGO_ACCELERATION_MPS2_MAX, FnDef, Interval,
     JUNCTION_AHEAD_M_MAX, LEAD_GAP_M_MAX, RoadFacts, SINCE_S_MAX, SPEED_MPS_MAX, TICK_MS, TIME_S_MAX, Type,
@@ -174,14 +174,22 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
         // What is known of this moment says nothing of those before it.
         ExprKind::Past(_, PastWord::Change, _) | ExprKind::Margin(_) => Values::Number(Interval::ALL),
         ExprKind::Past(_, PastWord::Total, ticks) => {
-            Values::Number(between(0.0, f64::from(*ticks * TICK_MS) / 1000.0))
+            let most_s = Rational::new((*ticks * TICK_MS).into(), 1000);
+            Values::Number(
+                most_s.map_or(Interval::NOT_NEGATIVE, |most_s| Interval::closed(Rational::ZERO, most_s)),
+            )
         }
         ExprKind::Past(_, PastWord::Times, ticks) => Values::Number(between(0.0, f64::from(*ticks))),
         // Of whom it is asked, is not known; there may be nobody.
-        ExprKind::Some(_, condition) => {
-            match enclose(condition, &Known { case: None, ..*known }).may_hold() {
-                true => Values::UNKNOWN_TRUTH,
-                false => Values::truth(false),
+        ExprKind::Near(word, _, condition) => {
+            let may_hold = enclose(condition, &Known { case: None, ..*known }).may_hold();
+            match (word, may_hold) {
+                (NearWord::Some, true) => Values::UNKNOWN_TRUTH,
+                (NearWord::Some, false) => Values::truth(false),
+                (NearWord::Count, true) => {
+                    Values::Number(between(0.0, f64::from(COMMANDED_MAX + AMBIENT_MAX)))
+                }
+                (NearWord::Count, false) => Values::Number(Interval::point(Rational::ZERO)),
             }
         }
         ExprKind::Past(condition, ..) => enclose(condition, &Known { case: None, ..*known }),
@@ -321,7 +329,13 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
         | Fact::SpawnGap
         | Fact::SafetyGap => Interval::NOT_NEGATIVE,
         Fact::Proc => between(0.0, 1.0),
-        Fact::NpcSiren | Fact::Collision | Fact::Repeated | Fact::Sudden | Fact::Struck | Fact::Avoidable => {
+        Fact::NpcInNextJunction
+        | Fact::NpcSiren
+        | Fact::Collision
+        | Fact::Repeated
+        | Fact::Sudden
+        | Fact::Struck
+        | Fact::Avoidable => {
             return None;
         }
     })

@@ -45,7 +45,7 @@ pub(super) fn reduce(expr: &Expr, functions: &[FnDef], locals: &[Expr]) -> Expr 
         ExprKind::Negate(of) => ExprKind::Negate(inner(of)),
         ExprKind::Arithmetic(op, left, right) => ExprKind::Arithmetic(*op, inner(left), inner(right)),
         ExprKind::Compare(op, left, right) => ExprKind::Compare(*op, inner(left), inner(right)),
-        ExprKind::Some(bodies, of) => ExprKind::Some(bodies.clone(), inner(of)),
+        ExprKind::Near(word, bodies, of) => ExprKind::Near(*word, bodies.clone(), inner(of)),
         ExprKind::Past(of, word, ticks) => ExprKind::Past(inner(of), *word, *ticks),
         ExprKind::And(left, right) => ExprKind::And(inner(left), inner(right)),
         ExprKind::Or(left, right) => ExprKind::Or(inner(left), inner(right)),
@@ -103,7 +103,7 @@ fn fold(expr: Expr) -> Expr {
                 | ExprKind::OnRoad(_)
                 | ExprKind::Since(..)
                 | ExprKind::Past(..)
-                | ExprKind::Some(..)
+                | ExprKind::Near(..)
                 | ExprKind::Breached(_)
                 | ExprKind::Margin(_)
                 | ExprKind::IsWord(..)

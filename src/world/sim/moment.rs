@@ -156,6 +156,13 @@ impl Around<'_> {
         next.map_or(CROSSWALK_GAP_M_MAX, |nth| self.scene.route_crosswalk_gap_m(nth, point))
     }
 
+    /// The junction that the ego vehicle is in, or the next one of its route, by index.
+    fn next_junction(&self) -> Option<usize> {
+        let lanes = &self.scene.route.lanes;
+        let first = lanes.partition_point(|lane| lane.enter_m <= self.ego_station_m).max(1) - 1;
+        lanes[first..].iter().find_map(|lane| self.scene.map.lane(lane.lane).junction)
+    }
+
     /// What the ego vehicle's place says.
     fn on_route(&self) -> OnRoute {
         OnRoute::at(&self.scene.map, &self.scene.route, self.ego_station_m)
@@ -220,7 +227,9 @@ pub(super) fn driver_facts(around: &Around, obstacle: &Obstacle, driver: &Driver
     let line = way.stop_lines.iter().find(|line| reach.contains(&line.station_m));
     let light = around.light(line.map(|line| line.signal));
     let facts = facts(around, obstacle, way.limit_mps(scene, station_m), junction, light);
-    NpcFacts { has_siren: driver.has_siren, ..facts }
+    let junction = scene.map.lane(way.lane_at(station_m).0).junction;
+    let in_next_junction = junction.is_some() && junction == around.next_junction();
+    NpcFacts { has_siren: driver.has_siren, in_next_junction, ..facts }
 }
 
 fn facts(
@@ -248,6 +257,12 @@ fn facts(
     };
     let (_, ego_half_width_m) = around.ego_outline.half_extent_m(around.ego_forward, along);
     let across_mps = along.perp(&obstacle.velocity_mps);
+    // Where the ego vehicle's lane has ended, the route's is meant.
+    let scene = around.scene;
+    let own = scene.lane_beside(around.ego_station_m, around.ego_offset_m);
+    let half_lane_m = || scene.half_width_m(station_m);
+    let strip = if own == 0 { None } else { scene.strip(station_m, own) };
+    let (right_m, left_m) = strip.unwrap_or_else(|| (-half_lane_m(), half_lane_m()));
     let (_, ego_along) = around.scene.route.path.along(around.ego_station_m);
     let lengthwise = Closing {
         from_m: rear_m - ego_front_m,
@@ -264,7 +279,7 @@ fn facts(
         along_mps: other_mps,
         across_mps,
         aside_m: aside_m.abs() - both_m,
-        in_lane_m: around.scene.half_width_m(station_m) + half_width_m - offset_m.abs(),
+        in_lane_m: (left_m - offset_m).min(offset_m - right_m) + half_width_m,
         crosswalk_gap_m: around.scene.crosswalk_gap_m(obstacle.outline.pose.position),
         speed_mps: obstacle.velocity_mps.norm(),
         gap_m: obstacle.distance_m,
@@ -276,6 +291,7 @@ fn facts(
         contact_in_s: contact_in_s(lengthwise, sideways),
         pet_s: TIME_S_MAX,
         has_siren: false,
+        in_next_junction: false,
         turn,
         front_m,
         rear_m,
@@ -429,6 +445,51 @@ mod tests {
             oncoming.along_mps < -1.0 && oncoming.in_lane_m < 0.0 && oncoming.aside_m > 0.0,
             "{oncoming:?}"
         );
+    }
+
+    #[test]
+    fn the_lane_of_the_ego_vehicle_is_the_one_that_it_is_in() {
+        use crate::action::Effect;
+        let mut world = testing::world(&testing::straight());
+        world.apply(&Effect::Spawn(testing::request(Verb::DriveAhead, 60.0, 8.0))).expect("there is room");
+        let before = world.npc_facts(1).expect("it is there");
+        let (mut lanes, mut least_m) = (Vec::new(), f64::INFINITY);
+        // Into the lane to the right and back again, and over the line to the left.
+        for tick in 0..900 {
+            let steer_rad = [-0.1, 0.1, 0.1, -0.1, 0.1, -0.1].get(tick / 80).copied().unwrap_or(0.0);
+            world.tick(&Control { throttle_pct: 25.0, steer_rad, ..Control::default() });
+            let (Some(npc), left_m) = (world.npc_facts(1), world.ego_offset_m()) else { break };
+            // Lanes of 3.5 m, the route in the middle of the left one of two; beyond are two that come towards it.
+            let nth = ((left_m + 1.75) / 3.5).floor().clamp(-1.0, 2.0);
+            lanes.push(nth as i32);
+            let half_m = before.in_lane_m - 1.75;
+            let wanted_m = 1.75 + half_m - (npc.offset_m - 3.5 * nth).abs();
+            assert!((npc.in_lane_m - wanted_m).abs() < 1e-6, "{npc:?} from {left_m} m: {wanted_m}");
+            least_m = least_m.min(npc.in_lane_m);
+        }
+        lanes.dedup();
+        assert!(lanes.len() > 1 && least_m < 0.0, "{lanes:?} {least_m}");
+    }
+
+    #[test]
+    fn who_crosses_is_in_the_junction_and_says_where_it_goes() {
+        use crate::action::{Effect, SpawnRequest};
+        let mut world = testing::world(&testing::four_arms());
+        let request = testing::request(Verb::CrossRoad, 60.0, 6.0);
+        world.apply(&Effect::Spawn(SpawnRequest { siren: true, ..request })).expect("there is room");
+        let mut inside = 0;
+        for _ in 0..1500 {
+            world.tick(&Control { brake_pct: 100.0, ..Control::default() });
+            let (Some(npc), Some(obstacle)) = (world.npc_facts(1), world.obstacle(1)) else { break };
+            assert!(npc.has_siren);
+            // The streets meet within 10 m of the origin; a vehicle is where its axles are.
+            let away_m = obstacle.outline.pose.position.norm();
+            assert!(npc.in_next_junction || away_m > 7.0, "{away_m} m");
+            assert!(!npc.in_next_junction || away_m < 13.0, "{away_m} m");
+            assert!(npc.turn == if npc.junction_ahead_m < 1000.0 { Turn::Straight } else { Turn::None });
+            inside += usize::from(npc.in_next_junction);
+        }
+        assert!(inside > 10, "{inside} ticks");
     }
 
     #[test]

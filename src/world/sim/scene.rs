@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use avastra_base::geometry::Vec2;
+use avastra_base::geometry::{Path, Vec2};
 use avastra_lang::model::{CROSSWALK_GAP_M_MAX, Road};
 use avastra_road::{FootWay, LaneIndex, RoadMap, Route};
 
 use super::junction::ConflictAreas;
 use super::right_of_way::{RouteArea, route_areas};
-use super::watched::{OncomingEdge, WAY_STEP_M, oncoming_edges};
+use super::watched::{OncomingEdge, oncoming_edges};
 use super::way::Ways;
 
 /// Objects farther away than this are not sensed at all, m: the clear-day range for cars of the LiDAR and the camera that
@@ -20,11 +20,48 @@ pub const RANGE_M: f64 = 120.0;
 /// 408-21).
 const MOTORWAY_RANGE_M: f64 = 250.0;
 
-/// Points of the route, [`WAY_STEP_M`] apart.
+/// The route is looked at in points this far from each other, m, and in so many of them: as far as vehicles are sensed on
+/// motorways.
+pub(super) const WAY_STEP_M: f64 = 10.0;
+const WAY_POINTS: usize = (MOTORWAY_RANGE_M / WAY_STEP_M) as usize;
+
+/// Points of the route ahead of a station.
 pub(super) struct WayPoints<'a> {
     /// Station of the first one, m.
     pub first_m: f64,
     pub points: &'a [Vec2],
+    /// The least x and y of them, and the greatest.
+    pub least: Vec2,
+    pub greatest: Vec2,
+}
+
+/// Points all along a route, and for each the least and the greatest x and y of those that are ahead of it.
+#[derive(Debug)]
+struct RoutePoints {
+    points: Vec<Vec2>,
+    bounds: Vec<(Vec2, Vec2)>,
+}
+
+impl RoutePoints {
+    fn new(path: &Path) -> RoutePoints {
+        let count = (path.length_m() / WAY_STEP_M) as usize;
+        let points: Vec<Vec2> = (0..=count).map(|nth| path.position_at(nth as f64 * WAY_STEP_M)).collect();
+        let none = Vec2::new(f64::INFINITY, f64::INFINITY);
+        let bounds = (0..=points.len()).map(|first| {
+            let ahead = &points[first..(first + WAY_POINTS).min(points.len())];
+            ahead
+                .iter()
+                .fold((none, -none), |(least, greatest), point| (least.inf(point), greatest.sup(point)))
+        });
+        RoutePoints { bounds: bounds.collect(), points }
+    }
+
+    fn ahead(&self, station_m: f64) -> WayPoints<'_> {
+        let first = ((station_m / WAY_STEP_M).max(0.0) as usize).min(self.points.len());
+        let points = &self.points[first..(first + WAY_POINTS).min(self.points.len())];
+        let (least, greatest) = self.bounds[first];
+        WayPoints { first_m: first as f64 * WAY_STEP_M, points, least, greatest }
+    }
 }
 
 /// What stays the same during all episodes of one road. Shared, never copied.
@@ -46,9 +83,9 @@ pub struct Scene {
     foot_ways: FootWays,
     /// Lanes outside junctions, each with the sum of the lengths up to its end, m.
     streets: Vec<(LaneIndex, f64)>,
-    /// Points of the route, [`WAY_STEP_M`] apart, and the edges of oncoming lanes at every metre of it. Only requirements
+    /// Points of the route, and the edges of oncoming lanes at every metre of it. Only requirements
     /// ask for them.
-    way_points: OnceLock<Vec<Vec2>>,
+    route_points: OnceLock<RoutePoints>,
     oncoming: OnceLock<Vec<Option<OncomingEdge>>>,
     /// A circle around each crosswalk of the map: its middle and its radius, m.
     crosswalk_circles: Vec<(Vec2, f64)>,
@@ -90,7 +127,7 @@ impl Scene {
             ways: Ways::default(),
             foot_ways: FootWays::default(),
             streets,
-            way_points: OnceLock::new(),
+            route_points: OnceLock::new(),
             oncoming: OnceLock::new(),
             is_motorway,
             range_m: if is_motorway { MOTORWAY_RANGE_M } else { RANGE_M },
@@ -104,6 +141,48 @@ impl Scene {
     pub fn half_width_m(&self, station_m: f64) -> f64 {
         let here = self.route.lane_at(station_m);
         self.map.lane(here.lane).width_at(station_m - here.from_m) / 2.0
+    }
+
+    /// The lane in which somebody at a station and an offset of the route is: so many to the left of the route's lane, or below 0
+    /// to its right.
+    pub(super) fn lane_beside(&self, station_m: f64, offset_m: f64) -> i32 {
+        let side = if offset_m > 0.0 { 1 } else { -1 };
+        let mut nth = 0;
+        if offset_m.abs() <= self.half_width_m(station_m) {
+            return nth;
+        }
+        // Between two lanes it is in the one that it comes from.
+        while let Some((right_m, left_m)) = self.strip(station_m, nth + side) {
+            let is_beyond = if side > 0 { offset_m > right_m } else { offset_m < left_m };
+            if !is_beyond {
+                break;
+            }
+            nth += side;
+        }
+        nth
+    }
+
+    /// From where to where the nth lane to the left of the route's lane reaches beside a station, m to the left of the route; `None`
+    /// if there is none.
+    pub(super) fn strip(&self, station_m: f64, nth: i32) -> Option<(f64, f64)> {
+        let half_m = self.half_width_m(station_m);
+        let (mut right_m, mut left_m) = (-half_m, half_m);
+        let here = self.route.path.position_at(station_m);
+        let (mut lane, mut is_ours) = (self.route.lane_at(station_m).lane, true);
+        for _ in 0..nth.abs() {
+            let of = self.map.lane(lane);
+            // What lies to our left is to the right of who comes towards us.
+            let next = if (nth > 0) == is_ours { of.left } else { of.right }?;
+            let beside = self.map.lane(next.lane);
+            let width_m = beside.width_at(beside.centre.project(here).station_m);
+            (right_m, left_m) = match nth > 0 {
+                true => (left_m + next.gap_m, left_m + next.gap_m + width_m),
+                false => (right_m - next.gap_m - width_m, right_m - next.gap_m),
+            };
+            is_ours ^= !next.same_direction;
+            lane = next.lane;
+        }
+        Some((right_m, left_m))
     }
 
     /// Distance from a point to the nearest crosswalk, m: 0 on one, at most [`CROSSWALK_GAP_M_MAX`].
@@ -129,19 +208,9 @@ impl Scene {
         }
     }
 
-    /// Points of the route from a station on, as far as it goes.
-    pub(super) fn points_ahead(&self, station_m: f64, reach_m: f64) -> WayPoints<'_> {
-        let points = self.way_points.get_or_init(|| {
-            let path = &self.route.path;
-            let count = (path.length_m() / WAY_STEP_M) as usize;
-            (0..=count).map(|nth| path.position_at(nth as f64 * WAY_STEP_M)).collect()
-        });
-        let nth = |station_m: f64| ((station_m / WAY_STEP_M).max(0.0) as usize).min(points.len());
-        let first = nth(station_m);
-        WayPoints {
-            first_m: first as f64 * WAY_STEP_M,
-            points: &points[first..nth(station_m + reach_m).max(first)],
-        }
+    /// Points of the route from a station on, as far as it goes and as they are looked at.
+    pub(super) fn points_ahead(&self, station_m: f64) -> WayPoints<'_> {
+        self.route_points.get_or_init(|| RoutePoints::new(&self.route.path)).ahead(station_m)
     }
 
     /// The near edge of the oncoming lane beside a station of the route, to the metre.

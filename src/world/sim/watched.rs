@@ -12,14 +12,10 @@ use avastra_road::SignKind;
 use super::around::Around;
 use super::ego::VehicleParameters;
 use super::road_user::Obstacle;
-use super::scene::Scene;
+use super::scene::{Scene, WAY_STEP_M, WayPoints};
 use super::sense::{FRAME_TICKS, SignalColour};
 use super::world::{DT_S, World};
 
-/// A road user ahead is looked for as near as this, m: as far as vehicles are sensed on motorways.
-const LEAD_REACH_M: f64 = 250.0;
-/// The route is looked at in points this far from each other, m.
-pub(super) const WAY_STEP_M: f64 = 10.0;
 /// Whoever is in the ego vehicle's way is nearer to a point than this and half of both outlines, m: half a step, half the
 /// width of the ego vehicle on any heading, and what a bend adds.
 const WAY_ASIDE_M: f64 = 9.0;
@@ -150,11 +146,8 @@ struct Lead {
 
 /// The next road user ahead whose outline reaches into the ego vehicle's way, and which does not come towards it.
 fn next_ahead(around: &Around) -> Option<Lead> {
-    let points = around.scene.points_ahead(around.ego_station_m, LEAD_REACH_M);
-    let from_m = points.first_m;
-    let none = Vec2::new(f64::INFINITY, f64::INFINITY);
-    let least = points.points.iter().fold(none, |least, point| least.inf(point));
-    let greatest = points.points.iter().fold(-none, |greatest, point| greatest.sup(point));
+    let WayPoints { first_m: from_m, points, least, greatest } =
+        around.scene.points_ahead(around.ego_station_m);
     let ahead = around.obstacles_on_level().filter_map(|obstacle| {
         let outline = &obstacle.outline;
         // Whoever is in the way is no farther from one of the points.
@@ -166,7 +159,7 @@ fn next_ahead(around: &Around) -> Option<Lead> {
             return None;
         }
         let away_m2 = |point: &Vec2| (place - point).norm_squared();
-        let near = points.points.iter().map(away_m2).enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+        let near = points.iter().map(away_m2).enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
         let (nth, _) = near.filter(|(_, away_m2)| *away_m2 <= reach_m * reach_m)?;
         in_the_way(around, obstacle, from_m + nth as f64 * WAY_STEP_M)
     });

@@ -131,7 +131,7 @@ impl Reader<'_> {
             | ExprKind::IsWord(..)
             | ExprKind::IsWordOf(..)
             | ExprKind::IsBody(..) => Form::Known(evaluate(expr, self.functions, &self.facts)),
-            ExprKind::Past(..) | ExprKind::Some(..) => Form::Open,
+            ExprKind::Past(..) | ExprKind::Near(..) => Form::Open,
             ExprKind::Local(local) => locals[*local].clone(),
             ExprKind::Cell(cell) => self.cells[*cell].clone(),
             ExprKind::CellAt(first, key) => match self.read(key, locals)? {
