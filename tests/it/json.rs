@@ -16,7 +16,7 @@ fn result(arguments: &[&str]) -> Value {
     let value: Value = serde_json::from_str(line).unwrap_or_else(|error| panic!("{line}: {error}"));
     let command = described(arguments);
     let command = command.split(" --").next().unwrap_or(&command);
-    assert_eq!((&value["command"], &value["schema"]), (&command.into(), &3.into()), "{line}");
+    assert_eq!((&value["command"], &value["schema"]), (&command.into(), &4.into()), "{line}");
     assert_eq!((&value["status"], value["error"].is_null()), (&status.into(), status == 0), "{line}");
     value
 }

@@ -31,7 +31,7 @@ fn a_map_in_json_holds_every_lane_with_its_poses() {
     let (status, stdout, _) = road(&[CORNER, "--format", "json"]);
     assert_eq!(status, 0);
     let map = last_line(&stdout);
-    assert_eq!((map["schema"].as_u64(), map["command"].as_str()), (Some(3), Some("road")));
+    assert_eq!((map["schema"].as_u64(), map["command"].as_str()), (Some(4), Some("road")));
     let lanes = map["lanes"].as_array().expect("lanes");
     assert_eq!(lanes.len(), 39);
     for lane in lanes {

@@ -300,7 +300,7 @@ fn a_quick_study_says_that_it_is_none() {
     let study = ["study", "scenarios/studies/healthy.yaml", "--quick", "--format", "json", "--out", &out];
     let stdout = done(&study);
     let line = stdout.lines().last().expect("a result");
-    assert!(line.starts_with("{\"schema\":3,\"command\":\"study\""), "{line}");
+    assert!(line.starts_with("{\"schema\":4,\"command\":\"study\""), "{line}");
     let result: Value = serde_json::from_str(line).expect("JSON");
     let results = &result["results"];
     assert_eq!((&results["quick"], &results["cells"]), (&true.into(), &8.into()));

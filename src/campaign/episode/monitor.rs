@@ -98,8 +98,9 @@ struct Required {
     within_ticks: u32,
     on: Vec<BodyWord>,
     ready: ReadyRequirement,
-    /// Whether it looks at ticks before, and whether it has an `after`.
+    /// Whether it looks at ticks before, of road users as a whole or of the ego vehicle; and whether it has an `after`.
     remembers: bool,
+    remembers_of_ego: bool,
     is_response: bool,
     /// Whether rewards ask for its margin of each step.
     is_paid: bool,
@@ -142,8 +143,18 @@ impl Monitor {
             let RequirementDef { within_ticks, ref on, .. } = *requirement;
             let ready = requirement.ready();
             let (remembers, is_response) = (ready.remembers(), requirement.after.is_some());
+            let remembers_of_ego = !on.is_empty() && ready.remembers_of_ego();
             let (on, is_paid) = (on.clone(), paid >> index & 1 == 1);
-            let required = Required { index, within_ticks, on, ready, remembers, is_response, is_paid };
+            let required = Required {
+                index,
+                within_ticks,
+                on,
+                ready,
+                remembers,
+                remembers_of_ego,
+                is_response,
+                is_paid,
+            };
             Watch {
                 required: Arc::new(required),
                 ego: Stretch::default(),
@@ -171,12 +182,14 @@ impl Monitor {
                 _ => None,
             })
         });
-        let words = all.iter().flat_map(|expr| {
-            expr.filter_map(|kind| match kind {
-                ExprKind::IsWord(word, _) => Some(*word),
-                _ => None,
+        let words = || {
+            all.iter().flat_map(|expr| {
+                expr.filter_map(|kind| match kind {
+                    ExprKind::IsWord(word, _) => Some(*word),
+                    _ => None,
+                })
             })
-        });
+        };
         let facts: Vec<Fact> = facts.collect();
         let some = all.iter().flat_map(|expr| {
             expr.filter_map(|kind| match kind {
@@ -191,8 +204,8 @@ impl Monitor {
             named => named.iter().fold(all, |all, body| all | 1 << body.like as u32),
         });
         let encroachment = facts.contains(&Fact::NpcPet).then(Encroachment::default);
-        let moment = MomentParts::of(facts.iter().copied(), words);
-        let tick = WatchedParts::of(facts);
+        let moment = MomentParts::of(facts.iter().copied(), words());
+        let tick = WatchedParts::of(facts.iter().copied(), words());
         let monitor = Monitor {
             moment,
             tick,
@@ -227,25 +240,31 @@ impl Monitor {
             self.facts.bearers.extend(there);
         }
         if self.asks_of != 0 {
-            self.facts.near.clear();
-            self.facts.near.extend(near(world, own_bodies, self.asks_of));
             if let Some(encroachment) = &mut self.encroachment {
                 encroachment.note(world);
-                for near in &mut self.facts.near {
-                    near.npc.pet_s = encroachment.pet_s(near.id);
-                }
             }
+            self.facts.near.clear();
+            self.facts.near.extend(near(world, own_bodies, self.asks_of));
+        }
+        let (watched, encroachment, tick) = (&self.watched, &self.encroachment, self.tick);
+        let watched_of = |id: u32, npc: NpcFacts| {
+            let pet_s = encroachment.as_ref().map_or(npc.pet_s, |encroachment| encroachment.pet_s(id));
+            watched.of_near(world, id, NpcFacts { pet_s, ..npc }, tick)
+        };
+        for near in &mut self.facts.near {
+            near.npc = watched_of(near.id, near.npc);
         }
         let facts =
             Facts { road: Some(&setup.road.facts), world: Some(&self.facts), ..Facts::new(&[], memory) };
         let functions = &setup.table.space().functions;
         let moment = Judged { functions, facts: &facts, time_s: world.time_s(), step };
+        let far = |id: u32| world.npc_facts(id).map(|npc| watched_of(id, npc));
         for watch in &mut self.watches {
             let required = &watch.required;
             let is_asked = if required.on.is_empty() {
-                watch.ego.ask(required, &facts, &moment, &mut self.breaches)
+                watch.ego.ask(required, (&facts, None), &moment, &mut self.breaches)
             } else {
-                watch.ask_of_each(world, &self.facts.near, &moment, &mut self.breaches)
+                watch.ask_of_each(&far, &self.facts.near, &moment, &mut self.breaches)
             };
             watch.asked += u32::from(is_asked);
         }
@@ -324,11 +343,15 @@ impl Watch {
     /// something. Returns whether it is asked of any now.
     fn ask_of_each(
         &mut self,
-        world: &World,
+        facts_of: &dyn Fn(u32) -> Option<NpcFacts>,
         near: &[NearFacts],
         moment: &Judged,
         breaches: &mut Vec<Breach>,
     ) -> bool {
+        let required = &self.required;
+        if required.remembers_of_ego {
+            required.ready.next_of_ego(&mut self.ego.memory, moment.functions, moment.facts);
+        }
         if near.is_empty() && self.each.is_empty() {
             return false;
         }
@@ -341,8 +364,7 @@ impl Watch {
             let id = stretch.obstacle.expect("each is about a road user");
             let is_awaited = !stretch.tally.begun.is_empty();
             let is_near = asked.iter().any(|(known, _)| *known == id);
-            let far = (!is_near && is_awaited).then(|| world.npc_facts(id)).flatten();
-            // Who is farther away than is looked for met nobody here lately.
+            let far = (!is_near && is_awaited).then(|| facts_of(id)).flatten();
             asked.extend(far.map(|npc| (id, npc)));
             let stays = is_near || far.is_some();
             if !stays {
@@ -359,25 +381,27 @@ impl Watch {
             });
             let spawn = Some(SpawnFacts { npc, ..SpawnFacts::default() });
             let facts = Facts { spawn, ..*moment.facts };
-            is_asked |= self.each[index].ask(&self.required, &facts, moment, breaches);
+            let of_ego = self.required.remembers_of_ego.then_some(&self.ego.memory);
+            is_asked |= self.each[index].ask(&self.required, (&facts, of_ego), moment, breaches);
         }
         is_asked
     }
 }
 
 impl Stretch {
-    /// Asks by these facts, and keeps what of `breaches` follows. Returns whether anything is asked.
+    /// Asks by these facts, and by what is remembered for all road users, and keeps what of `breaches` follows. Returns whether
+    /// anything is asked.
     #[inline]
     fn ask(
         &mut self,
         required: &Required,
-        facts: &Facts,
+        (facts, of_ego): (&Facts, Option<&RequirementMemory>),
         moment: &Judged,
         breaches: &mut Vec<Breach>,
     ) -> bool {
         let Some((margin, is_breached, is_asked)) = (match required.remembers {
             false => self.answer(required, facts, moment),
-            true => self.answer_next(required, facts, moment),
+            true => self.answer_next(required, (facts, of_ego), moment),
         }) else {
             self.tally.pause();
             self.open = None;
@@ -423,11 +447,11 @@ impl Stretch {
     fn answer_next(
         &mut self,
         required: &Required,
-        facts: &Facts,
+        (facts, of_ego): (&Facts, Option<&RequirementMemory>),
         moment: &Judged,
     ) -> Option<(Option<f64>, bool, bool)> {
         let is_awaited = !self.tally.begun.is_empty();
-        let asked = required.ready.at_next(&mut self.memory, is_awaited, moment.functions, facts)?;
+        let asked = required.ready.at_next(&mut self.memory, of_ego, is_awaited, moment.functions, facts)?;
         if !required.is_response {
             let margin = self.tally.take(asked.kept, required.within_ticks, required.is_paid);
             return Some((margin, self.tally.failed > required.within_ticks, true));
@@ -588,29 +612,42 @@ mod tests {
         }
     }
 
-    fn made_up(rng: &mut rng::Rng, depth: u32) -> MadeUp {
+    /// What is not known yet does not hold, where the condition does not await it: its sign is all that is looked at there.
+    const UNKNOWN: f64 = -0.5;
+
+    fn made_up(rng: &mut rng::Rng, depth: u32, is_awaited: bool) -> MadeUp {
         // No margin is 0: whether a condition holds is known by its sign.
         let number = f64::from(below(rng, 80)) / 4.0 + 0.1234;
         let side = |rng: &mut rng::Rng| -> (String, MarginAt, usize) {
             let part = f64::from(below(rng, 8)) / 4.0;
             let ticks = below(rng, 6) as usize + 1;
-            match below(rng, if depth == 0 { 6 } else { 8 }) {
+            match below(rng, if depth == 0 { 7 } else { 9 }) {
                 0 => ("ego.speed".to_owned(), Box::new(|all, t| all[t].0), 0),
                 1 => ("ego.limit".to_owned(), Box::new(|all, t| all[t].1), 0),
                 2 => (format!("({part} * ego.speed)"), Box::new(move |all, t| part * all[t].0), 0),
                 3 => ("-(ego.limit - ego.speed)".to_owned(), Box::new(|all, t| all[t].0 - all[t].1), 0),
                 4 => (
                     format!("change(ego.speed, {} ms)", ticks * 20),
-                    Box::new(move |all, t| all[t].0 - all[t - ticks].0),
+                    Box::new(move |all, t| {
+                        all[t].0 - t.checked_sub(ticks).map_or(f64::NAN, |then| all[then].0)
+                    }),
                     ticks,
                 ),
                 5 => (
                     format!("ago(ego.limit, {} ms)", ticks * 20),
-                    Box::new(move |all, t| all[t - ticks].1),
+                    Box::new(move |all, t| t.checked_sub(ticks).map_or(f64::NAN, |then| all[then].1)),
                     ticks,
                 ),
-                6 => {
-                    let of = made_up(rng, depth - 1);
+                6 => (
+                    format!("mean(ego.speed, {} ms)", ticks * 20),
+                    Box::new(move |all, t| {
+                        let last = &all[(t + 1).saturating_sub(ticks)..=t];
+                        last.iter().map(|(v, _)| v).sum::<f64>() / last.len() as f64
+                    }),
+                    0,
+                ),
+                7 => {
+                    let of = made_up(rng, depth - 1, is_awaited);
                     let (text, since) = (of.text.clone(), of.known_from);
                     let held = move |all: &Trace, t: usize| {
                         (t.saturating_sub(ticks - 1).max(of.known_from)..=t)
@@ -624,7 +661,7 @@ mod tests {
                     )
                 }
                 _ => {
-                    let of = made_up(rng, depth - 1);
+                    let of = made_up(rng, depth - 1, is_awaited);
                     let (text, since) = (of.text.clone(), of.known_from);
                     let begins = move |all: &Trace, t: usize| {
                         of.holds(all, t) && (t == of.known_from || !of.holds(all, t - 1))
@@ -643,7 +680,10 @@ mod tests {
         let (text, of, known) = side(rng);
         let kind = below(rng, if depth == 0 { 5 } else { 12 });
         let ticks = below(rng, 6) as usize + 1;
-        let mut two = || (made_up(rng, depth.saturating_sub(1)), made_up(rng, depth.saturating_sub(1)));
+        let mut two = || {
+            let mut one = || made_up(rng, depth.saturating_sub(1), is_awaited);
+            (one(), one())
+        };
         let (a, b) = if kind > 4 { two() } else { (never(), never()) };
         let mut known_from = match kind {
             0..=4 => known,
@@ -653,13 +693,13 @@ mod tests {
         let since = a.known_from;
         let first = move |tick: usize| tick.saturating_sub(ticks).max(since);
         let (text, margin): (String, MarginAt) = match kind {
-            0 => (format!("{text} < {number} m/s"), Box::new(move |all, t| number - of(all, t))),
-            1 => (format!("{text} <= {number} m/s"), Box::new(move |all, t| number - of(all, t))),
-            2 => (format!("{text} > {number} m/s"), Box::new(move |all, t| of(all, t) - number)),
-            3 => (format!("{text} >= {number} m/s"), Box::new(move |all, t| of(all, t) - number)),
+            0 => (format!("{text} < {number} m/s"), Box::new(move |all, t| known_or(number - of(all, t)))),
+            1 => (format!("{text} <= {number} m/s"), Box::new(move |all, t| known_or(number - of(all, t)))),
+            2 => (format!("{text} > {number} m/s"), Box::new(move |all, t| known_or(of(all, t) - number))),
+            3 => (format!("{text} >= {number} m/s"), Box::new(move |all, t| known_or(of(all, t) - number))),
             4 => (
                 format!("{text} in {number} m/s .. {} m/s", number + 3.5),
-                Box::new(move |all, t| (of(all, t) - number).min(number + 3.5 - of(all, t))),
+                Box::new(move |all, t| known_or((of(all, t) - number).min(number + 3.5 - of(all, t)))),
             ),
             5 => (format!("not ({})", a.text), Box::new(move |all, t| -(a.margin)(all, t))),
             6 => {
@@ -683,18 +723,27 @@ mod tests {
             10 => {
                 known_from += ticks;
                 let text = format!("ago({}, {} ms)", a.text, ticks * 20);
-                (text, Box::new(move |all, t| (a.margin)(all, t - ticks)))
+                let margin = move |all: &Trace, t: usize| match t >= since + ticks {
+                    true => (a.margin)(all, t - ticks),
+                    false => UNKNOWN,
+                };
+                (text, Box::new(margin))
             }
             _ => {
                 known_from += ticks;
                 let text = format!("throughout({}, {} ms)", a.text, ticks * 20);
-                let least = move |all: &Trace, t: usize| {
-                    (first(t)..=t).map(|at| (a.margin)(all, at)).fold(f64::INFINITY, f64::min)
+                let least = move |all: &Trace, t: usize| match t >= since + ticks {
+                    true => (first(t)..=t).map(|at| (a.margin)(all, at)).fold(f64::INFINITY, f64::min),
+                    false => UNKNOWN,
                 };
                 (text, Box::new(least))
             }
         };
-        MadeUp { text, margin, known_from }
+        MadeUp { text, margin, known_from: if is_awaited { known_from } else { 0 } }
+    }
+
+    fn known_or(margin: f64) -> f64 {
+        if margin.is_nan() { UNKNOWN } else { margin }
     }
 
     fn never() -> MadeUp {
@@ -713,7 +762,8 @@ mod tests {
 
     impl MadeUpRequirement {
         fn new(rng: &mut rng::Rng) -> MadeUpRequirement {
-            let mut maybe = |share: u32, depth: u32| (below(rng, 4) < share).then(|| made_up(rng, depth));
+            let mut maybe =
+                |share: u32, depth: u32| (below(rng, 4) < share).then(|| made_up(rng, depth, false));
             let when = maybe(2, 1);
             let until = maybe(2, 1).filter(|_| when.is_some());
             let after = maybe(2, 1);
@@ -723,7 +773,7 @@ mod tests {
                 until,
                 after,
                 unless,
-                condition: made_up(rng, 3),
+                condition: made_up(rng, 3, true),
                 within: below(rng, 5) as usize,
             }
         }
@@ -823,8 +873,17 @@ mod tests {
                 let within_ticks = requirement.within_ticks;
                 let (ready, is_response) = (requirement.ready(), requirement.after.is_some());
                 let (on, remembers) = (Vec::new(), ready.remembers());
-                let is_paid = false;
-                let required = Required { index, within_ticks, on, ready, remembers, is_response, is_paid };
+                let (is_paid, remembers_of_ego) = (false, false);
+                let required = Required {
+                    index,
+                    within_ticks,
+                    on,
+                    ready,
+                    remembers,
+                    remembers_of_ego,
+                    is_response,
+                    is_paid,
+                };
                 let (mut stretch, mut breaches) = (Stretch::default(), Vec::new());
                 for (tick, (wanted, is_breached)) in one.answers(&trace).into_iter().enumerate() {
                     let mut world = WorldFacts::default();
@@ -832,7 +891,7 @@ mod tests {
                     let facts = Facts { world: Some(&world), ..Facts::new(&[], &memory) };
                     let time_s = tick as f64;
                     let moment = Judged { functions: &space.functions, facts: &facts, time_s, step: 0 };
-                    stretch.ask(&required, &facts, &moment, &mut breaches);
+                    stretch.ask(&required, (&facts, None), &moment, &mut breaches);
                     let found = stretch.tally.smallest;
                     let same = match (found, wanted) {
                         (Some(found), Some(wanted)) => {

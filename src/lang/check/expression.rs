@@ -43,16 +43,20 @@ impl Place<'_> {
     }
 }
 
-/// A fact of a road user that is named, or told by its number. Where two were lately is watched for requirements `on` bodies.
+/// A fact of a road user that is named, or told by its number. Some are watched for requirements `on` bodies alone.
 fn fact_of_named(part: &str) -> Option<Fact> {
-    Fact::from_name(&format!("npc.{part}")).filter(|fact| *fact != Fact::NpcPet)
+    Fact::from_name(&format!("npc.{part}")).filter(|fact| !is_watched(*fact))
+}
+
+fn is_watched(fact: Fact) -> bool {
+    matches!(fact, Fact::NpcPet | Fact::NpcLeads | Fact::NpcLanesLeft | Fact::NpcOffRoad)
 }
 
 fn parts_of_named() -> impl Iterator<Item = &'static str> {
     parts_of("npc")
         .into_iter()
         .map(|(part, _)| part)
-        .filter(|part| format!("npc.{part}") != Fact::NpcPet.name())
+        .filter(|part| Fact::from_name(&format!("npc.{part}")).is_none_or(|fact| !is_watched(fact)))
 }
 
 /// Most enums that the error about an ambiguous variant names.

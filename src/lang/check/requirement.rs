@@ -187,7 +187,9 @@ impl Checker {
         let Some(inside) = past_inside(&found) else { return Some(found) };
         let message = "what was cannot be asked inside of this";
         let error = Diagnostic::error(code::NOT_HERE, message).at(inside.span, "within something else");
-        self.reject(error.help("join it by `and`, `or`, `not` and `implies` alone"))
+        self.reject(error.help(
+            "it may stand in `and`, `or`, `not`, `implies`, comparisons and arithmetic: not in functions, `match`, `some` and `count`",
+        ))
     }
 
     /// `recently(npc.gap <= 5 m, 2 s)`: whether a condition held at some moment of the last seconds, or at each of them, how
@@ -203,7 +205,7 @@ impl Checker {
             PastWord::Ago => {
                 ("number or a condition", format!("write what and when: `{name}(ego.speed, 2 s)`"))
             }
-            PastWord::Change => {
+            PastWord::Change | PastWord::Mean => {
                 ("number", format!("write a number and a time: `{name}(ego.acceleration, 0.5 s)`"))
             }
             PastWord::Recently | PastWord::Throughout | PastWord::Total | PastWord::Times => {
@@ -219,7 +221,7 @@ impl Checker {
         };
         let of = match word {
             PastWord::Ago => self.expr(condition, place, None),
-            PastWord::Change => self.numeric(condition, place),
+            PastWord::Change | PastWord::Mean => self.numeric(condition, place),
             PastWord::Recently | PastWord::Throughout | PastWord::Total | PastWord::Times => {
                 self.typed(condition, place, Type::Bool)
             }
@@ -232,7 +234,10 @@ impl Checker {
             return self.reject(error.help("compare it: `ago(time == Night, 2 s)`"));
         }
         let ty = match word {
-            PastWord::Recently | PastWord::Throughout | PastWord::Change | PastWord::Ago => of.ty,
+            PastWord::Mean if of.ty == Type::Int => Type::Quantity(Dimension::RATIO),
+            PastWord::Recently | PastWord::Throughout | PastWord::Change | PastWord::Mean | PastWord::Ago => {
+                of.ty
+            }
             PastWord::Total => Type::Quantity(Dimension::DURATION),
             PastWord::Times => Type::Int,
         };

@@ -8,7 +8,7 @@ use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind, Who};
 use crate::model::space::{BodyWord, COUNTED, FnDef, RoadFacts, Space, WordExpr};
 use crate::model::value::{Memory, Value};
 use crate::model::vocabulary::{
-    Fact, LaneChoice, Light, NearWord, PastWord, Priority, RoadKind, Turn, Word, WordFact,
+    Crossing, Fact, LaneChoice, Light, NearWord, PastWord, Priority, RoadKind, Turn, Word, WordFact,
 };
 
 /// Numbers that differ by at most this part of the larger one are equal, and their difference is 0, unless both are whole.
@@ -89,6 +89,8 @@ pub struct TickFacts {
     pub over_red_m: f64,
     pub over_stop_m: f64,
     pub over_line_m: f64,
+    pub over_crosswalk_m: f64,
+    pub crosses: Crossing,
     pub lane_offset_m: f64,
     pub over_oncoming_m: f64,
     pub over_lane_m: f64,
@@ -171,6 +173,11 @@ pub struct NpcFacts {
     /// Since one of the two left the place where the other is, at most [`TIME_S_MAX`]. Known only to who watches.
     pub pet_s: f64,
     pub has_siren: bool,
+    /// Whether it is the one ahead of the ego vehicle, in which lane to the left of that one's it is, and how far off the road, m:
+    /// known only to who watches.
+    pub leads: bool,
+    pub lanes_left: i32,
+    pub off_road_m: f64,
     /// Whether it drives in the junction that is the next one of the ego vehicle's route.
     pub in_next_junction: bool,
     /// Where it means to go at the next junction; nowhere for who is on foot.
@@ -355,6 +362,7 @@ fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
         | Fact::EgoOverStop
         | Fact::EgoLateralAcceleration
         | Fact::EgoOverLine
+        | Fact::EgoOverCrosswalk
         | Fact::EgoLaneOffset
         | Fact::EgoOverOncoming
         | Fact::EgoOverLane
@@ -379,6 +387,9 @@ fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
         Fact::NpcNextCrosswalkGap => spawn(|spawn| spawn.npc.next_crosswalk_gap_m),
         Fact::NpcContactIn => spawn(|spawn| spawn.npc.contact_in_s),
         Fact::NpcPet => spawn(|spawn| spawn.npc.pet_s),
+        Fact::NpcLeads => Value::Bool(facts.spawn.is_some_and(|spawn| spawn.npc.leads)),
+        Fact::NpcLanesLeft => spawn(|spawn| f64::from(spawn.npc.lanes_left)),
+        Fact::NpcOffRoad => spawn(|spawn| spawn.npc.off_road_m),
         Fact::NpcInNextJunction => Value::Bool(facts.spawn.is_some_and(|spawn| spawn.npc.in_next_junction)),
         Fact::NpcSiren => Value::Bool(facts.spawn.is_some_and(|spawn| spawn.npc.has_siren)),
         Fact::SpawnGap => spawn(|spawn| spawn.spawn_gap_m),
@@ -422,6 +433,7 @@ pub(crate) fn of_tick(fact: Fact) -> Option<fn(&TickFacts) -> f64> {
         Fact::EgoOverRed => |tick| tick.over_red_m,
         Fact::EgoOverStop => |tick| tick.over_stop_m,
         Fact::EgoOverLine => |tick| tick.over_line_m,
+        Fact::EgoOverCrosswalk => |tick| tick.over_crosswalk_m,
         Fact::EgoLaneOffset => |tick| tick.lane_offset_m,
         Fact::EgoOverOncoming => |tick| tick.over_oncoming_m,
         Fact::EgoOverLane => |tick| tick.over_lane_m,
@@ -437,6 +449,7 @@ pub(crate) fn word_of(fact: WordFact, facts: &Facts<'_>) -> Option<&'static str>
     match fact {
         WordFact::EgoLight => facts.world.map(|world| world.moment.ego_light.name()),
         WordFact::EgoRoad => facts.world.map(|world| world.moment.ego_road.name()),
+        WordFact::EgoCrosses => facts.world.map(|world| world.tick.crosses.name()),
         WordFact::EgoTurn => facts.world.map(|world| world.moment.ego_turn.name()),
         WordFact::NpcTurn => facts.spawn.map(|spawn| spawn.npc.turn.name()),
         WordFact::NpcLight => facts.spawn.map(|spawn| spawn.npc.light.name()),

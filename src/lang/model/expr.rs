@@ -146,7 +146,7 @@ impl Expr {
     }
 
     /// Calls `visit` for the expressions of which this one is made.
-    fn each_part<'a>(&'a self, visit: &mut dyn FnMut(&'a Expr)) {
+    pub(crate) fn each_part<'a>(&'a self, visit: &mut dyn FnMut(&'a Expr)) {
         match &self.kind {
             ExprKind::Bool(_)
             | ExprKind::Number(_)

@@ -15,7 +15,7 @@ use crate::model::limits::TICK_MS;
 use crate::model::sliding::Sliding;
 use crate::model::space::{BodyWord, FnDef, RequirementDef};
 use crate::model::value::Type;
-use crate::model::vocabulary::{Light, NearWord, PastWord, Word, WordFact};
+use crate::model::vocabulary::{Known, Light, NearWord, PastWord, Word, WordFact};
 use avastra_base::units::Dimension;
 
 /// How a requirement stands at a moment.
@@ -38,12 +38,18 @@ pub struct ReadyRequirement {
     bearers: Vec<usize>,
     /// What it asks of the past, those within others first.
     pasts: Vec<PastNode>,
+    /// Whether `after` asks nothing of `npc`.
+    after_is_of_ego: bool,
 }
 
 /// A word for the past with what it is asked of: `recently(condition, …)`, `change(number, …)`.
 #[derive(Debug, Clone)]
 struct PastNode {
     of: Node,
+    /// Whether the condition needs it: then nothing is asked until it is known.
+    is_awaited: bool,
+    /// Whether it asks nothing of `npc`: then it is the same for all of them.
+    is_of_ego: bool,
     is_number: bool,
     has_margin: bool,
     word: PastWord,
@@ -59,8 +65,9 @@ pub struct RequirementMemory {
     pasts: Vec<Past>,
     /// Whether `when` held at some tick since which `until` did not.
     is_latched: bool,
-    /// Whether `after` held at the tick before.
+    /// Whether `after` held at the tick before, and whether it began to hold at this one.
     was: bool,
+    began: bool,
 }
 
 /// The last ticks of a condition, or of a number.
@@ -81,7 +88,8 @@ struct Past {
     answers: VecDeque<Kept>,
     /// The numbers of these ticks; or for those at which the condition counts 1, and 0 for the others.
     numbers: VecDeque<f64>,
-    /// By how much the number changed, or the time or the number of times that it counts.
+    sum: f64,
+    /// The mean, or by how much the number changed, or the time or the number of times that it counts.
     number: f64,
     /// Whether the condition held at the tick before.
     held: bool,
@@ -133,16 +141,19 @@ impl RequirementDef {
     /// Made ready to be asked often.
     pub fn ready(&self) -> ReadyRequirement {
         let mut pasts = Vec::new();
+        let condition = Node::of(&self.condition, &mut pasts);
+        pasts.iter_mut().for_each(|node| node.is_awaited = true);
         let mut of = |expr: &Expr| Node::of(expr, &mut pasts);
         ReadyRequirement {
             when: self.when.as_ref().map(&mut of),
             until: self.until.as_ref().map(&mut of),
             after: self.after.as_ref().map(&mut of),
-            condition: of(&self.condition),
+            condition,
             unless: self.unless.as_ref().map(&mut of),
             has_margin: self.margin.is_some(),
             bearers: self.bearers.clone(),
             pasts,
+            after_is_of_ego: self.after.as_ref().is_some_and(|after| !asks_of_npc(after)),
         }
     }
 }
@@ -180,25 +191,44 @@ impl ReadyRequirement {
         self.bearers.iter().all(is_there)
     }
 
-    /// How one stands at the next tick that remembers; `None` as in [`ReadyRequirement::at`], and where `after` does not begin
-    /// to hold or too little is past. Of a requirement with `after` the condition is asked, too, while it `is_awaited`.
-    pub fn at_next(
+    /// Whether it remembers something that is the same for all road users of which it is asked.
+    pub fn remembers_of_ego(&self) -> bool {
+        self.after_is_of_ego || self.pasts.iter().any(|node| node.is_of_ego)
+    }
+
+    /// Takes the next tick of what is the same for all road users, whoever is near.
+    pub fn next_of_ego(&self, memory: &mut RequirementMemory, functions: &[FnDef], facts: &Facts<'_>) {
+        self.next_pasts(memory, |node| !node.is_of_ego, None, functions, facts);
+        memory.pasts.iter_mut().zip(&self.pasts).for_each(|(past, node)| past.settle(node));
+        let RequirementMemory { pasts, was, began, .. } = memory;
+        if self.after_is_of_ego {
+            let at = At { functions, facts, pasts };
+            let is_now = self.after.as_ref().is_some_and(|after| at.holds(after));
+            (*began, *was) = (is_now && !*was, is_now);
+        }
+    }
+
+    /// Takes the next tick of what was, but of what is left out. What is the same for all road users comes from `of_ego`, if
+    /// there is such a thing.
+    fn next_pasts(
         &self,
         memory: &mut RequirementMemory,
-        is_awaited: bool,
+        is_left_out: impl Fn(&PastNode) -> bool,
+        of_ego: Option<&RequirementMemory>,
         functions: &[FnDef],
         facts: &Facts<'_>,
-    ) -> Option<Asked> {
-        if !self.are_there(facts) {
-            *memory = RequirementMemory::default();
-            return None;
-        }
-        let RequirementMemory { pasts, is_latched, was } = memory;
+    ) {
+        let pasts = &mut memory.pasts;
         pasts.resize_with(self.pasts.len(), Past::default);
-        for (index, node) in self.pasts.iter().enumerate() {
+        for (index, node) in self.pasts.iter().enumerate().filter(|(_, node)| !is_left_out(node)) {
             let (within, from) = pasts.split_at_mut(index);
-            // What is said of the past begins once all within it is known.
-            if within[node.first..].iter().any(|past| !past.is_known) {
+            if let Some(known) = of_ego.filter(|_| node.is_of_ego).and_then(|of_ego| of_ego.pasts.get(index))
+            {
+                from[0].take_over(known);
+                continue;
+            }
+            // What the condition asks of the past begins once all within it is known.
+            if node.is_awaited && within[node.first..].iter().any(|past| !past.is_known) {
                 continue;
             }
             if node.has_margin {
@@ -208,25 +238,27 @@ impl ReadyRequirement {
                     .for_each(|(past, node)| past.settle(node));
             }
             let at = At { functions, facts, pasts: within };
-            match node.word {
-                PastWord::Change | PastWord::Ago if node.is_number => {
-                    from[0].take_number(at.number(&node.of), node);
-                }
-                PastWord::Change | PastWord::Ago => {
-                    from[0].recall(at.kept_of(&node.of, node.has_margin), node)
-                }
-                PastWord::Total => from[0].count(at.holds(&node.of), node.ticks, TICK_MS as f64 / 1000.0),
-                PastWord::Times => {
-                    let holds = at.holds(&node.of);
-                    let held = core::mem::replace(&mut from[0].held, holds);
-                    from[0].count(holds && !held, node.ticks, 1.0);
-                }
-                PastWord::Recently | PastWord::Throughout => {
-                    from[0].take(at.kept_of(&node.of, node.has_margin), node);
-                }
-            }
+            from[0].next(node, &at);
         }
-        if pasts.iter().any(|past| !past.is_known) {
+    }
+
+    /// How one stands at the next tick that remembers; `None` as in [`ReadyRequirement::at`], and where `after` does not begin
+    /// to hold or too little is past. Of a requirement with `after` the condition is asked, too, while it `is_awaited`.
+    pub fn at_next(
+        &self,
+        memory: &mut RequirementMemory,
+        of_ego: Option<&RequirementMemory>,
+        is_awaited: bool,
+        functions: &[FnDef],
+        facts: &Facts<'_>,
+    ) -> Option<Asked> {
+        if !self.are_there(facts) {
+            *memory = RequirementMemory::default();
+            return None;
+        }
+        self.next_pasts(memory, |_| false, of_ego, functions, facts);
+        let RequirementMemory { pasts, is_latched, was, .. } = memory;
+        if pasts.iter().zip(&self.pasts).any(|(past, node)| node.is_awaited && !past.is_known) {
             return None;
         }
         let at = At { functions, facts, pasts };
@@ -236,7 +268,11 @@ impl ReadyRequirement {
             Some(until) => !at.holds(until) && (*is_latched || holds(&self.when)),
         };
         let is_now = self.after.as_ref().is_some_and(|after| at.holds(after));
-        let begins = is_now && !*was && is_asked;
+        let began = match of_ego.filter(|_| self.after_is_of_ego) {
+            Some(of_ego) => of_ego.began,
+            None => is_now && !*was,
+        };
+        let begins = began && is_asked;
         (*is_latched, *was) = (is_asked, is_now);
         let asks = if self.after.is_some() { begins || is_awaited } else { is_asked };
         asks.then(|| {
@@ -250,6 +286,32 @@ impl ReadyRequirement {
 }
 
 impl Past {
+    /// Takes the next tick.
+    fn next(&mut self, node: &PastNode, at: &At<'_>) {
+        match node.word {
+            PastWord::Change | PastWord::Ago if node.is_number => {
+                self.take_number(at.number(&node.of), node);
+            }
+            PastWord::Change | PastWord::Ago => self.recall(at.kept_of(&node.of, node.has_margin), node),
+            PastWord::Mean => self.average(at.number(&node.of), node.ticks),
+            PastWord::Total => self.count(at.holds(&node.of), node.ticks, TICK_MS as f64 / 1000.0),
+            PastWord::Times => {
+                let holds = at.holds(&node.of);
+                let held = core::mem::replace(&mut self.held, holds);
+                self.count(holds && !held, node.ticks, 1.0);
+            }
+            PastWord::Recently | PastWord::Throughout => {
+                self.take(at.kept_of(&node.of, node.has_margin), node);
+            }
+        }
+    }
+
+    /// What is said of the past by another one that is about the same.
+    fn take_over(&mut self, known: &Past) {
+        (self.is_known, self.holds, self.margin, self.number) =
+            (known.is_known, known.holds, known.margin, known.number);
+    }
+
     /// Takes the answer of a tick.
     fn take(&mut self, kept: Kept, node: &PastNode) {
         let is_some = node.word == PastWord::Recently;
@@ -284,6 +346,21 @@ impl Past {
             self.number = if node.word == PastWord::Ago { before } else { number - before };
             self.is_known = true;
         }
+    }
+
+    /// Takes the number of a tick, and finds the mean of the last ones.
+    fn average(&mut self, number: f64, ticks: u32) {
+        self.numbers.push_back(number);
+        self.sum += number;
+        if self.numbers.len() > ticks as usize {
+            self.sum -= self.numbers.pop_front().unwrap_or(0.0);
+        }
+        // A number without a value is forgotten with its tick.
+        if !self.sum.is_finite() {
+            self.sum = self.numbers.iter().sum();
+        }
+        self.number = self.sum / self.numbers.len() as f64;
+        self.is_known = true;
     }
 
     /// Takes the answer of a tick, and finds that of the one so many before.
@@ -350,7 +427,17 @@ impl Node {
                 let of = Node::of(inner, pasts);
                 let has_margin = margin_dimension(inner).is_some();
                 let is_number = is_number(inner);
-                pasts.push(PastNode { of, is_number, has_margin, word: *word, ticks: *ticks, first });
+                let (is_of_ego, word, ticks) = (!asks_of_npc(inner), *word, *ticks);
+                pasts.push(PastNode {
+                    of,
+                    is_awaited: false,
+                    is_of_ego,
+                    is_number,
+                    has_margin,
+                    word,
+                    ticks,
+                    first,
+                });
                 Node::Past(pasts.len() - 1)
             }
             ExprKind::Negate(inner) => {
@@ -364,6 +451,20 @@ impl Node {
                 }
             }
             _ => Node::Other(expr.clone()),
+        }
+    }
+}
+
+/// Whether an expression asks something of `npc`. Whom `some` asks is its own.
+fn asks_of_npc(expr: &Expr) -> bool {
+    match &expr.kind {
+        ExprKind::Near(..) => false,
+        ExprKind::Fact(fact) => matches!(fact.known(), Known::Spawn | Known::Near),
+        ExprKind::IsWord(word, _) => word.known() == Known::Spawn,
+        _ => {
+            let mut asks = false;
+            expr.each_part(&mut |part| asks |= asks_of_npc(part));
+            asks
         }
     }
 }
@@ -411,7 +512,9 @@ impl<'a> At<'a> {
             Node::Fact(of) => self.fact(*of),
             Node::Arithmetic(op, left, right) => arithmetic(*op, self.number(left), self.number(right)),
             Node::Other(expr) => evaluate(expr, self.functions, self.facts).number(),
-            Node::Past(index) => self.pasts[*index].number,
+            Node::Past(index) => {
+                self.pasts.get(*index).filter(|past| past.is_known).map_or(f64::NAN, |past| past.number)
+            }
             Node::Count(bodies, condition) => {
                 let holds = |facts: &Facts<'_>| At { facts, ..*self }.holds(condition);
                 self.each_near(bodies).filter(holds).count() as f64
@@ -469,8 +572,8 @@ impl<'a> At<'a> {
 
     /// What was said of the past at this tick. Those within others are known before them.
     fn past(&self, index: usize) -> Kept {
-        let Past { holds, margin, .. } = self.pasts[index];
-        Kept { holds, margin }
+        let Past { is_known, holds, margin, .. } = self.pasts[index];
+        Kept { holds: is_known && holds, margin: if is_known { margin } else { f64::NEG_INFINITY } }
     }
 
     /// Truth of a condition, and its margin if it has one.

@@ -265,6 +265,9 @@ facts! {
     NpcNextCrosswalkGap "npc.next_crosswalk_gap" LENGTH, Spawn = "A `Length`: from its middle to the crosswalk that is the next one on the ego vehicle's route, or on which that is; 0 on it, 100 m if there is none or it is farther away.";
     NpcContactIn "npc.contact_in" DURATION, Spawn = "A `Duration`: until it and the ego vehicle touch, if both go on along and across the route as fast as now; 0 if they touch, 100 s if they do not.";
     NpcPet "npc.pet" DURATION, Near = "A `Duration`: since the other of the two left the place where one of them is now (post-encroachment time); 100 s if that is more than 5 s ago.";
+    NpcLeads "npc.leads" Type::Bool, Near = "A `Bool`: whether it is the road user that `ego.lead_gap` is about.";
+    NpcLanesLeft "npc.lanes_left" Type::Int, Near = "A `Int`: how many lanes its middle is to the left of the ego vehicle's lane, below 0 to the right; 0 in the same one, 100 if it is in no lane beside the route.";
+    NpcOffRoad "npc.off_road" LENGTH, Near = "A `Length`: from its middle to the nearest driving lane, at most 3 m; below 0 on one.";
     NpcInNextJunction "npc.in_next_junction" Type::Bool, Near = "A `Bool`: whether a vehicle is in the junction that `ego.junction_ahead` is about.";
     NpcSiren "npc.siren" Type::Bool, Near = "A `Bool`: whether it is an emergency vehicle under way, for which all others wait.";
     SpawnGap "spawn_gap" LENGTH, Spawn = "A `Length`: the gap from the ego vehicle to the road user that appears.";
@@ -275,6 +278,7 @@ facts! {
     EgoOverRed "ego.over_red" LENGTH, Tick = "A `Length`: how far its front is beyond the stop line of a light that was red as it passed, until its rear has passed, too; else minus the way to a red light; at least -100 m.";
     EgoOverStop "ego.over_stop" LENGTH, Tick = "A `Length`: how far its front is beyond the line of a stop sign, until its rear has passed, too; else minus the way to the next one; at least -100 m.";
     EgoOverLine "ego.over_line" LENGTH, Tick = "A `Length`: how far its front is beyond the stop line of a traffic light, whatever its colour, until its rear has passed, too; else minus the way to the next one; at least -100 m.";
+    EgoOverCrosswalk "ego.over_crosswalk" LENGTH, Tick = "A `Length`: how far its front is beyond the near edge of a crosswalk of its route, until its rear has passed the far one; else minus the way to the next one; at least -100 m.";
     EgoLaneOffset "ego.lane_offset" LENGTH, Tick = "A `Length`: how far its rear axle is to the left of the middle of its route's lane.";
     EgoOverOncoming "ego.over_oncoming" LENGTH, Tick = "A `Length`: how far its outline reaches into a lane of the other direction; below 0 the room that is left; -100 m in junctions and where there is no such lane.";
     EgoOverLane "ego.over_lane" LENGTH, Tick = "A `Length`: how far its outline reaches beyond the lines of its route's lane (of both lanes where the route may change lanes); below 0 the room that is left; -100 m in junctions.";
@@ -339,6 +343,7 @@ words! {
     Throughout "throughout" = "Whether a condition held at every moment of the last seconds: `throughout(ego.speed <= 0.1 m/s, 3 s)`.",
     Total "total" = "For how long in all a condition held during the last seconds: `total(ego.acceleration <= -3 m/s^2, 10 s) <= 2 s`.",
     Times "times" = "How often a condition began to hold during the last seconds: `times(ego.acceleration <= -3 m/s^2, 60 s) <= 2`.",
+    Mean "mean" = "The mean of a number over the last seconds: `mean(ego.jerk * ego.jerk, 10 s) <= 1 m/s^3 * 1 m/s^3`.",
     Ago "ago" = "What a condition or a number was so many seconds ago: `ago(ego.speed, 2 s)`.",
     Change "change" = "By how much a number is more than so many seconds ago: `change(ego.acceleration, 0.5 s) <= 1 m/s^2`.",
 }
@@ -359,6 +364,7 @@ word_facts! {
     EgoLight "ego.light" Light, World = "The next traffic light within 100 m: `ego.light == Red`, `ego.light in [Yellow, Red]`.";
     EgoRoad "ego.road" RoadKind, World = "Where the ego vehicle drives: `ego.road == InJunction`.";
     EgoTurn "ego.turn" Turn, World = "Where the route goes at the junction that it is in, or at the next one: `ego.turn == Left`.";
+    EgoCrosses "ego.crosses" Crossing, Tick = "To which side the ego vehicle crosses a line of its lane, from when its outline is over it until it is wholly in a lane again: `ego.crosses == Left`.";
     NpcLight "npc.light" Light, Spawn = "The next traffic light within 100 m on the way of a vehicle: `npc.light == Red`, `van.light == Green`.";
     NpcTurn "npc.turn" Turn, Spawn = "Where a vehicle means to go at the junction that it is in, or at the next one: `npc.turn in [Left, Right]`.";
     NpcPriority "npc.priority" Priority, Spawn = "Which of it and the ego vehicle goes first, once one of them has come into the other's way: `npc.priority == other` is that it does.";
@@ -644,6 +650,15 @@ words! {
     Back = "Back to where it came from.",
     #[default]
     None = "No junction within 1000 m.",
+}
+
+words! {
+    #[derive(Default)]
+    Crossing "To which side a line is crossed.":
+    Left = "To the left.",
+    Right = "To the right.",
+    #[default]
+    None = "It is in its lane, or in a junction.",
 }
 
 words! {

@@ -304,6 +304,9 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
         | Fact::EgoOverStop
         | Fact::EgoLateralAcceleration
         | Fact::EgoLaneOffset
+        | Fact::EgoOverCrosswalk
+        | Fact::NpcLanesLeft
+        | Fact::NpcOffRoad
         | Fact::EgoOverLine
         | Fact::NpcAlong
         | Fact::NpcAcross
@@ -329,7 +332,8 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
         | Fact::SpawnGap
         | Fact::SafetyGap => Interval::NOT_NEGATIVE,
         Fact::Proc => between(0.0, 1.0),
-        Fact::NpcInNextJunction
+        Fact::NpcLeads
+        | Fact::NpcInNextJunction
         | Fact::NpcSiren
         | Fact::Collision
         | Fact::Repeated

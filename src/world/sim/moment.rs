@@ -13,6 +13,7 @@ use super::ego::VehicleParameters;
 use super::npc::Driver;
 use super::road_user::{Motion, Obstacle};
 use super::sense::SignalColour;
+use super::watched::own_lane;
 use super::world::{DT_S, World};
 
 /// Distance that stands for "no road user around", m, as in the published package.
@@ -259,7 +260,7 @@ fn facts(
     let across_mps = along.perp(&obstacle.velocity_mps);
     // Where the ego vehicle's lane has ended, the route's is meant.
     let scene = around.scene;
-    let own = scene.lane_beside(around.ego_station_m, around.ego_offset_m);
+    let own = own_lane(around);
     let half_lane_m = || scene.half_width_m(station_m);
     let strip = if own == 0 { None } else { scene.strip(station_m, own) };
     let (right_m, left_m) = strip.unwrap_or_else(|| (-half_lane_m(), half_lane_m()));
@@ -292,6 +293,9 @@ fn facts(
         pet_s: TIME_S_MAX,
         has_siren: false,
         in_next_junction: false,
+        leads: false,
+        lanes_left: 0,
+        off_road_m: f64::NAN,
         turn,
         front_m,
         rear_m,

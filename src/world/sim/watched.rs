@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 
 use avastra_base::geometry::{Vec2, unit_vector};
 use avastra_base::kinematics::STANDING_MPS;
-use avastra_lang::model::vocabulary::Fact;
-use avastra_lang::model::{LEAD_GAP_M_MAX, LIGHT_AHEAD_M, TickFacts};
+use avastra_lang::model::vocabulary::{Crossing, Fact, WordFact};
+use avastra_lang::model::{LEAD_GAP_M_MAX, LIGHT_AHEAD_M, NpcFacts, TickFacts};
 use avastra_road::SignKind;
 
 use super::around::Around;
@@ -30,6 +30,7 @@ pub struct Watched {
     /// The road user ahead, the tick since when it is that one, and where it was on the route.
     lead: Option<(u32, u64, f64)>,
     red_runs: u32,
+    crosses: Crossing,
     /// The stop line that its front passed at red, until its rear has passed it.
     red_line_m: Option<f64>,
     /// The accelerations of the last second, the latest last, m/s².
@@ -46,15 +47,29 @@ pub struct WatchedParts {
     pub oncoming: bool,
     pub lane: bool,
     pub jerk: bool,
+    pub crosswalk: bool,
+    pub crosses: bool,
+    /// Of road users near.
+    pub lanes_left: bool,
+    pub off_road: bool,
 }
 
 impl WatchedParts {
     /// The parts that these facts are in.
-    pub fn of(facts: impl IntoIterator<Item = Fact>) -> WatchedParts {
-        let mut parts = WatchedParts::default();
+    pub fn of(
+        facts: impl IntoIterator<Item = Fact>,
+        words: impl IntoIterator<Item = WordFact>,
+    ) -> WatchedParts {
+        let crosses = words.into_iter().any(|word| word == WordFact::EgoCrosses);
+        let mut parts = WatchedParts { crosses, ..WatchedParts::default() };
         for fact in facts {
             match fact {
-                Fact::EgoLeadGap | Fact::EgoLeadSpeed | Fact::EgoLeadSince => parts.lead = true,
+                Fact::EgoLeadGap | Fact::EgoLeadSpeed | Fact::EgoLeadSince | Fact::NpcLeads => {
+                    parts.lead = true;
+                }
+                Fact::EgoOverCrosswalk => parts.crosswalk = true,
+                Fact::NpcLanesLeft => parts.lanes_left = true,
+                Fact::NpcOffRoad => parts.off_road = true,
                 Fact::EgoOverRed => parts.red = true,
                 Fact::EgoOverStop => parts.stop = true,
                 Fact::EgoOverOncoming => parts.oncoming = true,
@@ -80,6 +95,8 @@ impl Watched {
             lead_since_s: self.lead.map_or(0.0, |(_, tick, _)| since_s(tick)),
             over_red_m: if parts.red { self.over_red_m(world, &around) } else { f64::NAN },
             over_line_m: if parts.line { over_line_m(&around) } else { f64::NAN },
+            over_crosswalk_m: if parts.crosswalk { over_crosswalk_m(&around) } else { f64::NAN },
+            crosses: if parts.crosses { self.crosses(&around) } else { Crossing::None },
             lane_offset_m: if parts.lane { lane_offset_m(&around) } else { f64::NAN },
             over_stop_m: if parts.stop { over_stop_m(&around) } else { f64::NAN },
             over_oncoming_m: if parts.oncoming { over_oncoming_m(&around) } else { f64::NAN },
@@ -103,6 +120,47 @@ impl Watched {
             _ => (id, world.ticks(), station_m),
         });
         lead
+    }
+
+    /// The facts of a road user near, with what of these parts is watched.
+    pub fn of_near(&self, world: &World, id: u32, npc: NpcFacts, parts: WatchedParts) -> NpcFacts {
+        let leads = self.lead.is_some_and(|(lead, ..)| lead == id);
+        let place = world.obstacle(id).map(|obstacle| obstacle.outline.pose.position);
+        let Some(place) = place.filter(|_| parts.lanes_left || parts.off_road) else {
+            return NpcFacts { leads, ..npc };
+        };
+        let around = world.alone();
+        let lanes_left = || {
+            let (station_m, offset_m, _) = around.beside_route(place);
+            let nth = around.scene.lane_beside(station_m, offset_m);
+            let strip = around.scene.strip(station_m, nth);
+            let is_in_it = strip.is_some_and(|(right_m, left_m)| (right_m..=left_m).contains(&offset_m));
+            if is_in_it { nth - own_lane(&around) } else { NO_LANE }
+        };
+        NpcFacts {
+            leads,
+            lanes_left: if parts.lanes_left { lanes_left() } else { 0 },
+            off_road_m: if parts.off_road { around.scene.map.lane_room_m(place) } else { f64::NAN },
+            ..npc
+        }
+    }
+
+    /// To which side a line of a lane is crossed.
+    fn crosses(&mut self, around: &Around) -> Crossing {
+        let Scene { map, route, .. } = around.scene;
+        let is_in_junction = map.lane(route.lane_at(around.ego_station_m).lane).junction.is_some();
+        let strip = around.scene.strip(around.ego_station_m, own_lane(around)).filter(|_| !is_in_junction);
+        let corners = around.ego_outline.corners().map(|corner| around.beside_route(corner).1);
+        let now = match strip {
+            None => Crossing::None,
+            Some((_, left_m)) if corners.iter().any(|offset_m| *offset_m > left_m) => Crossing::Left,
+            Some((right_m, _)) if corners.iter().any(|offset_m| *offset_m < right_m) => Crossing::Right,
+            Some(_) => Crossing::None,
+        };
+        // Half way over, the lane is another one, of which the other line is crossed.
+        let goes_on = now != Crossing::None && self.crosses != Crossing::None;
+        self.crosses = if goes_on { self.crosses } else { now };
+        self.crosses
     }
 
     /// The change of the acceleration over the last second, m/s³.
@@ -136,6 +194,9 @@ impl Watched {
         red.map_or(FAR_M, |line| front_m - line.station_m)
     }
 }
+
+/// Stands for a road user that is in no lane beside the route.
+const NO_LANE: i32 = 100;
 
 struct Lead {
     id: u32,
@@ -203,6 +264,19 @@ fn over_stop_m(around: &Around) -> f64 {
 /// Of the stop lines of lights.
 fn over_line_m(around: &Around) -> f64 {
     over_m(around, around.scene.route.stop_lines.iter().map(|line| line.station_m))
+}
+
+/// The same of a crosswalk, until the rear has passed its far edge.
+fn over_crosswalk_m(around: &Around) -> f64 {
+    let ego = VehicleParameters::MKZ;
+    let (front_m, rear_m) = (ego.front_m(around.ego_station_m), ego.rear_m(around.ego_station_m));
+    let next = around.scene.route.crosswalks_m.iter().find(|(_, end_m)| rear_m < *end_m);
+    next.map_or(FAR_M, |(begin_m, _)| (front_m - begin_m).max(FAR_M))
+}
+
+/// The lane that holds the ego vehicle's rear axle, as [`Scene::lane_beside`] counts.
+pub(super) fn own_lane(around: &Around) -> i32 {
+    around.scene.lane_beside(around.ego_station_m, around.ego_offset_m)
 }
 
 /// How far the ego vehicle's rear axle is to the left of the middle of its route's lane, m.
@@ -286,6 +360,10 @@ mod tests {
         oncoming: true,
         lane: true,
         jerk: true,
+        crosswalk: true,
+        crosses: true,
+        lanes_left: true,
+        off_road: true,
     };
 
     #[test]
@@ -307,6 +385,59 @@ mod tests {
         assert!((later.lead_since_s - 1.0).abs() < 1e-9, "{later:?}");
         let rear_m = world.npc_facts(1).expect("it is there").rear_m;
         assert!((later.lead_gap_m - (rear_m - world.moment_facts().ego_front_m)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_line_is_crossed_from_the_first_corner_to_the_last() {
+        let mut world = testing::world(&testing::straight());
+        let mut watched = Watched::default();
+        // The lines beside the route, which lies in the middle of a lane of 3.5 m: two lanes ahead, and two of the others.
+        let lines_m = [-5.25, -1.75, 1.75, 5.25, 8.75];
+        let (mut before, mut told) = (Crossing::None, Vec::new());
+        for tick in 0..900 {
+            let steer_rad = [-0.1, 0.1, 0.1, -0.1, 0.1, -0.1].get(tick / 80).copied().unwrap_or(0.0);
+            world.tick(&Control { throttle_pct: 25.0, steer_rad, ..Control::default() });
+            let now = watched.look(&world, ALL).crosses;
+            let corners = world.ego_outline().corners().map(|corner| corner.y + 1.75);
+            let (least_m, most_m) = corners
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), y| (least.min(*y), most.max(*y)));
+            let crossed = lines_m
+                .into_iter()
+                .find(|line_m| (least_m..most_m).contains(line_m) || *line_m == 8.75 && least_m > 8.75);
+            assert_eq!(now != Crossing::None, crossed.is_some(), "{least_m} to {most_m}");
+            if before == Crossing::None
+                && let Some(line_m) = crossed
+            {
+                let is_left = line_m > world.ego_offset_m();
+                assert_eq!(now, if is_left { Crossing::Left } else { Crossing::Right });
+            }
+            assert!(before == Crossing::None || now == Crossing::None || before == now);
+            told.push(now);
+            before = now;
+        }
+        told.dedup();
+        assert!(
+            told.len() > 3 && told.contains(&Crossing::Left) && told.contains(&Crossing::Right),
+            "{told:?}"
+        );
+    }
+
+    #[test]
+    fn a_crosswalk_is_passed_from_its_near_edge_to_its_far_one() {
+        let mut world = testing::world(&testing::zebra());
+        let mut watched = Watched::default();
+        let [(begin_m, end_m)] = world.scene().route.crosswalks_m[..] else { panic!("it has one") };
+        let mut most_m: f64 = -100.0;
+        for _ in 0..1500 {
+            world.tick(&Control { throttle_pct: 30.0, ..Control::default() });
+            let moment = world.moment_facts();
+            let wanted_m = if moment.ego_rear_m < end_m { moment.ego_front_m - begin_m } else { -100.0 };
+            let found_m = watched.look(&world, ALL).over_crosswalk_m;
+            assert!((found_m - wanted_m.max(-100.0)).abs() < 1e-9, "{found_m} in place of {wanted_m}");
+            most_m = most_m.max(found_m);
+        }
+        assert!(most_m > 6.0, "it has passed: {most_m}");
     }
 
     #[test]
