@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use avastra_base::geometry::{Vec2, unit_vector};
+use avastra_base::geometry::{Beside, Path, Projection, Vec2, unit_vector};
 use avastra_base::kinematics::STANDING_MPS;
 use avastra_lang::model::vocabulary::{Crossing, Fact, WordFact};
 use avastra_lang::model::{LEAD_GAP_M_MAX, LIGHT_AHEAD_M, NpcFacts, TickFacts};
@@ -231,7 +231,7 @@ fn next_ahead(around: &Around) -> Option<Lead> {
 fn in_the_way(around: &Around, obstacle: &Obstacle, guess_m: f64) -> Option<Lead> {
     let front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
     let Obstacle { id, outline, forward, velocity_mps, .. } = obstacle;
-    let beside = around.scene.route.path.project_from(outline.pose.position, guess_m)?;
+    let beside = beside(&around.scene.route.path, outline.pose.position, guess_m)?;
     let (half_length_m, half_width_m) = outline.half_extent_m(*forward, beside.forward);
     let aside_m = (beside.offset_m - around.ego_offset_m).abs();
     let speed_mps = beside.forward.dot(velocity_mps);
@@ -240,6 +240,17 @@ fn in_the_way(around: &Around, obstacle: &Obstacle, guess_m: f64) -> Option<Lead
         && speed_mps > -STANDING_MPS;
     let gap_m = (beside.station_m - half_length_m - front_m).max(0.0);
     is_ahead.then_some(Lead { id: *id, station_m: beside.station_m, gap_m, speed_mps })
+}
+
+/// Where a place about at a station lies beside a path; `None` for one that is far aside.
+fn beside(path: &Path, place: Vec2, guess_m: f64) -> Option<Beside> {
+    // Outside of a bend a place may lie between the ends of two tangents, which then lead back and forth.
+    path.project_from(place, guess_m).or_else(|| {
+        let Projection { station_m, offset_m, distance_m } =
+            path.project_near(place, guess_m, 2.0 * WAY_STEP_M);
+        let (_, forward) = path.along(station_m);
+        (distance_m <= WAY_ASIDE_M).then_some(Beside { station_m, offset_m, forward })
+    })
 }
 
 /// Half the width of the ego vehicle across a direction, m.
@@ -385,6 +396,26 @@ mod tests {
         assert!((later.lead_since_s - 1.0).abs() < 1e-9, "{later:?}");
         let rear_m = world.npc_facts(1).expect("it is there").rear_m;
         assert!((later.lead_gap_m - (rear_m - world.moment_facts().ego_front_m)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn every_place_beside_a_bend_is_found() {
+        for scene in [testing::corner(), testing::straight()] {
+            let path = &scene.route.path;
+            let stations = (0..(path.length_m() * 10.0) as usize).map(|nth| nth as f64 / 10.0);
+            for (station_m, offset_m) in
+                stations.flat_map(|station_m| [-2.0, -0.7, 0.7, 2.0].map(|left| (station_m, left)))
+            {
+                let place = path.pose_at(station_m).offset(0.0, offset_m).position;
+                for guess_m in [station_m - 9.0, station_m + 9.0] {
+                    let found = beside(path, place, guess_m).expect("it is near");
+                    assert!(
+                        (found.offset_m - offset_m).abs() < 0.1,
+                        "{offset_m} m at {station_m} m: {found:?}"
+                    );
+                }
+            }
+        }
     }
 
     #[test]
