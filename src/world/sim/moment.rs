@@ -260,10 +260,9 @@ fn facts(
     let across_mps = along.perp(&obstacle.velocity_mps);
     // Where the ego vehicle's lane has ended, the route's is meant.
     let scene = around.scene;
-    let own = own_lane(around);
-    let half_lane_m = || scene.half_width_m(station_m);
-    let strip = if own == 0 { None } else { scene.strip(station_m, own) };
-    let (right_m, left_m) = strip.unwrap_or_else(|| (-half_lane_m(), half_lane_m()));
+    let strip = scene.strip(station_m, own_lane(around));
+    let strip = strip.or_else(|| scene.strip(station_m, scene.route_lane_number(station_m)));
+    let (right_m, left_m) = strip.unwrap_or_default();
     let (_, ego_along) = around.scene.route.path.along(around.ego_station_m);
     let lengthwise = Closing {
         from_m: rear_m - ego_front_m,
@@ -454,25 +453,30 @@ mod tests {
     #[test]
     fn the_lane_of_the_ego_vehicle_is_the_one_that_it_is_in() {
         use crate::action::Effect;
-        let mut world = testing::world(&testing::straight());
-        world.apply(&Effect::Spawn(testing::request(Verb::DriveAhead, 60.0, 8.0))).expect("there is room");
-        let before = world.npc_facts(1).expect("it is there");
-        let (mut lanes, mut least_m) = (Vec::new(), f64::INFINITY);
-        // Into the lane to the right and back again, and over the line to the left.
-        for tick in 0..900 {
-            let steer_rad = [-0.1, 0.1, 0.1, -0.1, 0.1, -0.1].get(tick / 80).copied().unwrap_or(0.0);
-            world.tick(&Control { throttle_pct: 25.0, steer_rad, ..Control::default() });
-            let (Some(npc), left_m) = (world.npc_facts(1), world.ego_offset_m()) else { break };
-            // Lanes of 3.5 m, the route in the middle of the left one of two; beyond are two that come towards it.
-            let nth = ((left_m + 1.75) / 3.5).floor().clamp(-1.0, 2.0);
-            lanes.push(nth as i32);
-            let half_m = before.in_lane_m - 1.75;
-            let wanted_m = 1.75 + half_m - (npc.offset_m - 3.5 * nth).abs();
-            assert!((npc.in_lane_m - wanted_m).abs() < 1e-6, "{npc:?} from {left_m} m: {wanted_m}");
-            least_m = least_m.min(npc.in_lane_m);
+        // Also where the route itself changes lanes.
+        for scene in [testing::straight(), testing::changing()] {
+            let mut world = testing::world(&scene);
+            let request = testing::request(Verb::DriveAhead, 60.0, 8.0);
+            world.apply(&Effect::Spawn(request)).expect("there is room");
+            let (mut lanes, mut least_m) = (Vec::new(), f64::INFINITY);
+            // Into the lane to the right and back again, and over the line to the left.
+            for tick in 0..900 {
+                let steer_rad = [-0.1, 0.1, 0.1, -0.1, 0.1, -0.1].get(tick / 80).copied().unwrap_or(0.0);
+                world.tick(&Control { throttle_pct: 25.0, steer_rad, ..Control::default() });
+                let (Some(npc), Some(obstacle)) = (world.npc_facts(1), world.obstacle(1)) else { break };
+                // Four lanes of 3.5 m from y = -7 m on.
+                let ego_m = world.ego().rear_axle.position.y;
+                let nth = ((ego_m + 7.0) / 3.5).floor().clamp(0.0, 3.0);
+                lanes.push(nth as i32);
+                let half_m = obstacle.outline.half_extent_m(obstacle.forward, Vec2::x()).1;
+                let away_m = (obstacle.outline.pose.position.y - (3.5 * nth - 5.25)).abs();
+                let wanted_m = 1.75 + half_m - away_m;
+                assert!((npc.in_lane_m - wanted_m).abs() < 0.03, "{npc:?} from {ego_m} m: {wanted_m}");
+                least_m = least_m.min(npc.in_lane_m);
+            }
+            lanes.dedup();
+            assert!(lanes.len() > 1 && least_m < 0.0, "{lanes:?} {least_m}");
         }
-        lanes.dedup();
-        assert!(lanes.len() > 1 && least_m < 0.0, "{lanes:?} {least_m}");
     }
 
     #[test]

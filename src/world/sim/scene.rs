@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use avastra_base::geometry::{Path, Vec2};
 use avastra_lang::model::{CROSSWALK_GAP_M_MAX, Road};
-use avastra_road::{FootWay, LaneIndex, RoadMap, Route};
+use avastra_road::{FootWay, LaneIndex, Neighbour, RoadMap, Route};
 
 use super::junction::ConflictAreas;
 use super::right_of_way::{RouteArea, route_areas};
@@ -89,6 +89,8 @@ pub struct Scene {
     oncoming: OnceLock<Vec<Option<OncomingEdge>>>,
     /// A circle around each crosswalk of the map: its middle and its radius, m.
     crosswalk_circles: Vec<(Vec2, f64)>,
+    /// The number of each lane of the route, as [`Scene::lane_number`] counts.
+    lane_numbers: Vec<i32>,
     /// For each crosswalk of the route, the one of the map, by index.
     route_crosswalks: Vec<Option<usize>>,
 }
@@ -119,7 +121,15 @@ impl Scene {
             (0..map.crosswalks.len()).find(|crosswalk| map.crosswalk_gap_m(*crosswalk, middle) <= 0.0)
         };
         let route_crosswalks = route.crosswalks_m.iter().map(on_route).collect();
+        let mut lane_numbers: Vec<i32> = vec![0];
+        for part in route.lanes.windows(2) {
+            let is_beside = |side: Option<Neighbour>| side.is_some_and(|beside| beside.lane == part[1].lane);
+            let of = map.lane(part[0].lane);
+            let by = i32::from(is_beside(of.left)) - i32::from(is_beside(of.right));
+            lane_numbers.push(lane_numbers[lane_numbers.len() - 1] + by);
+        }
         Scene {
+            lane_numbers,
             crosswalk_circles,
             route_crosswalks,
             areas,
@@ -143,32 +153,41 @@ impl Scene {
         self.map.lane(here.lane).width_at(station_m - here.from_m) / 2.0
     }
 
-    /// The lane in which somebody at a station and an offset of the route is: so many to the left of the route's lane, or below 0
-    /// to its right.
-    pub(super) fn lane_beside(&self, station_m: f64, offset_m: f64) -> i32 {
-        let side = if offset_m > 0.0 { 1 } else { -1 };
-        let mut nth = 0;
-        if offset_m.abs() <= self.half_width_m(station_m) {
-            return nth;
+    /// The number of the lane in which somebody at a station and an offset of the route is. The lane in which the route begins has
+    /// 0, those to its left 1, 2 and so on; where the route changes lanes, its lane has another number from there on.
+    pub(super) fn lane_number(&self, station_m: f64, offset_m: f64) -> i32 {
+        let mut number = self.route_lane_number(station_m);
+        let Some((right_m, left_m)) = self.strip(station_m, number) else { return number };
+        if (right_m..=left_m).contains(&offset_m) {
+            return number;
         }
+        let side = if offset_m > left_m { 1 } else { -1 };
         // Between two lanes it is in the one that it comes from.
-        while let Some((right_m, left_m)) = self.strip(station_m, nth + side) {
+        while let Some((right_m, left_m)) = self.strip(station_m, number + side) {
             let is_beyond = if side > 0 { offset_m > right_m } else { offset_m < left_m };
             if !is_beyond {
                 break;
             }
-            nth += side;
+            number += side;
         }
-        nth
+        number
     }
 
-    /// From where to where the nth lane to the left of the route's lane reaches beside a station, m to the left of the route; `None`
-    /// if there is none.
-    pub(super) fn strip(&self, station_m: f64, nth: i32) -> Option<(f64, f64)> {
+    /// The number of the route's lane at a station.
+    pub(super) fn route_lane_number(&self, station_m: f64) -> i32 {
+        let after = self.route.lanes.partition_point(|lane| lane.enter_m <= station_m);
+        self.lane_numbers[after.max(1) - 1]
+    }
+
+    /// From where to where the lane of a number reaches beside a station, m to the left of the route; `None` if there is none.
+    pub(super) fn strip(&self, station_m: f64, number: i32) -> Option<(f64, f64)> {
         let half_m = self.half_width_m(station_m);
-        let (mut right_m, mut left_m) = (-half_m, half_m);
-        let here = self.route.path.position_at(station_m);
-        let (mut lane, mut is_ours) = (self.route.lane_at(station_m).lane, true);
+        let (here, mut lane) = (self.route.path.position_at(station_m), self.route.lane_at(station_m).lane);
+        // In a lane change the route is on its way from one centre to another.
+        let is_in_change = self.route.changes.iter().any(|of| (of.begin_m..=of.end_m).contains(&station_m));
+        let centre_m = if is_in_change { -self.map.lane(lane).centre.project(here).offset_m } else { 0.0 };
+        let (mut right_m, mut left_m) = (centre_m - half_m, centre_m + half_m);
+        let (nth, mut is_ours) = (number - self.route_lane_number(station_m), true);
         for _ in 0..nth.abs() {
             let of = self.map.lane(lane);
             // What lies to our left is to the right of who comes towards us.

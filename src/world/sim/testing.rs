@@ -104,6 +104,12 @@ pub fn straight() -> Arc<Scene> {
     along_x(&[2, 1, -1, -2].map(plain), "")
 }
 
+/// As [`straight`], with a route that begins on the outer lane (y = -5.25) and changes to the inner one.
+pub fn changing() -> Arc<Scene> {
+    let of = lanes(&[2, 1, -1, -2].map(plain));
+    scene(&street("1", [0.0, 0.0, 0.0, 600.0], "-1", "", &of, ""), ("1", -2, 100.0), ("1", -1, 500.0))
+}
+
 /// A street of 600 m along +x with these lanes and what else stands in it; the route leads from x = 100 to x = 500.
 fn along_x(of: &[(i32, &str, f64, &str)], more: &str) -> Arc<Scene> {
     let road = street("1", [0.0, 0.0, 0.0, 600.0], "-1", "", &lanes(of), more);
