@@ -448,23 +448,28 @@ pub fn requirements_text(requirements: &[RequirementCount]) -> String {
         let episodes = plural(of.asked_in as usize, "episode");
         format!("asked for {:.1} s in {episodes}", of.asked_s)
     };
-    let line = |of: &RequirementCount| match (&of.scenario, figure(of)) {
-        (Some(scenario), figure) => format!(
-            "{} × {} in {} ({} of {} kept by a careful driver){}: {scenario}; {}",
+    let line = |of: &RequirementCount| match figure(of) {
+        figure if of.breaches > 0 => format!(
+            "{} × {} in {} ({} of {} kept by a careful driver){}{}; {}",
             of.breaches,
             of.requirement,
             plural(of.breached_in as usize, "episode"),
             of.kept_in,
             if of.tried_in == of.breached_in { "these".to_owned() } else { of.tried_in.to_string() },
             if figure.is_empty() { figure } else { format!(", by up to {}", figure.trim_start_matches('-')) },
+            of.scenario.as_ref().map_or_else(String::new, |scenario| format!(": {scenario}")),
             asked(of),
         ),
-        (None, _) if of.asked_in == 0 => format!("{} never asked", of.requirement),
-        (None, figure) if figure.is_empty() && of.unit.is_some() => {
-            format!("{} kept, never asked for all the time that it grants; {}", of.requirement, asked(of))
+        _ if of.asked_in == 0 => format!("{} never asked", of.requirement),
+        figure if figure.is_empty() && of.unit.is_some() => {
+            format!(
+                "{} not breached, and no margin is known: what was asked was excused, or over too soon; {}",
+                of.requirement,
+                asked(of)
+            )
         }
-        (None, figure) if figure.is_empty() => format!("{} kept; {}", of.requirement, asked(of)),
-        (None, figure) => {
+        figure if figure.is_empty() => format!("{} kept; {}", of.requirement, asked(of)),
+        figure => {
             let nearest = of.nearest.as_deref().unwrap_or_default();
             format!("{} kept, by at least {figure}: {nearest}; {}", of.requirement, asked(of))
         }

@@ -122,7 +122,7 @@ run
   never.legal[] object a row that no step allowed; what `refused` it, and how often
   never.chosen[] object a row that was legal, but that the agent never chose
   never.realised[] object a row that was chosen, but never carried out
-  requirements[] object a requirement in force: for how long it was asked (`asked_s`, `asked_in` episodes), `breaches`, `breached_in`, `tried_in` and `kept_in` (episodes with a breach; of these, those that careful drivers drove, and that one kept), the `smallest` margin in its `unit`, the `nearest` episode, a `scenario` with the worst breach
+  requirements[] object a requirement in force: for how long it was asked (`asked_s`, `asked_in` episodes), `breaches`, `breached_in`, `tried_in` and `kept_in` (episodes with a breach; of these, those that careful drivers drove, and that one kept), the `smallest` margin in its `unit`, the `nearest` episode, a `scenario` with the worst breach of those that were written
   critical[] text scenarios with a counted collision or a breach, the surest and worst first
   found[] object an episode with a finding: `road`, `episode`, whether it has a counted collision or a breach (`critical`), the `recurrence` (`recurred` of `replays`) of the finding that recurs most often, the `harm` of its worst collision
   kept[] text with `--keep`: paths of episodes without a finding, the nearest misses first

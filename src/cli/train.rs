@@ -161,12 +161,12 @@ fn keep(
     let TrainSettings { agent, without, with, .. } = settings;
     let player = Player { command: "train", table: training.table(), agent, without, with };
     directory.write_failure(&player, (&trained.log, &trained.summary))?;
-    let is_first = || {
-        let known = directory.read(Database::first_breaches)?;
-        let name = |breach: &Breach| &training.table().space().requirements[breach.requirement].name;
-        Ok::<_, Failure>(trained.log.breaches.iter().any(|breach| !known.contains_key(name(breach))))
+    let is_first = |breach: &Breach| {
+        let name = &training.table().space().requirements[breach.requirement].name;
+        directory.read(|database| database.is_breached(name)).map(|known| !known)
     };
-    let is_critical = trained.summary.counted() > 0 || !trained.log.breaches.is_empty() && is_first()?;
+    let has_first = trained.log.first_breaches().map(is_first).collect::<Result<Vec<bool>, Failure>>()?;
+    let is_critical = trained.summary.counted() > 0 || has_first.contains(&true);
     // A training with an observation period of its own writes no scenario, because a replay would use the period
     // of the space.
     let has_scenario = is_critical && settings.hyperparameters.observation_period_s().is_none();

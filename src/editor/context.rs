@@ -491,7 +491,17 @@ impl<'a> Place<'a> {
                 };
                 let parts = match things().contains(&name) {
                     true => parts_of(name).into_iter().filter(|(part, _)| is_here(part)).collect(),
-                    false if is_named => parts_of("npc").into_iter().chain([THERE]).collect(),
+                    false if is_named => {
+                        let of_named = |part: &str| {
+                            Fact::from_name(&format!("npc.{part}"))
+                                .is_none_or(|fact| fact.known() == Known::Spawn)
+                        };
+                        parts_of("npc")
+                            .into_iter()
+                            .filter(|(part, _)| of_named(part))
+                            .chain([THERE])
+                            .collect()
+                    }
                     false if self.declared(Symbol::Requirement, name).is_some() => match self.about {
                         About::Facts(Site::Reward) => vec![BREACHED, MARGIN],
                         About::Facts(_) => vec![BREACHED],

@@ -181,7 +181,7 @@ fn series_asked(gaps: &BTreeMap<u32, Margins>, jerks: &Margins, name: &str) -> B
 fn what_is_asked_of_each_road_user_near_is_asked_of_each_by_itself() {
     let run = run_against("idm", space_at("tests/cases/spaces/requirements_near.ava"), 10, 5, &[]);
     let space = run.space().clone();
-    let (mut found, mut lately, mut asked_in) = ([0; 3], 0, [0.0; 4]);
+    let (mut found, mut lately, mut asked_in) = ([0; 3], 0, [0.0; 6]);
     for number in 0..run.episodes() {
         let log = run.episode(number);
         let script = avastra::episode::Script::of_log(&log);
@@ -270,11 +270,21 @@ fn what_is_asked_of_each_road_user_near_is_asked_of_each_by_itself() {
         };
         assert_eq!(ticks_of("nobody_near"), ticks_of("keeps_off"), "episode {number}");
         assert_eq!(ticks_of("few_near"), ticks_of("keeps_off"), "episode {number}");
-        let by_definition = ["leader_is_ahead", "in_the_same_lane", "in_another_lane", "on_the_road"];
+        let by_definition = [
+            "leader_is_ahead",
+            "in_the_same_lane",
+            "in_another_lane",
+            "on_the_road",
+            "mean_of_squares",
+            "mean_at_rest",
+        ];
         for (name, asked) in by_definition.into_iter().zip(&mut asked_in) {
             assert_eq!(ticks_of(name), BTreeSet::new(), "{name} in episode {number}");
             let is_of = |one: &&avastra::episode::Margin| space.requirements[one.requirement].name == name;
             *asked += log.margins.iter().find(is_of).expect("it is in force").asked_s;
+        }
+        for name in ["at_first", "at_first_ago"] {
+            assert_eq!(ticks_of(name), (1..=50).collect(), "{name} in episode {number}");
         }
         for name in ["begins_once", "after_once"] {
             assert!(ticks_of(name).into_iter().all(|tick| tick == 1), "{name} in episode {number}");

@@ -806,7 +806,7 @@ mod tests {
             let holds =
                 |part: &Option<MadeUp>, tick: usize| part.as_ref().is_none_or(|part| part.holds(trace, tick));
             let mut asked = vec![false; trace.len()];
-            for tick in known_from..trace.len() {
+            for tick in 0..trace.len() {
                 asked[tick] = match &self.until {
                     None => holds(&self.when, tick),
                     Some(until) => {
@@ -832,7 +832,7 @@ mod tests {
                         .map(|from| largest(from, tick)),
                     Some(after) => from
                         .filter(|from| asked[*from] && after.holds(trace, *from))
-                        .filter(|from| *from == known_from || !after.holds(trace, from - 1))
+                        .filter(|from| *from == 0 || !after.holds(trace, from - 1))
                         .map(|from| largest(from, tick)),
                 };
                 smallest = smaller(smallest, margin);

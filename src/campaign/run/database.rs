@@ -293,6 +293,15 @@ impl Database {
         })
     }
 
+    /// Whether a requirement was breached in an episode.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn is_breached(&self, requirement: &str) -> Result<bool, DatabaseError> {
+        let query = "SELECT EXISTS (SELECT 1 FROM breach WHERE requirement = ?)";
+        Ok(self.connection.query_row(query, [requirement], |row| row.get(0))?)
+    }
+
     /// The requirements that were breached, each with the first episode in which it was.
     ///
     /// # Errors

@@ -43,7 +43,7 @@ impl Checker {
         self.note_fields::<BodyField>(&declared.fields, &Place::default());
         let fields = self.fields_known::<BodyField>(&declared.fields);
         let name = &declared.name;
-        if Body::from_name(&name.text).is_some() {
+        if Body::from_name(&name.text).is_some() || BodyClass::from_name(&name.text).is_some() {
             let message = format!("the engine has a body `{}` already", name.text);
             let error = Diagnostic::error(code::DUPLICATE, message).at(name.span, "declared again");
             self.report(error.help("give yours another name"));

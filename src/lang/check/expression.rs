@@ -45,18 +45,13 @@ impl Place<'_> {
 
 /// A fact of a road user that is named, or told by its number. Some are watched for requirements `on` bodies alone.
 fn fact_of_named(part: &str) -> Option<Fact> {
-    Fact::from_name(&format!("npc.{part}")).filter(|fact| !is_watched(*fact))
-}
-
-fn is_watched(fact: Fact) -> bool {
-    matches!(fact, Fact::NpcPet | Fact::NpcLeads | Fact::NpcLanesLeft | Fact::NpcOffRoad)
+    Fact::from_name(&format!("npc.{part}")).filter(|fact| fact.known() == Known::Spawn)
 }
 
 fn parts_of_named() -> impl Iterator<Item = &'static str> {
-    parts_of("npc")
-        .into_iter()
-        .map(|(part, _)| part)
-        .filter(|part| Fact::from_name(&format!("npc.{part}")).is_none_or(|fact| !is_watched(fact)))
+    parts_of("npc").into_iter().map(|(part, _)| part).filter(|part| {
+        Fact::from_name(&format!("npc.{part}")).is_none_or(|fact| fact.known() == Known::Spawn)
+    })
 }
 
 /// Most enums that the error about an ambiguous variant names.
@@ -459,12 +454,21 @@ impl Checker {
             self.references.note(part.span, Symbol::Engine(THERE.0, THERE.1), false);
             return Some(Expr { kind: ExprKind::IsThere(who), ty: Type::Bool, span });
         }
-        if WordFact::from_name(&format!("npc.{}", part.text)).is_some() {
+        if let Some(fact) = WordFact::from_name(&format!("npc.{}", part.text)) {
+            let words = fact.words();
+            let example = words.first().map_or("", |(word, _)| word);
             let message = format!("`{}` is a word of the engine", part.text);
             let error = Diagnostic::error(code::TYPE_MISMATCH, message).at(span, "no value");
-            return self.reject(error.help(format!("compare it: `.{} == Red`", part.text)));
+            return self.reject(error.help(format!("compare it: `.{} == {example}`", part.text)));
         }
         let Some(fact) = fact_of_named(&part.text) else {
+            if Fact::from_name(&format!("npc.{}", part.text)).is_some_and(|fact| fact.known() == Known::Near)
+            {
+                let error =
+                    Diagnostic::error(code::NOT_HERE, format!("`.{}` is not known of a name", part.text));
+                let help = format!("ask for `npc.{}` in a requirement `on` its body", part.text);
+                return self.reject(error.at(span, "watched of each road user near").help(help));
+            }
             let parts = parts_of_named().chain([THERE.0]);
             return self.reject(unknown("fact of a road user", &part.text, part.span, parts));
         };

@@ -268,8 +268,9 @@ impl Checker {
         if !knows {
             let error = Diagnostic::error(code::NOT_HERE, format!("`{}` is not known here", fact.name()));
             let who = match fact.known() {
-                Known::Road | Known::World | Known::Spawn | Known::Tick | Known::Near => {
-                    format!("{SEEN_BY} the moment")
+                Known::Road | Known::World | Known::Spawn => format!("{SEEN_BY} the moment"),
+                Known::Tick | Known::Near => {
+                    "only requirements see it: it is watched at every tick".to_owned()
                 }
                 Known::Step => "only rewards and verdicts see what happened in the step".to_owned(),
                 Known::Judgement => "only verdicts see how a collision was judged".to_owned(),
@@ -288,7 +289,7 @@ impl Checker {
         Some(Expr { kind, ty: Type::Bool, span })
     }
 
-    /// A body beside `hit` or `near`: of the engine, or of the author's own.
+    /// The bodies that a name beside `hit` or `near`: of the engine, or of the author's own.
     fn bodies_of(&mut self, word: &ast::Expr) -> Option<Vec<BodyWord>> {
         let name = self.name_of(word, "the name of a body")?;
         self.bodies_named(name, word.span)

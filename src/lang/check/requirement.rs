@@ -280,7 +280,7 @@ impl Checker {
             [ast::Arg { name: None, value }] => (Vec::new(), value),
             [ast::Arg { name: None, value: bodies }, ast::Arg { name: None, value }] => {
                 let named = match &bodies.kind {
-                    ast::ExprKind::List(items) => items.iter().collect(),
+                    ast::ExprKind::List(items) if !items.is_empty() => items.iter().collect(),
                     _ => vec![bodies],
                 };
                 let body = |named: &ast::Expr| match &named.kind {
@@ -300,6 +300,12 @@ impl Checker {
         };
         let place = Place { site: Site::RequirementOn, ..*place };
         let condition = self.typed(condition, &place, Type::Bool)?;
+        // The inner one would hide the road user of the outer one, and look at all of them for each.
+        if condition.any(|kind| matches!(kind, ExprKind::Near(..))) {
+            let error = Diagnostic::error(code::NOT_HERE, format!("`{name}` is not asked of each road user"));
+            return self
+                .reject(error.at(condition.span, "asks of them all").help("ask beside it, joined by `and`"));
+        }
         let ty = if word == NearWord::Some { Type::Bool } else { Type::Int };
         Some(Expr { kind: ExprKind::Near(word, bodies, Box::new(condition)), ty, span: call.span })
     }

@@ -75,7 +75,8 @@ pub struct RequirementMemory {
 struct Past {
     /// Whether enough is past to say something.
     is_known: bool,
-    /// Ticks up to now, and the last one that decides: at which it held (`recently`), or failed (`throughout`).
+    /// Ticks up to now, and the last one that decides: at which it held (`recently`), or failed (`throughout`). Of `total` and `times`
+    /// the ticks that count.
     ticks: u32,
     decided: Option<u32>,
     /// What is said of these ticks now, and by which margin: that of all but `margins`, which were not looked at yet. Of
@@ -88,7 +89,9 @@ struct Past {
     answers: VecDeque<Kept>,
     /// The numbers of these ticks; or for those at which the condition counts 1, and 0 for the others.
     numbers: VecDeque<f64>,
+    /// The sum of these, and those of the ones before them: of all older ones, and so on.
     sum: f64,
+    sums: Vec<f64>,
     /// The mean, or by how much the number changed, or the time or the number of times that it counts.
     number: f64,
     /// Whether the condition held at the tick before.
@@ -142,14 +145,21 @@ impl RequirementDef {
     pub fn ready(&self) -> ReadyRequirement {
         let mut pasts = Vec::new();
         let condition = Node::of(&self.condition, &mut pasts);
-        pasts.iter_mut().for_each(|node| node.is_awaited = true);
+        for node in &mut pasts {
+            node.is_awaited = true;
+            node.has_margin &= self.margin.is_some();
+        }
         let mut of = |expr: &Expr| Node::of(expr, &mut pasts);
+        let [when, until, after, unless] =
+            [&self.when, &self.until, &self.after, &self.unless].map(|part| part.as_ref().map(&mut of));
+        // Of the other parts nothing but their truth is asked.
+        pasts.iter_mut().filter(|node| !node.is_awaited).for_each(|node| node.has_margin = false);
         ReadyRequirement {
-            when: self.when.as_ref().map(&mut of),
-            until: self.until.as_ref().map(&mut of),
-            after: self.after.as_ref().map(&mut of),
+            when,
+            until,
+            after,
             condition,
-            unless: self.unless.as_ref().map(&mut of),
+            unless,
             has_margin: self.margin.is_some(),
             bearers: self.bearers.clone(),
             pasts,
@@ -258,9 +268,6 @@ impl ReadyRequirement {
         }
         self.next_pasts(memory, |_| false, of_ego, functions, facts);
         let RequirementMemory { pasts, is_latched, was, .. } = memory;
-        if pasts.iter().zip(&self.pasts).any(|(past, node)| node.is_awaited && !past.is_known) {
-            return None;
-        }
         let at = At { functions, facts, pasts };
         let holds = |node: &Option<Node>| node.as_ref().is_none_or(|node| at.holds(node));
         let is_asked = match &self.until {
@@ -274,6 +281,9 @@ impl ReadyRequirement {
         };
         let begins = began && is_asked;
         (*is_latched, *was) = (is_asked, is_now);
+        if pasts.iter().zip(&self.pasts).any(|(past, node)| node.is_awaited && !past.is_known) {
+            return None;
+        }
         let asks = if self.after.is_some() { begins || is_awaited } else { is_asked };
         asks.then(|| {
             if self.has_margin {
@@ -348,18 +358,24 @@ impl Past {
         }
     }
 
-    /// Takes the number of a tick, and finds the mean of the last ones.
+    /// Takes the number of a tick, and finds the mean of the last ones. They are only ever added up, so that nothing is left of
+    /// what is gone: the older ones are kept as their sums from each of them on, the latest to be popped first.
     fn average(&mut self, number: f64, ticks: u32) {
         self.numbers.push_back(number);
         self.sum += number;
-        if self.numbers.len() > ticks as usize {
-            self.sum -= self.numbers.pop_front().unwrap_or(0.0);
+        if self.numbers.len() + self.sums.len() > ticks as usize {
+            if self.sums.is_empty() {
+                let mut sum = 0.0;
+                while let Some(number) = self.numbers.pop_back() {
+                    sum += number;
+                    self.sums.push(sum);
+                }
+                self.sum = 0.0;
+            }
+            self.sums.pop();
         }
-        // A number without a value is forgotten with its tick.
-        if !self.sum.is_finite() {
-            self.sum = self.numbers.iter().sum();
-        }
-        self.number = self.sum / self.numbers.len() as f64;
+        let count = self.numbers.len() + self.sums.len();
+        self.number = (self.sums.last().copied().unwrap_or(0.0) + self.sum) / count as f64;
         self.is_known = true;
     }
 

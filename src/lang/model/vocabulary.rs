@@ -109,7 +109,7 @@ pub enum Known {
     Spawn,
     /// At every tick, where requirements are judged: what must be watched over time, or costs too much elsewhere.
     Tick,
-    /// The same of each road user near.
+    /// The same of a road user near: what is watched, or costs too much elsewhere.
     Near,
     /// After the step.
     Step,
@@ -268,8 +268,8 @@ facts! {
     NpcLeads "npc.leads" Type::Bool, Near = "A `Bool`: whether it is the road user that `ego.lead_gap` is about.";
     NpcLanesLeft "npc.lanes_left" Type::Int, Near = "A `Int`: how many lanes its middle is to the left of the ego vehicle's lane, below 0 to the right; 0 in the same one, 100 if it is in no lane beside the route.";
     NpcOffRoad "npc.off_road" LENGTH, Near = "A `Length`: from its middle to the nearest driving lane, at most 3 m; below 0 on one.";
-    NpcInNextJunction "npc.in_next_junction" Type::Bool, Near = "A `Bool`: whether a vehicle is in the junction that `ego.junction_ahead` is about.";
-    NpcSiren "npc.siren" Type::Bool, Near = "A `Bool`: whether it is an emergency vehicle under way, for which all others wait.";
+    NpcInNextJunction "npc.in_next_junction" Type::Bool, Spawn = "A `Bool`: whether a vehicle is in the junction that `ego.junction_ahead` is about.";
+    NpcSiren "npc.siren" Type::Bool, Spawn = "A `Bool`: whether it is an emergency vehicle under way, for which all others wait.";
     SpawnGap "spawn_gap" LENGTH, Spawn = "A `Length`: the gap from the ego vehicle to the road user that appears.";
     SafetyGap "safety_gap" LENGTH, Spawn = "A `Length`: the gap that a careful driver needs.";
     EgoLeadGap "ego.lead_gap" LENGTH, Tick = "A `Length`: to the next road user ahead in its way that does not come towards it; 1000 m if there is none nearer.";
@@ -366,7 +366,7 @@ word_facts! {
     EgoTurn "ego.turn" Turn, World = "Where the route goes at the junction that it is in, or at the next one: `ego.turn == Left`.";
     EgoCrosses "ego.crosses" Crossing, Tick = "To which side the ego vehicle crosses a line of its lane, from when its outline is over it until it is wholly in a lane again: `ego.crosses == Left`.";
     NpcLight "npc.light" Light, Spawn = "The next traffic light within 100 m on the way of a vehicle: `npc.light == Red`, `van.light == Green`.";
-    NpcTurn "npc.turn" Turn, Spawn = "Where a vehicle means to go at the junction that it is in, or at the next one: `npc.turn in [Left, Right]`.";
+    NpcTurn "npc.turn" Turn, Spawn = "Where a vehicle goes, by its way as it is laid now, at the junction that it is in, or at the next one: `npc.turn in [Left, Right]`.";
     NpcPriority "npc.priority" Priority, Spawn = "Which of it and the ego vehicle goes first, once one of them has come into the other's way: `npc.priority == other` is that it does.";
     Priority "priority" Priority, Step = "Whether the ego vehicle or the road user that was hit had to give way: `priority == ego`, `priority in [other, none]`.";
     Hit "hit" Body, Step = "What was hit: `hit == Pedestrian`; nothing if there was no collision.";

@@ -169,6 +169,7 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
         },
         ExprKind::OfRoadUser(_, fact) => fact_values(*fact, known),
         // While it is not there, it has no value: as after a division by 0, no comparison is certain.
+        ExprKind::OfBearer(_, fact) if fact_range(*fact).is_none() => Values::UNKNOWN_TRUTH,
         ExprKind::OfBearer(..) => Values::Number(Interval::ALL),
         ExprKind::IsThere(_) | ExprKind::Breached(_) => Values::UNKNOWN_TRUTH,
         // What is known of this moment says nothing of those before it.
@@ -190,6 +191,13 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
                     Values::Number(between(0.0, f64::from(COMMANDED_MAX + AMBIENT_MAX)))
                 }
                 (NearWord::Count, false) => Values::Number(Interval::point(Rational::ZERO)),
+            }
+        }
+        // At first neither has a value, and what has none does not hold.
+        ExprKind::Past(condition, PastWord::Throughout | PastWord::Ago, _) => {
+            match enclose(condition, &Known { case: None, ..*known }) {
+                number @ Values::Number(_) => number,
+                truth => Values::Truth { may_hold: truth.may_hold(), may_fail: true },
             }
         }
         ExprKind::Past(condition, ..) => enclose(condition, &Known { case: None, ..*known }),
@@ -369,6 +377,18 @@ fn compare_parts(op: Comparison, left: &Expr, right: &Expr, known: &Known<'_>) -
     if lacks_value(left, known) || lacks_value(right, known) {
         return Values::truth(op == Comparison::NotEqual);
     }
+    // What a number was, and by how much it changed, has no value at first.
+    let looks_back =
+        |expr: &Expr| expr.any(|kind| matches!(kind, ExprKind::Past(_, PastWord::Change | PastWord::Ago, _)));
+    let found = compare_known(op, left, right, known);
+    match looks_back(left) || looks_back(right) {
+        true => found.union(Values::truth(op == Comparison::NotEqual)),
+        false => found,
+    }
+}
+
+/// Compares what has a value.
+fn compare_known(op: Comparison, left: &Expr, right: &Expr, known: &Known<'_>) -> Values {
     let apart = compare(op, enclose(left, known), enclose(right, known));
     if !(apart.may_hold() && apart.may_fail()) {
         return apart;

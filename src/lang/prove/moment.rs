@@ -345,7 +345,9 @@ fn facts_named(conditions: &[&Expr]) -> (Vec<Fact>, Vec<WordFact>) {
     for condition in conditions {
         condition.walk(&mut |part| match part.kind {
             ExprKind::Fact(fact)
-                if matches!(fact.known(), From::World | From::Spawn) && !numbers.contains(&fact) =>
+                if matches!(fact.known(), From::World | From::Spawn)
+                    && fact.ty() != Type::Bool
+                    && !numbers.contains(&fact) =>
             {
                 numbers.push(fact);
             }

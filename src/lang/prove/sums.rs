@@ -2,6 +2,7 @@
 
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::rules::allowed;
+use crate::model::vocabulary::PastWord;
 use crate::model::{Interval, Type, effort};
 use crate::prove::enclose::{Known, Values, enclose};
 use avastra_base::units::Rational;
@@ -99,7 +100,8 @@ pub(super) fn is_same(left: &Expr, right: &Expr) -> bool {
 /// A quotient by 0 has no value, nor has a fact about a road user that is not there, nor an argument that is one of them.
 pub(super) fn may_lack_a_value(expr: &Expr, known: &Known<'_>) -> bool {
     expr.any(|kind| match kind {
-        ExprKind::Arithmetic(Arithmetic::Divide, ..) => true,
+        ExprKind::Arithmetic(Arithmetic::Divide, ..) | ExprKind::Margin(_) => true,
+        ExprKind::Past(_, PastWord::Change | PastWord::Ago, _) => true,
         ExprKind::Call(..) | ExprKind::OfRoadUser(..) | ExprKind::OfBearer(..) => true,
         ExprKind::Local(index) => known.locals.get(*index) == Some(&Values::Number(Interval::ALL)),
         _ => false,

@@ -256,14 +256,15 @@ fn facts(
         false if speed_mps > 0.0 => (between_m / speed_mps).min(TIME_S_MAX),
         false => TIME_S_MAX,
     };
-    let (_, ego_half_width_m) = around.ego_outline.half_extent_m(around.ego_forward, along);
+    // The ego vehicle is across the route where it is itself, which in a bend is another direction.
+    let (_, ego_along) = around.scene.route.path.along(around.ego_station_m);
+    let (_, ego_half_width_m) = around.ego_outline.half_extent_m(around.ego_forward, ego_along);
     let across_mps = along.perp(&obstacle.velocity_mps);
     // Where the ego vehicle's lane has ended, the route's is meant.
     let scene = around.scene;
     let strip = scene.strip(station_m, own_lane(around));
     let strip = strip.or_else(|| scene.strip(station_m, scene.route_lane_number(station_m)));
-    let (right_m, left_m) = strip.unwrap_or_default();
-    let (_, ego_along) = around.scene.route.path.along(around.ego_station_m);
+    let (right_m, left_m) = strip.expect("the route has a lane everywhere");
     let lengthwise = Closing {
         from_m: rear_m - ego_front_m,
         to_m: front_m - ego_rear_m,

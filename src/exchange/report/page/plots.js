@@ -5,13 +5,13 @@ import { figure } from "./words.js";
 const LEFT = 74;
 const RIGHT = 10;
 
-/** The rows of the plot: name, height in px, and how to draw it. */
+/** The rows of the plot: what they show, and their height in px. */
 const ROWS = [
-  ["speed", 62],
-  ["acceleration", 52],
-  ["ProC", 44],
-  ["reason", 30],
-  ["steps", 34],
+  { name: "speed", height: 62 },
+  { name: "acceleration", height: 52 },
+  { name: "ProC", height: 44 },
+  { name: "reason", height: 30 },
+  { name: "steps", height: 34 },
 ];
 
 export class Plots {
@@ -21,9 +21,9 @@ export class Plots {
     this.recording = recording;
     this.other = other;
     this.still = document.createElement("canvas");
-    const margins = recording.header.margins.map(({ requirement }) => [requirement, 44]);
+    const margins = recording.header.margins.map((margin) => ({ margin, height: 44 }));
     this.rows = [...ROWS.slice(0, 3), ...margins, ...ROWS.slice(3)];
-    element.style.height = `${this.rows.reduce((sum, [, height]) => sum + height + 8, 22)}px`;
+    element.style.height = `${this.rows.reduce((sum, { height }) => sum + height + 8, 22)}px`;
     const to = (event) => {
       const box = element.getBoundingClientRect();
       const share = (event.clientX - box.left - LEFT) / (box.width - LEFT - RIGHT);
@@ -80,25 +80,25 @@ export class Plots {
     canvas.context = this.still.getContext("2d");
     canvas.enterScreen();
     let top = 4;
-    for (const [name, height] of this.rows) {
-      this.#row(name, top, height);
-      top += height + 8;
+    for (const row of this.rows) {
+      this.#row(row, top);
+      top += row.height + 8;
     }
     this.#axis(top);
     canvas.context = onPage;
   }
 
-  #row(name, top, height) {
+  #row({ name, margin, height }, top) {
     const { context, colours } = this.canvas;
     context.font = "600 12px system-ui, sans-serif";
     context.fillStyle = colours.ink;
     context.textAlign = "left";
     context.textBaseline = "top";
-    const label = { speed: "Speed", acceleration: "Accel.", ProC: "ProC", reason: "Held by", steps: "Actions" }[name];
-    context.fillText(label ?? name, 2, top, LEFT - 6);
+    const labels = { speed: "Speed", acceleration: "Accel.", ProC: "ProC", reason: "Held by", steps: "Actions" };
+    context.fillText(margin ? margin.requirement : labels[name], 2, top, LEFT - 6);
     if (name === "reason") return this.#reasons(top, height);
     if (name === "steps") return this.#steps(top, height);
-    if (!label) return this.#margin(name, top, height);
+    if (margin) return this.#margin(margin, top, height);
     const [column, unit, factor] = {
       speed: ["speed_mps", "km/h", 3.6],
       acceleration: ["acceleration_mps2", "m/s²", 1],
@@ -145,15 +145,14 @@ export class Plots {
   }
 
   /** By how much a requirement was kept, where it was asked; below 0 it was not. Its breaches are shaded. */
-  #margin(name, top, height) {
+  #margin({ requirement, unit, parts }, top, height) {
     const { context, colours } = this.canvas;
     const { header, columns, tickS } = this.recording;
-    const { unit, parts } = header.margins.find(({ requirement }) => requirement === name);
     const all = parts.flatMap(([, column]) => Array.from(columns[column]));
-    const [low, high] = [Math.min(0, ...all.map((m) => Math.max(m, -100))), Math.max(0.1, median(all) * 2)];
+    const [low, high] = [all.reduce((least, m) => Math.min(least, Math.max(m, -100)), 0), Math.max(0.1, median(all) * 2)];
     const y = (margin) => top + height - ((Math.min(Math.max(margin, low), high) - low) / (high - low)) * height;
     context.fillStyle = `color-mix(in srgb, ${colours.danger} 25%, ${colours.paper})`;
-    for (const breach of header.summary.breaches.filter(({ requirement }) => requirement === name)) {
+    for (const breach of header.summary.breaches.filter((one) => one.requirement === requirement)) {
       const [left, right] = [this.#x(breach.at_s), this.#x(breach.until_s)];
       context.fillRect(left - 1, top, Math.max(right - left, 2), height);
     }
