@@ -6,7 +6,7 @@ use avastra_lang::model::Type;
 use avastra_lang::model::vocabulary::{
     BREACHED, BodyClass, CHANGE, CommandField, EpisodeField, Fact, KEPT, Known, MARGIN, RECURRENCE,
     ROAD_USER, RoadField, SINCE, ScenarioClaim, Site, SpaceClaim, SpawnField, StartField, StopReason, THERE,
-    WAIT, Word, parts_of, things,
+    WAIT, Word, parts_of, parts_of_named, things,
 };
 use avastra_lang::syntax::ast::{
     Action, ActionParam, Arm, BinaryOp, Call, Effect, EffectKind, Expr, ExprKind, Field, Initial, ItemKind,
@@ -491,17 +491,7 @@ impl<'a> Place<'a> {
                 };
                 let parts = match things().contains(&name) {
                     true => parts_of(name).into_iter().filter(|(part, _)| is_here(part)).collect(),
-                    false if is_named => {
-                        let of_named = |part: &str| {
-                            Fact::from_name(&format!("npc.{part}"))
-                                .is_none_or(|fact| fact.known() == Known::Spawn)
-                        };
-                        parts_of("npc")
-                            .into_iter()
-                            .filter(|(part, _)| of_named(part))
-                            .chain([THERE])
-                            .collect()
-                    }
+                    false if is_named => parts_of_named().into_iter().chain([THERE]).collect(),
                     false if self.declared(Symbol::Requirement, name).is_some() => match self.about {
                         About::Facts(Site::Reward) => vec![BREACHED, MARGIN],
                         About::Facts(_) => vec![BREACHED],

@@ -181,7 +181,7 @@ fn series_asked(gaps: &BTreeMap<u32, Margins>, jerks: &Margins, name: &str) -> B
 fn what_is_asked_of_each_road_user_near_is_asked_of_each_by_itself() {
     let run = run_against("idm", space_at("tests/cases/spaces/requirements_near.ava"), 10, 5, &[]);
     let space = run.space().clone();
-    let (mut found, mut lately, mut asked_in) = ([0; 3], 0, [0.0; 6]);
+    let (mut found, mut lately, mut asked_in, mut began) = ([0; 3], 0, [0.0; 6], 0);
     for number in 0..run.episodes() {
         let log = run.episode(number);
         let script = avastra::episode::Script::of_log(&log);
@@ -287,7 +287,9 @@ fn what_is_asked_of_each_road_user_near_is_asked_of_each_by_itself() {
             assert_eq!(ticks_of(name), (1..=50).collect(), "{name} in episode {number}");
         }
         for name in ["begins_once", "after_once"] {
-            assert!(ticks_of(name).into_iter().all(|tick| tick == 1), "{name} in episode {number}");
+            let ticks = ticks_of(name);
+            assert!(ticks.iter().all(|tick| *tick == 1), "{name} in episode {number}");
+            began += ticks.len();
         }
         let smallest = |name: &str| {
             let is_of = |one: &&avastra::episode::Margin| space.requirements[one.requirement].name == name;
@@ -309,6 +311,7 @@ fn what_is_asked_of_each_road_user_near_is_asked_of_each_by_itself() {
     }
     assert!(found.iter().all(|count| *count > 3) && lately > 3, "{found:?}, {lately}");
     assert!(asked_in.iter().all(|asked_s| *asked_s > 5.0), "{asked_in:?}");
+    assert!(began > 3, "{began}");
 }
 
 #[test]

@@ -79,13 +79,13 @@ pub(super) struct Monitor {
 #[derive(Debug, Clone)]
 struct Watch {
     required: Arc<Required>,
-    /// About the ego vehicle alone, or about each of the road users near.
+    /// About the ego vehicle alone, or about each of the road users near; then the first remembers what is the same for all.
     ego: Stretch,
     each: Vec<Stretch>,
-    /// The smallest margin of the steps that are over, if rewards ask for that of each; and of the road users of this one that
-    /// are gone.
-    smallest: Option<f64>,
-    over: Option<f64>,
+    /// The smallest margin of the steps before this one, if rewards ask for that of each step.
+    of_steps: Option<f64>,
+    /// That of the road users that are gone: since the step began, if rewards ask, else since the episode did.
+    of_gone: Option<f64>,
     /// Ticks in which it was asked.
     asked: u32,
 }
@@ -98,12 +98,29 @@ struct Required {
     within_ticks: u32,
     on: Vec<BodyWord>,
     ready: ReadyRequirement,
-    /// Whether it looks at ticks before, of road users as a whole or of the ego vehicle; and whether it has an `after`.
+    /// Whether it looks at ticks before, whether some of that is the same for all road users, and whether it has an `after`.
     remembers: bool,
     remembers_of_ego: bool,
     is_response: bool,
     /// Whether rewards ask for its margin of each step.
     is_paid: bool,
+}
+
+impl Required {
+    fn new(index: usize, requirement: &RequirementDef, is_paid: bool) -> Required {
+        let RequirementDef { within_ticks, ref on, ref after, .. } = *requirement;
+        let ready = requirement.ready();
+        Required {
+            index,
+            within_ticks,
+            on: on.clone(),
+            remembers: ready.remembers(),
+            remembers_of_ego: !on.is_empty() && ready.remembers_of_ego(),
+            is_response: after.is_some(),
+            is_paid,
+            ready,
+        }
+    }
 }
 
 /// A requirement, of one road user or of none.
@@ -140,27 +157,13 @@ impl Monitor {
         let paid = setup.table.space().margins_paid();
         let watch = |index: usize| {
             let requirement = &setup.table.space().requirements[index];
-            let RequirementDef { within_ticks, ref on, .. } = *requirement;
-            let ready = requirement.ready();
-            let (remembers, is_response) = (ready.remembers(), requirement.after.is_some());
-            let remembers_of_ego = !on.is_empty() && ready.remembers_of_ego();
-            let (on, is_paid) = (on.clone(), paid >> index & 1 == 1);
-            let required = Required {
-                index,
-                within_ticks,
-                on,
-                ready,
-                remembers,
-                remembers_of_ego,
-                is_response,
-                is_paid,
-            };
+            let required = Required::new(index, requirement, paid >> index & 1 == 1);
             Watch {
                 required: Arc::new(required),
                 ego: Stretch::default(),
                 each: Vec::new(),
-                smallest: None,
-                over: None,
+                of_steps: None,
+                of_gone: None,
                 asked: 0,
             }
         };
@@ -292,10 +295,10 @@ impl Monitor {
     /// Ends a step. Of each requirement its smallest margin, if rewards ask for it; else NaN.
     pub fn end_step(&mut self) -> &[f64] {
         for watch in self.watches.iter_mut().filter(|watch| watch.required.is_paid) {
-            let over = core::mem::take(&mut watch.over);
+            let of_gone = watch.of_gone.take();
             let stretches = watch.each.iter_mut().chain([&mut watch.ego]);
-            let smallest = stretches.map(|stretch| stretch.tally.smallest.take()).fold(over, smaller);
-            watch.smallest = smaller(watch.smallest, smallest);
+            let smallest = stretches.map(|stretch| stretch.tally.smallest.take()).fold(of_gone, smaller);
+            watch.of_steps = smaller(watch.of_steps, smallest);
             let is_known = smallest.filter(|smallest| smallest.is_finite());
             self.of_step[watch.required.index] = is_known.unwrap_or(f64::NAN);
         }
@@ -306,8 +309,8 @@ impl Monitor {
     pub fn found(self) -> (Vec<Breach>, Vec<Margin>) {
         let margin = |watch: &Watch| {
             let all = watch.each.iter().chain([&watch.ego]);
-            let over = smaller(watch.smallest, watch.over);
-            let smallest = all.map(|stretch| stretch.tally.smallest).fold(over, smaller);
+            let past = smaller(watch.of_steps, watch.of_gone);
+            let smallest = all.map(|stretch| stretch.tally.smallest).fold(past, smaller);
             // Where nobody was near, `some` was as far as can be from holding, and `not some` from failing.
             let smallest = smallest.filter(|smallest| smallest.is_finite());
             Margin { requirement: watch.required.index, smallest, asked_s: f64::from(watch.asked) * DT_S }
@@ -359,7 +362,7 @@ impl Watch {
         let mut asked: Vec<(u32, NpcFacts)> =
             near.iter().filter(is_meant).map(|near| (near.id, near.npc)).collect();
         // Who is no longer near is asked nothing, and begins anew if it comes back.
-        let over = &mut self.over;
+        let of_gone = &mut self.of_gone;
         self.each.retain(|stretch| {
             let id = stretch.obstacle.expect("each is about a road user");
             let is_awaited = !stretch.tally.begun.is_empty();
@@ -368,7 +371,7 @@ impl Watch {
             asked.extend(far.map(|npc| (id, npc)));
             let stays = is_near || far.is_some();
             if !stays {
-                *over = smaller(*over, stretch.tally.smallest);
+                *of_gone = smaller(*of_gone, stretch.tally.smallest);
             }
             stays
         });
@@ -870,20 +873,7 @@ mod tests {
                 let trace: Vec<(f64, f64)> = (0..40)
                     .map(|_| (f64::from(below(&mut rng, 60)) / 3.0, f64::from(below(&mut rng, 60)) / 3.0))
                     .collect();
-                let within_ticks = requirement.within_ticks;
-                let (ready, is_response) = (requirement.ready(), requirement.after.is_some());
-                let (on, remembers) = (Vec::new(), ready.remembers());
-                let (is_paid, remembers_of_ego) = (false, false);
-                let required = Required {
-                    index,
-                    within_ticks,
-                    on,
-                    ready,
-                    remembers,
-                    remembers_of_ego,
-                    is_response,
-                    is_paid,
-                };
+                let required = Required::new(index, requirement, false);
                 let (mut stretch, mut breaches) = (Stretch::default(), Vec::new());
                 for (tick, (wanted, is_breached)) in one.answers(&trace).into_iter().enumerate() {
                     let mut world = WorldFacts::default();

@@ -11,7 +11,7 @@ use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind, Who};
 use crate::model::vocabulary::{
     BEGINS, Fact, Known, NearWord, PastWord, ROAD_LANES, SINCE, Site, THERE, Word, WordFact, parts_of,
-    thing_of, things,
+    parts_of_named, thing_of, things,
 };
 use crate::model::{EnumIndex, STATE_MAX, StateDef, Type, code};
 use crate::syntax::ast::{Span, UnaryOp};
@@ -46,12 +46,6 @@ impl Place<'_> {
 /// A fact of a road user that is named, or told by its number. Some are watched for requirements `on` bodies alone.
 fn fact_of_named(part: &str) -> Option<Fact> {
     Fact::from_name(&format!("npc.{part}")).filter(|fact| fact.known() == Known::Spawn)
-}
-
-fn parts_of_named() -> impl Iterator<Item = &'static str> {
-    parts_of("npc").into_iter().map(|(part, _)| part).filter(|part| {
-        Fact::from_name(&format!("npc.{part}")).is_none_or(|fact| fact.known() == Known::Spawn)
-    })
 }
 
 /// Most enums that the error about an ambiguous variant names.
@@ -374,7 +368,7 @@ impl Checker {
         {
             return self.part_of_bearer(who, part, place, span);
         }
-        if let Some(found) = self.breached(base, part, place, span) {
+        if let Some(found) = self.part_of_requirement(base, part, place, span) {
             return found;
         }
         self.note_part(base, part);
@@ -437,7 +431,12 @@ impl Checker {
             return self.reject(error.help("road users are `npc#1`, `npc#2` and so on, as they appear"));
         };
         let Some(fact) = fact_of_named(&part.text) else {
-            return self.reject(unknown("npc fact", &part.text, part.span, parts_of_named()));
+            return self.reject(unknown(
+                "npc fact",
+                &part.text,
+                part.span,
+                parts_of_named().into_iter().map(|(part, _)| part),
+            ));
         };
         self.references.note(part.span, Symbol::Engine(fact.name(), fact.meaning()), false);
         Some(Expr { kind: ExprKind::OfRoadUser(id, fact), ty: fact.ty(), span })
@@ -469,7 +468,7 @@ impl Checker {
                 let help = format!("ask for `npc.{}` in a requirement `on` its body", part.text);
                 return self.reject(error.at(span, "watched of each road user near").help(help));
             }
-            let parts = parts_of_named().chain([THERE.0]);
+            let parts = parts_of_named().into_iter().map(|(part, _)| part).chain([THERE.0]);
             return self.reject(unknown("fact of a road user", &part.text, part.span, parts));
         };
         self.references.note(part.span, Symbol::Engine(fact.name(), fact.meaning()), false);

@@ -49,6 +49,9 @@ impl Names {
     }
 }
 
+/// The most names that an error lists: as many as all bodies and their classes, with a few of the author's own.
+const LISTED_MAX: usize = 16;
+
 /// The diagnostic for a name that is not declared, with the most similar candidate or a short list of them.
 pub(crate) fn unknown<'a>(
     kind: &str,
@@ -68,7 +71,7 @@ pub(crate) fn unknown<'a>(
     match nearest(name, candidates.iter().copied()) {
         Some(near) => error.meant(span, near),
         // All facts, because whoever asks for one that is missing needs to know what there is.
-        None if !candidates.is_empty() && (candidates.len() <= 16 || kind.ends_with(" fact")) => {
+        None if !candidates.is_empty() && (candidates.len() <= LISTED_MAX || kind.ends_with(" fact")) => {
             error.help(format!("there is {}", listed(&candidates)))
         }
         None => error,

@@ -135,7 +135,7 @@ impl Checker {
     }
 
     /// `stops_at_red.breached` in a reward or verdict, `stops_at_red.margin` in a reward; `None` if this is no requirement.
-    pub(super) fn breached(
+    pub(super) fn part_of_requirement(
         &mut self,
         base: &ast::Expr,
         part: &ast::Name,
@@ -244,7 +244,7 @@ impl Checker {
         Some(Expr { kind: ExprKind::Past(Box::new(of), word, ticks?), ty, span: call.span })
     }
 
-    /// `begins(ego.light == Red)`: it did so once in the last tick.
+    /// `begins(ego.light == Red)`: as `times(ego.light == Red, 20 ms) == 1`.
     pub(super) fn begins(&mut self, call: &ast::Call, place: &Place<'_>) -> Option<Expr> {
         self.references.note(call.name.span, Symbol::Engine(BEGINS.0, BEGINS.1), false);
         if !place.site.is_requirement() {

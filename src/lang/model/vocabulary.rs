@@ -402,6 +402,14 @@ pub fn parts_of(thing: &str) -> Vec<(&'static str, &'static str)> {
     parts.filter(|((of, _), _)| *of == thing).map(|((_, part), meaning)| (part, meaning)).collect()
 }
 
+/// The facts of a road user that is named, or told by its number, each with its sentence: without those that are watched of each
+/// one near alone.
+pub fn parts_of_named() -> Vec<(&'static str, &'static str)> {
+    let is_watched =
+        |part: &str| Fact::from_name(&format!("npc.{part}")).is_some_and(|fact| fact.known() == Known::Near);
+    parts_of("npc").into_iter().filter(|(part, _)| !is_watched(part)).collect()
+}
+
 words! {
     EpisodeField "A setting of `episode`.":
     Roads "roads" = "The roads on which episodes are driven, in this order: `roads: [corner, boulevard]`.",

@@ -162,7 +162,7 @@ impl Scene {
             return number;
         }
         let side = if offset_m > left_m { 1 } else { -1 };
-        // Between two lanes it is in the one that it comes from.
+        // In the gap between two lanes the one nearer to the route counts; beyond all of them, the outermost.
         while let Some((right_m, left_m)) = self.strip(station_m, number + side) {
             let is_beyond = if side > 0 { offset_m > right_m } else { offset_m < left_m };
             if !is_beyond {

@@ -157,13 +157,16 @@ impl Watched {
             let (right_m, left_m) = strip.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
             (offset_m < right_m, offset_m > left_m)
         });
-        let now = match () {
-            () if is_in_junction => Crossing::None,
-            () if beside.iter().any(|(_, is_left)| *is_left) => Crossing::Left,
-            () if beside.iter().any(|(is_right, _)| *is_right) => Crossing::Right,
-            () => Crossing::None,
+        let now = if is_in_junction {
+            Crossing::None
+        } else if beside.iter().any(|(_, is_left)| *is_left) {
+            Crossing::Left
+        } else if beside.iter().any(|(is_right, _)| *is_right) {
+            Crossing::Right
+        } else {
+            Crossing::None
         };
-        // Half way over, the lane is another one, of which the other line is crossed.
+        // Once the rear axle is in the next lane, the same line lies on the other side: the first side stays.
         let goes_on = now != Crossing::None && self.crosses != Crossing::None;
         self.crosses = if goes_on { self.crosses } else { now };
         self.crosses
@@ -264,34 +267,32 @@ fn ego_half_width_m(around: &Around, along: Vec2) -> f64 {
     around.ego_outline.half_extent_m(around.ego_forward, along).1
 }
 
-/// How far the ego vehicle's front is beyond the first of these lines that its rear has not passed, m; below 0 the way to it.
-fn over_m(around: &Around, lines: impl Iterator<Item = f64>) -> f64 {
+/// How far the ego vehicle's front is beyond the beginning of the first of these stretches of the route whose end its rear has not
+/// passed, m; below 0 the way to it.
+fn over_m(around: &Around, stretches: impl Iterator<Item = (f64, f64)>) -> f64 {
     let ego = VehicleParameters::MKZ;
     let (front_m, rear_m) = (ego.front_m(around.ego_station_m), ego.rear_m(around.ego_station_m));
-    let next = { lines }.find(|line_m| rear_m < *line_m);
-    next.map_or(FAR_M, |line_m| (front_m - line_m).max(FAR_M))
+    let next = { stretches }.find(|(_, end_m)| rear_m < *end_m);
+    next.map_or(FAR_M, |(begin_m, _)| (front_m - begin_m).max(FAR_M))
 }
 
 /// Of the lines of stop signs.
 fn over_stop_m(around: &Around) -> f64 {
     let lines = around.scene.route.sign_lines.iter().filter(|line| line.kind == SignKind::Stop);
-    over_m(around, lines.map(|line| line.station_m))
+    over_m(around, lines.map(|line| (line.station_m, line.station_m)))
 }
 
 /// Of the stop lines of lights.
 fn over_line_m(around: &Around) -> f64 {
-    over_m(around, around.scene.route.stop_lines.iter().map(|line| line.station_m))
+    over_m(around, around.scene.route.stop_lines.iter().map(|line| (line.station_m, line.station_m)))
 }
 
-/// The same of a crosswalk, until the rear has passed its far edge.
+/// Of crosswalks, from edge to edge.
 fn over_crosswalk_m(around: &Around) -> f64 {
-    let ego = VehicleParameters::MKZ;
-    let (front_m, rear_m) = (ego.front_m(around.ego_station_m), ego.rear_m(around.ego_station_m));
-    let next = around.scene.route.crosswalks_m.iter().find(|(_, end_m)| rear_m < *end_m);
-    next.map_or(FAR_M, |(begin_m, _)| (front_m - begin_m).max(FAR_M))
+    over_m(around, around.scene.route.crosswalks_m.iter().copied())
 }
 
-/// The number of the lane that holds the ego vehicle's rear axle.
+/// The number of the lane that holds the ego vehicle's rear axle; beyond all lanes, of the outermost one.
 pub(super) fn own_lane(around: &Around) -> i32 {
     around.scene.lane_number(around.ego_station_m, around.ego_offset_m)
 }
