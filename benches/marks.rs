@@ -139,6 +139,7 @@ fn crowded(scene: &Arc<Scene>) -> World {
                     waits_s: None,
                     siren: false,
                     turn: None,
+                    trajectory: None,
                     bearer: None,
                     own: None,
                     cover_own: None,

@@ -106,6 +106,9 @@ impl List<'_> {
             Kind::Groups => self.symbols(ProposalKind::Module, |symbol| matches!(symbol, Symbol::Group(_))),
             Kind::States => self.symbols(ProposalKind::Variable, |symbol| matches!(symbol, Symbol::State(_))),
             Kind::Roads => self.symbols(ProposalKind::Module, |symbol| matches!(symbol, Symbol::Road(_))),
+            Kind::Trajectories => {
+                self.symbols(ProposalKind::Module, |symbol| matches!(symbol, Symbol::Trajectory(_)));
+            }
             Kind::Manoeuvres => {
                 self.symbols(ProposalKind::Function, |symbol| matches!(symbol, Symbol::Manoeuvre(_)))
             }

@@ -4,9 +4,9 @@
 use avastra_lang::check::{Declaration, References, Symbol};
 use avastra_lang::model::Type;
 use avastra_lang::model::vocabulary::{
-    BREACHED, BodyClass, CHANGE, CommandField, EpisodeField, Fact, KEPT, Known, MARGIN, RECURRENCE,
-    ROAD_USER, RoadField, SINCE, ScenarioClaim, Site, SpaceClaim, SpawnField, StartField, StopReason, THERE,
-    WAIT, Word, parts_of, parts_of_named, things,
+    BREACHED, BodyClass, CHANGE, CommandField, EpisodeField, Fact, KEPT, Known, MARGIN, PointField,
+    RECURRENCE, ROAD_USER, RoadField, SINCE, ScenarioClaim, Site, SpaceClaim, SpawnField, StartField,
+    StopReason, THERE, TrajectoryField, WAIT, Word, parts_of, parts_of_named, things,
 };
 use avastra_lang::syntax::ast::{
     Action, ActionParam, Arm, BinaryOp, Call, Effect, EffectKind, Expr, ExprKind, Field, Initial, ItemKind,
@@ -30,6 +30,7 @@ pub enum Kind {
     Units,
     Actions,
     Groups,
+    Trajectories,
     Manoeuvres,
     /// Names that spawns give.
     RoadUsers,
@@ -103,6 +104,7 @@ fn replaceable(item: &ItemKind) -> Vec<Kind> {
         ItemKind::Group(_) => vec![Kind::Groups],
         ItemKind::Rule(_) => vec![Kind::Rules],
         ItemKind::Require(_) => vec![Kind::Requirements],
+        ItemKind::Trajectory(_) => vec![Kind::Trajectories],
         ItemKind::Road(_) => vec![Kind::Roads],
         ItemKind::Verdict(_) => vec![Kind::Verdicts],
         _ => Vec::new(),
@@ -216,6 +218,7 @@ impl<'a> Place<'a> {
             ItemKind::EachStep(effects) => self.in_effects(effects),
             ItemKind::Rule(of) => self.in_rule(of),
             ItemKind::Body(of) => self.units(&of.fields),
+            ItemKind::Trajectory(of) => self.in_trajectory(&of.fields),
             ItemKind::Road(of) => self.in_road(&of.fields),
             ItemKind::Episode(fields) => self.in_episode(fields),
             ItemKind::Reward(cases) => cases.iter().find_map(|case| {
@@ -278,10 +281,11 @@ impl<'a> Place<'a> {
                 false => self.in_command(field),
             }),
             EffectKind::Spawn { of: Some(of), .. } if is_here(of) => Some(self.road_users()),
-            EffectKind::Spawn { body, distance, apart, cover, fields, .. } => {
+            EffectKind::Spawn { body, place, distance, apart, cover, fields, .. } => {
                 let mut bodies = [Some(body), cover.as_deref()].into_iter().flatten();
                 bodies
                     .find_map(|body| self.word_or_value(Kind::Bodies, body, None))
+                    .or_else(|| self.word_or_value(Kind::Trajectories, place.trajectory()?, None))
                     .or_else(|| self.within(distance, None, None))
                     .or_else(|| self.within(apart.as_deref()?, None, None))
                     .or_else(|| self.in_spawn(fields))
@@ -370,6 +374,28 @@ impl<'a> Place<'a> {
                 _ => None,
             })
             .or_else(|| self.units(fields))
+    }
+
+    fn in_trajectory(&self, fields: &[Field]) -> Option<Vec<Kind>> {
+        let in_point = |point: &Expr| match &point.kind {
+            ExprKind::Name(name) if name == HERE => Some(vec![Kind::Keyword("lane")]),
+            ExprKind::Record(fields) => fields.iter().find_map(|field| match &field.value.kind {
+                _ if is_here(&field.name) => Some(unused::<PointField>(fields)),
+                ExprKind::Name(name) if name == HERE && field.name.text == PointField::At.name() => {
+                    Some(vec![Kind::Keyword("lane")])
+                }
+                _ => self.units(core::slice::from_ref(field)),
+            }),
+            _ => None,
+        };
+        fields.iter().find_map(|field| match &field.value.kind {
+            _ if is_here(&field.name) => Some(unused::<TrajectoryField>(fields)),
+            ExprKind::Name(name) if name == HERE && field.name.text == TrajectoryField::Road.name() => {
+                Some(vec![Kind::Roads])
+            }
+            ExprKind::List(points) => points.iter().find_map(in_point),
+            _ => None,
+        })
     }
 
     fn in_episode(&self, fields: &[Field]) -> Option<Vec<Kind>> {

@@ -58,7 +58,11 @@ fn kind(symbol: &Symbol) -> Option<NameKind> {
         Symbol::Function(_) | Symbol::Manoeuvre(_) => NameKind::Function,
         Symbol::Argument(..) | Symbol::Given(..) | Symbol::Parameter(..) => NameKind::Parameter,
         Symbol::Action(_) => NameKind::Action,
-        Symbol::Group(_) | Symbol::Road(_) | Symbol::Scenario(_) | Symbol::Policy(_) => NameKind::Namespace,
+        Symbol::Group(_)
+        | Symbol::Trajectory(_)
+        | Symbol::Road(_)
+        | Symbol::Scenario(_)
+        | Symbol::Policy(_) => NameKind::Namespace,
         Symbol::Rule(_) | Symbol::Requirement(_) | Symbol::Verdict(_) | Symbol::Engine(..) => {
             NameKind::Property
         }

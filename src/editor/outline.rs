@@ -61,9 +61,11 @@ fn kind(item: &Item) -> Option<OutlineKind> {
         ItemKind::Fn(_) | ItemKind::Manoeuvre(_) => OutlineKind::Function,
         ItemKind::Action(_) | ItemKind::Also(_) | ItemKind::EachStep(_) => OutlineKind::Action,
         ItemKind::Rule(_) | ItemKind::Require(_) | ItemKind::Verdict(_) => OutlineKind::Rule,
-        ItemKind::Body(_) | ItemKind::Road(_) | ItemKind::Episode(_) | ItemKind::Reward(_) => {
-            OutlineKind::Block
-        }
+        ItemKind::Body(_)
+        | ItemKind::Trajectory(_)
+        | ItemKind::Road(_)
+        | ItemKind::Episode(_)
+        | ItemKind::Reward(_) => OutlineKind::Block,
         ItemKind::Scenario(_) | ItemKind::Policy(_) => OutlineKind::Module,
     })
 }

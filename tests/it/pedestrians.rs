@@ -36,6 +36,7 @@ fn walks_ahead(side: Side, distance_m: f64, speed_mps: f64, cover: Option<Body>)
         waits_s: None,
         siren: false,
         turn: None,
+        trajectory: None,
         bearer: None,
     }
 }

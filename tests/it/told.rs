@@ -7,7 +7,7 @@ use avastra::model::NpcFacts;
 use avastra::sim::{DT_S, World};
 
 use crate::wishes::{number, row, wish};
-use crate::world::{assert_replays, loaded, run_of};
+use crate::world::{assert_replays, loaded, run_of, space_at};
 
 /// What was seen at a tick of an episode, before the ego vehicle touched anybody.
 struct Tick {
@@ -326,4 +326,32 @@ fn a_drawn_road_user_is_one_that_the_rules_allow() {
         }
     }
     assert!(ordered > 4, "{ordered} orders");
+}
+
+#[test]
+fn who_follows_a_trajectory_goes_on_along_it_and_replays() {
+    let run = run_of(space_at("tests/cases/spaces/trajectory.ava"), 3, 4, &[]);
+    let table = run.table();
+    for episode in 0..run.episodes() {
+        let wanted = episode as usize % table.rows().len();
+        let mut drawn = false;
+        let mut choose = |moment: &Moment| match table.offer(moment.situation, wanted) {
+            Ok(draw) if !drawn => {
+                drawn = true;
+                Choice::Act(draw)
+            }
+            _ => Choice::Pass,
+        };
+        let (mut stations_m, mut fastest_mps) = (Vec::new(), 0.0_f64);
+        let log = run.play(episode, &mut choose, &mut |world, _, _| {
+            if let Some(npc) = world.npc_facts(1) {
+                stations_m.push(npc.station_m);
+                fastest_mps = fastest_mps.max(npc.speed_mps);
+            }
+        });
+        assert!(stations_m.windows(2).all(|pair| pair[0] <= pair[1]), "it goes on");
+        assert!(stations_m.last() > stations_m.first(), "row {wanted} moves");
+        assert!((0.5..7.0).contains(&fastest_mps), "{fastest_mps}");
+        assert_replays(&run, episode, &log);
+    }
 }

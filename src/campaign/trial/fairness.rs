@@ -33,7 +33,7 @@ pub(super) fn complaint(world: &World, request: &SpawnRequest, id: u32) -> Optio
         Verb::DriveAhead => stopping_m(ego_mps - along_mps.max(0.0)),
         Verb::WalkAhead | Verb::WalkOpposite => stopping_m(ego_mps - along_mps),
         Verb::CrossRoad | Verb::Walk | Verb::Stand => stopping_m(ego_mps),
-        Verb::Overtake | Verb::DriveBehind | Verb::DriveOpposite => 0.0,
+        Verb::Overtake | Verb::DriveBehind | Verb::DriveOpposite | Verb::Follow => 0.0,
     };
     if newcomer.distance_m + SLACK_M < zone_m {
         return Some(format!(

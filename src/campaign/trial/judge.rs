@@ -86,7 +86,9 @@ pub(super) fn appears(scene: &Scene, request: &SpawnRequest, seen: &Sighting) ->
         | Verb::Walk
         | Verb::Stand
         | Verb::WalkAhead
-        | Verb::WalkOpposite => Ok(()),
+        | Verb::WalkOpposite
+        // The world places it where its trajectory says.
+        | Verb::Follow => Ok(()),
     }
 }
 
@@ -108,6 +110,7 @@ pub(super) fn verdict(
         Verb::Walk => walks(request, seen),
         Verb::Stand => stands(seen),
         Verb::WalkAhead | Verb::WalkOpposite => walks_along(request, seen),
+        Verb::Follow => Ok(()),
         Verb::DriveAhead => {
             drives()?;
             appears_ahead(scene, request, first)?;

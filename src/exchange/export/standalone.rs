@@ -11,8 +11,10 @@ use avastra_campaign::emit::{identifier, lane_point, quoted};
 use avastra_campaign::episode::{EpisodeLog, Outcome};
 use avastra_lang::model::body::parameters;
 use avastra_lang::model::command::{Command, IgnoredRules};
-use avastra_lang::model::vocabulary::{Body, Phenomenon, Verb, Word};
-use avastra_lang::model::{BodyDef, Memory, Road, SPAWN_SPEED_MPS, Scenario, Space, ticks_s};
+use avastra_lang::model::vocabulary::{Body, Phenomenon, TrajectoryField, Verb, Word};
+use avastra_lang::model::{BodyDef, Memory, Road, SPAWN_SPEED_MPS, Scenario, Space, TrajectoryDef, ticks_s};
+use avastra_lang::syntax::ast::{ExprKind, Field, ItemKind};
+use avastra_lang::syntax::print_item;
 use avastra_world::action::{Effect, OrderRequest, SpawnRequest};
 
 /// The scenario in an exported file.
@@ -60,6 +62,9 @@ pub fn standalone(space: &Space, scenario: &Scenario, log: &EpisodeLog) -> Optio
     for body in actions.bodies.values() {
         let _ = write!(text, " {}", body_text(body));
     }
+    for trajectory in actions.trajectories.values() {
+        let _ = write!(text, " {}", trajectory_text(trajectory, &road_name));
+    }
     text += &actions.text();
     let episode = &space.episode;
     let stalled = episode.stalled_steps.map(|steps| format!("stalled >= {steps}"));
@@ -93,6 +98,8 @@ struct Actions<'a> {
     effects: Vec<String>,
     /// The author's own bodies that they let appear, by their index in the space.
     bodies: BTreeMap<usize, &'a BodyDef>,
+    /// The trajectories that they follow, likewise.
+    trajectories: BTreeMap<usize, &'a TrajectoryDef>,
 }
 
 impl<'a> Actions<'a> {
@@ -138,7 +145,14 @@ impl<'a> Actions<'a> {
         let cover = request.cover.map(|cover| name(cover, request.cover_own.map(|own| own.index)));
         let cover = cover.map_or_else(String::new, |cover| format!(" from behind {cover}"));
         let name = request.bearer.map_or_else(String::new, |who| format!(" as {}", space.bearers[who]));
-        let direction = if request.verb.begins_behind() { "behind" } else { "ahead" };
+        let place = match request.trajectory.map(|index| (index, &space.trajectories[index])) {
+            Some((index, trajectory)) => {
+                self.trajectories.insert(index, trajectory);
+                format!("on {} at", trajectory.name)
+            }
+            None if request.verb.begins_behind() => "behind".to_owned(),
+            None => "ahead".to_owned(),
+        };
         let mut fields = vec![format!("does: {}", request.verb.name())];
         if matches!(request.verb, Verb::DriveAhead | Verb::DriveBehind | Verb::Overtake) {
             fields.push(format!("lane: {}", request.lane.name()));
@@ -146,7 +160,7 @@ impl<'a> Actions<'a> {
         if matches!(request.verb, Verb::CrossRoad | Verb::Walk) {
             fields.push(format!("side: {}", request.side.name()));
         }
-        if request.body.is_vehicle() {
+        if request.body.is_vehicle() && request.verb != Verb::Follow {
             fields.push(format!("then: {}", request.then.name()));
         }
         if request.verb != Verb::Stand {
@@ -172,7 +186,7 @@ impl<'a> Actions<'a> {
         }
         fields.push(format!("colour: {}", request.colour.name()));
         let distance = decimal(request.distance_m, false);
-        format!("spawn {body}{name} {direction} {distance} m{cover} {{ {} }}", fields.join(", "))
+        format!("spawn {body}{name} {place} {distance} m{cover} {{ {} }}", fields.join(", "))
     }
 
     /// Their declarations. A space has at least one action.
@@ -220,6 +234,17 @@ fn road_text(road: &Road, name: &str) -> Option<String> {
     }
     text += " }";
     Some(text)
+}
+
+/// A trajectory on the map of the text's one road.
+fn trajectory_text(trajectory: &TrajectoryDef, road: &str) -> String {
+    let mut declared = trajectory.declared.clone();
+    let is_road = |field: &&mut Field| field.name.text == TrajectoryField::Road.name();
+    for field in declared.fields.iter_mut().filter(is_road) {
+        field.value.kind = ExprKind::Name(road.to_owned());
+    }
+    let text = print_item(&ItemKind::Trajectory(declared));
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 fn body_text(body: &BodyDef) -> String {
@@ -291,6 +316,8 @@ fn command_fields(command: &Command) -> String {
         keep_s,
         early_s,
         at_m,
+        reach_m,
+        steady_m,
         ignores,
         siren,
         turn,
@@ -309,6 +336,8 @@ fn command_fields(command: &Command) -> String {
         figure("keep", keep_s, "s"),
         figure("early", early_s, "s"),
         figure("at", at_m, "m"),
+        figure("reach", reach_m, "m"),
+        figure("steady", steady_m, "m"),
         ignores.map(ignored_field),
         siren.map(|siren| format!("siren: {siren}")),
         turn.map(|turn| format!("turn: {}", turn.name())),

@@ -9,7 +9,7 @@ use crate::check::operator::with_range;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of, as_written, field};
 use crate::check::rule::locals;
-use crate::model::command::{CommandDef, Needs};
+use crate::model::command::{CommandDef, Told};
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::rules_by_action;
 use crate::model::vocabulary::{
@@ -352,6 +352,7 @@ impl Checker {
             }
             ast::EffectKind::Spawn { body, bearers, place: side, distance, of, apart, cover, fields } => {
                 let behind = *side == ast::Place::Behind;
+                let on = side.trajectory().map(|trajectory| self.trajectory_word(trajectory, place));
                 let is_taken = |name: &&ast::Name| place.locals.iter().any(|(local, _)| *local == name.text);
                 if let Some(name) = bearers.iter().find(is_taken) {
                     let message = format!("`{}` is a parameter, and no new name", name.text);
@@ -362,10 +363,12 @@ impl Checker {
                 let of = of.as_ref().map(|of| self.named_road_user(of, place));
                 let cover = cover.as_ref().map(|cover| self.body_word(cover, place));
                 let apart = apart.as_ref().map(|apart| self.apart(apart, bearers, place));
-                let spawn = self.spawn(body, (behind, of.is_some()), distance, fields, place, effect.span)?;
-                let (of, cover) = (as_written(of)?, as_written(cover)?);
+                let has_place = (behind, of.is_some() || on.is_some());
+                let spawn = self.spawn(body, has_place, distance, fields, place, effect.span)?;
+                self.check_trajectory(on.is_some(), of.is_some(), &spawn.verb, effect.span);
+                let (of, cover, trajectory) = (as_written(of)?, as_written(cover)?, as_written(on)?);
                 self.check_cover(cover.as_ref(), &spawn.verb, effect.span);
-                let spawn = SpawnDef { cover, of, ..spawn };
+                let spawn = SpawnDef { cover, of, trajectory, ..spawn };
                 let bearer = |name: &ast::Name| self.bearers.iter().position(|one| *one == name.text);
                 let one = |spawn: SpawnDef| EffectDef::Spawn(Box::new(spawn));
                 match (apart, bearers.as_slice()) {
@@ -499,6 +502,7 @@ impl Checker {
             distance: distance?,
             behind,
             of: None,
+            trajectory: None,
             cover: None,
             offset: offset?,
             ignores: ignores?,
@@ -511,6 +515,28 @@ impl Checker {
             manoeuvre,
             span,
         })
+    }
+
+    /// Reports who follows a trajectory without one, and who has one and does something else.
+    fn check_trajectory(&mut self, is_on: bool, is_beside: bool, verb: &WordExpr<Verb>, span: Span) {
+        let odd = possible(verb).into_iter().find(|verb| (*verb == Verb::Follow) != is_on);
+        let (message, help) = match odd {
+            Some(Verb::Follow) => (
+                "`Follow` needs a trajectory".to_owned(),
+                "write where it begins: `on NAME at 12 m` in place of `ahead` or `behind`",
+            ),
+            Some(verb) => (
+                format!("`{}` does not begin on a trajectory", verb.name()),
+                "write `does: Follow`, or `ahead` and a distance",
+            ),
+            None if is_on && is_beside => (
+                "the place is said twice".to_owned(),
+                "leave `of` out: a station on a trajectory is beside nobody",
+            ),
+            None => return,
+        };
+        let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here");
+        self.report(error.help(help));
     }
 
     /// Reports fields that mean nothing to a verb.
@@ -526,25 +552,48 @@ impl Checker {
         };
         let keeps = has(|command| command.keep.is_some());
         let changes_lanes = has(|command| command.lane.is_some());
-        let needs = manoeuvre.map_or(Needs::Legs, |call| self.needs(call.manoeuvre));
+        let told = manoeuvre.map_or(Told::NOTHING, |call| self.told(call.manoeuvre));
         let goes_back = has(CommandDef::goes_back);
+        let meets_nowhere = has(|command| command.early.is_some() && command.reach.is_none());
         for verb in possible(verb) {
             let on_foot = verb.is_on_foot();
             let other_way = matches!(verb, Verb::DriveOpposite | Verb::CrossRoad);
             let says = |wanted: SpawnField| field(fields, wanted).is_some();
+            let follows = verb == Verb::Follow;
             let (what, help) = match () {
                 () if verb == Verb::Stand && manoeuvre.is_some() => (
                     "does no manoeuvre",
                     "leave `then` out, or let it `Walk`, with `speed: 0 m/s` until it is told",
                 ),
-                () if needs.lacked_by(verb).is_some() && verb == Verb::Walk => (
+                () if told.lacked_by(verb).is_some() && verb == Verb::Walk => (
                     "is told a `speed` alone",
                     "the other fields of its manoeuvre are not for who crosses the road; leave them out",
                 ),
-                () if needs.lacked_by(verb).is_some() => (
+                () if told.lacked_by(verb).is_some() && on_foot => (
                     "is told a `speed`, an `offset` and an `aside` alone",
                     "the other fields of its manoeuvre are for vehicles; leave them out",
                 ),
+                () if told.lacked_by(verb).is_some() && follows => (
+                    "has no driver",
+                    "give its manoeuvre a `speed`, `rate`, `offset`, `aside`, `early`, `at`, `reach` and `steady` alone",
+                ),
+                () if told.lacked_by(verb).is_some() => (
+                    "follows no trajectory",
+                    "`reach` and `steady` are for `Follow`; leave them out of its manoeuvre",
+                ),
+                () if follows && meets_nowhere => (
+                    "is `early` at a place of its trajectory",
+                    "say in its manoeuvre where, `reach: 30 m`, and where the ego vehicle is then, `at: …`",
+                ),
+                () if follows && says(SpawnField::Ignores) => {
+                    ("minds nobody", "it follows its trajectory whatever comes; leave `ignores` out")
+                }
+                () if follows && (says(SpawnField::Siren) || says(SpawnField::Turn)) => {
+                    ("has no driver", "leave `siren` and `turn` out")
+                }
+                () if follows && (says(SpawnField::Lane) || says(SpawnField::Side)) => {
+                    ("begins on its trajectory", "leave `lane` and `side` out")
+                }
                 () if !on_foot && goes_back => {
                     ("does not drive backwards", "give its manoeuvre no speed below 0 m/s")
                 }
@@ -614,7 +663,8 @@ impl Checker {
         let on_foot = |verb: &Verb| verb.is_on_foot();
         let verbs = possible(verb);
         let clash = possible(body).into_iter().find_map(|body| {
-            verbs.iter().find(|verb| on_foot(verb) == body.like.is_vehicle()).map(|verb| (body, *verb))
+            let clashes = |verb: &&Verb| **verb != Verb::Follow && on_foot(verb) == body.like.is_vehicle();
+            verbs.iter().find(clashes).map(|verb| (body, *verb))
         });
         if let Some((body, verb)) = clash {
             let message = format!("a `{}` cannot `{}`", self.body_name(body), verb.name());

@@ -11,14 +11,14 @@ use crate::check::references::{References, Symbol};
 use crate::check::report::Report;
 use crate::check::road::Maps;
 use crate::check::{style, unused};
-use crate::model::command::Needs;
+use crate::model::command::Told;
 use crate::model::effort;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{bounds, clauses, rules_by_action};
 use crate::model::vocabulary::{ROAD_USER, TYPES};
 use crate::model::{
-    ActionDef, BodyDef, EnumDef, FnDef, GroupDef, ManoeuvreDef, Meaning, SetDef, Space, StateDef, Type,
-    Value, code,
+    ActionDef, BodyDef, EnumDef, FnDef, GroupDef, ManoeuvreDef, Meaning, SetDef, Space, StateDef,
+    TrajectoryDef, Type, Value, code,
 };
 use crate::prove;
 use crate::prove::{Known, RunsIn, enclose, product_size};
@@ -45,10 +45,11 @@ pub(super) struct Checker {
     /// Positions in `states`, by name.
     pub(super) state_places: BTreeMap<String, usize>,
     pub(super) bodies: Vec<BodyDef>,
+    pub(super) trajectories: Vec<TrajectoryDef>,
     /// Names that the spawns of all actions give.
     pub(super) bearers: Vec<String>,
     /// What the road users of each name can be told at most.
-    pub(super) obeys: BTreeMap<String, Needs>,
+    pub(super) obeys: BTreeMap<String, Told>,
     pub(super) manoeuvre_names: Names,
     /// `None` stands for a broken one.
     pub(super) manoeuvres: Vec<Option<ManoeuvreDef>>,
@@ -153,6 +154,7 @@ pub(super) fn space(
     checker.declare_constants(items);
     checker.declare_odds(items);
     checker.declare_bodies(items);
+    checker.declare_trajectories(items);
     checker.declare_functions(items);
     checker.declare_states(items);
     checker.declare_bearers(items);
@@ -188,6 +190,7 @@ pub(super) fn space(
         enums: core::mem::take(&mut checker.enums),
         states: core::mem::take(&mut checker.states),
         bodies: core::mem::take(&mut checker.bodies),
+        trajectories: core::mem::take(&mut checker.trajectories),
         bearers: core::mem::take(&mut checker.bearers),
         manoeuvres: core::mem::take(&mut checker.manoeuvres).into_iter().flatten().collect(),
         functions: core::mem::take(&mut checker.functions),
@@ -310,6 +313,7 @@ impl Checker {
         for item in items.iter().chain(aside) {
             match item.kind.plain() {
                 ItemKind::Road(block) => self.note_road(block),
+                ItemKind::Trajectory(block) => self.note_trajectory(block),
                 ItemKind::Expect(expect) => self.note_claim(&expect.claim),
                 _ => {}
             }
@@ -341,6 +345,7 @@ impl Checker {
             ItemKind::Language(_)
             | ItemKind::Use(_)
             | ItemKind::Enum(_)
+            | ItemKind::Trajectory(_)
             | ItemKind::Road(_)
             | ItemKind::Expect(_)
             | ItemKind::Scenario(_)

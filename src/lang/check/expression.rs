@@ -640,18 +640,15 @@ impl Checker {
         let subject = self.expr(subject, place, None);
         let of = enum_of(subject.as_ref().map(|subject| subject.ty));
         arms.iter().flat_map(|arm| &arm.patterns).for_each(|pattern| self.references.variant(pattern, of));
-        if subject.as_ref().is_none_or(|subject| matches!(subject.ty, Type::Quantity(_))) {
+        if subject.is_none() {
             arms.iter().for_each(|arm| self.look_at(&arm.value, place, hint));
         }
         let subject = subject?;
         let variants: Vec<String> = match subject.ty {
             Type::Enum(of) => self.enums[of.0].variants.clone(),
             Type::Bool => vec!["false".to_owned(), "true".to_owned()],
-            Type::Int => return self.matching_number(subject, arms, place, hint, span),
-            Type::Quantity(_) => {
-                let message = "`match` needs an enum, a truth value or a whole number";
-                let error = Diagnostic::error(code::TYPE_MISMATCH, message);
-                return self.reject(error.at(subject.span, "this may have a fraction"));
+            Type::Int | Type::Quantity(_) => {
+                return self.matching_number(subject, arms, place, hint, span);
             }
         };
         let mut arm_of: Vec<Option<usize>> = vec![None; variants.len()];
@@ -677,7 +674,29 @@ impl Checker {
         Some(Expr { kind: ExprKind::Match { subject: Box::new(subject), arm_of, arms }, ty, span })
     }
 
-    /// `match` on a whole number: a choice between an arm and the arms after it, for each arm.
+    /// The number of a pattern, of the type of what is matched; `None` if it is none, which is reported.
+    fn number_pattern(&mut self, pattern: &ast::Name, ty: Type) -> Option<Rational> {
+        let written = pattern.text.strip_prefix('-').unwrap_or(&pattern.text);
+        let is_digits = |end: &usize| {
+            written.is_char_boundary(*end) && Rational::from_literal(&written[..*end]).is_some()
+        };
+        let Some(end) = (1..=written.len()).rev().find(is_digits) else {
+            let message = format!("`{}` is no number", pattern.text);
+            let error = Diagnostic::error(code::TYPE_MISMATCH, message);
+            let error =
+                error.at(pattern.span, format!("the value is {}", article(&self.references.type_name(ty))));
+            return self.reject(error.help("write a number, or `_` for all that are left"));
+        };
+        let unit = written[end..].trim();
+        let unit = (!unit.is_empty()).then(|| ast::Name::new(unit, pattern.span));
+        let number = ast::Number { digits: written[..end].to_owned(), unit, span: pattern.span };
+        let found = self.number(&number)?;
+        let found = self.fit(found, ty, || None)?;
+        let value = self.fold_number(&found)?;
+        Some(if written.len() < pattern.text.len() { Rational::ZERO.checked_sub(value)? } else { value })
+    }
+
+    /// `match` on a number: a choice between an arm and the arms after it, for each arm.
     fn matching_number(
         &mut self,
         subject: Expr,
@@ -686,7 +705,7 @@ impl Checker {
         hint: Option<Type>,
         span: Span,
     ) -> Option<Expr> {
-        let (mut taken, mut seen): (Vec<i64>, BTreeSet<i64>) = (Vec::new(), BTreeSet::new());
+        let (mut taken, mut seen): (Vec<Rational>, BTreeSet<Rational>) = (Vec::new(), BTreeSet::new());
         let mut ty = hint;
         let mut sound = true;
         let mut chosen: Vec<(Vec<Expr>, Expr)> = Vec::new();
@@ -694,16 +713,10 @@ impl Checker {
         for arm in arms {
             let before = taken.len();
             for pattern in &arm.patterns {
-                match pattern.text.parse::<i64>() {
-                    Ok(number) if seen.insert(number) => taken.push(number),
-                    Ok(_) => {}
-                    Err(_) => {
-                        sound = false;
-                        let message = format!("`{}` is no whole number", pattern.text);
-                        let error = Diagnostic::error(code::TYPE_MISMATCH, message);
-                        let error = error.at(pattern.span, "the value is an `Int`");
-                        self.report(error.help("write a number, or `_` for all that are left"));
-                    }
+                match self.number_pattern(pattern, subject.ty) {
+                    Some(number) if seen.insert(number) => taken.push(number),
+                    Some(_) => {}
+                    None => sound = false,
                 }
             }
             if sound && (rest.is_some() || before == taken.len() && !arm.patterns.is_empty()) {
@@ -715,9 +728,7 @@ impl Checker {
                 continue;
             };
             let make = |kind, ty| Expr { kind, ty, span: arm.span };
-            let numbers = taken[before..]
-                .iter()
-                .map(|number| make(ExprKind::Number(Rational::integer(*number)), Type::Int));
+            let numbers = taken[before..].iter().map(|number| make(ExprKind::Number(*number), subject.ty));
             match arm.patterns.is_empty() {
                 true => rest = rest.or(Some(body)),
                 false => chosen.push((numbers.collect(), body)),

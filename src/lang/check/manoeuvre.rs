@@ -6,14 +6,14 @@ use crate::check::checker::{Checker, docs, each};
 use crate::check::expression::Place;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of, as_written, field};
-use crate::model::command::{CommandDef, Needs};
+use crate::model::command::{CommandDef, Told};
 use crate::model::expr::{Expr, ExprKind, Who};
 use crate::model::vocabulary::{
     Body, CHANGE, CommandField, Fact, LaneChoice, ROAD_USER, Site, SpawnField, TrafficRule, Turning, Verb,
     Word,
 };
 use crate::model::{
-    EnumDef, ManoeuvreCall, ManoeuvreDef, OrderDef, PhaseDef, REPEAT, Type, WordExpr, code, needs, reached,
+    EnumDef, ManoeuvreCall, ManoeuvreDef, OrderDef, PhaseDef, REPEAT, Type, WordExpr, code, reached, told,
 };
 use crate::prove::VARIANTS_MAX;
 use crate::syntax::ast::{ItemKind, Span};
@@ -56,12 +56,16 @@ impl Checker {
                 _ => None,
             });
             let has = match (&body.kind, verb) {
-                (ast::ExprKind::Name(body), Some(verb)) if is_on_foot(body) => Needs::of(verb),
-                (ast::ExprKind::Name(body), None) if is_on_foot(body) => Needs::LegsAlong,
-                _ => Needs::Wheels,
+                (_, Some(Verb::Follow)) => Told::to(Verb::Follow),
+                (ast::ExprKind::Name(body), Some(verb)) if is_on_foot(body) => Told::to(verb),
+                (ast::ExprKind::Name(body), None) if is_on_foot(body) => {
+                    Told::to(Verb::WalkAhead).and(Told::to(Verb::Follow))
+                }
+                (_, Some(_)) => Told::BY_DRIVERS,
+                (_, None) => Told::BY_DRIVERS.and(Told::to(Verb::Follow)),
             };
-            let most = self.obeys.entry(name.text.clone()).or_insert(has);
-            *most = has.max(*most);
+            let most = self.obeys.entry(name.text.clone()).or_default();
+            *most = most.and(has);
             if Fact::ALL.iter().any(|fact| fact.name().split('.').next() == Some(name.text.as_str())) {
                 let message = format!("`{}` cannot be the name of a road user", name.text);
                 let error = Diagnostic::error(code::NOT_HERE, message);
@@ -365,17 +369,18 @@ impl Checker {
             let message = "the order tells the vehicle nothing".to_owned();
             return self.missing_field(CommandField::Speed, span, message);
         }
-        let needs = manoeuvre.as_ref().map_or(Needs::Legs, |call| self.needs(call.manoeuvre));
+        let told = manoeuvre.as_ref().map_or(Told::NOTHING, |call| self.told(call.manoeuvre));
         let has = match bearer {
-            Some(Who::Given(_)) => self.obeys.values().max().copied(),
+            Some(Who::Given(_)) => self.obeys.values().copied().reduce(Told::and),
             Some(Who::Named(_)) | None => self.obeys.get(&who.text).copied(),
         };
-        let has = has.unwrap_or(Needs::Wheels);
-        let may_drive = has == Needs::Wheels;
-        if bearer.is_some() && needs.max(command.needs()) > has {
-            let message = format!("`{}` is always on foot", who.text);
-            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(who.span, "drives no vehicle");
-            let help = format!("it can be told {}", has.told());
+        let has = has.unwrap_or(Told::BY_DRIVERS);
+        let may_drive = has.covers(Told::BY_DRIVERS);
+        if bearer.is_some() && !has.covers(told.and(command.told())) {
+            let message = format!("`{}` cannot be told that", who.text);
+            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message);
+            let error = error.at(who.span, "on foot, or on a trajectory, whenever it is there");
+            let help = format!("it can be told {}", has.words());
             self.report(error.help(help));
         }
         Some(OrderDef { who: bearer?, command, manoeuvre, may_drive, span })
@@ -417,6 +422,8 @@ impl Checker {
         let time_gap = figure(CommandField::TimeGap, Dimension::DURATION);
         let early = figure(CommandField::Early, Dimension::DURATION);
         let at = figure(CommandField::At, Dimension::LENGTH);
+        let reach = figure(CommandField::Reach, Dimension::LENGTH);
+        let steady = figure(CommandField::Steady, Dimension::LENGTH);
         let keep = match field(fields, CommandField::Keep) {
             Some(value) => Some(self.gap(value, place)?),
             None => None,
@@ -448,6 +455,12 @@ impl Checker {
         }
         for (part, of, is_there) in [
             (CommandField::At, "an `early`", is_early),
+            (CommandField::Reach, "an `early` and an `at`", is_early && says(CommandField::At)),
+            (
+                CommandField::Steady,
+                "a `reach` and a `speed`",
+                says(CommandField::Reach) && says(CommandField::Speed),
+            ),
             (
                 CommandField::Rate,
                 "a `speed`, a `keep` or an `early`",
@@ -473,6 +486,8 @@ impl Checker {
             keep,
             early,
             at,
+            reach,
+            steady,
             ignores,
             siren,
             turn,
@@ -509,9 +524,9 @@ impl Checker {
         all_of(items.iter().map(|item| self.word::<TrafficRule>("rule of the road", item, place)))
     }
 
-    /// What the phases of a manoeuvre need; little, if it is broken.
-    pub(super) fn needs(&self, manoeuvre: usize) -> Needs {
-        needs(manoeuvre, |index| self.manoeuvres.get(index)?.as_ref())
+    /// What the phases of a manoeuvre tell; nothing, if it is broken.
+    pub(super) fn told(&self, manoeuvre: usize) -> Told {
+        told(manoeuvre, |index| self.manoeuvres.get(index)?.as_ref())
     }
 
     /// Whether a phase of a manoeuvre has such a command.

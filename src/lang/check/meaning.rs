@@ -76,6 +76,7 @@ fn has_free_order(kind: &ItemKind) -> bool {
             | ItemKind::Fn(_)
             | ItemKind::Manoeuvre(_)
             | ItemKind::Body(_)
+            | ItemKind::Trajectory(_)
             | ItemKind::Group(_)
             | ItemKind::Require(_)
     )

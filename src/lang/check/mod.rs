@@ -48,6 +48,7 @@ mod scenario_value;
 mod settings;
 pub mod state_argument;
 mod style;
+mod trajectory;
 mod unused;
 
 pub use checker::{Claim, Runs};

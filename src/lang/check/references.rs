@@ -41,6 +41,7 @@ pub enum Symbol {
     Rule(String),
     Requirement(String),
     Body(String),
+    Trajectory(String),
     Road(String),
     Verdict(String),
     Scenario(String),
@@ -262,6 +263,7 @@ impl Symbol {
             | Symbol::Rule(name)
             | Symbol::Requirement(name)
             | Symbol::Body(name)
+            | Symbol::Trajectory(name)
             | Symbol::Road(name)
             | Symbol::Verdict(name)
             | Symbol::Scenario(name)
@@ -442,6 +444,7 @@ impl References {
             ItemKind::Rule(_) => self.declare(item, Symbol::Rule, Vec::new()),
             ItemKind::Require(_) => self.declare(item, Symbol::Requirement, Vec::new()),
             ItemKind::Body(_) => self.declare(item, Symbol::Body, Vec::new()),
+            ItemKind::Trajectory(_) => self.declare(item, Symbol::Trajectory, Vec::new()),
             ItemKind::Road(_) => self.declare(item, Symbol::Road, Vec::new()),
             ItemKind::Verdict(_) => self.declare(item, Symbol::Verdict, Vec::new()),
             ItemKind::Scenario(_) => self.declare(item, Symbol::Scenario, Vec::new()),

@@ -37,6 +37,7 @@ impl Checker {
         let (names, declared) = self.declared("road", items, ItemKind::as_road);
         let mut roads: Vec<Option<Road>> =
             declared.into_iter().map(|(item, block)| self.road(item, block, maps)).collect();
+        self.lay_trajectories(items, &mut roads, maps);
         let Some(chosen) = chosen else { return roads.into_iter().flatten().collect() };
         let mut picked = Vec::new();
         for name in &chosen {
@@ -128,6 +129,7 @@ impl Checker {
             route,
             ego_mps: ego_mps?,
             set_mps,
+            trajectories: Vec::new(),
             facts,
         })
     }
@@ -213,7 +215,7 @@ impl Checker {
         self.reject(error.help(format!("write for example `{}: 60 km/h`", of.name())))
     }
 
-    fn lane_point(&mut self, value: &ast::Expr, map: &RoadMap) -> Option<LanePlace> {
+    pub(super) fn lane_point(&mut self, value: &ast::Expr, map: &RoadMap) -> Option<LanePlace> {
         let ast::ExprKind::LanePoint { road, lane, station } = &value.kind else {
             let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted a place on a lane");
             return self.reject(

@@ -50,6 +50,9 @@ pub(super) fn report(own: &[&ast::Item], all: &[&ast::Item]) -> Vec<Diagnostic> 
             ItemKind::Group(declared) if is_unused(&declared.name) => {
                 diagnostics.push(warning("group", &declared.name));
             }
+            ItemKind::Trajectory(declared) if is_unused(&declared.name) => {
+                diagnostics.push(warning("trajectory", &declared.name));
+            }
             ItemKind::Manoeuvre(declared) if is_unused(&declared.name) => {
                 diagnostics.push(warning("manoeuvre", &declared.name));
             }
@@ -124,7 +127,9 @@ fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
                 names.extend(moves.iter().flat_map(|line| line.to.iter().chain([&line.from])));
             }
         },
-        ItemKind::Body(block) | ItemKind::Road(block) => fields.extend(&block.fields),
+        ItemKind::Body(block) | ItemKind::Trajectory(block) | ItemKind::Road(block) => {
+            fields.extend(&block.fields)
+        }
         ItemKind::Episode(declared) => fields.extend(declared),
         ItemKind::Reward(cases) => {
             exprs.extend(cases.iter().flat_map(|case| case.condition.iter().chain([&case.value])));
@@ -162,8 +167,9 @@ fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
                 names.push(who);
                 fields.extend(of_order);
             }
-            ast::EffectKind::Spawn { body, distance, of, apart, cover, fields: of_spawn, .. } => {
+            ast::EffectKind::Spawn { body, place, distance, of, apart, cover, fields: of_spawn, .. } => {
                 names.extend(of);
+                exprs.extend(place.trajectory());
                 exprs.extend([body, distance].into_iter().chain(apart.as_deref()).chain(cover.as_deref()));
                 fields.extend(of_spawn);
             }

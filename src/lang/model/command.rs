@@ -18,34 +18,85 @@ const SPEED_MPS: RangeInclusive<f64> = -ON_FOOT_MPS_MAX..=SPEED_MPS_MAX;
 /// Nobody on foot is told to go faster, m/s: below a sprinter's 12 m/s.
 const ON_FOOT_MPS_MAX: f64 = 10.0;
 
-/// What a road user needs to do what it is told.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Needs {
-    /// Two legs: it is told a speed alone.
-    Legs,
-    /// A way along the road: it is told a place beside the middle of the lane, too.
-    LegsAlong,
-    Wheels,
-}
+/// What a road user is told: fields of an order. Not everybody can be told all of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Told(u16);
 
-impl Needs {
-    pub(crate) fn of(verb: Verb) -> Needs {
-        needs(verb.walks_along(), !verb.is_on_foot())
+impl Told {
+    pub const NOTHING: Told = Told(0);
+
+    /// All that drivers are told.
+    pub const BY_DRIVERS: Told = Told(!(Told::of(&[CommandField::Reach, CommandField::Steady]).0));
+
+    const fn of(fields: &[CommandField]) -> Told {
+        let (mut bits, mut nth) = (0, 0);
+        while nth < fields.len() {
+            bits |= 1 << fields[nth] as u16;
+            nth += 1;
+        }
+        Told(bits)
     }
 
-    /// What can be told to who has no more than this, in words.
-    pub fn told(self) -> &'static str {
-        match self {
-            Needs::Legs => "a `speed` alone",
-            Needs::LegsAlong => "a `speed`, an `offset` and an `aside` alone",
-            Needs::Wheels => "all",
+    /// These figures, and which of the lane, the rules that are ignored, the siren and the turn.
+    fn all(figures: impl Iterator<Item = CommandField>, words: [bool; 4]) -> Told {
+        const WORDS: [CommandField; 4] =
+            [CommandField::Lane, CommandField::Ignores, CommandField::Siren, CommandField::Turn];
+        let words = WORDS.into_iter().zip(words).filter(|(_, says)| *says).map(|(field, _)| field);
+        figures.chain(words).fold(Told::NOTHING, |told, field| told.and(Told::of(&[field])))
+    }
+
+    /// What can be told to who does that.
+    pub fn to(verb: Verb) -> Told {
+        use CommandField::{Aside, At, Early, Offset, Rate, Reach, Speed, Steady};
+        match verb {
+            Verb::Walk | Verb::Stand => Told::of(&[Speed]),
+            Verb::WalkAhead | Verb::WalkOpposite => Told::of(&[Speed, Offset, Aside]),
+            Verb::Follow => Told::of(&[Speed, Rate, Offset, Aside, Early, At, Reach, Steady]),
+            Verb::DriveAhead | Verb::DriveBehind | Verb::Overtake | Verb::DriveOpposite | Verb::CrossRoad => {
+                Told::BY_DRIVERS
+            }
         }
     }
 
-    /// Why somebody who does that cannot be told what needs this; `None` if they can.
+    #[must_use]
+    pub fn and(self, other: Told) -> Told {
+        Told(self.0 | other.0)
+    }
+
+    pub fn holds(self, field: CommandField) -> bool {
+        self.0 >> field as u16 & 1 == 1
+    }
+
+    /// Whether all that `other` says is among this.
+    pub fn covers(self, other: Told) -> bool {
+        other.0 & !self.0 == 0
+    }
+
+    /// The fields, in words.
+    pub fn words(self) -> String {
+        if self == Told::BY_DRIVERS {
+            return "all but a `reach` and a `steady`".to_owned();
+        }
+        let fields = CommandField::ALL.iter().filter(|field| self.holds(**field));
+        let fields: Vec<String> = fields.map(|field| format!("`{}`", field.name())).collect();
+        match fields.split_last() {
+            Some((last, [])) => format!("a {last} alone"),
+            Some((last, others)) => format!("{} and {last} alone", others.join(", ")),
+            None => "nothing".to_owned(),
+        }
+    }
+
+    /// Why somebody who does that cannot be told this, in words; `None` if they can.
     pub fn lacked_by(self, verb: Verb) -> Option<String> {
-        let has = Needs::of(verb);
-        (self > has).then(|| format!("it is on foot, and can be told {}", has.told()))
+        let can = Told::to(verb);
+        (!can.covers(self)).then(|| {
+            let what = match verb {
+                _ if verb.is_on_foot() => "it is on foot",
+                Verb::Follow => "it follows a trajectory",
+                _ => "it drives",
+            };
+            format!("{what}, and can be told {}", can.words())
+        })
     }
 }
 
@@ -95,6 +146,10 @@ pub struct CommandDef {
     pub early: Option<Expr>,
     /// Where, m along the ego vehicle's route; without it where the two ways cross.
     pub at: Option<Expr>,
+    /// Where on its own trajectory, m.
+    pub reach: Option<Expr>,
+    /// For how long a way before that it has its speed already, m.
+    pub steady: Option<Expr>,
     pub ignores: Option<Vec<WordExpr<TrafficRule>>>,
     pub siren: Option<Expr>,
     pub turn: Option<WordExpr<Turning>>,
@@ -113,6 +168,8 @@ pub struct Command {
     pub keep_s: Option<f64>,
     pub early_s: Option<f64>,
     pub at_m: Option<f64>,
+    pub reach_m: Option<f64>,
+    pub steady_m: Option<f64>,
     pub ignores: Option<IgnoredRules>,
     pub siren: Option<bool>,
     /// Where it goes at the next junction.
@@ -156,7 +213,7 @@ struct Figure {
     value: fn(&mut Command) -> &mut Option<f64>,
 }
 
-const FIGURES: [Figure; 9] = [
+const FIGURES: [Figure; 11] = [
     Figure {
         field: CommandField::Speed,
         unit: "m/s",
@@ -229,6 +286,22 @@ const FIGURES: [Figure; 9] = [
         written: |def| def.at.as_ref(),
         value: |command| &mut command.at_m,
     },
+    Figure {
+        field: CommandField::Reach,
+        unit: "m",
+        bounds: AT_M,
+        may_be_left_out: false,
+        written: |def| def.reach.as_ref(),
+        value: |command| &mut command.reach_m,
+    },
+    Figure {
+        field: CommandField::Steady,
+        unit: "m",
+        bounds: AT_M,
+        may_be_left_out: true,
+        written: |def| def.steady.as_ref(),
+        value: |command| &mut command.steady_m,
+    },
 ];
 
 /// A figure as the file says it, with its unit and its bounds.
@@ -239,14 +312,6 @@ pub struct WrittenFigure<'a> {
     pub bounds: RangeInclusive<f64>,
 }
 
-fn needs(goes_aside: bool, drives: bool) -> Needs {
-    match (goes_aside, drives) {
-        (_, true) => Needs::Wheels,
-        (true, false) => Needs::LegsAlong,
-        (false, false) => Needs::Legs,
-    }
-}
-
 impl CommandDef {
     pub fn figures(&self) -> impl Iterator<Item = WrittenFigure<'_>> {
         FIGURES.into_iter().filter_map(|Figure { field, unit, bounds, written, .. }| {
@@ -254,26 +319,11 @@ impl CommandDef {
         })
     }
 
-    pub fn needs(&self) -> Needs {
-        let CommandDef {
-            speed: _,
-            rate,
-            lane,
-            offset,
-            aside,
-            time_gap,
-            keep,
-            early,
-            at,
-            ignores,
-            siren,
-            turn,
-        } = self;
-        let wheels = [rate, time_gap, keep, early, at, siren].into_iter().any(Option::is_some)
-            || lane.is_some()
-            || ignores.is_some()
-            || turn.is_some();
-        needs(aside.is_some() || offset.is_some(), wheels)
+    /// What it says.
+    pub fn told(&self) -> Told {
+        let CommandDef { lane, ignores, siren, turn, .. } = self;
+        let words = [lane.is_some(), ignores.is_some(), siren.is_some(), turn.is_some()];
+        Told::all(self.figures().map(|figure| figure.field), words)
     }
 
     /// Whether it is written as a speed below 0. One that is computed may still be.
@@ -353,7 +403,7 @@ impl Command {
         if verb == Verb::Stand {
             return Some("it stands, and does not walk".to_owned());
         }
-        self.needs().lacked_by(verb).or_else(|| match self.speed_mps {
+        self.told().lacked_by(verb).or_else(|| match self.speed_mps {
             Some(mps) if is_out(mps) && on_foot => {
                 Some(format!("nobody on foot is told more than {ON_FOOT_MPS_MAX} m/s"))
             }
@@ -362,10 +412,12 @@ impl Command {
         })
     }
 
-    fn needs(&self) -> Needs {
-        let Command { speed_mps, offset_m, aside_mps, .. } = *self;
-        let on_foot = Command { speed_mps, offset_m, aside_mps, ..Command::default() };
-        needs(self.goes_aside(), *self != on_foot)
+    fn told(&self) -> Told {
+        let Command { lane, ignores, siren, turn, .. } = *self;
+        let words = [lane.is_some(), ignores.is_some(), siren.is_some(), turn.is_some()];
+        let mut command = *self;
+        let says = |figure: &Figure| (figure.value)(&mut command).is_some();
+        Told::all(FIGURES.into_iter().filter(says).map(|figure| figure.field), words)
     }
 
     /// Whether it says where beside the ego vehicle.

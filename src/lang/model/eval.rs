@@ -172,6 +172,8 @@ pub struct NpcFacts {
     pub contact_in_s: f64,
     /// Since one of the two left the place where the other is, at most [`TIME_S_MAX`]. Known only to who watches.
     pub pet_s: f64,
+    /// Where it is along the trajectory that it follows; 0 if it follows none.
+    pub station_m: f64,
     pub has_siren: bool,
     /// Whether it is the one ahead of the ego vehicle, in which lane to the left of that one's it is, and how far off the road, m:
     /// known only to who watches.
@@ -391,6 +393,7 @@ fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
         Fact::NpcLanesLeft => spawn(|spawn| f64::from(spawn.npc.lanes_left)),
         Fact::NpcOffRoad => spawn(|spawn| spawn.npc.off_road_m),
         Fact::NpcInNextJunction => Value::Bool(facts.spawn.is_some_and(|spawn| spawn.npc.in_next_junction)),
+        Fact::NpcStation => spawn(|spawn| spawn.npc.station_m),
         Fact::NpcSiren => Value::Bool(facts.spawn.is_some_and(|spawn| spawn.npc.has_siren)),
         Fact::SpawnGap => spawn(|spawn| spawn.spawn_gap_m),
         Fact::SafetyGap => spawn(|spawn| spawn.safety_gap_m),

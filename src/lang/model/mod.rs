@@ -55,7 +55,7 @@ pub use space::{
     ACTION_ODDS_MAX, ActionDef, BodyDef, BodyWord, COUNTED, Domain, EffectDef, EnumDef, EpisodeDef, FnDef,
     GroupDef, Initial, ManoeuvreCall, ManoeuvreDef, OrderDef, Parameter, PhaseDef, RequirementDef,
     RewardCase, Road, RoadFacts, RuleBinding, RuleBody, RuleDef, SetDef, Space, SpawnDef, StateDef,
-    StateMeaning, VerdictDef, WordExpr, needs, reached,
+    StateMeaning, Trajectory, TrajectoryDef, VerdictDef, WordExpr, reached, told,
 };
 pub(crate) use value::STATE_MAX;
 pub use value::{EnumIndex, Memory, Type, Value};

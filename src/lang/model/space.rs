@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::model::body::BodyParameters;
-use crate::model::command::{CommandDef, Needs};
+use crate::model::command::{CommandDef, Told};
 use crate::model::eval::{Facts, evaluate};
 use crate::model::expr::{Expr, Who};
 use crate::model::interval::Interval;
@@ -17,7 +17,8 @@ use crate::model::value::{EnumIndex, Type, Value};
 use crate::model::vocabulary::{
     Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, TrafficRule, Turning, Verb, Word,
 };
-use crate::syntax::ast::Span;
+use crate::syntax::ast::{Block, Span};
+use avastra_base::geometry::Path;
 use avastra_base::units::{
     Dimension, Rational, Unit, decimal, quantity, quantity_in, quantity_short, unit_of_all,
 };
@@ -39,6 +40,7 @@ pub struct Space {
     pub enums: Vec<EnumDef>,
     pub states: Vec<StateDef>,
     pub bodies: Vec<BodyDef>,
+    pub trajectories: Vec<TrajectoryDef>,
     /// Names that spawns give to road users, each once.
     pub bearers: Vec<String>,
     pub manoeuvres: Vec<ManoeuvreDef>,
@@ -124,6 +126,31 @@ pub struct BodyDef {
     pub like: Body,
     pub shape: BodyParameters,
     pub span: Span,
+}
+
+/// A way in a map that a road user may follow. Its course on the map of a road is in [`Road::trajectories`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrajectoryDef {
+    pub name: String,
+    pub docs: Vec<String>,
+    pub declared: Block,
+}
+
+/// A way in the plane that a road user may follow.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trajectory {
+    pub path: Path,
+    /// Height of the road at each vertex of the path, m.
+    pub heights_m: Vec<f64>,
+}
+
+impl Trajectory {
+    /// Height of the road at a station, m.
+    pub fn height_at(&self, station_m: f64) -> f64 {
+        let (segment, part) = self.path.locate(station_m);
+        let (from_m, to_m) = (self.heights_m[segment], self.heights_m[segment + 1]);
+        from_m + (to_m - from_m) * part
+    }
 }
 
 /// What a spawn calls a body: one of the engine, or one of the author's own that is like it.
@@ -326,6 +353,8 @@ pub struct SpawnDef {
     pub behind: bool,
     /// The road user from which the distance is measured, in place of the ego vehicle.
     pub of: Option<Who>,
+    /// The trajectory on which it begins, by index in `Space::trajectories`; the distance is then its station there.
+    pub trajectory: Option<WordExpr<usize>>,
     /// The parked vehicle from behind which a pedestrian steps.
     pub cover: Option<WordExpr<BodyWord>>,
     /// m to the left of the middle of its lane.
@@ -382,11 +411,11 @@ pub fn reached<'a>(manoeuvre: usize, of: impl Fn(usize) -> Option<&'a ManoeuvreD
     found
 }
 
-/// What all that a manoeuvre may come to needs.
-pub fn needs<'a>(manoeuvre: usize, of: impl Fn(usize) -> Option<&'a ManoeuvreDef>) -> Needs {
+/// What all that a manoeuvre may come to tells.
+pub fn told<'a>(manoeuvre: usize, of: impl Fn(usize) -> Option<&'a ManoeuvreDef>) -> Told {
     let all = reached(manoeuvre, &of);
     let phases = all.iter().filter_map(|one| of(*one)).flat_map(|one| &one.phases);
-    phases.map(|phase| phase.command.needs()).max().unwrap_or(Needs::Legs)
+    phases.fold(Told::NOTHING, |told, phase| told.and(phase.command.told()))
 }
 
 /// A phase begins when `once` has held for long enough, and `after` some more time. It ends when the road user has done what
@@ -570,6 +599,8 @@ pub struct Road {
     pub ego_mps: f64,
     /// The speed that it wants on a free road, m/s; `None`: its driver's own.
     pub set_mps: Option<f64>,
+    /// For each trajectory of the space its course; `None` for one that lies on another map.
+    pub trajectories: Vec<Option<Arc<Trajectory>>>,
     pub facts: RoadFacts,
 }
 

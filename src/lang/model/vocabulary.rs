@@ -269,6 +269,7 @@ facts! {
     NpcLanesLeft "npc.lanes_left" Type::Int, Near = "A `Int`: how many lanes its middle is to the left of the ego vehicle's lane, below 0 to the right; 0 in the same one, 100 if it is in no lane beside the route.";
     NpcOffRoad "npc.off_road" LENGTH, Near = "A `Length`: from its middle to the nearest driving lane, at most 3 m; below 0 on one.";
     NpcInNextJunction "npc.in_next_junction" Type::Bool, Spawn = "A `Bool`: whether a vehicle is in the junction that `ego.junction_ahead` is about.";
+    NpcStation "npc.station" LENGTH, Spawn = "A `Length`: where its rear axle, or on foot its middle, is along the trajectory that it follows; 0 if it follows none.";
     NpcSiren "npc.siren" Type::Bool, Spawn = "A `Bool`: whether it is an emergency vehicle under way, for which all others wait.";
     SpawnGap "spawn_gap" LENGTH, Spawn = "A `Length`: the gap from the ego vehicle to the road user that appears.";
     SafetyGap "safety_gap" LENGTH, Spawn = "A `Length`: the gap that a careful driver needs.";
@@ -437,6 +438,21 @@ words! {
 }
 
 words! {
+    TrajectoryField "A field of `trajectory`.":
+    Road "road" = "The road on whose map it lies: `road: corner`.",
+    Lanes "lanes" = "Places between which it follows the lanes: `lanes: [lane 1/-1 at 12 m, lane 7/-1 at 80 m]`.",
+    Points "points" = "Places between which it runs straight: `points: [{ at: lane 1/-1 at 40 m, offset: -4 m }, { x: 12 m, y: 3 m }]`.",
+}
+
+words! {
+    PointField "A field of a point of a `trajectory`.":
+    At "at" = "A place on a lane: `at: lane 1/-1 at 40 m`.",
+    Offset "offset" = "How far to the left of the middle of that lane; negative to the right.",
+    X "x" = "Where it is on the map, with `y`: `{ x: 12 m, y: -3.5 m }`.",
+    Y "y" = "Where it is on the map, with `x`.",
+}
+
+words! {
     BodyField "A field of `body`.":
     Like "like" = "The body of the engine that it is like: what it does not say itself, it has from there.",
     Length "length" = "How long it is.",
@@ -475,6 +491,8 @@ words! {
     Keep "keep" = "The gap that it keeps to the ego vehicle, ahead of it or behind it: `keep: 1.5 s`, `keep: 20 m`.",
     Early "early" = "How much before the ego vehicle it is where the two ways cross, or `at` a station: `early: 1 s`.",
     At "at" = "The station of the ego vehicle's route at which it is `early`: `at: van.rear`.",
+    Reach "reach" = "Where on its own trajectory it is `early`, for who does `Follow`: `reach: 30 m`.",
+    Steady "steady" = "For how long a way before that place it has its `speed` already: `steady: 10 m`.",
     Ignores "ignores" = "The rules of the road that it ignores from then on: `ignores: [Signals]`; `[]` for none.",
     Siren "siren" = "Whether it is an emergency vehicle under way from then on: `siren: false`.",
     Turn "turn" = "Where it goes at the next junction: `Left`, `Straight` or `Right`.",
@@ -594,6 +612,7 @@ words! {
     WalkAhead = "A pedestrian who walks along the road in the ego vehicle's direction.",
     WalkOpposite = "A pedestrian who walks along the road towards the ego vehicle.",
     DriveBehind = "Drives behind the ego vehicle in the same direction.",
+    Follow = "Follows a trajectory exactly, whatever comes, as the targets of proving grounds do.",
 }
 
 impl Verb {
@@ -617,6 +636,7 @@ impl Verb {
             | Verb::CrossRoad
             | Verb::Walk
             | Verb::Stand => self,
+            Verb::Follow => Verb::CrossRoad,
         }
     }
 

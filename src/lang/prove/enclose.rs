@@ -337,6 +337,7 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
         | Fact::NpcGap
         | Fact::NpcLimit
         | Fact::EgoLeadSince
+        | Fact::NpcStation
         | Fact::SpawnGap
         | Fact::SafetyGap => Interval::NOT_NEGATIVE,
         Fact::Proc => between(0.0, 1.0),

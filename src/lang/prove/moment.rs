@@ -149,7 +149,8 @@ fn newcomer(spawn: &SpawnDef, known: &Known<'_>, lands: bool) -> Case {
         numbers.push((Fact::NpcSpeed, speed));
     }
     let distance = enclose(&spawn.distance, known).interval().intersect(&Interval::NOT_NEGATIVE);
-    let is_on_route = |verb: &Verb| !verb.walks_along() && !matches!(verb, Verb::Walk | Verb::CrossRoad);
+    let is_on_route =
+        |verb: &Verb| !verb.walks_along() && !matches!(verb, Verb::Walk | Verb::CrossRoad | Verb::Follow);
     if lands
         && spawn.of.is_none()
         && spawn.offset.is_none()

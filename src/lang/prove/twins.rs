@@ -188,7 +188,7 @@ fn ignored_form(ignores: &[WordExpr<TrafficRule>], reduced: &impl Fn(&Expr) -> E
 
 fn spawn_form(spawn: &SpawnDef, locals: &[Expr], reduced: &impl Fn(&Expr) -> Expr) -> String {
     format!(
-        "spawn {} {} {} {} {} {} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {} {} {:?} {} {:?} {:?}",
+        "spawn {} {} {} {} {} {} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {} {} {:?} {} {:?} {:?} {:?}",
         word_form(&spawn.body, reduced),
         word_form(&spawn.colour, reduced),
         word_form(&spawn.verb, reduced),
@@ -206,6 +206,7 @@ fn spawn_form(spawn: &SpawnDef, locals: &[Expr], reduced: &impl Fn(&Expr) -> Exp
         spawn.behind,
         spawn.of.map(|who| reduced_who(who, locals)),
         spawn.cover.as_ref().map_or(String::new(), |cover| word_form(cover, reduced)),
+        spawn.trajectory.as_ref().map(|trajectory| word_form(trajectory, reduced)),
         spawn.bearer,
         spawn.row.as_ref().map(|(nth, apart)| (nth, reduced(apart).kind)),
     )

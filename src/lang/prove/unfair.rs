@@ -79,6 +79,8 @@ fn figures(space: &Space, road: &Road, spawn: &SpawnDef, values: &[Value], memor
         Verb::CrossRoad | Verb::Walk | Verb::Stand => braked_m(ego_mps),
         // A vehicle from behind sees the ego vehicle, which need do nothing.
         Verb::Overtake | Verb::DriveBehind => 0.0,
+        // Where it begins has nothing to do with the ego vehicle.
+        Verb::Follow => 0.0,
     };
     Figures { speed_mps, distance_m, needed_m }
 }

@@ -161,6 +161,7 @@ kinds! {
     Rule(Rule) "rule" as_rule name;
     Require(Box<Require>) "require" as_require name;
     Body(Block) "body" as_body name;
+    Trajectory(Block) "trajectory" as_trajectory name;
     Road(Block) "road" as_road name;
     Episode(Vec<Field>) "episode" as_episode;
     Reward(Vec<Case>) "reward" as_reward;
@@ -360,11 +361,24 @@ pub enum EffectKind {
     Order { who: Name, fields: Vec<Field> },
 }
 
-/// Whether a road user appears ahead of the ego vehicle or behind it, along its route.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+/// From where the distance of a spawn counts.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum Place {
+    /// Ahead of the ego vehicle, along its route.
     Ahead,
     Behind,
+    /// From the beginning of a trajectory.
+    On(Box<Expr>),
+}
+
+impl Place {
+    /// The trajectory, if there is one.
+    pub fn trajectory(&self) -> Option<&Expr> {
+        match self {
+            Place::On(trajectory) => Some(trajectory),
+            Place::Ahead | Place::Behind => None,
+        }
+    }
 }
 
 /// `group vehicles = drive_ahead, overtake`.

@@ -169,6 +169,10 @@ impl Builder {
                 let name = self.name(parts.next());
                 ItemKind::Body(Block { name, fields: self.fields(parts.next())? })
             }
+            Rule::trajectory => {
+                let name = self.name(parts.next());
+                ItemKind::Trajectory(Block { name, fields: self.fields(parts.next())? })
+            }
             Rule::road => {
                 let name = self.name(parts.next());
                 ItemKind::Road(Block { name, fields: self.fields(parts.next())? })
@@ -323,8 +327,10 @@ impl Builder {
                     None => vec![self.name(parts.next())],
                 }
             });
-            let place = match parts.next().as_rule() {
+            let place = parts.next();
+            let place = match place.as_rule() {
                 Rule::kw_ahead => Place::Ahead,
+                Rule::on_trajectory => Place::On(Box::new(self.only_expression(place)?)),
                 _ => Place::Behind,
             };
             let distance = self.expression(parts.next())?;

@@ -2,7 +2,7 @@
 
 use pest::iterators::Pair;
 
-use crate::syntax::ast::{Arg, Arm, Call, Expr, ExprKind, Span, Text};
+use crate::syntax::ast::{Arg, Arm, Call, Expr, ExprKind, Name, Span, Text};
 use crate::syntax::build::{Builder, Built, Parts};
 use crate::syntax::grammar::{Role, Rule, role};
 use crate::syntax::operator::{Grouping, Operator};
@@ -156,7 +156,9 @@ impl Builder {
         let mut patterns = Vec::new();
         if parts.take(Rule::otherwise).is_none() {
             while let Some(pattern) = parts.take(Rule::pattern) {
-                patterns.push(self.name(pattern));
+                let span = self.span(&pattern);
+                let words: Vec<&str> = pattern.as_str().split_whitespace().collect();
+                patterns.push(Name::new(words.join(" "), span));
             }
         }
         Ok(Arm { patterns, value: self.expression(parts.next())?, span })

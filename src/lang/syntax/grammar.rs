@@ -128,6 +128,7 @@ pub fn role(rule: Rule) -> Role {
         Rule::kw_repeat | Rule::repeat => Role::Said("`repeat`"),
         Rule::kw_as | Rule::bearer => Role::Said("`as`"),
         Rule::kw_of | Rule::of_whom => Role::Said("`of`"),
+        Rule::on_trajectory => Role::Said("`on`"),
         Rule::kw_apart | Rule::apart => Role::Said("`apart`"),
         Rule::kw_order => Role::Said("`order`"),
         Rule::kw_ahead => Role::Said("`ahead`"),
@@ -178,6 +179,7 @@ pub fn role(rule: Rule) -> Role {
         | Rule::requirement
         | Rule::body
         | Rule::road
+        | Rule::trajectory
         | Rule::episode
         | Rule::reward
         | Rule::verdict
@@ -218,6 +220,7 @@ pub fn role(rule: Rule) -> Role {
         | Rule::kw_optional
         | Rule::kw_require
         | Rule::kw_body
+        | Rule::kw_trajectory
         | Rule::kw_manoeuvre
         | Rule::kw_episode
         | Rule::kw_reward

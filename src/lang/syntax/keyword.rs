@@ -31,6 +31,10 @@ pub const DECLARATIONS: &[Keyword] = &[
         "manoeuvre",
         "What a road user does, phase by phase: `manoeuvre brake(rate: Accel) { after 3 s { speed: 0 m/s, rate: rate } }`.",
     ),
+    (
+        "trajectory",
+        "A way in a map that a road user follows: `trajectory across { road: corner, lanes: [lane 3/-1 at 0 m, lane 5/-1 at 60 m] }`.",
+    ),
     ("road", "A map with a start and a goal, on which episodes are driven."),
     ("episode", "How episodes run: their roads, steps and ends."),
     ("reward", "What an agent learns from: the first case that holds."),
@@ -76,10 +80,11 @@ pub const CLAUSES: &[Keyword] = &[
     ("from", "With `behind`, what hides a pedestrian: `spawn Pedestrian ahead 30 m from behind SUV { … }`."),
     (
         "on",
-        "The actions that a rule binds or that have more effects, or the state whose changes a rule orders.",
+        "The actions that a rule binds or that have more effects, the state whose changes a rule orders, or the trajectory of a \
+         spawn: `spawn Sedan on across at 20 m { does: Follow, speed: 8 m/s }`.",
     ),
     ("with", "Values of drawn parameters, or the road user that a claim is about."),
-    ("at", "The time of a claim, or the station of a place on a lane."),
+    ("at", "The time of a claim, or the station of a place on a lane or a trajectory."),
     ("by", "The reference drivers that a claim names."),
     ("during", "What a rule restricts instead of the draw: `rule calm on vehicles during change: …`."),
     ("once", "The moment of a scenario's action, or of a phase: `once ego.junction_ahead <= 40 m`."),

@@ -296,6 +296,10 @@ impl Printer<'_> {
                 self.words(&format!("body {} ", item.name.text));
                 self.braced(span, field_entries(&item.fields).collect());
             }
+            ItemKind::Trajectory(item) => {
+                self.words(&format!("trajectory {} ", item.name.text));
+                self.lines(span.end, field_entries(&item.fields));
+            }
             ItemKind::Road(item) => {
                 self.words(&format!("road {} ", item.name.text));
                 self.lines(span.end, field_entries(&item.fields));
@@ -590,6 +594,7 @@ fn one_line(kind: &ItemKind) -> bool {
         | ItemKind::EachStep(_)
         | ItemKind::Odds(_)
         | ItemKind::Body(_)
+        | ItemKind::Trajectory(_)
         | ItemKind::Road(_)
         | ItemKind::Episode(_)
         | ItemKind::Reward(_)
@@ -666,10 +671,6 @@ fn effect(effect: &Effect) -> Layout {
             Layout::row([Layout::text(format!("order {} ", who.text)), fields(entries)])
         }
         EffectKind::Spawn { body, bearers, place, distance, of, apart, cover, fields: entries } => {
-            let place = match place {
-                Place::Ahead => " ahead ",
-                Place::Behind => " behind ",
-            };
             let mut parts = vec![Layout::text("spawn "), expression(body)];
             let names: Vec<&str> = bearers.iter().map(|name| name.text.as_str()).collect();
             match names[..] {
@@ -677,7 +678,14 @@ fn effect(effect: &Effect) -> Layout {
                 [name] => parts.push(Layout::text(format!(" as {name}"))),
                 _ => parts.push(Layout::text(format!(" as [{}]", names.join(", ")))),
             }
-            parts.extend([Layout::text(place), expression(distance)]);
+            match place {
+                Place::Ahead => parts.push(Layout::text(" ahead ")),
+                Place::Behind => parts.push(Layout::text(" behind ")),
+                Place::On(trajectory) => {
+                    parts.extend([Layout::text(" on "), expression(trajectory), Layout::text(" at ")]);
+                }
+            }
+            parts.push(expression(distance));
             if let Some(of) = of {
                 parts.push(Layout::text(format!(" of {}", of.text)));
             }

@@ -10,7 +10,7 @@ use crate::action::{Course, Effect, LaneChangeRules, OrderRequest, SpawnRequest}
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 use avastra_lang::model::body::{OwnBody, parameters};
-use avastra_lang::model::command::{IgnoredRules, Needs, OFFSET_M};
+use avastra_lang::model::command::{IgnoredRules, OFFSET_M, Told};
 use avastra_lang::model::expr::{Expr, Who};
 use avastra_lang::model::rules::{
     Before, Candidate, Choose, Clause, Nearest, Room, RowRules, TRIES_MAX, Unsolved,
@@ -19,7 +19,7 @@ use avastra_lang::model::vocabulary::Verb;
 use avastra_lang::model::{
     ActionDef, BodyWord, Domain, EffectDef, Facts, MEET, ManoeuvreCall, Memory, MomentFacts, NpcFacts,
     OrderDef, Parameter, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value, WAITS_S,
-    WorldFacts, evaluate, locals, needs, reached, rounded_into,
+    WorldFacts, evaluate, locals, reached, rounded_into, told,
 };
 
 /// Draws of one row in a step before the row is refused. Every draw obeys what can be known before; a further one
@@ -355,6 +355,7 @@ impl<'a> Judge<'a> {
                 .map(|waits| rounded_into(evaluate(waits, functions, &facts).number(), WAITS_S)),
             siren: spawn.siren.as_ref().is_some_and(|siren| evaluate(siren, functions, &facts).truth()),
             turn: spawn.turn.as_ref().map(|turn| turn.word(functions, &facts)),
+            trajectory: spawn.trajectory.as_ref().map(|one| one.word(functions, &facts)),
             bearer: spawn.bearer,
         }
     }
@@ -363,9 +364,9 @@ impl<'a> Judge<'a> {
         let facts = self.facts(locals, after);
         let command = order.command.evaluate(&self.row.space.functions, &facts);
         let of = |manoeuvre: usize| self.row.space.manoeuvres.get(manoeuvre);
-        let needed = |call: &ManoeuvreCall| needs(call.manoeuvre, of);
-        let needs = order.manoeuvre.as_ref().map_or(Needs::Legs, needed);
-        OrderRequest { bearer: order.who.bearer(locals), command, needs }
+        let needed = |call: &ManoeuvreCall| told(call.manoeuvre, of);
+        let phases = order.manoeuvre.as_ref().map_or(Told::NOTHING, needed);
+        OrderRequest { bearer: order.who.bearer(locals), command, phases }
     }
 
     /// Why an order cannot be given after the effects before it. Somebody whom one of them spawns under that name is there.

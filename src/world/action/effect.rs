@@ -1,7 +1,7 @@
 //! What a row does to the world once its parameters are drawn.
 
 use avastra_lang::model::body::OwnBody;
-use avastra_lang::model::command::{Command, IgnoredRules, Needs};
+use avastra_lang::model::command::{Command, IgnoredRules, Told};
 use avastra_lang::model::expr::Expr;
 use avastra_lang::model::vocabulary::{
     Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Turning, Verb,
@@ -29,14 +29,14 @@ pub struct OrderRequest {
     pub bearer: usize,
     /// Empty for an order of a manoeuvre alone.
     pub command: Command,
-    /// What the phases of its manoeuvre need.
-    pub needs: Needs,
+    /// What the phases of its manoeuvre tell.
+    pub phases: Told,
 }
 
 impl OrderRequest {
     /// Why nobody of that kind can be told this, in words; `None` if they can.
     pub fn impossible(&self, verb: Verb) -> Option<String> {
-        self.command.impossible(verb).or_else(|| self.needs.lacked_by(verb))
+        self.command.impossible(verb).or_else(|| self.phases.lacked_by(verb))
     }
 }
 
@@ -74,6 +74,8 @@ pub struct SpawnRequest {
     pub siren: bool,
     /// Where it goes at the next junction; with `CrossRoad` at the one where it crosses the ego vehicle's way.
     pub turn: Option<Turning>,
+    /// The trajectory on which it begins, by its index in the space; `distance_m` is then its station there.
+    pub trajectory: Option<usize>,
     /// The name that it bears, by its index in the space.
     pub bearer: Option<usize>,
 }

@@ -153,7 +153,7 @@ impl Around<'_> {
             Motion::Drive(driver) if !user.mover.is_wreck() => {
                 Some((&user.obstacle, &user.mover.size, driver))
             }
-            Motion::Drive(_) | Motion::Walk(_) | Motion::Stroll(_) | Motion::Stand => None,
+            Motion::Drive(_) | Motion::Walk(_) | Motion::Stroll(_) | Motion::Guide(_) | Motion::Stand => None,
         })
     }
 
@@ -161,7 +161,7 @@ impl Around<'_> {
     pub fn walkers(&self) -> impl Iterator<Item = (&Obstacle, &Walker)> {
         self.users().filter_map(|user| match &user.mover.motion {
             Motion::Walk(walker) => Some((&user.obstacle, walker)),
-            Motion::Drive(_) | Motion::Stroll(_) | Motion::Stand => None,
+            Motion::Drive(_) | Motion::Stroll(_) | Motion::Guide(_) | Motion::Stand => None,
         })
     }
 

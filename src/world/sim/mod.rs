@@ -26,6 +26,7 @@ mod contact;
 mod ego;
 mod encroachment;
 mod environment;
+mod guided;
 mod incident;
 mod junction;
 mod lanes;

@@ -204,11 +204,13 @@ pub(super) fn npc_facts(around: &Around, obstacle: &Obstacle, motion: &Motion) -
     let scene = around.scene;
     match motion {
         Motion::Drive(driver) => driver_facts(around, obstacle, driver),
-        Motion::Walk(_) | Motion::Stroll(_) | Motion::Stand => {
+        Motion::Walk(_) | Motion::Stroll(_) | Motion::Guide(_) | Motion::Stand => {
             let station_m = scene.route.path.project(obstacle.outline.pose.position).station_m;
             let beside = OnRoute::at(&scene.map, &scene.route, station_m);
             let junction = (beside.junction_ahead_m, Turn::None);
-            facts(around, obstacle, beside.limit_mps, junction, Light::None)
+            let facts = facts(around, obstacle, beside.limit_mps, junction, Light::None);
+            let station_m = if let Motion::Guide(guided) = motion { guided.station_m() } else { 0.0 };
+            NpcFacts { station_m, ..facts }
         }
     }
 }
@@ -291,6 +293,7 @@ fn facts(
         next_crosswalk_gap_m: around.next_crosswalk_gap_m(obstacle.outline.pose.position),
         contact_in_s: contact_in_s(lengthwise, sideways),
         pet_s: TIME_S_MAX,
+        station_m: 0.0,
         has_siren: false,
         in_next_junction: false,
         leads: false,

@@ -13,6 +13,7 @@ use avastra_road::is_apart;
 use super::ambient::COMMANDED_MAX;
 use super::around::Around;
 use super::body::BodyParameters;
+use super::guided::Guided;
 use super::npc::{Driver, View};
 use super::pedestrian::Walker;
 use super::right_of_way::{Rights, SIDEWAYS_MPS};
@@ -298,6 +299,7 @@ pub(super) enum Motion {
     Drive(Driver),
     Walk(Walker),
     Stroll(Stroller),
+    Guide(Guided),
     Stand,
 }
 
@@ -327,6 +329,14 @@ impl Motion {
                 let is_over = stroller.is_over(around);
                 Some(on_foot(speed_mps, is_aside, is_over))
             }
+            Motion::Guide(guided) => Some(Progress {
+                speed_mps: guided.speed_mps,
+                is_aside: guided.is_aside(),
+                has_turned: true,
+                has_met: guided.has_met(),
+                on_foot: false,
+                is_over: guided.is_over(),
+            }),
             Motion::Stand => None,
         }
     }
@@ -339,6 +349,7 @@ impl Motion {
                 command.speed_mps.iter().for_each(|speed_mps| walker.order(*speed_mps, tick));
             }
             Motion::Stroll(stroller) => stroller.order(command),
+            Motion::Guide(guided) => guided.order(command),
             Motion::Stand => {}
         }
     }
@@ -433,6 +444,7 @@ impl Mover {
         match &self.motion {
             Motion::Drive(driver) => Some(driver.way.height_at(driver.station_m)),
             Motion::Stroll(stroller) => Some(stroller.height_m()),
+            Motion::Guide(guided) => Some(guided.height_m()),
             Motion::Walk(_) | Motion::Stand => None,
         }
     }
@@ -469,6 +481,7 @@ impl Mover {
             _ if self.is_wreck() => this.velocity_mps == Vec2::zeros(),
             // One that stands within a manoeuvre may go on by itself.
             Motion::Drive(driver) => driver.has_given_up() || self.course.is_none() && driver.is_parked(),
+            Motion::Guide(guided) => self.course.is_none() && guided.speed_mps == 0.0,
             Motion::Walk(_) | Motion::Stroll(_) | Motion::Stand => false,
         }
     }
@@ -498,13 +511,19 @@ impl Mover {
             // Who has still something to do does not leave.
             Motion::Walk(walker) => walker.step(this, in_sight || self.course.is_some(), around),
             Motion::Stroll(stroller) => stroller.step(this, in_sight || self.course.is_some(), around),
+            Motion::Guide(guided) => Some(guided.step(this, self.touched, around)),
             Motion::Stand => Some(rest),
         }
     }
 
     /// The area that it sweeps within a tick.
     pub fn sweep(&self, mut start: OrientedBox, end: Pose) -> Sweep {
-        if let Motion::Walk(_) | Motion::Stroll(_) = self.motion {
+        let on_foot = match &self.motion {
+            Motion::Walk(_) | Motion::Stroll(_) => true,
+            Motion::Guide(guided) => guided.turns_on_the_spot(),
+            Motion::Drive(_) | Motion::Stand => false,
+        };
+        if on_foot {
             // A person turns round on the spot, so the corners of its box must not sweep half a circle within a tick.
             start.pose.heading_rad = end.heading_rad;
         }
@@ -543,6 +562,7 @@ impl Mover {
             Motion::Drive(driver) => driver.trace(trace),
             Motion::Walk(walker) => walker.trace(trace),
             Motion::Stroll(stroller) => stroller.trace(trace),
+            Motion::Guide(guided) => guided.trace(trace),
             Motion::Stand => {}
         }
     }

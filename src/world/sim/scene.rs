@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use avastra_base::geometry::{Path, Vec2};
-use avastra_lang::model::{CROSSWALK_GAP_M_MAX, Road};
+use avastra_lang::model::{CROSSWALK_GAP_M_MAX, Road, Trajectory};
 use avastra_road::{FootWay, LaneIndex, Neighbour, RoadMap, Route};
 
 use super::junction::ConflictAreas;
@@ -76,6 +76,8 @@ pub struct Scene {
     pub is_motorway: bool,
     /// How far vehicles are sensed, m.
     pub range_m: f64,
+    /// The courses of the space's trajectories; `None` for those on other maps.
+    pub(super) trajectories: Vec<Option<Arc<Trajectory>>>,
     pub(super) areas: ConflictAreas,
     /// Where the ways of others cross or join the route, by rising station.
     pub(super) route_areas: Vec<RouteArea>,
@@ -98,7 +100,8 @@ pub struct Scene {
 impl Scene {
     /// The scene of a road of a space.
     pub fn of(road: &Road) -> Scene {
-        Scene { set_mps: road.set_mps, ..Scene::new(road.map.clone(), road.route.clone()) }
+        let trajectories = road.trajectories.clone();
+        Scene { set_mps: road.set_mps, trajectories, ..Scene::new(road.map.clone(), road.route.clone()) }
     }
 
     pub fn new(map: Arc<RoadMap>, route: Route) -> Scene {
@@ -143,6 +146,7 @@ impl Scene {
             range_m: if is_motorway { MOTORWAY_RANGE_M } else { RANGE_M },
             map,
             route,
+            trajectories: Vec::new(),
             set_mps: None,
         }
     }

@@ -91,6 +91,7 @@ pub fn request(verb: Verb, distance_m: f64, speed_mps: f64) -> SpawnRequest {
         turn: None,
         meet: None,
         waits_s: None,
+        trajectory: None,
         bearer: None,
     }
 }

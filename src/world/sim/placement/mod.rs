@@ -20,6 +20,7 @@ use avastra_road::LaneIndex;
 use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
+use crate::sim::guided::Guided;
 use crate::sim::lanes::may_use;
 use crate::sim::moment::npc_facts;
 use crate::sim::npc::{Cruise, Driver, PlannedChange};
@@ -73,6 +74,7 @@ pub(super) fn place(
         Verb::DriveOpposite => drive_opposite(&asked)?,
         Verb::CrossRoad => cross_road(&asked)?,
         Verb::Walk | Verb::Stand | Verb::WalkAhead | Verb::WalkOpposite => return on_foot(&asked),
+        Verb::Follow => return on_trajectory(&asked),
     };
     let (lane, _) = driver.way.lane_at(driver.station_m);
     if !may_use(around, lane, request.body, request.ignores) {
@@ -85,6 +87,20 @@ pub(super) fn place(
     Ok(Newcomers { asked: finish(&asked, Motion::Drive(driver), moved)?, cover: None })
 }
 
+/// Who follows a trajectory, at its station.
+fn on_trajectory(asked: &Asked) -> Result<Newcomers, String> {
+    let Asked { around, request, size, .. } = asked;
+    let way = request.trajectory.and_then(|index| around.scene.trajectories.get(index)?.clone());
+    let way = way.ok_or("its trajectory lies on another map")?;
+    if request.distance_m > way.path.length_m() {
+        return Err("the trajectory ends before that station".into());
+    }
+    let to_middle_m = Guided::to_middle_m(request.body.is_vehicle(), size);
+    let guided = Guided::new(way, request.distance_m, request.offset_m, request.speed_mps, to_middle_m);
+    let begins = guided.begins();
+    Ok(Newcomers { asked: finish(asked, Motion::Guide(guided), begins)?, cover: None })
+}
+
 /// Refuses what no road user could do. Requests of scripts come from outside, so nothing is taken for
 /// granted; NaN is in no range.
 fn check(request: &SpawnRequest) -> Result<(), String> {
@@ -93,6 +109,9 @@ fn check(request: &SpawnRequest) -> Result<(), String> {
     }
     if request.cover.is_some_and(|cover| !cover.is_vehicle() || request.verb != Verb::Walk) {
         return Err("only a pedestrian who walks comes from behind a vehicle".into());
+    }
+    if request.verb == Verb::Follow {
+        return Ok(());
     }
     match (request.verb.is_on_foot(), request.body.is_vehicle()) {
         (true, true) => Err("only a pedestrian walks".into()),
@@ -128,7 +147,8 @@ pub(super) fn facts(around: &Around, request: &SpawnRequest, newcomers: &Newcome
         Verb::DriveOpposite if request.offset_m > 0.0 || meets_route(around, &newcomer.mover) => {
             safety::oncoming_m(ego_mps, -along_mps, friction)
         }
-        Verb::DriveOpposite => 0.0,
+        // It is where its trajectory says, whatever the ego vehicle does.
+        Verb::DriveOpposite | Verb::Follow => 0.0,
         Verb::WalkOpposite => safety::oncoming_m(ego_mps, -along_mps, friction),
         Verb::CrossRoad | Verb::Walk | Verb::Stand => safety::behind_leader_m(ego_mps, 0.0, friction),
     };

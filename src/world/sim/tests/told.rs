@@ -1,9 +1,14 @@
 //! What road users are told to do beside the ego vehicle and along its route, against closed forms.
 
-use avastra_lang::model::command::{Command, IgnoredRules, Needs};
+use std::sync::Arc;
+
+use avastra_base::geometry::Path;
+use avastra_lang::model::Trajectory;
+use avastra_lang::model::command::{Command, IgnoredRules, Told};
 use avastra_lang::model::vocabulary::{LaneChoice, TrafficRule, Turning, Verb};
 
 use crate::action::{Effect, OrderRequest, SpawnRequest, Surroundings};
+use crate::sim::scene::Scene;
 use crate::sim::testing::request;
 use crate::sim::{DT_S, Obstacle, Start, VehicleParameters, World, testing};
 
@@ -14,7 +19,9 @@ fn named(request: SpawnRequest) -> SpawnRequest {
 }
 
 fn order(world: &mut World, command: Command) {
-    world.apply(&Effect::Order(OrderRequest { bearer: 0, command, needs: Needs::Legs })).expect("it obeys");
+    world
+        .apply(&Effect::Order(OrderRequest { bearer: 0, command, phases: Told::NOTHING }))
+        .expect("it obeys");
 }
 
 fn there(world: &World, id: u32) -> Obstacle {
@@ -143,7 +150,7 @@ fn nobody_is_early_where_ways_do_not_cross() {
     let mut world = driven(&testing::straight(), 10.0, 3.0);
     spawn(&mut world, named(request(Verb::DriveAhead, 30.0, 8.0)));
     let command = Command { early_s: Some(1.0), ..Command::default() };
-    let order = OrderRequest { bearer: 0, command, needs: Needs::Legs };
+    let order = OrderRequest { bearer: 0, command, phases: Told::NOTHING };
     let refusal = world.order_refusal(&order);
     assert_eq!(refusal.as_deref(), Some("its way does not cross the ego vehicle's ahead of it"));
     // It may be told to turn first.
@@ -191,5 +198,36 @@ fn a_pedestrian_who_waits_sets_out_after_that_time() {
         drive(&mut world, 2.0, 5.0);
         let way_m = (there(&world, user.id).outline.pose.position - from).norm();
         assert!((way_m - 1.4 * (5.0 - waits_s)).abs() <= 1.4 * DT_S + 1e-9, "{waits_s} s: {way_m} m");
+    }
+}
+
+#[test]
+fn who_follows_a_trajectory_is_at_a_place_of_it_when_the_ego_vehicle_is_at_one_of_its_route() {
+    let plain = testing::straight();
+    let from = plain.route.path.pose_at(120.0).offset(0.0, -6.0).position;
+    let to = plain.route.path.pose_at(120.0).offset(0.0, 14.0).position;
+    let path = Path::through(&[from, to]).expect("a way");
+    let heights_m = vec![0.0; path.points().len()];
+    let mut scene = Scene::new(Arc::clone(&plain.map), plain.route.clone());
+    scene.trajectories = vec![Some(Arc::new(Trajectory { path, heights_m }))];
+    let scene = Arc::new(scene);
+    for (speed_mps, reach_m, steady_m) in [(2.0, 6.0, 3.0), (8.0, 9.0, 1.0), (1.0, 4.0, 0.0)] {
+        let mut world = World::new(Arc::clone(&scene), &Start { ego_mps: 10.0, ..testing::start() });
+        let asked = SpawnRequest { trajectory: Some(0), ..request(Verb::Follow, 0.0, 0.0) };
+        let user = spawn(&mut world, named(asked)).id;
+        let at_m = 110.0;
+        let early_s = Some(0.0);
+        let told = Command { early_s, at_m: Some(at_m), reach_m: Some(reach_m), ..Command::default() };
+        order(&mut world, Command { speed_mps: Some(speed_mps), steady_m: Some(steady_m), ..told });
+        let mut last_mps = 0.0;
+        while ego_front_m(&world) < at_m {
+            world.tick(&hold(&world, 10.0));
+            last_mps = there(&world, user).velocity_mps.norm();
+        }
+        let station_m = world.npc_facts(user).expect("it is there").station_m;
+        // The ego vehicle is up to a tick beyond the place.
+        let beyond_m = (ego_front_m(&world) - at_m) / 10.0 * speed_mps;
+        assert!((station_m - beyond_m - reach_m).abs() < 0.05, "{reach_m}: at {station_m}");
+        assert!((last_mps - speed_mps).abs() < 0.05, "{speed_mps}: {last_mps}");
     }
 }

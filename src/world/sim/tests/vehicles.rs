@@ -1,6 +1,6 @@
 //! How other vehicles move: on bends, after a crash, at stop signs, by each traffic profile.
 
-use avastra_lang::model::command::{Command, IgnoredRules, Needs};
+use avastra_lang::model::command::{Command, IgnoredRules, Told};
 use std::sync::Arc;
 
 use crate::action::{Effect, OrderRequest, SpawnRequest, Surroundings};
@@ -90,7 +90,7 @@ fn an_order_changes_speed_at_its_rate() {
         let user = spawn(&mut world, named);
         let command =
             Command { speed_mps: Some(speed_mps), rate_mps2: Some(rate_mps2), ..Command::default() };
-        let order = OrderRequest { bearer: 7, command, needs: Needs::Legs };
+        let order = OrderRequest { bearer: 7, command, phases: Told::NOTHING };
         world.apply(&Effect::Order(order)).expect("it is there and drives");
         let from_m = user.outline.pose.position.x;
         let (mut ticks, mut now) = (0, user);
@@ -141,7 +141,7 @@ fn a_told_time_gap_is_kept_as_the_driver_model_has_it() {
         let follower = spawn(&mut world, named);
         let command = Command { speed_mps: Some(20.0), time_gap_s: Some(gap_s), ..Command::default() };
         world
-            .apply(&Effect::Order(OrderRequest { bearer: 0, command, needs: Needs::Legs }))
+            .apply(&Effect::Order(OrderRequest { bearer: 0, command, phases: Told::NOTHING }))
             .expect("it is there");
         drive(&mut world, 8.0, 32.0);
         let [ahead, behind] =
@@ -159,7 +159,7 @@ fn an_order_is_for_the_latest_bearer_and_no_wreck_obeys() {
     let order = OrderRequest {
         bearer: 0,
         command: Command { speed_mps: Some(3.0), ..Command::default() },
-        needs: Needs::Legs,
+        phases: Told::NOTHING,
     };
     assert_eq!(world.order_refusal(&order).as_deref(), Some("no road user of that name is there"));
     let named = |distance_m| SpawnRequest { bearer: Some(0), ..request(Verb::DriveAhead, distance_m, 9.0) };
@@ -176,16 +176,16 @@ fn an_order_is_for_the_latest_bearer_and_no_wreck_obeys() {
     assert_eq!(world.order_refusal(&order).as_deref(), Some("it stands, and does not walk"));
     let walker = SpawnRequest { bearer: Some(2), ..request(Verb::Walk, 50.0, 1.0) };
     spawn(&mut world, walker);
-    let manoeuvre = OrderRequest { bearer: 2, command: Command::default(), needs: Needs::Wheels };
+    let manoeuvre = OrderRequest { bearer: 2, command: Command::default(), phases: Told::BY_DRIVERS };
     assert_eq!(
         world.order_refusal(&manoeuvre).as_deref(),
         Some("it is on foot, and can be told a `speed` alone")
     );
-    assert_eq!(world.order_refusal(&OrderRequest { needs: Needs::Legs, ..manoeuvre }), None);
+    assert_eq!(world.order_refusal(&OrderRequest { phases: Told::NOTHING, ..manoeuvre }), None);
     let backwards = Command { speed_mps: Some(-1.0), ..Command::default() };
     let car = SpawnRequest { bearer: Some(1), ..request(Verb::DriveOpposite, 60.0, 9.0) };
     spawn(&mut world, car);
-    let refusal = world.order_refusal(&OrderRequest { bearer: 1, command: backwards, needs: Needs::Legs });
+    let refusal = world.order_refusal(&OrderRequest { bearer: 1, command: backwards, phases: Told::NOTHING });
     assert_eq!(refusal.as_deref(), Some("it does not drive backwards"));
 }
 

@@ -155,6 +155,7 @@ impl World {
             let Some(progress) = mover.motion.progress(&self.alone()) else { continue };
             let speed_mps = match &mover.motion {
                 Motion::Drive(driver) => driver.speed_mps,
+                Motion::Guide(guided) => guided.speed_mps,
                 Motion::Walk(_) | Motion::Stroll(_) | Motion::Stand => obstacle.velocity_mps.norm(),
             };
             let npc = NpcFacts { speed_mps, ..npc_facts(&self.alone(), obstacle, &mover.motion) };

@@ -1,0 +1,224 @@
+//! Trajectories: ways in the map of a road, along its lanes or straight from point to point.
+
+use std::sync::Arc;
+
+use crate::check::checker::{Checker, docs, each};
+use crate::check::expression::Place;
+use crate::check::references::Symbol;
+use crate::check::report::{Report, all_of, field};
+use crate::check::road::Maps;
+use crate::model::vocabulary::{PointField, TrajectoryField};
+use crate::model::{Road, Trajectory, TrajectoryDef, Type, WordExpr, code};
+use crate::syntax::ast::{ItemKind, Span};
+use crate::syntax::{Diagnostic, ast};
+use avastra_base::geometry::{Path, Vec2};
+use avastra_base::units::Dimension;
+use avastra_road::RoadMap;
+
+/// A way that is shorter leads nowhere, m.
+const LENGTH_M_MIN: f64 = 0.1;
+
+/// The road under a point is at most so far beside it, m; beyond that the height is taken for 0 m.
+const BESIDE_M: f64 = 30.0;
+
+impl Checker {
+    /// Notes the names of trajectories, which spawns use before roads are known.
+    pub(super) fn declare_trajectories(&mut self, items: &[&ast::Item]) {
+        let (_, declared) = self.declared("trajectory", items, ItemKind::as_trajectory);
+        self.trajectories = declared
+            .into_iter()
+            .map(|(item, block)| TrajectoryDef {
+                name: block.name.text.clone(),
+                docs: docs(item),
+                declared: block.clone(),
+            })
+            .collect();
+    }
+
+    /// The trajectory of a spawn: its name, or an expression of an enum whose variants are such names.
+    pub(super) fn trajectory_word(&mut self, expr: &ast::Expr, place: &Place<'_>) -> Option<WordExpr<usize>> {
+        let known = |checker: &Checker, name: &str, span: Span| {
+            let found = checker.trajectories.iter().position(|one| one.name == name);
+            found.ok_or_else(|| {
+                let names = checker.trajectories.iter().map(|one| one.name.as_str());
+                checker.unknown("trajectory", name, span, names)
+            })
+        };
+        let note = |checker: &mut Checker, span, name: &str| {
+            checker.references.uses(span, Symbol::Trajectory(name.to_owned()));
+        };
+        self.word_or_enum("trajectory", expr, place, known, note)
+    }
+
+    /// Lays every trajectory on the map of its road, and gives it to all roads on that map. `roads` may lack those with mistakes.
+    pub(super) fn lay_trajectories(
+        &mut self,
+        items: &[&ast::Item],
+        roads: &mut [Option<Road>],
+        maps: &mut dyn Maps,
+    ) {
+        let doubles = self.doubles.clone();
+        let declared = each(items, ItemKind::as_trajectory).filter(|(item, _)| !doubles.contains(&item.span));
+        let declared: Vec<&ast::Block> = declared.map(|(_, block)| block).collect();
+        for block in declared {
+            let laid = self.laid(block, roads, maps);
+            for road in roads.iter_mut().flatten() {
+                let on_it = laid.as_ref().filter(|(map_path, _)| *map_path == road.map_path);
+                road.trajectories.push(on_it.map(|(_, trajectory)| Arc::clone(trajectory)));
+            }
+        }
+    }
+
+    fn laid(
+        &mut self,
+        block: &ast::Block,
+        roads: &[Option<Road>],
+        maps: &mut dyn Maps,
+    ) -> Option<(std::path::PathBuf, Arc<Trajectory>)> {
+        let fields = self.fields_known::<TrajectoryField>(&block.fields);
+        let name = &block.name;
+        let Some(road) = field(&fields, TrajectoryField::Road) else {
+            let message = format!("trajectory `{}` has no `road`", name.text);
+            return self.missing_field(TrajectoryField::Road, name.span, message);
+        };
+        let road_name = self.name_of(road, "a road")?;
+        let Some(road) = roads.iter().flatten().find(|known| known.name == road_name) else {
+            if self.road_names.iter().any(|known| known == road_name) {
+                // It has a mistake of its own.
+                return None;
+            }
+            let names = self.road_names.iter().map(String::as_str);
+            let error = self.unknown("road", road_name, road.span, names);
+            return self.reject(error);
+        };
+        let (lanes, points) =
+            (field(&fields, TrajectoryField::Lanes), field(&fields, TrajectoryField::Points));
+        let path = match (lanes, points) {
+            (Some(lanes), None) => self.along_lanes(lanes, &road.map, maps)?,
+            (None, Some(points)) => self.through_points(points, &road.map)?,
+            (Some(_), Some(points)) => {
+                let error = Diagnostic::error(code::NOT_HERE, "`lanes` and `points` both say the way");
+                let error = error.at(points.span, "beside `lanes`");
+                return self.reject(error.help("leave one of the two out"));
+            }
+            (None, None) => {
+                let message = format!("trajectory `{}` does not say where it leads", name.text);
+                let error = Diagnostic::error(code::MISSING_FIELD, message).at(name.span, "without a way");
+                return self.reject(error.help(
+                    "write `lanes: [lane 1/-1 at 0 m, lane 7/-1 at 80 m]` for a way along lanes, or `points: […]` for straight pieces",
+                ));
+            }
+        };
+        let heights_m = path.points().iter().map(|point| {
+            let found = road.map.nearest(point.position, point.heading_rad, BESIDE_M);
+            found.map_or(0.0, |place| road.map.lane(place.lane).height_at(place.station_m))
+        });
+        let heights_m = heights_m.collect();
+        Some((road.map_path.clone(), Arc::new(Trajectory { path, heights_m })))
+    }
+
+    /// The expressions of a list of at least two places.
+    fn places<'a>(&mut self, list: &'a ast::Expr, example: &str) -> Option<&'a [ast::Expr]> {
+        match &list.kind {
+            ast::ExprKind::List(items) if items.len() >= 2 => Some(items),
+            _ => {
+                let error = Diagnostic::error(code::TYPE_MISMATCH, "a way is a list of two places or more");
+                self.reject(error.at(list.span, "leads nowhere").help(format!("write `{example}`")))
+            }
+        }
+    }
+
+    fn along_lanes(&mut self, list: &ast::Expr, map: &Arc<RoadMap>, maps: &mut dyn Maps) -> Option<Path> {
+        let items = self.places(list, "lanes: [lane 1/-1 at 0 m, lane 7/-1 at 80 m]")?;
+        let places = all_of(items.iter().map(|item| self.lane_point(item, map)))?;
+        let mut parts = Vec::new();
+        for (pair, item) in places.windows(2).zip(&items[1..]) {
+            match maps.route(map, pair[0], pair[1]) {
+                Ok(route) => parts.push(route.path),
+                Err(error) => {
+                    let message = "no way leads along the lanes to this place";
+                    let error = Diagnostic::error(code::NO_ROUTE, message).at(item.span, error.to_string());
+                    return self.reject(error.help(
+                        "`avastra road MAP` tells which lane leads where; `points` lead straight from place to place",
+                    ));
+                }
+            }
+        }
+        self.long_enough(Path::join(&parts), list.span)
+    }
+
+    fn through_points(&mut self, list: &ast::Expr, map: &Arc<RoadMap>) -> Option<Path> {
+        let items = self.places(list, "points: [{ x: 0 m, y: 3 m }, { x: 40 m, y: 3 m }]")?;
+        let points = all_of(items.iter().map(|item| self.point(item, map)))?;
+        self.long_enough(Path::through(&points), list.span)
+    }
+
+    fn long_enough(&mut self, path: Option<Path>, span: Span) -> Option<Path> {
+        path.filter(|path| path.length_m() >= LENGTH_M_MIN).or_else(|| {
+            let error = Diagnostic::error(code::SETTING, "the trajectory has no length");
+            self.reject(error.at(span, format!("must be at least {LENGTH_M_MIN} m long")))
+        })
+    }
+
+    /// A point: a place on a lane, one beside it, or one in the plane.
+    fn point(&mut self, item: &ast::Expr, map: &RoadMap) -> Option<Vec2> {
+        let ast::ExprKind::Record(fields) = &item.kind else {
+            let place = self.lane_point(item, map)?;
+            return Some(map.lane(place.lane).centre.position_at(place.station_m));
+        };
+        let fields = self.fields_known::<PointField>(fields);
+        let mut number = |wanted| field(&fields, wanted).map(|value| self.length_m(value));
+        let (x, y, offset) = (number(PointField::X), number(PointField::Y), number(PointField::Offset));
+        match (field(&fields, PointField::At), x, y) {
+            (Some(at), None, None) => {
+                let place = self.lane_point(at, map)?;
+                let pose = map.lane(place.lane).centre.pose_at(place.station_m);
+                Some(pose.offset(0.0, offset.unwrap_or(Some(0.0))?).position)
+            }
+            (None, Some(x), Some(y)) if offset.is_none() => Some(Vec2::new(x?, y?)),
+            _ => {
+                let message =
+                    "a point is a place on a lane, with an `offset` or without, or an `x` and a `y`";
+                let error = Diagnostic::error(code::MISSING_FIELD, message).at(item.span, "neither");
+                self.reject(
+                    error.help("write `{ at: lane 1/-1 at 40 m, offset: -4 m }` or `{ x: 12 m, y: 3 m }`"),
+                )
+            }
+        }
+    }
+
+    fn length_m(&mut self, value: &ast::Expr) -> Option<f64> {
+        let length = self.typed(value, &Place::default(), Type::Quantity(Dimension::LENGTH))?;
+        Some(self.fold_number(&length)?.to_f64())
+    }
+
+    /// Notes the names and numbers of a trajectory, whether its map can be read or not.
+    pub(super) fn note_trajectory(&mut self, block: &ast::Block) {
+        for field in &block.fields {
+            self.references.word_named::<TrajectoryField>(field.name.span, &field.name.text);
+            match &field.value.kind {
+                ast::ExprKind::Name(road) => {
+                    self.references.uses(field.value.span, Symbol::Road(road.clone()));
+                }
+                ast::ExprKind::List(items) => items.iter().for_each(|item| self.note_point(item)),
+                _ => {}
+            }
+        }
+    }
+
+    fn note_point(&mut self, item: &ast::Expr) {
+        match &item.kind {
+            ast::ExprKind::LanePoint { station, .. } => self.references.number(station),
+            ast::ExprKind::Record(fields) => {
+                for field in fields {
+                    self.references.word_named::<PointField>(field.name.span, &field.name.text);
+                    match &field.value.kind {
+                        ast::ExprKind::LanePoint { station, .. } => self.references.number(station),
+                        _ => self.look_at(&field.value, &Place::default(), None),
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+}

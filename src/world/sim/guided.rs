@@ -1,0 +1,311 @@
+//! Road users that follow a trajectory exactly, whatever comes, as the targets of proving grounds do: robots on a planned way.
+//!
+//! They take on a speed as they are told, move to the side of their way, and arrive at a place of it when the ego vehicle arrives
+//! at one of its route, as OpenSCENARIO's `SynchronizeAction` has it. Nobody is given way to, and nothing stops them but a
+//! contact and the end of the way.
+
+use std::sync::Arc;
+
+use avastra_base::geometry::{Pose, SMOOTH_STEP_SLOPE_MAX, smooth_step, unit_vector, wrap_angle};
+use avastra_lang::model::Trajectory;
+use avastra_lang::model::command::Command;
+
+use super::around::Around;
+use super::body::BodyParameters;
+use super::ego::VehicleParameters;
+use super::road_user::{Moved, Obstacle};
+use super::trace::Trace;
+use super::world::DT_S;
+
+/// How fast one moves to the side that is told no `aside`, m/s. Ours.
+const ASIDE_MPS: f64 = 1.0;
+
+/// An ego vehicle that is slower does not arrive: who is to meet it stands, too, m/s.
+const STANDING_MPS: f64 = 0.01;
+
+/// A speed so near to that of a steady change leads to the place in time, m/s.
+const ON_LINE_MPS: f64 = 0.1;
+
+#[derive(Debug, Clone)]
+pub(super) struct Guided {
+    way: Arc<Trajectory>,
+    /// Where its rear axle (on foot its middle) is along the way, and to the left of it, m.
+    station_m: f64,
+    left_m: f64,
+    /// From that point to the middle of its outline, m.
+    to_middle_m: f64,
+    pub speed_mps: f64,
+    wants_mps: f64,
+    /// Infinite: at once.
+    rate_mps2: f64,
+    shift: Option<Shift>,
+    meeting: Option<Meeting>,
+}
+
+/// A move to the side, by the smooth step of least jerk.
+#[derive(Debug, Clone, Copy)]
+struct Shift {
+    from_m: f64,
+    to_m: f64,
+    takes_s: f64,
+    since_s: f64,
+}
+
+/// To be at a place when the ego vehicle is at one of its route, or so much earlier.
+#[derive(Debug, Clone, Copy)]
+struct Meeting {
+    /// Where the front of the ego vehicle is then, m along its route.
+    ego_m: f64,
+    early_s: f64,
+    reach_m: f64,
+    /// The speed that it has then; without it whatever brings it there.
+    mps: Option<f64>,
+    /// For how long a way before the place it has it already, m.
+    steady_m: f64,
+    stage: Stage,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stage {
+    /// It gains speed and loses it again, or the other way round, so that time and way come out right.
+    Adapting,
+    /// A steady change of speed brings it to the place in time.
+    OnLine,
+    /// It has the speed with which it arrives.
+    Steady,
+}
+
+impl Meeting {
+    fn told(command: &Command) -> Option<Meeting> {
+        Some(Meeting {
+            ego_m: command.at_m?,
+            early_s: command.early_s?,
+            reach_m: command.reach_m?,
+            mps: command.speed_mps,
+            steady_m: command.steady_m.unwrap_or(0.0),
+            stage: Stage::Adapting,
+        })
+    }
+
+    /// The speed for the next tick; `None` once it is there, or the ego vehicle is.
+    fn speed_mps(&mut self, station_m: f64, speed_mps: f64, around: &Around) -> Option<f64> {
+        let own_m = self.reach_m - station_m;
+        let ego_m = self.ego_m - VehicleParameters::MKZ.front_m(around.ego_station_m);
+        if own_m <= 0.0 || ego_m <= 0.0 {
+            return None;
+        }
+        if let (Stage::Steady, Some(mps)) = (self.stage, self.mps) {
+            return Some(mps);
+        }
+        let ego_mps = around.ego.speed_mps;
+        if ego_mps < STANDING_MPS {
+            self.stage = Stage::Adapting;
+            return Some(0.0);
+        }
+        // The ego vehicle has moved in this tick already.
+        let left_s = ego_m / ego_mps - self.early_s + DT_S;
+        let Some(mps) = self.mps else { return Some(own_m / left_s.max(DT_S)) };
+        let steady_s = if self.steady_m > 0.0 { self.steady_m / mps } else { 0.0 };
+        let (way_m, time_s) = (own_m - self.steady_m, left_s - steady_s);
+        if way_m <= 0.0 || time_s <= DT_S {
+            self.stage = Stage::Steady;
+            return Some(mps);
+        }
+        let on_line_mps = 2.0 * way_m / time_s - mps;
+        if self.stage == Stage::Adapting && (speed_mps - on_line_mps).abs() < ON_LINE_MPS {
+            self.stage = Stage::OnLine;
+        }
+        Some(match self.stage {
+            Stage::OnLine => on_line_mps.max(0.0),
+            Stage::Adapting | Stage::Steady => {
+                (speed_mps + adapting_mps2(speed_mps, mps, way_m, time_s) * DT_S).max(0.0)
+            }
+        })
+    }
+}
+
+/// The acceleration now of one that goes over from `from_mps` to `to_mps` on so long a way in so long a time, m/s²: first this one,
+/// then as strong a one against it. If the way is too short for that, it brakes to a stop, from which it sets out again later.
+fn adapting_mps2(from_mps: f64, to_mps: f64, way_m: f64, time_s: f64) -> f64 {
+    let lacks_m = 2.0 * way_m - (from_mps + to_mps) * time_s;
+    let more_m = (to_mps - from_mps) * time_s;
+    let mps2 = (lacks_m + lacks_m.signum() * libm::hypot(lacks_m, more_m)) / (time_s * time_s);
+    let turns_s = time_s / 2.0 + (to_mps - from_mps) / (2.0 * mps2);
+    if from_mps + mps2 * turns_s < 0.0 {
+        return -(from_mps * from_mps + to_mps * to_mps) / (2.0 * way_m);
+    }
+    mps2
+}
+
+impl Guided {
+    pub fn new(
+        way: Arc<Trajectory>,
+        station_m: f64,
+        left_m: f64,
+        speed_mps: f64,
+        to_middle_m: f64,
+    ) -> Guided {
+        Guided {
+            way,
+            station_m,
+            left_m,
+            to_middle_m,
+            speed_mps,
+            wants_mps: speed_mps,
+            rate_mps2: f64::INFINITY,
+            shift: None,
+            meeting: None,
+        }
+    }
+
+    /// Of a body, from the point that follows the way to the middle of the outline, m.
+    pub fn to_middle_m(is_vehicle: bool, size: &BodyParameters) -> f64 {
+        if is_vehicle { size.rear_axle_m } else { 0.0 }
+    }
+
+    /// Where it begins.
+    pub fn begins(&self) -> Moved {
+        self.moved(0.0, 0.0)
+    }
+
+    pub fn order(&mut self, command: &Command) {
+        self.meeting = Meeting::told(command).or(self.meeting.filter(|_| command.speed_mps.is_none()));
+        if let Some(speed_mps) = command.speed_mps.filter(|_| command.early_s.is_none()) {
+            self.wants_mps = speed_mps;
+            self.rate_mps2 = command.rate_mps2.unwrap_or(f64::INFINITY);
+        }
+        if let Some(to_m) = command.offset_m {
+            let by_m = (to_m - self.left_m).abs();
+            let takes_s = SMOOTH_STEP_SLOPE_MAX * by_m / command.aside_mps.unwrap_or(ASIDE_MPS);
+            let shift = Shift { from_m: self.left_m, to_m, takes_s, since_s: 0.0 };
+            self.shift = (by_m > 0.0).then_some(shift);
+        }
+    }
+
+    /// Whether it turns at corners of its way without sweeping round them: on foot.
+    pub fn turns_on_the_spot(&self) -> bool {
+        self.to_middle_m == 0.0
+    }
+
+    pub fn is_aside(&self) -> bool {
+        self.shift.is_none()
+    }
+
+    pub fn has_met(&self) -> bool {
+        self.meeting.is_none()
+    }
+
+    /// Whether its way is at its end.
+    pub fn is_over(&self) -> bool {
+        self.station_m >= self.way.path.length_m()
+    }
+
+    /// Height of the road where it is, m.
+    pub fn height_m(&self) -> f64 {
+        self.way.height_at(self.station_m)
+    }
+
+    pub fn station_m(&self) -> f64 {
+        self.station_m
+    }
+
+    /// Where it is at the end of a tick. One that has `touched` the ego vehicle stays where it is.
+    pub fn step(&mut self, this: &Obstacle, touched: bool, around: &Around) -> Moved {
+        if touched {
+            self.speed_mps = 0.0;
+            return Moved::at_rest(this);
+        }
+        let before_mps = self.speed_mps;
+        let mut is_at_once = false;
+        if let Some(meeting) = &mut self.meeting {
+            match meeting.speed_mps(self.station_m, self.speed_mps, around) {
+                Some(speed_mps) => self.speed_mps = speed_mps,
+                None => {
+                    self.wants_mps = meeting.mps.unwrap_or(self.speed_mps);
+                    self.rate_mps2 = f64::INFINITY;
+                    self.meeting = None;
+                }
+            }
+        }
+        if self.meeting.is_none() && self.speed_mps != self.wants_mps {
+            let most_mps = self.rate_mps2 * DT_S;
+            self.speed_mps += (self.wants_mps - self.speed_mps).clamp(-most_mps, most_mps);
+            is_at_once = self.rate_mps2.is_infinite();
+        }
+        let mean_mps = if is_at_once { self.speed_mps } else { (before_mps + self.speed_mps) / 2.0 };
+        let before_m = self.station_m;
+        self.station_m = (self.station_m + mean_mps * DT_S).clamp(0.0, self.way.path.length_m());
+        if self.is_over() {
+            self.speed_mps = 0.0;
+        }
+        let left_m = self.left_m;
+        if let Some(shift) = &mut self.shift {
+            shift.since_s += DT_S;
+            let part = shift.since_s / shift.takes_s;
+            self.left_m = shift.from_m + (shift.to_m - shift.from_m) * smooth_step(part).value;
+            if part >= 1.0 {
+                self.left_m = shift.to_m;
+                self.shift = None;
+            }
+        }
+        self.moved(self.station_m - before_m, self.left_m - left_m)
+    }
+
+    /// Where it is, after a tick in which it has gone so far along its way and to the left, m.
+    fn moved(&self, along_m: f64, left_m: f64) -> Moved {
+        let way = self.way.path.pose_at(self.station_m);
+        // A vehicle looks where it goes.
+        let askew_rad = if left_m == 0.0 { 0.0 } else { libm::atan2(left_m, along_m.max(f64::MIN_POSITIVE)) };
+        let heading_rad = wrap_angle(way.heading_rad + askew_rad);
+        let forward = unit_vector(heading_rad);
+        let position = way.offset(0.0, self.left_m).position + forward * self.to_middle_m;
+        Moved {
+            pose: Pose { position, heading_rad },
+            forward,
+            lane_heading_rad: way.heading_rad,
+            velocity_mps: forward * self.speed_mps,
+        }
+    }
+
+    pub fn trace(&self, trace: &mut Trace) {
+        let Guided { station_m, left_m, speed_mps, wants_mps, rate_mps2, .. } = *self;
+        trace.numbers([station_m, left_m, speed_mps, wants_mps, rate_mps2]);
+        if let Some(Shift { from_m, to_m, takes_s, since_s }) = self.shift {
+            trace.word(1);
+            trace.numbers([from_m, to_m, takes_s, since_s]);
+        }
+        if let Some(Meeting { ego_m, early_s, reach_m, mps, steady_m, stage }) = self.meeting {
+            trace.words([2, stage as u64]);
+            trace.numbers([ego_m, early_s, reach_m, mps.unwrap_or(f64::INFINITY), steady_m]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn way_and_time_come_out_right_and_so_does_the_speed() {
+        for (from_mps, to_mps, way_m, time_s) in
+            [(0.0, 8.0, 50.0, 10.0), (0.0, 8.0, 70.0, 10.0), (10.0, 5.0, 90.0, 10.0), (4.0, 4.0, 30.0, 8.0)]
+        {
+            let (mut at_m, mut mps) = (0.0_f64, from_mps);
+            let mut is_on_line = false;
+            let ticks = (time_s / DT_S).round() as u32;
+            for tick in 0..ticks - 1 {
+                let (left_m, left_s) = (way_m - at_m, time_s - f64::from(tick) * DT_S);
+                let on_line_mps: f64 = 2.0 * left_m / left_s - to_mps;
+                is_on_line |= (mps - on_line_mps).abs() < ON_LINE_MPS;
+                let next_mps = match is_on_line {
+                    true => on_line_mps.max(0.0),
+                    false => (mps + adapting_mps2(mps, to_mps, left_m, left_s) * DT_S).max(0.0),
+                };
+                at_m += (mps + next_mps) / 2.0 * DT_S;
+                mps = next_mps;
+            }
+            assert!((way_m - at_m - to_mps * DT_S).abs() < 0.1, "{way_m}: at {at_m}");
+            assert!((mps - to_mps).abs() < 0.3, "{to_mps}: {mps}");
+        }
+    }
+}
