@@ -91,7 +91,10 @@ fn impossible_spawns_are_refused() {
         let refusal = world.survey(&SpawnRequest { distance_m, ..ahead }).expect_err("no such distance");
         assert_eq!(refusal, format!("the spawn's distance is {distance_m} m, possible is 0 .. 1000 m"));
     }
-    for verb in Verb::ALL {
+    // Everybody may follow a trajectory, and this road has none.
+    let follows = SpawnRequest { verb: Verb::Follow, ..ahead };
+    assert_eq!(world.survey(&follows).expect_err("no such way"), "its trajectory lies on another map");
+    for verb in Verb::ALL.iter().filter(|verb| **verb != Verb::Follow) {
         let on_foot = verb.is_on_foot();
         let body = if on_foot { Body::SUV } else { Body::Pedestrian };
         let refusal = world.survey(&SpawnRequest { verb: *verb, body, ..ahead }).expect_err("no such body");
@@ -585,5 +588,6 @@ fn every_verb_has_its_place_on_road_2() {
         }
         assert!(world.ego_offset_m().abs() < 0.1, "it drives on the route");
     }
-    assert_eq!(found.len(), 4 * Verb::ALL.len(), "{found:?}");
+    // Without a trajectory nobody follows one.
+    assert_eq!(found.len(), 4 * (Verb::ALL.len() - 1), "{found:?}");
 }
