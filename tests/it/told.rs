@@ -333,7 +333,7 @@ fn who_follows_a_trajectory_goes_on_along_it_and_replays() {
     let run = run_of(space_at("tests/cases/spaces/trajectory.ava"), 3, 4, &[]);
     let table = run.table();
     for episode in 0..run.episodes() {
-        let wanted = episode as usize % table.rows().len();
+        let wanted = episode % table.rows().len();
         let mut drawn = false;
         let mut choose = |moment: &Moment| match table.offer(moment.situation, wanted) {
             Ok(draw) if !drawn => {

@@ -110,7 +110,7 @@ pub(super) fn verdict(
         Verb::Walk => walks(request, seen),
         Verb::Stand => stands(seen),
         Verb::WalkAhead | Verb::WalkOpposite => walks_along(request, seen),
-        Verb::Follow => Ok(()),
+        Verb::Follow => follows(request, seen),
         Verb::DriveAhead => {
             drives()?;
             appears_ahead(scene, request, first)?;
@@ -225,6 +225,17 @@ fn moves(request: &SpawnRequest, seen: &Sighting) -> Result<(), String> {
         return Err(ended(seen, "it had moved"));
     }
     Ok(())
+}
+
+/// Whether who follows a trajectory stands or goes on, as it was asked to. How far, the trajectory says.
+fn follows(request: &SpawnRequest, seen: &Sighting) -> Result<(), String> {
+    let (first, last) = (&seen.frames[0], &seen.frames[seen.frames.len() - 1]);
+    let has_moved = last.outline.pose.position != first.outline.pose.position;
+    match (request.speed_mps > 0.0, has_moved) {
+        (true, false) => Err(ended(seen, "it had moved")),
+        (false, true) if seen.ending != Ending::TouchedEgo => Err("it does not stand".to_owned()),
+        _ => Ok(()),
+    }
 }
 
 /// By how much its rear is in front of the ego vehicle's front, m; negative while it is not.

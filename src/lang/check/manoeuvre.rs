@@ -40,10 +40,12 @@ impl Checker {
     pub(super) fn declare_bearers(&mut self, items: &[&ast::Item]) {
         let effects = each(items, ItemKind::as_action).flat_map(|(_, action)| &action.effects);
         let named = effects.filter_map(|effect| match &effect.kind {
-            ast::EffectKind::Spawn { bearers, body, fields, .. } => Some((bearers, (body, fields))),
+            ast::EffectKind::Spawn { bearers, body, place, fields, .. } => {
+                Some((bearers, (body, place, fields)))
+            }
             ast::EffectKind::Set { .. } | ast::EffectKind::Order { .. } => None,
         });
-        for (name, (body, fields)) in
+        for (name, (body, place, fields)) in
             named.flat_map(|(names, spawn)| names.iter().map(move |name| (name, spawn)))
         {
             let is_on_foot = |name: &String| {
@@ -56,13 +58,10 @@ impl Checker {
                 _ => None,
             });
             let has = match (&body.kind, verb) {
-                (_, Some(Verb::Follow)) => Told::to(Verb::Follow),
+                _ if place.trajectory().is_some() => Told::to(Verb::Follow),
                 (ast::ExprKind::Name(body), Some(verb)) if is_on_foot(body) => Told::to(verb),
-                (ast::ExprKind::Name(body), None) if is_on_foot(body) => {
-                    Told::to(Verb::WalkAhead).and(Told::to(Verb::Follow))
-                }
-                (_, Some(_)) => Told::BY_DRIVERS,
-                (_, None) => Told::BY_DRIVERS.and(Told::to(Verb::Follow)),
+                (ast::ExprKind::Name(body), None) if is_on_foot(body) => Told::to(Verb::WalkAhead),
+                _ => Told::BY_DRIVERS,
             };
             let most = self.obeys.entry(name.text.clone()).or_default();
             *most = most.and(has);
@@ -375,7 +374,8 @@ impl Checker {
             Some(Who::Named(_)) | None => self.obeys.get(&who.text).copied(),
         };
         let has = has.unwrap_or(Told::BY_DRIVERS);
-        let may_drive = has.covers(Told::BY_DRIVERS);
+        // Nobody on foot is told a rate.
+        let may_drive = has.holds(CommandField::Rate);
         if bearer.is_some() && !has.covers(told.and(command.told())) {
             let message = format!("`{}` cannot be told that", who.text);
             let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message);

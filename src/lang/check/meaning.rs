@@ -7,7 +7,7 @@
 //!
 //! Rows are numbered in the order of the actions, states are drawn in theirs, roads are driven in theirs, and the
 //! first rule that refuses an action gives the reason. So their order is covered. That of enums, odds, constants,
-//! functions, bodies and groups has no effect; they are sorted by name.
+//! functions, bodies, trajectories and groups has no effect; they are sorted by name.
 
 use std::collections::BTreeSet;
 use std::path::Path;

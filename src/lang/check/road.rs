@@ -37,7 +37,7 @@ impl Checker {
         let (names, declared) = self.declared("road", items, ItemKind::as_road);
         let mut roads: Vec<Option<Road>> =
             declared.into_iter().map(|(item, block)| self.road(item, block, maps)).collect();
-        self.lay_trajectories(items, &mut roads, maps);
+        self.lay_trajectories(&mut roads, maps);
         let Some(chosen) = chosen else { return roads.into_iter().flatten().collect() };
         let mut picked = Vec::new();
         for name in &chosen {

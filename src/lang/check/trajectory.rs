@@ -1,8 +1,9 @@
 //! Trajectories: ways in the map of a road, along its lanes or straight from point to point.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::check::checker::{Checker, docs, each};
+use crate::check::checker::{Checker, docs};
 use crate::check::expression::Place;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of, field};
@@ -51,17 +52,9 @@ impl Checker {
     }
 
     /// Lays every trajectory on the map of its road, and gives it to all roads on that map. `roads` may lack those with mistakes.
-    pub(super) fn lay_trajectories(
-        &mut self,
-        items: &[&ast::Item],
-        roads: &mut [Option<Road>],
-        maps: &mut dyn Maps,
-    ) {
-        let doubles = self.doubles.clone();
-        let declared = each(items, ItemKind::as_trajectory).filter(|(item, _)| !doubles.contains(&item.span));
-        let declared: Vec<&ast::Block> = declared.map(|(_, block)| block).collect();
-        for block in declared {
-            let laid = self.laid(block, roads, maps);
+    pub(super) fn lay_trajectories(&mut self, roads: &mut [Option<Road>], maps: &mut dyn Maps) {
+        for definition in self.trajectories.clone() {
+            let laid = self.laid(&definition.declared, roads, maps);
             for road in roads.iter_mut().flatten() {
                 let on_it = laid.as_ref().filter(|(map_path, _)| *map_path == road.map_path);
                 road.trajectories.push(on_it.map(|(_, trajectory)| Arc::clone(trajectory)));
@@ -74,7 +67,7 @@ impl Checker {
         block: &ast::Block,
         roads: &[Option<Road>],
         maps: &mut dyn Maps,
-    ) -> Option<(std::path::PathBuf, Arc<Trajectory>)> {
+    ) -> Option<(PathBuf, Arc<Trajectory>)> {
         let fields = self.fields_known::<TrajectoryField>(&block.fields);
         let name = &block.name;
         let Some(road) = field(&fields, TrajectoryField::Road) else {

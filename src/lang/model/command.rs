@@ -403,6 +403,9 @@ impl Command {
         if verb == Verb::Stand {
             return Some("it stands, and does not walk".to_owned());
         }
+        if verb == Verb::Follow && self.early_s.is_some() && self.reach_m.is_none() {
+            return Some("it is `early` at a place of its trajectory: say where by `reach`".to_owned());
+        }
         self.told().lacked_by(verb).or_else(|| match self.speed_mps {
             Some(mps) if is_out(mps) && on_foot => {
                 Some(format!("nobody on foot is told more than {ON_FOOT_MPS_MAX} m/s"))

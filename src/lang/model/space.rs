@@ -460,7 +460,7 @@ pub struct OrderDef {
     /// Empty for an order of a manoeuvre alone.
     pub command: CommandDef,
     pub manoeuvre: Option<ManoeuvreCall>,
-    /// Whether a vehicle may bear the name.
+    /// Whether one that does more than walk may bear the name.
     pub may_drive: bool,
     pub span: Span,
 }

@@ -239,7 +239,9 @@ impl Guided {
             self.speed_mps = 0.0;
         }
         let left_m = self.left_m;
-        if let Some(shift) = &mut self.shift {
+        // A vehicle that stands moves no farther to the side.
+        let may_shift = self.station_m > before_m || self.turns_on_the_spot();
+        if let Some(shift) = self.shift.as_mut().filter(|_| may_shift) {
             shift.since_s += DT_S;
             let part = shift.since_s / shift.takes_s;
             self.left_m = shift.from_m + (shift.to_m - shift.from_m) * smooth_step(part).value;
