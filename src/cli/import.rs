@@ -1,4 +1,4 @@
-//! `avastra import`: OpenSCENARIO files of others as scenarios of the language.
+//! `avastra import`: OpenSCENARIO files of others as spaces of the language.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use avastra_campaign::episode::{End, Outcome};
 use avastra_campaign::files::PlainName;
 use avastra_campaign::run::{Stage, recorded};
-use avastra_exchange::import::{self, Files, Imported, Refusal};
+use avastra_exchange::import::{self, Files, Refusal};
 use avastra_lang::check::{self, ReadError};
 use avastra_world::action::ActionTable;
 
@@ -22,7 +22,7 @@ const FOLDER: &str = "imported";
 /// Files of a folder of catalogues that are read at most.
 const CATALOGUES_MAX: usize = 100;
 
-/// Writes every file's scenario, with its map beside it. What the language cannot say is listed, and nothing is written.
+/// Writes every file's space, with its maps beside it. What the language cannot say is listed, and nothing is written.
 pub fn import(output: &Output, arguments: &ImportArguments) -> Result<(), Failure> {
     let targets = targets(arguments)?;
     let parameters = parameters(arguments)?;
@@ -30,22 +30,29 @@ pub fn import(output: &Output, arguments: &ImportArguments) -> Result<(), Failur
     let (mut refused, mut results) = (Vec::new(), Vec::new());
     for (file, target) in arguments.files.iter().zip(targets) {
         match one(file, &target, arguments, &parameters)? {
-            Ok((imported, map)) => {
-                output.say(&format!("{}: {}", file.display(), target.display()));
-                for note in &imported.notes {
+            Ok(taken) => {
+                let (space, scenario) = (&taken.space, &taken.scenario);
+                let paths: Vec<String> =
+                    space.iter().chain(scenario).map(|path| path.display().to_string()).collect();
+                output.say(&format!("{}: {}", file.display(), paths.join(", ")));
+                for note in &taken.notes {
                     output.tell(&format!("  {note}"));
                 }
                 results.push(serde_json::json!({
-                    "file": file, "scenario": target, "notes": imported.notes, "refused": [],
+                    "file": file, "space": space, "scenario": scenario, "notes": taken.notes, "refused": [],
                 }));
-                written.extend([target, map]);
+                written.extend(taken.space.into_iter().chain(taken.scenario).chain(taken.maps));
             }
             Err(refusals) => {
-                for Refusal { line, element, reason } in &refusals {
-                    output.say(&format!("{}:{line}: {element}: {reason}", file.display()));
+                for Refusal { scenario, line, element, reason } in &refusals {
+                    let place = match scenario {
+                        Some(scenario) => folder_of(file).join(slashed(scenario)),
+                        None => file.clone(),
+                    };
+                    output.say(&format!("{}:{line}: {element}: {reason}", place.display()));
                 }
                 results.push(serde_json::json!({
-                    "file": file, "scenario": null, "notes": [], "refused": refusals,
+                    "file": file, "space": null, "scenario": null, "notes": [], "refused": refusals,
                 }));
                 refused.push(refusals);
             }
@@ -62,55 +69,94 @@ pub fn import(output: &Output, arguments: &ImportArguments) -> Result<(), Failur
     }
 }
 
-/// Imports one file: what it says and where its map lies now, or all that is refused.
+/// What was written of a file.
+struct Taken {
+    /// `None` of a file that avastra exported: its scenario stands alone.
+    space: Option<PathBuf>,
+    /// `None` if the space has more than one row.
+    scenario: Option<PathBuf>,
+    maps: Vec<PathBuf>,
+    notes: BTreeSet<String>,
+}
+
+/// Imports one file.
 fn one(
     file: &Path,
     target: &Path,
     arguments: &ImportArguments,
     parameters: &BTreeMap<String, String>,
-) -> Result<Result<(Imported, PathBuf), Vec<Refusal>>, Failure> {
+) -> Result<Result<Taken, Vec<Refusal>>, Failure> {
     let text = load::text(file)?;
-    let beside = file.parent().unwrap_or(Path::new(""));
+    let beside = folder_of(file);
     let (name, ego) = (file.file_stem().unwrap_or_default().to_string_lossy(), arguments.ego.as_deref());
     let imported = match import::openscenario(&text, &name, ego, parameters, &Beside { folder: beside }) {
         Ok(imported) => imported,
         Err(refusals) => return Ok(Err(refusals)),
     };
-    let source = beside.join(slashed(&imported.map));
-    // The name of the copy comes from the file, and the copy must lie beside the scenario.
-    let name = source.file_name().unwrap_or_default().to_string_lossy();
-    let name = PlainName::new(name).map_err(|error| Failure::file("import", file, error))?;
-    let map = target.with_file_name(&*name);
-    if let Err(reason) = plays(&imported, target, &map, &source) {
-        return Ok(Err(vec![Refusal { line: 1, element: "OpenSCENARIO".to_owned(), reason }]));
+    let refused = |reason: String| {
+        vec![Refusal { scenario: None, line: 1, element: "OpenSCENARIO".to_owned(), reason }]
+    };
+    // Where each map lies beside the space, and where it comes from.
+    let mut maps: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
+    for map in &imported.maps {
+        let source = beside.join(slashed(map));
+        // The name of the copy comes from the file, and the copy must lie beside the space.
+        let name = source.file_name().unwrap_or_default().to_string_lossy();
+        let name = PlainName::new(name).map_err(|error| Failure::file("import", file, error))?;
+        if let Some(other) = maps.insert(target.with_file_name(&*name), source.clone()) {
+            let (other, source) = (other.display(), source.display());
+            return Ok(Err(refused(format!("two maps have one name: `{other}` and `{source}`"))));
+        }
+    }
+    let space = imported.space.map(|text| (target.to_owned(), text));
+    // A space and its scenario are two files: what uses the space has no use for the scenario.
+    let name = match &space {
+        Some(_) => {
+            format!("{}_scenario.ava", target.file_stem().unwrap_or_default().to_string_lossy()).into()
+        }
+        None => target.to_owned(),
+    };
+    let scenario = imported.scenario.map(|text| (target.with_file_name(name), text));
+    let texts: Vec<&(PathBuf, String)> = space.iter().chain(&scenario).collect();
+    if let Err(reason) = plays(&texts, &maps) {
+        return Ok(Err(refused(reason)));
     }
     match &arguments.out {
         Some(named) => make(named)?,
         None => drop(folder(beside, FOLDER)?),
     }
-    copy_map(&source, &map)?;
-    match load::read(target) {
-        Ok(there) if there == imported.text => {}
-        _ => write_new(target, &imported.text)?,
+    for (map, source) in &maps {
+        copy_map(source, map)?;
     }
-    Ok(Ok((imported, map)))
+    for (path, text) in &texts {
+        match load::read(path) {
+            Ok(there) if there == *text => {}
+            _ => write_new(path, text)?,
+        }
+    }
+    let [space, scenario] = [space, scenario].map(|written| written.map(|(path, _)| path));
+    Ok(Ok(Taken { space, scenario, maps: maps.into_keys().collect(), notes: imported.notes }))
 }
 
-/// Whether the scenario compiles, and everyone appears when it is played with the driving system `modular`.
-fn plays(imported: &Imported, target: &Path, map: &Path, source: &Path) -> Result<(), String> {
-    let (own, map) = (check::normal(target), check::normal(map));
-    let read = |path: &Path| match path {
-        path if path == own => Ok(imported.text.clone()),
-        path if path == map => load::read_used(source),
-        _ => Err(ReadError("the scenario uses its map alone".to_owned())),
+/// Whether the space compiles, and everyone appears when its scenario, the last of the texts, is played with the driving
+/// system `modular`.
+fn plays(texts: &[&(PathBuf, String)], maps: &BTreeMap<PathBuf, PathBuf>) -> Result<(), String> {
+    let maps: BTreeMap<PathBuf, &PathBuf> =
+        maps.iter().map(|(map, source)| (check::normal(map), source)).collect();
+    let read = |path: &Path| {
+        if let Some(source) = maps.get(path) {
+            return load::read_used(source);
+        }
+        let own = texts.iter().find(|(own, _)| check::normal(own) == path);
+        own.map(|(_, text)| text.clone()).ok_or_else(|| ReadError("it uses its maps alone".to_owned()))
     };
-    let loaded = check::load(target, &read).map_err(|error| error.to_string())?;
+    let Some((last, _)) = texts.last() else { return Ok(()) };
+    let loaded = check::load(last, &read).map_err(|error| error.to_string())?;
     if let Some(mistake) = loaded.diagnostics.iter().find(|diagnostic| diagnostic.is_error()) {
-        return Err(format!("as a scenario of the language it does not compile: {}", mistake.message));
+        return Err(format!("as a space of the language it does not compile: {}", mistake.message));
     }
-    let (Some(space), Some(scenario)) = (loaded.space, loaded.scenario) else {
-        return Err("it gives no scenario".to_owned());
-    };
+    let Some(space) = loaded.space else { return Err("it gives no space".to_owned()) };
+    let Some(scenario) = loaded.scenario else { return Ok(()) };
     let table = ActionTable::new(space);
     let ads = recorded(&scenario).map_err(|error| error.to_string())?;
     let stage = Stage::new(&table, &scenario).map_err(|error| error.to_string())?;
@@ -130,6 +176,11 @@ struct Beside<'a> {
 }
 
 impl Files for Beside<'_> {
+    fn scenario(&self, path: &str) -> Result<String, String> {
+        let path = self.folder.join(slashed(path));
+        load::read_named(&path, &["xosc"], "no scenario (`.xosc`)").map_err(|error| error.to_string())
+    }
+
     fn map(&self, path: &str) -> Result<String, String> {
         load::read_used(&self.folder.join(slashed(path))).map_err(|error| error.to_string())
     }
@@ -163,6 +214,11 @@ fn targets(arguments: &ImportArguments) -> Result<Vec<PathBuf>, Failure> {
         targets.push(target);
     }
     Ok(targets)
+}
+
+/// The folder in which a file lies.
+fn folder_of(file: &Path) -> &Path {
+    file.parent().unwrap_or(Path::new(""))
 }
 
 /// A path as other systems may write it.

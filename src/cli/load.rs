@@ -460,17 +460,23 @@ pub fn read(path: &Path) -> Result<String, ReadError> {
     read_up_to(path, if is_source(path) { SOURCE_BYTES_MAX } else { FILE_BYTES_MAX })
 }
 
-/// Reads a file that another file names. Whatever a file from somebody else names, only sources and maps are read and
-/// shown in a diagnostic: the name must say so, and that of the file at the end of a link.
+/// Reads a source or a map that another file names.
 pub fn read_used(path: &Path) -> Result<String, ReadError> {
+    read_named(path, &["ava", "xodr"], "neither a source (`.ava`) nor a map (`.xodr`)")
+}
+
+/// Reads a file that another file names. Whatever a file from somebody else names, only files of a kind are read and shown in a
+/// diagnostic: the name must say so, and that of the file at the end of a link.
+pub fn read_named(path: &Path, extensions: &[&str], what_else: &str) -> Result<String, ReadError> {
     let followed = path.canonicalize().map_err(|error| {
         let meant = beside(path).map_or(String::new(), |meant| format!("; did you mean `{meant}`?"));
         ReadError(format!("{}{meant}", reason(&error)))
     })?;
-    if followed.is_file()
-        && followed.extension().is_none_or(|extension| extension != "ava" && extension != "xodr")
-    {
-        return Err(ReadError("it is neither a source (`.ava`) nor a map (`.xodr`)".to_owned()));
+    let is_of_the_kind = |path: &Path| {
+        path.extension().is_some_and(|extension| extensions.iter().any(|known| extension == *known))
+    };
+    if followed.is_file() && !is_of_the_kind(&followed) {
+        return Err(ReadError(format!("it is {what_else}")));
     }
     read(path)
 }

@@ -266,8 +266,10 @@ report
 import
   files[] text paths of what was written, maps too
   imported[].file text the OpenSCENARIO file
-  imported[].scenario text? path of its scenario; null if it was refused
+  imported[].space text? path of its space; null if it was refused, or is an export of avastra
+  imported[].scenario text? path of its scenario; null without one: if it was refused, or has many variations
   imported[].notes[] text what drives otherwise than in the file
+  imported[].refused[].scenario text? the scenario that a file of variations names, where the line is of that
   imported[].refused[].line number where the language cannot say what the file says
   imported[].refused[].element text
   imported[].refused[].reason text

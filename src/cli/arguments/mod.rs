@@ -120,7 +120,7 @@ pub enum Command {
     Test(TestArguments),
     /// Write scenarios for other tools, or as a folder that can be moved.
     Export(ExportArguments),
-    /// Make scenarios of OpenSCENARIO files, or say what cannot be said.
+    /// Make spaces of OpenSCENARIO files, or say what cannot be said.
     Import(ImportArguments),
     /// Check a driving system of your own; print the protocol's schema.
     Ads(AdsArguments),

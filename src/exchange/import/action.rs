@@ -1,24 +1,46 @@
 //! What the actions of a file ask of an entity: a place, a speed, another lane, a way.
 
+use core::f64::consts::FRAC_PI_2;
+
 use roxmltree::Node;
 
-use super::position::{Position, position};
-use super::source::{Mark, Source, children, element, elements};
+use super::position::{Position, position, route};
+use super::shape::{Shape, shape_of};
+use super::source::{Mark, Source, children, element};
 use super::story::DURATION_S_MAX;
 
 const FOLLOWING: [&str; 2] = ["follow", "position"];
 
-const STRATEGIES: [&str; 4] = ["fastest", "leastIntersections", "random", "shortest"];
+const FRAMES: [&str; 5] = ["entity", "lane", "road", "trajectory", "world"];
 
 /// An action as it was read.
 #[derive(Debug, Clone)]
-pub enum Begun {
-    Placed(Mark, Position),
-    Speed(Mark, Speed, bool),
-    Headway(Mark, Headway),
-    Change(Mark, Target),
-    Walk(Walk),
-    Goal(Mark, Position),
+pub struct Act {
+    pub mark: Mark,
+    pub kind: ActKind,
+}
+
+#[derive(Debug, Clone)]
+pub enum ActKind {
+    Placed(Position),
+    Speed(Speed, Dynamics),
+    /// Ahead of the ego vehicle at once.
+    Ahead(Headway),
+    Lane(Target, f64, Dynamics),
+    Offset(Aside, Dynamics),
+    Meet(Box<Meeting>),
+    Follow(Box<Way>),
+    /// Along the lanes through these places.
+    Route(Vec<Position>),
+}
+
+/// A place across the road.
+#[derive(Debug, Clone)]
+pub enum Aside {
+    /// To the left of the middle of its lane in the road's direction, m.
+    InLane(f64),
+    /// So much to the left of an entity, as that looks, m.
+    Of(String, f64),
 }
 
 #[derive(Debug, Clone)]
@@ -30,7 +52,28 @@ pub enum Speed {
     Times(String, f64),
 }
 
-/// The free space ahead of the ego vehicle.
+/// How a value goes over to another.
+#[derive(Debug, Clone, Copy)]
+pub struct Dynamics {
+    pub over: Over,
+    /// The greatest rate of change, as a multiple of the mean one.
+    pub peak: f64,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub enum Over {
+    AtOnce,
+    /// At a rate of 0: nothing changes.
+    Never,
+    /// s.
+    Time(f64),
+    /// m.
+    Way(f64),
+    /// Of the greatest change, m/s² of a speed, m/s of a place aside.
+    Rate(f64),
+}
+
+/// Free space ahead of the ego vehicle.
 #[derive(Debug, Clone)]
 pub enum Headway {
     Way(f64),
@@ -45,27 +88,49 @@ pub enum Target {
     Beside(String, i32),
 }
 
+/// To be at a place when the master is at another.
 #[derive(Debug, Clone)]
-pub struct Walk {
-    pub mark: Mark,
-    /// At least one place; what lies between the first and the last must lie straight between them.
-    pub way: Vec<(Mark, Position)>,
-    /// From the first vertex to the last, if they have times.
-    pub duration_s: Option<f64>,
+pub struct Meeting {
+    pub master: String,
+    pub master_at: Position,
+    pub own_at: Position,
+    pub speed: Option<Speed>,
+    pub steady: Steady,
 }
 
-/// What an action within a `PrivateAction` begins; `None` if nothing that matters, or it is refused.
-pub fn begun(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
+/// How long before the place the final speed is held.
+#[derive(Debug, Clone, Copy)]
+pub enum Steady {
+    No,
+    Way(f64),
+    Time(f64),
+}
+
+#[derive(Debug, Clone)]
+pub struct Way {
+    pub shape: Shape,
+    pub from_m: f64,
+    /// How the times of its places count: more, and times; `None`: they do not.
+    pub timing: Option<(f64, f64)>,
+    /// Whether the times count from the beginning of the scenario.
+    pub is_absolute: bool,
+}
+
+/// Reads an action within a `PrivateAction`; `None` if it does nothing that matters, or is refused.
+pub fn act(source: &mut Source, action: Node, is_ego: bool) -> Option<Act> {
     let mark = source.mark(action);
     match action.tag_name().name() {
         "TeleportAction" => {
             let place = source.required(action, "Position")?;
-            Some(Begun::Placed(mark, position(source, place)?))
+            Some(Act { mark, kind: ActKind::Placed(position(source, place)?) })
         }
         "LongitudinalAction" | "LateralAction" | "RoutingAction" => {
             let inner = children(action).next()?;
-            moved(source, inner, is_ego)
+            let mark = source.mark(inner);
+            moved(source, inner, is_ego).map(|kind| Act { mark, kind })
         }
+        "SynchronizeAction" if !is_ego => meeting(source, action).map(|kind| Act { mark, kind }),
+        "SynchronizeAction" => None,
         "ControllerAction" | "ActivateControllerAction" | "AssignControllerAction" => {
             if !is_ego && drives(source, action)? {
                 return source.refuse(
@@ -96,168 +161,192 @@ fn drives(source: &mut Source, action: Node) -> Option<bool> {
     let mut drives = false;
     for activated in action.descendants().filter(|node| node.has_tag_name("ActivateControllerAction")) {
         for name in ["longitudinal", "lateral"] {
-            drives |= source.switch(activated, name, true)?;
+            drives |= source.switch(activated, name, false)?;
         }
     }
     Some(drives)
 }
 
-/// Whether a change of speed or lane happens at once.
-fn at_once(source: &mut Source, dynamics: Node) -> Option<bool> {
-    let shape = source.word(dynamics, "dynamicsShape", &["linear", "cubic", "sinusoidal", "step"])?;
-    let dimension = source.word(dynamics, "dynamicsDimension", &["time", "distance", "rate"])?;
-    source.word(dynamics, "followingMode", &FOLLOWING)?;
-    let value = match (dimension, dynamics.has_attribute("value")) {
-        (_, false) if shape == "step" => 0.0,
-        ("rate", _) => match source.number(dynamics, "value")? {
-            0.0 if shape != "step" => {
-                return source.refuse(dynamics, "`value` is 0: at that rate it never ends");
-            }
-            rate => rate,
-        },
-        _ => source.amount(dynamics, "value")?,
+/// How a value goes over. `dimension`: what a file leaves out.
+fn dynamics(source: &mut Source, node: Node) -> Option<Dynamics> {
+    let shape = source.word(node, "dynamicsShape", &["linear", "cubic", "sinusoidal", "step"])?;
+    let dimension = source.word(node, "dynamicsDimension", &["time", "distance", "rate"])?;
+    source.word(node, "followingMode", &FOLLOWING)?;
+    let peak = match shape {
+        "sinusoidal" => FRAC_PI_2,
+        "cubic" => 1.5,
+        _ => 1.0,
+    };
+    if shape == "step" {
+        return Some(Dynamics { over: Over::AtOnce, peak });
+    }
+    let value = if dimension == "rate" {
+        source.number(node, "value")?.abs()
+    } else {
+        source.amount(node, "value")?
     };
     let reason = format!("it takes {value} s: nothing lasts longer than {DURATION_S_MAX} s");
-    source.refuse_if(dimension == "time" && value > DURATION_S_MAX, dynamics, reason)?;
-    Some(shape == "step" || (dimension == "time" && value == 0.0))
+    source.refuse_if(dimension == "time" && value > DURATION_S_MAX, node, reason)?;
+    let over = match dimension {
+        "rate" if value == 0.0 => Over::Never,
+        _ if value == 0.0 => Over::AtOnce,
+        "rate" => Over::Rate(value),
+        "distance" => Over::Way(value),
+        _ => Over::Time(value),
+    };
+    Some(Dynamics { over, peak })
 }
 
-fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
-    let mark = source.mark(action);
+fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<ActKind> {
     match action.tag_name().name() {
         "SpeedAction" => {
-            let dynamics = source.required(action, "SpeedActionDynamics")?;
-            let at_once = at_once(source, dynamics)?;
+            let node = source.required(action, "SpeedActionDynamics")?;
+            let dynamics = dynamics(source, node)?;
             let target = source.required(action, "SpeedActionTarget")?;
             if let Some(absolute) = element(target, "AbsoluteTargetSpeed") {
-                let mps = source.number(absolute, "value")?;
-                return Some(Begun::Speed(mark, Speed::Absolute(mps), at_once));
+                return Some(ActKind::Speed(Speed::Absolute(source.number(absolute, "value")?), dynamics));
             }
             let relative = source.required(target, "RelativeTargetSpeed")?;
             let (entity, value) = (source.text(relative, "entityRef")?, source.number(relative, "value")?);
-            if source.switch(relative, "continuous", false)? {
-                source.note("a speed relative to another's is taken at the beginning, and kept");
+            if source.switch(relative, "continuous", false)? && !is_ego {
+                return source
+                    .refuse(relative, "a speed that follows another's from moment to moment is not read");
             }
             let speed = match source.text(relative, "speedTargetValueType")?.as_str() {
                 "delta" => Speed::More(entity, value),
                 "factor" => Speed::Times(entity, value),
                 _ => return source.refuse(relative, "`speedTargetValueType` is `delta` or `factor`"),
             };
-            Some(Begun::Speed(mark, speed, at_once))
+            Some(ActKind::Speed(speed, dynamics))
         }
-        "LongitudinalDistanceAction" if !is_ego => {
-            if source.switch(action, "continuous", false)? {
-                return source.refuse(action, "a vehicle keeps its speed, not its distance");
-            }
-            if !source.switch(action, "freespace", false)? {
-                return source.refuse(action, "only `freespace=\"true\"` is read: between the bumpers");
-            }
-            let sides = ["any", "leadingReferencedEntity", "trailingReferencedEntity"];
-            match source.word(action, "displacement", &sides)? {
-                "trailingReferencedEntity" => {
-                    return source.refuse(action, "only a distance ahead of the ego vehicle is read");
-                }
-                // 1.0 has no such attribute. Later, players need not take its absence as ahead.
-                "" if source.minor > 0 => {
-                    let reason = "without `displacement` it need not be ahead: `leadingReferencedEntity` is";
-                    return source.refuse(action, reason);
-                }
-                _ => {}
-            }
-            source.word(action, "coordinateSystem", &["entity", "lane", "road", "trajectory", "world"])?;
-            let headway = match action.attribute("timeGap") {
-                Some(_) => Headway::Time(source.amount(action, "timeGap")?),
-                None => Headway::Way(source.amount(action, "distance")?),
-            };
-            Some(Begun::Headway(mark, headway))
-        }
+        _ if is_ego && !action.has_tag_name("FollowTrajectoryAction") && !is_route(action) => None,
+        "LongitudinalDistanceAction" => ahead(source, action).map(ActKind::Ahead),
         "LaneChangeAction" => {
-            let dynamics = source.required(action, "LaneChangeActionDynamics")?;
-            // Either way its time is the drivers': only its words are looked at.
-            at_once(source, dynamics)?;
-            if source.number_or(action, "targetLaneOffset", 0.0)? != 0.0 {
-                return source.refuse(action, "vehicles keep to the middle of their lanes");
-            }
+            let node = source.required(action, "LaneChangeActionDynamics")?;
+            let dynamics = dynamics(source, node)?;
+            let offset_m = source.number_or(action, "targetLaneOffset", 0.0)?;
             let target = source.required(action, "LaneChangeTarget")?;
             if let Some(absolute) = element(target, "AbsoluteTargetLane") {
-                return Some(Begun::Change(mark, Target::Lane(source.integer(absolute, "value")?)));
+                let lane = Target::Lane(source.integer(absolute, "value")?);
+                return Some(ActKind::Lane(lane, offset_m, dynamics));
             }
             let relative = source.required(target, "RelativeTargetLane")?;
             let (entity, lanes) = (source.text(relative, "entityRef")?, source.integer(relative, "value")?);
-            Some(Begun::Change(mark, Target::Beside(entity, lanes)))
+            Some(ActKind::Lane(Target::Beside(entity, lanes), offset_m, dynamics))
         }
-        "FollowTrajectoryAction" => walk(source, action).map(Begun::Walk),
-        "AssignRouteAction" if is_ego => {
-            let waypoints = action.descendants().filter(|node| node.has_tag_name("Waypoint"));
-            let waypoints: Vec<Node> = waypoints.collect();
-            for waypoint in &waypoints {
-                source.word(*waypoint, "routeStrategy", &STRATEGIES)?;
+        "LaneOffsetAction" => {
+            if source.switch(action, "continuous", false)? {
+                source.note("an offset in a lane is reached, and then kept");
             }
-            let place = waypoints.last().and_then(|waypoint| element(*waypoint, "Position"));
-            let Some(place) = place else {
-                return source.refuse(action, "it has no waypoint with a position");
+            let node = source.required(action, "LaneOffsetActionDynamics")?;
+            let shape = source.word(node, "dynamicsShape", &["linear", "cubic", "sinusoidal", "step"])?;
+            let dynamics = match (shape, node.has_attribute("maxLateralAcc")) {
+                ("step", _) => Dynamics { over: Over::AtOnce, peak: 1.0 },
+                (_, true) => {
+                    let most_mps2 = source.amount(node, "maxLateralAcc")?;
+                    source.refuse_if(most_mps2 == 0.0, node, "`maxLateralAcc` is 0: it never gets there")?;
+                    // Kept for the way, which is not known here.
+                    Dynamics { over: Over::Rate(-most_mps2), peak: 1.0 }
+                }
+                _ => Dynamics { over: Over::Rate(1.0), peak: 1.0 },
             };
-            Some(Begun::Goal(mark, position(source, place)?))
+            let target = source.required(action, "LaneOffsetTarget")?;
+            if let Some(absolute) = element(target, "AbsoluteTargetLaneOffset") {
+                return Some(ActKind::Offset(Aside::InLane(source.number(absolute, "value")?), dynamics));
+            }
+            let relative = source.required(target, "RelativeTargetLaneOffset")?;
+            let of = source.text(relative, "entityRef")?;
+            Some(ActKind::Offset(Aside::Of(of, source.number(relative, "value")?), dynamics))
         }
-        "AcquirePositionAction" if is_ego => {
+        "FollowTrajectoryAction" => way(source, action).map(|way| ActKind::Follow(Box::new(way))),
+        "AssignRouteAction" => route(source, action).map(ActKind::Route),
+        "AcquirePositionAction" => {
             let place = source.required(action, "Position")?;
-            Some(Begun::Goal(mark, position(source, place)?))
-        }
-        "LaneOffsetAction" | "LateralDistanceAction" => {
-            source.refuse(action, "vehicles keep to the middle of their lanes")
-        }
-        "LongitudinalDistanceAction" | "SpeedProfileAction" | "SynchronizeAction" => {
-            source.refuse(action, "a vehicle keeps the speed with which it appears")
-        }
-        "AssignRouteAction" | "AcquirePositionAction" => {
-            source.refuse(action, "vehicles follow their lanes, and draw their way at junctions")
+            Some(ActKind::Route(vec![position(source, place)?]))
         }
         _ => source.refuse(action, "this action is not read"),
     }
 }
 
-fn walk(source: &mut Source, action: Node) -> Option<Walk> {
-    let mark = source.mark(action);
-    if source.number_or(action, "initialDistanceOffset", 0.0)? != 0.0 {
-        return source.refuse(action, "a pedestrian walks its way from the beginning");
-    }
-    let within = |name: &'static str| action.descendants().find(move |node| node.has_tag_name(name));
-    if let Some(mode) = within("TrajectoryFollowingMode") {
-        source.word(mode, "followingMode", &FOLLOWING)?;
-    }
-    if let Some(trajectory) = within("Trajectory")
-        && source.switch(trajectory, "closed", false)?
-    {
-        return source.refuse(trajectory, "a pedestrian walks one way: `closed` leads back");
-    }
-    let timing = within("Timing");
-    let scale = timing.map_or(Some(1.0), |timing| scale(source, timing))?;
-    let Some(polyline) = within("Polyline") else {
-        return source.refuse(action, "a pedestrian walks straight across the road: a `Polyline` is read");
-    };
-    let vertices: Vec<Node> = elements(polyline, "Vertex").collect();
-    let (Some(first), Some(last)) = (vertices.first(), vertices.last()) else {
-        return source.refuse(polyline, "it has no vertices");
-    };
-    let mut way = Vec::new();
-    for vertex in &vertices {
-        let place = source.required(*vertex, "Position")?;
-        way.push((source.mark(*vertex), position(source, place)?));
-    }
-    // Without `Timing` the times of the vertices are not kept: it walks with its speed.
-    let times = (source.number_or(*first, "time", 0.0)?, source.number_or(*last, "time", 0.0)?);
-    let duration_s = (times.1 - times.0) * scale;
-    let duration_s = (timing.is_some() && duration_s > 0.0).then_some(duration_s);
-    Some(Walk { mark, way, duration_s })
+fn is_route(action: Node) -> bool {
+    action.has_tag_name("AssignRouteAction") || action.has_tag_name("AcquirePositionAction")
 }
 
-/// By how much the times of a way are stretched.
-fn scale(source: &mut Source, timing: Node) -> Option<f64> {
-    source.word(timing, "domainAbsoluteRelative", &["absolute", "relative"])?;
-    if source.number_or(timing, "offset", 0.0)? != 0.0 {
-        return source.refuse(timing, "a pedestrian sets out when it is triggered: `offset` is 0");
+fn ahead(source: &mut Source, action: Node) -> Option<Headway> {
+    if source.switch(action, "continuous", false)? {
+        return source.refuse(action, "a distance that is kept from moment to moment is not read");
     }
-    let scale = source.number_or(timing, "scale", 1.0)?;
-    source.refuse_if(scale <= 0.0, timing, format!("`scale` is {scale}: times go on, by more than 0"))?;
-    Some(scale)
+    if !source.switch(action, "freespace", false)? {
+        return source.refuse(action, "only `freespace=\"true\"` is read: between the bumpers");
+    }
+    if element(action, "DynamicConstraints").is_some() {
+        return source.refuse(action, "a distance is taken at once: `DynamicConstraints` are not read");
+    }
+    let sides = ["any", "leadingReferencedEntity", "trailingReferencedEntity"];
+    match source.word(action, "displacement", &sides)? {
+        "trailingReferencedEntity" => {
+            return source.refuse(action, "only a distance ahead of the ego vehicle is read");
+        }
+        // 1.0 has no such attribute. Later, players need not take its absence as ahead.
+        "" if source.minor > 0 => {
+            let reason = "without `displacement` it need not be ahead: `leadingReferencedEntity` is";
+            return source.refuse(action, reason);
+        }
+        _ => {}
+    }
+    source.word(action, "coordinateSystem", &FRAMES)?;
+    match action.attribute("timeGap") {
+        Some(_) => Some(Headway::Time(source.amount(action, "timeGap")?)),
+        None => Some(Headway::Way(source.amount(action, "distance")?)),
+    }
+}
+
+fn meeting(source: &mut Source, action: Node) -> Option<ActKind> {
+    let master = source.text(action, "masterEntityRef")?;
+    for name in ["targetTolerance", "targetToleranceMaster"] {
+        source.number_or(action, name, 0.0)?;
+    }
+    let (at, own) =
+        (source.required(action, "TargetPositionMaster")?, source.required(action, "TargetPosition")?);
+    let (master_at, own_at) = (position(source, at)?, position(source, own)?);
+    let (mut speed, mut steady) = (None, Steady::No);
+    if let Some(last) = element(action, "FinalSpeed") {
+        let Some(inner) = children(last).next() else { return source.refuse(last, "it is empty") };
+        speed = Some(match inner.tag_name().name() {
+            "AbsoluteSpeed" => Speed::Absolute(source.number(inner, "value")?),
+            "RelativeSpeedToMaster" => match source.text(inner, "speedTargetValueType")?.as_str() {
+                "delta" => Speed::More(master.clone(), source.number(inner, "value")?),
+                "factor" => Speed::Times(master.clone(), source.number(inner, "value")?),
+                _ => return source.refuse(inner, "`speedTargetValueType` is `delta` or `factor`"),
+            },
+            _ => return source.refuse(inner, "such a speed is not read"),
+        });
+        if let Some(held) = children(inner).next() {
+            steady = match held.tag_name().name() {
+                "TargetDistanceSteadyState" => Steady::Way(source.amount(held, "distance")?),
+                "TargetTimeSteadyState" => Steady::Time(source.amount(held, "time")?),
+                _ => return source.refuse(held, "such a steady state is not read"),
+            };
+        }
+    }
+    Some(ActKind::Meet(Box::new(Meeting { master, master_at, own_at, speed, steady })))
+}
+
+fn way(source: &mut Source, action: Node) -> Option<Way> {
+    let from_m = source.number_or(action, "initialDistanceOffset", 0.0)?;
+    if let Some(mode) = element(action, "TrajectoryFollowingMode") {
+        source.word(mode, "followingMode", &FOLLOWING)?;
+    }
+    let outer = element(action, "TrajectoryRef").unwrap_or(action);
+    let shape = shape_of(source, outer)?;
+    let timing = element(action, "TimeReference").and_then(|node| element(node, "Timing"));
+    let (mut found, mut is_absolute) = (None, false);
+    if let Some(timing) = timing {
+        is_absolute = source.word(timing, "domainAbsoluteRelative", &["absolute", "relative"])? == "absolute";
+        let (more_s, times) =
+            (source.number_or(timing, "offset", 0.0)?, source.number_or(timing, "scale", 1.0)?);
+        source.refuse_if(times <= 0.0, timing, format!("`scale` is {times}: times go on, by more than 0"))?;
+        found = Some((more_s, times));
+    }
+    Some(Way { shape, from_m, timing: found, is_absolute })
 }

@@ -1,188 +1,294 @@
-//! Triggers as conditions of the language, asked while a vehicle waits for its lane change.
+//! Triggers as conditions of the language, asked while a phase waits.
 
-use super::scene::{Placed, Setting};
+use avastra_base::geometry::Vec2;
+
+use super::action::ActKind;
+use super::said::Said;
+use super::scene::{Cast, Moving};
 use super::source::{Mark, Source};
+use super::story::Event;
 use super::trigger::{Condition, Pair, Trigger, When};
 
-/// What holds from the beginning.
-const ALWAYS: &str = "elapsed >= 0 s";
+/// From the ego vehicle's rear axle to its front in avastra, m: what the language's `ego.front` is ahead of a file's reference point.
+const EGO_FRONT_M: f64 = 3.705;
 
-/// Why a condition between others is refused.
-const NEVER: &str = "at the speeds of the beginning this never comes";
+/// What a speed may differ and be reached, m/s.
+const REACHED_MPS: f64 = 0.1;
 
-/// Whether a group of conditions holds from the beginning.
-pub fn is_always(all: &[Condition]) -> bool {
-    all.iter().all(|condition| matches!(condition.kind, When::Always))
+/// The words before a phase.
+#[derive(Debug, Clone, Default)]
+pub struct Begins {
+    pub once: Option<Said>,
+    /// s.
+    pub held_s: f64,
+    pub after_s: f64,
 }
 
-/// A vehicle that waits for a trigger.
-pub struct Waiting<'a> {
-    pub actor: &'a Placed<'a>,
-    pub setting: &'a Setting<'a>,
-}
-
-impl Waiting<'_> {
-    /// A trigger in the language; `elapsed >= 0 s` if it holds from the beginning.
-    pub fn text(&self, source: &mut Source, trigger: &Trigger) -> Option<String> {
-        if trigger.is_empty() || trigger.iter().any(|all| is_always(all)) {
-            return Some(ALWAYS.to_owned());
-        }
-        let mut groups = Vec::new();
-        for all in trigger {
-            let mut parts = Vec::new();
-            for condition in all.iter().filter(|condition| !matches!(condition.kind, When::Always)) {
-                parts.push(self.part(source, condition)?);
+impl Begins {
+    /// The words with a blank after each.
+    pub fn said(&self) -> Said {
+        let mut said = Said::default();
+        if let Some(once) = &self.once {
+            said = said.and("once ").then(once.clone()).and(" ");
+            if self.held_s > 0.0 {
+                said = said.and("for ").number(self.held_s, "s").and(" ");
             }
-            groups.push(parts.join(" and "));
         }
-        Some(groups.join(" or "))
+        if self.after_s > 0.0 {
+            said = said.and("after ").number(self.after_s, "s").and(" ");
+        }
+        said
+    }
+}
+
+/// Somebody who waits for a trigger.
+pub struct Waiting<'w, 'a> {
+    pub cast: &'w Cast<'a>,
+    pub actor: &'w Moving<'a>,
+    /// The event before this one, if there is one.
+    pub before: Option<&'w Event>,
+}
+
+impl Waiting<'_, '_> {
+    pub fn begins(&self, source: &mut Source, trigger: &Trigger) -> Option<Begins> {
+        let mut begins = Begins::default();
+        let [all] = trigger.as_slice() else {
+            let mut groups = Vec::new();
+            for all in trigger {
+                if let Some(condition) = all.iter().find(|condition| condition.delay_s > 0.0) {
+                    return source.refuse(&condition.mark, "a delay is read where there is one condition");
+                }
+                let parts: Option<Vec<Said>> = all.iter().map(|one| self.part(source, one)).collect();
+                groups.push(Said::joined(parts?, " and "));
+            }
+            begins.once = (!groups.is_empty()).then(|| Said::joined(groups, " or "));
+            return Some(begins);
+        };
+        let follows = |condition: &&Condition| match &condition.kind {
+            When::Ended { kind, name } => self.before.is_some_and(|event| is_called(event, kind, name)),
+            _ => false,
+        };
+        let (own, others): (Vec<&Condition>, Vec<&Condition>) = all.iter().partition(follows);
+        begins.after_s = own.iter().map(|condition| condition.delay_s).fold(0.0, f64::max);
+        if let [only] = others.as_slice() {
+            begins.after_s += only.delay_s;
+            if let When::Stands { seconds, .. } = &only.kind {
+                begins.held_s = *seconds;
+            }
+        } else if let Some(delayed) = others.iter().find(|condition| condition.delay_s > 0.0) {
+            return source.refuse(&delayed.mark, "a delay is read where there is one condition");
+        }
+        let mut parts = Vec::new();
+        for condition in others {
+            if condition.kind == When::Always {
+                continue;
+            }
+            parts.push(self.part(source, condition)?);
+        }
+        begins.once = (!parts.is_empty()).then(|| Said::joined(parts, " and "));
+        Some(begins)
     }
 
-    fn part(&self, source: &mut Source, condition: &Condition) -> Option<String> {
-        let (actor, ego) = (self.actor, self.setting.ego());
+    fn part(&self, source: &mut Source, condition: &Condition) -> Option<Said> {
         let mark = &condition.mark;
+        if condition.is_rising && self.holds(source, condition)? {
+            let reason = "it holds from the beginning, and so never begins to hold as `rising` asks";
+            return source.refuse(mark, reason);
+        }
         match &condition.kind {
-            When::Always => Some(ALWAYS.to_owned()),
-            When::After(seconds) => Some(format!("elapsed >= {seconds:.2} s")),
+            When::Always => Some(Said::text("elapsed >= ").number(0.0, "s")),
+            When::Never => source.refuse(mark, "it never comes"),
+            When::After(seconds) => Some(Said::text("elapsed >= ").number(*seconds, "s")),
             When::Headway { pair, seconds } => {
-                let gap = self.gap(source, mark, pair)?;
-                let (of, mps) = if pair.of == actor.name() { ("npc", actor.mps) } else { ("ego", ego.mps) };
-                if self.holds(pair, mps * seconds) {
-                    return already(source, condition);
-                }
-                Some(format!("{gap} {} {of}.speed * {seconds:.3} s", sign(pair)))
+                let of = self.who(source, mark, &pair.of)?;
+                let bound = Said::text(format!("{of}.speed * ")).number(*seconds, "s");
+                self.distance(source, mark, pair, &bound)
             }
             When::Collides { pair, seconds } => {
-                let gap = self.gap(source, mark, pair)?;
-                let is_behind = self.is_behind();
-                let closing_mps = (actor.mps - ego.mps) * if is_behind { 1.0 } else { -1.0 };
-                if self.holds(pair, closing_mps * seconds) {
-                    return already(source, condition);
-                }
-                let (back, front) = if is_behind { ("npc", "ego") } else { ("ego", "npc") };
-                Some(format!("{gap} < ({back}.speed - {front}.speed) * {seconds:.3} s"))
-            }
-            When::Distance { pair, metres } if self.is_to_ego(pair) => {
-                let gap = self.gap(source, mark, pair)?;
-                if self.holds(pair, *metres) {
-                    return already(source, condition);
-                }
-                Some(format!("{gap} {} {metres:.2} m", sign(pair)))
+                let way = self.nearer(source, mark, pair)?;
+                let (of, to) = (self.who(source, mark, &pair.of)?, self.who(source, mark, &pair.to)?);
+                let (back, front) = if self.is_behind(source, mark, pair)? { (of, to) } else { (to, of) };
+                Some(way.and(format!(" < ({back}.speed - {front}.speed) * ")).number(*seconds, "s"))
             }
             When::Distance { pair, metres } => {
-                let (of, to) = (self.named(source, mark, &pair.of)?, self.named(source, mark, &pair.to)?);
-                meeting(source, condition, (of, to), *metres, pair)
+                let bound = Said::default().number(*metres, "m");
+                self.distance(source, mark, pair, &bound)
             }
-            When::Reaches { entity, position, within_m } => {
-                let of = self.named(source, mark, entity)?;
-                let there = self.setting.ground.beside(source, mark, position)?;
-                let station_m = there.station_m - within_m;
-                let (from_m, mps) = (of.beside.station_m, of.along_mps());
-                if (from_m - there.station_m).abs() <= *within_m {
-                    return already(source, condition);
-                }
-                if entity == ego.name() {
-                    let left_m = (self.setting.ground.route.goal_m - station_m).max(0.0);
-                    return Some(format!("ego.route_left <= {left_m:.2} m"));
-                }
-                // One that comes towards the ego vehicle meets the far side of the place first.
-                let edge_m = if mps < 0.0 { there.station_m + within_m } else { station_m };
-                at(source, mark, (edge_m - from_m) / mps)
+            When::Reaches { entity, position, within_m, is_less } => {
+                let point = self.cast.place(source, &position.0)?.pose.position;
+                let (said, station_m) = self.station(source, mark, entity, point)?;
+                let at_m = if *is_less { station_m - within_m } else { station_m + within_m };
+                Some(said.and(if *is_less { " >= " } else { " > " }).number(at_m, "m"))
             }
+            When::Travelled { entity, metres } => {
+                if self.cast.is_ego(entity) {
+                    return Some(Said::text("ego.front >= ").number(EGO_FRONT_M + metres, "m"));
+                }
+                let who = self.who(source, mark, entity)?;
+                let from_m = self.cast.moving(source, mark, entity)?.at_m;
+                Some(Said::text(format!("{who}.station >= ")).number(from_m + metres, "m"))
+            }
+            When::Stands { entity, .. } => {
+                let who = self.who(source, mark, entity)?;
+                Some(Said::text(format!("{who}.speed <= ")).number(0.01, "m/s"))
+            }
+            When::Speed { entity, mps, is_less } => {
+                let who = self.who(source, mark, entity)?;
+                Some(Said::text(format!("{who}.speed {} ", sign(*is_less))).number(*mps, "m/s"))
+            }
+            When::Faster { of, to, mps, is_less } => {
+                let (of, to) = (self.who(source, mark, of)?, self.who(source, mark, to)?);
+                Some(Said::text(format!("{of}.speed - {to}.speed {} ", sign(*is_less))).number(*mps, "m/s"))
+            }
+            When::Ended { kind, name } => self.ended(source, mark, kind, name),
         }
     }
 
-    /// Whether a pair is the ego vehicle and the actor.
-    fn is_to_ego(&self, pair: &Pair) -> bool {
-        let names = [pair.of.as_str(), pair.to.as_str()];
-        names.contains(&self.actor.name()) && names.contains(&self.setting.ego().name())
-    }
-
-    /// The distance between the ego vehicle and the actor, in the language.
-    fn gap(&self, source: &mut Source, mark: &Mark, pair: &Pair) -> Option<String> {
-        let (actor, ego) = (self.actor, self.setting.ego());
-        let reason = "it must ask about the ego vehicle and the one that acts";
-        source.refuse_if(!self.is_to_ego(pair), mark, reason)?;
-        if pair.is_free_space {
-            return Some("npc.gap".to_owned());
-        }
-        // From the reference points to those ends that face each other. One that begins behind comes nearer from there, and
-        // has passed when it is farther away.
-        let faces_front = self.is_behind() && pair.is_less;
-        let more_m = match faces_front {
-            true => actor.ends_m().0 - actor.beside.station_m - ego.ends_m().1,
-            false => ego.ends_m().0 + actor.beside.station_m - actor.ends_m().1,
+    /// That something of another road user's, or farther back of its own, has ended.
+    fn ended(&self, source: &mut Source, mark: &Mark, kind: &'static str, name: &str) -> Option<Said> {
+        let Some((moving, event)) = self.cast.last_event(kind, name) else {
+            let reason =
+                format!("what ends with `{name}` is not known here: the ego vehicle's, or the player's");
+            return source.refuse(mark, reason);
         };
-        Some(format!("npc.gap + {more_m:.2} m"))
-    }
-
-    fn is_behind(&self) -> bool {
-        self.actor.beside.station_m < 0.0
-    }
-
-    /// Whether a distance between the ego vehicle and the actor compares so at the beginning.
-    fn holds(&self, pair: &Pair, metres: f64) -> bool {
-        let ((front_m, back_m), (ego_front_m, ego_back_m)) =
-            (self.actor.ends_m(), self.setting.ego().ends_m());
-        let away_m = match pair.is_free_space {
-            true => (back_m - ego_front_m).max(ego_back_m - front_m).max(0.0),
-            false => self.actor.beside.station_m.abs(),
+        let who = if moving.entity.name == self.actor.entity.name { "npc" } else { moving.bearer.as_str() };
+        let Some(act) = event.acts.last() else {
+            return source.refuse(mark, format!("`{name}` does nothing that ends"));
         };
-        if pair.is_less { away_m < metres } else { away_m > metres }
-    }
-
-    fn named(&self, source: &mut Source, mark: &Mark, name: &str) -> Option<&Placed<'_>> {
-        let is_torn = source.is_torn(name);
-        let found = self.setting.find(name).filter(|_| !is_torn);
-        if found.is_none() && !is_torn {
-            source.refuse::<()>(mark, format!("`{name}` is no vehicle with a place"));
+        match &act.kind {
+            ActKind::Meet(meeting) => {
+                let at_m = moving.reach_m(source, self.cast, &meeting.own_at)?;
+                Some(Said::text(format!("{who}.station >= ")).number(at_m, "m"))
+            }
+            ActKind::Follow(_) => {
+                Some(Said::text(format!("{who}.station >= ")).number(moving.path.length_m() - 0.05, "m"))
+            }
+            ActKind::Speed(super::action::Speed::Absolute(mps), _) => Some(
+                Said::text(format!("{who}.speed >= "))
+                    .number(mps - REACHED_MPS, "m/s")
+                    .and(format!(" and {who}.speed <= "))
+                    .number(mps + REACHED_MPS, "m/s"),
+            ),
+            _ => source.refuse(mark, format!("when `{name}` has ended is not read")),
         }
-        found
+    }
+
+    /// The distance of two, less or more than a bound. Less it becomes from the side from which the first one comes.
+    fn distance(&self, source: &mut Source, mark: &Mark, pair: &Pair, bound: &Said) -> Option<Said> {
+        if pair.is_less {
+            return Some(self.nearer(source, mark, pair)?.and(" <= ").then(bound.clone()));
+        }
+        let sides = [(&pair.of, &pair.to), (&pair.to, &pair.of)];
+        let sides = sides.map(|(back, front)| {
+            Some(self.between(source, mark, back, front, pair.is_free_space)?.and(" >= ").then(bound.clone()))
+        });
+        let [ahead, behind] = sides;
+        Some(Said::text("(").then(ahead?).and(" or ").then(behind?).and(")"))
+    }
+
+    /// The way between two, from the side from which the first one comes.
+    fn nearer(&self, source: &mut Source, mark: &Mark, pair: &Pair) -> Option<Said> {
+        let (back, front) =
+            if self.is_behind(source, mark, pair)? { (&pair.of, &pair.to) } else { (&pair.to, &pair.of) };
+        self.between(source, mark, back, front, pair.is_free_space)
+    }
+
+    /// The way from one to another that is ahead of it along the ego vehicle's route: between outlines, or reference points.
+    fn between(
+        &self,
+        source: &mut Source,
+        mark: &Mark,
+        back: &str,
+        front: &str,
+        is_free_space: bool,
+    ) -> Option<Said> {
+        let (from, to) = (self.who(source, mark, back)?, self.who(source, mark, front)?);
+        let said = Said::text(format!("{to}.rear - {from}.front"));
+        if is_free_space {
+            return Some(said);
+        }
+        let more_m = self.cast.overhang_m(source, mark, front, false)?
+            + self.cast.overhang_m(source, mark, back, true)?;
+        Some(said.and(" + ").number(more_m, "m"))
+    }
+
+    /// Whether the first of two begins behind the second along the ego vehicle's route.
+    fn is_behind(&self, source: &mut Source, mark: &Mark, pair: &Pair) -> Option<bool> {
+        let (of, to) = (self.cast.begins(source, mark, &pair.of)?, self.cast.begins(source, mark, &pair.to)?);
+        Some(self.cast.station_m(of) < self.cast.station_m(to))
+    }
+
+    /// Whether a condition holds at the beginning, as far as the speeds and places there say.
+    fn holds(&self, source: &mut Source, condition: &Condition) -> Option<bool> {
+        let mark = &condition.mark;
+        Some(match &condition.kind {
+            When::Distance { pair, metres } => {
+                let away_m = self.away_m(source, mark, pair)?;
+                if pair.is_less { away_m < *metres } else { away_m > *metres }
+            }
+            When::Headway { pair, seconds } => {
+                let away_m = self.away_m(source, mark, pair)?;
+                let bound_m = self.cast.begins_mps(source, mark, &pair.of)? * seconds;
+                if pair.is_less { away_m < bound_m } else { away_m > bound_m }
+            }
+            When::Collides { pair, seconds } => {
+                let of_mps = self.cast.begins_mps(source, mark, &pair.of)?;
+                let to_mps = self.cast.begins_mps(source, mark, &pair.to)?;
+                let by_mps =
+                    if self.is_behind(source, mark, pair)? { of_mps - to_mps } else { to_mps - of_mps };
+                self.away_m(source, mark, pair)? < by_mps * seconds
+            }
+            When::Speed { entity, mps, is_less } => {
+                let begins_mps = self.cast.begins_mps(source, mark, entity)?;
+                if *is_less { begins_mps < *mps } else { begins_mps > *mps }
+            }
+            _ => false,
+        })
+    }
+
+    /// How far two are from each other at the beginning, m.
+    fn away_m(&self, source: &mut Source, mark: &Mark, pair: &Pair) -> Option<f64> {
+        let (of, to) = (self.cast.begins(source, mark, &pair.of)?, self.cast.begins(source, mark, &pair.to)?);
+        let away_m = (self.cast.station_m(of) - self.cast.station_m(to)).abs();
+        if !pair.is_free_space {
+            return Some(away_m);
+        }
+        let (back, front) =
+            if self.is_behind(source, mark, pair)? { (&pair.of, &pair.to) } else { (&pair.to, &pair.of) };
+        let less_m = self.cast.overhang_m(source, mark, front, false)?
+            + self.cast.overhang_m(source, mark, back, true)?;
+        Some((away_m - less_m).max(0.0))
+    }
+
+    /// The station of an entity in the language, and that of a point on the same way, m.
+    fn station(&self, source: &mut Source, mark: &Mark, entity: &str, point: Vec2) -> Option<(Said, f64)> {
+        if self.cast.is_ego(entity) {
+            let station_m = self.cast.station_m(point) + EGO_FRONT_M;
+            return Some((Said::text("ego.front"), station_m));
+        }
+        let who = self.who(source, mark, entity)?;
+        let station_m = self.cast.moving(source, mark, entity)?.path.project(point).station_m;
+        Some((Said::text(format!("{who}.station")), station_m))
+    }
+
+    /// What an entity is called in a phase of the actor.
+    fn who(&self, source: &mut Source, mark: &Mark, name: &str) -> Option<String> {
+        if self.cast.is_ego(name) {
+            return Some("ego".to_owned());
+        }
+        if self.actor.entity.name == name {
+            return Some("npc".to_owned());
+        }
+        Some(self.cast.moving(source, mark, name)?.bearer.clone())
     }
 }
 
-/// What holds from the beginning, unless it is asked to begin to hold.
-fn already(source: &mut Source, condition: &Condition) -> Option<String> {
-    if condition.is_rising {
-        let reason =
-            "it holds from the beginning, so `rising` never comes: with `conditionEdge=\"none\"` it is read";
-        return source.refuse(&condition.mark, reason);
-    }
-    Some(ALWAYS.to_owned())
+/// Whether an event, or something that holds it, has a name.
+pub fn is_called(event: &Event, kind: &str, name: &str) -> bool {
+    let last = name.rsplit("::").next().unwrap_or(name);
+    event.names.iter().any(|(of, own)| *of == kind && own == last)
 }
 
-fn sign(pair: &Pair) -> &'static str {
-    if pair.is_less { "<" } else { ">" }
-}
-
-/// When two that keep their speeds are so far from each other.
-fn meeting(
-    source: &mut Source,
-    condition: &Condition,
-    (of, to): (&Placed, &Placed),
-    metres: f64,
-    pair: &Pair,
-) -> Option<String> {
-    let mark = &condition.mark;
-    let (front, back) = if of.beside.station_m <= to.beside.station_m { (to, of) } else { (of, to) };
-    let gap_m = match pair.is_free_space {
-        true => front.ends_m().1 - back.ends_m().0,
-        false => front.beside.station_m - back.beside.station_m,
-    };
-    if if pair.is_less { gap_m < metres } else { gap_m > metres } {
-        return already(source, condition);
-    }
-    let closing_mps = back.along_mps() - front.along_mps();
-    let comes = if pair.is_less { closing_mps > 0.0 } else { closing_mps < 0.0 };
-    source.refuse_if(!comes, mark, NEVER)?;
-    at(source, mark, (gap_m - metres) / closing_mps)
-}
-
-/// A moment that follows from speeds and distances.
-fn at(source: &mut Source, mark: &Mark, seconds: f64) -> Option<String> {
-    source.refuse_if(!(0.0..1e4).contains(&seconds), mark, NEVER)?;
-    source.note(
-        "a condition between others is asked at the time at which it comes true if they keep their speeds",
-    );
-    Some(format!("elapsed >= {seconds:.2} s"))
+fn sign(is_less: bool) -> &'static str {
+    if is_less { "<=" } else { ">=" }
 }

@@ -85,6 +85,9 @@ impl<'a> Reader<'a> {
             return self.literal();
         }
         let name = self.word(|letter| letter.is_alphanumeric() || letter == '_');
+        if name == "pi" {
+            return Ok(core::f64::consts::PI);
+        }
         if name.is_empty() || !self.takes('(') {
             return Err(if name.is_empty() { "a number is missing".to_owned() } else { unknown(name) });
         }
@@ -92,6 +95,12 @@ impl<'a> Reader<'a> {
         let second = if self.takes(',') { Some(self.sum()?) } else { None };
         self.close()?;
         match (name, second) {
+            ("sin", None) => Ok(libm::sin(first)),
+            ("cos", None) => Ok(libm::cos(first)),
+            ("tan", None) => Ok(libm::tan(first)),
+            ("asin", None) => Ok(libm::asin(first)),
+            ("acos", None) => Ok(libm::acos(first)),
+            ("atan", None) => Ok(libm::atan(first)),
             ("sqrt", None) => Ok(first.sqrt()),
             ("abs", None) => Ok(first.abs()),
             ("sign", None) => Ok(if first == 0.0 { 0.0 } else { first.signum() }),
@@ -136,7 +145,8 @@ impl<'a> Reader<'a> {
 
 fn unknown(name: &str) -> String {
     format!(
-        "`{name}` is neither a number nor a function that is read: sqrt, abs, sign, round, floor, ceil, min, max, pow"
+        "`{name}` is neither a number nor a function that is read: sqrt, abs, sign, round, floor, ceil, \
+         min, max, pow, sin, cos, tan, asin, acos, atan"
     )
 }
 
@@ -152,7 +162,8 @@ mod tests {
         assert_eq!(value("$v / 3.6 + 2 * (1 - 3)"), Ok(60.0 / 3.6 - 4.0));
         assert_eq!(value("-sqrt( $v * $v )"), Ok(-60.0));
         assert_eq!(value("max(1e1, pow(2, 3))"), Ok(10.0));
-        for wrong in ["", "1 +", "$w", "$n", "(1", "1 / 0", "sin(1)", "a", "1 2", "é", &"(".repeat(1000)] {
+        assert_eq!(value("sin(pi / 2) + acos(1)"), Ok(1.0));
+        for wrong in ["", "1 +", "$w", "$n", "(1", "1 / 0", "sinh(1)", "a", "1 2", "é", &"(".repeat(1000)] {
             assert!(value(wrong).is_err(), "{wrong}");
         }
     }

@@ -1,38 +1,58 @@
-//! OpenSCENARIO XML of others as a scenario of the language.
+//! OpenSCENARIO XML of others as spaces of the language (LANGUAGE.md has what is read).
 //!
-//! A documented subset (LANGUAGE.md): vehicles and pedestrians that stand or drive before, behind or beside the ego vehicle, keep
-//! their speed, and change lanes when a condition holds. The driving system under test takes the place of whatever moves the
-//! ego vehicle in the file. What cannot be said is refused, each with its line; what is left to the driving
-//! system or to the engine's drivers becomes a note in the scenario.
+//! A scenario becomes a space with one row, and a scenario that plays it; a file with a `ParameterValueDistribution` a space with a row
+//! for each of its variations. Others follow their ways as the file's player moves them (`Follow`); the driving system under test
+//! takes the place of whatever moves the ego vehicle in the file. What cannot be said is refused, each with its line; what
+//! drives otherwise here is a note at the head of the space.
 //!
-//! `vocabulary` refuses what no file may hold. `story` reads the file, with `body`, `position`, `action`, `trigger` and `weather`
-//! for what stands in it, through `source`, which fills in each `parameter` and its `expression`; `ground` finds places on the map,
-//! `scene` decides who is where and does what, `condition` turns triggers into conditions of the language, and `write` prints the
-//! scenario. A file that avastra exported carries its scenario (`own`). No file is read here: `cli` gives texts.
+//! `variation` reads the values of a distribution. For each variation `story` reads the scenario, with `body`, `position`,
+//! `shape`, `action`, `trigger` and `weather` for what stands in it, through `source`, which fills in each `parameter` and its
+//! `expression`, and `catalogue`, which finds what lies in other files; `vocabulary` refuses what no file may hold. `place` finds
+//! places on the map, `scene` gives everybody a way and phases, `condition` the moments at which these begin: as `said`, text
+//! with its numbers apart. `rows` finds how the numbers follow from the parameters, and `write` prints the space. A file that
+//! avastra exported carries its scenario (`own`). No file is read here: `cli` gives texts.
 
 mod action;
 mod body;
+mod catalogue;
 mod condition;
 mod expression;
-mod ground;
 mod own;
 mod parameter;
+mod place;
 mod position;
+mod rows;
+mod said;
 mod scene;
+mod shape;
 mod source;
 mod story;
 mod trigger;
+mod variation;
 mod vocabulary;
 mod weather;
 mod write;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
+use std::rc::Rc;
 
+use avastra_road::Lines;
+use roxmltree::Document;
+
+use catalogue::Library;
 use scene::Scene;
 use source::Source;
+use variation::Values;
+use weather::Weather;
 
-/// Gives the texts of the files that a scenario names.
+/// Gives the texts of the files that a file names.
 pub trait Files {
+    /// The scenario at a path that a file of variations names.
+    ///
+    /// # Errors
+    /// Why it cannot be read.
+    fn scenario(&self, path: &str) -> Result<String, String>;
+
     /// The map at a path that the scenario names.
     ///
     /// # Errors
@@ -46,13 +66,15 @@ pub trait Files {
     fn catalogues(&self, folder: &str) -> Result<Vec<String>, String>;
 }
 
-/// A scenario of another tool in the language.
+/// A file of another tool in the language.
 #[derive(Debug)]
 pub struct Imported {
-    /// The text of the file: the space and its one scenario.
-    pub text: String,
-    /// The map as the scenario of the other tool names it; the text names the map by its file name alone.
-    pub map: String,
+    /// `None` of a file that avastra exported: its scenario stands alone.
+    pub space: Option<String>,
+    /// A scenario that stands alone, or plays the only row of the space, which it uses as `NAME.ava`.
+    pub scenario: Option<String>,
+    /// The maps, as paths from the file of the other tool; the text names each by its file name alone.
+    pub maps: BTreeSet<String>,
     /// What drives otherwise here than the file says.
     pub notes: BTreeSet<String>,
 }
@@ -60,14 +82,27 @@ pub struct Imported {
 /// Something that the language cannot say, or that is no OpenSCENARIO.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
 pub struct Refusal {
+    /// The scenario that a file of variations names, where the line is one of that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scenario: Option<String>,
     pub line: u32,
     /// The name of the XML element.
     pub element: String,
     pub reason: String,
 }
 
-/// The scenario of an OpenSCENARIO XML file (1.0 to 1.3). `name` is what it is to be called, `ego` the entity that is the ego
-/// vehicle, if it is not called so, and `parameters` have values in place of those that the file declares.
+/// One variation of a scenario.
+struct Variant {
+    values: Values,
+    /// As a path from the file that is imported.
+    map: String,
+    scene: Scene,
+    weather: Weather,
+    duration_s: f64,
+}
+
+/// The space of an OpenSCENARIO XML file (1.0 to 1.3). `name` is what it is to be called, `ego` the entity that is the ego
+/// vehicle, if it is not called so, and `parameters` have values in place of those that the file declares or lists.
 ///
 /// # Errors
 /// All that cannot be said, by lines.
@@ -75,28 +110,121 @@ pub fn openscenario(
     text: &str,
     name: &str,
     ego: Option<&str>,
-    parameters: &BTreeMap<String, String>,
+    parameters: &Values,
     files: &dyn Files,
 ) -> Result<Imported, Vec<Refusal>> {
-    let document = avastra_road::well_formed(text).map_err(|error| {
-        let (line, reason) = match error {
-            avastra_road::RoadError::Map { line, message } => (line, message),
-            avastra_road::RoadError::Route { message } => (1, message),
-        };
-        vec![Refusal { line, element: "OpenSCENARIO".to_owned(), reason }]
-    })?;
-    let mut source = Source::new(text, parameters);
+    let document = parsed(text, None)?;
+    let lines = Rc::new(Lines::new(text));
+    let library = Library::new(files, String::new());
+    let mut source = Source::new(Rc::clone(&lines), parameters, &library);
     // With another ego vehicle or other values, the file is read like those of other tools.
     let is_as_written = ego.is_none() && parameters.is_empty();
     if let Some(own) = is_as_written.then(|| own::read(&mut source, &document)).flatten() {
         return Ok(write::own(&own, name, source.notes()));
     }
-    let imported = story::read(&mut source, &document, ego, files).and_then(|story| {
-        let scene = Scene::of(&mut source, &story, files)?;
-        Some(write::scenario(&scene, &story, name, source.notes()))
-    });
-    match (imported, source.refusals()) {
-        (Some(imported), refusals) if refusals.is_empty() => Ok(imported),
-        (_, refusals) => Err(refusals),
+    let mut whole =
+        Whole { ego, description: String::new(), notes: BTreeSet::new(), variants: Vec::new(), excluded: 0 };
+    let Some(distribution) = variation::read(&mut source, document.root_element()) else {
+        whole
+            .add(&document, &lines, &library, parameters.clone(), parameters)
+            .map_err(|refused| refused.0)?;
+        return Ok(write::space(&whole, &[], name));
+    };
+    let Some(distribution) = distribution.filter(|_| !source.is_refused()) else {
+        return Err(source.refusals());
+    };
+    let path = distribution.scenario.replace('\\', "/");
+    let of_scenario = |refusals: Vec<Refusal>| {
+        refusals
+            .into_iter()
+            .map(|refusal| Refusal { scenario: Some(path.clone()), ..refusal })
+            .collect::<Vec<_>>()
+    };
+    let text = files.scenario(&path).map_err(|reason| {
+        let reason = format!("`{path}`: {reason}");
+        vec![Refusal { scenario: None, line: distribution.line, element: "ScenarioFile".to_owned(), reason }]
+    })?;
+    let document = parsed(&text, Some(&path))?;
+    let lines = Rc::new(Lines::new(&text));
+    let folder = path.rfind('/').map_or_else(String::new, |at| path[..=at].to_owned());
+    let library = Library::new(files, folder);
+    let mut excluded = None;
+    let mut known = BTreeSet::new();
+    for values in &distribution.variations {
+        // Values that were asked for stand in place of those that are listed.
+        let values: Values = values.iter().chain(parameters).map(|(k, v)| (k.clone(), v.clone())).collect();
+        if !known.insert(values.clone()) {
+            continue;
+        }
+        match whole.add(&document, &lines, &library, values.clone(), &values) {
+            Ok(()) => {}
+            Err((refusals, true)) => excluded = Some(refusals),
+            Err((refusals, false)) => return Err(of_scenario(refusals)),
+        }
     }
+    match excluded.filter(|_| whole.variants.is_empty()) {
+        Some(refusals) => Err(of_scenario(refusals)),
+        None => {
+            whole.description = distribution.description;
+            Ok(write::space(&whole, &distribution.parameters, name))
+        }
+    }
+}
+
+/// All variations of a file.
+struct Whole<'a> {
+    ego: Option<&'a str>,
+    description: String,
+    notes: BTreeSet<String>,
+    /// One or more.
+    variants: Vec<Variant>,
+    /// How many variations have values that the scenario's own constraints exclude.
+    excluded: usize,
+}
+
+impl Whole<'_> {
+    /// Reads the scenario with the values of one variation. What is refused comes with whether the file itself excludes the values.
+    fn add(
+        &mut self,
+        document: &Document,
+        lines: &Rc<Lines>,
+        library: &Library,
+        values: Values,
+        asked: &Values,
+    ) -> Result<(), (Vec<Refusal>, bool)> {
+        let mut source = Source::new(Rc::clone(lines), asked, library);
+        if self.variants.is_empty() {
+            for (node, reason) in vocabulary::unknown(document.root_element()) {
+                source.refuse::<()>(node, reason);
+            }
+        }
+        let story = story::read(&mut source, document, self.ego);
+        let found = story.and_then(|story| Some((Scene::of(&mut source, &story)?, story)));
+        let (is_excluded, notes) = (source.is_excluded, source.notes());
+        match (found, source.refusals()) {
+            (Some((scene, story)), refusals) if refusals.is_empty() => {
+                self.notes.extend(notes);
+                self.description.clone_from(&story.description);
+                let map = library.beside(&story.map.1.replace('\\', "/"));
+                let (weather, duration_s) = (story.weather, story.duration_s);
+                self.variants.push(Variant { values, map, scene, weather, duration_s });
+                Ok(())
+            }
+            (_, refusals) => {
+                self.excluded += usize::from(is_excluded);
+                Err((refusals, is_excluded))
+            }
+        }
+    }
+}
+
+fn parsed<'t>(text: &'t str, scenario: Option<&str>) -> Result<Document<'t>, Vec<Refusal>> {
+    avastra_road::well_formed(text).map_err(|error| {
+        let (line, reason) = match error {
+            avastra_road::RoadError::Map { line, message } => (line, message),
+            avastra_road::RoadError::Route { message } => (1, message),
+        };
+        let scenario = scenario.map(str::to_owned);
+        vec![Refusal { scenario, line, element: "OpenSCENARIO".to_owned(), reason }]
+    })
 }

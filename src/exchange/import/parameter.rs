@@ -26,6 +26,7 @@ pub fn check(source: &mut Source, declared: Node, value: &str) -> Option<()> {
             None => return Some(()),
         }
     }
+    source.is_excluded |= is_excluded;
     source.refuse_if(is_excluded, declared, format!("its constraints exclude the value `{value}`"));
     Some(())
 }

@@ -2,45 +2,197 @@
 
 use roxmltree::Node;
 
-use super::source::{Source, children, element};
+use super::catalogue;
+use super::shape::{Shape, shape_of};
+use super::source::{Mark, Source, children, element, elements};
 
 #[derive(Debug, Clone)]
-pub enum Position {
-    Lane { road: String, lane: i32, s_m: f64, offset_m: f64, heading: Heading },
-    RelativeLane { entity: String, lanes: i32, ahead_m: f64, offset_m: f64, heading: Heading },
-    World { x_m: f64, y_m: f64, heading_rad: f64 },
+pub struct Position {
+    pub mark: Mark,
+    pub kind: PositionKind,
+    pub heading: Heading,
+}
+
+#[derive(Debug, Clone)]
+pub enum PositionKind {
+    /// On a lane: the station along the road, and to the left of the lane's middle in the road's direction, m.
+    Lane {
+        road: String,
+        lane: i32,
+        s_m: f64,
+        offset_m: f64,
+    },
+    /// On the lane of an entity or so many lanes to the left of it.
+    RelativeLane {
+        entity: String,
+        lanes: i32,
+        ahead_m: f64,
+        offset_m: f64,
+    },
+    /// Beside a road's reference line.
+    Road {
+        road: String,
+        s_m: f64,
+        t_m: f64,
+    },
+    RelativeRoad {
+        entity: String,
+        ds_m: f64,
+        dt_m: f64,
+    },
+    World {
+        x_m: f64,
+        y_m: f64,
+    },
+    RelativeWorld {
+        entity: String,
+        dx_m: f64,
+        dy_m: f64,
+    },
+    /// In front of an entity and to its left.
+    RelativeObject {
+        entity: String,
+        dx_m: f64,
+        dy_m: f64,
+    },
+    OnRoute {
+        route: Vec<Position>,
+        along_m: f64,
+        beside: Beside,
+    },
+    OnTrajectory {
+        trajectory: Box<Shape>,
+        s_m: f64,
+        t_m: f64,
+    },
+    /// Where an entity is.
+    Entity(String),
+}
+
+/// Where beside a route.
+#[derive(Debug, Clone, Copy)]
+pub enum Beside {
+    /// To the left of the road's reference line, m.
+    Road(f64),
+    /// In a lane, to the left of its middle, m.
+    Lane(i32, f64),
 }
 
 /// Where an entity looks, rad.
 #[derive(Debug, Clone, Copy)]
 pub enum Heading {
-    /// To the left of the direction of its road.
+    /// To the left of the direction that its place has.
     Relative(f64),
     /// In the plane.
     Absolute(f64),
 }
 
+/// The position within an element.
 pub fn position(source: &mut Source, parent: Node) -> Option<Position> {
     let Some(place) = children(parent).next() else { return source.refuse(parent, "it is empty") };
-    match place.tag_name().name() {
-        "LanePosition" => {
-            let (road, lane) = (source.text(place, "roadId")?, source.integer(place, "laneId")?);
-            let (s_m, offset_m) = (source.number(place, "s")?, source.number_or(place, "offset", 0.0)?);
-            Some(Position::Lane { road, lane, s_m, offset_m, heading: heading(source, place)? })
-        }
+    let mark = source.mark(place);
+    let mut heading = heading(source, place)?;
+    let kind = match place.tag_name().name() {
+        "LanePosition" => PositionKind::Lane {
+            road: source.text(place, "roadId")?,
+            lane: source.integer(place, "laneId")?,
+            s_m: source.number(place, "s")?,
+            offset_m: source.number_or(place, "offset", 0.0)?,
+        },
         "RelativeLanePosition" => {
-            let (entity, lanes) = (source.text(place, "entityRef")?, source.integer(place, "dLane")?);
             let along = if place.has_attribute("ds") { "ds" } else { "dsLane" };
-            let ahead_m = source.number(place, along)?;
-            let offset_m = source.number_or(place, "offset", 0.0)?;
-            let heading = heading(source, place)?;
-            Some(Position::RelativeLane { entity, lanes, ahead_m, offset_m, heading })
+            PositionKind::RelativeLane {
+                entity: source.text(place, "entityRef")?,
+                lanes: source.integer(place, "dLane")?,
+                ahead_m: source.number(place, along)?,
+                offset_m: source.number_or(place, "offset", 0.0)?,
+            }
         }
+        "RoadPosition" => PositionKind::Road {
+            road: source.text(place, "roadId")?,
+            s_m: source.number(place, "s")?,
+            t_m: source.number(place, "t")?,
+        },
+        "RelativeRoadPosition" => PositionKind::RelativeRoad {
+            entity: source.text(place, "entityRef")?,
+            ds_m: source.number(place, "ds")?,
+            dt_m: source.number(place, "dt")?,
+        },
         "WorldPosition" => {
-            let (x_m, y_m) = (source.number(place, "x")?, source.number(place, "y")?);
-            Some(Position::World { x_m, y_m, heading_rad: source.number_or(place, "h", 0.0)? })
+            let turned_rad = source.number_or(place, "h", 0.0)?;
+            heading = Heading::Absolute(turned_rad);
+            PositionKind::World { x_m: source.number(place, "x")?, y_m: source.number(place, "y")? }
         }
-        _ => source.refuse(place, "read are LanePosition, RelativeLanePosition and WorldPosition"),
+        "RelativeWorldPosition" => PositionKind::RelativeWorld {
+            entity: source.text(place, "entityRef")?,
+            dx_m: source.number(place, "dx")?,
+            dy_m: source.number(place, "dy")?,
+        },
+        "RelativeObjectPosition" => PositionKind::RelativeObject {
+            entity: source.text(place, "entityRef")?,
+            dx_m: source.number(place, "dx")?,
+            dy_m: source.number(place, "dy")?,
+        },
+        "RoutePosition" => on_route(source, place)?,
+        "TrajectoryPosition" => {
+            let reference = source.required(place, "TrajectoryRef")?;
+            PositionKind::OnTrajectory {
+                trajectory: Box::new(shape_of(source, reference)?),
+                s_m: source.number(place, "s")?,
+                t_m: source.number_or(place, "t", 0.0)?,
+            }
+        }
+        _ => return source.refuse(place, "such a position is not read"),
+    };
+    Some(Position { mark, kind, heading })
+}
+
+/// The places that a route leads through.
+pub fn route(source: &mut Source, parent: Node) -> Option<Vec<Position>> {
+    if let Some(route) = element(parent, "Route") {
+        return waypoints(source, route);
+    }
+    let reference = source.required(parent, "CatalogReference")?;
+    catalogue::entry(source, reference, &[catalogue::ROUTE], |source, route| {
+        source.declare_missing(route);
+        waypoints(source, route)
+    })
+}
+
+fn waypoints(source: &mut Source, route: Node) -> Option<Vec<Position>> {
+    const STRATEGIES: [&str; 4] = ["fastest", "leastIntersections", "random", "shortest"];
+    if source.switch(route, "closed", false)? {
+        return source.refuse(route, "a route leads one way: `closed` leads back");
+    }
+    let mut places = Vec::new();
+    for waypoint in elements(route, "Waypoint") {
+        source.word(waypoint, "routeStrategy", &STRATEGIES)?;
+        let place = source.required(waypoint, "Position")?;
+        places.push(position(source, place)?);
+    }
+    source.refuse_if(places.is_empty(), route, "it has no waypoint with a position")?;
+    Some(places)
+}
+
+fn on_route(source: &mut Source, place: Node) -> Option<PositionKind> {
+    let reference = source.required(place, "RouteRef")?;
+    let route = route(source, reference)?;
+    let inner = source.required(place, "InRoutePosition")?;
+    let Some(inner) = children(inner).next() else { return source.refuse(inner, "it is empty") };
+    match inner.tag_name().name() {
+        "FromCurrentEntity" => Some(PositionKind::Entity(source.text(inner, "entityRef")?)),
+        "FromRoadCoordinates" | "PositionInRoadCoordinates" => {
+            let along_m = source.number(inner, "pathS")?;
+            let beside = Beside::Road(source.number_or(inner, "t", 0.0)?);
+            Some(PositionKind::OnRoute { route, along_m, beside })
+        }
+        "FromLaneCoordinates" | "PositionInLaneCoordinates" => {
+            let along_m = source.number(inner, "pathS")?;
+            let lane = source.integer(inner, "laneId")?;
+            let beside = Beside::Lane(lane, source.number_or(inner, "laneOffset", 0.0)?);
+            Some(PositionKind::OnRoute { route, along_m, beside })
+        }
+        _ => source.refuse(inner, "such a place on a route is not read"),
     }
 }
 

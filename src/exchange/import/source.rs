@@ -3,11 +3,13 @@
 //! A reader that ends with `None` has refused something, and its callers do not refuse again what follows from it.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
 
 use avastra_road::Lines;
 use roxmltree::Node;
 
 use super::Refusal;
+use super::catalogue::Library;
 use super::expression;
 use super::parameter;
 
@@ -43,10 +45,20 @@ impl Marked for &Mark {
 
 /// The parameters that are in force, and what was found wrong and worth a note so far.
 #[derive(Debug)]
-pub struct Source {
-    lines: Lines,
+pub struct Source<'f> {
+    pub library: &'f Library<'f>,
+    /// The folders of catalogues, by the elements that name them.
+    pub folders: BTreeMap<String, (Mark, String)>,
+    /// How many catalogues deep the text lies that is read, and where and under which name the outermost is referred to.
+    pub depth: usize,
+    outermost: Option<(u32, String)>,
+    lines: Rc<Lines>,
+    /// Whether a value is one that its own declaration excludes.
+    pub is_excluded: bool,
     /// The minor version of the file; 2 of 1.2.
     pub minor: i32,
+    /// The variables of the file with their values; `None` for those that the story sets.
+    pub variables: BTreeMap<String, Option<String>>,
     parameters: BTreeMap<String, String>,
     /// Parameters and entities of which something was refused: what follows from that is not told again.
     torn: BTreeSet<String>,
@@ -58,11 +70,18 @@ pub struct Source {
     notes: BTreeSet<String>,
 }
 
-impl Source {
-    pub fn new(text: &str, asked: &BTreeMap<String, String>) -> Source {
+impl<'f> Source<'f> {
+    /// `lines` are those of the file, and `asked` values for its parameters.
+    pub fn new(lines: Rc<Lines>, asked: &BTreeMap<String, String>, library: &'f Library<'f>) -> Source<'f> {
         Source {
-            lines: Lines::new(text),
+            library,
+            folders: BTreeMap::new(),
+            depth: 0,
+            outermost: None,
+            lines,
+            is_excluded: false,
             minor: 0,
+            variables: BTreeMap::new(),
             parameters: BTreeMap::new(),
             torn: BTreeSet::new(),
             told: 0,
@@ -74,7 +93,42 @@ impl Source {
 
     /// Where an element stands.
     pub fn mark(&self, node: Node) -> Mark {
-        Mark { line: self.lines.of(node.range().start), element: node.tag_name().name().to_owned() }
+        let element = node.tag_name().name().to_owned();
+        match &self.outermost {
+            Some((line, _)) => Mark { line: *line, element },
+            None => Mark { line: self.lines.of(node.range().start), element },
+        }
+    }
+
+    /// Reads within an entry of a catalogue, of which messages name the reference to it.
+    pub fn within<T>(
+        &mut self,
+        reference: Node,
+        whose: &str,
+        parameters: BTreeMap<String, String>,
+        read: impl FnOnce(&mut Self) -> Option<T>,
+    ) -> Option<T> {
+        let before = core::mem::replace(&mut self.parameters, parameters);
+        let outermost = self.outermost.clone();
+        if outermost.is_none() {
+            self.outermost = Some((self.mark(reference).line, whose.to_owned()));
+        }
+        self.depth += 1;
+        let found = read(self);
+        self.depth -= 1;
+        self.outermost = outermost;
+        self.parameters = before;
+        found
+    }
+
+    /// The value of a parameter.
+    pub fn parameter(&self, name: &str) -> Option<&str> {
+        self.parameters.get(name).map(String::as_str)
+    }
+
+    /// All parameters with their values.
+    pub fn parameters(&self) -> &BTreeMap<String, String> {
+        &self.parameters
     }
 
     /// Whether anything was refused.
@@ -108,7 +162,11 @@ impl Source {
         self.told += 1;
         if self.refused.len() < REFUSALS_MAX {
             let Mark { line, element } = at.mark(self);
-            self.refused.insert(Refusal { line, element, reason: reason.into() });
+            let reason = match &self.outermost {
+                Some((_, whose)) => format!("{whose}: {}", reason.into()),
+                None => reason.into(),
+            };
+            self.refused.insert(Refusal { scenario: None, line, element, reason });
         }
         None
     }
@@ -119,7 +177,7 @@ impl Source {
     }
 
     /// Does something for an entity; if anything is refused meanwhile, what follows from that is not told again.
-    pub fn about<T>(&mut self, entity: &str, act: impl FnOnce(&mut Source) -> Option<T>) -> Option<T> {
+    pub fn about<T>(&mut self, entity: &str, act: impl FnOnce(&mut Self) -> Option<T>) -> Option<T> {
         let before = self.told;
         let done = act(self);
         if self.told > before {
@@ -161,6 +219,17 @@ impl Source {
         }
     }
 
+    /// Declares the parameters of an element that have no value yet: those that a reference to it has not given.
+    pub fn declare_missing(&mut self, parent: Node) {
+        for declared in elements(parent, "ParameterDeclarations").flat_map(children) {
+            if declared.attribute("name").is_some_and(|name| !self.parameters.contains_key(name))
+                && let (Some(name), Some(value)) = (self.text(declared, "name"), self.text(declared, "value"))
+            {
+                self.parameters.insert(name, value);
+            }
+        }
+    }
+
     /// A child that must be there.
     pub fn required<'a, 'input>(
         &mut self,
@@ -174,6 +243,14 @@ impl Source {
     pub fn text(&mut self, node: Node, name: &str) -> Option<String> {
         match node.attribute(name) {
             Some(value) => self.filled(node, value),
+            None => self.refuse(node, format!("it has no `{name}`")),
+        }
+    }
+
+    /// The name of a parameter of somebody else's, which is not filled in. Some files write it with its `$`.
+    pub fn named(&mut self, node: Node, name: &str) -> Option<String> {
+        match node.attribute(name) {
+            Some(value) => Some(value.trim().trim_start_matches('$').to_owned()),
             None => self.refuse(node, format!("it has no `{name}`")),
         }
     }

@@ -5,13 +5,12 @@ use std::collections::BTreeSet;
 
 use roxmltree::{Document, Node};
 
-use super::Files;
-use super::action::{Begun, Headway, Speed, Target, Walk, begun};
-use super::body::{Shape, body};
+use super::action::{Act, ActKind, Headway, Over, Speed, Way, act};
+use super::body::{Body, body};
+use super::catalogue;
 use super::position::Position;
 use super::source::{Mark, Source, children, element, elements};
-use super::trigger::{Trigger, both, is_less, trigger};
-use super::vocabulary;
+use super::trigger::{Condition, Trigger, When, both, is_less, reduced, trigger};
 use super::weather::{Weather, weather};
 
 /// The latest minor version that is read.
@@ -40,62 +39,68 @@ pub struct Story {
 pub struct Entity {
     pub name: String,
     pub mark: Mark,
-    pub body: Shape,
-    pub position: Option<(Mark, Position)>,
-    /// The last counts; before the first an entity stands.
-    pub speeds: Vec<Paced>,
-    /// The way to the ego vehicle that an action of the start asks for.
+    pub body: Body,
+    pub position: Option<Position>,
+    /// The speed with which it begins; the last that the file says counts.
+    pub speed: Option<(Mark, Speed)>,
+    /// Its free space ahead of the ego vehicle.
     pub headway: Option<(Mark, Headway)>,
-    pub changes: Vec<Change>,
-    /// The ways of a pedestrian.
-    pub walks: Vec<Walk>,
-    /// Where the ego vehicle is to drive.
-    pub goal: Option<(Mark, Position)>,
+    /// The trajectory that it follows from the beginning.
+    pub way: Option<Way>,
+    /// The places through which it drives, from the beginning.
+    pub route: Option<(Mark, Vec<Position>)>,
+    pub events: Vec<Event>,
 }
 
-#[derive(Debug)]
-pub struct Paced {
+/// What somebody does, and when.
+#[derive(Debug, Clone)]
+pub struct Event {
     pub mark: Mark,
-    pub speed: Speed,
-    /// Whether it is reached at once.
-    pub at_once: bool,
-    /// When it begins; empty: with the scenario.
+    /// What it is called: its actions, itself, its manoeuvre, the group of that and the act, each with its kind.
+    pub names: Vec<(&'static str, String)>,
     pub when: Trigger,
+    pub acts: Vec<Act>,
 }
 
-#[derive(Debug)]
-pub struct Change {
-    pub mark: Mark,
-    pub to: Target,
-    pub when: Trigger,
+impl Event {
+    /// When it comes, if that is a time, s.
+    pub fn time_s(&self) -> Option<f64> {
+        match self.when.as_slice() {
+            [] => Some(0.0),
+            [all] => match all.as_slice() {
+                [Condition { kind: When::After(time_s), .. }] => Some(*time_s),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+}
+
+impl Story {
+    pub fn entity(&self, name: &str) -> Option<&Entity> {
+        core::iter::once(&self.ego).chain(&self.others).find(|entity| entity.name == name)
+    }
 }
 
 /// Reads a file. What cannot be said is refused; `None` if that is so much that nothing can be placed.
-pub fn read(source: &mut Source, document: &Document, ego: Option<&str>, files: &dyn Files) -> Option<Story> {
+pub fn read(source: &mut Source, document: &Document, ego: Option<&str>) -> Option<Story> {
     let root = document.root_element();
-    let reason = "the root element of a scenario is `OpenSCENARIO`";
-    source.refuse_if(!root.has_tag_name("OpenSCENARIO"), root, reason)?;
-    let header = source.required(root, "FileHeader")?;
-    source.minor = source.integer(header, "revMinor")?;
-    if source.integer(header, "revMajor")? != 1 || !(0..=MINOR_MAX).contains(&source.minor) {
-        return source.refuse(header, format!("OpenSCENARIO XML of 1.0 to 1.{MINOR_MAX} is read"));
-    }
+    let header = check_header(source, root)?;
     if let Some(other) = children(root)
         .find(|child| matches!(child.tag_name().name(), "Catalog" | "ParameterValueDistribution"))
     {
         return source.refuse(other, "this is no scenario; give the file of one that uses it");
     }
-    for (node, reason) in vocabulary::unknown(root) {
-        source.refuse::<()>(node, reason);
-    }
     source.declare(root);
+    catalogue::locate(source, root);
+    variables(source, root);
     let network = source.required(root, "RoadNetwork")?;
     let logic = source.required(network, "LogicFile")?;
     let map = (source.mark(logic), source.text(logic, "filepath")?);
     if element(network, "TrafficSignals").is_some() {
         source.note("traffic lights follow the map's controllers, not the phases of the file");
     }
-    let entities = entities(source, root, files);
+    let entities = entities(source, root);
     let mut cast = Cast::of(source, root, entities, ego)?;
     let storyboard = source.required(root, "Storyboard")?;
     let mut sky = Weather::default();
@@ -104,6 +109,7 @@ pub fn read(source: &mut Source, document: &Document, ego: Option<&str>, files: 
             for action in children(actions) {
                 match action.tag_name().name() {
                     "Private" => cast.start(source, action),
+                    "GlobalAction" if is_signal(action) => signals(source),
                     "GlobalAction" => sky = sky.then(weather(source, action).unwrap_or_default()),
                     _ => user_defined(source, action),
                 }
@@ -121,9 +127,40 @@ pub fn read(source: &mut Source, document: &Document, ego: Option<&str>, files: 
         let note = "what the story lets the ego vehicle do is left to the driving system under test";
         source.note(format!("{note} (actions of the file: {})", cast.ego_actions));
     }
-    let duration_s = duration_s(source, storyboard);
+    let gone = core::mem::take(&mut cast.gone);
+    cast.others.retain(|entity| !gone.contains(&entity.name));
+    let ego_mps = match &cast.ego.speed {
+        Some((_, Speed::Absolute(mps))) => *mps,
+        _ => 0.0,
+    };
+    let duration_s = duration_s(source, storyboard, &cast.ego.name, ego_mps);
     let description = header.attribute("description").unwrap_or("").to_owned();
     Some(Story { map, ego: cast.ego, others: cast.others, weather: sky, duration_s, description })
+}
+
+/// The header of a file whose version is read.
+pub fn check_header<'a, 'input>(source: &mut Source, root: Node<'a, 'input>) -> Option<Node<'a, 'input>> {
+    let reason = "the root element of a scenario is `OpenSCENARIO`";
+    source.refuse_if(!root.has_tag_name("OpenSCENARIO"), root, reason)?;
+    let header = source.required(root, "FileHeader")?;
+    source.minor = source.integer(header, "revMinor")?;
+    if source.integer(header, "revMajor")? != 1 || !(0..=MINOR_MAX).contains(&source.minor) {
+        return source.refuse(header, format!("OpenSCENARIO XML of 1.0 to 1.{MINOR_MAX} is read"));
+    }
+    Some(header)
+}
+
+/// Notes the variables of the file: their values, or that the story sets them.
+fn variables(source: &mut Source, root: Node) {
+    for one in elements(root, "VariableDeclarations").flat_map(children) {
+        if let (Some(name), Some(value)) = (source.text(one, "name"), source.text(one, "value")) {
+            source.variables.insert(name, Some(value));
+        }
+    }
+    let set = root.descendants().filter(|node| node.has_tag_name("VariableAction"));
+    for name in set.filter_map(|node| node.attribute("variableRef")) {
+        source.variables.insert(name.to_owned(), None);
+    }
 }
 
 /// The entities and what is known of them so far.
@@ -131,6 +168,8 @@ struct Cast {
     ego: Entity,
     others: Vec<Entity>,
     ego_actions: usize,
+    /// Who leaves as the scenario begins.
+    gone: BTreeSet<String>,
 }
 
 impl Cast {
@@ -155,7 +194,7 @@ impl Cast {
             return source.refuse(root, reason);
         };
         let ego = entities.remove(at);
-        Some(Cast { ego, others: entities, ego_actions: 0 })
+        Some(Cast { ego, others: entities, ego_actions: 0, gone: BTreeSet::new() })
     }
 
     fn is_ego(&self, name: &str) -> bool {
@@ -185,116 +224,193 @@ impl Cast {
             if let Some(distance) = distance.filter(|_| !is_ego)
                 && source.text(distance, "entityRef").is_some_and(|of| !self.is_ego(&of))
             {
-                source.refuse::<()>(distance, "only a distance to the ego vehicle is read");
+                source.about(&name, |source| {
+                    source.refuse::<()>(distance, "only a distance to the ego vehicle is read")
+                });
                 continue;
             }
-            let begun = source.about(&name, |source| begun(source, action, is_ego));
+            let begun = source.about(&name, |source| act(source, action, is_ego));
             let entity = if is_ego { Some(&mut self.ego) } else { self.other(&name) };
             if let (Some(begun), Some(entity)) = (begun, entity) {
-                entity.begin(begun, Vec::new());
+                entity.begin(begun);
             }
         }
     }
 
     fn act(&mut self, source: &mut Source, act: Node) {
         let mut begins = None;
-        if let Some(stop) = element(act, "StopTrigger").filter(|stop| children(*stop).next().is_some()) {
-            source.refuse::<()>(stop, "an act goes on to the end of the scenario");
-        }
         for group in elements(act, "ManeuverGroup") {
-            is_carried_out(source, group);
-            if let Some(catalogue) = element(group, "CatalogReference") {
-                source.refuse::<()>(catalogue, "manoeuvres of catalogues are not read");
+            if !is_carried_out(source, group) {
+                continue;
             }
             let Some(actors) = element(group, "Actors") else { continue };
             if source.switch(actors, "selectTriggeringEntities", false) != Some(false) {
                 source.refuse::<()>(actors, "who acts is named: those that a condition selects are not read");
                 continue;
             }
-            let (mut names, mut is_read) = (Vec::new(), true);
+            let mut names = Vec::new();
             for actor in elements(actors, "EntityRef") {
                 let Some(name) = source.text(actor, "entityRef") else { continue };
                 if self.knows(source, actor, &name) {
                     names.push(name);
-                } else {
-                    is_read = false;
                 }
             }
-            if names.is_empty() {
-                source.refuse_if(is_read, actors, "it names nobody who acts");
+            // Who was named and is not known was told already.
+            if names.is_empty() && element(actors, "EntityRef").is_some() {
                 continue;
             }
-            for manoeuvre in elements(group, "Maneuver") {
-                source.declare(manoeuvre);
-                for event in elements(manoeuvre, "Event") {
-                    is_carried_out(source, event);
-                    source.word(event, "priority", &["override", "overwrite", "parallel", "skip"]);
-                    let actions: Vec<Node> = elements(event, "Action").flat_map(children).collect();
-                    let own: Vec<&String> = names.iter().filter(|name| !self.is_ego(name)).collect();
-                    let is_global = actions.iter().any(|action| !action.has_tag_name("PrivateAction"));
-                    if own.is_empty() && !is_global {
-                        self.ego_actions += actions.len();
-                        continue;
+            let scope = Scope { act, group, names: &names };
+            for part in children(group) {
+                match part.tag_name().name() {
+                    "Maneuver" => {
+                        source.declare(part);
+                        self.manoeuvre(source, &scope, part, &mut begins);
                     }
-                    let begins = begins.get_or_insert_with(|| trigger(source, act)).clone();
-                    self.event(source, &own, event, &actions, begins);
+                    "CatalogReference" => {
+                        catalogue::entry(source, part, &[catalogue::MANOEUVRE], |source, manoeuvre| {
+                            self.manoeuvre(source, &scope, manoeuvre, &mut begins);
+                            Some(())
+                        });
+                    }
+                    _ => {}
+                }
+            }
+        }
+        if begins.is_some()
+            && let Some(stop) = element(act, "StopTrigger").filter(|stop| children(*stop).next().is_some())
+        {
+            source.refuse::<()>(stop, "an act goes on to the end of the scenario");
+        }
+    }
+
+    fn manoeuvre(
+        &mut self,
+        source: &mut Source,
+        scope: &Scope,
+        manoeuvre: Node,
+        begins: &mut Option<Option<Trigger>>,
+    ) {
+        for event in elements(manoeuvre, "Event") {
+            if !is_carried_out(source, event) {
+                continue;
+            }
+            source.word(event, "priority", &["override", "overwrite", "parallel", "skip"]);
+            let actions: Vec<Node> = elements(event, "Action").flat_map(children).collect();
+            let own: Vec<&String> = scope.names.iter().filter(|name| !self.is_ego(name)).collect();
+            let (private, global): (Vec<Node>, Vec<Node>) =
+                actions.iter().partition(|action| action.has_tag_name("PrivateAction"));
+            if own.is_empty() {
+                if scope.names.is_empty() && !private.is_empty() {
+                    source.refuse::<()>(event, "nobody is named who acts");
+                }
+                self.ego_actions += private.len();
+            }
+            let does = if own.is_empty() { Vec::new() } else { private };
+            let changes: Vec<Node> =
+                global.into_iter().filter(|action| changes_the_world(source, *action)).collect();
+            if does.is_empty() && changes.is_empty() {
+                continue;
+            }
+            let begins = begins.get_or_insert_with(|| trigger(source, scope.act)).clone();
+            // What an action asks for is told even where its trigger is refused.
+            let when = trigger(source, event).zip(begins).map(|(event, act)| both(&act, &event));
+            if when.is_none() {
+                own.iter().for_each(|name| source.tear(name));
+            }
+            let when = when.map(reduced);
+            // It never comes.
+            if matches!(when, Some(None)) {
+                continue;
+            }
+            for action in changes {
+                self.change(source, action, when.as_ref().and_then(Option::as_ref));
+            }
+            let names = scope.names_of(source, manoeuvre, event);
+            for name in own {
+                let acts: Vec<Act> = does
+                    .iter()
+                    .flat_map(|action| children(*action))
+                    .filter_map(|action| source.about(name, |source| act(source, action, false)))
+                    .collect();
+                let mark = source.mark(event);
+                if let (Some(Some(when)), Some(entity)) = (&when, self.other(name)) {
+                    entity.events.push(Event { mark, names: names.clone(), when: when.clone(), acts });
                 }
             }
         }
     }
 
-    fn event(
-        &mut self,
-        source: &mut Source,
-        actors: &[&String],
-        event: Node,
-        actions: &[Node],
-        begins: Option<Trigger>,
-    ) {
-        // What an action asks for is told even where its trigger is refused.
-        let when = trigger(source, event).zip(begins).map(|(event, act)| both(&act, &event));
-        if when.is_none() {
-            actors.iter().for_each(|name| source.tear(name));
-        }
-        for action in actions {
-            if !action.has_tag_name("PrivateAction") {
-                user_defined(source, *action);
-                continue;
-            }
-            for act in children(*action) {
-                for name in actors {
-                    let begun = source.about(name, |source| {
-                        let begun = begun(source, act, false);
-                        match begun {
-                            Some(Begun::Placed(..) | Begun::Headway(..)) => {
-                                source.refuse(act, "nothing is placed anew in the story")
-                            }
-                            _ => begun,
-                        }
-                    });
-                    if let (Some(begun), Some(when), Some(entity)) = (begun, &when, self.other(name)) {
-                        entity.begin(begun, when.clone());
-                    }
+    /// An action of the story that concerns nobody's motion.
+    fn change(&mut self, source: &mut Source, action: Node, when: Option<&Trigger>) {
+        let inner = children(action).next().unwrap_or(action);
+        let is_at_once = |when: &Trigger| {
+            when.is_empty()
+                || when.iter().any(|all| all.iter().all(|one| matches!(one.kind, When::After(s) if s <= 0.1)))
+        };
+        let leaves = element(inner, "DeleteEntityAction").is_some();
+        match source.text(inner, "entityRef").filter(|_| inner.has_tag_name("EntityAction") && leaves) {
+            Some(name) if when.is_some_and(is_at_once) => {
+                if self.knows(source, inner, &name) {
+                    self.gone.insert(name);
                 }
             }
+            Some(_) => {
+                source.refuse::<()>(inner, "nobody leaves during the story");
+            }
+            None => {
+                source.refuse::<()>(inner, "this action is not read in the story");
+            }
         }
+    }
+}
+
+/// Where an event stands.
+struct Scope<'a, 'input> {
+    act: Node<'a, 'input>,
+    group: Node<'a, 'input>,
+    names: &'a [String],
+}
+
+impl Scope<'_, '_> {
+    fn names_of(&self, source: &Source, manoeuvre: Node, event: Node) -> Vec<(&'static str, String)> {
+        let outer =
+            [("act", self.act), ("maneuverGroup", self.group), ("maneuver", manoeuvre), ("event", event)];
+        let actions = elements(event, "Action").map(|action| ("action", action)).collect::<Vec<_>>();
+        let all = outer.into_iter().chain(actions);
+        // A name that is no text stands for nobody: nothing refers to it.
+        let named = |node: Node| super::source::filled(node.attribute("name")?, source.parameters()).ok();
+        all.filter_map(|(kind, node)| Some((kind, named(node)?))).collect()
     }
 }
 
 impl Entity {
-    fn begin(&mut self, begun: Begun, when: Trigger) {
-        match begun {
-            Begun::Placed(mark, position) => self.position = Some((mark, position)),
-            Begun::Headway(mark, headway) => self.headway = Some((mark, headway)),
-            Begun::Speed(mark, speed, at_once) => self.speeds.push(Paced { mark, speed, at_once, when }),
-            Begun::Change(mark, to) => self.changes.push(Change { mark, to, when }),
-            Begun::Walk(walk) => self.walks.push(walk),
-            Begun::Goal(mark, position) => self.goal = Some((mark, position)),
+    /// What it does from the beginning.
+    fn begin(&mut self, begun: Act) {
+        let Act { mark, kind } = begun;
+        match kind {
+            ActKind::Placed(position) => self.position = Some(position),
+            ActKind::Ahead(headway) => self.headway = Some((mark, headway)),
+            ActKind::Speed(speed, dynamics) => {
+                let is_at_once = matches!(dynamics.over, Over::AtOnce);
+                if is_at_once || self.speed.is_none() && matches!(speed, Speed::Absolute(0.0)) {
+                    self.speed = Some((mark, speed));
+                } else {
+                    let kind = ActKind::Speed(speed, dynamics);
+                    let acts = vec![Act { mark: mark.clone(), kind }];
+                    self.events.push(Event { mark, names: Vec::new(), when: Vec::new(), acts });
+                }
+            }
+            ActKind::Follow(way) => self.way = Some(*way),
+            ActKind::Route(places) => self.route = Some((mark, places)),
+            ActKind::Lane(..) | ActKind::Offset(..) | ActKind::Meet(_) => {
+                let acts = vec![Act { mark: mark.clone(), kind }];
+                self.events.push(Event { mark, names: Vec::new(), when: Vec::new(), acts });
+            }
         }
     }
 }
 
-fn entities(source: &mut Source, root: Node, files: &dyn Files) -> Vec<Entity> {
+fn entities(source: &mut Source, root: Node) -> Vec<Entity> {
     let (mut found, mut names) = (Vec::new(), BTreeSet::new());
     let Some(list) = source.required(root, "Entities") else { return found };
     for node in children(list) {
@@ -308,20 +424,50 @@ fn entities(source: &mut Source, root: Node, files: &dyn Files) -> Vec<Entity> {
             source.refuse::<()>(node, format!("another entity is called `{name}`, too"));
             continue;
         }
-        let Some(body) = source.about(&name, |source| body(source, root, node, files)) else { continue };
+        let Some(body) = source.about(&name, |source| body(source, node)) else { continue };
         found.push(Entity {
             name,
             mark: source.mark(node),
             body,
             position: None,
-            speeds: Vec::new(),
+            speed: None,
             headway: None,
-            changes: Vec::new(),
-            walks: Vec::new(),
-            goal: None,
+            way: None,
+            route: None,
+            events: Vec::new(),
         });
     }
     found
+}
+
+/// Whether a global action changes what others meet; those of the player and of variables do not.
+fn changes_the_world(source: &mut Source, action: Node) -> bool {
+    if action.has_tag_name("UserDefinedAction") {
+        user_defined(source, action);
+        return false;
+    }
+    let inner = children(action).next().unwrap_or(action);
+    match inner.tag_name().name() {
+        "VariableAction" => {
+            if let Some(name) = source.text(inner, "variableRef") {
+                source.variables.insert(name, None);
+            }
+            false
+        }
+        "InfrastructureAction" => {
+            signals(source);
+            false
+        }
+        _ => true,
+    }
+}
+
+fn is_signal(action: Node) -> bool {
+    children(action).next().is_some_and(|inner| inner.has_tag_name("InfrastructureAction"))
+}
+
+fn signals(source: &mut Source) {
+    source.note("traffic lights follow the map's controllers, not the phases of the file");
 }
 
 fn user_defined(source: &mut Source, action: Node) {
@@ -333,20 +479,39 @@ fn user_defined(source: &mut Source, action: Node) {
     }
 }
 
-/// Refuses what is to be carried out no times.
-fn is_carried_out(source: &mut Source, node: Node) {
-    if source.number_or(node, "maximumExecutionCount", 1.0).is_some_and(|count| count < 1.0) {
-        source.refuse::<()>(node, "`maximumExecutionCount` is less than 1: leave out what never happens");
+/// Whether something is carried out at all; one that is to be repeated is refused.
+fn is_carried_out(source: &mut Source, node: Node) -> bool {
+    match source.number_or(node, "maximumExecutionCount", 1.0) {
+        Some(count) if count < 1.0 => {
+            source.refuse::<()>(node, "`maximumExecutionCount` is less than 1: leave out what never happens");
+            false
+        }
+        Some(count) if count > 1.0 => {
+            source.note("what a file lets happen several times happens once");
+            true
+        }
+        count => count.is_some(),
     }
 }
 
-/// When the scenario ends: the latest time that its stop trigger names.
-fn duration_s(source: &mut Source, storyboard: Node) -> f64 {
+/// When the scenario ends: the latest time that its stop trigger names, or in which the ego vehicle goes as far as it names.
+fn duration_s(source: &mut Source, storyboard: Node, ego: &str, ego_mps: f64) -> f64 {
     let mut latest_s: f64 = 0.0;
     let trigger = element(storyboard, "StopTrigger");
     for node in trigger.iter().flat_map(|trigger| trigger.descendants()) {
         if node.has_tag_name("SimulationTimeCondition") && is_less(source, node) == Some(false) {
             latest_s = latest_s.max(source.number(node, "value").unwrap_or(0.0));
+        }
+        if node.has_tag_name("TraveledDistanceCondition") && ego_mps > 0.0 {
+            let by = node.ancestors().find(|outer| outer.has_tag_name("ByEntityCondition"));
+            let mut refs =
+                by.iter().flat_map(|by| by.descendants().filter(|node| node.has_tag_name("EntityRef")));
+            if refs.any(|node| node.attribute("entityRef") == Some(ego))
+                && let Some(way_m) = source.number(node, "value")
+            {
+                // Half as long again, for one that slows down, and some seconds to come to a stop.
+                latest_s = latest_s.max(1.5 * way_m / ego_mps + 5.0);
+            }
         }
     }
     if latest_s <= 0.0 {

@@ -30,27 +30,82 @@ pub struct Condition {
     pub mark: Mark,
     /// It asks for what begins to hold.
     pub is_rising: bool,
+    /// What it asks for has held, or come, so long ago, s.
+    pub delay_s: f64,
     pub kind: When,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum When {
     /// It holds from the beginning.
     Always,
+    Never,
     /// After this time, s.
     After(f64),
     /// The distance of two entities is less or more than the way that the first one drives in `seconds`.
-    Headway { pair: Pair, seconds: f64 },
+    Headway {
+        pair: Pair,
+        seconds: f64,
+    },
     /// The distance of two entities is less or more than `metres`.
-    Distance { pair: Pair, metres: f64 },
+    Distance {
+        pair: Pair,
+        metres: f64,
+    },
     /// The first would reach the second in less than `seconds`.
-    Collides { pair: Pair, seconds: f64 },
-    /// An entity is this near to a place, m.
-    Reaches { entity: String, position: Position, within_m: f64 },
+    Collides {
+        pair: Pair,
+        seconds: f64,
+    },
+    /// An entity is this near to a place, m, or farther away.
+    Reaches {
+        entity: String,
+        position: PlaceMark,
+        within_m: f64,
+        is_less: bool,
+    },
+    /// An entity has gone so far, m.
+    Travelled {
+        entity: String,
+        metres: f64,
+    },
+    /// An entity has stood for so long, s.
+    Stands {
+        entity: String,
+        seconds: f64,
+    },
+    /// The speed of an entity is less or more, m/s.
+    Speed {
+        entity: String,
+        mps: f64,
+        is_less: bool,
+    },
+    /// How much faster the first one is than the second, m/s.
+    Faster {
+        of: String,
+        to: String,
+        mps: f64,
+        is_less: bool,
+    },
+    /// An element of the story has ended: its kind and its name.
+    Ended {
+        kind: &'static str,
+        name: String,
+    },
+}
+
+/// A position that conditions compare by where it is written.
+#[derive(Debug, Clone)]
+pub struct PlaceMark(pub Position);
+
+impl PartialEq for PlaceMark {
+    fn eq(&self, other: &PlaceMark) -> bool {
+        self.0.mark.line == other.0.mark.line
+    }
 }
 
 /// Two entities whose distance is compared.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Pair {
     pub of: String,
     pub to: String,
@@ -93,6 +148,26 @@ pub fn both(a: &Trigger, b: &Trigger) -> Trigger {
     a.iter().flat_map(|a| b.iter().map(move |b| a.iter().chain(b).cloned().collect())).collect()
 }
 
+/// Without what holds from the beginning, and without what never comes: `None` if nothing is left that comes, no groups if it
+/// comes at once.
+pub fn reduced(trigger: Trigger) -> Option<Trigger> {
+    let had_groups = !trigger.is_empty();
+    let comes = |all: &Vec<Condition>| all.iter().all(|condition| condition.kind != When::Never);
+    let groups: Trigger = trigger
+        .into_iter()
+        .filter(comes)
+        .map(|all| {
+            let waits = |condition: &Condition| condition.kind != When::Always || condition.delay_s > 0.0;
+            all.into_iter().filter(waits).collect::<Vec<Condition>>()
+        })
+        .collect();
+    match () {
+        () if had_groups && groups.is_empty() => None,
+        () if groups.iter().any(Vec::is_empty) => Some(Vec::new()),
+        () => Some(groups),
+    }
+}
+
 fn condition(source: &mut Source, node: Node) -> Option<Condition> {
     let delay_s = source.number_or(node, "delay", 0.0)?;
     source.refuse_if(delay_s < 0.0, node, "its `delay` is less than 0")?;
@@ -101,29 +176,48 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
     source.refuse_if(edge.ends_with("alling"), node, "only what begins to hold is read, not what ends")?;
     if let Some(value) = element(node, "ByValueCondition") {
         let Some(inner) = children(value).next() else { return source.refuse(value, "it is empty") };
+        let mut delay_s = delay_s;
         let kind = match inner.tag_name().name() {
             "SimulationTimeCondition" => {
                 let seconds = source.number(inner, "value")?;
                 if is_less(source, inner)? {
                     return source.refuse(inner, "only times that have passed are read");
                 }
-                if seconds + delay_s <= 0.0 { When::Always } else { When::After(seconds + delay_s) }
+                let after_s = seconds + core::mem::take(&mut delay_s);
+                if after_s <= 0.0 { When::Always } else { When::After(after_s) }
             }
             "StoryboardElementStateCondition" => {
                 let of = source.word(inner, "storyboardElementType", &STORYBOARD_ELEMENTS)?;
                 let state = source.word(inner, "state", &STATES)?;
-                let begins = matches!(state, "startTransition" | "runningState");
-                let reason = "an event does not wait for another: what ends when is up to the drivers";
-                source.refuse_if(
-                    !(begins && matches!(of, "act" | "story")) || delay_s > 0.0,
-                    inner,
-                    reason,
-                )?;
-                When::Always
+                let name = source.text(inner, "storyboardElementRef")?;
+                match state {
+                    "startTransition" | "runningState" if matches!(of, "act" | "story") => When::Always,
+                    "completeState" | "endTransition" => When::Ended { kind: of, name },
+                    _ => {
+                        return source.refuse(inner, "only what has ended is read, or an act that has begun");
+                    }
+                }
+            }
+            "ParameterCondition" => {
+                let name = source.text(inner, "parameterRef")?;
+                let Some(value) = source.parameter(&name).map(str::to_owned) else {
+                    return source.refuse(inner, format!("no parameter is called `{name}`"));
+                };
+                constant(source, inner, &value)?
+            }
+            "VariableCondition" => {
+                let name = source.text(inner, "variableRef")?;
+                match source.variables.get(&name).cloned() {
+                    Some(Some(value)) => constant(source, inner, &value)?,
+                    Some(None) => {
+                        return source.refuse(inner, "a variable that the story sets is not read here");
+                    }
+                    None => return source.refuse(inner, format!("no variable is called `{name}`")),
+                }
             }
             _ => return source.refuse(inner, "this condition is not read"),
         };
-        return Some(Condition { mark: source.mark(inner), is_rising, kind });
+        return Some(Condition { mark: source.mark(inner), is_rising, delay_s, kind });
     }
     let by_entity = source.required(node, "ByEntityCondition")?;
     let list = source.required(by_entity, "TriggeringEntities")?;
@@ -139,7 +233,7 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
             if names.is_empty() { "it names no entity" } else { "a condition asks about one entity" };
         return source.refuse(list, reason);
     };
-    source.refuse_if(delay_s > 0.0, node, "a delay is read of times alone")?;
+    let entity = of.clone();
     let kind = match inner.tag_name().name() {
         "TimeHeadwayCondition" => {
             frame(source, inner)?;
@@ -164,11 +258,49 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
         "ReachPositionCondition" => {
             let place = source.required(inner, "Position")?;
             let within_m = source.amount(inner, "tolerance")?;
-            When::Reaches { entity: of.clone(), position: position(source, place)?, within_m }
+            When::Reaches { entity, position: PlaceMark(position(source, place)?), within_m, is_less: true }
+        }
+        "DistanceCondition" => {
+            frame(source, inner)?;
+            let place = source.required(inner, "Position")?;
+            let within_m = source.amount(inner, "value")?;
+            let is_less = is_less(source, inner)?;
+            When::Reaches { entity, position: PlaceMark(position(source, place)?), within_m, is_less }
+        }
+        "TraveledDistanceCondition" => When::Travelled { entity, metres: source.amount(inner, "value")? },
+        "StandStillCondition" => When::Stands { entity, seconds: source.amount(inner, "duration")? },
+        "SpeedCondition" => {
+            source.word(inner, "direction", &["longitudinal", "lateral", "vertical"])?;
+            When::Speed { entity, mps: source.number(inner, "value")?, is_less: is_less(source, inner)? }
+        }
+        "RelativeSpeedCondition" => {
+            source.word(inner, "direction", &["longitudinal", "lateral", "vertical"])?;
+            let (to, mps) = (source.text(inner, "entityRef")?, source.number(inner, "value")?);
+            When::Faster { of: entity, to, mps, is_less: is_less(source, inner)? }
         }
         _ => return source.refuse(inner, "this condition is not read"),
     };
-    Some(Condition { mark: source.mark(inner), is_rising, kind })
+    Some(Condition { mark: source.mark(inner), is_rising, delay_s, kind })
+}
+
+/// Whether a value that does not change compares so.
+fn constant(source: &mut Source, node: Node, value: &str) -> Option<When> {
+    let (rule, wanted) = (source.text(node, "rule")?, source.text(node, "value")?);
+    let number = |text: &str| text.trim().parse::<f64>().ok();
+    let order = match (number(value), number(&wanted)) {
+        (Some(value), Some(wanted)) => value.total_cmp(&wanted),
+        _ => value.cmp(&wanted),
+    };
+    let holds = match rule.as_str() {
+        "equalTo" => order.is_eq(),
+        "notEqualTo" => order.is_ne(),
+        "lessThan" => order.is_lt(),
+        "lessOrEqual" => order.is_le(),
+        "greaterThan" => order.is_gt(),
+        "greaterOrEqual" => order.is_ge(),
+        other => return source.refuse(node, format!("the rule `{other}` is not read")),
+    };
+    Some(if holds { When::Always } else { When::Never })
 }
 
 /// Refuses distances across the road, and words for what a distance counts along that no version has.

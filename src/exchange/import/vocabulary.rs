@@ -18,16 +18,24 @@ const ANY: &str = "*";
 /// Each element with its attributes in brackets, and its children.
 const ELEMENTS: &str = "
     OpenSCENARIO [] FileHeader ParameterDeclarations VariableDeclarations MonitorDeclarations CatalogLocations
-        RoadNetwork Entities Storyboard;
+        RoadNetwork Entities Storyboard ParameterValueDistribution;
     FileHeader [author date description revMajor revMinor] License Properties;
     ParameterDeclarations [] ParameterDeclaration;
     ParameterDeclaration [name parameterType value] ConstraintGroup;
     ConstraintGroup [] ValueConstraint;
     ValueConstraint [rule value];
+    VariableDeclarations [] VariableDeclaration;
+    VariableDeclaration [name variableType value];
     CatalogLocations [] ControllerCatalog EnvironmentCatalog ManeuverCatalog MiscObjectCatalog
         PedestrianCatalog RouteCatalog TrajectoryCatalog VehicleCatalog;
-    VehicleCatalog [] Directory;
+    ControllerCatalog [] Directory;
+    EnvironmentCatalog [] Directory;
+    ManeuverCatalog [] Directory;
+    MiscObjectCatalog [] Directory;
     PedestrianCatalog [] Directory;
+    RouteCatalog [] Directory;
+    TrajectoryCatalog [] Directory;
+    VehicleCatalog [] Directory;
     Directory [path];
     RoadNetwork [] LogicFile SceneGraphFile TrafficSignals UsedArea;
     LogicFile [filepath];
@@ -40,6 +48,7 @@ const ELEMENTS: &str = "
     Vehicle [name vehicleCategory mass model3d role] ParameterDeclarations BoundingBox Performance Axles
         Properties Trailer TrailerCoupler TrailerHitch;
     Pedestrian [name pedestrianCategory mass model model3d role] ParameterDeclarations BoundingBox Properties;
+    MiscObject [name miscObjectCategory mass model3d] ParameterDeclarations BoundingBox Properties;
     BoundingBox [] Center Dimensions;
     Center [x y z];
     Dimensions [height length width];
@@ -52,7 +61,20 @@ const ELEMENTS: &str = "
     Position [] ?;
     LanePosition [roadId laneId s offset] Orientation;
     RelativeLanePosition [entityRef dLane ds dsLane offset] Orientation;
+    RoadPosition [roadId s t] Orientation;
+    RelativeRoadPosition [entityRef ds dt] Orientation;
     WorldPosition [x y z h p r];
+    RelativeWorldPosition [entityRef dx dy dz] Orientation;
+    RelativeObjectPosition [entityRef dx dy dz] Orientation;
+    RoutePosition [] RouteRef InRoutePosition Orientation;
+    RouteRef [] Route CatalogReference;
+    InRoutePosition [] ?;
+    FromCurrentEntity [entityRef];
+    FromRoadCoordinates [pathS t];
+    FromLaneCoordinates [pathS laneId laneOffset];
+    PositionInRoadCoordinates [pathS t];
+    PositionInLaneCoordinates [pathS laneId laneOffset];
+    TrajectoryPosition [s t] Orientation TrajectoryRef;
     Orientation [h p r type];
     LongitudinalAction [] ?;
     SpeedAction [] SpeedActionDynamics SpeedActionTarget;
@@ -68,6 +90,20 @@ const ELEMENTS: &str = "
     LaneChangeTarget [] AbsoluteTargetLane RelativeTargetLane;
     AbsoluteTargetLane [value];
     RelativeTargetLane [entityRef value];
+    LaneOffsetAction [continuous] LaneOffsetActionDynamics LaneOffsetTarget;
+    LaneOffsetActionDynamics [dynamicsShape maxLateralAcc];
+    LaneOffsetTarget [] AbsoluteTargetLaneOffset RelativeTargetLaneOffset;
+    AbsoluteTargetLaneOffset [value];
+    RelativeTargetLaneOffset [entityRef value];
+    SynchronizeAction [masterEntityRef targetTolerance targetToleranceMaster] TargetPositionMaster
+        TargetPosition FinalSpeed;
+    TargetPositionMaster [] ?;
+    TargetPosition [] ?;
+    FinalSpeed [] ?;
+    AbsoluteSpeed [value] TargetDistanceSteadyState TargetTimeSteadyState;
+    RelativeSpeedToMaster [value speedTargetValueType] TargetDistanceSteadyState TargetTimeSteadyState;
+    TargetDistanceSteadyState [distance];
+    TargetTimeSteadyState [time];
     RoutingAction [] ?;
     FollowTrajectoryAction [initialDistanceOffset] Trajectory TrajectoryRef CatalogReference TimeReference
         TrajectoryFollowingMode;
@@ -76,6 +112,13 @@ const ELEMENTS: &str = "
     Shape [] ?;
     Polyline [] Vertex;
     Vertex [time] Position;
+    Clothoid [curvature curvatureDot curvaturePrime length startTime stopTime] Position;
+    ClothoidSpline [timeEnd] ClothoidSplineSegment;
+    ClothoidSplineSegment [curvatureStart curvatureEnd length hOffset timeStart] PositionStart;
+    PositionStart [] ?;
+    Nurbs [order] ControlPoint Knot;
+    ControlPoint [time weight] Position;
+    Knot [value];
     TimeReference [] None Timing;
     Timing [domainAbsoluteRelative offset scale];
     TrajectoryFollowingMode [followingMode];
@@ -87,11 +130,14 @@ const ELEMENTS: &str = "
     ControllerAction [] ActivateControllerAction AssignControllerAction OverrideControllerValueAction;
     ActivateControllerAction [controllerRef objectControllerRef longitudinal lateral animation lighting];
     GlobalAction [] ?;
+    EntityAction [entityRef] AddEntityAction DeleteEntityAction;
+    VariableAction [variableRef] SetAction ModifyAction;
     EnvironmentAction [] Environment CatalogReference;
     Environment [name] ParameterDeclarations TimeOfDay Weather RoadCondition;
     TimeOfDay [animation dateTime];
     Weather [atmosphericPressure cloudState fractionalCloudCover temperature] Sun Fog Precipitation Wind
         DomeImage;
+    Sun [azimuth elevation illuminance intensity];
     Precipitation [intensity precipitationIntensity precipitationType];
     Fog [visualRange] BoundingBox;
     RoadCondition [frictionScaleFactor wetness] Properties;
@@ -110,6 +156,8 @@ const ELEMENTS: &str = "
     ByValueCondition [] ?;
     SimulationTimeCondition [value rule];
     StoryboardElementStateCondition [storyboardElementType storyboardElementRef state];
+    ParameterCondition [parameterRef value rule];
+    VariableCondition [variableRef value rule];
     ByEntityCondition [] TriggeringEntities EntityCondition;
     TriggeringEntities [triggeringEntitiesRule] EntityRef;
     EntityCondition [] ?;
@@ -121,6 +169,23 @@ const ELEMENTS: &str = "
         routingAlgorithm] TimeToCollisionConditionTarget;
     TimeToCollisionConditionTarget [] EntityRef Position;
     ReachPositionCondition [tolerance] Position;
+    DistanceCondition [value freespace rule alongRoute coordinateSystem relativeDistanceType routingAlgorithm]
+        Position;
+    TraveledDistanceCondition [value];
+    StandStillCondition [duration];
+    SpeedCondition [value rule direction];
+    RelativeSpeedCondition [entityRef value rule direction];
+    ParameterValueDistribution [] ScenarioFile Deterministic Stochastic;
+    ScenarioFile [filepath];
+    Deterministic [] *;
+    DeterministicSingleParameterDistribution [parameterName] ?;
+    DeterministicMultiParameterDistribution [] ValueSetDistribution;
+    DistributionSet [] Element;
+    Element [value];
+    DistributionRange [stepWidth] Range;
+    Range [lowerLimit upperLimit];
+    ValueSetDistribution [] ParameterValueSet;
+    ParameterValueSet [] ParameterAssignment;
 ";
 
 /// The attributes and the children of each element.
@@ -173,11 +238,19 @@ mod tests {
 
     /// What stands where any element may.
     const CHOSEN: &str = "ScenarioObject Private GlobalAction TeleportAction LongitudinalAction LateralAction \
-        RoutingAction VisibilityAction ControllerAction ActivateControllerAction SpeedAction LongitudinalDistanceAction \
-        LaneChangeAction FollowTrajectoryAction AssignRouteAction AcquirePositionAction EnvironmentAction LanePosition \
-        RelativeLanePosition WorldPosition Polyline PrivateAction SimulationTimeCondition \
-        StoryboardElementStateCondition TimeHeadwayCondition RelativeDistanceCondition TimeToCollisionCondition \
-        ReachPositionCondition";
+        RoutingAction VisibilityAction ControllerAction ActivateControllerAction SpeedAction \
+        LongitudinalDistanceAction LaneChangeAction FollowTrajectoryAction AssignRouteAction \
+        AcquirePositionAction EnvironmentAction LanePosition RelativeLanePosition WorldPosition \
+        Polyline PrivateAction SimulationTimeCondition StoryboardElementStateCondition \
+        TimeHeadwayCondition RelativeDistanceCondition TimeToCollisionCondition ReachPositionCondition \
+        RoadPosition RelativeRoadPosition RelativeWorldPosition RelativeObjectPosition RoutePosition \
+        TrajectoryPosition FromCurrentEntity FromRoadCoordinates FromLaneCoordinates \
+        PositionInRoadCoordinates PositionInLaneCoordinates LaneOffsetAction SynchronizeAction \
+        AbsoluteSpeed RelativeSpeedToMaster Clothoid ClothoidSpline Nurbs EntityAction VariableAction \
+        ParameterCondition VariableCondition DistanceCondition TraveledDistanceCondition \
+        StandStillCondition SpeedCondition RelativeSpeedCondition \
+        DeterministicSingleParameterDistribution DeterministicMultiParameterDistribution \
+        DistributionSet DistributionRange";
 
     #[test]
     fn every_row_is_reached_from_the_root() {

@@ -2,6 +2,7 @@
 
 use roxmltree::Node;
 
+use super::catalogue;
 use super::source::{Source, children, element};
 
 /// Levels of the engine's sky, and what each reaches up to: rain by the bounds of light and moderate rain (WMO), as a part
@@ -14,6 +15,9 @@ const SIGHT_M: [f64; 3] = [1000.0, 200.0, 75.0];
 const FRICTION: [f64; 3] = [0.9, 0.75, 0.65];
 /// Less friction than that of a flooded road is ice.
 const FRICTION_MIN: f64 = 0.5;
+
+/// With less light of the sun than this it is night; civil twilight ends at some 3 lx.
+const DARK_LX: f64 = 10.0;
 
 /// Words for clouds, of which nothing is taken over.
 const CLOUDS: [&str; 6] = ["cloudy", "free", "overcast", "rainy", "skyOff", "skyoff"];
@@ -31,7 +35,7 @@ const OKTAS: [&str; 10] = [
 ];
 
 /// What an `EnvironmentAction` sets.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Weather {
     /// The engine's word for the time of day.
     pub time: Option<&'static str>,
@@ -59,10 +63,17 @@ impl Weather {
 pub fn weather(source: &mut Source, global: Node) -> Option<Weather> {
     let action = children(global).next()?;
     source.refuse_if(!action.has_tag_name("EnvironmentAction"), action, "this action is not read")?;
-    let Some(environment) = element(action, "Environment") else {
-        return source.refuse(action, "environments of catalogues are not read");
-    };
+    if let Some(own) = element(action, "Environment") {
+        return environment(source, own);
+    }
+    let reference = source.required(action, "CatalogReference")?;
+    catalogue::entry(source, reference, &[catalogue::ENVIRONMENT], environment)
+}
+
+fn environment(source: &mut Source, environment: Node) -> Option<Weather> {
+    source.declare_missing(environment);
     let mut found = Weather::default();
+    let mut is_dark = false;
     for node in environment.descendants() {
         match node.tag_name().name() {
             "Precipitation" => found.sky[0] = Some(rain(source, node)?),
@@ -81,9 +92,17 @@ pub fn weather(source: &mut Source, global: Node) -> Option<Weather> {
                 source.word(node, "cloudState", &CLOUDS)?;
                 source.word(node, "fractionalCloudCover", &OKTAS)?;
             }
-            "Sun" | "Wind" | "DomeImage" => source.note("sun, wind and clouds are not taken over"),
+            "Sun" => {
+                is_dark = node.has_attribute("illuminance") && source.amount(node, "illuminance")? < DARK_LX;
+                source.note("sun, wind and clouds are not taken over");
+            }
+            "Wind" | "DomeImage" => source.note("sun, wind and clouds are not taken over"),
             _ => {}
         }
+    }
+    if is_dark && found.time.is_none_or(|time| matches!(time, "Morning" | "Noon")) {
+        source.note("it is night: the file's sun gives no light of a day");
+        found.time = Some("Night");
     }
     if found.is_rough() {
         source.note("weather is the nearest of the engine's levels of rain, fog and wetness");

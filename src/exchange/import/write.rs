@@ -1,84 +1,54 @@
-//! The scenario as a text of the language.
+//! The variations of a file as a text of the language.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
-use avastra_campaign::emit::{identifier, quoted};
+use avastra_campaign::emit::quoted;
+use avastra_lang::model::vocabulary::{Body, BodyClass, Word};
 use avastra_lang::syntax::ast::FileId;
 use avastra_lang::syntax::format;
 
-use super::Imported;
-use super::body::Shape;
+use super::body::wheelbase_m;
 use super::own::Own;
-use super::scene::{Other, Scene};
-use super::story::Story;
+use super::rows::{Parameters, capital, small, unique};
+use super::said::{Figure, Piece, Said, number};
+use super::scene::{OFFSET, Other};
+use super::weather::Weather;
+use super::{Imported, Variant, Whole};
 
-/// The file: its space, with a body for each road user and one action that lets all of them appear, and the scenario.
-pub fn scenario(scene: &Scene, story: &Story, name: &str, notes: BTreeSet<String>) -> Imported {
-    let mut text = head(&story.description, name, &notes);
-    let own = identifier(name);
-    let Scene { start, goal, .. } = scene;
-    let map = quoted(story.map.1.rsplit(['/', '\\']).next().unwrap_or_default());
-    let ego_mps = number(scene.ego_mps);
-    let _ = writeln!(text, "road {own}_road {{\n  map: {map}\n  start: {start}\n  goal: {goal}");
-    if scene.ego_mps > 0.0 {
-        let _ = writeln!(text, "  // the ego vehicle's speed in the file\n  limit: {ego_mps} m/s");
+/// The space of a file's variations. With one of them, it has a scenario, too. `order` names the parameters as they are listed.
+pub fn space(whole: &Whole, order: &[String], name: &str) -> Imported {
+    let values: Vec<_> = whole.variants.iter().map(|variant| &variant.values).collect();
+    let mut space = Space {
+        variants: &whole.variants,
+        parameters: Parameters::of(order, &values),
+        own: small(name),
+        roads: Vec::new(),
+        declared: String::new(),
+        names: BTreeSet::new(),
+        made: Vec::new(),
+    };
+    let mut notes = whole.notes.clone();
+    if whole.excluded > 0 {
+        let count = whole.excluded + whole.variants.len();
+        notes.insert(format!(
+            "{} of {count} variations have values that the file's own constraints exclude, and are left out",
+            whole.excluded
+        ));
     }
-    text += "}\n\n";
-    if let Some(time) = story.weather.time {
-        let more = if matches!(time, "Dawn" | "Dusk") { format!(" | {time}") } else { String::new() };
-        let _ = write!(text, "enum Time = Morning | Noon | Night{more}\nstate time: Time = any\n\n");
-    }
-    if story.weather.is_rough() {
-        text += "enum Sky = Rain | Fog | Wetness\nenum Level = None < Light < Moderate < High\n";
-        text += "state sky: Sky -> Level = None\n\n";
-    }
-    for (index, other) in scene.others.iter().enumerate() {
-        let Shape { like, length_m, width_m, height_m, .. } = &other.shape;
-        let [length, width, height] = [length_m, width_m, height_m].map(|metres| number(*metres));
-        let body = body(index, other);
-        let size = format!("length: {length} m, width: {width} m, height: {height} m");
-        let _ = writeln!(text, "body {body} {{ like: {like}, {size} }}");
-    }
-    if scene.others.is_empty() {
-        text += "state begun: Bool = false\naction begin() { set begun = true }\n";
-    } else {
-        text += "/// All that the file places.\naction begin() {\n";
-        for (index, other) in scene.others.iter().enumerate() {
-            let _ = writeln!(text, "  {}", spawn(&body(index, other), other));
-        }
-        text += "}\n";
-    }
-    if let Some(change) = &scene.change {
-        let _ = writeln!(text, "rule change_begins on begin during change: {change}");
-    }
-    // One step: its action happens at the beginning, or at the moment that it waits for.
-    let step_ms = (story.duration_s * 50.0).ceil().max(1.0) * 20.0;
-    let step = number(step_ms / 1000.0);
-    let _ = writeln!(
-        text,
-        "\nepisode {{\n  roads: [{own}_road]\n  step: {step} s\n  stop: arrived\n  limit: 1 steps\n}}"
-    );
-    let mut start = story.weather.time.map_or_else(String::new, |time| format!("time: {time}, "));
-    if story.weather.is_rough() {
-        let [rain, fog, wetness] = story.weather.sky.map(|level| level.unwrap_or("None"));
-        let _ = write!(start, "sky: {{ Rain: {rain}, Fog: {fog}, Wetness: {wetness} }}, ");
-    }
-    let once = scene.once.as_ref().map_or_else(String::new, |once| format!(" once {once}"));
-    let _ = writeln!(
-        text,
-        "\nscenario {own} {{\n  road: {own}_road\n  start {{ {start}ego_speed: {ego_mps} m/s }}\n  steps {{ 0: begin(){once} }}\n}}"
-    );
+    let mut text = head(&whole.description, name, &notes);
+    text += &space.text();
     // A text that does not parse is refused when it is checked.
     let text = format(FileId(0), &text).unwrap_or(text);
-    Imported { text, map: story.map.1.clone(), notes }
+    let maps = whole.variants.iter().map(|variant| variant.map.clone()).collect();
+    Imported { scenario: space.scenario(name), space: Some(text), maps, notes }
 }
 
 /// The file of a scenario that the other file carries.
 pub fn own(own: &Own, name: &str, notes: BTreeSet<String>) -> Imported {
     let text = head(&own.description, name, &notes) + &own.text + "\n";
     let text = format(FileId(0), &text).unwrap_or(text);
-    Imported { text, map: own.map.clone(), notes }
+    Imported { space: None, scenario: Some(text), maps: BTreeSet::from([own.map.clone()]), notes }
 }
 
 /// How a file begins: what it is, what differs, and the version of the language.
@@ -95,38 +65,418 @@ fn head(description: &str, name: &str, notes: &BTreeSet<String>) -> String {
     text
 }
 
-fn spawn(body: &str, other: &Other) -> String {
-    let direction = if other.is_behind { "behind" } else { "ahead" };
-    let mut fields = Vec::new();
-    fields.extend(other.lane.map(|lane| format!("lane: {lane}")));
-    fields.extend(other.side.map(|side| format!("side: {side}")));
-    if other.does != "Stand" {
-        fields.push(format!("speed: {} m/s", number(other.speed_mps)));
-    }
-    fields.push(format!("does: {}", other.does));
-    if other.changes {
-        fields.push("then: Change".to_owned());
-    }
-    format!("spawn {body} {direction} {} m {{ {} }}", number(other.gap_m), fields.join(", "))
-}
-
-/// The number keeps two bodies with one name apart.
-fn body(index: usize, other: &Other) -> String {
-    format!("{}_{}", capital(&identifier(&other.name)), index + 1)
-}
-
-/// To the millimetre: a file's figures have no more.
-fn number(value: f64) -> String {
-    let text = format!("{value:.3}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".to_owned() } else { text.to_owned() }
-}
-
 fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-fn capital(name: &str) -> String {
-    let mut letters = name.chars();
-    letters.next().map_or_else(String::new, |first| first.to_ascii_uppercase().to_string() + letters.as_str())
+/// Where the ego vehicle begins and arrives: the map, the two places, and its speed.
+type Home<'a> = (&'a str, &'a str, &'a str, Figure);
+
+struct Space<'a> {
+    variants: &'a [Variant],
+    parameters: Parameters,
+    /// What the file is called.
+    own: String,
+    /// Each with its name.
+    roads: Vec<(Home<'a>, String)>,
+    /// Bodies, trajectories and manoeuvres, as they were needed.
+    declared: String,
+    /// The names of those.
+    names: BTreeSet<String>,
+    /// The fields of bodies and trajectories, whose they are, and what they are called.
+    made: Vec<(String, String, String)>,
+}
+
+impl<'a> Space<'a> {
+    fn text(&mut self) -> String {
+        let all: Vec<usize> = (0..self.variants.len()).collect();
+        self.lay_roads();
+        let weathers: BTreeSet<&Weather> = self.variants.iter().map(|variant| &variant.weather).collect();
+        let begins = &self.variants[0].weather;
+        let mut text = self.road_declarations();
+        text += &sky(begins, &weathers);
+        // Variations that differ in numbers alone are one action.
+        let mut groups: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+        let mut order = Vec::new();
+        for at in all {
+            let form = form(&self.variants[at]);
+            let rows = groups.entry(form.clone()).or_default();
+            if rows.is_empty() {
+                order.push(form);
+            }
+            rows.push(at);
+        }
+        let manoeuvres = self.manoeuvres(&groups, &order);
+        let (mut actions, mut rules) = (String::new(), String::new());
+        for (nth, form) in order.iter().enumerate() {
+            let group = &groups[form];
+            let name = if order.len() == 1 { "begin".to_owned() } else { format!("begin_{}", nth + 1) };
+            let set = set(&self.variants[group[0]].weather, &weathers);
+            let times = order.len() * self.roads.len();
+            actions += &self.action(&name, group, times, &set, &manoeuvres);
+            if self.roads.len() > 1 {
+                rules += &self.rule(&name, group);
+            }
+        }
+        if self.variants.iter().all(|variant| variant.scene.others.is_empty()) && weathers.len() < 2 {
+            text += "state begun: Bool = false\n";
+        }
+        text += &self.parameters.enums();
+        text += &self.declared;
+        for function in self.parameters.functions() {
+            let _ = writeln!(text, "{function}");
+        }
+        text += &actions;
+        text += &rules;
+        let duration_s = self.variants.iter().map(|variant| variant.duration_s).fold(0.0, f64::max);
+        // One step, in which everything happens.
+        let step_s = (duration_s * 50.0).ceil().max(1.0) / 50.0;
+        let _ = writeln!(text, "\nepisode {{ step: {} s, stop: arrived, limit: 1 steps }}", number(step_s));
+        text
+    }
+
+    /// The scenario of the only variation, in a file beside that of the space.
+    fn scenario(&self, file: &str) -> Option<String> {
+        let ([_], [(_, road)]) = (self.variants, self.roads.as_slice()) else { return None };
+        let (own, file) = (&self.own, quoted(&format!("{file}.ava")));
+        let text =
+            format!("language 1\nuse {file}\nscenario {own} {{ road: {road} steps {{ 0: begin() }} }}\n");
+        Some(format(FileId(0), &text).unwrap_or(text))
+    }
+
+    fn lay_roads(&mut self) {
+        let variants = self.variants;
+        let all: Vec<usize> = (0..variants.len()).collect();
+        let names = self.parameters.names(&all, |at| home(&variants[at]));
+        let mut taken = BTreeSet::new();
+        for (variant, name) in variants.iter().zip(names) {
+            if !self.roads.iter().any(|(known, _)| *known == home(variant)) {
+                let name =
+                    if name.is_empty() { format!("{}_road", self.own) } else { small(&format!("at_{name}")) };
+                self.roads.push((home(variant), unique(&name, &mut taken)));
+            }
+        }
+    }
+
+    fn road_of(&self, at: usize) -> &str {
+        let home = home(&self.variants[at]);
+        self.roads.iter().find(|(known, _)| *known == home).map_or("", |(_, name)| name)
+    }
+
+    fn road_declarations(&self) -> String {
+        let mut text = String::new();
+        for ((map, start, goal, ego), name) in &self.roads {
+            let map = quoted(map.rsplit('/').next().unwrap_or_default());
+            let _ = writeln!(text, "road {name} {{\n  map: {map}\n  start: {start}\n  goal: {goal}");
+            let _ = writeln!(text, "  ego_speed: {}", ego.text());
+            if ego.value() >= SET_SPEED_MPS_MIN {
+                let _ = writeln!(text, "  set_speed: {}", ego.text());
+            }
+            text += "}\n\n";
+        }
+        text
+    }
+
+    /// An action that lets everybody of a group of variations appear.
+    fn action(
+        &mut self,
+        name: &str,
+        group: &[usize],
+        times: usize,
+        set: &str,
+        manoeuvres: &Manoeuvres,
+    ) -> String {
+        let mut effects = set.to_owned();
+        let variants = self.variants;
+        let first = &variants[group[0]];
+        if first.scene.others.is_empty() && set.is_empty() {
+            effects += "  set begun = true\n";
+        }
+        for (nth, other) in first.scene.others.iter().enumerate() {
+            let body = self.body(other);
+            let trajectory = self.trajectory(other, &first.map);
+            let columns: Vec<&Said> = group.iter().map(|at| &variants[*at].scene.others[nth].spawn).collect();
+            let spawn = self.said(group, &columns, &other.bearer);
+            let then = match manoeuvres.of(other) {
+                None => String::new(),
+                Some(manoeuvre) => {
+                    let arguments: Vec<String> = manoeuvre
+                        .varied
+                        .iter()
+                        .map(|place| {
+                            let figures: Vec<Figure> = group
+                                .iter()
+                                .map(|at| figures(&variants[*at].scene.others[nth])[place.at])
+                                .collect();
+                            let name = format!("{}_{}", other.bearer, place.word);
+                            self.parameters.number(group, &figures, &name)
+                        })
+                        .collect();
+                    format!(", then: {}({})", manoeuvre.name, arguments.join(", "))
+                }
+            };
+            let _ =
+                writeln!(effects, "  spawn {body} as {} on {trajectory} at {spawn}{then} }}", other.bearer);
+        }
+        let parameters = self.parameters.declared(group, times);
+        format!("/// All that the file places.\naction {name}({parameters}) {{\n{effects}}}\n")
+    }
+
+    /// A text whose numbers follow from the parameters.
+    fn said(&mut self, group: &[usize], columns: &[&Said], name: &str) -> String {
+        let mut nth = 0;
+        let mut text = String::new();
+        let mut word = String::new();
+        for piece in &columns[0].0 {
+            match piece {
+                Piece::Text(part) => {
+                    text += part;
+                    word = last_word(part).unwrap_or(word);
+                }
+                Piece::Number(_) => {
+                    let figures: Vec<Figure> =
+                        columns.iter().filter_map(|said| said.figures().nth(nth)).collect();
+                    let word = if word.is_empty() { "at" } else { word.as_str() };
+                    text += &self.parameters.number(group, &figures, &format!("{name}_{word}"));
+                    nth += 1;
+                }
+            }
+        }
+        // In the middle of its way it needs no word.
+        text.strip_suffix(&format!("{OFFSET}0 m")).map_or(text.clone(), str::to_owned)
+    }
+
+    /// A rule that lets an action happen on the roads of its variations alone.
+    fn rule(&self, name: &str, group: &[usize]) -> String {
+        let cases =
+            self.parameters.cases(group, |at| self.road_of(at).to_owned(), |road| format!("road == {road}"));
+        format!("rule {name}_is_there on {name}: {cases}\n")
+    }
+
+    /// The name of a body of somebody's size.
+    fn body(&mut self, other: &Other) -> String {
+        let body = &other.body;
+        let [length, width, height] = [body.length_m, body.width_m, body.height_m].map(number);
+        // The axle lies where the file's reference point is.
+        let wheelbase = match body.like {
+            "Pedestrian" => String::new(),
+            _ => format!(", wheelbase: {} m", number(wheelbase_m(body.length_m, body.middle_m))),
+        };
+        let size = format!("length: {length} m, width: {width} m, height: {height} m{wheelbase}");
+        let fields = format!("{{ like: {}, {size} }}", body.like);
+        let name = capital(&other.bearer);
+        let is_known = Body::from_name(&name).is_some() || BodyClass::from_name(&name).is_some();
+        self.declare("body", &if is_known { format!("{name}_1") } else { name }, &fields)
+    }
+
+    /// The name of somebody's trajectory, which every road of its map has.
+    fn trajectory(&mut self, other: &Other, map: &str) -> String {
+        let road = self.roads.iter().find(|((of, ..), _)| *of == map).map_or("", |(_, name)| name.as_str());
+        let fields = format!("{{ road: {road}, {} }}", other.trajectory);
+        self.declare("trajectory", &format!("{}_way", other.bearer), &fields)
+    }
+
+    /// The name of a declaration, which is made if nobody has made it yet.
+    fn declare(&mut self, kind: &str, name: &str, fields: &str) -> String {
+        let known = self.made.iter().find(|(own, of, _)| own == fields && of == name);
+        if let Some((_, _, known)) = known {
+            return known.clone();
+        }
+        let known = unique(name, &mut self.names);
+        let _ = writeln!(self.declared, "{kind} {known} {fields}");
+        self.made.push((fields.to_owned(), name.to_owned(), known.clone()));
+        known
+    }
+
+    /// What everybody does in some variation: those whose phases differ in numbers alone do one manoeuvre.
+    fn manoeuvres(&mut self, groups: &BTreeMap<String, Vec<usize>>, order: &[String]) -> Manoeuvres {
+        let variants = self.variants;
+        let mut found: Vec<(String, Vec<&Other>)> = Vec::new();
+        for other in order.iter().flat_map(|form| &groups[form]).flat_map(|at| &variants[*at].scene.others) {
+            if other.phases.is_empty() {
+                continue;
+            }
+            let form = phases_form(other);
+            match found.iter_mut().find(|(known, _)| *known == form) {
+                Some((_, others)) => others.push(other),
+                None => found.push((form, vec![other])),
+            }
+        }
+        let mut manoeuvres = BTreeMap::new();
+        for (form, others) in found {
+            let name = unique(&format!("{}_does", others[0].bearer), &mut self.names);
+            let columns: Vec<Vec<Figure>> = others.iter().map(|other| figures(other)).collect();
+            let manoeuvre = Manoeuvre::of(name, others[0], &columns);
+            let _ = writeln!(self.declared, "{}", manoeuvre.text(others[0]));
+            manoeuvres.insert(form, manoeuvre);
+        }
+        Manoeuvres(manoeuvres)
+    }
+}
+
+/// Manoeuvres by the form of their phases.
+struct Manoeuvres(BTreeMap<String, Manoeuvre>);
+
+impl Manoeuvres {
+    fn of(&self, other: &Other) -> Option<&Manoeuvre> {
+        self.0.get(&phases_form(other))
+    }
+}
+
+struct Manoeuvre {
+    name: String,
+    /// Its parameters.
+    varied: Vec<Varied>,
+    /// For each number of its phases the parameter that it is, if it varies.
+    parameter: Vec<Option<usize>>,
+}
+
+struct Varied {
+    /// Which number of the phases it is.
+    at: usize,
+    word: String,
+    type_name: &'static str,
+}
+
+impl Manoeuvre {
+    fn of(name: String, other: &Other, columns: &[Vec<Figure>]) -> Manoeuvre {
+        let words = words(other);
+        let (mut varied, mut parameter): (Vec<Varied>, Vec<Option<usize>>) = (Vec::new(), Vec::new());
+        let mut taken = BTreeSet::new();
+        for at in 0..columns[0].len() {
+            if columns.iter().all(|column| column[at] == columns[0][at]) {
+                parameter.push(None);
+                continue;
+            }
+            // Numbers that are always the same are one parameter.
+            let same = |known: &Varied| columns.iter().all(|column| column[known.at] == column[at]);
+            let known = varied.iter().position(same);
+            parameter.push(Some(known.unwrap_or(varied.len())));
+            if known.is_none() {
+                // A number behind the word keeps it from being one of the language.
+                let word = unique(&format!("{}_1", words[at]), &mut taken);
+                varied.push(Varied { at, word, type_name: columns[0][at].type_name() });
+            }
+        }
+        Manoeuvre { name, varied, parameter }
+    }
+
+    fn text(&self, other: &Other) -> String {
+        let typed: Vec<String> =
+            self.varied.iter().map(|varied| format!("{}: {}", varied.word, varied.type_name)).collect();
+        let mut text = format!("manoeuvre {}({}) {{", self.name, typed.join(", "));
+        let mut parameters = self.parameter.iter();
+        for phase in &other.phases {
+            text += " ";
+            text += &phase.shown(|figure| match parameters.next() {
+                Some(Some(nth)) => self.varied[*nth].word.clone(),
+                _ => figure.text(),
+            });
+        }
+        text + " }"
+    }
+}
+
+fn figures(other: &Other) -> Vec<Figure> {
+    other.phases.iter().flat_map(Said::figures).collect()
+}
+
+/// For each number of somebody's phases the word before it.
+fn words(other: &Other) -> Vec<String> {
+    let mut words = Vec::new();
+    for phase in &other.phases {
+        let mut word = String::new();
+        for piece in &phase.0 {
+            match piece {
+                Piece::Text(text) => word = last_word(text).unwrap_or(word),
+                Piece::Number(_) => {
+                    words.push(if word.is_empty() { "value".to_owned() } else { word.clone() })
+                }
+            }
+        }
+    }
+    words
+}
+
+/// The last word of a text, without what stands before a point.
+fn last_word(text: &str) -> Option<String> {
+    let mut words = text.split(|letter: char| !(letter.is_ascii_alphanumeric() || letter == '_'));
+    words.rfind(|word| word.starts_with(|letter: char| letter.is_ascii_alphabetic())).map(str::to_owned)
+}
+
+/// All of a variation but its numbers, its road and what it is called.
+fn form(variant: &Variant) -> String {
+    let mut form = format!("{} {:?}", variant.map, variant.weather);
+    for other in &variant.scene.others {
+        let body = &other.body;
+        let size = [body.length_m, body.width_m, body.height_m].map(number);
+        let _ = write!(
+            form,
+            "\n{} {} {size:?} {} {} {} {}",
+            other.bearer,
+            body.like,
+            number(body.middle_m),
+            other.trajectory,
+            other.spawn.form(),
+            phases_form(other)
+        );
+    }
+    form
+}
+
+fn phases_form(other: &Other) -> String {
+    let phases: Vec<String> = other.phases.iter().map(Said::form).collect();
+    phases.join(" ")
+}
+
+fn home(variant: &Variant) -> Home<'_> {
+    (&variant.map, &variant.scene.start, &variant.scene.goal, variant.scene.ego_mps)
+}
+
+/// Below this no driving system has a wish to drive, m/s.
+const SET_SPEED_MPS_MIN: f64 = 1.0;
+
+/// The states of time and weather, as they are when the first variation begins; those of all variations have words.
+fn sky(begins: &Weather, all: &BTreeSet<&Weather>) -> String {
+    let mut text = String::new();
+    let times: BTreeSet<&str> = all.iter().filter_map(|weather| weather.time).collect();
+    if !times.is_empty() {
+        let more: String = ["Dawn", "Dusk"]
+            .iter()
+            .filter(|time| times.contains(*time))
+            .map(|time| format!(" | {time}"))
+            .collect();
+        let _ = write!(
+            text,
+            "enum Time = Morning | Noon | Night{more}\nstate time: Time = {}\n\n",
+            begins.time.unwrap_or("Noon")
+        );
+    }
+    if all.iter().any(|weather| weather.is_rough()) {
+        text += "enum Sky = Rain | Fog | Wetness\nenum Level = None < Light < Moderate < High\n";
+        let [rain, fog, wetness] = levels(begins);
+        let _ =
+            writeln!(text, "state sky: Sky -> Level = {{ Rain: {rain}, Fog: {fog}, Wetness: {wetness} }}\n");
+    }
+    text
+}
+
+fn levels(weather: &Weather) -> [&'static str; 3] {
+    weather.sky.map(|level| level.unwrap_or("None"))
+}
+
+/// The effects that set a weather, if another variation has another one.
+fn set(weather: &Weather, all: &BTreeSet<&Weather>) -> String {
+    let mut text = String::new();
+    if all.iter().any(|other| other.time != weather.time) {
+        let _ = writeln!(text, "  set time = {}", weather.time.unwrap_or("Noon"));
+    }
+    if all.iter().any(|other| levels(other) != levels(weather)) {
+        let [rain, fog, wetness] = levels(weather);
+        let _ = writeln!(
+            text,
+            "  set sky[Rain] = {rain}\n  set sky[Fog] = {fog}\n  set sky[Wetness] = {wetness}"
+        );
+    }
+    text
 }

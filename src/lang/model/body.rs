@@ -33,7 +33,7 @@ pub struct BodyParameters {
 }
 
 /// The part of the length beside the wheelbase that lies behind the rear axle, where a body of one's own says no more.
-const REAR_PART: f64 = 0.6;
+pub const REAR_PART: f64 = 0.6;
 
 /// What a body of one's own says of itself; the rest is as in the body that it is like.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

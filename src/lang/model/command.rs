@@ -108,11 +108,11 @@ pub fn speeds_mps(on_foot: bool) -> RangeInclusive<f64> {
 /// Rates at which a vehicle may be told to change its speed, m/s². The most is more than tyres give.
 const RATE_MPS2: RangeInclusive<f64> = 0.1..=15.0;
 
-/// Places beside the middle of a lane, m to the left: the next lane's middle and more, on either side.
-pub const OFFSET_M: RangeInclusive<f64> = -5.0..=5.0;
+/// Places beside the middle of a lane, m to the left: two lanes and more, on either side.
+pub const OFFSET_M: RangeInclusive<f64> = -10.0..=10.0;
 
-/// Speeds to the side, m/s. UN R157's cut-ins reach 3 m/s.
-const ASIDE_MPS: RangeInclusive<f64> = 0.1..=4.0;
+/// Speeds to the side, m/s. UN R157's cut-ins reach 3 m/s; who follows a trajectory may run aside.
+const ASIDE_MPS: RangeInclusive<f64> = 0.1..=10.0;
 
 /// Time gaps that a vehicle may be told to keep, s: from bumper on bumper to the sight of a town.
 const TIME_GAP_S: RangeInclusive<f64> = 0.1..=10.0;

@@ -12,7 +12,8 @@ use crate::syntax::ast::{
 };
 use crate::syntax::layout::{INDENT, Layout, WIDTH};
 use crate::syntax::print_expression::{
-    arm, braced, call, expression, expression_on_new_line, field, fields, number, patterns, quoted,
+    arm, braced, call, expression, expression_on_new_line, field, fields, needs_comma, number, patterns,
+    quoted,
 };
 use crate::syntax::scan::Comment;
 
@@ -384,10 +385,13 @@ impl Printer<'_> {
         self.put(&expression(subject));
         self.words(" ");
         self.block(value.span.end, |printer| {
-            for arm in arms {
+            for (at, arm) in arms.iter().enumerate() {
                 printer.entry_of_entries(arm.span, |printer| {
                     printer.words(&format!("{} => ", patterns(arm)));
                     printer.arms(&arm.value);
+                    if needs_comma(arms, at) {
+                        printer.words(",");
+                    }
                 });
             }
         });

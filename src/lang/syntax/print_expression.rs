@@ -46,7 +46,12 @@ fn bare(expr: &Expr) -> Layout {
         ExprKind::Record(entries) => fields(entries),
         ExprKind::Match { subject, arms } => {
             let mut parts = vec![Layout::text("match "), expression(subject), Layout::text(" ")];
-            parts.push(braced(arms.iter().map(arm)));
+            // A line break ends no value before a minus.
+            let ended = |(at, one): (usize, &Arm)| match needs_comma(arms, at) {
+                true => Layout::row([arm(one), Layout::IfBroken(",")]),
+                false => arm(one),
+            };
+            parts.push(braced(arms.iter().enumerate().map(ended)));
             Layout::row(parts)
         }
         ExprKind::LanePoint { road, lane, station } => {
@@ -118,6 +123,12 @@ pub fn braced(entries: impl Iterator<Item = Layout>) -> Layout {
 
 pub fn arm(arm: &Arm) -> Layout {
     Layout::row([Layout::text(format!("{} => ", patterns(arm))), expression(&arm.value)])
+}
+
+/// Whether the case after this one begins with a minus, which would continue the value of this one on the line before.
+pub fn needs_comma(arms: &[Arm], at: usize) -> bool {
+    let next = arms.get(at + 1).and_then(|next| next.patterns.first());
+    next.is_some_and(|pattern| pattern.text.starts_with('-'))
 }
 
 /// `A | B`, or `_` for the rest.

@@ -1,0 +1,160 @@
+//! Files that a scenario names: maps and catalogues. Each is read once, however many variations of the scenario there are.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+use avastra_road::RoadMap;
+use roxmltree::Node;
+
+use super::Files;
+use super::source::{Source, children, element, elements, filled};
+use super::vocabulary;
+
+/// Where the catalogues of a kind are named, and what their entries are called.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Kind(&'static str, &'static str);
+
+pub const VEHICLE: Kind = Kind("VehicleCatalog", "Vehicle");
+pub const PEDESTRIAN: Kind = Kind("PedestrianCatalog", "Pedestrian");
+pub const OBJECT: Kind = Kind("MiscObjectCatalog", "MiscObject");
+pub const MANOEUVRE: Kind = Kind("ManeuverCatalog", "Maneuver");
+pub const ROUTE: Kind = Kind("RouteCatalog", "Route");
+pub const TRAJECTORY: Kind = Kind("TrajectoryCatalog", "Trajectory");
+pub const ENVIRONMENT: Kind = Kind("EnvironmentCatalog", "Environment");
+
+/// Catalogues within catalogues are read this deep.
+const DEPTH_MAX: usize = 8;
+
+type Read<T> = RefCell<BTreeMap<String, Result<Rc<T>, String>>>;
+
+/// The files that a scenario names, as far as they were read.
+pub struct Library<'f> {
+    files: &'f dyn Files,
+    /// The folder of the scenario, before the paths that it names; empty if it is that of the file that is imported.
+    folder: String,
+    maps: Read<RoadMap>,
+    folders: Read<Vec<String>>,
+}
+
+impl core::fmt::Debug for Library<'_> {
+    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        formatter.debug_struct("Library").finish_non_exhaustive()
+    }
+}
+
+impl<'f> Library<'f> {
+    pub fn new(files: &'f dyn Files, folder: String) -> Library<'f> {
+        Library { files, folder, maps: Read::default(), folders: Read::default() }
+    }
+
+    /// A path of the scenario as one of the file that is imported.
+    pub fn beside(&self, path: &str) -> String {
+        format!("{}{path}", self.folder)
+    }
+
+    /// The map at a path.
+    ///
+    /// # Errors
+    /// Why it cannot be read.
+    pub fn map(&self, path: &str) -> Result<Rc<RoadMap>, String> {
+        let read = || {
+            let text = self.files.map(&self.beside(path))?;
+            RoadMap::from_opendrive("map", &text).map_err(|error| error.to_string())
+        };
+        once(&self.maps, path, read)
+    }
+
+    fn folder(&self, path: &str) -> Result<Rc<Vec<String>>, String> {
+        once(&self.folders, path, || self.files.catalogues(&self.beside(path)))
+    }
+}
+
+fn once<T>(known: &Read<T>, path: &str, read: impl FnOnce() -> Result<T, String>) -> Result<Rc<T>, String> {
+    if let Some(found) = known.borrow().get(path) {
+        return found.clone();
+    }
+    let found = read().map(Rc::new);
+    known.borrow_mut().insert(path.to_owned(), found.clone());
+    found
+}
+
+/// Notes the folders of catalogues.
+pub fn locate(source: &mut Source, root: Node) {
+    let locations: Vec<Node> = elements(root, "CatalogLocations").flat_map(children).collect();
+    for location in locations {
+        let Some(directory) = element(location, "Directory") else { continue };
+        let mark = source.mark(directory);
+        if let Some(path) = source.text(directory, "path") {
+            source.folders.insert(location.tag_name().name().to_owned(), (mark, path));
+        }
+    }
+}
+
+/// Reads the entry of a catalogue that a `CatalogReference` names, with the values that it gives to the entry's parameters.
+pub fn entry<T>(
+    source: &mut Source,
+    reference: Node,
+    kinds: &[Kind],
+    read: impl FnOnce(&mut Source, Node) -> Option<T>,
+) -> Option<T> {
+    let (catalogue, name) = (source.text(reference, "catalogName")?, source.text(reference, "entryName")?);
+    if source.depth >= DEPTH_MAX {
+        return source.refuse(reference, format!("catalogues lie in one another more than {DEPTH_MAX} deep"));
+    }
+    let mut assigned = BTreeMap::new();
+    for one in elements(reference, "ParameterAssignments").flat_map(children) {
+        // Some files write a `$` before the name.
+        let name = source.named(one, "parameterRef")?;
+        assigned.insert(name, source.text(one, "value")?);
+    }
+    let mut texts = Vec::new();
+    for Kind(location, _) in kinds {
+        let Some((mark, path)) = source.folders.get(*location).cloned() else { continue };
+        match source.library.folder(&path) {
+            Ok(found) => texts.push(found),
+            Err(reason) => return source.refuse(&mark, format!("`{path}`: {reason}")),
+        }
+    }
+    for text in texts.iter().flat_map(|texts| texts.iter()) {
+        let Ok(document) = avastra_road::well_formed(text) else { continue };
+        let is_named = |node: &Node, name: &str| node.attribute("name") == Some(name);
+        let list = document.descendants().find(|node| node.has_tag_name("Catalog"));
+        let Some(list) = list.filter(|node| is_named(node, &catalogue)) else { continue };
+        let is_meant = |node: &Node| {
+            is_named(node, &name) && kinds.iter().any(|Kind(_, element)| node.has_tag_name(*element))
+        };
+        let Some(found) = children(list).find(is_meant) else { continue };
+        let whose = format!("`{name}` of `{catalogue}`");
+        if let Some((node, reason)) = vocabulary::unknown(found).first() {
+            let element = node.tag_name().name();
+            return source.refuse(reference, format!("{whose}: `{element}`: {reason}"));
+        }
+        let parameters = match given(found, assigned) {
+            Ok(parameters) => parameters,
+            Err(reason) => return source.refuse(reference, format!("{whose}: {reason}")),
+        };
+        return source.within(reference, &whose, parameters, |source| read(source, found));
+    }
+    let kinds: Vec<String> = kinds.iter().map(|Kind(_, element)| format!("`{element}`")).collect();
+    source.refuse(reference, format!("no {} `{name}` in a catalogue `{catalogue}`", kinds.join(" or ")))
+}
+
+/// The values of an entry's parameters: those that are assigned, and the defaults of the others.
+fn given(entry: Node, assigned: BTreeMap<String, String>) -> Result<BTreeMap<String, String>, String> {
+    let declared: Vec<Node> = elements(entry, "ParameterDeclarations").flat_map(children).collect();
+    let is_declared =
+        |name: &&String| declared.iter().any(|one| one.attribute("name") == Some(name.as_str()));
+    if let Some(name) = assigned.keys().find(|name| !is_declared(name)) {
+        return Err(format!("it declares no parameter `{name}`"));
+    }
+    let mut parameters = assigned;
+    for one in declared {
+        let (Some(name), Some(value)) = (one.attribute("name"), one.attribute("value")) else { continue };
+        if !parameters.contains_key(name) {
+            let value = filled(value, &parameters)?;
+            parameters.insert(name.to_owned(), value);
+        }
+    }
+    Ok(parameters)
+}

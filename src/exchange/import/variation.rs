@@ -1,0 +1,121 @@
+//! Variations of a scenario: the values that a file with a `ParameterValueDistribution` gives to its parameters.
+
+use std::collections::BTreeMap;
+
+use roxmltree::Node;
+
+use super::source::{Source, children, element, elements};
+use super::story::check_header;
+use super::vocabulary;
+
+/// More variations are no test that anybody drives.
+const VARIATIONS_MAX: usize = 60_000;
+
+/// Values of parameters, by name.
+pub type Values = BTreeMap<String, String>;
+
+/// What a distribution says.
+#[derive(Debug)]
+pub struct Distribution {
+    /// The file of the scenario, as this one names it.
+    pub scenario: String,
+    /// Where it names it.
+    pub line: u32,
+    pub description: String,
+    /// The parameters in the order of the file.
+    pub parameters: Vec<String>,
+    /// One or more.
+    pub variations: Vec<Values>,
+}
+
+/// The distribution of a file; the outer `None` if it is another file, the inner one if something is refused.
+pub fn read(source: &mut Source, root: Node) -> Option<Option<Distribution>> {
+    let found = element(root, "ParameterValueDistribution")?;
+    Some(distribution(source, root, found))
+}
+
+fn distribution(source: &mut Source, root: Node, found: Node) -> Option<Distribution> {
+    for (node, reason) in vocabulary::unknown(root) {
+        source.refuse::<()>(node, reason);
+    }
+    let header = check_header(source, root)?;
+    source.declare(root);
+    let file = source.required(found, "ScenarioFile")?;
+    let (scenario, line) = (source.text(file, "filepath")?, source.mark(file).line);
+    if let Some(other) = element(found, "Stochastic") {
+        return source
+            .refuse(other, "values that are drawn by chance are not read: those that are listed are");
+    }
+    let listed = source.required(found, "Deterministic")?;
+    let (mut parameters, mut variations) = (Vec::new(), vec![Values::new()]);
+    for part in children(listed) {
+        let choices = match part.tag_name().name() {
+            "DeterministicSingleParameterDistribution" => {
+                let name = source.named(part, "parameterName")?;
+                let values = single(source, part)?;
+                values.into_iter().map(|value| Values::from([(name.clone(), value)])).collect()
+            }
+            "DeterministicMultiParameterDistribution" => sets(source, part)?,
+            _ => return source.refuse(part, "such a distribution is not read"),
+        };
+        source.refuse_if(choices.is_empty(), part, "it lists no value")?;
+        for name in choices.iter().flat_map(Values::keys) {
+            if !parameters.contains(name) {
+                parameters.push(name.clone());
+            }
+        }
+        let count = variations.len().saturating_mul(choices.len());
+        let reason = format!("its values make {count} variations: {VARIATIONS_MAX} are possible");
+        source.refuse_if(count > VARIATIONS_MAX, part, reason)?;
+        let with = |values: &Values| {
+            let values = values.clone();
+            choices
+                .iter()
+                .map(move |more| values.iter().chain(more).map(|(k, v)| (k.clone(), v.clone())).collect())
+        };
+        variations = variations.iter().flat_map(with).collect();
+    }
+    let description = header.attribute("description").unwrap_or("").to_owned();
+    Some(Distribution { scenario, line, description, parameters, variations })
+}
+
+/// The values of one parameter.
+fn single(source: &mut Source, part: Node) -> Option<Vec<String>> {
+    let Some(inner) = children(part).next() else { return source.refuse(part, "it is empty") };
+    match inner.tag_name().name() {
+        "DistributionSet" => elements(inner, "Element").map(|one| source.text(one, "value")).collect(),
+        "DistributionRange" => {
+            let step = source.number(inner, "stepWidth")?;
+            let range = source.required(inner, "Range")?;
+            let (low, high) = (source.number(range, "lowerLimit")?, source.number(range, "upperLimit")?);
+            source.refuse_if(step <= 0.0 || high < low, inner, "a range goes up, in steps above 0")?;
+            // A range whose last step misses its end by rounding reaches it all the same.
+            let count = ((high - low) / step + 1e-6).floor();
+            let reason = format!("it has {count:.0} steps: {VARIATIONS_MAX} are possible");
+            source.refuse_if(count >= VARIATIONS_MAX as f64, inner, reason)?;
+            Some((0..=count as usize).map(|nth| plain(low + nth as f64 * step)).collect())
+        }
+        "UserDefinedDistribution" => source.refuse(inner, "a distribution of the user's own is not read"),
+        _ => source.refuse(inner, "such a distribution is not read"),
+    }
+}
+
+/// A number without the noise of adding steps.
+fn plain(value: f64) -> String {
+    let rounded = (value * 1e9).round() / 1e9;
+    format!("{rounded}")
+}
+
+/// Values of several parameters together.
+fn sets(source: &mut Source, part: Node) -> Option<Vec<Values>> {
+    let list = source.required(part, "ValueSetDistribution")?;
+    let mut found = Vec::new();
+    for set in elements(list, "ParameterValueSet") {
+        let mut values = Values::new();
+        for one in elements(set, "ParameterAssignment") {
+            values.insert(source.named(one, "parameterRef")?, source.text(one, "value")?);
+        }
+        found.push(values);
+    }
+    Some(found)
+}
