@@ -20,6 +20,9 @@ pub struct Body {
     pub height_m: f64,
     /// From the reference point, a vehicle's rear axle, to the middle.
     pub middle_m: f64,
+    /// How fast it may gain speed, and lose it, m/s².
+    pub gains_mps2: f64,
+    pub loses_mps2: f64,
 }
 
 pub fn body(source: &mut Source, object: Node) -> Option<Body> {
@@ -76,7 +79,12 @@ fn described(source: &mut Source, node: Node) -> Option<Body> {
     let middle_m = source.number(centre, "x")?;
     let reason = format!("`x` is {middle_m}: more than {MIDDLE_M_MAX} m from the axle");
     source.refuse_if(middle_m.abs() > MIDDLE_M_MAX, centre, reason)?;
-    Some(Body { like, length_m, width_m, height_m, middle_m })
+    let (mut gains_mps2, mut loses_mps2) = (f64::INFINITY, f64::INFINITY);
+    if let Some(node) = element(node, "Performance") {
+        gains_mps2 = source.amount(node, "maxAcceleration")?;
+        loses_mps2 = source.amount(node, "maxDeceleration")?;
+    }
+    Some(Body { like, length_m, width_m, height_m, middle_m, gains_mps2, loses_mps2 })
 }
 
 fn within(source: &mut Source, node: Node, attribute: &str, field: BodyField) -> Option<f64> {

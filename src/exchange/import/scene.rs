@@ -15,7 +15,7 @@ use super::condition::{Waiting, is_called};
 use super::place::{Placed, Places, straight_on};
 use super::position::Position;
 use super::rows::small;
-use super::said::{Figure, Said, number};
+use super::said::{Figure, Piece, Said, number};
 use super::source::{Mark, Source};
 use super::story::{Entity, Event, Story};
 use super::trigger::When;
@@ -629,6 +629,20 @@ impl<'a> Cast<'a> {
                 return source.refuse(mark, "over a way a speed changes only from one that the file says");
             }
         };
+        // A player keeps to what its vehicle can.
+        let body = &moving.entity.body;
+        let most_mps2 = match (told.mps, mps) {
+            (Some(from), Some(to)) if to < from => body.loses_mps2,
+            (Some(_), Some(_)) => body.gains_mps2,
+            _ => f64::INFINITY,
+        };
+        let capped = |rate: Said| match rate.0.as_slice() {
+            [Piece::Number(figure)] if figure.value() > most_mps2 && most_mps2 > 0.0 => {
+                Said::default().number(most_mps2, "m/s^2")
+            }
+            _ => rate,
+        };
+        let rate = rate.map(capped);
         told.mps = mps;
         fields.push(Said::text("speed: ").then(said));
         fields.extend(rate.map(|rate| Said::text("rate: ").then(rate)));

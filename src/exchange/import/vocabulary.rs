@@ -49,6 +49,7 @@ const ELEMENTS: &str = "
         Properties Trailer TrailerCoupler TrailerHitch;
     Pedestrian [name pedestrianCategory mass model model3d role] ParameterDeclarations BoundingBox Properties;
     MiscObject [name miscObjectCategory mass model3d] ParameterDeclarations BoundingBox Properties;
+    Performance [maxSpeed maxAcceleration maxAccelerationRate maxDeceleration maxDecelerationRate];
     BoundingBox [] Center Dimensions;
     Center [x y z];
     Dimensions [height length width];

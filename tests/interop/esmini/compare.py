@@ -3,7 +3,7 @@
 Arguments: the program, esmini, the number of variations of each file of variations, and folders that hold `.xosc` files. Each file that
 avastra imports, with each of the chosen variations, is played by both with an ego vehicle that keeps its speed (`blind.py`). Says for each
 by how much the middles of all others differ: the part of the ticks within 0.3 m, the greatest difference, and how far apart in time they
-begin to do something (the speed has changed by 0.5 m/s, or the place across the first heading by 0.3 m). Compared is up to the first
+begin to do something (the speed has changed by 0.2 m/s, or the place across the first heading changes by 0.02 m/s). Compared is up to the first
 contact of the ego vehicle, because a contact moves nobody in esmini, and as long as the ego vehicles are within 0.5 m of each other.
 """
 
@@ -23,7 +23,9 @@ DURATION_S = 30.0
 
 
 def identifier(name):
-    own = re.sub(r"[^A-Za-z0-9]", "_", name).strip("_").lower()
+    """What the import calls an entity."""
+    own = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name)
+    own = re.sub(r"[^A-Za-z0-9]", "_", own).strip("_").lower()
     return own if own[:1].isalpha() else f"s_{own}"
 
 
@@ -127,11 +129,13 @@ def begins(way, last):
     """The tick in which somebody begins to do something."""
     ticks = sorted(tick for tick in way if tick <= last)
     x, y, speed, heading = way[ticks[0]]
+    was = 0.0
     for tick in ticks:
         now = way[tick]
         across = -(now[0] - x) * math.sin(heading) + (now[1] - y) * math.cos(heading)
-        if abs(now[2] - speed) > 0.5 or abs(across) > 0.3:
+        if abs(now[2] - speed) > 0.2 or abs(across - was) > 0.02 * STEP_S:
             return tick
+        was = across
     return None
 
 
@@ -187,11 +191,14 @@ def main():
                 if found is None:
                     continue
                 _, within, count, worst, late, until_s = found
-                part = within / count if count else 1.0
+                if count == 0:
+                    print(f"  -    {name}: nobody to compare", flush=True)
+                    continue
+                part = within / count
                 is_good = part >= 0.95 and late[0] <= 0.1
                 good, all_files = good + is_good, all_files + 1
                 print(f"  {'ok' if is_good else 'NOT'}  {name}: {part:.1%} of {count} within 0.3 m, at most {worst[0]:.2f} m ({worst[1]}); "
-                      f"begins {late[0]:.2f} s apart ({late[1]}); up to {until_s:.1f} s", flush=True)
+                      f"they begin {late[0]:.2f} s apart ({late[1]}); up to {until_s:.1f} s", flush=True)
     print(f"{good} of {all_files} drive alike")
 
 
