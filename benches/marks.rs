@@ -320,6 +320,7 @@ impl Attached {
 
 fn run(space: Arc<Space>) -> Run {
     let settings = RunSettings {
+        rows: 0,
         replays: 0,
         keep: 0,
         avastra: String::new(),

@@ -214,7 +214,7 @@ fn examples_text(command: &str) -> String {
 }
 
 fn is_ready(entry: &agent::Entry) -> bool {
-    matches!(entry.kind, Kind::Ready(_))
+    matches!(entry.kind, Kind::Ready(_) | Kind::OneRow(_))
 }
 
 fn is_trained(entry: &agent::Entry) -> bool {

@@ -33,6 +33,7 @@ mod pack;
 mod parallel;
 mod policy;
 mod progress;
+mod protocol;
 mod render;
 mod replay;
 mod report;

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use avastra_campaign::run::{Asked, Database, DatabaseError, FoundIn, RunSettings, Units, recorded};
+use avastra_campaign::run::{
+    Asked, Database, DatabaseError, FoundIn, RunSettings, Units, main_parameters, recorded,
+};
 use avastra_campaign::study::StudyResults;
 use avastra_campaign::train::TrainSettings;
 use avastra_exchange::report::{self, Page, Scene, record, record_another};
@@ -38,7 +40,7 @@ pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failur
     let asked = arguments.ads.as_deref().map(|text| load::asked(Some(text))).transpose()?;
     let is_folder = matches!(arguments.paths.as_slice(), [directory] if directory.is_dir());
     let found = match arguments.paths.as_slice() {
-        [directory] if directory.is_dir() => of_directory(output, directory)?,
+        [directory] if directory.is_dir() => of_directory(output, directory, &arguments.by)?,
         files => of_files(files)?,
     };
     let (files, left_out) = chosen(&found, arguments.most as usize);
@@ -144,7 +146,7 @@ fn of_files(paths: &[PathBuf]) -> Result<Found, Failure> {
 }
 
 /// A run, a training, a study, an estimate, or a folder of scenarios.
-fn of_directory(output: &Output, directory: &Path) -> Result<Found, Failure> {
+fn of_directory(output: &Output, directory: &Path, by: &[String]) -> Result<Found, Failure> {
     let mut found = Found { title: title(&[directory.to_owned()]), ..Found::default() };
     for folder in FOLDERS {
         let folder = directory.join(folder);
@@ -155,7 +157,7 @@ fn of_directory(output: &Output, directory: &Path) -> Result<Found, Failure> {
     let settings = |command: &str| directory.join(command).with_extension("yaml");
     let mut remarks = Vec::new();
     if settings("run").is_file() {
-        remarks = of_run(output, directory, &load::text(&settings("run"))?, &mut found)?;
+        remarks = of_run(output, directory, &load::text(&settings("run"))?, by, &mut found)?;
     } else if settings("study").is_file() {
         if run_directory::lost(&directory.join("study.db")).is_some() {
             return Err(without_results(directory, "study", None));
@@ -216,6 +218,7 @@ fn of_run(
     output: &Output,
     directory: &Path,
     settings: &str,
+    asked: &[String],
     found: &mut Found,
 ) -> Result<Vec<String>, Failure> {
     #[derive(serde::Deserialize)]
@@ -266,12 +269,36 @@ fn of_run(
         results => results.map_err(unread)?,
     };
     let results: Option<Value> = results.and_then(|text| serde_json::from_str(&text).ok());
-    found.overview = report::of_run(&database, table.as_ref(), settings, results.as_ref()).map_err(unread)?;
+    let by = pairs(asked, &database, settings).map_err(unread)?;
+    let (table, results) = (table.as_ref(), results.as_ref());
+    found.overview = report::of_run(&database, table, settings, results, &by).map_err(unread)?;
+    let maps = found.overview["heat"].as_array().map_or(0, Vec::len);
+    if maps < by.len() {
+        remarks.push("no action has some of the parameters of `--by`: they are left out".to_owned());
+    }
     let groups = database.groups().map_err(unread)?;
     let name = |road: &str, episode: i64| format!("{road}_{episode:04}");
     found.examples = groups.iter().map(|group| name(&group.road, group.episode)).collect();
     found.worst = database.found().map_err(unread)?.iter().map(FoundIn::name).collect();
     Ok(remarks)
+}
+
+/// The pairs of parameters by which maps are drawn: those that are asked for, or the main ones of a protocol.
+fn pairs(
+    asked: &[String],
+    database: &Database,
+    settings: &str,
+) -> Result<Vec<(String, String)>, DatabaseError> {
+    let pair = |text: &str| {
+        let (down, across) = text.split_once(',').unwrap_or((text, ""));
+        (down.trim().to_owned(), across.trim().to_owned())
+    };
+    let is_protocol = serde_yaml::from_str::<RunSettings>(settings).is_ok_and(|run| run.rows > 0);
+    if !asked.is_empty() || !is_protocol {
+        return Ok(asked.iter().map(|text| pair(text)).collect());
+    }
+    let main = main_parameters(&database.trials()?);
+    Ok(if main.is_empty() { Vec::new() } else { vec![pair(&main.join(","))] })
 }
 
 /// Says how many episodes a training lacks. If later ones are there, they learned from it, so it cannot be gone on with.

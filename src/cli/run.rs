@@ -29,7 +29,11 @@ use super::parallel::jobs;
 use super::policy::acting;
 use super::progress::now;
 use super::run_directory::{Player, Resumed};
-use super::{compile, conditions, load, merge, run_directory, shard};
+use super::{compile, conditions, load, merge, protocol, run_directory, shard};
+
+/// The agent that plays each row once, and what others play on each road if nobody asks for more or less.
+const EVERY_ROW: &str = "every-row";
+const EPISODES: u32 = 100;
 
 /// Largest number of critical scenarios, groups and refusal reasons that the summary lists.
 const NAMED_MAX: usize = 10;
@@ -56,7 +60,7 @@ impl Campaign for RunSettings {
 
 impl Cut for RunSettings {
     fn work(&self) -> Vec<Item> {
-        let episodes = self.roads.len() as i64 * i64::from(self.episodes);
+        let episodes = self.all_episodes() as i64;
         (0..episodes).map(|number| Item { cost: 1, units: number..number + 1 }).collect()
     }
 
@@ -146,6 +150,18 @@ fn play_all(
     if !requirements.is_empty() {
         output.say(&requirements_text(&requirements));
     }
+    let is_protocol = run.settings().rows > 0;
+    let trials = if is_protocol { directory.read(Database::trials)? } else { Vec::new() };
+    let tables = match is_protocol && is_over {
+        true => protocol::write_both(&directory.path, &trials)?.to_vec(),
+        false => Vec::new(),
+    };
+    if is_protocol {
+        output.say(&protocol::in_words(&trials));
+    }
+    if let [table, cases] = tables.as_slice() {
+        output.say(&format!("each row: {}, {}", table.display(), cases.display()));
+    }
     let never = Never::new(run.table(), &directory.read(Database::rows)?);
     output.say(&never.in_words(output.verbose));
     let critical = worst_first(directory.critical(output)?, &found);
@@ -173,7 +189,7 @@ fn play_all(
     cut_off(program).iter().for_each(|note| output.warn(note));
     output.result(serde_json::json!({
         "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups,
-        "requirements": requirements, "never": never, "critical": critical, "found": found, "kept": kept, "failures": failures, "reproducible": is_reproducible,
+        "requirements": requirements, "never": never, "critical": critical, "found": found, "kept": kept, "failures": failures, "trials": trials, "tables": tables, "reproducible": is_reproducible,
     }));
     share.end(output, directory, is_over, program)?;
     Ok(totals)
@@ -193,11 +209,12 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<Option<(Run, Direc
     let shard = shard::asked(output, arguments.shard.shard)?;
     let agent = policy.as_ref().map_or(&arguments.conditions.agent, |(_, policy)| &policy.name);
     let under_test = load::named(&arguments.under_test.ads)?;
-    let settings = conditions::settings(space, &arguments.conditions, agent, under_test, arguments.episodes)?;
+    let settings = conditions::settings(space, &arguments.conditions, agent, under_test, 0)?;
     let settings = RunSettings {
         causes: arguments.causes,
         replays: arguments.replays,
         keep: arguments.keep,
+        episodes: arguments.episodes.unwrap_or(if *agent == *EVERY_ROW { 1 } else { EPISODES }),
         ..settings
     };
     let settings = settings.started_unless(arguments.shard.dry_run);
@@ -337,7 +354,7 @@ fn heading(run: &Run, arguments: &RunArguments) -> String {
         run.space().path.display(),
         settings.agent,
         ads,
-        plural(settings.episodes as usize, "episode"),
+        plural(if settings.rows > 0 { run.episodes() } else { settings.episodes as usize }, "episode"),
         settings.roads.join(", "),
         settings.seed
     )

@@ -487,7 +487,7 @@ fn junit(suite: &str, cases: &[Case]) -> String {
 }
 
 /// Text as it may stand in an XML attribute; what XML cannot hold at all becomes U+FFFD.
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     let mut escaped = String::new();
     for letter in text.chars() {
         match letter {

@@ -117,7 +117,8 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, Direc
 
 /// The agent's settings: the preset that is asked for, as the configuration file changes it.
 fn settings(arguments: &TrainArguments) -> Result<Settings, Failure> {
-    let trained = agent::REGISTRY.iter().filter(|entry| !matches!(entry.kind, Kind::Ready(_)));
+    let trained =
+        agent::REGISTRY.iter().filter(|entry| !matches!(entry.kind, Kind::Ready(_) | Kind::OneRow(_)));
     let entry = agent::by_name(&arguments.agent).ok_or_else(|| {
         let known = listed(&trained.map(|entry| entry.name).collect::<Vec<_>>());
         Failure::usage(format!("no agent `{}` that learns: there are {known}", arguments.agent))

@@ -22,7 +22,7 @@ fn run_of(entry: &Entry, seed: u64) -> Run {
 /// A training of a few episodes on two roads, with a network of a few neurons where there is one.
 fn training(entry: &Entry, checkpoint: Option<(usize, &[u8])>) -> Option<Training> {
     let text = match entry.kind {
-        Kind::Ready(_) => return None,
+        Kind::Ready(_) | Kind::OneRow(_) => return None,
         Kind::Learning(_) => "learning_starts: 30\nupdates_per_step: 1\nhidden_units: [8]\nbatch_len: 8\n",
         Kind::Searching(_) => "",
     };
@@ -43,7 +43,8 @@ fn training(entry: &Entry, checkpoint: Option<(usize, &[u8])>) -> Option<Trainin
 
 #[test]
 fn an_agent_that_acts_at_once_replays_and_does_not_depend_on_the_workers() {
-    for entry in agent::REGISTRY.iter().filter(|entry| matches!(entry.kind, Kind::Ready(_))) {
+    for entry in agent::REGISTRY.iter().filter(|entry| matches!(entry.kind, Kind::Ready(_) | Kind::OneRow(_)))
+    {
         let run = run_of(entry, 5);
         let judged = |jobs| {
             let mut episodes: Vec<EpisodeSummary> = Vec::new();

@@ -31,6 +31,7 @@ mod motorway;
 mod pedestrians;
 mod policies;
 mod profiles;
+mod protocols;
 mod r157;
 mod references;
 mod report;

@@ -11,7 +11,7 @@ use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 use avastra_drivers::Selected;
 use avastra_drivers::external::{Attached, Program};
-use avastra_lang::model::{Road, RulesInForce, Space};
+use avastra_lang::model::{Reach, Road, Row, RulesInForce, Space};
 use avastra_lang::prove;
 use avastra_lang::syntax::listed;
 use avastra_search::agent::{Agent, Trial};
@@ -19,6 +19,7 @@ use avastra_search::mdp::ProcKind;
 use avastra_world::action::{ActionTable, Offer, Situation};
 use avastra_world::sim::{Scene, Start, TrafficProfile};
 
+use crate::run::offered::Offered;
 use crate::run::settings::RunError;
 use crate::run::summary::EpisodeSummary;
 
@@ -102,6 +103,21 @@ impl Arena {
         self.roads.len()
     }
 
+    /// Each road with each row that its rules let run there. Rules that are switched on or off may change that: then every
+    /// row is taken, and its refusals are told.
+    pub fn rows_on_roads(&self) -> Vec<(usize, usize)> {
+        let space = self.table.space();
+        let is_usual = self.rules == RulesInForce::by_default(space);
+        let runs = |row: &Row, road: usize| !is_usual || matches!(row.roads[road], Reach::Open(_));
+        let roads = self.roads.iter().enumerate();
+        roads
+            .flat_map(|(nth, (road, _))| {
+                let rows = space.rows.iter().filter(move |row| runs(row, *road));
+                rows.map(move |row| (nth, row.index))
+            })
+            .collect()
+    }
+
     /// The nth of the roads.
     pub fn road(&self, road: usize) -> &Road {
         &self.table.space().roads[self.roads[road].0]
@@ -158,6 +174,21 @@ pub fn choose(agent: &mut dyn Agent, moment: &Moment) -> (Choice, Array1<bool>) 
     let mut rng = exploration(moment);
     let chosen = agent.choose(moment.observation, all.view(), &mut rng);
     (chosen.map_or(Choice::Pass, |row| Choice::of(row, offer(row))), all)
+}
+
+/// Lets an agent choose that asks for one row alone.
+pub(crate) fn choose_only(
+    agent: &mut dyn Agent,
+    row: usize,
+    moment: &Moment,
+    offered: &mut Offered,
+) -> Choice {
+    let table = moment.setup().table;
+    let offer = table.offer(&situation(agent, moment), row);
+    offered.note_one(table.rows().len(), row, &offer);
+    let legal = Array1::from_shape_fn(table.rows().len(), |other| other == row && offer.is_ok());
+    let chosen = agent.choose(moment.observation, legal.view(), &mut exploration(moment));
+    chosen.map_or(Choice::Pass, |row| Choice::of(row, offer))
 }
 
 /// What each row would do now.

@@ -24,7 +24,7 @@ use crate::run::settled::{Units, WrittenScenario};
 use crate::run::summary::{EpisodeSummary, Finding};
 
 pub(crate) const LAYOUT: Layout = Layout {
-    version: 14,
+    version: 15,
     schema: || format!("{SCHEMA}{}", step_table()),
     unit: "episode",
     tables: &[
@@ -65,6 +65,7 @@ pub(crate) const LAYOUT: Layout = Layout {
     ],
 };
 
+/// `step.top_speed_mps` is the ego vehicle's greatest speed in the step before the first contact, NULL after it.
 /// `held` says what held the speed of the ego vehicle back, from the row's time to that of the next row. `offer`
 /// counts, per episode and row, the steps in which the row was legal (`reason` 0) or refused (other reasons); training
 /// writes nothing there. `breach.kept_by` has the careful drivers that keep the
@@ -519,6 +520,7 @@ fn step_table() -> String {
            episode INTEGER NOT NULL REFERENCES episode, step INTEGER NOT NULL, time_s REAL NOT NULL,
            action_row INTEGER, action TEXT, refused TEXT, states TEXT, proc REAL NOT NULL, reward REAL NOT NULL,
            ttc_s REAL, thw_s REAL, drac_mps2 REAL, required_mps2 REAL, rss_unsafe_s REAL,
+           top_speed_mps REAL,
            {}, PRIMARY KEY (episode, step)) STRICT;",
         states.join(", ")
     )
@@ -563,6 +565,7 @@ pub(crate) fn add_all(
             measured.map(|step| step.drac_mps2).into(),
             measured.map(|step| step.required_mps2).into(),
             measured.map(|step| step.rss_unsafe_s).into(),
+            summary.top_speeds_mps.get(index).copied().flatten().into(),
         ]);
         values.extend(step.state.iter().map(|&value| f64::from(value).into()));
         let places = vec!["?"; values.len()].join(", ");

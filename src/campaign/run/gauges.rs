@@ -26,6 +26,8 @@ pub struct Gauges {
     moments: Vec<(f64, Criticality)>,
     encroachment: Encroachment,
     hit: Vec<u32>,
+    /// Time (s) and speed (m/s) of the ego vehicle at every tick before the first contact.
+    speeds: Vec<(f64, f64)>,
     /// Ticks that count as [`Manners::speeding_s`] and [`Manners::astray_s`].
     speeding: u64,
     astray: u64,
@@ -34,6 +36,9 @@ pub struct Gauges {
 impl Gauges {
     /// Takes in a tick.
     pub fn note(&mut self, world: &World, contacts: &[Contact]) {
+        if self.hit.is_empty() {
+            self.speeds.push((world.time_s(), world.ego().speed_mps));
+        }
         self.hit.extend(contacts.iter().map(|contact| contact.obstacle));
         let mut now = Criticality::default();
         now.note(world, &|id| self.hit.contains(&id));
@@ -62,18 +67,32 @@ impl Gauges {
         Manners { speeding_s: self.speeding as f64 * DT_S, astray_s: self.astray as f64 * DT_S }
     }
 
+    /// The greatest speed of each step of the measured episode's log, m/s; `None` after the first contact.
+    pub fn top_speeds_mps(&self, log: &EpisodeLog) -> Vec<Option<f64>> {
+        let mut tops = vec![None; log.steps.len()];
+        for (time_s, speed_mps) in &self.speeds {
+            if let Some(step) = step_at(log, *time_s) {
+                tops[step] = Some(speed_mps.max(tops[step].unwrap_or(0.0)));
+            }
+        }
+        tops
+    }
+
     /// The most critical values of each step of the measured episode's log, and the least post-encroachment time,
     /// s.
     pub fn of_steps(&self, log: &EpisodeLog) -> (Vec<Criticality>, Option<f64>) {
         let mut steps = vec![Criticality::default(); log.steps.len()];
         for (time_s, moment) in &self.moments {
-            // The last tick of a period belongs to its own step, even if rounding puts it just after the next step
-            // began.
-            let after = log.steps.partition_point(|step| step.time_s + 1e-6 < *time_s);
-            if let Some(step) = after.checked_sub(1) {
+            if let Some(step) = step_at(log, *time_s) {
                 steps[step] = steps[step].and(moment);
             }
         }
         (steps, self.encroachment.least_s(&|id| self.hit.contains(&id)))
     }
+}
+
+/// The step in which a tick lies. The last tick of a period belongs to its own step, even if rounding puts it just after the next
+/// step began.
+fn step_at(log: &EpisodeLog, time_s: f64) -> Option<usize> {
+    log.steps.partition_point(|step| step.time_s + 1e-6 < time_s).checked_sub(1)
 }

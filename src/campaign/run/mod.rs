@@ -15,6 +15,7 @@ mod groups;
 mod offered;
 mod play;
 mod profile;
+mod protocol;
 mod sealed;
 mod settings;
 mod settled;
@@ -42,6 +43,7 @@ pub use profile::{
     trained_against,
 };
 pub(crate) use profile::{traffic_of, under_test};
+pub use protocol::{Ending, HeatMap, Tally, Trial, heat_map, main_parameters};
 pub use sealed::differences as settings_differences;
 pub use sealed::{DatabaseError, Layout};
 pub(crate) use sealed::{insert_row, query_all, settings_digest};

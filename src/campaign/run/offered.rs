@@ -35,6 +35,15 @@ impl Offered {
         }
     }
 
+    /// One step's offer of one of so many rows, where nobody asked for the others.
+    pub(super) fn note_one(&mut self, rows: usize, row: usize, offer: &Offer) {
+        self.rows.resize_with(rows, RowOffers::default);
+        match offer {
+            Ok(_) => self.rows[row].legal += 1,
+            Err(refusal) => self.rows[row].refused.push(refusal.clone()),
+        }
+    }
+
     /// Steps by row and reason; without a reason the row was legal.
     pub(super) fn steps(&self) -> BTreeMap<(usize, Option<String>), u32> {
         let mut steps = BTreeMap::new();

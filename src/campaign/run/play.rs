@@ -16,7 +16,7 @@ use avastra_lang::model::Space;
 use avastra_search::agent::{Agent, Kind, QPolicy};
 use avastra_world::action::ActionTable;
 
-use crate::run::arena::{Arena, carry_out, choose, legal, offers};
+use crate::run::arena::{Arena, carry_out, choose, choose_only, legal, offers};
 use crate::run::gauges::Gauges;
 use crate::run::offered::Offered;
 use crate::run::profile::{traffic_of, under_test};
@@ -24,14 +24,16 @@ use crate::run::settings::{RunError, RunSettings, agent_named, check_episodes};
 use crate::run::summary::EpisodeSummary;
 use crate::run::threads::on_threads;
 
-/// Makes the agent of an episode.
-type MakeAgent = dyn Fn() -> Box<dyn Agent> + Send + Sync;
+/// Makes the agent of an episode on the nth of the roads, for a row if it plays one.
+type MakeAgent = dyn Fn(usize) -> Box<dyn Agent> + Send + Sync;
 
 /// A run that is ready to play.
 pub struct Run {
     arena: Arena,
     settings: RunSettings,
     agent: Box<MakeAgent>,
+    /// A road and a row for each block of episodes, of an agent that plays each row.
+    plan: Vec<(usize, usize)>,
 }
 
 impl Run {
@@ -42,7 +44,13 @@ impl Run {
     /// twice, or a number of episodes that is not possible.
     pub fn new(table: ActionTable, settings: RunSettings) -> Result<Run, RunError> {
         match agent_named(&settings.agent)?.kind {
-            Kind::Ready(build) => Run::with_agent(table, settings, Box::new(build)),
+            Kind::Ready(build) => Run::with_agent(table, settings, Box::new(move |_| build())),
+            Kind::OneRow(build) => {
+                let mut run = Run::with_agent(table, settings, Box::new(build))?;
+                run.plan = run.arena.rows_on_roads();
+                run.settings.rows = u32::try_from(run.plan.len()).unwrap_or(u32::MAX);
+                if run.plan.is_empty() { Err(RunError::NoRow) } else { Ok(run) }
+            }
             Kind::Learning(_) | Kind::Searching(_) => Err(RunError::Untrained { name: settings.agent }),
         }
     }
@@ -52,7 +60,7 @@ impl Run {
     /// # Errors
     /// As [`Run::new`].
     pub fn with_policy(table: ActionTable, settings: RunSettings, policy: QPolicy) -> Result<Run, RunError> {
-        Run::with_agent(table, settings, Box::new(move || Box::new(policy.clone())))
+        Run::with_agent(table, settings, Box::new(move |_| Box::new(policy.clone())))
     }
 
     fn with_agent(table: ActionTable, settings: RunSettings, agent: Box<MakeAgent>) -> Result<Run, RunError> {
@@ -68,7 +76,7 @@ impl Run {
         if settings.causes && !has_modules {
             return Err(RunError::NoModules(oracle::NoModules { ads: arena.ads_name() }));
         }
-        Ok(Run { arena, settings, agent })
+        Ok(Run { arena, settings, agent, plan: Vec::new() })
     }
 
     pub fn table(&self) -> &ActionTable {
@@ -90,18 +98,21 @@ impl Run {
 
     /// Number of episodes on all roads together.
     pub fn episodes(&self) -> usize {
-        self.arena.roads() * self.settings.episodes as usize
+        self.settings.all_episodes()
     }
 
     /// Plays one episode; numbers run through the roads one after another.
     pub fn episode(&self, number: usize) -> EpisodeLog {
-        self.played(&self.setup(number)).0
+        self.played_by(&self.setup(number), self.agent_of(number)).0
     }
 
     /// Plays an episode of a setup with a fresh agent. Returns the log, and the time that the agent simulated in
     /// branches, s.
     pub fn played(&self, setup: &episode::Setup) -> (EpisodeLog, f64) {
-        let mut agent = self.agent();
+        self.played_by(setup, self.agent())
+    }
+
+    fn played_by(&self, setup: &episode::Setup, mut agent: Box<dyn Agent>) -> (EpisodeLog, f64) {
         agent.begin();
         let mut choose = |moment: &Moment| choose(agent.as_mut(), moment).0;
         let log = episode::run(setup, &mut choose, &mut |_, _, _| {});
@@ -110,7 +121,7 @@ impl Run {
 
     /// Plays one episode and judges its collisions.
     pub fn judged(&self, number: usize) -> (EpisodeSummary, EpisodeLog) {
-        self.judged_by(number, (self.agent)().as_mut())
+        self.judged_by(number, self.agent_of(number).as_mut())
     }
 
     /// As [`Run::judged`], with another agent than the run's own.
@@ -119,6 +130,9 @@ impl Run {
         let mut gauges = Gauges::default();
         let mut offered = Offered::default();
         let mut choose = |moment: &Moment| {
+            if let Some(row) = agent.only() {
+                return choose_only(agent, row, moment, &mut offered);
+            }
             let offers = offers(agent, moment);
             offered.note(&offers);
             let legal = legal(&offers);
@@ -134,6 +148,7 @@ impl Run {
             summary.find_recurrence(&setup, &script, &log, self.settings.replays);
         }
         (summary.criticality, summary.pet_s) = gauges.of_steps(&log);
+        summary.top_speeds_mps = gauges.top_speeds_mps(&log);
         summary.manners = gauges.manners();
         summary.offered = offered;
         summary.branched_s = agent.branched_s();
@@ -156,7 +171,14 @@ impl Run {
     /// Everything that the nth episode is made of but the choices.
     pub fn setup(&self, number: usize) -> episode::Setup<'_> {
         let seed = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
-        self.setup_of(number / self.settings.episodes as usize, seed)
+        let block = number / self.settings.episodes as usize;
+        self.setup_of(self.plan.get(block).map_or(block, |(road, _)| *road), seed)
+    }
+
+    /// A fresh agent for the nth episode.
+    fn agent_of(&self, number: usize) -> Box<dyn Agent> {
+        let block = number / self.settings.episodes as usize;
+        (self.agent)(self.plan.get(block).map_or(0, |(_, row)| *row))
     }
 
     /// An episode of any seed on the nth of the roads.
@@ -168,7 +190,7 @@ impl Run {
 
     /// A fresh agent for one episode.
     pub fn agent(&self) -> Box<dyn Agent> {
-        (self.agent)()
+        (self.agent)(0)
     }
 }
 

@@ -39,8 +39,11 @@ pub struct RunSettings {
     /// The policy that the agent follows, from the run directory, and its digest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub policy: Option<PolicyReference>,
-    /// Episodes on each road.
+    /// Episodes on each road; of an agent that plays each row, those of each row on a road.
     pub episodes: u32,
+    /// How many rows on roads such an agent plays; 0 of others.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub rows: u32,
     pub seed: u64,
     /// Vehicles of ambient traffic.
     #[serde(default)]
@@ -66,7 +69,17 @@ pub struct RunSettings {
     pub avoidability: AvoidabilitySettings,
 }
 
+fn is_zero(count: &u32) -> bool {
+    *count == 0
+}
+
 impl RunSettings {
+    /// Number of episodes on all roads together.
+    pub fn all_episodes(&self) -> usize {
+        let times = if self.rows > 0 { self.rows as usize } else { self.roads.len() };
+        times * self.episodes as usize
+    }
+
     /// A run on all roads of a space against the default driving system, with every option off. The caller
     /// changes what it wants otherwise.
     pub fn new(space: &Space, agent: &str, episodes: u32, seed: u64) -> RunSettings {
@@ -82,6 +95,7 @@ impl RunSettings {
             agent: agent.to_owned(),
             policy: None,
             episodes,
+            rows: 0,
             seed,
             ambient: 0,
             traffic: None,
@@ -119,6 +133,10 @@ pub enum RunError {
     Untrained { name: String },
     #[error("`{name}` has nothing to learn: `avastra run --agent {name}` plays it")]
     Unteachable { name: String },
+    #[error("`{name}` plays each row of a table once: `avastra run --agent {name}` does so")]
+    OneRow { name: String },
+    #[error("no row can run on these roads: `avastra check --audit` says which rule forbids each")]
+    NoRow,
     #[error("the checkpoint is not of a training with such settings: begin a new one")]
     Checkpoint,
     #[error(transparent)]

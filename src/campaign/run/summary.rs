@@ -20,6 +20,8 @@ pub struct EpisodeSummary {
     pub breached: Vec<Breached>,
     /// Measures of danger for each step; empty if the episode was not measured.
     pub criticality: Vec<Criticality>,
+    /// The ego vehicle's greatest speed in each step, m/s, until its first contact; empty if the episode was not measured.
+    pub top_speeds_mps: Vec<Option<f64>>,
     /// Least post-encroachment time over the obstacles that were not hit, s; `None` above 5 s.
     pub pet_s: Option<f64>,
     /// How the ego vehicle kept to limit and lane; zeros if the episode was not measured.

@@ -257,6 +257,9 @@ fn agent_settings(
             }
             (file.repeats, None)
         }
+        Kind::OneRow(_) => {
+            return Err(StudyError::Agent { label, error: RunError::OneRow { name: file.name } });
+        }
         Kind::Learning(_) | Kind::Searching(_) => {
             if file.repeats.is_some() {
                 return Err(StudyError::Learning { label, name: file.name });

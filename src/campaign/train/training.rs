@@ -316,7 +316,7 @@ fn experiences(
 /// Looks everything up that the settings name.
 fn prepared(table: ActionTable, settings: &TrainSettings) -> Result<(Arena, Arc<Rows>), RunError> {
     check_episodes(settings.episodes)?;
-    if matches!(agent_named(&settings.agent)?.kind, Kind::Ready(_)) {
+    if matches!(agent_named(&settings.agent)?.kind, Kind::Ready(_) | Kind::OneRow(_)) {
         return Err(RunError::Unteachable { name: settings.agent.clone() });
     }
     let table = with_period(table, settings.hyperparameters.observation_period_s());

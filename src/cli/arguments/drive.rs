@@ -71,9 +71,9 @@ pub struct RunArguments {
     /// Which face of the policy acts: its network, or the rules distilled from it.
     #[arg(long, requires = "policy", default_value = "network", value_parser = one_of::<Face>(["network", "rules"]))]
     pub face: Face,
-    /// Episodes on each road.
-    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=i64::from(avastra_campaign::run::EPISODES_MAX)))]
-    pub episodes: u32,
+    /// Episodes on each road, of `every-row` of each row on each [default: 100, of `every-row` 1].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(avastra_campaign::run::EPISODES_MAX)))]
+    pub episodes: Option<u32>,
     /// Say of each counted collision which module of the driving system is at fault; takes some twenty
     /// replays for each.
     #[arg(long)]

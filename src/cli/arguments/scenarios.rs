@@ -168,6 +168,10 @@ pub struct ReportArguments {
     /// Another driving system, whose drives are shown beside: a name, a profile, or a command as `avastra run --ads` takes it.
     #[arg(long, value_name = "NAME|FILE|COMMAND", value_parser = Named::ADS)]
     pub ads: Option<String>,
+    /// Heat maps of how actions ended by two parameters (`road` is one, too); may be given several times. A run of `every-row` has
+    /// one by its two main parameters without it.
+    #[arg(long, value_name = "PARAMETER[,PARAMETER]")]
+    pub by: Vec<String>,
     /// Scenarios to show at most; one of each kind of failure comes first.
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub most: u32,

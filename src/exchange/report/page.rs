@@ -39,6 +39,7 @@ const MODULES: &[&str] = &[
     include_str!("page/charts.js"),
     include_str!("page/list.js"),
     include_str!("page/coverage.js"),
+    include_str!("page/heat.js"),
     include_str!("page/study.js"),
     include_str!("page/estimate.js"),
     include_str!("page/overview.js"),

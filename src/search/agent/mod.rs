@@ -4,7 +4,7 @@
 //! [`Observation`](crate::mdp::Observation) and the mask of rows that the rules allow, never the world.
 //! [`REGISTRY`] has every agent by name.
 //!
-//! - `random`, `space-filling` and `greedy` need no training.
+//! - `random`, `space-filling` and `greedy` need no training; `every-row` plays each row once.
 //! - [`Trainable`] agents take in a [`Trajectory`] when an episode has ended and has been judged.
 //! - The [`Learner`] is deep Q-learning; [`improve`] is one update. `exploration` says how often it chooses at random,
 //!   `payment` what a step earns, `n_step` makes transitions of an episode, `replay` keeps them, `network` computes
@@ -25,6 +25,7 @@ mod greedy;
 mod learner;
 mod n_step;
 mod network;
+mod one_row;
 mod payment;
 mod presets;
 mod q_policy;

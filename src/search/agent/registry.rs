@@ -12,7 +12,7 @@ use super::branch::Branch;
 use super::presets::Preset;
 use super::search::{AvFuzzerSettings, BanditSettings, ConstantSettings, MapElitesSettings};
 use super::settings::{Settings, SettingsError, changed};
-use super::{greedy, presets, random, space_filling};
+use super::{greedy, one_row, presets, random, space_filling};
 
 /// Chooses rows of the action table.
 pub trait Agent: Send {
@@ -40,6 +40,11 @@ pub trait Agent: Send {
     /// drawn, and all others pass for legal.
     fn looks_at_mask(&self) -> bool {
         true
+    }
+
+    /// The one row that it may choose, if it asks nothing about the others.
+    fn only(&self) -> Option<usize> {
+        None
     }
 
     /// A step begins: the seed for its draws, or `None` if they come from the episode's own.
@@ -81,6 +86,8 @@ pub struct Entry {
 pub enum Kind {
     /// It can act at once: a fresh one for each episode.
     Ready(fn() -> Box<dyn Agent>),
+    /// It plays a row of the table: a fresh one for each episode and row.
+    OneRow(fn(usize) -> Box<dyn Agent>),
     /// It must be trained: its presets, the default first. See [`super::Learner`].
     Learning(&'static [Preset]),
     /// It searches over many episodes, and what it found can act: how its settings are made from changes by name.
@@ -109,6 +116,11 @@ pub const REGISTRY: &[Entry] = &[
         name: "space-filling",
         summary: "random, but spread evenly over the rows and their drawn values: a Latin hypercube in each episode",
         kind: Kind::Ready(|| Box::new(space_filling::SpaceFilling::default())),
+    },
+    Entry {
+        name: "every-row",
+        summary: "each row once on each road on which its rules let it run, in an episode of its own: a protocol",
+        kind: Kind::OneRow(|row| Box::new(one_row::OneRow::new(row))),
     },
     Entry {
         name: "ddqn",
@@ -188,6 +200,7 @@ mod tests {
         let rows = || Arc::new(Rows { allowed: vec![true; ROWS], environment: vec![false; ROWS] });
         match entry.kind {
             Kind::Ready(build) => vec![(build(), entry.name != "random-raw")],
+            Kind::OneRow(build) => vec![(build(1), true)],
             Kind::Learning(presets) => {
                 let learner = |preset: &Preset| -> (Box<dyn Agent>, bool) {
                     let settings = (preset.settings)();
@@ -231,6 +244,10 @@ mod tests {
                 assert!(choices(1).iter().flatten().all(Option::is_none));
                 continue;
             }
+            if entry.name == "every-row" {
+                assert_eq!(choices(1)[0].iter().flatten().collect::<Vec<_>>(), [&1], "once");
+                continue;
+            }
             assert!(choices(1).iter().flatten().all(Option::is_some), "{}", entry.name);
             // A constant row may be the same for two seeds, but not for all.
             let others: Vec<Vec<Vec<Option<usize>>>> = (2..10).map(choices).collect();
@@ -264,7 +281,7 @@ mod tests {
                 Kind::Learning(_) => {
                     "learning_starts: 32\nreplay_capacity: 60\nrandom_decay: 0.05\nhidden_units: [16]\naverage_decay: 0.9"
                 }
-                Kind::Ready(_) | Kind::Searching(_) => "",
+                Kind::Ready(_) | Kind::OneRow(_) | Kind::Searching(_) => "",
             };
             let Some(settings) = Settings::from_yaml(entry, None, text) else { continue };
             let settings = settings.unwrap();

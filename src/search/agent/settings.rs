@@ -93,7 +93,7 @@ impl Settings {
         let no_presets =
             |name: &str| Err(SettingsError::Text(format!("no preset `{name}`: `{}` has none", entry.name)));
         match (&entry.kind, preset) {
-            (Kind::Ready(_), _) => None,
+            (Kind::Ready(_) | Kind::OneRow(_), _) => None,
             (Kind::Learning(presets), _) => Some(from_preset(presets, preset, text)),
             (Kind::Searching(_), Some(name)) => Some(no_presets(name)),
             (Kind::Searching(read), None) => Some(lines(text).and_then(read)),

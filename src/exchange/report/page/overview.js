@@ -3,6 +3,7 @@ import { el, refill, table } from "./dom.js";
 import { curve } from "./charts.js";
 import { coverage } from "./coverage.js";
 import { estimate } from "./estimate.js";
+import { heat } from "./heat.js";
 import { showList } from "./list.js";
 import { linkOf, nameOf } from "./link.js";
 import { study } from "./study.js";
@@ -22,6 +23,7 @@ export function showOverview(place, data, missing = null) {
     compared(data),
     data.remarks.map((remark) => el("p", { class: "warning" }, remark)),
     overview && results(overview),
+    overview && heat(overview),
     scenarios.length > 0 &&
       el("section", { "aria-labelledby": "h-list" }, el("h2", { id: "h-list" }, "Scenarios"), list),
     scenarios.length === 0 && ["run", "training"].includes(overview?.kind) && el("p", {}, nothingShown(overview)),

@@ -1,0 +1,67 @@
+// What came of actions by the values of their parameters, as the maps of a protocol: green where the ego vehicle kept clear, red where it
+// hit at nearly the speed before.
+import { el } from "./dom.js";
+import { figure, plural } from "./words.js";
+
+/** How an action ends, in the order in which the counts come. */
+const HEAT_ENDINGS = ["avoided", "near miss", "mitigated", "hit"];
+const HEAT_SIGNS = ["●", "◔", "◑", "○"];
+
+/** A section with a map for each pair of parameters; nothing without one. */
+export function heat(overview) {
+  const maps = overview.heat ?? [];
+  if (maps.length === 0) return null;
+  return el(
+    "section",
+    { "aria-labelledby": "h-heat" },
+    el("h2", { id: "h-heat" }, "By parameters"),
+    el(
+      "p",
+      { class: "legend" },
+      HEAT_ENDINGS.map((ending, at) => [el("span", { class: `heat-${at}` }, `${HEAT_SIGNS[at]} ${ending}`), " "]),
+      "· a near miss came within 1.5 s of a contact; a mitigated contact was at least 5 km/h slower than the speed before · with the " +
+        "mean speed at contacts",
+    ),
+    maps.map(heatMap),
+  );
+}
+
+function heatMap({ down, across, rows, columns, cells }) {
+  const head = el(
+    "tr",
+    {},
+    el("th", { scope: "col" }, across ? `${down} ↓ ${across} →` : down),
+    columns.map((column) => el("th", { scope: "col" }, column || "all")),
+  );
+  const line = (label, at) => el("tr", {}, el("th", { scope: "row" }, label), cells[at].map(heatCell));
+  const what = across ? `By ${down} and ${across}` : `By ${down}`;
+  return el(
+    "div",
+    { class: "scroll", tabindex: "0", role: "region", "aria-label": what },
+    el(
+      "table",
+      { class: "heat" },
+      el("caption", {}, `${what}.`),
+      el("thead", {}, head),
+      el("tbody", {}, rows.map(line)),
+    ),
+  );
+}
+
+/** A cell has the colour of its worst ending, and says all of them. */
+function heatCell(tally) {
+  if (!tally) return el("td", {}, "–");
+  const { endings, impact_mps: impact, reduction_mps: reduction, breached } = tally;
+  const all = endings.reduce((sum, count) => sum + count, 0);
+  const worst = endings.findLastIndex((count) => count > 0);
+  const told = HEAT_ENDINGS.map((ending, at) => endings[at] > 0 && `${endings[at]} ${ending}`).filter(Boolean);
+  const speeds = impact === null ? null : `${figure(impact * 3.6, "km/h", 0)} (−${figure(reduction * 3.6, "", 0)})`;
+  const title = [`${plural(all, "trial")}: ${told.join(", ")}`, breached > 0 && `${breached} with a breach`];
+  const text = all === 1 ? HEAT_SIGNS[worst] : endings.map((count, at) => count > 0 && `${HEAT_SIGNS[at]} ${count}`).filter(Boolean).join(" ");
+  return el(
+    "td",
+    { class: `heat-${worst}`, title: title.filter(Boolean).join("; ") },
+    text,
+    speeds && el("span", { class: "why" }, speeds),
+  );
+}

@@ -1,0 +1,105 @@
+//! `run --agent every-row`: each row of a space once, with its tables and its page.
+
+use std::path::Path;
+
+use crate::command::{avastra, done, outcome};
+
+/// A file of variations of another tool, which is a space of twelve rows on six roads.
+const SPEEDS: &str = "tests/cases/imports/crossing_speeds.xosc";
+
+fn space(folder: &Path) -> String {
+    let folder = folder.display().to_string();
+    done(&["import", "--out", &folder, SPEEDS]);
+    format!("{folder}/crossing_speeds.ava")
+}
+
+fn read(folder: &Path, name: &str) -> String {
+    std::fs::read_to_string(folder.join(name)).expect("it was written")
+}
+
+#[test]
+fn each_row_is_played_once_whoever_plays_it() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let space = space(scratch.path());
+    let run = |name: &str, more: &[&str]| {
+        let out = scratch.path().join(name);
+        let told = out.display().to_string();
+        let wanted = ["run", &space, "--agent", "every-row", "--replays", "0", "--out", &told];
+        (done(&[&wanted, more].concat()), out)
+    };
+    let (said, one) = run("one", &["--jobs", "1"]);
+    assert!(said.contains("protocol: ") && said.contains("each of the 12 rows was carried out"), "{said}");
+    let (_, two) = run("two", &["--jobs", "2"]);
+    let table = read(&one, "protocol.csv");
+    assert_eq!(table, read(&two, "protocol.csv"));
+    let lines: Vec<&str> = table.lines().collect();
+    assert_eq!(lines.len(), 13, "{table}");
+    assert!(
+        lines[0].starts_with("episode,road,action,ego_kmh,walker_kmh,met_m,ending,before_kmh"),
+        "{table}"
+    );
+    // The row's speed is that of its road.
+    for line in &lines[1..] {
+        let cells: Vec<&str> = line.split(',').collect();
+        assert_eq!(cells[1], format!("at_{}_{}", cells[3], cells[5]), "{line}");
+        let before_kmh: f64 = cells[7].parse().expect("a speed");
+        let ego_kmh: f64 = cells[3].parse().expect("a speed");
+        assert!((before_kmh - ego_kmh).abs() < 2.0, "{line}");
+    }
+    let cases = read(&one, "protocol.xml");
+    let cases = roxmltree::Document::parse(&cases).expect("it is well-formed");
+    assert_eq!(cases.descendants().filter(|node| node.has_tag_name("testcase")).count(), 12);
+    // In pieces it comes to the same.
+    let pieces = ["1/2", "2/2"].map(|shard| {
+        let (_, out) = run(&shard.replace('/', "of"), &["--shard", shard]);
+        out.display().to_string()
+    });
+    let whole = scratch.path().join("whole");
+    let told = whole.display().to_string();
+    done(&["merge", &pieces[0], &pieces[1], "--out", &told]);
+    assert_eq!(table, read(&whole, "protocol.csv"));
+    let (_, twice) = run("twice", &["--episodes", "2"]);
+    assert_eq!(read(&twice, "protocol.csv").lines().count(), 25);
+}
+
+#[test]
+fn a_page_has_heat_maps_by_parameters() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let space = space(scratch.path());
+    let out = scratch.path().join("run").display().to_string();
+    done(&["run", &space, "--agent", "every-row", "--replays", "0", "--out", &out]);
+    let page = |more: &[&str]| {
+        let said = done(&[&["report", &out], more].concat());
+        (said, read(Path::new(&out), "report.html"))
+    };
+    let (_, own) = page(&[]);
+    let has = |page: &str, wanted: &[&str]| wanted.iter().all(|wanted| page.contains(wanted));
+    assert!(has(&own, &[r#""across":"met_m""#, r#""down":"ego_kmh""#]), "its main parameters");
+    let (_, asked) = page(&["--by", "walker_kmh,ego_kmh", "--by", "road"]);
+    assert!(has(&asked, &[r#""rows":["5","8"]"#, r#""columns":["25","30","35"]"#, r#""down":"road""#]));
+    let (_, none) = page(&["--by", "colour"]);
+    assert!(none.contains("no action has some of the parameters"), "it is said what is missing");
+    // Any run has them if they are asked for.
+    let other = scratch.path().join("random").display().to_string();
+    done(&[
+        "run",
+        "scenarios/avastra45.ava",
+        "--road",
+        "corner",
+        "--episodes",
+        "3",
+        "--replays",
+        "0",
+        "--out",
+        &other,
+    ]);
+    done(&["report", &other, "--by", "speed,vehicle"]);
+    assert!(has(&read(Path::new(&other), "report.html"), &[r#""down":"speed""#]));
+}
+
+#[test]
+fn what_plays_each_row_is_neither_trained_nor_estimated() {
+    let (status, _, stderr) =
+        outcome(&mut avastra(&["train", "scenarios/avastra45.ava", "--agent", "every-row"]));
+    assert!(status == 1 && stderr.contains("every-row"), "{status} {stderr}");
+}
