@@ -56,9 +56,20 @@ examples! {
     "wet_trucks",
 }
 
+/// The tests of a protocol, which share their roads.
+const CATALOGUE: [(&str, &str); 2] = [
+    ("euro_ncap_cars", include_str!("../../scenarios/catalogue/euro_ncap_cars.ava")),
+    ("euro_ncap_vulnerable", include_str!("../../scenarios/catalogue/euro_ncap_vulnerable.ava")),
+];
+const PROVING_GROUND: [(&str, &str); 2] = [
+    ("proving_ground.ava", include_str!("../../scenarios/catalogue/proving_ground.ava")),
+    ("roads/proving_ground.xodr", include_str!("../../scenarios/roads/proving_ground.xodr")),
+];
+
 /// What `--template` takes.
 pub fn template_names() -> PossibleValuesParser {
-    PossibleValuesParser::new(EXAMPLES.iter().map(|(name, ..)| *name))
+    let examples = EXAMPLES.iter().map(|(name, ..)| *name);
+    PossibleValuesParser::new(examples.chain(CATALOGUE.iter().map(|(name, _)| *name)))
 }
 
 /// Routes that are proposed on a map.
@@ -81,16 +92,27 @@ pub fn new(output: &Output, arguments: &NewArguments) -> Result<(), Failure> {
         output.tell(&path.display().to_string());
     }
     let space = for_shell(&paths[0].0);
-    output.tell(&format!("next: avastra check {space}, then avastra run {space} --episodes 20"));
+    let is_protocol = arguments.template.as_ref().is_some_and(|name| is_of_catalogue(name));
+    let how = if is_protocol { "--agent every-row" } else { "--episodes 20" };
+    output.tell(&format!("next: avastra check {space}, then avastra run {space} {how}"));
     let files: Vec<String> = paths.iter().map(|(path, _)| path.display().to_string()).collect();
     output.result(serde_json::json!({ "files": files }));
     Ok(())
 }
 
+fn is_of_catalogue(name: &str) -> bool {
+    CATALOGUE.iter().any(|(known, _)| *known == name)
+}
+
 /// An example with what it uses: names in the directory, and texts.
 fn example(name: &str) -> Vec<(String, String)> {
+    if let Some((_, own)) = CATALOGUE.iter().find(|(known, _)| *known == name) {
+        let ground =
+            PROVING_GROUND.map(|(name, text)| (name.to_owned(), text.replace("\"../roads/", "\"roads/")));
+        return [(format!("{name}.ava"), (*own).to_owned())].into_iter().chain(ground).collect();
+    }
     let found = EXAMPLES.iter().find(|(known, ..)| *known == name);
-    let (_, own, maps) = found.expect("clap takes the names of examples alone");
+    let (_, own, maps) = found.expect("clap takes the names of templates alone");
     // Here it stands beside what it uses.
     let mut files = vec![(format!("{name}.ava"), own.replace("use \"../", "use \""))];
     files.extend(SHIPPED.iter().chain(*maps).map(|(name, text)| ((*name).to_owned(), (*text).to_owned())));

@@ -35,6 +35,8 @@ pub struct Library<'f> {
     folder: String,
     maps: Read<RoadMap>,
     folders: Read<Vec<String>>,
+    /// The text of each entry that was asked for, and what is wrong with it; `None` if there is none.
+    entries: RefCell<BTreeMap<(String, String), Option<(Rc<str>, String)>>>,
 }
 
 impl core::fmt::Debug for Library<'_> {
@@ -45,7 +47,13 @@ impl core::fmt::Debug for Library<'_> {
 
 impl<'f> Library<'f> {
     pub fn new(files: &'f dyn Files, folder: String) -> Library<'f> {
-        Library { files, folder, maps: Read::default(), folders: Read::default() }
+        Library {
+            files,
+            folder,
+            maps: Read::default(),
+            folders: Read::default(),
+            entries: RefCell::default(),
+        }
     }
 
     /// A path of the scenario as one of the file that is imported.
@@ -67,6 +75,37 @@ impl<'f> Library<'f> {
 
     fn folder(&self, path: &str) -> Result<Rc<Vec<String>>, String> {
         once(&self.folders, path, || self.files.catalogues(&self.beside(path)))
+    }
+
+    /// The text of an entry of a catalogue in one of the folders, and what is wrong with it. Most variations ask for the same ones.
+    fn entry(
+        &self,
+        folders: &[(String, Rc<Vec<String>>)],
+        kinds: &[Kind],
+        catalogue: &str,
+        name: &str,
+    ) -> Option<(Rc<str>, String)> {
+        let places: Vec<&str> = folders.iter().map(|(path, _)| path.as_str()).collect();
+        let key = (format!("{kinds:?} {places:?}"), format!("{catalogue:?} {name:?}"));
+        if let Some(known) = self.entries.borrow().get(&key) {
+            return known.clone();
+        }
+        let texts = folders.iter().flat_map(|(_, texts)| texts.iter());
+        let found = texts.into_iter().find_map(|text| {
+            let document = avastra_road::well_formed(text).ok()?;
+            let is_named = |node: &Node, name: &str| node.attribute("name") == Some(name);
+            let list = document.descendants().find(|node| node.has_tag_name("Catalog"));
+            let list = list.filter(|node| is_named(node, catalogue))?;
+            let is_of_kind = |node: &Node| kinds.iter().any(|Kind(_, element)| node.has_tag_name(*element));
+            let found = children(list).find(|node| is_named(node, name) && is_of_kind(node))?;
+            let unknown = vocabulary::unknown(found);
+            let reason = unknown
+                .first()
+                .map_or(String::new(), |(node, reason)| format!("`{}`: {reason}", node.tag_name().name()));
+            Some((Rc::from(&text[found.range()]), reason))
+        });
+        self.entries.borrow_mut().insert(key, found.clone());
+        found
     }
 }
 
@@ -108,36 +147,28 @@ pub fn entry<T>(
         let name = source.named(one, "parameterRef")?;
         assigned.insert(name, source.text(one, "value")?);
     }
-    let mut texts = Vec::new();
+    let mut folders = Vec::new();
     for Kind(location, _) in kinds {
         let Some((mark, path)) = source.folders.get(*location).cloned() else { continue };
         match source.library.folder(&path) {
-            Ok(found) => texts.push(found),
+            Ok(found) => folders.push((path, found)),
             Err(reason) => return source.refuse(&mark, format!("`{path}`: {reason}")),
         }
     }
-    for text in texts.iter().flat_map(|texts| texts.iter()) {
-        let Ok(document) = avastra_road::well_formed(text) else { continue };
-        let is_named = |node: &Node, name: &str| node.attribute("name") == Some(name);
-        let list = document.descendants().find(|node| node.has_tag_name("Catalog"));
-        let Some(list) = list.filter(|node| is_named(node, &catalogue)) else { continue };
-        let is_meant = |node: &Node| {
-            is_named(node, &name) && kinds.iter().any(|Kind(_, element)| node.has_tag_name(*element))
-        };
-        let Some(found) = children(list).find(is_meant) else { continue };
-        let whose = format!("`{name}` of `{catalogue}`");
-        if let Some((node, reason)) = vocabulary::unknown(found).first() {
-            let element = node.tag_name().name();
-            return source.refuse(reference, format!("{whose}: `{element}`: {reason}"));
-        }
-        let parameters = match given(found, assigned) {
-            Ok(parameters) => parameters,
-            Err(reason) => return source.refuse(reference, format!("{whose}: {reason}")),
-        };
-        return source.within(reference, &whose, parameters, |source| read(source, found));
-    }
-    let kinds: Vec<String> = kinds.iter().map(|Kind(_, element)| format!("`{element}`")).collect();
-    source.refuse(reference, format!("no {} `{name}` in a catalogue `{catalogue}`", kinds.join(" or ")))
+    let whose = format!("`{name}` of `{catalogue}`");
+    let Some((text, reason)) = source.library.entry(&folders, kinds, &catalogue, &name) else {
+        let kinds: Vec<String> = kinds.iter().map(|Kind(_, element)| format!("`{element}`")).collect();
+        let reason = format!("no {} `{name}` in a catalogue `{catalogue}`", kinds.join(" or "));
+        return source.refuse(reference, reason);
+    };
+    let document = avastra_road::well_formed(&text).ok().filter(|_| reason.is_empty());
+    let Some(document) = document else { return source.refuse(reference, format!("{whose}: {reason}")) };
+    let found = document.root_element();
+    let parameters = match given(found, assigned) {
+        Ok(parameters) => parameters,
+        Err(reason) => return source.refuse(reference, format!("{whose}: {reason}")),
+    };
+    source.within(reference, &whose, parameters, |source| read(source, found))
 }
 
 /// The values of an entry's parameters: those that are assigned, and the defaults of the others.

@@ -534,9 +534,12 @@ fn any_road(space: &Space) -> String {
     }
 }
 
-/// One remark for each road on which some rows of an action are masked, which run on others.
+/// More roads on which an action is masked are told in one remark.
+const REMARKS_MAX: usize = 4;
+
+/// One remark for each road on which some rows of an action are masked, which run on others; one for all of many roads.
 fn report_masked(space: &Space, action: &ActionDef, left: &[&Row]) -> Vec<Diagnostic> {
-    let mut diagnostics = Vec::new();
+    let mut diagnostics: Vec<Diagnostic> = Vec::new();
     for (index, road) in space.roads.iter().enumerate() {
         let is_masked = |row: &&Row| matches!(row.roads[index], Reach::Dead { .. });
         let masked: Vec<&Row> = left.iter().copied().filter(is_masked).collect();
@@ -548,7 +551,15 @@ fn report_masked(space: &Space, action: &ActionDef, left: &[&Row]) -> Vec<Diagno
         let remark = Diagnostic::remark(code::MASKED, message).at(action.span, numbers(&masked));
         diagnostics.push(remark.note(reason.clone()));
     }
-    diagnostics
+    if diagnostics.len() <= REMARKS_MAX {
+        return diagnostics;
+    }
+    let of = space.roads.len();
+    let message =
+        format!("each row of `{}` is masked on some of the {of} roads, and runs on another", action.name);
+    let first = diagnostics.swap_remove(0).message;
+    let remark = Diagnostic::remark(code::MASKED, message).at(action.span, numbers(left));
+    vec![remark.note(format!("for one, {first}; `avastra table FILE --row N` says where a row runs"))]
 }
 
 /// `row 15`, `rows 15..27`, `rows 3, 7 and 9`.
