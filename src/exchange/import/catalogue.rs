@@ -26,6 +26,9 @@ pub const ENVIRONMENT: Kind = Kind("EnvironmentCatalog", "Environment");
 /// Catalogues within catalogues are read this deep.
 const DEPTH_MAX: usize = 8;
 
+/// The text of an entry, and what is wrong with it; empty if nothing is.
+type Entry = (Rc<str>, String);
+
 type Read<T> = RefCell<BTreeMap<String, Result<Rc<T>, String>>>;
 
 /// The files that a scenario names, as far as they were read.
@@ -35,8 +38,8 @@ pub struct Library<'f> {
     folder: String,
     maps: Read<RoadMap>,
     folders: Read<Vec<String>>,
-    /// The text of each entry that was asked for, and what is wrong with it; `None` if there is none.
-    entries: RefCell<BTreeMap<(String, String), Option<(Rc<str>, String)>>>,
+    /// Each entry that was asked for; `None` if there is none.
+    entries: RefCell<BTreeMap<(String, String), Option<Entry>>>,
 }
 
 impl core::fmt::Debug for Library<'_> {
@@ -84,7 +87,7 @@ impl<'f> Library<'f> {
         kinds: &[Kind],
         catalogue: &str,
         name: &str,
-    ) -> Option<(Rc<str>, String)> {
+    ) -> Option<Entry> {
         let places: Vec<&str> = folders.iter().map(|(path, _)| path.as_str()).collect();
         let key = (format!("{kinds:?} {places:?}"), format!("{catalogue:?} {name:?}"));
         if let Some(known) = self.entries.borrow().get(&key) {
