@@ -58,6 +58,8 @@ pub struct Dynamics {
     pub over: Over,
     /// The greatest rate of change, as a multiple of the mean one.
     pub peak: f64,
+    /// Whether the goal moves with another entity's from moment to moment.
+    pub is_continuous: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -178,7 +180,7 @@ fn dynamics(source: &mut Source, node: Node) -> Option<Dynamics> {
         _ => 1.0,
     };
     if shape == "step" {
-        return Some(Dynamics { over: Over::AtOnce, peak });
+        return Some(Dynamics { over: Over::AtOnce, peak, is_continuous: false });
     }
     let value = if dimension == "rate" {
         source.number(node, "value")?.abs()
@@ -194,7 +196,7 @@ fn dynamics(source: &mut Source, node: Node) -> Option<Dynamics> {
         "distance" => Over::Way(value),
         _ => Over::Time(value),
     };
-    Some(Dynamics { over, peak })
+    Some(Dynamics { over, peak, is_continuous: false })
 }
 
 fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<ActKind> {
@@ -208,10 +210,8 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<ActKind> {
             }
             let relative = source.required(target, "RelativeTargetSpeed")?;
             let (entity, value) = (source.text(relative, "entityRef")?, source.number(relative, "value")?);
-            if source.switch(relative, "continuous", false)? && !is_ego {
-                return source
-                    .refuse(relative, "a speed that follows another's from moment to moment is not read");
-            }
+            let is_continuous = source.switch(relative, "continuous", false)?;
+            let dynamics = Dynamics { is_continuous, ..dynamics };
             let speed = match source.text(relative, "speedTargetValueType")?.as_str() {
                 "delta" => Speed::More(entity, value),
                 "factor" => Speed::Times(entity, value),
@@ -241,14 +241,14 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<ActKind> {
             let node = source.required(action, "LaneOffsetActionDynamics")?;
             let shape = source.word(node, "dynamicsShape", &["linear", "cubic", "sinusoidal", "step"])?;
             let dynamics = match (shape, node.has_attribute("maxLateralAcc")) {
-                ("step", _) => Dynamics { over: Over::AtOnce, peak: 1.0 },
+                ("step", _) => Dynamics { over: Over::AtOnce, peak: 1.0, is_continuous: false },
                 (_, true) => {
                     let most_mps2 = source.amount(node, "maxLateralAcc")?;
                     source.refuse_if(most_mps2 == 0.0, node, "`maxLateralAcc` is 0: it never gets there")?;
                     // Kept for the way, which is not known here.
-                    Dynamics { over: Over::Rate(-most_mps2), peak: 1.0 }
+                    Dynamics { over: Over::Rate(-most_mps2), peak: 1.0, is_continuous: false }
                 }
-                _ => Dynamics { over: Over::Rate(1.0), peak: 1.0 },
+                _ => Dynamics { over: Over::Rate(1.0), peak: 1.0, is_continuous: false },
             };
             let target = source.required(action, "LaneOffsetTarget")?;
             if let Some(absolute) = element(target, "AbsoluteTargetLaneOffset") {

@@ -7,7 +7,7 @@ use super::said::Said;
 use super::scene::{Cast, Moving};
 use super::source::{Mark, Source};
 use super::story::Event;
-use super::trigger::{Condition, Pair, Trigger, When};
+use super::trigger::{Condition, Edge, Pair, Trigger, When};
 
 /// From the ego vehicle's rear axle to its front in avastra, m: what the language's `ego.front` is ahead of a file's reference point.
 const EGO_FRONT_M: f64 = 3.705;
@@ -18,6 +18,8 @@ const REACHED_MPS: f64 = 0.1;
 /// The words before a phase.
 #[derive(Debug, Clone, Default)]
 pub struct Begins {
+    /// What must come before.
+    pub first: Option<Said>,
     pub once: Option<Said>,
     /// s.
     pub held_s: f64,
@@ -55,6 +57,15 @@ impl Waiting<'_, '_> {
         let [all] = trigger.as_slice() else {
             let mut groups = Vec::new();
             for all in trigger {
+                for condition in all {
+                    let is_edge = match condition.edge {
+                        Edge::None => false,
+                        Edge::Rising => self.holds(source, condition)?,
+                        Edge::Falling | Edge::Either => true,
+                    };
+                    let reason = "what ceases to hold is read where there is one group of conditions";
+                    source.refuse_if(is_edge, &condition.mark, reason)?;
+                }
                 if let Some(condition) = all.iter().find(|condition| condition.delay_s > 0.0) {
                     return source.refuse(&condition.mark, "a delay is read where there is one condition");
                 }
@@ -79,22 +90,31 @@ impl Waiting<'_, '_> {
             return source.refuse(&delayed.mark, "a delay is read where there is one condition");
         }
         let mut parts = Vec::new();
+        let mut first = Vec::new();
         for condition in others {
             if condition.kind == When::Always {
                 continue;
             }
-            parts.push(self.part(source, condition)?);
+            let part = self.part(source, condition)?;
+            let not = Said::text("not (").then(part.clone()).and(")");
+            // An edge needs the other side before it.
+            let (before, then) = match (condition.edge, self.holds(source, condition)?) {
+                (Edge::None, _) | (Edge::Rising, false) => (None, part),
+                (Edge::Either, false) => (None, part),
+                (Edge::Rising, true) => (Some(not), part),
+                (Edge::Falling, false) => (Some(part), not),
+                (Edge::Falling | Edge::Either, true) => (None, not),
+            };
+            first.extend(before);
+            parts.push(then);
         }
+        begins.first = (!first.is_empty()).then(|| Said::joined(first, " and "));
         begins.once = (!parts.is_empty()).then(|| Said::joined(parts, " and "));
         Some(begins)
     }
 
     fn part(&self, source: &mut Source, condition: &Condition) -> Option<Said> {
         let mark = &condition.mark;
-        if condition.is_rising && self.holds(source, condition)? {
-            let reason = "it holds from the beginning, and so never begins to hold as `rising` asks";
-            return source.refuse(mark, reason);
-        }
         match &condition.kind {
             When::Always => Some(Said::text("elapsed >= ").number(0.0, "s")),
             When::Never => source.refuse(mark, "it never comes"),
@@ -140,7 +160,37 @@ impl Waiting<'_, '_> {
                 let (of, to) = (self.who(source, mark, of)?, self.who(source, mark, to)?);
                 Some(Said::text(format!("{of}.speed - {to}.speed {} ", sign(*is_less))).number(*mps, "m/s"))
             }
+            When::Nears { entity, position, seconds } => {
+                let point = self.cast.place(source, &position.0)?.pose.position;
+                let (said, station_m) = self.station(source, mark, entity, point)?;
+                let who = self.who(source, mark, entity)?;
+                let said = said.and(format!(" + {who}.speed * ")).number(*seconds, "s");
+                Some(said.and(" >= ").number(station_m, "m"))
+            }
             When::Ended { kind, name } => self.ended(source, mark, kind, name),
+            When::Begun { kind, name } => self.begun(source, mark, kind, name),
+        }
+    }
+
+    /// That something has begun: what it waits for has come.
+    fn begun(&self, source: &mut Source, mark: &Mark, kind: &'static str, name: &str) -> Option<Said> {
+        let Some((_, event)) = self.cast.last_event(kind, name) else {
+            let reason = format!("what begins with `{name}` is not known here: the ego vehicle's, or the player's");
+            return source.refuse(mark, reason);
+        };
+        let waits = |condition: &Condition| {
+            condition.delay_s > 0.0 || matches!(condition.kind, When::Begun { .. } | When::Ended { .. })
+        };
+        let reason = format!("`{name}` waits for another event, or some time after its moment");
+        source.refuse_if(event.when.iter().flatten().any(waits), mark, reason)?;
+        let mut groups = Vec::new();
+        for all in &event.when {
+            let parts: Option<Vec<Said>> = all.iter().map(|one| self.part(source, one)).collect();
+            groups.push(Said::joined(parts?, " and "));
+        }
+        match groups.is_empty() {
+            true => Some(Said::text("elapsed >= ").number(0.0, "s")),
+            false => Some(Said::text("(").then(Said::joined(groups, " or ")).and(")")),
         }
     }
 

@@ -432,7 +432,11 @@ impl<'a> Cast<'a> {
                 None => Said::default(),
                 Some(event) => {
                     let waiting = Waiting { cast: self, actor: moving, before };
-                    waiting.begins(source, &event.when)?.said()
+                    let begins = waiting.begins(source, &event.when)?;
+                    phases.extend(begins.first.as_ref().map(|first| {
+                        Said::text("once ").then(first.clone()).and(" {}")
+                    }));
+                    begins.said()
                 }
             };
             before = event.or(before);
@@ -579,6 +583,10 @@ impl<'a> Cast<'a> {
         told: &mut Told,
         fields: &mut Vec<Said>,
     ) -> Option<()> {
+        if let (true, Speed::More(name, _) | Speed::Times(name, _)) = (dynamics.is_continuous, wanted) {
+            let reason = "a speed that follows another's from moment to moment is read where that one keeps its own";
+            source.refuse_if(self.is_ego(name) || !self.keeps_its_speed(name), mark, reason)?;
+        }
         let who = |source: &mut Source, name: &str| match () {
             () if self.is_ego(name) => Some("ego".to_owned()),
             () if name == moving.entity.name => Some("npc".to_owned()),
@@ -647,6 +655,14 @@ impl<'a> Cast<'a> {
         fields.push(Said::text("speed: ").then(said));
         fields.extend(rate.map(|rate| Said::text("rate: ").then(rate)));
         Some(())
+    }
+
+    /// Whether somebody beside the ego vehicle drives at one speed from the beginning on.
+    fn keeps_its_speed(&self, name: &str) -> bool {
+        let changes = |act: &Act| matches!(act.kind, ActKind::Speed(..) | ActKind::Meet(_));
+        let Some(entity) = self.story.entity(name) else { return false };
+        let is_timed = entity.way.as_ref().is_some_and(|way| way.timing.is_some());
+        !is_timed && !entity.events.iter().flat_map(|event| &event.acts).any(changes)
     }
 
     /// How far to the left of its way a lane lies, m.

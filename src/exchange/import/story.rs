@@ -391,7 +391,7 @@ impl Entity {
             ActKind::Placed(position) => self.position = Some(position),
             ActKind::Ahead(headway) => self.headway = Some((mark, headway)),
             ActKind::Speed(speed, dynamics) => {
-                let is_at_once = matches!(dynamics.over, Over::AtOnce);
+                let is_at_once = matches!(dynamics.over, Over::AtOnce) && !dynamics.is_continuous;
                 if is_at_once || self.speed.is_none() && matches!(speed, Speed::Absolute(0.0)) {
                     self.speed = Some((mark, speed));
                 } else {

@@ -28,11 +28,19 @@ pub type Trigger = Vec<Vec<Condition>>;
 #[derive(Debug, Clone)]
 pub struct Condition {
     pub mark: Mark,
-    /// It asks for what begins to hold.
-    pub is_rising: bool,
+    pub edge: Edge,
     /// What it asks for has held, or come, so long ago, s.
     pub delay_s: f64,
     pub kind: When,
+}
+
+/// What a condition asks for: that it holds, begins to hold, or ceases to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Edge {
+    None,
+    Rising,
+    Falling,
+    Either,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -87,20 +95,31 @@ pub enum When {
         mps: f64,
         is_less: bool,
     },
+    /// An entity would reach a place in less than `seconds`.
+    Nears {
+        entity: String,
+        position: PlaceMark,
+        seconds: f64,
+    },
     /// An element of the story has ended: its kind and its name.
     Ended {
         kind: &'static str,
         name: String,
     },
+    /// It has begun.
+    Begun {
+        kind: &'static str,
+        name: String,
+    },
 }
 
-/// A position that conditions compare by where it is written.
+/// A position, which conditions compare.
 #[derive(Debug, Clone)]
 pub struct PlaceMark(pub Position);
 
 impl PartialEq for PlaceMark {
     fn eq(&self, other: &PlaceMark) -> bool {
-        self.0.mark.line == other.0.mark.line
+        format!("{:?} {:?}", self.0.kind, self.0.heading) == format!("{:?} {:?}", other.0.kind, other.0.heading)
     }
 }
 
@@ -172,8 +191,12 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
     let delay_s = source.number_or(node, "delay", 0.0)?;
     source.refuse_if(delay_s < 0.0, node, "its `delay` is less than 0")?;
     let edge = source.word(node, "conditionEdge", &["none", "rising", "falling", "risingOrFalling"])?;
-    let is_rising = edge == "rising";
-    source.refuse_if(edge.ends_with("alling"), node, "only what begins to hold is read, not what ends")?;
+    let edge = match edge {
+        "rising" => Edge::Rising,
+        "falling" => Edge::Falling,
+        "risingOrFalling" => Edge::Either,
+        _ => Edge::None,
+    };
     if let Some(value) = element(node, "ByValueCondition") {
         let Some(inner) = children(value).next() else { return source.refuse(value, "it is empty") };
         let mut delay_s = delay_s;
@@ -192,10 +215,9 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
                 let name = source.text(inner, "storyboardElementRef")?;
                 match state {
                     "startTransition" | "runningState" if matches!(of, "act" | "story") => When::Always,
+                    "startTransition" | "runningState" => When::Begun { kind: of, name },
                     "completeState" | "endTransition" => When::Ended { kind: of, name },
-                    _ => {
-                        return source.refuse(inner, "only what has ended is read, or an act that has begun");
-                    }
+                    _ => return source.refuse(inner, "only what has begun or ended is read"),
                 }
             }
             "ParameterCondition" => {
@@ -217,7 +239,7 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
             }
             _ => return source.refuse(inner, "this condition is not read"),
         };
-        return Some(Condition { mark: source.mark(inner), is_rising, delay_s, kind });
+        return Some(Condition { mark: source.mark(inner), edge, delay_s, kind });
     }
     let by_entity = source.required(node, "ByEntityCondition")?;
     let list = source.required(by_entity, "TriggeringEntities")?;
@@ -245,15 +267,18 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
         }
         "TimeToCollisionCondition" => {
             frame(source, inner)?;
-            let target =
-                element(inner, "TimeToCollisionConditionTarget").and_then(|node| element(node, "EntityRef"));
-            let Some(target) = target else { return source.refuse(inner, "the target is an entity") };
-            let to = source.text(target, "entityRef")?;
+            let target = source.required(inner, "TimeToCollisionConditionTarget")?;
             let is_less = is_less(source, inner)?;
             let is_free_space = source.switch(inner, "freespace", false)?;
-            let pair = Pair { of: of.clone(), to, is_less, is_free_space };
             source.refuse_if(!is_less, inner, "only `lessThan` is read")?;
-            When::Collides { pair, seconds: source.amount(inner, "value")? }
+            let seconds = source.amount(inner, "value")?;
+            if let Some(place) = element(target, "Position") {
+                When::Nears { entity, position: PlaceMark(position(source, place)?), seconds }
+            } else {
+                let to = source.required(target, "EntityRef")?;
+                let to = source.text(to, "entityRef")?;
+                When::Collides { pair: Pair { of: of.clone(), to, is_less, is_free_space }, seconds }
+            }
         }
         "ReachPositionCondition" => {
             let place = source.required(inner, "Position")?;
@@ -280,7 +305,7 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
         }
         _ => return source.refuse(inner, "this condition is not read"),
     };
-    Some(Condition { mark: source.mark(inner), is_rising, delay_s, kind })
+    Some(Condition { mark: source.mark(inner), edge, delay_s, kind })
 }
 
 /// Whether a value that does not change compares so.
