@@ -29,7 +29,15 @@ pub fn import(output: &Output, arguments: &ImportArguments) -> Result<(), Failur
     let mut written: BTreeSet<PathBuf> = BTreeSet::new();
     let (mut refused, mut results) = (Vec::new(), Vec::new());
     for (file, target) in arguments.files.iter().zip(targets) {
-        match one(file, &target, arguments, &parameters)? {
+        let taken = match one(file, &target, arguments, &parameters) {
+            // One of many files does not keep the others from being read.
+            Err(failure) if arguments.files.len() > 1 => {
+                let reason = failure.to_string();
+                Err(vec![Refusal { scenario: None, line: 1, element: "OpenSCENARIO".to_owned(), reason }])
+            }
+            taken => taken?,
+        };
+        match taken {
             Ok(taken) => {
                 let (space, scenario) = (&taken.space, &taken.scenario);
                 let paths: Vec<String> =
@@ -108,18 +116,26 @@ fn one(
             return Ok(Err(refused(format!("two maps have one name: `{other}` and `{source}`"))));
         }
     }
+    let stem = target.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let space = imported.space.map(|text| (target.to_owned(), text));
     // A space and its scenario are two files: what uses the space has no use for the scenario.
-    let name = match &space {
-        Some(_) => {
-            format!("{}_scenario.ava", target.file_stem().unwrap_or_default().to_string_lossy()).into()
-        }
-        None => target.to_owned(),
-    };
-    let scenario = imported.scenario.map(|text| (target.with_file_name(name), text));
+    let beside_it = || target.with_file_name(format!("{stem}_scenario.ava"));
+    let at = if space.is_some() { beside_it() } else { target.to_owned() };
+    let scenario = imported.scenario.map(|text| (at, text));
     let texts: Vec<&(PathBuf, String)> = space.iter().chain(&scenario).collect();
     if let Err(reason) = plays(&texts, &maps) {
         return Ok(Err(refused(reason)));
+    }
+    // Nothing is written if something of it cannot be.
+    let is_other = |(path, text): &&&(PathBuf, String)| {
+        path.symlink_metadata().is_ok() && load::read(path).ok().as_ref() != Some(text)
+    };
+    if let Some((path, _)) = texts.iter().find(is_other) {
+        let message = format!(
+            "`{}` is there already, and says something else: name another folder with `--out`",
+            path.display()
+        );
+        return Err(Failure::usage(message));
     }
     match &arguments.out {
         Some(named) => make(named)?,
@@ -128,11 +144,8 @@ fn one(
     for (map, source) in &maps {
         copy_map(source, map)?;
     }
-    for (path, text) in &texts {
-        match load::read(path) {
-            Ok(there) if there == *text => {}
-            _ => write_new(path, text)?,
-        }
+    for (path, text) in texts.iter().filter(|(path, _)| path.symlink_metadata().is_err()) {
+        write_new(path, text)?;
     }
     let [space, scenario] = [space, scenario].map(|written| written.map(|(path, _)| path));
     Ok(Ok(Taken { space, scenario, maps: maps.into_keys().collect(), notes: imported.notes }))

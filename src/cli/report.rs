@@ -6,12 +6,14 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use avastra_campaign::run::{
-    Asked, Database, DatabaseError, FoundIn, RunSettings, Units, main_parameters, recorded,
+    Asked, Database, DatabaseError, FoundIn, HeatMap, ProtocolTest, RunSettings, Units, heat_maps, main_maps,
+    parameters, recorded,
 };
 use avastra_campaign::study::StudyResults;
 use avastra_campaign::train::TrainSettings;
 use avastra_exchange::report::{self, Page, Scene, record, record_another};
 use avastra_lang::check::normal;
+use avastra_lang::syntax::listed;
 use avastra_world::action::ActionTable;
 
 use super::arguments::{FilesArguments, ReportArguments};
@@ -269,13 +271,11 @@ fn of_run(
         results => results.map_err(unread)?,
     };
     let results: Option<Value> = results.and_then(|text| serde_json::from_str(&text).ok());
-    let by = pairs(asked, &database, settings).map_err(unread)?;
+    let labels = table.as_ref().map_or(&[][..], ActionTable::rows).iter().map(|row| row.label.as_str());
+    let tests = database.tests(&labels.collect::<Vec<_>>()).map_err(unread)?;
+    let heat = maps(asked, &tests, settings)?;
     let (table, results) = (table.as_ref(), results.as_ref());
-    found.overview = report::of_run(&database, table, settings, results, &by).map_err(unread)?;
-    let maps = found.overview["heat"].as_array().map_or(0, Vec::len);
-    if maps < by.len() {
-        remarks.push("no action has some of the parameters of `--by`: they are left out".to_owned());
-    }
+    found.overview = report::of_run(&database, table, settings, results, &heat).map_err(unread)?;
     let groups = database.groups().map_err(unread)?;
     let name = |road: &str, episode: i64| format!("{road}_{episode:04}");
     found.examples = groups.iter().map(|group| name(&group.road, group.episode)).collect();
@@ -283,22 +283,25 @@ fn of_run(
     Ok(remarks)
 }
 
-/// The pairs of parameters by which maps are drawn: those that are asked for, or the main ones of a protocol.
-fn pairs(
-    asked: &[String],
-    database: &Database,
-    settings: &str,
-) -> Result<Vec<(String, String)>, DatabaseError> {
-    let pair = |text: &str| {
-        let (down, across) = text.split_once(',').unwrap_or((text, ""));
-        (down.trim().to_owned(), across.trim().to_owned())
-    };
+/// The heat maps of a run: by the parameters that are asked for, or the main ones of a protocol.
+fn maps(asked: &[String], tests: &[ProtocolTest], settings: &str) -> Result<Vec<HeatMap>, Failure> {
     let is_protocol = serde_yaml::from_str::<RunSettings>(settings).is_ok_and(|run| run.rows > 0);
-    if !asked.is_empty() || !is_protocol {
-        return Ok(asked.iter().map(|text| pair(text)).collect());
+    if asked.is_empty() {
+        return Ok(if is_protocol { main_maps(tests) } else { Vec::new() });
     }
-    let main = main_parameters(&database.trials()?);
-    Ok(if main.is_empty() { Vec::new() } else { vec![pair(&main.join(","))] })
+    let mut found = Vec::new();
+    for text in asked {
+        let (down, across) = text.split_once(',').unwrap_or((text, ""));
+        let maps = heat_maps(tests, down.trim(), across.trim());
+        if maps.is_empty() || down.trim().is_empty() {
+            let known = listed(&parameters(tests).iter().map(String::as_str).collect::<Vec<_>>());
+            let message =
+                format!("`--by {text}`: no action that was carried out has that; there are {known}");
+            return Err(Failure::usage(message));
+        }
+        found.extend(maps);
+    }
+    Ok(found)
 }
 
 /// Says how many episodes a training lacks. If later ones are there, they learned from it, so it cannot be gone on with.

@@ -14,11 +14,11 @@ use avastra_campaign::run::{
 };
 use avastra_drivers::external::{Conversation, Problem};
 use avastra_lang::model::Policy;
-use avastra_search::agent::Face;
+use avastra_search::agent::{Face, Kind, by_name};
 use avastra_world::action::{ActionTable, Draw};
 
 use super::arguments::RunArguments;
-use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, settled};
+use super::campaign::{self, Campaign, Cut, Item, Outside, Share, settled};
 use super::error::Failure;
 use super::files::write_answers;
 use super::findings::{cut_off, failures_text, is_reproducible};
@@ -31,8 +31,7 @@ use super::progress::now;
 use super::run_directory::{Player, Resumed};
 use super::{compile, conditions, load, merge, protocol, run_directory, shard};
 
-/// The agent that plays each row once, and what others play on each road if nobody asks for more or less.
-const EVERY_ROW: &str = "every-row";
+/// Episodes on each road if nobody asks for more or less.
 const EPISODES: u32 = 100;
 
 /// Largest number of critical scenarios, groups and refusal reasons that the summary lists.
@@ -41,7 +40,7 @@ const NAMED_MAX: usize = 10;
 type Directory = run_directory::Directory<RunSettings>;
 
 impl Campaign for RunSettings {
-    const KIND: Kind = Kind {
+    const KIND: campaign::Kind = campaign::Kind {
         what: "run",
         command: "run",
         file: "run",
@@ -151,19 +150,23 @@ fn play_all(
         output.say(&requirements_text(&requirements));
     }
     let is_protocol = run.settings().rows > 0;
-    let trials = if is_protocol { directory.read(Database::trials)? } else { Vec::new() };
+    let labels: Vec<&str> = run.table().rows().iter().map(|row| row.label.as_str()).collect();
+    let tests = if is_protocol { directory.read(|database| database.tests(&labels))? } else { Vec::new() };
     let tables = match is_protocol && is_over {
-        true => protocol::write_both(&directory.path, &trials)?.to_vec(),
+        true => protocol::write_both(&directory.path, &run.space().path, &tests)?.to_vec(),
         false => Vec::new(),
     };
     if is_protocol {
-        output.say(&protocol::in_words(&trials));
+        output.say(&protocol::in_words(&tests));
     }
     if let [table, cases] = tables.as_slice() {
         output.say(&format!("each row: {}, {}", table.display(), cases.display()));
     }
     let never = Never::new(run.table(), &directory.read(Database::rows)?);
-    output.say(&never.in_words(output.verbose));
+    // A protocol says of each row what came of it.
+    if !is_protocol {
+        output.say(&never.in_words(output.verbose));
+    }
     let critical = worst_first(directory.critical(output)?, &found);
     output.say(&critical_text(&directory.path, &critical, &found));
     let kept = if is_over { keep_near(&run, &directory)? } else { Vec::new() };
@@ -189,7 +192,7 @@ fn play_all(
     cut_off(program).iter().for_each(|note| output.warn(note));
     output.result(serde_json::json!({
         "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups,
-        "requirements": requirements, "never": never, "critical": critical, "found": found, "kept": kept, "failures": failures, "trials": trials, "tables": tables, "reproducible": is_reproducible,
+        "requirements": requirements, "never": never, "critical": critical, "found": found, "kept": kept, "failures": failures, "tests": tests, "tables": tables, "reproducible": is_reproducible,
     }));
     share.end(output, directory, is_over, program)?;
     Ok(totals)
@@ -209,12 +212,13 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<Option<(Run, Direc
     let shard = shard::asked(output, arguments.shard.shard)?;
     let agent = policy.as_ref().map_or(&arguments.conditions.agent, |(_, policy)| &policy.name);
     let under_test = load::named(&arguments.under_test.ads)?;
-    let settings = conditions::settings(space, &arguments.conditions, agent, under_test, 0)?;
+    let is_protocol = by_name(agent).is_some_and(|entry| matches!(entry.kind, Kind::OneRow(_)));
+    let episodes = arguments.episodes.unwrap_or(if is_protocol { 1 } else { EPISODES });
+    let settings = conditions::settings(space, &arguments.conditions, agent, under_test, episodes)?;
     let settings = RunSettings {
         causes: arguments.causes,
         replays: arguments.replays,
         keep: arguments.keep,
-        episodes: arguments.episodes.unwrap_or(if *agent == *EVERY_ROW { 1 } else { EPISODES }),
         ..settings
     };
     let settings = settings.started_unless(arguments.shard.dry_run);

@@ -283,12 +283,14 @@ impl<'a> Builder<'a> {
                         }
                     }
                     let limit_mps = speed_limit_mps(road, section, element.id);
-                    limitless += usize::from(limit_mps.is_none());
+                    let states_limit = limit_mps.is_some();
+                    limitless += usize::from(!states_limit);
                     let key = LaneKey { road: road.id.clone(), section: section_index, lane: element.id };
                     let index = LaneIndex(self.map.lanes.len());
                     self.lanes.insert((road_index, section_index, element.id), index);
                     let limit_mps = limit_mps.unwrap_or(LIMIT_MPS_DEFAULT);
                     let mut lane = new_lane(key, centre, limit_mps, road.left_hand, junction);
+                    lane.states_limit = states_limit;
                     lane.is_motorway = road.is_motorway;
                     lane.for_buses = element.for_buses;
                     lane.heights = Heights::sampled(lane.centre.length_m(), |station_m| {
@@ -619,6 +621,7 @@ fn new_lane(
         centre: centre.path,
         widths_m: centre.widths_m,
         speed_limit_mps,
+        states_limit: true,
         is_motorway: false,
         for_buses: false,
         keeps_left,

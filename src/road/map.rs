@@ -42,6 +42,8 @@ pub struct Lane {
     pub widths_m: Vec<f64>,
     /// m/s.
     pub speed_limit_mps: f64,
+    /// Whether the map states it; without a limit 50 km/h is taken.
+    pub states_limit: bool,
     /// Whether its road is a motorway, on which nobody goes on foot.
     pub is_motorway: bool,
     /// Whether it is a bus lane.

@@ -1,7 +1,7 @@
 """Mutates OpenSCENARIO files and imports each: no panic, none over a second, and nothing is read or written but what is named.
 
 Arguments: the program, how many mutants, and folders that hold `.xosc` files (our cases in tests/cases/imports, and public ones). A mutant
-lies beside its original, so that it finds maps and catalogues. With `strace` on the path, every file that the program opens must lie in
+lies beside its original, so that it finds maps and catalogues. With `strace` on the path, of each tenth mutant every file that the program opens must lie in
 the original's repository, in the folder of the result, or belong to the system's libraries; without it that is not looked at.
 """
 

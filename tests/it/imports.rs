@@ -13,12 +13,17 @@ use crate::exports::crash;
 
 const AREA: &str = "tests/cases/imports";
 
+const FILES: [&str; 7] = ["cut_in", "walker", "refused", "braking", "crossing", "crossing_speeds", "profile"];
+
+/// Files of variations, and how many rows they make: of the second one, a parameter is drawn in each.
+const ROWS: [(&str, usize); 2] = [("crossing_speeds", 12), ("profile_values", 726)];
+
 /// A scenario by hand, in which the weather changes.
 const WET: &str = "tests/cases/exports/wet_corner.ava";
 
 #[test]
 fn every_file_becomes_a_space_or_is_refused_with_its_lines() {
-    for name in ["cut_in", "walker", "refused", "braking", "crossing", "crossing_speeds"] {
+    for name in FILES.into_iter().chain(["profile_values"]) {
         let scratch = tempfile::tempdir().expect("a scratch directory");
         let folder = scratch.path().display().to_string();
         let file = format!("{AREA}/{name}.xosc");
@@ -40,7 +45,10 @@ fn every_file_becomes_a_space_or_is_refused_with_its_lines() {
             outcome(&mut avastra(&["import", "--out", &folder, &format!("{AREA}/{name}.xosc")]));
         assert_eq!(status, 0, "{name} again: it finds what was written before");
         // A space of many rows has no scenario.
-        if name == "crossing_speeds" {
+        if let Some((_, rows)) = ROWS.iter().find(|(many, _)| *many == name) {
+            let table = done(&["table", &file]);
+            let last = table.lines().last().and_then(|line| line.split_whitespace().next());
+            assert_eq!(last, Some((rows - 1).to_string().as_str()), "{name}");
             continue;
         }
         let scenario = scratch.path().join(format!("{name}_scenario.ava"));
@@ -57,7 +65,7 @@ fn every_file_becomes_a_space_or_is_refused_with_its_lines() {
         // Without `body`, which is no number, the speed's parts are the sixth and the seventh.
         let ego_kmh = libm::hypot(first[5], first[6]) * 3.6;
         let wanted_kmh = match name {
-            "cut_in" => 36.0,
+            "cut_in" | "profile" => 36.0,
             "braking" => 50.0,
             _ => 30.0,
         };
@@ -239,7 +247,7 @@ fn conditions_and_words_are_read_or_refused() {
     for (old, new, wanted) in [
         ("value=\"1.5\"", "value=\"-1\"", "less than 0"),
         ("freespace=\"true\"", "freespace=\"perhaps\"", "neither `true` nor `false`"),
-        ("conditionEdge=\"rising\"", "conditionEdge=\"falling\"", "not what ends"),
+        ("conditionEdge=\"rising\"", "conditionEdge=\"falling\"", "once not npc.rear"),
         ("conditionEdge=\"rising\"", "conditionEdge=\"upward\"", "it may be none, rising"),
         ("<EntityRef entityRef=\"Ego\"/>", "", "it names no entity"),
         ("selectTriggeringEntities=\"false\"", "selectTriggeringEntities=\"true\"", "a condition selects"),
@@ -478,11 +486,11 @@ fn no_torn_or_altered_file_makes_it_panic() {
     let files = Kept {
         map: read("scenarios/roads/corner.xodr"),
         catalogue: read("tests/cases/imports/catalogue/vehicles.xosc"),
-        scenario: String::new(),
+        scenario: read("tests/cases/imports/crossing.xosc"),
     };
     let mut rng = rng::stream(18, Stream::Reset, 0);
     let (mut imported, mut refused) = (0, 0);
-    for name in ["cut_in", "walker", "refused", "braking", "crossing", "crossing_speeds"] {
+    for name in FILES {
         // The corner's map is small: its lane 1/-1 stands for the boulevard's 3/-2.
         let text = read(&format!("{AREA}/{name}.xosc"))
             .replace("roadId=\"3\" laneId=\"-2\"", "roadId=\"1\" laneId=\"-1\"");

@@ -6,7 +6,7 @@ use crate::episode::{EpisodeLog, Setup};
 use crate::estimate::part::Part;
 use crate::estimate::settings::{EstimateError, EstimateSettings, Method};
 use crate::oracle::Found;
-use crate::run::{EpisodeSummary, Run};
+use crate::run::{EpisodeSummary, Run, RunError};
 use avastra_base::rng;
 use avastra_base::rng::Stream;
 use avastra_world::action::ActionTable;
@@ -35,6 +35,9 @@ impl Estimate {
         settings.check()?;
         let run = Run::new(table, settings.run.clone())?;
         settings.event.check(run.space(), run.arena().rules())?;
+        if run.settings().rows > 0 {
+            return Err(RunError::OneRow { name: settings.run.agent }.into());
+        }
         let rows = run.table().rows().len();
         if settings.method == Method::Probe
             && run.agent().chances(Array1::from_elem(rows, true).view()).is_none()

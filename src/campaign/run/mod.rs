@@ -43,7 +43,7 @@ pub use profile::{
     trained_against,
 };
 pub(crate) use profile::{traffic_of, under_test};
-pub use protocol::{Ending, HeatMap, Tally, Trial, heat_map, main_parameters};
+pub use protocol::{Ending, HeatMap, ProtocolTest, Tally, heat_maps, main_maps, parameters};
 pub use sealed::differences as settings_differences;
 pub use sealed::{DatabaseError, Layout};
 pub(crate) use sealed::{insert_row, query_all, settings_digest};

@@ -12,8 +12,10 @@ pub const NEAR_S: f64 = 1.5;
 /// A contact is mitigated if the ego vehicle was slower by this than before, m/s: 5 km/h, a step of Euro NCAP's speeds.
 pub const MITIGATED_MPS: f64 = 5.0 / 3.6;
 
-/// Values of one axis beyond which numbers are put into as many ranges.
-const AXIS_MAX: usize = 12;
+/// Values of one axis beyond which numbers are put into ranges.
+const AXIS_MAX: usize = 24;
+/// Ranges into which more numbers are put.
+const RANGES: usize = 12;
 
 /// How an action ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
@@ -44,7 +46,7 @@ impl Ending {
 
 /// An action that was carried out, or an episode in which none was.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct Trial {
+pub struct ProtocolTest {
     pub episode: i64,
     pub road: String,
     /// The action's name; `None` if none was carried out in the episode.
@@ -67,7 +69,7 @@ pub struct Trial {
     pub refused: Option<String>,
 }
 
-impl Trial {
+impl ProtocolTest {
     /// What was lost of the speed before the contact, m/s.
     pub fn reduction_mps(&self) -> Option<f64> {
         Some((self.before_mps? - self.impact_mps?).max(0.0))
@@ -94,111 +96,149 @@ impl Trial {
 }
 
 impl Database {
-    /// Every action that was carried out, in order, and the episodes in which none was.
+    /// Every action that was carried out, in order, and the episodes in which none was. `labels` are the rows of the table, to name
+    /// a row that was asked for and refused.
     ///
     /// # Errors
     /// If the file cannot be read.
-    pub fn trials(&self) -> Result<Vec<Trial>, DatabaseError> {
+    pub fn tests(&self, labels: &[&str]) -> Result<Vec<ProtocolTest>, DatabaseError> {
+        let read = &self.connection;
         let steps = "SELECT episode, step, action, ttc_s, top_speed_mps FROM step ORDER BY episode, step";
-        let steps = query_all(&self.connection, steps, |row| {
-            Ok(Step {
-                episode: row.get(0)?,
-                step: row.get(1)?,
-                action: row.get(2)?,
-                ttc_s: row.get(3)?,
-                top_mps: row.get(4)?,
-            })
+        let steps = query_all(read, steps, |row| {
+            let (episode, step, action) = (row.get(0)?, row.get(1)?, row.get(2)?);
+            Ok(Step { episode, step, action, ttc_s: row.get(3)?, top_mps: row.get(4)? })
         })?;
-        let contacts = "SELECT episode, step, ego_speed_mps, relative_speed_mps, counted FROM collision ORDER BY episode, number";
-        let contacts: Vec<(i64, i64, f64, f64, bool)> = query_all(&self.connection, contacts, |row| {
-            Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?, row.get(4)?))
+        let contacts = "SELECT episode, step, ego_speed_mps, relative_speed_mps, counted FROM collision
+            ORDER BY episode, number";
+        let contacts = query_all(read, contacts, |row| {
+            let (episode, step, ego_mps) = (row.get(0)?, row.get(1)?, row.get(2)?);
+            Ok(Contact { episode, step, ego_mps, relative_mps: row.get(3)?, counted: row.get(4)? })
         })?;
         let breaches = "SELECT episode, step, requirement FROM breach ORDER BY episode, number";
         let breaches: Vec<(i64, i64, String)> =
-            query_all(&self.connection, breaches, |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
-        let episodes: Vec<(i64, String, Option<f64>)> = query_all(
-            &self.connection,
-            "SELECT episode, road, pet_s FROM episode ORDER BY episode",
-            |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)),
-        )?;
-        let reasons =
-            "SELECT episode, text FROM offer JOIN reason USING (reason) ORDER BY episode, steps DESC, text";
-        let reasons: Vec<(i64, String)> =
-            query_all(&self.connection, reasons, |row| Ok((row.get(0)?, row.get(1)?)))?;
-        let by_episode = |wanted: i64, from: &mut usize| {
-            let first = *from + steps[*from..].partition_point(|step| step.episode < wanted);
-            *from = first + steps[first..].partition_point(|step| step.episode == wanted);
-            &steps[first..*from]
-        };
-        let (mut trials, mut from) = (Vec::new(), 0);
+            query_all(read, breaches, |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
+        let reasons = "SELECT episode, action_row, text FROM offer JOIN reason USING (reason)
+            ORDER BY episode, steps DESC, text";
+        let reasons: Vec<(i64, i64, String)> =
+            query_all(read, reasons, |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
+        let episodes = "SELECT episode, road, pet_s FROM episode ORDER BY episode";
+        let episodes: Vec<(i64, String, Option<f64>)> =
+            query_all(read, episodes, |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
+        let mut tests = Vec::new();
         for (episode, road, pet_s) in episodes {
-            let own = by_episode(episode, &mut from);
-            let begun: Vec<usize> = (0..own.len()).filter(|at| own[*at].action.is_some()).collect();
-            let plain = Trial {
-                episode,
-                road,
-                action: None,
-                values: Vec::new(),
-                ending: None,
-                before_mps: None,
-                impact_mps: None,
-                relative_mps: None,
-                ttc_s: None,
-                counted: false,
-                breached: Vec::new(),
-                refused: None,
-            };
+            let steps = of_episode(&steps, episode, |step| step.episode);
+            let contacts = of_episode(&contacts, episode, |contact| contact.episode);
+            let breaches = of_episode(&breaches, episode, |breach| breach.0);
+            let begun: Vec<usize> = (0..steps.len()).filter(|at| steps[*at].action.is_some()).collect();
             if begun.is_empty() {
-                let at = reasons.partition_point(|(of, _)| *of < episode);
-                let refused = reasons.get(at).filter(|(of, _)| *of == episode).map(|(_, text)| text.clone());
-                trials.push(Trial { refused, ..plain });
-                continue;
+                let refused = of_episode(&reasons, episode, |reason| reason.0).first();
+                let mut test = ProtocolTest::without_action(episode, &road);
+                if let Some((_, row, reason)) = refused {
+                    test.refused = Some(reason.clone());
+                    let label = usize::try_from(*row).ok().and_then(|row| labels.get(row));
+                    let asked = label
+                        .filter(|_| self.is_of_one_row(episode).unwrap_or(false))
+                        .map(|label| said(label));
+                    (test.action, test.values) =
+                        asked.map_or((None, Vec::new()), |(name, values)| (Some(name), values));
+                }
+                tests.push(test);
             }
             for (nth, at) in begun.iter().enumerate() {
                 // What comes until the next action is put down to this one.
-                let until = begun.get(nth + 1).copied().unwrap_or(own.len());
-                let span = &own[*at..until];
-                let is_within = |step: i64| span.iter().any(|one| one.step == step);
-                let own_contacts: Vec<_> =
-                    contacts.iter().filter(|(of, step, ..)| *of == episode && is_within(*step)).collect();
-                let least = |values: &mut dyn Iterator<Item = f64>| values.reduce(f64::min);
-                let ttc_s = least(&mut span.iter().filter_map(|step| step.ttc_s));
-                let before_mps = span.iter().filter_map(|step| step.top_mps).reduce(f64::max);
-                let impact = own_contacts.first();
+                let until = begun.get(nth + 1).copied().unwrap_or(steps.len());
                 // The encroachment is the episode's: it belongs to its only action, if there is one.
                 let pet_s = pet_s.filter(|_| begun.len() == 1);
-                let is_near = ttc_s.into_iter().chain(pet_s).any(|time_s| time_s < NEAR_S);
-                let ending = match (impact, before_mps) {
-                    (None, _) if is_near => Ending::Near,
-                    (None, _) => Ending::Avoided,
-                    (Some((_, _, mps, ..)), Some(before)) if before - mps >= MITIGATED_MPS => {
-                        Ending::Mitigated
-                    }
-                    (Some(_), _) => Ending::Hit,
-                };
-                let mut breached: Vec<String> = Vec::new();
-                for (of, step, name) in &breaches {
-                    if *of == episode && is_within(*step) && !breached.contains(name) {
-                        breached.push(name.clone());
-                    }
-                }
-                let (action, values) = said(span[0].action.as_deref().unwrap_or_default());
-                trials.push(Trial {
-                    action: Some(action),
-                    values,
-                    ending: Some(ending),
-                    before_mps,
-                    impact_mps: impact.map(|(_, _, mps, ..)| *mps),
-                    relative_mps: impact.map(|(_, _, _, mps, _)| *mps),
-                    ttc_s,
-                    counted: own_contacts.iter().any(|(.., counted)| *counted),
-                    breached,
-                    ..plain.clone()
-                });
+                tests.push(ProtocolTest::of(&road, &steps[*at..until], contacts, breaches, pet_s));
             }
         }
-        Ok(trials)
+        Ok(tests)
     }
+}
+
+impl Database {
+    /// Whether one row alone was asked for in an episode.
+    fn is_of_one_row(&self, episode: i64) -> Result<bool, DatabaseError> {
+        let query = "SELECT count(DISTINCT action_row) FROM offer WHERE episode = ?";
+        Ok(self.connection.query_row(query, [episode], |row| row.get::<_, i64>(0))? == 1)
+    }
+}
+
+/// The rows of an episode among those of all, which are in order.
+fn of_episode<T>(rows: &[T], episode: i64, number: impl Fn(&T) -> i64) -> &[T] {
+    let first = rows.partition_point(|row| number(row) < episode);
+    let last = rows.partition_point(|row| number(row) <= episode);
+    &rows[first..last]
+}
+
+impl ProtocolTest {
+    fn without_action(episode: i64, road: &str) -> ProtocolTest {
+        ProtocolTest {
+            episode,
+            road: road.to_owned(),
+            action: None,
+            values: Vec::new(),
+            ending: None,
+            before_mps: None,
+            impact_mps: None,
+            relative_mps: None,
+            ttc_s: None,
+            counted: false,
+            breached: Vec::new(),
+            refused: None,
+        }
+    }
+
+    /// An action with all that came until the next one: `steps` are its own, one or more, the others those of the episode.
+    fn of(
+        road: &str,
+        steps: &[Step],
+        contacts: &[Contact],
+        breaches: &[(i64, i64, String)],
+        pet_s: Option<f64>,
+    ) -> ProtocolTest {
+        let is_own = |step: i64| steps.iter().any(|one| one.step == step);
+        let contacts: Vec<&Contact> = contacts.iter().filter(|contact| is_own(contact.step)).collect();
+        let ttc_s = steps.iter().filter_map(|step| step.ttc_s).reduce(f64::min);
+        let before_mps = steps.iter().filter_map(|step| step.top_mps).reduce(f64::max);
+        let is_near = ttc_s.into_iter().chain(pet_s).any(|time_s| time_s < NEAR_S);
+        let impact = contacts.first();
+        let ending = match (impact, before_mps) {
+            (None, _) if is_near => Ending::Near,
+            (None, _) => Ending::Avoided,
+            (Some(impact), Some(before_mps)) if before_mps - impact.ego_mps >= MITIGATED_MPS => {
+                Ending::Mitigated
+            }
+            (Some(_), _) => Ending::Hit,
+        };
+        let mut breached: Vec<String> = Vec::new();
+        for (_, step, name) in breaches {
+            if is_own(*step) && !breached.contains(name) {
+                breached.push(name.clone());
+            }
+        }
+        let (action, values) = said(steps[0].action.as_deref().unwrap_or_default());
+        ProtocolTest {
+            action: Some(action),
+            values,
+            ending: Some(ending),
+            before_mps,
+            impact_mps: impact.map(|impact| impact.ego_mps),
+            relative_mps: impact.map(|impact| impact.relative_mps),
+            ttc_s,
+            counted: contacts.iter().any(|contact| contact.counted),
+            breached,
+            ..ProtocolTest::without_action(steps[0].episode, road)
+        }
+    }
+}
+
+struct Contact {
+    episode: i64,
+    step: i64,
+    ego_mps: f64,
+    relative_mps: f64,
+    counted: bool,
 }
 
 struct Step {
@@ -234,7 +274,7 @@ fn said(text: &str) -> (String, Vec<(String, String)>) {
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct Tally {
     pub endings: [u32; 4],
-    /// Trials with a breach.
+    /// Tests with a breach.
     pub breached: u32,
     /// The mean speed at contacts, and what was lost of the speed before them, m/s.
     pub impact_mps: Option<f64>,
@@ -242,16 +282,16 @@ pub struct Tally {
 }
 
 impl Tally {
-    pub fn of<'t>(trials: impl IntoIterator<Item = &'t Trial>) -> Tally {
+    pub fn of<'t>(tests: impl IntoIterator<Item = &'t ProtocolTest>) -> Tally {
         let mut tally = Tally::default();
         let (mut impacts, mut reductions) = (Vec::new(), Vec::new());
-        for trial in trials {
-            if let Some(ending) = trial.ending {
+        for test in tests {
+            if let Some(ending) = test.ending {
                 tally.endings[ending as usize] += 1;
             }
-            tally.breached += u32::from(!trial.breached.is_empty());
-            impacts.extend(trial.impact_mps);
-            reductions.extend(trial.reduction_mps());
+            tally.breached += u32::from(!test.breached.is_empty());
+            impacts.extend(test.impact_mps);
+            reductions.extend(test.reduction_mps());
         }
         let mean =
             |values: Vec<f64>| (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64);
@@ -264,9 +304,10 @@ impl Tally {
     }
 }
 
-/// Trials by the values of two parameters, or of one.
+/// Tests by the values of two parameters, or of one.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct HeatMap {
+    pub action: String,
     /// The parameter of each axis; the second is empty if there is none.
     pub down: String,
     pub across: String,
@@ -276,52 +317,87 @@ pub struct HeatMap {
     pub cells: Vec<Vec<Option<Tally>>>,
 }
 
-/// The trials of actions that have both parameters, by their values. Numbers of more than twelve values come in ranges. `across`
-/// is empty for one parameter alone; `None` if no action has them.
-pub fn heat_map(trials: &[Trial], down: &str, across: &str) -> Option<HeatMap> {
-    let value = |trial: &Trial, name: &str| match name {
+/// A map of each action that has both parameters: its tests by their values. `across` is empty for one parameter alone, and `road` is
+/// one, too. Numbers of more than two dozen values come in ranges.
+pub fn heat_maps(tests: &[ProtocolTest], down: &str, across: &str) -> Vec<HeatMap> {
+    actions(tests).iter().filter_map(|action| heat_map(tests, action, down, across)).collect()
+}
+
+/// The actions that were carried out, in the order in which they first were.
+fn actions(tests: &[ProtocolTest]) -> Vec<String> {
+    let mut actions: Vec<String> = Vec::new();
+    for action in tests.iter().filter_map(|test| test.action.as_ref()) {
+        if !actions.contains(action) {
+            actions.push(action.clone());
+        }
+    }
+    actions
+}
+
+fn heat_map(tests: &[ProtocolTest], action: &str, down: &str, across: &str) -> Option<HeatMap> {
+    let value = |test: &ProtocolTest, name: &str| match name {
         "" => Some(String::new()),
-        "road" => Some(trial.road.clone()),
-        _ => trial.value(name).map(str::to_owned),
+        "road" => Some(test.road.clone()),
+        _ => test.value(name).map(str::to_owned),
     };
-    let has = |trial: &&Trial| {
-        trial.ending.is_some() && value(trial, down).is_some() && value(trial, across).is_some()
+    let has = |test: &&ProtocolTest| {
+        test.ending.is_some()
+            && test.action.as_deref() == Some(action)
+            && value(test, down).is_some()
+            && value(test, across).is_some()
     };
-    let trials: Vec<&Trial> = trials.iter().filter(has).collect();
-    if trials.is_empty() {
+    let tests: Vec<&ProtocolTest> = tests.iter().filter(has).collect();
+    if tests.is_empty() {
         return None;
     }
     let values = |name: &str| -> Vec<String> {
-        trials.iter().map(|trial| value(trial, name).unwrap_or_default()).collect()
+        tests.iter().map(|test| value(test, name).unwrap_or_default()).collect()
     };
     let (rows, columns) = (Axis::of(&values(down)), Axis::of(&values(across)));
-    let mut within: BTreeMap<(usize, usize), Vec<&Trial>> = BTreeMap::new();
-    for (nth, trial) in trials.iter().enumerate() {
-        within.entry((rows.at[nth], columns.at[nth])).or_default().push(trial);
+    let mut within: BTreeMap<(usize, usize), Vec<&ProtocolTest>> = BTreeMap::new();
+    for (nth, test) in tests.iter().enumerate() {
+        within.entry((rows.at[nth], columns.at[nth])).or_default().push(test);
     }
     let cell = |row, column| within.get(&(row, column)).map(|found| Tally::of(found.iter().copied()));
     let line = |row| (0..columns.labels.len()).map(|column| cell(row, column)).collect();
     let cells = (0..rows.labels.len()).map(line).collect();
-    let (down, across) = (down.to_owned(), across.to_owned());
-    Some(HeatMap { down, across, rows: rows.labels, columns: columns.labels, cells })
+    let [action, down, across] = [action, down, across].map(str::to_owned);
+    Some(HeatMap { action, down, across, rows: rows.labels, columns: columns.labels, cells })
 }
 
-/// The two parameters with the most values among those that are listed in the table; fewer if fewer differ.
-pub fn main_parameters(trials: &[Trial]) -> Vec<String> {
-    let mut values: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
-    for (name, value) in trials.iter().flat_map(|trial| &trial.values) {
-        values.entry(name).or_default().insert(value);
+/// A map of each action by the two of its parameters that have the most values; by road where none differs.
+pub fn main_maps(tests: &[ProtocolTest]) -> Vec<HeatMap> {
+    let of = |action: &String| {
+        let mut values: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+        for test in tests.iter().filter(|test| test.action.as_ref() == Some(action)) {
+            for (name, value) in &test.values {
+                values.entry(name).or_default().insert(value);
+            }
+        }
+        let mut names: Vec<(&str, usize)> = values
+            .into_iter()
+            .map(|(name, values)| (name, values.len()))
+            .filter(|(_, count)| *count > 1)
+            .collect();
+        names.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(b.0)));
+        let name = |nth: usize| names.get(nth).map(|(name, _)| *name);
+        heat_map(tests, action, name(0).unwrap_or("road"), name(1).unwrap_or(""))
+    };
+    actions(tests).iter().filter_map(of).collect()
+}
+
+/// The parameters of all actions, and `road`.
+pub fn parameters(tests: &[ProtocolTest]) -> Vec<String> {
+    let mut names = vec!["road".to_owned()];
+    for (name, _) in tests.iter().flat_map(|test| &test.values) {
+        if !names.contains(name) {
+            names.push(name.clone());
+        }
     }
-    let mut names: Vec<(&str, usize)> = values
-        .into_iter()
-        .map(|(name, values)| (name, values.len()))
-        .filter(|(_, count)| (2..=AXIS_MAX * AXIS_MAX).contains(count))
-        .collect();
-    names.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(b.0)));
-    names.into_iter().take(2).map(|(name, _)| name.to_owned()).collect()
+    names
 }
 
-/// The values of a parameter in order, and which of them each trial has.
+/// The values of a parameter in order, and which of them each test has.
 struct Axis {
     labels: Vec<String>,
     at: Vec<usize>,
@@ -332,7 +408,10 @@ impl Axis {
         let number = |text: &str| text.split(' ').next().and_then(|digits| digits.parse::<f64>().ok());
         let unit = |text: &str| text.split_once(' ').map_or(String::new(), |(_, unit)| format!(" {unit}"));
         let mut distinct: Vec<&String> = values.iter().collect::<BTreeSet<_>>().into_iter().collect();
-        let numbers: Option<Vec<f64>> = values.iter().map(|value| number(value)).collect();
+        // Numbers of several units have no order.
+        let is_one_unit = values.iter().all(|value| unit(value) == unit(&values[0]));
+        let numbers: Option<Vec<f64>> =
+            values.iter().map(|value| number(value).filter(|_| is_one_unit)).collect();
         let Some(numbers) = numbers else {
             let at = |value: &String| distinct.iter().position(|known| *known == value).unwrap_or(0);
             return Axis {
@@ -351,14 +430,14 @@ impl Axis {
         let (low, high) = numbers.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
             (low.min(*value), high.max(*value))
         });
-        let width = (high - low) / AXIS_MAX as f64;
+        let width = (high - low) / RANGES as f64;
         let unit = unit(&values[0]);
         let label = |nth: usize| {
             let [from, to] = [nth, nth + 1].map(|edge| low + width * edge as f64);
             format!("{from:.3} to {to:.3}{unit}")
         };
-        let at = |value: &f64| (((value - low) / width) as usize).min(AXIS_MAX - 1);
-        Axis { labels: (0..AXIS_MAX).map(label).collect(), at: numbers.iter().map(at).collect() }
+        let at = |value: &f64| (((value - low) / width) as usize).min(RANGES - 1);
+        Axis { labels: (0..RANGES).map(label).collect(), at: numbers.iter().map(at).collect() }
     }
 }
 
@@ -366,9 +445,9 @@ impl Axis {
 mod tests {
     use super::*;
 
-    fn trial(values: &[(&str, &str)], impact_mps: Option<f64>) -> Trial {
+    fn test(values: &[(&str, &str)], impact_mps: Option<f64>) -> ProtocolTest {
         let ending = Some(if impact_mps.is_some() { Ending::Hit } else { Ending::Avoided });
-        Trial {
+        ProtocolTest {
             episode: 0,
             road: "corner".to_owned(),
             action: Some("begin".to_owned()),
@@ -398,13 +477,13 @@ mod tests {
 
     #[test]
     fn a_heat_map_has_a_cell_for_each_pair_of_values_that_was_tried() {
-        let trials = [
-            trial(&[("speed", "30"), ("overlap", "50")], None),
-            trial(&[("speed", "5"), ("overlap", "100")], Some(4.0)),
-            trial(&[("speed", "5"), ("overlap", "100")], Some(6.0)),
-            trial(&[("speed", "5")], None),
+        let tests = [
+            test(&[("speed", "30"), ("overlap", "50")], None),
+            test(&[("speed", "5"), ("overlap", "100")], Some(4.0)),
+            test(&[("speed", "5"), ("overlap", "100")], Some(6.0)),
+            test(&[("speed", "5")], None),
         ];
-        let map = heat_map(&trials, "speed", "overlap").expect("three have both");
+        let map = heat_map(&tests, "begin", "speed", "overlap").expect("three have both");
         assert_eq!(
             (map.rows, map.columns),
             (vec!["5".to_owned(), "30".to_owned()], vec!["50".to_owned(), "100".to_owned()])
@@ -415,16 +494,18 @@ mod tests {
             (tally.endings, tally.impact_mps, tally.reduction_mps),
             ([0, 0, 0, 2], Some(5.0), Some(5.0))
         );
-        assert!(heat_map(&trials, "speed", "colour").is_none());
-        assert_eq!(heat_map(&trials, "speed", "").expect("all have it").columns, [""]);
-        assert_eq!(main_parameters(&trials), ["overlap", "speed"]);
+        assert!(heat_maps(&tests, "speed", "colour").is_empty());
+        assert_eq!(heat_maps(&tests, "speed", "")[0].columns, [""]);
+        let main = &main_maps(&tests)[0];
+        assert_eq!((main.down.as_str(), main.across.as_str()), ("overlap", "speed"));
+        assert_eq!(parameters(&tests), ["road", "speed", "overlap"]);
     }
 
     #[test]
     fn many_numbers_come_in_ranges() {
-        let values: Vec<String> = (0..=24).map(|nth| format!("{} m/s", nth as f64 / 2.0)).collect();
+        let values: Vec<String> = (0..=48).map(|nth| format!("{} m/s", nth as f64 / 4.0)).collect();
         let axis = Axis::of(&values);
         assert_eq!((axis.labels.len(), axis.labels[0].as_str()), (12, "0.000 to 1.000 m/s"));
-        assert_eq!((axis.at[0], axis.at[2], axis.at[24]), (0, 1, 11));
+        assert_eq!((axis.at[0], axis.at[4], axis.at[48]), (0, 1, 11));
     }
 }

@@ -24,6 +24,7 @@ pub struct Act {
 pub enum ActKind {
     Placed(Position),
     Speed(Speed, Dynamics),
+    Profile(Vec<SpeedEntry>),
     /// Ahead of the ego vehicle at once.
     Ahead(Headway),
     Lane(Target, f64, Dynamics),
@@ -50,6 +51,13 @@ pub enum Speed {
     More(String, f64),
     /// Times another entity's.
     Times(String, f64),
+}
+
+/// A speed that is reached evenly in some time.
+#[derive(Debug, Clone, Copy)]
+pub struct SpeedEntry {
+    pub mps: f64,
+    pub time_s: f64,
 }
 
 /// How a value goes over to another.
@@ -219,6 +227,7 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<ActKind> {
             };
             Some(ActKind::Speed(speed, dynamics))
         }
+        "SpeedProfileAction" if !is_ego => profile(source, action).map(ActKind::Profile),
         _ if is_ego && !action.has_tag_name("FollowTrajectoryAction") && !is_route(action) => None,
         "LongitudinalDistanceAction" => ahead(source, action).map(ActKind::Ahead),
         "LaneChangeAction" => {
@@ -266,6 +275,30 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<ActKind> {
         }
         _ => source.refuse(action, "this action is not read"),
     }
+}
+
+fn profile(source: &mut Source, action: Node) -> Option<Vec<SpeedEntry>> {
+    if source.word(action, "followingMode", &FOLLOWING)? != "position" {
+        source.note("speeds change evenly, also where the file has a curve");
+    }
+    if action.has_attribute("entityRef") {
+        return source.refuse(action, "a profile of speeds that are relative to an entity is not read");
+    }
+    let mut most_mps = f64::INFINITY;
+    if let Some(bounds) = element(action, "DynamicConstraints") {
+        most_mps = source.number_or(bounds, "maxSpeed", f64::INFINITY)?;
+    }
+    let mut entries = Vec::new();
+    for node in children(action).filter(|node| node.has_tag_name("SpeedProfileEntry")) {
+        if !node.has_attribute("time") {
+            return source.refuse(node, "without a `time` the player chooses how fast the speed changes");
+        }
+        let (mps, time_s) = (source.number(node, "speed")?, source.amount(node, "time")?);
+        source.refuse_if(mps > most_mps, node, format!("{mps} m/s is above the `maxSpeed` {most_mps}"))?;
+        entries.push(SpeedEntry { mps, time_s });
+    }
+    source.refuse_if(entries.is_empty(), action, "it has no `SpeedProfileEntry`")?;
+    Some(entries)
 }
 
 fn is_route(action: Node) -> bool {

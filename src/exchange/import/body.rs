@@ -34,7 +34,6 @@ pub fn body(source: &mut Source, object: Node) -> Option<Body> {
     let [found] = found[..] else {
         return source.refuse(object, "only vehicles, pedestrians and objects are read, one an object");
     };
-    source.declare_missing(found);
     described(source, found)
 }
 
@@ -42,7 +41,8 @@ pub fn body(source: &mut Source, object: Node) -> Option<Body> {
 pub fn wheelbase_m(length_m: f64, middle_m: f64) -> f64 {
     let wheelbase_m = length_m - (length_m / 2.0 - middle_m) / REAR_PART;
     let (_, low_m, high_m) = BodyField::Wheelbase.range().expect("it is a length");
-    wheelbase_m.clamp(low_m, high_m)
+    // Shorter than the body, whatever its middle is.
+    wheelbase_m.min(0.95 * length_m).clamp(low_m, high_m)
 }
 
 fn is_described(node: Node) -> bool {
@@ -51,6 +51,10 @@ fn is_described(node: Node) -> bool {
 
 /// The body of a `Vehicle`, a `Pedestrian` or a `MiscObject`.
 fn described(source: &mut Source, node: Node) -> Option<Body> {
+    source.scoped(node, |source| of_size(source, node))
+}
+
+fn of_size(source: &mut Source, node: Node) -> Option<Body> {
     let like = match node.tag_name().name() {
         "Vehicle" => match source.text(node, "vehicleCategory")?.as_str() {
             "car" => "Sedan",

@@ -161,7 +161,11 @@ pub fn entry<T>(
     let whose = format!("`{name}` of `{catalogue}`");
     let Some((text, reason)) = source.library.entry(&folders, kinds, &catalogue, &name) else {
         let kinds: Vec<String> = kinds.iter().map(|Kind(_, element)| format!("`{element}`")).collect();
-        let reason = format!("no {} `{name}` in a catalogue `{catalogue}`", kinds.join(" or "));
+        let mut reason = format!("no {} `{name}` in a catalogue `{catalogue}`", kinds.join(" or "));
+        let texts = || folders.iter().flat_map(|(_, texts)| texts.iter());
+        if texts().any(|text| avastra_road::well_formed(text).is_err()) {
+            reason += "; a file there is not well-formed, and is left out";
+        }
         return source.refuse(reference, reason);
     };
     let document = avastra_road::well_formed(&text).ok().filter(|_| reason.is_empty());

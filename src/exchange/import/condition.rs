@@ -1,6 +1,7 @@
 //! Triggers as conditions of the language, asked while a phase waits.
 
 use avastra_base::geometry::Vec2;
+use avastra_world::sim::VehicleParameters;
 
 use super::action::ActKind;
 use super::said::Said;
@@ -10,7 +11,7 @@ use super::story::Event;
 use super::trigger::{Condition, Edge, Pair, Trigger, When};
 
 /// From the ego vehicle's rear axle to its front in avastra, m: what the language's `ego.front` is ahead of a file's reference point.
-const EGO_FRONT_M: f64 = 3.705;
+pub const EGO_FRONT_M: f64 = VehicleParameters::MKZ.rear_axle_to_front_m;
 
 /// What a speed may differ and be reached, m/s.
 const REACHED_MPS: f64 = 0.1;
@@ -47,8 +48,8 @@ impl Begins {
 pub struct Waiting<'w, 'a> {
     pub cast: &'w Cast<'a>,
     pub actor: &'w Moving<'a>,
-    /// The event before this one, if there is one.
-    pub before: Option<&'w Event>,
+    /// The events before this one that began together.
+    pub before: Vec<&'w Event>,
 }
 
 impl Waiting<'_, '_> {
@@ -66,8 +67,8 @@ impl Waiting<'_, '_> {
                     let reason = "what ceases to hold is read where there is one group of conditions";
                     source.refuse_if(is_edge, &condition.mark, reason)?;
                 }
-                if let Some(condition) = all.iter().find(|condition| condition.delay_s > 0.0) {
-                    return source.refuse(&condition.mark, "a delay is read where there is one condition");
+                if let Some(condition) = all.iter().find(|condition| needs_alone(condition)) {
+                    return source.refuse(&condition.mark, "a time is read where there is one condition");
                 }
                 let parts: Option<Vec<Said>> = all.iter().map(|one| self.part(source, one)).collect();
                 groups.push(Said::joined(parts?, " and "));
@@ -76,18 +77,22 @@ impl Waiting<'_, '_> {
             return Some(begins);
         };
         let follows = |condition: &&Condition| match &condition.kind {
-            When::Ended { kind, name } => self.before.is_some_and(|event| is_called(event, kind, name)),
+            When::Ended { kind, name } => self.before.iter().any(|event| is_called(event, kind, name)),
             _ => false,
         };
         let (own, others): (Vec<&Condition>, Vec<&Condition>) = all.iter().partition(follows);
         begins.after_s = own.iter().map(|condition| condition.delay_s).fold(0.0, f64::max);
         if let [only] = others.as_slice() {
+            let reason =
+                "an event waits some time after another has ended, or for a moment, and not for both";
+            let is_both = begins.after_s > 0.0 && only.kind != When::Always;
+            source.refuse_if(is_both, &only.mark, reason)?;
             begins.after_s += only.delay_s;
             if let When::Stands { seconds, .. } = &only.kind {
                 begins.held_s = *seconds;
             }
-        } else if let Some(delayed) = others.iter().find(|condition| condition.delay_s > 0.0) {
-            return source.refuse(&delayed.mark, "a delay is read where there is one condition");
+        } else if let Some(delayed) = others.iter().find(|condition| needs_alone(condition)) {
+            return source.refuse(&delayed.mark, "a time is read where there is one condition");
         }
         let mut parts = Vec::new();
         let mut first = Vec::new();
@@ -128,7 +133,8 @@ impl Waiting<'_, '_> {
                 let way = self.nearer(source, mark, pair)?;
                 let (of, to) = (self.who(source, mark, &pair.of)?, self.who(source, mark, &pair.to)?);
                 let (back, front) = if self.is_behind(source, mark, pair)? { (of, to) } else { (to, of) };
-                Some(way.and(format!(" < ({back}.speed - {front}.speed) * ")).number(*seconds, "s"))
+                let sign = if self.face_each_other(source, mark, pair)? { "+" } else { "-" };
+                Some(way.and(format!(" < ({back}.speed {sign} {front}.speed) * ")).number(*seconds, "s"))
             }
             When::Distance { pair, metres } => {
                 let bound = Said::default().number(*metres, "m");
@@ -175,7 +181,8 @@ impl Waiting<'_, '_> {
     /// That something has begun: what it waits for has come.
     fn begun(&self, source: &mut Source, mark: &Mark, kind: &'static str, name: &str) -> Option<Said> {
         let Some((_, event)) = self.cast.last_event(kind, name) else {
-            let reason = format!("what begins with `{name}` is not known here: the ego vehicle's, or the player's");
+            let reason =
+                format!("what begins with `{name}` is not known here: the ego vehicle's, or the player's");
             return source.refuse(mark, reason);
         };
         let waits = |condition: &Condition| {
@@ -284,8 +291,11 @@ impl Waiting<'_, '_> {
             When::Collides { pair, seconds } => {
                 let of_mps = self.cast.begins_mps(source, mark, &pair.of)?;
                 let to_mps = self.cast.begins_mps(source, mark, &pair.to)?;
-                let by_mps =
-                    if self.is_behind(source, mark, pair)? { of_mps - to_mps } else { to_mps - of_mps };
+                let by_mps = match self.is_behind(source, mark, pair)? {
+                    _ if self.face_each_other(source, mark, pair)? => of_mps + to_mps,
+                    true => of_mps - to_mps,
+                    false => to_mps - of_mps,
+                };
                 self.away_m(source, mark, pair)? < by_mps * seconds
             }
             When::Speed { entity, mps, is_less } => {
@@ -294,6 +304,12 @@ impl Waiting<'_, '_> {
             }
             _ => false,
         })
+    }
+
+    /// Whether two look against each other as they begin.
+    fn face_each_other(&self, source: &mut Source, mark: &Mark, pair: &Pair) -> Option<bool> {
+        let [of, to] = [&pair.of, &pair.to].map(|name| self.cast.looks_ahead(source, mark, name));
+        Some(of? != to?)
     }
 
     /// How far two are from each other at the beginning, m.
@@ -317,7 +333,7 @@ impl Waiting<'_, '_> {
             return Some((Said::text("ego.front"), station_m));
         }
         let who = self.who(source, mark, entity)?;
-        let station_m = self.cast.moving(source, mark, entity)?.path.project(point).station_m;
+        let station_m = self.cast.moving(source, mark, entity)?.station_m(point);
         Some((Said::text(format!("{who}.station")), station_m))
     }
 
@@ -331,6 +347,11 @@ impl Waiting<'_, '_> {
         }
         Some(self.cast.moving(source, mark, name)?.bearer.clone())
     }
+}
+
+/// Whether a condition holds a time, which only a condition of its own keeps.
+fn needs_alone(condition: &Condition) -> bool {
+    condition.delay_s > 0.0 || matches!(condition.kind, When::Stands { seconds, .. } if seconds > 0.0)
 }
 
 /// Whether an event, or something that holds it, has a name.

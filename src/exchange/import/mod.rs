@@ -8,7 +8,7 @@
 //! `variation` reads the values of a distribution. For each variation `story` reads the scenario, with `body`, `position`,
 //! `shape`, `action`, `trigger` and `weather` for what stands in it, through `source`, which fills in each `parameter` and its
 //! `expression`, and `catalogue`, which finds what lies in other files; `vocabulary` refuses what no file may hold. `place` finds
-//! places on the map, `scene` gives everybody a way and phases, `condition` the moments at which these begin: as `said`, text
+//! places on the map, `scene` gives everybody a way and phases, `pace` their speeds, `condition` the moments at which these begin: as `said`, text
 //! with its numbers apart. `rows` finds how the numbers follow from the parameters, and `write` prints the space. A file that
 //! avastra exported carries its scenario (`own`). No file is read here: `cli` gives texts.
 
@@ -18,6 +18,7 @@ mod catalogue;
 mod condition;
 mod expression;
 mod own;
+mod pace;
 mod parameter;
 mod place;
 mod position;
@@ -124,27 +125,32 @@ pub fn openscenario(
     }
     let mut whole =
         Whole { ego, description: String::new(), notes: BTreeSet::new(), variants: Vec::new(), excluded: 0 };
-    let Some(distribution) = variation::read(&mut source, document.root_element()) else {
+    let Some(named) = variation::scenario(&mut source, document.root_element()) else {
         whole
             .add(&document, &lines, &library, parameters.clone(), parameters)
             .map_err(|refused| refused.0)?;
         return Ok(write::space(&whole, &[], name));
     };
-    let Some(distribution) = distribution.filter(|_| !source.is_refused()) else {
-        return Err(source.refusals());
-    };
-    let path = distribution.scenario.replace('\\', "/");
-    let of_scenario = |refusals: Vec<Refusal>| {
-        refusals
-            .into_iter()
-            .map(|refusal| Refusal { scenario: Some(path.clone()), ..refusal })
-            .collect::<Vec<_>>()
-    };
+    let Some((path, line)) = named else { return Err(source.refusals()) };
+    let path = path.replace('\\', "/");
     let text = files.scenario(&path).map_err(|reason| {
         let reason = format!("`{path}`: {reason}");
-        vec![Refusal { scenario: None, line: distribution.line, element: "ScenarioFile".to_owned(), reason }]
+        vec![Refusal { scenario: None, line, element: "ScenarioFile".to_owned(), reason }]
     })?;
+    let of_variations = document;
     let document = parsed(&text, Some(&path))?;
+    let declared = declared(&document);
+    let read = variation::read(&mut source, of_variations.root_element(), &declared);
+    let Some(distribution) = read.filter(|_| !source.is_refused()) else { return Err(source.refusals()) };
+    // What is wrong with the scenario, and for which values.
+    let of_scenario = |refusals: Vec<Refusal>, values: &Values| {
+        let pairs: Vec<String> = values.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+        let with = |refusal: Refusal| {
+            let reason = format!("{} (where {})", refusal.reason, pairs.join(", "));
+            Refusal { scenario: Some(path.clone()), reason, ..refusal }
+        };
+        refusals.into_iter().map(with).collect::<Vec<_>>()
+    };
     let lines = Rc::new(Lines::new(&text));
     let folder = path.rfind('/').map_or_else(String::new, |at| path[..=at].to_owned());
     let library = Library::new(files, folder);
@@ -158,12 +164,12 @@ pub fn openscenario(
         }
         match whole.add(&document, &lines, &library, values.clone(), &values) {
             Ok(()) => {}
-            Err((refusals, true)) => excluded = Some(refusals),
-            Err((refusals, false)) => return Err(of_scenario(refusals)),
+            Err((refusals, true)) => excluded = Some((refusals, values)),
+            Err((refusals, false)) => return Err(of_scenario(refusals, &values)),
         }
     }
     match excluded.filter(|_| whole.variants.is_empty()) {
-        Some(refusals) => Err(of_scenario(refusals)),
+        Some((refusals, values)) => Err(of_scenario(refusals, &values)),
         None => {
             whole.description = distribution.description;
             Ok(write::space(&whole, &distribution.parameters, name))
@@ -216,6 +222,15 @@ impl Whole<'_> {
             }
         }
     }
+}
+
+/// The parameters that a scenario declares, with their values as it writes them.
+fn declared(document: &Document) -> Values {
+    let lists = source::elements(document.root_element(), "ParameterDeclarations");
+    let declared = lists.flat_map(source::children);
+    declared
+        .filter_map(|one| Some((one.attribute("name")?.to_owned(), one.attribute("value")?.to_owned())))
+        .collect()
 }
 
 fn parsed<'t>(text: &'t str, scenario: Option<&str>) -> Result<Document<'t>, Vec<Refusal>> {

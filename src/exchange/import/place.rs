@@ -17,6 +17,13 @@ const WAY_M_MAX: f64 = 12_000.0;
 /// The goal lies this far before the end of the lanes, m.
 const BEFORE_END_M: f64 = 1.0;
 
+/// A way against the direction of its lane goes on so far, m, is looked at in such steps, m, and drawn so near to the lanes, m.
+const AGAINST_M_MAX: f64 = 2_000.0;
+const AGAINST_STEP_M: f64 = 2.0;
+const AGAINST_NEAR_M: f64 = 0.02;
+/// Points between two that are kept: it bounds the search.
+const STRIDE_MAX: usize = 200;
+
 /// A place in the plane belongs to a lane that is this near, m.
 const REACH_M: f64 = 2.0;
 
@@ -57,8 +64,8 @@ impl<'a> Places<'a> {
             }
             return source.refuse(mark, format!("no entity is called `{name}`"));
         };
+        source.refuse_if(self.depth >= DEPTH_MAX, mark, "places are relative to each other in a circle")?;
         self.depth += 1;
-        source.refuse_if(self.depth > DEPTH_MAX, mark, "places are relative to each other in a circle")?;
         let found = match (&entity.position, &entity.way) {
             (Some(position), _) => self.placed(source, position),
             (None, Some(way)) => {
@@ -83,14 +90,12 @@ impl<'a> Places<'a> {
                     Ok(place) => place,
                     Err(error) => return source.refuse(mark, error.to_string()),
                 };
-                // The file's offsets are to the left of the road's reference line.
-                let is_along = self.map.lane(place.lane).is_along();
-                self.on_lane(LanePlace { offset_m: if is_along { *offset_m } else { -offset_m }, ..place })
+                self.on_lane(LanePlace { offset_m: self.left_m(place, *offset_m), ..place })
             }
             PositionKind::RelativeLane { entity, lanes, ahead_m, offset_m } => {
                 let of = self.on_a_lane(source, mark, entity)?;
                 let there = self.beside(source, mark, of, *lanes, *ahead_m)?;
-                self.on_lane(LanePlace { offset_m: *offset_m, ..there })
+                self.on_lane(LanePlace { offset_m: self.left_m(there, *offset_m), ..there })
             }
             PositionKind::Road { road, s_m, t_m } => {
                 let reference = self.reference(source, mark, road, *s_m)?;
@@ -99,10 +104,8 @@ impl<'a> Places<'a> {
             PositionKind::RelativeRoad { entity, ds_m, dt_m } => {
                 let of = self.on_a_lane(source, mark, entity)?;
                 let there = self.beside(source, mark, of, 0, *ds_m)?;
-                let is_along = self.map.lane(there.lane).is_along();
-                let left_m = if is_along { *dt_m } else { -dt_m };
-                let there = self.on_lane(LanePlace { offset_m: of.offset_m + left_m, ..there });
-                self.near_lane(there)
+                let offset_m = of.offset_m + self.left_m(there, *dt_m);
+                self.in_plane(self.on_lane(LanePlace { offset_m, ..there }).pose)
             }
             PositionKind::World { x_m, y_m } => {
                 let (Heading::Absolute(rad) | Heading::Relative(rad)) = *heading;
@@ -114,9 +117,7 @@ impl<'a> Places<'a> {
             }
             PositionKind::RelativeObject { entity, dx_m, dy_m } => {
                 let of = self.of(source, mark, entity)?;
-                let placed = self.in_plane(of.pose.offset(*dx_m, *dy_m));
-                // One that looks against its lane does so farther along, too.
-                placed
+                self.in_plane(of.pose.offset(*dx_m, *dy_m))
             }
             PositionKind::OnRoute { route, along_m, beside } => {
                 self.on_route(source, mark, route, *along_m, *beside)?
@@ -149,9 +150,9 @@ impl<'a> Places<'a> {
         Placed { pose, lane, turned_rad }
     }
 
-    /// The same place with the lane in which it lies, if that is another one.
-    fn near_lane(&self, placed: Placed) -> Placed {
-        self.in_plane(placed.pose)
+    /// A way to the left in a road's direction as one to the left in that of a lane.
+    fn left_m(&self, place: LanePlace, left_m: f64) -> f64 {
+        if self.map.lane(place.lane).is_along() { left_m } else { -left_m }
     }
 
     fn turned(&self, placed: Placed, heading: Heading) -> Placed {
@@ -162,6 +163,21 @@ impl<'a> Places<'a> {
         };
         let turned_rad = if placed.lane.is_some() { wrap_angle(heading_rad - lane_rad) } else { 0.0 };
         Placed { pose: Pose { heading_rad: wrap_angle(heading_rad), ..placed.pose }, turned_rad, ..placed }
+    }
+
+    /// The way back along the lanes from a place, at the same distance from their middles.
+    pub fn against(&self, from: LanePlace) -> Vec<Vec2> {
+        let (mut lane, mut station_m, mut points) = (from.lane, from.station_m, Vec::new());
+        while points.len() as f64 * AGAINST_STEP_M < AGAINST_M_MAX {
+            points.push(self.map.lane(lane).centre.pose_at(station_m).offset(0.0, from.offset_m).position);
+            station_m -= AGAINST_STEP_M;
+            if station_m < 0.0 {
+                let Some(before) = self.map.lane(lane).predecessors.first() else { break };
+                lane = *before;
+                station_m += self.map.lane(lane).centre.length_m();
+            }
+        }
+        thinned(&points)
     }
 
     fn on_a_lane(&mut self, source: &mut Source, mark: &Mark, entity: &str) -> Option<LanePlace> {
@@ -299,6 +315,7 @@ impl<'a> Places<'a> {
                     let Some(place) = place else {
                         return source.refuse(mark, "the road has no such lane there");
                     };
+                    // To the left of the route, not of the road.
                     Some(self.on_lane(LanePlace { offset_m, ..place }))
                 }
                 Beside::Road(t_m) => {
@@ -332,11 +349,39 @@ impl Placed {
         self.lane.is_some() && self.turned_rad.abs() < 0.1
     }
 
+    /// Whether it looks against its lane.
+    pub fn is_against(&self) -> bool {
+        self.lane.is_some() && self.turned_rad.abs() > core::f64::consts::PI - 0.1
+    }
+
     /// A short straight way on from here, m.
     pub fn ahead(&self, way_m: f64) -> [Vec2; 2] {
         let from = self.pose.position;
         [from, from + unit_vector(self.pose.heading_rad) * way_m]
     }
+}
+
+/// As few of the points as keep every other one near to the line between two.
+fn thinned(points: &[Vec2]) -> Vec<Vec2> {
+    let Some(first) = points.first() else { return Vec::new() };
+    let (mut kept, mut from) = (vec![*first], 0);
+    while from + 1 < points.len() {
+        let fits = |to: usize| {
+            let along = points[to] - points[from];
+            let off_m = |point: &Vec2| {
+                let by = point - points[from];
+                (along.x * by.y - along.y * by.x).abs() / along.norm().max(f64::MIN_POSITIVE)
+            };
+            points[from + 1..to].iter().all(|point| off_m(point) <= AGAINST_NEAR_M)
+        };
+        let mut to = from + 1;
+        while to + 1 < points.len() && to < from + STRIDE_MAX && fits(to + 1) {
+            to += 1;
+        }
+        kept.push(points[to]);
+        from = to;
+    }
+    kept
 }
 
 /// The lane that goes on from another with the least turn, without one of those that were passed.

@@ -89,6 +89,10 @@ pub enum Heading {
 
 /// The position within an element.
 pub fn position(source: &mut Source, parent: Node) -> Option<Position> {
+    source.nested(parent, |source| place_in(source, parent))
+}
+
+fn place_in(source: &mut Source, parent: Node) -> Option<Position> {
     let Some(place) = children(parent).next() else { return source.refuse(parent, "it is empty") };
     let mark = source.mark(place);
     let mut heading = heading(source, place)?;
@@ -150,12 +154,11 @@ pub fn position(source: &mut Source, parent: Node) -> Option<Position> {
 /// The places that a route leads through.
 pub fn route(source: &mut Source, parent: Node) -> Option<Vec<Position>> {
     if let Some(route) = element(parent, "Route") {
-        return waypoints(source, route);
+        return source.scoped(route, |source| waypoints(source, route));
     }
     let reference = source.required(parent, "CatalogReference")?;
     catalogue::entry(source, reference, &[catalogue::ROUTE], |source, route| {
-        source.declare_missing(route);
-        waypoints(source, route)
+        source.scoped(route, |source| waypoints(source, route))
     })
 }
 

@@ -6,6 +6,7 @@ use std::fmt::Write;
 use avastra_campaign::emit::identifier;
 
 use super::said::Figure;
+use super::scene::TAKEN;
 use super::variation::Values;
 
 /// More rows of one action than this are drawn, not listed; so are those that all actions have on all roads.
@@ -27,6 +28,8 @@ pub struct Parameters {
     rows: Vec<Vec<usize>>,
     /// Functions that numbers need: their texts, and their names.
     functions: Vec<(String, String)>,
+    /// The parameters that are drawn in some action.
+    pub drawn: BTreeSet<String>,
 }
 
 #[derive(Debug)]
@@ -74,7 +77,7 @@ impl Parameters {
                 kept.retain(|(other, _)| *other != name);
             }
         }
-        let mut taken = BTreeSet::new();
+        let mut taken: BTreeSet<String> = TAKEN.map(str::to_owned).into();
         let mut rows = vec![Vec::new(); variations.len()];
         let mut list = Vec::new();
         for (name, texts) in kept {
@@ -85,7 +88,7 @@ impl Parameters {
             }
             list.push(parameter);
         }
-        Parameters { list, rows, functions: Vec::new() }
+        Parameters { list, rows, functions: Vec::new(), drawn: BTreeSet::new() }
     }
 
     /// The enums of parameters that are words.
@@ -106,16 +109,19 @@ impl Parameters {
 
     /// The parameters of an action that stands for some of the variations, with what combines no values otherwise than they do.
     /// `times` is how many actions there are, by how many roads.
-    pub fn declared(&self, group: &[usize], times: usize) -> String {
+    pub fn declared(&mut self, group: &[usize], times: usize) -> String {
         let most = EACH_MAX.min(ALL_MAX / times.max(1));
         let mut declared = Vec::new();
-        let mut count = 1;
+        let mut count: usize = 1;
         let all: Vec<usize> = (0..self.list.len()).collect();
         for at in 0..self.list.len() {
-            let parameter = &self.list[at];
             let values = self.values(group, at);
-            count *= values.len();
+            count = count.saturating_mul(values.len());
             let word = if count > most { "any" } else { "each" };
+            if word == "any" {
+                self.drawn.insert(self.list[at].name.clone());
+            }
+            let parameter = &self.list[at];
             let listed: Vec<&str> = values.iter().map(|value| parameter.values[*value].as_str()).collect();
             let mut text =
                 format!("{word} {}: {} in [{}]", parameter.name, parameter.type_name(), listed.join(", "));
@@ -330,7 +336,7 @@ impl Parameter {
             let mut distinct = numbers.clone();
             distinct.sort_by(f64::total_cmp);
             distinct.dedup();
-            let at = |number: &f64| distinct.iter().position(|value| value == number).unwrap_or(0);
+            let at = |number: &f64| distinct.partition_point(|value| value < number);
             let row = numbers.iter().map(at).collect();
             let values = distinct.iter().map(f64::to_string).collect();
             return (Parameter { name, kind: Kind::Number(distinct), values }, row);
@@ -341,13 +347,14 @@ impl Parameter {
             return (Parameter { name, kind: Kind::Truth, values }, row);
         }
         let mut distinct: Vec<&str> = Vec::new();
+        let mut places: BTreeMap<&str, usize> = BTreeMap::new();
         let mut row = Vec::new();
         for text in texts {
-            let known = distinct.iter().position(|known| known == text);
-            row.push(known.unwrap_or(distinct.len()));
-            if known.is_none() {
+            let at = *places.entry(text).or_insert(distinct.len());
+            if at == distinct.len() {
                 distinct.push(text);
             }
+            row.push(at);
         }
         // The last part of a path, without its ending, says which one it is.
         let short = |text: &str| {
@@ -460,4 +467,82 @@ pub fn unique(name: &str, taken: &mut BTreeSet<String>) -> String {
     let own = own.into_iter().find(|name| !taken.contains(name)).unwrap_or_default();
     taken.insert(own.clone());
     own
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The parameters of some variations, given as `name=value` words.
+    fn parameters(order: &[&str], variations: &[&str]) -> Parameters {
+        let order: Vec<String> = order.iter().map(|name| (*name).to_owned()).collect();
+        let values: Vec<Values> = variations
+            .iter()
+            .map(|text| {
+                let pairs = text.split_whitespace().map(|pair| pair.split_once('=').expect("name=value"));
+                pairs.map(|(name, value)| (name.to_owned(), value.to_owned())).collect()
+            })
+            .collect();
+        Parameters::of(&order, &values.iter().collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn what_follows_from_others_is_no_parameter() {
+        let variations =
+            ["kmh=30 id=a far=10 same=1", "kmh=40 id=b far=20 same=1", "kmh=50 id=c far=20 same=1"];
+        let found = parameters(&["id", "kmh", "far", "same"], &variations);
+        let names: Vec<&str> = found.list.iter().map(|parameter| parameter.name.as_str()).collect();
+        assert_eq!(names, ["kmh"], "a speed stays");
+        assert_eq!(found.enums(), "");
+    }
+
+    #[test]
+    fn words_make_an_enum_and_what_is_not_combined_is_left_out() {
+        let variations = ["who=Cars/van.xml kmh=30", "who=car kmh=30", "who=car kmh=40"];
+        let mut found = parameters(&["who", "kmh"], &variations);
+        assert_eq!(found.enums(), "enum WhoOf = Van | Car\n");
+        let declared = "each who: WhoOf in [Van, Car], each kmh: Ratio in [30, 40] where ((who == Van and kmh == 30) or who == Car)";
+        assert_eq!(found.declared(&[0, 1, 2], 1), declared);
+        assert_eq!(found.declared(&[1, 2], 1), "each who: WhoOf in [Car], each kmh: Ratio in [30, 40]");
+        let cases = found.cases(&[0, 1, 2], |at| at == 2, |far| format!("far == {far}"));
+        assert_eq!(cases, "((far == false and kmh == 30) or (far == true and kmh == 40))");
+        assert_eq!(found.names(&[0, 2], |at| at), ["Van", "Car"]);
+    }
+
+    #[test]
+    fn beyond_the_most_rows_the_last_parameters_are_drawn() {
+        let all: Vec<String> = (0..1200).map(|at| format!("a={} b={}", at % 40, at / 40)).collect();
+        let mut found = parameters(&["a", "b"], &all.iter().map(String::as_str).collect::<Vec<_>>());
+        let group: Vec<usize> = (0..1200).collect();
+        let declared = found.declared(&group, 1);
+        assert!(declared.contains("each a: ") && declared.contains("any b: "), "{declared}");
+        assert_eq!(found.drawn, ["b".to_owned()].into());
+    }
+
+    #[test]
+    fn numbers_are_multiples_lines_or_tables_of_parameters() {
+        let variations = ["kmh=20 far=1", "kmh=30 far=1", "kmh=40 far=2"];
+        let mut found = parameters(&["kmh"], &variations);
+        let said = |found: &mut Parameters, unit, values: [f64; 3]| {
+            found.number(&[0, 1, 2], &values.map(|value| Figure::new(value, unit)), "it")
+        };
+        assert_eq!(said(&mut found, "m/s", [20.0 / 3.6, 30.0 / 3.6, 40.0 / 3.6]), "kmh * 1 km/h");
+        assert_eq!(said(&mut found, "m", [10.0 / 3.6, 15.0 / 3.6, 20.0 / 3.6]), "kmh * 1 km/h * 0.5 s");
+        assert_eq!(said(&mut found, "m", [7.0, 9.0, 11.0]), "kmh * 0.2 m + 3 m");
+        assert_eq!(said(&mut found, "s", [2.0, 2.0, 2.0]), "2 s");
+        assert_eq!(said(&mut found, "m", [1.0, 1.0, 5.0]), "it(kmh)");
+        assert_eq!(said(&mut found, "m", [1.0, 5.0, 1.0]), "it_2(kmh)");
+        assert_eq!(said(&mut found, "m", [1.0, 1.0, 5.0]), "it(kmh)", "one function for the same table");
+        let functions: Vec<&str> = found.functions().collect();
+        let first = "fn it(kmh: Ratio) -> Length = match kmh { 20 | 30 => 1 m, _ => 5 m }";
+        let second = "fn it_2(kmh: Ratio) -> Length = match kmh { 20 | 40 => 1 m, _ => 5 m }";
+        assert_eq!(functions, [first, second]);
+    }
+
+    #[test]
+    fn two_points_are_a_multiple_or_no_line() {
+        assert_eq!(line(&[(2.0, 1.0), (4.0, 2.0)], "", "x").as_deref(), Some("x * 0.5"));
+        assert_eq!(line(&[(2.0, 1.0), (4.0, 3.0)], "", "x"), None);
+        assert_eq!(line(&[(0.0, 1.0), (0.0, 1.0)], "", "x"), None);
+    }
 }

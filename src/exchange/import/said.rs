@@ -87,6 +87,12 @@ impl Said {
         })
     }
 
+    /// The word before its first colon.
+    pub fn name(&self) -> String {
+        let text = self.form();
+        text.split(':').next().unwrap_or_default().to_owned()
+    }
+
     pub fn figures(&self) -> impl Iterator<Item = Figure> {
         self.0.iter().filter_map(|piece| match piece {
             Piece::Text(_) => None,

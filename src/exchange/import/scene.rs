@@ -8,10 +8,12 @@ use avastra_campaign::emit::lane_point;
 use avastra_lang::model::SPAWN_SPEED_MPS;
 use avastra_lang::model::command::OFFSET_M;
 use avastra_road::{LanePlace, RoadMap, Route, Side};
+use avastra_world::sim::VehicleParameters;
 
 use super::action::{Act, ActKind, Aside, Dynamics, Headway, Meeting, Over, Speed, Steady, Target};
 use super::body::Body;
-use super::condition::{Waiting, is_called};
+use super::condition::{EGO_FRONT_M, Waiting, is_called};
+use super::pace::{self, Change, too_fast};
 use super::place::{Placed, Places, straight_on};
 use super::position::Position;
 use super::rows::small;
@@ -25,6 +27,9 @@ pub const OFFSET: &str = ", offset: ";
 
 /// A way along lanes begins at a multiple of this, so that places that differ a little are on one way, m.
 const BEGINS_M: f64 = 500.0;
+
+/// The least limit that is written where the map states none, m/s: 50 km/h, as a town's.
+const LIMIT_MPS: f64 = 50.0 / 3.6;
 
 /// A way that is shorter shows nothing, m.
 const WAY_M_MIN: f64 = 20.0;
@@ -40,7 +45,7 @@ const NEAR_M: f64 = 1.5;
 const ASIDE_MPS_MAX: f64 = 10.0;
 
 /// Words of the language that name no road user.
-const TAKEN: [&str; 6] = ["ego", "npc", "road", "nearest", "road_users", "step"];
+pub const TAKEN: [&str; 6] = ["ego", "npc", "road", "nearest", "road_users", "step"];
 
 /// The ego vehicle's way, and all the others.
 #[derive(Debug)]
@@ -49,6 +54,8 @@ pub struct Scene {
     pub start: String,
     pub goal: String,
     pub ego_mps: Figure,
+    /// What counts on lanes of which the map states no limit.
+    pub limit_mps: Option<Figure>,
     pub others: Vec<Other>,
 }
 
@@ -134,8 +141,16 @@ impl Scene {
             source.note("others follow their ways exactly, as the file's player moves them, and mind nobody");
         }
         let (start, goal) = (lane_point(&cast.map, start), lane_point(&cast.map, goal));
-        let ego_mps = Figure::new(ego_mps, "m/s");
-        (!source.is_refused()).then_some(Scene { start, goal, ego_mps, others })
+        let lanes = || cast.route.lanes.iter().map(|part| cast.map.lane(part.lane));
+        let is_open = lanes().any(|lane| !lane.states_limit);
+        if lanes().any(|lane| lane.states_limit && lane.speed_limit_mps < ego_mps - 0.01) {
+            source.note(
+                "the map's speed limit is below the ego vehicle's speed: driving systems slow down to it",
+            );
+        }
+        let (ego_mps, most) = (Figure::new(ego_mps, "m/s"), ego_mps.max(LIMIT_MPS));
+        let limit_mps = is_open.then(|| Figure::new(most, "m/s"));
+        (!source.is_refused()).then_some(Scene { start, goal, ego_mps, limit_mps, others })
     }
 }
 
@@ -251,15 +266,24 @@ impl<'a> Cast<'a> {
     /// How far an end of somebody's outline lies beyond its reference point along the ego vehicle's route, m.
     pub fn overhang_m(&self, source: &mut Source, mark: &Mark, name: &str, is_front: bool) -> Option<f64> {
         if self.is_ego(name) {
-            return Some(if is_front { 3.705 } else { 4.70 - 3.705 });
+            let rear_m = VehicleParameters::MKZ.length_m - EGO_FRONT_M;
+            return Some(if is_front { EGO_FRONT_M } else { rear_m });
         }
-        let moving = self.moving(source, mark, name)?;
-        let body = &moving.entity.body;
-        let beside = self.route.path.project(moving.placed.pose.position).station_m;
-        let turned_rad = wrap_angle(moving.placed.pose.heading_rad - self.route.path.heading_at(beside));
-        let looks_ahead = turned_rad.abs() < core::f64::consts::FRAC_PI_2;
+        let looks_ahead = self.looks_ahead(source, mark, name)?;
+        let body = &self.moving(source, mark, name)?.entity.body;
         let middle_m = if looks_ahead == is_front { body.middle_m } else { -body.middle_m };
         Some(body.length_m / 2.0 + middle_m)
+    }
+
+    /// Whether a road user begins in the direction of the ego vehicle's route.
+    pub fn looks_ahead(&self, source: &mut Source, mark: &Mark, name: &str) -> Option<bool> {
+        if self.is_ego(name) {
+            return Some(true);
+        }
+        let pose = self.moving(source, mark, name)?.placed.pose;
+        let beside = self.route.path.project(pose.position).station_m;
+        let turned_rad = wrap_angle(pose.heading_rad - self.route.path.heading_at(beside));
+        Some(turned_rad.abs() < core::f64::consts::FRAC_PI_2)
     }
 
     /// Somebody on the way that it goes.
@@ -354,7 +378,16 @@ impl<'a> Cast<'a> {
         if !is_short && !entity.events.is_empty() && entity.route.is_some() {
             return source.refuse(&entity.mark, "its route leads beside the lanes");
         }
-        let points = placed.ahead(if is_short { STANDING_M } else { STRAIGHT_M });
+        let against = placed.lane.filter(|_| !is_short && placed.is_against());
+        let points = match against {
+            Some(lane) => self.places.borrow().against(lane),
+            None => placed.ahead(if is_short { STANDING_M } else { STRAIGHT_M }).to_vec(),
+        };
+        let points = if points.len() < 2 { placed.ahead(STANDING_M).to_vec() } else { points };
+        if against.is_none() && !is_short {
+            source
+                .note(format!("`{}` looks along no lane, and goes {STRAIGHT_M} m straight on", entity.name));
+        }
         let path = Path::through(&points)?;
         Some(moving(path, points_text(&points), 0.0, 0.0, Vec::new()))
     }
@@ -373,8 +406,7 @@ impl<'a> Cast<'a> {
             Headway::Way(way_m) => *way_m,
             Headway::Time(time_s) => time_s * speed(source, self.story, ego, 0)?,
         };
-        let ego_front_m = ego.body.length_m / 2.0 + ego.body.middle_m;
-        let ahead_m = ego_front_m + gap_m + body.length_m / 2.0 - body.middle_m;
+        let ahead_m = EGO_FRONT_M + gap_m + body.length_m / 2.0 - body.middle_m;
         let Some(lane) = placed.lane.filter(|_| placed.is_along()) else {
             return source
                 .refuse(mark, "a distance to the ego vehicle is read of a vehicle in a lane ahead of it");
@@ -404,6 +436,7 @@ impl<'a> Cast<'a> {
         }
         let mut told =
             Told { mps: Some(moving.mps), offset_m: moving.offset_m, lane: moving.placed.lane, lane_m: 0.0 };
+        told.lane_m = told.lane.map_or(0.0, |lane| self.aside_m(moving, lane));
         let mut phases = Vec::new();
         if entity.way.as_ref().is_some_and(|way| way.timing.is_some()) {
             phases.extend(self.timed(source, moving, Said::default(), true)?);
@@ -426,26 +459,39 @@ impl<'a> Cast<'a> {
             }
         }
         // Also one that only placed somebody, which took no time.
-        let mut before: Option<&Event> = entity.events.iter().rfind(|event| event.when.is_empty());
+        let mut before: Vec<&Event> = entity.events.iter().filter(|event| event.when.is_empty()).collect();
         for (event, acts) in groups {
             let begins = match event {
                 None => Said::default(),
                 Some(event) => {
-                    let waiting = Waiting { cast: self, actor: moving, before };
+                    let waiting = Waiting { cast: self, actor: moving, before: before.clone() };
                     let begins = waiting.begins(source, &event.when)?;
-                    phases.extend(begins.first.as_ref().map(|first| {
-                        Said::text("once ").then(first.clone()).and(" {}")
-                    }));
+                    phases.extend(
+                        begins.first.as_ref().map(|first| Said::text("once ").then(first.clone()).and(" {}")),
+                    );
                     begins.said()
                 }
             };
-            before = event.or(before);
+            if let Some(event) = event {
+                before = entity.events.iter().filter(|other| same_moment(other, event)).collect();
+            }
             let mut fields = Vec::new();
             let mut timed = Vec::new();
             for act in acts {
                 match &act.kind {
                     ActKind::Follow(way) if way.timing.is_some() => {
                         timed = self.timed(source, moving, begins.clone(), way.is_absolute)?;
+                    }
+                    ActKind::Profile(entries) => {
+                        timed = pace::profile(
+                            source,
+                            &act.mark,
+                            &entity.body,
+                            told.mps,
+                            entries,
+                            begins.clone(),
+                        )?;
+                        told.mps = entries.last().map(|entry| entry.mps);
                     }
                     _ => self.fields(source, moving, act, &mut told, &mut fields)?,
                 }
@@ -456,7 +502,8 @@ impl<'a> Cast<'a> {
                 phases.extend(timed);
             } else {
                 let mark = &event.map_or(&entity.mark, |event| &event.mark);
-                return source.refuse(*mark, "the times of a trajectory say the speed already");
+                let reason = "times of a trajectory or of a profile say the speed, and nothing else is read beside them";
+                return source.refuse(*mark, reason);
             }
         }
         Some(phases)
@@ -489,7 +536,9 @@ impl<'a> Cast<'a> {
             let said = core::mem::take(&mut begins);
             let said = match (phases.is_empty(), is_wait) {
                 (true, _) | (false, true) => said,
-                (false, false) => Said::text("once npc.station >= ").number(from_m, "m").and(" "),
+                (false, false) => {
+                    Said::text("once npc.station >= ").number(from_m + moving.more_m(), "m").and(" ")
+                }
             };
             let mps = way_m / time_s;
             source.refuse_if(mps > *SPAWN_SPEED_MPS.end(), &moving.entity.mark, too_fast(mps))?;
@@ -517,18 +566,18 @@ impl<'a> Cast<'a> {
             ActKind::Ahead(_) => Some(()),
             ActKind::Route(_) => source.refuse(mark, "a route is taken from the beginning"),
             // It goes on with the speed that it has, which is 0: an event of its own tells it more.
-            ActKind::Follow(_) => Some(()),
+            ActKind::Follow(_) | ActKind::Profile(_) => Some(()),
             ActKind::Speed(wanted, dynamics) => {
                 self.speed_fields(source, moving, mark, wanted, *dynamics, told, fields)
             }
             ActKind::Lane(target, more_m, dynamics) => {
                 let lane_m = self.lane_offset_m(source, moving, mark, target, told)?;
-                let to_m = lane_m + self.left_m(told, *more_m);
+                let to_m = lane_m + self.left_m(moving, told, *more_m);
                 let to = Said::default().number(to_m, "m");
                 aside_fields(source, mark, to_m, to, *dynamics, told, fields)
             }
             ActKind::Offset(Aside::InLane(offset_m), dynamics) => {
-                let to_m = told.lane_m + self.left_m(told, *offset_m);
+                let to_m = told.lane_m + self.left_m(moving, told, *offset_m);
                 let to = Said::default().number(to_m, "m");
                 aside_fields(source, mark, to_m, to, *dynamics, told, fields)
             }
@@ -540,10 +589,14 @@ impl<'a> Cast<'a> {
         }
     }
 
-    /// A way to the left of the road as one to the left of somebody in a lane of it.
-    fn left_m(&self, told: &Told, left_m: f64) -> f64 {
-        let is_along = told.lane.is_none_or(|place| self.map.lane(place.lane).is_along());
-        if is_along { left_m } else { -left_m }
+    /// A way to the left in the road's direction as one to the left of somebody in a lane of it, on its way.
+    fn left_m(&self, moving: &Moving, told: &Told, left_m: f64) -> f64 {
+        let Some(place) = told.lane else { return left_m };
+        let lane = self.map.lane(place.lane);
+        let turned_rad =
+            wrap_angle(moving.path.heading_at(moving.at_m) - lane.centre.heading_at(place.station_m));
+        let goes_with_lane = turned_rad.abs() < core::f64::consts::FRAC_PI_2;
+        if goes_with_lane == lane.is_along() { left_m } else { -left_m }
     }
 
     /// Where on its way, across, somebody is so much to the left of another one: as both begin, and as both are then.
@@ -584,7 +637,8 @@ impl<'a> Cast<'a> {
         fields: &mut Vec<Said>,
     ) -> Option<()> {
         if let (true, Speed::More(name, _) | Speed::Times(name, _)) = (dynamics.is_continuous, wanted) {
-            let reason = "a speed that follows another's from moment to moment is read where that one keeps its own";
+            let reason =
+                "a speed that follows another's from moment to moment is read where that one keeps its own";
             source.refuse_if(self.is_ego(name) || !self.keeps_its_speed(name), mark, reason)?;
         }
         let who = |source: &mut Source, name: &str| match () {
@@ -637,21 +691,16 @@ impl<'a> Cast<'a> {
                 return source.refuse(mark, "over a way a speed changes only from one that the file says");
             }
         };
-        // A player keeps to what its vehicle can.
-        let body = &moving.entity.body;
-        let most_mps2 = match (told.mps, mps) {
-            (Some(from), Some(to)) if to < from => body.loses_mps2,
-            (Some(_), Some(_)) => body.gains_mps2,
-            _ => f64::INFINITY,
-        };
-        let capped = |rate: Said| match rate.0.as_slice() {
-            [Piece::Number(figure)] if figure.value() > most_mps2 && most_mps2 > 0.0 => {
-                Said::default().number(most_mps2, "m/s^2")
+        let change = Change::between(told.mps, mps);
+        let rate = rate.map(|rate| match rate.0.as_slice() {
+            [Piece::Number(figure)] => {
+                let within = pace::within(source, &moving.entity.body, change, figure.value());
+                Said::default().number(within, "m/s^2")
             }
             _ => rate,
-        };
-        let rate = rate.map(capped);
+        });
         told.mps = mps;
+        instead_of(fields, &["speed", "rate", "early", "at", "reach", "steady"]);
         fields.push(Said::text("speed: ").then(said));
         fields.extend(rate.map(|rate| Said::text("rate: ").then(rate)));
         Some(())
@@ -659,7 +708,8 @@ impl<'a> Cast<'a> {
 
     /// Whether somebody beside the ego vehicle drives at one speed from the beginning on.
     fn keeps_its_speed(&self, name: &str) -> bool {
-        let changes = |act: &Act| matches!(act.kind, ActKind::Speed(..) | ActKind::Meet(_));
+        let changes =
+            |act: &Act| matches!(act.kind, ActKind::Speed(..) | ActKind::Profile(_) | ActKind::Meet(_));
         let Some(entity) = self.story.entity(name) else { return false };
         let is_timed = entity.way.as_ref().is_some_and(|way| way.timing.is_some());
         !is_timed && !entity.events.iter().flat_map(|event| &event.acts).any(changes)
@@ -674,9 +724,7 @@ impl<'a> Cast<'a> {
         target: &Target,
         told: &mut Told,
     ) -> Option<f64> {
-        let (Some(own), Some(way)) = (told.lane, moving.placed.lane) else {
-            return source.refuse(mark, "it drives in no lane");
-        };
+        let Some(own) = told.lane else { return source.refuse(mark, "it drives in no lane") };
         let to = match target {
             Target::Beside(name, lanes) => {
                 let of = match () {
@@ -699,11 +747,15 @@ impl<'a> Cast<'a> {
             }
         };
         let Some(to) = to else { return source.refuse(mark, "no such lane is beside its own") };
-        let here = self.map.lane(way.lane).centre.pose_at(way.station_m);
-        let there = self.map.lane(to.lane).centre.project(here.position);
-        let centre = self.map.lane(to.lane).centre.position_at(there.station_m);
-        (told.lane, told.lane_m) = (Some(to), here.to_local(centre).y);
+        (told.lane, told.lane_m) = (Some(to), self.aside_m(moving, to));
         Some(told.lane_m)
+    }
+
+    /// How far to the left of somebody's way, where it begins, the middle of a lane lies, m.
+    fn aside_m(&self, moving: &Moving, lane: LanePlace) -> f64 {
+        let here = moving.path.pose_at(moving.at_m);
+        let centre = &self.map.lane(lane.lane).centre;
+        here.to_local(centre.position_at(centre.project(here.position).station_m)).y
     }
 
     /// The lane that is so many lanes to the left of another's, beside a place.
@@ -742,6 +794,7 @@ impl<'a> Cast<'a> {
         // The file says where its reference point is; the language where the front is.
         let ego_m = self.station_m(point) + ego.middle_m + ego.length_m / 2.0;
         let reach_m = moving.reach_m(source, self, &meeting.own_at)?;
+        instead_of(fields, &["speed", "rate", "early", "at", "reach", "steady"]);
         fields.push(Said::text("early: ").number(0.0, "s"));
         fields.push(Said::text("at: ").number(ego_m, "m"));
         fields.push(Said::text("reach: ").number(reach_m, "m"));
@@ -772,7 +825,7 @@ impl<'a> Cast<'a> {
 impl Moving<'_> {
     /// Where it appears, and its first fields.
     fn spawn(&self) -> Said {
-        let at = Said::default().number(self.at_m, "m");
+        let at = Said::default().number((self.at_m + self.more_m()).max(0.0), "m");
         let said = at.and(" { does: Follow, speed: ").number(self.mps, "m/s");
         said.and(OFFSET).number(self.offset_m, "m")
     }
@@ -780,7 +833,17 @@ impl Moving<'_> {
     /// Where a place of the file lies on its way, m.
     pub fn reach_m(&self, source: &mut Source, cast: &Cast, position: &Position) -> Option<f64> {
         let point = cast.place(source, position)?.pose.position;
-        Some(self.path.project(point).station_m)
+        Some(self.station_m(point))
+    }
+
+    /// The station of somebody whose reference point in the file is there, m. On foot the language means the middle.
+    pub fn station_m(&self, point: Vec2) -> f64 {
+        self.path.project(point).station_m + self.more_m()
+    }
+
+    /// From the file's reference point to the one that a station of the language means, m.
+    fn more_m(&self) -> f64 {
+        if self.entity.body.like == "Pedestrian" { self.entity.body.middle_m } else { 0.0 }
     }
 }
 
@@ -792,6 +855,11 @@ struct Told {
     lane: Option<LanePlace>,
     /// How far the middle of that lane is to the left of its way, m.
     lane_m: f64,
+}
+
+/// Of two actions that begin together the later one counts.
+fn instead_of(fields: &mut Vec<Said>, names: &[&str]) {
+    fields.retain(|field| !names.contains(&field.name().as_str()));
 }
 
 fn aside_fields(
@@ -815,6 +883,7 @@ fn aside_fields(
     if by_m < 1e-6 {
         return Some(());
     }
+    instead_of(fields, &["offset", "aside"]);
     fields.push(Said::text("offset: ").then(to));
     let slope = SMOOTH_STEP_SLOPE_MAX;
     let aside_mps = match dynamics.over {
@@ -905,8 +974,4 @@ fn speed(source: &mut Source, story: &Story, entity: &Entity, depth: usize) -> O
     source.refuse_if(mps > *SPAWN_SPEED_MPS.end(), mark, too_fast(mps))?;
     source.refuse_if(mps < 0.0, mark, "no vehicle drives backwards")?;
     Some(mps)
-}
-
-fn too_fast(mps: f64) -> String {
-    format!("{mps:.1} m/s: nothing is faster than {} m/s", SPAWN_SPEED_MPS.end())
 }

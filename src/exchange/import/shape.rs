@@ -15,6 +15,13 @@ const NEAR_M: f64 = 0.005;
 const PIECE_M: f64 = 5.0;
 const PIECES_MAX: usize = 4_000;
 
+/// The highest order of a curve of control points, and the most of these.
+const ORDER_MAX: usize = 10;
+const CONTROLS_MAX: usize = 1_000;
+
+/// A longer way is a mistake, m.
+const WAY_M_MAX: f64 = 50_000.0;
+
 /// Knots of a curve of control points are looked at in so many steps each.
 const STEPS: usize = 16;
 
@@ -66,7 +73,10 @@ pub fn shape_of(source: &mut Source, parent: Node) -> Option<Shape> {
 }
 
 fn shape(source: &mut Source, trajectory: Node) -> Option<Shape> {
-    source.declare_missing(trajectory);
+    source.scoped(trajectory, |source| shape_in(source, trajectory))
+}
+
+fn shape_in(source: &mut Source, trajectory: Node) -> Option<Shape> {
     if source.switch(trajectory, "closed", false)? {
         return source.refuse(trajectory, "a trajectory leads one way: `closed` leads back");
     }
@@ -87,6 +97,7 @@ fn shape(source: &mut Source, trajectory: Node) -> Option<Shape> {
                 vertices.push((position(source, place)?, time_s));
             }
             source.refuse_if(vertices.len() < 2, inner, "it has fewer than two vertices")?;
+            source.refuse_if(vertices.len() > PIECES_MAX, inner, "it has too many vertices")?;
             ShapeKind::Polyline(vertices)
         }
         "ClothoidSpline" => {
@@ -104,6 +115,7 @@ fn shape(source: &mut Source, trajectory: Node) -> Option<Shape> {
                 });
             }
             source.refuse_if(segments.is_empty(), inner, "it has no segments")?;
+            source.refuse_if(segments.len() > PIECES_MAX, inner, "it has too many segments")?;
             ShapeKind::Spline(segments)
         }
         "Clothoid" => {
@@ -136,6 +148,14 @@ fn shape(source: &mut Source, trajectory: Node) -> Option<Shape> {
             let fits = order >= 2 && controls.len() >= order && knots.len() == controls.len() + order;
             let is_rising = knots.windows(2).all(|pair| pair[0] <= pair[1]);
             source.refuse_if(!fits || !is_rising, inner, "its order, control points and knots do not fit")?;
+            let is_large = order > ORDER_MAX || controls.len() > CONTROLS_MAX;
+            source.refuse_if(
+                is_large,
+                inner,
+                format!("curves of order {ORDER_MAX} and {CONTROLS_MAX} points are read"),
+            )?;
+            let is_light = controls.iter().any(|(_, weight)| *weight <= 0.0);
+            source.refuse_if(is_light, inner, "the weight of a control point is above 0")?;
             ShapeKind::Nurbs { order, controls, knots }
         }
         _ => return source.refuse(inner, "such a shape is not read"),
@@ -186,6 +206,9 @@ impl Shape {
             }
         };
         match Path::through(&points) {
+            Some(path) if path.length_m() > WAY_M_MAX => {
+                source.refuse(&self.mark, "it is longer than a way can be")
+            }
             Some(path) => Some(Drawn { points, path, timed }),
             None => source.refuse(&self.mark, "its way has no length"),
         }
@@ -196,12 +219,10 @@ impl Segment {
     /// Adds its points, the first one included; where it ends.
     fn draw(&self, begin: Pose, points: &mut Vec<Vec2>) -> Pose {
         let sharpest_per_m = self.from_per_m.abs().max(self.to_per_m.abs());
+        let is_straight = sharpest_per_m == 0.0;
         let piece_m =
-            if sharpest_per_m > 0.0 { (8.0 * NEAR_M / sharpest_per_m).sqrt() } else { self.length_m };
-        let count = ((self.length_m
-            / piece_m.min(PIECE_M.max(self.length_m * f64::from(sharpest_per_m == 0.0))))
-        .ceil())
-        .clamp(1.0, PIECES_MAX as f64);
+            if is_straight { self.length_m } else { (8.0 * NEAR_M / sharpest_per_m).sqrt().min(PIECE_M) };
+        let count = (self.length_m / piece_m).ceil().clamp(1.0, PIECES_MAX as f64);
         let step_m = self.length_m / count;
         if points.last().is_none_or(|last| (last - begin.position).norm() > 1e-6) {
             points.push(begin.position);

@@ -16,6 +16,12 @@ use super::parameter;
 /// More refusals help nobody.
 const REFUSALS_MAX: usize = 100;
 
+/// Positions may lie in routes and trajectories of other positions so deep.
+const NESTED_MAX: usize = 16;
+
+/// Entries of catalogues that one scenario may ask for: each may name others.
+const ENTRIES_MAX: usize = 10_000;
+
 /// Larger numbers are no place, speed or time of a scenario. It keeps all arithmetic finite.
 const NUMBER_MAX: f64 = 1e7;
 
@@ -52,6 +58,9 @@ pub struct Source<'f> {
     /// How many catalogues deep the text lies that is read, and where and under which name the outermost is referred to.
     pub depth: usize,
     outermost: Option<(u32, String)>,
+    /// How many entries of catalogues were read, and how deep positions lie in one another.
+    entries: usize,
+    nested: usize,
     lines: Rc<Lines>,
     /// Whether a value is one that its own declaration excludes.
     pub is_excluded: bool,
@@ -78,6 +87,8 @@ impl<'f> Source<'f> {
             folders: BTreeMap::new(),
             depth: 0,
             outermost: None,
+            entries: 0,
+            nested: 0,
             lines,
             is_excluded: false,
             minor: 0,
@@ -108,6 +119,9 @@ impl<'f> Source<'f> {
         parameters: BTreeMap<String, String>,
         read: impl FnOnce(&mut Self) -> Option<T>,
     ) -> Option<T> {
+        self.entries += 1;
+        let reason = format!("it asks for more than {ENTRIES_MAX} entries of catalogues");
+        self.refuse_if(self.entries > ENTRIES_MAX, reference, reason)?;
         let before = core::mem::replace(&mut self.parameters, parameters);
         let outermost = self.outermost.clone();
         if outermost.is_none() {
@@ -117,6 +131,34 @@ impl<'f> Source<'f> {
         let found = read(self);
         self.depth -= 1;
         self.outermost = outermost;
+        self.parameters = before;
+        found
+    }
+
+    /// Reads what may lie in its own kind.
+    pub fn nested<T>(&mut self, node: Node, read: impl FnOnce(&mut Self) -> Option<T>) -> Option<T> {
+        let reason = format!("positions lie in one another more than {NESTED_MAX} deep");
+        self.refuse_if(self.nested >= NESTED_MAX, node, reason)?;
+        self.nested += 1;
+        let found = read(self);
+        self.nested -= 1;
+        found
+    }
+
+    /// Reads an element with parameters of its own, which have their values unless a reference has given others.
+    pub fn scoped<T>(&mut self, node: Node, read: impl FnOnce(&mut Self) -> Option<T>) -> Option<T> {
+        let before = self.parameters.clone();
+        let own = elements(node, "ParameterDeclarations").flat_map(children);
+        for declared in own.collect::<Vec<Node>>() {
+            let is_given = self.depth > 0
+                && declared.attribute("name").is_some_and(|name| self.parameters.contains_key(name));
+            if !is_given
+                && let (Some(name), Some(value)) = (self.text(declared, "name"), self.text(declared, "value"))
+            {
+                self.parameters.insert(name, value);
+            }
+        }
+        let found = read(self);
         self.parameters = before;
         found
     }
@@ -215,17 +257,6 @@ impl<'f> Source<'f> {
                     Some(value) => drop(self.parameters.insert(name.to_owned(), value)),
                     None => self.tear(&format!("${name}")),
                 }
-            }
-        }
-    }
-
-    /// Declares the parameters of an element that have no value yet: those that a reference to it has not given.
-    pub fn declare_missing(&mut self, parent: Node) {
-        for declared in elements(parent, "ParameterDeclarations").flat_map(children) {
-            if declared.attribute("name").is_some_and(|name| !self.parameters.contains_key(name))
-                && let (Some(name), Some(value)) = (self.text(declared, "name"), self.text(declared, "value"))
-            {
-                self.parameters.insert(name, value);
             }
         }
     }

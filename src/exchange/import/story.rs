@@ -189,8 +189,12 @@ impl Cast {
             }
             let names: Vec<String> = entities.iter().map(|entity| format!("`{}`", entity.name)).collect();
             source.refuse_if(names.is_empty(), root, "no entity can be read")?;
-            let reason =
-                format!("which entity is the ego vehicle? Name it with `--ego`: {}", names.join(", "));
+            let reason = match ego {
+                Some(ego) => format!("no entity is called `{ego}`: there are {}", names.join(", ")),
+                None => {
+                    format!("which entity is the ego vehicle? Name it with `--ego`: {}", names.join(", "))
+                }
+            };
             return source.refuse(root, reason);
         };
         let ego = entities.remove(at);
@@ -347,19 +351,15 @@ impl Cast {
             when.is_empty()
                 || when.iter().any(|all| all.iter().all(|one| matches!(one.kind, When::After(s) if s <= 0.1)))
         };
-        let leaves = element(inner, "DeleteEntityAction").is_some();
-        match source.text(inner, "entityRef").filter(|_| inner.has_tag_name("EntityAction") && leaves) {
-            Some(name) if when.is_some_and(is_at_once) => {
-                if self.knows(source, inner, &name) {
-                    self.gone.insert(name);
-                }
-            }
-            Some(_) => {
-                source.refuse::<()>(inner, "nobody leaves during the story");
-            }
-            None => {
-                source.refuse::<()>(inner, "this action is not read in the story");
-            }
+        if !inner.has_tag_name("EntityAction") || element(inner, "DeleteEntityAction").is_none() {
+            source.refuse::<()>(inner, "this action is not read in the story");
+            return;
+        }
+        let Some(name) = source.text(inner, "entityRef") else { return };
+        if !when.is_some_and(is_at_once) {
+            source.refuse::<()>(inner, "nobody leaves during the story");
+        } else if self.knows(source, inner, &name) {
+            self.gone.insert(name);
         }
     }
 }
@@ -402,7 +402,7 @@ impl Entity {
             }
             ActKind::Follow(way) => self.way = Some(*way),
             ActKind::Route(places) => self.route = Some((mark, places)),
-            ActKind::Lane(..) | ActKind::Offset(..) | ActKind::Meet(_) => {
+            ActKind::Profile(_) | ActKind::Lane(..) | ActKind::Offset(..) | ActKind::Meet(_) => {
                 let acts = vec![Act { mark: mark.clone(), kind }];
                 self.events.push(Event { mark, names: Vec::new(), when: Vec::new(), acts });
             }

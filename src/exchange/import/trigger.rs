@@ -119,7 +119,8 @@ pub struct PlaceMark(pub Position);
 
 impl PartialEq for PlaceMark {
     fn eq(&self, other: &PlaceMark) -> bool {
-        format!("{:?} {:?}", self.0.kind, self.0.heading) == format!("{:?} {:?}", other.0.kind, other.0.heading)
+        format!("{:?} {:?}", self.0.kind, self.0.heading)
+            == format!("{:?} {:?}", other.0.kind, other.0.heading)
     }
 }
 
@@ -295,11 +296,11 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
         "TraveledDistanceCondition" => When::Travelled { entity, metres: source.amount(inner, "value")? },
         "StandStillCondition" => When::Stands { entity, seconds: source.amount(inner, "duration")? },
         "SpeedCondition" => {
-            source.word(inner, "direction", &["longitudinal", "lateral", "vertical"])?;
+            along(source, inner)?;
             When::Speed { entity, mps: source.number(inner, "value")?, is_less: is_less(source, inner)? }
         }
         "RelativeSpeedCondition" => {
-            source.word(inner, "direction", &["longitudinal", "lateral", "vertical"])?;
+            along(source, inner)?;
             let (to, mps) = (source.text(inner, "entityRef")?, source.number(inner, "value")?);
             When::Faster { of: entity, to, mps, is_less: is_less(source, inner)? }
         }
@@ -326,6 +327,12 @@ fn constant(source: &mut Source, node: Node, value: &str) -> Option<When> {
         other => return source.refuse(node, format!("the rule `{other}` is not read")),
     };
     Some(if holds { When::Always } else { When::Never })
+}
+
+/// Refuses speeds to the side and upwards.
+fn along(source: &mut Source, node: Node) -> Option<()> {
+    let direction = source.word(node, "direction", &["longitudinal", "lateral", "vertical"])?;
+    source.refuse_if(matches!(direction, "lateral" | "vertical"), node, "only speeds ahead are read")
 }
 
 /// Refuses distances across the road, and words for what a distance counts along that no version has.

@@ -1,6 +1,6 @@
 //! Variations of a scenario: the values that a file with a `ParameterValueDistribution` gives to its parameters.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use roxmltree::Node;
 
@@ -11,16 +11,15 @@ use super::vocabulary;
 /// More variations are no test that anybody drives.
 const VARIATIONS_MAX: usize = 60_000;
 
+/// The most values of all variations together.
+const VALUES_MAX: usize = 2_000_000;
+
 /// Values of parameters, by name.
 pub type Values = BTreeMap<String, String>;
 
 /// What a distribution says.
 #[derive(Debug)]
 pub struct Distribution {
-    /// The file of the scenario, as this one names it.
-    pub scenario: String,
-    /// Where it names it.
-    pub line: u32,
     pub description: String,
     /// The parameters in the order of the file.
     pub parameters: Vec<String>,
@@ -28,20 +27,30 @@ pub struct Distribution {
     pub variations: Vec<Values>,
 }
 
-/// The distribution of a file; the outer `None` if it is another file, the inner one if something is refused.
-pub fn read(source: &mut Source, root: Node) -> Option<Option<Distribution>> {
+/// The scenario that a file of variations names, and its line; the outer `None` if it is another file, the inner one if something
+/// is refused.
+pub fn scenario(source: &mut Source, root: Node) -> Option<Option<(String, u32)>> {
     let found = element(root, "ParameterValueDistribution")?;
-    Some(distribution(source, root, found))
+    let named = |source: &mut Source| {
+        let file = source.required(found, "ScenarioFile")?;
+        Some((source.text(file, "filepath")?, source.mark(file).line))
+    };
+    Some(named(source))
 }
 
-fn distribution(source: &mut Source, root: Node, found: Node) -> Option<Distribution> {
+/// The distribution of a file over a scenario that declares these parameters, with their values there; `None` if something is
+/// refused.
+pub fn read(source: &mut Source, root: Node, declared: &Values) -> Option<Distribution> {
+    let found = element(root, "ParameterValueDistribution")?;
+    distribution(source, root, found, declared)
+}
+
+fn distribution(source: &mut Source, root: Node, found: Node, declared: &Values) -> Option<Distribution> {
     for (node, reason) in vocabulary::unknown(root) {
         source.refuse::<()>(node, reason);
     }
     let header = check_header(source, root)?;
     source.declare(root);
-    let file = source.required(found, "ScenarioFile")?;
-    let (scenario, line) = (source.text(file, "filepath")?, source.mark(file).line);
     if let Some(other) = element(found, "Stochastic") {
         return source
             .refuse(other, "values that are drawn by chance are not read: those that are listed are");
@@ -59,14 +68,18 @@ fn distribution(source: &mut Source, root: Node, found: Node) -> Option<Distribu
             _ => return source.refuse(part, "such a distribution is not read"),
         };
         source.refuse_if(choices.is_empty(), part, "it lists no value")?;
-        for name in choices.iter().flat_map(Values::keys) {
-            if !parameters.contains(name) {
-                parameters.push(name.clone());
-            }
+        let own: BTreeSet<&String> = choices.iter().flat_map(Values::keys).collect();
+        for name in own {
+            let reason = format!("it lists values of `{name}` again: one of the two would count for nothing");
+            source.refuse_if(parameters.contains(name), part, reason)?;
+            let reason = format!("the scenario declares no parameter `{name}`");
+            source.refuse_if(!declared.contains_key(name), part, reason)?;
+            parameters.push(name.clone());
         }
         let count = variations.len().saturating_mul(choices.len());
         let reason = format!("its values make {count} variations: {VARIATIONS_MAX} are possible");
-        source.refuse_if(count > VARIATIONS_MAX, part, reason)?;
+        let is_large = count > VARIATIONS_MAX || count.saturating_mul(parameters.len()) > VALUES_MAX;
+        source.refuse_if(is_large, part, reason)?;
         let with = |values: &Values| {
             let values = values.clone();
             choices
@@ -76,7 +89,13 @@ fn distribution(source: &mut Source, root: Node, found: Node) -> Option<Distribu
         variations = variations.iter().flat_map(with).collect();
     }
     let description = header.attribute("description").unwrap_or("").to_owned();
-    Some(Distribution { scenario, line, description, parameters, variations })
+    // A set need not say all of them.
+    for values in &mut variations {
+        for name in parameters.iter().filter(|name| !values.contains_key(*name)).collect::<Vec<_>>() {
+            values.insert(name.clone(), declared.get(name).cloned().unwrap_or_default());
+        }
+    }
+    Some(Distribution { description, parameters, variations })
 }
 
 /// The values of one parameter.

@@ -82,6 +82,9 @@ const ELEMENTS: &str = "
     SpeedActionDynamics [dynamicsShape dynamicsDimension value followingMode];
     SpeedActionTarget [] AbsoluteTargetSpeed RelativeTargetSpeed;
     AbsoluteTargetSpeed [value];
+    SpeedProfileAction [entityRef followingMode] DynamicConstraints SpeedProfileEntry;
+    DynamicConstraints [maxAcceleration maxAccelerationRate maxDeceleration maxDecelerationRate maxSpeed];
+    SpeedProfileEntry [speed time];
     RelativeTargetSpeed [entityRef value speedTargetValueType continuous];
     LongitudinalDistanceAction [entityRef distance timeGap freespace continuous displacement coordinateSystem]
         DynamicConstraints;
@@ -239,7 +242,7 @@ mod tests {
 
     /// What stands where any element may.
     const CHOSEN: &str = "ScenarioObject Private GlobalAction TeleportAction LongitudinalAction LateralAction \
-        RoutingAction VisibilityAction ControllerAction ActivateControllerAction SpeedAction \
+        RoutingAction VisibilityAction ControllerAction ActivateControllerAction SpeedAction SpeedProfileAction \
         LongitudinalDistanceAction LaneChangeAction FollowTrajectoryAction AssignRouteAction \
         AcquirePositionAction EnvironmentAction LanePosition RelativeLanePosition WorldPosition \
         Polyline PrivateAction SimulationTimeCondition StoryboardElementStateCondition \

@@ -71,7 +71,10 @@ pub fn weather(source: &mut Source, global: Node) -> Option<Weather> {
 }
 
 fn environment(source: &mut Source, environment: Node) -> Option<Weather> {
-    source.declare_missing(environment);
+    source.scoped(environment, |source| sky_of(source, environment))
+}
+
+fn sky_of(source: &mut Source, environment: Node) -> Option<Weather> {
     let mut found = Weather::default();
     let mut is_dark = false;
     for node in environment.descendants() {

@@ -12,7 +12,7 @@ use super::body::wheelbase_m;
 use super::own::Own;
 use super::rows::{Parameters, capital, small, unique};
 use super::said::{Figure, Piece, Said, number};
-use super::scene::{OFFSET, Other};
+use super::scene::{OFFSET, Other, Scene};
 use super::weather::Weather;
 use super::{Imported, Variant, Whole};
 
@@ -24,8 +24,9 @@ pub fn space(whole: &Whole, order: &[String], name: &str) -> Imported {
         parameters: Parameters::of(order, &values),
         own: small(name),
         roads: Vec::new(),
+        road_of: Vec::new(),
         declared: String::new(),
-        names: BTreeSet::new(),
+        names: ["Time", "Sky", "Level"].map(str::to_owned).into(),
         made: Vec::new(),
     };
     let mut notes = whole.notes.clone();
@@ -36,8 +37,28 @@ pub fn space(whole: &Whole, order: &[String], name: &str) -> Imported {
             whole.excluded
         ));
     }
-    let mut text = head(&whole.description, name, &notes);
-    text += &space.text();
+    let durations = whole.variants.iter().map(|variant| variant.duration_s);
+    let (least_s, most_s) =
+        durations.fold((f64::INFINITY, 0.0), |(least, most), s| (s.min(least), s.max(most)));
+    if most_s > least_s {
+        let text = format!(
+            "each row is played for {} s, though the file ends some after {} s",
+            number(most_s),
+            number(least_s)
+        );
+        notes.insert(text);
+    }
+    let body = space.text();
+    let drawn: Vec<String> = space.parameters.drawn.iter().map(|name| format!("`{name}`")).collect();
+    if !drawn.is_empty() {
+        let text = format!(
+            "{} variations are too many rows: {} is drawn in each",
+            whole.variants.len(),
+            drawn.join(", ")
+        );
+        notes.insert(text);
+    }
+    let text = head(&whole.description, name, &notes) + &body;
     // A text that does not parse is refused when it is checked.
     let text = format(FileId(0), &text).unwrap_or(text);
     let maps = whole.variants.iter().map(|variant| variant.map.clone()).collect();
@@ -65,12 +86,19 @@ fn head(description: &str, name: &str, notes: &BTreeSet<String>) -> String {
     text
 }
 
-fn one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
+fn is_invisible(letter: char) -> bool {
+    letter.is_control() && !letter.is_whitespace()
+        || matches!(letter, '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
 }
 
-/// Where the ego vehicle begins and arrives: the map, the two places, and its speed.
-type Home<'a> = (&'a str, &'a str, &'a str, Figure);
+fn one_line(text: &str) -> String {
+    // Signs that change how a line looks have no place in a comment.
+    let plain: String = text.chars().filter(|letter| !is_invisible(*letter)).collect();
+    plain.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Where the ego vehicle begins and arrives: the map, the two places, its speed and the limit.
+type Home<'a> = (&'a str, &'a str, &'a str, Figure, Option<Figure>);
 
 struct Space<'a> {
     variants: &'a [Variant],
@@ -79,6 +107,8 @@ struct Space<'a> {
     own: String,
     /// Each with its name.
     roads: Vec<(Home<'a>, String)>,
+    /// The road of each variation.
+    road_of: Vec<usize>,
     /// Bodies, trajectories and manoeuvres, as they were needed.
     declared: String,
     /// The names of those.
@@ -118,7 +148,7 @@ impl<'a> Space<'a> {
                 rules += &self.rule(&name, group);
             }
         }
-        if self.variants.iter().all(|variant| variant.scene.others.is_empty()) && weathers.len() < 2 {
+        if actions.contains(BEGUN) {
             text += "state begun: Bool = false\n";
         }
         text += &self.parameters.enums();
@@ -147,27 +177,36 @@ impl<'a> Space<'a> {
     fn lay_roads(&mut self) {
         let variants = self.variants;
         let all: Vec<usize> = (0..variants.len()).collect();
-        let names = self.parameters.names(&all, |at| home(&variants[at]));
-        let mut taken = BTreeSet::new();
-        for (variant, name) in variants.iter().zip(names) {
-            if !self.roads.iter().any(|(known, _)| *known == home(variant)) {
-                let name =
-                    if name.is_empty() { format!("{}_road", self.own) } else { small(&format!("at_{name}")) };
-                self.roads.push((home(variant), unique(&name, &mut taken)));
+        let mut known: BTreeMap<Home, usize> = BTreeMap::new();
+        let mut firsts = Vec::new();
+        for variant in variants {
+            let next = known.len();
+            let road = *known.entry(home(variant)).or_insert(next);
+            if road == next {
+                firsts.push(self.road_of.len());
             }
+            self.road_of.push(road);
         }
-    }
-
-    fn road_of(&self, at: usize) -> &str {
-        let home = home(&self.variants[at]);
-        self.roads.iter().find(|(known, _)| *known == home).map_or("", |(_, name)| name)
+        let road_of = &self.road_of;
+        let names = self.parameters.names(&all, |at| road_of[at]);
+        let mut taken = BTreeSet::new();
+        for first in firsts {
+            let name = match names[first].as_str() {
+                "" => format!("{}_road", self.own),
+                name => small(&format!("at_{name}")),
+            };
+            self.roads.push((home(&variants[first]), unique(&name, &mut taken)));
+        }
     }
 
     fn road_declarations(&self) -> String {
         let mut text = String::new();
-        for ((map, start, goal, ego), name) in &self.roads {
+        for ((map, start, goal, ego, limit), name) in &self.roads {
             let map = quoted(map.rsplit('/').next().unwrap_or_default());
             let _ = writeln!(text, "road {name} {{\n  map: {map}\n  start: {start}\n  goal: {goal}");
+            if let Some(limit) = limit {
+                let _ = writeln!(text, "  limit: {}", limit.text());
+            }
             let _ = writeln!(text, "  ego_speed: {}", ego.text());
             if ego.value() >= SET_SPEED_MPS_MIN {
                 let _ = writeln!(text, "  set_speed: {}", ego.text());
@@ -190,7 +229,7 @@ impl<'a> Space<'a> {
         let variants = self.variants;
         let first = &variants[group[0]];
         if first.scene.others.is_empty() && set.is_empty() {
-            effects += "  set begun = true\n";
+            effects += BEGUN;
         }
         for (nth, other) in first.scene.others.iter().enumerate() {
             let body = self.body(other);
@@ -248,8 +287,11 @@ impl<'a> Space<'a> {
 
     /// A rule that lets an action happen on the roads of its variations alone.
     fn rule(&self, name: &str, group: &[usize]) -> String {
-        let cases =
-            self.parameters.cases(group, |at| self.road_of(at).to_owned(), |road| format!("road == {road}"));
+        let cases = self.parameters.cases(
+            group,
+            |at| self.road_of[at],
+            |road| format!("road == {}", self.roads[*road].1),
+        );
         format!("rule {name}_is_there on {name}: {cases}\n")
     }
 
@@ -292,15 +334,17 @@ impl<'a> Space<'a> {
     fn manoeuvres(&mut self, groups: &BTreeMap<String, Vec<usize>>, order: &[String]) -> Manoeuvres {
         let variants = self.variants;
         let mut found: Vec<(String, Vec<&Other>)> = Vec::new();
+        let mut places: BTreeMap<String, usize> = BTreeMap::new();
         for other in order.iter().flat_map(|form| &groups[form]).flat_map(|at| &variants[*at].scene.others) {
             if other.phases.is_empty() {
                 continue;
             }
             let form = phases_form(other);
-            match found.iter_mut().find(|(known, _)| *known == form) {
-                Some((_, others)) => others.push(other),
-                None => found.push((form, vec![other])),
+            let at = *places.entry(form.clone()).or_insert(found.len());
+            if at == found.len() {
+                found.push((form, Vec::new()));
             }
+            found[at].1.push(other);
         }
         let mut manoeuvres = BTreeMap::new();
         for (form, others) in found {
@@ -430,8 +474,12 @@ fn phases_form(other: &Other) -> String {
 }
 
 fn home(variant: &Variant) -> Home<'_> {
-    (&variant.map, &variant.scene.start, &variant.scene.goal, variant.scene.ego_mps)
+    let Scene { start, goal, ego_mps, limit_mps, .. } = &variant.scene;
+    (&variant.map, start, goal, *ego_mps, *limit_mps)
 }
+
+/// The effect of an action that does nothing else.
+const BEGUN: &str = "  set begun = true\n";
 
 /// Below this no driving system has a wish to drive, m/s.
 const SET_SPEED_MPS_MIN: f64 = 1.0;

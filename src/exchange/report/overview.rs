@@ -2,13 +2,13 @@
 
 use serde_json::{Value, json};
 
-use avastra_campaign::run::{Database, DatabaseError, HeatMap, Profile, TrafficRecord, heat_map};
+use avastra_campaign::run::{Database, DatabaseError, HeatMap, Profile, TrafficRecord};
 use avastra_drivers::external::Attached;
 use avastra_world::action::ActionTable;
 
 /// What a run or a training found: totals, groups of like failures, rows on roads, refusals, the curve of learning, and what was
-/// learned. `settings` is the text of its `run.yaml`, `results` what a finished training wrote, `by` the pairs of parameters by
-/// which heat maps are drawn (the second of a pair may be empty).
+/// learned. `settings` is the text of its `run.yaml`, `results` what a finished training wrote, `heat` the maps of how
+/// actions ended.
 ///
 /// # Errors
 /// If the database cannot be read.
@@ -17,15 +17,13 @@ pub fn of_run(
     table: Option<&ActionTable>,
     settings: &str,
     results: Option<&Value>,
-    by: &[(String, String)],
+    heat: &[HeatMap],
 ) -> Result<Value, DatabaseError> {
     let rows = table.map(|table| table.rows().iter().map(|row| row.label.as_str()).collect::<Vec<_>>());
     let learning = database.learning()?;
     let totals = database.totals()?;
     // A training simulates branches too, and returns to moments without playing up to them again.
     let simulated_s = if learning.is_empty() { totals.simulated_s } else { database.trained_s()? };
-    let trials = if by.is_empty() { Vec::new() } else { database.trials()? };
-    let heat: Vec<HeatMap> = by.iter().filter_map(|(down, across)| heat_map(&trials, down, across)).collect();
     Ok(json!({
         "heat": heat,
         "kind": if learning.is_empty() { "run" } else { "training" },

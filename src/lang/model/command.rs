@@ -106,7 +106,7 @@ pub fn speeds_mps(on_foot: bool) -> RangeInclusive<f64> {
 }
 
 /// Rates at which a vehicle may be told to change its speed, m/s². The most is more than tyres give.
-const RATE_MPS2: RangeInclusive<f64> = 0.1..=15.0;
+pub const RATE_MPS2: RangeInclusive<f64> = 0.1..=15.0;
 
 /// Places beside the middle of a lane, m to the left: two lanes and more, on either side.
 pub const OFFSET_M: RangeInclusive<f64> = -10.0..=10.0;

@@ -554,11 +554,13 @@ fn report_masked(space: &Space, action: &ActionDef, left: &[&Row]) -> Vec<Diagno
     if diagnostics.len() <= REMARKS_MAX {
         return diagnostics;
     }
-    let of = space.roads.len();
+    let (on, of) = (diagnostics.len(), space.roads.len());
     let message =
-        format!("each row of `{}` is masked on some of the {of} roads, and runs on another", action.name);
+        format!("rows of `{}` are masked on {on} of the {of} roads, and run on another", action.name);
     let first = diagnostics.swap_remove(0).message;
-    let remark = Diagnostic::remark(code::MASKED, message).at(action.span, numbers(left));
+    let is_masked = |row: &&Row| row.roads.iter().any(|reach| matches!(reach, Reach::Dead { .. }));
+    let masked: Vec<&Row> = left.iter().copied().filter(is_masked).collect();
+    let remark = Diagnostic::remark(code::MASKED, message).at(action.span, numbers(&masked));
     vec![remark.note(format!("for one, {first}; `avastra table FILE --row N` says where a row runs"))]
 }
 

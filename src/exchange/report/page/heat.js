@@ -19,14 +19,14 @@ export function heat(overview) {
       "p",
       { class: "legend" },
       HEAT_ENDINGS.map((ending, at) => [el("span", { class: `heat-${at}` }, `${HEAT_SIGNS[at]} ${ending}`), " "]),
-      "· a near miss came within 1.5 s of a contact; a mitigated contact was at least 5 km/h slower than the speed before · with the " +
+      "· ⚑ a requirement was breached · a near miss had a time to collision or a post-encroachment time below 1.5 s; a mitigated contact was at least 5 km/h slower than the speed before · with the " +
         "mean speed at contacts",
     ),
     maps.map(heatMap),
   );
 }
 
-function heatMap({ down, across, rows, columns, cells }) {
+function heatMap({ action, down, across, rows, columns, cells }) {
   const head = el(
     "tr",
     {},
@@ -34,7 +34,7 @@ function heatMap({ down, across, rows, columns, cells }) {
     columns.map((column) => el("th", { scope: "col" }, column || "all")),
   );
   const line = (label, at) => el("tr", {}, el("th", { scope: "row" }, label), cells[at].map(heatCell));
-  const what = across ? `By ${down} and ${across}` : `By ${down}`;
+  const what = `${action}, by ${across ? `${down} and ${across}` : down}`;
   return el(
     "div",
     { class: "scroll", tabindex: "0", role: "region", "aria-label": what },
@@ -53,15 +53,16 @@ function heatCell(tally) {
   if (!tally) return el("td", {}, "–");
   const { endings, impact_mps: impact, reduction_mps: reduction, breached } = tally;
   const all = endings.reduce((sum, count) => sum + count, 0);
-  const worst = endings.findLastIndex((count) => count > 0);
+  // A breach without a contact is no clean drive.
+  const worst = Math.max(endings.findLastIndex((count) => count > 0), breached > 0 ? 2 : 0);
   const told = HEAT_ENDINGS.map((ending, at) => endings[at] > 0 && `${endings[at]} ${ending}`).filter(Boolean);
   const speeds = impact === null ? null : `${figure(impact * 3.6, "km/h", 0)} (−${figure(reduction * 3.6, "", 0)})`;
   const title = [`${plural(all, "trial")}: ${told.join(", ")}`, breached > 0 && `${breached} with a breach`];
-  const text = all === 1 ? HEAT_SIGNS[worst] : endings.map((count, at) => count > 0 && `${HEAT_SIGNS[at]} ${count}`).filter(Boolean).join(" ");
+  const text = all === 1 ? HEAT_SIGNS[endings.findLastIndex((count) => count > 0)] : endings.map((count, at) => count > 0 && `${HEAT_SIGNS[at]} ${count}`).filter(Boolean).join(" ");
   return el(
     "td",
     { class: `heat-${worst}`, title: title.filter(Boolean).join("; ") },
-    text,
+    breached > 0 ? `${text} ⚑` : text,
     speeds && el("span", { class: "why" }, speeds),
   );
 }
