@@ -200,7 +200,7 @@ impl Files for Beside<'_> {
 
     fn catalogues(&self, folder: &str) -> Result<Vec<String>, String> {
         let folder = self.folder.join(slashed(folder));
-        let files = load::files_in(&folder, "xosc").map_err(|error| error.to_string())?;
+        let files = load::files_in(&folder, "xosc").map_err(|error| load::reason(&error))?;
         Ok(files.iter().take(CATALOGUES_MAX).filter_map(|file| load::read(file).ok()).collect())
     }
 }

@@ -517,7 +517,7 @@ fn read_up_to(path: &Path, bytes_max: u64) -> Result<String, ReadError> {
 }
 
 /// The system's reason without its error number.
-fn reason(error: &std::io::Error) -> String {
+pub fn reason(error: &std::io::Error) -> String {
     let text = error.to_string();
     text.split(" (os error").next().unwrap_or(&text).to_lowercase()
 }

@@ -45,6 +45,10 @@ pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failur
         [directory] if directory.is_dir() => of_directory(output, directory, &arguments.by)?,
         files => of_files(files)?,
     };
+    let is_run = is_folder && arguments.paths[0].join("run.yaml").is_file();
+    if !arguments.by.is_empty() && !is_run {
+        return Err(Failure::usage("`--by` draws heat maps of what a run drew: name the folder of a run"));
+    }
     let (files, left_out) = chosen(&found, arguments.most as usize);
     let many = FilesArguments { files, jobs: arguments.jobs };
     let program = asked.as_ref().and_then(|asked| asked.external.as_ref());

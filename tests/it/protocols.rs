@@ -79,6 +79,8 @@ fn a_page_has_heat_maps_by_parameters() {
     assert!(has(&asked, &[r#""rows":["5","8"]"#, r#""columns":["25","30","35"]"#, r#""down":"road""#]));
     let (status, _, stderr) = outcome(&mut avastra(&["report", &out, "--by", "colour"]));
     assert!(status == 1 && stderr.contains("there are `road`, `ego_kmh`"), "{status} {stderr}");
+    let (status, _, stderr) = outcome(&mut avastra(&["report", "scenarios/found", "--by", "road"]));
+    assert!(status == 1 && stderr.contains("name the folder of a run"), "{status} {stderr}");
     // Any run has them if they are asked for.
     let other = scratch.path().join("random").display().to_string();
     done(&[

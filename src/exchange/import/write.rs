@@ -51,11 +51,8 @@ pub fn space(whole: &Whole, order: &[String], name: &str) -> Imported {
     let body = space.text();
     let drawn: Vec<String> = space.parameters.drawn.iter().map(|name| format!("`{name}`")).collect();
     if !drawn.is_empty() {
-        let text = format!(
-            "{} variations are too many rows: {} is drawn in each",
-            whole.variants.len(),
-            drawn.join(", ")
-        );
+        let text =
+            format!("{} variations are too many rows: each draws {}", whole.variants.len(), drawn.join(", "));
         notes.insert(text);
     }
     let text = head(&whole.description, name, &notes) + &body;
