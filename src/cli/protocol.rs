@@ -153,7 +153,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_trial_is_a_line_of_each_table() {
+    fn a_test_is_a_line_of_each_table() {
         let test = ProtocolTest {
             episode: 3,
             road: "at_30".to_owned(),

@@ -299,8 +299,9 @@ fn maps(asked: &[String], tests: &[ProtocolTest], settings: &str) -> Result<Vec<
         let maps = heat_maps(tests, down.trim(), across.trim());
         if maps.is_empty() || down.trim().is_empty() {
             let known = listed(&parameters(tests).iter().map(String::as_str).collect::<Vec<_>>());
-            let message =
-                format!("`--by {text}`: no action that was carried out has that; there are {known}");
+            let message = format!(
+                "`--by {text}`: no action that was carried out has these parameters: name one or two of {known}"
+            );
             return Err(Failure::usage(message));
         }
         found.extend(maps);

@@ -163,6 +163,73 @@ const HEADINGS: [(&str, &str, &str); 9] = [
     ("revMinor=\"3\"", r#"h="0.5""#, "begins along its lane"),
 ];
 
+/// An event that makes the one ahead drive 3 m/s, when a condition holds.
+fn going(condition: &str) -> String {
+    format!(
+        r#"</Event>
+          <Event name="go" priority="overwrite">
+            <Action name="go_action"><PrivateAction><LongitudinalAction><SpeedAction>
+              <SpeedActionDynamics dynamicsShape="step" value="0" dynamicsDimension="time"/>
+              <SpeedActionTarget><AbsoluteTargetSpeed value="3"/></SpeedActionTarget>
+            </SpeedAction></LongitudinalAction></PrivateAction></Action>
+            <StartTrigger><ConditionGroup><Condition name="then" delay="0" conditionEdge="none">
+              <ByValueCondition>{condition}</ByValueCondition>
+            </Condition></ConditionGroup></StartTrigger>
+          </Event>"#
+    )
+}
+
+/// Each entry of a profile has its time, whatever its vehicle can do in it.
+#[test]
+fn profiles_of_speeds_keep_their_times() {
+    let read = |path: &str| std::fs::read_to_string(root().join(path)).expect("it is there");
+    let files = Kept {
+        map: read("scenarios/roads/boulevard.xodr"),
+        catalogue: read("tests/cases/imports/catalogue/vehicles.xosc"),
+        scenario: String::new(),
+    };
+    let profile = read(&format!("{AREA}/profile.xosc"));
+    let dip = r#"speed="$dip_mps" time="$dip_s""#;
+    let action = r#"<SpeedProfileAction followingMode="position">"#;
+    let end = r#"<StoryboardElementStateCondition storyboardElementType="event" storyboardElementRef="dip" state="completeState"/>"#;
+    let later = r#"<SimulationTimeCondition value="5" rule="greaterThan"/>"#;
+    for (old, new, wanted) in [
+        // A phase is done 0.1 m/s before its speed, which takes the rest of the time.
+        (dip, r#"speed="$dip_mps" time="1""#, "{ speed: 2 m/s, rate: 6 m/s^2 }\n  after 0.0167 s {"),
+        (dip, r#"speed="$dip_mps" time="0.1""#, "{ speed: 2 m/s, rate: 8 m/s^2 }\n  { speed: 2 m/s }"),
+        (dip, r#"speed="$dip_mps" time="0""#, "{ speed: 2 m/s }\n  { speed: 2 m/s }\n  after 1 s"),
+        // The least rate is 0.1 m/s²: 0.4 m/s take 4 s of the 20 s.
+        (dip, r#"speed="7.5" time="20""#, "{ speed: 7.5 m/s, rate: 0.1 m/s^2 }\n  after 16.5 s {"),
+        // A stop is exact.
+        (dip, r#"speed="0" time="4""#, "{ speed: 0 m/s, rate: 2 m/s^2 }\n  { speed: 2 m/s, rate: 2 m/s^2 }"),
+        (dip, r#"speed="-1" time="4""#, "nobody drives backwards"),
+        (dip, r#"speed="$dip_mps""#, "without a `time`"),
+        (dip, r#"speed="$dip_mps" time="-1""#, "less than 0"),
+        // What follows waits for the end of the last entry, or is refused.
+        ("</Event>", &going(end), "after 0.1067 s {}\n  { speed: 3 m/s }"),
+        ("</Event>", &going(later), "only what waits for their end is read"),
+        (action, r#"<SpeedProfileAction entityRef="Ego">"#, "relative to an entity"),
+        (
+            action,
+            &format!(r#"{action}<DynamicConstraints maxSpeed="7"/>"#),
+            "8 m/s is above the `maxSpeed` 7",
+        ),
+        (
+            action,
+            &format!(r#"{action}<DynamicConstraints maxAcceleration="1"/>"#),
+            "`maxSpeed` alone is read",
+        ),
+    ] {
+        assert!(profile.contains(old), "{old}");
+        let text = profile.replace(old, new);
+        let said: String = match openscenario(&text, "case", None, &BTreeMap::new(), &files) {
+            Ok(imported) => imported.space.unwrap_or_default(),
+            Err(refusals) => refusals.into_iter().map(|refusal| refusal.reason + "\n").collect(),
+        };
+        assert!(said.contains(wanted), "{new}: {said}, and not `{wanted}`");
+    }
+}
+
 /// What becomes of `cut_in` and `walker` where one thing in them is another: a line of the scenario, or a refusal.
 #[test]
 fn conditions_and_words_are_read_or_refused() {

@@ -78,7 +78,7 @@ fn a_page_has_heat_maps_by_parameters() {
     let (_, asked) = page(&["--by", "walker_kmh,ego_kmh", "--by", "road"]);
     assert!(has(&asked, &[r#""rows":["5","8"]"#, r#""columns":["25","30","35"]"#, r#""down":"road""#]));
     let (status, _, stderr) = outcome(&mut avastra(&["report", &out, "--by", "colour"]));
-    assert!(status == 1 && stderr.contains("there are `road`, `ego_kmh`"), "{status} {stderr}");
+    assert!(status == 1 && stderr.contains("name one or two of `road`, `ego_kmh`"), "{status} {stderr}");
     let (status, _, stderr) = outcome(&mut avastra(&["report", "scenarios/found", "--by", "road"]));
     assert!(status == 1 && stderr.contains("name the folder of a run"), "{status} {stderr}");
     // Any run has them if they are asked for.
@@ -101,9 +101,13 @@ fn a_page_has_heat_maps_by_parameters() {
 
 #[test]
 fn what_plays_each_row_is_neither_trained_nor_estimated() {
-    for more in [&["train"][..], &["estimate", "--method", "count"]] {
+    let cases = [
+        (&["train"][..], "has nothing to learn"),
+        (&["estimate", "--method", "count"], "plays each row of a table once"),
+    ];
+    for (more, told) in cases {
         let asked = [more, &["scenarios/avastra45.ava", "--agent", "every-row"]].concat();
         let (status, _, stderr) = outcome(&mut avastra(&asked));
-        assert!(status == 1 && stderr.contains("every-row"), "{more:?}: {status} {stderr}");
+        assert!(status == 1 && stderr.contains(told), "{more:?}: {status} {stderr}");
     }
 }

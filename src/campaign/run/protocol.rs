@@ -49,7 +49,7 @@ impl Ending {
 pub struct ProtocolTest {
     pub episode: i64,
     pub road: String,
-    /// The action's name; `None` if none was carried out in the episode.
+    /// The action's name: it was carried out if there is an `ending`, else asked for and refused. `None` if no row alone was asked for.
     pub action: Option<String>,
     /// Its values, as the language writes them.
     pub values: Vec<(String, String)>,
@@ -136,11 +136,12 @@ impl Database {
                 if let Some((_, row, reason)) = refused {
                     test.refused = Some(reason.clone());
                     let label = usize::try_from(*row).ok().and_then(|row| labels.get(row));
-                    let asked = label
-                        .filter(|_| self.is_of_one_row(episode).unwrap_or(false))
-                        .map(|label| said(label));
-                    (test.action, test.values) =
-                        asked.map_or((None, Vec::new()), |(name, values)| (Some(name), values));
+                    if let Some(label) = label
+                        && self.is_of_one_row(episode)?
+                    {
+                        let (name, values) = said(label);
+                        (test.action, test.values) = (Some(name), values);
+                    }
                 }
                 tests.push(test);
             }
@@ -154,9 +155,7 @@ impl Database {
         }
         Ok(tests)
     }
-}
 
-impl Database {
     /// Whether one row alone was asked for in an episode.
     fn is_of_one_row(&self, episode: i64) -> Result<bool, DatabaseError> {
         let query = "SELECT count(DISTINCT action_row) FROM offer WHERE episode = ?";
@@ -326,7 +325,7 @@ pub fn heat_maps(tests: &[ProtocolTest], down: &str, across: &str) -> Vec<HeatMa
 /// The actions that were carried out, in the order in which they first were.
 fn actions(tests: &[ProtocolTest]) -> Vec<String> {
     let mut actions: Vec<String> = Vec::new();
-    for action in tests.iter().filter_map(|test| test.action.as_ref()) {
+    for action in tests.iter().filter(|test| test.ending.is_some()).filter_map(|test| test.action.as_ref()) {
         if !actions.contains(action) {
             actions.push(action.clone());
         }
@@ -369,7 +368,8 @@ fn heat_map(tests: &[ProtocolTest], action: &str, down: &str, across: &str) -> O
 pub fn main_maps(tests: &[ProtocolTest]) -> Vec<HeatMap> {
     let of = |action: &String| {
         let mut values: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
-        for test in tests.iter().filter(|test| test.action.as_ref() == Some(action)) {
+        let is_of = |test: &&ProtocolTest| test.ending.is_some() && test.action.as_ref() == Some(action);
+        for test in tests.iter().filter(is_of) {
             for (name, value) in &test.values {
                 values.entry(name).or_default().insert(value);
             }
@@ -386,10 +386,10 @@ pub fn main_maps(tests: &[ProtocolTest]) -> Vec<HeatMap> {
     actions(tests).iter().filter_map(of).collect()
 }
 
-/// The parameters of all actions, and `road`.
+/// The parameters of all actions that were carried out, and `road`.
 pub fn parameters(tests: &[ProtocolTest]) -> Vec<String> {
     let mut names = vec!["road".to_owned()];
-    for (name, _) in tests.iter().flat_map(|test| &test.values) {
+    for (name, _) in tests.iter().filter(|test| test.ending.is_some()).flat_map(|test| &test.values) {
         if !names.contains(name) {
             names.push(name.clone());
         }

@@ -287,6 +287,11 @@ fn profile(source: &mut Source, action: Node) -> Option<Vec<SpeedEntry>> {
     let mut most_mps = f64::INFINITY;
     if let Some(bounds) = element(action, "DynamicConstraints") {
         most_mps = source.number_or(bounds, "maxSpeed", f64::INFINITY)?;
+        if bounds.attributes().any(|one| one.name() != "maxSpeed") {
+            source.note(
+                "of a profile's bounds `maxSpeed` alone is read: its times say how fast a speed changes",
+            );
+        }
     }
     let mut entries = Vec::new();
     for node in children(action).filter(|node| node.has_tag_name("SpeedProfileEntry")) {

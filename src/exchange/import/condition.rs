@@ -8,10 +8,13 @@ use super::said::Said;
 use super::scene::{Cast, Moving};
 use super::source::{Mark, Source};
 use super::story::Event;
-use super::trigger::{Condition, Edge, Pair, Trigger, When};
+use super::trigger::{Condition, Edge, Pair, PlaceMark, Trigger, When};
 
 /// From the ego vehicle's rear axle to its front in avastra, m: what the language's `ego.front` is ahead of a file's reference point.
 pub const EGO_FRONT_M: f64 = VehicleParameters::MKZ.rear_axle_to_front_m;
+
+/// Who drives through a circle of a smaller radius may be through it within a tick: it is reached once its near edge is, m.
+const PASSED_M: f64 = 1.0;
 
 /// What a speed may differ and be reached, m/s.
 const REACHED_MPS: f64 = 0.1;
@@ -19,6 +22,8 @@ const REACHED_MPS: f64 = 0.1;
 /// The words before a phase.
 #[derive(Debug, Clone, Default)]
 pub struct Begins {
+    /// Whether what was told before has to be done first.
+    pub is_after: bool,
     /// What must come before.
     pub first: Option<Said>,
     pub once: Option<Said>,
@@ -53,6 +58,15 @@ pub struct Waiting<'w, 'a> {
 }
 
 impl Waiting<'_, '_> {
+    /// Whether a trigger waits for nothing but the end of the event before it.
+    pub fn waits_for_the_end(&self, trigger: &Trigger) -> bool {
+        let is_end = |condition: &Condition| match &condition.kind {
+            When::Ended { kind, name } => self.before.iter().any(|event| is_called(event, kind, name)),
+            _ => condition.kind == When::Always,
+        };
+        matches!(trigger.as_slice(), [all] if all.iter().all(is_end))
+    }
+
     pub fn begins(&self, source: &mut Source, trigger: &Trigger) -> Option<Begins> {
         let mut begins = Begins::default();
         let [all] = trigger.as_slice() else {
@@ -82,6 +96,8 @@ impl Waiting<'_, '_> {
         };
         let (own, others): (Vec<&Condition>, Vec<&Condition>) = all.iter().partition(follows);
         begins.after_s = own.iter().map(|condition| condition.delay_s).fold(0.0, f64::max);
+        // The words of a phase would cut short what has to end first.
+        begins.is_after = !own.is_empty() && others.iter().any(|one| one.kind != When::Always);
         if let [only] = others.as_slice() {
             let reason =
                 "an event waits some time after another has ended, or for a moment, and not for both";
@@ -97,6 +113,10 @@ impl Waiting<'_, '_> {
         let mut parts = Vec::new();
         let mut first = Vec::new();
         for condition in others {
+            let ceases =
+                matches!(condition.edge, Edge::Falling | Edge::Either) && is_small_circle(&condition.kind);
+            let reason = format!("that a place within {PASSED_M} m is left is not read");
+            source.refuse_if(ceases, &condition.mark, reason)?;
             if condition.kind == When::Always {
                 continue;
             }
@@ -143,8 +163,16 @@ impl Waiting<'_, '_> {
             When::Reaches { entity, position, within_m, is_less } => {
                 let point = self.cast.place(source, &position.0)?.pose.position;
                 let (said, station_m) = self.station(source, mark, entity, point)?;
-                let at_m = if *is_less { station_m - within_m } else { station_m + within_m };
-                Some(said.and(if *is_less { " >= " } else { " > " }).number(at_m, "m"))
+                if is_small_circle(&condition.kind) {
+                    return Some(said.and(" >= ").number(station_m - within_m, "m"));
+                }
+                if *is_less {
+                    let far = said.clone().and(" <= ").number(station_m + within_m, "m").and(")");
+                    let near = Said::text("(").then(said).and(" >= ").number(station_m - within_m, "m");
+                    return Some(near.and(" and ").then(far));
+                }
+                let before = Said::text("(").then(said.clone()).and(" < ").number(station_m - within_m, "m");
+                Some(before.and(" or ").then(said).and(" > ").number(station_m + within_m, "m").and(")"))
             }
             When::Travelled { entity, metres } => {
                 if self.cast.is_ego(entity) {
@@ -178,18 +206,24 @@ impl Waiting<'_, '_> {
         }
     }
 
-    /// That something has begun: what it waits for has come.
+    /// That something has begun: what it waits for holds now. That it held earlier is not remembered.
     fn begun(&self, source: &mut Source, mark: &Mark, kind: &'static str, name: &str) -> Option<Said> {
         let Some((_, event)) = self.cast.last_event(kind, name) else {
             let reason =
                 format!("what begins with `{name}` is not known here: the ego vehicle's, or the player's");
             return source.refuse(mark, reason);
         };
-        let waits = |condition: &Condition| {
-            condition.delay_s > 0.0 || matches!(condition.kind, When::Begun { .. } | When::Ended { .. })
-        };
-        let reason = format!("`{name}` waits for another event, or some time after its moment");
-        source.refuse_if(event.when.iter().flatten().any(waits), mark, reason)?;
+        let mut waits = false;
+        for condition in event.when.iter().flatten() {
+            waits |= needs_alone(condition)
+                || matches!(condition.kind, When::Begun { .. } | When::Ended { .. })
+                || matches!(condition.edge, Edge::Falling | Edge::Either)
+                || condition.edge == Edge::Rising && self.holds(source, condition)?;
+        }
+        let reason = format!(
+            "`{name}` waits for another event, for some time, or for what must first cease: when it begins is not read"
+        );
+        source.refuse_if(waits, mark, reason)?;
         let mut groups = Vec::new();
         for all in &event.when {
             let parts: Option<Vec<Said>> = all.iter().map(|one| self.part(source, one)).collect();
@@ -302,8 +336,33 @@ impl Waiting<'_, '_> {
                 let begins_mps = self.cast.begins_mps(source, mark, entity)?;
                 if *is_less { begins_mps < *mps } else { begins_mps > *mps }
             }
-            _ => false,
+            When::Faster { of, to, mps, is_less } => {
+                let of_mps = self.cast.begins_mps(source, mark, of)?;
+                let by_mps = of_mps - self.cast.begins_mps(source, mark, to)?;
+                if *is_less { by_mps < *mps } else { by_mps > *mps }
+            }
+            When::Reaches { entity, position, within_m, is_less } => {
+                let ahead_m = self.ahead_m(source, mark, entity, position)?;
+                (ahead_m.abs() <= *within_m) == *is_less
+            }
+            When::Nears { entity, position, seconds } => {
+                let way_m = self.cast.begins_mps(source, mark, entity)? * seconds;
+                self.ahead_m(source, mark, entity, position)? <= way_m
+            }
+            When::Travelled { metres, .. } => *metres <= 0.0,
+            When::Always => true,
+            When::Never | When::After(_) | When::Stands { .. } | When::Ended { .. } | When::Begun { .. } => {
+                false
+            }
         })
+    }
+
+    /// How far a place is ahead of somebody at the beginning, m.
+    fn ahead_m(&self, source: &mut Source, mark: &Mark, entity: &str, place: &PlaceMark) -> Option<f64> {
+        let point = self.cast.place(source, &place.0)?.pose.position;
+        let begins = self.cast.begins(source, mark, entity)?;
+        let (_, station_m) = self.station(source, mark, entity, point)?;
+        Some(station_m - self.station(source, mark, entity, begins)?.1)
     }
 
     /// Whether two look against each other as they begin.
@@ -352,6 +411,11 @@ impl Waiting<'_, '_> {
 /// Whether a condition holds a time, which only a condition of its own keeps.
 fn needs_alone(condition: &Condition) -> bool {
     condition.delay_s > 0.0 || matches!(condition.kind, When::Stands { seconds, .. } if seconds > 0.0)
+}
+
+/// Whether a place is reached for a moment only.
+fn is_small_circle(kind: &When) -> bool {
+    matches!(kind, When::Reaches { within_m, is_less: true, .. } if *within_m < PASSED_M)
 }
 
 /// Whether an event, or something that holds it, has a name.

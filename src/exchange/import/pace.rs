@@ -12,29 +12,34 @@ use super::source::{Mark, Source};
 const DONE_MPS: f64 = 0.1;
 const DONE_PART: f64 = 0.02;
 
+/// A shorter wait is none, s.
+const LEAST_S: f64 = 1e-4;
+
 pub fn too_fast(mps: f64) -> String {
     format!("{mps:.1} m/s: nothing is faster than {} m/s", SPAWN_SPEED_MPS.end())
 }
 
-/// The rate at which a vehicle changes its speed, m/s²: a player keeps to what its vehicle can.
-pub fn within(source: &mut Source, body: &Body, change: Change, rate_mps2: f64) -> f64 {
+/// A rate of a speed that the vehicle can keep to, as a player does, and an order may have, m/s².
+pub fn rate_within_mps2(source: &mut Source, body: &Body, change: Change, rate_mps2: f64) -> f64 {
     let most_mps2 = match change {
         Change::Up => body.gains_mps2,
         Change::Down => body.loses_mps2,
         Change::Unknown => f64::INFINITY,
     };
-    let (least, most) = (*RATE_MPS2.start(), most_mps2.min(*RATE_MPS2.end()));
-    let within = rate_mps2.clamp(least.min(most), most);
+    let (least, most) = (*RATE_MPS2.start(), *RATE_MPS2.end());
+    let within = rate_mps2.clamp(least, most_mps2.clamp(least, most));
     if rate_mps2 > within {
-        source.note("speeds change no faster than the file's vehicles can, nor than 15 m/s^2");
+        source.note(format!("speeds change no faster than the file's vehicles can, nor than {most} m/s^2"));
     } else if rate_mps2 < within {
-        source.note("speeds change by 0.1 m/s^2 at least");
+        source.note(format!("speeds change by {least} m/s^2 at least"));
     }
     within
 }
 
+/// Which way a speed changes.
 #[derive(Debug, Clone, Copy)]
 pub enum Change {
+    /// Or not at all.
     Up,
     Down,
     /// The file does not say from which speed.
@@ -51,7 +56,10 @@ impl Change {
     }
 }
 
-/// A phase for each entry of a profile, which begins when the one before it has had its time.
+/// A phase for each entry of a profile, which begins when the one before it has had its time, or has reached its speed if that
+/// takes its vehicle longer.
+///
+/// With them the words before a phase that waits until the last one has had its time.
 pub fn profile(
     source: &mut Source,
     mark: &Mark,
@@ -59,7 +67,7 @@ pub fn profile(
     from_mps: Option<f64>,
     entries: &[SpeedEntry],
     begins: Said,
-) -> Option<Vec<Said>> {
+) -> Option<(Vec<Said>, Said)> {
     let (mut from, mut begins, mut phases) = (from_mps, begins, Vec::new());
     for SpeedEntry { mps, time_s } in entries {
         source.refuse_if(*mps < 0.0, mark, "nobody drives backwards")?;
@@ -72,18 +80,21 @@ pub fn profile(
             };
             let by_mps = (mps - from_mps).abs();
             if by_mps > 0.0 {
-                let rate = within(source, body, Change::between(from, Some(*mps)), by_mps / time_s);
-                said = said.and(", rate: ").number(rate, "m/s^2");
-            }
-            let near_mps = if *mps == 0.0 { 0.0 } else { DONE_MPS.max(DONE_PART * mps) };
-            if by_mps > near_mps {
-                rest_s = time_s * near_mps / by_mps;
+                let change = Change::between(from, Some(*mps));
+                let rate_mps2 = rate_within_mps2(source, body, change, by_mps / time_s);
+                said = said.and(", rate: ").number(rate_mps2, "m/s^2");
+                let near_mps = if *mps == 0.0 { 0.0 } else { DONE_MPS.max(DONE_PART * mps) };
+                // From when the phase is done; one whose vehicle is slower takes longer.
+                rest_s = (time_s - (by_mps - near_mps).max(0.0) / rate_mps2).max(0.0);
             }
         }
         phases.push(said.and(" }"));
-        begins =
-            if rest_s > 0.0 { Said::text("after ").number(rest_s, "s").and(" ") } else { Said::default() };
+        begins = if rest_s >= LEAST_S {
+            Said::text("after ").number(rest_s, "s").and(" ")
+        } else {
+            Said::default()
+        };
         from = Some(*mps);
     }
-    Some(phases)
+    Some((phases, begins))
 }

@@ -17,9 +17,11 @@ const WAY_M_MAX: f64 = 12_000.0;
 /// The goal lies this far before the end of the lanes, m.
 const BEFORE_END_M: f64 = 1.0;
 
-/// A way against the direction of its lane goes on so far, m, is looked at in such steps, m, and drawn so near to the lanes, m.
+/// How far a way against the direction of its lane goes on, m.
 const AGAINST_M_MAX: f64 = 2_000.0;
+/// In such steps it is looked at, m.
 const AGAINST_STEP_M: f64 = 2.0;
+/// So near to the lanes it is drawn, m.
 const AGAINST_NEAR_M: f64 = 0.02;
 /// Points between two that are kept: it bounds the search.
 const STRIDE_MAX: usize = 200;
@@ -165,14 +167,15 @@ impl<'a> Places<'a> {
         Placed { pose: Pose { heading_rad: wrap_angle(heading_rad), ..placed.pose }, turned_rad, ..placed }
     }
 
-    /// The way back along the lanes from a place, at the same distance from their middles.
+    /// The way back along the lanes from a place, at the same distance from their middles. Where lanes come together it takes the
+    /// first one of the map.
     pub fn against(&self, from: LanePlace) -> Vec<Vec2> {
         let (mut lane, mut station_m, mut points) = (from.lane, from.station_m, Vec::new());
         while points.len() as f64 * AGAINST_STEP_M < AGAINST_M_MAX {
             points.push(self.map.lane(lane).centre.pose_at(station_m).offset(0.0, from.offset_m).position);
             station_m -= AGAINST_STEP_M;
-            if station_m < 0.0 {
-                let Some(before) = self.map.lane(lane).predecessors.first() else { break };
+            while station_m < 0.0 {
+                let Some(before) = self.map.lane(lane).predecessors.first() else { return thinned(&points) };
                 lane = *before;
                 station_m += self.map.lane(lane).centre.length_m();
             }

@@ -9,7 +9,7 @@ use super::said::Figure;
 use super::scene::TAKEN;
 use super::variation::Values;
 
-/// More rows of one action than this are drawn, not listed; so are those that all actions have on all roads.
+/// Parameters with more combinations than this in one action are drawn, not listed; so are those with more over all actions and roads.
 const EACH_MAX: usize = 1_000;
 const ALL_MAX: usize = 30_000;
 
@@ -51,7 +51,8 @@ enum Kind {
 impl Parameters {
     /// The least that tells the variations apart: of parameters that say the same, one of a speed stays, else a number, else the
     /// first one.
-    pub fn of(order: &[String], variations: &[&Values]) -> Parameters {
+    /// `names` are those of road users.
+    pub fn of(order: &[String], variations: &[&Values], names: &BTreeSet<&str>) -> Parameters {
         let texts = |name: &String| -> Vec<&str> {
             variations.iter().map(|values| values.get(name).map_or("", String::as_str)).collect()
         };
@@ -78,6 +79,9 @@ impl Parameters {
             }
         }
         let mut taken: BTreeSet<String> = TAKEN.map(str::to_owned).into();
+        for name in names {
+            taken.extend([(*name).to_owned(), format!("{name}_way"), format!("{name}_does")]);
+        }
         let mut rows = vec![Vec::new(); variations.len()];
         let mut list = Vec::new();
         for (name, texts) in kept {
@@ -483,7 +487,7 @@ mod tests {
                 pairs.map(|(name, value)| (name.to_owned(), value.to_owned())).collect()
             })
             .collect();
-        Parameters::of(&order, &values.iter().collect::<Vec<_>>())
+        Parameters::of(&order, &values.iter().collect::<Vec<_>>(), &["lead"].into())
     }
 
     #[test]
@@ -507,6 +511,17 @@ mod tests {
         let cases = found.cases(&[0, 1, 2], |at| at == 2, |far| format!("far == {far}"));
         assert_eq!(cases, "((far == false and kmh == 30) or (far == true and kmh == 40))");
         assert_eq!(found.names(&[0, 2], |at| at), ["Van", "Car"]);
+    }
+
+    #[test]
+    fn names_of_the_language_and_of_road_users_are_changed() {
+        let found = parameters(
+            &["lead", "Lead_way", "in"],
+            &["lead=1 Lead_way=1 in=1", "lead=1 Lead_way=2 in=1", "lead=2 Lead_way=2 in=3"],
+        );
+        let names: Vec<&str> = found.list.iter().map(|parameter| parameter.name.as_str()).collect();
+        assert_eq!(names, ["lead_2", "lead_way_2"]);
+        assert_eq!(parameters(&["in"], &["in=1", "in=2"]).list[0].name, "in_2");
     }
 
     #[test]

@@ -44,8 +44,25 @@ const NEAR_M: f64 = 1.5;
 /// The fastest that somebody is told to move aside, m/s.
 const ASIDE_MPS_MAX: f64 = 10.0;
 
-/// Words of the language that name no road user.
-pub const TAKEN: [&str; 6] = ["ego", "npc", "road", "nearest", "road_users", "step"];
+/// Words of the language that name no road user and no parameter.
+pub const TAKEN: [&str; 16] = [
+    "ego",
+    "npc",
+    "road",
+    "nearest",
+    "road_users",
+    "step",
+    "in",
+    "and",
+    "or",
+    "not",
+    "true",
+    "false",
+    "match",
+    "where",
+    "each",
+    "any",
+];
 
 /// The ego vehicle's way, and all the others.
 #[derive(Debug)]
@@ -438,8 +455,11 @@ impl<'a> Cast<'a> {
             Told { mps: Some(moving.mps), offset_m: moving.offset_m, lane: moving.placed.lane, lane_m: 0.0 };
         told.lane_m = told.lane.map_or(0.0, |lane| self.aside_m(moving, lane));
         let mut phases = Vec::new();
+        // After what takes several phases, whose `once` would come too late: the words before what may follow.
+        let mut several: Option<Said> = None;
         if entity.way.as_ref().is_some_and(|way| way.timing.is_some()) {
             phases.extend(self.timed(source, moving, Said::default(), true)?);
+            several = (phases.len() > 1).then(Said::default);
         }
         let (at_once, later): (Vec<&Event>, Vec<&Event>) =
             events.into_iter().partition(|event| event.when.is_empty());
@@ -461,11 +481,25 @@ impl<'a> Cast<'a> {
         // Also one that only placed somebody, which took no time.
         let mut before: Vec<&Event> = entity.events.iter().filter(|event| event.when.is_empty()).collect();
         for (event, acts) in groups {
+            let reason =
+                "beside the times of a trajectory or of a profile only what waits for their end is read";
             let begins = match event {
-                None => Said::default(),
+                None => {
+                    source.refuse_if(several.is_some(), &entity.mark, reason)?;
+                    Said::default()
+                }
                 Some(event) => {
                     let waiting = Waiting { cast: self, actor: moving, before: before.clone() };
                     let begins = waiting.begins(source, &event.when)?;
+                    if let Some(words) = several.take() {
+                        source.refuse_if(!waiting.waits_for_the_end(&event.when), &event.mark, reason)?;
+                        if !words.0.is_empty() {
+                            phases.push(words.and("{}"));
+                        }
+                    }
+                    if begins.is_after {
+                        phases.push(Said::text("after 0 s {}"));
+                    }
                     phases.extend(
                         begins.first.as_ref().map(|first| Said::text("once ").then(first.clone()).and(" {}")),
                     );
@@ -481,16 +515,15 @@ impl<'a> Cast<'a> {
                 match &act.kind {
                     ActKind::Follow(way) if way.timing.is_some() => {
                         timed = self.timed(source, moving, begins.clone(), way.is_absolute)?;
+                        several = (timed.len() > 1).then(Said::default);
                     }
                     ActKind::Profile(entries) => {
-                        timed = pace::profile(
-                            source,
-                            &act.mark,
-                            &entity.body,
-                            told.mps,
-                            entries,
-                            begins.clone(),
-                        )?;
+                        let reason = "its trajectory has times, which say the speed already";
+                        source.refuse_if(!moving.timed.is_empty(), &act.mark, reason)?;
+                        let begins = begins.clone();
+                        let (said, then) =
+                            pace::profile(source, &act.mark, &entity.body, told.mps, entries, begins)?;
+                        (timed, several) = (said, Some(then));
                         told.mps = entries.last().map(|entry| entry.mps);
                     }
                     _ => self.fields(source, moving, act, &mut told, &mut fields)?,
@@ -502,7 +535,6 @@ impl<'a> Cast<'a> {
                 phases.extend(timed);
             } else {
                 let mark = &event.map_or(&entity.mark, |event| &event.mark);
-                let reason = "times of a trajectory or of a profile say the speed, and nothing else is read beside them";
                 return source.refuse(*mark, reason);
             }
         }
@@ -694,7 +726,7 @@ impl<'a> Cast<'a> {
         let change = Change::between(told.mps, mps);
         let rate = rate.map(|rate| match rate.0.as_slice() {
             [Piece::Number(figure)] => {
-                let within = pace::within(source, &moving.entity.body, change, figure.value());
+                let within = pace::rate_within_mps2(source, &moving.entity.body, change, figure.value());
                 Said::default().number(within, "m/s^2")
             }
             _ => rate,

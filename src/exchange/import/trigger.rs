@@ -208,14 +208,23 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
                     return source.refuse(inner, "only times that have passed are read");
                 }
                 let after_s = seconds + core::mem::take(&mut delay_s);
+                let reason = "times do not cease: `conditionEdge=\"falling\"` waits for nothing";
+                source.refuse_if(edge == Edge::Falling, node, reason)?;
                 if after_s <= 0.0 { When::Always } else { When::After(after_s) }
             }
             "StoryboardElementStateCondition" => {
                 let of = source.word(inner, "storyboardElementType", &STORYBOARD_ELEMENTS)?;
                 let state = source.word(inner, "state", &STATES)?;
+                let reason = "of a state it is read that it begins, not that it ceases";
+                source.refuse_if(matches!(edge, Edge::Falling | Edge::Either), inner, reason)?;
                 let name = source.text(inner, "storyboardElementRef")?;
                 match state {
-                    "startTransition" | "runningState" if matches!(of, "act" | "story") => When::Always,
+                    "startTransition" | "runningState" if of == "story" => When::Always,
+                    "startTransition" | "runningState" if of == "act" => {
+                        let reason = "the beginning of an act is read where the act begins at once";
+                        source.refuse_if(!begins_at_once(inner, &name), inner, reason)?;
+                        When::Always
+                    }
                     "startTransition" | "runningState" => When::Begun { kind: of, name },
                     "completeState" | "endTransition" => When::Ended { kind: of, name },
                     _ => return source.refuse(inner, "only what has begun or ended is read"),
@@ -240,6 +249,8 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
             }
             _ => return source.refuse(inner, "this condition is not read"),
         };
+        let reason = "it does not cease to hold: `conditionEdge=\"falling\"` waits for nothing";
+        source.refuse_if(edge == Edge::Falling && kind == When::Always, inner, reason)?;
         return Some(Condition { mark: source.mark(inner), edge, delay_s, kind });
     }
     let by_entity = source.required(node, "ByEntityCondition")?;
@@ -307,6 +318,22 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
         _ => return source.refuse(inner, "this condition is not read"),
     };
     Some(Condition { mark: source.mark(inner), edge, delay_s, kind })
+}
+
+/// Whether an act waits for nothing but times that have come when the scenario begins.
+fn begins_at_once(node: Node, name: &str) -> bool {
+    let last = name.rsplit("::").next();
+    let mut acts = node.document().descendants().filter(|one| one.has_tag_name("Act"));
+    let Some(act) = acts.find(|act| act.attribute("name") == last) else { return false };
+    let Some(trigger) = element(act, "StartTrigger") else { return true };
+    let number = |node: &Node, name: &str| node.attribute(name).map_or(Some(0.0), |text| text.parse().ok());
+    let is_past = |condition: Node| {
+        let time = condition.descendants().find(|one| one.has_tag_name("SimulationTimeCondition"));
+        let at_s = time.and_then(|time| number(&time, "value"));
+        at_s.is_some_and(|at_s: f64| at_s <= 0.0)
+            && number(&condition, "delay").is_some_and(|delay_s: f64| delay_s <= 0.0)
+    };
+    trigger.descendants().filter(|one| one.has_tag_name("Condition")).all(is_past)
 }
 
 /// Whether a value that does not change compares so.

@@ -19,9 +19,11 @@ use super::{Imported, Variant, Whole};
 /// The space of a file's variations. With one of them, it has a scenario, too. `order` names the parameters as they are listed.
 pub fn space(whole: &Whole, order: &[String], name: &str) -> Imported {
     let values: Vec<_> = whole.variants.iter().map(|variant| &variant.values).collect();
+    let others = whole.variants.iter().flat_map(|variant| &variant.scene.others);
+    let names = others.map(|other| other.bearer.as_str()).collect();
     let mut space = Space {
         variants: &whole.variants,
-        parameters: Parameters::of(order, &values),
+        parameters: Parameters::of(order, &values, &names),
         own: small(name),
         roads: Vec::new(),
         road_of: Vec::new(),
@@ -51,8 +53,11 @@ pub fn space(whole: &Whole, order: &[String], name: &str) -> Imported {
     let body = space.text();
     let drawn: Vec<String> = space.parameters.drawn.iter().map(|name| format!("`{name}`")).collect();
     if !drawn.is_empty() {
-        let text =
-            format!("{} variations are too many rows: each draws {}", whole.variants.len(), drawn.join(", "));
+        let text = format!(
+            "the parameters of {} variations have too many combinations to list: each row draws {}",
+            whole.variants.len(),
+            drawn.join(", ")
+        );
         notes.insert(text);
     }
     let text = head(&whole.description, name, &notes) + &body;
