@@ -163,6 +163,21 @@ const HEADINGS: [(&str, &str, &str); 9] = [
     ("revMinor=\"3\"", r#"h="0.5""#, "begins along its lane"),
 ];
 
+#[test]
+fn a_variation_that_is_listed_twice_counts_once() {
+    let read = |path: &str| std::fs::read_to_string(root().join(path)).expect("it is there");
+    let files = Kept {
+        map: read("scenarios/roads/corner.xodr"),
+        catalogue: read("tests/cases/imports/catalogue/vehicles.xosc"),
+        scenario: read(&format!("{AREA}/crossing.xosc")),
+    };
+    let text = read(&format!("{AREA}/crossing_speeds.xosc"))
+        .replace(r#"<Element value="8"/>"#, r#"<Element value="5"/>"#);
+    let space = openscenario(&text, "case", None, &BTreeMap::new(), &files).expect("it is read").space;
+    let space = space.unwrap_or_default();
+    assert!(space.contains("8 variations have the values of another one, and count once"), "{space}");
+}
+
 /// An event that makes the one ahead drive 3 m/s, when a condition holds.
 fn going(condition: &str) -> String {
     format!(

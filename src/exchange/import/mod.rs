@@ -154,12 +154,13 @@ pub fn openscenario(
     let lines = Rc::new(Lines::new(&text));
     let folder = path.rfind('/').map_or_else(String::new, |at| path[..=at].to_owned());
     let library = Library::new(files, folder);
-    let mut excluded = None;
+    let (mut excluded, mut repeated) = (None, 0);
     let mut known = BTreeSet::new();
     for values in &distribution.variations {
         // Values that were asked for stand in place of those that are listed.
         let values: Values = values.iter().chain(parameters).map(|(k, v)| (k.clone(), v.clone())).collect();
         if !known.insert(values.clone()) {
+            repeated += 1;
             continue;
         }
         match whole.add(&document, &lines, &library, values.clone(), &values) {
@@ -172,6 +173,10 @@ pub fn openscenario(
         Some((refusals, values)) => Err(of_scenario(refusals, &values)),
         None => {
             whole.description = distribution.description;
+            if repeated > 0 {
+                let note = format!("{repeated} variations have the values of another one, and count once");
+                whole.notes.insert(note);
+            }
             Ok(write::space(&whole, &distribution.parameters, name))
         }
     }
