@@ -21,8 +21,8 @@ use super::opendrive::{
 use super::phases::share_phases;
 use super::signals::{add_objects, add_signals, set_precedence};
 
-/// The limit of a road whose file states none: 50 km/h, usual in towns.
-const LIMIT_MPS_DEFAULT: f64 = 50.0 / 3.6;
+/// The limit of a road whose file states none, m/s: 50 km/h, usual in towns.
+pub const LIMIT_MPS_DEFAULT: f64 = 50.0 / 3.6;
 
 /// Below this change of heading a connection is straight (survey conventions).
 const STRAIGHT_RAD_MAX: f64 = 30.0 * core::f64::consts::PI / 180.0;

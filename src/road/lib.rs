@@ -35,6 +35,7 @@ mod tests;
 
 pub use abreast::{Connection, Opposing};
 pub use footway::{FootWay, Kerb};
+pub use graph::LIMIT_MPS_DEFAULT;
 pub use heights::{Heights, is_apart};
 pub use lane_change::STRIP_M_MAX;
 pub use map::{

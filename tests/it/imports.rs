@@ -136,6 +136,22 @@ struct Kept {
     scenario: String,
 }
 
+/// The text of a file of the repository.
+fn read(path: &str) -> String {
+    std::fs::read_to_string(root().join(path)).expect("it is there")
+}
+
+impl Kept {
+    /// With one of our roads as the map; a file of variations varies `crossing`.
+    fn with(road: &str) -> Kept {
+        Kept {
+            map: read(&format!("scenarios/roads/{road}.xodr")),
+            catalogue: read(&format!("{AREA}/catalogue/vehicles.xosc")),
+            scenario: read(&format!("{AREA}/crossing.xosc")),
+        }
+    }
+}
+
 impl Files for Kept {
     fn scenario(&self, _: &str) -> Result<String, String> {
         Ok(self.scenario.clone())
@@ -165,12 +181,7 @@ const HEADINGS: [(&str, &str, &str); 9] = [
 
 #[test]
 fn a_variation_that_is_listed_twice_counts_once() {
-    let read = |path: &str| std::fs::read_to_string(root().join(path)).expect("it is there");
-    let files = Kept {
-        map: read("scenarios/roads/corner.xodr"),
-        catalogue: read("tests/cases/imports/catalogue/vehicles.xosc"),
-        scenario: read(&format!("{AREA}/crossing.xosc")),
-    };
+    let files = Kept::with("corner");
     let text = read(&format!("{AREA}/crossing_speeds.xosc"))
         .replace(r#"<Element value="8"/>"#, r#"<Element value="5"/>"#);
     let space = openscenario(&text, "case", None, &BTreeMap::new(), &files).expect("it is read").space;
@@ -197,12 +208,7 @@ fn going(condition: &str) -> String {
 /// Each entry of a profile has its time, whatever its vehicle can do in it.
 #[test]
 fn profiles_of_speeds_keep_their_times() {
-    let read = |path: &str| std::fs::read_to_string(root().join(path)).expect("it is there");
-    let files = Kept {
-        map: read("scenarios/roads/boulevard.xodr"),
-        catalogue: read("tests/cases/imports/catalogue/vehicles.xosc"),
-        scenario: String::new(),
-    };
+    let files = Kept::with("boulevard");
     let profile = read(&format!("{AREA}/profile.xosc"));
     let dip = r#"speed="$dip_mps" time="$dip_s""#;
     let action = r#"<SpeedProfileAction followingMode="position">"#;
@@ -248,12 +254,7 @@ fn profiles_of_speeds_keep_their_times() {
 /// What becomes of `cut_in` and `walker` where one thing in them is another: a line of the scenario, or a refusal.
 #[test]
 fn conditions_and_words_are_read_or_refused() {
-    let read = |path: &str| std::fs::read_to_string(root().join(path)).expect("it is there");
-    let files = Kept {
-        map: read("scenarios/roads/boulevard.xodr"),
-        catalogue: read("tests/cases/imports/catalogue/vehicles.xosc"),
-        scenario: String::new(),
-    };
+    let files = Kept::with("boulevard");
     let wrong = RefCell::new(Vec::new());
     let expect = |found: &str, wanted: &str, case: &str| {
         if !found.contains(wanted) {
@@ -564,12 +565,7 @@ fn conditions_and_words_are_read_or_refused() {
 
 #[test]
 fn no_torn_or_altered_file_makes_it_panic() {
-    let read = |path: &str| std::fs::read_to_string(root().join(path)).expect("it is there");
-    let files = Kept {
-        map: read("scenarios/roads/corner.xodr"),
-        catalogue: read("tests/cases/imports/catalogue/vehicles.xosc"),
-        scenario: read("tests/cases/imports/crossing.xosc"),
-    };
+    let files = Kept::with("corner");
     let mut rng = rng::stream(18, Stream::Reset, 0);
     let (mut imported, mut refused) = (0, 0);
     for name in FILES {

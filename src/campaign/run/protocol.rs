@@ -412,21 +412,16 @@ impl Axis {
         let is_one_unit = values.iter().all(|value| unit(value) == unit(&values[0]));
         let numbers: Option<Vec<f64>> =
             values.iter().map(|value| number(value).filter(|_| is_one_unit)).collect();
-        let Some(numbers) = numbers else {
+        if numbers.is_some() {
+            distinct.sort_by(|a, b| number(a).unwrap_or(0.0).total_cmp(&number(b).unwrap_or(0.0)));
+        }
+        let Some(numbers) = numbers.filter(|_| distinct.len() > AXIS_MAX) else {
             let at = |value: &String| distinct.iter().position(|known| *known == value).unwrap_or(0);
             return Axis {
                 at: values.iter().map(at).collect(),
                 labels: distinct.into_iter().cloned().collect(),
             };
         };
-        if distinct.len() <= AXIS_MAX {
-            distinct.sort_by(|a, b| number(a).unwrap_or(0.0).total_cmp(&number(b).unwrap_or(0.0)));
-            let at = |value: &String| distinct.iter().position(|known| *known == value).unwrap_or(0);
-            return Axis {
-                at: values.iter().map(at).collect(),
-                labels: distinct.into_iter().cloned().collect(),
-            };
-        }
         let (low, high) = numbers.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
             (low.min(*value), high.max(*value))
         });

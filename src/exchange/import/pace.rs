@@ -2,15 +2,12 @@
 
 use avastra_lang::model::SPAWN_SPEED_MPS;
 use avastra_lang::model::command::RATE_MPS2;
+use avastra_world::sim::{SPEED_REACHED_MPS, SPEED_REACHED_PART};
 
 use super::action::SpeedEntry;
 use super::body::Body;
 use super::said::Said;
 use super::source::{Mark, Source};
-
-/// A phase is done when its speed is so near to what it tells: m/s, and a part of that. A stop is exact.
-const DONE_MPS: f64 = 0.1;
-const DONE_PART: f64 = 0.02;
 
 /// A shorter wait is none, s.
 const LEAST_S: f64 = 1e-4;
@@ -83,7 +80,9 @@ pub fn profile(
                 let change = Change::between(from, Some(*mps));
                 let rate_mps2 = rate_within_mps2(source, body, change, by_mps / time_s);
                 said = said.and(", rate: ").number(rate_mps2, "m/s^2");
-                let near_mps = if *mps == 0.0 { 0.0 } else { DONE_MPS.max(DONE_PART * mps) };
+                // A stop is exact.
+                let near_mps =
+                    if *mps == 0.0 { 0.0 } else { SPEED_REACHED_MPS.max(SPEED_REACHED_PART * mps) };
                 // From when the phase is done; one whose vehicle is slower takes longer.
                 rest_s = (time_s - (by_mps - near_mps).max(0.0) / rate_mps2).max(0.0);
             }

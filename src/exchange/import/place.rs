@@ -1,6 +1,6 @@
 //! Where things are: places of a file on its map.
 
-use core::f64::consts::FRAC_PI_2;
+use core::f64::consts::PI;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
@@ -253,7 +253,7 @@ impl<'a> Places<'a> {
         let centre = lane.centre.pose_at(place.station_m);
         let along = match lane.is_along() {
             true => centre,
-            false => Pose { heading_rad: wrap_angle(centre.heading_rad + 2.0 * FRAC_PI_2), ..centre },
+            false => Pose { heading_rad: wrap_angle(centre.heading_rad + PI), ..centre },
         };
         let half_m = lane.width_at(place.station_m) / 2.0;
         Some(along.offset(0.0, if id < 0 { half_m } else { -half_m }))
@@ -326,7 +326,7 @@ impl<'a> Places<'a> {
                     let s_m = self.map.lane(here.lane).road_station_m(here.station_m);
                     let reference = self.reference(source, mark, &key.road.clone(), s_m)?;
                     let lane = self.map.lane(here.lane);
-                    let turn_rad = if lane.is_along() { 0.0 } else { 2.0 * FRAC_PI_2 };
+                    let turn_rad = if lane.is_along() { 0.0 } else { PI };
                     let along =
                         Pose { heading_rad: wrap_angle(reference.heading_rad + turn_rad), ..reference };
                     Some(self.in_plane(along.offset(0.0, t_m)))
@@ -354,7 +354,7 @@ impl Placed {
 
     /// Whether it looks against its lane.
     pub fn is_against(&self) -> bool {
-        self.lane.is_some() && self.turned_rad.abs() > core::f64::consts::PI - 0.1
+        self.lane.is_some() && self.turned_rad.abs() > PI - 0.1
     }
 
     /// A short straight way on from here, m.

@@ -7,7 +7,7 @@ use avastra_base::geometry::{Path, SMOOTH_STEP_SLOPE_MAX, Vec2, wrap_angle};
 use avastra_campaign::emit::lane_point;
 use avastra_lang::model::SPAWN_SPEED_MPS;
 use avastra_lang::model::command::OFFSET_M;
-use avastra_road::{LanePlace, RoadMap, Route, Side};
+use avastra_road::{LIMIT_MPS_DEFAULT, LanePlace, RoadMap, Route, Side};
 use avastra_world::sim::VehicleParameters;
 
 use super::action::{Act, ActKind, Aside, Dynamics, Headway, Meeting, Over, Speed, Steady, Target};
@@ -28,9 +28,6 @@ pub const OFFSET: &str = ", offset: ";
 /// A way along lanes begins at a multiple of this, so that places that differ a little are on one way, m.
 const BEGINS_M: f64 = 500.0;
 
-/// The least limit that is written where the map states none, m/s: 50 km/h, as a town's.
-const LIMIT_MPS: f64 = 50.0 / 3.6;
-
 /// A way that is shorter shows nothing, m.
 const WAY_M_MIN: f64 = 20.0;
 
@@ -40,6 +37,9 @@ const STANDING_M: f64 = 10.0;
 
 /// A trajectory that begins during the story does so this near to where its entity stands, m.
 const NEAR_M: f64 = 1.5;
+
+/// The fields of an order that say how fast somebody drives.
+const PACE: [&str; 6] = ["speed", "rate", "early", "at", "reach", "steady"];
 
 /// The fastest that somebody is told to move aside, m/s.
 const ASIDE_MPS_MAX: f64 = 10.0;
@@ -165,7 +165,7 @@ impl Scene {
                 "the map's speed limit is below the ego vehicle's speed: driving systems slow down to it",
             );
         }
-        let (ego_mps, most) = (Figure::new(ego_mps, "m/s"), ego_mps.max(LIMIT_MPS));
+        let (ego_mps, most) = (Figure::new(ego_mps, "m/s"), ego_mps.max(LIMIT_MPS_DEFAULT));
         let limit_mps = is_open.then(|| Figure::new(most, "m/s"));
         (!source.is_refused()).then_some(Scene { start, goal, ego_mps, limit_mps, others })
     }
@@ -732,7 +732,7 @@ impl<'a> Cast<'a> {
             _ => rate,
         });
         told.mps = mps;
-        instead_of(fields, &["speed", "rate", "early", "at", "reach", "steady"]);
+        instead_of(fields, &PACE);
         fields.push(Said::text("speed: ").then(said));
         fields.extend(rate.map(|rate| Said::text("rate: ").then(rate)));
         Some(())
@@ -826,7 +826,7 @@ impl<'a> Cast<'a> {
         // The file says where its reference point is; the language where the front is.
         let ego_m = self.station_m(point) + ego.middle_m + ego.length_m / 2.0;
         let reach_m = moving.reach_m(source, self, &meeting.own_at)?;
-        instead_of(fields, &["speed", "rate", "early", "at", "reach", "steady"]);
+        instead_of(fields, &PACE);
         fields.push(Said::text("early: ").number(0.0, "s"));
         fields.push(Said::text("at: ").number(ego_m, "m"));
         fields.push(Said::text("reach: ").number(reach_m, "m"));

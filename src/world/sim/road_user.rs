@@ -26,8 +26,8 @@ const WRECK_S: f64 = 2.0;
 
 /// A road user this near to the speed of a phase has it, m/s, or by this part of it: without a `rate`, the driver model only
 /// approaches it.
-const SPEED_REACHED_MPS: f64 = 0.1;
-const SPEED_REACHED_PART: f64 = 0.02;
+pub const SPEED_REACHED_MPS: f64 = 0.1;
+pub const SPEED_REACHED_PART: f64 = 0.02;
 
 /// What walks or stands does so beside this stretch of the ego vehicle's route, before and behind it, m.
 const ON_FOOT_M: f64 = 200.0;
