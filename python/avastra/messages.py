@@ -255,7 +255,7 @@ class Ego:
 
 @dataclass(frozen=True)
 class Object:
-    """Another road user. `kind` is its `class`: car, truck, bus, motorcycle, cyclist, pedestrian or unknown."""
+    """Another road user. `kind` is its `class`: car, truck, bus, motorcycle, cyclist, pedestrian, animal, object or unknown."""
 
     id: int
     kind: str = field(metadata={"json": "class"})

@@ -56,12 +56,33 @@ examples! {
     "wet_trucks",
 }
 
-/// The tests of a protocol, which share their roads.
-const CATALOGUE: [(&str, &str); 2] = [
-    ("euro_ncap_cars", include_str!("../../scenarios/catalogue/euro_ncap_cars.ava")),
-    ("euro_ncap_vulnerable", include_str!("../../scenarios/catalogue/euro_ncap_vulnerable.ava")),
+/// Files by their names beside the space, with what they hold.
+type Files = &'static [(&'static str, &'static str)];
+
+/// The tests of protocols, each with what it uses.
+const CATALOGUE: [(&str, &str, Files); 4] = [
+    ("euro_ncap_cars", include_str!("../../scenarios/catalogue/euro_ncap_cars.ava"), PROVING_GROUND),
+    (
+        "euro_ncap_vulnerable",
+        include_str!("../../scenarios/catalogue/euro_ncap_vulnerable.ava"),
+        PROVING_GROUND,
+    ),
+    (
+        "pre_crash",
+        include_str!("../../scenarios/catalogue/pre_crash.ava"),
+        &[("roads/pre_crash.xodr", include_str!("../../scenarios/roads/pre_crash.xodr"))],
+    ),
+    (
+        "r157",
+        include_str!("../../scenarios/r157.ava"),
+        &[
+            ("motorway.ava", include_str!("../../scenarios/motorway.ava")),
+            ("moves.ava", include_str!("../../scenarios/moves.ava")),
+            ("roads/motorway.xodr", include_str!("../../scenarios/roads/motorway.xodr")),
+        ],
+    ),
 ];
-const PROVING_GROUND: [(&str, &str); 2] = [
+const PROVING_GROUND: Files = &[
     ("proving_ground.ava", include_str!("../../scenarios/catalogue/proving_ground.ava")),
     ("roads/proving_ground.xodr", include_str!("../../scenarios/roads/proving_ground.xodr")),
 ];
@@ -69,7 +90,7 @@ const PROVING_GROUND: [(&str, &str); 2] = [
 /// What `--template` takes.
 pub fn template_names() -> PossibleValuesParser {
     let examples = EXAMPLES.iter().map(|(name, ..)| *name);
-    PossibleValuesParser::new(examples.chain(CATALOGUE.iter().map(|(name, _)| *name)))
+    PossibleValuesParser::new(examples.chain(CATALOGUE.iter().map(|(name, ..)| *name)))
 }
 
 /// Routes that are proposed on a map.
@@ -101,15 +122,16 @@ pub fn new(output: &Output, arguments: &NewArguments) -> Result<(), Failure> {
 }
 
 fn is_of_catalogue(name: &str) -> bool {
-    CATALOGUE.iter().any(|(known, _)| *known == name)
+    CATALOGUE.iter().any(|(known, ..)| *known == name)
 }
 
 /// An example with what it uses: names in the directory, and texts.
 fn example(name: &str) -> Vec<(String, String)> {
-    if let Some((_, own)) = CATALOGUE.iter().find(|(known, _)| *known == name) {
-        let ground =
-            PROVING_GROUND.map(|(name, text)| (name.to_owned(), text.replace("\"../roads/", "\"roads/")));
-        return [(format!("{name}.ava"), (*own).to_owned())].into_iter().chain(ground).collect();
+    if let Some((_, own, used)) = CATALOGUE.iter().find(|(known, ..)| *known == name) {
+        let own = (format!("{name}.ava"), *own);
+        let files = core::iter::once(own).chain(used.iter().map(|(name, text)| ((*name).to_owned(), *text)));
+        // The maps stand beside them here.
+        return files.map(|(name, text)| (name, text.replace("\"../roads/", "\"roads/"))).collect();
     }
     let found = EXAMPLES.iter().find(|(known, ..)| *known == name);
     let (_, own, maps) = found.expect("clap takes the names of templates alone");

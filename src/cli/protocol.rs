@@ -62,6 +62,9 @@ fn ended(test: &ProtocolTest) -> String {
     if let (Some(impact), Some(lost)) = (test.impact_mps, test.reduction_mps()) {
         let _ = write!(text, " at {}, {} less than before", kmh(impact), kmh(lost));
     }
+    if let Some(precrash) = &test.precrash {
+        let _ = write!(text, ": {precrash}");
+    }
     if !test.breached.is_empty() {
         let _ = write!(text, "; breached: {}", test.breached.join(", "));
     }
@@ -77,7 +80,7 @@ fn csv(tests: &[ProtocolTest]) -> String {
         }
     }
     let mut text = format!(
-        "episode,road,action,{}ending,before_kmh,impact_kmh,reduction_kmh,relative_kmh,ttc_s,counted,breached,refused\n",
+        "episode,road,action,{}ending,before_kmh,impact_kmh,reduction_kmh,relative_kmh,precrash,ttc_s,counted,breached,refused\n",
         names.iter().map(|name| format!("{name},")).collect::<String>()
     );
     let figure = |value: Option<f64>, factor: f64| {
@@ -94,7 +97,7 @@ fn csv(tests: &[ProtocolTest]) -> String {
         };
         let _ = writeln!(
             text,
-            "{},{},{},{}{},{},{},{},{},{},{},{},{}",
+            "{},{},{},{}{},{},{},{},{},{},{},{},{},{}",
             test.episode,
             test.road,
             test.action.as_deref().unwrap_or_default(),
@@ -104,6 +107,7 @@ fn csv(tests: &[ProtocolTest]) -> String {
             figure(test.impact_mps, 3.6),
             figure(test.reduction_mps(), 3.6),
             figure(test.relative_mps, 3.6),
+            quoted(test.precrash.as_deref().unwrap_or_default()),
             figure(test.ttc_s, 1.0),
             test.counted,
             test.breached.join(" "),
@@ -163,6 +167,7 @@ mod tests {
             before_mps: Some(10.0),
             impact_mps: Some(5.0),
             relative_mps: Some(5.0),
+            precrash: Some("24 lead vehicle moving at lower constant speed".to_owned()),
             ttc_s: Some(0.0),
             counted: true,
             breached: vec!["keeps_gap".to_owned()],
@@ -178,16 +183,16 @@ mod tests {
         let tests = [test, missed];
         let table = csv(&tests);
         let lines: Vec<&str> = table.lines().collect();
-        assert_eq!(lines[0].matches(',').count(), 13);
+        assert_eq!(lines[0].matches(',').count(), 14);
         assert_eq!(
             lines[1],
-            "3,at_30,begin,30,\"a, b\",mitigated,36.000,18.000,18.000,18.000,0.000,true,keeps_gap,"
+            "3,at_30,begin,30,\"a, b\",mitigated,36.000,18.000,18.000,18.000,24 lead vehicle moving at lower constant speed,0.000,true,keeps_gap,"
         );
         let cases = junit("runs/<1>", &tests);
         roxmltree::Document::parse(&cases).expect("it is well-formed");
         assert!(cases.contains("failures=\"1\"") && cases.contains("skipped=\"1\""), "{cases}");
         assert!(
-            cases.contains("mitigated at 18.0 km/h, 18.0 km/h less than before; breached: keeps_gap"),
+            cases.contains("18.0 km/h less than before: 24 lead vehicle moving at lower constant speed; breached: keeps_gap"),
             "{cases}"
         );
         assert!(in_words(&tests).contains("1 mitigated, 1 without an action"));

@@ -31,6 +31,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod blind;
 mod driver;
 pub mod external;
 mod frenet;
@@ -52,6 +53,6 @@ pub use frenet::Frenet;
 pub use modular::{ConfigError, Foresight, Modular, ModularConfig, Module, Weaknesses};
 pub use reactive::Reactive;
 pub use reference::{CarefulHuman, Evasion, FuzzySafety, Idm, MinimalPerformance, Reference, Rss, in_sight};
-pub use registry::{Entry, REGISTRY, by_name};
+pub use registry::{Entry, REGISTRY, by_name, seeing};
 pub use selected::{EXTERNAL, NoSettings, Selected};
 pub use status::{GHOST_ID_MIN, Manoeuvre, PerceivedObject, Reason, Status};

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use avastra_world::sim::Scene;
 
+use super::blind::Blind;
 use super::driver::Ads;
 use super::frenet::Frenet;
 use super::modular::{Modular, ModularConfig};
@@ -66,7 +67,20 @@ pub const REGISTRY: &[Entry] = &[
         summary: "reference driver: the least that UN R157 demands",
         build: |scene, _seed| Box::new(Reference::new(scene, MinimalPerformance)),
     },
+    Entry {
+        name: BLIND,
+        summary: "keeps its lane and speed and sees nothing: what it does not hit is no test",
+        build: |scene, _seed| Box::new(Blind::new(scene)),
+    },
 ];
+
+/// The one that sees nothing.
+const BLIND: &str = "blind";
+
+/// Those that mind others.
+pub fn seeing() -> impl Iterator<Item = &'static Entry> {
+    REGISTRY.iter().filter(|entry| entry.name != BLIND)
+}
 
 #[cfg(test)]
 mod tests {

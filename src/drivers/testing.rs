@@ -134,6 +134,8 @@ pub fn object(id: u32, body: Body, pose: Pose, speed_mps: f64) -> SensedObject {
         Body::BoxTruck => (7.5, 2.4, 3.2),
         Body::Jeep | Body::Sedan | Body::SUV | Body::Hatchback => (4.8, 1.85, 1.45),
         Body::Motorcycle | Body::Bicycle => (2.0, 0.7, 1.6),
+        Body::Animal => (1.6, 0.5, 1.2),
+        Body::Object => (1.0, 1.0, 0.8),
     };
     SensedObject {
         id,

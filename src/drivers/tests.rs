@@ -11,7 +11,7 @@ use avastra_road::testing::{lanes as lanes_of, street};
 use avastra_world::sim::testing::overpass;
 use avastra_world::sim::{DT_S, SignalColour, VehicleParameters, World};
 
-use super::registry::{Entry, REGISTRY};
+use super::registry::{Entry, seeing};
 use super::status::{Manoeuvre, Reason};
 use super::testing::{Rig, SOURCE_Y_M, TARGET_Y_M, object, straight, two_lanes, winding};
 
@@ -34,7 +34,7 @@ fn nothing_slows_down_for_traffic_on_a_bridge() {
         assert!(height_m == 0.0 || world.arrived() && contacts == 0, "{}", entry.name);
         speeds_mps
     };
-    for entry in REGISTRY {
+    for entry in seeing() {
         let alone = speeds_mps(entry, 6.0, false);
         assert!(speeds_mps(entry, 6.0, true) == alone, "{} yields to traffic above it", entry.name);
         assert!(speeds_mps(entry, 0.0, true) != alone, "{} does not meet traffic on the flat", entry.name);
@@ -44,7 +44,7 @@ fn nothing_slows_down_for_traffic_on_a_bridge() {
 #[test]
 fn all_keep_a_straight_lane_repeat_themselves_and_copy() {
     let scene = straight();
-    for entry in REGISTRY {
+    for entry in seeing() {
         let build = || {
             let mut rig = Rig::driven_by(entry.name, &scene, 5, 8.0);
             rig.sensed.objects.push(object(1, Body::SUV, Pose::new(60.0, -1.75, 0.0), 7.0));
@@ -214,7 +214,7 @@ fn a_cut_in_that_brakes_is_survived() {
     let lanes = lanes_of(&[-1, -2, -3].map(|id| (id, "driving", 3.5, broken)));
     let road = street("1", [0.0, 0.0, 0.0, 600.0], "-1", "", &lanes, "");
     let scene = avastra_world::sim::testing::scene(&road, ("1", -2, 20.0), ("1", -2, 500.0));
-    for entry in REGISTRY {
+    for entry in seeing() {
         let mut rig = Rig::driven_by(entry.name, &scene, 5, 14.0);
         rig.sensed.signals.clear();
         rig.sensed.objects = vec![

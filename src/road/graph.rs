@@ -321,12 +321,21 @@ impl<'a> Builder<'a> {
     /// the kerb.
     fn add_strips(&mut self) -> Result<(), RoadError> {
         for road in &self.document.roads {
-            for section in &road.sections {
+            for (index, section) in road.sections.iter().enumerate() {
                 for element in &section.lanes {
                     let Some(kind) = element.beside else { continue };
                     let found = self.spent.centre_line(self.document, road, section, element.id)?;
-                    let Ok(CentreLine { path, widths_m, .. }) = found else { continue };
-                    self.map.strips.push(Strip { kind, bounds: path.bounds(), centre: path, widths_m });
+                    let Ok(CentreLine { path, widths_m, road_stations_m, .. }) = found else { continue };
+                    let key = LaneKey { road: road.id.clone(), section: index, lane: element.id };
+                    let bounds = path.bounds();
+                    self.map.strips.push(Strip {
+                        kind,
+                        key,
+                        road_stations_m,
+                        centre: path,
+                        widths_m,
+                        bounds,
+                    });
                 }
             }
         }

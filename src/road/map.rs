@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-use avastra_base::geometry::{Bounds, OrientedBox, Path, Vec2, wrap_angle};
+use avastra_base::geometry::{Bounds, OrientedBox, Path, Pose, Vec2, wrap_angle};
 
 use super::heights::Heights;
 use super::index::LaneGrid;
@@ -195,6 +195,9 @@ pub struct LeftOut {
 #[derive(Debug, Clone)]
 pub struct Strip {
     pub kind: StripKind,
+    pub key: LaneKey,
+    /// Station of the road's reference line at each vertex of `centre`, m.
+    pub road_stations_m: Vec<f64>,
     pub centre: Path,
     /// Width at each vertex of `centre`, m.
     pub widths_m: Vec<f64>,
@@ -346,6 +349,20 @@ impl RoadMap {
         Ok(LanePlace { lane: LaneIndex(index), station_m: candidate.station_of(s_m), offset_m: 0.0 })
     }
 
+    /// The middle of a lane on which nobody drives but people may be, in its direction, at a station of the road's reference line, and
+    /// whether that is the line's direction; `None` if there is none.
+    pub fn strip_pose(&self, road: &str, lane: i32, s_m: f64) -> Option<(Pose, bool)> {
+        let holds = |strip: &&Strip| {
+            let (first_m, last_m) = ends(&strip.road_stations_m);
+            let held = first_m.min(last_m) - 1e-3..=first_m.max(last_m) + 1e-3;
+            strip.key.road == road && strip.key.lane == lane && held.contains(&s_m)
+        };
+        let strip = self.strips.iter().rfind(holds)?;
+        let (first_m, last_m) = ends(&strip.road_stations_m);
+        let pose = strip.centre.pose_at(station_beside(&strip.road_stations_m, &strip.centre, s_m));
+        Some((pose, first_m < last_m))
+    }
+
     /// Says of a lane that is no driving lane what it is, to be appended to a message; empty if the map has no such lane.
     fn left_out_text(&self, road: &str, lane: i32) -> String {
         let Some(LeftOut { what, .. }) = self.left_out.get(&(road.to_owned(), lane)) else {
@@ -449,14 +466,7 @@ impl Lane {
 
     /// The lane's own station beside a station of the road's reference line, clamped to the lane, m.
     pub fn station_of(&self, s_m: f64) -> f64 {
-        let stations_m = &self.road_stations_m;
-        let rising = self.is_along();
-        let after = stations_m.partition_point(|at_m| if rising { *at_m <= s_m } else { *at_m >= s_m });
-        let after = after.clamp(1, stations_m.len() - 1);
-        let (from_m, to_m) = (stations_m[after - 1], stations_m[after]);
-        let fraction = ((s_m - from_m) / (to_m - from_m)).clamp(0.0, 1.0);
-        let (a, b) = (&self.centre.points()[after - 1], &self.centre.points()[after]);
-        a.station_m + (b.station_m - a.station_m) * fraction
+        station_beside(&self.road_stations_m, &self.centre, s_m)
     }
 
     /// Station of the road's reference line beside a station of the lane, clamped to the lane, m.
@@ -472,10 +482,25 @@ impl Lane {
 
     /// The first and the last station of the road's reference line beside the lane, m.
     fn road_range_m(&self) -> (f64, f64) {
-        let (first_m, last_m) =
-            (self.road_stations_m[0], self.road_stations_m[self.road_stations_m.len() - 1]);
+        let (first_m, last_m) = ends(&self.road_stations_m);
         (first_m.min(last_m), first_m.max(last_m))
     }
+}
+
+fn ends(stations_m: &[f64]) -> (f64, f64) {
+    (stations_m[0], stations_m[stations_m.len() - 1])
+}
+
+/// The station of a lane's centre line beside a station of the road's reference line, of which each vertex has its own, m.
+fn station_beside(stations_m: &[f64], centre: &Path, s_m: f64) -> f64 {
+    let (first_m, last_m) = ends(stations_m);
+    let rising = first_m < last_m;
+    let after = stations_m.partition_point(|at_m| if rising { *at_m <= s_m } else { *at_m >= s_m });
+    let after = after.clamp(1, stations_m.len() - 1);
+    let (from_m, to_m) = (stations_m[after - 1], stations_m[after]);
+    let fraction = ((s_m - from_m) / (to_m - from_m)).clamp(0.0, 1.0);
+    let (a, b) = (&centre.points()[after - 1], &centre.points()[after]);
+    a.station_m + (b.station_m - a.station_m) * fraction
 }
 
 /// Most names that a message lists: a city has thousands of roads.

@@ -96,6 +96,29 @@ fn the_rows_are_those_of_the_published_tables() {
     }
 }
 
+/// Of each row that a driver that sees nothing plays: the action, and the pre-crash type.
+#[test]
+fn each_of_the_37_pre_crash_types_happens_in_the_row_that_has_its_number() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let out = scratch.path().join("run").display().to_string();
+    let space = root().join("scenarios/catalogue/pre_crash.ava").display().to_string();
+    done(&["run", &space, "--agent", "every-row", "--replays", "0", "--ads", "blind", "--out", &out]);
+    let table = std::fs::read_to_string(format!("{out}/protocol.csv")).expect("it was written");
+    let head: Vec<&str> = table.lines().next().expect("it has a head").split(',').collect();
+    let column = |name: &str| head.iter().position(|known| *known == name).expect("it is a column");
+    let (action, kind) = (column("action"), column("precrash"));
+    let mut found = BTreeSet::new();
+    for row in table.lines().skip(1) {
+        // Names of types may hold a comma, but their numbers come first.
+        let cells: Vec<&str> = row.split(',').collect();
+        let asked: u32 = cells[action][1..3].parse().expect("its name begins with its number");
+        let number = cells[kind].trim_matches('"').split(' ').next().and_then(|number| number.parse().ok());
+        assert_eq!(number, Some(asked), "{row}");
+        found.insert(asked);
+    }
+    assert_eq!(found, (1..=37).collect());
+}
+
 #[test]
 fn a_template_of_the_catalogue_is_played_row_by_row() {
     let scratch = tempfile::tempdir().expect("a scratch directory");

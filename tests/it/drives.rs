@@ -22,7 +22,7 @@ fn undisturbed_drives_arrive_in_every_weather() {
             let dealt = (index as u64, space.roads.len());
             threads.spawn(move || {
                 let scene = Arc::new(Scene::of(road));
-                for entry in ads::REGISTRY {
+                for entry in ads::seeing() {
                     let (first, stride) = if entry.name == "modular" { (0, 1) } else { dealt };
                     for seed in (first..DRIVES).step_by(stride) {
                         drive(&scene, entry, seed, road.facts.limit_mps);
@@ -39,7 +39,7 @@ fn a_healthy_driving_system_mostly_survives_ambient_traffic() {
     let (mut drives, mut failed) = (0, Vec::new());
     for (index, road) in space.roads.iter().enumerate() {
         let scene = Arc::new(Scene::of(road));
-        for entry in ads::REGISTRY {
+        for entry in ads::seeing() {
             for seed in (index as u64..60).step_by(space.roads.len()) {
                 drives += 1;
                 let start = Start { ambient: 8, ..start(seed) };

@@ -13,7 +13,8 @@ use crate::exports::crash;
 
 const AREA: &str = "tests/cases/imports";
 
-const FILES: [&str; 7] = ["cut_in", "walker", "refused", "braking", "crossing", "crossing_speeds", "profile"];
+const FILES: [&str; 8] =
+    ["cut_in", "walker", "refused", "braking", "crossing", "crossing_speeds", "profile", "kept"];
 
 /// Files of variations, and how many rows they make: of the second one, a parameter is drawn in each.
 const ROWS: [(&str, usize); 2] = [("crossing_speeds", 12), ("profile_values", 726)];
@@ -65,7 +66,7 @@ fn every_file_becomes_a_space_or_is_refused_with_its_lines() {
         // Without `body`, which is no number, the speed's parts are the sixth and the seventh.
         let ego_kmh = libm::hypot(first[5], first[6]) * 3.6;
         let wanted_kmh = match name {
-            "cut_in" | "profile" => 36.0,
+            "cut_in" | "profile" | "kept" => 36.0,
             "braking" => 50.0,
             _ => 30.0,
         };
@@ -249,6 +250,42 @@ fn profiles_of_speeds_keep_their_times() {
         };
         assert!(said.contains(wanted), "{new}: {said}, and not `{wanted}`");
     }
+}
+
+/// A van is as fast as 1.2 times the ego vehicle once it has gained speed at 2 m/s², and another one comes to 12 m behind it.
+#[test]
+fn speeds_and_distances_that_are_kept_follow_at_every_tick() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let folder = scratch.path().display().to_string();
+    done(&["import", "--out", &folder, &format!("{AREA}/kept.xosc")]);
+    done(&["export", "--to", "csv", &scratch.path().join("kept_scenario.ava").display().to_string()]);
+    let table = std::fs::read_to_string(scratch.path().join("exported/kept_scenario.csv"));
+    // By road user and moment: place and speed.
+    let mut seen: BTreeMap<(String, i64), ([f64; 2], f64)> = BTreeMap::new();
+    for row in table.expect("it was written").lines().skip(1) {
+        let cells: Vec<&str> = row.split(',').collect();
+        let number = |at: usize| cells[at].parse::<f64>().expect("it is a number");
+        let tick = (number(0) / 0.02).round() as i64;
+        let speed_mps = libm::hypot(number(6), number(7));
+        seen.insert((cells[2].to_owned(), tick), ([number(3), number(4)], speed_mps));
+    }
+    let of = |who: &str, tick: i64| seen[&(who.to_owned(), tick)];
+    let away_m = |tick: i64| {
+        let ([a, b], [c, d]) = (of("Van", tick).0, of("Follower", tick).0);
+        libm::hypot(a - c, b - d)
+    };
+    for tick in [50, 100, 150] {
+        let wanted_mps = f64::min(2.0 * 0.02 * tick as f64, 12.0);
+        assert!((of("Van", tick).1 - wanted_mps).abs() < 0.05, "{tick}: {:?}", of("Van", tick));
+    }
+    for tick in [400, 500, 590] {
+        let (van_mps, ego_mps) = (of("Van", tick).1, of("ego", tick - 1).1);
+        assert!((van_mps - 1.2 * ego_mps).abs() < 0.02, "{tick}: {van_mps} m/s and {ego_mps} m/s");
+    }
+    // Both are 5.2 m long; the spring closes in without passing by.
+    let gaps_m = [300, 450, 590].map(|tick| away_m(tick) - 5.2);
+    assert!(gaps_m.iter().all(|gap_m| *gap_m > 11.5), "{gaps_m:?}");
+    assert!((gaps_m[2] - 12.0).abs() < 0.5, "{gaps_m:?}");
 }
 
 /// What becomes of `cut_in` and `walker` where one thing in them is another: a line of the scenario, or a refusal.

@@ -59,7 +59,7 @@ fn every_driving_system_arrives_at_every_place() {
     for place in PLACES {
         for road in &space_at(&path(&format!("{place}.ava"))).roads {
             let scene = Arc::new(Scene::of(road));
-            for entry in ads::REGISTRY {
+            for entry in ads::seeing() {
                 for seed in 0..3 {
                     let case = format!("{} on {place}, {}, seed {seed}", entry.name, road.name);
                     assert_eq!(drive(&scene, entry, seed, 0), (0, true), "{case}");

@@ -15,7 +15,7 @@ const AMBIENT: u32 = 12;
 #[test]
 fn every_driver_keeps_to_motorways_at_their_speeds() {
     let space = space("r157.ava");
-    for entry in ads::REGISTRY {
+    for entry in ads::seeing() {
         let mut fastest_mps = 0.0_f64;
         for (number, road) in space.roads.iter().enumerate() {
             let scene = Arc::new(Scene::of(road));

@@ -157,8 +157,9 @@ def moving(other):
         dimension=osi.Dimension3d(length=other.length, width=other.width, height=other.height),
         position=vector(other.x, other.y, other.height / 2.0), orientation=osi.Orientation3d(yaw=other.heading), velocity=vector(other.vx, other.vy))
     types = osi.MovingObject.Type
-    if other.kind == "pedestrian":
-        return osi.MovingObject(id=osi.Identifier(value=OBJECTS + other.id), base=base, type=types.PEDESTRIAN)
+    others = {"pedestrian": types.PEDESTRIAN, "animal": types.ANIMAL, "object": types.OTHER}
+    if other.kind in others:
+        return osi.MovingObject(id=osi.Identifier(value=OBJECTS + other.id), base=base, type=others[other.kind])
     vehicle = osi.MovingObject.VehicleClassification
     kind = getattr(vehicle.Type, VEHICLES.get(other.kind, "UNKNOWN"))
     return osi.MovingObject(id=osi.Identifier(value=OBJECTS + other.id), base=base, type=types.VEHICLE, vehicle_classification=vehicle(type=kind))

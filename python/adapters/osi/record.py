@@ -52,8 +52,10 @@ def moving_object(row):
     identifier = osi.Identifier(value=HOST if user == 0 else OBJECTS + user)
     # A body of the author's own has a name that only the author knows.
     body = row.get("like") or row["body"]
-    if body == "Pedestrian":
-        return osi.MovingObject(id=identifier, base=base, type=osi.MovingObject.Type.PEDESTRIAN)
+    types = osi.MovingObject.Type
+    others = {"Pedestrian": types.PEDESTRIAN, "Animal": types.ANIMAL, "Object": types.OTHER}
+    if body in others:
+        return osi.MovingObject(id=identifier, base=base, type=others[body])
     kind = osi.MovingObject.VehicleClassification(type=VEHICLES.get(body, Kind.CAR))
     return osi.MovingObject(id=identifier, base=base, type=osi.MovingObject.Type.VEHICLE, vehicle_classification=kind)
 

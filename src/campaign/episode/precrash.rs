@@ -2,14 +2,13 @@
 //! "Pre-Crash Scenario Typology for Crash Avoidance Research", DOT HS 810 767).
 //!
 //! The typology has 37 types, in an order in which the first that fits applies. It is about what both parties did before it
-//! became critical; here that is the last 5 s. These of the 37 cannot happen in this world, and are left out: 1 (vehicle
-//! failure), 2 and 3 (control loss), 6 to 8 (road edge departure), 9 and 10 (animals), 15 and 17 (backing, parking), 32 and 33
-//! (evasive action alone), 34 (no collision), 35 and 36 (objects). How angles and speeds tell the others apart is ours, and a
-//! vehicle that had crashed before is a kind of its own.
+//! became critical; here that is the last 5 s. How places, angles and speeds tell the types apart is ours. An evasive action goes
+//! before the types of lane changes, which it would else be; of type 34, incidents without a collision, a load that falls
+//! onto the road is the one that this world has; a vehicle that had crashed before is a kind of its own.
 
 use avastra_base::geometry::{Pose, Vec2, unit_vector, wrap_angle};
 use avastra_base::kinematics::STANDING_MPS;
-use avastra_lang::model::vocabulary::Body;
+use avastra_lang::model::vocabulary::{Body, BodyClass};
 
 use super::shape::Shape;
 
@@ -17,17 +16,40 @@ use super::shape::Shape;
 const ALIKE_RAD: f64 = core::f64::consts::FRAC_PI_4;
 /// A lead vehicle whose speed changes by less than this over the time that is looked at has a constant one, m/s.
 const CONSTANT_MPS: f64 = 1.0;
+/// A vehicle that looks so far away from where it goes, forwards or backwards, skids, rad (15°).
+const SKIDS_RAD: f64 = core::f64::consts::PI / 12.0;
+/// A vehicle that leaves the lanes or skids is faster than this, m/s; slower, it parks.
+const PARKING_MPS: f64 = 3.0;
+/// A vehicle whose middle is so far beside all lanes has left the road, m.
+const BESIDE_ROAD_M: f64 = 0.3;
+/// A vehicle backs, or a thing moves, at more than this, m/s.
+const MOVES_MPS: f64 = 0.5;
+/// Who moves aside by this, m, before what is so wide to either side in the way, m, and would be reached in this time, s, evades
+/// it; who moves earlier passes it.
+const EVADES_M: f64 = 1.2;
+const IN_THE_WAY_M: f64 = 1.5;
+const LATE_S: f64 = 2.5;
 
 /// A pre-crash type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum PreCrash {
+    VehicleFailure,
+    ControlLossWithManoeuvre,
+    ControlLossWithoutManoeuvre,
     RunningRedLight,
     RunningStopSign,
+    RoadDepartureWithManoeuvre,
+    RoadDepartureWithoutManoeuvre,
+    RoadDepartureBacking,
+    AnimalWithManoeuvre,
+    AnimalWithoutManoeuvre,
     PedestrianWithManoeuvre,
     PedestrianWithoutManoeuvre,
     CyclistWithManoeuvre,
     CyclistWithoutManoeuvre,
+    Backing,
     TurningSameDirection,
+    Parking,
     ChangingLanesSameDirection,
     DriftingSameDirection,
     ManoeuvreOppositeDirection,
@@ -42,6 +64,11 @@ pub enum PreCrash {
     LeftTurnAcrossPath,
     StraightCrossingPaths,
     TurningNonSignalized,
+    EvasionWithManoeuvre,
+    EvasionWithoutManoeuvre,
+    FallingLoad,
+    ObjectWithManoeuvre,
+    ObjectWithoutManoeuvre,
     Other,
     /// With a vehicle that had crashed into somebody else before. No type of NHTSA's.
     Wreck,
@@ -51,13 +78,23 @@ impl PreCrash {
     /// Its number among the 37.
     pub fn number(self) -> Option<u32> {
         Some(match self {
+            PreCrash::VehicleFailure => 1,
+            PreCrash::ControlLossWithManoeuvre => 2,
+            PreCrash::ControlLossWithoutManoeuvre => 3,
             PreCrash::RunningRedLight => 4,
             PreCrash::RunningStopSign => 5,
+            PreCrash::RoadDepartureWithManoeuvre => 6,
+            PreCrash::RoadDepartureWithoutManoeuvre => 7,
+            PreCrash::RoadDepartureBacking => 8,
+            PreCrash::AnimalWithManoeuvre => 9,
+            PreCrash::AnimalWithoutManoeuvre => 10,
             PreCrash::PedestrianWithManoeuvre => 11,
             PreCrash::PedestrianWithoutManoeuvre => 12,
             PreCrash::CyclistWithManoeuvre => 13,
             PreCrash::CyclistWithoutManoeuvre => 14,
+            PreCrash::Backing => 15,
             PreCrash::TurningSameDirection => 16,
+            PreCrash::Parking => 17,
             PreCrash::ChangingLanesSameDirection => 18,
             PreCrash::DriftingSameDirection => 19,
             PreCrash::ManoeuvreOppositeDirection => 20,
@@ -72,6 +109,11 @@ impl PreCrash {
             PreCrash::LeftTurnAcrossPath => 29,
             PreCrash::StraightCrossingPaths => 30,
             PreCrash::TurningNonSignalized => 31,
+            PreCrash::EvasionWithManoeuvre => 32,
+            PreCrash::EvasionWithoutManoeuvre => 33,
+            PreCrash::FallingLoad => 34,
+            PreCrash::ObjectWithManoeuvre => 35,
+            PreCrash::ObjectWithoutManoeuvre => 36,
             PreCrash::Other => 37,
             PreCrash::Wreck => return None,
         })
@@ -80,13 +122,23 @@ impl PreCrash {
     /// Its name, by the typology.
     pub fn name(self) -> &'static str {
         match self {
+            PreCrash::VehicleFailure => "vehicle failure",
+            PreCrash::ControlLossWithManoeuvre => "control loss after a manoeuvre",
+            PreCrash::ControlLossWithoutManoeuvre => "control loss without a manoeuvre",
             PreCrash::RunningRedLight => "running a red light",
             PreCrash::RunningStopSign => "running a stop sign",
+            PreCrash::RoadDepartureWithManoeuvre => "road edge departure after a manoeuvre",
+            PreCrash::RoadDepartureWithoutManoeuvre => "road edge departure without a manoeuvre",
+            PreCrash::RoadDepartureBacking => "road edge departure while backing up",
+            PreCrash::AnimalWithManoeuvre => "animal, the vehicle making a manoeuvre",
+            PreCrash::AnimalWithoutManoeuvre => "animal, the vehicle making no manoeuvre",
             PreCrash::PedestrianWithManoeuvre => "pedestrian, the vehicle making a manoeuvre",
             PreCrash::PedestrianWithoutManoeuvre => "pedestrian, the vehicle making no manoeuvre",
             PreCrash::CyclistWithManoeuvre => "cyclist, the vehicle making a manoeuvre",
             PreCrash::CyclistWithoutManoeuvre => "cyclist, the vehicle making no manoeuvre",
+            PreCrash::Backing => "backing up into another vehicle",
             PreCrash::TurningSameDirection => "turning, same direction",
+            PreCrash::Parking => "parking, same direction",
             PreCrash::ChangingLanesSameDirection => "changing lanes, same direction",
             PreCrash::DriftingSameDirection => "drifting, same direction",
             PreCrash::ManoeuvreOppositeDirection => "making a manoeuvre, opposite direction",
@@ -101,40 +153,139 @@ impl PreCrash {
             PreCrash::LeftTurnAcrossPath => "left turn across path, non-signalized junction",
             PreCrash::StraightCrossingPaths => "straight crossing paths, non-signalized junction",
             PreCrash::TurningNonSignalized => "turning, non-signalized junction",
+            PreCrash::EvasionWithManoeuvre => "evasive action after a manoeuvre",
+            PreCrash::EvasionWithoutManoeuvre => "evasive action without a manoeuvre",
+            PreCrash::FallingLoad => "non-collision incident: a falling load",
+            PreCrash::ObjectWithManoeuvre => "object, the vehicle making a manoeuvre",
+            PreCrash::ObjectWithoutManoeuvre => "object, the vehicle making no manoeuvre",
             PreCrash::Other => "other",
             PreCrash::Wreck => "wreck of another crash",
         }
     }
 }
 
-/// Where somebody was, and how fast.
+/// Where somebody was, and how it moved.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Place {
     pub pose: Pose,
-    pub speed_mps: f64,
+    pub velocity_mps: Vec2,
 }
 
-/// What somebody did in the last seconds.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Way {
-    pub from: Place,
-    pub to: Place,
+impl Place {
+    fn speed_mps(&self) -> f64 {
+        self.velocity_mps.norm()
+    }
+
+    /// Along its own heading; below 0 it goes back, m/s.
+    fn ahead_mps(&self) -> f64 {
+        unit_vector(self.pose.heading_rad).dot(&self.velocity_mps)
+    }
 }
+
+/// Where somebody was at a look, and what is there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Step {
+    pub place: Place,
+    /// How far the middle was beside all lanes, m; below 0 on one.
+    pub off_road_m: f64,
+    pub in_junction: bool,
+}
+
+/// What somebody did in the last seconds: one step or more, the last one at the contact.
+#[derive(Debug, Clone)]
+pub(super) struct Way(pub Vec<Step>);
 
 impl Way {
+    fn now(&self) -> &Step {
+        &self.0[self.0.len() - 1]
+    }
+
+    fn from(&self) -> Place {
+        self.0[0].place
+    }
+
+    fn to(&self) -> Place {
+        self.now().place
+    }
+
     pub fn shape(&self) -> Shape {
-        Shape::between((self.from.pose, self.from.speed_mps), (self.to.pose, self.to.speed_mps))
+        self.shape_until(self.0.len() - 1)
+    }
+
+    fn shape_until(&self, step: usize) -> Shape {
+        let (from, to) = (self.from(), self.0[step].place);
+        Shape::between((from.pose, from.speed_mps()), (to.pose, to.speed_mps()))
+    }
+
+    /// Whether it turned at a junction or changed lanes before a step. A bend turns a vehicle, too, and is no manoeuvre.
+    fn manoeuvres_before(&self, step: usize) -> bool {
+        (0..step).any(|until| match self.shape_until(until) {
+            Shape::LeftTurn | Shape::RightTurn => self.0[..=until].iter().any(|step| step.in_junction),
+            Shape::LaneChange => true,
+            Shape::Stopping | Shape::Straight => false,
+        })
+    }
+
+    /// The step at which it skids.
+    fn skids(&self) -> Option<usize> {
+        self.0.iter().position(|Step { place, .. }| {
+            let course_rad = libm::atan2(place.velocity_mps.y, place.velocity_mps.x);
+            let askew_rad = wrap_angle(course_rad - place.pose.heading_rad).abs();
+            let is_skewed = askew_rad.min(core::f64::consts::PI - askew_rad) > SKIDS_RAD;
+            place.speed_mps() > PARKING_MPS && is_skewed
+        })
+    }
+
+    /// The step at which it has left the road.
+    fn leaves_road(&self) -> Option<usize> {
+        let was_on_it = |step: usize| self.0[..step].iter().any(|step| step.off_road_m <= 0.0);
+        (0..self.0.len()).find(|&step| {
+            let Step { off_road_m, in_junction, .. } = self.0[step];
+            off_road_m > BESIDE_ROAD_M && !in_junction && was_on_it(step)
+        })
+    }
+
+    fn backs(&self) -> bool {
+        self.to().ahead_mps() < -MOVES_MPS
+    }
+
+    /// Whether it leaves a place beside the lanes, or has come to one.
+    fn parks(&self) -> bool {
+        let is_beside = |step: &Step| step.off_road_m >= 0.0 && !step.in_junction;
+        let stood = self.0.iter().any(|step| is_beside(step) && step.place.speed_mps() < STANDING_MPS);
+        let moves = self.to().speed_mps() >= STANDING_MPS;
+        moves && (stood || is_beside(self.now()) && self.to().speed_mps() < PARKING_MPS)
+    }
+
+    /// The step from which it moves aside before somebody in its way, too late to pass. `others`: where they were at each step.
+    fn evades(&self, others: &[Vec<Place>]) -> Option<usize> {
+        (0..self.0.len()).find(|&step| {
+            let own = self.0[step].place;
+            let aside_m = own.pose.to_local(self.to().pose.position).y.abs();
+            let is_in_the_way = |other: &Place| {
+                let there = own.pose.to_local(other.pose.position);
+                let closing_mps = own.speed_mps() - own.pose.forward().dot(&other.velocity_mps);
+                there.x > 0.0 && there.y.abs() < IN_THE_WAY_M && there.x < LATE_S * closing_mps
+            };
+            aside_m > EVADES_M && others[step].iter().any(is_in_the_way)
+        })
     }
 }
 
 /// What led to a collision.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Before {
     pub body: Body,
     pub ego: Way,
+    /// With as many steps as that of the ego vehicle.
     pub other: Way,
-    /// Whether the ego vehicle, or a vehicle that ignores lights, passed a red one.
+    /// Where all others were at each step.
+    pub third: Vec<Vec<Place>>,
+    /// Whether the other has no brakes.
+    pub has_failed: bool,
+    /// Whether the ego vehicle, or the other one, passed a red light without a siren.
     pub ran_red: bool,
+    /// Whether the ego vehicle, or the other one, passed a stop sign without having stood.
     pub ran_stop: bool,
     /// Whether the ego vehicle was in a junction, and whether it has lights.
     pub in_junction: bool,
@@ -149,14 +300,20 @@ impl Before {
     /// The first type that fits.
     pub fn kind(&self) -> PreCrash {
         let (ego, other) = (self.ego.shape(), self.other.shape());
-        // A bend of the road turns a vehicle, too, and is no manoeuvre.
         let turns = |shape: Shape, to: Shape| self.in_junction && shape == to;
         let turns_left = turns(ego, Shape::LeftTurn) || turns(other, Shape::LeftTurn);
         let turns_right = turns(ego, Shape::RightTurn) || turns(other, Shape::RightTurn);
         let ego_turns = turns(ego, Shape::LeftTurn) || turns(ego, Shape::RightTurn);
         let is_manoeuvring = ego_turns || ego == Shape::LaneChange;
+        let either = |manoeuvring, not| if is_manoeuvring { manoeuvring } else { not };
         if self.is_wreck {
             return PreCrash::Wreck;
+        }
+        if self.has_failed {
+            return PreCrash::VehicleFailure;
+        }
+        if let Some(kind) = self.loses_control() {
+            return kind;
         }
         if self.ran_red {
             return PreCrash::RunningRedLight;
@@ -164,14 +321,30 @@ impl Before {
         if self.ran_stop {
             return PreCrash::RunningStopSign;
         }
+        if let Some(kind) = self.leaves_road() {
+            return kind;
+        }
         match self.body {
-            Body::Pedestrian if is_manoeuvring => return PreCrash::PedestrianWithManoeuvre,
-            Body::Pedestrian => return PreCrash::PedestrianWithoutManoeuvre,
-            Body::Bicycle if is_manoeuvring => return PreCrash::CyclistWithManoeuvre,
-            Body::Bicycle => return PreCrash::CyclistWithoutManoeuvre,
+            Body::Animal => return either(PreCrash::AnimalWithManoeuvre, PreCrash::AnimalWithoutManoeuvre),
+            Body::Pedestrian => {
+                return either(PreCrash::PedestrianWithManoeuvre, PreCrash::PedestrianWithoutManoeuvre);
+            }
+            Body::Bicycle => {
+                return either(PreCrash::CyclistWithManoeuvre, PreCrash::CyclistWithoutManoeuvre);
+            }
+            Body::Object if self.other.0.iter().any(|step| step.place.speed_mps() > MOVES_MPS) => {
+                return PreCrash::FallingLoad;
+            }
+            Body::Object => return either(PreCrash::ObjectWithManoeuvre, PreCrash::ObjectWithoutManoeuvre),
             _ => {}
         }
-        let (ego_from, other_from) = (self.ego.from.pose, self.other.from.pose);
+        if self.ego.backs() || self.other.backs() {
+            return PreCrash::Backing;
+        }
+        if let Some(kind) = self.evades() {
+            return kind;
+        }
+        let (ego_from, other_from) = (self.ego.from().pose, self.other.from().pose);
         let apart_rad = wrap_angle(other_from.heading_rad - ego_from.heading_rad).abs();
         if apart_rad < ALIKE_RAD {
             return self.same_direction(ego, other, turns_left || turns_right);
@@ -191,10 +364,46 @@ impl Before {
         }
     }
 
+    /// The ways of the vehicles that keep to roads: of the ego vehicle, and of the other if it is a motor vehicle.
+    fn motor_vehicles(&self) -> impl Iterator<Item = &Way> {
+        let is_one = BodyClass::MotorVehicle.holds(self.body);
+        core::iter::once(&self.ego).chain(is_one.then_some(&self.other))
+    }
+
+    fn loses_control(&self) -> Option<PreCrash> {
+        let (way, step) = self.motor_vehicles().find_map(|way| Some((way, way.skids()?)))?;
+        Some(match way.manoeuvres_before(step) {
+            true => PreCrash::ControlLossWithManoeuvre,
+            false => PreCrash::ControlLossWithoutManoeuvre,
+        })
+    }
+
+    fn leaves_road(&self) -> Option<PreCrash> {
+        let (way, step) = self.motor_vehicles().find_map(|way| Some((way, way.leaves_road()?)))?;
+        let place = way.0[step].place;
+        Some(match () {
+            () if place.ahead_mps() < -MOVES_MPS => PreCrash::RoadDepartureBacking,
+            () if place.speed_mps() < PARKING_MPS => return None,
+            () if way.manoeuvres_before(step) => PreCrash::RoadDepartureWithManoeuvre,
+            () => PreCrash::RoadDepartureWithoutManoeuvre,
+        })
+    }
+
+    fn evades(&self) -> Option<PreCrash> {
+        let evading = |way: &'_ Way| way.evades(&self.third).map(|step| way.manoeuvres_before(step + 1));
+        Some(match self.motor_vehicles().find_map(evading)? {
+            true => PreCrash::EvasionWithManoeuvre,
+            false => PreCrash::EvasionWithoutManoeuvre,
+        })
+    }
+
     fn same_direction(&self, ego: Shape, other: Shape, turns: bool) -> PreCrash {
-        let ahead_m = unit_vector(self.ego.from.pose.heading_rad)
-            .dot(&(self.other.from.pose.position - self.ego.from.pose.position));
-        let (lead, follower) = if ahead_m > 0.0 { (&self.other, ego) } else { (&self.ego, other) };
+        if self.other.parks() {
+            return PreCrash::Parking;
+        }
+        let (ego_from, other_from) = (self.ego.from().pose, self.other.from().pose);
+        let is_ahead = ego_from.to_local(other_from.position).x > 0.0;
+        let (lead, follower) = if is_ahead { (&self.other, ego) } else { (&self.ego, other) };
         if follower == Shape::LaneChange && self.is_lengthwise {
             return PreCrash::FollowingVehicleManoeuvre;
         }
@@ -204,7 +413,7 @@ impl Before {
         if !self.is_lengthwise {
             return if turns { PreCrash::TurningSameDirection } else { PreCrash::DriftingSameDirection };
         }
-        let (before_mps, after_mps) = (lead.from.speed_mps, lead.to.speed_mps);
+        let (before_mps, after_mps) = (lead.from().speed_mps(), lead.to().speed_mps());
         match after_mps - before_mps {
             _ if before_mps.max(after_mps) < STANDING_MPS => PreCrash::LeadStopped,
             change_mps if change_mps < -CONSTANT_MPS => PreCrash::LeadDecelerating,
@@ -215,25 +424,29 @@ impl Before {
     }
 }
 
-/// Where somebody is who moves so.
-pub(super) fn place(pose: Pose, velocity_mps: Vec2) -> Place {
-    Place { pose, speed_mps: velocity_mps.norm() }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn at(x_m: f64, y_m: f64, heading_deg: f64, speed_mps: f64) -> Place {
-        Place { pose: Pose::new(x_m, y_m, heading_deg.to_radians()), speed_mps }
+        let pose = Pose::new(x_m, y_m, heading_deg.to_radians());
+        Place { pose, velocity_mps: pose.forward() * speed_mps }
+    }
+
+    /// On a street.
+    fn way(places: &[Place]) -> Way {
+        let step = |place: &Place| Step { place: *place, off_road_m: -1.5, in_junction: false };
+        Way(places.iter().map(step).collect())
     }
 
     /// The ego vehicle drives 50 m along +x at 10 m/s; in town, at no junction.
     fn before(other: [Place; 2]) -> Before {
         Before {
             body: Body::Sedan,
-            ego: Way { from: at(0.0, 0.0, 0.0, 10.0), to: at(50.0, 0.0, 0.0, 10.0) },
-            other: Way { from: other[0], to: other[1] },
+            ego: way(&[at(0.0, 0.0, 0.0, 10.0), at(50.0, 0.0, 0.0, 10.0)]),
+            other: way(&other),
+            third: vec![Vec::new(); 2],
+            has_failed: false,
             ran_red: false,
             ran_stop: false,
             in_junction: false,
@@ -241,6 +454,15 @@ mod tests {
             is_lengthwise: true,
             is_wreck: false,
         }
+    }
+
+    /// An overtaking vehicle comes from behind, and does this in between, 30 m and more ahead of where it began.
+    fn along(middle: Step) -> Before {
+        let mut before = before([at(-10.0, 0.0, 0.0, 15.0), at(54.0, 0.0, 0.0, 12.0)]);
+        before.ego.0.insert(1, Step { place: at(25.0, 0.0, 0.0, 10.0), ..before.ego.0[0] });
+        before.other.0.insert(1, middle);
+        before.third.push(Vec::new());
+        before
     }
 
     #[test]
@@ -261,7 +483,7 @@ mod tests {
             Before { is_lengthwise: false, ..before([at(0.0, 2.5, 0.0, 10.0), at(50.0, 1.9, 0.0, 10.0)]) };
         assert_eq!(beside.kind(), PreCrash::DriftingSameDirection);
         let mut swerve = before([at(40.0, 3.5, 0.0, 2.0), at(54.0, 3.5, 0.0, 2.0)]);
-        swerve.ego.to = at(50.0, 3.5, 0.0, 10.0);
+        swerve.ego.0[1].place = at(50.0, 3.5, 0.0, 10.0);
         assert_eq!(swerve.kind(), PreCrash::FollowingVehicleManoeuvre);
     }
 
@@ -269,9 +491,11 @@ mod tests {
     fn junctions_lights_and_turns_tell_the_types_of_crossing_ways() {
         let crossing = before([at(50.0, -30.0, 90.0, 8.0), at(50.0, 0.0, 90.0, 8.0)]);
         assert_eq!(crossing.kind(), PreCrash::StraightCrossingPaths);
-        assert_eq!(Before { is_signalized: true, ..crossing }.kind(), PreCrash::Other);
-        assert_eq!(Before { ran_red: true, ..crossing }.kind(), PreCrash::RunningRedLight);
-        assert_eq!(Before { is_wreck: true, ran_red: true, ..crossing }.kind(), PreCrash::Wreck);
+        assert_eq!(Before { is_signalized: true, ..crossing.clone() }.kind(), PreCrash::Other);
+        assert_eq!(Before { ran_red: true, ..crossing.clone() }.kind(), PreCrash::RunningRedLight);
+        assert_eq!(Before { ran_stop: true, ..crossing.clone() }.kind(), PreCrash::RunningStopSign);
+        assert_eq!(Before { is_wreck: true, ran_red: true, ..crossing.clone() }.kind(), PreCrash::Wreck);
+        assert_eq!(Before { has_failed: true, ran_red: true, ..crossing }.kind(), PreCrash::VehicleFailure);
         let oncoming = before([at(100.0, 3.0, 180.0, 8.0), at(54.0, 0.5, 180.0, 8.0)]);
         assert_eq!(oncoming.kind(), PreCrash::ManoeuvreOppositeDirection);
         let turned = [at(80.0, 3.5, 180.0, 6.0), at(52.0, 0.0, -90.0, 6.0)];
@@ -287,16 +511,58 @@ mod tests {
     }
 
     #[test]
-    fn people_and_cyclists_have_types_of_their_own() {
+    fn people_cyclists_animals_and_things_have_types_of_their_own() {
         let walker = Before {
             body: Body::Pedestrian,
             ..before([at(50.0, -5.0, 90.0, 1.5), at(50.0, 0.0, 90.0, 1.5)])
         };
-        assert_eq!(walker.kind().number(), Some(12));
-        let mut turning = Before { in_junction: true, ..walker };
-        turning.ego.to = at(20.0, 20.0, 90.0, 5.0);
-        assert_eq!(turning.kind().number(), Some(11));
-        assert_eq!(Before { body: Body::Bicycle, ..turning }.kind().number(), Some(13));
-        assert_eq!(Before { body: Body::Bicycle, ..walker }.kind().number(), Some(14));
+        let mut turning = Before { in_junction: true, ..walker.clone() };
+        turning.ego.0[1].place = at(20.0, 20.0, 90.0, 5.0);
+        for (body, numbers) in
+            [(Body::Pedestrian, (11, 12)), (Body::Bicycle, (13, 14)), (Body::Animal, (9, 10))]
+        {
+            let of = |before: &Before| Before { body, ..before.clone() }.kind().number();
+            assert_eq!((of(&turning), of(&walker)), (Some(numbers.0), Some(numbers.1)), "{body:?}");
+        }
+        let thing = Before { body: Body::Object, ..before([at(52.0, 0.0, 0.0, 0.0); 2]) };
+        assert_eq!(thing.kind().number(), Some(36));
+        assert_eq!(Before { ego: turning.ego, in_junction: true, ..thing.clone() }.kind().number(), Some(35));
+        let falls = way(&[at(30.0, 0.0, 0.0, 12.0), at(52.0, 0.0, 0.0, 0.0)]);
+        assert_eq!(Before { other: falls, ..thing }.kind(), PreCrash::FallingLoad);
+    }
+
+    #[test]
+    fn who_skids_leaves_the_road_backs_parks_or_evades_is_told_by_the_steps_in_between() {
+        let street = Step { place: at(20.0, 0.0, 0.0, 15.0), off_road_m: -1.5, in_junction: false };
+        assert_eq!(along(street).kind(), PreCrash::LeadSlower);
+        let skewed = Pose::new(20.0, 0.0, 0.5);
+        let skids = Step { place: Place { pose: skewed, ..street.place }, ..street };
+        assert_eq!(along(skids).kind().number(), Some(3));
+        let mut after_a_change = along(Step { place: Place { pose: skewed, ..street.place }, ..street });
+        after_a_change.other.0[0].place = at(-10.0, 3.5, 0.0, 15.0);
+        after_a_change.other.0.insert(1, Step { place: at(10.0, 0.0, 0.0, 15.0), ..street });
+        assert_eq!(after_a_change.kind().number(), Some(2));
+        let beside = Step { place: at(20.0, -3.0, 0.0, 15.0), off_road_m: 1.0, ..street };
+        assert_eq!(along(beside).kind().number(), Some(7));
+        assert_ne!(along(Step { in_junction: true, ..beside }).kind().number(), Some(7));
+        let mut changed = along(beside);
+        changed.other.0.insert(1, Step { place: at(10.0, -3.5, 0.0, 15.0), ..street });
+        assert_eq!(changed.kind().number(), Some(6));
+        assert_eq!(along(Step { place: at(20.0, -3.0, 180.0, -5.0), ..beside }).kind().number(), Some(8));
+
+        let backs = before([at(60.0, 0.0, 0.0, -2.0), at(54.0, 0.0, 0.0, -2.0)]);
+        assert_eq!(backs.kind(), PreCrash::Backing);
+        let mut parks = before([at(45.0, -3.0, 0.0, 0.0), at(54.0, 0.0, 10.0, 4.0)]);
+        parks.other.0[0].off_road_m = 0.8;
+        assert_eq!(parks.kind(), PreCrash::Parking);
+
+        // A vehicle beside the ego vehicle comes over because somebody stands before it: late, or in good time.
+        let comes = |stands_m: f64| {
+            let mut before = before([at(10.0, 3.5, 0.0, 10.0), at(52.0, 1.0, 0.0, 9.0)]);
+            before.third[0].push(at(stands_m, 3.5, 0.0, 0.0));
+            before.kind()
+        };
+        assert_eq!(comes(30.0).number(), Some(33));
+        assert_eq!(comes(60.0), PreCrash::ChangingLanesSameDirection);
     }
 }

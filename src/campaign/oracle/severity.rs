@@ -83,9 +83,15 @@ fn harm(severity: &Severity, body: Body) -> (f64, f64) {
         Body::Pedestrian => (severity.closing_speed_mps, PEDESTRIAN_MPS),
         Body::Bicycle => (severity.closing_speed_mps, CYCLIST_MPS),
         Body::Motorcycle => (severity.closing_speed_mps, MOTORCYCLIST_MPS),
-        Body::BoxTruck | Body::SchoolBus | Body::Jeep | Body::Sedan | Body::SUV | Body::Hatchback => {
-            (car_mps, if is_side { SIDE_MPS } else { FRONT_MPS })
-        }
+        // Of animals and things it is the ego vehicle's own people that count.
+        Body::Animal
+        | Body::Object
+        | Body::BoxTruck
+        | Body::SchoolBus
+        | Body::Jeep
+        | Body::Sedan
+        | Body::SUV
+        | Body::Hatchback => (car_mps, if is_side { SIDE_MPS } else { FRONT_MPS }),
     }
 }
 

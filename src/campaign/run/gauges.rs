@@ -36,10 +36,11 @@ pub struct Gauges {
 impl Gauges {
     /// Takes in a tick.
     pub fn note(&mut self, world: &World, contacts: &[Contact]) {
+        self.hit.extend(contacts.iter().map(|contact| contact.obstacle));
+        // A contact changes the speed within its tick.
         if self.hit.is_empty() {
             self.speeds.push((world.time_s(), world.ego().speed_mps));
         }
-        self.hit.extend(contacts.iter().map(|contact| contact.obstacle));
         let mut now = Criticality::default();
         now.note(world, &|id| self.hit.contains(&id));
         if now != Criticality::default() {

@@ -22,7 +22,7 @@ pub struct Group {
     /// The group's example: the episode with the shortest scenario, the first among equals.
     pub episode: i64,
     pub road: String,
-    /// Of the example: what was hit (`pedestrian`, `two-wheeler`, `car` or `large vehicle`), and its verb, for example
+    /// Of the example: what was hit (`pedestrian`, `animal`, `object`, `two-wheeler`, `car` or `large vehicle`), and its verb, for example
     /// `CrossRoad`.
     pub kind: String,
     pub manoeuvre: String,
@@ -89,6 +89,8 @@ pub fn kind(body: &str) -> &'static str {
         Some(Body::Pedestrian) => PEDESTRIAN,
         Some(Body::Motorcycle | Body::Bicycle) => "two-wheeler",
         Some(Body::BoxTruck | Body::SchoolBus) => "large vehicle",
+        Some(Body::Animal) => "animal",
+        Some(Body::Object) => "object",
         Some(Body::Jeep | Body::Sedan | Body::SUV | Body::Hatchback) | None => "car",
     }
 }

@@ -59,6 +59,8 @@ pub struct ProtocolTest {
     /// Its speed at the first contact, and that of the two against each other, m/s.
     pub impact_mps: Option<f64>,
     pub relative_mps: Option<f64>,
+    /// The pre-crash type of the first contact, with its number among NHTSA's 37; a wreck has none.
+    pub precrash: Option<String>,
     /// The least time to collision, s.
     pub ttc_s: Option<f64>,
     /// Whether a collision counts by the space's verdict.
@@ -108,11 +110,14 @@ impl Database {
             let (episode, step, action) = (row.get(0)?, row.get(1)?, row.get(2)?);
             Ok(Step { episode, step, action, ttc_s: row.get(3)?, top_mps: row.get(4)? })
         })?;
-        let contacts = "SELECT episode, step, ego_speed_mps, relative_speed_mps, counted FROM collision
-            ORDER BY episode, number";
+        let contacts =
+            "SELECT episode, step, ego_speed_mps, relative_speed_mps, counted, precrash, precrash_number
+            FROM collision ORDER BY episode, number";
         let contacts = query_all(read, contacts, |row| {
             let (episode, step, ego_mps) = (row.get(0)?, row.get(1)?, row.get(2)?);
-            Ok(Contact { episode, step, ego_mps, relative_mps: row.get(3)?, counted: row.get(4)? })
+            let (name, number): (String, Option<u32>) = (row.get(5)?, row.get(6)?);
+            let precrash = number.map_or(name.clone(), |number| format!("{number} {name}"));
+            Ok(Contact { episode, step, ego_mps, relative_mps: row.get(3)?, counted: row.get(4)?, precrash })
         })?;
         let breaches = "SELECT episode, step, requirement FROM breach ORDER BY episode, number";
         let breaches: Vec<(i64, i64, String)> =
@@ -181,6 +186,7 @@ impl ProtocolTest {
             before_mps: None,
             impact_mps: None,
             relative_mps: None,
+            precrash: None,
             ttc_s: None,
             counted: false,
             breached: Vec::new(),
@@ -224,6 +230,7 @@ impl ProtocolTest {
             before_mps,
             impact_mps: impact.map(|impact| impact.ego_mps),
             relative_mps: impact.map(|impact| impact.relative_mps),
+            precrash: impact.map(|impact| impact.precrash.clone()),
             ttc_s,
             counted: contacts.iter().any(|contact| contact.counted),
             breached,
@@ -238,6 +245,7 @@ struct Contact {
     ego_mps: f64,
     relative_mps: f64,
     counted: bool,
+    precrash: String,
 }
 
 struct Step {
@@ -451,6 +459,7 @@ mod tests {
             before_mps: Some(10.0),
             impact_mps,
             relative_mps: impact_mps,
+            precrash: None,
             ttc_s: None,
             counted: false,
             breached: Vec::new(),

@@ -115,7 +115,7 @@ words! {
     /// Kinds of road users.
     pub enum Class {
         Car = "car", Truck = "truck", Bus = "bus", Motorcycle = "motorcycle", Cyclist = "cyclist",
-        Pedestrian = "pedestrian", Unknown = "unknown",
+        Pedestrian = "pedestrian", Animal = "animal", Object = "object", Unknown = "unknown",
     }
 }
 

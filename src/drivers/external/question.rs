@@ -312,6 +312,8 @@ fn believed(object: &PerceivedObject) -> ObjectMessage {
             Body::Jeep | Body::Sedan | Body::SUV | Body::Hatchback => Class::Car,
             Body::Motorcycle => Class::Motorcycle,
             Body::Bicycle => Class::Cyclist,
+            Body::Animal => Class::Animal,
+            Body::Object => Class::Object,
         },
         x: number(object.pose.position.x),
         y: number(object.pose.position.y),

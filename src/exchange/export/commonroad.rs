@@ -222,6 +222,8 @@ fn kind(body: Body) -> &'static str {
         Body::BoxTruck => "truck",
         Body::SchoolBus => "bus",
         Body::Pedestrian => "pedestrian",
+        // CommonRoad has no word for animals and things.
+        Body::Animal | Body::Object => "unknown",
         Body::Motorcycle => "motorcycle",
         Body::Bicycle => "bicycle",
     }

@@ -228,6 +228,9 @@ fn road_text(road: &Road, name: &str) -> Option<String> {
     if let Some(set_mps) = road.set_mps {
         let _ = write!(text, ", set_speed: {} m/s", decimal(set_mps, false));
     }
+    if let Some(phase_s) = road.signal_phase_s {
+        let _ = write!(text, ", signal_phase: {} s", decimal(phase_s, false));
+    }
     let mut passed = road.route.lanes.iter().filter_map(|part| road.map.lane(part.lane).junction);
     if passed.any(|junction| road.map.junctions[junction].idle_lights > 0) {
         text += ", unlit: true";
@@ -308,6 +311,8 @@ fn command_fields(command: &Command) -> String {
     let Command {
         speed_mps,
         rate_mps2,
+        // Of phases alone, which are written as they stand.
+        is_continuous: _,
         lane,
         offset_m,
         aside_mps,

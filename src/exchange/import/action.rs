@@ -25,8 +25,9 @@ pub enum ActKind {
     Placed(Position),
     Speed(Speed, Dynamics),
     Profile(Vec<SpeedEntry>),
-    /// Ahead of the ego vehicle at once.
-    Ahead(Headway),
+    /// Ahead of the entity of that name at once.
+    Ahead(String, Headway),
+    Keep(Box<Kept>),
     Lane(Target, f64, Dynamics),
     Offset(Aside, Dynamics),
     Meet(Box<Meeting>),
@@ -83,12 +84,25 @@ pub enum Over {
     Rate(f64),
 }
 
-/// Free space ahead of the ego vehicle.
+/// A distance to another entity.
 #[derive(Debug, Clone)]
 pub enum Headway {
     Way(f64),
-    /// At the ego vehicle's speed, s.
+    /// At the other one's speed, s.
     Time(f64),
+}
+
+/// A distance to another entity that is kept, or reached within bounds.
+#[derive(Debug, Clone)]
+pub struct Kept {
+    pub of: String,
+    pub headway: Headway,
+    pub is_free_space: bool,
+    /// Whether it is ahead of the other one; `None`: as it is.
+    pub is_ahead: Option<bool>,
+    /// How fast it gains speed and loses it, m/s², and is at most, m/s; without bounds it is there at once.
+    pub bounds: Option<(f64, f64, f64)>,
+    pub is_continuous: bool,
 }
 
 #[derive(Debug, Clone)]
@@ -229,7 +243,7 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<ActKind> {
         }
         "SpeedProfileAction" if !is_ego => profile(source, action).map(ActKind::Profile),
         _ if is_ego && !action.has_tag_name("FollowTrajectoryAction") && !is_route(action) => None,
-        "LongitudinalDistanceAction" => ahead(source, action).map(ActKind::Ahead),
+        "LongitudinalDistanceAction" => distance(source, action),
         "LaneChangeAction" => {
             let node = source.required(action, "LaneChangeActionDynamics")?;
             let dynamics = dynamics(source, node)?;
@@ -310,18 +324,35 @@ fn is_route(action: Node) -> bool {
     action.has_tag_name("AssignRouteAction") || action.has_tag_name("AcquirePositionAction")
 }
 
-fn ahead(source: &mut Source, action: Node) -> Option<Headway> {
-    if source.switch(action, "continuous", false)? {
-        return source.refuse(action, "a distance that is kept from moment to moment is not read");
+fn distance(source: &mut Source, action: Node) -> Option<ActKind> {
+    let of = source.text(action, "entityRef")?;
+    let is_continuous = source.switch(action, "continuous", false)?;
+    let is_free_space = source.switch(action, "freespace", false)?;
+    let sides = ["any", "leadingReferencedEntity", "trailingReferencedEntity"];
+    let side = source.word(action, "displacement", &sides)?;
+    source.word(action, "coordinateSystem", &FRAMES)?;
+    let headway = match action.attribute("timeGap") {
+        Some(_) => Headway::Time(source.amount(action, "timeGap")?),
+        None => Headway::Way(source.amount(action, "distance")?),
+    };
+    let bounds = element(action, "DynamicConstraints");
+    if is_continuous || bounds.is_some() {
+        let is_ahead = match side {
+            "leadingReferencedEntity" => Some(true),
+            "trailingReferencedEntity" => Some(false),
+            _ => None,
+        };
+        let bounds = match bounds {
+            Some(node) => within(source, node)?,
+            None => None,
+        };
+        let kept = Kept { of, headway, is_free_space, is_ahead, bounds, is_continuous };
+        return Some(ActKind::Keep(Box::new(kept)));
     }
-    if !source.switch(action, "freespace", false)? {
+    if !is_free_space {
         return source.refuse(action, "only `freespace=\"true\"` is read: between the bumpers");
     }
-    if element(action, "DynamicConstraints").is_some() {
-        return source.refuse(action, "a distance is taken at once: `DynamicConstraints` are not read");
-    }
-    let sides = ["any", "leadingReferencedEntity", "trailingReferencedEntity"];
-    match source.word(action, "displacement", &sides)? {
+    match side {
         "trailingReferencedEntity" => {
             return source.refuse(action, "only a distance ahead of the ego vehicle is read");
         }
@@ -332,11 +363,23 @@ fn ahead(source: &mut Source, action: Node) -> Option<Headway> {
         }
         _ => {}
     }
-    source.word(action, "coordinateSystem", &FRAMES)?;
-    match action.attribute("timeGap") {
-        Some(_) => Some(Headway::Time(source.amount(action, "timeGap")?)),
-        None => Some(Headway::Way(source.amount(action, "distance")?)),
+    Some(ActKind::Ahead(of, headway))
+}
+
+/// The bounds of how somebody comes to a distance; `None` if they bind nothing.
+fn within(source: &mut Source, bounds: Node) -> Option<Option<(f64, f64, f64)>> {
+    if bounds.has_attribute("maxAccelerationRate") || bounds.has_attribute("maxDecelerationRate") {
+        source.note("how fast an acceleration changes is not bounded");
     }
+    let gains_mps2 = source.number_or(bounds, "maxAcceleration", f64::INFINITY)?;
+    let loses_mps2 = source.number_or(bounds, "maxDeceleration", f64::INFINITY)?;
+    let most_mps = source.number_or(bounds, "maxSpeed", f64::INFINITY)?;
+    let is_bound = gains_mps2.is_finite() && loses_mps2.is_finite();
+    let reason = "bounds of a distance are a `maxAcceleration` and a `maxDeceleration` above 0, or neither";
+    let is_whole = is_bound || gains_mps2.is_infinite() && loses_mps2.is_infinite();
+    source.refuse_if(!is_whole || gains_mps2 <= 0.0 || loses_mps2 <= 0.0, bounds, reason)?;
+    source.refuse_if(most_mps <= 0.0, bounds, "`maxSpeed` is above 0")?;
+    Some(is_bound.then_some((gains_mps2, loses_mps2, most_mps)))
 }
 
 fn meeting(source: &mut Source, action: Node) -> Option<ActKind> {

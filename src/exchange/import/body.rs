@@ -25,6 +25,12 @@ pub struct Body {
     pub loses_mps2: f64,
 }
 
+impl Body {
+    pub fn is_on_foot(&self) -> bool {
+        matches!(self.like, "Pedestrian" | "Animal")
+    }
+}
+
 pub fn body(source: &mut Source, object: Node) -> Option<Body> {
     const KINDS: [catalogue::Kind; 3] = [catalogue::VEHICLE, catalogue::PEDESTRIAN, catalogue::OBJECT];
     if let Some(reference) = element(object, "CatalogReference") {
@@ -67,12 +73,10 @@ fn of_size(source: &mut Source, node: Node) -> Option<Body> {
         },
         "Pedestrian" => match node.attribute("pedestrianCategory").unwrap_or("") {
             "pedestrian" | "" => "Pedestrian",
+            "animal" => "Animal",
             other => return source.refuse(node, format!("no pedestrian of the category `{other}` is known")),
         },
-        _ => {
-            source.note("objects stand there as parked cars of their size");
-            "Sedan"
-        }
+        _ => "Object",
     };
     no_trailer(source, node)?;
     let bounds = source.required(node, "BoundingBox")?;

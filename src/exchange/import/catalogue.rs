@@ -8,6 +8,7 @@ use avastra_road::RoadMap;
 use roxmltree::Node;
 
 use super::Files;
+use super::ground::Ground;
 use super::source::{Source, children, element, elements, filled};
 use super::vocabulary;
 
@@ -36,7 +37,7 @@ pub struct Library<'f> {
     files: &'f dyn Files,
     /// The folder of the scenario, before the paths that it names; empty if it is that of the file that is imported.
     folder: String,
-    maps: Read<RoadMap>,
+    maps: Read<Ground>,
     folders: Read<Vec<String>>,
     /// Each entry that was asked for; `None` if there is none.
     entries: RefCell<BTreeMap<(String, String), Option<Entry>>>,
@@ -68,10 +69,10 @@ impl<'f> Library<'f> {
     ///
     /// # Errors
     /// Why it cannot be read.
-    pub fn map(&self, path: &str) -> Result<Rc<RoadMap>, String> {
+    pub fn map(&self, path: &str) -> Result<Rc<Ground>, String> {
         let read = || {
             let text = self.files.map(&self.beside(path))?;
-            RoadMap::from_opendrive("map", &text).map_err(|error| error.to_string())
+            RoadMap::from_opendrive("map", &text).map(Ground::new).map_err(|error| error.to_string())
         };
         once(&self.maps, path, read)
     }

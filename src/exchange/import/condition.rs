@@ -143,6 +143,7 @@ impl Waiting<'_, '_> {
         match &condition.kind {
             When::Always => Some(Said::text("elapsed >= ").number(0.0, "s")),
             When::Never => source.refuse(mark, "it never comes"),
+            When::Contact(_) => source.refuse(mark, "what others do after a contact of two is not read"),
             When::After(seconds) => Some(Said::text("elapsed >= ").number(*seconds, "s")),
             When::Headway { pair, seconds } => {
                 let of = self.who(source, mark, &pair.of)?;
@@ -285,7 +286,7 @@ impl Waiting<'_, '_> {
     }
 
     /// The way from one to another that is ahead of it along the ego vehicle's route: between outlines, or reference points.
-    fn between(
+    pub fn between(
         &self,
         source: &mut Source,
         mark: &Mark,
@@ -294,13 +295,18 @@ impl Waiting<'_, '_> {
         is_free_space: bool,
     ) -> Option<Said> {
         let (from, to) = (self.who(source, mark, back)?, self.who(source, mark, front)?);
-        let said = Said::text(format!("{to}.rear - {from}.front"));
-        if is_free_space {
-            return Some(said);
-        }
-        let more_m = self.cast.overhang_m(source, mark, front, false)?
+        let overhangs_m = self.cast.overhang_m(source, mark, front, false)?
             + self.cast.overhang_m(source, mark, back, true)?;
-        Some(said.and(" + ").number(more_m, "m"))
+        // Places beside the ego vehicle's route say little of two that are far from it.
+        if self.cast.is_far_off(source, mark, back)? || self.cast.is_far_off(source, mark, front)? {
+            let Some(more_m) = self.cast.stations_apart_m(back, front) else {
+                return source.refuse(mark, "the way between two on different roads is not known");
+            };
+            let more_m = if is_free_space { more_m - overhangs_m } else { more_m };
+            return Some(Said::text(format!("{to}.station - {from}.station + ")).number(more_m, "m"));
+        }
+        let said = Said::text(format!("{to}.rear - {from}.front"));
+        Some(if is_free_space { said } else { said.and(" + ").number(overhangs_m, "m") })
     }
 
     /// Whether the first of two begins behind the second along the ego vehicle's route.
@@ -351,9 +357,12 @@ impl Waiting<'_, '_> {
             }
             When::Travelled { metres, .. } => *metres <= 0.0,
             When::Always => true,
-            When::Never | When::After(_) | When::Stands { .. } | When::Ended { .. } | When::Begun { .. } => {
-                false
-            }
+            When::Never
+            | When::Contact(_)
+            | When::After(_)
+            | When::Stands { .. }
+            | When::Ended { .. }
+            | When::Begun { .. } => false,
         })
     }
 
@@ -397,7 +406,7 @@ impl Waiting<'_, '_> {
     }
 
     /// What an entity is called in a phase of the actor.
-    fn who(&self, source: &mut Source, mark: &Mark, name: &str) -> Option<String> {
+    pub fn who(&self, source: &mut Source, mark: &Mark, name: &str) -> Option<String> {
         if self.cast.is_ego(name) {
             return Some("ego".to_owned());
         }

@@ -19,6 +19,18 @@ pub fn value(text: &str, parameters: &BTreeMap<String, String>) -> Result<f64, S
     }
 }
 
+/// Texts that `+` joins, of parameters and words, if one of them is no number: esmini's way to compose names.
+pub fn joined(text: &str, parameters: &BTreeMap<String, String>) -> Option<String> {
+    let is_word = |part: &str| part.chars().all(|letter| letter.is_alphanumeric() || "_. ".contains(letter));
+    let part = |part: &str| match part.trim().strip_prefix('$') {
+        Some(name) => parameters.get(name).map(|value| value.trim().to_owned()),
+        None => is_word(part).then(|| part.trim().to_owned()),
+    };
+    let parts: Vec<String> = text.split('+').map(part).collect::<Option<_>>()?;
+    let is_text = parts.len() > 1 && parts.iter().any(|part| part.parse::<f64>().is_err());
+    (is_text && parts.iter().all(|part| !part.is_empty())).then(|| parts.concat())
+}
+
 struct Reader<'a> {
     rest: &'a str,
     parameters: &'a BTreeMap<String, String>,
@@ -163,6 +175,12 @@ mod tests {
         assert_eq!(value("-sqrt( $v * $v )"), Ok(-60.0));
         assert_eq!(value("max(1e1, pow(2, 3))"), Ok(10.0));
         assert_eq!(value("sin(pi / 2) + acos(1)"), Ok(1.0));
+        let joined = |text: &str| joined(text, &parameters);
+        assert_eq!(joined("$n + speed 2 + $v"), Some("xspeed 260".to_owned()));
+        assert_eq!(
+            [joined("$v + 1"), joined("$w + a"), joined("$n"), joined("sin(1) + $n")],
+            [const { None }; 4]
+        );
         for wrong in ["", "1 +", "$w", "$n", "(1", "1 / 0", "sinh(1)", "a", "1 2", "é", &"(".repeat(1000)] {
             assert!(value(wrong).is_err(), "{wrong}");
         }

@@ -12,14 +12,17 @@
 //! with its numbers apart. `rows` finds how the numbers follow from the parameters, and `write` prints the space. A file that
 //! avastra exported carries its scenario (`own`). No file is read here: `cli` gives texts.
 
+mod across;
 mod action;
 mod body;
 mod catalogue;
 mod condition;
 mod expression;
+mod ground;
 mod own;
 mod pace;
 mod parameter;
+mod phases;
 mod place;
 mod position;
 mod rows;

@@ -4,13 +4,47 @@ use avastra_lang::model::SPAWN_SPEED_MPS;
 use avastra_lang::model::command::RATE_MPS2;
 use avastra_world::sim::{SPEED_REACHED_MPS, SPEED_REACHED_PART};
 
-use super::action::SpeedEntry;
+use super::action::{Act, ActKind, Dynamics, Headway, Kept, Meeting, Over, Speed, SpeedEntry, Steady};
 use super::body::Body;
-use super::said::Said;
+use super::condition::Waiting;
+use super::phases::{CONTINUOUS, Told, instead_of};
+use super::said::{Piece, Said};
+use super::scene::{Cast, Moving, speed};
 use super::source::{Mark, Source};
 
 /// A shorter wait is none, s.
 const LEAST_S: f64 = 1e-4;
+
+/// The fields of an order that say how fast somebody drives.
+pub const PACE: [&str; 7] = ["speed", "rate", "continuous", "early", "at", "reach", "steady"];
+
+/// The stiffness of the spring by which esmini keeps a distance, for each m/s² of the bound, 1/m.
+pub const SPRING_PER_M: f64 = 0.4;
+
+/// That law as functions of the language. `too_far`: how far it has to go ahead; `faster`: by how much it is faster than the other one.
+pub const KEEPING: &str = "\
+fn bounded(value: Accel, gains: Accel, loses: Accel) -> Accel = match value > gains {
+  true => gains
+  false => match value < -loses { true => -loses, false => value }
+}
+fn pulled(too_far: Length, faster: Speed, bound: Accel, damping: Ratio) -> Accel =
+  too_far * 0.4 * bound / 1 m - faster * damping / 1 s
+fn up_to(speed: Speed, most: Speed) -> Speed = match speed > most { true => most, false => speed }
+/// The speed a tick later of one that keeps a distance, as the spring does with which esmini keeps it.
+fn keeping(
+  speed: Speed,
+  too_far: Length,
+  faster: Speed,
+  gains: Accel,
+  loses: Accel,
+  gains_damping: Ratio,
+  loses_damping: Ratio,
+  most: Speed,
+) -> Speed = match too_far < 0 m {
+  true => up_to(speed + bounded(pulled(too_far, faster, gains, gains_damping), gains, loses) * 20 ms, most)
+  false => up_to(speed + bounded(pulled(too_far, faster, loses, loses_damping), gains, loses) * 20 ms, most)
+}
+";
 
 pub fn too_fast(mps: f64) -> String {
     format!("{mps:.1} m/s: nothing is faster than {} m/s", SPAWN_SPEED_MPS.end())
@@ -50,6 +84,209 @@ impl Change {
             (Some(_), Some(_)) => Change::Up,
             _ => Change::Unknown,
         }
+    }
+}
+
+impl<'a> Cast<'a> {
+    #[expect(clippy::too_many_arguments, reason = "an action with where it stands and what it changes")]
+    pub fn speed_fields(
+        &self,
+        source: &mut Source,
+        moving: &Moving,
+        mark: &Mark,
+        wanted: &Speed,
+        dynamics: Dynamics,
+        told: &mut Told,
+        fields: &mut Vec<Said>,
+    ) -> Option<()> {
+        let is_continuous = match wanted {
+            Speed::More(name, _) | Speed::Times(name, _) if dynamics.is_continuous => {
+                let reason = "a speed that follows itself from moment to moment";
+                source.refuse_if(*name == moving.entity.name, mark, reason)?;
+                self.is_ego(name) || !self.keeps_its_speed(name)
+            }
+            _ => false,
+        };
+        let who = |source: &mut Source, name: &str| match () {
+            () if self.is_ego(name) => Some("ego".to_owned()),
+            () if name == moving.entity.name => Some("npc".to_owned()),
+            () => Some(self.moving(source, mark, name)?.bearer.clone()),
+        };
+        let (said, mps) = match wanted {
+            Speed::Absolute(mps) => (Said::default().number(*mps, "m/s"), Some(*mps)),
+            Speed::More(name, more) => {
+                (Said::text(format!("{}.speed + ", who(source, name)?)).number(*more, "m/s"), None)
+            }
+            Speed::Times(name, times) => {
+                (Said::text(format!("{}.speed * ", who(source, name)?)).number(*times, ""), None)
+            }
+        };
+        if let Some(mps) = mps {
+            source.refuse_if(mps < 0.0, mark, "nobody drives backwards")?;
+            source.refuse_if(mps > *SPAWN_SPEED_MPS.end(), mark, too_fast(mps))?;
+        }
+        if matches!(dynamics.over, Over::Never) {
+            source.note("a speed that changes by 0 m/s² stays as it is");
+            return Some(());
+        }
+        if dynamics.peak > 1.0 && !matches!(dynamics.over, Over::AtOnce) {
+            source.note("speeds change evenly, also where the file has a curve");
+        }
+        let rate = match (dynamics.over, told.mps, mps) {
+            (Over::AtOnce | Over::Never, ..) => None,
+            (Over::Rate(rate), ..) => Some(Said::default().number(rate.abs() / dynamics.peak, "m/s^2")),
+            (Over::Time(time_s), Some(from), Some(to)) => {
+                (from != to).then(|| Said::default().number((to - from).abs() / time_s, "m/s^2"))
+            }
+            (Over::Way(way_m), Some(from), Some(to)) => (from != to)
+                .then(|| Said::default().number((to * to - from * from).abs() / (2.0 * way_m), "m/s^2")),
+            (Over::Time(time_s), ..) => Some(
+                Said::text("match npc.speed <= ")
+                    .then(said.clone())
+                    .and(" { true => (")
+                    .then(said.clone())
+                    .and(" - npc.speed) / ")
+                    .number(time_s, "s")
+                    .and(", false => (npc.speed - ")
+                    .then(Said::text("(").then(said.clone()).and(")"))
+                    .and(") / ")
+                    .number(time_s, "s")
+                    .and(" }"),
+            ),
+            (Over::Way(_), ..) => {
+                return source.refuse(mark, "over a way a speed changes only from one that the file says");
+            }
+        };
+        let change = Change::between(told.mps, mps);
+        let rate = rate.map(|rate| match rate.0.as_slice() {
+            [Piece::Number(figure)] => {
+                let within = rate_within_mps2(source, &moving.entity.body, change, figure.value());
+                Said::default().number(within, "m/s^2")
+            }
+            _ => rate,
+        });
+        told.mps = mps;
+        instead_of(fields, &PACE);
+        fields.push(Said::text("speed: ").then(said));
+        fields.extend(rate.map(|rate| Said::text("rate: ").then(rate)));
+        fields.extend(is_continuous.then(|| Said::text(CONTINUOUS)));
+        Some(())
+    }
+
+    /// The fields of one that keeps a distance to another, by the law of esmini: a spring that is damped critically, or at once where
+    /// nothing bounds it.
+    pub fn kept(
+        &self,
+        source: &mut Source,
+        moving: &Moving<'a>,
+        mark: &Mark,
+        kept: &Kept,
+    ) -> Option<Vec<Said>> {
+        let (of, too_far) = self.too_far(source, moving, mark, kept)?;
+        let said = match kept.bounds {
+            None => {
+                source.note("a distance without bounds is taken at 70 m/s at most");
+                Said::text(format!("{of}.speed + (")).then(too_far).and(") / 20 ms")
+            }
+            Some((gains_mps2, loses_mps2, most_mps)) => {
+                let most_mps = most_mps.min(*SPAWN_SPEED_MPS.end());
+                let damping = |mps2: f64| 2.0 * (SPRING_PER_M * mps2).sqrt();
+                Said::text("keeping(npc.speed, ")
+                    .then(too_far)
+                    .and(format!(", npc.speed - {of}.speed, "))
+                    .number(gains_mps2, "m/s^2")
+                    .and(", ")
+                    .number(loses_mps2, "m/s^2")
+                    .and(", ")
+                    .number(damping(gains_mps2), "")
+                    .and(", ")
+                    .number(damping(loses_mps2), "")
+                    .and(", ")
+                    .number(most_mps, "m/s")
+                    .and(")")
+            }
+        };
+        Some(vec![Said::text("speed: ").then(said), Said::text(CONTINUOUS)])
+    }
+
+    /// To whom a distance is kept, and how far one has to go ahead for it.
+    pub fn too_far(
+        &self,
+        source: &mut Source,
+        moving: &Moving<'a>,
+        mark: &Mark,
+        kept: &Kept,
+    ) -> Option<(String, Said)> {
+        let own = &moving.entity.name;
+        source.refuse_if(kept.of == *own, mark, "a distance to itself")?;
+        let waiting = Waiting { cast: self, actor: moving, before: Vec::new() };
+        let of = waiting.who(source, mark, &kept.of)?;
+        let (here, there) = (self.begins(source, mark, own)?, self.begins(source, mark, &kept.of)?);
+        let is_ahead = kept.is_ahead.unwrap_or(self.station_m(here) > self.station_m(there));
+        let (back, front) = if is_ahead { (&kept.of, own) } else { (own, &kept.of) };
+        let away = waiting.between(source, mark, back, front, kept.is_free_space)?;
+        let wanted = match kept.headway {
+            Headway::Way(way_m) => Said::default().number(way_m, "m"),
+            Headway::Time(time_s) => Said::text(format!("{of}.speed * ")).number(time_s, "s"),
+        };
+        let too_far = match is_ahead {
+            true => wanted.and(" - (").then(away).and(")"),
+            false => away.and(" - ").then(wanted),
+        };
+        Some((of, too_far))
+    }
+
+    /// Whether somebody beside the ego vehicle drives at one speed from the beginning on.
+    fn keeps_its_speed(&self, name: &str) -> bool {
+        let changes = |act: &Act| {
+            matches!(act.kind, ActKind::Speed(..) | ActKind::Profile(_) | ActKind::Meet(_) | ActKind::Keep(_))
+        };
+        let Some(entity) = self.story.entity(name) else { return false };
+        let is_timed = entity.way.as_ref().is_some_and(|way| way.timing.is_some());
+        !is_timed && !entity.events.iter().flat_map(|event| &event.acts).any(changes)
+    }
+
+    pub fn meeting_fields(
+        &self,
+        source: &mut Source,
+        moving: &Moving,
+        mark: &Mark,
+        meeting: &Meeting,
+        told: &mut Told,
+        fields: &mut Vec<Said>,
+    ) -> Option<()> {
+        let reason = "only the ego vehicle is met";
+        source.refuse_if(!self.is_ego(&meeting.master), mark, reason)?;
+        let ego = &self.story.ego.body;
+        let point = self.place(source, &meeting.master_at)?.pose.position;
+        // The file says where its reference point is; the language where the front is.
+        let ego_m = self.station_m(point) + ego.middle_m + ego.length_m / 2.0;
+        let reach_m = moving.reach_m(source, self, &meeting.own_at)?;
+        instead_of(fields, &PACE);
+        fields.push(Said::text("early: ").number(0.0, "s"));
+        fields.push(Said::text("at: ").number(ego_m, "m"));
+        fields.push(Said::text("reach: ").number(reach_m, "m"));
+        let mps = match &meeting.speed {
+            None => None,
+            Some(Speed::Absolute(mps)) => Some(*mps),
+            Some(Speed::More(_, more)) => Some(speed(source, self.story, &self.story.ego, 0)? + more),
+            Some(Speed::Times(_, times)) => Some(speed(source, self.story, &self.story.ego, 0)? * times),
+        };
+        if let Some(mps) = mps {
+            source.refuse_if(mps <= 0.0, mark, "it arrives with a speed above 0")?;
+            source.refuse_if(mps > *SPAWN_SPEED_MPS.end(), mark, too_fast(mps))?;
+            fields.push(Said::text("speed: ").number(mps, "m/s"));
+            let steady_m = match meeting.steady {
+                Steady::No => 0.0,
+                Steady::Way(way_m) => way_m,
+                Steady::Time(time_s) => time_s * mps,
+            };
+            if steady_m > 0.0 {
+                fields.push(Said::text("steady: ").number(steady_m, "m"));
+            }
+        }
+        told.mps = mps;
+        Some(())
     }
 }
 

@@ -4,9 +4,10 @@ use core::f64::consts::PI;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use avastra_base::geometry::{Pose, Vec2, unit_vector, wrap_angle};
-use avastra_road::{LaneIndex, LanePlace, RoadMap, Route, Side};
+use avastra_base::geometry::{Path, Pose, Vec2, unit_vector, wrap_angle};
+use avastra_road::{LaneIndex, LanePlace, RoadMap, Side};
 
+use super::ground::Ground;
 use super::position::{Beside, Heading, Position, PositionKind};
 use super::source::{Mark, Source};
 use super::story::Story;
@@ -44,14 +45,14 @@ pub struct Placed {
 
 /// The map with the entities on it, as far as they have a place.
 pub struct Places<'a> {
-    pub map: Rc<RoadMap>,
+    pub map: Rc<Ground>,
     story: &'a Story,
     known: BTreeMap<String, Placed>,
     depth: usize,
 }
 
 impl<'a> Places<'a> {
-    pub fn new(map: Rc<RoadMap>, story: &'a Story) -> Places<'a> {
+    pub fn new(map: Rc<Ground>, story: &'a Story) -> Places<'a> {
         Places { map, story, known: BTreeMap::new(), depth: 0 }
     }
 
@@ -88,11 +89,15 @@ impl<'a> Places<'a> {
         let Position { mark, kind, heading } = position;
         let placed = match kind {
             PositionKind::Lane { road, lane, s_m, offset_m } => {
-                let place = match self.map.place(road, *lane, *s_m) {
-                    Ok(place) => place,
-                    Err(error) => return source.refuse(mark, error.to_string()),
-                };
-                self.on_lane(LanePlace { offset_m: self.left_m(place, *offset_m), ..place })
+                match (self.map.place(road, *lane, *s_m), self.map.strip_pose(road, *lane, *s_m)) {
+                    (Ok(place), _) => {
+                        self.on_lane(LanePlace { offset_m: self.left_m(place, *offset_m), ..place })
+                    }
+                    (Err(_), Some((strip, is_along))) => {
+                        self.in_plane(strip.offset(0.0, if is_along { *offset_m } else { -offset_m }))
+                    }
+                    (Err(error), None) => return source.refuse(mark, error.to_string()),
+                }
             }
             PositionKind::RelativeLane { entity, lanes, ahead_m, offset_m } => {
                 let of = self.on_a_lane(source, mark, entity)?;
@@ -271,23 +276,11 @@ impl<'a> Places<'a> {
     }
 
     /// The way along lanes from place to place.
-    pub fn laid(
-        &self,
-        source: &mut Source,
-        mark: &Mark,
-        places: &[LanePlace],
-    ) -> Option<avastra_base::geometry::Path> {
-        let mut parts = Vec::new();
-        for pair in places.windows(2) {
-            match Route::find(&self.map, pair[0], pair[1]) {
-                Ok(route) => {
-                    let goal_m = route.path.length_m();
-                    parts.push(route.path.part(0.0, goal_m)?);
-                }
-                Err(error) => return source.refuse(mark, format!("no way leads there: {error}")),
-            }
+    pub fn laid(&self, source: &mut Source, mark: &Mark, places: &[LanePlace]) -> Option<Rc<Path>> {
+        match self.map.way(places) {
+            Ok(way) => Some(way),
+            Err(error) => source.refuse(mark, format!("no way leads there: {error}")),
         }
-        avastra_base::geometry::Path::join(&parts)
     }
 
     fn on_route(
@@ -301,7 +294,7 @@ impl<'a> Places<'a> {
         let places = self.route(source, mark, places)?;
         let mut left_m = along_m;
         for pair in places.windows(2) {
-            let route = match Route::find(&self.map, pair[0], pair[1]) {
+            let route = match self.map.route(pair[0], pair[1]) {
                 Ok(route) => route,
                 Err(error) => return source.refuse(mark, format!("no way leads along the route: {error}")),
             };

@@ -87,6 +87,11 @@ impl Said {
         })
     }
 
+    /// Whether one of its texts is this.
+    pub fn holds(&self, text: &str) -> bool {
+        self.0.iter().any(|piece| matches!(piece, Piece::Text(own) if own == text))
+    }
+
     /// The word before its first colon.
     pub fn name(&self) -> String {
         let text = self.form();

@@ -3,24 +3,25 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use avastra_base::geometry::{Path, SMOOTH_STEP_SLOPE_MAX, Vec2, wrap_angle};
+use avastra_base::geometry::{Path, Vec2, wrap_angle};
 use avastra_campaign::emit::lane_point;
 use avastra_lang::model::SPAWN_SPEED_MPS;
 use avastra_lang::model::command::OFFSET_M;
-use avastra_road::{LIMIT_MPS_DEFAULT, LanePlace, RoadMap, Route, Side};
+use avastra_road::{LIMIT_MPS_DEFAULT, LanePlace, Route};
 use avastra_world::sim::VehicleParameters;
 
-use super::action::{Act, ActKind, Aside, Dynamics, Headway, Meeting, Over, Speed, Steady, Target};
+use super::action::{Act, ActKind, Headway, Speed};
 use super::body::Body;
-use super::condition::{EGO_FRONT_M, Waiting, is_called};
-use super::pace::{self, Change, too_fast};
+use super::condition::{EGO_FRONT_M, is_called};
+use super::ground::Ground;
+use super::pace::too_fast;
+use super::phases::same_moment;
 use super::place::{Placed, Places, straight_on};
 use super::position::Position;
 use super::rows::small;
-use super::said::{Figure, Piece, Said, number};
+use super::said::{Figure, Said, number};
 use super::source::{Mark, Source};
 use super::story::{Entity, Event, Story};
-use super::trigger::When;
 
 /// Before the offset of a spawn.
 pub const OFFSET: &str = ", offset: ";
@@ -35,14 +36,14 @@ const WAY_M_MIN: f64 = 20.0;
 const STRAIGHT_M: f64 = 300.0;
 const STANDING_M: f64 = 10.0;
 
+/// Farther beside the ego vehicle's route, or another way, one drives on another road, m.
+const OFF_ROUTE_M: f64 = 12.0;
+
+/// Two ways that lie beside each other for so long are of one road, m.
+const SAME_ROAD_M: f64 = 100.0;
+
 /// A trajectory that begins during the story does so this near to where its entity stands, m.
 const NEAR_M: f64 = 1.5;
-
-/// The fields of an order that say how fast somebody drives.
-const PACE: [&str; 6] = ["speed", "rate", "early", "at", "reach", "steady"];
-
-/// The fastest that somebody is told to move aside, m/s.
-const ASIDE_MPS_MAX: f64 = 10.0;
 
 /// Words of the language that name no road user and no parameter.
 pub const TAKEN: [&str; 16] = [
@@ -94,23 +95,23 @@ pub struct Moving<'a> {
     pub entity: &'a Entity,
     pub bearer: String,
     pub placed: Placed,
-    pub path: Path,
+    pub path: Rc<Path>,
     /// The fields of its trajectory.
-    trajectory: String,
+    pub trajectory: String,
     /// Where it begins on the way, m, and to the left of it.
     pub at_m: f64,
-    offset_m: f64,
-    mps: f64,
+    pub offset_m: f64,
+    pub mps: f64,
     /// When places of its way are reached, m and s.
-    timed: Vec<(f64, f64)>,
+    pub timed: Vec<(f64, f64)>,
 }
 
 /// The ego vehicle's way with everybody who has a place.
 pub struct Cast<'a> {
-    story: &'a Story,
-    map: Rc<RoadMap>,
-    route: Route,
-    places: RefCell<Places<'a>>,
+    pub story: &'a Story,
+    pub map: Rc<Ground>,
+    pub route: Rc<Route>,
+    pub places: RefCell<Places<'a>>,
     pub moving: Vec<Moving<'a>>,
 }
 
@@ -124,7 +125,7 @@ impl Scene {
         };
         let mut places = Places::new(Rc::clone(&map), story);
         let (start, goal) = ego_way(source, story, &mut places)?;
-        let route = match Route::find(&map, start, goal) {
+        let route = match map.route(start, goal) {
             Ok(route) => route,
             Err(error) => {
                 return source.refuse(&story.ego.mark, format!("the way of the ego vehicle: {error}"));
@@ -280,6 +281,33 @@ impl<'a> Cast<'a> {
         if projected.station_m > 0.0 { projected.station_m } else { begin.to_local(point).x.min(0.0) }
     }
 
+    /// Whether somebody begins on another road than the ego vehicle's route.
+    pub fn is_far_off(&self, source: &mut Source, mark: &Mark, name: &str) -> Option<bool> {
+        if self.is_ego(name) {
+            return Some(false);
+        }
+        let pose = self.moving(source, mark, name)?.placed.pose;
+        let beside = self.route.path.project(pose.position);
+        let is_beside = beside.station_m > 0.0 && beside.station_m < self.route.path.length_m();
+        Some(is_beside && beside.offset_m.abs() > OFF_ROUTE_M)
+    }
+
+    /// What is added to the station of `front` less that of `back` to give the way between their reference points, m; `None` if they
+    /// follow different roads.
+    pub fn stations_apart_m(&self, back: &str, front: &str) -> Option<f64> {
+        let of = |name: &str| self.moving.iter().find(|moving| moving.entity.name == name);
+        let (back, front) = (of(back)?, of(front)?);
+        let beside = |point: Vec2| {
+            let at = back.path.project(point);
+            (at.offset_m.abs() < OFF_ROUTE_M).then_some(at.station_m)
+        };
+        let later_m = (front.at_m + SAME_ROAD_M).min(front.path.length_m());
+        let here_m = beside(front.path.position_at(front.at_m))?;
+        let there_m = beside(front.path.position_at(later_m))?;
+        let goes_on_m = (there_m - here_m) - (later_m - front.at_m);
+        (goes_on_m.abs() < 0.1 * SAME_ROAD_M).then_some(here_m - front.at_m)
+    }
+
     /// How far an end of somebody's outline lies beyond its reference point along the ego vehicle's route, m.
     pub fn overhang_m(&self, source: &mut Source, mark: &Mark, name: &str, is_front: bool) -> Option<f64> {
         if self.is_ego(name) {
@@ -310,11 +338,12 @@ impl<'a> Cast<'a> {
         let at_once = |event: &&Event| event.when.is_empty();
         let later = entity.events.iter().filter(at_once).flat_map(|event| &event.acts);
         let mut headway = later.filter_map(|act| match &act.kind {
-            ActKind::Ahead(headway) => Some((&act.mark, headway)),
+            ActKind::Ahead(of, headway) => Some((&act.mark, of, headway)),
             _ => None,
         });
-        let headway = headway.next_back().or(entity.headway.as_ref().map(|(mark, headway)| (mark, headway)));
-        if let Some((mark, headway)) = headway {
+        let first = entity.headway.as_ref().map(|(mark, of, headway)| (mark, of, headway));
+        if let Some((mark, of, headway)) = headway.next_back().or(first) {
+            source.refuse_if(!self.is_ego(of), mark, "only a distance to the ego vehicle is read")?;
             placed = self.ahead_of_ego(source, mark, entity, headway, placed)?;
         }
         let taken = self.moving.iter().map(|moving| moving.bearer.clone()).collect::<Vec<_>>();
@@ -352,7 +381,7 @@ impl<'a> Cast<'a> {
             source.refuse_if(!is_first && !stands, &way.shape.mark, reason)?;
             let reason = format!("its trajectory begins {away_m:.1} m away from where it stands");
             source.refuse_if(!is_first && away_m > NEAR_M, &way.shape.mark, reason)?;
-            let is_turned = entity.position.is_some() && turned_rad > 2.0 && entity.body.like != "Pedestrian";
+            let is_turned = entity.position.is_some() && turned_rad > 2.0 && !entity.body.is_on_foot();
             source.refuse_if(is_turned, &way.shape.mark, "vehicles do not drive backwards")?;
             let timed = match way.timing {
                 Some((more_s, times)) => {
@@ -361,7 +390,7 @@ impl<'a> Cast<'a> {
                 None => Vec::new(),
             };
             let text = points_text(&drawn.points);
-            return Some(moving(drawn.path, text, from_m, 0.0, timed));
+            return Some(moving(Rc::new(drawn.path), text, from_m, 0.0, timed));
         }
         let is_short = mps == 0.0 && !entity.events.iter().any(moves);
         if let Some(lane) = placed.lane.filter(|lane| placed.is_along() && OFFSET_M.contains(&lane.offset_m))
@@ -405,7 +434,7 @@ impl<'a> Cast<'a> {
             source
                 .note(format!("`{}` looks along no lane, and goes {STRAIGHT_M} m straight on", entity.name));
         }
-        let path = Path::through(&points)?;
+        let path = Rc::new(Path::through(&points)?);
         Some(moving(path, points_text(&points), 0.0, 0.0, Vec::new()))
     }
 
@@ -440,418 +469,6 @@ impl<'a> Cast<'a> {
         source.refuse_if(!(0.0..=length_m).contains(&station_m), mark, reason)?;
         Some(self.places.borrow().on_lane(LanePlace { station_m, ..lane }))
     }
-
-    /// What somebody does, phase by phase.
-    fn phases(&self, source: &mut Source, moving: &Moving<'a>) -> Option<Vec<Said>> {
-        let entity = moving.entity;
-        let mut events: Vec<&Event> = entity.events.iter().filter(|event| !event.acts.is_empty()).collect();
-        events.retain(|event| !event.acts.iter().all(|act| matches!(act.kind, ActKind::Ahead(_))));
-        if events.iter().all(|event| event.time_s().is_some()) {
-            events.sort_by(|a, b| a.time_s().unwrap_or(0.0).total_cmp(&b.time_s().unwrap_or(0.0)));
-        } else if events.iter().filter(|event| waits_by_itself(event)).count() > 1 {
-            source.note(format!("what `{}` does is taken to come in the order of the file", entity.name));
-        }
-        let mut told =
-            Told { mps: Some(moving.mps), offset_m: moving.offset_m, lane: moving.placed.lane, lane_m: 0.0 };
-        told.lane_m = told.lane.map_or(0.0, |lane| self.aside_m(moving, lane));
-        let mut phases = Vec::new();
-        // After what takes several phases, whose `once` would come too late: the words before what may follow.
-        let mut several: Option<Said> = None;
-        if entity.way.as_ref().is_some_and(|way| way.timing.is_some()) {
-            phases.extend(self.timed(source, moving, Said::default(), true)?);
-            several = (phases.len() > 1).then(Said::default);
-        }
-        let (at_once, later): (Vec<&Event>, Vec<&Event>) =
-            events.into_iter().partition(|event| event.when.is_empty());
-        let mut groups: Vec<(Option<&Event>, Vec<&Act>)> = Vec::new();
-        let first: Vec<&Act> = at_once.iter().flat_map(|event| &event.acts).collect();
-        if !first.is_empty() {
-            groups.push((None, first));
-        }
-        for event in later {
-            // What begins at the same moment is one phase.
-            let is_same = |(last, _): &&mut (Option<&Event>, Vec<&Act>)| {
-                last.is_some_and(|last| same_moment(last, event))
-            };
-            match groups.last_mut().filter(is_same) {
-                Some((_, acts)) => acts.extend(&event.acts),
-                None => groups.push((Some(event), event.acts.iter().collect())),
-            }
-        }
-        // Also one that only placed somebody, which took no time.
-        let mut before: Vec<&Event> = entity.events.iter().filter(|event| event.when.is_empty()).collect();
-        for (event, acts) in groups {
-            let reason =
-                "beside the times of a trajectory or of a profile only what waits for their end is read";
-            let begins = match event {
-                None => {
-                    source.refuse_if(several.is_some(), &entity.mark, reason)?;
-                    Said::default()
-                }
-                Some(event) => {
-                    let waiting = Waiting { cast: self, actor: moving, before: before.clone() };
-                    let begins = waiting.begins(source, &event.when)?;
-                    if let Some(words) = several.take() {
-                        source.refuse_if(!waiting.waits_for_the_end(&event.when), &event.mark, reason)?;
-                        if !words.0.is_empty() {
-                            phases.push(words.and("{}"));
-                        }
-                    }
-                    if begins.is_after {
-                        phases.push(Said::text("after 0 s {}"));
-                    }
-                    phases.extend(
-                        begins.first.as_ref().map(|first| Said::text("once ").then(first.clone()).and(" {}")),
-                    );
-                    begins.said()
-                }
-            };
-            if let Some(event) = event {
-                before = entity.events.iter().filter(|other| same_moment(other, event)).collect();
-            }
-            let mut fields = Vec::new();
-            let mut timed = Vec::new();
-            for act in acts {
-                match &act.kind {
-                    ActKind::Follow(way) if way.timing.is_some() => {
-                        timed = self.timed(source, moving, begins.clone(), way.is_absolute)?;
-                        several = (timed.len() > 1).then(Said::default);
-                    }
-                    ActKind::Profile(entries) => {
-                        let reason = "its trajectory has times, which say the speed already";
-                        source.refuse_if(!moving.timed.is_empty(), &act.mark, reason)?;
-                        let begins = begins.clone();
-                        let (said, then) =
-                            pace::profile(source, &act.mark, &entity.body, told.mps, entries, begins)?;
-                        (timed, several) = (said, Some(then));
-                        told.mps = entries.last().map(|entry| entry.mps);
-                    }
-                    _ => self.fields(source, moving, act, &mut told, &mut fields)?,
-                }
-            }
-            if timed.is_empty() {
-                phases.push(begins.and("{ ").then(Said::joined(fields, ", ")).and(" }"));
-            } else if fields.is_empty() {
-                phases.extend(timed);
-            } else {
-                let mark = &event.map_or(&entity.mark, |event| &event.mark);
-                return source.refuse(*mark, reason);
-            }
-        }
-        Some(phases)
-    }
-
-    /// The phases of one that is at places of its way at given times.
-    fn timed(
-        &self,
-        source: &mut Source,
-        moving: &Moving,
-        begins: Said,
-        is_absolute: bool,
-    ) -> Option<Vec<Said>> {
-        let mut phases = Vec::new();
-        let Some((_, first_s)) = moving.timed.first() else { return Some(phases) };
-        let mut begins = begins;
-        if *first_s > 0.0 {
-            begins = match is_absolute {
-                true => Said::text("once elapsed >= ").number(*first_s, "s").and(" "),
-                false => begins.and("after ").number(*first_s, "s").and(" "),
-            };
-        }
-        let mut is_wait = false;
-        for pair in moving.timed.windows(2) {
-            let ((from_m, from_s), (to_m, to_s)) = (pair[0], pair[1]);
-            let (way_m, time_s) = (to_m - from_m, to_s - from_s);
-            if time_s <= 0.0 {
-                continue;
-            }
-            let said = core::mem::take(&mut begins);
-            let said = match (phases.is_empty(), is_wait) {
-                (true, _) | (false, true) => said,
-                (false, false) => {
-                    Said::text("once npc.station >= ").number(from_m + moving.more_m(), "m").and(" ")
-                }
-            };
-            let mps = way_m / time_s;
-            source.refuse_if(mps > *SPAWN_SPEED_MPS.end(), &moving.entity.mark, too_fast(mps))?;
-            phases.push(said.and("{ speed: ").number(mps, "m/s").and(" }"));
-            is_wait = way_m < 1e-6;
-            if is_wait {
-                begins = Said::text("after ").number(time_s, "s").and(" ");
-            }
-        }
-        Some(phases)
-    }
-
-    /// The fields of an order that an action is.
-    fn fields(
-        &self,
-        source: &mut Source,
-        moving: &Moving,
-        act: &Act,
-        told: &mut Told,
-        fields: &mut Vec<Said>,
-    ) -> Option<()> {
-        let mark = &act.mark;
-        match &act.kind {
-            ActKind::Placed(_) => source.refuse(mark, "nobody is placed anew in the story"),
-            ActKind::Ahead(_) => Some(()),
-            ActKind::Route(_) => source.refuse(mark, "a route is taken from the beginning"),
-            // It goes on with the speed that it has, which is 0: an event of its own tells it more.
-            ActKind::Follow(_) | ActKind::Profile(_) => Some(()),
-            ActKind::Speed(wanted, dynamics) => {
-                self.speed_fields(source, moving, mark, wanted, *dynamics, told, fields)
-            }
-            ActKind::Lane(target, more_m, dynamics) => {
-                let lane_m = self.lane_offset_m(source, moving, mark, target, told)?;
-                let to_m = lane_m + self.left_m(moving, told, *more_m);
-                let to = Said::default().number(to_m, "m");
-                aside_fields(source, mark, to_m, to, *dynamics, told, fields)
-            }
-            ActKind::Offset(Aside::InLane(offset_m), dynamics) => {
-                let to_m = told.lane_m + self.left_m(moving, told, *offset_m);
-                let to = Said::default().number(to_m, "m");
-                aside_fields(source, mark, to_m, to, *dynamics, told, fields)
-            }
-            ActKind::Offset(Aside::Of(name, more_m), dynamics) => {
-                let (to_m, to) = self.beside(source, moving, mark, name, *more_m, told)?;
-                aside_fields(source, mark, to_m, to, *dynamics, told, fields)
-            }
-            ActKind::Meet(meeting) => self.meeting_fields(source, moving, mark, meeting, told, fields),
-        }
-    }
-
-    /// A way to the left in the road's direction as one to the left of somebody in a lane of it, on its way.
-    fn left_m(&self, moving: &Moving, told: &Told, left_m: f64) -> f64 {
-        let Some(place) = told.lane else { return left_m };
-        let lane = self.map.lane(place.lane);
-        let turned_rad =
-            wrap_angle(moving.path.heading_at(moving.at_m) - lane.centre.heading_at(place.station_m));
-        let goes_with_lane = turned_rad.abs() < core::f64::consts::FRAC_PI_2;
-        if goes_with_lane == lane.is_along() { left_m } else { -left_m }
-    }
-
-    /// Where on its way, across, somebody is so much to the left of another one: as both begin, and as both are then.
-    fn beside(
-        &self,
-        source: &mut Source,
-        moving: &Moving,
-        mark: &Mark,
-        name: &str,
-        more_m: f64,
-        told: &Told,
-    ) -> Option<(f64, Said)> {
-        let other = self.begins(source, mark, name)?;
-        let own = moving.placed.pose;
-        let along = self.route.path.project(own.position);
-        let turned_rad = wrap_angle(own.heading_rad - self.route.path.heading_at(along.station_m));
-        let reason = "to be beside another one is read of those that drive along the ego vehicle's way";
-        source.refuse_if(turned_rad.abs() > 1.0, mark, reason)?;
-        let of = if self.is_ego(name) {
-            "ego".to_owned()
-        } else {
-            self.moving(source, mark, name)?.bearer.clone()
-        };
-        let away_m = self.route.path.project(other).offset_m - along.offset_m;
-        let said = Said::text(format!("{of}.offset - npc.offset + ")).number(told.offset_m + more_m, "m");
-        Some((moving.offset_m + away_m + more_m, said))
-    }
-
-    #[expect(clippy::too_many_arguments, reason = "an action with where it stands and what it changes")]
-    fn speed_fields(
-        &self,
-        source: &mut Source,
-        moving: &Moving,
-        mark: &Mark,
-        wanted: &Speed,
-        dynamics: Dynamics,
-        told: &mut Told,
-        fields: &mut Vec<Said>,
-    ) -> Option<()> {
-        if let (true, Speed::More(name, _) | Speed::Times(name, _)) = (dynamics.is_continuous, wanted) {
-            let reason =
-                "a speed that follows another's from moment to moment is read where that one keeps its own";
-            source.refuse_if(self.is_ego(name) || !self.keeps_its_speed(name), mark, reason)?;
-        }
-        let who = |source: &mut Source, name: &str| match () {
-            () if self.is_ego(name) => Some("ego".to_owned()),
-            () if name == moving.entity.name => Some("npc".to_owned()),
-            () => Some(self.moving(source, mark, name)?.bearer.clone()),
-        };
-        let (said, mps) = match wanted {
-            Speed::Absolute(mps) => (Said::default().number(*mps, "m/s"), Some(*mps)),
-            Speed::More(name, more) => {
-                (Said::text(format!("{}.speed + ", who(source, name)?)).number(*more, "m/s"), None)
-            }
-            Speed::Times(name, times) => {
-                (Said::text(format!("{}.speed * ", who(source, name)?)).number(*times, ""), None)
-            }
-        };
-        if let Some(mps) = mps {
-            source.refuse_if(mps < 0.0, mark, "nobody drives backwards")?;
-            source.refuse_if(mps > *SPAWN_SPEED_MPS.end(), mark, too_fast(mps))?;
-        }
-        if matches!(dynamics.over, Over::Never) {
-            source.note("a speed that changes by 0 m/s² stays as it is");
-            return Some(());
-        }
-        if dynamics.peak > 1.0 && !matches!(dynamics.over, Over::AtOnce) {
-            source.note("speeds change evenly, also where the file has a curve");
-        }
-        let rate = match (dynamics.over, told.mps, mps) {
-            (Over::AtOnce | Over::Never, ..) => None,
-            (Over::Rate(rate), ..) => Some(Said::default().number(rate.abs() / dynamics.peak, "m/s^2")),
-            (Over::Time(time_s), Some(from), Some(to)) => {
-                (from != to).then(|| Said::default().number((to - from).abs() / time_s, "m/s^2"))
-            }
-            (Over::Way(way_m), Some(from), Some(to)) => (from != to)
-                .then(|| Said::default().number((to * to - from * from).abs() / (2.0 * way_m), "m/s^2")),
-            (Over::Time(time_s), ..) => Some(
-                Said::text("match npc.speed <= ")
-                    .then(said.clone())
-                    .and(" { true => (")
-                    .then(said.clone())
-                    .and(" - npc.speed) / ")
-                    .number(time_s, "s")
-                    .and(", false => (npc.speed - ")
-                    .then(Said::text("(").then(said.clone()).and(")"))
-                    .and(") / ")
-                    .number(time_s, "s")
-                    .and(" }"),
-            ),
-            (Over::Way(_), ..) => {
-                return source.refuse(mark, "over a way a speed changes only from one that the file says");
-            }
-        };
-        let change = Change::between(told.mps, mps);
-        let rate = rate.map(|rate| match rate.0.as_slice() {
-            [Piece::Number(figure)] => {
-                let within = pace::rate_within_mps2(source, &moving.entity.body, change, figure.value());
-                Said::default().number(within, "m/s^2")
-            }
-            _ => rate,
-        });
-        told.mps = mps;
-        instead_of(fields, &PACE);
-        fields.push(Said::text("speed: ").then(said));
-        fields.extend(rate.map(|rate| Said::text("rate: ").then(rate)));
-        Some(())
-    }
-
-    /// Whether somebody beside the ego vehicle drives at one speed from the beginning on.
-    fn keeps_its_speed(&self, name: &str) -> bool {
-        let changes =
-            |act: &Act| matches!(act.kind, ActKind::Speed(..) | ActKind::Profile(_) | ActKind::Meet(_));
-        let Some(entity) = self.story.entity(name) else { return false };
-        let is_timed = entity.way.as_ref().is_some_and(|way| way.timing.is_some());
-        !is_timed && !entity.events.iter().flat_map(|event| &event.acts).any(changes)
-    }
-
-    /// How far to the left of its way a lane lies, m.
-    fn lane_offset_m(
-        &self,
-        source: &mut Source,
-        moving: &Moving,
-        mark: &Mark,
-        target: &Target,
-        told: &mut Told,
-    ) -> Option<f64> {
-        let Some(own) = told.lane else { return source.refuse(mark, "it drives in no lane") };
-        let to = match target {
-            Target::Beside(name, lanes) => {
-                let of = match () {
-                    () if *name == moving.entity.name => own,
-                    () => {
-                        let placed = self.places.borrow_mut().of(source, mark, name)?;
-                        let Some(lane) = placed.lane else {
-                            return source.refuse(mark, "that one is in no lane");
-                        };
-                        lane
-                    }
-                };
-                // Beside this one, wherever the other one is along the road.
-                self.lane_beside(own, of, *lanes)
-            }
-            Target::Lane(id) => {
-                let lane = self.map.lane(own.lane);
-                let s_m = lane.road_station_m(own.station_m);
-                self.map.place(&lane.key.road, *id, s_m).ok()
-            }
-        };
-        let Some(to) = to else { return source.refuse(mark, "no such lane is beside its own") };
-        (told.lane, told.lane_m) = (Some(to), self.aside_m(moving, to));
-        Some(told.lane_m)
-    }
-
-    /// How far to the left of somebody's way, where it begins, the middle of a lane lies, m.
-    fn aside_m(&self, moving: &Moving, lane: LanePlace) -> f64 {
-        let here = moving.path.pose_at(moving.at_m);
-        let centre = &self.map.lane(lane.lane).centre;
-        here.to_local(centre.position_at(centre.project(here.position).station_m)).y
-    }
-
-    /// The lane that is so many lanes to the left of another's, beside a place.
-    fn lane_beside(&self, own: LanePlace, of: LanePlace, lanes: i32) -> Option<LanePlace> {
-        let (own_key, of_key) = (&self.map.lane(own.lane).key, &self.map.lane(of.lane).key);
-        if own_key.road == of_key.road {
-            let s_m = self.map.lane(own.lane).road_station_m(own.station_m);
-            let mut id = of_key.lane + lanes;
-            // Lanes have no number 0.
-            if (of_key.lane < 0) != (id < 0) || id == 0 {
-                id += lanes.signum();
-            }
-            return self.map.place(&own_key.road, id, s_m).ok();
-        }
-        let mut lane = own.lane;
-        let side = if lanes > 0 { Side::Left } else { Side::Right };
-        for _ in 0..lanes.abs() {
-            lane = self.map.lane(lane).neighbour(side)?.lane;
-        }
-        Some(LanePlace { lane, ..own })
-    }
-
-    fn meeting_fields(
-        &self,
-        source: &mut Source,
-        moving: &Moving,
-        mark: &Mark,
-        meeting: &Meeting,
-        told: &mut Told,
-        fields: &mut Vec<Said>,
-    ) -> Option<()> {
-        let reason = "only the ego vehicle is met";
-        source.refuse_if(!self.is_ego(&meeting.master), mark, reason)?;
-        let ego = &self.story.ego.body;
-        let point = self.place(source, &meeting.master_at)?.pose.position;
-        // The file says where its reference point is; the language where the front is.
-        let ego_m = self.station_m(point) + ego.middle_m + ego.length_m / 2.0;
-        let reach_m = moving.reach_m(source, self, &meeting.own_at)?;
-        instead_of(fields, &PACE);
-        fields.push(Said::text("early: ").number(0.0, "s"));
-        fields.push(Said::text("at: ").number(ego_m, "m"));
-        fields.push(Said::text("reach: ").number(reach_m, "m"));
-        let mps = match &meeting.speed {
-            None => None,
-            Some(Speed::Absolute(mps)) => Some(*mps),
-            Some(Speed::More(_, more)) => Some(speed(source, self.story, &self.story.ego, 0)? + more),
-            Some(Speed::Times(_, times)) => Some(speed(source, self.story, &self.story.ego, 0)? * times),
-        };
-        if let Some(mps) = mps {
-            source.refuse_if(mps <= 0.0, mark, "it arrives with a speed above 0")?;
-            source.refuse_if(mps > *SPAWN_SPEED_MPS.end(), mark, too_fast(mps))?;
-            fields.push(Said::text("speed: ").number(mps, "m/s"));
-            let steady_m = match meeting.steady {
-                Steady::No => 0.0,
-                Steady::Way(way_m) => way_m,
-                Steady::Time(time_s) => time_s * mps,
-            };
-            if steady_m > 0.0 {
-                fields.push(Said::text("steady: ").number(steady_m, "m"));
-            }
-        }
-        told.mps = mps;
-        Some(())
-    }
 }
 
 impl Moving<'_> {
@@ -874,72 +491,15 @@ impl Moving<'_> {
     }
 
     /// From the file's reference point to the one that a station of the language means, m.
-    fn more_m(&self) -> f64 {
-        if self.entity.body.like == "Pedestrian" { self.entity.body.middle_m } else { 0.0 }
+    pub fn more_m(&self) -> f64 {
+        if self.entity.body.is_on_foot() { self.entity.body.middle_m } else { 0.0 }
     }
-}
-
-/// What somebody was told so far.
-struct Told {
-    /// Its speed, if the file says it.
-    mps: Option<f64>,
-    offset_m: f64,
-    lane: Option<LanePlace>,
-    /// How far the middle of that lane is to the left of its way, m.
-    lane_m: f64,
-}
-
-/// Of two actions that begin together the later one counts.
-fn instead_of(fields: &mut Vec<Said>, names: &[&str]) {
-    fields.retain(|field| !names.contains(&field.name().as_str()));
-}
-
-fn aside_fields(
-    source: &mut Source,
-    mark: &Mark,
-    to_m: f64,
-    to: Said,
-    dynamics: Dynamics,
-    told: &mut Told,
-    fields: &mut Vec<Said>,
-) -> Option<()> {
-    if matches!(dynamics.over, Over::Never) {
-        source.note("who moves aside at 0 m/s stays where it is");
-        return Some(());
-    }
-    let by_m = (to_m - told.offset_m).abs();
-    let (low_m, high_m) = (OFFSET_M.start(), OFFSET_M.end());
-    let reason = format!("it moves to {to_m:.1} m beside its way: {low_m} to {high_m} m is possible");
-    source.refuse_if(!OFFSET_M.contains(&to_m), mark, reason)?;
-    told.offset_m = to_m;
-    if by_m < 1e-6 {
-        return Some(());
-    }
-    instead_of(fields, &["offset", "aside"]);
-    fields.push(Said::text("offset: ").then(to));
-    let slope = SMOOTH_STEP_SLOPE_MAX;
-    let aside_mps = match dynamics.over {
-        Over::AtOnce | Over::Never => ASIDE_MPS_MAX,
-        Over::Time(time_s) => slope * by_m / time_s,
-        // By the greatest acceleration, along a cosine: `T = π √(d / 2a)`.
-        Over::Rate(mps) if mps < 0.0 => slope * by_m / (core::f64::consts::PI * (by_m / (2.0 * -mps)).sqrt()),
-        Over::Rate(mps) => slope * mps / dynamics.peak,
-        Over::Way(way_m) => {
-            fields.push(Said::text("aside: npc.speed * ").number(slope * by_m / way_m, ""));
-            return Some(());
-        }
-    };
-    if aside_mps > ASIDE_MPS_MAX || matches!(dynamics.over, Over::AtOnce) {
-        source.note(format!("nobody moves aside faster than {ASIDE_MPS_MAX} m/s"));
-    }
-    fields.push(Said::text("aside: ").number(aside_mps.clamp(0.1, ASIDE_MPS_MAX), "m/s"));
-    Some(())
 }
 
 /// Whether somebody moves by an event.
 fn moves(event: &Event) -> bool {
     let stays = |act: &Act| {
-        matches!(act.kind, ActKind::Ahead(_) | ActKind::Follow(_) | ActKind::Speed(Speed::Absolute(0.0), _))
+        matches!(act.kind, ActKind::Ahead(..) | ActKind::Follow(_) | ActKind::Speed(Speed::Absolute(0.0), _))
     };
     !event.acts.iter().all(stays)
 }
@@ -955,19 +515,6 @@ fn moves_before_its_way(events: &[Event]) -> bool {
         };
         is_earlier && !same_moment(event, &events[at]) && moves(event)
     })
-}
-
-/// Whether an event waits for something that is neither a time nor the end of another.
-fn waits_by_itself(event: &Event) -> bool {
-    let is_own = |kind: &When| !matches!(kind, When::After(_) | When::Always | When::Ended { .. });
-    event.when.iter().flatten().any(|condition| is_own(&condition.kind))
-}
-
-fn same_moment(a: &Event, b: &Event) -> bool {
-    a.when.len() == b.when.len()
-        && a.when.iter().zip(&b.when).all(|(a, b)| {
-            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.kind == b.kind && a.delay_s == b.delay_s)
-        })
 }
 
 fn points_text(points: &[Vec2]) -> String {
@@ -990,7 +537,7 @@ fn name_of(name: &str, taken: &[String]) -> String {
 }
 
 /// The speed with which an entity begins, m/s.
-fn speed(source: &mut Source, story: &Story, entity: &Entity, depth: usize) -> Option<f64> {
+pub fn speed(source: &mut Source, story: &Story, entity: &Entity, depth: usize) -> Option<f64> {
     source.refuse_if(depth > story.others.len(), &entity.mark, "its speed is relative to itself")?;
     let Some((mark, wanted)) = &entity.speed else { return Some(0.0) };
     let of = |source: &mut Source, name: &str| match story.entity(name) {

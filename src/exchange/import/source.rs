@@ -69,6 +69,8 @@ pub struct Source<'f> {
     /// The variables of the file with their values; `None` for those that the story sets.
     pub variables: BTreeMap<String, Option<String>>,
     parameters: BTreeMap<String, String>,
+    /// Those of the texts around the entry of a catalogue that is read, the outermost first.
+    outer: Vec<BTreeMap<String, String>>,
     /// Parameters and entities of which something was refused: what follows from that is not told again.
     torn: BTreeSet<String>,
     /// How often something was refused, or would have been were it not told already.
@@ -94,6 +96,7 @@ impl<'f> Source<'f> {
             minor: 0,
             variables: BTreeMap::new(),
             parameters: BTreeMap::new(),
+            outer: Vec::new(),
             torn: BTreeSet::new(),
             told: 0,
             asked: asked.iter().map(|(name, value)| (name.clone(), (value.clone(), false))).collect(),
@@ -128,10 +131,11 @@ impl<'f> Source<'f> {
             self.outermost = Some((self.mark(reference).line, whose.to_owned()));
         }
         self.depth += 1;
+        self.outer.push(before);
         let found = read(self);
         self.depth -= 1;
         self.outermost = outermost;
-        self.parameters = before;
+        self.parameters = self.outer.pop().unwrap_or_default();
         found
     }
 
@@ -345,8 +349,28 @@ impl<'f> Source<'f> {
             self.told += 1;
             return None;
         }
-        filled(value, &self.parameters).map_or_else(|reason| self.refuse(node, reason), Some)
+        let found = filled(value, &self.parameters);
+        // As esmini has it; the standard leaves an entry with the parameters that it declares.
+        let around = || {
+            let mut all: BTreeMap<String, String> = self.outer.iter().flatten().map(pair).collect();
+            all.extend(self.parameters.iter().map(pair));
+            filled(value, &all)
+        };
+        match found {
+            Err(reason) if !self.outer.is_empty() => match around() {
+                Ok(found) => {
+                    self.note("entries of catalogues see the parameters of the file, too");
+                    Some(found)
+                }
+                Err(_) => self.refuse(node, reason),
+            },
+            found => found.map_or_else(|reason| self.refuse(node, reason), Some),
+        }
     }
+}
+
+fn pair((name, value): (&String, &String)) -> (String, String) {
+    (name.clone(), value.clone())
 }
 
 /// A value with its parameters: `$name` and `${$name / 3.6}`.
@@ -356,6 +380,9 @@ impl<'f> Source<'f> {
 pub fn filled(value: &str, parameters: &BTreeMap<String, String>) -> Result<String, String> {
     let value = value.trim();
     if let Some(inner) = value.strip_prefix("${").and_then(|rest| rest.strip_suffix('}')) {
+        if let Some(joined) = expression::joined(inner, parameters) {
+            return Ok(joined);
+        }
         let number = expression::value(inner, parameters).map_err(|reason| format!("`{value}`: {reason}"))?;
         return Ok(number.to_string());
     }

@@ -44,7 +44,7 @@ pub struct Entity {
     /// The speed with which it begins; the last that the file says counts.
     pub speed: Option<(Mark, Speed)>,
     /// Its free space ahead of the ego vehicle.
-    pub headway: Option<(Mark, Headway)>,
+    pub headway: Option<(Mark, String, Headway)>,
     /// The trajectory that it follows from the beginning.
     pub way: Option<Way>,
     /// The places through which it drives, from the beginning.
@@ -170,6 +170,8 @@ struct Cast {
     ego_actions: usize,
     /// Who leaves as the scenario begins.
     gone: BTreeSet<String>,
+    /// What never comes: its kind and its name.
+    never: Vec<(&'static str, String)>,
 }
 
 impl Cast {
@@ -198,7 +200,7 @@ impl Cast {
             return source.refuse(root, reason);
         };
         let ego = entities.remove(at);
-        Some(Cast { ego, others: entities, ego_actions: 0, gone: BTreeSet::new() })
+        Some(Cast { ego, others: entities, ego_actions: 0, gone: BTreeSet::new(), never: Vec::new() })
     }
 
     fn is_ego(&self, name: &str) -> bool {
@@ -224,15 +226,6 @@ impl Cast {
         }
         let is_ego = self.is_ego(&name);
         for action in elements(private, "PrivateAction").flat_map(children) {
-            let distance = action.descendants().find(|node| node.has_tag_name("LongitudinalDistanceAction"));
-            if let Some(distance) = distance.filter(|_| !is_ego)
-                && source.text(distance, "entityRef").is_some_and(|of| !self.is_ego(&of))
-            {
-                source.about(&name, |source| {
-                    source.refuse::<()>(distance, "only a distance to the ego vehicle is read")
-                });
-                continue;
-            }
             let begun = source.about(&name, |source| act(source, action, is_ego));
             let entity = if is_ego { Some(&mut self.ego) } else { self.other(&name) };
             if let (Some(begun), Some(entity)) = (begun, entity) {
@@ -321,15 +314,16 @@ impl Cast {
             if when.is_none() {
                 own.iter().for_each(|name| source.tear(name));
             }
-            let when = when.map(reduced);
+            let when = when.map(|when| self.without_contacts(source, when, &own)).map(reduced);
+            let names = scope.names_of(source, manoeuvre, event);
             // It never comes.
             if matches!(when, Some(None)) {
+                self.never.extend(names);
                 continue;
             }
             for action in changes {
                 self.change(source, action, when.as_ref().and_then(Option::as_ref));
             }
-            let names = scope.names_of(source, manoeuvre, event);
             for name in own {
                 let acts: Vec<Act> = does
                     .iter()
@@ -342,6 +336,25 @@ impl Cast {
                 }
             }
         }
+    }
+
+    /// A trigger in which a contact of who acts never comes, nor what waits for that: a contact ends what both do.
+    fn without_contacts(&self, source: &mut Source, mut when: Trigger, own: &[&String]) -> Trigger {
+        for condition in when.iter_mut().flatten() {
+            let is_over = match &condition.kind {
+                When::Contact(Some((of, with))) => own.iter().all(|name| [of, with].contains(name)),
+                When::Ended { kind, name } | When::Begun { kind, name } => {
+                    let last = name.rsplit("::").next();
+                    self.never.iter().any(|(of, known)| of == kind && Some(known.as_str()) == last)
+                }
+                _ => false,
+            };
+            if is_over {
+                source.note("what the file lets somebody do after a contact is not played: a contact ends what both do");
+                condition.kind = When::Never;
+            }
+        }
+        when
     }
 
     /// An action of the story that concerns nobody's motion.
@@ -389,7 +402,7 @@ impl Entity {
         let Act { mark, kind } = begun;
         match kind {
             ActKind::Placed(position) => self.position = Some(position),
-            ActKind::Ahead(headway) => self.headway = Some((mark, headway)),
+            ActKind::Ahead(of, headway) => self.headway = Some((mark, of, headway)),
             ActKind::Speed(speed, dynamics) => {
                 let is_at_once = matches!(dynamics.over, Over::AtOnce) && !dynamics.is_continuous;
                 if is_at_once || self.speed.is_none() && matches!(speed, Speed::Absolute(0.0)) {
@@ -402,7 +415,11 @@ impl Entity {
             }
             ActKind::Follow(way) => self.way = Some(*way),
             ActKind::Route(places) => self.route = Some((mark, places)),
-            ActKind::Profile(_) | ActKind::Lane(..) | ActKind::Offset(..) | ActKind::Meet(_) => {
+            ActKind::Profile(_)
+            | ActKind::Lane(..)
+            | ActKind::Offset(..)
+            | ActKind::Meet(_)
+            | ActKind::Keep(_) => {
                 let acts = vec![Act { mark: mark.clone(), kind }];
                 self.events.push(Event { mark, names: Vec::new(), when: Vec::new(), acts });
             }

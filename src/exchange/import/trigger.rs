@@ -48,6 +48,8 @@ pub enum When {
     /// It holds from the beginning.
     Always,
     Never,
+    /// The two touch; `None`: any two.
+    Contact(Option<(String, String)>),
     /// After this time, s.
     After(f64),
     /// The distance of two entities is less or more than the way that the first one drives in `seconds`.
@@ -305,6 +307,13 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
             When::Reaches { entity, position: PlaceMark(position(source, place)?), within_m, is_less }
         }
         "TraveledDistanceCondition" => When::Travelled { entity, metres: source.amount(inner, "value")? },
+        "CollisionCondition" => {
+            let with = match element(inner, "EntityRef") {
+                Some(with) => Some((entity, source.text(with, "entityRef")?)),
+                None => None,
+            };
+            When::Contact(with)
+        }
         "StandStillCondition" => When::Stands { entity, seconds: source.amount(inner, "duration")? },
         "SpeedCondition" => {
             along(source, inner)?;

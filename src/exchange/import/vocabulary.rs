@@ -177,6 +177,8 @@ const ELEMENTS: &str = "
         Position;
     TraveledDistanceCondition [value];
     StandStillCondition [duration];
+    CollisionCondition [] EntityRef ByType;
+    ByType [type];
     SpeedCondition [value rule direction];
     RelativeSpeedCondition [entityRef value rule direction];
     ParameterValueDistribution [] ScenarioFile Deterministic Stochastic;

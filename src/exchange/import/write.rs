@@ -10,6 +10,7 @@ use avastra_lang::syntax::format;
 
 use super::body::wheelbase_m;
 use super::own::Own;
+use super::pace;
 use super::rows::{Parameters, capital, small, unique};
 use super::said::{Figure, Piece, Said, number};
 use super::scene::{OFFSET, Other, Scene};
@@ -302,9 +303,9 @@ impl<'a> Space<'a> {
         let body = &other.body;
         let [length, width, height] = [body.length_m, body.width_m, body.height_m].map(number);
         // The axle lies where the file's reference point is.
-        let wheelbase = match body.like {
-            "Pedestrian" => String::new(),
-            _ => format!(", wheelbase: {} m", number(wheelbase_m(body.length_m, body.middle_m))),
+        let wheelbase = match body.is_on_foot() {
+            true => String::new(),
+            false => format!(", wheelbase: {} m", number(wheelbase_m(body.length_m, body.middle_m))),
         };
         let size = format!("length: {length} m, width: {width} m, height: {height} m{wheelbase}");
         let fields = format!("{{ like: {}, {size} }}", body.like);
@@ -347,6 +348,9 @@ impl<'a> Space<'a> {
                 found.push((form, Vec::new()));
             }
             found[at].1.push(other);
+        }
+        if found.iter().any(|(form, _)| form.contains("keeping(")) {
+            self.declared += pace::KEEPING;
         }
         let mut manoeuvres = BTreeMap::new();
         for (form, others) in found {

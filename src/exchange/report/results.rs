@@ -17,7 +17,7 @@ const HEAD: &str = "\
 `avastra study results` wrote this file from the studies in `{folder}/*.yaml` and from what was kept of playing them,
 `*.jsonl` beside them; no figure is typed by hand, and a test writes it again. Everything was played against avastra's
 own driving systems in avastra's own world: no figure says anything about Apollo or LGSVL, which the paper used.
-How these drive the tests of Euro NCAP, by family: [scenarios/catalogue](scenarios/catalogue/README.md).
+How these drive the tests of Euro NCAP, the pre-crash types of NHTSA and the ranges of UN R157, by family: [scenarios/catalogue](scenarios/catalogue/README.md).
 
 How to read it:
 - A number is the mean over independent trainings (or repetitions, of agents that have nothing to learn), in brackets with Student's 95 % interval over them; where none was found at all, with Poisson's, which takes collisions to be independent.

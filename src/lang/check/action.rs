@@ -594,7 +594,7 @@ impl Checker {
                 () if follows && (says(SpawnField::Lane) || says(SpawnField::Side)) => {
                     ("begins on its trajectory", "leave `lane` and `side` out")
                 }
-                () if !on_foot && goes_back => {
+                () if !on_foot && !follows && goes_back => {
                     ("does not drive backwards", "give its manoeuvre no speed below 0 m/s")
                 }
                 () if on_foot && says(SpawnField::Ignores) => {
@@ -660,18 +660,17 @@ impl Checker {
 
     /// Reports a vehicle that walks, and a pedestrian that drives.
     fn check_verb(&mut self, body: &WordExpr<BodyWord>, verb: &WordExpr<Verb>, span: Span) {
-        let on_foot = |verb: &Verb| verb.is_on_foot();
         let verbs = possible(verb);
-        let clash = possible(body).into_iter().find_map(|body| {
-            let clashes = |verb: &&Verb| **verb != Verb::Follow && on_foot(verb) == body.like.is_vehicle();
-            verbs.iter().find(clashes).map(|verb| (body, *verb))
-        });
+        let clash = possible(body)
+            .into_iter()
+            .find_map(|body| verbs.iter().find(|verb| !body.like.can(**verb)).map(|verb| (body, *verb)));
         if let Some((body, verb)) = clash {
             let message = format!("a `{}` cannot `{}`", self.body_name(body), verb.name());
             let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here");
             self.report(
                 error.help(
-                    "`Stand` and those with `Walk` are for a `Pedestrian`, all other verbs for vehicles",
+                    "`Stand` and those with `Walk` are for a `Pedestrian` or an `Animal`, all other verbs for vehicles; an \
+                     `Object` does `Stand` or `Follow`",
                 ),
             );
         }

@@ -6,7 +6,7 @@ use crate::check::checker::{Checker, docs, each};
 use crate::check::expression::Place;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of, as_written, field};
-use crate::model::command::{CommandDef, Told};
+use crate::model::command::{CommandDef, Moves, Told};
 use crate::model::expr::{Expr, ExprKind, Who};
 use crate::model::vocabulary::{
     Body, CHANGE, CommandField, Fact, LaneChoice, ROAD_USER, Site, SpawnField, TrafficRule, Turning, Verb,
@@ -50,7 +50,8 @@ impl Checker {
         {
             let is_on_foot = |name: &String| {
                 let own = self.bodies.iter().find(|body| body.name == *name);
-                own.map_or(name == Body::Pedestrian.name(), |own| own.like == Body::Pedestrian)
+                let like = own.map(|own| own.like).or_else(|| Body::from_name(name));
+                like.is_some_and(|like| !like.is_vehicle())
             };
             let does = fields.iter().find(|field| field.name.text == SpawnField::Does.name());
             let verb = does.and_then(|field| match &field.value.kind {
@@ -360,6 +361,11 @@ impl Checker {
             None => None,
         };
         let command = self.command(&fields, place)?;
+        if let Some(continuous) = &command.continuous {
+            let error = Diagnostic::error(code::NOT_HERE, "only the `speed` of a phase is `continuous`");
+            let error = error.at(continuous.span, "in an order, whose numbers are drawn");
+            return self.reject(error.help("write a manoeuvre with that phase, and order `then: …`"));
+        }
         if manoeuvre.is_none() && command == CommandDef::default() {
             // A misspelt field was reported.
             if fields.len() < declared {
@@ -375,7 +381,7 @@ impl Checker {
         };
         let has = has.unwrap_or(Told::BY_DRIVERS);
         // Nobody on foot is told a rate.
-        let may_drive = has.holds(CommandField::Rate);
+        let moves = Moves::told(has);
         if bearer.is_some() && !has.covers(told.and(command.told())) {
             let message = format!("`{}` cannot be told that", who.text);
             let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message);
@@ -383,7 +389,7 @@ impl Checker {
             let help = format!("it can be told {}", has.words());
             self.report(error.help(help));
         }
-        Some(OrderDef { who: bearer?, command, manoeuvre, may_drive, span })
+        Some(OrderDef { who: bearer?, command, manoeuvre, moves, span })
     }
 
     /// The road user that an order is for, or beside whom another one appears.
@@ -440,6 +446,10 @@ impl Checker {
             Some(value) => Some(self.typed(value, place, Type::Bool)?),
             None => None,
         };
+        let continuous = match field(fields, CommandField::Continuous) {
+            Some(value) => Some(self.typed(value, place, Type::Bool)?),
+            None => None,
+        };
         let turn = match field(fields, CommandField::Turn) {
             Some(value) => Some(self.word::<Turning>("turn", value, place)?),
             None => None,
@@ -467,6 +477,11 @@ impl Checker {
                 says(CommandField::Speed) || keeps || is_early,
             ),
             (CommandField::Aside, "a `lane` or an `offset`", goes_aside),
+            (
+                CommandField::Continuous,
+                "a `speed` without a `keep` or an `early`",
+                says(CommandField::Speed) && !keeps && !is_early,
+            ),
         ] {
             if let Some(value) = field(fields, part).filter(|_| !is_there) {
                 let message = format!("`{}` belongs to {of}", part.name());
@@ -479,6 +494,7 @@ impl Checker {
         all.then_some(CommandDef {
             speed,
             rate,
+            continuous,
             lane,
             offset,
             aside,

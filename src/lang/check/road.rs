@@ -1,5 +1,6 @@
 //! Roads: each has a map, a start and a goal on it, the route between them, and the facts that rules may use.
 
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -8,7 +9,9 @@ use crate::check::expression::{Place, number_help};
 use crate::check::names::unknown;
 use crate::check::report::{Report, all_of, field};
 use crate::model::vocabulary::{RoadField, Word};
-use crate::model::{Road, RoadFacts, SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, Type, code, stretches};
+use crate::model::{
+    Road, RoadFacts, SIGNAL_PHASE_S, SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, Type, code, stretches,
+};
 use crate::syntax::ast::ItemKind;
 use crate::syntax::{Diagnostic, ast, print_expr};
 use avastra_base::units::{Dimension, Rational};
@@ -117,6 +120,14 @@ impl Checker {
             }
             None => None,
         };
+        let signal_phase_s = match field(&fields, RoadField::SignalPhase) {
+            Some(value) => {
+                let what = "a signal phase";
+                let example = "signal_phase: 12 s";
+                Some(self.road_number(value, Dimension::DURATION, what, SIGNAL_PHASE_S, example)?)
+            }
+            None => None,
+        };
         let facts = facts(&block.name.text, &map, &route);
         let name = block.name.text.clone();
         Some(Road {
@@ -129,6 +140,7 @@ impl Checker {
             route,
             ego_mps: ego_mps?,
             set_mps,
+            signal_phase_s,
             trajectories: Vec::new(),
             facts,
         })
@@ -204,15 +216,29 @@ impl Checker {
 
     /// A speed of the ego vehicle, m/s.
     fn road_speed(&mut self, value: &ast::Expr, of: RoadField, what: &str, least_mps: f64) -> Option<f64> {
-        let speed = self.typed(value, &Place::default(), Type::Quantity(Dimension::SPEED))?;
-        let speed_mps = self.fold_number(&speed)?.to_f64();
-        if (least_mps..=SPEED_MPS_MAX).contains(&speed_mps) {
-            return Some(speed_mps);
+        let example = format!("{}: 60 km/h", of.name());
+        self.road_number(value, Dimension::SPEED, what, least_mps..=SPEED_MPS_MAX, &example)
+    }
+
+    /// A number of a road in SI, within its range.
+    fn road_number(
+        &mut self,
+        value: &ast::Expr,
+        dimension: Dimension,
+        what: &str,
+        range: RangeInclusive<f64>,
+        example: &str,
+    ) -> Option<f64> {
+        let number = self.typed(value, &Place::default(), Type::Quantity(dimension))?;
+        let number = self.fold_number(&number)?.to_f64();
+        if range.contains(&number) {
+            return Some(number);
         }
         let message = format!("{what} of `{}` is not possible", print_expr(value));
-        let error = Diagnostic::error(code::SETTING, message);
-        let error = error.at(value.span, format!("must lie within {least_mps} .. {SPEED_MPS_MAX} m/s"));
-        self.reject(error.help(format!("write for example `{}: 60 km/h`", of.name())))
+        let unit = if dimension == Dimension::SPEED { "m/s" } else { "s" };
+        let bounds = format!("must lie within {} .. {} {unit}", range.start(), range.end());
+        let error = Diagnostic::error(code::SETTING, message).at(value.span, bounds);
+        self.reject(error.help(format!("write for example `{example}`")))
     }
 
     pub(super) fn lane_point(&mut self, value: &ast::Expr, map: &RoadMap) -> Option<LanePlace> {

@@ -19,6 +19,12 @@ use avastra_road::RoadMap;
 /// A way that is shorter leads nowhere, m.
 const LENGTH_M_MIN: f64 = 0.1;
 
+/// Where a way leads through, and how far one is turned to its left there.
+struct Point {
+    place: Vec2,
+    turned_rad: f64,
+}
+
 /// The road under a point is at most so far beside it, m; beyond that the height is taken for 0 m.
 const BESIDE_M: f64 = 30.0;
 
@@ -86,8 +92,8 @@ impl Checker {
         };
         let (lanes, points) =
             (field(&fields, TrajectoryField::Lanes), field(&fields, TrajectoryField::Points));
-        let path = match (lanes, points) {
-            (Some(lanes), None) => self.along_lanes(lanes, &road.map, maps)?,
+        let (path, turns) = match (lanes, points) {
+            (Some(lanes), None) => (self.along_lanes(lanes, &road.map, maps)?, Vec::new()),
             (None, Some(points)) => self.through_points(points, &road.map)?,
             (Some(_), Some(points)) => {
                 let error = Diagnostic::error(code::NOT_HERE, "`lanes` and `points` both say the way");
@@ -107,7 +113,7 @@ impl Checker {
             found.map_or(0.0, |place| road.map.lane(place.lane).height_at(place.station_m))
         });
         let heights_m = heights_m.collect();
-        Some((road.map_path.clone(), Arc::new(Trajectory { path, heights_m })))
+        Some((road.map_path.clone(), Arc::new(Trajectory { path, heights_m, turns })))
     }
 
     /// The expressions of a list of at least two places.
@@ -140,10 +146,23 @@ impl Checker {
         self.long_enough(Path::join(&parts), list.span)
     }
 
-    fn through_points(&mut self, list: &ast::Expr, map: &Arc<RoadMap>) -> Option<Path> {
+    /// The way, and how far one is turned at the stations of its points, if that is said of any.
+    fn through_points(&mut self, list: &ast::Expr, map: &Arc<RoadMap>) -> Option<(Path, Vec<(f64, f64)>)> {
         let items = self.places(list, "points: [{ x: 0 m, y: 3 m }, { x: 40 m, y: 3 m }]")?;
         let points = all_of(items.iter().map(|item| self.point(item, map)))?;
-        self.long_enough(Path::through(&points), list.span)
+        let places: Vec<Vec2> = points.iter().map(|point| point.place).collect();
+        let path = self.long_enough(Path::through(&places), list.span)?;
+        let mut station_m = 0.0;
+        let mut turns = Vec::new();
+        for (nth, point) in points.iter().enumerate() {
+            let step_m = nth.checked_sub(1).map_or(0.0, |before| (point.place - places[before]).norm());
+            station_m += step_m;
+            if step_m > 0.0 || nth == 0 {
+                turns.push((station_m, point.turned_rad));
+            }
+        }
+        turns.retain(|_| points.iter().any(|point| point.turned_rad != 0.0));
+        Some((path, turns))
     }
 
     fn long_enough(&mut self, path: Option<Path>, span: Span) -> Option<Path> {
@@ -154,21 +173,30 @@ impl Checker {
     }
 
     /// A point: a place on a lane, one beside it, or one in the plane.
-    fn point(&mut self, item: &ast::Expr, map: &RoadMap) -> Option<Vec2> {
+    fn point(&mut self, item: &ast::Expr, map: &RoadMap) -> Option<Point> {
         let ast::ExprKind::Record(fields) = &item.kind else {
             let place = self.lane_point(item, map)?;
-            return Some(map.lane(place.lane).centre.position_at(place.station_m));
+            let place = map.lane(place.lane).centre.position_at(place.station_m);
+            return Some(Point { place, turned_rad: 0.0 });
         };
         let fields = self.fields_known::<PointField>(fields);
-        let mut number = |wanted| field(&fields, wanted).map(|value| self.length_m(value));
+        let turned_rad = match field(&fields, PointField::Turned) {
+            Some(value) => self.number_of(value, Dimension::ANGLE)?,
+            None => 0.0,
+        };
+        let mut number =
+            |wanted| field(&fields, wanted).map(|value| self.number_of(value, Dimension::LENGTH));
         let (x, y, offset) = (number(PointField::X), number(PointField::Y), number(PointField::Offset));
         match (field(&fields, PointField::At), x, y) {
             (Some(at), None, None) => {
                 let place = self.lane_point(at, map)?;
                 let pose = map.lane(place.lane).centre.pose_at(place.station_m);
-                Some(pose.offset(0.0, offset.unwrap_or(Some(0.0))?).position)
+                let place = pose.offset(0.0, offset.unwrap_or(Some(0.0))?).position;
+                Some(Point { place, turned_rad })
             }
-            (None, Some(x), Some(y)) if offset.is_none() => Some(Vec2::new(x?, y?)),
+            (None, Some(x), Some(y)) if offset.is_none() => {
+                Some(Point { place: Vec2::new(x?, y?), turned_rad })
+            }
             _ => {
                 let message =
                     "a point is a place on a lane, with an `offset` or without, or an `x` and a `y`";
@@ -180,9 +208,9 @@ impl Checker {
         }
     }
 
-    fn length_m(&mut self, value: &ast::Expr) -> Option<f64> {
-        let length = self.typed(value, &Place::default(), Type::Quantity(Dimension::LENGTH))?;
-        Some(self.fold_number(&length)?.to_f64())
+    fn number_of(&mut self, value: &ast::Expr, dimension: Dimension) -> Option<f64> {
+        let number = self.typed(value, &Place::default(), Type::Quantity(dimension))?;
+        Some(self.fold_number(&number)?.to_f64())
     }
 
     /// Notes the names and numbers of a trajectory, whether its map can be read or not.

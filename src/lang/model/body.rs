@@ -4,7 +4,7 @@
 //! and the bus brake better than FMVSS 121 demands on average (3.8 and 4.2 m/s²). Wheelbases are those of a
 //! typical sedan (2.80 m), Golf, SUV, four-door Wrangler, 16 to 20 ft box truck and American school bus of
 //! type C. The rear overhangs are ours, about 0.6 of what the wheelbase leaves of the length. A motorcycle is one of
-//! 125 to 500 cm³ and a bicycle one of 28 inches, both with their riders.
+//! 125 to 500 cm³ and a bicycle one of 28 inches, both with their riders. The animal is a deer, the object a box of goods; ours.
 
 use crate::model::vocabulary::Body;
 
@@ -96,5 +96,7 @@ pub fn parameters(body: Body) -> BodyParameters {
         Body::Pedestrian => of([0.5, 0.5, 1.75], [0.0, 0.25], 0.075, 1.5, 1.5),
         Body::Motorcycle => of([2.10, 0.80, 1.50], [1.40, 0.35], 0.25, 3.5, 7.0),
         Body::Bicycle => of([1.80, 0.60, 1.75], [1.05, 0.37], 0.090, 1.0, 3.5),
+        Body::Animal => of([1.60, 0.50, 1.20], [0.0, 0.80], 0.080, 4.0, 4.0),
+        Body::Object => of([1.00, 1.00, 0.80], [0.0, 0.50], 0.050, 1.0, 4.0),
     }
 }

@@ -12,11 +12,14 @@ use avastra_base::units::{Dimension, Rational};
 
 use crate::model::vocabulary::{CommandField, LaneChoice, TrafficRule, Turning, Verb, Word};
 
-/// Speeds that an order or a phase may name, m/s. What of it a body does, [`speeds_mps`] says.
-const SPEED_MPS: RangeInclusive<f64> = -ON_FOOT_MPS_MAX..=SPEED_MPS_MAX;
+/// Speeds that an order or a phase may name, m/s. What of it somebody does, [`Moves`] says.
+const SPEED_MPS: RangeInclusive<f64> = -BACK_MPS_MAX..=SPEED_MPS_MAX;
 
 /// Nobody on foot is told to go faster, m/s: below a sprinter's 12 m/s.
 const ON_FOOT_MPS_MAX: f64 = 10.0;
+
+/// Nobody is told to go back faster, m/s.
+const BACK_MPS_MAX: f64 = ON_FOOT_MPS_MAX;
 
 /// What a road user is told: fields of an order. Not everybody can be told all of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -37,21 +40,26 @@ impl Told {
         Told(bits)
     }
 
-    /// These figures, and which of the lane, the rules that are ignored, the siren and the turn.
-    fn all(figures: impl Iterator<Item = CommandField>, words: [bool; 4]) -> Told {
-        const WORDS: [CommandField; 4] =
-            [CommandField::Lane, CommandField::Ignores, CommandField::Siren, CommandField::Turn];
+    /// These figures, and which of the words, in this order.
+    fn all(figures: impl Iterator<Item = CommandField>, words: [bool; 5]) -> Told {
+        const WORDS: [CommandField; 5] = [
+            CommandField::Lane,
+            CommandField::Ignores,
+            CommandField::Siren,
+            CommandField::Turn,
+            CommandField::Continuous,
+        ];
         let words = WORDS.into_iter().zip(words).filter(|(_, says)| *says).map(|(field, _)| field);
         figures.chain(words).fold(Told::NOTHING, |told, field| told.and(Told::of(&[field])))
     }
 
     /// What can be told to who does that.
     pub fn to(verb: Verb) -> Told {
-        use CommandField::{Aside, At, Early, Offset, Rate, Reach, Speed, Steady};
+        use CommandField::{Aside, At, Continuous, Early, Offset, Rate, Reach, Speed, Steady};
         match verb {
-            Verb::Walk | Verb::Stand => Told::of(&[Speed]),
-            Verb::WalkAhead | Verb::WalkOpposite => Told::of(&[Speed, Offset, Aside]),
-            Verb::Follow => Told::of(&[Speed, Rate, Offset, Aside, Early, At, Reach, Steady]),
+            Verb::Walk | Verb::Stand => Told::of(&[Speed, Continuous]),
+            Verb::WalkAhead | Verb::WalkOpposite => Told::of(&[Speed, Continuous, Offset, Aside]),
+            Verb::Follow => Told::of(&[Speed, Rate, Continuous, Offset, Aside, Early, At, Reach, Steady]),
             Verb::DriveAhead | Verb::DriveBehind | Verb::Overtake | Verb::DriveOpposite | Verb::CrossRoad => {
                 Told::BY_DRIVERS
             }
@@ -100,9 +108,42 @@ impl Told {
     }
 }
 
-/// Speeds that somebody can be told, m/s: on foot below 0 for the way back.
-pub fn speeds_mps(on_foot: bool) -> RangeInclusive<f64> {
-    if on_foot { -ON_FOOT_MPS_MAX..=ON_FOOT_MPS_MAX } else { 0.0..=SPEED_MPS_MAX }
+/// How somebody moves, which decides how fast they can be told to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Moves {
+    Drives,
+    /// Below 0 m/s for the way back.
+    Walks,
+    /// Along a trajectory; below 0 m/s backwards.
+    Follows,
+}
+
+impl Moves {
+    fn of(verb: Verb) -> Moves {
+        match verb {
+            Verb::Follow => Moves::Follows,
+            _ if verb.is_on_foot() => Moves::Walks,
+            _ => Moves::Drives,
+        }
+    }
+
+    /// Of somebody who can be told this; who may be one of several has the widest range.
+    pub(crate) fn told(can: Told) -> Moves {
+        match () {
+            () if can.holds(CommandField::Reach) => Moves::Follows,
+            () if can.holds(CommandField::Rate) => Moves::Drives,
+            () => Moves::Walks,
+        }
+    }
+
+    /// m/s.
+    pub fn speeds_mps(self) -> RangeInclusive<f64> {
+        match self {
+            Moves::Drives => 0.0..=SPEED_MPS_MAX,
+            Moves::Walks => -BACK_MPS_MAX..=ON_FOOT_MPS_MAX,
+            Moves::Follows => -BACK_MPS_MAX..=SPEED_MPS_MAX,
+        }
+    }
 }
 
 /// Rates at which a vehicle may be told to change its speed, m/s². The most is more than tyres give.
@@ -133,6 +174,8 @@ pub struct CommandDef {
     pub speed: Option<Expr>,
     /// m/s²; without it the driver goes over to the speed as it would by itself.
     pub rate: Option<Expr>,
+    /// Whether the speed is asked anew at every tick.
+    pub continuous: Option<Expr>,
     pub lane: Option<WordExpr<LaneChoice>>,
     /// m to the left of the middle of its lane.
     pub offset: Option<Expr>,
@@ -160,6 +203,8 @@ pub struct CommandDef {
 pub struct Command {
     pub speed_mps: Option<f64>,
     pub rate_mps2: Option<f64>,
+    /// Whether the speed will be told anew in every tick.
+    pub is_continuous: bool,
     pub lane: Option<LaneChoice>,
     pub offset_m: Option<f64>,
     pub aside_mps: Option<f64>,
@@ -321,8 +366,9 @@ impl CommandDef {
 
     /// What it says.
     pub fn told(&self) -> Told {
-        let CommandDef { lane, ignores, siren, turn, .. } = self;
-        let words = [lane.is_some(), ignores.is_some(), siren.is_some(), turn.is_some()];
+        let CommandDef { lane, ignores, siren, turn, continuous, .. } = self;
+        let words =
+            [lane.is_some(), ignores.is_some(), siren.is_some(), turn.is_some(), continuous.is_some()];
         Told::all(self.figures().map(|figure| figure.field), words)
     }
 
@@ -340,7 +386,8 @@ impl CommandDef {
         let lane = self.lane.iter().filter_map(WordExpr::expr);
         let ignores = self.ignores.iter().flatten().filter_map(WordExpr::expr);
         let turn = self.turn.iter().filter_map(WordExpr::expr);
-        self.figures().map(|figure| figure.expr).chain(lane).chain(ignores).chain(&self.siren).chain(turn)
+        let words = lane.chain(ignores).chain(&self.siren).chain(turn).chain(&self.continuous);
+        self.figures().map(|figure| figure.expr).chain(words)
     }
 
     /// The command with its values. What has no value is NaN.
@@ -352,6 +399,7 @@ impl CommandDef {
             lane: self.lane.as_ref().map(|lane| lane.word(functions, facts)),
             ignores: self.ignores.as_ref().map(ignored),
             siren: self.siren.as_ref().map(|siren| evaluate(siren, functions, facts).truth()),
+            is_continuous: self.continuous.as_ref().is_some_and(|is| evaluate(is, functions, facts).truth()),
             turn: self.turn.as_ref().map(|turn| turn.word(functions, facts)),
             ..Command::default()
         };
@@ -389,17 +437,17 @@ impl Command {
         Some(self)
     }
 
-    /// The same for somebody on foot, or for a vehicle: the nearest speed that it can be told.
-    pub fn for_body(self, on_foot: bool) -> Command {
-        let speeds_mps = speeds_mps(on_foot);
+    /// The same for somebody who moves so: the nearest speed that it can be told.
+    pub fn for_who(self, moves: Moves) -> Command {
+        let speeds_mps = moves.speeds_mps();
         let speed_mps = self.speed_mps.map(|mps| mps.clamp(*speeds_mps.start(), *speeds_mps.end()));
         Command { speed_mps, ..self }
     }
 
     /// Why nobody of that kind can be told this, in words; `None` if they can.
     pub fn impossible(&self, verb: Verb) -> Option<String> {
-        let on_foot = verb.is_on_foot();
-        let is_out = |mps: f64| !speeds_mps(on_foot).contains(&mps);
+        let moves = Moves::of(verb);
+        let is_out = |mps: f64| !moves.speeds_mps().contains(&mps);
         if verb == Verb::Stand {
             return Some("it stands, and does not walk".to_owned());
         }
@@ -407,17 +455,18 @@ impl Command {
             return Some("it is `early` at a place of its trajectory: say where by `reach`".to_owned());
         }
         self.told().lacked_by(verb).or_else(|| match self.speed_mps {
-            Some(mps) if is_out(mps) && on_foot => {
-                Some(format!("nobody on foot is told more than {ON_FOOT_MPS_MAX} m/s"))
-            }
-            Some(mps) if is_out(mps) => Some("it does not drive backwards".to_owned()),
+            Some(mps) if is_out(mps) => Some(match moves {
+                Moves::Drives => "it does not drive backwards".to_owned(),
+                Moves::Walks => format!("nobody on foot is told more than {ON_FOOT_MPS_MAX} m/s"),
+                Moves::Follows => format!("it goes back at {BACK_MPS_MAX} m/s at most"),
+            }),
             Some(_) | None => None,
         })
     }
 
     fn told(&self) -> Told {
-        let Command { lane, ignores, siren, turn, .. } = *self;
-        let words = [lane.is_some(), ignores.is_some(), siren.is_some(), turn.is_some()];
+        let Command { lane, ignores, siren, turn, is_continuous, .. } = *self;
+        let words = [lane.is_some(), ignores.is_some(), siren.is_some(), turn.is_some(), is_continuous];
         let mut command = *self;
         let says = |figure: &Figure| (figure.value)(&mut command).is_some();
         Told::all(FIGURES.into_iter().filter(says).map(|figure| figure.field), words)

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::model::body::BodyParameters;
-use crate::model::command::{CommandDef, Told};
+use crate::model::command::{CommandDef, Moves, Told};
 use crate::model::eval::{Facts, evaluate};
 use crate::model::expr::{Expr, Who};
 use crate::model::interval::Interval;
@@ -142,6 +142,8 @@ pub struct Trajectory {
     pub path: Path,
     /// Height of the road at each vertex of the path, m.
     pub heights_m: Vec<f64>,
+    /// How far one is turned to the left of the way at some stations, m and rad; empty if nowhere.
+    pub turns: Vec<(f64, f64)>,
 }
 
 impl Trajectory {
@@ -150,6 +152,18 @@ impl Trajectory {
         let (segment, part) = self.path.locate(station_m);
         let (from_m, to_m) = (self.heights_m[segment], self.heights_m[segment + 1]);
         from_m + (to_m - from_m) * part
+    }
+
+    /// How far one is turned to the left of the way at a station, rad.
+    pub fn turned_rad(&self, station_m: f64) -> f64 {
+        let next = self.turns.partition_point(|(at_m, _)| *at_m < station_m);
+        match (next.checked_sub(1).and_then(|before| self.turns.get(before)), self.turns.get(next)) {
+            (Some((from_m, from_rad)), Some((to_m, to_rad))) => {
+                from_rad + (to_rad - from_rad) * (station_m - from_m) / (to_m - from_m)
+            }
+            (Some((_, turn_rad)), None) | (None, Some((_, turn_rad))) => *turn_rad,
+            (None, None) => 0.0,
+        }
     }
 }
 
@@ -460,8 +474,8 @@ pub struct OrderDef {
     /// Empty for an order of a manoeuvre alone.
     pub command: CommandDef,
     pub manoeuvre: Option<ManoeuvreCall>,
-    /// Whether one that does more than walk may bear the name.
-    pub may_drive: bool,
+    /// How who bears the name moves; of several the one with the most speeds.
+    pub moves: Moves,
     pub span: Span,
 }
 
@@ -599,6 +613,8 @@ pub struct Road {
     pub ego_mps: f64,
     /// The speed that it wants on a free road, m/s; `None`: its driver's own.
     pub set_mps: Option<f64>,
+    /// When in the signals' cycle an episode begins, s; `None`: by chance.
+    pub signal_phase_s: Option<f64>,
     /// For each trajectory of the space its course; `None` for one that lies on another map.
     pub trajectories: Vec<Option<Arc<Trajectory>>>,
     pub facts: RoadFacts,

@@ -434,6 +434,7 @@ words! {
     BusLanes "bus_lanes" = "Lanes that only buses use, each by a place on it: `bus_lanes: [lane 3/4 at 10 m]`.",
     EgoSpeed "ego_speed" = "How fast the ego vehicle is as an episode begins: `ego_speed: 60 km/h`.",
     SetSpeed "set_speed" = "How fast the ego vehicle wants to drive where it is free to: `set_speed: 130 km/h`.",
+    SignalPhase "signal_phase" = "When in their cycle the lights are as an episode begins: `signal_phase: 12 s`; by chance without it.",
     Unlit "unlit" = "Whether to drive through junctions whose lights hold no lane, as if they had none: `unlit: true`.",
 }
 
@@ -450,6 +451,7 @@ words! {
     Offset "offset" = "How far to the left of the middle of that lane; negative to the right.",
     X "x" = "Where it is on the map, with `y`: `{ x: 12 m, y: -3.5 m }`.",
     Y "y" = "Where it is on the map, with `x`.",
+    Turned "turned" = "How far who comes there is turned to the left of the way, as in a skid; in between it changes evenly.",
 }
 
 words! {
@@ -484,6 +486,7 @@ words! {
     CommandField "A field of `order` and of a phase of a manoeuvre.":
     Speed "speed" = "The speed that the road user goes over to.",
     Rate "rate" = "How fast it gains or loses speed for that, as far as its body and the road allow.",
+    Continuous "continuous" = "Whether the `speed` of a phase is asked anew at every tick, until another one is told: `continuous: true`.",
     Lane "lane" = "The lane that it changes to, seen from the ego vehicle: `Left`, `Current` or `Right`.",
     Offset "offset" = "How far to the left of its lane's middle it drives from then on; negative to the right.",
     Aside "aside" = "Its greatest speed to the side on the way there, as far as the road allows.",
@@ -575,12 +578,14 @@ words! {
 words! {
     Body "The body of a road user.": Jeep, Sedan, SUV, Hatchback, BoxTruck, SchoolBus, Pedestrian, Motorcycle,
     Bicycle = "It rides on the road, as a vehicle does.",
+    Animal = "It is on foot, as a pedestrian is.",
+    Object = "A thing on the road: it stands, or follows a trajectory.",
 }
 
 words! {
     BodyClass "Bodies of road users together, where they are compared or listed.":
     RoadUser "RoadUser" = "All of them.",
-    Vehicle "Vehicle" = "All but `Pedestrian`.",
+    Vehicle "Vehicle" = "All but `Pedestrian`, `Animal` and `Object`.",
     MotorVehicle "MotorVehicle" = "All vehicles but `Bicycle`.",
     TwoWheeler "TwoWheeler" = "`Motorcycle` and `Bicycle`.",
 }
@@ -589,8 +594,8 @@ impl BodyClass {
     pub fn holds(self, body: Body) -> bool {
         match self {
             BodyClass::RoadUser => true,
-            BodyClass::Vehicle => body.is_vehicle(),
-            BodyClass::MotorVehicle => body.is_vehicle() && body != Body::Bicycle,
+            BodyClass::Vehicle => body.is_vehicle() && body != Body::Object,
+            BodyClass::MotorVehicle => body.is_vehicle() && !matches!(body, Body::Bicycle | Body::Object),
             BodyClass::TwoWheeler => body.has_two_wheels(),
         }
     }
@@ -608,7 +613,7 @@ words! {
     DriveOpposite = "Comes towards the ego vehicle in an opposing lane.",
     CrossRoad = "Crosses the ego vehicle's way at a junction.",
     Walk = "A pedestrian who crosses the road on foot.",
-    Stand = "A pedestrian who stands in the lane.",
+    Stand = "Somebody on foot, or an object, that stands in the lane.",
     WalkAhead = "A pedestrian who walks along the road in the ego vehicle's direction.",
     WalkOpposite = "A pedestrian who walks along the road towards the ego vehicle.",
     DriveBehind = "Drives behind the ego vehicle in the same direction.",
@@ -727,13 +732,14 @@ words! {
 }
 
 words! {
-    TrafficRule "A rule of the road that a vehicle ignores.":
+    TrafficRule "What a vehicle ignores, or drives without.":
     Signals "Signals" = "It stops neither at red lights nor at stop signs.",
     RightOfWay "RightOfWay" = "It waits for nobody at junctions.",
     Ego "Ego" = "It follows and changes lanes as if the ego vehicle were not there.",
     Others "Others" = "It follows and changes lanes as if nobody but the ego vehicle were there.",
     BusLanes "BusLanes" = "It drives in bus lanes though it is no bus.",
     Headlights "Headlights" = "It drives without lights from dusk to dawn.",
+    Brakes "Brakes" = "Its brakes have failed: it only rolls out.",
 }
 
 words! {
@@ -782,9 +788,18 @@ impl Level {
 }
 
 impl Body {
-    /// Everything on wheels.
+    /// Everything that is not on foot. An object counts as a vehicle that stands, except where authors name classes.
     pub fn is_vehicle(self) -> bool {
-        self != Body::Pedestrian
+        !matches!(self, Body::Pedestrian | Body::Animal)
+    }
+
+    /// Whether a road user of this body can do that.
+    pub fn can(self, verb: Verb) -> bool {
+        match (self, verb) {
+            (_, Verb::Follow) | (Body::Object, Verb::Stand) => true,
+            (Body::Object, _) => false,
+            _ => verb.is_on_foot() != self.is_vehicle(),
+        }
     }
 
     pub fn has_two_wheels(self) -> bool {

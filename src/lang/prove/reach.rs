@@ -17,7 +17,7 @@ use crate::model::{
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::prove::moment::{Case, may_hold_together, newcomers, ranges_named};
 use crate::prove::{distinct, product, rule_names};
-use crate::syntax::Diagnostic;
+use crate::syntax::{Diagnostic, listed};
 use avastra_base::units::{Unit, unit_as_written};
 
 /// Each row allows all proofs together this many more steps for each road, counting up to `ROADS_MAX` roads. A row under a
@@ -537,27 +537,48 @@ fn any_road(space: &Space) -> String {
 /// More roads on which an action is masked are told in one remark.
 const REMARKS_MAX: usize = 4;
 
-/// One remark for each road on which some rows of an action are masked, which run on others; one for all of many roads.
+/// Rows that are masked on some roads for one reason.
+struct Masked<'a> {
+    rows: Vec<&'a Row>,
+    rules: &'a [usize],
+    reason: &'a str,
+    roads: Vec<&'a str>,
+}
+
+/// One remark for the roads on which the same rows of an action are masked by the same rules, and which run on others; one for
+/// all of many roads.
 fn report_masked(space: &Space, action: &ActionDef, left: &[&Row]) -> Vec<Diagnostic> {
-    let mut diagnostics: Vec<Diagnostic> = Vec::new();
+    let mut found: Vec<Masked> = Vec::new();
     for (index, road) in space.roads.iter().enumerate() {
         let is_masked = |row: &&Row| matches!(row.roads[index], Reach::Dead { .. });
-        let masked: Vec<&Row> = left.iter().copied().filter(is_masked).collect();
-        let Some(Reach::Dead { rules, reason }) = masked.first().map(|row| &row.roads[index]) else {
+        let rows: Vec<&Row> = left.iter().copied().filter(is_masked).collect();
+        let Some(Reach::Dead { rules, reason }) = rows.first().map(|row| &row.roads[index]) else {
             continue;
         };
-        let by = rule_names(space, rules);
-        let message = format!("`{}` is masked on `{}` by {by}", action.name, road.name);
-        let remark = Diagnostic::remark(code::MASKED, message).at(action.span, numbers(&masked));
-        diagnostics.push(remark.note(reason.clone()));
+        let numbers_of = |rows: &[&Row]| rows.iter().map(|row| row.index).collect::<Vec<_>>();
+        let alike =
+            found.iter_mut().find(|one| one.rules == *rules && numbers_of(&one.rows) == numbers_of(&rows));
+        match alike {
+            Some(one) => one.roads.push(&road.name),
+            None => found.push(Masked { rows, rules, reason, roads: vec![&road.name] }),
+        }
     }
-    if diagnostics.len() <= REMARKS_MAX {
-        return diagnostics;
+    let on: usize = found.iter().map(|one| one.roads.len()).sum();
+    let of = space.roads.len();
+    let said = |roads: &[&str], rules: &[usize]| {
+        format!("`{}` is masked on {} by {}", action.name, listed(roads), rule_names(space, rules))
+    };
+    if on <= REMARKS_MAX {
+        let remark = |Masked { rows, rules, reason, roads }: Masked| {
+            let also =
+                if roads.len() > 1 { format!("on `{}`: {reason}", roads[0]) } else { reason.to_owned() };
+            Diagnostic::remark(code::MASKED, said(&roads, rules)).at(action.span, numbers(&rows)).note(also)
+        };
+        return found.into_iter().map(remark).collect();
     }
-    let (on, of) = (diagnostics.len(), space.roads.len());
     let message =
         format!("rows of `{}` are masked on {on} of the {of} roads, and run on another", action.name);
-    let first = diagnostics.swap_remove(0).message;
+    let first = said(&found[0].roads[..1], found[0].rules);
     let is_masked = |row: &&Row| row.roads.iter().any(|reach| matches!(reach, Reach::Dead { .. }));
     let masked: Vec<&Row> = left.iter().copied().filter(is_masked).collect();
     let remark = Diagnostic::remark(code::MASKED, message).at(action.span, numbers(&masked));

@@ -3,7 +3,7 @@
 use core::ops::RangeInclusive;
 use std::collections::BTreeSet;
 
-use crate::model::command::{OFFSET_M, speeds_mps};
+use crate::model::command::OFFSET_M;
 use crate::model::expr::ExprKind;
 use crate::model::vocabulary::{CommandField, Word};
 use crate::model::{
@@ -79,7 +79,7 @@ fn errors(space: &Space, action: usize) -> impl Iterator<Item = Diagnostic> {
     let of_orders = space.actions[action].orders().flat_map(|order| {
         order.command.figures().map(|figure| {
             let bounds = match figure.field {
-                CommandField::Speed => speeds_mps(!order.may_drive),
+                CommandField::Speed => order.moves.speeds_mps(),
                 _ => figure.bounds,
             };
             (figure.field.name(), "an order", figure.unit, figure.expr, bounds)

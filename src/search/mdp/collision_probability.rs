@@ -173,7 +173,7 @@ fn same_lane_safety_m(world: &World, obstacle: &Obstacle, ahead: bool) -> f64 {
 
 fn decel_mps2(obstacle: &Obstacle) -> f64 {
     match obstacle.body {
-        Body::Pedestrian => PEDESTRIAN_DECEL_MPS2,
+        Body::Pedestrian | Body::Animal => PEDESTRIAN_DECEL_MPS2,
         _ => VEHICLE_DECEL_MPS2,
     }
 }

@@ -7,7 +7,6 @@
 //! package: obstacles that have been hit already are left out, as in our own ProC.
 
 use avastra_base::geometry::Vec2;
-use avastra_lang::model::vocabulary::Body;
 use avastra_world::sim::World;
 
 use super::collision_probability::{Danger, Most, probability};
@@ -39,7 +38,7 @@ pub fn released_probability(world: &World, is_hit: &dyn Fn(u32) -> bool) -> Dang
         } else {
             obstacle.velocity_mps
         };
-        let decel_mps2 = if obstacle.body == Body::Pedestrian { PEDESTRIAN_DECEL_MPS2 } else { DECEL_MPS2 };
+        let decel_mps2 = if obstacle.body.is_vehicle() { DECEL_MPS2 } else { PEDESTRIAN_DECEL_MPS2 };
         let apart = obstacle.outline.pose.position - ego.position;
         let slopes = (slope(velocity), slope(other));
         if is_same_lane(slopes, slope(apart)) {

@@ -14,7 +14,7 @@ use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 use avastra_lang::model::AMBIENT_MAX;
 use avastra_lang::model::command::IgnoredRules;
-use avastra_lang::model::vocabulary::{Body, Colour, Verb, Word};
+use avastra_lang::model::vocabulary::{Body, BodyClass, Colour, Verb, Word};
 
 use super::around::Around;
 use super::body;
@@ -88,7 +88,8 @@ pub(super) fn is_gone(obstacle: &Obstacle, ego: &OrientedBox, range_m: f64) -> b
 /// A vehicle somewhere on a street, if it may appear there.
 fn draw(around: &Around, nearest_m: f64, id: u32, rng: &mut Rng) -> Option<RoadUser> {
     let (lane, station_m) = around.scene.street_at(rng::unit(rng))?;
-    let bodies = || Body::ALL.iter().filter(|body| body.is_vehicle() && !body.has_two_wheels());
+    let bodies =
+        || Body::ALL.iter().filter(|body| BodyClass::Vehicle.holds(**body) && !body.has_two_wheels());
     let body = *bodies().nth(rng::below(rng, bodies().count() as u32) as usize)?;
     if !may_use(around, lane, body, IgnoredRules::default()) {
         return None;

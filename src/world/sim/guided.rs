@@ -195,9 +195,10 @@ impl Guided {
         self.meeting.is_none()
     }
 
-    /// Whether its way is at its end.
+    /// Whether its way is at its end, or backwards at its beginning.
     pub fn is_over(&self) -> bool {
-        self.station_m >= self.way.path.length_m()
+        let end_m = if self.speed_mps.min(self.wants_mps) < 0.0 { 0.0 } else { self.way.path.length_m() };
+        self.station_m == end_m
     }
 
     /// Height of the road where it is, m.
@@ -240,7 +241,7 @@ impl Guided {
         }
         let left_m = self.left_m;
         // A vehicle that stands moves no farther to the side.
-        let may_shift = self.station_m > before_m || self.turns_on_the_spot();
+        let may_shift = self.station_m != before_m || self.turns_on_the_spot();
         if let Some(shift) = self.shift.as_mut().filter(|_| may_shift) {
             shift.since_s += DT_S;
             let part = shift.since_s / shift.takes_s;
@@ -256,16 +257,22 @@ impl Guided {
     /// Where it is, after a tick in which it has gone so far along its way and to the left, m.
     fn moved(&self, along_m: f64, left_m: f64) -> Moved {
         let way = self.way.path.pose_at(self.station_m);
-        // A vehicle looks where it goes.
-        let askew_rad = if left_m == 0.0 { 0.0 } else { libm::atan2(left_m, along_m.max(f64::MIN_POSITIVE)) };
-        let heading_rad = wrap_angle(way.heading_rad + askew_rad);
+        // A vehicle looks where it goes, or where it comes from.
+        let back = if along_m < 0.0 { -1.0 } else { 1.0 };
+        let askew_rad = match left_m == 0.0 {
+            true => 0.0,
+            false => libm::atan2(back * left_m, (back * along_m).max(f64::MIN_POSITIVE)),
+        };
+        let course_rad = wrap_angle(way.heading_rad + askew_rad);
+        // In a skid it does not look where it goes.
+        let heading_rad = wrap_angle(course_rad + self.way.turned_rad(self.station_m));
         let forward = unit_vector(heading_rad);
         let position = way.offset(0.0, self.left_m).position + forward * self.to_middle_m;
         Moved {
             pose: Pose { position, heading_rad },
             forward,
             lane_heading_rad: way.heading_rad,
-            velocity_mps: forward * self.speed_mps,
+            velocity_mps: unit_vector(course_rad) * self.speed_mps,
         }
     }
 

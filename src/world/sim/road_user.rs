@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::action::{Course, LaterMoment};
 use avastra_base::geometry::{OrientedBox, Pose, Sweep, Vec2, distance_m, unit_vector};
 use avastra_base::kinematics::GRAVITY_MPS2;
-use avastra_lang::model::command::Command;
+use avastra_lang::model::command::{Command, Moves};
 use avastra_lang::model::vocabulary::{Body, Colour, TrafficRule, Verb};
 use avastra_road::is_apart;
 
@@ -116,6 +116,16 @@ pub(super) struct Running {
     stage: Stage,
     /// Tick at which the stage began.
     since: u64,
+    tracked: Option<Tracked>,
+}
+
+/// A phase whose speed is told anew in every tick, until another one is told.
+#[derive(Debug, Clone)]
+struct Tracked {
+    course: Arc<Course>,
+    phase: usize,
+    /// What it told first.
+    first: Command,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -126,6 +136,8 @@ enum Stage {
     Holding(u64),
     /// Until the road user has done what it was told.
     UnderWay(Command),
+    /// No phase is left; a speed is still tracked.
+    Over,
 }
 
 /// How far a road user is with what it was told.
@@ -139,7 +151,7 @@ pub(super) struct Progress {
     pub has_turned: bool,
     /// Whether it is beside the ego vehicle as it was told, or was.
     pub has_met: bool,
-    pub on_foot: bool,
+    pub moves: Moves,
     /// Whether it is where its walk ends, this way or back: no speed would get it farther.
     pub is_over: bool,
 }
@@ -149,8 +161,9 @@ impl Progress {
     pub fn meets(&self, command: &Command) -> bool {
         let speed_mps = command.speed_mps.filter(|_| !command.pursues());
         // Who stands as told moves no farther to the side.
-        let stands = !self.on_foot && speed_mps == Some(0.0) && self.speed_mps == 0.0;
-        speed_mps.is_none_or(|mps| self.is_over || has_speed(self.speed_mps, mps))
+        let stands = self.moves != Moves::Walks && speed_mps == Some(0.0) && self.speed_mps == 0.0;
+        !command.is_continuous
+            && speed_mps.is_none_or(|mps| self.is_over || has_speed(self.speed_mps, mps))
             && (self.has_met || !command.pursues())
             && (self.is_aside || stands || !command.goes_aside())
             && (self.has_turned || command.turn.is_none())
@@ -172,7 +185,7 @@ pub(super) struct Advance {
 
 impl Running {
     pub fn new(course: Arc<Course>, tick: u64) -> Running {
-        Running { course, phase: 0, stage: Stage::Waiting(None), since: tick }
+        Running { course, phase: 0, stage: Stage::Waiting(None), since: tick, tracked: None }
     }
 
     /// The phase that is under way: its manoeuvre, by its index in the space, its number from 1, and the tick in which it
@@ -187,9 +200,23 @@ impl Running {
         self.course.phases() as u32
     }
 
+    /// What the continuous speed of a phase tells now, at the rate with which that began; `None` if there is none, or it has no value
+    /// now.
+    pub fn tracked(&self, moment: &LaterMoment, moves: Moves) -> Option<Command> {
+        let Tracked { course, phase, first } = self.tracked.as_ref()?;
+        let now = course.command(*phase, moment)?.for_who(moves);
+        let (speed_mps, rate_mps2) = (now.speed_mps, first.rate_mps2);
+        Some(Command { speed_mps, rate_mps2, is_continuous: true, ..Command::default() })
+    }
+
     /// The names of road users that its phases ask about.
     pub fn bearers(&self) -> Vec<usize> {
-        self.course.bearers()
+        let tracked = self.tracked.iter().filter(|tracked| !Arc::ptr_eq(&tracked.course, &self.course));
+        self.course
+            .bearers()
+            .into_iter()
+            .chain(tracked.flat_map(|tracked| tracked.course.bearers()))
+            .collect()
     }
 
     /// Advances by one tick. `progress`: how far the road user is with what it was told.
@@ -225,10 +252,15 @@ impl Running {
                         return stays(None, None, begun, ended);
                     };
                     begun += 1;
-                    let command = command.for_body(progress.on_foot);
+                    let command = command.for_who(progress.moves);
+                    if command.speed_mps.is_some() || command.pursues() {
+                        let course = Arc::clone(&self.course);
+                        let tracked = Tracked { course, phase: self.phase, first: command };
+                        self.tracked = command.is_continuous.then_some(tracked);
+                    }
                     if let Some(next) = self.course.next(self.phase, moment) {
-                        let rest = Some(Running::new(Arc::new(next), tick));
-                        let command = Some(command);
+                        let rest = Running { tracked: self.tracked, ..Running::new(Arc::new(next), tick) };
+                        let (rest, command) = (Some(rest), Some(command));
                         return Advance { hands_over: true, ..stays(rest, command, begun, ended + 1) };
                     }
                     (self.stage, self.since) = (Stage::UnderWay(command), tick);
@@ -239,10 +271,12 @@ impl Running {
                 {
                     ended += 1;
                     if !self.goes_on(tick) {
-                        return stays(None, None, begun, ended);
+                        self.stage = Stage::Over;
+                        let rest = self.tracked.is_some().then_some(self);
+                        return stays(rest, None, begun, ended);
                     }
                 }
-                Stage::Holding(_) | Stage::UnderWay(_) => {
+                Stage::Over | Stage::Holding(_) | Stage::UnderWay(_) => {
                     return stays(Some(self), None, begun, ended);
                 }
             }
@@ -270,6 +304,7 @@ impl Running {
         match self.stage {
             Stage::Waiting(held) => trace.words([0, held.map_or(0, |tick| tick + 1)]),
             Stage::Holding(until) => trace.words([1, until]),
+            Stage::Over => trace.word(3),
             Stage::UnderWay(command) => {
                 trace.words([2, command.speed_mps.map_or(u64::MAX, f64::to_bits)]);
                 if command.goes_aside() {
@@ -284,6 +319,7 @@ impl Running {
             }
         }
         trace.words(self.course.arguments());
+        trace.words(self.tracked.as_ref().map(|tracked| tracked.phase as u64));
     }
 }
 
@@ -311,14 +347,21 @@ impl Motion {
             is_aside,
             has_turned: true,
             has_met: true,
-            on_foot: true,
+            moves: Moves::Walks,
             is_over,
         };
         match self {
             Motion::Drive(driver) => {
                 let (is_aside, has_turned) = (driver.is_aside_as_told(), driver.has_turned());
                 let (speed_mps, has_met) = (driver.speed_mps, driver.has_met());
-                Some(Progress { speed_mps, is_aside, has_turned, has_met, on_foot: false, is_over: false })
+                Some(Progress {
+                    speed_mps,
+                    is_aside,
+                    has_turned,
+                    has_met,
+                    moves: Moves::Drives,
+                    is_over: false,
+                })
             }
             Motion::Walk(walker) => {
                 let (speed_mps, is_over) = (walker.pace_mps(), walker.is_over());
@@ -334,7 +377,7 @@ impl Motion {
                 is_aside: guided.is_aside(),
                 has_turned: true,
                 has_met: guided.has_met(),
-                on_foot: false,
+                moves: Moves::Follows,
                 is_over: guided.is_over(),
             }),
             Motion::Stand => None,

@@ -16,7 +16,7 @@ use avastra_base::rng;
 use avastra_base::rng::Stream;
 use avastra_lang::model::body::BodyParameters;
 use avastra_lang::model::command::Command;
-use avastra_lang::model::vocabulary::{Level, TimeOfDay, TrafficRule};
+use avastra_lang::model::vocabulary::{Body, Level, TimeOfDay, TrafficRule};
 use avastra_lang::model::{COMMANDED_MAX, Memory, NpcFacts, Road, Space, TICK_MS};
 use avastra_road::{RouteLaneChange, is_apart};
 
@@ -101,7 +101,7 @@ impl Start {
             ego_mps: road.ego_mps,
             time,
             sky,
-            signal_phase_s,
+            signal_phase_s: road.signal_phase_s.unwrap_or(signal_phase_s),
             seed,
             reactions: 0,
             ambient: 0,
@@ -309,6 +309,11 @@ impl World {
         self.users.iter().any(|user| user.obstacle.id == id && user.mover.ignores(rule))
     }
 
+    /// Whether the road user with an id is an emergency vehicle under way.
+    pub fn has_siren(&self, id: u32) -> bool {
+        self.users.iter().any(|user| user.obstacle.id == id && user.mover.has_siren())
+    }
+
     /// How far the road user with an id is with its manoeuvre; 0 if it is not there.
     pub fn phases(&self, id: u32) -> PhaseCount {
         let user = self.users.iter().find(|user| user.obstacle.id == id);
@@ -366,7 +371,12 @@ impl World {
 
     /// Colour of a signal now, by index in `RoadMap::signals`.
     pub fn signal(&self, signal: usize) -> SignalColour {
-        self.signals.colour(&self.scene.map, signal, self.ticks)
+        self.signal_at(signal, self.ticks)
+    }
+
+    /// Colour of a signal at a tick.
+    pub fn signal_at(&self, signal: usize, tick: u64) -> SignalColour {
+        self.signals.colour(&self.scene.map, signal, tick)
     }
 
     /// What the sensors see now, in buffers of its own.
@@ -408,7 +418,7 @@ impl World {
                 height_m: mover.size.height_m,
                 visible_fraction: mover.visible_fraction,
                 distance_m: obstacle.distance_m,
-                is_unlit: mover.is_unlit(),
+                is_unlit: mover.is_unlit() || obstacle.body == Body::Object,
                 has_siren: mover.has_siren(),
             });
         }

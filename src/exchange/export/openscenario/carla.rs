@@ -12,7 +12,7 @@ use avastra_lang::model::vocabulary::{Body, Level};
 use super::super::recording::Recording;
 use super::super::xml::Element;
 use super::actions::private;
-use super::entity::{bounding_box, build, vehicle_category};
+use super::entity::{bounding_box, build, vehicle_category, without_wheels};
 use super::environment::{sun, time};
 use super::{BENEATH_M, natural, property};
 
@@ -51,12 +51,8 @@ pub fn entity(recording: &Recording, actor: &Actor) -> Element {
     let kind = if actor.id == 0 { "ego_vehicle" } else { "simulation" };
     let properties = Element::new("Properties").holding(property("type", kind));
     let Some(category) = vehicle_category(actor.body) else {
-        let pedestrian = Element::new("Pedestrian")
-            .with("name", actor.name())
-            .with("model", model)
-            .with("pedestrianCategory", "pedestrian")
-            .measured("mass", actor.shape.mass_t * 1000.0);
-        return object.holding(pedestrian.holding(bounding_box(actor)).holding(properties));
+        let other = without_wheels(actor, model).with("model", model);
+        return object.holding(other.holding(bounding_box(actor)).holding(properties));
     };
     let facts = recording.facts.iter().cloned().chain([natural::caveat(&[])]);
     let facts = facts.filter(|_| actor.id == 0).map(|(name, value)| property(&name, &value));
@@ -118,5 +114,8 @@ fn model(actor: &Actor) -> (&'static str, &'static str) {
         Body::Motorcycle => ("vehicle.yamaha.yzf", "Motorcycle: yamaha.yzf"),
         Body::Bicycle => ("vehicle.bh.crossbike", "Bicycle: bh.crossbike"),
         Body::Pedestrian => ("walker.pedestrian.0001", "Pedestrian: walker 0001"),
+        // CARLA has no animals.
+        Body::Animal => ("walker.pedestrian.0001", "Animal: walker 0001"),
+        Body::Object => ("static.prop.box01", "Object: box01"),
     }
 }

@@ -25,13 +25,8 @@ pub fn entity(actor: &Actor, ego: Ego) -> Element {
     let name = actor.name();
     let entity = Element::new("ScenarioObject").with("name", &name);
     let Some(category) = vehicle_category(actor.body) else {
-        let pedestrian = Element::new("Pedestrian")
-            .with("name", &name)
-            .with("pedestrianCategory", "pedestrian")
-            .measured("mass", actor.shape.mass_t * 1000.0)
-            .holding(bounding_box(actor))
-            .holding(properties());
-        return entity.holding(pedestrian);
+        let other = without_wheels(actor, &name);
+        return entity.holding(other.holding(bounding_box(actor)).holding(properties()));
     };
     let vehicle = Element::new("Vehicle")
         .with("name", &name)
@@ -85,7 +80,19 @@ pub fn bounding_box(actor: &Actor) -> Element {
     Element::new("BoundingBox").holding(centre).holding(dimensions)
 }
 
-/// `None` for a pedestrian.
+/// Who is on foot, or a thing, without its outline and properties.
+pub fn without_wheels(actor: &Actor, name: &str) -> Element {
+    let element = match actor.body {
+        Body::Object => Element::new("MiscObject").with("name", name).with("miscObjectCategory", "obstacle"),
+        body => {
+            let category = if body == Body::Animal { "animal" } else { "pedestrian" };
+            Element::new("Pedestrian").with("name", name).with("pedestrianCategory", category)
+        }
+    };
+    element.measured("mass", actor.shape.mass_t * 1000.0)
+}
+
+/// `None` for who is on foot, and for things.
 pub fn vehicle_category(body: Body) -> Option<&'static str> {
     match body {
         Body::Jeep | Body::Sedan | Body::SUV | Body::Hatchback => Some("car"),
@@ -93,6 +100,6 @@ pub fn vehicle_category(body: Body) -> Option<&'static str> {
         Body::SchoolBus => Some("bus"),
         Body::Motorcycle => Some("motorbike"),
         Body::Bicycle => Some("bicycle"),
-        Body::Pedestrian => None,
+        Body::Pedestrian | Body::Animal | Body::Object => None,
     }
 }

@@ -32,6 +32,8 @@ use super::manners::GIVE_UP_S;
 use super::pursuit::Pursuit;
 use super::turn::MeantTurn;
 
+/// What slows down a vehicle without brakes, m/s²: the engine's drag. Ours.
+const DRAG_MPS2: f64 = 0.5;
 /// IDM: comfortable deceleration, m/s². Ours.
 pub(super) const COMFORT_MPS2: f64 = 2.0;
 /// IDM: gap at standstill, m: that of its authors.
@@ -188,7 +190,9 @@ impl Driver {
         let acceleration_mps2 = if touched {
             -braking_mps2
         } else {
-            self.wanted_mps2(view, braking_mps2).clamp(-braking_mps2, size.acceleration_mps2_max)
+            let brakes = !self.ignores.contains(TrafficRule::Brakes);
+            let most_mps2 = if brakes { braking_mps2 } else { DRAG_MPS2 };
+            self.wanted_mps2(view, braking_mps2).clamp(-most_mps2, size.acceleration_mps2_max)
         };
         let speed_mps = (self.speed_mps + acceleration_mps2 * DT_S).max(0.0);
         let way_m = (self.speed_mps + speed_mps) / 2.0 * DT_S;

@@ -113,13 +113,10 @@ fn check(request: &SpawnRequest) -> Result<(), String> {
     if request.cover.is_some_and(|cover| !cover.is_vehicle() || request.verb != Verb::Walk) {
         return Err("only a pedestrian who walks comes from behind a vehicle".into());
     }
-    if request.verb == Verb::Follow {
-        return Ok(());
-    }
-    match (request.verb.is_on_foot(), request.body.is_vehicle()) {
-        (true, true) => Err("only a pedestrian walks".into()),
-        (false, false) => Err("a pedestrian does not drive".into()),
-        (true, false) | (false, true) => Ok(()),
+    match request.verb.is_on_foot() {
+        _ if request.body.can(request.verb) => Ok(()),
+        true => Err("only a pedestrian walks".into()),
+        false => Err("a pedestrian does not drive".into()),
     }
 }
 

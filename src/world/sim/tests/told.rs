@@ -209,7 +209,7 @@ fn who_follows_a_trajectory_is_at_a_place_of_it_when_the_ego_vehicle_is_at_one_o
     let path = Path::through(&[from, to]).expect("a way");
     let heights_m = vec![0.0; path.points().len()];
     let mut scene = Scene::new(Arc::clone(&plain.map), plain.route.clone());
-    scene.trajectories = vec![Some(Arc::new(Trajectory { path, heights_m }))];
+    scene.trajectories = vec![Some(Arc::new(Trajectory { path, heights_m, turns: Vec::new() }))];
     let scene = Arc::new(scene);
     for (speed_mps, reach_m, steady_m) in [(2.0, 6.0, 3.0), (8.0, 9.0, 1.0), (1.0, 4.0, 0.0)] {
         let mut world = World::new(Arc::clone(&scene), &Start { ego_mps: 10.0, ..testing::start() });

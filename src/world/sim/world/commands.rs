@@ -170,6 +170,8 @@ impl World {
             if let Some(next) = rest.as_ref().filter(|_| hands_over) {
                 mover.phases.all = mover.phases.begun + next.phases();
             }
+            let tracked = || rest.as_ref()?.tracked(&moment, progress.moves);
+            let command = command.or_else(tracked);
             mover.course = rest;
             if let Some(command) = command {
                 mover.motion.order(&command, self.ticks);

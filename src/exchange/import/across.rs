@@ -1,0 +1,158 @@
+//! Places across the road: other lanes, offsets in them, and how fast somebody moves there.
+
+use avastra_base::geometry::{SMOOTH_STEP_SLOPE_MAX, wrap_angle};
+use avastra_lang::model::command::OFFSET_M;
+use avastra_road::{LanePlace, Side};
+
+use super::action::{Dynamics, Over, Target};
+use super::phases::{Told, instead_of};
+use super::said::Said;
+use super::scene::{Cast, Moving};
+use super::source::{Mark, Source};
+
+/// The fastest that somebody is told to move aside, m/s.
+const ASIDE_MPS_MAX: f64 = 10.0;
+
+impl<'a> Cast<'a> {
+    /// A way to the left in the road's direction as one to the left of somebody in a lane of it, on its way.
+    pub fn left_m(&self, moving: &Moving, told: &Told, left_m: f64) -> f64 {
+        let Some(place) = told.lane else { return left_m };
+        let lane = self.map.lane(place.lane);
+        let turned_rad =
+            wrap_angle(moving.path.heading_at(moving.at_m) - lane.centre.heading_at(place.station_m));
+        let goes_with_lane = turned_rad.abs() < core::f64::consts::FRAC_PI_2;
+        if goes_with_lane == lane.is_along() { left_m } else { -left_m }
+    }
+
+    /// Where on its way, across, somebody is so much to the left of another one: as both begin, and as both are then.
+    pub fn beside(
+        &self,
+        source: &mut Source,
+        moving: &Moving,
+        mark: &Mark,
+        name: &str,
+        more_m: f64,
+        told: &Told,
+    ) -> Option<(f64, Said)> {
+        let other = self.begins(source, mark, name)?;
+        let own = moving.placed.pose;
+        let along = self.route.path.project(own.position);
+        let turned_rad = wrap_angle(own.heading_rad - self.route.path.heading_at(along.station_m));
+        let reason = "to be beside another one is read of those that drive along the ego vehicle's way";
+        source.refuse_if(turned_rad.abs() > 1.0, mark, reason)?;
+        let of = if self.is_ego(name) {
+            "ego".to_owned()
+        } else {
+            self.moving(source, mark, name)?.bearer.clone()
+        };
+        let away_m = self.route.path.project(other).offset_m - along.offset_m;
+        let said = Said::text(format!("{of}.offset - npc.offset + ")).number(told.offset_m + more_m, "m");
+        Some((moving.offset_m + away_m + more_m, said))
+    }
+
+    /// How far to the left of its way a lane lies, m.
+    pub fn lane_offset_m(
+        &self,
+        source: &mut Source,
+        moving: &Moving,
+        mark: &Mark,
+        target: &Target,
+        told: &mut Told,
+    ) -> Option<f64> {
+        let Some(own) = told.lane else { return source.refuse(mark, "it drives in no lane") };
+        let to = match target {
+            Target::Beside(name, lanes) => {
+                let of = match () {
+                    () if *name == moving.entity.name => own,
+                    () => {
+                        let placed = self.places.borrow_mut().of(source, mark, name)?;
+                        let Some(lane) = placed.lane else {
+                            return source.refuse(mark, "that one is in no lane");
+                        };
+                        lane
+                    }
+                };
+                // Beside this one, wherever the other one is along the road.
+                self.lane_beside(own, of, *lanes)
+            }
+            Target::Lane(id) => {
+                let lane = self.map.lane(own.lane);
+                let s_m = lane.road_station_m(own.station_m);
+                self.map.place(&lane.key.road, *id, s_m).ok()
+            }
+        };
+        let Some(to) = to else { return source.refuse(mark, "no such lane is beside its own") };
+        (told.lane, told.lane_m) = (Some(to), self.aside_m(moving, to));
+        Some(told.lane_m)
+    }
+
+    /// How far to the left of somebody's way, where it begins, the middle of a lane lies, m.
+    pub fn aside_m(&self, moving: &Moving, lane: LanePlace) -> f64 {
+        let here = moving.path.pose_at(moving.at_m);
+        let centre = &self.map.lane(lane.lane).centre;
+        here.to_local(centre.position_at(centre.project(here.position).station_m)).y
+    }
+
+    /// The lane that is so many lanes to the left of another's, beside a place.
+    fn lane_beside(&self, own: LanePlace, of: LanePlace, lanes: i32) -> Option<LanePlace> {
+        let (own_key, of_key) = (&self.map.lane(own.lane).key, &self.map.lane(of.lane).key);
+        if own_key.road == of_key.road {
+            let s_m = self.map.lane(own.lane).road_station_m(own.station_m);
+            let mut id = of_key.lane + lanes;
+            // Lanes have no number 0.
+            if (of_key.lane < 0) != (id < 0) || id == 0 {
+                id += lanes.signum();
+            }
+            return self.map.place(&own_key.road, id, s_m).ok();
+        }
+        let mut lane = own.lane;
+        let side = if lanes > 0 { Side::Left } else { Side::Right };
+        for _ in 0..lanes.abs() {
+            lane = self.map.lane(lane).neighbour(side)?.lane;
+        }
+        Some(LanePlace { lane, ..own })
+    }
+}
+
+/// The fields of a move to a place across.
+pub fn aside_fields(
+    source: &mut Source,
+    mark: &Mark,
+    to_m: f64,
+    to: Said,
+    dynamics: Dynamics,
+    told: &mut Told,
+    fields: &mut Vec<Said>,
+) -> Option<()> {
+    if matches!(dynamics.over, Over::Never) {
+        source.note("who moves aside at 0 m/s stays where it is");
+        return Some(());
+    }
+    let by_m = (to_m - told.offset_m).abs();
+    let (low_m, high_m) = (OFFSET_M.start(), OFFSET_M.end());
+    let reason = format!("it moves to {to_m:.1} m beside its way: {low_m} to {high_m} m is possible");
+    source.refuse_if(!OFFSET_M.contains(&to_m), mark, reason)?;
+    told.offset_m = to_m;
+    if by_m < 1e-6 {
+        return Some(());
+    }
+    instead_of(fields, &["offset", "aside"]);
+    fields.push(Said::text("offset: ").then(to));
+    let slope = SMOOTH_STEP_SLOPE_MAX;
+    let aside_mps = match dynamics.over {
+        Over::AtOnce | Over::Never => ASIDE_MPS_MAX,
+        Over::Time(time_s) => slope * by_m / time_s,
+        // By the greatest acceleration, along a cosine: `T = π √(d / 2a)`.
+        Over::Rate(mps) if mps < 0.0 => slope * by_m / (core::f64::consts::PI * (by_m / (2.0 * -mps)).sqrt()),
+        Over::Rate(mps) => slope * mps / dynamics.peak,
+        Over::Way(way_m) => {
+            fields.push(Said::text("aside: npc.speed * ").number(slope * by_m / way_m, ""));
+            return Some(());
+        }
+    };
+    if aside_mps > ASIDE_MPS_MAX || matches!(dynamics.over, Over::AtOnce) {
+        source.note(format!("nobody moves aside faster than {ASIDE_MPS_MAX} m/s"));
+    }
+    fields.push(Said::text("aside: ").number(aside_mps.clamp(0.1, ASIDE_MPS_MAX), "m/s"));
+    Some(())
+}

@@ -1,0 +1,253 @@
+//! What everybody does, phase by phase.
+
+use avastra_lang::model::SPAWN_SPEED_MPS;
+use avastra_road::LanePlace;
+
+use super::across::aside_fields;
+use super::action::{Act, ActKind, Aside};
+use super::condition::Waiting;
+use super::pace::{self, PACE, too_fast};
+use super::said::Said;
+use super::scene::{Cast, Moving};
+use super::source::Source;
+use super::story::Event;
+use super::trigger::When;
+
+/// A distance that is to be reached is, this near to it, m, as for esmini.
+const KEPT_M: f64 = 0.1;
+
+/// A speed that is asked anew at every tick.
+pub const CONTINUOUS: &str = "continuous: true";
+
+/// What somebody was told so far.
+pub struct Told {
+    /// Its speed, if the file says it.
+    pub mps: Option<f64>,
+    pub offset_m: f64,
+    pub lane: Option<LanePlace>,
+    /// How far the middle of that lane is to the left of its way, m.
+    pub lane_m: f64,
+}
+
+impl<'a> Cast<'a> {
+    /// What somebody does, phase by phase.
+    pub fn phases(&self, source: &mut Source, moving: &Moving<'a>) -> Option<Vec<Said>> {
+        let entity = moving.entity;
+        let mut events: Vec<&Event> = entity.events.iter().filter(|event| !event.acts.is_empty()).collect();
+        let is_placed = |act: &Act| matches!(act.kind, ActKind::Ahead(..));
+        events.retain(|event| !(event.when.is_empty() && event.acts.iter().all(is_placed)));
+        if events.iter().all(|event| event.time_s().is_some()) {
+            events.sort_by(|a, b| a.time_s().unwrap_or(0.0).total_cmp(&b.time_s().unwrap_or(0.0)));
+        } else if events.iter().filter(|event| waits_by_itself(event)).count() > 1 {
+            source.note(format!("what `{}` does is taken to come in the order of the file", entity.name));
+        }
+        let mut told =
+            Told { mps: Some(moving.mps), offset_m: moving.offset_m, lane: moving.placed.lane, lane_m: 0.0 };
+        told.lane_m = told.lane.map_or(0.0, |lane| self.aside_m(moving, lane));
+        let mut phases = Vec::new();
+        // After what takes several phases, whose `once` would come too late: the words before what may follow.
+        let mut several: Option<Said> = None;
+        if entity.way.as_ref().is_some_and(|way| way.timing.is_some()) {
+            phases.extend(self.timed(source, moving, Said::default(), true)?);
+            several = (phases.len() > 1).then(Said::default);
+        }
+        let (at_once, later): (Vec<&Event>, Vec<&Event>) =
+            events.into_iter().partition(|event| event.when.is_empty());
+        let mut groups: Vec<(Option<&Event>, Vec<&Act>)> = Vec::new();
+        let first = at_once.iter().flat_map(|event| &event.acts);
+        let first: Vec<&Act> = first.filter(|act| !is_placed(act)).collect();
+        if !first.is_empty() {
+            groups.push((None, first));
+        }
+        for event in later {
+            // What begins at the same moment is one phase.
+            let is_same = |(last, _): &&mut (Option<&Event>, Vec<&Act>)| {
+                last.is_some_and(|last| same_moment(last, event))
+            };
+            match groups.last_mut().filter(is_same) {
+                Some((_, acts)) => acts.extend(&event.acts),
+                None => groups.push((Some(event), event.acts.iter().collect())),
+            }
+        }
+        // Also one that only placed somebody, which took no time.
+        let mut before: Vec<&Event> = entity.events.iter().filter(|event| event.when.is_empty()).collect();
+        for (event, acts) in groups {
+            let reason =
+                "beside the times of a trajectory or of a profile only what waits for their end is read";
+            let begins = match event {
+                None => {
+                    source.refuse_if(several.is_some(), &entity.mark, reason)?;
+                    Said::default()
+                }
+                Some(event) => {
+                    let waiting = Waiting { cast: self, actor: moving, before: before.clone() };
+                    let begins = waiting.begins(source, &event.when)?;
+                    let is_endless = phases.last().is_some_and(|phase: &Said| phase.holds(CONTINUOUS));
+                    let waits = begins.once.is_some() && !begins.is_after;
+                    let never = "what comes after a speed or a distance that is kept waits for the end of that, which never comes";
+                    source.refuse_if(is_endless && !waits, &event.mark, never)?;
+                    if let Some(words) = several.take() {
+                        source.refuse_if(!waiting.waits_for_the_end(&event.when), &event.mark, reason)?;
+                        if !words.0.is_empty() {
+                            phases.push(words.and("{}"));
+                        }
+                    }
+                    if begins.is_after {
+                        phases.push(Said::text("after 0 s {}"));
+                    }
+                    phases.extend(
+                        begins.first.as_ref().map(|first| Said::text("once ").then(first.clone()).and(" {}")),
+                    );
+                    begins.said()
+                }
+            };
+            if let Some(event) = event {
+                before = entity.events.iter().filter(|other| same_moment(other, event)).collect();
+            }
+            let mut fields = Vec::new();
+            let mut timed = Vec::new();
+            let mut ends = None;
+            for act in acts {
+                match &act.kind {
+                    ActKind::Keep(kept) if !kept.is_continuous => {
+                        let (_, too_far) = self.too_far(source, moving, &act.mark, kept)?;
+                        let near = Said::text("once ").then(too_far.clone()).and(" <= ").number(KEPT_M, "m");
+                        let near = near.and(" and ").then(too_far).and(" >= ").number(-KEPT_M, "m");
+                        ends = Some(near.and(" { speed: npc.speed }"));
+                        self.fields(source, moving, act, &mut told, &mut fields)?;
+                    }
+                    ActKind::Follow(way) if way.timing.is_some() => {
+                        timed = self.timed(source, moving, begins.clone(), way.is_absolute)?;
+                        several = (timed.len() > 1).then(Said::default);
+                    }
+                    ActKind::Profile(entries) => {
+                        let reason = "its trajectory has times, which say the speed already";
+                        source.refuse_if(!moving.timed.is_empty(), &act.mark, reason)?;
+                        let begins = begins.clone();
+                        let (said, then) =
+                            pace::profile(source, &act.mark, &entity.body, told.mps, entries, begins)?;
+                        (timed, several) = (said, Some(then));
+                        told.mps = entries.last().map(|entry| entry.mps);
+                    }
+                    _ => self.fields(source, moving, act, &mut told, &mut fields)?,
+                }
+            }
+            if timed.is_empty() {
+                phases.push(begins.and("{ ").then(Said::joined(fields, ", ")).and(" }"));
+                phases.extend(ends);
+            } else if fields.is_empty() {
+                phases.extend(timed);
+            } else {
+                let mark = &event.map_or(&entity.mark, |event| &event.mark);
+                return source.refuse(*mark, reason);
+            }
+        }
+        Some(phases)
+    }
+
+    /// The phases of one that is at places of its way at given times.
+    fn timed(
+        &self,
+        source: &mut Source,
+        moving: &Moving,
+        begins: Said,
+        is_absolute: bool,
+    ) -> Option<Vec<Said>> {
+        let mut phases = Vec::new();
+        let Some((_, first_s)) = moving.timed.first() else { return Some(phases) };
+        let mut begins = begins;
+        if *first_s > 0.0 {
+            begins = match is_absolute {
+                true => Said::text("once elapsed >= ").number(*first_s, "s").and(" "),
+                false => begins.and("after ").number(*first_s, "s").and(" "),
+            };
+        }
+        let mut is_wait = false;
+        for pair in moving.timed.windows(2) {
+            let ((from_m, from_s), (to_m, to_s)) = (pair[0], pair[1]);
+            let (way_m, time_s) = (to_m - from_m, to_s - from_s);
+            if time_s <= 0.0 {
+                continue;
+            }
+            let said = core::mem::take(&mut begins);
+            let said = match (phases.is_empty(), is_wait) {
+                (true, _) | (false, true) => said,
+                (false, false) => {
+                    Said::text("once npc.station >= ").number(from_m + moving.more_m(), "m").and(" ")
+                }
+            };
+            let mps = way_m / time_s;
+            source.refuse_if(mps > *SPAWN_SPEED_MPS.end(), &moving.entity.mark, too_fast(mps))?;
+            phases.push(said.and("{ speed: ").number(mps, "m/s").and(" }"));
+            is_wait = way_m < 1e-6;
+            if is_wait {
+                begins = Said::text("after ").number(time_s, "s").and(" ");
+            }
+        }
+        Some(phases)
+    }
+
+    /// The fields of an order that an action is.
+    fn fields(
+        &self,
+        source: &mut Source,
+        moving: &Moving<'a>,
+        act: &Act,
+        told: &mut Told,
+        fields: &mut Vec<Said>,
+    ) -> Option<()> {
+        let mark = &act.mark;
+        match &act.kind {
+            ActKind::Placed(_) | ActKind::Ahead(..) => {
+                source.refuse(mark, "nobody is placed anew in the story")
+            }
+            ActKind::Keep(kept) => {
+                let said = self.kept(source, moving, mark, kept)?;
+                told.mps = None;
+                instead_of(fields, &PACE);
+                fields.extend(said);
+                Some(())
+            }
+            ActKind::Route(_) => source.refuse(mark, "a route is taken from the beginning"),
+            // It goes on with the speed that it has, which is 0: an event of its own tells it more.
+            ActKind::Follow(_) | ActKind::Profile(_) => Some(()),
+            ActKind::Speed(wanted, dynamics) => {
+                self.speed_fields(source, moving, mark, wanted, *dynamics, told, fields)
+            }
+            ActKind::Lane(target, more_m, dynamics) => {
+                let lane_m = self.lane_offset_m(source, moving, mark, target, told)?;
+                let to_m = lane_m + self.left_m(moving, told, *more_m);
+                let to = Said::default().number(to_m, "m");
+                aside_fields(source, mark, to_m, to, *dynamics, told, fields)
+            }
+            ActKind::Offset(Aside::InLane(offset_m), dynamics) => {
+                let to_m = told.lane_m + self.left_m(moving, told, *offset_m);
+                let to = Said::default().number(to_m, "m");
+                aside_fields(source, mark, to_m, to, *dynamics, told, fields)
+            }
+            ActKind::Offset(Aside::Of(name, more_m), dynamics) => {
+                let (to_m, to) = self.beside(source, moving, mark, name, *more_m, told)?;
+                aside_fields(source, mark, to_m, to, *dynamics, told, fields)
+            }
+            ActKind::Meet(meeting) => self.meeting_fields(source, moving, mark, meeting, told, fields),
+        }
+    }
+}
+
+/// Of two actions that begin together the later one counts.
+pub fn instead_of(fields: &mut Vec<Said>, names: &[&str]) {
+    fields.retain(|field| !names.contains(&field.name().as_str()));
+}
+
+/// Whether an event waits for something that is neither a time nor the end of another.
+fn waits_by_itself(event: &Event) -> bool {
+    let is_own = |kind: &When| !matches!(kind, When::After(_) | When::Always | When::Ended { .. });
+    event.when.iter().flatten().any(|condition| is_own(&condition.kind))
+}
+
+pub fn same_moment(a: &Event, b: &Event) -> bool {
+    a.when.len() == b.when.len()
+        && a.when.iter().zip(&b.when).all(|(a, b)| {
+            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.kind == b.kind && a.delay_s == b.delay_s)
+        })
+}
