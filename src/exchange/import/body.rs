@@ -34,7 +34,7 @@ impl Body {
 pub fn body(source: &mut Source, object: Node) -> Option<Body> {
     const KINDS: [catalogue::Kind; 3] = [catalogue::VEHICLE, catalogue::PEDESTRIAN, catalogue::OBJECT];
     if let Some(reference) = element(object, "CatalogReference") {
-        return catalogue::entry(source, reference, &KINDS, described);
+        return catalogue::body(source, reference, &KINDS, described);
     }
     let found: Vec<Node> = children(object).filter(|node| is_described(*node)).collect();
     let [found] = found[..] else {

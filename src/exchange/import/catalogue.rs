@@ -8,6 +8,7 @@ use avastra_road::RoadMap;
 use roxmltree::Node;
 
 use super::Files;
+use super::body::Body;
 use super::ground::Ground;
 use super::source::{Source, children, element, elements, filled};
 use super::vocabulary;
@@ -34,6 +35,8 @@ type Read<T> = RefCell<BTreeMap<String, Result<Rc<T>, String>>>;
 
 /// The files that a scenario names, as far as they were read.
 pub struct Library<'f> {
+    /// Bodies of entries, by the entry and the values that it is given.
+    pub bodies: RefCell<BTreeMap<String, Body>>,
     files: &'f dyn Files,
     /// The folder of the scenario, before the paths that it names; empty if it is that of the file that is imported.
     folder: String,
@@ -54,6 +57,7 @@ impl<'f> Library<'f> {
         Library {
             files,
             folder,
+            bodies: RefCell::default(),
             maps: Read::default(),
             folders: Read::default(),
             entries: RefCell::default(),
@@ -134,6 +138,38 @@ pub fn locate(source: &mut Source, root: Node) {
     }
 }
 
+/// The body that an entry describes, read once for all variations that ask for it with the same values.
+pub fn body(
+    source: &mut Source,
+    reference: Node,
+    kinds: &[Kind],
+    read: impl FnOnce(&mut Source, Node) -> Option<Body>,
+) -> Option<Body> {
+    let (catalogue, name) = (source.text(reference, "catalogName")?, source.text(reference, "entryName")?);
+    let key = format!("{catalogue:?} {name:?} {:?}", assigned(source, reference)?);
+    if let Some(known) = source.library.bodies.borrow().get(&key) {
+        return Some(known.clone());
+    }
+    let sees_more = source.sees_more;
+    let found = entry(source, reference, kinds, read)?;
+    // One that asks for the file's own parameters may be another one next time.
+    if source.sees_more == sees_more {
+        source.library.bodies.borrow_mut().insert(key, found.clone());
+    }
+    Some(found)
+}
+
+/// The values that a reference gives to parameters of an entry.
+fn assigned(source: &mut Source, reference: Node) -> Option<BTreeMap<String, String>> {
+    let mut assigned = BTreeMap::new();
+    for one in elements(reference, "ParameterAssignments").flat_map(children) {
+        // Some files write a `$` before the name.
+        let name = source.named(one, "parameterRef")?;
+        assigned.insert(name, source.text(one, "value")?);
+    }
+    Some(assigned)
+}
+
 /// Reads the entry of a catalogue that a `CatalogReference` names, with the values that it gives to the entry's parameters.
 pub fn entry<T>(
     source: &mut Source,
@@ -145,12 +181,7 @@ pub fn entry<T>(
     if source.depth >= DEPTH_MAX {
         return source.refuse(reference, format!("catalogues lie in one another more than {DEPTH_MAX} deep"));
     }
-    let mut assigned = BTreeMap::new();
-    for one in elements(reference, "ParameterAssignments").flat_map(children) {
-        // Some files write a `$` before the name.
-        let name = source.named(one, "parameterRef")?;
-        assigned.insert(name, source.text(one, "value")?);
-    }
+    let assigned = assigned(source, reference)?;
     let mut folders = Vec::new();
     for Kind(location, _) in kinds {
         let Some((mark, path)) = source.folders.get(*location).cloned() else { continue };

@@ -126,8 +126,14 @@ pub fn openscenario(
     if let Some(own) = is_as_written.then(|| own::read(&mut source, &document)).flatten() {
         return Ok(write::own(&own, name, source.notes()));
     }
-    let mut whole =
-        Whole { ego, description: String::new(), notes: BTreeSet::new(), variants: Vec::new(), excluded: 0 };
+    let mut whole = Whole {
+        ego,
+        description: String::new(),
+        notes: BTreeSet::new(),
+        variants: Vec::new(),
+        excluded: 0,
+        is_looked_over: false,
+    };
     let Some(named) = variation::scenario(&mut source, document.root_element()) else {
         whole
             .add(&document, &lines, &library, parameters.clone(), parameters)
@@ -194,6 +200,8 @@ struct Whole<'a> {
     variants: Vec<Variant>,
     /// How many variations have values that the scenario's own constraints exclude.
     excluded: usize,
+    /// Whether the scenario was searched for what no version has.
+    is_looked_over: bool,
 }
 
 impl Whole<'_> {
@@ -207,12 +215,13 @@ impl Whole<'_> {
         asked: &Values,
     ) -> Result<(), (Vec<Refusal>, bool)> {
         let mut source = Source::new(Rc::clone(lines), asked, library);
-        if self.variants.is_empty() {
+        if !core::mem::replace(&mut self.is_looked_over, true) {
             for (node, reason) in vocabulary::unknown(document.root_element()) {
                 source.refuse::<()>(node, reason);
             }
         }
         let story = story::read(&mut source, document, self.ego);
+        let story = story.filter(|_| !source.is_excluded);
         let found = story.and_then(|story| Some((Scene::of(&mut source, &story)?, story)));
         let (is_excluded, notes) = (source.is_excluded, source.notes());
         match (found, source.refusals()) {

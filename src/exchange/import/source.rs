@@ -71,6 +71,8 @@ pub struct Source<'f> {
     parameters: BTreeMap<String, String>,
     /// Those of the texts around the entry of a catalogue that is read, the outermost first.
     outer: Vec<BTreeMap<String, String>>,
+    /// How often an entry asked for a parameter that it does not declare.
+    pub sees_more: usize,
     /// Parameters and entities of which something was refused: what follows from that is not told again.
     torn: BTreeSet<String>,
     /// How often something was refused, or would have been were it not told already.
@@ -97,6 +99,7 @@ impl<'f> Source<'f> {
             variables: BTreeMap::new(),
             parameters: BTreeMap::new(),
             outer: Vec::new(),
+            sees_more: 0,
             torn: BTreeSet::new(),
             told: 0,
             asked: asked.iter().map(|(name, value)| (name.clone(), (value.clone(), false))).collect(),
@@ -344,6 +347,9 @@ impl<'f> Source<'f> {
 
     /// A value with its parameters filled in.
     fn filled(&mut self, node: Node, value: &str) -> Option<String> {
+        if !value.contains('$') {
+            return Some(value.trim().to_owned());
+        }
         let names = value.split(|letter: char| !(letter.is_alphanumeric() || "_.$".contains(letter)));
         if names.filter(|word| word.starts_with('$')).any(|word| self.torn.contains(word)) {
             self.told += 1;
@@ -359,6 +365,7 @@ impl<'f> Source<'f> {
         match found {
             Err(reason) if !self.outer.is_empty() => match around() {
                 Ok(found) => {
+                    self.sees_more += 1;
                     self.note("entries of catalogues see the parameters of the file, too");
                     Some(found)
                 }

@@ -92,6 +92,10 @@ pub fn read(source: &mut Source, document: &Document, ego: Option<&str>) -> Opti
         return source.refuse(other, "this is no scenario; give the file of one that uses it");
     }
     source.declare(root);
+    // Nothing else is to be told of values that the file itself excludes.
+    if source.is_excluded {
+        return None;
+    }
     catalogue::locate(source, root);
     variables(source, root);
     let network = source.required(root, "RoadNetwork")?;
