@@ -327,7 +327,8 @@ pub struct HeatMap {
 /// A map of each action that has both parameters: its tests by their values. `across` is empty for one parameter alone, and `road` is
 /// one, too. Numbers of more than two dozen values come in ranges.
 pub fn heat_maps(tests: &[ProtocolTest], down: &str, across: &str) -> Vec<HeatMap> {
-    actions(tests).iter().filter_map(|action| heat_map(tests, action, down, across)).collect()
+    let of = |action: &String| heat_map(tests, action, core::slice::from_ref(action), [down, across]);
+    actions(tests).iter().filter_map(of).collect()
 }
 
 /// The actions that were carried out, in the order in which they first were.
@@ -341,15 +342,22 @@ fn actions(tests: &[ProtocolTest]) -> Vec<String> {
     actions
 }
 
-fn heat_map(tests: &[ProtocolTest], action: &str, down: &str, across: &str) -> Option<HeatMap> {
+/// A map of some actions, under a title.
+fn heat_map(
+    tests: &[ProtocolTest],
+    title: &str,
+    actions: &[String],
+    [down, across]: [&str; 2],
+) -> Option<HeatMap> {
     let value = |test: &ProtocolTest, name: &str| match name {
         "" => Some(String::new()),
         "road" => Some(test.road.clone()),
+        ACTION => test.action.clone(),
         _ => test.value(name).map(str::to_owned),
     };
     let has = |test: &&ProtocolTest| {
         test.ending.is_some()
-            && test.action.as_deref() == Some(action)
+            && test.action.as_ref().is_some_and(|action| actions.contains(action))
             && value(test, down).is_some()
             && value(test, across).is_some()
     };
@@ -368,13 +376,18 @@ fn heat_map(tests: &[ProtocolTest], action: &str, down: &str, across: &str) -> O
     let cell = |row, column| within.get(&(row, column)).map(|found| Tally::of(found.iter().copied()));
     let line = |row| (0..columns.labels.len()).map(|column| cell(row, column)).collect();
     let cells = (0..rows.labels.len()).map(line).collect();
-    let [action, down, across] = [action, down, across].map(str::to_owned);
+    let [action, down, across] = [title, down, across].map(str::to_owned);
     Some(HeatMap { action, down, across, rows: rows.labels, columns: columns.labels, cells })
 }
 
-/// A map of each action by the two of its parameters that have the most values; by road where none differs.
+/// What stands for the action among parameters; none is called so, since it is a keyword.
+const ACTION: &str = "action";
+
+/// A map of each action by the two of its parameters that have the most values, and one of all those without such parameters; by road
+/// if that is a single one.
 pub fn main_maps(tests: &[ProtocolTest]) -> Vec<HeatMap> {
-    let of = |action: &String| {
+    let mut single: Vec<String> = Vec::new();
+    let mut of = |action: &String| {
         let mut values: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
         let is_of = |test: &&ProtocolTest| test.ending.is_some() && test.action.as_ref() == Some(action);
         for test in tests.iter().filter(is_of) {
@@ -389,9 +402,18 @@ pub fn main_maps(tests: &[ProtocolTest]) -> Vec<HeatMap> {
             .collect();
         names.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(b.0)));
         let name = |nth: usize| names.get(nth).map(|(name, _)| *name);
-        heat_map(tests, action, name(0).unwrap_or("road"), name(1).unwrap_or(""))
+        let Some(first) = name(0) else {
+            single.push(action.clone());
+            return None;
+        };
+        heat_map(tests, action, core::slice::from_ref(action), [first, name(1).unwrap_or("")])
     };
-    actions(tests).iter().filter_map(of).collect()
+    let mut maps: Vec<HeatMap> = actions(tests).iter().filter_map(&mut of).collect();
+    maps.extend(match single.as_slice() {
+        [only] => heat_map(tests, only, &single, ["road", ""]),
+        _ => heat_map(tests, if maps.is_empty() { "all" } else { "all others" }, &single, [ACTION, ""]),
+    });
+    maps
 }
 
 /// The parameters of all actions that were carried out, and `road`.
@@ -487,7 +509,8 @@ mod tests {
             test(&[("speed", "5"), ("overlap", "100")], Some(6.0)),
             test(&[("speed", "5")], None),
         ];
-        let map = heat_map(&tests, "begin", "speed", "overlap").expect("three have both");
+        let map =
+            heat_map(&tests, "begin", &["begin".to_owned()], ["speed", "overlap"]).expect("three have both");
         assert_eq!(
             (map.rows, map.columns),
             (vec!["5".to_owned(), "30".to_owned()], vec!["50".to_owned(), "100".to_owned()])
@@ -502,6 +525,13 @@ mod tests {
         assert_eq!(heat_maps(&tests, "speed", "")[0].columns, [""]);
         let main = &main_maps(&tests)[0];
         assert_eq!((main.down.as_str(), main.across.as_str()), ("overlap", "speed"));
+        let named = |name: &str| ProtocolTest { action: Some(name.to_owned()), ..test(&[], None) };
+        let of_all = &main_maps(&[named("one"), named("two")])[0];
+        assert_eq!(
+            (of_all.down.as_str(), &of_all.rows),
+            ("action", &vec!["one".to_owned(), "two".to_owned()])
+        );
+        assert_eq!(main_maps(&[named("one")])[0].down, "road");
         assert_eq!(parameters(&tests), ["road", "speed", "overlap"]);
     }
 

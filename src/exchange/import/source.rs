@@ -68,6 +68,8 @@ pub struct Source<'f> {
     pub minor: i32,
     /// The variables of the file with their values; `None` for those that the story sets.
     pub variables: BTreeMap<String, Option<String>>,
+    /// The names of the acts that begin with the scenario.
+    pub acts_at_once: BTreeSet<String>,
     parameters: BTreeMap<String, String>,
     /// Those of the texts around the entry of a catalogue that is read, the outermost first.
     outer: Vec<BTreeMap<String, String>>,
@@ -98,6 +100,7 @@ impl<'f> Source<'f> {
             minor: 0,
             variables: BTreeMap::new(),
             parameters: BTreeMap::new(),
+            acts_at_once: BTreeSet::new(),
             outer: Vec::new(),
             sees_more: 0,
             torn: BTreeSet::new(),

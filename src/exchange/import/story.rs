@@ -10,7 +10,7 @@ use super::body::{Body, body};
 use super::catalogue;
 use super::position::Position;
 use super::source::{Mark, Source, children, element, elements};
-use super::trigger::{Condition, Trigger, When, both, is_less, reduced, trigger};
+use super::trigger::{Condition, Trigger, When, acts_at_once, both, is_less, reduced, trigger};
 use super::weather::{Weather, weather};
 
 /// The latest minor version that is read.
@@ -97,6 +97,7 @@ pub fn read(source: &mut Source, document: &Document, ego: Option<&str>) -> Opti
         return None;
     }
     catalogue::locate(source, root);
+    source.acts_at_once = acts_at_once(root);
     variables(source, root);
     let network = source.required(root, "RoadNetwork")?;
     let logic = source.required(network, "LogicFile")?;

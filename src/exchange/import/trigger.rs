@@ -1,5 +1,7 @@
 //! When something begins: the conditions of a file.
 
+use std::collections::BTreeSet;
+
 use roxmltree::Node;
 
 use super::position::{Position, position};
@@ -224,7 +226,8 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
                     "startTransition" | "runningState" if of == "story" => When::Always,
                     "startTransition" | "runningState" if of == "act" => {
                         let reason = "the beginning of an act is read where the act begins at once";
-                        source.refuse_if(!begins_at_once(inner, &name), inner, reason)?;
+                        let last = name.rsplit("::").next().unwrap_or_default();
+                        source.refuse_if(!source.acts_at_once.contains(last), inner, reason)?;
                         When::Always
                     }
                     "startTransition" | "runningState" => When::Begun { kind: of, name },
@@ -329,11 +332,14 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
     Some(Condition { mark: source.mark(inner), edge, delay_s, kind })
 }
 
-/// Whether an act waits for nothing but times that have come when the scenario begins.
-fn begins_at_once(node: Node, name: &str) -> bool {
-    let last = name.rsplit("::").next();
-    let mut acts = node.document().descendants().filter(|one| one.has_tag_name("Act"));
-    let Some(act) = acts.find(|act| act.attribute("name") == last) else { return false };
+/// The names of the acts that wait for nothing but times that have come when the scenario begins.
+pub fn acts_at_once(root: Node) -> BTreeSet<String> {
+    let acts = root.descendants().filter(|one| one.has_tag_name("Act"));
+    let at_once = acts.filter(|act| begins_at_once(*act));
+    at_once.filter_map(|act| act.attribute("name").map(str::to_owned)).collect()
+}
+
+fn begins_at_once(act: Node) -> bool {
     let Some(trigger) = element(act, "StartTrigger") else { return true };
     let number = |node: &Node, name: &str| node.attribute(name).map_or(Some(0.0), |text| text.parse().ok());
     let is_past = |condition: Node| {
