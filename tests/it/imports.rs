@@ -216,19 +216,17 @@ fn profiles_of_speeds_keep_their_times() {
     let end = r#"<StoryboardElementStateCondition storyboardElementType="event" storyboardElementRef="dip" state="completeState"/>"#;
     let later = r#"<SimulationTimeCondition value="5" rule="greaterThan"/>"#;
     for (old, new, wanted) in [
-        // A phase is done 0.1 m/s before its speed, which takes the rest of the time.
-        (dip, r#"speed="$dip_mps" time="1""#, "{ speed: 2 m/s, rate: 6 m/s^2 }\n  after 0.0167 s {"),
+        (dip, r#"speed="$dip_mps" time="1""#, "{ speed: 2 m/s, rate: 6 m/s^2 }\n  { speed: 2 m/s }"),
         (dip, r#"speed="$dip_mps" time="0.1""#, "{ speed: 2 m/s, rate: 8 m/s^2 }\n  { speed: 2 m/s }"),
         (dip, r#"speed="$dip_mps" time="0""#, "{ speed: 2 m/s }\n  { speed: 2 m/s }\n  after 1 s"),
-        // The least rate is 0.1 m/s²: 0.4 m/s take 4 s of the 20 s.
-        (dip, r#"speed="7.5" time="20""#, "{ speed: 7.5 m/s, rate: 0.1 m/s^2 }\n  after 16.5 s {"),
-        // A stop is exact.
+        // The least rate is 0.1 m/s²: 0.5 m/s take 5 s of the 20 s.
+        (dip, r#"speed="7.5" time="20""#, "{ speed: 7.5 m/s, rate: 0.1 m/s^2 }\n  after 15 s {"),
         (dip, r#"speed="0" time="4""#, "{ speed: 0 m/s, rate: 2 m/s^2 }\n  { speed: 2 m/s, rate: 2 m/s^2 }"),
         (dip, r#"speed="-1" time="4""#, "nobody drives backwards"),
         (dip, r#"speed="$dip_mps""#, "without a `time`"),
         (dip, r#"speed="$dip_mps" time="-1""#, "less than 0"),
         // What follows waits for the end of the last entry, or is refused.
-        ("</Event>", &going(end), "after 0.1067 s {}\n  { speed: 3 m/s }"),
+        ("</Event>", &going(end), "rate: 1.5 m/s^2 }\n  { speed: 3 m/s }"),
         ("</Event>", &going(later), "only what waits for their end is read"),
         (action, r#"<SpeedProfileAction entityRef="Ego">"#, "relative to an entity"),
         (
@@ -530,7 +528,7 @@ fn conditions_and_words_are_read_or_refused() {
         "scenario case",
     );
     let behind = distance("revMinor=\"2\"", "displacement=\"trailingReferencedEntity\"");
-    expect(&behind, "only a distance ahead", "behind");
+    expect(&behind, "is read ahead of the ego vehicle alone", "behind");
 
     // A mistake is told once, whatever follows from it.
     for (old, new) in [
@@ -596,6 +594,26 @@ fn conditions_and_words_are_read_or_refused() {
             new,
         );
     }
+    // What waits for the end of a way begins there.
+    let event = |speed: &str| {
+        format!(
+            r#"</Event><Event name="then" priority="overwrite"><Action name="a"><PrivateAction><LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="step" value="0" dynamicsDimension="time"/><SpeedActionTarget>{speed}</SpeedActionTarget></SpeedAction></LongitudinalAction></PrivateAction></Action><StartTrigger><ConditionGroup><Condition name="c" delay="0" conditionEdge="none"><ByValueCondition><StoryboardElementStateCondition storyboardElementType="event" storyboardElementRef="cross" state="completeState"/></ByValueCondition></Condition></ConditionGroup></StartTrigger></Event>"#
+        )
+    };
+    let slower = event(r#"<AbsoluteTargetSpeed value="0.5"/>"#);
+    let found = import(&walker.replacen("</Event>", &slower, 1));
+    expect(&found, "\n  once npc.station >= 5.95 m {}\n  { speed: 0.5 m/s }\n", "after a way");
+    // The rate by which another's speed is reached in a time is none for following it.
+    let timed = event(
+        r#"<RelativeTargetSpeed entityRef="Ego" value="1" speedTargetValueType="delta" continuous="true"/>"#,
+    );
+    let timed = timed.replace(r#"Shape="step" value="0""#, r#"Shape="linear" value="4""#);
+    let found = import(&walker.replacen("</Event>", &timed, 1));
+    expect(
+        &found,
+        " / 4 s\n    }\n  }\n  { continuous: true, speed: ego.speed + 1 m/s }\n",
+        "a speed in a time",
+    );
     let wrong = wrong.take();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }

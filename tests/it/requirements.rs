@@ -602,6 +602,17 @@ fn a_breach_is_a_finding_that_replays() {
 }
 
 #[test]
+fn who_asks_whether_somebody_is_there_sees_them() {
+    let run = run_against("idm", space_at("tests/cases/spaces/requirements_there.ava"), 1, 1, &[]);
+    let log = run.episode(0);
+    assert_replays(&run, 0, &log);
+    let requirements = &run.space().requirements;
+    let breached = |breach: &Breach| requirements[breach.requirement].name.as_str();
+    let breached: BTreeSet<&str> = log.breaches.iter().map(breached).collect();
+    assert_eq!(breached, BTreeSet::from(["is_slow", "is_slow_if_named", "is_slow_while_there"]));
+}
+
+#[test]
 fn requirements_are_switched_as_rules_are() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let run = |name: &str, more: &[&str]| -> Vec<String> {

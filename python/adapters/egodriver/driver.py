@@ -94,7 +94,7 @@ class Policy(avastra.Driver):
         state, data.ego_traffic_light_distance_m = self.light(step)
         data.ego_traffic_light = protocol.TrafficLightState.Value(f"TRAFFIC_LIGHT_STATE_{state}")
         for other in step.objects:
-            actor = data.actors.add(track_id=str(other.id), type_id="walker" if other.kind == "pedestrian" else f"vehicle.{other.kind}")
+            actor = data.actors.add(track_id=str(other.id), type_id="walker" if other.kind in ("pedestrian", "animal") else f"vehicle.{other.kind}")
             pose = Pose.from_xyz_yaw(other.x, other.y, other.height / 2.0, other.heading)
             actor.pose_local_to_aabb.CopyFrom(pose.to_proto())
             actor.aabb.size_x, actor.aabb.size_y, actor.aabb.size_z = other.length, other.width, other.height

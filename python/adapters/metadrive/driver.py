@@ -130,7 +130,7 @@ class Expert(avastra.Driver):
         return numbers
 
     def others(self, step, frame):
-        vehicles = [other for other in step.objects if other.kind != "pedestrian"]
+        vehicles = [other for other in step.objects if other.kind not in ("pedestrian", "animal", "object")]
         near = sorted(vehicles, key=lambda other: math.dist((other.x, other.y), (frame.x, frame.y)))
         numbers = []
         for other in near[:OTHERS]:

@@ -24,11 +24,21 @@ const PARKING_MPS: f64 = 3.0;
 const BESIDE_ROAD_M: f64 = 0.3;
 /// A vehicle backs, or a thing moves, at more than this, m/s.
 const MOVES_MPS: f64 = 0.5;
-/// Who moves aside by this, m, before what is so wide to either side in the way, m, and would be reached in this time, s, evades
-/// it; who moves earlier passes it.
+/// A vehicle that moves aside by less evades nothing, m: a third of a lane. Ours.
 const EVADES_M: f64 = 1.2;
+/// A road user is in the way of a vehicle if its middle is no farther aside, m: half of both widths. Ours.
 const IN_THE_WAY_M: f64 = 1.5;
+/// Two that came nearer by less, sideways, just were there, m. Ours.
+const COMES_M: f64 = 0.5;
+/// A vehicle that has gone aside by more than this has changed lanes, m: a little more than half of a lane. Ours.
+const CHANGES_M: f64 = 2.0;
+/// One that was slower sideways, and has not, drifts, m/s: unintended departures are tested up to 0.6 m/s, lane changes are driven
+/// at 1 m/s and more. Ours.
+const CHANGES_MPS: f64 = 1.0;
+/// What would be reached later than this is passed and not evaded, s: a driver's reaction and braking. Ours.
 const LATE_S: f64 = 2.5;
+/// One that has turned by more meanwhile drives through a bend or a junction, rad (20°). Ours.
+const EVADES_RAD: f64 = core::f64::consts::PI / 9.0;
 
 /// A pre-crash type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -189,6 +199,24 @@ pub(super) struct Step {
     /// How far the middle was beside all lanes, m; below 0 on one.
     pub off_road_m: f64,
     pub in_junction: bool,
+    /// Where the lane leads there, as far as possible the way that the vehicle looks; without a lane, where it looks itself.
+    pub lane_rad: f64,
+}
+
+impl Step {
+    /// To the left across the lane.
+    fn left(&self) -> Vec2 {
+        unit_vector(self.lane_rad + core::f64::consts::FRAC_PI_2)
+    }
+}
+
+/// What somebody does beside driving on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Manoeuvre {
+    /// At a junction; a bend turns a vehicle, too, and is none.
+    LeftTurn,
+    RightTurn,
+    LaneChange,
 }
 
 /// What somebody did in the last seconds: one step or more, the last one at the contact.
@@ -217,13 +245,42 @@ impl Way {
         Shape::between((from.pose, from.speed_mps()), (to.pose, to.speed_mps()))
     }
 
-    /// Whether it turned at a junction or changed lanes before a step. A bend turns a vehicle, too, and is no manoeuvre.
+    /// How far it has gone aside across its lanes between two steps, m to the left.
+    fn aside_m(&self, from: usize, to: usize) -> f64 {
+        let pairs = self.0[from..=to].windows(2);
+        pairs
+            .map(|pair| {
+                (pair[1].place.pose.position - pair[0].place.pose.position)
+                    .dot(&(pair[0].left() + pair[1].left()))
+                    / 2.0
+            })
+            .sum()
+    }
+
+    fn manoeuvre(&self) -> Option<Manoeuvre> {
+        self.manoeuvre_until(self.0.len() - 1)
+    }
+
+    fn manoeuvre_until(&self, step: usize) -> Option<Manoeuvre> {
+        let turns = self.0[..=step].iter().any(|step| step.in_junction);
+        match self.shape_until(step) {
+            Shape::LeftTurn if turns => Some(Manoeuvre::LeftTurn),
+            Shape::RightTurn if turns => Some(Manoeuvre::RightTurn),
+            _ => (self.aside_m(0, step).abs() > CHANGES_M).then_some(Manoeuvre::LaneChange),
+        }
+    }
+
     fn manoeuvres_before(&self, step: usize) -> bool {
-        (0..step).any(|until| match self.shape_until(until) {
-            Shape::LeftTurn | Shape::RightTurn => self.0[..=until].iter().any(|step| step.in_junction),
-            Shape::LaneChange => true,
-            Shape::Stopping | Shape::Straight => false,
-        })
+        (0..step).any(|until| self.manoeuvre_until(until).is_some())
+    }
+
+    /// Whether it goes aside on purpose, or has done so.
+    fn changes_lanes(&self) -> bool {
+        let goes = |step: &Step| step.place.velocity_mps.dot(&step.left()).abs() > CHANGES_MPS;
+        match self.manoeuvre() {
+            Some(manoeuvre) => manoeuvre == Manoeuvre::LaneChange,
+            None => self.0.iter().any(goes),
+        }
     }
 
     /// The step at which it skids.
@@ -257,11 +314,16 @@ impl Way {
         moves && (stood || is_beside(self.now()) && self.to().speed_mps() < PARKING_MPS)
     }
 
-    /// The step from which it moves aside before somebody in its way, too late to pass. `others`: where they were at each step.
+    /// The step from which it moves aside before somebody in its way, too late to pass; one that turns does not. `others`: where they
+    /// were at each step.
     fn evades(&self, others: &[Vec<Place>]) -> Option<usize> {
         (0..self.0.len()).find(|&step| {
             let own = self.0[step].place;
-            let aside_m = own.pose.to_local(self.to().pose.position).y.abs();
+            let turned_rad = wrap_angle(self.to().pose.heading_rad - own.pose.heading_rad).abs();
+            if turned_rad > EVADES_RAD {
+                return false;
+            }
+            let aside_m = self.aside_m(step, self.0.len() - 1).abs();
             let is_in_the_way = |other: &Place| {
                 let there = own.pose.to_local(other.pose.position);
                 let closing_mps = own.speed_mps() - own.pose.forward().dot(&other.velocity_mps);
@@ -299,13 +361,10 @@ pub(super) struct Before {
 impl Before {
     /// The first type that fits.
     pub fn kind(&self) -> PreCrash {
-        let (ego, other) = (self.ego.shape(), self.other.shape());
-        let turns = |shape: Shape, to: Shape| self.in_junction && shape == to;
-        let turns_left = turns(ego, Shape::LeftTurn) || turns(other, Shape::LeftTurn);
-        let turns_right = turns(ego, Shape::RightTurn) || turns(other, Shape::RightTurn);
-        let ego_turns = turns(ego, Shape::LeftTurn) || turns(ego, Shape::RightTurn);
-        let is_manoeuvring = ego_turns || ego == Shape::LaneChange;
-        let either = |manoeuvring, not| if is_manoeuvring { manoeuvring } else { not };
+        let (ego, other) = (self.ego.manoeuvre(), self.other.manoeuvre());
+        let turns = |to: Manoeuvre| self.in_junction && [ego, other].contains(&Some(to));
+        let (turns_left, turns_right) = (turns(Manoeuvre::LeftTurn), turns(Manoeuvre::RightTurn));
+        let either = |manoeuvring, not| if ego.is_some() { manoeuvring } else { not };
         if self.is_wreck {
             return PreCrash::Wreck;
         }
@@ -344,18 +403,20 @@ impl Before {
         if let Some(kind) = self.evades() {
             return kind;
         }
-        let (ego_from, other_from) = (self.ego.from().pose, self.other.from().pose);
-        let apart_rad = wrap_angle(other_from.heading_rad - ego_from.heading_rad).abs();
+        // Before a junction each looks where it comes from; along a bend those who are apart look elsewhere than where they meet.
+        let (ego_pose, other_pose) = match self.in_junction {
+            true => (self.ego.from().pose, self.other.from().pose),
+            false => (self.ego.to().pose, self.other.to().pose),
+        };
+        let apart_rad = wrap_angle(other_pose.heading_rad - ego_pose.heading_rad).abs();
         if apart_rad < ALIKE_RAD {
-            return self.same_direction(ego, other, turns_left || turns_right);
+            return self.same_direction(turns_left || turns_right);
         }
         let is_opposite = apart_rad > core::f64::consts::PI - ALIKE_RAD;
         match (is_opposite, self.is_signalized) {
             (true, true) if turns_left => PreCrash::LeftTurnAcrossPathSignalized,
             (true, false) if turns_left => PreCrash::LeftTurnAcrossPath,
-            (true, _) if is_manoeuvring || turns_right || other == Shape::LaneChange => {
-                PreCrash::ManoeuvreOppositeDirection
-            }
+            (true, _) if [ego, other].iter().any(Option::is_some) => PreCrash::ManoeuvreOppositeDirection,
             (true, _) => PreCrash::NoManoeuvreOppositeDirection,
             (false, true) if turns_right => PreCrash::RightTurnSignalized,
             (false, false) if turns_left || turns_right => PreCrash::TurningNonSignalized,
@@ -379,13 +440,15 @@ impl Before {
     }
 
     fn leaves_road(&self) -> Option<PreCrash> {
-        let (way, step) = self.motor_vehicles().find_map(|way| Some((way, way.leaves_road()?)))?;
-        let place = way.0[step].place;
-        Some(match () {
-            () if place.ahead_mps() < -MOVES_MPS => PreCrash::RoadDepartureBacking,
-            () if place.speed_mps() < PARKING_MPS => return None,
-            () if way.manoeuvres_before(step) => PreCrash::RoadDepartureWithManoeuvre,
-            () => PreCrash::RoadDepartureWithoutManoeuvre,
+        self.motor_vehicles().find_map(|way| {
+            let step = way.leaves_road()?;
+            let place = way.0[step].place;
+            match () {
+                () if place.ahead_mps() < -MOVES_MPS => Some(PreCrash::RoadDepartureBacking),
+                () if place.speed_mps() < PARKING_MPS => None,
+                () if way.manoeuvres_before(step) => Some(PreCrash::RoadDepartureWithManoeuvre),
+                () => Some(PreCrash::RoadDepartureWithoutManoeuvre),
+            }
         })
     }
 
@@ -397,20 +460,32 @@ impl Before {
         })
     }
 
-    fn same_direction(&self, ego: Shape, other: Shape, turns: bool) -> PreCrash {
+    /// Whether one of them was beside the way of the other.
+    fn came_over(&self) -> bool {
+        let whole_m = |way: &Way| way.aside_m(0, way.0.len() - 1);
+        let now_m: f64 =
+            (self.other.to().pose.position - self.ego.to().pose.position).dot(&self.ego.now().left());
+        let came_m = whole_m(&self.other) - whole_m(&self.ego);
+        came_m.abs() > COMES_M && (now_m - came_m).abs() > IN_THE_WAY_M
+    }
+
+    fn same_direction(&self, turns: bool) -> PreCrash {
         if self.other.parks() {
             return PreCrash::Parking;
         }
         let (ego_from, other_from) = (self.ego.from().pose, self.other.from().pose);
         let is_ahead = ego_from.to_local(other_from.position).x > 0.0;
-        let (lead, follower) = if is_ahead { (&self.other, ego) } else { (&self.ego, other) };
-        if follower == Shape::LaneChange && self.is_lengthwise {
+        let (lead, follower) = if is_ahead { (&self.other, &self.ego) } else { (&self.ego, &self.other) };
+        let came_over = self.came_over();
+        if self.is_lengthwise && follower.changes_lanes() {
             return PreCrash::FollowingVehicleManoeuvre;
         }
-        if [ego, other].contains(&Shape::LaneChange) {
+        if came_over && (lead.changes_lanes() || follower.changes_lanes())
+            || [lead, follower].iter().any(|way| way.manoeuvre() == Some(Manoeuvre::LaneChange))
+        {
             return PreCrash::ChangingLanesSameDirection;
         }
-        if !self.is_lengthwise {
+        if came_over || !self.is_lengthwise {
             return if turns { PreCrash::TurningSameDirection } else { PreCrash::DriftingSameDirection };
         }
         let (before_mps, after_mps) = (lead.from().speed_mps(), lead.to().speed_mps());
@@ -435,7 +510,8 @@ mod tests {
 
     /// On a street.
     fn way(places: &[Place]) -> Way {
-        let step = |place: &Place| Step { place: *place, off_road_m: -1.5, in_junction: false };
+        let step =
+            |place: &Place| Step { place: *place, off_road_m: -1.5, in_junction: false, lane_rad: 0.0 };
         Way(places.iter().map(step).collect())
     }
 
@@ -454,6 +530,13 @@ mod tests {
             is_lengthwise: true,
             is_wreck: false,
         }
+    }
+
+    /// The same at a junction.
+    fn at_junction(mut before: Before) -> Before {
+        before.in_junction = true;
+        before.ego.0.iter_mut().chain(&mut before.other.0).for_each(|step| step.in_junction = true);
+        before
     }
 
     /// An overtaking vehicle comes from behind, and does this in between, 30 m and more ahead of where it began.
@@ -482,6 +565,13 @@ mod tests {
         let beside =
             Before { is_lengthwise: false, ..before([at(0.0, 2.5, 0.0, 10.0), at(50.0, 1.9, 0.0, 10.0)]) };
         assert_eq!(beside.kind(), PreCrash::DriftingSameDirection);
+        // It comes over in front of the ego vehicle, which hits it with its front: on purpose, or slowly.
+        let comes_over = |aside_mps: f64| {
+            let mut comes = before([at(40.0, 3.5, 0.0, 8.0), at(54.0, 1.6, 0.0, 8.0)]);
+            comes.other.0[1].place.velocity_mps.y = -aside_mps;
+            comes.kind().number()
+        };
+        assert_eq!((comes_over(1.5), comes_over(0.6)), (Some(18), Some(19)));
         let mut swerve = before([at(40.0, 3.5, 0.0, 2.0), at(54.0, 3.5, 0.0, 2.0)]);
         swerve.ego.0[1].place = at(50.0, 3.5, 0.0, 10.0);
         assert_eq!(swerve.kind(), PreCrash::FollowingVehicleManoeuvre);
@@ -499,13 +589,18 @@ mod tests {
         let oncoming = before([at(100.0, 3.0, 180.0, 8.0), at(54.0, 0.5, 180.0, 8.0)]);
         assert_eq!(oncoming.kind(), PreCrash::ManoeuvreOppositeDirection);
         let turned = [at(80.0, 3.5, 180.0, 6.0), at(52.0, 0.0, -90.0, 6.0)];
-        let left = Before { in_junction: true, ..before(turned) };
+        let left = at_junction(before(turned));
         assert_eq!(left.kind(), PreCrash::LeftTurnAcrossPath);
         assert_eq!(Before { is_signalized: true, ..left }.kind().number(), Some(27));
-        // A bend is no turn.
-        assert_eq!(before(turned).kind(), PreCrash::NoManoeuvreOppositeDirection);
+        // A bend is no turn, and who meet there come towards each other.
+        let mut bend = before([at(74.0, 73.0, -90.0, 12.0), at(54.0, 24.7, -135.0, 12.0)]);
+        bend.ego.0[1].place = at(50.0, 20.7, 45.0, 10.0);
+        for way in [&mut bend.ego, &mut bend.other] {
+            way.0.iter_mut().for_each(|step| step.lane_rad = step.place.pose.heading_rad);
+        }
+        assert_eq!(bend.kind().number(), Some(21));
         let from_the_side = [at(60.0, -20.0, 90.0, 5.0), at(54.0, -1.0, 20.0, 5.0)];
-        let right = Before { in_junction: true, ..before(from_the_side) };
+        let right = at_junction(before(from_the_side));
         assert_eq!(right.kind(), PreCrash::TurningNonSignalized);
         assert_eq!(Before { is_signalized: true, ..right }.kind(), PreCrash::RightTurnSignalized);
     }
@@ -516,7 +611,7 @@ mod tests {
             body: Body::Pedestrian,
             ..before([at(50.0, -5.0, 90.0, 1.5), at(50.0, 0.0, 90.0, 1.5)])
         };
-        let mut turning = Before { in_junction: true, ..walker.clone() };
+        let mut turning = at_junction(walker.clone());
         turning.ego.0[1].place = at(20.0, 20.0, 90.0, 5.0);
         for (body, numbers) in
             [(Body::Pedestrian, (11, 12)), (Body::Bicycle, (13, 14)), (Body::Animal, (9, 10))]
@@ -526,14 +621,15 @@ mod tests {
         }
         let thing = Before { body: Body::Object, ..before([at(52.0, 0.0, 0.0, 0.0); 2]) };
         assert_eq!(thing.kind().number(), Some(36));
-        assert_eq!(Before { ego: turning.ego, in_junction: true, ..thing.clone() }.kind().number(), Some(35));
+        assert_eq!(Before { ego: turning.ego, ..thing.clone() }.kind().number(), Some(35));
         let falls = way(&[at(30.0, 0.0, 0.0, 12.0), at(52.0, 0.0, 0.0, 0.0)]);
         assert_eq!(Before { other: falls, ..thing }.kind(), PreCrash::FallingLoad);
     }
 
     #[test]
     fn who_skids_leaves_the_road_backs_parks_or_evades_is_told_by_the_steps_in_between() {
-        let street = Step { place: at(20.0, 0.0, 0.0, 15.0), off_road_m: -1.5, in_junction: false };
+        let street =
+            Step { place: at(20.0, 0.0, 0.0, 15.0), off_road_m: -1.5, in_junction: false, lane_rad: 0.0 };
         assert_eq!(along(street).kind(), PreCrash::LeadSlower);
         let skewed = Pose::new(20.0, 0.0, 0.5);
         let skids = Step { place: Place { pose: skewed, ..street.place }, ..street };

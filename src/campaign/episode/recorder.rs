@@ -241,7 +241,7 @@ impl Actor {
         let lost_mps = before.map_or(0.0, |before| before.velocity_mps.norm() - sample.velocity_mps.norm());
         self.samples.push(sample);
         let brakes = lost_mps > BRAKING_MPS2 * BRAKING_TICKS as f64 * DT_S;
-        self.light_brakes(sample.tick, brakes && self.is_vehicle());
+        self.light_brakes(sample.tick, brakes && self.is_vehicle() && self.body != Body::Object);
     }
 
     fn light_brakes(&mut self, tick: u64, on: bool) {

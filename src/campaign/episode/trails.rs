@@ -1,10 +1,11 @@
 //! Where everybody was in the last seconds, as far as the kind of a collision asks.
 
+use core::ops::Range;
 use std::collections::VecDeque;
 
-use avastra_base::geometry::Pose;
-use avastra_lang::model::vocabulary::TrafficRule;
-use avastra_road::{LanePlace, RoadMap, SignKind};
+use avastra_base::geometry::{Pose, wrap_angle};
+use avastra_lang::model::vocabulary::{BodyClass, TrafficRule};
+use avastra_road::{LaneIndex, LanePlace, RoadMap, SignKind};
 use avastra_world::sim::{Contact, DT_S, Obstacle, Scene, SignalColour, VehicleParameters, World};
 
 use super::facts::side;
@@ -51,69 +52,60 @@ impl Trails {
 
     /// The shape of the ego vehicle's way to this moment, and the kind of a collision that begins now.
     pub fn kind(&self, world: &World, contact: &Contact, is_wreck: bool) -> (Shape, PreCrash) {
-        let Scene { map, route, .. } = world.scene().as_ref();
-        let step = |place: Place| {
-            let Pose { position, heading_rad } = place.pose;
-            let lane = map.nearest(position, heading_rad, BESIDE_M).map(|at| map.lane(at.lane));
-            let in_junction = lane.is_some_and(|lane| lane.junction.is_some());
-            Step { place, off_road_m: map.lane_room_m(position), in_junction }
+        let map = &world.scene().map;
+        // The contact has changed the speeds already.
+        let heading = world.ego().rear_axle.forward();
+        let ego_ends = Place { velocity_mps: heading * contact.ego_speed_mps, ..ego_now(world) };
+        let way = |places: &mut dyn Iterator<Item = Place>, ends: Place| {
+            Way(places.chain([ends]).map(|place| step(map, place)).collect())
         };
-        let now = step(ego_now(world));
-        let way = |looks: &mut dyn Iterator<Item = Place>| Way(looks.map(step).chain([now]).collect());
-        let whole = way(&mut self.looks.iter().map(|look| look.ego)).shape();
+        let whole = way(&mut self.looks.iter().map(|look| look.ego), ego_ends).shape();
         let (Some(first), Some(obstacle)) = (self.looks.front(), world.obstacle(contact.obstacle)) else {
             return (whole, PreCrash::Other);
         };
+        let ends = Place { pose: obstacle.outline.pose, velocity_mps: contact.obstacle_velocity_mps };
         // Both are looked at from the moment at which the other was there.
         let is_it = |(id, _): &&(u32, Place)| *id == contact.obstacle;
-        let met: Vec<(&Look, Place)> =
-            self.looks.iter().filter_map(|look| Some((look, look.others.iter().find(is_it)?.1))).collect();
-        let ends = Place { pose: obstacle.outline.pose, velocity_mps: contact.obstacle_velocity_mps };
-        let mut other = Way(met.iter().map(|(_, place)| step(*place)).chain([step(ends)]).collect());
-        let mut ego = way(&mut met.iter().map(|(look, _)| look.ego));
+        let met = self.looks.iter().filter_map(|look| Some((look, look.others.iter().find(is_it)?.1)));
+        let mut met: Vec<(&Look, Place)> = met.collect();
         if met.is_empty() {
-            ego = way(&mut core::iter::once(first.ego));
-            other.0.insert(0, other.0[0]);
+            met.push((first, ends));
         }
-        let looks = if met.is_empty() { vec![first] } else { met.iter().map(|(look, _)| *look).collect() };
-        let others = |look: &Look| {
-            let third = look.others.iter().filter(|other| !is_it(other));
-            third.map(|(_, place)| *place).collect()
-        };
-        let third = looks.into_iter().map(others).chain([Vec::new()]).collect();
+        let others =
+            |look: &Look| look.others.iter().filter(|other| !is_it(other)).map(|other| other.1).collect();
+        let third = met.iter().map(|(look, _)| others(look)).chain([Vec::new()]).collect();
+        let ego = way(&mut met.iter().map(|(look, _)| look.ego), ego_ends);
+        let other = way(&mut met.iter().map(|(_, place)| *place), ends);
+        let ticks: Vec<u64> = met.iter().map(|(look, _)| look.tick).chain([world.ticks()]).collect();
+        let (other_ran_red, other_ran_stop) = ran(world, obstacle, &other, &ticks);
         let junction = self.junction(world);
-        let is_signalized = junction.is_some_and(|junction| map.junctions[junction].groups > 0);
-        let passed = first.ego_front_m..=front_m(world);
-        let mut stops = route.sign_lines.iter().filter(|line| line.kind == SignKind::Stop);
-        let stood = self.looks.iter().any(|look| look.ego.velocity_mps.norm() < STOOD_MPS);
-        let ego_ran_stop = !stood && stops.any(|line| passed.contains(&line.station_m));
-        let passed_lines = if obstacle.body.is_vehicle() { lines(map, &other) } else { Vec::new() };
-        // The colour is that of the look before, at most half a second ago.
-        let is_red = |(step, line): &(usize, Line)| match line {
-            Line::Light(signal) => {
-                world.signal_at(*signal, met.get(*step).map_or(0, |(look, _)| look.tick)) == SignalColour::Red
-            }
-            Line::Stop => false,
-        };
-        let other_stood = other.0.iter().any(|step| step.place.velocity_mps.norm() < STOOD_MPS);
-        // The typology's country lets vehicles turn right at red after a stop.
-        let may_pass = world.has_siren(contact.obstacle) || other_stood && other.shape() == Shape::RightTurn;
-        let other_ran_red = passed_lines.iter().any(is_red) && !may_pass;
-        let other_ran_stop = !other_stood && passed_lines.iter().any(|(_, line)| *line == Line::Stop);
         let before = Before {
             body: obstacle.body,
             has_failed: world.ignores(contact.obstacle, TrafficRule::Brakes),
             ran_red: world.red_runs() > first.red_runs || other_ran_red,
-            ran_stop: ego_ran_stop || other_ran_stop,
+            ran_stop: self.ego_ran_stop(world) || other_ran_stop,
             ego,
             other,
             third,
             in_junction: junction.is_some(),
-            is_signalized,
+            is_signalized: junction.is_some_and(|junction| map.junctions[junction].groups > 0),
             is_lengthwise: !matches!(side(contact.on_ego, &VehicleParameters::MKZ), "left" | "right"),
             is_wreck: is_wreck && obstacle.body.is_vehicle(),
         };
         (whole, before.kind())
+    }
+
+    /// Whether the ego vehicle passed a stop sign and had not stood before it.
+    fn ego_ran_stop(&self, world: &World) -> bool {
+        let lines = world.scene().route.sign_lines.iter().filter(|line| line.kind == SignKind::Stop);
+        let mut lines = lines.map(|line| line.station_m);
+        lines.any(|line_m| {
+            let is_before = |look: &&Look| look.ego_front_m <= line_m;
+            let mut before = self.looks.iter().filter(is_before).peekable();
+            before.peek().is_some()
+                && line_m < front_m(world)
+                && !before.any(|look| look.ego.velocity_mps.norm() < STOOD_MPS)
+        })
     }
 
     /// The junction that the ego vehicle is in, from its front to its rear.
@@ -132,7 +124,43 @@ const STOOD_MPS: f64 = 0.5;
 /// Farther away than this one is in no lane, m.
 const BESIDE_M: f64 = 1.0;
 
-/// A line at which a lane stops.
+fn step(map: &RoadMap, place: Place) -> Step {
+    let Pose { position, heading_rad } = place.pose;
+    let at = map.nearest(position, heading_rad, BESIDE_M);
+    let lane_rad = at.map_or(heading_rad, |at| {
+        let lane_rad = map.lane(at.lane).centre.heading_at(at.station_m);
+        let is_against = wrap_angle(lane_rad - heading_rad).abs() > core::f64::consts::FRAC_PI_2;
+        lane_rad + if is_against { core::f64::consts::PI } else { 0.0 }
+    });
+    let in_junction = at.is_some_and(|at| map.lane(at.lane).junction.is_some());
+    Step { place, off_road_m: map.lane_room_m(position), in_junction, lane_rad }
+}
+
+/// Whether another vehicle passed a red light, and whether it passed a stop sign without having stood before it. One with a siren
+/// may. `ticks`: of its steps.
+fn ran(world: &World, vehicle: &Obstacle, way: &Way, ticks: &[u64]) -> (bool, bool) {
+    if !BodyClass::Vehicle.holds(vehicle.body) || world.has_siren(vehicle.id) {
+        return (false, false);
+    }
+    let stood = |step: usize| way.0[..=step].iter().any(|step| step.place.velocity_mps.norm() < STOOD_MPS);
+    // The typology's country lets vehicles turn right at red after a stop.
+    let turns_right = way.shape() == Shape::RightTurn;
+    let passed = lines(&world.scene().map, way, vehicle.outline.half_length_m);
+    let mut ran = (false, false);
+    for Passed { step, part, line } in passed {
+        match line {
+            Line::Light(signal) => {
+                let tick = ticks[step] + (part * (ticks[step + 1] - ticks[step]) as f64) as u64;
+                let is_red = world.signal_at(signal, tick) == SignalColour::Red;
+                ran.0 |= is_red && !(turns_right && stood(step));
+            }
+            Line::Stop => ran.1 |= !stood(step),
+        }
+    }
+    ran
+}
+
+/// A line at which vehicles of a lane stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Line {
     /// Of a light: an index in [`RoadMap::signals`].
@@ -141,27 +169,63 @@ enum Line {
     Stop,
 }
 
-/// The lines that a vehicle passed in its lanes, each with the step before.
-fn lines(map: &RoadMap, way: &Way) -> Vec<(usize, Line)> {
+/// A line that the front of a vehicle passed.
+#[derive(Debug, Clone, Copy)]
+struct Passed {
+    /// The step before, and the part of the way to the next one.
+    step: usize,
+    part: f64,
+    line: Line,
+}
+
+fn lines(map: &RoadMap, way: &Way, half_length_m: f64) -> Vec<Passed> {
     let lane_at = |step: &Step| {
         let Pose { position, heading_rad } = step.place.pose;
-        map.nearest(position, heading_rad, BESIDE_M)
+        map.nearest(position + step.place.pose.forward() * half_length_m, heading_rad, BESIDE_M)
     };
     let lanes: Vec<Option<LanePlace>> = way.0.iter().map(lane_at).collect();
     let mut passed = Vec::new();
     for (step, pair) in lanes.windows(2).enumerate() {
         let [Some(before), Some(after)] = pair else { continue };
-        // Where the lane has ended in between, all that was left of it was passed.
-        let until_m = if after.lane == before.lane { after.station_m } else { f64::INFINITY };
-        let is_passed = |station_m: f64| (before.station_m..until_m).contains(&station_m);
-        let lane = map.lane(before.lane);
-        let lights = lane.stop_lines.iter().filter(|line| is_passed(line.station_m));
-        passed.extend(lights.map(|line| (step, Line::Light(line.signal))));
-        let stops = lane.sign_lines.iter().filter(|line| line.kind == SignKind::Stop);
-        let stops = stops.filter(|line| is_passed(line.station_m));
-        passed.extend(stops.map(|_| (step, Line::Stop)));
+        let stretches = stretches(map, before, after);
+        let whole_m: f64 = stretches.iter().map(|(_, stations_m)| stations_m.end - stations_m.start).sum();
+        let mut driven_m = 0.0;
+        for (index, stations_m) in stretches {
+            let lane = map.lane(index);
+            let lights = lane.stop_lines.iter().map(|line| (line.station_m, Line::Light(line.signal)));
+            let signs = lane.sign_lines.iter().filter(|line| line.kind == SignKind::Stop);
+            let signs = signs.map(|line| (line.station_m, Line::Stop));
+            let there = lights.chain(signs).filter(|(station_m, _)| stations_m.contains(station_m));
+            passed.extend(there.map(|(station_m, line)| Passed {
+                step,
+                part: (driven_m + station_m - stations_m.start) / whole_m,
+                line,
+            }));
+            driven_m += stations_m.end - stations_m.start;
+        }
     }
     passed
+}
+
+/// The stretches of lanes from one place to another that its lane leads to, within half a second; beside it, as after a change of
+/// the lane, that of the new lane from where the vehicle was beside it.
+fn stretches(map: &RoadMap, before: &LanePlace, after: &LanePlace) -> Vec<(LaneIndex, Range<f64>)> {
+    if before.lane == after.lane {
+        return vec![(before.lane, before.station_m..after.station_m)];
+    }
+    let length_m = |lane: LaneIndex| map.lane(lane).centre.length_m();
+    let first = (before.lane, before.station_m..length_m(before.lane).next_up());
+    let last = (after.lane, 0.0..after.station_m);
+    let next = &map.lane(before.lane).successors;
+    if next.contains(&after.lane) {
+        return vec![first, last];
+    }
+    if let Some(between) = next.iter().find(|lane| map.lane(**lane).successors.contains(&after.lane)) {
+        return vec![first, (*between, 0.0..length_m(*between).next_up()), last];
+    }
+    let here = map.lane(before.lane).centre.position_at(before.station_m);
+    let from_m = map.lane(after.lane).centre.project(here).station_m;
+    vec![(after.lane, from_m..after.station_m)]
 }
 
 fn ego_now(world: &World) -> Place {

@@ -100,9 +100,17 @@ pub struct Kept {
     pub is_free_space: bool,
     /// Whether it is ahead of the other one; `None`: as it is.
     pub is_ahead: Option<bool>,
-    /// How fast it gains speed and loses it, m/s², and is at most, m/s; without bounds it is there at once.
-    pub bounds: Option<(f64, f64, f64)>,
+    /// Without them it is there at once.
+    pub bounds: Option<Bounds>,
     pub is_continuous: bool,
+}
+
+/// How fast somebody who comes to a distance gains speed and loses it, m/s², and is at most, m/s.
+#[derive(Debug, Clone, Copy)]
+pub struct Bounds {
+    pub gains_mps2: f64,
+    pub loses_mps2: f64,
+    pub speed_mps_max: f64,
 }
 
 #[derive(Debug, Clone)]
@@ -354,7 +362,10 @@ fn distance(source: &mut Source, action: Node) -> Option<ActKind> {
     }
     match side {
         "trailingReferencedEntity" => {
-            return source.refuse(action, "only a distance ahead of the ego vehicle is read");
+            return source.refuse(
+                action,
+                "a distance without bounds that is not kept is read ahead of the ego vehicle alone",
+            );
         }
         // 1.0 has no such attribute. Later, players need not take its absence as ahead.
         "" if source.minor > 0 => {
@@ -367,19 +378,20 @@ fn distance(source: &mut Source, action: Node) -> Option<ActKind> {
 }
 
 /// The bounds of how somebody comes to a distance; `None` if they bind nothing.
-fn within(source: &mut Source, bounds: Node) -> Option<Option<(f64, f64, f64)>> {
+fn within(source: &mut Source, bounds: Node) -> Option<Option<Bounds>> {
     if bounds.has_attribute("maxAccelerationRate") || bounds.has_attribute("maxDecelerationRate") {
         source.note("how fast an acceleration changes is not bounded");
     }
     let gains_mps2 = source.number_or(bounds, "maxAcceleration", f64::INFINITY)?;
     let loses_mps2 = source.number_or(bounds, "maxDeceleration", f64::INFINITY)?;
-    let most_mps = source.number_or(bounds, "maxSpeed", f64::INFINITY)?;
+    let speed_mps_max = source.number_or(bounds, "maxSpeed", f64::INFINITY)?;
     let is_bound = gains_mps2.is_finite() && loses_mps2.is_finite();
     let reason = "bounds of a distance are a `maxAcceleration` and a `maxDeceleration` above 0, or neither";
     let is_whole = is_bound || gains_mps2.is_infinite() && loses_mps2.is_infinite();
     source.refuse_if(!is_whole || gains_mps2 <= 0.0 || loses_mps2 <= 0.0, bounds, reason)?;
-    source.refuse_if(most_mps <= 0.0, bounds, "`maxSpeed` is above 0")?;
-    Some(is_bound.then_some((gains_mps2, loses_mps2, most_mps)))
+    let reason = "a `maxSpeed` is read beside a `maxAcceleration` and a `maxDeceleration`, and is above 0";
+    source.refuse_if(speed_mps_max <= 0.0 || speed_mps_max.is_finite() && !is_bound, bounds, reason)?;
+    Some(is_bound.then_some(Bounds { gains_mps2, loses_mps2, speed_mps_max }))
 }
 
 fn meeting(source: &mut Source, action: Node) -> Option<ActKind> {

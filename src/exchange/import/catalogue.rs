@@ -146,7 +146,9 @@ pub fn body(
     read: impl FnOnce(&mut Source, Node) -> Option<Body>,
 ) -> Option<Body> {
     let (catalogue, name) = (source.text(reference, "catalogName")?, source.text(reference, "entryName")?);
-    let key = format!("{catalogue:?} {name:?} {:?}", assigned(source, reference)?);
+    let folders: Vec<&String> = source.folders.values().map(|(_, path)| path).collect();
+    let key = format!("{folders:?} {catalogue:?} {name:?}");
+    let key = format!("{key} {:?}", assigned(source, reference)?);
     if let Some(known) = source.library.bodies.borrow().get(&key) {
         return Some(known.clone());
     }

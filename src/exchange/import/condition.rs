@@ -4,6 +4,7 @@ use avastra_base::geometry::Vec2;
 use avastra_world::sim::VehicleParameters;
 
 use super::action::ActKind;
+use super::phases::ARRIVES_M;
 use super::said::Said;
 use super::scene::{Cast, Moving};
 use super::source::{Mark, Source};
@@ -15,9 +16,6 @@ pub const EGO_FRONT_M: f64 = VehicleParameters::MKZ.rear_axle_to_front_m;
 
 /// Who drives through a circle of a smaller radius may be through it within a tick: it is reached once its near edge is, m.
 const PASSED_M: f64 = 1.0;
-
-/// What a speed may differ and be reached, m/s.
-const REACHED_MPS: f64 = 0.1;
 
 /// The words before a phase.
 #[derive(Debug, Clone, Default)]
@@ -65,6 +63,17 @@ impl Waiting<'_, '_> {
             _ => condition.kind == When::Always,
         };
         matches!(trigger.as_slice(), [all] if all.iter().all(is_end))
+    }
+
+    /// Whether a trigger waits for the end of a way, among others.
+    pub fn waits_for_a_way(&self, trigger: &Trigger) -> bool {
+        let is_way = |event: &&&Event| event.acts.iter().any(|act| matches!(act.kind, ActKind::Follow(_)));
+        trigger.iter().flatten().any(|condition| match &condition.kind {
+            When::Ended { kind, name } => {
+                self.before.iter().filter(is_way).any(|event| is_called(event, kind, name))
+            }
+            _ => false,
+        })
     }
 
     pub fn begins(&self, source: &mut Source, trigger: &Trigger) -> Option<Begins> {
@@ -253,14 +262,11 @@ impl Waiting<'_, '_> {
                 Some(Said::text(format!("{who}.station >= ")).number(at_m, "m"))
             }
             ActKind::Follow(_) => {
-                Some(Said::text(format!("{who}.station >= ")).number(moving.path.length_m() - 0.05, "m"))
+                Some(Said::text(format!("{who}.station >= ")).number(moving.path.length_m() - ARRIVES_M, "m"))
             }
-            ActKind::Speed(super::action::Speed::Absolute(mps), _) => Some(
-                Said::text(format!("{who}.speed >= "))
-                    .number(mps - REACHED_MPS, "m/s")
-                    .and(format!(" and {who}.speed <= "))
-                    .number(mps + REACHED_MPS, "m/s"),
-            ),
+            ActKind::Speed(super::action::Speed::Absolute(mps), _) => {
+                Some(Said::text(format!("{who}.speed == ")).number(*mps, "m/s"))
+            }
             _ => source.refuse(mark, format!("when `{name}` has ended is not read")),
         }
     }
@@ -295,16 +301,16 @@ impl Waiting<'_, '_> {
         is_free_space: bool,
     ) -> Option<Said> {
         let (from, to) = (self.who(source, mark, back)?, self.who(source, mark, front)?);
-        let overhangs_m = self.cast.overhang_m(source, mark, front, false)?
-            + self.cast.overhang_m(source, mark, back, true)?;
         // Places beside the ego vehicle's route say little of two that are far from it.
         if self.cast.is_far_off(source, mark, back)? || self.cast.is_far_off(source, mark, front)? {
-            let Some(more_m) = self.cast.stations_apart_m(back, front) else {
+            let Some((more_m, overhangs_m)) = self.cast.stations_apart_m(back, front) else {
                 return source.refuse(mark, "the way between two on different roads is not known");
             };
             let more_m = if is_free_space { more_m - overhangs_m } else { more_m };
             return Some(Said::text(format!("{to}.station - {from}.station + ")).number(more_m, "m"));
         }
+        let overhangs_m = self.cast.overhang_m(source, mark, front, false)?
+            + self.cast.overhang_m(source, mark, back, true)?;
         let said = Said::text(format!("{to}.rear - {from}.front"));
         Some(if is_free_space { said } else { said.and(" + ").number(overhangs_m, "m") })
     }

@@ -132,7 +132,7 @@ pub fn openscenario(
         notes: BTreeSet::new(),
         variants: Vec::new(),
         excluded: 0,
-        is_looked_over: false,
+        is_known: false,
     };
     let Some(named) = variation::scenario(&mut source, document.root_element()) else {
         whole
@@ -200,8 +200,8 @@ struct Whole<'a> {
     variants: Vec<Variant>,
     /// How many variations have values that the scenario's own constraints exclude.
     excluded: usize,
-    /// Whether the scenario was searched for what no version has.
-    is_looked_over: bool,
+    /// Whether the scenario has nothing that no version has.
+    is_known: bool,
 }
 
 impl Whole<'_> {
@@ -215,8 +215,11 @@ impl Whole<'_> {
         asked: &Values,
     ) -> Result<(), (Vec<Refusal>, bool)> {
         let mut source = Source::new(Rc::clone(lines), asked, library);
-        if !core::mem::replace(&mut self.is_looked_over, true) {
-            for (node, reason) in vocabulary::unknown(document.root_element()) {
+        // What is told of values that the file excludes is dropped, so it is told again of others.
+        if !self.is_known {
+            let unknown = vocabulary::unknown(document.root_element());
+            self.is_known = unknown.is_empty();
+            for (node, reason) in unknown {
                 source.refuse::<()>(node, reason);
             }
         }

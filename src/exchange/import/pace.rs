@@ -2,9 +2,10 @@
 
 use avastra_lang::model::SPAWN_SPEED_MPS;
 use avastra_lang::model::command::RATE_MPS2;
-use avastra_world::sim::{SPEED_REACHED_MPS, SPEED_REACHED_PART};
 
-use super::action::{Act, ActKind, Dynamics, Headway, Kept, Meeting, Over, Speed, SpeedEntry, Steady};
+use super::action::{
+    Act, ActKind, Bounds, Dynamics, Headway, Kept, Meeting, Over, Speed, SpeedEntry, Steady,
+};
 use super::body::Body;
 use super::condition::Waiting;
 use super::phases::{CONTINUOUS, Told, instead_of};
@@ -167,9 +168,13 @@ impl<'a> Cast<'a> {
         });
         told.mps = mps;
         instead_of(fields, &PACE);
+        let follows = Said::text(format!("{CONTINUOUS}, speed: ")).then(said.clone());
         fields.push(Said::text("speed: ").then(said));
+        // A rate that is computed holds on the way to the other's speed, and not while that is kept.
+        let is_computed = rate.as_ref().is_some_and(|rate| rate.0.len() > 1);
         fields.extend(rate.map(|rate| Said::text("rate: ").then(rate)));
-        fields.extend(is_continuous.then(|| Said::text(CONTINUOUS)));
+        told.then = (is_continuous && is_computed).then(|| Said::text("{ ").then(follows).and(" }"));
+        fields.extend((is_continuous && !is_computed).then(|| Said::text(CONTINUOUS)));
         Some(())
     }
 
@@ -185,11 +190,11 @@ impl<'a> Cast<'a> {
         let (of, too_far) = self.too_far(source, moving, mark, kept)?;
         let said = match kept.bounds {
             None => {
-                source.note("a distance without bounds is taken at 70 m/s at most");
+                source.note("a distance without bounds is taken at 70 m/s at most, backwards at 10 m/s");
                 Said::text(format!("{of}.speed + (")).then(too_far).and(") / 20 ms")
             }
-            Some((gains_mps2, loses_mps2, most_mps)) => {
-                let most_mps = most_mps.min(*SPAWN_SPEED_MPS.end());
+            Some(Bounds { gains_mps2, loses_mps2, speed_mps_max }) => {
+                let most_mps = speed_mps_max.min(*SPAWN_SPEED_MPS.end());
                 let damping = |mps2: f64| 2.0 * (SPRING_PER_M * mps2).sqrt();
                 Said::text("keeping(npc.speed, ")
                     .then(too_far)
@@ -209,7 +214,12 @@ impl<'a> Cast<'a> {
         Some(vec![Said::text("speed: ").then(said), Said::text(CONTINUOUS)])
     }
 
-    /// To whom a distance is kept, and how far one has to go ahead for it.
+    /// The station at which somebody begins on its way, m; 0 of who has none.
+    fn begin_m(&self, name: &str) -> f64 {
+        self.moving.iter().find(|moving| moving.entity.name == name).map_or(0.0, |moving| moving.at_m)
+    }
+
+    /// The name of the one to whom a distance is kept, and how far the vehicle has to go ahead for it.
     pub fn too_far(
         &self,
         source: &mut Source,
@@ -222,7 +232,16 @@ impl<'a> Cast<'a> {
         let waiting = Waiting { cast: self, actor: moving, before: Vec::new() };
         let of = waiting.who(source, mark, &kept.of)?;
         let (here, there) = (self.begins(source, mark, own)?, self.begins(source, mark, &kept.of)?);
-        let is_ahead = kept.is_ahead.unwrap_or(self.station_m(here) > self.station_m(there));
+        let is_ahead = match kept.is_ahead {
+            Some(is_ahead) => is_ahead,
+            None => {
+                source.note("who is ahead where a distance is kept is as at the beginning");
+                match self.stations_apart_m(own, &kept.of) {
+                    Some((apart_m, _)) => apart_m + self.begin_m(&kept.of) < self.begin_m(own),
+                    None => self.station_m(here) > self.station_m(there),
+                }
+            }
+        };
         let (back, front) = if is_ahead { (&kept.of, own) } else { (own, &kept.of) };
         let away = waiting.between(source, mark, back, front, kept.is_free_space)?;
         let wanted = match kept.headway {
@@ -317,11 +336,8 @@ pub fn profile(
                 let change = Change::between(from, Some(*mps));
                 let rate_mps2 = rate_within_mps2(source, body, change, by_mps / time_s);
                 said = said.and(", rate: ").number(rate_mps2, "m/s^2");
-                // A stop is exact.
-                let near_mps =
-                    if *mps == 0.0 { 0.0 } else { SPEED_REACHED_MPS.max(SPEED_REACHED_PART * mps) };
-                // From when the phase is done; one whose vehicle is slower takes longer.
-                rest_s = (time_s - (by_mps - near_mps).max(0.0) / rate_mps2).max(0.0);
+                // One whose vehicle is slower takes longer.
+                rest_s = (time_s - by_mps / rate_mps2).max(0.0);
             }
         }
         phases.push(said.and(" }"));

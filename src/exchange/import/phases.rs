@@ -16,6 +16,9 @@ use super::trigger::When;
 /// A distance that is to be reached is, this near to it, m, as for esmini.
 const KEPT_M: f64 = 0.1;
 
+/// Whoever is so near to the end of its way has reached it, m.
+pub const ARRIVES_M: f64 = 0.05;
+
 /// A speed that is asked anew at every tick.
 pub const CONTINUOUS: &str = "continuous: true";
 
@@ -27,6 +30,8 @@ pub struct Told {
     pub lane: Option<LanePlace>,
     /// How far the middle of that lane is to the left of its way, m.
     pub lane_m: f64,
+    /// A phase that begins when the one is done that tells it.
+    pub then: Option<Said>,
 }
 
 impl<'a> Cast<'a> {
@@ -41,15 +46,21 @@ impl<'a> Cast<'a> {
         } else if events.iter().filter(|event| waits_by_itself(event)).count() > 1 {
             source.note(format!("what `{}` does is taken to come in the order of the file", entity.name));
         }
-        let mut told =
-            Told { mps: Some(moving.mps), offset_m: moving.offset_m, lane: moving.placed.lane, lane_m: 0.0 };
+        let mut told = Told {
+            mps: Some(moving.mps),
+            offset_m: moving.offset_m,
+            lane: moving.placed.lane,
+            lane_m: 0.0,
+            then: None,
+        };
         told.lane_m = told.lane.map_or(0.0, |lane| self.aside_m(moving, lane));
         let mut phases = Vec::new();
-        // After what takes several phases, whose `once` would come too late: the words before what may follow.
-        let mut several: Option<Said> = None;
+        // After what takes a while: what may follow.
+        let mut takes: Option<Takes> = None;
         if entity.way.as_ref().is_some_and(|way| way.timing.is_some()) {
-            phases.extend(self.timed(source, moving, Said::default(), true)?);
-            several = (phases.len() > 1).then(Said::default);
+            let (timed, then) = self.timed(source, moving, Said::default(), true)?;
+            phases.extend(timed);
+            takes = Some(Takes { then, is_cut_short: false });
         }
         let (at_once, later): (Vec<&Event>, Vec<&Event>) =
             events.into_iter().partition(|event| event.when.is_empty());
@@ -76,7 +87,7 @@ impl<'a> Cast<'a> {
                 "beside the times of a trajectory or of a profile only what waits for their end is read";
             let begins = match event {
                 None => {
-                    source.refuse_if(several.is_some(), &entity.mark, reason)?;
+                    source.refuse_if(takes.is_some(), &entity.mark, reason)?;
                     Said::default()
                 }
                 Some(event) => {
@@ -86,10 +97,14 @@ impl<'a> Cast<'a> {
                     let waits = begins.once.is_some() && !begins.is_after;
                     let never = "what comes after a speed or a distance that is kept waits for the end of that, which never comes";
                     source.refuse_if(is_endless && !waits, &event.mark, never)?;
-                    if let Some(words) = several.take() {
-                        source.refuse_if(!waiting.waits_for_the_end(&event.when), &event.mark, reason)?;
-                        if !words.0.is_empty() {
-                            phases.push(words.and("{}"));
+                    if let Some(Takes { then, is_cut_short }) = takes.take() {
+                        let waits = match is_cut_short {
+                            true => waiting.waits_for_a_way(&event.when),
+                            false => waiting.waits_for_the_end(&event.when),
+                        };
+                        source.refuse_if(!waits && !is_cut_short, &event.mark, reason)?;
+                        if waits && !then.0.is_empty() {
+                            phases.push(then.and("{}"));
                         }
                     }
                     if begins.is_after {
@@ -106,19 +121,19 @@ impl<'a> Cast<'a> {
             }
             let mut fields = Vec::new();
             let mut timed = Vec::new();
-            let mut ends = None;
             for act in acts {
                 match &act.kind {
                     ActKind::Keep(kept) if !kept.is_continuous => {
                         let (_, too_far) = self.too_far(source, moving, &act.mark, kept)?;
                         let near = Said::text("once ").then(too_far.clone()).and(" <= ").number(KEPT_M, "m");
                         let near = near.and(" and ").then(too_far).and(" >= ").number(-KEPT_M, "m");
-                        ends = Some(near.and(" { speed: npc.speed }"));
                         self.fields(source, moving, act, &mut told, &mut fields)?;
+                        told.then = Some(near.and(" { speed: npc.speed }"));
                     }
                     ActKind::Follow(way) if way.timing.is_some() => {
-                        timed = self.timed(source, moving, begins.clone(), way.is_absolute)?;
-                        several = (timed.len() > 1).then(Said::default);
+                        let then;
+                        (timed, then) = self.timed(source, moving, begins.clone(), way.is_absolute)?;
+                        takes = Some(Takes { then, is_cut_short: false });
                     }
                     ActKind::Profile(entries) => {
                         let reason = "its trajectory has times, which say the speed already";
@@ -126,15 +141,19 @@ impl<'a> Cast<'a> {
                         let begins = begins.clone();
                         let (said, then) =
                             pace::profile(source, &act.mark, &entity.body, told.mps, entries, begins)?;
-                        (timed, several) = (said, Some(then));
+                        (timed, takes) = (said, Some(Takes { then, is_cut_short: false }));
                         told.mps = entries.last().map(|entry| entry.mps);
+                    }
+                    // It goes on with the speed that it has, which is 0: an event of its own tells it more.
+                    ActKind::Follow(_) => {
+                        takes = Some(Takes { then: arrives(moving.path.length_m()), is_cut_short: true });
                     }
                     _ => self.fields(source, moving, act, &mut told, &mut fields)?,
                 }
             }
             if timed.is_empty() {
                 phases.push(begins.and("{ ").then(Said::joined(fields, ", ")).and(" }"));
-                phases.extend(ends);
+                phases.extend(told.then.take());
             } else if fields.is_empty() {
                 phases.extend(timed);
             } else {
@@ -145,16 +164,18 @@ impl<'a> Cast<'a> {
         Some(phases)
     }
 
-    /// The phases of one that is at places of its way at given times.
+    /// The phases of one that is at places of its way at given times, and the words before a phase that waits for the end.
     fn timed(
         &self,
         source: &mut Source,
         moving: &Moving,
         begins: Said,
         is_absolute: bool,
-    ) -> Option<Vec<Said>> {
+    ) -> Option<(Vec<Said>, Said)> {
         let mut phases = Vec::new();
-        let Some((_, first_s)) = moving.timed.first() else { return Some(phases) };
+        let (Some((_, first_s)), Some((last_m, _))) = (moving.timed.first(), moving.timed.last()) else {
+            return Some((phases, Said::default()));
+        };
         let mut begins = begins;
         if *first_s > 0.0 {
             begins = match is_absolute {
@@ -184,7 +205,7 @@ impl<'a> Cast<'a> {
                 begins = Said::text("after ").number(time_s, "s").and(" ");
             }
         }
-        Some(phases)
+        Some((phases, if is_wait { begins } else { arrives(last_m + moving.more_m()) }))
     }
 
     /// The fields of an order that an action is.
@@ -203,13 +224,13 @@ impl<'a> Cast<'a> {
             }
             ActKind::Keep(kept) => {
                 let said = self.kept(source, moving, mark, kept)?;
-                told.mps = None;
+                (told.mps, told.then) = (None, None);
                 instead_of(fields, &PACE);
                 fields.extend(said);
                 Some(())
             }
             ActKind::Route(_) => source.refuse(mark, "a route is taken from the beginning"),
-            // It goes on with the speed that it has, which is 0: an event of its own tells it more.
+            // Those of `phases`.
             ActKind::Follow(_) | ActKind::Profile(_) => Some(()),
             ActKind::Speed(wanted, dynamics) => {
                 self.speed_fields(source, moving, mark, wanted, *dynamics, told, fields)
@@ -232,6 +253,19 @@ impl<'a> Cast<'a> {
             ActKind::Meet(meeting) => self.meeting_fields(source, moving, mark, meeting, told, fields),
         }
     }
+}
+
+/// What takes a while.
+struct Takes {
+    /// The words before a phase that waits for its end.
+    then: Said,
+    /// Whether something else may begin before that.
+    is_cut_short: bool,
+}
+
+/// Before a phase that waits until a station has been reached.
+fn arrives(station_m: f64) -> Said {
+    Said::text("once npc.station >= ").number(station_m - ARRIVES_M, "m").and(" ")
 }
 
 /// Of two actions that begin together the later one counts.

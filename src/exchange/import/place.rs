@@ -88,17 +88,15 @@ impl<'a> Places<'a> {
     pub fn placed(&mut self, source: &mut Source, position: &Position) -> Option<Placed> {
         let Position { mark, kind, heading } = position;
         let placed = match kind {
-            PositionKind::Lane { road, lane, s_m, offset_m } => {
-                match (self.map.place(road, *lane, *s_m), self.map.strip_pose(road, *lane, *s_m)) {
-                    (Ok(place), _) => {
-                        self.on_lane(LanePlace { offset_m: self.left_m(place, *offset_m), ..place })
-                    }
-                    (Err(_), Some((strip, is_along))) => {
-                        self.in_plane(strip.offset(0.0, if is_along { *offset_m } else { -offset_m }))
-                    }
-                    (Err(error), None) => return source.refuse(mark, error.to_string()),
+            PositionKind::Lane { road, lane, s_m, offset_m } => match self.map.place(road, *lane, *s_m) {
+                Ok(place) => self.on_lane(LanePlace { offset_m: self.left_m(place, *offset_m), ..place }),
+                Err(error) => {
+                    let Some((strip, is_along)) = self.map.strip_pose(road, *lane, *s_m) else {
+                        return source.refuse(mark, error.to_string());
+                    };
+                    self.in_plane(strip.offset(0.0, if is_along { *offset_m } else { -offset_m }))
                 }
-            }
+            },
             PositionKind::RelativeLane { entity, lanes, ahead_m, offset_m } => {
                 let of = self.on_a_lane(source, mark, entity)?;
                 let there = self.beside(source, mark, of, *lanes, *ahead_m)?;

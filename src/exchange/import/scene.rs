@@ -292,9 +292,9 @@ impl<'a> Cast<'a> {
         Some(is_beside && beside.offset_m.abs() > OFF_ROUTE_M)
     }
 
-    /// What is added to the station of `front` less that of `back` to give the way between their reference points, m; `None` if they
-    /// follow different roads.
-    pub fn stations_apart_m(&self, back: &str, front: &str) -> Option<f64> {
+    /// The way between the reference points of two is the station of `front` less that of `back` and this, m; with it by how much it is
+    /// longer than the one between their outlines. `None` if they follow different roads.
+    pub fn stations_apart_m(&self, back: &str, front: &str) -> Option<(f64, f64)> {
         let of = |name: &str| self.moving.iter().find(|moving| moving.entity.name == name);
         let (back, front) = (of(back)?, of(front)?);
         let beside = |point: Vec2| {
@@ -305,7 +305,9 @@ impl<'a> Cast<'a> {
         let here_m = beside(front.path.position_at(front.at_m))?;
         let there_m = beside(front.path.position_at(later_m))?;
         let goes_on_m = (there_m - here_m) - (later_m - front.at_m);
-        (goes_on_m.abs() < 0.1 * SAME_ROAD_M).then_some(here_m - front.at_m)
+        let [behind, ahead] = [&back.entity.body, &front.entity.body];
+        let overhangs_m = behind.length_m / 2.0 + behind.middle_m + ahead.length_m / 2.0 - ahead.middle_m;
+        (goes_on_m.abs() < 0.1 * SAME_ROAD_M).then_some((here_m - front.at_m, overhangs_m))
     }
 
     /// How far an end of somebody's outline lies beyond its reference point along the ego vehicle's route, m.

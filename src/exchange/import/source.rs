@@ -390,11 +390,11 @@ fn pair((name, value): (&String, &String)) -> (String, String) {
 pub fn filled(value: &str, parameters: &BTreeMap<String, String>) -> Result<String, String> {
     let value = value.trim();
     if let Some(inner) = value.strip_prefix("${").and_then(|rest| rest.strip_suffix('}')) {
-        if let Some(joined) = expression::joined(inner, parameters) {
-            return Ok(joined);
-        }
-        let number = expression::value(inner, parameters).map_err(|reason| format!("`{value}`: {reason}"))?;
-        return Ok(number.to_string());
+        return match (expression::value(inner, parameters), expression::joined(inner, parameters)) {
+            (Ok(number), _) => Ok(number.to_string()),
+            (Err(_), Some(joined)) => Ok(joined),
+            (Err(reason), None) => Err(format!("`{value}`: {reason}")),
+        };
     }
     let Some(name) = value.strip_prefix('$') else { return Ok(value.to_owned()) };
     parameters.get(name).cloned().ok_or_else(|| format!("no parameter is called `{name}`"))

@@ -343,19 +343,30 @@ impl Cast {
         }
     }
 
+    /// Whether it waits for something that never comes.
+    fn never_comes(&self, kind: &When) -> bool {
+        let (When::Ended { kind, name } | When::Begun { kind, name }) = kind else { return false };
+        let last = name.rsplit("::").next();
+        self.never.iter().any(|(of, known)| of == kind && Some(known.as_str()) == last)
+    }
+
     /// A trigger in which a contact of who acts never comes, nor what waits for that: a contact ends what both do.
     fn without_contacts(&self, source: &mut Source, mut when: Trigger, own: &[&String]) -> Trigger {
         for condition in when.iter_mut().flatten() {
             let is_over = match &condition.kind {
-                When::Contact(Some((of, with))) => own.iter().all(|name| [of, with].contains(name)),
-                When::Ended { kind, name } | When::Begun { kind, name } => {
-                    let last = name.rsplit("::").next();
-                    self.never.iter().any(|(of, known)| of == kind && Some(known.as_str()) == last)
+                When::Contact(Some((of, with))) => {
+                    !own.is_empty() && own.iter().all(|name| [of, with].contains(name))
+                }
+                // What holds it has begun all the same.
+                When::Begun { kind: "event" | "action", .. } | When::Ended { .. } => {
+                    self.never_comes(&condition.kind)
                 }
                 _ => false,
             };
-            if is_over {
+            if matches!(condition.kind, When::Contact(_)) && is_over {
                 source.note("what the file lets somebody do after a contact is not played: a contact ends what both do");
+            }
+            if is_over {
                 condition.kind = When::Never;
             }
         }

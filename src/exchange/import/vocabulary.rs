@@ -248,7 +248,7 @@ mod tests {
         LongitudinalDistanceAction LaneChangeAction FollowTrajectoryAction AssignRouteAction \
         AcquirePositionAction EnvironmentAction LanePosition RelativeLanePosition WorldPosition \
         Polyline PrivateAction SimulationTimeCondition StoryboardElementStateCondition \
-        TimeHeadwayCondition RelativeDistanceCondition TimeToCollisionCondition ReachPositionCondition \
+        TimeHeadwayCondition RelativeDistanceCondition TimeToCollisionCondition CollisionCondition ReachPositionCondition \
         RoadPosition RelativeRoadPosition RelativeWorldPosition RelativeObjectPosition RoutePosition \
         TrajectoryPosition FromCurrentEntity FromRoadCoordinates FromLaneCoordinates \
         PositionInRoadCoordinates PositionInLaneCoordinates LaneOffsetAction SynchronizeAction \

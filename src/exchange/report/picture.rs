@@ -240,13 +240,16 @@ impl Panel<'_> {
 
     fn obstacle(&mut self, obstacle: &Obstacle) {
         self.arrow(&obstacle.outline, obstacle.velocity_mps, "#23272e");
-        if obstacle.body == Body::Pedestrian {
+        if matches!(obstacle.body, Body::Pedestrian | Body::Animal) {
             let radius_px = format!("{:.1}", (0.4 * self.canvas.px_per_m).max(4.0));
             let style = r##"fill="#b0128a" stroke="#5a0046""##;
             self.canvas.circle(obstacle.outline.pose.position, &radius_px, style);
             return;
         }
         let style = r##"fill="#f2ede4" stroke="#23272e" stroke-width="1.2""##;
+        if obstacle.body == Body::Object {
+            return self.canvas.polygon(&obstacle.outline.corners(), style);
+        }
         self.vehicle(&obstacle.outline, style, "#23272e");
         if self.moment.braking.contains(&obstacle.id) {
             self.brake_lights(&obstacle.outline);

@@ -247,6 +247,15 @@ impl Checker {
             let error = error.at(declared.phases[at].span, "it hands over to another manoeuvre");
             self.report(error.help("leave them out, or write `if …` before its fields"));
         }
+        let never_ends = |phase: &Option<PhaseDef>| phase.as_ref().is_some_and(PhaseDef::never_ends);
+        for (at, pair) in declared.phases.windows(2).enumerate().filter(|(at, _)| never_ends(&phases[*at])) {
+            if pair[1].once.is_none() {
+                let error = Diagnostic::error(code::NEVER_REACHED, "this phase never comes");
+                let error = error.at(pair[1].span, "waits for the end of the one before");
+                let error = error.beside(declared.phases[at].span, "`continuous`: it does not end by itself");
+                self.report(error.help("say when with `once …`"));
+            }
+        }
         let phases: Vec<PhaseDef> = phases.into_iter().collect::<Option<_>>()?;
         let name = declared.name.text.clone();
         Some(ManoeuvreDef { name, docs: docs(item), parameters, repeat: repeat?, phases })
@@ -463,6 +472,12 @@ impl Checker {
             self.report(error.help("leave one of the two out, or write them in two phases"));
             all = false;
         }
+        if let Some(value) = field(fields, CommandField::Continuous).filter(|_| keeps || is_early) {
+            let error =
+                Diagnostic::error(code::NOT_HERE, "`keep` and `early` say the speed at every tick already");
+            self.report(error.at(value.span, "beside one of them").help("leave it out"));
+            all = false;
+        }
         for (part, of, is_there) in [
             (CommandField::At, "an `early`", is_early),
             (CommandField::Reach, "an `early` and an `at`", is_early && says(CommandField::At)),
@@ -477,11 +492,7 @@ impl Checker {
                 says(CommandField::Speed) || keeps || is_early,
             ),
             (CommandField::Aside, "a `lane` or an `offset`", goes_aside),
-            (
-                CommandField::Continuous,
-                "a `speed` without a `keep` or an `early`",
-                says(CommandField::Speed) && !keeps && !is_early,
-            ),
+            (CommandField::Continuous, "a `speed`", says(CommandField::Speed)),
         ] {
             if let Some(value) = field(fields, part).filter(|_| !is_there) {
                 let message = format!("`{}` belongs to {of}", part.name());

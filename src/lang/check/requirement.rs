@@ -93,30 +93,18 @@ impl Checker {
             let help = "multiply the other side instead: `ego.lead_gap >= 0.8 s * ego.speed`";
             return self.reject(error.help(help));
         }
-        // Who asks `truck.there` wants an answer while it is not there, too.
-        let asked_for = |who: usize| {
-            let asks =
-                |kind: &ExprKind| matches!(kind, ExprKind::IsThere(of) if of.bearers(0).contains(&who));
-            when.iter()
-                .chain(&until)
-                .chain(&after)
-                .chain([&condition])
-                .chain(&unless)
-                .any(|expr| expr.any(asks))
+        let all = || when.iter().chain(&until).chain(&after).chain([&condition]).chain(&unless);
+        let distinct = |mut bearers: Vec<usize>| {
+            bearers.sort_unstable();
+            bearers.dedup();
+            bearers
         };
-        let all = when.iter().chain(&until).chain(&after).chain([&condition]).chain(&unless);
-        let mut bearers: Vec<usize> = all
-            .flat_map(|expr| {
-                expr.filter_map(|kind| match kind {
-                    ExprKind::OfBearer(who, _) | ExprKind::IsWordOf(who, ..) => Some(*who),
-                    _ => None,
-                })
-            })
-            .flat_map(|who| who.bearers(0))
-            .filter(|who| !asked_for(*who))
-            .collect();
-        bearers.sort_unstable();
-        bearers.dedup();
+        let bearers = distinct(all().flat_map(|expr| expr.bearers(0)).collect());
+        // Who asks `truck.there` wants an answer while it is not there, too.
+        let asks_whether_there =
+            |kind: &ExprKind, who| matches!(kind, ExprKind::IsThere(of) if of.bearers(0).contains(&who));
+        let is_needed = |who: &usize| !all().any(|expr| expr.any(|kind| asks_whether_there(kind, *who)));
+        let needed = bearers.iter().copied().filter(is_needed).collect();
         Some(RequirementDef {
             name: declared.name.text.clone(),
             docs: docs(item),
@@ -130,6 +118,7 @@ impl Checker {
             unless,
             within_ticks: within_ticks?,
             bearers,
+            needed,
             span: declared.name.span,
         })
     }

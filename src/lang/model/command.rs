@@ -85,7 +85,9 @@ impl Told {
         if self == Told::BY_DRIVERS {
             return "all but a `reach` and a `steady`".to_owned();
         }
-        let fields = CommandField::ALL.iter().filter(|field| self.holds(**field));
+        // Beside a `speed`, and so left out.
+        let is_named = |field: &&CommandField| self.holds(**field) && **field != CommandField::Continuous;
+        let fields = CommandField::ALL.iter().filter(is_named);
         let fields: Vec<String> = fields.map(|field| format!("`{}`", field.name())).collect();
         match fields.split_last() {
             Some((last, [])) => format!("a {last} alone"),

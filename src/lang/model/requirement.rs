@@ -35,7 +35,7 @@ pub struct ReadyRequirement {
     condition: Node,
     unless: Option<Node>,
     has_margin: bool,
-    bearers: Vec<usize>,
+    needed: Vec<usize>,
     /// What it asks of the past, those within others first.
     pasts: Vec<PastNode>,
     /// Whether `after` asks nothing of `npc`.
@@ -161,7 +161,7 @@ impl RequirementDef {
             condition,
             unless,
             has_margin: self.margin.is_some(),
-            bearers: self.bearers.clone(),
+            needed: self.needed.clone(),
             pasts,
             after_is_of_ego: self.after.as_ref().is_some_and(|after| !asks_of_npc(after)),
         }
@@ -198,7 +198,7 @@ impl ReadyRequirement {
         let is_there = |who: &usize| {
             facts.world.is_some_and(|world| world.bearers.iter().any(|(known, _)| known == who))
         };
-        self.bearers.iter().all(is_there)
+        self.needed.iter().all(is_there)
     }
 
     /// Whether it remembers something that is the same for all road users of which it is asked.

@@ -224,7 +224,7 @@ pub const MODULES: [&str; 8] =
     ["localization", "perception", "tracking", "prediction", "planning", "latency", "control", "emergency"];
 
 /// The drivers that can tell whether a collision was avoidable, in the words of `expect avoidable by […]`.
-pub const DRIVERS: [&str; 9] = ["modular", "frenet", "reactive", "idm", "cc", "fsm", "rss", "r157", "blind"];
+pub const DRIVERS: [&str; 8] = ["modular", "frenet", "reactive", "idm", "cc", "fsm", "rss", "r157"];
 
 /// How an episode may end, in the words of `expect end == …`.
 pub const ENDS: [&str; 14] = [

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use crate::model::body::BodyParameters;
 use crate::model::command::{CommandDef, Moves, Told};
 use crate::model::eval::{Facts, evaluate};
-use crate::model::expr::{Expr, Who};
+use crate::model::expr::{Expr, ExprKind, Who};
 use crate::model::interval::Interval;
 use crate::model::meaning::Meaning;
 use crate::model::on_route::Stretch;
@@ -450,6 +450,14 @@ pub struct PhaseDef {
     pub then: Option<ManoeuvreCall>,
 }
 
+impl PhaseDef {
+    /// Whether it comes, and goes on until something else is told.
+    pub fn never_ends(&self) -> bool {
+        let is_true = |expr: &Expr| matches!(expr.kind, ExprKind::Bool(true));
+        self.only_if.is_none() && self.command.continuous.as_ref().is_some_and(is_true)
+    }
+}
+
 /// A manoeuvre by its index in `Space::manoeuvres`, and the values that it is given.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ManoeuvreCall {
@@ -552,6 +560,8 @@ pub struct RequirementDef {
     pub within_ticks: u32,
     /// The road users that it names, by index in `Space::bearers`.
     pub bearers: Vec<usize>,
+    /// Those of them without which it is not asked: it does not ask whether they are there.
+    pub needed: Vec<usize>,
     /// The dimension of its margin; `None` if the condition has none.
     pub margin: Option<Dimension>,
     pub span: Span,

@@ -128,6 +128,12 @@ impl Course {
         Some(Course::new(Arc::clone(&self.parts), part, Later { locals, ..self.later.clone() }))
     }
 
+    /// The speed alone that a phase tells, m/s; `None` if it has no value.
+    pub fn speed_mps(&self, phase: usize, moment: &LaterMoment) -> Option<f64> {
+        let speed = self.phase(phase).command.speed.as_ref()?;
+        Some(self.later.value(speed, moment).number()).filter(|mps| !mps.is_nan())
+    }
+
     /// What a phase tells the road user, within what an order may say; `None` if a figure has no value that it cannot go
     /// without.
     pub fn command(&self, phase: usize, moment: &LaterMoment) -> Option<Command> {

@@ -235,8 +235,8 @@ impl Rights {
                 self.is_foreseen = stands && (self.is_foreseen || has_time());
                 self.watch_driver(this, driver, ego_passed, around);
             }
-            // What follows a trajectory keeps no rules of the road, so a vehicle has no right by them.
-            Motion::Guide(_) if this.body.is_vehicle() => {}
+            // What follows a trajectory keeps no rules of the road, so a vehicle has no right by them; nor has a thing.
+            Motion::Guide(_) | Motion::Stand if this.body.is_vehicle() => {}
             Motion::Walk(_) | Motion::Stroll(_) | Motion::Guide(_) | Motion::Stand => {
                 self.watch_pedestrian(this, in_sight, around)
             }
@@ -279,7 +279,7 @@ impl Rights {
                 };
                 (found.or_else(by_lane).unwrap_or(Priority::None), self.is_foreseen)
             }
-            Motion::Guide(_) if this.body.is_vehicle() => (Priority::None, false),
+            Motion::Guide(_) | Motion::Stand if this.body.is_vehicle() => (Priority::None, false),
             Motion::Walk(_) | Motion::Stroll(_) | Motion::Guide(_) | Motion::Stand => {
                 let by_time = || on_foot(&Strip::of(this, around), around);
                 (found.unwrap_or_else(by_time), around.ego.speed_mps <= WALKING_MPS)

@@ -26,8 +26,8 @@ const WRECK_S: f64 = 2.0;
 
 /// A road user this near to the speed of a phase has it, m/s, or by this part of it: without a `rate`, the driver model only
 /// approaches it.
-pub const SPEED_REACHED_MPS: f64 = 0.1;
-pub const SPEED_REACHED_PART: f64 = 0.02;
+const SPEED_REACHED_MPS: f64 = 0.1;
+const SPEED_REACHED_PART: f64 = 0.02;
 
 /// What walks or stands does so beside this stretch of the ego vehicle's route, before and behind it, m.
 const ON_FOOT_M: f64 = 200.0;
@@ -163,10 +163,17 @@ impl Progress {
         // Who stands as told moves no farther to the side.
         let stands = self.moves != Moves::Walks && speed_mps == Some(0.0) && self.speed_mps == 0.0;
         !command.is_continuous
-            && speed_mps.is_none_or(|mps| self.is_over || has_speed(self.speed_mps, mps))
+            && speed_mps.is_none_or(|mps| self.is_over || self.has_speed(mps))
             && (self.has_met || !command.pursues())
             && (self.is_aside || stands || !command.goes_aside())
             && (self.has_turned || command.turn.is_none())
+    }
+
+    /// Whether it has the speed that a phase wants, m/s. A stop is exact, and who follows a trajectory comes to every speed exactly.
+    fn has_speed(&self, wanted_mps: f64) -> bool {
+        let is_exact = wanted_mps == 0.0 || self.moves == Moves::Follows;
+        let near_mps = SPEED_REACHED_MPS.max(SPEED_REACHED_PART * wanted_mps.abs());
+        self.speed_mps == wanted_mps || !is_exact && (self.speed_mps - wanted_mps).abs() < near_mps
     }
 }
 
@@ -204,9 +211,9 @@ impl Running {
     /// now.
     pub fn tracked(&self, moment: &LaterMoment, moves: Moves) -> Option<Command> {
         let Tracked { course, phase, first } = self.tracked.as_ref()?;
-        let now = course.command(*phase, moment)?.for_who(moves);
-        let (speed_mps, rate_mps2) = (now.speed_mps, first.rate_mps2);
-        Some(Command { speed_mps, rate_mps2, is_continuous: true, ..Command::default() })
+        let speed_mps = Some(course.speed_mps(*phase, moment)?);
+        let now = Command { speed_mps, rate_mps2: first.rate_mps2, ..Command::default() };
+        Some(now.for_who(moves))
     }
 
     /// The names of road users that its phases ask about.
@@ -237,19 +244,20 @@ impl Running {
                     let waited_s = (tick - self.since) as f64 * DT_S;
                     let is_over =
                         self.course.within_s(self.phase, moment).is_some_and(|most_s| waited_s >= most_s);
-                    return stays((!is_over).then_some(self), None, begun, ended);
+                    let rest = if is_over { self.over() } else { Some(self) };
+                    return stays(rest, None, begun, ended);
                 }
                 Stage::Holding(until) if tick >= until && self.course.may_begin(moment) => {
                     if !self.course.comes(self.phase, moment) {
                         begun += 1;
                         ended += 1;
                         if !self.goes_on(tick) {
-                            return stays(None, None, begun, ended);
+                            return stays(self.over(), None, begun, ended);
                         }
                         continue;
                     }
                     let Some(command) = self.course.command(self.phase, moment) else {
-                        return stays(None, None, begun, ended);
+                        return stays(self.over(), None, begun, ended);
                     };
                     begun += 1;
                     let command = command.for_who(progress.moves);
@@ -271,9 +279,7 @@ impl Running {
                 {
                     ended += 1;
                     if !self.goes_on(tick) {
-                        self.stage = Stage::Over;
-                        let rest = self.tracked.is_some().then_some(self);
-                        return stays(rest, None, begun, ended);
+                        return stays(self.over(), None, begun, ended);
                     }
                 }
                 Stage::Over | Stage::Holding(_) | Stage::UnderWay(_) => {
@@ -281,6 +287,11 @@ impl Running {
                 }
             }
         }
+    }
+
+    /// What is left when no phase is: a speed that is tracked.
+    fn over(self) -> Option<Running> {
+        self.tracked.is_some().then_some(Running { stage: Stage::Over, ..self })
     }
 
     /// Goes on to the next phase, if there is one.
@@ -319,15 +330,12 @@ impl Running {
             }
         }
         trace.words(self.course.arguments());
-        trace.words(self.tracked.as_ref().map(|tracked| tracked.phase as u64));
+        if let Some(Tracked { course, phase, first }) = &self.tracked {
+            trace.words([course.part as u64, *phase as u64]);
+            trace.words(course.arguments());
+            trace.words(first.rate_mps2.map(f64::to_bits));
+        }
     }
-}
-
-/// Whether a road user has the speed that a phase wants, m/s. A stop is exact.
-fn has_speed(now_mps: f64, wanted_mps: f64) -> bool {
-    now_mps == wanted_mps
-        || wanted_mps != 0.0
-            && (now_mps - wanted_mps).abs() < SPEED_REACHED_MPS.max(SPEED_REACHED_PART * wanted_mps.abs())
 }
 
 #[derive(Debug, Clone)]

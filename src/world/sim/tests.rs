@@ -98,7 +98,14 @@ fn impossible_spawns_are_refused() {
         let on_foot = verb.is_on_foot();
         let body = if on_foot { Body::SUV } else { Body::Pedestrian };
         let refusal = world.survey(&SpawnRequest { verb: *verb, body, ..ahead }).expect_err("no such body");
-        assert_eq!(refusal, if on_foot { "only a pedestrian walks" } else { "a pedestrian does not drive" });
+        assert_eq!(
+            refusal,
+            if on_foot {
+                "only pedestrians and animals walk"
+            } else {
+                "pedestrians, animals and objects do not drive"
+            }
+        );
     }
 }
 

@@ -1,12 +1,15 @@
 // Vehicles and people, what is believed of them, and the names beside them.
 import { beside, corners } from "./paint.js";
 
+/** Whether it walks: people and animals. */
+export const isOnFoot = (body) => body.like === "Pedestrian" || body.like === "Animal";
+
 /** A vehicle or person as it is: filled, with its heading, its speed and its brake lights. */
 export function drawBody(canvas, body, { fill, line, dashed = false, alpha = 1 }) {
   const { context, colours } = canvas;
   context.globalAlpha = alpha;
   const thin = Math.max(0.07, canvas.px(1.2));
-  if (body.like === "Pedestrian") {
+  if (isOnFoot(body)) {
     const radius = Math.max(0.35, canvas.px(4));
     canvas.dot(body, radius, fill);
     canvas.line([body, beside(body, radius * 2, 0)], line, thin);
@@ -16,17 +19,14 @@ export function drawBody(canvas, body, { fill, line, dashed = false, alpha = 1 }
   const box = corners(body);
   canvas.area(box, fill);
   canvas.line([...box, box[0]], line, thin, dashed ? [0.5, 0.35] : []);
-  // The windscreen shows which end is the front.
+  // The windscreen shows which end is the front; a thing has none.
   const { length, width } = body;
-  canvas.line(
-    [
-      beside(body, length * 0.18, width * 0.42),
-      beside(body, length * 0.28, 0),
-      beside(body, length * 0.18, -width * 0.42),
-    ],
-    line,
-    thin,
-  );
+  const screen = [
+    beside(body, length * 0.18, width * 0.42),
+    beside(body, length * 0.28, 0),
+    beside(body, length * 0.18, -width * 0.42),
+  ];
+  if (body.like !== "Object") canvas.line(screen, line, thin);
   if (body.braking) {
     const size = Math.max(0.28, canvas.px(2.5));
     for (const side of [0.38, -0.38]) canvas.dot(beside(body, -length / 2, width * side), size, colours.brake);
@@ -38,7 +38,7 @@ export function drawBody(canvas, body, { fill, line, dashed = false, alpha = 1 }
 export function drawSpeed(canvas, body, colour) {
   const way = body.speed;
   if (Math.abs(way) < 0.3) return;
-  const front = (body.like === "Pedestrian" ? 0.4 : body.length / 2) * Math.sign(way);
+  const front = (isOnFoot(body) ? 0.4 : body.length / 2) * Math.sign(way);
   const from = beside(body, front, 0);
   const tip = beside(body, front + way, 0);
   const thin = Math.max(0.1, canvas.px(1.5));
@@ -109,7 +109,7 @@ export class Labels {
   /** Keeps a body free of names. */
   keep(body, radius) {
     // A long body is three boxes: at its ends and in its middle.
-    const half = body.length && body.like !== "Pedestrian" ? body.length / 2 : 0;
+    const half = body.length && !isOnFoot(body) ? body.length / 2 : 0;
     for (const ahead of half > 0 ? [-half, 0, half] : [0]) {
       const { x, y } = this.canvas.at(half > 0 ? beside(body, ahead, 0) : body);
       this.taken.push({ left: x - radius, right: x + radius, top: y - radius, bottom: y + radius });

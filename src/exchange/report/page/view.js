@@ -1,6 +1,6 @@
 // The view from above: a recording on its road, at a time, with layers and a camera.
 import { drawGround } from "./ground.js";
-import { Labels, drawBody, drawImpact, drawPlan, drawPrediction, drawSpeed, drawTrack } from "./bodies.js";
+import { Labels, drawBody, drawImpact, drawPlan, drawPrediction, drawSpeed, drawTrack, isOnFoot } from "./bodies.js";
 import { Canvas, palette } from "./paint.js";
 import { kmh } from "./words.js";
 
@@ -77,7 +77,7 @@ export class View {
     const { canvas } = this;
     const { colours } = canvas;
     for (const body of others) {
-      const fill = body.like === "Pedestrian" ? colours.pedestrian : colours.truth;
+      const fill = isOnFoot(body) ? colours.pedestrian : colours.truth;
       drawSpeed(canvas, body, colours.truthLine);
       drawBody(canvas, body, { fill, line: colours.truthLine, alpha: body.ambient ? 0.75 : 1 });
     }
@@ -143,7 +143,7 @@ export class View {
   #names(ego, others) {
     const { canvas } = this;
     const labels = new Labels(canvas);
-    const size = (body) => (body.like === "Pedestrian" ? 6 : Math.max(8, (body.width / 2) * canvas.camera.pxPerM));
+    const size = (body) => (isOnFoot(body) ? 6 : Math.max(8, (body.width / 2) * canvas.camera.pxPerM));
     for (const body of [ego, ...others]) labels.keep(body, size(body));
     for (const collision of this.recording.header.collisions) {
       if (Math.abs(this.timeS - collision.at_s) <= IMPACT_SHOWN_S) labels.keep(this.recording.impact(collision), 12);

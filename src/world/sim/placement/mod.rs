@@ -115,8 +115,8 @@ fn check(request: &SpawnRequest) -> Result<(), String> {
     }
     match request.verb.is_on_foot() {
         _ if request.body.can(request.verb) => Ok(()),
-        true => Err("only a pedestrian walks".into()),
-        false => Err("a pedestrian does not drive".into()),
+        true => Err("only pedestrians and animals walk".into()),
+        false => Err("pedestrians, animals and objects do not drive".into()),
     }
 }
 

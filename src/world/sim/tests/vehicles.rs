@@ -179,7 +179,7 @@ fn an_order_is_for_the_latest_bearer_and_no_wreck_obeys() {
     let manoeuvre = OrderRequest { bearer: 2, command: Command::default(), phases: Told::BY_DRIVERS };
     assert_eq!(
         world.order_refusal(&manoeuvre).as_deref(),
-        Some("it is on foot, and can be told `speed` and `continuous` alone")
+        Some("it is on foot, and can be told a `speed` alone")
     );
     assert_eq!(world.order_refusal(&OrderRequest { phases: Told::NOTHING, ..manoeuvre }), None);
     let backwards = Command { speed_mps: Some(-1.0), ..Command::default() };

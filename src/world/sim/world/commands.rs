@@ -8,6 +8,7 @@ use crate::sim::npc::View;
 use crate::sim::placement;
 use crate::sim::placement::Arrivals;
 use crate::sim::road_user::{Advance, Motion, PhaseCount, RoadUser, Running};
+use avastra_lang::model::command::Command;
 use avastra_lang::model::{COMMANDED_MAX, NpcFacts};
 
 use super::{DT_S, World};
@@ -170,8 +171,14 @@ impl World {
             if let Some(next) = rest.as_ref().filter(|_| hands_over) {
                 mover.phases.all = mover.phases.begun + next.phases();
             }
-            let tracked = || rest.as_ref()?.tracked(&moment, progress.moves);
-            let command = command.or_else(tracked);
+            let tracked = rest.as_ref().and_then(|rest| rest.tracked(&moment, progress.moves));
+            // What a phase tells now may leave the speed to one before it.
+            let command = match (command, tracked) {
+                (Some(command), Some(tracked)) if command.speed_mps.is_none() => {
+                    Some(Command { speed_mps: tracked.speed_mps, rate_mps2: tracked.rate_mps2, ..command })
+                }
+                (command, tracked) => command.or(tracked),
+            };
             mover.course = rest;
             if let Some(command) = command {
                 mover.motion.order(&command, self.ticks);
