@@ -11,7 +11,7 @@ use avastra_road::testing::{lanes as lanes_of, street};
 use avastra_world::sim::testing::overpass;
 use avastra_world::sim::{DT_S, SignalColour, VehicleParameters, World};
 
-use super::registry::{Entry, seeing};
+use super::registry::{Entry, REGISTRY, seeing};
 use super::status::{Manoeuvre, Reason};
 use super::testing::{Rig, SOURCE_Y_M, TARGET_Y_M, object, straight, two_lanes, winding};
 
@@ -44,7 +44,7 @@ fn nothing_slows_down_for_traffic_on_a_bridge() {
 #[test]
 fn all_keep_a_straight_lane_repeat_themselves_and_copy() {
     let scene = straight();
-    for entry in seeing() {
+    for entry in REGISTRY {
         let build = || {
             let mut rig = Rig::driven_by(entry.name, &scene, 5, 8.0);
             rig.sensed.objects.push(object(1, Body::SUV, Pose::new(60.0, -1.75, 0.0), 7.0));
@@ -56,7 +56,8 @@ fn all_keep_a_straight_lane_repeat_themselves_and_copy() {
             assert_eq!(first.tick(), again.tick(), "{} at tick {tick}", entry.name);
         }
         assert!(first.offset_m_max < 0.4, "{}: {}", entry.name, first.offset_m_max);
-        assert!(first.gap_m_min > 1.2, "{}: {}", entry.name, first.gap_m_min);
+        let sees = seeing().any(|one| one.name == entry.name);
+        assert!(!sees || first.gap_m_min > 1.2, "{}: {}", entry.name, first.gap_m_min);
         assert_eq!(first.ads.status(), again.ads.status());
 
         let mut copy = first.ads.clone();

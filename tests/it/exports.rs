@@ -172,6 +172,23 @@ fn a_natural_version_has_actions_in_place_of_trajectories() {
     assert_eq!(sorted.len(), names.len(), "names are unique");
 }
 
+/// A thing is no vehicle, and CARLA's player makes of it what it is called.
+#[test]
+fn a_thing_is_written_as_one() {
+    for (profile, called) in [(&[][..], "npc_1"), (&["--profile", "carla"][..], "static.prop.box01")] {
+        let scratch = tempfile::tempdir().expect("a scratch directory");
+        let (status, _, stderr) =
+            export("openscenario", "tests/cases/exports/thing.ava", scratch.path(), profile);
+        assert_eq!(status, 0, "{stderr}");
+        let written = texts(scratch.path());
+        let (_, text) = written.iter().find(|(name, _)| name.ends_with(".xosc")).expect("it is written");
+        let document = Document::parse(text).expect("it is well-formed");
+        let thing = all(document.root(), "MiscObject").next().expect("it is there");
+        let known: Vec<_> = thing.attributes().map(|one| (one.name(), one.value())).collect();
+        assert_eq!(known, [("name", called), ("miscObjectCategory", "obstacle"), ("mass", "50")]);
+    }
+}
+
 /// ScenarioRunner reads 1.0 alone, makes everyone at the start, and wants no times of polylines; what it cannot be told is
 /// said.
 #[test]

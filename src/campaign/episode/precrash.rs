@@ -247,14 +247,11 @@ impl Way {
 
     /// How far it has gone aside across its lanes between two steps, m to the left.
     fn aside_m(&self, from: usize, to: usize) -> f64 {
-        let pairs = self.0[from..=to].windows(2);
-        pairs
-            .map(|pair| {
-                (pair[1].place.pose.position - pair[0].place.pose.position)
-                    .dot(&(pair[0].left() + pair[1].left()))
-                    / 2.0
-            })
-            .sum()
+        let across_m = |pair: &[Step]| {
+            let way = pair[1].place.pose.position - pair[0].place.pose.position;
+            way.dot(&(pair[0].left() + pair[1].left())) / 2.0
+        };
+        self.0[from..=to].windows(2).map(across_m).sum()
     }
 
     fn manoeuvre(&self) -> Option<Manoeuvre> {

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use avastra_base::geometry::{Pose, Vec2};
 use avastra_drivers::Ads;
 use avastra_lang::model::body::BodyParameters;
-use avastra_lang::model::vocabulary::{Body, Level, TimeOfDay};
+use avastra_lang::model::vocabulary::{Body, BodyClass, Level, TimeOfDay};
 use avastra_world::sim::{Contact, DT_S, Obstacle, SignalColour, VehicleParameters, World, friction_scale};
 
 /// The ego vehicle's brake lights are on above this much brake, %. Ours: a brake that only rubs lights nothing.
@@ -217,7 +217,7 @@ impl Actor {
         if self.id == 0 { "ego".to_owned() } else { format!("npc_{}", self.id) }
     }
 
-    /// Whether it is not a pedestrian.
+    /// Whether it is not on foot.
     pub fn is_vehicle(&self) -> bool {
         self.body.is_vehicle()
     }
@@ -241,7 +241,7 @@ impl Actor {
         let lost_mps = before.map_or(0.0, |before| before.velocity_mps.norm() - sample.velocity_mps.norm());
         self.samples.push(sample);
         let brakes = lost_mps > BRAKING_MPS2 * BRAKING_TICKS as f64 * DT_S;
-        self.light_brakes(sample.tick, brakes && self.is_vehicle() && self.body != Body::Object);
+        self.light_brakes(sample.tick, brakes && BodyClass::Vehicle.holds(self.body));
     }
 
     fn light_brakes(&mut self, tick: u64, on: bool) {

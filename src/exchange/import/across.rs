@@ -40,11 +40,7 @@ impl<'a> Cast<'a> {
         let turned_rad = wrap_angle(own.heading_rad - self.route.path.heading_at(along.station_m));
         let reason = "to be beside another one is read of those that drive along the ego vehicle's way";
         source.refuse_if(turned_rad.abs() > 1.0, mark, reason)?;
-        let of = if self.is_ego(name) {
-            "ego".to_owned()
-        } else {
-            self.moving(source, mark, name)?.bearer.clone()
-        };
+        let of = self.called(source, mark, moving, name)?;
         let away_m = self.route.path.project(other).offset_m - along.offset_m;
         let said = Said::text(format!("{of}.offset - npc.offset + ")).number(told.offset_m + more_m, "m");
         Some((moving.offset_m + away_m + more_m, said))

@@ -9,7 +9,7 @@ use roxmltree::Node;
 
 use super::Files;
 use super::body::Body;
-use super::ground::Ground;
+use super::ground::{Ground, Known, once};
 use super::source::{Source, children, element, elements, filled};
 use super::vocabulary;
 
@@ -31,8 +31,6 @@ const DEPTH_MAX: usize = 8;
 /// The text of an entry, and what is wrong with it; empty if nothing is.
 type Entry = (Rc<str>, String);
 
-type Read<T> = RefCell<BTreeMap<String, Result<Rc<T>, String>>>;
-
 /// The files that a scenario names, as far as they were read.
 pub struct Library<'f> {
     /// Bodies of entries, by the entry and the values that it is given.
@@ -40,8 +38,8 @@ pub struct Library<'f> {
     files: &'f dyn Files,
     /// The folder of the scenario, before the paths that it names; empty if it is that of the file that is imported.
     folder: String,
-    maps: Read<Ground>,
-    folders: Read<Vec<String>>,
+    maps: Known<String, Ground>,
+    folders: Known<String, Vec<String>>,
     /// Each entry that was asked for; `None` if there is none.
     entries: RefCell<BTreeMap<(String, String), Option<Entry>>>,
 }
@@ -58,8 +56,8 @@ impl<'f> Library<'f> {
             files,
             folder,
             bodies: RefCell::default(),
-            maps: Read::default(),
-            folders: Read::default(),
+            maps: Known::default(),
+            folders: Known::default(),
             entries: RefCell::default(),
         }
     }
@@ -78,11 +76,11 @@ impl<'f> Library<'f> {
             let text = self.files.map(&self.beside(path))?;
             RoadMap::from_opendrive("map", &text).map(Ground::new).map_err(|error| error.to_string())
         };
-        once(&self.maps, path, read)
+        once(&self.maps, path.to_owned(), read)
     }
 
     fn folder(&self, path: &str) -> Result<Rc<Vec<String>>, String> {
-        once(&self.folders, path, || self.files.catalogues(&self.beside(path)))
+        once(&self.folders, path.to_owned(), || self.files.catalogues(&self.beside(path)))
     }
 
     /// The text of an entry of a catalogue in one of the folders, and what is wrong with it. Most variations ask for the same ones.
@@ -117,15 +115,6 @@ impl<'f> Library<'f> {
     }
 }
 
-fn once<T>(known: &Read<T>, path: &str, read: impl FnOnce() -> Result<T, String>) -> Result<Rc<T>, String> {
-    if let Some(found) = known.borrow().get(path) {
-        return found.clone();
-    }
-    let found = read().map(Rc::new);
-    known.borrow_mut().insert(path.to_owned(), found.clone());
-    found
-}
-
 /// Notes the folders of catalogues.
 pub fn locate(source: &mut Source, root: Node) {
     let locations: Vec<Node> = elements(root, "CatalogLocations").flat_map(children).collect();
@@ -147,8 +136,8 @@ pub fn body(
 ) -> Option<Body> {
     let (catalogue, name) = (source.text(reference, "catalogName")?, source.text(reference, "entryName")?);
     let folders: Vec<&String> = source.folders.values().map(|(_, path)| path).collect();
-    let key = format!("{folders:?} {catalogue:?} {name:?}");
-    let key = format!("{key} {:?}", assigned(source, reference)?);
+    let of = format!("{folders:?} {catalogue:?} {name:?}");
+    let key = format!("{of} {:?}", assigned(source, reference)?);
     if let Some(known) = source.library.bodies.borrow().get(&key) {
         return Some(known.clone());
     }

@@ -413,13 +413,7 @@ impl Waiting<'_, '_> {
 
     /// What an entity is called in a phase of the actor.
     pub fn who(&self, source: &mut Source, mark: &Mark, name: &str) -> Option<String> {
-        if self.cast.is_ego(name) {
-            return Some("ego".to_owned());
-        }
-        if self.actor.entity.name == name {
-            return Some("npc".to_owned());
-        }
-        Some(self.cast.moving(source, mark, name)?.bearer.clone())
+        self.cast.called(source, mark, self.actor, name)
     }
 }
 

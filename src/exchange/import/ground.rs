@@ -11,7 +11,8 @@ use avastra_road::{LanePlace, RoadMap, Route};
 /// A place on a lane as a key: the lane, and its station in bits.
 type Place = (usize, u64);
 
-type Known<K, T> = RefCell<BTreeMap<K, Result<Rc<T>, String>>>;
+/// What was found, or why it was not.
+pub type Known<K, T> = RefCell<BTreeMap<K, Result<Rc<T>, String>>>;
 
 /// A map that remembers.
 #[derive(Debug)]
@@ -64,7 +65,8 @@ fn key(place: &LanePlace) -> Place {
     (place.lane.0, place.station_m.to_bits())
 }
 
-fn once<K: Ord, T>(
+/// What is known, or else found now and known from then on.
+pub fn once<K: Ord, T>(
     known: &Known<K, T>,
     key: K,
     find: impl FnOnce() -> Result<T, String>,

@@ -108,11 +108,7 @@ impl<'a> Cast<'a> {
             }
             _ => false,
         };
-        let who = |source: &mut Source, name: &str| match () {
-            () if self.is_ego(name) => Some("ego".to_owned()),
-            () if name == moving.entity.name => Some("npc".to_owned()),
-            () => Some(self.moving(source, mark, name)?.bearer.clone()),
-        };
+        let who = |source: &mut Source, name: &str| self.called(source, mark, moving, name);
         let (said, mps) = match wanted {
             Speed::Absolute(mps) => (Said::default().number(*mps, "m/s"), Some(*mps)),
             Speed::More(name, more) => {

@@ -45,8 +45,8 @@ const SAME_ROAD_M: f64 = 100.0;
 /// A trajectory that begins during the story does so this near to where its entity stands, m.
 const NEAR_M: f64 = 1.5;
 
-/// Words of the language that name no road user and no parameter.
-pub const TAKEN: [&str; 16] = [
+/// Words of the language, and of `pace::KEEPING`, that name no road user and no parameter.
+pub const TAKEN: [&str; 20] = [
     "ego",
     "npc",
     "road",
@@ -63,6 +63,10 @@ pub const TAKEN: [&str; 16] = [
     "where",
     "each",
     "any",
+    "keeping",
+    "pulled",
+    "bounded",
+    "up_to",
 ];
 
 /// The ego vehicle's way, and all the others.
@@ -256,6 +260,15 @@ impl<'a> Cast<'a> {
 
     pub fn place(&self, source: &mut Source, position: &Position) -> Option<Placed> {
         self.places.borrow_mut().placed(source, position)
+    }
+
+    /// What an entity is called in a phase of the actor.
+    pub fn called(&self, source: &mut Source, mark: &Mark, actor: &Moving, name: &str) -> Option<String> {
+        match () {
+            () if self.is_ego(name) => Some("ego".to_owned()),
+            () if name == actor.entity.name => Some("npc".to_owned()),
+            () => Some(self.moving(source, mark, name)?.bearer.clone()),
+        }
     }
 
     /// Where somebody begins.

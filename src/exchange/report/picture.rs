@@ -240,7 +240,7 @@ impl Panel<'_> {
 
     fn obstacle(&mut self, obstacle: &Obstacle) {
         self.arrow(&obstacle.outline, obstacle.velocity_mps, "#23272e");
-        if matches!(obstacle.body, Body::Pedestrian | Body::Animal) {
+        if !obstacle.body.is_vehicle() {
             let radius_px = format!("{:.1}", (0.4 * self.canvas.px_per_m).max(4.0));
             let style = r##"fill="#b0128a" stroke="#5a0046""##;
             self.canvas.circle(obstacle.outline.pose.position, &radius_px, style);

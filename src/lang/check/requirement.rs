@@ -94,16 +94,14 @@ impl Checker {
             return self.reject(error.help(help));
         }
         let all = || when.iter().chain(&until).chain(&after).chain([&condition]).chain(&unless);
-        let distinct = |mut bearers: Vec<usize>| {
-            bearers.sort_unstable();
-            bearers.dedup();
-            bearers
-        };
-        let bearers = distinct(all().flat_map(|expr| expr.bearers(0)).collect());
+        let mut bearers: Vec<usize> = all().flat_map(|expr| expr.bearers(0)).collect();
+        bearers.sort_unstable();
+        bearers.dedup();
         // Who asks `truck.there` wants an answer while it is not there, too.
-        let asks_whether_there =
-            |kind: &ExprKind, who| matches!(kind, ExprKind::IsThere(of) if of.bearers(0).contains(&who));
-        let is_needed = |who: &usize| !all().any(|expr| expr.any(|kind| asks_whether_there(kind, *who)));
+        let is_needed = |who: &usize| {
+            let asks = |kind: &ExprKind| matches!(kind, ExprKind::IsThere(of) if of.bearers(0).contains(who));
+            !all().any(|expr| expr.any(asks))
+        };
         let needed = bearers.iter().copied().filter(is_needed).collect();
         Some(RequirementDef {
             name: declared.name.text.clone(),

@@ -7,7 +7,6 @@
 
 use avastra_base::geometry::wrap_angle;
 use avastra_base::kinematics::braking_m;
-use avastra_lang::model::vocabulary::Body;
 use avastra_world::sim::{Obstacle, World};
 
 use super::released_probability::released_probability;
@@ -172,10 +171,7 @@ fn same_lane_safety_m(world: &World, obstacle: &Obstacle, ahead: bool) -> f64 {
 }
 
 fn decel_mps2(obstacle: &Obstacle) -> f64 {
-    match obstacle.body {
-        Body::Pedestrian | Body::Animal => PEDESTRIAN_DECEL_MPS2,
-        _ => VEHICLE_DECEL_MPS2,
-    }
+    if obstacle.body.is_vehicle() { VEHICLE_DECEL_MPS2 } else { PEDESTRIAN_DECEL_MPS2 }
 }
 
 /// Whether every safety distance that could apply is shorter than the gap: then ProC is 0, and the

@@ -51,7 +51,11 @@ pub fn entity(recording: &Recording, actor: &Actor) -> Element {
     let kind = if actor.id == 0 { "ego_vehicle" } else { "simulation" };
     let properties = Element::new("Properties").holding(property("type", kind));
     let Some(category) = vehicle_category(actor.body) else {
-        let other = without_wheels(actor, model).with("model", model);
+        // Of things its player takes the name for the model.
+        let other = match actor.body {
+            Body::Object => without_wheels(actor, model),
+            _ => without_wheels(actor, &actor.name()).with("model", model),
+        };
         return object.holding(other.holding(bounding_box(actor)).holding(properties));
     };
     let facts = recording.facts.iter().cloned().chain([natural::caveat(&[])]);
