@@ -198,10 +198,12 @@ impl Files for Beside<'_> {
         load::read_used(&self.folder.join(slashed(path))).map_err(|error| error.to_string())
     }
 
-    fn catalogues(&self, folder: &str) -> Result<Vec<String>, String> {
+    fn catalogues(&self, folder: &str) -> Result<Vec<(String, String)>, String> {
         let folder = self.folder.join(slashed(folder));
         let files = load::files_in(&folder, "xosc").map_err(|error| load::reason(&error))?;
-        Ok(files.iter().take(CATALOGUES_MAX).filter_map(|file| load::read(file).ok()).collect())
+        let stem = |file: &Path| file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let read = |file: &PathBuf| Some((stem(file), load::read(file).ok()?));
+        Ok(files.iter().take(CATALOGUES_MAX).filter_map(read).collect())
     }
 }
 

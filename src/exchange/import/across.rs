@@ -19,7 +19,7 @@ impl<'a> Cast<'a> {
         let Some(place) = told.lane else { return left_m };
         let lane = self.map.lane(place.lane);
         let turned_rad =
-            wrap_angle(moving.path.heading_at(moving.at_m) - lane.centre.heading_at(place.station_m));
+            wrap_angle(moving.path.heading_at(told.at_m) - lane.centre.heading_at(place.station_m));
         let goes_with_lane = turned_rad.abs() < core::f64::consts::FRAC_PI_2;
         if goes_with_lane == lane.is_along() { left_m } else { -left_m }
     }
@@ -34,6 +34,8 @@ impl<'a> Cast<'a> {
         more_m: f64,
         told: &Told,
     ) -> Option<(f64, Said)> {
+        let reason = "to be beside another one is read before the first trajectory";
+        source.refuse_if(told.at_m > moving.at_m, mark, reason)?;
         let other = self.begins(source, mark, name)?;
         let own = moving.placed.pose;
         let along = self.route.path.project(own.position);
@@ -78,13 +80,13 @@ impl<'a> Cast<'a> {
             }
         };
         let Some(to) = to else { return source.refuse(mark, "no such lane is beside its own") };
-        (told.lane, told.lane_m) = (Some(to), self.aside_m(moving, to));
+        (told.lane, told.lane_m) = (Some(to), self.aside_m(moving, told.at_m, to));
         Some(told.lane_m)
     }
 
-    /// How far to the left of somebody's way, where it begins, the middle of a lane lies, m.
-    pub fn aside_m(&self, moving: &Moving, lane: LanePlace) -> f64 {
-        let here = moving.path.pose_at(moving.at_m);
+    /// How far to the left of a station of somebody's way the middle of a lane lies, m.
+    pub fn aside_m(&self, moving: &Moving, at_m: f64, lane: LanePlace) -> f64 {
+        let here = moving.path.pose_at(at_m);
         let centre = &self.map.lane(lane.lane).centre;
         here.to_local(centre.position_at(centre.project(here.position).station_m)).y
     }

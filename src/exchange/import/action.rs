@@ -148,8 +148,8 @@ pub struct Way {
     pub is_absolute: bool,
 }
 
-/// Reads an action within a `PrivateAction`; `None` if it does nothing that matters, or is refused.
-pub fn act(source: &mut Source, action: Node, is_ego: bool) -> Option<Act> {
+/// Reads an action of somebody's within a `PrivateAction`; `None` if it does nothing that matters, or is refused.
+pub fn act(source: &mut Source, action: Node, name: &str, is_ego: bool) -> Option<Act> {
     let mark = source.mark(action);
     match action.tag_name().name() {
         "TeleportAction" => {
@@ -164,7 +164,7 @@ pub fn act(source: &mut Source, action: Node, is_ego: bool) -> Option<Act> {
         "SynchronizeAction" if !is_ego => meeting(source, action).map(|kind| Act { mark, kind }),
         "SynchronizeAction" => None,
         "ControllerAction" | "ActivateControllerAction" | "AssignControllerAction" => {
-            if !is_ego && drives(source, action)? {
+            if !is_ego && drives(source, action)? && source.controlled.contains(name) {
                 return source.refuse(
                     action,
                     "a controller of the player's drives it, of which the file says no more",

@@ -28,8 +28,18 @@ pub const ENVIRONMENT: Kind = Kind("EnvironmentCatalog", "Environment");
 /// Catalogues within catalogues are read this deep.
 const DEPTH_MAX: usize = 8;
 
-/// The text of an entry, and what is wrong with it; empty if nothing is.
-type Entry = (Rc<str>, String);
+/// An entry of a catalogue.
+#[derive(Debug, Clone)]
+struct Entry {
+    text: Rc<str>,
+    /// What is wrong with it; empty if nothing is.
+    reason: String,
+    /// What its catalogue calls itself, if only its file has the name that was asked for.
+    other_name: Option<String>,
+}
+
+/// The catalogues of a folder, with the names of their files.
+type Folder = Rc<Vec<(String, String)>>;
 
 /// The files that a scenario names, as far as they were read.
 pub struct Library<'f> {
@@ -39,7 +49,7 @@ pub struct Library<'f> {
     /// The folder of the scenario, before the paths that it names; empty if it is that of the file that is imported.
     folder: String,
     maps: Known<String, Ground>,
-    folders: Known<String, Vec<String>>,
+    folders: Known<String, Vec<(String, String)>>,
     /// Each entry that was asked for; `None` if there is none.
     entries: RefCell<BTreeMap<(String, String), Option<Entry>>>,
 }
@@ -79,14 +89,15 @@ impl<'f> Library<'f> {
         once(&self.maps, path.to_owned(), read)
     }
 
-    fn folder(&self, path: &str) -> Result<Rc<Vec<String>>, String> {
+    fn folder(&self, path: &str) -> Result<Folder, String> {
         once(&self.folders, path.to_owned(), || self.files.catalogues(&self.beside(path)))
     }
 
-    /// The text of an entry of a catalogue in one of the folders, and what is wrong with it. Most variations ask for the same ones.
+    /// An entry of a catalogue of that name in one of the folders, or else of a file of that name, as esmini finds it.
+    /// Most variations ask for the same ones.
     fn entry(
         &self,
-        folders: &[(String, Rc<Vec<String>>)],
+        folders: &[(String, Folder)],
         kinds: &[Kind],
         catalogue: &str,
         name: &str,
@@ -96,23 +107,32 @@ impl<'f> Library<'f> {
         if let Some(known) = self.entries.borrow().get(&key) {
             return known.clone();
         }
-        let texts = folders.iter().flat_map(|(_, texts)| texts.iter());
-        let found = texts.into_iter().find_map(|text| {
-            let document = avastra_road::well_formed(text).ok()?;
-            let is_named = |node: &Node, name: &str| node.attribute("name") == Some(name);
-            let list = document.descendants().find(|node| node.has_tag_name("Catalog"));
-            let list = list.filter(|node| is_named(node, catalogue))?;
-            let is_of_kind = |node: &Node| kinds.iter().any(|Kind(_, element)| node.has_tag_name(*element));
-            let found = children(list).find(|node| is_named(node, name) && is_of_kind(node))?;
-            let unknown = vocabulary::unknown(found);
-            let reason = unknown
-                .first()
-                .map_or(String::new(), |(node, reason)| format!("`{}`: {reason}", node.tag_name().name()));
-            Some((Rc::from(&text[found.range()]), reason))
-        });
+        let find = |is_by_file: bool| {
+            let files = || folders.iter().flat_map(|(_, files)| files.iter());
+            let named = files().filter(|(stem, _)| !is_by_file || stem == catalogue);
+            named.into_iter().find_map(|(_, text)| entry_in(text, kinds, catalogue, name, is_by_file))
+        };
+        let found = find(false).or_else(|| find(true));
         self.entries.borrow_mut().insert(key, found.clone());
         found
     }
+}
+
+/// An entry of the catalogue that a file holds, if that is called so or its name does not count.
+fn entry_in(text: &str, kinds: &[Kind], catalogue: &str, name: &str, is_by_file: bool) -> Option<Entry> {
+    let document = avastra_road::well_formed(text).ok()?;
+    let is_named = |node: &Node, name: &str| node.attribute("name") == Some(name);
+    let list = document.descendants().find(|node| node.has_tag_name("Catalog"));
+    let list = list.filter(|node| is_by_file || is_named(node, catalogue))?;
+    let is_of_kind = |node: &Node| kinds.iter().any(|Kind(_, element)| node.has_tag_name(*element));
+    let found = children(list).find(|node| is_named(node, name) && is_of_kind(node))?;
+    let unknown = vocabulary::unknown(found);
+    let reason = unknown
+        .first()
+        .map_or(String::new(), |(node, reason)| format!("`{}`: {reason}", node.tag_name().name()));
+    let own = list.attribute("name").unwrap_or("");
+    let other_name = (own != catalogue).then(|| own.to_owned());
+    Some(Entry { text: Rc::from(&text[found.range()]), reason, other_name })
 }
 
 /// Notes the folders of catalogues.
@@ -182,15 +202,21 @@ pub fn entry<T>(
         }
     }
     let whose = format!("`{name}` of `{catalogue}`");
-    let Some((text, reason)) = source.library.entry(&folders, kinds, &catalogue, &name) else {
+    let Some(Entry { text, reason, other_name }) = source.library.entry(&folders, kinds, &catalogue, &name)
+    else {
         let kinds: Vec<String> = kinds.iter().map(|Kind(_, element)| format!("`{element}`")).collect();
         let mut reason = format!("no {} `{name}` in a catalogue `{catalogue}`", kinds.join(" or "));
-        let texts = || folders.iter().flat_map(|(_, texts)| texts.iter());
-        if texts().any(|text| avastra_road::well_formed(text).is_err()) {
+        let mut files = folders.iter().flat_map(|(_, files)| files.iter());
+        if files.any(|(_, text)| avastra_road::well_formed(text).is_err()) {
             reason += "; a file there is not well-formed, and is left out";
         }
         return source.refuse(reference, reason);
     };
+    if let Some(own) = other_name {
+        source.note(format!(
+            "the catalogue `{catalogue}` calls itself `{own}`: it is found by the name of its file"
+        ));
+    }
     let document = avastra_road::well_formed(&text).ok().filter(|_| reason.is_empty());
     let Some(document) = document else { return source.refuse(reference, format!("{whose}: {reason}")) };
     let found = document.root_element();

@@ -261,8 +261,9 @@ impl Waiting<'_, '_> {
                 let at_m = moving.reach_m(source, self.cast, &meeting.own_at)?;
                 Some(Said::text(format!("{who}.station >= ")).number(at_m, "m"))
             }
-            ActKind::Follow(_) => {
-                Some(Said::text(format!("{who}.station >= ")).number(moving.path.length_m() - ARRIVES_M, "m"))
+            ActKind::Follow(way) => {
+                let end_m = moving.leg(way)?.end_m;
+                Some(Said::text(format!("{who}.station >= ")).number(end_m - ARRIVES_M, "m"))
             }
             ActKind::Speed(super::action::Speed::Absolute(mps), _) => {
                 Some(Said::text(format!("{who}.speed == ")).number(*mps, "m/s"))
@@ -322,7 +323,7 @@ impl Waiting<'_, '_> {
     }
 
     /// Whether a condition holds at the beginning, as far as the speeds and places there say.
-    fn holds(&self, source: &mut Source, condition: &Condition) -> Option<bool> {
+    pub fn holds(&self, source: &mut Source, condition: &Condition) -> Option<bool> {
         let mark = &condition.mark;
         Some(match &condition.kind {
             When::Distance { pair, metres } => {

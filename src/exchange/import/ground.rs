@@ -53,7 +53,8 @@ impl Ground {
             let mut parts = Vec::new();
             for pair in places.windows(2) {
                 let route = self.route(pair[0], pair[1])?;
-                parts.extend(route.path.part(0.0, route.path.length_m()));
+                // Its path goes on behind the goal.
+                parts.extend(route.path.part(0.0, route.goal_m));
             }
             Path::join(&parts).ok_or_else(|| "it has no length".to_owned())
         };

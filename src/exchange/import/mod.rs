@@ -8,8 +8,8 @@
 //! `variation` reads the values of a distribution. For each variation `story` reads the scenario, with `body`, `position`,
 //! `shape`, `action`, `trigger` and `weather` for what stands in it, through `source`, which fills in each `parameter` and its
 //! `expression`, and `catalogue`, which finds what lies in other files; `vocabulary` refuses what no file may hold. `place` finds
-//! places on the map, `scene` gives everybody a way and phases, `pace` their speeds, `condition` the moments at which these begin: as `said`, text
-//! with its numbers apart. `rows` finds how the numbers follow from the parameters, and `write` prints the space. A file that
+//! places on the map, `scene` gives everybody a way, to which `ways` joins trajectories, and `phases` what it does, `pace` their speeds, `condition` the moments at which these begin: as `said`, text
+//! with its numbers apart. `rows` finds how the numbers follow from the parameters, `sky` how weather changes, and `write` prints the space. A file that
 //! avastra exported carries its scenario (`own`). No file is read here: `cli` gives texts.
 
 mod across;
@@ -29,11 +29,13 @@ mod rows;
 mod said;
 mod scene;
 mod shape;
+mod sky;
 mod source;
 mod story;
 mod trigger;
 mod variation;
 mod vocabulary;
+mod ways;
 mod weather;
 mod write;
 
@@ -45,9 +47,10 @@ use roxmltree::Document;
 
 use catalogue::Library;
 use scene::Scene;
+use sky::Sky;
 use source::Source;
+use story::Story;
 use variation::Values;
-use weather::Weather;
 
 /// Gives the texts of the files that a file names.
 pub trait Files {
@@ -63,11 +66,11 @@ pub trait Files {
     /// Why it cannot be read.
     fn map(&self, path: &str) -> Result<String, String>;
 
-    /// The texts of the `.xosc` files in a folder of catalogues.
+    /// The `.xosc` files in a folder of catalogues: what each is called, without its ending, and its text.
     ///
     /// # Errors
     /// Why they cannot be read.
-    fn catalogues(&self, folder: &str) -> Result<Vec<String>, String>;
+    fn catalogues(&self, folder: &str) -> Result<Vec<(String, String)>, String>;
 }
 
 /// A file of another tool in the language.
@@ -101,7 +104,7 @@ struct Variant {
     /// As a path from the file that is imported.
     map: String,
     scene: Scene,
-    weather: Weather,
+    sky: Sky,
     duration_s: f64,
 }
 
@@ -226,14 +229,17 @@ impl Whole<'_> {
         let story = story::read(&mut source, document, self.ego);
         let story = story.filter(|_| !source.is_excluded);
         let found = story.and_then(|story| Some((Scene::of(&mut source, &story)?, story)));
+        if let Some((_, story)) = &found {
+            self.same_sky(&mut source, story);
+        }
         let (is_excluded, notes) = (source.is_excluded, source.notes());
         match (found, source.refusals()) {
             (Some((scene, story)), refusals) if refusals.is_empty() => {
                 self.notes.extend(notes);
                 self.description.clone_from(&story.description);
                 let map = library.beside(&story.map.1.replace('\\', "/"));
-                let (weather, duration_s) = (story.weather, story.duration_s);
-                self.variants.push(Variant { values, map, scene, weather, duration_s });
+                let (sky, duration_s) = (Sky::of(story.weather, &story.changes), story.duration_s);
+                self.variants.push(Variant { values, map, scene, sky, duration_s });
                 Ok(())
             }
             (_, refusals) => {
@@ -241,6 +247,15 @@ impl Whole<'_> {
                 Err((refusals, is_excluded))
             }
         }
+    }
+
+    /// Each step of the space lets the sky change, whatever its row is.
+    fn same_sky(&self, source: &mut Source, story: &Story) -> Option<()> {
+        let Some(first) = self.variants.first() else { return Some(()) };
+        let own = Sky::of(story.weather.clone(), &story.changes);
+        let differs = (own.changes() || first.sky.changes()) && own != first.sky;
+        let mark = story.changes.first().map_or(&story.map.0, |change| &change.mark);
+        source.refuse_if(differs, mark, "a sky that changes is read where all variations have the same")
     }
 }
 

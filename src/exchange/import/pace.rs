@@ -228,17 +228,23 @@ impl<'a> Cast<'a> {
         let waiting = Waiting { cast: self, actor: moving, before: Vec::new() };
         let of = waiting.who(source, mark, &kept.of)?;
         let (here, there) = (self.begins(source, mark, own)?, self.begins(source, mark, &kept.of)?);
+        let looks_ahead = self.looks_ahead(source, mark, own)?;
+        let is_off = self.is_far_off(source, mark, own)? || self.is_far_off(source, mark, &kept.of)?;
+        let faces = !is_off && looks_ahead != self.looks_ahead(source, mark, &kept.of)?;
+        source.refuse_if(faces, mark, "a distance is kept by those who drive the same way")?;
+        // Who is ahead of two that come towards the ego vehicle is behind along its route.
+        let is_against = !is_off && !looks_ahead;
         let is_ahead = match kept.is_ahead {
             Some(is_ahead) => is_ahead,
             None => {
                 source.note("who is ahead where a distance is kept is as at the beginning");
                 match self.stations_apart_m(own, &kept.of) {
                     Some((apart_m, _)) => apart_m + self.begin_m(&kept.of) < self.begin_m(own),
-                    None => self.station_m(here) > self.station_m(there),
+                    None => (self.station_m(here) > self.station_m(there)) != is_against,
                 }
             }
         };
-        let (back, front) = if is_ahead { (&kept.of, own) } else { (own, &kept.of) };
+        let (back, front) = if is_ahead == is_against { (own, &kept.of) } else { (&kept.of, own) };
         let away = waiting.between(source, mark, back, front, kept.is_free_space)?;
         let wanted = match kept.headway {
             Headway::Way(way_m) => Said::default().number(way_m, "m"),

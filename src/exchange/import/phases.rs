@@ -12,6 +12,7 @@ use super::scene::{Cast, Moving};
 use super::source::Source;
 use super::story::Event;
 use super::trigger::When;
+use super::ways::Leg;
 
 /// A distance that is to be reached is, this near to it, m, as for esmini.
 const KEPT_M: f64 = 0.1;
@@ -27,6 +28,8 @@ pub struct Told {
     /// Its speed, if the file says it.
     pub mps: Option<f64>,
     pub offset_m: f64,
+    /// Where on its way it is told the next thing, m: behind its last trajectory.
+    pub at_m: f64,
     pub lane: Option<LanePlace>,
     /// How far the middle of that lane is to the left of its way, m.
     pub lane_m: f64,
@@ -49,18 +52,23 @@ impl<'a> Cast<'a> {
         let mut told = Told {
             mps: Some(moving.mps),
             offset_m: moving.offset_m,
+            at_m: moving.at_m,
             lane: moving.placed.lane,
             lane_m: 0.0,
             then: None,
         };
-        told.lane_m = told.lane.map_or(0.0, |lane| self.aside_m(moving, lane));
+        told.lane_m = told.lane.map_or(0.0, |lane| self.aside_m(moving, told.at_m, lane));
         let mut phases = Vec::new();
         // After what takes a while: what may follow.
         let mut takes: Option<Takes> = None;
-        if entity.way.as_ref().is_some_and(|way| way.timing.is_some()) {
-            let (timed, then) = self.timed(source, moving, Said::default(), true)?;
-            phases.extend(timed);
-            takes = Some(Takes { then, is_cut_short: false });
+        if let Some(way) = &entity.way {
+            let leg = moving.leg(way)?;
+            if way.timing.is_some() {
+                let (timed, then) = self.timed(source, moving, &leg.timed, Said::default(), true)?;
+                phases.extend(timed);
+                takes = Some(Takes { then: vec![then], is_cut_short: false });
+            }
+            self.told_at_the_end(moving, leg, &mut told);
         }
         let (at_once, later): (Vec<&Event>, Vec<&Event>) =
             events.into_iter().partition(|event| event.when.is_empty());
@@ -103,8 +111,9 @@ impl<'a> Cast<'a> {
                             false => waiting.waits_for_the_end(&event.when),
                         };
                         source.refuse_if(!waits && !is_cut_short, &event.mark, reason)?;
-                        if waits && !then.0.is_empty() {
-                            phases.push(then.and("{}"));
+                        if waits {
+                            let then = then.into_iter().filter(|then| !then.0.is_empty());
+                            phases.extend(then.map(|then| then.and("{}")));
                         }
                     }
                     if begins.is_after {
@@ -121,6 +130,7 @@ impl<'a> Cast<'a> {
             }
             let mut fields = Vec::new();
             let mut timed = Vec::new();
+            let mut own: Option<Takes> = None;
             for act in acts {
                 match &act.kind {
                     ActKind::Keep(kept) if !kept.is_continuous => {
@@ -130,29 +140,46 @@ impl<'a> Cast<'a> {
                         self.fields(source, moving, act, &mut told, &mut fields)?;
                         told.then = Some(near.and(" { speed: npc.speed }"));
                     }
-                    ActKind::Follow(way) if way.timing.is_some() => {
-                        let then;
-                        (timed, then) = self.timed(source, moving, begins.clone(), way.is_absolute)?;
-                        takes = Some(Takes { then, is_cut_short: false });
+                    ActKind::Follow(way) => {
+                        let leg = moving.leg(way)?;
+                        let reason = "it is beside its way when its trajectory begins";
+                        source.refuse_if(
+                            (told.offset_m - moving.offset_m).abs() > 0.01,
+                            &act.mark,
+                            reason,
+                        )?;
+                        // Without times it goes on with the speed that it has, which is 0 where nothing tells it more.
+                        let then = if way.timing.is_some() {
+                            let then;
+                            (timed, then) =
+                                self.timed(source, moving, &leg.timed, begins.clone(), way.is_absolute)?;
+                            then
+                        } else {
+                            arrives(leg.end_m)
+                        };
+                        Takes::add(&mut own, then, way.timing.is_none());
+                        self.told_at_the_end(moving, leg, &mut told);
                     }
                     ActKind::Profile(entries) => {
                         let reason = "its trajectory has times, which say the speed already";
-                        source.refuse_if(!moving.timed.is_empty(), &act.mark, reason)?;
+                        let has_times = moving.legs.iter().any(|leg| !leg.timed.is_empty());
+                        source.refuse_if(has_times, &act.mark, reason)?;
                         let begins = begins.clone();
-                        let (said, then) =
+                        let then;
+                        (timed, then) =
                             pace::profile(source, &act.mark, &entity.body, told.mps, entries, begins)?;
-                        (timed, takes) = (said, Some(Takes { then, is_cut_short: false }));
+                        Takes::add(&mut own, then, false);
                         told.mps = entries.last().map(|entry| entry.mps);
-                    }
-                    // It goes on with the speed that it has, which is 0: an event of its own tells it more.
-                    ActKind::Follow(_) => {
-                        takes = Some(Takes { then: arrives(moving.path.length_m()), is_cut_short: true });
                     }
                     _ => self.fields(source, moving, act, &mut told, &mut fields)?,
                 }
             }
+            takes = own.or(takes);
             if timed.is_empty() {
-                phases.push(begins.and("{ ").then(Said::joined(fields, ", ")).and(" }"));
+                // A phase that waits for nothing and tells nothing is none.
+                if !(begins.0.is_empty() && fields.is_empty()) {
+                    phases.push(begins.and("{ ").then(Said::joined(fields, ", ")).and(" }"));
+                }
                 phases.extend(told.then.take());
             } else if fields.is_empty() {
                 phases.extend(timed);
@@ -164,16 +191,23 @@ impl<'a> Cast<'a> {
         Some(phases)
     }
 
+    /// What follows is told where a trajectory ends.
+    fn told_at_the_end(&self, moving: &Moving<'a>, leg: &Leg, told: &mut Told) {
+        (told.at_m, told.lane, told.offset_m) = (leg.end_m, leg.lane, 0.0);
+        told.lane_m = leg.lane.map_or(0.0, |lane| self.aside_m(moving, told.at_m, lane));
+    }
+
     /// The phases of one that is at places of its way at given times, and the words before a phase that waits for the end.
     fn timed(
         &self,
         source: &mut Source,
         moving: &Moving,
+        places: &[(f64, f64)],
         begins: Said,
         is_absolute: bool,
     ) -> Option<(Vec<Said>, Said)> {
         let mut phases = Vec::new();
-        let (Some((_, first_s)), Some((last_m, _))) = (moving.timed.first(), moving.timed.last()) else {
+        let (Some((_, first_s)), Some((last_m, _))) = (places.first(), places.last()) else {
             return Some((phases, Said::default()));
         };
         let mut begins = begins;
@@ -184,7 +218,7 @@ impl<'a> Cast<'a> {
             };
         }
         let mut is_wait = false;
-        for pair in moving.timed.windows(2) {
+        for pair in places.windows(2) {
             let ((from_m, from_s), (to_m, to_s)) = (pair[0], pair[1]);
             let (way_m, time_s) = (to_m - from_m, to_s - from_s);
             if time_s <= 0.0 {
@@ -257,10 +291,19 @@ impl<'a> Cast<'a> {
 
 /// What takes a while.
 struct Takes {
-    /// The words before a phase that waits for its end.
-    then: Said,
+    /// The words before phases that wait for the end of each part of it.
+    then: Vec<Said>,
     /// Whether something else may begin before that.
     is_cut_short: bool,
+}
+
+impl Takes {
+    /// With something that begins at the same moment.
+    fn add(takes: &mut Option<Takes>, then: Said, is_cut_short: bool) {
+        let known = takes.get_or_insert(Takes { then: Vec::new(), is_cut_short });
+        known.then.push(then);
+        known.is_cut_short &= is_cut_short;
+    }
 }
 
 /// Before a phase that waits until a station has been reached.

@@ -18,12 +18,12 @@ const WAY_M_MAX: f64 = 12_000.0;
 /// The goal lies this far before the end of the lanes, m.
 const BEFORE_END_M: f64 = 1.0;
 
-/// How far a way against the direction of its lane goes on, m.
-const AGAINST_M_MAX: f64 = 2_000.0;
+/// How far a way that is drawn along lanes goes on, with them after a trajectory or against them, m.
+const ON_M_MAX: f64 = 2_000.0;
 /// In such steps it is looked at, m.
-const AGAINST_STEP_M: f64 = 2.0;
+const ON_STEP_M: f64 = 2.0;
 /// So near to the lanes it is drawn, m.
-const AGAINST_NEAR_M: f64 = 0.02;
+const ON_NEAR_M: f64 = 0.02;
 /// Points between two that are kept: it bounds the search.
 const STRIDE_MAX: usize = 200;
 
@@ -82,6 +82,11 @@ impl<'a> Places<'a> {
         let found = found?;
         self.known.insert(name.to_owned(), found);
         Some(found)
+    }
+
+    /// Lets an entity be somewhere else from now on; where it was.
+    pub fn stand(&mut self, name: &str, placed: Placed) -> Option<Placed> {
+        self.known.insert(name.to_owned(), placed)
     }
 
     /// A position of the file.
@@ -174,9 +179,9 @@ impl<'a> Places<'a> {
     /// first one of the map.
     pub fn against(&self, from: LanePlace) -> Vec<Vec2> {
         let (mut lane, mut station_m, mut points) = (from.lane, from.station_m, Vec::new());
-        while points.len() as f64 * AGAINST_STEP_M < AGAINST_M_MAX {
+        while points.len() as f64 * ON_STEP_M < ON_M_MAX {
             points.push(self.map.lane(lane).centre.pose_at(station_m).offset(0.0, from.offset_m).position);
-            station_m -= AGAINST_STEP_M;
+            station_m -= ON_STEP_M;
             while station_m < 0.0 {
                 let Some(before) = self.map.lane(lane).predecessors.first() else { return thinned(&points) };
                 lane = *before;
@@ -184,6 +189,15 @@ impl<'a> Places<'a> {
             }
         }
         thinned(&points)
+    }
+
+    /// The way on along the lanes from a place, at the same distance from their middles.
+    pub fn onwards(&self, from: LanePlace) -> Vec<Vec2> {
+        let begin = LanePlace { offset_m: 0.0, ..from };
+        let (goals, _) = straight_on(&self.map, begin);
+        let ways: Vec<LanePlace> = core::iter::once(begin).chain(goals).collect();
+        let Ok(way) = self.map.way(&ways) else { return Vec::new() };
+        drawn(0.0, way.length_m().min(ON_M_MAX), |at_m| way.pose_at(at_m).offset(0.0, from.offset_m).position)
     }
 
     fn on_a_lane(&mut self, source: &mut Source, mark: &Mark, entity: &str) -> Option<LanePlace> {
@@ -355,6 +369,13 @@ impl Placed {
     }
 }
 
+/// Points of a way from one station to another, as few as keep near to it.
+pub fn drawn(from_m: f64, to_m: f64, point: impl Fn(f64) -> Vec2) -> Vec<Vec2> {
+    let steps = ((to_m - from_m) / ON_STEP_M).ceil().max(1.0);
+    let at = |nth: u32| point(from_m + (to_m - from_m) * f64::from(nth) / steps);
+    thinned(&(0..=steps as u32).map(at).collect::<Vec<_>>())
+}
+
 /// As few of the points as keep every other one near to the line between two.
 fn thinned(points: &[Vec2]) -> Vec<Vec2> {
     let Some(first) = points.first() else { return Vec::new() };
@@ -366,7 +387,7 @@ fn thinned(points: &[Vec2]) -> Vec<Vec2> {
                 let by = point - points[from];
                 (along.x * by.y - along.y * by.x).abs() / along.norm().max(f64::MIN_POSITIVE)
             };
-            points[from + 1..to].iter().all(|point| off_m(point) <= AGAINST_NEAR_M)
+            points[from + 1..to].iter().all(|point| off_m(point) <= ON_NEAR_M)
         };
         let mut to = from + 1;
         while to + 1 < points.len() && to < from + STRIDE_MAX && fits(to + 1) {

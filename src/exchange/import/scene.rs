@@ -10,18 +10,18 @@ use avastra_lang::model::command::OFFSET_M;
 use avastra_road::{LIMIT_MPS_DEFAULT, LanePlace, Route};
 use avastra_world::sim::VehicleParameters;
 
-use super::action::{Act, ActKind, Headway, Speed};
+use super::action::{ActKind, Headway, Speed};
 use super::body::Body;
 use super::condition::{EGO_FRONT_M, is_called};
 use super::ground::Ground;
 use super::pace::too_fast;
-use super::phases::same_moment;
 use super::place::{Placed, Places, straight_on};
 use super::position::Position;
 use super::rows::small;
 use super::said::{Figure, Said, number};
 use super::source::{Mark, Source};
 use super::story::{Entity, Event, Story};
+use super::ways::{Leg, is_led, moves};
 
 /// Before the offset of a spawn.
 pub const OFFSET: &str = ", offset: ";
@@ -41,9 +41,6 @@ const OFF_ROUTE_M: f64 = 12.0;
 
 /// Two ways that lie beside each other for so long are of one road, m.
 const SAME_ROAD_M: f64 = 100.0;
-
-/// A trajectory that begins during the story does so this near to where its entity stands, m.
-const NEAR_M: f64 = 1.5;
 
 /// Words of the language, and of `pace::KEEPING`, that name no road user and no parameter.
 pub const TAKEN: [&str; 20] = [
@@ -106,8 +103,8 @@ pub struct Moving<'a> {
     pub at_m: f64,
     pub offset_m: f64,
     pub mps: f64,
-    /// When places of its way are reached, m and s.
-    pub timed: Vec<(f64, f64)>,
+    /// The trajectories of the file on its way.
+    pub legs: Vec<Leg<'a>>,
 }
 
 /// The ego vehicle's way with everybody who has a place.
@@ -147,17 +144,23 @@ impl Scene {
             let found = source.about(&entity.name, |source| cast.on_a_way(source, entity));
             cast.moving.extend(found);
         }
+        cast.join_ways(source);
         let mut others = Vec::new();
         for moving in &cast.moving {
-            if let Some(phases) = cast.phases(source, moving) {
-                others.push(Other {
-                    bearer: moving.bearer.clone(),
-                    body: moving.entity.body.clone(),
-                    trajectory: moving.trajectory.clone(),
-                    spawn: moving.spawn(),
-                    phases,
-                });
-            }
+            let Some(phases) = cast.phases(source, moving) else {
+                // Nobody is left out in silence.
+                if !source.is_refused() {
+                    source.refuse::<()>(&moving.entity.mark, "what it does cannot be said");
+                }
+                continue;
+            };
+            others.push(Other {
+                bearer: moving.bearer.clone(),
+                body: moving.entity.body.clone(),
+                trajectory: moving.trajectory.clone(),
+                spawn: moving.spawn(),
+                phases,
+            });
         }
         if !others.is_empty() {
             source.note("others follow their ways exactly, as the file's player moves them, and mind nobody");
@@ -363,15 +366,7 @@ impl<'a> Cast<'a> {
         }
         let taken = self.moving.iter().map(|moving| moving.bearer.clone()).collect::<Vec<_>>();
         let bearer = name_of(&entity.name, &taken);
-        let follows = entity.events.iter().flat_map(|event| &event.acts).filter_map(|act| match &act.kind {
-            ActKind::Follow(way) => Some(&**way),
-            _ => None,
-        });
-        let mut follows: Vec<_> = follows.collect();
-        if let Some(way) = &entity.way {
-            follows.insert(0, way);
-        }
-        let moving = |path, trajectory, at_m, offset_m, timed| Moving {
+        let moving = |path, trajectory, at_m, offset_m| Moving {
             entity,
             bearer: bearer.clone(),
             placed,
@@ -380,32 +375,13 @@ impl<'a> Cast<'a> {
             at_m,
             offset_m,
             mps,
-            timed,
+            legs: Vec::new(),
         };
-        if let Some(way) = follows.first() {
-            if let Some(second) = follows.get(1) {
-                return source.refuse(&second.shape.mark, "somebody follows one trajectory");
-            }
-            let drawn = way.shape.drawn(source, &mut self.places.borrow_mut(), Some(placed.pose))?;
-            let is_first = entity.way.is_some();
-            let (from_m, begins) = (way.from_m, drawn.path.pose_at(way.from_m));
-            let away_m = (begins.position - placed.pose.position).norm();
-            let turned_rad = wrap_angle(begins.heading_rad - placed.pose.heading_rad).abs();
-            let stands = mps == 0.0 && !moves_before_its_way(&entity.events);
-            let reason = "it drives already when its trajectory begins: where it is then is not known";
-            source.refuse_if(!is_first && !stands, &way.shape.mark, reason)?;
-            let reason = format!("its trajectory begins {away_m:.1} m away from where it stands");
-            source.refuse_if(!is_first && away_m > NEAR_M, &way.shape.mark, reason)?;
-            let is_turned = entity.position.is_some() && turned_rad > 2.0 && !entity.body.is_on_foot();
-            source.refuse_if(is_turned, &way.shape.mark, "vehicles do not drive backwards")?;
-            let timed = match way.timing {
-                Some((more_s, times)) => {
-                    drawn.timed.iter().map(|(at_m, time_s)| (*at_m, time_s * times + more_s)).collect()
-                }
-                None => Vec::new(),
-            };
-            let text = points_text(&drawn.points);
-            return Some(moving(Rc::new(drawn.path), text, from_m, 0.0, timed));
+        // Its trajectory takes the place of this way, unless it has to drive there first.
+        let is_met = |event: &Event| event.acts.iter().any(|act| matches!(act.kind, ActKind::Meet(_)));
+        if is_led(entity) && (entity.way.is_some() || !entity.events.iter().any(is_met)) {
+            let points = placed.ahead(STRAIGHT_M);
+            return Some(moving(Rc::new(Path::through(&points)?), points_text(&points), 0.0, 0.0));
         }
         let is_short = mps == 0.0 && !entity.events.iter().any(moves);
         if let Some(lane) = placed.lane.filter(|lane| placed.is_along() && OFFSET_M.contains(&lane.offset_m))
@@ -433,7 +409,7 @@ impl<'a> Cast<'a> {
             {
                 let text: Vec<String> = ways.iter().map(|place| lane_point(&self.map, *place)).collect();
                 let text = format!("lanes: [{}]", text.join(", "));
-                return Some(moving(path, text, lane.station_m - begin_m, lane.offset_m, Vec::new()));
+                return Some(moving(path, text, lane.station_m - begin_m, lane.offset_m));
             }
         }
         if !is_short && !entity.events.is_empty() && entity.route.is_some() {
@@ -445,12 +421,12 @@ impl<'a> Cast<'a> {
             None => placed.ahead(if is_short { STANDING_M } else { STRAIGHT_M }).to_vec(),
         };
         let points = if points.len() < 2 { placed.ahead(STANDING_M).to_vec() } else { points };
-        if against.is_none() && !is_short {
+        if against.is_none() && !is_short && !is_led(entity) {
             source
                 .note(format!("`{}` looks along no lane, and goes {STRAIGHT_M} m straight on", entity.name));
         }
         let path = Rc::new(Path::through(&points)?);
-        Some(moving(path, points_text(&points), 0.0, 0.0, Vec::new()))
+        Some(moving(path, points_text(&points), 0.0, 0.0))
     }
 
     /// Its place so far ahead of the ego vehicle.
@@ -511,28 +487,7 @@ impl Moving<'_> {
     }
 }
 
-/// Whether somebody moves by an event.
-fn moves(event: &Event) -> bool {
-    let stays = |act: &Act| {
-        matches!(act.kind, ActKind::Ahead(..) | ActKind::Follow(_) | ActKind::Speed(Speed::Absolute(0.0), _))
-    };
-    !event.acts.iter().all(stays)
-}
-
-/// Whether somebody moves by an event that comes before the one with which its trajectory begins.
-fn moves_before_its_way(events: &[Event]) -> bool {
-    let begins = |event: &Event| event.acts.iter().any(|act| matches!(act.kind, ActKind::Follow(_)));
-    let Some(at) = events.iter().position(begins) else { return events.iter().any(moves) };
-    events.iter().enumerate().any(|(nth, event)| {
-        let is_earlier = match (event.time_s(), events[at].time_s()) {
-            (Some(time_s), Some(begins_s)) => time_s < begins_s,
-            _ => nth < at,
-        };
-        is_earlier && !same_moment(event, &events[at]) && moves(event)
-    })
-}
-
-fn points_text(points: &[Vec2]) -> String {
+pub fn points_text(points: &[Vec2]) -> String {
     let point = |point: &Vec2| format!("{{ x: {} m, y: {} m }}", number(point.x), number(point.y));
     let points: Vec<String> = points.iter().map(point).collect();
     format!("points: [{}]", points.join(", "))

@@ -70,6 +70,8 @@ pub struct Source<'f> {
     pub variables: BTreeMap<String, Option<String>>,
     /// The names of the acts that begin with the scenario.
     pub acts_at_once: BTreeSet<String>,
+    /// The entities that have a controller of the player's.
+    pub controlled: BTreeSet<String>,
     parameters: BTreeMap<String, String>,
     /// Those of the texts around the entry of a catalogue that is read, the outermost first.
     outer: Vec<BTreeMap<String, String>>,
@@ -101,6 +103,7 @@ impl<'f> Source<'f> {
             variables: BTreeMap::new(),
             parameters: BTreeMap::new(),
             acts_at_once: BTreeSet::new(),
+            controlled: BTreeSet::new(),
             outer: Vec::new(),
             sees_more: 0,
             torn: BTreeSet::new(),

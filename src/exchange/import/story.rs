@@ -9,6 +9,7 @@ use super::action::{Act, ActKind, Headway, Over, Speed, Way, act};
 use super::body::{Body, body};
 use super::catalogue;
 use super::position::Position;
+use super::sky::{Change, Sky};
 use super::source::{Mark, Source, children, element, elements};
 use super::trigger::{Condition, Trigger, When, acts_at_once, both, is_less, reduced, trigger};
 use super::weather::{Weather, weather};
@@ -29,7 +30,10 @@ pub struct Story {
     pub map: (Mark, String),
     pub ego: Entity,
     pub others: Vec<Entity>,
+    /// As the scenario begins.
     pub weather: Weather,
+    /// In the order of the file.
+    pub changes: Vec<Change>,
     pub duration_s: f64,
     /// What the file says of itself.
     pub description: String,
@@ -65,14 +69,19 @@ pub struct Event {
 impl Event {
     /// When it comes, if that is a time, s.
     pub fn time_s(&self) -> Option<f64> {
-        match self.when.as_slice() {
-            [] => Some(0.0),
-            [all] => match all.as_slice() {
-                [Condition { kind: When::After(time_s), .. }] => Some(*time_s),
-                _ => None,
-            },
+        time_s(&self.when)
+    }
+}
+
+/// When a trigger comes, if that is a time, s.
+fn time_s(trigger: &Trigger) -> Option<f64> {
+    match trigger.as_slice() {
+        [] => Some(0.0),
+        [all] => match all.as_slice() {
+            [Condition { kind: When::After(time_s), .. }] => Some(*time_s),
             _ => None,
-        }
+        },
+        _ => None,
     }
 }
 
@@ -98,6 +107,7 @@ pub fn read(source: &mut Source, document: &Document, ego: Option<&str>) -> Opti
     }
     catalogue::locate(source, root);
     source.acts_at_once = acts_at_once(root);
+    source.controlled = controlled(source, root);
     variables(source, root);
     let network = source.required(root, "RoadNetwork")?;
     let logic = source.required(network, "LogicFile")?;
@@ -140,7 +150,8 @@ pub fn read(source: &mut Source, document: &Document, ego: Option<&str>) -> Opti
     };
     let duration_s = duration_s(source, storyboard, &cast.ego.name, ego_mps);
     let description = header.attribute("description").unwrap_or("").to_owned();
-    Some(Story { map, ego: cast.ego, others: cast.others, weather: sky, duration_s, description })
+    let Cast { ego, others, changes, .. } = cast;
+    Some(Story { map, ego, others, weather: sky, changes, duration_s, description })
 }
 
 /// The header of a file whose version is read.
@@ -173,6 +184,8 @@ struct Cast {
     ego: Entity,
     others: Vec<Entity>,
     ego_actions: usize,
+    /// Of the weather.
+    changes: Vec<Change>,
     /// Who leaves as the scenario begins.
     gone: BTreeSet<String>,
     /// What never comes: its kind and its name.
@@ -205,7 +218,8 @@ impl Cast {
             return source.refuse(root, reason);
         };
         let ego = entities.remove(at);
-        Some(Cast { ego, others: entities, ego_actions: 0, gone: BTreeSet::new(), never: Vec::new() })
+        let (gone, never, changes) = (BTreeSet::new(), Vec::new(), Vec::new());
+        Some(Cast { ego, others: entities, ego_actions: 0, changes, gone, never })
     }
 
     fn is_ego(&self, name: &str) -> bool {
@@ -231,7 +245,7 @@ impl Cast {
         }
         let is_ego = self.is_ego(&name);
         for action in elements(private, "PrivateAction").flat_map(children) {
-            let begun = source.about(&name, |source| act(source, action, is_ego));
+            let begun = source.about(&name, |source| act(source, action, &name, is_ego));
             let entity = if is_ego { Some(&mut self.ego) } else { self.other(&name) };
             if let (Some(begun), Some(entity)) = (begun, entity) {
                 entity.begin(begun);
@@ -333,7 +347,7 @@ impl Cast {
                 let acts: Vec<Act> = does
                     .iter()
                     .flat_map(|action| children(*action))
-                    .filter_map(|action| source.about(name, |source| act(source, action, false)))
+                    .filter_map(|action| source.about(name, |source| act(source, action, name, false)))
                     .collect();
                 let mark = source.mark(event);
                 if let (Some(Some(when)), Some(entity)) = (&when, self.other(name)) {
@@ -376,6 +390,20 @@ impl Cast {
     /// An action of the story that concerns nobody's motion.
     fn change(&mut self, source: &mut Source, action: Node, when: Option<&Trigger>) {
         let inner = children(action).next().unwrap_or(action);
+        if inner.has_tag_name("EnvironmentAction") {
+            let mark = source.mark(inner);
+            if let (Some(weather), Some(when)) = (weather(source, action), when) {
+                let Some(at_s) = time_s(when) else {
+                    source.refuse::<()>(&mark, "a sky that changes at a time is read, not with what happens");
+                    return;
+                };
+                if !Sky::can_change_at(at_s) {
+                    source.note("the sky changes at whole tenths of a second");
+                }
+                self.changes.push(Change { mark, at_s, weather });
+            }
+            return;
+        }
         let is_at_once = |when: &Trigger| {
             when.is_empty()
                 || when.iter().any(|all| all.iter().all(|one| matches!(one.kind, When::After(s) if s <= 0.1)))
@@ -471,6 +499,19 @@ fn entities(source: &mut Source, root: Node) -> Vec<Entity> {
         });
     }
     found
+}
+
+/// The entities to which the file gives controllers; all of them where an action gives one to somebody.
+fn controlled(source: &mut Source, root: Node) -> BTreeSet<String> {
+    let is_anybody = root.descendants().any(|node| node.has_tag_name("AssignControllerAction"));
+    let objects = root.descendants().filter(|node| node.has_tag_name("ScenarioObject"));
+    let has_one = |object: &Node| {
+        elements(*object, "ObjectController").any(|controller| children(controller).next().is_some())
+    };
+    objects
+        .filter(|object| is_anybody || has_one(object))
+        .filter_map(|object| super::source::filled(object.attribute("name")?, source.parameters()).ok())
+        .collect()
 }
 
 /// Whether a global action changes what others meet; those of the player and of variables do not.

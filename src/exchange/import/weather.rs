@@ -59,6 +59,11 @@ impl Weather {
     }
 }
 
+/// Levels of rain, fog and wetness.
+pub fn levels(weather: &Weather) -> [&'static str; 3] {
+    weather.sky.map(|level| level.unwrap_or(LEVELS[0]))
+}
+
 /// The weather of a `GlobalAction`.
 pub fn weather(source: &mut Source, global: Node) -> Option<Weather> {
     let action = children(global).next()?;
@@ -76,10 +81,15 @@ fn environment(source: &mut Source, environment: Node) -> Option<Weather> {
 
 fn sky_of(source: &mut Source, environment: Node) -> Option<Weather> {
     let mut found = Weather::default();
-    let mut is_dark = false;
+    let (mut is_dark, mut snow) = (false, None);
     for node in environment.descendants() {
         match node.tag_name().name() {
-            "Precipitation" => found.sky[0] = Some(rain(source, node)?),
+            "Precipitation" => {
+                let level = rain(source, node)?;
+                let is_snow = node.attribute("precipitationType") == Some("snow");
+                found.sky[0] = Some(if is_snow { LEVELS[0] } else { level });
+                snow = is_snow.then_some(level);
+            }
             "Fog" if node.has_attribute("visualRange") => {
                 let sight_m = source.amount(node, "visualRange")?;
                 found.sky[1] = Some(level(|bound| sight_m >= SIGHT_M[bound]));
@@ -107,6 +117,11 @@ fn sky_of(source: &mut Source, environment: Node) -> Option<Weather> {
         source.note("it is night: the file's sun gives no light of a day");
         found.time = Some("Night");
     }
+    if let Some(level) = snow {
+        source.note("snow that falls is fog of its level for the sensors");
+        let rank = |level: &&str| LEVELS.iter().position(|known| known == level);
+        found.sky[1] = found.sky[1].into_iter().chain([level]).max_by_key(rank);
+    }
     if found.is_rough() {
         source.note("weather is the nearest of the engine's levels of rain, fog and wetness");
     }
@@ -118,17 +133,17 @@ fn level(holds: impl Fn(usize) -> bool) -> &'static str {
     LEVELS[(0..3).find(|bound| holds(*bound)).unwrap_or(3)]
 }
 
+/// How much falls of it, rain or snow, which counts by the water that it holds.
 fn rain(source: &mut Source, node: Node) -> Option<&'static str> {
     match source.word(node, "precipitationType", &["dry", "rain", "snow"])? {
-        "rain" if node.has_attribute("precipitationIntensity") => {
+        "rain" | "snow" if node.has_attribute("precipitationIntensity") => {
             let mmph = source.amount(node, "precipitationIntensity")?;
             Some(level(|bound| mmph <= RAIN_MMPH[bound]))
         }
-        "rain" => {
+        "rain" | "snow" => {
             let part = source.amount(node, "intensity")?;
             Some(level(|bound| part <= RAIN_PART[bound]))
         }
-        "snow" => source.refuse(node, "the engine has no snow"),
         _ => Some(LEVELS[0]),
     }
 }

@@ -14,7 +14,7 @@ use super::pace;
 use super::rows::{Parameters, capital, small, unique};
 use super::said::{Figure, Piece, Said, number};
 use super::scene::{OFFSET, Other, Scene};
-use super::weather::Weather;
+use super::sky::{self, Sky};
 use super::{Imported, Variant, Whole};
 
 /// The space of a file's variations. With one of them, it has a scenario, too. `order` names the parameters as they are listed.
@@ -124,10 +124,10 @@ impl<'a> Space<'a> {
     fn text(&mut self) -> String {
         let all: Vec<usize> = (0..self.variants.len()).collect();
         self.lay_roads();
-        let weathers: BTreeSet<&Weather> = self.variants.iter().map(|variant| &variant.weather).collect();
-        let begins = &self.variants[0].weather;
+        let skies: BTreeSet<&Sky> = self.variants.iter().map(|variant| &variant.sky).collect();
+        let first = &self.variants[0].sky;
         let mut text = self.road_declarations();
-        text += &sky(begins, &weathers);
+        text += &sky::states(&first.begins, &skies);
         // Variations that differ in numbers alone are one action.
         let mut groups: BTreeMap<String, Vec<usize>> = BTreeMap::new();
         let mut order = Vec::new();
@@ -144,11 +144,15 @@ impl<'a> Space<'a> {
         for (nth, form) in order.iter().enumerate() {
             let group = &groups[form];
             let name = if order.len() == 1 { "begin".to_owned() } else { format!("begin_{}", nth + 1) };
-            let set = set(&self.variants[group[0]].weather, &weathers);
+            let set = self.variants[group[0]].sky.set(&skies);
             let times = order.len() * self.roads.len();
             actions += &self.action(&name, group, times, &set, &manoeuvres);
             if self.roads.len() > 1 {
                 rules += &self.rule(&name, group);
+            }
+            if first.changes() {
+                // Only the sky goes on after the first step.
+                let _ = writeln!(rules, "rule {name}_at_first on {name}: elapsed <= 0 s");
             }
         }
         if actions.contains(BEGUN) {
@@ -161,19 +165,30 @@ impl<'a> Space<'a> {
         }
         text += &actions;
         text += &rules;
-        let duration_s = self.variants.iter().map(|variant| variant.duration_s).fold(0.0, f64::max);
-        // One step, in which everything happens.
-        let step_s = (duration_s * 50.0).ceil().max(1.0) / 50.0;
-        let _ = writeln!(text, "\nepisode {{ step: {} s, stop: arrived, limit: 1 steps }}", number(step_s));
+        text += &first.each_step();
+        let (step_s, steps) = self.steps();
+        let _ =
+            writeln!(text, "\nepisode {{ step: {} s, stop: arrived, limit: {steps} steps }}", number(step_s));
         text
+    }
+
+    /// How long a step is, s, and how many there are: one, in which everything happens, if the sky stays as it is.
+    fn steps(&self) -> (f64, usize) {
+        let duration_s = self.variants.iter().map(|variant| variant.duration_s).fold(0.0, f64::max);
+        let whole_s = (duration_s * 50.0).ceil().max(1.0) / 50.0;
+        let step_s = self.variants[0].sky.step_s().filter(|step_s| *step_s < whole_s);
+        step_s.map_or((whole_s, 1), |step_s| (step_s, (whole_s / step_s - 1e-6).ceil() as usize))
     }
 
     /// The scenario of the only variation, in a file beside that of the space.
     fn scenario(&self, file: &str) -> Option<String> {
         let ([_], [(_, road)]) = (self.variants, self.roads.as_slice()) else { return None };
         let (own, file) = (&self.own, quoted(&format!("{file}.ava")));
-        let text =
-            format!("language 1\nuse {file}\nscenario {own} {{ road: {road} steps {{ 0: begin() }} }}\n");
+        let (_, steps) = self.steps();
+        let rest = if steps > 1 { format!(" {}: wait()", steps - 1) } else { String::new() };
+        let text = format!(
+            "language 1\nuse {file}\nscenario {own} {{ road: {road} steps {{ 0: begin(){rest} }} }}\n"
+        );
         Some(format(FileId(0), &text).unwrap_or(text))
     }
 
@@ -456,7 +471,7 @@ fn last_word(text: &str) -> Option<String> {
 
 /// All of a variation but its numbers, its road and what it is called.
 fn form(variant: &Variant) -> String {
-    let mut form = format!("{} {:?}", variant.map, variant.weather);
+    let mut form = format!("{} {:?}", variant.map, variant.sky);
     for other in &variant.scene.others {
         let body = &other.body;
         let size = [body.length_m, body.width_m, body.height_m].map(number);
@@ -489,48 +504,3 @@ const BEGUN: &str = "  set begun = true\n";
 
 /// Below this no driving system has a wish to drive, m/s.
 const SET_SPEED_MPS_MIN: f64 = 1.0;
-
-/// The states of time and weather, as they are when the first variation begins; those of all variations have words.
-fn sky(begins: &Weather, all: &BTreeSet<&Weather>) -> String {
-    let mut text = String::new();
-    let times: BTreeSet<&str> = all.iter().filter_map(|weather| weather.time).collect();
-    if !times.is_empty() {
-        let more: String = ["Dawn", "Dusk"]
-            .iter()
-            .filter(|time| times.contains(*time))
-            .map(|time| format!(" | {time}"))
-            .collect();
-        let _ = write!(
-            text,
-            "enum Time = Morning | Noon | Night{more}\nstate time: Time = {}\n\n",
-            begins.time.unwrap_or("Noon")
-        );
-    }
-    if all.iter().any(|weather| weather.is_rough()) {
-        text += "enum Sky = Rain | Fog | Wetness\nenum Level = None < Light < Moderate < High\n";
-        let [rain, fog, wetness] = levels(begins);
-        let _ =
-            writeln!(text, "state sky: Sky -> Level = {{ Rain: {rain}, Fog: {fog}, Wetness: {wetness} }}\n");
-    }
-    text
-}
-
-fn levels(weather: &Weather) -> [&'static str; 3] {
-    weather.sky.map(|level| level.unwrap_or("None"))
-}
-
-/// The effects that set a weather, if another variation has another one.
-fn set(weather: &Weather, all: &BTreeSet<&Weather>) -> String {
-    let mut text = String::new();
-    if all.iter().any(|other| other.time != weather.time) {
-        let _ = writeln!(text, "  set time = {}", weather.time.unwrap_or("Noon"));
-    }
-    if all.iter().any(|other| levels(other) != levels(weather)) {
-        let [rain, fog, wetness] = levels(weather);
-        let _ = writeln!(
-            text,
-            "  set sky[Rain] = {rain}\n  set sky[Fog] = {fog}\n  set sky[Wetness] = {wetness}"
-        );
-    }
-    text
-}
