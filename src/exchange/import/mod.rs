@@ -228,17 +228,17 @@ impl Whole<'_> {
         }
         let story = story::read(&mut source, document, self.ego);
         let story = story.filter(|_| !source.is_excluded);
-        let found = story.and_then(|story| Some((Scene::of(&mut source, &story)?, story)));
-        if let Some((_, story)) = &found {
-            self.same_sky(&mut source, story);
-        }
+        let found = story.and_then(|story| {
+            let scene = Scene::of(&mut source, &story)?;
+            Some((scene, self.sky(&mut source, &story)?, story))
+        });
         let (is_excluded, notes) = (source.is_excluded, source.notes());
         match (found, source.refusals()) {
-            (Some((scene, story)), refusals) if refusals.is_empty() => {
+            (Some((scene, sky, story)), refusals) if refusals.is_empty() => {
                 self.notes.extend(notes);
                 self.description.clone_from(&story.description);
                 let map = library.beside(&story.map.1.replace('\\', "/"));
-                let (sky, duration_s) = (Sky::of(story.weather, &story.changes), story.duration_s);
+                let duration_s = story.duration_s;
                 self.variants.push(Variant { values, map, scene, sky, duration_s });
                 Ok(())
             }
@@ -249,13 +249,14 @@ impl Whole<'_> {
         }
     }
 
-    /// Each step of the space lets the sky change, whatever its row is.
-    fn same_sky(&self, source: &mut Source, story: &Story) -> Option<()> {
-        let Some(first) = self.variants.first() else { return Some(()) };
+    /// The sky of a variation. Each step of the space lets it change, whatever its row is: so all variations have the same.
+    fn sky(&self, source: &mut Source, story: &Story) -> Option<Sky> {
         let own = Sky::of(story.weather.clone(), &story.changes);
-        let differs = (own.changes() || first.sky.changes()) && own != first.sky;
+        let first = self.variants.first().map(|variant| &variant.sky);
+        let differs = first.is_some_and(|first| (own.changes() || first.changes()) && own != *first);
         let mark = story.changes.first().map_or(&story.map.0, |change| &change.mark);
-        source.refuse_if(differs, mark, "a sky that changes is read where all variations have the same")
+        source.refuse_if(differs, mark, "a sky that changes is read where all variations have the same")?;
+        Some(own)
     }
 }
 

@@ -34,9 +34,11 @@ impl Sky {
         for change in changes {
             let at = (change.at_s / CHANGES_S).round() as u64;
             let last = sky.changes.last().map_or(&sky.begins, |(_, weather)| weather).clone();
-            let then = last.then(change.weather.clone());
+            let then = last.clone().then(change.weather.clone());
             match sky.changes.last_mut() {
                 _ if at == 0 => sky.begins = then,
+                // It stays as it is.
+                _ if shown(&then) == shown(&last) => {}
                 Some((known, weather)) if *known == at => *weather = then,
                 _ => sky.changes.push((at, then)),
             }
@@ -68,16 +70,17 @@ impl Sky {
         if !self.changes() {
             return String::new();
         }
-        let mut text = self.effect("time", &|weather| weather.time.unwrap_or("Noon"));
+        let mut text = self.effect("time", &|weather| shown(weather).0);
         for (at, key) in ["Rain", "Fog", "Wetness"].into_iter().enumerate() {
-            text += &self.effect(&format!("sky[{key}]"), &|weather| levels(weather)[at]);
+            text += &self.effect(&format!("sky[{key}]"), &|weather| shown(weather).1[at]);
         }
         format!("each step {{\n{text}}}\n")
     }
 
     /// The effect that gives a state the value that it has by then; empty if it never has another.
     fn effect(&self, state: &str, value: &dyn Fn(&Weather) -> &'static str) -> String {
-        let (mut text, mut last) = (value(&self.begins).to_owned(), value(&self.begins));
+        let first = value(&self.begins);
+        let (mut text, mut last) = (first.to_owned(), first);
         for (at, weather) in &self.changes {
             let now = value(weather);
             if now != last {
@@ -86,10 +89,7 @@ impl Sky {
                 last = now;
             }
         }
-        match text.starts_with("match") {
-            true => format!("  set {state} = {text}\n"),
-            false => String::new(),
-        }
+        if text == first { String::new() } else { format!("  set {state} = {text}\n") }
     }
 
     /// The effects that set it as it begins, if another variation begins otherwise.
@@ -107,6 +107,11 @@ impl Sky {
         }
         text
     }
+}
+
+/// The time of day, and the levels of rain, fog and wetness, also where the file says none.
+fn shown(weather: &Weather) -> (&'static str, [&'static str; 3]) {
+    (weather.time.unwrap_or("Noon"), levels(weather))
 }
 
 /// The states of time and weather, as they are when the first variation begins; those of all variations have words.
@@ -168,6 +173,8 @@ mod tests {
         let sky = Sky::of(Weather::default(), &[change(0.0, weather(Some("Night"), None))]);
         assert!(!sky.changes() && sky.begins.time == Some("Night"));
         assert_eq!((sky.step_s(), sky.each_step()), (None, String::new()));
+        let same = Sky::of(sky.begins, &[change(3.0, weather(Some("Night"), Some("None")))]);
+        assert!(!same.changes(), "what stays as it is does not change");
         assert!(Sky::can_change_at(0.3) && !Sky::can_change_at(0.25));
     }
 }

@@ -107,7 +107,6 @@ pub fn read(source: &mut Source, document: &Document, ego: Option<&str>) -> Opti
     }
     catalogue::locate(source, root);
     source.acts_at_once = acts_at_once(root);
-    source.controlled = controlled(source, root);
     variables(source, root);
     let network = source.required(root, "RoadNetwork")?;
     let logic = source.required(network, "LogicFile")?;
@@ -116,6 +115,10 @@ pub fn read(source: &mut Source, document: &Document, ego: Option<&str>) -> Opti
         source.note("traffic lights follow the map's controllers, not the phases of the file");
     }
     let entities = entities(source, root);
+    // Who is given one later is taken to have it from the beginning.
+    if root.descendants().any(|node| node.has_tag_name("AssignControllerAction")) {
+        source.controlled.extend(entities.iter().map(|entity| entity.name.clone()));
+    }
     let mut cast = Cast::of(source, root, entities, ego)?;
     let storyboard = source.required(root, "Storyboard")?;
     let mut sky = Weather::default();
@@ -486,6 +489,9 @@ fn entities(source: &mut Source, root: Node) -> Vec<Entity> {
             continue;
         }
         let Some(body) = source.about(&name, |source| body(source, node)) else { continue };
+        if elements(node, "ObjectController").any(|controller| children(controller).next().is_some()) {
+            source.controlled.insert(name.clone());
+        }
         found.push(Entity {
             name,
             mark: source.mark(node),
@@ -499,19 +505,6 @@ fn entities(source: &mut Source, root: Node) -> Vec<Entity> {
         });
     }
     found
-}
-
-/// The entities to which the file gives controllers; all of them where an action gives one to somebody.
-fn controlled(source: &mut Source, root: Node) -> BTreeSet<String> {
-    let is_anybody = root.descendants().any(|node| node.has_tag_name("AssignControllerAction"));
-    let objects = root.descendants().filter(|node| node.has_tag_name("ScenarioObject"));
-    let has_one = |object: &Node| {
-        elements(*object, "ObjectController").any(|controller| children(controller).next().is_some())
-    };
-    objects
-        .filter(|object| is_anybody || has_one(object))
-        .filter_map(|object| super::source::filled(object.attribute("name")?, source.parameters()).ok())
-        .collect()
 }
 
 /// Whether a global action changes what others meet; those of the player and of variables do not.

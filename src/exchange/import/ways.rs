@@ -1,14 +1,14 @@
-//! Trajectories that begin during the story, joined to the way before them.
+//! Trajectories of the file, joined to one way: one after another, with the lanes that lead to the first and on from the last.
 
 use std::rc::Rc;
 
 use avastra_base::geometry::{Path, Vec2, wrap_angle};
 use avastra_road::LanePlace;
 
-use super::action::{ActKind, Speed, Way};
+use super::action::{Act, ActKind, Meeting, Speed, Way};
 use super::condition::{Waiting, is_called};
 use super::phases::same_moment;
-use super::place::Placed;
+use super::place::{Placed, drawn};
 use super::scene::{Cast, Moving, points_text};
 use super::source::{Mark, Source};
 use super::story::{Entity, Event};
@@ -41,7 +41,7 @@ struct Joined<'a> {
 }
 
 impl<'a> Cast<'a> {
-    /// Lets everybody follow the trajectories that begin during the story. Whether one begins at once is asked of where all begin.
+    /// Lets everybody follow its trajectories. Whether one begins at once is asked of where all begin.
     pub fn join_ways(&mut self, source: &mut Source) {
         for at in 0..self.moving.len() {
             let entity = self.moving[at].entity;
@@ -58,9 +58,7 @@ impl<'a> Cast<'a> {
     fn joined(&self, source: &mut Source, moving: &Moving<'a>) -> Option<Moving<'a>> {
         let entity = moving.entity;
         let mut joined = Joined { points: Vec::new(), legs: Vec::new(), here: moving.placed };
-        let mut at_m = 0.0;
         if let Some(way) = &entity.way {
-            at_m = way.from_m;
             self.add(source, entity, &mut joined, way)?;
         }
         let mut before: Option<&Event> = None;
@@ -70,7 +68,7 @@ impl<'a> Cast<'a> {
                 match self.met_at(event, entity) {
                     Some(meeting) => {
                         let place = self.place(source, &meeting.own_at)?;
-                        at_m = self.drive_to(source, mark, moving, &mut joined, place)?;
+                        self.drive_to(source, mark, moving, &mut joined, place)?;
                     }
                     None => {
                         let stands = moving.mps == 0.0 && !moves_before(&entity.events, event);
@@ -89,9 +87,6 @@ impl<'a> Cast<'a> {
                 let reason = "a second trajectory is read where it waits for the end of the one before it";
                 source.refuse_if(!waits, mark, reason)?;
             }
-            if joined.legs.is_empty() {
-                at_m += way.from_m;
-            }
             self.add(source, entity, &mut joined, way)?;
             before = Some(event);
         }
@@ -101,6 +96,8 @@ impl<'a> Cast<'a> {
             joined.points.extend(points.into_iter().skip(1));
         }
         let path = Rc::new(Path::through(&joined.points)?);
+        // Only a way that begins with a trajectory begins in the middle of it.
+        let at_m = joined.legs.first().map_or(0.0, |leg| leg.way.from_m);
         let trajectory = points_text(&joined.points);
         let Moving { placed, mps, .. } = *moving;
         let bearer = moving.bearer.clone();
@@ -121,12 +118,12 @@ impl<'a> Cast<'a> {
         let here = joined.here.pose;
         let mut places = self.places.borrow_mut();
         let begins_there = places.stand(&entity.name, joined.here);
-        let drawn = way.shape.drawn(source, &mut places, Some(here));
+        let found = way.shape.drawn(source, &mut places, Some(here));
         if let Some(placed) = begins_there {
             places.stand(&entity.name, placed);
         }
-        let drawn = drawn?;
-        let begins = drawn.path.pose_at(way.from_m);
+        let found = found?;
+        let begins = found.path.pose_at(way.from_m);
         source.refuse_if(
             !is_first && way.from_m > 0.0,
             mark,
@@ -143,22 +140,22 @@ impl<'a> Cast<'a> {
             // Where it ends and the next one begins is one point.
             joined.points.pop();
         }
-        let from_m = joined.length_m(&drawn.points);
-        joined.points.extend(&drawn.points);
+        let from_m = joined.length_m(&found.points);
+        joined.points.extend(&found.points);
         let timed = match way.timing {
             Some((more_s, times)) => {
                 let at = |(at_m, time_s): &(f64, f64)| (from_m + at_m, time_s * times + more_s);
-                drawn.timed.iter().map(at).collect()
+                found.timed.iter().map(at).collect()
             }
             None => Vec::new(),
         };
-        joined.here = places.in_plane(drawn.path.pose_at(drawn.path.length_m()));
+        joined.here = places.in_plane(found.path.pose_at(found.path.length_m()));
         let lane = joined.here.lane;
-        joined.legs.push(Leg { way, end_m: from_m + drawn.path.length_m(), timed, lane });
+        joined.legs.push(Leg { way, end_m: from_m + found.path.length_m(), timed, lane });
         Some(())
     }
 
-    /// Lets somebody drive along its lane to a place; where on the way it begins, m.
+    /// Lets somebody drive along its lane to a place.
     fn drive_to(
         &self,
         source: &mut Source,
@@ -166,18 +163,18 @@ impl<'a> Cast<'a> {
         moving: &Moving<'a>,
         joined: &mut Joined<'a>,
         place: Placed,
-    ) -> Option<f64> {
+    ) -> Option<()> {
         let end_m = moving.path.project(place.pose.position).station_m;
         source.refuse_if(end_m <= moving.at_m, mark, "its trajectory begins behind it")?;
         let beside_m = |at_m: f64| moving.path.pose_at(at_m).offset(0.0, moving.offset_m).position;
-        joined.points = super::place::drawn(moving.at_m, end_m, beside_m);
+        joined.points = drawn(moving.at_m, end_m, beside_m);
         // A player minds how far along the place is, not where across.
         joined.here = self.places.borrow().in_plane(moving.path.pose_at(end_m).offset(0.0, moving.offset_m));
-        Some(0.0)
+        Some(())
     }
 
     /// The synchronised arrival for whose end an event waits.
-    fn met_at(&self, event: &Event, entity: &'a Entity) -> Option<&'a super::action::Meeting> {
+    fn met_at(&self, event: &Event, entity: &'a Entity) -> Option<&'a Meeting> {
         let [all] = event.when.as_slice() else { return None };
         let meets = |other: &'a Event| {
             other.acts.iter().find_map(|act| match &act.kind {
@@ -196,16 +193,16 @@ impl<'a> Cast<'a> {
     /// Whether what an event waits for holds at the beginning.
     fn begins_at_once(&self, source: &mut Source, moving: &Moving<'a>, event: &Event) -> Option<bool> {
         let waiting = Waiting { cast: self, actor: moving, before: Vec::new() };
-        let mut groups = event.when.is_empty();
+        let mut begins = event.when.is_empty();
         for all in &event.when {
             let mut holds = true;
             for condition in all {
                 let is_plain = condition.edge == Edge::None && condition.delay_s == 0.0;
                 holds = holds && is_plain && waiting.holds(source, condition)?;
             }
-            groups |= holds;
+            begins |= holds;
         }
-        Some(groups)
+        Some(begins)
     }
 }
 
@@ -241,7 +238,7 @@ fn follows(entity: &Entity) -> impl Iterator<Item = (&Event, &Way)> {
 
 /// Whether somebody moves by an event.
 pub fn moves(event: &Event) -> bool {
-    let stays = |act: &super::action::Act| {
+    let stays = |act: &Act| {
         matches!(act.kind, ActKind::Ahead(..) | ActKind::Follow(_) | ActKind::Speed(Speed::Absolute(0.0), _))
     };
     !event.acts.iter().all(stays)

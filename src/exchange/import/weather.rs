@@ -85,7 +85,7 @@ fn sky_of(source: &mut Source, environment: Node) -> Option<Weather> {
     for node in environment.descendants() {
         match node.tag_name().name() {
             "Precipitation" => {
-                let level = rain(source, node)?;
+                let level = precipitation(source, node)?;
                 let is_snow = node.attribute("precipitationType") == Some("snow");
                 found.sky[0] = Some(if is_snow { LEVELS[0] } else { level });
                 snow = is_snow.then_some(level);
@@ -134,7 +134,7 @@ fn level(holds: impl Fn(usize) -> bool) -> &'static str {
 }
 
 /// How much falls of it, rain or snow, which counts by the water that it holds.
-fn rain(source: &mut Source, node: Node) -> Option<&'static str> {
+fn precipitation(source: &mut Source, node: Node) -> Option<&'static str> {
     match source.word(node, "precipitationType", &["dry", "rain", "snow"])? {
         "rain" | "snow" if node.has_attribute("precipitationIntensity") => {
             let mmph = source.amount(node, "precipitationIntensity")?;
