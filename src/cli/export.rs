@@ -13,14 +13,17 @@ use super::files::{copy_map, folder, make, target, write};
 use super::output::{Output, plural};
 use super::parallel::each_file;
 use super::replay::refutation;
-use super::{look, pack};
+use super::{export_space, look, pack};
 
 /// The folder of what is written, beside the scenarios, unless another one is named.
-const FOLDER: &str = "exported";
+pub const FOLDER: &str = "exported";
 
 /// Writes every file's scenario, played again, in another tool's format. A scenario that does not replay is refused.
 pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failure> {
     refuse_senseless(arguments)?;
+    if export_space::is_asked(arguments) {
+        return export_space::export_spaces(output, arguments);
+    }
     if arguments.to == ExportFormat::Ava {
         let Some(folder) = &arguments.out else {
             return Err(Failure::usage("`--to ava` needs `--out DIR`, the folder that can be moved"));
@@ -188,7 +191,7 @@ fn style(arguments: &ExportArguments) -> export::Style {
 }
 
 /// What a file calls the map that lies beside it.
-fn map_name(map: &Path) -> Result<&str, Failure> {
+pub fn map_name(map: &Path) -> Result<&str, Failure> {
     map.file_name().and_then(|name| name.to_str()).ok_or_else(|| {
         Failure::usage(format!(
             "no OpenSCENARIO file can name the map `{}`: give it a name in UTF-8",

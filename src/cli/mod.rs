@@ -16,6 +16,7 @@ mod error;
 mod estimate;
 mod explain;
 mod export;
+mod export_space;
 mod files;
 mod findings;
 mod fmt;

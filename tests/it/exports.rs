@@ -412,3 +412,86 @@ fn nothing_of_others_is_overwritten() {
     std::fs::copy(root().join(SCENARIO), &twin).expect("it is writable");
     refused("csv", SCENARIO, scratch.path(), &[&twin.display().to_string()], "would both be written to");
 }
+
+const ROWS: &str = "tests/cases/exports/rows.ava";
+
+#[test]
+fn a_space_is_templates_with_lists_of_their_values() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let (status, stdout, stderr) = export("openscenario", ROWS, scratch.path(), &[]);
+    assert_eq!(status, 0, "{stderr}");
+    let told =
+        ["9 of 11 rows on their roads in 4 templates", "goes backwards: `backing(", "own models: `driver("];
+    assert!(told.iter().all(|part| stdout.contains(part)), "{stdout}");
+    let written = texts(scratch.path());
+    let names: Vec<&str> = written.keys().map(String::as_str).collect();
+    let both = |name: &str| [format!("{name}.xosc"), format!("{name}_variations.xosc")];
+    let wanted = ["rows_lead", "rows_walker_1", "rows_walker_2"].map(both).concat();
+    assert!(wanted.iter().all(|name| names.contains(&name.as_str())), "{names:?}");
+    assert!(names.contains(&"rows_met.xosc") && names.contains(&"proving_ground.xodr"), "{names:?}");
+    let lead = [&written["rows_lead.xosc"], &written["rows_lead_variations.xosc"]];
+    expect_snapshot("exports", "rows_lead", &lead.map(String::as_str).join("\n"));
+    expect_snapshot("exports", "rows_met", &written["rows_met.xosc"]);
+    // It depends on the space alone.
+    let again = tempfile::tempdir().expect("a scratch directory");
+    exported("openscenario", ROWS, again.path(), &[]);
+    assert_eq!(texts(again.path()), written);
+}
+
+/// How the rows of a space end with a driver whose sensors make no errors: its endings with their figures, and how often each comes, by action.
+fn ends(space: &Path, out: &Path) -> BTreeMap<String, BTreeMap<String, usize>> {
+    let (space, run) = (space.display().to_string(), out.display().to_string());
+    let (status, _, stderr) =
+        outcome(&mut avastra(&["run", "--agent", "every-row", "--ads", "idm", "--out", &run, &space]));
+    assert!(status <= 1, "{space}: {stderr}");
+    let table = std::fs::read_to_string(out.join("protocol.csv")).expect("it is written");
+    let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
+    let column = |name: &str| rows[0].iter().position(|head| *head == name).expect("it has the column");
+    let shown = ["ending", "before_kmh", "impact_kmh", "relative_kmh"].map(column);
+    let mut found: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
+    for row in &rows[1..] {
+        let rounded =
+            |text: &str| text.parse::<f64>().map_or(text.to_owned(), |number| format!("{number:.1}"));
+        let end = shown.map(|at| rounded(row[at])).join(" ");
+        *found.entry(row[column("action")].to_owned()).or_default().entry(end).or_default() += 1;
+    }
+    found
+}
+
+#[test]
+fn a_space_comes_back_with_the_same_rows() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let exported_to = scratch.path().join("exported");
+    exported("openscenario", ROWS, &exported_to, &[]);
+    let wanted = ends(&root().join(ROWS), &scratch.path().join("run"));
+    for (file, action, rows) in [
+        ("rows_met.xosc", "met", 1),
+        ("rows_walker_1_variations.xosc", "walker", 2),
+        ("rows_walker_2_variations.xosc", "walker", 2),
+    ] {
+        let (from, into) = (exported_to.join(file), scratch.path().join("imported"));
+        let arguments = ["import", "--out", &into.display().to_string(), &from.display().to_string()];
+        let (status, _, stderr) = outcome(&mut avastra(&arguments));
+        assert_eq!(status, 0, "{file}: {stderr}");
+        let space = into.join(file).with_extension("ava");
+        let back = ends(&space, &scratch.path().join(format!("run_{}", stem(&space))));
+        let back: Vec<(&String, &usize)> = back.values().flatten().collect();
+        assert_eq!(back.iter().map(|(_, count)| **count).sum::<usize>(), rows, "{file}: {back:?}");
+        assert!(
+            back.iter().all(|(end, _)| wanted[action].contains_key(*end)),
+            "{file}: {back:?} of {wanted:?}"
+        );
+    }
+}
+
+#[test]
+fn of_a_space_nothing_is_recorded() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    for option in [&["--natural"][..], &["--profile", "carla"], &["--ego", "none"]] {
+        let (status, _, stderr) = export("openscenario", ROWS, scratch.path(), option);
+        assert!(status == 1 && stderr.contains("a space has no recording"), "{option:?}: {status} {stderr}");
+    }
+    let (status, _, stderr) = export("openscenario", "scenarios/roads.ava", scratch.path(), &[]);
+    assert!(status != 0 && stderr.contains("no action"), "{status} {stderr}");
+    assert!(texts(scratch.path()).is_empty());
+}

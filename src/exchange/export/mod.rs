@@ -13,7 +13,9 @@ mod xml;
 
 pub use commonroad::commonroad;
 pub use csv::csv;
-pub use openscenario::{Ego, Others, Style, Version, Written, openscenario};
+pub use openscenario::{
+    Ego, Others, SPEED_LIMIT, SpaceFile, SpaceFiles, Style, Version, Written, openscenario, space,
+};
 pub use recording::{ExportError, Recording, SCENARIO_TEXT, SCENARIO_TEXT_LACKS, record};
 
 /// Everything has the same date: a file depends on its scenario alone.

@@ -46,6 +46,39 @@ impl Element {
         self
     }
 
+    pub fn name(&self) -> &'static str {
+        self.name
+    }
+
+    pub fn attributes(&self) -> &[(&'static str, String)] {
+        &self.attributes
+    }
+
+    pub fn attribute(&self, name: &str) -> Option<&str> {
+        self.attributes.iter().find(|(known, _)| *known == name).map(|(_, value)| value.as_str())
+    }
+
+    pub fn children(&self) -> &[Element] {
+        &self.children
+    }
+
+    /// With other values of attributes: `other` is asked of each, in the order of the document.
+    #[must_use]
+    pub fn with_values(&self, other: &mut dyn FnMut(&str) -> Option<String>) -> Element {
+        let attributes = self.attributes.iter();
+        let attributes: Vec<_> =
+            attributes.map(|(name, value)| (*name, other(value).unwrap_or_else(|| value.clone()))).collect();
+        let children = self.children.iter().map(|child| child.with_values(other)).collect();
+        Element { name: self.name, attributes, children, text: self.text.clone() }
+    }
+
+    /// With a child after its first one.
+    #[must_use]
+    pub fn holding_second(mut self, child: Element) -> Element {
+        self.children.insert(1.min(self.children.len()), child);
+        self
+    }
+
     /// The document whose root this is, indented by two spaces.
     pub fn document(&self) -> String {
         let mut writer = Writer::new_with_indent(Vec::new(), b' ', 2);

@@ -174,7 +174,8 @@ impl Scene {
             );
         }
         let (ego_mps, most) = (Figure::new(ego_mps, "m/s"), ego_mps.max(LIMIT_MPS_DEFAULT));
-        let limit_mps = is_open.then(|| Figure::new(most, "m/s"));
+        let limit_mps = story.limit_mps.or(is_open.then_some(most));
+        let limit_mps = limit_mps.map(|limit_mps| Figure::new(limit_mps, "m/s"));
         (!source.is_refused()).then_some(Scene { start, goal, ego_mps, limit_mps, others })
     }
 }

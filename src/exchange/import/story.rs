@@ -5,6 +5,8 @@ use std::collections::BTreeSet;
 
 use roxmltree::{Document, Node};
 
+use crate::export::SPEED_LIMIT;
+
 use super::action::{Act, ActKind, Headway, Over, Speed, Way, act};
 use super::body::{Body, body};
 use super::catalogue;
@@ -35,6 +37,8 @@ pub struct Story {
     /// In the order of the file.
     pub changes: Vec<Change>,
     pub duration_s: f64,
+    /// The speed limit of the ego vehicle's road, m/s, which an export of avastra says.
+    pub limit_mps: Option<f64>,
     /// What the file says of itself.
     pub description: String,
 }
@@ -153,8 +157,9 @@ pub fn read(source: &mut Source, document: &Document, ego: Option<&str>) -> Opti
     };
     let duration_s = duration_s(source, storyboard, &cast.ego.name, ego_mps);
     let description = header.attribute("description").unwrap_or("").to_owned();
+    let limit_mps = own_limit_mps(source, header);
     let Cast { ego, others, changes, .. } = cast;
-    Some(Story { map, ego, others, weather: sky, changes, duration_s, description })
+    Some(Story { map, ego, others, weather: sky, changes, duration_s, limit_mps, description })
 }
 
 /// The header of a file whose version is read.
@@ -167,6 +172,14 @@ pub fn check_header<'a, 'input>(source: &mut Source, root: Node<'a, 'input>) -> 
         return source.refuse(header, format!("OpenSCENARIO XML of 1.0 to 1.{MINOR_MAX} is read"));
     }
     Some(header)
+}
+
+/// The speed limit that an export of avastra has in its header, m/s: no element of the format holds one.
+fn own_limit_mps(source: &mut Source, header: Node) -> Option<f64> {
+    header.attribute("author").filter(|author| *author == "avastra")?;
+    let mut facts = elements(header, "Properties").flat_map(children);
+    let limit = facts.find(|fact| fact.attribute("name") == Some(SPEED_LIMIT))?;
+    source.number(limit, "value")
 }
 
 /// Notes the variables of the file: their values, or that the story sets them.

@@ -1,6 +1,6 @@
 //! Variations of a scenario: the values that a file with a `ParameterValueDistribution` gives to its parameters.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use roxmltree::Node;
 
@@ -58,23 +58,24 @@ fn distribution(source: &mut Source, root: Node, found: Node, declared: &Values)
     let listed = source.required(found, "Deterministic")?;
     let (mut parameters, mut variations) = (Vec::new(), vec![Values::new()]);
     for part in children(listed) {
-        let choices = match part.tag_name().name() {
+        let (own, choices) = match part.tag_name().name() {
             "DeterministicSingleParameterDistribution" => {
                 let name = source.named(part, "parameterName")?;
                 let values = single(source, part)?;
-                values.into_iter().map(|value| Values::from([(name.clone(), value)])).collect()
+                let choices: Vec<Values> =
+                    values.into_iter().map(|value| Values::from([(name.clone(), value)])).collect();
+                (vec![name], choices)
             }
             "DeterministicMultiParameterDistribution" => sets(source, part)?,
             _ => return source.refuse(part, "such a distribution is not read"),
         };
         source.refuse_if(choices.is_empty(), part, "it lists no value")?;
-        let own: BTreeSet<&String> = choices.iter().flat_map(Values::keys).collect();
         for name in own {
             let reason = format!("it lists values of `{name}` again: one of the two would count for nothing");
-            source.refuse_if(parameters.contains(name), part, reason)?;
+            source.refuse_if(parameters.contains(&name), part, reason)?;
             let reason = format!("the scenario declares no parameter `{name}`");
-            source.refuse_if(!declared.contains_key(name), part, reason)?;
-            parameters.push(name.clone());
+            source.refuse_if(!declared.contains_key(&name), part, reason)?;
+            parameters.push(name);
         }
         let count = variations.len().saturating_mul(choices.len());
         let reason = format!("its values make {count} variations: {VARIATIONS_MAX} are possible");
@@ -125,16 +126,20 @@ fn plain(value: f64) -> String {
     format!("{rounded}")
 }
 
-/// Values of several parameters together.
-fn sets(source: &mut Source, part: Node) -> Option<Vec<Values>> {
+/// Values of several parameters together, and the names of these in the order in which they come.
+fn sets(source: &mut Source, part: Node) -> Option<(Vec<String>, Vec<Values>)> {
     let list = source.required(part, "ValueSetDistribution")?;
-    let mut found = Vec::new();
+    let (mut names, mut found) = (Vec::new(), Vec::new());
     for set in elements(list, "ParameterValueSet") {
         let mut values = Values::new();
         for one in elements(set, "ParameterAssignment") {
-            values.insert(source.named(one, "parameterRef")?, source.text(one, "value")?);
+            let name = source.named(one, "parameterRef")?;
+            if !names.contains(&name) {
+                names.push(name.clone());
+            }
+            values.insert(name, source.text(one, "value")?);
         }
         found.push(values);
     }
-    Some(found)
+    Some((names, found))
 }

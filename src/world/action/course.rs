@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use avastra_lang::model::command::Command;
 use avastra_lang::model::expr::{Expr, Who};
+use avastra_lang::model::vocabulary::Known;
 use avastra_lang::model::{ManoeuvreDef, MomentFacts, NpcFacts, PhaseDef, REPEAT, Value};
 
 use super::later::{Later, LaterMoment};
@@ -58,6 +59,28 @@ impl Course {
     fn phase(&self, phase: usize) -> &PhaseDef {
         let phases = &self.definition().phases;
         &phases[phase % phases.len()]
+    }
+
+    /// A phase as it is written, counted as often as it comes.
+    pub fn written(&self, phase: usize) -> &PhaseDef {
+        self.phase(phase)
+    }
+
+    /// Whether rules say when its phases may begin.
+    pub fn is_ruled(&self) -> bool {
+        !self.rules().is_empty()
+    }
+
+    /// The value of an expression of its phases, if that is the same at every moment.
+    pub fn constant(&self, expr: &Expr) -> Option<Value> {
+        let moment =
+            LaterMoment { moment: MomentFacts::default(), npc: NpcFacts::default(), bearers: Vec::new() };
+        (expr.known() == Known::Road).then(|| self.later.value(expr, &moment))
+    }
+
+    /// The name of whom a phase asks, by its index in the space.
+    pub fn bearer(&self, who: Who) -> usize {
+        who.bearer(&self.later.locals)
     }
 
     /// The values of the arguments, in bits.

@@ -21,7 +21,12 @@ pub fn maneuver_group(name: &str, actor: Option<&str>, events: Vec<Element>) -> 
 /// Events run beside each other: with `override`, a later one would end those before it. It begins when all conditions
 /// hold.
 pub fn event(name: &str, actions: Vec<Element>, conditions: Vec<Element>) -> Element {
-    let trigger = Element::new("StartTrigger").holding(all(conditions));
+    event_of_groups(name, actions, vec![conditions])
+}
+
+/// One that begins when all conditions of some group hold.
+pub fn event_of_groups(name: &str, actions: Vec<Element>, groups: Vec<Vec<Element>>) -> Element {
+    let trigger = Element::new("StartTrigger").holding_all(groups.into_iter().map(all));
     Element::new("Event")
         .with("name", name)
         .with("priority", "parallel")
@@ -43,16 +48,21 @@ pub fn all(conditions: Vec<Element>) -> Element {
 pub fn from_time(version: Version, name: &str, time_s: f64) -> Element {
     let rule = if version == Version::Carla { "greaterThan" } else { "greaterOrEqual" };
     let time = Element::new("SimulationTimeCondition").with("rule", rule).measured("value", time_s);
-    condition(name, Element::new("ByValueCondition").holding(time))
+    condition(name, by_value(time))
 }
 
 /// A condition that holds when an event is over.
 pub fn after_event(name: &str, event: &str) -> Element {
+    condition(name, event_is(event, "completeState"))
+}
+
+/// That an event has this state.
+pub fn event_is(event: &str, state: &str) -> Element {
     let state = Element::new("StoryboardElementStateCondition")
         .with("storyboardElementType", "event")
         .with("storyboardElementRef", event)
-        .with("state", "completeState");
-    condition(name, Element::new("ByValueCondition").holding(state))
+        .with("state", state);
+    by_value(state)
 }
 
 /// A condition that holds when the reference points of two road users are this near, m.
@@ -78,15 +88,31 @@ pub fn touched(name: &str, of: &str, by: &str) -> Element {
 }
 
 fn of_any(name: &str, entity: &str, what: Element) -> Element {
+    condition(name, by_entity(entity, what))
+}
+
+/// What a condition asks of an entity.
+pub fn by_entity(entity: &str, what: Element) -> Element {
     let entities = Element::new("TriggeringEntities")
         .with("triggeringEntitiesRule", "any")
         .holding(Element::new("EntityRef").with("entityRef", entity));
     let what = Element::new("EntityCondition").holding(what);
-    condition(name, Element::new("ByEntityCondition").holding(entities).holding(what))
+    Element::new("ByEntityCondition").holding(entities).holding(what)
+}
+
+/// What a condition asks of no entity.
+pub fn by_value(what: Element) -> Element {
+    Element::new("ByValueCondition").holding(what)
 }
 
 fn condition(name: &str, what: Element) -> Element {
-    Element::new("Condition").with("name", name).with("delay", 0).with("conditionEdge", "none").holding(what)
+    condition_after(name, 0.0, what)
+}
+
+/// A condition that has held so long ago, s.
+pub fn condition_after(name: &str, delay_s: f64, what: Element) -> Element {
+    let condition = Element::new("Condition").with("name", name).measured("delay", delay_s);
+    condition.with("conditionEdge", "none").holding(what)
 }
 
 pub fn action(name: &str, what: Element) -> Element {
@@ -122,6 +148,27 @@ pub fn walk(version: Version, name: &str, way: &[Pose]) -> Element {
 }
 
 fn trajectory(name: &str, way: impl Iterator<Item = (Option<f64>, Pose)>, timing: Element) -> Element {
+    private(Element::new("RoutingAction").holding(along(
+        name,
+        way,
+        timing,
+        Element::new("FollowTrajectoryAction"),
+    )))
+}
+
+/// Along places at whatever speed, from a way behind the first one on, m.
+pub fn walk_from(name: &str, way: &[Pose], from_m: f64) -> Element {
+    let follow = Element::new("FollowTrajectoryAction").measured("initialDistanceOffset", from_m);
+    let way = way.iter().map(|pose| (None, *pose));
+    private(Element::new("RoutingAction").holding(along(name, way, Element::new("None"), follow)))
+}
+
+fn along(
+    name: &str,
+    way: impl Iterator<Item = (Option<f64>, Pose)>,
+    timing: Element,
+    follow: Element,
+) -> Element {
     let vertex = |(time_s, pose): (Option<f64>, Pose)| {
         let vertex = Element::new("Vertex").holding(position(&pose));
         time_s.into_iter().fold(vertex, |vertex, time_s| vertex.measured("time", time_s))
@@ -130,11 +177,10 @@ fn trajectory(name: &str, way: impl Iterator<Item = (Option<f64>, Pose)>, timing
         .with("name", format!("{name}_way"))
         .with("closed", false)
         .holding(Element::new("Shape").holding(Element::new("Polyline").holding_all(way.map(vertex))));
-    let follow = Element::new("FollowTrajectoryAction")
+    follow
         .holding(Element::new("TrajectoryRef").holding(trajectory))
         .holding(Element::new("TimeReference").holding(timing))
-        .holding(Element::new("TrajectoryFollowingMode").with("followingMode", "position"));
-    private(Element::new("RoutingAction").holding(follow))
+        .holding(Element::new("TrajectoryFollowingMode").with("followingMode", "position"))
 }
 
 pub fn position(pose: &Pose) -> Element {
@@ -155,16 +201,29 @@ fn world_position(pose: &Pose) -> Element {
 
 /// A place in a lane, along its traffic.
 pub fn lane_position(map: &RoadMap, place: LanePlace) -> Element {
+    let position = in_lane(map, place);
+    let is_aside = number(place.offset_m) != "0";
+    let position = if is_aside { position.measured("offset", offset_m(map, place)) } else { position };
+    Element::new("Position").holding(position)
+}
+
+/// A place in a lane that says its offset, also where that is 0.
+pub fn lane_position_aside(map: &RoadMap, place: LanePlace) -> Element {
+    let aside = in_lane(map, place).measured("offset", offset_m(map, place));
+    Element::new("Position").holding(aside)
+}
+
+fn in_lane(map: &RoadMap, place: LanePlace) -> Element {
     let lane = map.lane(place.lane);
-    // The standard's offset is to the left of the road's reference line, ours to that of traffic.
-    let offset_m = if lane.is_along() { place.offset_m } else { -place.offset_m };
-    let position = Element::new("LanePosition")
+    Element::new("LanePosition")
         .with("roadId", &lane.key.road)
         .with("laneId", lane.key.lane)
-        .with("s", number(lane.road_station_m(place.station_m)));
-    let is_aside = number(offset_m) != "0";
-    let position = if is_aside { position.measured("offset", offset_m) } else { position };
-    Element::new("Position").holding(position)
+        .with("s", number(lane.road_station_m(place.station_m)))
+}
+
+/// The standard's offset is to the left of the road's reference line, ours to that of traffic.
+fn offset_m(map: &RoadMap, place: LanePlace) -> f64 {
+    if map.lane(place.lane).is_along() { place.offset_m } else { -place.offset_m }
 }
 
 /// A speed at once.

@@ -20,16 +20,15 @@ pub fn ahead_of_centre_m(actor: &Actor) -> f64 {
     if actor.is_vehicle() { -actor.shape.rear_axle_m } else { 0.0 }
 }
 
-/// An entry of `Entities`.
-pub fn entity(actor: &Actor, ego: Ego) -> Element {
-    let name = actor.name();
-    let entity = Element::new("ScenarioObject").with("name", &name);
+/// An entry of `Entities` of this name.
+pub fn entity(actor: &Actor, name: &str, ego: Ego) -> Element {
+    let entity = Element::new("ScenarioObject").with("name", name);
     let Some(category) = vehicle_category(actor.body) else {
-        let other = without_wheels(actor, &name);
+        let other = without_wheels(actor, name);
         return entity.holding(other.holding(bounding_box(actor)).holding(properties()));
     };
     let vehicle = Element::new("Vehicle")
-        .with("name", &name)
+        .with("name", name)
         .with("vehicleCategory", category)
         .measured("mass", actor.shape.mass_t * 1000.0)
         .holding_all(build(actor))

@@ -15,6 +15,7 @@ mod environment;
 mod lanes;
 mod natural;
 mod pace;
+mod space;
 
 use avastra_campaign::episode::Actor;
 use avastra_road::LanePlace;
@@ -32,6 +33,8 @@ use actions::{
 use entity::{ahead_of_centre_m, entity};
 use environment::{environment, signals};
 use natural::Natural;
+
+pub use space::{SPEED_LIMIT, SpaceFile, SpaceFiles, space};
 
 /// What must not be met is so far beneath its place, m.
 const BENEATH_M: f64 = 100.0;
@@ -92,7 +95,7 @@ pub fn openscenario(recording: &Recording, map_file: &str, style: Style) -> Writ
     };
     let entities = recording.actors().map(|actor| match style.version {
         Version::Carla => carla::entity(recording, actor),
-        Version::V1_2 => entity(actor, style.ego),
+        Version::V1_2 => entity(actor, &actor.name(), style.ego),
     });
     let text = Element::new("OpenSCENARIO")
         .holding(header(recording, style, &exact))

@@ -1,0 +1,235 @@
+//! A space as OpenSCENARIO: what each row of its table lets happen at the start, as a template and the values of its parameters.
+//!
+//! Each row on each road is laid out by itself: its road users appear in a world, and `story` writes down what they do. Rows whose files
+//! differ in numbers alone share a `template`; what differs are its parameters, and a second file lists their values.
+//!
+//! Rows whose road users are led by avastra's drivers are left out: how these drive, no other player knows.
+
+mod story;
+mod template;
+mod when;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use avastra_campaign::episode::{Recorder, Setup};
+use avastra_campaign::run::Arena;
+use avastra_lang::model::{Row, SPAWN_SPEED_MPS, Type};
+use avastra_road::LanePlace;
+use avastra_world::action::{Draw, Effect, Situation};
+use avastra_world::sim::World;
+
+use super::super::DATE;
+use super::super::xml::{Element, number};
+use super::actions::{all, from_time, lane_position, maneuver_group, private, speed, teleport};
+use super::entity::entity;
+use super::environment::environment;
+use super::{Ego, Version, property};
+use story::{Cast, Player};
+use template::Template;
+
+/// What drawn values are drawn from: a file has one value of each.
+const SEED: u64 = 0;
+
+/// The fact of a file that holds the speed limit of the ego vehicle's road, m/s.
+pub const SPEED_LIMIT: &str = "speed_limit";
+
+/// Files of a space.
+pub struct SpaceFiles {
+    pub templates: Vec<SpaceFile>,
+    /// Why rows were left out, and which, each with its road.
+    pub left_out: BTreeMap<String, Vec<String>>,
+}
+
+/// A scenario, and the values of its parameters.
+pub struct SpaceFile {
+    /// The name of the action, with a number if it needs several.
+    pub name: String,
+    pub text: String,
+    /// `None` if a single row needs no parameters.
+    pub variations: Option<String>,
+    /// The OpenDRIVE file.
+    pub map_path: PathBuf,
+    /// How many rows it stands for, each on one road.
+    pub rows: usize,
+}
+
+/// A row on a road.
+struct Laid {
+    action: usize,
+    map_path: PathBuf,
+    file: Element,
+    /// The values of the action's parameters, with their types in OpenSCENARIO.
+    values: Vec<(String, String, &'static str)>,
+}
+
+/// Writes down all rows of a space on the roads of an arena. `scenario_file` says what the file of a name will be called, `map_file` what its
+/// map will.
+pub fn space(
+    arena: &Arena,
+    scenario_file: &dyn Fn(&str) -> String,
+    map_file: &dyn Fn(&PathBuf) -> String,
+) -> SpaceFiles {
+    let space = arena.table().space();
+    let mut left_out: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    let mut forms: Vec<((usize, PathBuf, String), Vec<Laid>)> = Vec::new();
+    for (nth, row) in arena.rows_on_roads() {
+        let road = arena.road(nth);
+        let row = &space.rows[row];
+        match laid(&arena.setup(nth, SEED), row, &map_file(&road.map_path)) {
+            Err(reason) => {
+                left_out.entry(reason).or_default().push(format!("{} on {}", row.label, road.name));
+            }
+            Ok(laid) => {
+                let key = (laid.action, laid.map_path.clone(), template::form(&laid.file));
+                match forms.iter_mut().find(|(known, _)| *known == key) {
+                    Some((_, rows)) => rows.push(laid),
+                    None => forms.push((key, vec![laid])),
+                }
+            }
+        }
+    }
+    let mut templates = Vec::new();
+    for (place, ((action, map_path, _), rows)) in forms.iter().enumerate() {
+        let own = &space.actions[*action].name;
+        let of_action = |((other, ..), _): &&((usize, PathBuf, String), Vec<Laid>)| other == action;
+        let name = match forms.iter().filter(of_action).count() {
+            1 => own.clone(),
+            _ => format!("{own}_{}", forms[..=place].iter().filter(of_action).count()),
+        };
+        let Template { text, variations } = template::of(rows, &scenario_file(&name));
+        let map_path = map_path.clone();
+        templates.push(SpaceFile { name, text, variations, map_path, rows: rows.len() });
+    }
+    SpaceFiles { templates, left_out }
+}
+
+/// A row on its road as a file with the row's own numbers.
+///
+/// # Errors
+/// Why it is left out, in words.
+fn laid(setup: &Setup, row: &Row, map_file: &str) -> Result<Laid, String> {
+    let space = setup.table.space();
+    if !space.each_step.is_empty() {
+        return Err("the space changes its states in every step".to_owned());
+    }
+    let mut world = World::new(Arc::clone(&setup.scene), &setup.start);
+    let happened_s = vec![f64::NEG_INFINITY; space.actions.len()];
+    let situation = Situation {
+        memory: &setup.memory,
+        road: setup.road,
+        rules: setup.rules,
+        surroundings: &world,
+        seed: setup.seed,
+        step: 0,
+        happened_s: &happened_s,
+    };
+    let draw = setup.table.offer(&situation, row.index).map_err(|refusal| refusal.in_words())?;
+    let newcomers = world.carry_out(&draw).map_err(|(_, reason)| reason)?;
+    if setup.start.ambient > 0 {
+        return Err("its road has traffic of its own".to_owned());
+    }
+    let mut seen = Recorder::default();
+    seen.note(&world, setup.ads.build(&setup.scene, setup.seed).as_ref(), &[]);
+    let mut players = Vec::new();
+    for (nth, id) in newcomers {
+        let Effect::Spawn(request) = &draw.effects[nth] else { continue };
+        let (Some(actor), Some(facts)) =
+            (seen.others.iter().find(|actor| actor.id == id), world.npc_facts(id))
+        else {
+            continue;
+        };
+        let name = request.bearer.map_or_else(|| actor.name(), |who| space.bearers[who].clone());
+        players.push(Player { name, actor, request, course: draw.course(nth), facts });
+    }
+    if draw.effects.iter().any(|effect| matches!(effect, Effect::Order(_))) {
+        return Err("it gives orders".to_owned());
+    }
+    let duration_s = space.episode.step_s * f64::from(space.episode.step_limit);
+    let cast = Cast {
+        road: setup.road,
+        ego_front_m: world.moment_facts().ego_front_m,
+        ego_mps: setup.start.ego_mps,
+        players,
+        duration_s,
+    };
+    let file = file(setup, row, &seen, &cast, map_file)?;
+    let values = values(setup, row, &draw);
+    Ok(Laid { action: row.action, map_path: setup.road.map_path.clone(), file, values })
+}
+
+/// The document of a row; its parameters are declared where templates are made.
+fn file(setup: &Setup, row: &Row, seen: &Recorder, cast: &Cast, map_file: &str) -> Result<Element, String> {
+    let space = setup.table.space();
+    let action = &space.actions[row.action];
+    let road = setup.road;
+    let description = action.docs.first().map_or_else(|| action.name.clone(), Clone::clone);
+    // The file of the map need not have the limit of the road, and OpenSCENARIO has no place for one.
+    let limit_mps = road.facts.map_limits_mps[1];
+    let limit = (limit_mps <= *SPAWN_SPEED_MPS.end()).then(|| property(SPEED_LIMIT, &number(limit_mps)));
+    let properties = Element::new("Properties").holding(property("action", &action.name)).holding_all(limit);
+    let header = Element::new("FileHeader")
+        .with("revMajor", 1)
+        .with("revMinor", 2)
+        .with("date", format!("{DATE}T00:00:00"))
+        .with("description", description)
+        .with("author", "avastra")
+        .holding(properties);
+    let network = Element::new("RoadNetwork").holding(Element::new("LogicFile").with("filepath", map_file));
+    let others = cast.players.iter().map(|player| entity(player.actor, &player.name, Ego::None));
+    let entities = Element::new("Entities").holding(entity(&seen.ego, "ego", Ego::None)).holding_all(others);
+    let goal = lane_position(&road.map, LanePlace { offset_m: 0.0, ..road.goal });
+    let goal = Element::new("RoutingAction").holding(Element::new("AcquirePositionAction").holding(goal));
+    let ego = Element::new("Private")
+        .with("entityRef", "ego")
+        .holding(teleport(lane_position(&road.map, road.start)))
+        .holding(speed(cast.ego_mps))
+        .holding(private(goal));
+    let (mut begins, mut groups) = (vec![ego], Vec::new());
+    for player in &cast.players {
+        let (begin, events) = cast.story(player)?;
+        begins.push(begin);
+        if !events.is_empty() {
+            groups.push(maneuver_group(&player.name, Some(&player.name), events));
+        }
+    }
+    let story = (!groups.is_empty()).then(|| {
+        let begin = all(vec![from_time(Version::V1_2, "start", 0.0)]);
+        let act = Element::new("Act")
+            .with("name", "others")
+            .holding_all(groups)
+            .holding(Element::new("StartTrigger").holding(begin));
+        Element::new("Story").with("name", "others").holding(act)
+    });
+    let sky = seen.skies.first().map(|sky| environment(sky, 0));
+    let end = all(vec![from_time(Version::V1_2, "end", cast.duration_s)]);
+    let storyboard = Element::new("Storyboard")
+        .holding(Element::new("Init").holding(Element::new("Actions").holding_all(sky).holding_all(begins)))
+        .holding_all(story)
+        .holding(Element::new("StopTrigger").holding(end));
+    Ok(Element::new("OpenSCENARIO")
+        .holding(header)
+        .holding(Element::new("CatalogLocations"))
+        .holding(network)
+        .holding(entities)
+        .holding(storyboard))
+}
+
+/// The values of the row's parameters, as declared: numbers in SI units.
+fn values(setup: &Setup, row: &Row, draw: &Draw) -> Vec<(String, String, &'static str)> {
+    let space = setup.table.space();
+    let known = row.axes.iter().chain(&draw.values);
+    let known: BTreeMap<&str, _> = known.map(|(name, value)| (&**name, *value)).collect();
+    let parameters = space.actions[row.action].parameters.iter();
+    let said = parameters.filter_map(|parameter| {
+        let value = *known.get(&*parameter.name)?;
+        let (text, kind) = match parameter.ty {
+            Type::Bool => (space.show(value, parameter.ty), "boolean"),
+            Type::Enum(_) => (space.show(value, parameter.ty), "string"),
+            Type::Int | Type::Quantity(_) => (number(value.number()), "double"),
+        };
+        Some((parameter.name.to_string(), text, kind))
+    });
+    said.collect()
+}

@@ -1,0 +1,412 @@
+//! What a road user of a row does: where it begins, and an event for each phase of its manoeuvre.
+//!
+//! Whoever drives along the lanes is placed in one and given a route; who follows another way is given that. A phase begins when the one
+//! before it is over, or, if it waits for something, when that holds while the one before it runs or after that.
+
+use core::f64::consts::PI;
+use std::sync::Arc;
+
+use avastra_base::geometry::{Path, PathPoint, Pose, SMOOTH_STEP_SLOPE_MAX, wrap_angle};
+use avastra_campaign::episode::Actor;
+use avastra_lang::model::command::Command;
+use avastra_lang::model::expr::Expr;
+use avastra_lang::model::vocabulary::Verb;
+use avastra_lang::model::{MomentFacts, NpcFacts, Road, Trajectory};
+use avastra_road::{Lane, LaneIndex, LanePlace, RoadMap};
+use avastra_world::action::{Course, LaterMoment, SpawnRequest};
+
+use super::super::super::xml::Element;
+use super::super::Version;
+use super::super::actions::{
+    action, by_entity, condition_after, event_is, event_of_groups, from_time, lane_position,
+    lane_position_aside, position, private, route, speed, teleport, walk_from,
+};
+use super::super::entity::ahead_of_centre_m;
+use super::when;
+
+/// A way that keeps this near to the middle of lanes, m, and no more across them, rad, leads along them.
+const LANE_M: f64 = 0.03;
+const LANE_RAD: f64 = 0.03;
+/// It is looked at in such steps, m.
+const STEP_M: f64 = 0.5;
+/// The corner of a way has two vertices that are nearer than this, m.
+const BEND_M: f64 = 1e-3;
+/// How fast one moves to the side that is told no speed for it, m/s, as the world has it.
+const ASIDE_MPS: f64 = 1.0;
+
+/// Who is there as a row begins.
+pub struct Cast<'a> {
+    pub road: &'a Road,
+    /// Station of the ego vehicle's front on its route, m.
+    pub ego_front_m: f64,
+    pub ego_mps: f64,
+    pub players: Vec<Player<'a>>,
+    pub duration_s: f64,
+}
+
+/// A road user that the row lets appear.
+pub struct Player<'a> {
+    pub name: String,
+    pub actor: &'a Actor,
+    pub request: &'a SpawnRequest,
+    pub course: Option<&'a Arc<Course>>,
+    pub facts: NpcFacts,
+}
+
+/// The way of somebody.
+enum Way<'a> {
+    /// It stays where it is.
+    Stands,
+    /// Along lanes: where it begins, and where it comes into each that is left, and its end.
+    Lanes(&'a Trajectory, LanePlace, Vec<LanePlace>),
+    Free(&'a Trajectory),
+}
+
+impl<'a> Cast<'a> {
+    /// How somebody begins, and its events.
+    ///
+    /// # Errors
+    /// What no other player can be told, in words.
+    pub fn story(&self, player: &Player<'a>) -> Result<(Element, Vec<Element>), String> {
+        let way = self.way(player)?;
+        Ok((self.begins(player, &way), self.events(player, &way)?))
+    }
+
+    fn way(&self, player: &Player<'a>) -> Result<Way<'a>, String> {
+        let Player { request, course, .. } = player;
+        let does = |what: &str| Err(format!("somebody {what}"));
+        let stands = request.speed_mps == 0.0 && course.is_none();
+        match request.verb {
+            _ if request.cover.is_some() => does("steps out from behind another one"),
+            Verb::Stand => Ok(Way::Stands),
+            Verb::DriveAhead | Verb::DriveBehind | Verb::DriveOpposite if stands => Ok(Way::Stands),
+            Verb::Follow => {
+                let known = request.trajectory.and_then(|at| self.road.trajectories[at].as_deref());
+                let Some(trajectory) = known else { return does("follows a way of another map") };
+                if !trajectory.turns.is_empty() {
+                    return does("is turned away from where it goes");
+                }
+                let lanes = lanes_along(&self.road.map, &trajectory.path, request.distance_m);
+                let lanes = lanes.map(|(begin, places)| Way::Lanes(trajectory, begin, places));
+                Ok(lanes.unwrap_or(Way::Free(trajectory)))
+            }
+            _ => does("drives or walks by avastra's own models"),
+        }
+    }
+
+    fn begins(&self, player: &Player<'a>, way: &Way<'a>) -> Element {
+        let Player { name, actor, request, .. } = player;
+        let private = Element::new("Private").with("entityRef", name);
+        let pose = actor.samples[0].pose.offset(ahead_of_centre_m(actor), 0.0);
+        match way {
+            Way::Stands => private.holding(teleport(position(&pose))).holding(speed(0.0)),
+            Way::Lanes(_, begin, places) => {
+                let map = &self.road.map;
+                let at = LanePlace { offset_m: request.offset_m, ..*begin };
+                let begins =
+                    private.holding(teleport(lane_position_aside(map, at))).holding(speed(request.speed_mps));
+                let leaves = |place: &LanePlace| map.lane(place.lane).successors.len() > 1;
+                match places.iter().any(leaves) {
+                    true => begins.holding(route(
+                        &format!("{name}_route"),
+                        places.iter().map(|place| lane_position(map, *place)),
+                    )),
+                    false => begins,
+                }
+            }
+            Way::Free(trajectory) => {
+                let vertex = |at_m: f64| trajectory.path.pose_at(at_m).offset(0.0, request.offset_m);
+                let points = trajectory.path.points();
+                // Two beside a bend are one in the file.
+                let next_m = |nth: usize| points.get(nth + 1).map_or(f64::INFINITY, |next| next.station_m);
+                let is_own = |(nth, point): &(usize, &PathPoint)| next_m(*nth) - point.station_m > BEND_M;
+                let own = points.iter().enumerate().filter(is_own);
+                let way: Vec<Pose> = own.map(|(_, point)| vertex(point.station_m)).collect();
+                private
+                    .holding(teleport(position(&pose)))
+                    .holding(speed(request.speed_mps))
+                    .holding(walk_from(name, &way, request.distance_m))
+            }
+        }
+    }
+
+    /// An event for each phase.
+    fn events(&self, player: &Player<'a>, way: &Way<'a>) -> Result<Vec<Element>, String> {
+        let mut events: Vec<Element> = Vec::new();
+        let mut offset_m = player.request.offset_m;
+        let mut most_mps = player.request.speed_mps;
+        let phases = player.course.iter().flat_map(|course| (0..course.phases()).map(move |at| (course, at)));
+        for (course, at) in phases {
+            if course.is_ruled() {
+                return Err("rules say when a phase may begin".to_owned());
+            }
+            // Who arrives somewhere in time may be fast on the way.
+            let is_timed = course.written(at).command.early.is_some();
+            let speed_mps =
+                course.written(at).command.speed.as_ref().and_then(|speed| course.constant(speed));
+            let told_mps = speed_mps.map_or(0.0, |value| value.number());
+            most_mps = most_mps.max(if is_timed { f64::INFINITY } else { told_mps });
+            let name = event_name(player, at);
+            let actions = self.actions(player, way, course, at, &mut offset_m)?;
+            let actions = actions.into_iter().enumerate();
+            let actions =
+                actions.map(|(nth, what)| action(&format!("{name}_action_{}", nth + 1), what)).collect();
+            let groups = self.groups(player, course, at, &name)?;
+            events.push(event_of_groups(&name, actions, groups));
+        }
+        events.extend(self.arrives(player, way, most_mps));
+        Ok(events)
+    }
+
+    /// Stands at the end of its way, where other players would drive on; nothing if it cannot come so far.
+    fn arrives(&self, player: &Player, way: &Way<'a>, most_mps: f64) -> Option<Element> {
+        let (Way::Lanes(trajectory, ..) | Way::Free(trajectory)) = way else { return None };
+        let left_m = trajectory.path.length_m() - player.request.distance_m;
+        if most_mps * self.duration_s < left_m {
+            return None;
+        }
+        let name = format!("{}_arrives", player.name);
+        let way = Element::new("TraveledDistanceCondition").measured("value", left_m);
+        let when = condition_after(&format!("{name}_when"), 0.0, by_entity(&player.name, way));
+        let stands = action(&format!("{name}_action"), changes_speed(0.0, None));
+        Some(event_of_groups(&name, vec![stands], vec![vec![when]]))
+    }
+
+    /// When a phase begins: one of these groups of conditions holds.
+    fn groups(
+        &self,
+        player: &Player,
+        course: &Course,
+        at: usize,
+        name: &str,
+    ) -> Result<Vec<Vec<Element>>, String> {
+        let phase = course.written(at);
+        let time_s = |written: &Option<Expr>| match written {
+            None => Ok(None),
+            Some(expr) => match course.constant(expr) {
+                Some(value) => Ok(Some(value.number().max(0.0))),
+                None => Err("a phase waits for a time that depends on the moment".to_owned()),
+            },
+        };
+        let after_s = time_s(&phase.after)?.unwrap_or(0.0);
+        if time_s(&phase.held)?.is_some_and(|held_s| held_s > 0.0) {
+            return Err("a phase waits until something has held for a while".to_owned());
+        }
+        if time_s(&phase.within)?.is_some_and(|within_s| within_s < self.duration_s) {
+            return Err("a phase waits only for a while".to_owned());
+        }
+        if phase.only_if.is_some() || phase.then.is_some() {
+            return Err("a phase comes only sometimes, or goes over to another manoeuvre".to_owned());
+        }
+        let named = |nth: usize| format!("{name}_when_{nth}");
+        let before = at.checked_sub(1).map(|before| event_name(player, before));
+        let Some(once) = &phase.once else {
+            let when = match before {
+                None => from_time(Version::V1_2, &named(1), after_s),
+                Some(before) => condition_after(&named(1), after_s, event_is(&before, "completeState")),
+            };
+            return Ok(vec![vec![when]]);
+        };
+        let groups = when::groups(self, player, course, once)?;
+        if after_s > 0.0 && groups.iter().any(|group| group.len() > 1) {
+            return Err("a phase waits for a time after several conditions".to_owned());
+        }
+        let mut nth = 0;
+        let mut numbered = |what: Element| {
+            nth += 1;
+            condition_after(&named(nth), after_s, what)
+        };
+        let groups: Vec<Vec<Element>> =
+            groups.into_iter().map(|group| group.into_iter().map(&mut numbered).collect()).collect();
+        let Some(before) = before else { return Ok(groups) };
+        if after_s > 0.0 {
+            return Err("a phase waits for a time after another one and a condition".to_owned());
+        }
+        let states = ["runningState", "completeState"];
+        let mut all = Vec::new();
+        for (state, group) in
+            states.into_iter().flat_map(|state| groups.iter().map(move |group| (state, group)))
+        {
+            let mut group = group.clone();
+            group.push(condition_after(
+                &format!("{name}_after_{}", all.len() + 1),
+                0.0,
+                event_is(&before, state),
+            ));
+            all.push(group);
+        }
+        Ok(all)
+    }
+
+    /// What a phase tells.
+    fn actions(
+        &self,
+        player: &Player,
+        way: &Way<'a>,
+        course: &Course,
+        at: usize,
+        offset_m: &mut f64,
+    ) -> Result<Vec<Element>, String> {
+        let written = &course.written(at).command;
+        if written.parts().any(|expr| course.constant(expr).is_none()) {
+            return Err("a phase tells what depends on the moment".to_owned());
+        }
+        let moment =
+            LaterMoment { moment: MomentFacts::default(), npc: NpcFacts::default(), bearers: Vec::new() };
+        let Some(command) = course.command(at, &moment) else {
+            return Err("a phase tells what has no value".to_owned());
+        };
+        let mut actions = Vec::new();
+        match (command.early_s, command.speed_mps) {
+            (Some(_), _) => actions.push(self.meets(player, way, &command)?),
+            (None, Some(mps)) if mps < 0.0 => return Err("somebody goes backwards".to_owned()),
+            (None, Some(mps)) => actions.push(changes_speed(mps, command.rate_mps2)),
+            (None, None) => {}
+        }
+        if let Some(to_m) = command.offset_m {
+            let Way::Lanes(_, begin, _) = way else {
+                return Err("somebody moves to the side of a way of its own".to_owned());
+            };
+            let by_m = (to_m - *offset_m).abs();
+            *offset_m = to_m;
+            let lane = self.road.map.lane(begin.lane);
+            actions.push(moves_aside(lane, to_m, by_m, command.aside_mps.unwrap_or(ASIDE_MPS)));
+        }
+        match actions.is_empty() {
+            true => Err("a phase tells nothing that other players know".to_owned()),
+            false => Ok(actions),
+        }
+    }
+
+    /// To be somewhere when the ego vehicle is at a place of its route.
+    fn meets(&self, player: &Player, way: &Way<'a>, command: &Command) -> Result<Element, String> {
+        let (Some(at_m), Some(reach_m), Some(0.0)) = (command.at_m, command.reach_m, command.early_s) else {
+            return Err("somebody arrives earlier or later than the ego vehicle".to_owned());
+        };
+        // The file says where its rear axle is, the language where its front is.
+        let route = &self.road.route;
+        let ego_m = (at_m - self.ego_front_m).max(0.0);
+        let there = route.lane_at(ego_m);
+        let ego_at = LanePlace { lane: there.lane, station_m: ego_m - there.from_m, offset_m: 0.0 };
+        let own_at = match way {
+            Way::Lanes(trajectory, begin, places) => {
+                let point = trajectory.path.position_at(reach_m);
+                let near = |place: &LanePlace| self.road.map.lane(place.lane).centre.project(point);
+                let found = places.iter().min_by(|a, b| near(a).distance_m.total_cmp(&near(b).distance_m));
+                let place = found.unwrap_or(begin);
+                lane_position(&self.road.map, LanePlace { station_m: near(place).station_m, ..*place })
+            }
+            Way::Free(trajectory) => {
+                position(&trajectory.path.pose_at(reach_m).offset(0.0, player.request.offset_m))
+            }
+            Way::Stands => return Err("somebody arrives who stands".to_owned()),
+        };
+        let speed = command.speed_mps.map(|mps| {
+            let steady = command
+                .steady_m
+                .filter(|steady_m| *steady_m > 0.0)
+                .map(|steady_m| Element::new("TargetDistanceSteadyState").measured("distance", steady_m));
+            let speed = Element::new("AbsoluteSpeed").measured("value", mps).holding_all(steady);
+            Element::new("FinalSpeed").holding(speed)
+        });
+        let meets = Element::new("SynchronizeAction")
+            .with("masterEntityRef", "ego")
+            .holding(renamed("TargetPositionMaster", lane_position(&self.road.map, ego_at)))
+            .holding(renamed("TargetPosition", own_at))
+            .holding_all(speed);
+        Ok(private(meets))
+    }
+}
+
+/// What the event of a phase is called.
+fn event_name(player: &Player, at: usize) -> String {
+    format!("{}_phase_{}", player.name, at + 1)
+}
+
+/// A position under another name, as synchronised arrivals have it.
+fn renamed(name: &'static str, position: Element) -> Element {
+    Element::new(name).holding_all(position.children().iter().cloned())
+}
+
+fn changes_speed(mps: f64, rate_mps2: Option<f64>) -> Element {
+    let dynamics = Element::new("SpeedActionDynamics");
+    let dynamics = match rate_mps2 {
+        None => {
+            dynamics.with("dynamicsShape", "step").with("dynamicsDimension", "time").measured("value", 0.0)
+        }
+        Some(rate_mps2) => dynamics
+            .with("dynamicsShape", "linear")
+            .with("dynamicsDimension", "rate")
+            .measured("value", rate_mps2),
+    };
+    let target =
+        Element::new("SpeedActionTarget").holding(Element::new("AbsoluteTargetSpeed").measured("value", mps));
+    let speed = Element::new("SpeedAction").holding(dynamics).holding(target);
+    private(Element::new("LongitudinalAction").holding(speed))
+}
+
+/// A sinusoidal move that takes as long as one by the smooth step of that greatest speed.
+fn moves_aside(lane: &Lane, to_m: f64, by_m: f64, aside_mps: f64) -> Element {
+    let time_s = SMOOTH_STEP_SLOPE_MAX * by_m / aside_mps;
+    // By a cosine: `a = d π² / (2 T²)`.
+    let most_mps2 = if time_s > 0.0 { by_m * PI * PI / (2.0 * time_s * time_s) } else { 1.0 };
+    let to_m = if lane.is_along() { to_m } else { -to_m };
+    let dynamics = Element::new("LaneOffsetActionDynamics")
+        .with("dynamicsShape", "sinusoidal")
+        .measured("maxLateralAcc", most_mps2);
+    let target = Element::new("LaneOffsetTarget")
+        .holding(Element::new("AbsoluteTargetLaneOffset").measured("value", to_m));
+    let moves = Element::new("LaneOffsetAction").with("continuous", false).holding(dynamics).holding(target);
+    private(Element::new("LateralAction").holding(moves))
+}
+
+/// The lanes along which a way leads, if it leads along lanes: the place of a station, and of the lanes from that one on a place in
+/// each, and the end. The places but for the first are the same wherever on the way it begins.
+fn lanes_along(map: &RoadMap, path: &Path, from_m: f64) -> Option<(LanePlace, Vec<LanePlace>)> {
+    let end_m = path.length_m();
+    let in_lane = |lane: LaneIndex, at_m: f64| {
+        let station_m = map.lane(lane).centre.project(path.position_at(at_m)).station_m;
+        LanePlace { lane, station_m, offset_m: 0.0 }
+    };
+    let (mut begin, mut places, mut at_m) = (None, Vec::new(), 0.0);
+    while at_m < end_m {
+        let lanes = map.lanes.iter().enumerate();
+        let kept = lanes.map(|(index, lane)| (LaneIndex(index), kept_m(lane, path, at_m)));
+        let (lane, until_m) = kept.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        if until_m <= at_m {
+            return None;
+        }
+        let is_first = begin.is_none() && from_m < until_m;
+        if is_first {
+            begin = Some(in_lane(lane, from_m));
+        }
+        if begin.is_some() {
+            places.push(in_lane(lane, if is_first { at_m } else { (at_m + until_m) / 2.0 }));
+        }
+        if until_m >= end_m {
+            places.push(in_lane(lane, end_m));
+        }
+        at_m = until_m;
+    }
+    Some((begin?, places))
+}
+
+/// Up to which station a way keeps to the middle of a lane; where it begins if it does not lie there.
+fn kept_m(lane: &Lane, path: &Path, from_m: f64) -> f64 {
+    let begin = path.position_at(from_m);
+    if lane.centre.bounds().distance_m2_min(begin) > LANE_M * LANE_M {
+        return from_m;
+    }
+    let lies_in = |at_m: f64| {
+        let pose = path.pose_at(at_m);
+        let beside = lane.centre.project(pose.position);
+        let turned_rad = wrap_angle(lane.centre.heading_at(beside.station_m) - pose.heading_rad);
+        beside.distance_m <= LANE_M && turned_rad.abs() <= LANE_RAD
+    };
+    let steps = ((path.length_m() - from_m) / STEP_M).ceil() as usize;
+    let stations = (0..=steps).map(|step| (from_m + step as f64 * STEP_M).min(path.length_m()));
+    stations
+        .take_while(|at_m| lies_in(*at_m))
+        .last()
+        .map_or(from_m, |last_m| if last_m >= path.length_m() { last_m } else { last_m + STEP_M })
+}

@@ -1,0 +1,168 @@
+//! Files that differ in numbers alone as one template with parameters, and the list of their values.
+
+use std::collections::BTreeSet;
+use std::fmt::Write;
+
+use super::super::super::DATE;
+use super::super::super::xml::Element;
+use super::Laid;
+
+pub struct Template {
+    pub text: String,
+    pub variations: Option<String>,
+}
+
+/// A parameter: its name, its type, and its value in each file.
+struct Parameter {
+    name: String,
+    kind: &'static str,
+    values: Vec<String>,
+}
+
+/// The template of files of one form, which will be called `file`.
+pub fn of(rows: &[Laid], file: &str) -> Template {
+    let mut parameters = declared(rows);
+    let mut taken: BTreeSet<String> = parameters.iter().map(|parameter| parameter.name.clone()).collect();
+    let places = places(&rows[0].file);
+    let values: Vec<Vec<Place>> = rows.iter().map(|row| self::places(&row.file)).collect();
+    let mut given = Vec::new();
+    for (at, place) in places.iter().enumerate() {
+        let column: Vec<&str> = values.iter().map(|places| places[at].value).collect();
+        if column.iter().all(|value| *value == column[0]) {
+            given.push(None);
+            continue;
+        }
+        let is_it = |known: &&Parameter| known.kind != "string" && known.values == column;
+        if let Some(known) = parameters.iter().find(is_it) {
+            given.push(Some(format!("${}", known.name)));
+            continue;
+        }
+        let own = format!("{}_{}", place.owner, place.word);
+        let names = (1..).map(|nth| if nth == 1 { own.clone() } else { format!("{own}_{nth}") });
+        let name = names.into_iter().find(|name| !taken.contains(name)).unwrap_or_default();
+        taken.insert(name.clone());
+        given.push(Some(format!("${name}")));
+        let values = column.into_iter().map(str::to_owned).collect();
+        parameters.push(Parameter { name, kind: place.kind, values });
+    }
+    let declarations = parameters.iter().map(|parameter| {
+        Element::new("ParameterDeclaration")
+            .with("name", &parameter.name)
+            .with("parameterType", parameter.kind)
+            .with("value", &parameter.values[0])
+    });
+    let declarations = Element::new("ParameterDeclarations").holding_all(declarations);
+    let mut given = given.into_iter();
+    let whole = rows[0].file.with_values(&mut |_| given.next().flatten());
+    let text = match parameters.is_empty() {
+        true => whole.document(),
+        false => whole.holding_second(declarations).document(),
+    };
+    Template { text, variations: (rows.len() > 1).then(|| variations(rows, &parameters, file)) }
+}
+
+/// An attribute of a file.
+struct Place<'e> {
+    /// The entity that it is about.
+    owner: String,
+    /// What it is, in a word.
+    word: &'static str,
+    /// Its type in OpenSCENARIO.
+    kind: &'static str,
+    value: &'e str,
+}
+
+/// All attributes of a file in its order.
+fn places(file: &Element) -> Vec<Place<'_>> {
+    let mut found = Vec::new();
+    note(file, "scenario", &mut found);
+    found
+}
+
+fn note<'e>(element: &'e Element, owner: &str, found: &mut Vec<Place<'e>>) {
+    let named = match element.name() {
+        "Private" => element.attribute("entityRef"),
+        "ScenarioObject" => element.attribute("name"),
+        "ManeuverGroup" => element.attribute("name").and_then(|name| name.strip_suffix("_group")),
+        _ => None,
+    };
+    let owner = named.unwrap_or(owner);
+    for (name, value) in element.attributes() {
+        let kind = match *name {
+            "roadId" => "string",
+            "laneId" => "integer",
+            _ => "double",
+        };
+        found.push(Place { owner: owner.to_owned(), word: word(element.name(), name), kind, value });
+    }
+    element.children().iter().for_each(|child| note(child, owner, found));
+}
+
+/// What an attribute is called as a parameter.
+fn word(element: &str, attribute: &'static str) -> &'static str {
+    match (element, attribute) {
+        ("AbsoluteTargetSpeed" | "AbsoluteSpeed" | "SpeedCondition" | "RelativeSpeedCondition", "value") => {
+            "speed"
+        }
+        ("SpeedActionDynamics", "value") => "rate",
+        ("SimulationTimeCondition", "value") => "time",
+        ("FollowTrajectoryAction", "initialDistanceOffset") => "begins",
+        ("AbsoluteTargetLaneOffset", "value") => "aside",
+        ("LaneOffsetActionDynamics", "maxLateralAcc") => "aside_acceleration",
+        ("TargetDistanceSteadyState", "distance") => "steady",
+        ("RelativeDistanceCondition", "value") => "gap",
+        ("TimeHeadwayCondition", "value") => "headway",
+        ("TraveledDistanceCondition", "value") => "way",
+        _ => attribute,
+    }
+}
+
+/// A file's elements, attributes and words, without its numbers: what files of one template have in common.
+pub fn form(file: &Element) -> String {
+    let mut text = String::new();
+    shape(file, &mut text);
+    text
+}
+
+fn shape(element: &Element, text: &mut String) {
+    let _ = write!(text, "<{}", element.name());
+    for (name, value) in element.attributes() {
+        let is_number = value.parse::<f64>().is_ok();
+        let _ = write!(text, " {name}={}", if is_number { "#" } else { value });
+    }
+    element.children().iter().for_each(|child| shape(child, text));
+    text.push('>');
+}
+
+/// The parameters of the action that tell files apart.
+fn declared(rows: &[Laid]) -> Vec<Parameter> {
+    let own = rows[0].values.iter().enumerate().map(|(at, (name, _, kind))| {
+        let values = rows.iter().map(|row| row.values[at].1.clone()).collect();
+        Parameter { name: name.clone(), kind, values }
+    });
+    own.filter(|parameter| parameter.values.iter().any(|value| *value != parameter.values[0])).collect()
+}
+
+/// The file that lists the values.
+fn variations(rows: &[Laid], parameters: &[Parameter], file: &str) -> String {
+    let header = Element::new("FileHeader")
+        .with("revMajor", 1)
+        .with("revMinor", 2)
+        .with("date", format!("{DATE}T00:00:00"))
+        .with("description", format!("Variations of {file}"))
+        .with("author", "avastra");
+    let sets = (0..rows.len()).map(|row| {
+        let values = parameters.iter().map(|parameter| {
+            Element::new("ParameterAssignment")
+                .with("parameterRef", &parameter.name)
+                .with("value", &parameter.values[row])
+        });
+        Element::new("ParameterValueSet").holding_all(values)
+    });
+    let listed = Element::new("DeterministicMultiParameterDistribution")
+        .holding(Element::new("ValueSetDistribution").holding_all(sets));
+    let distribution = Element::new("ParameterValueDistribution")
+        .holding(Element::new("ScenarioFile").with("filepath", file))
+        .holding(Element::new("Deterministic").holding(listed));
+    Element::new("OpenSCENARIO").holding(header).holding(distribution).document()
+}
