@@ -13,8 +13,18 @@ use crate::exports::crash;
 
 const AREA: &str = "tests/cases/imports";
 
-const FILES: [&str; 9] =
-    ["cut_in", "walker", "refused", "braking", "crossing", "crossing_speeds", "profile", "kept", "changing"];
+const FILES: [&str; 10] = [
+    "cut_in",
+    "walker",
+    "refused",
+    "braking",
+    "crossing",
+    "crossing_speeds",
+    "profile",
+    "kept",
+    "changing",
+    "beside",
+];
 
 /// Files of variations, and how many rows they make: of the second one, a parameter is drawn in each.
 const ROWS: [(&str, usize); 2] = [("crossing_speeds", 12), ("profile_values", 726)];
@@ -66,7 +76,7 @@ fn every_file_becomes_a_space_or_is_refused_with_its_lines() {
         // Without `body`, which is no number, the speed's parts are the sixth and the seventh.
         let ego_kmh = libm::hypot(first[5], first[6]) * 3.6;
         let wanted_kmh = match name {
-            "cut_in" | "profile" | "kept" | "changing" => 36.0,
+            "cut_in" | "profile" | "kept" | "changing" | "beside" => 36.0,
             "braking" => 50.0,
             _ => 30.0,
         };

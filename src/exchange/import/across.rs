@@ -13,6 +13,19 @@ use super::source::{Mark, Source};
 /// The fastest that somebody is told to move aside, m/s.
 const ASIDE_MPS_MAX: f64 = 10.0;
 
+/// A way is looked at in such steps for lanes beside it, m.
+const LOOK_M: f64 = 0.5;
+
+/// Lanes beside somebody's own along a stretch of its way.
+pub struct Beside {
+    /// Stations of its way, m.
+    pub from_m: f64,
+    pub to_m: f64,
+    /// Where they begin and end across the road, m to its left.
+    pub right_m: f64,
+    pub left_m: f64,
+}
+
 impl<'a> Cast<'a> {
     /// A way to the left in the road's direction as one to the left of somebody in a lane of it, on its way.
     pub fn left_m(&self, moving: &Moving, told: &Told, left_m: f64) -> f64 {
@@ -84,6 +97,44 @@ impl<'a> Cast<'a> {
         Some(told.lane_m)
     }
 
+    /// Lanes to the left of somebody's own, where it comes to the first stretch of its way that has any of them. Lanes of the other
+    /// direction count if they are asked for.
+    pub fn lanes_beside(
+        &self,
+        source: &mut Source,
+        mark: &Mark,
+        name: &str,
+        (from, to): (i32, i32),
+        has_oncoming: bool,
+    ) -> Option<Beside> {
+        let moving = self.moving(source, mark, name)?;
+        // Each beside a station of its way: how far to the left its middle lies, and half its width.
+        let lanes_at = |at_m: f64| -> Vec<(f64, f64)> {
+            let Some(own) = self.places.borrow().in_plane(moving.path.pose_at(at_m)).lane else {
+                return Vec::new();
+            };
+            let is_along = self.map.lane(own.lane).is_along();
+            let beside = (from..=to).filter_map(|lanes| self.lane_beside(own, own, lanes));
+            let beside =
+                beside.filter(|lane| has_oncoming || self.map.lane(lane.lane).is_along() == is_along);
+            let own_m = self.aside_m(moving, at_m, own);
+            let width_m = |lane: &LanePlace| self.map.lane(lane.lane).width_at(lane.station_m);
+            beside.map(|lane| (self.aside_m(moving, at_m, lane) - own_m, width_m(&lane) / 2.0)).collect()
+        };
+        let steps = ((moving.path.length_m() - moving.at_m) / LOOK_M) as usize;
+        let stations = || (0..=steps).map(|step| moving.at_m + step as f64 * LOOK_M);
+        let mut has_some = stations().skip_while(|at_m| lanes_at(*at_m).is_empty());
+        let Some(from_m) = has_some.next() else {
+            return source.refuse(mark, "no such lane is beside its own");
+        };
+        let to_m = has_some.take_while(|at_m| !lanes_at(*at_m).is_empty()).last().unwrap_or(from_m);
+        let found = lanes_at((from_m + to_m) / 2.0);
+        let right_m = found.iter().map(|(middle_m, half_m)| middle_m - half_m).fold(f64::INFINITY, f64::min);
+        let left_m =
+            found.iter().map(|(middle_m, half_m)| middle_m + half_m).fold(f64::NEG_INFINITY, f64::max);
+        Some(Beside { from_m, to_m, right_m, left_m })
+    }
+
     /// How far to the left of a station of somebody's way the middle of a lane lies, m.
     pub fn aside_m(&self, moving: &Moving, at_m: f64, lane: LanePlace) -> f64 {
         let here = moving.path.pose_at(at_m);
@@ -136,6 +187,9 @@ pub fn aside_fields(
     }
     instead_of(fields, &["offset", "aside"]);
     fields.push(Said::text("offset: ").then(to));
+    if !matches!(dynamics.over, Over::AtOnce) {
+        source.note("who moves aside needs the file's time for it, and is faster in the middle than by a sine, up to a fifth");
+    }
     let slope = SMOOTH_STEP_SLOPE_MAX;
     let aside_mps = match dynamics.over {
         Over::AtOnce | Over::Never => ASIDE_MPS_MAX,

@@ -26,6 +26,11 @@ pub struct Body {
 }
 
 impl Body {
+    /// Whether it is a vehicle with more than two wheels.
+    pub fn is_for_passengers(&self) -> bool {
+        !self.is_on_foot() && !matches!(self.like, "Bicycle" | "Motorcycle" | "Object")
+    }
+
     pub fn is_on_foot(&self) -> bool {
         matches!(self.like, "Pedestrian" | "Animal")
     }

@@ -3,13 +3,14 @@
 use avastra_base::geometry::Vec2;
 use avastra_world::sim::VehicleParameters;
 
+use super::across::Beside;
 use super::action::ActKind;
 use super::phases::ARRIVES_M;
 use super::said::Said;
 use super::scene::{Cast, Moving};
 use super::source::{Mark, Source};
 use super::story::Event;
-use super::trigger::{Condition, Edge, Pair, PlaceMark, Trigger, When};
+use super::trigger::{Clearance, Condition, Edge, Pair, PlaceMark, Trigger, When};
 
 /// From the ego vehicle's rear axle to its front in avastra, m: what the language's `ego.front` is ahead of a file's reference point.
 pub const EGO_FRONT_M: f64 = VehicleParameters::MKZ.rear_axle_to_front_m;
@@ -170,6 +171,18 @@ impl Waiting<'_, '_> {
                 let bound = Said::default().number(*metres, "m");
                 self.distance(source, mark, pair, &bound)
             }
+            When::Apart { pair, metres } => {
+                source.note("distances across the road are taken across the ego vehicle's route");
+                let metres = metres + if pair.is_free_space { self.cast.half_widths_m(pair) } else { 0.0 };
+                let (of, to) = (self.who(source, mark, &pair.of)?, self.who(source, mark, &pair.to)?);
+                let (below, above, word) =
+                    if pair.is_less { (">=", "<=", "and") } else { ("<=", ">=", "or") };
+                let apart = || Said::text(format!("{of}.offset - {to}.offset "));
+                let said = Said::text("(").then(apart()).and(format!("{above} ")).number(metres, "m");
+                let other = apart().and(format!("{below} ")).number(-metres, "m").and(")");
+                Some(said.and(format!(" {word} ")).then(other))
+            }
+            When::Clear(room) => self.clear(source, mark, room),
             When::Reaches { entity, position, within_m, is_less } => {
                 let point = self.cast.place(source, &position.0)?.pose.position;
                 let (said, station_m) = self.station(source, mark, entity, point)?;
@@ -214,6 +227,60 @@ impl Waiting<'_, '_> {
             When::Ended { kind, name } => self.ended(source, mark, kind, name),
             When::Begun { kind, name } => self.begun(source, mark, kind, name),
         }
+    }
+
+    /// That nobody is in lanes beside somebody.
+    fn clear(&self, source: &mut Source, mark: &Mark, room: &Clearance) -> Option<Said> {
+        let reason = "room beside somebody is read of one that drives the ego vehicle's way";
+        let is_along = self.cast.looks_ahead(source, mark, &room.of)?;
+        source.refuse_if(!is_along || self.cast.is_ego(&room.of), mark, reason)?;
+        let beside = self.beside(source, mark, room)?;
+        let own = self.who(source, mark, &room.of)?;
+        // Where there are no such lanes there is no room.
+        let mut nobody = Vec::new();
+        if let Some(Beside { from_m, to_m, .. }) = beside {
+            let station = || Said::text(format!("{own}.station "));
+            nobody.push(station().and(">= ").number(from_m, "m"));
+            nobody.push(station().and("<= ").number(to_m, "m"));
+        }
+        for name in self.counted(source, mark, room)? {
+            let ahead = self.between(source, mark, &room.of, &name, room.is_free_space)?;
+            let behind = self.between(source, mark, &name, &room.of, room.is_free_space)?;
+            let mut is_there = vec![
+                ahead.and(" <= ").number(room.ahead_m, "m"),
+                behind.and(" <= ").number(room.behind_m, "m"),
+            ];
+            if let Some(Beside { right_m, left_m, .. }) = beside {
+                let name = self.who(source, mark, &name)?;
+                let aside = || Said::text(format!("{name}.offset - {own}.offset "));
+                is_there.push(aside().and(">= ").number(right_m, "m"));
+                is_there.push(aside().and("<= ").number(left_m, "m"));
+            }
+            nobody.push(Said::text("not (").then(Said::joined(is_there, " and ")).and(")"));
+        }
+        Some(match nobody.is_empty() {
+            true => Said::text("elapsed >= ").number(0.0, "s"),
+            false => Said::joined(nobody, " and "),
+        })
+    }
+
+    /// The lanes that somebody asks about; the inner `None` for all.
+    fn beside(&self, source: &mut Source, mark: &Mark, room: &Clearance) -> Option<Option<Beside>> {
+        let Some(lanes) = room.lanes else { return Some(None) };
+        self.cast.lanes_beside(source, mark, &room.of, lanes, room.has_oncoming).map(Some)
+    }
+
+    /// Who counts where somebody asks for room.
+    fn counted(&self, source: &mut Source, mark: &Mark, room: &Clearance) -> Option<Vec<String>> {
+        let ahead = self.cast.looks_ahead(source, mark, &room.of)?;
+        let mut counted = Vec::new();
+        for name in self.cast.names().filter(|name| *name != room.of) {
+            let is_meant = room.others.is_empty() || room.others.iter().any(|other| other == name);
+            if is_meant && (room.has_oncoming || self.cast.looks_ahead(source, mark, name)? == ahead) {
+                counted.push(name.to_owned());
+            }
+        }
+        Some(counted)
     }
 
     /// That something has begun: what it waits for holds now. That it held earlier is not remembered.
@@ -329,6 +396,30 @@ impl Waiting<'_, '_> {
             When::Distance { pair, metres } => {
                 let away_m = self.away_m(source, mark, pair)?;
                 if pair.is_less { away_m < *metres } else { away_m > *metres }
+            }
+            When::Apart { pair, metres } => {
+                let of = self.cast.begins(source, mark, &pair.of)?;
+                let to = self.cast.begins(source, mark, &pair.to)?;
+                let offset_m = |point: Vec2| self.cast.route.path.project(point).offset_m;
+                let metres = metres + if pair.is_free_space { self.cast.half_widths_m(pair) } else { 0.0 };
+                let apart_m = (offset_m(of) - offset_m(to)).abs();
+                if pair.is_less { apart_m < metres } else { apart_m > metres }
+            }
+            When::Clear(room) => {
+                let beside = self.beside(source, mark, room)?;
+                let here = self.cast.begins(source, mark, &room.of)?;
+                let begins_m = self.cast.moving(source, mark, &room.of)?.at_m;
+                let mut is_clear = beside.as_ref().is_none_or(|beside| beside.from_m <= begins_m);
+                for name in self.counted(source, mark, room)? {
+                    let there = self.cast.begins(source, mark, &name)?;
+                    let ahead_m = self.cast.station_m(there) - self.cast.station_m(here);
+                    let offset_m = |point: Vec2| self.cast.route.path.project(point).offset_m;
+                    let left_m = offset_m(there) - offset_m(here);
+                    let is_in = |lanes: &Beside| lanes.right_m <= left_m && left_m <= lanes.left_m;
+                    let is_beside = beside.as_ref().is_none_or(is_in);
+                    is_clear &= !(is_beside && -room.behind_m <= ahead_m && ahead_m <= room.ahead_m);
+                }
+                is_clear
             }
             When::Headway { pair, seconds } => {
                 let away_m = self.away_m(source, mark, pair)?;

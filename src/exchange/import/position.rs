@@ -199,9 +199,25 @@ fn on_route(source: &mut Source, place: Node) -> Option<PositionKind> {
     }
 }
 
+impl Position {
+    /// Whether it is where somebody is already, who looks on as before.
+    pub fn is_where(&self, name: &str) -> bool {
+        let PositionKind::RelativeObject { entity, dx_m, dy_m } = &self.kind else { return false };
+        entity == name
+            && *dx_m == 0.0
+            && *dy_m == 0.0
+            && matches!(self.heading, Heading::Relative(rad) if rad == 0.0)
+    }
+}
+
 fn heading(source: &mut Source, place: Node) -> Option<Heading> {
     let Some(orientation) = element(place, "Orientation") else { return Some(Heading::Relative(0.0)) };
     let heading_rad = source.number_or(orientation, "h", 0.0)?;
+    for tilt in ["p", "r"] {
+        if source.number_or(orientation, tilt, 0.0)? != 0.0 {
+            source.note("nobody is tilted: pitch and roll are not taken over");
+        }
+    }
     let is_relative = match source.word(orientation, "type", &["relative", "absolute"])? {
         // What it is without the word has changed with 1.3.
         "" => source.minor >= 3,

@@ -49,8 +49,8 @@ enum Kind {
 }
 
 impl Parameters {
-    /// The least that tells the variations apart: of parameters that say the same, one of a speed stays, else a number, else the
-    /// first one.
+    /// The least that tells the variations apart: of parameters that say the same, one of a speed stays, else a number, else a word,
+    /// and of those alike the first one.
     /// `names` are those of road users.
     pub fn of(order: &[String], variations: &[&Values], names: &BTreeSet<&str>) -> Parameters {
         let texts = |name: &String| -> Vec<&str> {
@@ -62,9 +62,10 @@ impl Parameters {
             .filter(|(_, texts)| texts.iter().any(|text| text != &texts[0]))
             .collect();
         let worth = |name: &str, texts: &[&str]| match () {
-            () if name.to_lowercase().contains("speed") => 2,
-            () if texts.iter().all(|text| text.parse::<f64>().is_ok()) => 1,
-            () => 0,
+            () if name.to_lowercase().contains("speed") => 3,
+            () if texts.iter().all(|text| text.parse::<f64>().is_ok()) => 2,
+            // Paths of files say least to a reader.
+            () => usize::from(!texts.iter().any(|text| text.contains(['/', '\\']))),
         };
         let mut leaving: Vec<(usize, &String)> =
             kept.iter().rev().map(|(name, texts)| (worth(name, texts), *name)).collect();

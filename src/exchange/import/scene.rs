@@ -21,6 +21,7 @@ use super::rows::small;
 use super::said::{Figure, Said, number};
 use super::source::{Mark, Source};
 use super::story::{Entity, Event, Story};
+use super::trigger::Pair;
 use super::ways::{Leg, is_led, moves};
 
 /// Before the offset of a spawn.
@@ -325,6 +326,21 @@ impl<'a> Cast<'a> {
         let [behind, ahead] = [&back.entity.body, &front.entity.body];
         let overhangs_m = behind.length_m / 2.0 + behind.middle_m + ahead.length_m / 2.0 - ahead.middle_m;
         (goes_on_m.abs() < 0.1 * SAME_ROAD_M).then_some((here_m - front.at_m, overhangs_m))
+    }
+
+    /// The names of all in the file who are there, the ego vehicle first.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        let others = self.moving.iter().map(|moving| moving.entity.name.as_str());
+        core::iter::once(self.story.ego.name.as_str()).chain(others)
+    }
+
+    /// Half the widths of two together, m.
+    pub fn half_widths_m(&self, pair: &Pair) -> f64 {
+        let width_m = |name: &str| match self.is_ego(name) {
+            true => VehicleParameters::MKZ.width_m,
+            false => self.story.entity(name).map_or(0.0, |entity| entity.body.width_m),
+        };
+        (width_m(&pair.of) + width_m(&pair.to)) / 2.0
     }
 
     /// How far an end of somebody's outline lies beyond its reference point along the ego vehicle's route, m.

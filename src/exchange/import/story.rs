@@ -149,6 +149,10 @@ pub fn read(source: &mut Source, document: &Document, ego: Option<&str>) -> Opti
         let note = "what the story lets the ego vehicle do is left to the driving system under test";
         source.note(format!("{note} (actions of the file: {})", cast.ego_actions));
     }
+    if cast.ego.way.is_some() {
+        source
+            .note("the ego vehicle drives along lanes, and not along the trajectory that the file gives it");
+    }
     let gone = core::mem::take(&mut cast.gone);
     cast.others.retain(|entity| !gone.contains(&entity.name));
     let ego_mps = match &cast.ego.speed {
@@ -217,7 +221,14 @@ impl Cast {
         let listed: Vec<&str> =
             elements(root, "Entities").flat_map(children).filter_map(|node| node.attribute("name")).collect();
         let found = entities.iter().position(|entity| is_ego(&entity.name));
-        let found = found.or((ego.is_none() && listed.len() == 1 && entities.len() == 1).then_some(0));
+        // The only one there is may have another name.
+        let found = found.or_else(|| match entities.as_slice() {
+            [only] if ego.is_none() && listed.len() == 1 && only.body.is_for_passengers() => {
+                source.note(format!("`{}`, the only one there is, is taken for the ego vehicle", only.name));
+                Some(0)
+            }
+            _ => None,
+        });
         let Some(at) = found else {
             let mut torn = listed.iter().filter(|name| source.is_torn(name));
             if torn.any(|name| is_ego(name) || entities.is_empty()) {

@@ -10,6 +10,12 @@ use super::source::{Mark, Source, children, element, elements};
 /// Conditions of a trigger. An act's and an event's are multiplied.
 const CONDITIONS_MAX: usize = 16;
 
+/// Lanes beside each other.
+const LANES_MAX: i32 = 20;
+
+/// Groups of a trigger.
+const GROUPS_MAX: usize = 64;
+
 const STORYBOARD_ELEMENTS: [&str; 6] = ["story", "act", "maneuverGroup", "maneuver", "event", "action"];
 
 const STATES: [&str; 7] = [
@@ -64,6 +70,13 @@ pub enum When {
         pair: Pair,
         metres: f64,
     },
+    /// The distance of two entities across the road is less or more than `metres`.
+    Apart {
+        pair: Pair,
+        metres: f64,
+    },
+    /// Nobody is in lanes beside an entity, so far ahead of it and so far behind.
+    Clear(Box<Clearance>),
     /// The first would reach the second in less than `seconds`.
     Collides {
         pair: Pair,
@@ -128,6 +141,21 @@ impl PartialEq for PlaceMark {
     }
 }
 
+/// Room beside an entity in which nobody is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Clearance {
+    pub of: String,
+    /// The only ones who count; empty: all others.
+    pub others: Vec<String>,
+    pub ahead_m: f64,
+    pub behind_m: f64,
+    /// Lanes to the left of its own, from and to; without them all lanes.
+    pub lanes: Option<(i32, i32)>,
+    pub is_free_space: bool,
+    /// Whether those count who come the other way.
+    pub has_oncoming: bool,
+}
+
 /// Two entities whose distance is compared.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pair {
@@ -146,20 +174,14 @@ pub fn trigger(source: &mut Source, parent: Node) -> Option<Trigger> {
     }
     let mut groups = Some(Vec::new());
     for group in elements(trigger, "ConditionGroup") {
-        let mut all = Some(Vec::new());
-        if source.required(group, "Condition").is_none() {
-            all = None;
-        }
+        let mut own = source.required(group, "Condition").map(|_| Trigger::new());
         for node in elements(group, "Condition") {
-            match condition(source, node) {
-                Some(found) => all.iter_mut().for_each(|all| all.push(found.clone())),
-                None => all = None,
-            }
+            own = condition(source, node).zip(own).map(|(found, own)| both(&own, &found));
         }
-        match (all, &mut groups) {
-            (Some(all), Some(groups)) => groups.push(all),
-            _ => groups = None,
-        }
+        let count = own.iter().chain(&groups).map(Vec::len).sum::<usize>();
+        let reason = format!("its conditions on several entities make more than {GROUPS_MAX} groups");
+        source.refuse_if(count > GROUPS_MAX, group, reason)?;
+        groups = own.zip(groups).map(|(own, groups)| [groups, own].concat());
     }
     groups
 }
@@ -192,7 +214,8 @@ pub fn reduced(trigger: Trigger) -> Option<Trigger> {
     }
 }
 
-fn condition(source: &mut Source, node: Node) -> Option<Condition> {
+/// A condition as groups: one that asks about several entities is one for each.
+fn condition(source: &mut Source, node: Node) -> Option<Trigger> {
     let delay_s = source.number_or(node, "delay", 0.0)?;
     source.refuse_if(delay_s < 0.0, node, "its `delay` is less than 0")?;
     let edge = source.word(node, "conditionEdge", &["none", "rising", "falling", "risingOrFalling"])?;
@@ -256,32 +279,45 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
         };
         let reason = "it does not cease to hold: `conditionEdge=\"falling\"` waits for nothing";
         source.refuse_if(edge == Edge::Falling && kind == When::Always, inner, reason)?;
-        return Some(Condition { mark: source.mark(inner), edge, delay_s, kind });
+        return Some(vec![vec![Condition { mark: source.mark(inner), edge, delay_s, kind }]]);
     }
     let by_entity = source.required(node, "ByEntityCondition")?;
     let list = source.required(by_entity, "TriggeringEntities")?;
-    source.word(list, "triggeringEntitiesRule", &["any", "all"])?;
+    let rule = source.word(list, "triggeringEntitiesRule", &["any", "all"])?;
     let mut names = Vec::new();
     for entity in elements(list, "EntityRef") {
         names.push(source.text(entity, "entityRef")?);
     }
     let outer = source.required(by_entity, "EntityCondition")?;
     let Some(inner) = children(outer).next() else { return source.refuse(outer, "it is empty") };
-    let [of] = names.as_slice() else {
-        let reason =
-            if names.is_empty() { "it names no entity" } else { "a condition asks about one entity" };
-        return source.refuse(list, reason);
-    };
-    let entity = of.clone();
+    source.refuse_if(names.is_empty(), list, "it names no entity")?;
+    let reason = "when a condition on several entities begins to hold, or ceases, is not read";
+    source.refuse_if(names.len() > 1 && edge != Edge::None, list, reason)?;
+    let mut found = Vec::new();
+    for of in &names {
+        let kind = of_entity(source, inner, of)?;
+        found.push(Condition { mark: source.mark(inner), edge, delay_s, kind });
+    }
+    Some(if rule == "all" { vec![found] } else { found.into_iter().map(|one| vec![one]).collect() })
+}
+
+/// What a condition asks about an entity.
+fn of_entity(source: &mut Source, inner: Node, of: &str) -> Option<When> {
+    let entity = of.to_owned();
     let kind = match inner.tag_name().name() {
         "TimeHeadwayCondition" => {
             frame(source, inner)?;
             When::Headway { pair: pair(source, inner, of)?, seconds: source.amount(inner, "value")? }
         }
+        "RelativeDistanceCondition" if inner.attribute("relativeDistanceType") == Some("lateral") => {
+            source.word(inner, "coordinateSystem", &["entity", "lane", "road", "trajectory", "world"])?;
+            When::Apart { pair: pair(source, inner, of)?, metres: source.amount(inner, "value")? }
+        }
         "RelativeDistanceCondition" => {
             frame(source, inner)?;
             When::Distance { pair: pair(source, inner, of)?, metres: source.amount(inner, "value")? }
         }
+        "RelativeClearanceCondition" => When::Clear(Box::new(clearance(source, inner, of)?)),
         "TimeToCollisionCondition" => {
             frame(source, inner)?;
             let target = source.required(inner, "TimeToCollisionConditionTarget")?;
@@ -294,7 +330,7 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
             } else {
                 let to = source.required(target, "EntityRef")?;
                 let to = source.text(to, "entityRef")?;
-                When::Collides { pair: Pair { of: of.clone(), to, is_less, is_free_space }, seconds }
+                When::Collides { pair: Pair { of: entity, to, is_less, is_free_space }, seconds }
             }
         }
         "ReachPositionCondition" => {
@@ -329,7 +365,32 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
         }
         _ => return source.refuse(inner, "this condition is not read"),
     };
-    Some(Condition { mark: source.mark(inner), edge, delay_s, kind })
+    Some(kind)
+}
+
+fn clearance(source: &mut Source, node: Node, of: &str) -> Option<Clearance> {
+    let mut ranges = elements(node, "RelativeLaneRange");
+    let lanes = match (ranges.next(), ranges.next()) {
+        (None, _) => None,
+        (Some(range), None) => Some((source.integer(range, "from")?, source.integer(range, "to")?)),
+        (_, Some(second)) => return source.refuse(second, "one range of lanes is read"),
+    };
+    let is_wide = |(from, to): (i32, i32)| from > to || to.saturating_sub(from) > LANES_MAX;
+    let reason = format!("lanes go from a lesser to a greater number, and are {LANES_MAX} at most");
+    source.refuse_if(lanes.is_some_and(is_wide), node, reason)?;
+    let mut others = Vec::new();
+    for entity in elements(node, "EntityRef") {
+        others.push(source.text(entity, "entityRef")?);
+    }
+    Some(Clearance {
+        of: of.to_owned(),
+        others,
+        ahead_m: source.amount(node, "distanceForward")?,
+        behind_m: source.amount(node, "distanceBackward")?,
+        lanes,
+        is_free_space: source.switch(node, "freeSpace", false)?,
+        has_oncoming: source.switch(node, "oppositeLanes", false)?,
+    })
 }
 
 /// The names of the acts that wait for nothing but times that have come when the scenario begins.

@@ -169,6 +169,8 @@ const ELEMENTS: &str = "
         routingAlgorithm];
     RelativeDistanceCondition [entityRef value freespace rule relativeDistanceType coordinateSystem
         routingAlgorithm];
+    RelativeClearanceCondition [distanceForward distanceBackward freeSpace oppositeLanes] RelativeLaneRange EntityRef;
+    RelativeLaneRange [from to];
     TimeToCollisionCondition [value freespace rule alongRoute coordinateSystem relativeDistanceType
         routingAlgorithm] TimeToCollisionConditionTarget;
     TimeToCollisionConditionTarget [] EntityRef Position;
@@ -248,7 +250,7 @@ mod tests {
         LongitudinalDistanceAction LaneChangeAction FollowTrajectoryAction AssignRouteAction \
         AcquirePositionAction EnvironmentAction LanePosition RelativeLanePosition WorldPosition \
         Polyline PrivateAction SimulationTimeCondition StoryboardElementStateCondition \
-        TimeHeadwayCondition RelativeDistanceCondition TimeToCollisionCondition CollisionCondition ReachPositionCondition \
+        TimeHeadwayCondition RelativeDistanceCondition RelativeClearanceCondition TimeToCollisionCondition CollisionCondition ReachPositionCondition \
         RoadPosition RelativeRoadPosition RelativeWorldPosition RelativeObjectPosition RoutePosition \
         TrajectoryPosition FromCurrentEntity FromRoadCoordinates FromLaneCoordinates \
         PositionInRoadCoordinates PositionInLaneCoordinates LaneOffsetAction SynchronizeAction \

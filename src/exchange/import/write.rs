@@ -43,13 +43,8 @@ pub fn space(whole: &Whole, order: &[String], name: &str) -> Imported {
     let durations = whole.variants.iter().map(|variant| variant.duration_s);
     let (least_s, most_s) =
         durations.fold((f64::INFINITY, 0.0), |(least, most), s| (s.min(least), s.max(most)));
-    if most_s > least_s {
-        let text = format!(
-            "each row is played for {} s, though the file ends some after {} s",
-            number(most_s),
-            number(least_s)
-        );
-        notes.insert(text);
+    if most_s - least_s > 1.0 {
+        notes.insert(format!("each row is played for {} s, as long as the slowest needs", number(most_s)));
     }
     let body = space.text();
     let drawn: Vec<String> = space.parameters.drawn.iter().map(|name| format!("`{name}`")).collect();
