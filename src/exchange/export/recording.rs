@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use avastra_campaign::episode::{Actor, Recorder};
+use avastra_campaign::episode::{Actor, EpisodeLog, Outcome, Recorder};
 use avastra_campaign::oracle::ClaimResult;
 use avastra_campaign::run::{RunError, Stage};
 use avastra_drivers::Selected;
 use avastra_lang::model::vocabulary::Word;
-use avastra_lang::model::{Claim, Scenario};
+use avastra_lang::model::{Claim, NpcFacts, Road, Scenario};
 use avastra_road::{LaneIndex, LanePlace, RoadMap};
-use avastra_world::action::ActionTable;
+use avastra_world::action::{ActionTable, Course, Effect, SpawnRequest};
 use avastra_world::sim::DT_S;
 
 use super::standalone::{Standalone, standalone};
@@ -34,10 +34,25 @@ pub struct Recording {
     /// The lanes of its route, in order.
     pub route: Vec<LaneIndex>,
     pub seen: Recorder,
+    /// The road in its space, with its trajectories.
+    pub road: Road,
+    /// What those were told who appear at the start.
+    pub told: Vec<Told>,
     /// Names of the author's own bodies, by number of the road user.
     pub own_bodies: BTreeMap<u32, String>,
     /// Where the scenario comes from, what it claims, and the scenario as text of the language: name and value.
     pub facts: Vec<(String, String)>,
+}
+
+/// What a road user was told that appears at the start.
+#[derive(Debug, Clone)]
+pub struct Told {
+    /// As claims number it.
+    pub id: u32,
+    pub request: SpawnRequest,
+    pub course: Option<Arc<Course>>,
+    /// As it appeared.
+    pub facts: NpcFacts,
 }
 
 /// Why a scenario has no recording.
@@ -69,7 +84,13 @@ impl Recording {
 pub fn record(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Result<Recording, ExportError> {
     let stage = Stage::new(table, scenario)?;
     let mut seen = Recorder::default();
-    let log = stage.play(ads, &mut |world, ads, contacts| seen.note(world, ads, contacts));
+    let mut facts_at_first = BTreeMap::new();
+    let log = stage.play(ads, &mut |world, ads, contacts| {
+        seen.note(world, ads, contacts);
+        for other in seen.others.iter().filter(|other| other.samples.len() == 1) {
+            facts_at_first.extend(world.npc_facts(other.id).map(|facts| (other.id, facts)));
+        }
+    });
     let driven = |claim: &Claim| {
         matches!(claim, Claim::Collision { .. } | Claim::Trace(_) | Claim::Proc(_) | Claim::End(_))
     };
@@ -92,9 +113,34 @@ pub fn record(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Resul
         goal: road.goal,
         route: road.route.lanes.iter().map(|part| part.lane).collect(),
         seen,
+        road: road.clone(),
+        told: told(&log, &facts_at_first),
         own_bodies: log.own_bodies().into_iter().map(named).collect(),
         facts,
     })
+}
+
+/// What those were told who appear at once in the first step.
+fn told(log: &EpisodeLog, facts: &BTreeMap<u32, NpcFacts>) -> Vec<Told> {
+    let Some(Outcome::Done { draw, spawned, delay_ticks: 0, .. }) =
+        log.steps.first().map(|step| &step.outcome)
+    else {
+        return Vec::new();
+    };
+    let mut ids = spawned.iter();
+    let mut told = Vec::new();
+    for (nth, effect) in draw.effects.iter().enumerate() {
+        let Effect::Spawn(request) = effect else { continue };
+        let id = ids.next();
+        // What hides it has an id, too.
+        for _ in 1..effect.newcomers() {
+            ids.next();
+        }
+        if let Some((id, facts)) = id.and_then(|id| Some((*id, *facts.get(id)?))) {
+            told.push(Told { id, request: *request, course: draw.course(nth).cloned(), facts });
+        }
+    }
+    told
 }
 
 /// Where a scenario comes from and what it claims.

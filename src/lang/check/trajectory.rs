@@ -133,7 +133,8 @@ impl Checker {
         let mut parts = Vec::new();
         for (pair, item) in places.windows(2).zip(&items[1..]) {
             match maps.route(map, pair[0], pair[1]) {
-                Ok(route) => parts.push(route.path),
+                // The path of a route goes on behind its goal.
+                Ok(route) => parts.extend(route.path.part(0.0, route.goal_m)),
                 Err(error) => {
                     let message = "no way leads along the lanes to this place";
                     let error = Diagnostic::error(code::NO_ROUTE, message).at(item.span, error.to_string());

@@ -16,6 +16,8 @@ mod lanes;
 mod natural;
 mod pace;
 mod space;
+mod story;
+mod when;
 
 use avastra_campaign::episode::Actor;
 use avastra_road::LanePlace;
@@ -153,7 +155,8 @@ fn storyboard(recording: &Recording, style: Style, exact: &[&Actor]) -> Element 
         let (begins, events) = if is_exact {
             (begins(recording, actor, style), events(recording, actor, style))
         } else {
-            Natural::of(recording, actor, version).written()
+            let told = (version == Version::V1_2).then(|| natural::as_told(recording, actor)).flatten();
+            told.unwrap_or_else(|| Natural::of(recording, actor, version).written())
         };
         init.extend(begins);
         if !events.is_empty() {

@@ -7,8 +7,9 @@
 
 use avastra_base::geometry::{Pose, Vec2};
 use avastra_campaign::episode::Actor;
+use avastra_lang::model::vocabulary::Verb;
 use avastra_road::{LaneIndex, LanePlace, RoadMap};
-use avastra_world::sim::DT_S;
+use avastra_world::sim::{DT_S, VehicleParameters};
 
 use super::super::recording::Recording;
 use super::super::xml::Element;
@@ -19,6 +20,7 @@ use super::actions::{
 use super::entity::ahead_of_centre_m;
 use super::lanes::{Driven, STRIDE, driven};
 use super::pace::{Change, Pace, SPEED_MPS, WAY_M};
+use super::story::{Cast, Player};
 use super::{BENEATH_M, Version, leaves};
 
 /// What moved less than this stands, m.
@@ -91,6 +93,41 @@ pub fn caveat(exact: &[&Actor]) -> (String, String) {
 
 pub fn names(actors: &[&Actor]) -> String {
     actors.iter().map(|actor| actor.name()).collect::<Vec<_>>().join(", ")
+}
+
+/// How a road user begins and what it does, as the scenario tells it, and not as it was seen: of those that appear at the start and
+/// follow a trajectory, whatever comes. `None` of others, and of those who are told what no other player knows.
+pub fn as_told(recording: &Recording, actor: &Actor) -> Option<(Option<Element>, Vec<Element>)> {
+    let told = recording.told.iter().find(|told| told.id == actor.id)?;
+    let ego = &recording.seen.ego.samples[0];
+    let of = |id: u32| recording.seen.others.iter().find(|other| other.id == id);
+    let players = recording.told.iter().filter_map(|told| {
+        let actor = of(told.id)?;
+        let (request, course) = (&told.request, told.course.as_ref());
+        Some(Player { name: actor.name(), actor, request, course, facts: told.facts })
+    });
+    let cast = Cast {
+        road: &recording.road,
+        ego_front_m: VehicleParameters::MKZ.rear_axle_to_front_m,
+        ego_mps: ego.velocity_mps.norm(),
+        players: players.collect(),
+        duration_s: recording.duration_s(),
+    };
+    let name = actor.name();
+    let player = cast.players.iter().find(|player| player.name == name)?;
+    if told.request.verb != Verb::Follow {
+        return None;
+    }
+    let (begins, mut events) = cast.story(player).ok()?;
+    // What it was to do after a contact it does not do.
+    if let Some(touch) = touch(recording, actor) {
+        let touched = actor.samples[touch].tick;
+        let begun = actor.phases.iter().filter(|phase| phase.tick <= touched).count();
+        events.truncate(begun);
+    }
+    events.extend(stop_where_hit(recording, actor));
+    events.extend(leaves(recording.seen.end_tick, actor, Version::V1_2));
+    Some((Some(begins), events))
 }
 
 impl<'a> Natural<'a> {

@@ -5,9 +5,7 @@
 //!
 //! Rows whose road users are led by avastra's drivers are left out: how these drive, no other player knows.
 
-mod story;
 mod template;
-mod when;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -25,8 +23,8 @@ use super::super::xml::{Element, number};
 use super::actions::{all, from_time, lane_position, maneuver_group, private, speed, teleport};
 use super::entity::entity;
 use super::environment::environment;
+use super::story::{Cast, Player};
 use super::{Ego, Version, property};
-use story::{Cast, Player};
 use template::Template;
 
 /// What drawn values are drawn from: a file has one value of each.

@@ -4,13 +4,18 @@ use avastra_lang::model::NpcFacts;
 use avastra_lang::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use avastra_lang::model::vocabulary::Fact;
 use avastra_world::action::Course;
+use avastra_world::sim::VehicleParameters;
 
-use super::super::super::xml::Element;
-use super::super::actions::{by_entity, by_value};
+use super::super::xml::Element;
+use super::actions::{by_entity, by_value};
+use super::entity::ahead_of_centre_m;
 use super::story::{Cast, Player};
 
 /// Parts of a sum that are smaller are none.
 const NOTHING: f64 = 1e-9;
+
+/// A distance of outlines that is so near to that of the reference points is meant as that, m.
+const POINTS_M: f64 = 0.01;
 
 /// Groups of conditions, of which one must hold, each as what stands in a `Condition`.
 type Groups = Vec<Vec<Element>>;
@@ -127,8 +132,7 @@ impl Waiting<'_> {
                 Ok(by_entity(self.name(one), speed))
             }
             [one @ Part { fact: Fact::EgoFront | Fact::NpcStation, .. }] if is_more => {
-                let begins_m =
-                    one.who.map_or(self.cast.ego_front_m, |who| self.cast.players[who].facts.station_m);
+                let begins_m = one.who.map_or(self.cast.ego_front_m, |who| self.cast.players[who].begins_m());
                 let way =
                     Element::new("TraveledDistanceCondition").measured("value", (bound - begins_m).max(0.0));
                 Ok(by_entity(self.name(one), way))
@@ -140,6 +144,18 @@ impl Waiting<'_> {
 
     fn name(&self, part: &Part) -> &str {
         part.who.map_or("ego", |who| &self.cast.players[who].name)
+    }
+
+    /// How far an end of somebody's outline lies from the reference point that the file has, m.
+    fn overhang_m(&self, part: &Part, is_front: bool) -> f64 {
+        let (length_m, ahead_m) = match part.who {
+            Some(who) => {
+                let actor = self.cast.players[who].actor;
+                (actor.shape.length_m, ahead_of_centre_m(actor))
+            }
+            None => (VehicleParameters::MKZ.length_m, -VehicleParameters::MKZ.rear_axle_to_centre_m()),
+        };
+        length_m / 2.0 + if is_front { -ahead_m } else { ahead_m }
     }
 
     /// The way between two, compared with a length, or with the way that the one behind drives in a time.
@@ -162,25 +178,28 @@ impl Waiting<'_> {
         let rule = rule_of(is_more == (ahead.times > 0.0));
         let rest: Vec<&Part> = sum.parts.iter().filter(|part| **part != ahead && **part != behind).collect();
         let bound = -sum.more * ahead.times;
-        let of_both = |element: Element| {
+        // Between the outlines, or between the reference points, where that is what the sum says.
+        let points_m = bound + self.overhang_m(&ahead, false) + self.overhang_m(&behind, true);
+        let of_both = |element: Element, is_free_space: bool| {
             element
                 .with("entityRef", self.name(&ahead))
-                .with("freespace", true)
+                .with("freespace", is_free_space)
                 .with("coordinateSystem", "road")
                 .with("relativeDistanceType", "longitudinal")
                 .with("rule", rule)
         };
         match rest.as_slice() {
-            [] if bound >= 0.0 => {
-                let distance = of_both(Element::new("RelativeDistanceCondition")).measured("value", bound);
+            [] if bound >= 0.0 || points_m >= 0.0 => {
+                let distance = of_both(Element::new("RelativeDistanceCondition"), bound >= 0.0);
+                let distance = distance.measured("value", if bound >= 0.0 { bound } else { points_m });
                 Ok(by_entity(self.name(&behind), distance))
             }
             [Part { who, fact: Fact::EgoSpeed | Fact::NpcSpeed, times }]
-                if *who == behind.who && is(bound, 0.0) =>
+                if *who == behind.who && (is(bound, 0.0) || points_m.abs() < POINTS_M) =>
             {
                 let time_s = -times * ahead.times;
-                let headway = of_both(Element::new("TimeHeadwayCondition")).measured("value", time_s);
-                Ok(by_entity(self.name(&behind), headway))
+                let headway = of_both(Element::new("TimeHeadwayCondition"), is(bound, 0.0));
+                Ok(by_entity(self.name(&behind), headway.measured("value", time_s)))
             }
             _ => Err(unknown()),
         }

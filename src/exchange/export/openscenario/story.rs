@@ -1,4 +1,4 @@
-//! What a road user of a row does: where it begins, and an event for each phase of its manoeuvre.
+//! What a road user was told that appears at the start: where it begins, and an event for each phase of its manoeuvre.
 //!
 //! Whoever drives along the lanes is placed in one and given a route; who follows another way is given that. A phase begins when the one
 //! before it is over, or, if it waits for something, when that holds while the one before it runs or after that.
@@ -15,18 +15,18 @@ use avastra_lang::model::{MomentFacts, NpcFacts, Road, Trajectory};
 use avastra_road::{Lane, LaneIndex, LanePlace, RoadMap};
 use avastra_world::action::{Course, LaterMoment, SpawnRequest};
 
-use super::super::super::xml::Element;
-use super::super::Version;
-use super::super::actions::{
+use super::super::xml::Element;
+use super::Version;
+use super::actions::{
     action, by_entity, condition_after, event_is, event_of_groups, from_time, lane_position,
     lane_position_aside, position, private, route, speed, teleport, walk_from,
 };
-use super::super::entity::ahead_of_centre_m;
+use super::entity::ahead_of_centre_m;
 use super::when;
 
 /// A way that keeps this near to the middle of lanes, m, and no more across them, rad, leads along them.
-const LANE_M: f64 = 0.03;
-const LANE_RAD: f64 = 0.03;
+const LANE_M: f64 = 0.1;
+const LANE_RAD: f64 = 0.1;
 /// It is looked at in such steps, m.
 const STEP_M: f64 = 0.5;
 /// The corner of a way has two vertices that are nearer than this, m.
@@ -34,7 +34,7 @@ const BEND_M: f64 = 1e-3;
 /// How fast one moves to the side that is told no speed for it, m/s, as the world has it.
 const ASIDE_MPS: f64 = 1.0;
 
-/// Who is there as a row begins.
+/// Who is there at the start.
 pub struct Cast<'a> {
     pub road: &'a Road,
     /// Station of the ego vehicle's front on its route, m.
@@ -44,13 +44,20 @@ pub struct Cast<'a> {
     pub duration_s: f64,
 }
 
-/// A road user that the row lets appear.
+/// A road user that appears at the start.
 pub struct Player<'a> {
     pub name: String,
     pub actor: &'a Actor,
     pub request: &'a SpawnRequest,
     pub course: Option<&'a Arc<Course>>,
     pub facts: NpcFacts,
+}
+
+impl Player<'_> {
+    /// The station of its trajectory at which it begins, m; 0 if it follows none.
+    pub fn begins_m(&self) -> f64 {
+        self.request.trajectory.map_or(0.0, |_| self.request.distance_m)
+    }
 }
 
 /// The way of somebody.
