@@ -92,12 +92,25 @@ fn one(
         }
     }
     let named = |name: &str| format!("{stem}_{name}.xosc");
+    let list = |name: &str| format!("{stem}_{name}_variations.xosc");
     let map_file = |path: &PathBuf| map_name(path).unwrap_or_default().to_owned();
     let found = export::space(&arena, &named, &map_file);
     if found.templates.is_empty() {
         return Ok(found);
     }
     let into = place.parent().unwrap_or(Path::new(""));
+    let mut own = BTreeSet::new();
+    for template in &found.templates {
+        let listed = template.variations.as_ref().map(|_| list(&template.name));
+        for name in [Some(named(&template.name)), listed].into_iter().flatten() {
+            let path = into.join(&name);
+            if files.contains(&path) || !own.insert(path) {
+                return Err(Failure::usage(format!(
+                    "two files would be written as `{name}`: export the spaces to two folders, or rename an action"
+                )));
+            }
+        }
+    }
     match &arguments.out {
         Some(named) => make(named)?,
         None => drop(folder(into.parent().unwrap_or(Path::new("")), FOLDER)?),
@@ -110,7 +123,7 @@ fn one(
         write(&path, &template.text)?;
         files.insert(path);
         if let Some(variations) = &template.variations {
-            let path = into.join(format!("{stem}_{}_variations.xosc", template.name));
+            let path = into.join(list(&template.name));
             write(&path, variations)?;
             files.insert(path);
         }

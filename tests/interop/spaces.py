@@ -66,8 +66,8 @@ def main():
             same += sum((counter & wanted).values())
             if counter - wanted:
                 print(f"  {space.stem} {action}: {dict(counter - wanted)} for {dict(wanted - counter)}")
-        differ += rows - same
-        print(f"{space}: {rows} rows back, {same} end alike; left out: "
+        differ += max(rows, result["rows"]) - same
+        print(f"{space}: {rows} rows back of {result['rows']}, {same} end alike; left out: "
               + (", ".join(f"{len(named)} × {reason}" for reason, named in left_out.items()) or "none"))
     sys.exit(1 if differ else 0)
 

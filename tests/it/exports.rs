@@ -8,7 +8,7 @@ use avastra::geometry::{Pose, Vec2, wrap_angle};
 use roxmltree::{Document, Node};
 
 use crate::cases::{expect_snapshot, files, root, stem, texts};
-use crate::command::{avastra, outcome};
+use crate::command::{avastra, done, outcome};
 
 const SCENARIO: &str = "tests/cases/exports/wet_corner.ava";
 
@@ -420,8 +420,12 @@ fn a_space_is_templates_with_lists_of_their_values() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let (status, stdout, stderr) = export("openscenario", ROWS, scratch.path(), &[]);
     assert_eq!(status, 0, "{stderr}");
-    let told =
-        ["9 of 11 rows on their roads in 4 templates", "goes backwards: `backing(", "own models: `driver("];
+    let told = [
+        "10 of 13 rows on their roads in 5 templates",
+        "goes backwards: `backing(",
+        "own models: `driver(",
+        "waited for later, or with other conditions: `later_gap(",
+    ];
     assert!(told.iter().all(|part| stdout.contains(part)), "{stdout}");
     let written = texts(scratch.path());
     let names: Vec<&str> = written.keys().map(String::as_str).collect();
@@ -432,6 +436,9 @@ fn a_space_is_templates_with_lists_of_their_values() {
     let lead = [&written["rows_lead.xosc"], &written["rows_lead_variations.xosc"]];
     expect_snapshot("exports", "rows_lead", &lead.map(String::as_str).join("\n"));
     expect_snapshot("exports", "rows_met", &written["rows_met.xosc"]);
+    let headway = written["rows_by_headway.xosc"].lines().find(|line| line.contains("<TimeHeadwayCondition"));
+    let headway = headway.expect("it is told the headway");
+    assert!(headway.contains("rule=\"lessOrEqual\"") && headway.contains("value=\"2\""), "{headway}");
     // It depends on the space alone.
     let again = tempfile::tempdir().expect("a scratch directory");
     exported("openscenario", ROWS, again.path(), &[]);
@@ -466,6 +473,7 @@ fn a_space_comes_back_with_the_same_rows() {
     let wanted = ends(&root().join(ROWS), &scratch.path().join("run"));
     for (file, action, rows) in [
         ("rows_met.xosc", "met", 1),
+        ("rows_by_headway.xosc", "by_headway", 1),
         ("rows_walker_1_variations.xosc", "walker", 2),
         ("rows_walker_2_variations.xosc", "walker", 2),
     ] {
@@ -485,7 +493,7 @@ fn a_space_comes_back_with_the_same_rows() {
 }
 
 #[test]
-fn of_a_space_nothing_is_recorded() {
+fn options_of_recordings_are_refused_for_spaces() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     for option in [&["--natural"][..], &["--profile", "carla"], &["--ego", "none"]] {
         let (status, _, stderr) = export("openscenario", ROWS, scratch.path(), option);
@@ -494,4 +502,23 @@ fn of_a_space_nothing_is_recorded() {
     let (status, _, stderr) = export("openscenario", "scenarios/roads.ava", scratch.path(), &[]);
     assert!(status != 0 && stderr.contains("no action"), "{status} {stderr}");
     assert!(texts(scratch.path()).is_empty());
+}
+
+/// Those who follow a trajectory from the start are written as they are told, and not as they were seen.
+#[test]
+fn a_natural_version_has_the_manoeuvres_of_those_who_follow() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let folder = scratch.path().display().to_string();
+    done(&["import", "--out", &folder, "tests/cases/imports/braking.xosc"]);
+    let scenario = scratch.path().join("braking_scenario.ava").display().to_string();
+    exported("openscenario", &scenario, scratch.path(), &["--natural"]);
+    let text = std::fs::read_to_string(scratch.path().join("braking_scenario.xosc")).expect("it was written");
+    let document = Document::parse(&text).expect("it is XML");
+    let events = document.descendants().filter(|node| node.has_tag_name("Event"));
+    let names: Vec<&str> = events.filter_map(|event| event.attribute("name")).collect();
+    assert!(names.iter().any(|name| name.ends_with("_phase_1")), "{names:?}");
+    assert!(
+        !names.iter().any(|name| name.contains("_speed_")),
+        "nothing is fitted to the recording: {names:?}"
+    );
 }

@@ -355,3 +355,18 @@ fn who_follows_a_trajectory_goes_on_along_it_and_replays() {
         assert_replays(&run, episode, &log);
     }
 }
+
+/// Each leg of a way through several places ends where the next one begins, though the lanes go on.
+#[test]
+fn a_way_through_several_places_never_leads_back() {
+    let space = space_at("tests/cases/spaces/places.ava");
+    let road = space.roads.iter().find(|road| road.name == "boulevard").expect("it is there");
+    let way = road.trajectories[0].as_ref().expect("it lies on the map of its road");
+    let [whole, first] = [&way.path, &road.trajectories[1].as_ref().expect("so does this one").path];
+    assert!((whole.length_m() - first.length_m()).abs() < 0.1, "{} m", whole.length_m());
+    let steps = (whole.length_m() / 0.5) as usize;
+    for step in 1..steps {
+        let (before, here) = (whole.pose_at((step - 1) as f64 * 0.5), whole.pose_at(step as f64 * 0.5));
+        assert!(before.to_local(here.position).x > 0.4, "it goes on at {} m", step as f64 * 0.5);
+    }
+}

@@ -8,7 +8,7 @@ use avastra_drivers::{ModularConfig, Reason, Status};
 use avastra_lang::model::vocabulary::Verb;
 use avastra_lang::model::{BodyWord, Memory, Space};
 use avastra_search::mdp::{PerceptionCounts, StateVector};
-use avastra_world::action::Draw;
+use avastra_world::action::{Draw, Effect};
 use avastra_world::sim::{Contact, Incident, Start};
 
 use super::monitor::{Breach, Margin};
@@ -109,6 +109,14 @@ pub enum Outcome {
 }
 
 impl Outcome {
+    /// What it did to the world, in order.
+    pub fn effects(&self) -> &[Effect] {
+        match self {
+            Outcome::Done { draw, .. } => &draw.effects,
+            Outcome::Passed | Outcome::Refused { .. } => &[],
+        }
+    }
+
     /// The ids of the road users that it made appear.
     pub fn spawned(&self) -> &[u32] {
         match self {

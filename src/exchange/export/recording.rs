@@ -44,7 +44,7 @@ pub struct Recording {
     pub facts: Vec<(String, String)>,
 }
 
-/// What a road user was told that appears at the start.
+/// What a road user was told that appears at the start, and is told nothing later.
 #[derive(Debug, Clone)]
 pub struct Told {
     /// As claims number it.
@@ -120,7 +120,7 @@ pub fn record(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Resul
     })
 }
 
-/// What those were told who appear at once in the first step.
+/// What those were told who appear at once in the first step, and are told nothing later.
 fn told(log: &EpisodeLog, facts: &BTreeMap<u32, NpcFacts>) -> Vec<Told> {
     let Some(Outcome::Done { draw, spawned, delay_ticks: 0, .. }) =
         log.steps.first().map(|step| &step.outcome)
@@ -132,11 +132,15 @@ fn told(log: &EpisodeLog, facts: &BTreeMap<u32, NpcFacts>) -> Vec<Told> {
     for (nth, effect) in draw.effects.iter().enumerate() {
         let Effect::Spawn(request) = effect else { continue };
         let id = ids.next();
+        let later = log.steps.iter().skip(1).flat_map(|step| step.outcome.effects());
+        let is_ordered =
+            |effect: &Effect| matches!(effect, Effect::Order(order) if Some(order.bearer) == request.bearer);
+        let is_free = !later.chain(&draw.effects).any(is_ordered);
         // What hides it has an id, too.
         for _ in 1..effect.newcomers() {
             ids.next();
         }
-        if let Some((id, facts)) = id.and_then(|id| Some((*id, *facts.get(id)?))) {
+        if let Some((id, facts)) = id.filter(|_| is_free).and_then(|id| Some((*id, *facts.get(id)?))) {
             told.push(Told { id, request: *request, course: draw.course(nth).cloned(), facts });
         }
     }

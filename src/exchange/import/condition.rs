@@ -413,6 +413,17 @@ impl Waiting<'_, '_> {
                 for name in self.counted(source, mark, room)? {
                     let there = self.cast.begins(source, mark, &name)?;
                     let ahead_m = self.cast.station_m(there) - self.cast.station_m(here);
+                    let pair = |of: &str, to: &str| (of.to_owned(), to.to_owned());
+                    let (back, front) =
+                        if ahead_m >= 0.0 { pair(&room.of, &name) } else { pair(&name, &room.of) };
+                    let outlines_m = match room.is_free_space {
+                        true => {
+                            self.cast.overhang_m(source, mark, &front, false)?
+                                + self.cast.overhang_m(source, mark, &back, true)?
+                        }
+                        false => 0.0,
+                    };
+                    let ahead_m = ahead_m.signum() * (ahead_m.abs() - outlines_m).max(0.0);
                     let offset_m = |point: Vec2| self.cast.route.path.project(point).offset_m;
                     let left_m = offset_m(there) - offset_m(here);
                     let is_in = |lanes: &Beside| lanes.right_m <= left_m && left_m <= lanes.left_m;

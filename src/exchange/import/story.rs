@@ -13,7 +13,7 @@ use super::catalogue;
 use super::position::Position;
 use super::sky::{Change, Sky};
 use super::source::{Mark, Source, children, element, elements};
-use super::trigger::{Condition, Trigger, When, acts_at_once, both, is_less, reduced, trigger};
+use super::trigger::{Condition, GROUPS_MAX, Trigger, When, acts_at_once, both, is_less, reduced, trigger};
 use super::weather::{Weather, weather};
 
 /// The latest minor version that is read.
@@ -356,7 +356,12 @@ impl Cast {
             }
             let begins = begins.get_or_insert_with(|| trigger(source, scope.act)).clone();
             // What an action asks for is told even where its trigger is refused.
-            let when = trigger(source, event).zip(begins).map(|(event, act)| both(&act, &event));
+            let when = trigger(source, event).zip(begins).and_then(|(own, act)| {
+                let reason =
+                    format!("with those of its act it has more than {GROUPS_MAX} groups of conditions");
+                source.refuse_if(own.len() * act.len() > GROUPS_MAX, event, reason)?;
+                Some(both(&act, &own))
+            });
             if when.is_none() {
                 own.iter().for_each(|name| source.tear(name));
             }

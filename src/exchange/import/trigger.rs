@@ -14,7 +14,7 @@ const CONDITIONS_MAX: usize = 16;
 const LANES_MAX: i32 = 20;
 
 /// Groups of a trigger.
-const GROUPS_MAX: usize = 64;
+pub const GROUPS_MAX: usize = 64;
 
 const STORYBOARD_ELEMENTS: [&str; 6] = ["story", "act", "maneuverGroup", "maneuver", "event", "action"];
 
@@ -176,11 +176,12 @@ pub fn trigger(source: &mut Source, parent: Node) -> Option<Trigger> {
     for group in elements(trigger, "ConditionGroup") {
         let mut own = source.required(group, "Condition").map(|_| Trigger::new());
         for node in elements(group, "Condition") {
-            own = condition(source, node).zip(own).map(|(found, own)| both(&own, &found));
+            let found = condition(source, node);
+            let count = own.iter().chain(&found).map(|groups| groups.len().max(1)).product::<usize>();
+            let reason = format!("its conditions on several entities make more than {GROUPS_MAX} groups");
+            source.refuse_if(count > GROUPS_MAX, group, reason)?;
+            own = found.zip(own).map(|(found, own)| both(&own, &found));
         }
-        let count = own.iter().chain(&groups).map(Vec::len).sum::<usize>();
-        let reason = format!("its conditions on several entities make more than {GROUPS_MAX} groups");
-        source.refuse_if(count > GROUPS_MAX, group, reason)?;
         groups = own.zip(groups).map(|(own, groups)| [groups, own].concat());
     }
     groups

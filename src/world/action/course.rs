@@ -6,7 +6,7 @@ use std::sync::Arc;
 use avastra_lang::model::command::Command;
 use avastra_lang::model::expr::{Expr, Who};
 use avastra_lang::model::vocabulary::Known;
-use avastra_lang::model::{ManoeuvreDef, MomentFacts, NpcFacts, PhaseDef, REPEAT, Value};
+use avastra_lang::model::{ManoeuvreDef, PhaseDef, REPEAT, Value};
 
 use super::later::{Later, LaterMoment};
 
@@ -35,8 +35,7 @@ impl Course {
     /// The part of that place, with the values of its arguments.
     pub(super) fn new(parts: Arc<[Part]>, part: usize, later: Later) -> Course {
         let Part { manoeuvre, definition, .. } = &parts[part];
-        let moment =
-            LaterMoment { moment: MomentFacts::default(), npc: NpcFacts::default(), bearers: Vec::new() };
+        let moment = LaterMoment::default();
         // It asks for no moment. What has no value counts as once.
         let times = definition.repeat.as_ref().map_or(1.0, |times| later.value(times, &moment).number());
         let times = times.clamp(*REPEAT.start(), *REPEAT.end()).max(*REPEAT.start()) as usize;
@@ -56,14 +55,10 @@ impl Course {
         self.definition().phases.len() * self.times
     }
 
-    fn phase(&self, phase: usize) -> &PhaseDef {
+    /// A phase, counted as often as it comes.
+    pub fn phase(&self, phase: usize) -> &PhaseDef {
         let phases = &self.definition().phases;
         &phases[phase % phases.len()]
-    }
-
-    /// A phase as it is written, counted as often as it comes.
-    pub fn written(&self, phase: usize) -> &PhaseDef {
-        self.phase(phase)
     }
 
     /// Whether rules say when its phases may begin.
@@ -73,9 +68,7 @@ impl Course {
 
     /// The value of an expression of its phases, if that is the same at every moment.
     pub fn constant(&self, expr: &Expr) -> Option<Value> {
-        let moment =
-            LaterMoment { moment: MomentFacts::default(), npc: NpcFacts::default(), bearers: Vec::new() };
-        (expr.known() == Known::Road).then(|| self.later.value(expr, &moment))
+        (expr.known() == Known::Road).then(|| self.later.value(expr, &LaterMoment::default()))
     }
 
     /// The name of whom a phase asks, by its index in the space.

@@ -18,7 +18,7 @@ pub(super) struct Later {
 }
 
 /// The moment in which it is asked.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct LaterMoment {
     pub moment: MomentFacts,
     /// The road user that is asked about.

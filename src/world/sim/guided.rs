@@ -18,7 +18,7 @@ use super::trace::Trace;
 use super::world::DT_S;
 
 /// How fast one moves to the side that is told no `aside`, m/s. Ours.
-const ASIDE_MPS: f64 = 1.0;
+pub const ASIDE_MPS: f64 = 1.0;
 
 /// An ego vehicle that is slower does not arrive: who is to meet it stands, too, m/s.
 const STANDING_MPS: f64 = 0.01;

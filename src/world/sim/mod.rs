@@ -59,6 +59,7 @@ pub use contact::Contact;
 pub use ego::{Control, VehicleParameters, pedal_acceleration_mps2, pedals_for};
 pub use encroachment::Encroachment;
 pub use environment::friction_scale;
+pub use guided::ASIDE_MPS;
 pub use incident::Incident;
 pub use moment::MomentParts;
 pub use right_of_way::right_of_way;

@@ -2,7 +2,7 @@
 //!
 //! Exactly, everyone is a `FollowTrajectoryAction` along a polyline with absolute times, so a player needs no model of
 //! driving. The last vertex is at the end of the recording, because a player may let what has no vertex left roll on.
-//! `natural` has the others as actions that a person would write. A road user that appears or leaves on the way is added
+//! `natural` has the others as actions that a person would write. `space` writes a space, of which nothing is recorded. A road user that appears or leaves on the way is added
 //! and deleted. Names, in the file's order: `ego`, then `npc_N` for the road user that claims call `npc#N`.
 //!
 //! Left out: what a driving system saw or planned, heights (a player puts road users on the map's road), and lights of
@@ -156,6 +156,7 @@ fn storyboard(recording: &Recording, style: Style, exact: &[&Actor]) -> Element 
             (begins(recording, actor, style), events(recording, actor, style))
         } else {
             let told = (version == Version::V1_2).then(|| natural::as_told(recording, actor)).flatten();
+            let told = told.map(|(begins, events)| (Some(begins), events));
             told.unwrap_or_else(|| Natural::of(recording, actor, version).written())
         };
         init.extend(begins);

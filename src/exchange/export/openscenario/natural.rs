@@ -1,7 +1,7 @@
 //! Other road users as a person would write them: where they begin, how fast, when they change speed and lane, which way
 //! they take at junctions.
 //!
-//! It is an approximation (`pace` and `lanes` say how near), for players whose ego vehicle drives otherwise than the
+//! Those who follow a trajectory from the start are written as they are told ([`as_told`]). Of others it is an approximation (`pace` and `lanes` say how near), for players whose ego vehicle drives otherwise than the
 //! recorded one: a pedestrian that set out as the ego vehicle came near does so when it comes as near, and what the ego
 //! vehicle hit stops when it is hit.
 
@@ -95,13 +95,15 @@ pub fn names(actors: &[&Actor]) -> String {
     actors.iter().map(|actor| actor.name()).collect::<Vec<_>>().join(", ")
 }
 
-/// How a road user begins and what it does, as the scenario tells it, and not as it was seen: of those that appear at the start and
-/// follow a trajectory, whatever comes. `None` of others, and of those who are told what no other player knows.
-pub fn as_told(recording: &Recording, actor: &Actor) -> Option<(Option<Element>, Vec<Element>)> {
-    let told = recording.told.iter().find(|told| told.id == actor.id)?;
-    let ego = &recording.seen.ego.samples[0];
+/// How a road user begins and what it does, as the scenario tells it, and not as it was seen: of those that appear at the start,
+/// follow a trajectory, whatever comes, and get no orders later. `None` of others, and of those who are told what no other tool knows.
+pub fn as_told(recording: &Recording, actor: &Actor) -> Option<(Element, Vec<Element>)> {
+    let own = recording.told.iter().position(|told| told.id == actor.id)?;
+    if recording.told[own].request.verb != Verb::Follow {
+        return None;
+    }
     let of = |id: u32| recording.seen.others.iter().find(|other| other.id == id);
-    let players = recording.told.iter().filter_map(|told| {
+    let players = recording.told.iter().map(|told| {
         let actor = of(told.id)?;
         let (request, course) = (&told.request, told.course.as_ref());
         Some(Player { name: actor.name(), actor, request, course, facts: told.facts })
@@ -109,16 +111,10 @@ pub fn as_told(recording: &Recording, actor: &Actor) -> Option<(Option<Element>,
     let cast = Cast {
         road: &recording.road,
         ego_front_m: VehicleParameters::MKZ.rear_axle_to_front_m,
-        ego_mps: ego.velocity_mps.norm(),
-        players: players.collect(),
+        players: players.collect::<Option<_>>()?,
         duration_s: recording.duration_s(),
     };
-    let name = actor.name();
-    let player = cast.players.iter().find(|player| player.name == name)?;
-    if told.request.verb != Verb::Follow {
-        return None;
-    }
-    let (begins, mut events) = cast.story(player).ok()?;
+    let (begins, mut events) = cast.story(own).ok()?;
     // What it was to do after a contact it does not do.
     if let Some(touch) = touch(recording, actor) {
         let touched = actor.samples[touch].tick;
@@ -127,7 +123,7 @@ pub fn as_told(recording: &Recording, actor: &Actor) -> Option<(Option<Element>,
     }
     events.extend(stop_where_hit(recording, actor));
     events.extend(leaves(recording.seen.end_tick, actor, Version::V1_2));
-    Some((Some(begins), events))
+    Some((begins, events))
 }
 
 impl<'a> Natural<'a> {

@@ -3,7 +3,7 @@
 //! Whoever drives along the lanes is placed in one and given a route; who follows another way is given that. A phase begins when the one
 //! before it is over, or, if it waits for something, when that holds while the one before it runs or after that.
 
-use core::f64::consts::PI;
+use core::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
 
 use avastra_base::geometry::{Path, PathPoint, Pose, SMOOTH_STEP_SLOPE_MAX, wrap_angle};
@@ -11,9 +11,10 @@ use avastra_campaign::episode::Actor;
 use avastra_lang::model::command::Command;
 use avastra_lang::model::expr::Expr;
 use avastra_lang::model::vocabulary::Verb;
-use avastra_lang::model::{MomentFacts, NpcFacts, Road, Trajectory};
+use avastra_lang::model::{NpcFacts, Road, Trajectory};
 use avastra_road::{Lane, LaneIndex, LanePlace, RoadMap};
 use avastra_world::action::{Course, LaterMoment, SpawnRequest};
+use avastra_world::sim::ASIDE_MPS;
 
 use super::super::xml::Element;
 use super::Version;
@@ -27,19 +28,16 @@ use super::when;
 /// A way that keeps this near to the middle of lanes, m, and no more across them, rad, leads along them.
 const LANE_M: f64 = 0.1;
 const LANE_RAD: f64 = 0.1;
-/// It is looked at in such steps, m.
+/// A way is compared with lanes in such steps, m.
 const STEP_M: f64 = 0.5;
 /// The corner of a way has two vertices that are nearer than this, m.
 const BEND_M: f64 = 1e-3;
-/// How fast one moves to the side that is told no speed for it, m/s, as the world has it.
-const ASIDE_MPS: f64 = 1.0;
 
 /// Who is there at the start.
 pub struct Cast<'a> {
     pub road: &'a Road,
     /// Station of the ego vehicle's front on its route, m.
     pub ego_front_m: f64,
-    pub ego_mps: f64,
     pub players: Vec<Player<'a>>,
     pub duration_s: f64,
 }
@@ -60,7 +58,7 @@ impl Player<'_> {
     }
 }
 
-/// The way of somebody.
+/// How a road user moves.
 enum Way<'a> {
     /// It stays where it is.
     Stands,
@@ -74,9 +72,18 @@ impl<'a> Cast<'a> {
     ///
     /// # Errors
     /// What no other player can be told, in words.
-    pub fn story(&self, player: &Player<'a>) -> Result<(Element, Vec<Element>), String> {
+    pub fn story(&self, nth: usize) -> Result<(Element, Vec<Element>), String> {
+        let player = &self.players[nth];
         let way = self.way(player)?;
-        Ok((self.begins(player, &way), self.events(player, &way)?))
+        Ok((self.begins(player, &way), self.events(nth, &way)?))
+    }
+
+    /// Whether somebody looks along the ego vehicle's route at the start.
+    pub fn looks_ahead(&self, actor: &Actor) -> bool {
+        let pose = actor.samples[0].pose;
+        let path = &self.road.route.path;
+        let along_rad = path.heading_at(path.project(pose.position).station_m);
+        wrap_angle(pose.heading_rad - along_rad).abs() < FRAC_PI_2
     }
 
     fn way(&self, player: &Player<'a>) -> Result<Way<'a>, String> {
@@ -94,8 +101,14 @@ impl<'a> Cast<'a> {
                     return does("is turned away from where it goes");
                 }
                 let lanes = lanes_along(&self.road.map, &trajectory.path, request.distance_m);
-                let lanes = lanes.map(|(begin, places)| Way::Lanes(trajectory, begin, places));
-                Ok(lanes.unwrap_or(Way::Free(trajectory)))
+                match lanes {
+                    Some((begin, places)) => Ok(Way::Lanes(trajectory, begin, places)),
+                    // Beside a bend the stations are not those of the way that is driven.
+                    None if request.offset_m != 0.0 && is_bent(&trajectory.path) => {
+                        does("goes beside a way that bends")
+                    }
+                    None => Ok(Way::Free(trajectory)),
+                }
             }
             _ => does("drives or walks by avastra's own models"),
         }
@@ -112,8 +125,8 @@ impl<'a> Cast<'a> {
                 let at = LanePlace { offset_m: request.offset_m, ..*begin };
                 let begins =
                     private.holding(teleport(lane_position_aside(map, at))).holding(speed(request.speed_mps));
-                let leaves = |place: &LanePlace| map.lane(place.lane).successors.len() > 1;
-                match places.iter().any(leaves) {
+                let forks = |place: &LanePlace| map.lane(place.lane).successors.len() > 1;
+                match places.iter().any(forks) {
                     true => begins.holding(route(
                         &format!("{name}_route"),
                         places.iter().map(|place| lane_position(map, *place)),
@@ -138,7 +151,8 @@ impl<'a> Cast<'a> {
     }
 
     /// An event for each phase.
-    fn events(&self, player: &Player<'a>, way: &Way<'a>) -> Result<Vec<Element>, String> {
+    fn events(&self, nth: usize, way: &Way<'a>) -> Result<Vec<Element>, String> {
+        let player = &self.players[nth];
         let mut events: Vec<Element> = Vec::new();
         let mut offset_m = player.request.offset_m;
         let mut most_mps = player.request.speed_mps;
@@ -148,9 +162,8 @@ impl<'a> Cast<'a> {
                 return Err("rules say when a phase may begin".to_owned());
             }
             // Who arrives somewhere in time may be fast on the way.
-            let is_timed = course.written(at).command.early.is_some();
-            let speed_mps =
-                course.written(at).command.speed.as_ref().and_then(|speed| course.constant(speed));
+            let is_timed = course.phase(at).command.early.is_some();
+            let speed_mps = course.phase(at).command.speed.as_ref().and_then(|speed| course.constant(speed));
             let told_mps = speed_mps.map_or(0.0, |value| value.number());
             most_mps = most_mps.max(if is_timed { f64::INFINITY } else { told_mps });
             let name = event_name(player, at);
@@ -158,7 +171,7 @@ impl<'a> Cast<'a> {
             let actions = actions.into_iter().enumerate();
             let actions =
                 actions.map(|(nth, what)| action(&format!("{name}_action_{}", nth + 1), what)).collect();
-            let groups = self.groups(player, course, at, &name)?;
+            let groups = self.groups(nth, course, at, &name)?;
             events.push(event_of_groups(&name, actions, groups));
         }
         events.extend(self.arrives(player, way, most_mps));
@@ -182,12 +195,12 @@ impl<'a> Cast<'a> {
     /// When a phase begins: one of these groups of conditions holds.
     fn groups(
         &self,
-        player: &Player,
+        nth: usize,
         course: &Course,
         at: usize,
         name: &str,
     ) -> Result<Vec<Vec<Element>>, String> {
-        let phase = course.written(at);
+        let (player, phase) = (&self.players[nth], course.phase(at));
         let time_s = |written: &Option<Expr>| match written {
             None => Ok(None),
             Some(expr) => match course.constant(expr) {
@@ -214,7 +227,7 @@ impl<'a> Cast<'a> {
             };
             return Ok(vec![vec![when]]);
         };
-        let groups = when::groups(self, player, course, once)?;
+        let groups = when::groups(self, nth, course, at, once)?;
         if after_s > 0.0 && groups.iter().any(|group| group.len() > 1) {
             return Err("a phase waits for a time after several conditions".to_owned());
         }
@@ -254,13 +267,11 @@ impl<'a> Cast<'a> {
         at: usize,
         offset_m: &mut f64,
     ) -> Result<Vec<Element>, String> {
-        let written = &course.written(at).command;
+        let written = &course.phase(at).command;
         if written.parts().any(|expr| course.constant(expr).is_none()) {
             return Err("a phase tells what depends on the moment".to_owned());
         }
-        let moment =
-            LaterMoment { moment: MomentFacts::default(), npc: NpcFacts::default(), bearers: Vec::new() };
-        let Some(command) = course.command(at, &moment) else {
+        let Some(command) = course.command(at, &LaterMoment::default()) else {
             return Err("a phase tells what has no value".to_owned());
         };
         let mut actions = Vec::new();
@@ -274,6 +285,13 @@ impl<'a> Cast<'a> {
             let Way::Lanes(_, begin, _) = way else {
                 return Err("somebody moves to the side of a way of its own".to_owned());
             };
+            let is_cut_short = |before: usize| {
+                course.phase(before).command.offset.is_some()
+                    && (before + 1..=at).any(|later| course.phase(later).once.is_some())
+            };
+            if (0..at).any(is_cut_short) {
+                return Err("somebody may be told another place aside on its way to one".to_owned());
+            }
             let by_m = (to_m - *offset_m).abs();
             *offset_m = to_m;
             let lane = self.road.map.lane(begin.lane);
@@ -288,7 +306,8 @@ impl<'a> Cast<'a> {
     /// To be somewhere when the ego vehicle is at a place of its route.
     fn meets(&self, player: &Player, way: &Way<'a>, command: &Command) -> Result<Element, String> {
         let (Some(at_m), Some(reach_m), Some(0.0)) = (command.at_m, command.reach_m, command.early_s) else {
-            return Err("somebody arrives earlier or later than the ego vehicle".to_owned());
+            return Err("somebody arrives earlier or later than the ego vehicle, or where their ways cross"
+                .to_owned());
         };
         // The file says where its rear axle is, the language where its front is.
         let route = &self.road.route;
@@ -323,6 +342,12 @@ impl<'a> Cast<'a> {
             .holding_all(speed);
         Ok(private(meets))
     }
+}
+
+/// Whether a way is no straight line.
+fn is_bent(path: &Path) -> bool {
+    let begin = path.pose_at(0.0);
+    path.points().iter().any(|point| begin.to_local(point.position).y.abs() > BEND_M)
 }
 
 /// What the event of a phase is called.

@@ -53,8 +53,8 @@ pub struct SpaceFile {
     pub rows: usize,
 }
 
-/// A row on a road.
-struct Laid {
+/// A row on a road, with the file that it would have alone.
+struct RowFile {
     action: usize,
     map_path: PathBuf,
     file: Element,
@@ -71,7 +71,9 @@ pub fn space(
 ) -> SpaceFiles {
     let space = arena.table().space();
     let mut left_out: BTreeMap<String, Vec<String>> = BTreeMap::new();
-    let mut forms: Vec<((usize, PathBuf, String), Vec<Laid>)> = Vec::new();
+    // In the order of their first rows.
+    let mut places: BTreeMap<(usize, PathBuf, String), usize> = BTreeMap::new();
+    let mut forms: Vec<Vec<RowFile>> = Vec::new();
     for (nth, row) in arena.rows_on_roads() {
         let road = arena.road(nth);
         let row = &space.rows[row];
@@ -80,24 +82,27 @@ pub fn space(
                 left_out.entry(reason).or_default().push(format!("{} on {}", row.label, road.name));
             }
             Ok(laid) => {
-                let key = (laid.action, laid.map_path.clone(), template::form(&laid.file));
-                match forms.iter_mut().find(|(known, _)| *known == key) {
-                    Some((_, rows)) => rows.push(laid),
-                    None => forms.push((key, vec![laid])),
+                let next = forms.len();
+                let form = template::form(&laid.file);
+                let place = *places.entry((laid.action, laid.map_path.clone(), form)).or_insert(next);
+                if place == next {
+                    forms.push(Vec::new());
                 }
+                forms[place].push(laid);
             }
         }
     }
     let mut templates = Vec::new();
-    for (place, ((action, map_path, _), rows)) in forms.iter().enumerate() {
-        let own = &space.actions[*action].name;
-        let of_action = |((other, ..), _): &&((usize, PathBuf, String), Vec<Laid>)| other == action;
-        let name = match forms.iter().filter(of_action).count() {
+    for (place, rows) in forms.iter().enumerate() {
+        let action = rows[0].action;
+        let own = &space.actions[action].name;
+        let count = |forms: &[Vec<RowFile>]| forms.iter().filter(|rows| rows[0].action == action).count();
+        let name = match count(&forms) {
             1 => own.clone(),
-            _ => format!("{own}_{}", forms[..=place].iter().filter(of_action).count()),
+            _ => format!("{own}_{}", count(&forms[..=place])),
         };
         let Template { text, variations } = template::of(rows, &scenario_file(&name));
-        let map_path = map_path.clone();
+        let map_path = rows[0].map_path.clone();
         templates.push(SpaceFile { name, text, variations, map_path, rows: rows.len() });
     }
     SpaceFiles { templates, left_out }
@@ -107,7 +112,7 @@ pub fn space(
 ///
 /// # Errors
 /// Why it is left out, in words.
-fn laid(setup: &Setup, row: &Row, map_file: &str) -> Result<Laid, String> {
+fn laid(setup: &Setup, row: &Row, map_file: &str) -> Result<RowFile, String> {
     let space = setup.table.space();
     if !space.each_step.is_empty() {
         return Err("the space changes its states in every step".to_owned());
@@ -133,28 +138,22 @@ fn laid(setup: &Setup, row: &Row, map_file: &str) -> Result<Laid, String> {
     let mut players = Vec::new();
     for (nth, id) in newcomers {
         let Effect::Spawn(request) = &draw.effects[nth] else { continue };
-        let (Some(actor), Some(facts)) =
-            (seen.others.iter().find(|actor| actor.id == id), world.npc_facts(id))
-        else {
-            continue;
-        };
+        let actor = seen.others.iter().find(|actor| actor.id == id);
+        let (actor, facts) = actor.zip(world.npc_facts(id)).expect("who appeared is there");
         let name = request.bearer.map_or_else(|| actor.name(), |who| space.bearers[who].clone());
+        if players.iter().any(|player: &Player| player.name == name) {
+            return Err("two of its road users would have one name".to_owned());
+        }
         players.push(Player { name, actor, request, course: draw.course(nth), facts });
     }
     if draw.effects.iter().any(|effect| matches!(effect, Effect::Order(_))) {
         return Err("it gives orders".to_owned());
     }
     let duration_s = space.episode.step_s * f64::from(space.episode.step_limit);
-    let cast = Cast {
-        road: setup.road,
-        ego_front_m: world.moment_facts().ego_front_m,
-        ego_mps: setup.start.ego_mps,
-        players,
-        duration_s,
-    };
+    let cast = Cast { road: setup.road, ego_front_m: world.moment_facts().ego_front_m, players, duration_s };
     let file = file(setup, row, &seen, &cast, map_file)?;
     let values = values(setup, row, &draw);
-    Ok(Laid { action: row.action, map_path: setup.road.map_path.clone(), file, values })
+    Ok(RowFile { action: row.action, map_path: setup.road.map_path.clone(), file, values })
 }
 
 /// The document of a row; its parameters are declared where templates are made.
@@ -182,11 +181,11 @@ fn file(setup: &Setup, row: &Row, seen: &Recorder, cast: &Cast, map_file: &str) 
     let ego = Element::new("Private")
         .with("entityRef", "ego")
         .holding(teleport(lane_position(&road.map, road.start)))
-        .holding(speed(cast.ego_mps))
+        .holding(speed(setup.start.ego_mps))
         .holding(private(goal));
     let (mut begins, mut groups) = (vec![ego], Vec::new());
-    for player in &cast.players {
-        let (begin, events) = cast.story(player)?;
+    for (nth, player) in cast.players.iter().enumerate() {
+        let (begin, events) = cast.story(nth)?;
         begins.push(begin);
         if !events.is_empty() {
             groups.push(maneuver_group(&player.name, Some(&player.name), events));
@@ -220,14 +219,14 @@ fn values(setup: &Setup, row: &Row, draw: &Draw) -> Vec<(String, String, &'stati
     let known = row.axes.iter().chain(&draw.values);
     let known: BTreeMap<&str, _> = known.map(|(name, value)| (&**name, *value)).collect();
     let parameters = space.actions[row.action].parameters.iter();
-    let said = parameters.filter_map(|parameter| {
-        let value = *known.get(&*parameter.name)?;
+    let said = parameters.map(|parameter| {
+        let value = known[&*parameter.name];
         let (text, kind) = match parameter.ty {
             Type::Bool => (space.show(value, parameter.ty), "boolean"),
             Type::Enum(_) => (space.show(value, parameter.ty), "string"),
             Type::Int | Type::Quantity(_) => (number(value.number()), "double"),
         };
-        Some((parameter.name.to_string(), text, kind))
+        (parameter.name.to_string(), text, kind)
     });
     said.collect()
 }

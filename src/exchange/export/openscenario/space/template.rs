@@ -5,26 +5,33 @@ use std::fmt::Write;
 
 use super::super::super::DATE;
 use super::super::super::xml::Element;
-use super::Laid;
+use super::RowFile;
 
+/// A file with parameters, and the file that lists their values.
 pub struct Template {
     pub text: String,
+    /// `None` where nothing tells the rows apart.
     pub variations: Option<String>,
 }
+
+/// Whose the facts of a file are.
+const HEADER: &str = "road";
 
 /// A parameter: its name, its type, and its value in each file.
 struct Parameter {
     name: String,
+    /// The entity that it is about; empty for one of the action.
+    owner: String,
     kind: &'static str,
     values: Vec<String>,
 }
 
 /// The template of files of one form, which will be called `file`.
-pub fn of(rows: &[Laid], file: &str) -> Template {
+pub fn of(rows: &[RowFile], file: &str) -> Template {
     let mut parameters = declared(rows);
     let mut taken: BTreeSet<String> = parameters.iter().map(|parameter| parameter.name.clone()).collect();
     let places = places(&rows[0].file);
-    let values: Vec<Vec<Place>> = rows.iter().map(|row| self::places(&row.file)).collect();
+    let values: Vec<Vec<Attribute>> = rows.iter().map(|row| self::places(&row.file)).collect();
     let mut given = Vec::new();
     for (at, place) in places.iter().enumerate() {
         let column: Vec<&str> = values.iter().map(|places| places[at].value).collect();
@@ -32,18 +39,25 @@ pub fn of(rows: &[Laid], file: &str) -> Template {
             given.push(None);
             continue;
         }
-        let is_it = |known: &&Parameter| known.kind != "string" && known.values == column;
-        if let Some(known) = parameters.iter().find(is_it) {
+        // What has the values of another one follows from it; but a fact of the header is one of its own.
+        let is_same = |known: &&Parameter| {
+            known.kind == place.kind
+                && known.owner != HEADER
+                && place.owner != HEADER
+                && known.values == column
+        };
+        if let Some(known) = parameters.iter().find(is_same) {
             given.push(Some(format!("${}", known.name)));
             continue;
         }
         let own = format!("{}_{}", place.owner, place.word);
         let names = (1..).map(|nth| if nth == 1 { own.clone() } else { format!("{own}_{nth}") });
-        let name = names.into_iter().find(|name| !taken.contains(name)).unwrap_or_default();
+        let name =
+            names.into_iter().find(|name| !taken.contains(name)).expect("there is always a next number");
         taken.insert(name.clone());
         given.push(Some(format!("${name}")));
         let values = column.into_iter().map(str::to_owned).collect();
-        parameters.push(Parameter { name, kind: place.kind, values });
+        parameters.push(Parameter { name, owner: place.owner.clone(), kind: place.kind, values });
     }
     let declarations = parameters.iter().map(|parameter| {
         Element::new("ParameterDeclaration")
@@ -58,11 +72,12 @@ pub fn of(rows: &[Laid], file: &str) -> Template {
         true => whole.document(),
         false => whole.holding_second(declarations).document(),
     };
-    Template { text, variations: (rows.len() > 1).then(|| variations(rows, &parameters, file)) }
+    let has_values = rows.len() > 1 && !parameters.is_empty();
+    Template { text, variations: has_values.then(|| variations(rows, &parameters, file)) }
 }
 
 /// An attribute of a file.
-struct Place<'e> {
+struct Attribute<'e> {
     /// The entity that it is about.
     owner: String,
     /// What it is, in a word.
@@ -73,15 +88,16 @@ struct Place<'e> {
 }
 
 /// All attributes of a file in its order.
-fn places(file: &Element) -> Vec<Place<'_>> {
+fn places(file: &Element) -> Vec<Attribute<'_>> {
     let mut found = Vec::new();
     note(file, "scenario", &mut found);
     found
 }
 
-fn note<'e>(element: &'e Element, owner: &str, found: &mut Vec<Place<'e>>) {
+fn note<'e>(element: &'e Element, owner: &str, found: &mut Vec<Attribute<'e>>) {
     let named = match element.name() {
         "Private" => element.attribute("entityRef"),
+        "FileHeader" => Some(HEADER),
         "ScenarioObject" => element.attribute("name"),
         "ManeuverGroup" => element.attribute("name").and_then(|name| name.strip_suffix("_group")),
         _ => None,
@@ -93,7 +109,7 @@ fn note<'e>(element: &'e Element, owner: &str, found: &mut Vec<Place<'e>>) {
             "laneId" => "integer",
             _ => "double",
         };
-        found.push(Place { owner: owner.to_owned(), word: word(element.name(), name), kind, value });
+        found.push(Attribute { owner: owner.to_owned(), word: word(element.name(), name), kind, value });
     }
     element.children().iter().for_each(|child| note(child, owner, found));
 }
@@ -101,6 +117,7 @@ fn note<'e>(element: &'e Element, owner: &str, found: &mut Vec<Place<'e>>) {
 /// What an attribute is called as a parameter.
 fn word(element: &str, attribute: &'static str) -> &'static str {
     match (element, attribute) {
+        ("Property", "value") => "speed_limit",
         ("AbsoluteTargetSpeed" | "AbsoluteSpeed" | "SpeedCondition" | "RelativeSpeedCondition", "value") => {
             "speed"
         }
@@ -127,7 +144,8 @@ pub fn form(file: &Element) -> String {
 fn shape(element: &Element, text: &mut String) {
     let _ = write!(text, "<{}", element.name());
     for (name, value) in element.attributes() {
-        let is_number = value.parse::<f64>().is_ok();
+        let is_number =
+            value.parse::<f64>().is_ok_and(|_| value.ends_with(|letter: char| letter.is_ascii_digit()));
         let _ = write!(text, " {name}={}", if is_number { "#" } else { value });
     }
     element.children().iter().for_each(|child| shape(child, text));
@@ -135,16 +153,16 @@ fn shape(element: &Element, text: &mut String) {
 }
 
 /// The parameters of the action that tell files apart.
-fn declared(rows: &[Laid]) -> Vec<Parameter> {
+fn declared(rows: &[RowFile]) -> Vec<Parameter> {
     let own = rows[0].values.iter().enumerate().map(|(at, (name, _, kind))| {
         let values = rows.iter().map(|row| row.values[at].1.clone()).collect();
-        Parameter { name: name.clone(), kind, values }
+        Parameter { name: name.clone(), owner: String::new(), kind, values }
     });
     own.filter(|parameter| parameter.values.iter().any(|value| *value != parameter.values[0])).collect()
 }
 
 /// The file that lists the values.
-fn variations(rows: &[Laid], parameters: &[Parameter], file: &str) -> String {
+fn variations(rows: &[RowFile], parameters: &[Parameter], file: &str) -> String {
     let header = Element::new("FileHeader")
         .with("revMajor", 1)
         .with("revMinor", 2)
