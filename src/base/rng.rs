@@ -55,6 +55,8 @@ pub enum Stream {
     Permutation = 42,
     /// Seeds of the parts of an estimate.
     Estimate = 51,
+    /// What a file of another tool lets chance choose; one index for each parameter.
+    Import = 61,
 }
 
 /// The stream of one consumer; `index` tells its uses apart, and may be the number of a step.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use avastra_campaign::episode::{End, Outcome};
 use avastra_campaign::files::PlainName;
 use avastra_campaign::run::{Stage, recorded};
-use avastra_exchange::import::{self, Files, Refusal};
+use avastra_exchange::import::{self, Files, Refusal, Request};
 use avastra_lang::check::{self, ReadError};
 use avastra_world::action::ActionTable;
 
@@ -96,8 +96,14 @@ fn one(
 ) -> Result<Result<Taken, Vec<Refusal>>, Failure> {
     let text = load::text(file)?;
     let beside = folder_of(file);
-    let (name, ego) = (file.file_stem().unwrap_or_default().to_string_lossy(), arguments.ego.as_deref());
-    let imported = match import::openscenario(&text, &name, ego, parameters, &Beside { folder: beside }) {
+    let name = file.file_stem().unwrap_or_default().to_string_lossy();
+    let request = Request {
+        name: &name,
+        ego: arguments.ego.as_deref(),
+        parameters,
+        variations_max: arguments.variations,
+    };
+    let imported = match import::openscenario(&text, &request, &Beside { folder: beside }) {
         Ok(imported) => imported,
         Err(refusals) => return Ok(Err(refusals)),
     };

@@ -17,6 +17,9 @@ EGO = {
     "light_state": "Car1", "parking_demo": "Target", "speed-profile": "Car1", "tunnels": "Car1", "velodrome": "Car1",
 }
 
+#: ALKS's logical files have up to 52,500.
+VARIATIONS = "60000"
+
 
 def main():
     avastra, folders = sys.argv[1], [Path(folder) for folder in sys.argv[2:]]
@@ -29,7 +32,7 @@ def main():
             out = Path("target/interop/imports") / folder.name / file.relative_to(folder).with_suffix("")
             ego = ["--ego", EGO[file.stem]] if file.stem in EGO else []
             began = time.monotonic()
-            done = subprocess.run([avastra, "import", "--format", "json", "--out", out, *ego, file],
+            done = subprocess.run([avastra, "import", "--format", "json", "--variations", VARIATIONS, "--out", out, *ego, file],
                                   capture_output=True, text=True, check=False)
             slowest = max(slowest, time.monotonic() - began)
             if done.returncode not in (0, 2):

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
-use avastra::import::{Files, openscenario};
+use avastra::import::{Files, Imported, Refusal, Request, VARIATIONS_USUAL, openscenario};
 use avastra::rng;
 use avastra::rng::Stream;
 
@@ -26,15 +26,15 @@ const FILES: [&str; 10] = [
     "beside",
 ];
 
-/// Files of variations, and how many rows they make: of the second one, a parameter is drawn in each.
-const ROWS: [(&str, usize); 2] = [("crossing_speeds", 12), ("profile_values", 726)];
+/// Files of variations, and how many rows they make: of the last one, a parameter is drawn in each.
+const ROWS: [(&str, usize); 3] = [("crossing_speeds", 12), ("crossing_drawn", 12), ("profile_values", 726)];
 
 /// A scenario by hand, in which the weather changes.
 const WET: &str = "tests/cases/exports/wet_corner.ava";
 
 #[test]
 fn every_file_becomes_a_space_or_is_refused_with_its_lines() {
-    for name in FILES.into_iter().chain(["profile_values"]) {
+    for name in FILES.into_iter().chain(["profile_values", "crossing_drawn"]) {
         let scratch = tempfile::tempdir().expect("a scratch directory");
         let folder = scratch.path().display().to_string();
         let file = format!("{AREA}/{name}.xosc");
@@ -190,12 +190,49 @@ const HEADINGS: [(&str, &str, &str); 9] = [
     ("revMinor=\"3\"", r#"h="0.5""#, "begins along its lane"),
 ];
 
+/// A file as it is imported without options.
+fn import(text: &str, name: &str, files: &dyn Files) -> Result<Imported, Vec<Refusal>> {
+    let request = Request { name, ego: None, parameters: &BTreeMap::new(), variations_max: VARIATIONS_USUAL };
+    openscenario(text, &request, files)
+}
+
+/// Values that are drawn come again with the same seed, stay what they are beside other parameters, and have bounds.
+#[test]
+fn values_are_drawn_for_as_many_test_runs_as_the_file_asks_for() {
+    let files = Kept::with("corner");
+    let drawn = read(&format!("{AREA}/crossing_drawn.xosc"));
+    let said = |text: &str| match import(text, "case", &files) {
+        Ok(imported) => imported.space.unwrap_or_default(),
+        Err(refusals) => refusals.into_iter().map(|refusal| refusal.reason + "\n").collect(),
+    };
+    let with = |old: &str, new: &str| {
+        assert!(drawn.contains(old), "{old}");
+        said(&drawn.replace(old, new))
+    };
+    assert_eq!(said(&drawn), said(&drawn));
+    assert_ne!(said(&drawn), with("\"7\"", "\"8\""));
+    for (old, new, wanted) in [
+        ("numberOfTestRuns=\"12\"", "numberOfTestRuns=\"0\"", "a whole number above 0"),
+        ("\"12\"", "\"3001\"", "3000 are read, up to 60000 with `--variations`"),
+        ("upperLimit=\"8\"", "upperLimit=\"1\"", "a range goes up"),
+        ("lowerLimit=\"4\"", "lowerLimit=\"7.999\"", "next to nothing"),
+        ("NormalDistribution", "LogNormalDistribution", "such a distribution is not read"),
+        ("\"walker_kmh\"", "\"parked\"", "lists values of `parked` again"),
+        ("\"walker_kmh\"", "\"nobody\"", "declares no parameter `nobody`"),
+        ("weight=\"3\"", "weight=\"-3\"", "less than 0"),
+        ("Range lowerLimit=\"4\"", "Range lowerLimit=\"4..\"", "no number"),
+    ] {
+        let said = with(old, new);
+        assert!(said.contains(wanted), "{new}: {said}, and not `{wanted}`");
+    }
+}
+
 #[test]
 fn a_variation_that_is_listed_twice_counts_once() {
     let files = Kept::with("corner");
     let text = read(&format!("{AREA}/crossing_speeds.xosc"))
         .replace(r#"<Element value="8"/>"#, r#"<Element value="5"/>"#);
-    let space = openscenario(&text, "case", None, &BTreeMap::new(), &files).expect("it is read").space;
+    let space = import(&text, "case", &files).expect("it is read").space;
     let space = space.unwrap_or_default();
     assert!(space.contains("8 variations have the values of another one, and count once"), "{space}");
 }
@@ -252,7 +289,7 @@ fn profiles_of_speeds_keep_their_times() {
     ] {
         assert!(profile.contains(old), "{old}");
         let text = profile.replace(old, new);
-        let said: String = match openscenario(&text, "case", None, &BTreeMap::new(), &files) {
+        let said: String = match import(&text, "case", &files) {
             Ok(imported) => imported.space.unwrap_or_default(),
             Err(refusals) => refusals.into_iter().map(|refusal| refusal.reason + "\n").collect(),
         };
@@ -314,7 +351,7 @@ fn conditions_and_words_are_read_or_refused() {
             wrong.borrow_mut().push(format!("{case}: {found:?}, and not `{wanted}`"));
         }
     };
-    let import = |text: &str| match openscenario(text, "case", None, &BTreeMap::new(), &files) {
+    let import = |text: &str| match import(text, "case", &files) {
         Ok(imported) => imported.space.unwrap_or_default() + &imported.scenario.unwrap_or_default(),
         Err(refusals) => refusals.into_iter().map(|refusal| refusal.reason + "\n").collect(),
     };
@@ -640,7 +677,7 @@ fn no_torn_or_altered_file_makes_it_panic() {
         // The corner's map is small: its lane 1/-1 stands for the boulevard's 3/-2.
         let text = read(&format!("{AREA}/{name}.xosc"))
             .replace("roadId=\"3\" laneId=\"-2\"", "roadId=\"1\" laneId=\"-1\"");
-        let mut try_one = |text: &str| match openscenario(text, name, None, &BTreeMap::new(), &files) {
+        let mut try_one = |text: &str| match import(text, name, &files) {
             Ok(_) => imported += 1,
             Err(refusals) => {
                 assert!(!refusals.is_empty(), "a refusal has a reason");

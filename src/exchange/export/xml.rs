@@ -46,18 +46,22 @@ impl Element {
         self
     }
 
+    /// Its tag.
     pub fn name(&self) -> &'static str {
         self.name
     }
 
+    /// Names and values, in the order of the document.
     pub fn attributes(&self) -> &[(&'static str, String)] {
         &self.attributes
     }
 
+    /// The value of an attribute, if it has it.
     pub fn attribute(&self, name: &str) -> Option<&str> {
         self.attributes.iter().find(|(known, _)| *known == name).map(|(_, value)| value.as_str())
     }
 
+    /// What it holds, in the order of the document.
     pub fn children(&self) -> &[Element] {
         &self.children
     }

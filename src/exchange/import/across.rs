@@ -17,7 +17,7 @@ const ASIDE_MPS_MAX: f64 = 10.0;
 const LOOK_M: f64 = 0.5;
 
 /// Lanes beside somebody's own along a stretch of its way.
-pub struct Beside {
+pub struct LanesBeside {
     /// Stations of its way, m.
     pub from_m: f64,
     pub to_m: f64,
@@ -106,7 +106,7 @@ impl<'a> Cast<'a> {
         name: &str,
         (from, to): (i32, i32),
         has_oncoming: bool,
-    ) -> Option<Beside> {
+    ) -> Option<LanesBeside> {
         let moving = self.moving(source, mark, name)?;
         // Each beside a station of its way: how far to the left its middle lies, and half its width.
         let lanes_at = |at_m: f64| -> Vec<(f64, f64)> {
@@ -132,7 +132,7 @@ impl<'a> Cast<'a> {
         let right_m = found.iter().map(|(middle_m, half_m)| middle_m - half_m).fold(f64::INFINITY, f64::min);
         let left_m =
             found.iter().map(|(middle_m, half_m)| middle_m + half_m).fold(f64::NEG_INFINITY, f64::max);
-        Some(Beside { from_m, to_m, right_m, left_m })
+        Some(LanesBeside { from_m, to_m, right_m, left_m })
     }
 
     /// How far to the left of a station of somebody's way the middle of a lane lies, m.

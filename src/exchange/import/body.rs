@@ -27,7 +27,7 @@ pub struct Body {
 
 impl Body {
     /// Whether it is a vehicle with more than two wheels.
-    pub fn is_for_passengers(&self) -> bool {
+    pub fn has_more_than_two_wheels(&self) -> bool {
         !self.is_on_foot() && !matches!(self.like, "Bicycle" | "Motorcycle" | "Object")
     }
 

@@ -3,7 +3,7 @@
 use avastra_base::geometry::Vec2;
 use avastra_world::sim::VehicleParameters;
 
-use super::across::Beside;
+use super::across::LanesBeside;
 use super::action::ActKind;
 use super::phases::ARRIVES_M;
 use super::said::Said;
@@ -238,7 +238,7 @@ impl Waiting<'_, '_> {
         let own = self.who(source, mark, &room.of)?;
         // Where there are no such lanes there is no room.
         let mut nobody = Vec::new();
-        if let Some(Beside { from_m, to_m, .. }) = beside {
+        if let Some(LanesBeside { from_m, to_m, .. }) = beside {
             let station = || Said::text(format!("{own}.station "));
             nobody.push(station().and(">= ").number(from_m, "m"));
             nobody.push(station().and("<= ").number(to_m, "m"));
@@ -250,7 +250,7 @@ impl Waiting<'_, '_> {
                 ahead.and(" <= ").number(room.ahead_m, "m"),
                 behind.and(" <= ").number(room.behind_m, "m"),
             ];
-            if let Some(Beside { right_m, left_m, .. }) = beside {
+            if let Some(LanesBeside { right_m, left_m, .. }) = beside {
                 let name = self.who(source, mark, &name)?;
                 let aside = || Said::text(format!("{name}.offset - {own}.offset "));
                 is_there.push(aside().and(">= ").number(right_m, "m"));
@@ -265,7 +265,7 @@ impl Waiting<'_, '_> {
     }
 
     /// The lanes that somebody asks about; the inner `None` for all.
-    fn beside(&self, source: &mut Source, mark: &Mark, room: &Clearance) -> Option<Option<Beside>> {
+    fn beside(&self, source: &mut Source, mark: &Mark, room: &Clearance) -> Option<Option<LanesBeside>> {
         let Some(lanes) = room.lanes else { return Some(None) };
         self.cast.lanes_beside(source, mark, &room.of, lanes, room.has_oncoming).map(Some)
     }
@@ -426,7 +426,7 @@ impl Waiting<'_, '_> {
                     let ahead_m = ahead_m.signum() * (ahead_m.abs() - outlines_m).max(0.0);
                     let offset_m = |point: Vec2| self.cast.route.path.project(point).offset_m;
                     let left_m = offset_m(there) - offset_m(here);
-                    let is_in = |lanes: &Beside| lanes.right_m <= left_m && left_m <= lanes.left_m;
+                    let is_in = |lanes: &LanesBeside| lanes.right_m <= left_m && left_m <= lanes.left_m;
                     let is_beside = beside.as_ref().is_none_or(is_in);
                     is_clear &= !(is_beside && -room.behind_m <= ahead_m && ahead_m <= room.ahead_m);
                 }

@@ -5,17 +5,19 @@
 //! takes the place of whatever moves the ego vehicle in the file. What cannot be said is refused, each with its line; what
 //! drives otherwise here is a note at the head of the space.
 //!
-//! `variation` reads the values of a distribution. For each variation `story` reads the scenario, with `body`, `position`,
+//! `variation` reads the values of a distribution, and `chance` draws those that it leaves to chance. For each variation `story` reads the scenario, with `body`, `position`,
 //! `shape`, `action`, `trigger` and `weather` for what stands in it, through `source`, which fills in each `parameter` and its
 //! `expression`, and `catalogue`, which finds what lies in other files; `vocabulary` refuses what no file may hold. `place` finds
-//! places on the map, `scene` gives everybody a way, to which `ways` joins trajectories, and `phases` what it does, `pace` their speeds, `condition` the moments at which these begin: as `said`, text
-//! with its numbers apart. `rows` finds how the numbers follow from the parameters, `sky` how weather changes, and `write` prints the space. A file that
-//! avastra exported carries its scenario (`own`). No file is read here: `cli` gives texts.
+//! places on the map, `scene` gives everybody a way, to which `ways` joins trajectories, and `phases` what it does, `pace`
+//! their speeds, `condition` the moments at which these begin: as `said`, text with its numbers apart. `rows` finds how the
+//! numbers follow from the parameters, `sky` how weather changes, and `write` prints the space. A file that avastra exported
+//! carries its scenario (`own`). No file is read here: `cli` gives texts.
 
 mod across;
 mod action;
 mod body;
 mod catalogue;
+mod chance;
 mod condition;
 mod expression;
 mod ground;
@@ -51,6 +53,8 @@ use sky::Sky;
 use source::Source;
 use story::Story;
 use variation::Values;
+
+pub use variation::{VARIATIONS_MAX, VARIATIONS_USUAL};
 
 /// Gives the texts of the files that a file names.
 pub trait Files {
@@ -108,18 +112,25 @@ struct Variant {
     duration_s: f64,
 }
 
-/// The space of an OpenSCENARIO XML file (1.0 to 1.3). `name` is what it is to be called, `ego` the entity that is the ego
-/// vehicle, if it is not called so, and `parameters` have values in place of those that the file declares or lists.
+/// How a file is to be read.
+#[derive(Debug, Clone, Copy)]
+pub struct Request<'a> {
+    /// What the space is to be called.
+    pub name: &'a str,
+    /// The entity that is the ego vehicle, if it is not called so.
+    pub ego: Option<&'a str>,
+    /// In place of the values that the file declares or lists.
+    pub parameters: &'a Values,
+    /// More variations are refused.
+    pub variations_max: u32,
+}
+
+/// The space of an OpenSCENARIO XML file (1.0 to 1.3).
 ///
 /// # Errors
 /// All that cannot be said, by lines.
-pub fn openscenario(
-    text: &str,
-    name: &str,
-    ego: Option<&str>,
-    parameters: &Values,
-    files: &dyn Files,
-) -> Result<Imported, Vec<Refusal>> {
+pub fn openscenario(text: &str, request: &Request, files: &dyn Files) -> Result<Imported, Vec<Refusal>> {
+    let &Request { name, ego, parameters, variations_max } = request;
     let document = parsed(text, None)?;
     let lines = Rc::new(Lines::new(text));
     let library = Library::new(files, String::new());
@@ -152,7 +163,7 @@ pub fn openscenario(
     let of_variations = document;
     let document = parsed(&text, Some(&path))?;
     let declared = declared(&document);
-    let read = variation::read(&mut source, of_variations.root_element(), &declared);
+    let read = variation::read(&mut source, of_variations.root_element(), &declared, variations_max as usize);
     let Some(distribution) = read.filter(|_| !source.is_refused()) else { return Err(source.refusals()) };
     // What is wrong with the scenario, and for which values.
     let of_scenario = |refusals: Vec<Refusal>, values: &Values| {
@@ -185,6 +196,7 @@ pub fn openscenario(
         Some((refusals, values)) => Err(of_scenario(refusals, &values)),
         None => {
             whole.description = distribution.description;
+            whole.notes.extend(source.notes());
             if repeated > 0 {
                 let note = format!("{repeated} variations have the values of another one, and count once");
                 whole.notes.insert(note);

@@ -254,7 +254,7 @@ impl<'a> Cast<'a> {
         let mark = &act.mark;
         match &act.kind {
             // It may be tilted there, which is not taken over.
-            ActKind::Placed(position) if position.is_where(&moving.entity.name) => Some(()),
+            ActKind::Placed(position) if position.is_own_place(&moving.entity.name) => Some(()),
             ActKind::Placed(_) | ActKind::Ahead(..) => {
                 source.refuse(mark, "nobody is placed anew in the story")
             }

@@ -201,7 +201,7 @@ fn on_route(source: &mut Source, place: Node) -> Option<PositionKind> {
 
 impl Position {
     /// Whether it is where somebody is already, who looks on as before.
-    pub fn is_where(&self, name: &str) -> bool {
+    pub fn is_own_place(&self, name: &str) -> bool {
         let PositionKind::RelativeObject { entity, dx_m, dy_m } = &self.kind else { return false };
         entity == name
             && *dx_m == 0.0

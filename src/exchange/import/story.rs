@@ -223,7 +223,7 @@ impl Cast {
         let found = entities.iter().position(|entity| is_ego(&entity.name));
         // The only one there is may have another name.
         let found = found.or_else(|| match entities.as_slice() {
-            [only] if ego.is_none() && listed.len() == 1 && only.body.is_for_passengers() => {
+            [only] if ego.is_none() && listed.len() == 1 && only.body.has_more_than_two_wheels() => {
                 source.note(format!("`{}`, the only one there is, is taken for the ego vehicle", only.name));
                 Some(0)
             }

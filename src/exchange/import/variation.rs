@@ -4,12 +4,16 @@ use std::collections::BTreeMap;
 
 use roxmltree::Node;
 
+use super::chance;
 use super::source::{Source, children, element, elements};
 use super::story::check_header;
 use super::vocabulary;
 
-/// More variations are no test that anybody drives.
-const VARIATIONS_MAX: usize = 60_000;
+/// The most variations that a file may be asked to have: more are no test that anybody drives.
+pub const VARIATIONS_MAX: u32 = 60_000;
+
+/// The most variations that are read unless more are asked for: what is read within a second.
+pub const VARIATIONS_USUAL: u32 = 3_000;
 
 /// The most values of all variations together.
 const VALUES_MAX: usize = 2_000_000;
@@ -38,57 +42,31 @@ pub fn scenario(source: &mut Source, root: Node) -> Option<Option<(String, u32)>
     Some(named(source))
 }
 
-/// The distribution of a file over a scenario that declares these parameters, with their values there; `None` if something is
-/// refused.
-pub fn read(source: &mut Source, root: Node, declared: &Values) -> Option<Distribution> {
+/// The distribution of a file, of at most `most` variations, over a scenario that declares these parameters, with their values
+/// there; `None` if something is refused.
+pub fn read(source: &mut Source, root: Node, declared: &Values, most: usize) -> Option<Distribution> {
     let found = element(root, "ParameterValueDistribution")?;
-    distribution(source, root, found, declared)
-}
-
-fn distribution(source: &mut Source, root: Node, found: Node, declared: &Values) -> Option<Distribution> {
     for (node, reason) in vocabulary::unknown(root) {
         source.refuse::<()>(node, reason);
     }
     let header = check_header(source, root)?;
     source.declare(root);
-    if let Some(other) = element(found, "Stochastic") {
-        return source
-            .refuse(other, "values that are drawn by chance are not read: those that are listed are");
-    }
-    let listed = source.required(found, "Deterministic")?;
-    let (mut parameters, mut variations) = (Vec::new(), vec![Values::new()]);
-    for part in children(listed) {
-        let (own, choices) = match part.tag_name().name() {
-            "DeterministicSingleParameterDistribution" => {
-                let name = source.named(part, "parameterName")?;
-                let values = single(source, part)?;
-                let choices: Vec<Values> =
-                    values.into_iter().map(|value| Values::from([(name.clone(), value)])).collect();
-                (vec![name], choices)
-            }
-            "DeterministicMultiParameterDistribution" => sets(source, part)?,
-            _ => return source.refuse(part, "such a distribution is not read"),
-        };
-        source.refuse_if(choices.is_empty(), part, "it lists no value")?;
-        for name in own {
-            let reason = format!("it lists values of `{name}` again: one of the two would count for nothing");
-            source.refuse_if(parameters.contains(&name), part, reason)?;
-            let reason = format!("the scenario declares no parameter `{name}`");
-            source.refuse_if(!declared.contains_key(&name), part, reason)?;
-            parameters.push(name);
+    let mut parameters: Vec<String> = Vec::new();
+    let mut claim = |source: &mut Source, part: Node, name: &str| {
+        let reason = format!("it lists values of `{name}` again: one of the two would count for nothing");
+        source.refuse_if(parameters.iter().any(|known| known == name), part, reason)?;
+        let reason = format!("the scenario declares no parameter `{name}`");
+        source.refuse_if(!declared.contains_key(name), part, reason)?;
+        parameters.push(name.to_owned());
+        Some(())
+    };
+    let mut variations = match element(found, "Stochastic") {
+        Some(stochastic) => chance::runs(source, stochastic, most, &mut claim)?,
+        None => {
+            let listed = source.required(found, "Deterministic")?;
+            combined(source, listed, most, &mut claim)?
         }
-        let count = variations.len().saturating_mul(choices.len());
-        let reason = format!("its values make {count} variations: {VARIATIONS_MAX} are possible");
-        let is_large = count > VARIATIONS_MAX || count.saturating_mul(parameters.len()) > VALUES_MAX;
-        source.refuse_if(is_large, part, reason)?;
-        let with = |values: &Values| {
-            let values = values.clone();
-            choices
-                .iter()
-                .map(move |more| values.iter().chain(more).map(|(k, v)| (k.clone(), v.clone())).collect())
-        };
-        variations = variations.iter().flat_map(with).collect();
-    }
+    };
     let description = header.attribute("description").unwrap_or("").to_owned();
     // A set need not say all of them.
     for values in &mut variations {
@@ -99,20 +77,78 @@ fn distribution(source: &mut Source, root: Node, found: Node, declared: &Values)
     Some(Distribution { description, parameters, variations })
 }
 
+/// How many variations are read at most, as the end of a refusal.
+pub fn too_many(most: usize) -> String {
+    let more = if most < VARIATIONS_MAX as usize {
+        format!(", up to {VARIATIONS_MAX} with `--variations`")
+    } else {
+        String::new()
+    };
+    format!("{most} are read{more}")
+}
+
+/// Each value that is listed with each value of the other parameters. `claim` is asked about each parameter.
+fn combined(
+    source: &mut Source,
+    listed: Node,
+    most: usize,
+    mut claim: impl FnMut(&mut Source, Node, &str) -> Option<()>,
+) -> Option<Vec<Values>> {
+    let mut variations = vec![Values::new()];
+    let mut width = 0;
+    for part in children(listed) {
+        let (own, choices) = match part.tag_name().name() {
+            "DeterministicSingleParameterDistribution" => {
+                let name = source.named(part, "parameterName")?;
+                let values = single(source, part, most)?;
+                let choices: Vec<Values> =
+                    values.into_iter().map(|value| Values::from([(name.clone(), value)])).collect();
+                (vec![name], choices)
+            }
+            "DeterministicMultiParameterDistribution" => sets(source, part)?,
+            _ => return source.refuse(part, "such a distribution is not read"),
+        };
+        source.refuse_if(choices.is_empty(), part, "it lists no value")?;
+        width += own.len();
+        for name in own {
+            claim(source, part, &name)?;
+        }
+        let count = variations.len().saturating_mul(choices.len());
+        let reason = format!("its values make {count} variations: {}", too_many(most));
+        source.refuse_if(count > most, part, reason)?;
+        let reason = format!("{count} variations of {width} parameters are more than {VALUES_MAX} values");
+        source.refuse_if(count.saturating_mul(width) > VALUES_MAX, part, reason)?;
+        let with = |values: &Values| {
+            let values = values.clone();
+            choices
+                .iter()
+                .map(move |more| values.iter().chain(more).map(|(k, v)| (k.clone(), v.clone())).collect())
+        };
+        variations = variations.iter().flat_map(with).collect();
+    }
+    Some(variations)
+}
+
 /// The values of one parameter.
-fn single(source: &mut Source, part: Node) -> Option<Vec<String>> {
+fn single(source: &mut Source, part: Node, most: usize) -> Option<Vec<String>> {
     let Some(inner) = children(part).next() else { return source.refuse(part, "it is empty") };
     match inner.tag_name().name() {
-        "DistributionSet" => elements(inner, "Element").map(|one| source.text(one, "value")).collect(),
+        "DistributionSet" => {
+            let value = |one: Node| {
+                source.refuse_if(one.has_attribute("weight"), one, "it has no attribute `weight`")?;
+                source.text(one, "value")
+            };
+            elements(inner, "Element").map(value).collect()
+        }
         "DistributionRange" => {
             let step = source.number(inner, "stepWidth")?;
             let range = source.required(inner, "Range")?;
-            let (low, high) = (source.number(range, "lowerLimit")?, source.number(range, "upperLimit")?);
-            source.refuse_if(step <= 0.0 || high < low, inner, "a range goes up, in steps above 0")?;
+            let [low, high] = chance::bounds(source, range)?;
+            source.refuse_if(step <= 0.0, inner, "its steps are above 0")?;
             // A range whose last step misses its end by rounding reaches it all the same.
             let count = ((high - low) / step + 1e-6).floor();
-            let reason = format!("it has {count:.0} steps: {VARIATIONS_MAX} are possible");
-            source.refuse_if(count >= VARIATIONS_MAX as f64, inner, reason)?;
+            let reason = format!("it has {:.0} values: {}", count + 1.0, too_many(most));
+            source.refuse_if(count >= most as f64, inner, reason)?;
             Some((0..=count as usize).map(|nth| plain(low + nth as f64 * step)).collect())
         }
         "UserDefinedDistribution" => source.refuse(inner, "a distribution of the user's own is not read"),
@@ -121,7 +157,7 @@ fn single(source: &mut Source, part: Node) -> Option<Vec<String>> {
 }
 
 /// A number without the noise of adding steps.
-fn plain(value: f64) -> String {
+pub fn plain(value: f64) -> String {
     let rounded = (value * 1e9).round() / 1e9;
     format!("{rounded}")
 }

@@ -185,11 +185,19 @@ const ELEMENTS: &str = "
     RelativeSpeedCondition [entityRef value rule direction];
     ParameterValueDistribution [] ScenarioFile Deterministic Stochastic;
     ScenarioFile [filepath];
+    Stochastic [numberOfTestRuns randomSeed] StochasticDistribution;
+    StochasticDistribution [parameterName] ?;
+    ProbabilityDistributionSet [] Element;
+    UniformDistribution [] Range;
+    NormalDistribution [expectedValue variance] Range;
+    PoissonDistribution [expectedValue] Range;
+    Histogram [] Bin;
+    Bin [weight] Range;
     Deterministic [] *;
     DeterministicSingleParameterDistribution [parameterName] ?;
     DeterministicMultiParameterDistribution [] ValueSetDistribution;
     DistributionSet [] Element;
-    Element [value];
+    Element [value weight];
     DistributionRange [stepWidth] Range;
     Range [lowerLimit upperLimit];
     ValueSetDistribution [] ParameterValueSet;
@@ -258,7 +266,8 @@ mod tests {
         ParameterCondition VariableCondition DistanceCondition TraveledDistanceCondition \
         StandStillCondition SpeedCondition RelativeSpeedCondition \
         DeterministicSingleParameterDistribution DeterministicMultiParameterDistribution \
-        DistributionSet DistributionRange";
+        DistributionSet DistributionRange ProbabilityDistributionSet UniformDistribution NormalDistribution \
+        PoissonDistribution Histogram";
 
     #[test]
     fn every_row_is_reached_from_the_root() {

@@ -43,7 +43,7 @@ pub fn space(whole: &Whole, order: &[String], name: &str) -> Imported {
     let durations = whole.variants.iter().map(|variant| variant.duration_s);
     let (least_s, most_s) =
         durations.fold((f64::INFINITY, 0.0), |(least, most), s| (s.min(least), s.max(most)));
-    if most_s - least_s > 1.0 {
+    if most_s - least_s > TOLD_S {
         notes.insert(format!("each row is played for {} s, as long as the slowest needs", number(most_s)));
     }
     let body = space.text();
@@ -499,3 +499,6 @@ const BEGUN: &str = "  set begun = true\n";
 
 /// Below this no driving system has a wish to drive, m/s.
 const SET_SPEED_MPS_MIN: f64 = 1.0;
+
+/// A row that is played longer than its file says is told beyond this, s.
+const TOLD_S: f64 = 1.0;

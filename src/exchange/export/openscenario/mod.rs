@@ -2,8 +2,9 @@
 //!
 //! Exactly, everyone is a `FollowTrajectoryAction` along a polyline with absolute times, so a player needs no model of
 //! driving. The last vertex is at the end of the recording, because a player may let what has no vertex left roll on.
-//! `natural` has the others as actions that a person would write. `space` writes a space, of which nothing is recorded. A road user that appears or leaves on the way is added
-//! and deleted. Names, in the file's order: `ego`, then `npc_N` for the road user that claims call `npc#N`.
+//! `natural` has the others as actions that a person would write. `space` writes a space, of which nothing is recorded. A
+//! road user that appears or leaves on the way is added and deleted. Names, in the file's order: `ego`, then `npc_N` for the
+//! road user that claims call `npc#N`.
 //!
 //! Left out: what a driving system saw or planned, heights (a player puts road users on the map's road), and lights of
 //! vehicles.
@@ -20,7 +21,7 @@ mod story;
 mod when;
 
 use avastra_campaign::episode::Actor;
-use avastra_road::LanePlace;
+use avastra_road::{LanePlace, RoadMap};
 use avastra_world::sim::DT_S;
 
 use super::DATE;
@@ -120,21 +121,24 @@ pub fn openscenario(recording: &Recording, map_file: &str, style: Style) -> Writ
 }
 
 fn header(recording: &Recording, style: Style, exact: &[&Actor]) -> Element {
-    let minor = if style.version == Version::Carla { 0 } else { 2 };
     let told = recording.docs.iter().find(|line| !line.starts_with("Emitted by"));
-    let description = told.unwrap_or(&recording.name);
-    let header = Element::new("FileHeader")
-        .with("revMajor", 1)
-        .with("revMinor", minor)
-        .with("date", format!("{DATE}T00:00:00"))
-        .with("description", description)
-        .with("author", "avastra");
+    let header = file_header(style.version, told.unwrap_or(&recording.name));
     if style.version == Version::Carla {
         return header;
     }
     let caveat = (style.others == Others::Natural).then(|| natural::caveat(exact));
     let facts = recording.facts.iter().chain(&caveat).map(|(name, value)| property(name, value));
     header.holding(Element::new("Properties").holding_all(facts))
+}
+
+/// The head of every file that is written here.
+fn file_header(version: Version, description: &str) -> Element {
+    Element::new("FileHeader")
+        .with("revMajor", 1)
+        .with("revMinor", if version == Version::Carla { 0 } else { 2 })
+        .with("date", format!("{DATE}T00:00:00"))
+        .with("description", description)
+        .with("author", "avastra")
 }
 
 /// A fact about the file.
@@ -168,22 +172,33 @@ fn storyboard(recording: &Recording, style: Style, exact: &[&Actor]) -> Element 
     if version != Version::Carla {
         groups.extend(weather_group(recording, version));
     }
-    let story = (!groups.is_empty()).then(|| {
-        let act = Element::new("Act")
-            .with("name", "recording")
-            .holding_all(groups)
-            .holding(Element::new("StartTrigger").holding(all(vec![from_time(version, "start", 0.0)])));
-        Element::new("Story").with("name", "recording").holding(act)
-    });
     let sky = recording.seen.skies.first().map(|sky| match version {
         Version::Carla => carla::environment(sky),
         Version::V1_2 => environment(sky, 0),
     });
-    let end = all(vec![from_time(version, "end", recording.duration_s())]);
+    staged(version, "recording", sky.into_iter().chain(init), groups, recording.duration_s())
+}
+
+/// A storyboard of what is there at the beginning, and of one act of manoeuvres, if there are any, from the beginning to its end.
+fn staged(
+    version: Version,
+    act: &str,
+    init: impl Iterator<Item = Element>,
+    groups: Vec<Element>,
+    end_s: f64,
+) -> Element {
+    let at = |name: &str, moment_s: f64| all(vec![from_time(version, name, moment_s)]);
+    let story = (!groups.is_empty()).then(|| {
+        let played = Element::new("Act")
+            .with("name", act)
+            .holding_all(groups)
+            .holding(Element::new("StartTrigger").holding(at("start", 0.0)));
+        Element::new("Story").with("name", act).holding(played)
+    });
     Element::new("Storyboard")
-        .holding(Element::new("Init").holding(Element::new("Actions").holding_all(sky).holding_all(init)))
+        .holding(Element::new("Init").holding(Element::new("Actions").holding_all(init)))
         .holding_all(story)
-        .holding(Element::new("StopTrigger").holding(end))
+        .holding(Element::new("StopTrigger").holding(at("end", end_s)))
 }
 
 /// Where a road user is at the start, if it is there.
@@ -200,7 +215,7 @@ fn begins(recording: &Recording, actor: &Actor, style: Style) -> Option<Element>
     Some(match style.version {
         _ if actor.id > 0 || style.ego != Ego::Controller => private,
         Version::Carla => private.holding(carla::controller()),
-        Version::V1_2 => private.holding(activation()).holding(destination(recording)),
+        Version::V1_2 => private.holding(activation()).holding(destination(&recording.map, recording.goal)),
     })
 }
 
@@ -263,8 +278,8 @@ fn activation() -> Element {
 }
 
 /// Where the ego vehicle is to go.
-fn destination(recording: &Recording) -> Element {
-    let position = lane_position(&recording.map, LanePlace { offset_m: 0.0, ..recording.goal });
+fn destination(map: &RoadMap, goal: LanePlace) -> Element {
+    let position = lane_position(map, LanePlace { offset_m: 0.0, ..goal });
     private(Element::new("RoutingAction").holding(Element::new("AcquirePositionAction").holding(position)))
 }
 

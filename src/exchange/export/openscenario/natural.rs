@@ -1,9 +1,10 @@
 //! Other road users as a person would write them: where they begin, how fast, when they change speed and lane, which way
 //! they take at junctions.
 //!
-//! Those who follow a trajectory from the start are written as they are told ([`as_told`]). Of others it is an approximation (`pace` and `lanes` say how near), for players whose ego vehicle drives otherwise than the
-//! recorded one: a pedestrian that set out as the ego vehicle came near does so when it comes as near, and what the ego
-//! vehicle hit stops when it is hit.
+//! Those who follow a trajectory from the start are written as they are told ([`as_told`]). Of others it is an
+//! approximation (`pace` and `lanes` say how near), for players whose ego vehicle drives otherwise than the recorded one: a
+//! pedestrian that set out as the ego vehicle came near does so when it comes as near, and what the ego vehicle hit stops
+//! when it is hit.
 
 use avastra_base::geometry::{Pose, Vec2};
 use avastra_campaign::episode::Actor;
@@ -20,7 +21,7 @@ use super::actions::{
 use super::entity::ahead_of_centre_m;
 use super::lanes::{Driven, STRIDE, driven};
 use super::pace::{Change, Pace, SPEED_MPS, WAY_M};
-use super::story::{Cast, Player};
+use super::story::{Cast, Newcomer};
 use super::{BENEATH_M, Version, leaves};
 
 /// What moved less than this stands, m.
@@ -103,15 +104,15 @@ pub fn as_told(recording: &Recording, actor: &Actor) -> Option<(Element, Vec<Ele
         return None;
     }
     let of = |id: u32| recording.seen.others.iter().find(|other| other.id == id);
-    let players = recording.told.iter().map(|told| {
+    let newcomers = recording.told.iter().map(|told| {
         let actor = of(told.id)?;
         let (request, course) = (&told.request, told.course.as_ref());
-        Some(Player { name: actor.name(), actor, request, course, facts: told.facts })
+        Some(Newcomer { name: actor.name(), actor, request, course, facts: told.facts })
     });
     let cast = Cast {
         road: &recording.road,
         ego_front_m: VehicleParameters::MKZ.rear_axle_to_front_m,
-        players: players.collect::<Option<_>>()?,
+        newcomers: newcomers.collect::<Option<_>>()?,
         duration_s: recording.duration_s(),
     };
     let (begins, mut events) = cast.story(own).ok()?;

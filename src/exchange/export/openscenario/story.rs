@@ -38,12 +38,12 @@ pub struct Cast<'a> {
     pub road: &'a Road,
     /// Station of the ego vehicle's front on its route, m.
     pub ego_front_m: f64,
-    pub players: Vec<Player<'a>>,
+    pub newcomers: Vec<Newcomer<'a>>,
     pub duration_s: f64,
 }
 
 /// A road user that appears at the start.
-pub struct Player<'a> {
+pub struct Newcomer<'a> {
     pub name: String,
     pub actor: &'a Actor,
     pub request: &'a SpawnRequest,
@@ -51,7 +51,7 @@ pub struct Player<'a> {
     pub facts: NpcFacts,
 }
 
-impl Player<'_> {
+impl Newcomer<'_> {
     /// The station of its trajectory at which it begins, m; 0 if it follows none.
     pub fn begins_m(&self) -> f64 {
         self.request.trajectory.map_or(0.0, |_| self.request.distance_m)
@@ -73,9 +73,9 @@ impl<'a> Cast<'a> {
     /// # Errors
     /// What no other player can be told, in words.
     pub fn story(&self, nth: usize) -> Result<(Element, Vec<Element>), String> {
-        let player = &self.players[nth];
-        let way = self.way(player)?;
-        Ok((self.begins(player, &way), self.events(nth, &way)?))
+        let newcomer = &self.newcomers[nth];
+        let way = self.way(newcomer)?;
+        Ok((self.begins(newcomer, &way), self.events(nth, &way)?))
     }
 
     /// Whether somebody looks along the ego vehicle's route at the start.
@@ -86,8 +86,8 @@ impl<'a> Cast<'a> {
         wrap_angle(pose.heading_rad - along_rad).abs() < FRAC_PI_2
     }
 
-    fn way(&self, player: &Player<'a>) -> Result<Way<'a>, String> {
-        let Player { request, course, .. } = player;
+    fn way(&self, newcomer: &Newcomer<'a>) -> Result<Way<'a>, String> {
+        let Newcomer { request, course, .. } = newcomer;
         let does = |what: &str| Err(format!("somebody {what}"));
         let stands = request.speed_mps == 0.0 && course.is_none();
         match request.verb {
@@ -114,8 +114,8 @@ impl<'a> Cast<'a> {
         }
     }
 
-    fn begins(&self, player: &Player<'a>, way: &Way<'a>) -> Element {
-        let Player { name, actor, request, .. } = player;
+    fn begins(&self, newcomer: &Newcomer<'a>, way: &Way<'a>) -> Element {
+        let Newcomer { name, actor, request, .. } = newcomer;
         let private = Element::new("Private").with("entityRef", name);
         let pose = actor.samples[0].pose.offset(ahead_of_centre_m(actor), 0.0);
         match way {
@@ -152,11 +152,12 @@ impl<'a> Cast<'a> {
 
     /// An event for each phase.
     fn events(&self, nth: usize, way: &Way<'a>) -> Result<Vec<Element>, String> {
-        let player = &self.players[nth];
+        let newcomer = &self.newcomers[nth];
         let mut events: Vec<Element> = Vec::new();
-        let mut offset_m = player.request.offset_m;
-        let mut most_mps = player.request.speed_mps;
-        let phases = player.course.iter().flat_map(|course| (0..course.phases()).map(move |at| (course, at)));
+        let mut offset_m = newcomer.request.offset_m;
+        let mut most_mps = newcomer.request.speed_mps;
+        let phases =
+            newcomer.course.iter().flat_map(|course| (0..course.phases()).map(move |at| (course, at)));
         for (course, at) in phases {
             if course.is_ruled() {
                 return Err("rules say when a phase may begin".to_owned());
@@ -166,28 +167,28 @@ impl<'a> Cast<'a> {
             let speed_mps = course.phase(at).command.speed.as_ref().and_then(|speed| course.constant(speed));
             let told_mps = speed_mps.map_or(0.0, |value| value.number());
             most_mps = most_mps.max(if is_timed { f64::INFINITY } else { told_mps });
-            let name = event_name(player, at);
-            let actions = self.actions(player, way, course, at, &mut offset_m)?;
+            let name = event_name(newcomer, at);
+            let actions = self.actions(newcomer, way, course, at, &mut offset_m)?;
             let actions = actions.into_iter().enumerate();
             let actions =
                 actions.map(|(nth, what)| action(&format!("{name}_action_{}", nth + 1), what)).collect();
             let groups = self.groups(nth, course, at, &name)?;
             events.push(event_of_groups(&name, actions, groups));
         }
-        events.extend(self.arrives(player, way, most_mps));
+        events.extend(self.arrives(newcomer, way, most_mps));
         Ok(events)
     }
 
     /// Stands at the end of its way, where other players would drive on; nothing if it cannot come so far.
-    fn arrives(&self, player: &Player, way: &Way<'a>, most_mps: f64) -> Option<Element> {
+    fn arrives(&self, newcomer: &Newcomer, way: &Way<'a>, most_mps: f64) -> Option<Element> {
         let (Way::Lanes(trajectory, ..) | Way::Free(trajectory)) = way else { return None };
-        let left_m = trajectory.path.length_m() - player.request.distance_m;
+        let left_m = trajectory.path.length_m() - newcomer.request.distance_m;
         if most_mps * self.duration_s < left_m {
             return None;
         }
-        let name = format!("{}_arrives", player.name);
+        let name = format!("{}_arrives", newcomer.name);
         let way = Element::new("TraveledDistanceCondition").measured("value", left_m);
-        let when = condition_after(&format!("{name}_when"), 0.0, by_entity(&player.name, way));
+        let when = condition_after(&format!("{name}_when"), 0.0, by_entity(&newcomer.name, way));
         let stands = action(&format!("{name}_action"), changes_speed(0.0, None));
         Some(event_of_groups(&name, vec![stands], vec![vec![when]]))
     }
@@ -200,7 +201,7 @@ impl<'a> Cast<'a> {
         at: usize,
         name: &str,
     ) -> Result<Vec<Vec<Element>>, String> {
-        let (player, phase) = (&self.players[nth], course.phase(at));
+        let (newcomer, phase) = (&self.newcomers[nth], course.phase(at));
         let time_s = |written: &Option<Expr>| match written {
             None => Ok(None),
             Some(expr) => match course.constant(expr) {
@@ -219,7 +220,7 @@ impl<'a> Cast<'a> {
             return Err("a phase comes only sometimes, or goes over to another manoeuvre".to_owned());
         }
         let named = |nth: usize| format!("{name}_when_{nth}");
-        let before = at.checked_sub(1).map(|before| event_name(player, before));
+        let before = at.checked_sub(1).map(|before| event_name(newcomer, before));
         let Some(once) = &phase.once else {
             let when = match before {
                 None => from_time(Version::V1_2, &named(1), after_s),
@@ -261,7 +262,7 @@ impl<'a> Cast<'a> {
     /// What a phase tells.
     fn actions(
         &self,
-        player: &Player,
+        newcomer: &Newcomer,
         way: &Way<'a>,
         course: &Course,
         at: usize,
@@ -276,7 +277,7 @@ impl<'a> Cast<'a> {
         };
         let mut actions = Vec::new();
         match (command.early_s, command.speed_mps) {
-            (Some(_), _) => actions.push(self.meets(player, way, &command)?),
+            (Some(_), _) => actions.push(self.meets(newcomer, way, &command)?),
             (None, Some(mps)) if mps < 0.0 => return Err("somebody goes backwards".to_owned()),
             (None, Some(mps)) => actions.push(changes_speed(mps, command.rate_mps2)),
             (None, None) => {}
@@ -298,13 +299,13 @@ impl<'a> Cast<'a> {
             actions.push(moves_aside(lane, to_m, by_m, command.aside_mps.unwrap_or(ASIDE_MPS)));
         }
         match actions.is_empty() {
-            true => Err("a phase tells nothing that other players know".to_owned()),
+            true => Err("a phase tells nothing that other newcomers know".to_owned()),
             false => Ok(actions),
         }
     }
 
     /// To be somewhere when the ego vehicle is at a place of its route.
-    fn meets(&self, player: &Player, way: &Way<'a>, command: &Command) -> Result<Element, String> {
+    fn meets(&self, newcomer: &Newcomer, way: &Way<'a>, command: &Command) -> Result<Element, String> {
         let (Some(at_m), Some(reach_m), Some(0.0)) = (command.at_m, command.reach_m, command.early_s) else {
             return Err("somebody arrives earlier or later than the ego vehicle, or where their ways cross"
                 .to_owned());
@@ -323,7 +324,7 @@ impl<'a> Cast<'a> {
                 lane_position(&self.road.map, LanePlace { station_m: near(place).station_m, ..*place })
             }
             Way::Free(trajectory) => {
-                position(&trajectory.path.pose_at(reach_m).offset(0.0, player.request.offset_m))
+                position(&trajectory.path.pose_at(reach_m).offset(0.0, newcomer.request.offset_m))
             }
             Way::Stands => return Err("somebody arrives who stands".to_owned()),
         };
@@ -351,8 +352,8 @@ fn is_bent(path: &Path) -> bool {
 }
 
 /// What the event of a phase is called.
-fn event_name(player: &Player, at: usize) -> String {
-    format!("{}_phase_{}", player.name, at + 1)
+fn event_name(newcomer: &Newcomer, at: usize) -> String {
+    format!("{}_phase_{}", newcomer.name, at + 1)
 }
 
 /// A position under another name, as synchronised arrivals have it.

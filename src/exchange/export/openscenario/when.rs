@@ -51,7 +51,7 @@ fn is_of(condition: &Element, rule: &str) -> bool {
 enum Who {
     Ego,
     /// A place among the players.
-    Player(usize),
+    Newcomer(usize),
 }
 
 /// What is asked of somebody, with its coefficient.
@@ -142,12 +142,12 @@ impl Waiting<'_> {
             ExprKind::Fact(fact @ (Fact::EgoSpeed | Fact::EgoFront | Fact::EgoRear | Fact::Elapsed)) => {
                 part(Who::Ego, *fact)
             }
-            ExprKind::Fact(fact) => part(Who::Player(self.own), *fact),
+            ExprKind::Fact(fact) => part(Who::Newcomer(self.own), *fact),
             ExprKind::OfBearer(who, fact) => {
                 let bearer = self.course.bearer(*who);
                 let found =
-                    self.cast.players.iter().position(|other| other.request.bearer == Some(bearer))?;
-                part(Who::Player(found), *fact)
+                    self.cast.newcomers.iter().position(|other| other.request.bearer == Some(bearer))?;
+                part(Who::Newcomer(found), *fact)
             }
             ExprKind::Negate(inner) => Some(self.sum(inner)?.times(-1.0)),
             ExprKind::Arithmetic(Arithmetic::Add, a, b) => Some(self.sum(a)?.and(self.sum(b)?, 1.0)),
@@ -196,7 +196,7 @@ impl Waiting<'_> {
             [one @ Part { fact: Fact::EgoFront | Fact::NpcStation, .. }] if is_more => {
                 let begins_m = match one.who {
                     Who::Ego => self.cast.ego_front_m,
-                    Who::Player(at) => self.cast.players[at].begins_m(),
+                    Who::Newcomer(at) => self.cast.newcomers[at].begins_m(),
                 };
                 let way_m = (bound - begins_m).max(0.0);
                 let way = Element::new("TraveledDistanceCondition").measured("value", way_m);
@@ -275,7 +275,7 @@ impl Waiting<'_> {
     fn end_m(&self, who: Who, of: fn(&NpcFacts) -> f64, behind_front_m: f64) -> f64 {
         match who {
             Who::Ego => self.cast.ego_front_m - behind_front_m,
-            Who::Player(at) => of(&self.cast.players[at].facts),
+            Who::Newcomer(at) => of(&self.cast.newcomers[at].facts),
         }
     }
 
@@ -283,8 +283,8 @@ impl Waiting<'_> {
     fn overhang_m(&self, who: Who, is_front: bool) -> f64 {
         let (length_m, ahead_m) = match who {
             Who::Ego => (VehicleParameters::MKZ.length_m, -VehicleParameters::MKZ.rear_axle_to_centre_m()),
-            Who::Player(at) => {
-                let actor = self.cast.players[at].actor;
+            Who::Newcomer(at) => {
+                let actor = self.cast.newcomers[at].actor;
                 let ahead_m = ahead_of_centre_m(actor);
                 (actor.shape.length_m, if self.cast.looks_ahead(actor) { ahead_m } else { -ahead_m })
             }
@@ -295,7 +295,7 @@ impl Waiting<'_> {
     fn name(&self, who: Who) -> &str {
         match who {
             Who::Ego => "ego",
-            Who::Player(at) => &self.cast.players[at].name,
+            Who::Newcomer(at) => &self.cast.newcomers[at].name,
         }
     }
 }

@@ -14,17 +14,15 @@ use std::sync::Arc;
 use avastra_campaign::episode::{Recorder, Setup};
 use avastra_campaign::run::Arena;
 use avastra_lang::model::{Row, SPAWN_SPEED_MPS, Type};
-use avastra_road::LanePlace;
 use avastra_world::action::{Draw, Effect, Situation};
 use avastra_world::sim::World;
 
-use super::super::DATE;
 use super::super::xml::{Element, number};
-use super::actions::{all, from_time, lane_position, maneuver_group, private, speed, teleport};
+use super::actions::{lane_position, maneuver_group, speed, teleport};
 use super::entity::entity;
 use super::environment::environment;
-use super::story::{Cast, Player};
-use super::{Ego, Version, property};
+use super::story::{Cast, Newcomer};
+use super::{Ego, Version, destination, file_header, property, staged};
 use template::Template;
 
 /// What drawn values are drawn from: a file has one value of each.
@@ -129,28 +127,29 @@ fn laid(setup: &Setup, row: &Row, map_file: &str) -> Result<RowFile, String> {
         happened_s: &happened_s,
     };
     let draw = setup.table.offer(&situation, row.index).map_err(|refusal| refusal.in_words())?;
-    let newcomers = world.carry_out(&draw).map_err(|(_, reason)| reason)?;
+    let appeared = world.carry_out(&draw).map_err(|(_, reason)| reason)?;
     if setup.start.ambient > 0 {
         return Err("its road has traffic of its own".to_owned());
     }
     let mut seen = Recorder::default();
     seen.note(&world, setup.ads.build(&setup.scene, setup.seed).as_ref(), &[]);
-    let mut players = Vec::new();
-    for (nth, id) in newcomers {
+    let mut newcomers = Vec::new();
+    for (nth, id) in appeared {
         let Effect::Spawn(request) = &draw.effects[nth] else { continue };
         let actor = seen.others.iter().find(|actor| actor.id == id);
         let (actor, facts) = actor.zip(world.npc_facts(id)).expect("who appeared is there");
         let name = request.bearer.map_or_else(|| actor.name(), |who| space.bearers[who].clone());
-        if players.iter().any(|player: &Player| player.name == name) {
+        if newcomers.iter().any(|newcomer: &Newcomer| newcomer.name == name) {
             return Err("two of its road users would have one name".to_owned());
         }
-        players.push(Player { name, actor, request, course: draw.course(nth), facts });
+        newcomers.push(Newcomer { name, actor, request, course: draw.course(nth), facts });
     }
     if draw.effects.iter().any(|effect| matches!(effect, Effect::Order(_))) {
         return Err("it gives orders".to_owned());
     }
     let duration_s = space.episode.step_s * f64::from(space.episode.step_limit);
-    let cast = Cast { road: setup.road, ego_front_m: world.moment_facts().ego_front_m, players, duration_s };
+    let cast =
+        Cast { road: setup.road, ego_front_m: world.moment_facts().ego_front_m, newcomers, duration_s };
     let file = file(setup, row, &seen, &cast, map_file)?;
     let values = values(setup, row, &draw);
     Ok(RowFile { action: row.action, map_path: setup.road.map_path.clone(), file, values })
@@ -166,45 +165,26 @@ fn file(setup: &Setup, row: &Row, seen: &Recorder, cast: &Cast, map_file: &str) 
     let limit_mps = road.facts.map_limits_mps[1];
     let limit = (limit_mps <= *SPAWN_SPEED_MPS.end()).then(|| property(SPEED_LIMIT, &number(limit_mps)));
     let properties = Element::new("Properties").holding(property("action", &action.name)).holding_all(limit);
-    let header = Element::new("FileHeader")
-        .with("revMajor", 1)
-        .with("revMinor", 2)
-        .with("date", format!("{DATE}T00:00:00"))
-        .with("description", description)
-        .with("author", "avastra")
-        .holding(properties);
+    let header = file_header(Version::V1_2, &description).holding(properties);
     let network = Element::new("RoadNetwork").holding(Element::new("LogicFile").with("filepath", map_file));
-    let others = cast.players.iter().map(|player| entity(player.actor, &player.name, Ego::None));
+    let others = cast.newcomers.iter().map(|newcomer| entity(newcomer.actor, &newcomer.name, Ego::None));
     let entities = Element::new("Entities").holding(entity(&seen.ego, "ego", Ego::None)).holding_all(others);
-    let goal = lane_position(&road.map, LanePlace { offset_m: 0.0, ..road.goal });
-    let goal = Element::new("RoutingAction").holding(Element::new("AcquirePositionAction").holding(goal));
     let ego = Element::new("Private")
         .with("entityRef", "ego")
         .holding(teleport(lane_position(&road.map, road.start)))
         .holding(speed(setup.start.ego_mps))
-        .holding(private(goal));
+        .holding(destination(&road.map, road.goal));
     let (mut begins, mut groups) = (vec![ego], Vec::new());
-    for (nth, player) in cast.players.iter().enumerate() {
+    for (nth, newcomer) in cast.newcomers.iter().enumerate() {
         let (begin, events) = cast.story(nth)?;
         begins.push(begin);
         if !events.is_empty() {
-            groups.push(maneuver_group(&player.name, Some(&player.name), events));
+            groups.push(maneuver_group(&newcomer.name, Some(&newcomer.name), events));
         }
     }
-    let story = (!groups.is_empty()).then(|| {
-        let begin = all(vec![from_time(Version::V1_2, "start", 0.0)]);
-        let act = Element::new("Act")
-            .with("name", "others")
-            .holding_all(groups)
-            .holding(Element::new("StartTrigger").holding(begin));
-        Element::new("Story").with("name", "others").holding(act)
-    });
     let sky = seen.skies.first().map(|sky| environment(sky, 0));
-    let end = all(vec![from_time(Version::V1_2, "end", cast.duration_s)]);
-    let storyboard = Element::new("Storyboard")
-        .holding(Element::new("Init").holding(Element::new("Actions").holding_all(sky).holding_all(begins)))
-        .holding_all(story)
-        .holding(Element::new("StopTrigger").holding(end));
+    let init = sky.into_iter().chain(begins);
+    let storyboard = staged(Version::V1_2, "others", init, groups, cast.duration_s);
     Ok(Element::new("OpenSCENARIO")
         .holding(header)
         .holding(Element::new("CatalogLocations"))

@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use super::super::super::DATE;
 use super::super::super::xml::Element;
+use super::super::{Version, file_header};
 use super::RowFile;
 
 /// A file with parameters, and the file that lists their values.
@@ -163,12 +163,7 @@ fn declared(rows: &[RowFile]) -> Vec<Parameter> {
 
 /// The file that lists the values.
 fn variations(rows: &[RowFile], parameters: &[Parameter], file: &str) -> String {
-    let header = Element::new("FileHeader")
-        .with("revMajor", 1)
-        .with("revMinor", 2)
-        .with("date", format!("{DATE}T00:00:00"))
-        .with("description", format!("Variations of {file}"))
-        .with("author", "avastra");
+    let header = file_header(Version::V1_2, &format!("Variations of {file}"));
     let sets = (0..rows.len()).map(|row| {
         let values = parameters.iter().map(|parameter| {
             Element::new("ParameterAssignment")
