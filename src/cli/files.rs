@@ -109,7 +109,10 @@ pub fn remove(file: &Path) -> Result<(), Failure> {
 
 /// Makes a folder that the user named.
 pub fn make(folder: &Path) -> Result<(), Failure> {
-    files::make(folder).map_err(|error| Failure::file("create", folder, error))
+    files::make(folder).map_err(|error| match error.kind() {
+        ErrorKind::AlreadyExists => Failure::file("create", folder, "it is a file: name a folder"),
+        _ => Failure::file("create", folder, error),
+    })
 }
 
 /// Makes a folder inside a directory, as [`files::folder`].

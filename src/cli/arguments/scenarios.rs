@@ -112,7 +112,7 @@ pub struct ImportArguments {
     /// Give a parameter that the file declares another value; may be given several times.
     #[arg(long, value_name = "NAME=VALUE")]
     pub set: Vec<String>,
-    /// Refuse a file with more variations than this, up to 60,000, which take 0.2 ms each.
+    /// Refuse a file with more variations than this, up to 60,000, which take up to 1 ms each.
     #[arg(long, value_name = "N", default_value_t = VARIATIONS_USUAL, value_parser = clap::value_parser!(u32).range(1..=i64::from(VARIATIONS_MAX)))]
     pub variations: u32,
 }

@@ -147,6 +147,8 @@ impl<'a> Cast<'a> {
         let (own_key, of_key) = (&self.map.lane(own.lane).key, &self.map.lane(of.lane).key);
         if own_key.road == of_key.road {
             let s_m = self.map.lane(own.lane).road_station_m(own.station_m);
+            // Numbers rise to the left of the road, which is to the right of who drives against it.
+            let lanes = if self.map.lane(of.lane).is_along() { lanes } else { -lanes };
             let mut id = of_key.lane + lanes;
             // Lanes have no number 0.
             if (of_key.lane < 0) != (id < 0) || id == 0 {
@@ -198,6 +200,7 @@ pub fn aside_fields(
         Over::Rate(mps) if mps < 0.0 => slope * by_m / (core::f64::consts::PI * (by_m / (2.0 * -mps)).sqrt()),
         Over::Rate(mps) => slope * mps / dynamics.peak,
         Over::Way(way_m) => {
+            source.note("who moves aside over a way does so by the speed with which it begins");
             fields.push(Said::text("aside: npc.speed * ").number(slope * by_m / way_m, ""));
             return Some(());
         }

@@ -279,7 +279,10 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<ActKind> {
                     // Kept for the way, which is not known here.
                     Dynamics { over: Over::Rate(-most_mps2), peak: 1.0, is_continuous: false }
                 }
-                _ => Dynamics { over: Over::Rate(1.0), peak: 1.0, is_continuous: false },
+                _ => {
+                    source.note("an offset without `maxLateralAcc` is reached at 1 m/s on average");
+                    Dynamics { over: Over::Rate(1.0), peak: 1.0, is_continuous: false }
+                }
             };
             let target = source.required(action, "LaneOffsetTarget")?;
             if let Some(absolute) = element(target, "AbsoluteTargetLaneOffset") {
@@ -427,8 +430,10 @@ fn meeting(source: &mut Source, action: Node) -> Option<ActKind> {
 
 fn way(source: &mut Source, action: Node) -> Option<Way> {
     let from_m = source.number_or(action, "initialDistanceOffset", 0.0)?;
-    if let Some(mode) = element(action, "TrajectoryFollowingMode") {
-        source.word(mode, "followingMode", &FOLLOWING)?;
+    if let Some(mode) = element(action, "TrajectoryFollowingMode")
+        && source.word(mode, "followingMode", &FOLLOWING)? == "follow"
+    {
+        source.note("who is to steer along a trajectory is on it exactly");
     }
     let outer = element(action, "TrajectoryRef").unwrap_or(action);
     let shape = shape_of(source, outer)?;

@@ -23,6 +23,8 @@ pub struct Body {
     /// How fast it may gain speed, and lose it, m/s².
     pub gains_mps2: f64,
     pub loses_mps2: f64,
+    /// How fast it may be, m/s.
+    pub most_mps: f64,
 }
 
 impl Body {
@@ -92,12 +94,13 @@ fn of_size(source: &mut Source, node: Node) -> Option<Body> {
     let middle_m = source.number(centre, "x")?;
     let reason = format!("`x` is {middle_m}: more than {MIDDLE_M_MAX} m from the axle");
     source.refuse_if(middle_m.abs() > MIDDLE_M_MAX, centre, reason)?;
-    let (mut gains_mps2, mut loses_mps2) = (f64::INFINITY, f64::INFINITY);
+    let (mut gains_mps2, mut loses_mps2, mut most_mps) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
     if let Some(node) = element(node, "Performance") {
         gains_mps2 = source.amount(node, "maxAcceleration")?;
         loses_mps2 = source.amount(node, "maxDeceleration")?;
+        most_mps = source.amount(node, "maxSpeed")?;
     }
-    Some(Body { like, length_m, width_m, height_m, middle_m, gains_mps2, loses_mps2 })
+    Some(Body { like, length_m, width_m, height_m, middle_m, gains_mps2, loses_mps2, most_mps })
 }
 
 fn within(source: &mut Source, node: Node, attribute: &str, field: BodyField) -> Option<f64> {

@@ -4,7 +4,7 @@ use avastra_base::geometry::Vec2;
 use avastra_world::sim::VehicleParameters;
 
 use super::across::LanesBeside;
-use super::action::ActKind;
+use super::action::{Act, ActKind, Speed};
 use super::phases::ARRIVES_M;
 use super::said::Said;
 use super::scene::{Cast, Moving};
@@ -17,6 +17,9 @@ pub const EGO_FRONT_M: f64 = VehicleParameters::MKZ.rear_axle_to_front_m;
 
 /// Who drives through a circle of a smaller radius may be through it within a tick: it is reached once its near edge is, m.
 const PASSED_M: f64 = 1.0;
+
+/// What a distance beside the way may change of one along it, m.
+const ASIDE_M: f64 = 0.5;
 
 /// The words before a phase.
 #[derive(Debug, Clone, Default)]
@@ -54,6 +57,15 @@ pub struct Waiting<'w, 'a> {
     pub actor: &'w Moving<'a>,
     /// The events before this one that began together.
     pub before: Vec<&'w Event>,
+    /// Whether nothing came before, and it waits for one condition: what becomes less then does so from the side where it begins.
+    pub is_first: bool,
+}
+
+impl<'w, 'a> Waiting<'w, 'a> {
+    /// Before which nothing came.
+    pub fn at_first(cast: &'w Cast<'a>, actor: &'w Moving<'a>) -> Waiting<'w, 'a> {
+        Waiting { cast, actor, before: Vec::new(), is_first: true }
+    }
 }
 
 impl Waiting<'_, '_> {
@@ -79,6 +91,21 @@ impl Waiting<'_, '_> {
 
     pub fn begins(&self, source: &mut Source, trigger: &Trigger) -> Option<Begins> {
         let mut begins = Begins::default();
+        for all in trigger {
+            edges_are_alone(source, all)?;
+        }
+        for condition in trigger.iter().flatten() {
+            let (When::Ended { kind, name } | When::Begun { kind, name }) = &condition.kind else { continue };
+            let own = self.actor.entity.events.iter().find(|event| is_called(event, kind, name));
+            let of = own.or_else(|| self.cast.last_event(kind, name).map(|(_, event)| event));
+            let does = |moving: &&Moving| {
+                moving.entity.events.iter().any(|event| of.is_some_and(|of| of.mark == event.mark))
+            };
+            let reason = format!("several do `{name}`: when all of them have begun or ended it is not read");
+            source.refuse_if(self.cast.moving.iter().filter(does).count() > 1, &condition.mark, reason)?;
+            let reason = format!("it waits for `{name}`, and that, by way of others, for itself");
+            source.refuse_if(self.cast.waits_for_itself(kind, name), &condition.mark, reason)?;
+        }
         let [all] = trigger.as_slice() else {
             let mut groups = Vec::new();
             for all in trigger {
@@ -92,7 +119,10 @@ impl Waiting<'_, '_> {
                     source.refuse_if(is_edge, &condition.mark, reason)?;
                 }
                 if let Some(condition) = all.iter().find(|condition| needs_alone(condition)) {
-                    return source.refuse(&condition.mark, "a time is read where there is one condition");
+                    return source.refuse(
+                        &condition.mark,
+                        "a `delay`, or a time that must pass, is read where there is one condition",
+                    );
                 }
                 let parts: Option<Vec<Said>> = all.iter().map(|one| self.part(source, one)).collect();
                 groups.push(Said::joined(parts?, " and "));
@@ -118,7 +148,10 @@ impl Waiting<'_, '_> {
                 begins.held_s = *seconds;
             }
         } else if let Some(delayed) = others.iter().find(|condition| needs_alone(condition)) {
-            return source.refuse(&delayed.mark, "a time is read where there is one condition");
+            return source.refuse(
+                &delayed.mark,
+                "a `delay`, or a time that must pass, is read where there is one condition",
+            );
         }
         let mut parts = Vec::new();
         let mut first = Vec::new();
@@ -158,17 +191,34 @@ impl Waiting<'_, '_> {
             When::Headway { pair, seconds } => {
                 let of = self.who(source, mark, &pair.of)?;
                 let bound = Said::text(format!("{of}.speed * ")).number(*seconds, "s");
+                let bound_m = self.cast.begins_mps(source, mark, &pair.of)? * seconds;
+                self.is_along(source, mark, pair, Some(bound_m))?;
+                if !self.is_behind(source, mark, pair)? {
+                    source.note("a headway of one who is ahead is its distance from the one behind it, by its own speed");
+                }
                 self.distance(source, mark, pair, &bound)
             }
             When::Collides { pair, seconds } => {
+                self.is_along(source, mark, pair, None)?;
+                self.meet_along(source, mark, pair)?;
                 let way = self.nearer(source, mark, pair)?;
                 let (of, to) = (self.who(source, mark, &pair.of)?, self.who(source, mark, &pair.to)?);
                 let (back, front) = if self.is_behind(source, mark, pair)? { (of, to) } else { (to, of) };
                 let sign = if self.face_each_other(source, mark, pair)? { "+" } else { "-" };
-                Some(way.and(format!(" < ({back}.speed {sign} {front}.speed) * ")).number(*seconds, "s"))
+                let said = way
+                    .clone()
+                    .and(format!(" < ({back}.speed {sign} {front}.speed) * "))
+                    .number(*seconds, "s");
+                // Who has passed the other one comes no nearer.
+                Some(if self.is_first {
+                    said
+                } else {
+                    said.and(" and ").then(way).and(" >= ").number(0.0, "m")
+                })
             }
             When::Distance { pair, metres } => {
                 let bound = Said::default().number(*metres, "m");
+                self.is_along(source, mark, pair, Some(*metres))?;
                 self.distance(source, mark, pair, &bound)
             }
             When::Apart { pair, metres } => {
@@ -186,6 +236,11 @@ impl Waiting<'_, '_> {
             When::Reaches { entity, position, within_m, is_less } => {
                 let point = self.cast.place(source, &position.0)?.pose.position;
                 let (said, station_m) = self.station(source, mark, entity, point)?;
+                let aside_m = self.aside_m(source, mark, entity, point)?;
+                let less_m = within_m - (within_m * within_m - aside_m * aside_m).max(0.0).sqrt();
+                let reason =
+                    format!("the place is {aside_m:.1} m beside its way: only what is on it is read");
+                source.refuse_if(aside_m > *within_m || less_m > ASIDE_M, mark, reason)?;
                 if is_small_circle(&condition.kind) {
                     return Some(said.and(" >= ").number(station_m - within_m, "m"));
                 }
@@ -312,7 +367,8 @@ impl Waiting<'_, '_> {
         }
     }
 
-    /// That something of another road user's, or farther back of its own, has ended.
+    /// That something of another road user's, or farther back of its own, has ended. Of a speed that is so only if the one whose
+    /// speed it is comes to it for the first time then.
     fn ended(&self, source: &mut Source, mark: &Mark, kind: &'static str, name: &str) -> Option<Said> {
         let Some((moving, event)) = self.cast.last_event(kind, name) else {
             let reason =
@@ -332,24 +388,118 @@ impl Waiting<'_, '_> {
                 let end_m = moving.leg(way)?.end_m;
                 Some(Said::text(format!("{who}.station >= ")).number(end_m - ARRIVES_M, "m"))
             }
-            ActKind::Speed(super::action::Speed::Absolute(mps), _) => {
+            ActKind::Speed(Speed::Absolute(mps), _) => {
+                self.comes_to_once(source, mark, moving, event, *mps)?;
                 Some(Said::text(format!("{who}.speed == ")).number(*mps, "m/s"))
             }
             _ => source.refuse(mark, format!("when `{name}` has ended is not read")),
         }
     }
 
+    /// Refuses the end of a change to a speed that somebody may have at another time, or may never come to.
+    fn comes_to_once(
+        &self,
+        source: &mut Source,
+        mark: &Mark,
+        moving: &Moving,
+        event: &Event,
+        mps: f64,
+    ) -> Option<()> {
+        let reason = "when this has ended cannot be told by a speed, which may be there at another time";
+        let mut known = vec![moving.mps];
+        for other in moving.entity.events.iter().take_while(|other| !core::ptr::eq(*other, event)) {
+            for act in &other.acts {
+                match &act.kind {
+                    ActKind::Speed(Speed::Absolute(mps), _) => known.push(*mps),
+                    ActKind::Speed(..) | ActKind::Profile(_) | ActKind::Meet(_) | ActKind::Keep(_) => {
+                        return source.refuse(mark, reason);
+                    }
+                    _ => {}
+                }
+            }
+        }
+        let (least_mps, most_mps) =
+            known.iter().fold((f64::MAX, f64::MIN), |(least, most), mps| (least.min(*mps), most.max(*mps)));
+        source.refuse_if((least_mps..=most_mps).contains(&mps), mark, reason)?;
+        // What cuts it short ends it, too, and then the speed is another one.
+        let is_speed = |act: &Act| {
+            matches!(act.kind, ActKind::Speed(..) | ActKind::Profile(_) | ActKind::Meet(_) | ActKind::Keep(_))
+        };
+        let later = moving.entity.events.iter().skip_while(|other| !core::ptr::eq(*other, event)).skip(1);
+        for other in later
+            .filter(|other| other.acts.iter().any(is_speed) || other.overwrites && other.is_beside(event))
+        {
+            let follows = |condition: &Condition| match &condition.kind {
+                When::Ended { kind, name } => is_called(event, kind, name),
+                _ => false,
+            };
+            let waits = other.when.iter().all(|all| all.iter().any(follows));
+            let reason = "another event may cut this short, and end it without its speed";
+            source.refuse_if(!waits || other.when.is_empty(), mark, reason)?;
+        }
+        Some(())
+    }
+
     /// The distance of two, less or more than a bound. Less it becomes from the side from which the first one comes.
     fn distance(&self, source: &mut Source, mark: &Mark, pair: &Pair, bound: &Said) -> Option<Said> {
-        if pair.is_less {
+        let is_apart =
+            self.cast.is_far_off(source, mark, &pair.of)? || self.cast.is_far_off(source, mark, &pair.to)?;
+        if pair.is_less && (self.is_first || is_apart) {
             return Some(self.nearer(source, mark, pair)?.and(" <= ").then(bound.clone()));
         }
+        let (sign, word) = if pair.is_less { (" <= ", " and ") } else { (" >= ", " or ") };
         let sides = [(&pair.of, &pair.to), (&pair.to, &pair.of)];
         let sides = sides.map(|(back, front)| {
-            Some(self.between(source, mark, back, front, pair.is_free_space)?.and(" >= ").then(bound.clone()))
+            Some(self.between(source, mark, back, front, pair.is_free_space)?.and(sign).then(bound.clone()))
         });
         let [ahead, behind] = sides;
-        Some(Said::text("(").then(ahead?).and(" or ").then(behind?).and(")"))
+        Some(Said::text("(").then(ahead?).and(word).then(behind?).and(")"))
+    }
+
+    /// Refuses a distance as the crow flies of two so far beside each other that the way along the road is another, where it is
+    /// `bound_m` long.
+    fn is_along(&self, source: &mut Source, mark: &Mark, pair: &Pair, bound_m: Option<f64>) -> Option<()> {
+        if !pair.is_straight {
+            return Some(());
+        }
+        if self.cast.is_far_off(source, mark, &pair.of)? || self.cast.is_far_off(source, mark, &pair.to)? {
+            source.note(
+                "distances as the crow flies of those who come from other roads are taken along the road",
+            );
+            return Some(());
+        }
+        let [of, to] = [&pair.of, &pair.to].map(|name| self.cast.begins(source, mark, name));
+        let offset_m = |point: Vec2| self.cast.route.path.project(point).offset_m;
+        let outlines_m = if pair.is_free_space { self.cast.half_widths_m(pair) } else { 0.0 };
+        let aside_m = ((offset_m(of?) - offset_m(to?)).abs() - outlines_m).max(0.0);
+        let is_short = |bound_m: f64| {
+            aside_m > bound_m || bound_m - (bound_m * bound_m - aside_m * aside_m).sqrt() > ASIDE_M
+        };
+        let is_other = bound_m.map_or(aside_m > ASIDE_M, is_short);
+        let reason = format!(
+            "they begin {aside_m:.1} m beside each other, and distances are read along the road: `relativeDistanceType=\"longitudinal\"`"
+        );
+        source.refuse_if(is_other, mark, reason)
+    }
+
+    /// Refuses the time in which two meet of whom one goes across the way of the other.
+    fn meet_along(&self, source: &mut Source, mark: &Mark, pair: &Pair) -> Option<()> {
+        for name in [&pair.of, &pair.to] {
+            let reason =
+                format!("`{name}` goes across the road: a time to meet is read of those who go along it");
+            let goes_across = self.cast.goes_across(source, mark, name)?;
+            source.refuse_if(goes_across, mark, reason)?;
+        }
+        Some(())
+    }
+
+    /// How far a point is beside the way of somebody, m.
+    fn aside_m(&self, source: &mut Source, mark: &Mark, entity: &str, point: Vec2) -> Option<f64> {
+        if self.cast.is_ego(entity) {
+            return Some(self.cast.route.path.project(point).offset_m.abs());
+        }
+        let moving = self.cast.moving(source, mark, entity)?;
+        Some((moving.path.project(point).offset_m - moving.offset_m).abs())
     }
 
     /// The way between two, from the side from which the first one comes.
@@ -475,6 +625,59 @@ impl Waiting<'_, '_> {
         })
     }
 
+    /// When a trigger comes if everybody goes on as they begin, s; `None` if that is not known.
+    pub fn comes_s(&self, source: &mut Source, trigger: &Trigger) -> Option<f64> {
+        let mut first_s: f64 = if trigger.is_empty() { 0.0 } else { f64::INFINITY };
+        for all in trigger {
+            let mut comes_s: f64 = 0.0;
+            for condition in all {
+                comes_s = comes_s.max(self.condition_comes_s(source, condition)? + condition.delay_s);
+            }
+            first_s = first_s.min(comes_s);
+        }
+        first_s.is_finite().then_some(first_s)
+    }
+
+    fn condition_comes_s(&self, source: &mut Source, condition: &Condition) -> Option<f64> {
+        let mark = &condition.mark;
+        let gap = |source: &mut Source, pair: &Pair, bound_m: f64| {
+            let of_mps = self.cast.begins_mps(source, mark, &pair.of)?;
+            let to_mps = self.cast.begins_mps(source, mark, &pair.to)?;
+            let closes_mps = match self.is_behind(source, mark, pair)? {
+                _ if self.face_each_other(source, mark, pair)? => of_mps + to_mps,
+                true => of_mps - to_mps,
+                false => to_mps - of_mps,
+            };
+            let away_m = self.away_m(source, mark, pair)?;
+            match pair.is_less {
+                true if away_m <= bound_m => Some(0.0),
+                true => (closes_mps > 0.0).then(|| (away_m - bound_m) / closes_mps),
+                false if away_m >= bound_m => (condition.edge == Edge::None).then_some(0.0),
+                false if closes_mps > 0.0 => Some((away_m + bound_m) / closes_mps),
+                false => (closes_mps < 0.0).then(|| (bound_m - away_m) / -closes_mps),
+            }
+        };
+        match &condition.kind {
+            When::Always => Some(0.0),
+            When::After(seconds) => Some(*seconds),
+            When::Distance { pair, metres } => gap(source, pair, *metres),
+            When::Headway { pair, seconds } => {
+                let bound_m = self.cast.begins_mps(source, mark, &pair.of)? * seconds;
+                gap(source, pair, bound_m)
+            }
+            When::Travelled { entity, metres } => {
+                let mps = self.cast.begins_mps(source, mark, entity)?;
+                (mps > 0.0).then(|| metres / mps)
+            }
+            When::Reaches { entity, position, within_m, is_less: true } => {
+                let mps = self.cast.begins_mps(source, mark, entity)?;
+                let way_m = (self.ahead_m(source, mark, entity, position)? - within_m).max(0.0);
+                (mps > 0.0).then(|| way_m / mps)
+            }
+            _ => None,
+        }
+    }
+
     /// How far a place is ahead of somebody at the beginning, m.
     fn ahead_m(&self, source: &mut Source, mark: &Mark, entity: &str, place: &PlaceMark) -> Option<f64> {
         let point = self.cast.place(source, &place.0)?.pose.position;
@@ -538,4 +741,29 @@ pub fn is_called(event: &Event, kind: &str, name: &str) -> bool {
 
 fn sign(is_less: bool) -> &'static str {
     if is_less { "<=" } else { ">=" }
+}
+
+/// Refuses an edge beside other conditions: they would have to hold at its very moment.
+fn edges_are_alone(source: &mut Source, all: &[Condition]) -> Option<()> {
+    let (of_act, own): (Vec<&Condition>, Vec<&Condition>) =
+        all.iter().filter(|one| one.kind != When::Always).partition(|one| one.is_of_act);
+    for some in [&of_act, &own] {
+        let edge = some.iter().find(|condition| some.len() > 1 && condition.edge != Edge::None);
+        if let Some(edge) = edge {
+            let reason = "beside other conditions, which would have to hold at the moment of its edge, only `conditionEdge=\"none\"` is read";
+            return source.refuse(&edge.mark, reason);
+        }
+    }
+    let latest_s = of_act.iter().map(|one| one.time_s()).collect::<Option<Vec<f64>>>();
+    let latest_s = latest_s.map(|times| times.into_iter().fold(0.0, f64::max));
+    for condition in own.iter().filter(|one| !of_act.is_empty() && one.edge != Edge::None) {
+        let is_later = match &condition.kind {
+            When::After(seconds) => latest_s.is_some_and(|latest_s| *seconds >= latest_s),
+            When::Ended { .. } | When::Begun { .. } => true,
+            _ => false,
+        };
+        let reason = "its act begins later, and whether it holds by then is not known: with `conditionEdge=\"none\"` it is read";
+        source.refuse_if(!is_later, &condition.mark, reason)?;
+    }
+    Some(())
 }

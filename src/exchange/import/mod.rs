@@ -198,7 +198,7 @@ pub fn openscenario(text: &str, request: &Request, files: &dyn Files) -> Result<
             whole.description = distribution.description;
             whole.notes.extend(source.notes());
             if repeated > 0 {
-                let note = format!("{repeated} variations have the values of another one, and count once");
+                let note = format!("variations with the values of another one, which count once: {repeated}");
                 whole.notes.insert(note);
             }
             Ok(write::space(&whole, &distribution.parameters, name))

@@ -225,7 +225,7 @@ impl<'a> Cast<'a> {
     ) -> Option<(String, Said)> {
         let own = &moving.entity.name;
         source.refuse_if(kept.of == *own, mark, "a distance to itself")?;
-        let waiting = Waiting { cast: self, actor: moving, before: Vec::new() };
+        let waiting = Waiting::at_first(self, moving);
         let of = waiting.who(source, mark, &kept.of)?;
         let (here, there) = (self.begins(source, mark, own)?, self.begins(source, mark, &kept.of)?);
         let looks_ahead = self.looks_ahead(source, mark, own)?;

@@ -21,7 +21,7 @@ use super::rows::small;
 use super::said::{Figure, Said, number};
 use super::source::{Mark, Source};
 use super::story::{Entity, Event, Story};
-use super::trigger::Pair;
+use super::trigger::{Pair, When};
 use super::ways::{Leg, is_led, moves};
 
 /// Before the offset of a spawn.
@@ -263,6 +263,28 @@ impl<'a> Cast<'a> {
         })
     }
 
+    /// Whether something waits, by way of what it waits for, for itself.
+    pub fn waits_for_itself(&self, kind: &str, name: &str) -> bool {
+        let Some((_, event)) = self.last_event(kind, name) else { return false };
+        let (mut waiting, mut seen): (Vec<&Event>, Vec<&Event>) = (vec![event], Vec::new());
+        while let Some(next) = waiting.pop() {
+            for condition in next.when.iter().flatten() {
+                let (When::Ended { kind, name } | When::Begun { kind, name }) = &condition.kind else {
+                    continue;
+                };
+                let Some((_, before)) = self.last_event(kind, name) else { continue };
+                if core::ptr::eq(before, event) {
+                    return true;
+                }
+                if !seen.iter().any(|known| core::ptr::eq(*known, before)) {
+                    seen.push(before);
+                    waiting.push(before);
+                }
+            }
+        }
+        false
+    }
+
     pub fn place(&self, source: &mut Source, position: &Position) -> Option<Placed> {
         self.places.borrow_mut().placed(source, position)
     }
@@ -364,6 +386,17 @@ impl<'a> Cast<'a> {
         let beside = self.route.path.project(pose.position).station_m;
         let turned_rad = wrap_angle(pose.heading_rad - self.route.path.heading_at(beside));
         Some(turned_rad.abs() < core::f64::consts::FRAC_PI_2)
+    }
+
+    /// Whether somebody begins across the ego vehicle's route, rather than along it.
+    pub fn goes_across(&self, source: &mut Source, mark: &Mark, name: &str) -> Option<bool> {
+        if self.is_ego(name) {
+            return Some(false);
+        }
+        let pose = self.moving(source, mark, name)?.placed.pose;
+        let beside = self.route.path.project(pose.position).station_m;
+        let turned_rad = wrap_angle(pose.heading_rad - self.route.path.heading_at(beside));
+        Some(libm::cos(turned_rad).abs() < libm::cos(core::f64::consts::FRAC_PI_4))
     }
 
     /// Somebody on the way that it goes.

@@ -13,6 +13,9 @@ use super::catalogue::Library;
 use super::expression;
 use super::parameter;
 
+/// Letters of a reason: it may have an expression of the file in it.
+const REASON_MAX: usize = 500;
+
 /// More refusals help nobody.
 const REFUSALS_MAX: usize = 100;
 
@@ -26,7 +29,7 @@ const ENTRIES_MAX: usize = 10_000;
 const NUMBER_MAX: f64 = 1e7;
 
 /// Where something stands in the file, to be refused later.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mark {
     pub line: u32,
     pub element: String,
@@ -220,6 +223,10 @@ impl<'f> Source<'f> {
             let reason = match &self.outermost {
                 Some((_, whose)) => format!("{whose}: {}", reason.into()),
                 None => reason.into(),
+            };
+            let reason = match reason.char_indices().nth(REASON_MAX) {
+                Some((end, _)) => format!("{}…", &reason[..end]),
+                None => reason,
             };
             self.refused.insert(Refusal { scenario: None, line, element, reason });
         }

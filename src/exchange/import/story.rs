@@ -19,6 +19,9 @@ use super::weather::{Weather, weather};
 /// The latest minor version that is read.
 const MINOR_MAX: i32 = 3;
 
+/// What one entity does at most: as many phases as a manoeuvre of the language has.
+const PHASES_MAX: usize = 100;
+
 /// How long a scenario is played that names no time for its end, s.
 const DURATION_S: f64 = 60.0;
 
@@ -68,9 +71,20 @@ pub struct Event {
     pub names: Vec<(&'static str, String)>,
     pub when: Trigger,
     pub acts: Vec<Act>,
+    /// Whether its beginning ends what else of its manoeuvre is under way.
+    pub overwrites: bool,
 }
 
 impl Event {
+    /// Whether two stand in one manoeuvre.
+    pub fn is_beside(&self, other: &Event) -> bool {
+        let within = |event: &Event| {
+            let outer = event.names.iter().filter(|(kind, _)| !matches!(*kind, "event" | "action"));
+            outer.cloned().collect::<Vec<_>>()
+        };
+        !self.names.is_empty() && within(self) == within(other)
+    }
+
     /// When it comes, if that is a time, s.
     pub fn time_s(&self) -> Option<f64> {
         time_s(&self.when)
@@ -333,11 +347,18 @@ impl Cast {
         manoeuvre: Node,
         begins: &mut Option<Option<Trigger>>,
     ) {
+        let has_several = elements(manoeuvre, "Event").nth(1).is_some();
         for event in elements(manoeuvre, "Event") {
             if !is_carried_out(source, event) {
                 continue;
             }
-            source.word(event, "priority", &["override", "overwrite", "parallel", "skip"]);
+            let priority = source.word(event, "priority", &["override", "overwrite", "parallel", "skip"]);
+            if has_several && priority == Some("skip") {
+                source.refuse::<()>(
+                    event,
+                    "what is skipped while another event of its manoeuvre goes on is not read",
+                );
+            }
             let actions: Vec<Node> = elements(event, "Action").flat_map(children).collect();
             let own: Vec<&String> = scope.names.iter().filter(|name| !self.is_ego(name)).collect();
             let (private, global): (Vec<Node>, Vec<Node>) =
@@ -354,7 +375,7 @@ impl Cast {
             if does.is_empty() && changes.is_empty() {
                 continue;
             }
-            let begins = begins.get_or_insert_with(|| trigger(source, scope.act)).clone();
+            let begins = begins.get_or_insert_with(|| of_act(source, scope.act)).clone();
             // What an action asks for is told even where its trigger is refused.
             let when = trigger(source, event).zip(begins).and_then(|(own, act)| {
                 let reason =
@@ -383,7 +404,14 @@ impl Cast {
                     .collect();
                 let mark = source.mark(event);
                 if let (Some(Some(when)), Some(entity)) = (&when, self.other(name)) {
-                    entity.events.push(Event { mark, names: names.clone(), when: when.clone(), acts });
+                    let reason = format!("more than {PHASES_MAX} events of one entity");
+                    if entity.events.len() >= PHASES_MAX {
+                        source.refuse::<()>(event, reason);
+                        return;
+                    }
+                    let overwrites = matches!(priority, Some("override" | "overwrite"));
+                    let (names, when) = (names.clone(), when.clone());
+                    entity.events.push(Event { mark, names, when, acts, overwrites });
                 }
             }
         }
@@ -486,7 +514,13 @@ impl Entity {
                 } else {
                     let kind = ActKind::Speed(speed, dynamics);
                     let acts = vec![Act { mark: mark.clone(), kind }];
-                    self.events.push(Event { mark, names: Vec::new(), when: Vec::new(), acts });
+                    self.events.push(Event {
+                        mark,
+                        names: Vec::new(),
+                        when: Vec::new(),
+                        acts,
+                        overwrites: false,
+                    });
                 }
             }
             ActKind::Follow(way) => self.way = Some(*way),
@@ -497,7 +531,13 @@ impl Entity {
             | ActKind::Meet(_)
             | ActKind::Keep(_) => {
                 let acts = vec![Act { mark: mark.clone(), kind }];
-                self.events.push(Event { mark, names: Vec::new(), when: Vec::new(), acts });
+                self.events.push(Event {
+                    mark,
+                    names: Vec::new(),
+                    when: Vec::new(),
+                    acts,
+                    overwrites: false,
+                });
             }
         }
     }
@@ -573,6 +613,13 @@ fn user_defined(source: &mut Source, action: Node) {
             source.refuse::<()>(children(action).next().unwrap_or(action), "this action is not read");
         }
     }
+}
+
+/// The trigger of an act.
+fn of_act(source: &mut Source, act: Node) -> Option<Trigger> {
+    let mut begins = trigger(source, act)?;
+    begins.iter_mut().flatten().for_each(|condition| condition.is_of_act = true);
+    Some(begins)
 }
 
 /// Whether something is carried out at all; one that is to be repeated is refused.

@@ -40,6 +40,19 @@ pub struct Condition {
     /// What it asks for has held, or come, so long ago, s.
     pub delay_s: f64,
     pub kind: When,
+    /// Whether it begins the act, in which the event then waits for its own conditions.
+    pub is_of_act: bool,
+}
+
+impl Condition {
+    /// The time for which it waits, if it waits for one, s.
+    pub fn time_s(&self) -> Option<f64> {
+        match self.kind {
+            When::Always => Some(0.0),
+            When::After(seconds) => Some(seconds),
+            _ => None,
+        }
+    }
 }
 
 /// What a condition asks for: that it holds, begins to hold, or ceases to.
@@ -164,6 +177,8 @@ pub struct Pair {
     pub is_less: bool,
     /// Between the outlines, not the reference points.
     pub is_free_space: bool,
+    /// As the crow flies, and not along the road.
+    pub is_straight: bool,
 }
 
 /// The conditions of a start trigger; without any it holds at once. `None` if one is refused.
@@ -280,7 +295,13 @@ fn condition(source: &mut Source, node: Node) -> Option<Trigger> {
         };
         let reason = "it does not cease to hold: `conditionEdge=\"falling\"` waits for nothing";
         source.refuse_if(edge == Edge::Falling && kind == When::Always, inner, reason)?;
-        return Some(vec![vec![Condition { mark: source.mark(inner), edge, delay_s, kind }]]);
+        return Some(vec![vec![Condition {
+            mark: source.mark(inner),
+            edge,
+            delay_s,
+            kind,
+            is_of_act: false,
+        }]]);
     }
     let by_entity = source.required(node, "ByEntityCondition")?;
     let list = source.required(by_entity, "TriggeringEntities")?;
@@ -292,12 +313,12 @@ fn condition(source: &mut Source, node: Node) -> Option<Trigger> {
     let outer = source.required(by_entity, "EntityCondition")?;
     let Some(inner) = children(outer).next() else { return source.refuse(outer, "it is empty") };
     source.refuse_if(names.is_empty(), list, "it names no entity")?;
-    let reason = "when a condition on several entities begins to hold, or ceases, is not read";
+    let reason = "when a condition on several entities begins to hold, or ceases, is not read: `conditionEdge=\"none\"` is";
     source.refuse_if(names.len() > 1 && edge != Edge::None, list, reason)?;
     let mut found = Vec::new();
     for of in &names {
         let kind = of_entity(source, inner, of)?;
-        found.push(Condition { mark: source.mark(inner), edge, delay_s, kind });
+        found.push(Condition { mark: source.mark(inner), edge, delay_s, kind, is_of_act: false });
     }
     Some(if rule == "all" { vec![found] } else { found.into_iter().map(|one| vec![one]).collect() })
 }
@@ -331,7 +352,8 @@ fn of_entity(source: &mut Source, inner: Node, of: &str) -> Option<When> {
             } else {
                 let to = source.required(target, "EntityRef")?;
                 let to = source.text(to, "entityRef")?;
-                When::Collides { pair: Pair { of: entity, to, is_less, is_free_space }, seconds }
+                let is_straight = is_straight(inner);
+                When::Collides { pair: Pair { of: entity, to, is_less, is_free_space, is_straight }, seconds }
             }
         }
         "ReachPositionCondition" => {
@@ -451,10 +473,16 @@ fn frame(source: &mut Source, node: Node) -> Option<()> {
     Some(())
 }
 
+/// Whether a distance is one as the crow flies.
+fn is_straight(node: Node) -> bool {
+    matches!(node.attribute("relativeDistanceType"), Some("euclidianDistance" | "cartesianDistance"))
+}
+
 fn pair(source: &mut Source, node: Node, of: &str) -> Option<Pair> {
     let to = source.text(node, "entityRef")?;
     let is_free_space = source.switch(node, "freespace", false)?;
-    Some(Pair { of: of.to_owned(), to, is_less: is_less(source, node)?, is_free_space })
+    let is_straight = is_straight(node);
+    Some(Pair { of: of.to_owned(), to, is_less: is_less(source, node)?, is_free_space, is_straight })
 }
 
 pub fn is_less(source: &mut Source, node: Node) -> Option<bool> {

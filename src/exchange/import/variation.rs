@@ -13,7 +13,7 @@ use super::vocabulary;
 pub const VARIATIONS_MAX: u32 = 60_000;
 
 /// The most variations that are read unless more are asked for: what is read within a second.
-pub const VARIATIONS_USUAL: u32 = 3_000;
+pub const VARIATIONS_USUAL: u32 = 500;
 
 /// The most values of all variations together.
 const VALUES_MAX: usize = 2_000_000;

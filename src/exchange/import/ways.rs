@@ -192,7 +192,7 @@ impl<'a> Cast<'a> {
 
     /// Whether what an event waits for holds at the beginning.
     fn begins_at_once(&self, source: &mut Source, moving: &Moving<'a>, event: &Event) -> Option<bool> {
-        let waiting = Waiting { cast: self, actor: moving, before: Vec::new() };
+        let waiting = Waiting::at_first(self, moving);
         let mut begins = event.when.is_empty();
         for all in &event.when {
             let mut holds = true;
