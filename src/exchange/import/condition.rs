@@ -4,13 +4,13 @@ use avastra_base::geometry::Vec2;
 use avastra_world::sim::VehicleParameters;
 
 use super::across::LanesBeside;
-use super::action::{Act, ActKind, Speed};
+use super::action::{ActKind, Speed};
 use super::phases::ARRIVES_M;
 use super::said::Said;
 use super::scene::{Cast, Moving};
 use super::source::{Mark, Source};
 use super::story::Event;
-use super::trigger::{Clearance, Condition, Edge, Pair, PlaceMark, Trigger, When};
+use super::trigger::{Clearance, Condition, Edge, Pair, Trigger, When};
 
 /// From the ego vehicle's rear axle to its front in avastra, m: what the language's `ego.front` is ahead of a file's reference point.
 pub const EGO_FRONT_M: f64 = VehicleParameters::MKZ.rear_axle_to_front_m;
@@ -91,21 +91,7 @@ impl Waiting<'_, '_> {
 
     pub fn begins(&self, source: &mut Source, trigger: &Trigger) -> Option<Begins> {
         let mut begins = Begins::default();
-        for all in trigger {
-            edges_are_alone(source, all)?;
-        }
-        for condition in trigger.iter().flatten() {
-            let (When::Ended { kind, name } | When::Begun { kind, name }) = &condition.kind else { continue };
-            let own = self.actor.entity.events.iter().find(|event| is_called(event, kind, name));
-            let of = own.or_else(|| self.cast.last_event(kind, name).map(|(_, event)| event));
-            let does = |moving: &&Moving| {
-                moving.entity.events.iter().any(|event| of.is_some_and(|of| of.mark == event.mark))
-            };
-            let reason = format!("several do `{name}`: when all of them have begun or ended it is not read");
-            source.refuse_if(self.cast.moving.iter().filter(does).count() > 1, &condition.mark, reason)?;
-            let reason = format!("it waits for `{name}`, and that, by way of others, for itself");
-            source.refuse_if(self.cast.waits_for_itself(kind, name), &condition.mark, reason)?;
-        }
+        self.comes_as_said(source, trigger)?;
         let [all] = trigger.as_slice() else {
             let mut groups = Vec::new();
             for all in trigger {
@@ -320,13 +306,13 @@ impl Waiting<'_, '_> {
     }
 
     /// The lanes that somebody asks about; the inner `None` for all.
-    fn beside(&self, source: &mut Source, mark: &Mark, room: &Clearance) -> Option<Option<LanesBeside>> {
+    pub fn beside(&self, source: &mut Source, mark: &Mark, room: &Clearance) -> Option<Option<LanesBeside>> {
         let Some(lanes) = room.lanes else { return Some(None) };
         self.cast.lanes_beside(source, mark, &room.of, lanes, room.has_oncoming).map(Some)
     }
 
     /// Who counts where somebody asks for room.
-    fn counted(&self, source: &mut Source, mark: &Mark, room: &Clearance) -> Option<Vec<String>> {
+    pub fn counted(&self, source: &mut Source, mark: &Mark, room: &Clearance) -> Option<Vec<String>> {
         let ahead = self.cast.looks_ahead(source, mark, &room.of)?;
         let mut counted = Vec::new();
         for name in self.cast.names().filter(|name| *name != room.of) {
@@ -394,50 +380,6 @@ impl Waiting<'_, '_> {
             }
             _ => source.refuse(mark, format!("when `{name}` has ended is not read")),
         }
-    }
-
-    /// Refuses the end of a change to a speed that somebody may have at another time, or may never come to.
-    fn comes_to_once(
-        &self,
-        source: &mut Source,
-        mark: &Mark,
-        moving: &Moving,
-        event: &Event,
-        mps: f64,
-    ) -> Option<()> {
-        let reason = "when this has ended cannot be told by a speed, which may be there at another time";
-        let mut known = vec![moving.mps];
-        for other in moving.entity.events.iter().take_while(|other| !core::ptr::eq(*other, event)) {
-            for act in &other.acts {
-                match &act.kind {
-                    ActKind::Speed(Speed::Absolute(mps), _) => known.push(*mps),
-                    ActKind::Speed(..) | ActKind::Profile(_) | ActKind::Meet(_) | ActKind::Keep(_) => {
-                        return source.refuse(mark, reason);
-                    }
-                    _ => {}
-                }
-            }
-        }
-        let (least_mps, most_mps) =
-            known.iter().fold((f64::MAX, f64::MIN), |(least, most), mps| (least.min(*mps), most.max(*mps)));
-        source.refuse_if((least_mps..=most_mps).contains(&mps), mark, reason)?;
-        // What cuts it short ends it, too, and then the speed is another one.
-        let is_speed = |act: &Act| {
-            matches!(act.kind, ActKind::Speed(..) | ActKind::Profile(_) | ActKind::Meet(_) | ActKind::Keep(_))
-        };
-        let later = moving.entity.events.iter().skip_while(|other| !core::ptr::eq(*other, event)).skip(1);
-        for other in later
-            .filter(|other| other.acts.iter().any(is_speed) || other.overwrites && other.is_beside(event))
-        {
-            let follows = |condition: &Condition| match &condition.kind {
-                When::Ended { kind, name } => is_called(event, kind, name),
-                _ => false,
-            };
-            let waits = other.when.iter().all(|all| all.iter().any(follows));
-            let reason = "another event may cut this short, and end it without its speed";
-            source.refuse_if(!waits || other.when.is_empty(), mark, reason)?;
-        }
-        Some(())
     }
 
     /// The distance of two, less or more than a bound. Less it becomes from the side from which the first one comes.
@@ -533,181 +475,14 @@ impl Waiting<'_, '_> {
         Some(if is_free_space { said } else { said.and(" + ").number(overhangs_m, "m") })
     }
 
-    /// Whether the first of two begins behind the second along the ego vehicle's route.
-    fn is_behind(&self, source: &mut Source, mark: &Mark, pair: &Pair) -> Option<bool> {
-        let (of, to) = (self.cast.begins(source, mark, &pair.of)?, self.cast.begins(source, mark, &pair.to)?);
-        Some(self.cast.station_m(of) < self.cast.station_m(to))
-    }
-
-    /// Whether a condition holds at the beginning, as far as the speeds and places there say.
-    pub fn holds(&self, source: &mut Source, condition: &Condition) -> Option<bool> {
-        let mark = &condition.mark;
-        Some(match &condition.kind {
-            When::Distance { pair, metres } => {
-                let away_m = self.away_m(source, mark, pair)?;
-                if pair.is_less { away_m < *metres } else { away_m > *metres }
-            }
-            When::Apart { pair, metres } => {
-                let of = self.cast.begins(source, mark, &pair.of)?;
-                let to = self.cast.begins(source, mark, &pair.to)?;
-                let offset_m = |point: Vec2| self.cast.route.path.project(point).offset_m;
-                let metres = metres + if pair.is_free_space { self.cast.half_widths_m(pair) } else { 0.0 };
-                let apart_m = (offset_m(of) - offset_m(to)).abs();
-                if pair.is_less { apart_m < metres } else { apart_m > metres }
-            }
-            When::Clear(room) => {
-                let beside = self.beside(source, mark, room)?;
-                let here = self.cast.begins(source, mark, &room.of)?;
-                let begins_m = self.cast.moving(source, mark, &room.of)?.at_m;
-                let mut is_clear = beside.as_ref().is_none_or(|beside| beside.from_m <= begins_m);
-                for name in self.counted(source, mark, room)? {
-                    let there = self.cast.begins(source, mark, &name)?;
-                    let ahead_m = self.cast.station_m(there) - self.cast.station_m(here);
-                    let pair = |of: &str, to: &str| (of.to_owned(), to.to_owned());
-                    let (back, front) =
-                        if ahead_m >= 0.0 { pair(&room.of, &name) } else { pair(&name, &room.of) };
-                    let outlines_m = match room.is_free_space {
-                        true => {
-                            self.cast.overhang_m(source, mark, &front, false)?
-                                + self.cast.overhang_m(source, mark, &back, true)?
-                        }
-                        false => 0.0,
-                    };
-                    let ahead_m = ahead_m.signum() * (ahead_m.abs() - outlines_m).max(0.0);
-                    let offset_m = |point: Vec2| self.cast.route.path.project(point).offset_m;
-                    let left_m = offset_m(there) - offset_m(here);
-                    let is_in = |lanes: &LanesBeside| lanes.right_m <= left_m && left_m <= lanes.left_m;
-                    let is_beside = beside.as_ref().is_none_or(is_in);
-                    is_clear &= !(is_beside && -room.behind_m <= ahead_m && ahead_m <= room.ahead_m);
-                }
-                is_clear
-            }
-            When::Headway { pair, seconds } => {
-                let away_m = self.away_m(source, mark, pair)?;
-                let bound_m = self.cast.begins_mps(source, mark, &pair.of)? * seconds;
-                if pair.is_less { away_m < bound_m } else { away_m > bound_m }
-            }
-            When::Collides { pair, seconds } => {
-                let of_mps = self.cast.begins_mps(source, mark, &pair.of)?;
-                let to_mps = self.cast.begins_mps(source, mark, &pair.to)?;
-                let by_mps = match self.is_behind(source, mark, pair)? {
-                    _ if self.face_each_other(source, mark, pair)? => of_mps + to_mps,
-                    true => of_mps - to_mps,
-                    false => to_mps - of_mps,
-                };
-                self.away_m(source, mark, pair)? < by_mps * seconds
-            }
-            When::Speed { entity, mps, is_less } => {
-                let begins_mps = self.cast.begins_mps(source, mark, entity)?;
-                if *is_less { begins_mps < *mps } else { begins_mps > *mps }
-            }
-            When::Faster { of, to, mps, is_less } => {
-                let of_mps = self.cast.begins_mps(source, mark, of)?;
-                let by_mps = of_mps - self.cast.begins_mps(source, mark, to)?;
-                if *is_less { by_mps < *mps } else { by_mps > *mps }
-            }
-            When::Reaches { entity, position, within_m, is_less } => {
-                let ahead_m = self.ahead_m(source, mark, entity, position)?;
-                (ahead_m.abs() <= *within_m) == *is_less
-            }
-            When::Nears { entity, position, seconds } => {
-                let way_m = self.cast.begins_mps(source, mark, entity)? * seconds;
-                self.ahead_m(source, mark, entity, position)? <= way_m
-            }
-            When::Travelled { metres, .. } => *metres <= 0.0,
-            When::Always => true,
-            When::Never
-            | When::Contact(_)
-            | When::After(_)
-            | When::Stands { .. }
-            | When::Ended { .. }
-            | When::Begun { .. } => false,
-        })
-    }
-
-    /// When a trigger comes if everybody goes on as they begin, s; `None` if that is not known.
-    pub fn comes_s(&self, source: &mut Source, trigger: &Trigger) -> Option<f64> {
-        let mut first_s: f64 = if trigger.is_empty() { 0.0 } else { f64::INFINITY };
-        for all in trigger {
-            let mut comes_s: f64 = 0.0;
-            for condition in all {
-                comes_s = comes_s.max(self.condition_comes_s(source, condition)? + condition.delay_s);
-            }
-            first_s = first_s.min(comes_s);
-        }
-        first_s.is_finite().then_some(first_s)
-    }
-
-    fn condition_comes_s(&self, source: &mut Source, condition: &Condition) -> Option<f64> {
-        let mark = &condition.mark;
-        let gap = |source: &mut Source, pair: &Pair, bound_m: f64| {
-            let of_mps = self.cast.begins_mps(source, mark, &pair.of)?;
-            let to_mps = self.cast.begins_mps(source, mark, &pair.to)?;
-            let closes_mps = match self.is_behind(source, mark, pair)? {
-                _ if self.face_each_other(source, mark, pair)? => of_mps + to_mps,
-                true => of_mps - to_mps,
-                false => to_mps - of_mps,
-            };
-            let away_m = self.away_m(source, mark, pair)?;
-            match pair.is_less {
-                true if away_m <= bound_m => Some(0.0),
-                true => (closes_mps > 0.0).then(|| (away_m - bound_m) / closes_mps),
-                false if away_m >= bound_m => (condition.edge == Edge::None).then_some(0.0),
-                false if closes_mps > 0.0 => Some((away_m + bound_m) / closes_mps),
-                false => (closes_mps < 0.0).then(|| (bound_m - away_m) / -closes_mps),
-            }
-        };
-        match &condition.kind {
-            When::Always => Some(0.0),
-            When::After(seconds) => Some(*seconds),
-            When::Distance { pair, metres } => gap(source, pair, *metres),
-            When::Headway { pair, seconds } => {
-                let bound_m = self.cast.begins_mps(source, mark, &pair.of)? * seconds;
-                gap(source, pair, bound_m)
-            }
-            When::Travelled { entity, metres } => {
-                let mps = self.cast.begins_mps(source, mark, entity)?;
-                (mps > 0.0).then(|| metres / mps)
-            }
-            When::Reaches { entity, position, within_m, is_less: true } => {
-                let mps = self.cast.begins_mps(source, mark, entity)?;
-                let way_m = (self.ahead_m(source, mark, entity, position)? - within_m).max(0.0);
-                (mps > 0.0).then(|| way_m / mps)
-            }
-            _ => None,
-        }
-    }
-
-    /// How far a place is ahead of somebody at the beginning, m.
-    fn ahead_m(&self, source: &mut Source, mark: &Mark, entity: &str, place: &PlaceMark) -> Option<f64> {
-        let point = self.cast.place(source, &place.0)?.pose.position;
-        let begins = self.cast.begins(source, mark, entity)?;
-        let (_, station_m) = self.station(source, mark, entity, point)?;
-        Some(station_m - self.station(source, mark, entity, begins)?.1)
-    }
-
-    /// Whether two look against each other as they begin.
-    fn face_each_other(&self, source: &mut Source, mark: &Mark, pair: &Pair) -> Option<bool> {
-        let [of, to] = [&pair.of, &pair.to].map(|name| self.cast.looks_ahead(source, mark, name));
-        Some(of? != to?)
-    }
-
-    /// How far two are from each other at the beginning, m.
-    fn away_m(&self, source: &mut Source, mark: &Mark, pair: &Pair) -> Option<f64> {
-        let (of, to) = (self.cast.begins(source, mark, &pair.of)?, self.cast.begins(source, mark, &pair.to)?);
-        let away_m = (self.cast.station_m(of) - self.cast.station_m(to)).abs();
-        if !pair.is_free_space {
-            return Some(away_m);
-        }
-        let (back, front) =
-            if self.is_behind(source, mark, pair)? { (&pair.of, &pair.to) } else { (&pair.to, &pair.of) };
-        let less_m = self.cast.overhang_m(source, mark, front, false)?
-            + self.cast.overhang_m(source, mark, back, true)?;
-        Some((away_m - less_m).max(0.0))
-    }
-
     /// The station of an entity in the language, and that of a point on the same way, m.
-    fn station(&self, source: &mut Source, mark: &Mark, entity: &str, point: Vec2) -> Option<(Said, f64)> {
+    pub fn station(
+        &self,
+        source: &mut Source,
+        mark: &Mark,
+        entity: &str,
+        point: Vec2,
+    ) -> Option<(Said, f64)> {
         if self.cast.is_ego(entity) {
             let station_m = self.cast.station_m(point) + EGO_FRONT_M;
             return Some((Said::text("ego.front"), station_m));
@@ -741,29 +516,4 @@ pub fn is_called(event: &Event, kind: &str, name: &str) -> bool {
 
 fn sign(is_less: bool) -> &'static str {
     if is_less { "<=" } else { ">=" }
-}
-
-/// Refuses an edge beside other conditions: they would have to hold at its very moment.
-fn edges_are_alone(source: &mut Source, all: &[Condition]) -> Option<()> {
-    let (of_act, own): (Vec<&Condition>, Vec<&Condition>) =
-        all.iter().filter(|one| one.kind != When::Always).partition(|one| one.is_of_act);
-    for some in [&of_act, &own] {
-        let edge = some.iter().find(|condition| some.len() > 1 && condition.edge != Edge::None);
-        if let Some(edge) = edge {
-            let reason = "beside other conditions, which would have to hold at the moment of its edge, only `conditionEdge=\"none\"` is read";
-            return source.refuse(&edge.mark, reason);
-        }
-    }
-    let latest_s = of_act.iter().map(|one| one.time_s()).collect::<Option<Vec<f64>>>();
-    let latest_s = latest_s.map(|times| times.into_iter().fold(0.0, f64::max));
-    for condition in own.iter().filter(|one| !of_act.is_empty() && one.edge != Edge::None) {
-        let is_later = match &condition.kind {
-            When::After(seconds) => latest_s.is_some_and(|latest_s| *seconds >= latest_s),
-            When::Ended { .. } | When::Begun { .. } => true,
-            _ => false,
-        };
-        let reason = "its act begins later, and whether it holds by then is not known: with `conditionEdge=\"none\"` it is read";
-        source.refuse_if(!is_later, &condition.mark, reason)?;
-    }
-    Some(())
 }

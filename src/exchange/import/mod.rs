@@ -9,7 +9,8 @@
 //! `shape`, `action`, `trigger` and `weather` for what stands in it, through `source`, which fills in each `parameter` and its
 //! `expression`, and `catalogue`, which finds what lies in other files; `vocabulary` refuses what no file may hold. `place` finds
 //! places on the map, `scene` gives everybody a way, to which `ways` joins trajectories, and `phases` what it does, `pace`
-//! their speeds, `condition` the moments at which these begin: as `said`, text with its numbers apart. `rows` finds how the
+//! their speeds, `condition` the moments at which these begin: as `said`, text with its numbers apart. `order` refuses what may
+//! come at another time, by what `estimate` knows of how everybody begins. `rows` finds how the
 //! numbers follow from the parameters, `sky` how weather changes, and `write` prints the space. A file that avastra exported
 //! carries its scenario (`own`). No file is read here: `cli` gives texts.
 
@@ -19,8 +20,10 @@ mod body;
 mod catalogue;
 mod chance;
 mod condition;
+mod estimate;
 mod expression;
 mod ground;
+mod order;
 mod own;
 mod pace;
 mod parameter;

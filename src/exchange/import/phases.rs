@@ -4,14 +4,14 @@ use avastra_lang::model::SPAWN_SPEED_MPS;
 use avastra_road::LanePlace;
 
 use super::across::aside_fields;
-use super::action::{Act, ActKind, Aside, Over, Speed};
-use super::condition::{Waiting, is_called};
+use super::action::{Act, ActKind, Aside, Speed};
+use super::condition::Waiting;
 use super::pace::{self, PACE, too_fast};
 use super::said::Said;
 use super::scene::{Cast, Moving};
 use super::source::Source;
 use super::story::Event;
-use super::trigger::{Condition, When};
+use super::trigger::When;
 use super::ways::Leg;
 
 /// A distance that is to be reached is, this near to it, m, as for esmini.
@@ -22,9 +22,6 @@ pub const ARRIVES_M: f64 = 0.05;
 
 const TIMES_LATER: &str =
     "it moves, and its trajectory has times only from later on: where it is until then is not known";
-
-/// What is estimated to come so much later is later, s.
-const LATER_S: f64 = 0.5;
 
 /// A speed that is asked anew at every tick.
 pub const CONTINUOUS: &str = "continuous: true";
@@ -206,78 +203,6 @@ impl<'a> Cast<'a> {
             }
         }
         Some(phases)
-    }
-
-    /// Refuses events of which a later one comes first, as those who are there begin.
-    fn come_in_order(&self, source: &mut Source, moving: &Moving<'a>, events: &[&Event]) -> Option<()> {
-        let waiting = Waiting::at_first(self, moving);
-        let mut latest_s: f64 = 0.0;
-        for event in events {
-            let waits_for_another =
-                |condition: &Condition| matches!(condition.kind, When::Ended { .. } | When::Begun { .. });
-            if event.when.iter().any(|all| all.iter().any(waits_for_another)) {
-                // What comes after another one comes in its own time.
-                latest_s = 0.0;
-                continue;
-            }
-            let Some(comes_s) = waiting.comes_s(source, &event.when) else { continue };
-            let reason = format!(
-                "as they begin, it comes at {comes_s:.1} s, and what stands before it at {latest_s:.1} s: what one does is read in the order in which it comes"
-            );
-            source.refuse_if(comes_s < latest_s - LATER_S, &event.mark, reason)?;
-            latest_s = latest_s.max(comes_s);
-        }
-        Some(())
-    }
-
-    /// The field that ends a speed which an event overwrites and says nothing of; to the side nothing may be under way.
-    fn ends_what_goes_on(
-        &self,
-        source: &mut Source,
-        moving: &Moving<'a>,
-        event: &Event,
-    ) -> Option<Option<Said>> {
-        let waiting = Waiting::at_first(self, moving);
-        let is_aside = |act: &Act| matches!(act.kind, ActKind::Lane(..) | ActKind::Offset(..));
-        let mut field = None;
-        let earlier = moving.entity.events.iter().take_while(|other| !core::ptr::eq(*other, event));
-        for other in earlier.filter(|other| event.overwrites && other.is_beside(event)) {
-            let follows = |condition: &Condition| match &condition.kind {
-                When::Ended { kind, name } => is_called(other, kind, name),
-                _ => false,
-            };
-            if same_moment(other, event) || event.when.iter().all(|all| all.iter().any(follows)) {
-                continue;
-            }
-            for act in &other.acts {
-                let takes_s = match &act.kind {
-                    ActKind::Speed(_, dynamics)
-                    | ActKind::Lane(_, _, dynamics)
-                    | ActKind::Offset(_, dynamics) => match dynamics.over {
-                        _ if dynamics.is_continuous => None,
-                        Over::AtOnce => Some(0.0),
-                        Over::Time(time_s) => Some(time_s),
-                        _ => None,
-                    },
-                    ActKind::Profile(_) | ActKind::Meet(_) | ActKind::Keep(_) => None,
-                    _ => Some(0.0),
-                };
-                let is_ended = event.acts.iter().any(|own| is_aside(own) == is_aside(act));
-                let ends_s = waiting
-                    .comes_s(source, &other.when)
-                    .zip(takes_s)
-                    .map(|(comes_s, takes_s)| comes_s + takes_s);
-                let comes_s = waiting.comes_s(source, &event.when);
-                let is_over = ends_s.zip(comes_s).is_some_and(|(ends_s, comes_s)| ends_s <= comes_s);
-                if takes_s == Some(0.0) || is_ended || is_over {
-                    continue;
-                }
-                let reason = "it ends another event of its manoeuvre, which would go on here: `parallel` is read, and what waits for its end";
-                source.refuse_if(!matches!(act.kind, ActKind::Speed(..)), &event.mark, reason)?;
-                field = Some(Said::text("speed: npc.speed"));
-            }
-        }
-        Some(field)
     }
 
     /// What follows is told where a trajectory ends.
