@@ -76,6 +76,12 @@ pub struct Event {
 }
 
 impl Event {
+    /// What somebody does from the beginning.
+    fn of_init(mark: Mark, kind: ActKind) -> Event {
+        let acts = vec![Act { mark: mark.clone(), kind }];
+        Event { mark, names: Vec::new(), when: Vec::new(), acts, overwrites: false }
+    }
+
     /// Whether two stand in one manoeuvre.
     pub fn is_beside(&self, other: &Event) -> bool {
         let within = |event: &Event| {
@@ -512,15 +518,7 @@ impl Entity {
                 if is_at_once || self.speed.is_none() && matches!(speed, Speed::Absolute(0.0)) {
                     self.speed = Some((mark, speed));
                 } else {
-                    let kind = ActKind::Speed(speed, dynamics);
-                    let acts = vec![Act { mark: mark.clone(), kind }];
-                    self.events.push(Event {
-                        mark,
-                        names: Vec::new(),
-                        when: Vec::new(),
-                        acts,
-                        overwrites: false,
-                    });
+                    self.events.push(Event::of_init(mark, ActKind::Speed(speed, dynamics)));
                 }
             }
             ActKind::Follow(way) => self.way = Some(*way),
@@ -530,14 +528,7 @@ impl Entity {
             | ActKind::Offset(..)
             | ActKind::Meet(_)
             | ActKind::Keep(_) => {
-                let acts = vec![Act { mark: mark.clone(), kind }];
-                self.events.push(Event {
-                    mark,
-                    names: Vec::new(),
-                    when: Vec::new(),
-                    acts,
-                    overwrites: false,
-                });
+                self.events.push(Event::of_init(mark, kind));
             }
         }
     }
