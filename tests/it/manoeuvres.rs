@@ -7,7 +7,9 @@ use std::sync::Arc;
 use avastra::action::{ActionTable, Draw, Effect, Situation};
 use avastra::ads;
 use avastra::episode::{Choice, Moment, Outcome};
-use avastra::geometry::{Pose, SMOOTH_STEP_SLOPE_MAX, Vec2, distance_m, unit_vector, wrap_angle};
+use avastra::geometry::{
+    Pose, SMOOTH_STEP_SLOPE_MAX, Vec2, distance_m, smooth_step, unit_vector, wrap_angle,
+};
 use avastra::model::vocabulary::Priority;
 use avastra::model::{NpcFacts, RulesInForce};
 use avastra::rng;
@@ -89,6 +91,93 @@ fn a_car_cuts_in_when_it_is_near_and_takes_the_time_of_its_lane_change() {
         changes += 1;
     }
     assert!(changes >= 3, "{changes} cars cut in");
+}
+
+/// Two smooth steps against each other, of which the second begins half way through the first.
+#[test]
+fn who_thinks_better_of_a_lane_change_goes_back() {
+    let table = wish("thinks_better_of_it");
+    let mut returns = 0;
+    for Seen { moments, drawn } in watched(&table, &["goes_back()"], &["back"], 8, &[]) {
+        let back_mps = drawn[0];
+        let (_, first) = moments[0];
+        let Some(begin) = moments.iter().position(|(_, npc)| npc.offset_m < first.offset_m - 1e-6) else {
+            continue;
+        };
+        let Some(half) = moments.iter().position(|(_, npc)| npc.offset_m <= 1.75) else { continue };
+        let (begin_s, half_s) = (moments[begin - 1].0, moments[half].0);
+        let out_s = 2.0 * (half_s - begin_s);
+        let back_s = SMOOTH_STEP_SLOPE_MAX * 3.5 / back_mps;
+        // The second one begins with the tick after the one in which the middle was reached.
+        for (at_s, npc) in &moments[half + 1..] {
+            let out = smooth_step((at_s - begin_s) / out_s).value;
+            let back = smooth_step((at_s - half_s) / back_s).value;
+            let wanted_m = 3.5 * (1.0 - out + back);
+            assert!((npc.offset_m - wanted_m).abs() < PLACE_M, "{npc:?} at {at_s} s: {wanted_m} m");
+        }
+        let (_, last) = moments.last().expect("it is there");
+        returns += usize::from((last.offset_m - 3.5).abs() < 1e-6);
+    }
+    assert!(returns >= 4, "{returns} cars came back");
+}
+
+#[test]
+fn who_stands_before_a_junction_turns_in_time() {
+    let table = wish("turns_in_time");
+    let mut turns = 0;
+    for Seen { moments, drawn } in watched(&table, &["turns_in_time()"], &["arrival"], 12, &[]) {
+        let Some(begin) = moments.iter().position(|(_, npc)| npc.speed_mps > 0.0) else { continue };
+        // What the ego vehicle has still to go grows less by as much as it drives, and is below 0 behind the place.
+        assert!(
+            moments[..begin].iter().all(|(_, npc)| npc.crossing_ahead_m > 0.0 && npc.crossing_ahead_m < 40.0)
+        );
+        let ahead = |at: usize| moments[at].1.ego_crossing_ahead_m;
+        let ego_mps = (ahead(begin - 2) - ahead(begin - 1)) / DT_S;
+        let arrival_s = ahead(begin - 1) / ego_mps;
+        assert!((arrival_s - drawn[0]).abs() < 0.05, "{arrival_s} s of {} s", drawn[0]);
+        turns += 1;
+    }
+    assert!(turns >= 3, "{turns} cars turned");
+}
+
+#[test]
+fn one_brakes_after_the_one_before_it() {
+    let table = wish("brakes_in_turn");
+    let (mut seen, run) = (0, run_of(table.space().clone(), 8, 6, &[]));
+    for episode in 0..run.episodes() {
+        let mut drawn = None;
+        let mut choose = |moment: &Moment| match table.offer(moment.situation, row(&table, "row()")) {
+            Ok(draw) if drawn.is_none() => {
+                drawn = Some((number(&draw, "rate"), number(&draw, "reaction")));
+                Choice::Act(draw)
+            }
+            _ => Choice::Pass,
+        };
+        // When each of the two begins to brake, s, and its hardest braking.
+        let (mut begun_s, mut hardest_mps2) = ([None; 2], [0.0_f64; 2]);
+        let log = run.play(episode, &mut choose, &mut |world, _, contacts| {
+            assert!(contacts.is_empty() || begun_s.iter().all(Option::is_some));
+            for (at, id) in [2, 1].into_iter().enumerate() {
+                let Some(facts) = world.npc_facts(id).filter(|_| contacts.is_empty()) else { continue };
+                if facts.acceleration_mps2 < -1.0 {
+                    begun_s[at] = begun_s[at].or(Some(world.time_s()));
+                }
+                hardest_mps2[at] = hardest_mps2[at].min(facts.acceleration_mps2);
+            }
+        });
+        assert_replays(&run, episode, &log);
+        let (Some((rate_mps2, reaction_s)), [Some(first_s), Some(last_s)]) = (drawn, begun_s) else {
+            continue;
+        };
+        assert!(
+            (last_s - first_s - reaction_s).abs() <= 2.5 * DT_S,
+            "{first_s} s, {last_s} s, {reaction_s} s"
+        );
+        assert!((hardest_mps2[0] + rate_mps2).abs() < 0.01, "{hardest_mps2:?} of {rate_mps2}");
+        assert!((hardest_mps2[1] + rate_mps2 + 1.0).abs() < 0.01, "{hardest_mps2:?} of {rate_mps2}");
+        seen += 1;
+    }
+    assert!(seen >= 4, "{seen} rows braked");
 }
 
 #[test]

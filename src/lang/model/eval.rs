@@ -138,10 +138,15 @@ pub const JUNCTION_AHEAD_M_MAX: f64 = 1000.0;
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct NpcFacts {
     pub speed_mps: f64,
+    /// Along its heading, negative when it brakes.
+    pub acceleration_mps2: f64,
     /// To the ego vehicle, between the outlines.
     pub gap_m: f64,
     /// Along its way to the next junction, as in [`MomentFacts`].
     pub junction_ahead_m: f64,
+    /// From its front, and from the ego vehicle's, to where their ways cross next.
+    pub crossing_ahead_m: f64,
+    pub ego_crossing_ahead_m: f64,
     /// Limit of the lane that it is in.
     pub limit_mps: f64,
     /// The next light on its way; none for who is on foot.
@@ -373,8 +378,11 @@ fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
         Fact::RoadLimit => Value::Number(facts.road.map_or(f64::NAN, |road| road.limit_mps)),
         Fact::StepNumber => Value::Number(facts.world.map_or(f64::NAN, |world| world.step as f64)),
         Fact::NpcSpeed => spawn(|spawn| spawn.npc.speed_mps),
+        Fact::NpcAcceleration => spawn(|spawn| spawn.npc.acceleration_mps2),
         Fact::NpcGap => spawn(|spawn| spawn.npc.gap_m),
         Fact::NpcJunctionAhead => spawn(|spawn| spawn.npc.junction_ahead_m),
+        Fact::NpcCrossingAhead => spawn(|spawn| spawn.npc.crossing_ahead_m),
+        Fact::NpcEgoCrossingAhead => spawn(|spawn| spawn.npc.ego_crossing_ahead_m),
         Fact::NpcLimit => spawn(|spawn| spawn.npc.limit_mps),
         Fact::NpcFront => spawn(|spawn| spawn.npc.front_m),
         Fact::NpcRear => spawn(|spawn| spawn.npc.rear_m),

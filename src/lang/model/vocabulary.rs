@@ -249,8 +249,11 @@ facts! {
     Elapsed "elapsed" DURATION, World = "A `Duration`: since the episode began.";
     StepNumber "step" Type::Int, World = "A `Int`: the number of the step, from 0.";
     NpcSpeed "npc.speed" SPEED, Spawn = "A `Speed`: of the road user that appears.";
+    NpcAcceleration "npc.acceleration" ACCEL, Spawn = "A `Accel`: along its heading, negative when it brakes; 0 as it appears.";
     NpcGap "npc.gap" LENGTH, Spawn = "A `Length`: from the road user that appears to the ego vehicle.";
     NpcJunctionAhead "npc.junction_ahead" LENGTH, Spawn = "A `Length`: along its way to the next junction; 0 in one, 1000 m if there is none nearer.";
+    NpcCrossingAhead "npc.crossing_ahead" LENGTH, Spawn = "A `Length`: from a vehicle's front to where its way next crosses the ego vehicle's, or joins it; 1000 m if it does not.";
+    NpcEgoCrossingAhead "npc.ego_crossing_ahead" LENGTH, Spawn = "A `Length`: from the ego vehicle's front to that place, below 0 behind it; 1000 m if there is none.";
     NpcLimit "npc.limit" SPEED, Spawn = "A `Speed`: the limit of the lane in which it appears.";
     NpcFront "npc.front" LENGTH, Spawn = "A `Length`: its end that is farthest along the ego vehicle's route.";
     NpcRear "npc.rear" LENGTH, Spawn = "A `Length`: its end that is least far along the ego vehicle's route.";

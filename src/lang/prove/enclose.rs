@@ -296,9 +296,10 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
     Some(match fact {
         Fact::EgoSpeed => between(0.0, SPEED_MPS_MAX),
         Fact::EgoAcceleration => between(-EGO_ACCELERATION_MPS2_MAX, EGO_ACCELERATION_MPS2_MAX),
-        Fact::EgoJunctionAhead | Fact::EgoCrosswalkAhead | Fact::NpcJunctionAhead => {
-            between(0.0, JUNCTION_AHEAD_M_MAX)
-        }
+        Fact::EgoJunctionAhead
+        | Fact::EgoCrosswalkAhead
+        | Fact::NpcJunctionAhead
+        | Fact::NpcCrossingAhead => between(0.0, JUNCTION_AHEAD_M_MAX),
         Fact::NpcTtc | Fact::NpcHeadway | Fact::NpcContactIn | Fact::NpcPet => between(0.0, TIME_S_MAX),
         Fact::EgoOffset
         | Fact::EgoRouteLeft
@@ -317,6 +318,8 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
         | Fact::NpcOffRoad
         | Fact::EgoOverLine
         | Fact::NpcAlong
+        | Fact::NpcAcceleration
+        | Fact::NpcEgoCrossingAhead
         | Fact::NpcAcross
         | Fact::NpcAside
         | Fact::NpcInLane

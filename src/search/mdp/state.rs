@@ -178,6 +178,7 @@ mod tests {
             elevation_m: 0.0,
             is_apart: false,
             distance_m: 5.0,
+            acceleration_mps2: 0.0,
             spawned_tick: 0,
         };
         let object = |id: Option<u32>, x_m, heading_rad| PerceivedObject {

@@ -232,7 +232,16 @@ pub(super) fn driver_facts(around: &Around, obstacle: &Obstacle, driver: &Driver
     let facts = facts(around, obstacle, way.limit_mps(scene, station_m), junction, light);
     let junction = scene.map.lane(way.lane_at(station_m).0).junction;
     let in_next_junction = junction.is_some() && junction == around.next_junction();
-    NpcFacts { has_siren: driver.has_siren, in_next_junction, ..facts }
+    let ways_m = driver.ways_to_crossing(2.0 * obstacle.outline.half_length_m, around);
+    let (crossing_ahead_m, ego_crossing_ahead_m) =
+        ways_m.unwrap_or((JUNCTION_AHEAD_M_MAX, JUNCTION_AHEAD_M_MAX));
+    NpcFacts {
+        has_siren: driver.has_siren,
+        in_next_junction,
+        crossing_ahead_m: crossing_ahead_m.min(JUNCTION_AHEAD_M_MAX),
+        ego_crossing_ahead_m,
+        ..facts
+    }
 }
 
 fn facts(
@@ -285,6 +294,9 @@ fn facts(
         in_lane_m: (left_m - offset_m).min(offset_m - right_m) + half_width_m,
         crosswalk_gap_m: around.scene.crosswalk_gap_m(obstacle.outline.pose.position),
         speed_mps: obstacle.velocity_mps.norm(),
+        acceleration_mps2: obstacle.acceleration_mps2,
+        crossing_ahead_m: JUNCTION_AHEAD_M_MAX,
+        ego_crossing_ahead_m: JUNCTION_AHEAD_M_MAX,
         gap_m: obstacle.distance_m,
         junction_ahead_m,
         limit_mps,

@@ -47,6 +47,8 @@ pub struct Obstacle {
     /// Heading of the lane that it drives in; a pedestrian's own heading.
     pub lane_heading_rad: f64,
     pub velocity_mps: Vec2,
+    /// Along its heading, over the last tick; negative when it brakes.
+    pub acceleration_mps2: f64,
     /// Height of the road under it, m.
     pub elevation_m: f64,
     /// Whether its road passes over or under that of the ego vehicle, which then neither sees nor meets it; at
@@ -440,6 +442,7 @@ impl RoadUser {
             height_m: mover.size.height_m,
             lane_heading_rad: moved.lane_heading_rad,
             velocity_mps: moved.velocity_mps,
+            acceleration_mps2: 0.0,
             elevation_m: mover.elevation_m().unwrap_or_else(|| {
                 let route = &around.scene.route;
                 let beside = route.path.project_near(moved.pose.position, around.ego_station_m, ON_FOOT_M);

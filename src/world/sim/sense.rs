@@ -211,6 +211,7 @@ mod tests {
             elevation_m: 0.0,
             is_apart: false,
             distance_m: 0.0,
+            acceleration_mps2: 0.0,
             spawned_tick: 0,
         }
     }

@@ -590,6 +590,10 @@ impl World {
             }
         }
         let RoadUser { obstacle, mover } = &mut users[index];
+        let along_mps = |forward: Vec2, velocity_mps: Vec2| forward.dot(&velocity_mps);
+        let gained_mps =
+            along_mps(moved.forward, moved.velocity_mps) - along_mps(before.forward, before.velocity_mps);
+        obstacle.acceleration_mps2 = gained_mps / DT_S;
         (obstacle.outline.pose, obstacle.velocity_mps) = (moved.pose, moved.velocity_mps);
         (obstacle.forward, obstacle.lane_heading_rad) = (moved.forward, moved.lane_heading_rad);
         obstacle.elevation_m = mover.elevation_m().unwrap_or(obstacle.elevation_m);

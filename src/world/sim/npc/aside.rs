@@ -24,6 +24,8 @@ const LANES_MAX: usize = 8;
 pub(super) struct Aside {
     /// The lane that it has still to change to.
     lane: Option<LaneChoice>,
+    /// Whether it was told that lane during a change, which it breaks off if that leads away from there.
+    was_told_midway: bool,
     /// m to the left of the middle of its lane.
     wanted_m: f64,
     now_m: f64,
@@ -108,6 +110,7 @@ impl Driver {
             let heads_for_m = aside.shift.map_or(begun_m, |shift| shift.to_m);
             aside.wanted_m = command.offset_m.unwrap_or(heads_for_m);
             (aside.lane, aside.told_mps) = (command.lane, command.aside_mps);
+            aside.was_told_midway = command.lane.is_some() && self.change.is_some();
         }
     }
 
@@ -134,9 +137,12 @@ impl Driver {
     /// meant ends at the place that it was told.
     #[inline]
     pub(super) fn begin_aside(&mut self, view: &View) {
-        let Some(Aside { lane, wanted_m, now_m, told_mps, shift }) = self.aside.as_deref().cloned() else {
-            return;
-        };
+        let Some(aside) = self.aside.as_deref_mut() else { return };
+        let was_told_midway = core::mem::take(&mut aside.was_told_midway);
+        let Aside { lane, wanted_m, now_m, told_mps, shift, .. } = aside.clone();
+        if was_told_midway && lane.is_some_and(|lane| self.leaves(lane, view)) {
+            self.break_off(told_mps, view.around);
+        }
         if self.change.is_some() || shift.is_some() {
             return;
         }
@@ -151,6 +157,12 @@ impl Driver {
             let shift = Shift { from_m: now_m, to_m: wanted_m, progress: 0.0, duration_s };
             self.aside.get_or_insert_default().shift = Some(shift);
         }
+    }
+
+    /// Whether it drives in the lane that is meant, or is about to leave it.
+    fn leaves(&self, lane: LaneChoice, View { this, around, .. }: &View) -> bool {
+        let meant = chosen_lane(around, around.beside_route(this.outline.pose.position).0, lane);
+        meant.is_ok_and(|meant| meant == self.way.lane_at(self.station_m).0)
     }
 
     /// Begins a change to the next lane on the way to the one that is meant, if the road and others leave the place; whether

@@ -7,8 +7,8 @@
 use std::sync::Arc;
 
 use avastra_base::geometry::{
-    OrientedBox, Pose, SMOOTH_STEP_BEND_MAX, SMOOTH_STEP_SLOPE_MAX, SmoothStep, Vec2, distance_m,
-    smooth_step, unit_vector, wrap_angle,
+    OrientedBox, Pose, SMOOTH_STEP_BEND_MAX, SMOOTH_STEP_SLOPE_MAX, Vec2, distance_m, smooth_step,
+    unit_vector, wrap_angle,
 };
 use avastra_base::kinematics::{GRAVITY_MPS2, braking_m};
 use avastra_lang::model::vocabulary::Side;
@@ -74,6 +74,16 @@ pub(super) struct Change {
     pub duration_s: f64,
     /// Where it ends, m to the left of the middle of the lane that it leads into.
     pub ends_m: f64,
+    /// The change that it breaks off, and which it leads back from.
+    pub broken_off: Option<BrokenOff>,
+}
+
+/// What is left of a change that is broken off: it swings to its end, while the one that leads back takes it back.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct BrokenOff {
+    /// From where it was broken off; above 1 it is over.
+    pub progress: f64,
+    pub duration_s: f64,
 }
 
 /// Whose wish a move to the side is.
@@ -89,6 +99,34 @@ impl Change {
     /// The part of the change that is done on each metre of the way, at a speed.
     pub fn progress_per_m(&self, speed_mps: f64) -> f64 {
         per_m(speed_mps, self.duration_s)
+    }
+
+    /// The part of the way to the side that lies behind it when it has driven on. Two smooth steps against each other begin
+    /// and end without a slope or a bend, wherever the second one begins.
+    pub fn done_after(&self, way_m: f64, speed_mps: f64) -> f64 {
+        let part = smooth_step(self.progress + self.progress_per_m(speed_mps) * way_m).value;
+        self.broken_off.map_or(part, |first| {
+            part + 1.0 - smooth_step(first.progress + per_m(speed_mps, first.duration_s) * way_m).value
+        })
+    }
+
+    /// How far to the side it gets on each metre, if all of it is `over_m`.
+    fn slope(&self, over_m: f64, speed_mps: f64) -> f64 {
+        let slope = over_m * smooth_step(self.progress).slope * self.progress_per_m(speed_mps);
+        self.broken_off.map_or(slope, |first| {
+            slope - over_m * smooth_step(first.progress).slope * per_m(speed_mps, first.duration_s)
+        })
+    }
+
+    fn advance(&mut self, way_m: f64, speed_mps: f64) {
+        self.progress += self.progress_per_m(speed_mps) * way_m;
+        self.broken_off
+            .iter_mut()
+            .for_each(|first| first.progress += per_m(speed_mps, first.duration_s) * way_m);
+    }
+
+    fn is_over(&self) -> bool {
+        self.progress >= 1.0 && self.broken_off.is_none_or(|first| first.progress >= 1.0)
     }
 }
 
@@ -163,8 +201,37 @@ impl Driver {
         let over = to.path.pose_at(to_station_m).position - self.middle(view.this);
         let aside_m = self.over_m(over, ends_m);
         let duration_s = duration_s(aside_m, self.speed_mps, whose, view.around);
-        self.change = Some(Change { to, to_station_m, progress: 0.0, duration_s, ends_m });
+        self.change = Some(Change { to, to_station_m, progress: 0.0, duration_s, ends_m, broken_off: None });
         self.last_change = side;
+    }
+
+    /// Turns back from a lane change under way to the lane that it leaves. One that leads back is not broken off again.
+    pub(super) fn break_off(&mut self, told_mps: Option<f64>, around: &Around) {
+        let Some(change) = self.change.take_if(|change| change.broken_off.is_none()) else { return };
+        let Change { to, to_station_m, progress, duration_s: took_s, ends_m, .. } = change;
+        let (left, left_m, aside_m) = (Arc::clone(&self.way), self.station_m, self.aside_m());
+        let over = to.path.position_at(to_station_m) - left.path.position_at(left_m);
+        let duration_s = duration_s(over.norm(), self.speed_mps, Whose::Told(told_mps), around);
+        self.comes_into(to, to_station_m, ends_m);
+        self.last_change = self.last_change.map(|side| match side {
+            Side::Left => Side::Right,
+            Side::Right => Side::Left,
+        });
+        self.change = Some(Change {
+            to: left,
+            to_station_m: left_m,
+            progress: 0.0,
+            duration_s,
+            ends_m: aside_m,
+            broken_off: Some(BrokenOff { progress, duration_s: took_s }),
+        });
+    }
+
+    /// Has another way, beside whose middle it is.
+    fn comes_into(&mut self, way: Arc<Way>, station_m: f64, left_m: f64) {
+        (self.way, self.station_m, self.hold_m) = (way, station_m, None);
+        (self.insists_to_m, self.stopped_to_m) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+        self.is_now_aside(left_m);
     }
 
     /// How far to the side it gets if the middle of its lane moves `over`, and it ends so far to the left of it, m.
@@ -308,24 +375,21 @@ impl Driver {
             change.to.path.project_from(from.position, guess_m).map_or(guess_m, |found| found.station_m);
         let to = beside(body_at(&change.to.path, change.to_station_m, size), change.ends_m);
         let to_lane_rad = change.to.path.heading_at(change.to_station_m);
-        let progress_per_m = change.progress_per_m(self.speed_mps);
-        change.progress += progress_per_m * way_m;
-        if change.progress >= 1.0 {
-            let ends_m = change.ends_m;
-            (self.way, self.station_m) = (Arc::clone(&change.to), change.to_station_m);
-            self.is_now_aside(ends_m);
-            (self.change, self.hold_m) = (None, None);
-            (self.insists_to_m, self.stopped_to_m) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+        change.advance(way_m, self.speed_mps);
+        if change.is_over() {
+            let (way, station_m, ends_m) = (Arc::clone(&change.to), change.to_station_m, change.ends_m);
+            self.change = None;
+            self.comes_into(way, station_m, ends_m);
             return at(to, to_lane_rad);
         }
-        let SmoothStep { value: blend, slope, .. } = smooth_step(change.progress);
+        let blend = change.done_after(0.0, self.speed_mps);
         let heading_rad = from.heading_rad + wrap_angle(to.heading_rad - from.heading_rad) * blend;
-        let turned_rad = libm::atan(from.to_local(to.position).y * slope * progress_per_m);
+        let turned_rad = libm::atan(change.slope(from.to_local(to.position).y, self.speed_mps));
         let pose = Pose {
             position: from.position + (to.position - from.position) * blend,
             heading_rad: wrap_angle(heading_rad + turned_rad),
         };
-        at(pose, if change.progress < 0.5 { from_lane_rad } else { to_lane_rad })
+        at(pose, if blend < 0.5 { from_lane_rad } else { to_lane_rad })
     }
 }
 

@@ -360,6 +360,9 @@ impl Driver {
             if change.ends_m != self.aside_m() {
                 trace.number(change.ends_m);
             }
+            if let Some(first) = change.broken_off {
+                trace.numbers([first.progress, first.duration_s]);
+            }
         }
         if let Some(aside) = &self.aside {
             aside.trace(trace);

@@ -3,7 +3,7 @@
 //! A leader is ahead on the own way and within a corridor as wide as the vehicle. What would come into
 //! the way beside that corridor is found in `foresight`.
 
-use avastra_base::geometry::{Pose, smooth_step};
+use avastra_base::geometry::Pose;
 use avastra_base::kinematics::{Following, STANDING_MPS, needed_mps2};
 use avastra_lang::model::vocabulary::TrafficRule;
 use avastra_road::is_apart;
@@ -104,8 +104,8 @@ impl Driver {
         };
         let target = change.to.path.position_at(change.to_station_m);
         let over_m = self.way.path.pose_at(self.station_m).to_local(target).y;
-        let progress = change.progress + change.progress_per_m(self.speed_mps) * leader.gap_m.max(0.0);
-        let moved_m = (over_m + change.ends_m - self.aside_m()) * smooth_step(progress).value;
+        let part = change.done_after(leader.gap_m.max(0.0), self.speed_mps);
+        let moved_m = (over_m + change.ends_m - self.aside_m()) * part;
         let (_, half_width_m) = other.outline.half_extent_m(other.forward, beside.forward);
         (beside.offset_m - self.aside_m() - moved_m).abs() - half_width_m - size.width_m / 2.0 > SIDE_ROOM_M
     }

@@ -128,7 +128,7 @@ impl Driver {
                 let ways = match station_m {
                     Some(station_m) => Some(ways_to(view, station_m)),
                     None => {
-                        let crossing = self.next_crossing(view.size, around, pursuit.crosses_in);
+                        let crossing = self.next_crossing(view.size.length_m, around, pursuit.crosses_in);
                         pursuit.crosses_in = pursuit.crosses_in.or(crossing.map(|(lane, _)| lane));
                         crossing.map(|(_, ways)| ways)
                     }
@@ -172,22 +172,18 @@ impl Driver {
 
     /// From its front to where its way next crosses the ego vehicle's route, and from the ego vehicle's front to there, m;
     /// below 0 if that one is past it.
-    pub(in crate::sim) fn ways_to_crossing(
-        &self,
-        size: &BodyParameters,
-        around: &Around,
-    ) -> Option<(f64, f64)> {
-        self.next_crossing(size, around, None).map(|(_, ways)| ways)
+    pub(in crate::sim) fn ways_to_crossing(&self, length_m: f64, around: &Around) -> Option<(f64, f64)> {
+        self.next_crossing(length_m, around, None).map(|(_, ways)| ways)
     }
 
     /// The lane of that crossing, with the two ways; of the crossings in one lane, if that is given.
     fn next_crossing(
         &self,
-        size: &BodyParameters,
+        length_m: f64,
         around: &Around,
         within: Option<LaneIndex>,
     ) -> Option<(LaneIndex, (f64, f64))> {
-        let front_m = self.station_m + size.length_m / 2.0;
+        let front_m = self.station_m + length_m / 2.0;
         let ego_front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
         let is_meant = |lane: LaneIndex| within.is_none_or(|within| lane == within);
         let ahead = around.scene.route.conflicts.iter().filter(|conflict| is_meant(conflict.lane));

@@ -122,8 +122,9 @@ impl World {
             if command.early_s.is_some() && command.at_m.is_some_and(|at_m| driver.is_past(&view, at_m)) {
                 return Err("it is past that place already".to_owned());
             }
-            let crosses =
-                || driver.ways_to_crossing(&mover.size, &around).is_some_and(|(_, ego_m)| ego_m > 0.0);
+            let crosses = || {
+                driver.ways_to_crossing(mover.size.length_m, &around).is_some_and(|(_, ego_m)| ego_m > 0.0)
+            };
             if command.early_s.is_some() && command.at_m.is_none() && command.turn.is_none() && !crosses() {
                 return Err("its way does not cross the ego vehicle's ahead of it".to_owned());
             }
