@@ -211,8 +211,8 @@ impl Waiting<'_, '_> {
                 source.note("distances across the road are taken across the ego vehicle's route");
                 let metres = metres + if pair.is_free_space { self.cast.half_widths_m(pair) } else { 0.0 };
                 let (of, to) = (self.who(source, mark, &pair.of)?, self.who(source, mark, &pair.to)?);
-                let (below, above, word) =
-                    if pair.is_less { (">=", "<=", "and") } else { ("<=", ">=", "or") };
+                let (above, below) = (pair.rule.sign(), pair.rule.against().sign());
+                let word = if pair.rule.is_less() { "and" } else { "or" };
                 let apart = || Said::text(format!("{of}.offset - {to}.offset "));
                 let said = Said::text("(").then(apart()).and(format!("{above} ")).number(metres, "m");
                 let other = apart().and(format!("{below} ")).number(-metres, "m").and(")");
@@ -250,13 +250,13 @@ impl Waiting<'_, '_> {
                 let who = self.who(source, mark, entity)?;
                 Some(Said::text(format!("{who}.speed <= ")).number(0.01, "m/s"))
             }
-            When::Speed { entity, mps, is_less } => {
+            When::Speed { entity, mps, rule } => {
                 let who = self.who(source, mark, entity)?;
-                Some(Said::text(format!("{who}.speed {} ", sign(*is_less))).number(*mps, "m/s"))
+                Some(Said::text(format!("{who}.speed {} ", rule.sign())).number(*mps, "m/s"))
             }
-            When::Faster { of, to, mps, is_less } => {
+            When::Faster { of, to, mps, rule } => {
                 let (of, to) = (self.who(source, mark, of)?, self.who(source, mark, to)?);
-                Some(Said::text(format!("{of}.speed - {to}.speed {} ", sign(*is_less))).number(*mps, "m/s"))
+                Some(Said::text(format!("{of}.speed - {to}.speed {} ", rule.sign())).number(*mps, "m/s"))
             }
             When::Nears { entity, position, seconds } => {
                 let point = self.cast.place(source, &position.0)?.pose.position;
@@ -386,13 +386,15 @@ impl Waiting<'_, '_> {
     fn distance(&self, source: &mut Source, mark: &Mark, pair: &Pair, bound: &Said) -> Option<Said> {
         let is_apart =
             self.cast.is_far_off(source, mark, &pair.of)? || self.cast.is_far_off(source, mark, &pair.to)?;
-        if pair.is_less && (self.is_first || is_apart) {
-            return Some(self.nearer(source, mark, pair)?.and(" <= ").then(bound.clone()));
+        if pair.rule.is_less() && (self.is_first || is_apart) {
+            let sign = format!(" {} ", pair.rule.sign());
+            return Some(self.nearer(source, mark, pair)?.and(sign).then(bound.clone()));
         }
-        let (sign, word) = if pair.is_less { (" <= ", " and ") } else { (" >= ", " or ") };
+        let (sign, word) =
+            (format!(" {} ", pair.rule.sign()), if pair.rule.is_less() { " and " } else { " or " });
         let sides = [(&pair.of, &pair.to), (&pair.to, &pair.of)];
         let sides = sides.map(|(back, front)| {
-            Some(self.between(source, mark, back, front, pair.is_free_space)?.and(sign).then(bound.clone()))
+            Some(self.between(source, mark, back, front, pair.is_free_space)?.and(&sign).then(bound.clone()))
         });
         let [ahead, behind] = sides;
         Some(Said::text("(").then(ahead?).and(word).then(behind?).and(")"))
@@ -512,8 +514,4 @@ fn is_small_circle(kind: &When) -> bool {
 pub fn is_called(event: &Event, kind: &str, name: &str) -> bool {
     let last = name.rsplit("::").next().unwrap_or(name);
     event.names.iter().any(|(of, own)| *of == kind && own == last)
-}
-
-fn sign(is_less: bool) -> &'static str {
-    if is_less { "<=" } else { ">=" }
 }

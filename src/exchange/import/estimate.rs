@@ -14,7 +14,7 @@ impl Waiting<'_, '_> {
         Some(match &condition.kind {
             When::Distance { pair, metres } => {
                 let away_m = self.away_m(source, mark, pair)?;
-                if pair.is_less { away_m < *metres } else { away_m > *metres }
+                pair.rule.holds(away_m, *metres)
             }
             When::Apart { pair, metres } => {
                 let of = self.cast.begins(source, mark, &pair.of)?;
@@ -22,7 +22,7 @@ impl Waiting<'_, '_> {
                 let offset_m = |point: Vec2| self.cast.route.path.project(point).offset_m;
                 let metres = metres + if pair.is_free_space { self.cast.half_widths_m(pair) } else { 0.0 };
                 let apart_m = (offset_m(of) - offset_m(to)).abs();
-                if pair.is_less { apart_m < metres } else { apart_m > metres }
+                pair.rule.holds(apart_m, metres)
             }
             When::Clear(room) => {
                 let beside = self.beside(source, mark, room)?;
@@ -54,19 +54,18 @@ impl Waiting<'_, '_> {
             When::Headway { pair, seconds } => {
                 let away_m = self.away_m(source, mark, pair)?;
                 let bound_m = self.cast.begins_mps(source, mark, &pair.of)? * seconds;
-                if pair.is_less { away_m < bound_m } else { away_m > bound_m }
+                pair.rule.holds(away_m, bound_m)
             }
             When::Collides { pair, seconds } => {
                 self.away_m(source, mark, pair)? < self.closes_mps(source, mark, pair)? * seconds
             }
-            When::Speed { entity, mps, is_less } => {
-                let begins_mps = self.cast.begins_mps(source, mark, entity)?;
-                if *is_less { begins_mps < *mps } else { begins_mps > *mps }
+            When::Speed { entity, mps, rule } => {
+                rule.holds(self.cast.begins_mps(source, mark, entity)?, *mps)
             }
-            When::Faster { of, to, mps, is_less } => {
+            When::Faster { of, to, mps, rule } => {
                 let of_mps = self.cast.begins_mps(source, mark, of)?;
                 let by_mps = of_mps - self.cast.begins_mps(source, mark, to)?;
-                if *is_less { by_mps < *mps } else { by_mps > *mps }
+                rule.holds(by_mps, *mps)
             }
             When::Reaches { entity, position, within_m, is_less } => {
                 let ahead_m = self.ahead_m(source, mark, entity, position)?;
@@ -87,52 +86,112 @@ impl Waiting<'_, '_> {
         })
     }
 
-    /// When a trigger comes if everybody goes on as they begin, s; `None` if that is not known.
-    pub fn comes_s(&self, source: &mut Source, trigger: &Trigger) -> Option<f64> {
+    /// When a trigger comes if everybody goes on as they begin, s: never is infinity, and `None` that it is not known.
+    /// `known`: when something of the story begins or ends.
+    pub fn comes_s(
+        &self,
+        source: &mut Source,
+        trigger: &Trigger,
+        known: &dyn Fn(&When) -> Option<f64>,
+    ) -> Option<f64> {
         let mut first_s: f64 = if trigger.is_empty() { 0.0 } else { f64::INFINITY };
         for all in trigger {
             let mut comes_s: f64 = 0.0;
             for condition in all {
-                comes_s = comes_s.max(self.condition_comes_s(source, condition)? + condition.delay_s);
+                let own_s = match (&condition.kind, condition.edge) {
+                    (when @ (When::Ended { .. } | When::Begun { .. }), _) => known(when)?,
+                    (When::After(seconds), Edge::None | Edge::Rising) => *seconds,
+                    (_, Edge::None) => self.holds_from_s(source, condition)?,
+                    // What must first cease does so at a time that the beginning does not say.
+                    (_, Edge::Rising) if !self.holds(source, condition)? => {
+                        self.holds_from_s(source, condition)?
+                    }
+                    _ => return None,
+                };
+                comes_s = comes_s.max(own_s + condition.delay_s);
             }
             first_s = first_s.min(comes_s);
         }
-        first_s.is_finite().then_some(first_s)
+        Some(first_s)
     }
 
-    /// As [`Self::comes_s`], of one condition, without its delay.
-    fn condition_comes_s(&self, source: &mut Source, condition: &Condition) -> Option<f64> {
+    /// When a condition holds for the first time, as [`Self::comes_s`].
+    fn holds_from_s(&self, source: &mut Source, condition: &Condition) -> Option<f64> {
         let mark = &condition.mark;
+        let takes_s = |way_m: f64, mps: f64| if mps > 0.0 { way_m / mps } else { f64::INFINITY };
         let gap = |source: &mut Source, pair: &Pair, bound_m: f64| {
             let closes_mps = self.closes_mps(source, mark, pair)?;
             let away_m = self.away_m(source, mark, pair)?;
-            match pair.is_less {
-                true if away_m <= bound_m => Some(0.0),
-                true => (closes_mps > 0.0).then(|| (away_m - bound_m) / closes_mps),
-                false if away_m >= bound_m => (condition.edge == Edge::None).then_some(0.0),
-                false if closes_mps > 0.0 => Some((away_m + bound_m) / closes_mps),
-                false => (closes_mps < 0.0).then(|| (bound_m - away_m) / -closes_mps),
-            }
+            Some(match pair.rule.is_less() {
+                _ if pair.rule.holds(away_m, bound_m) => 0.0,
+                true => takes_s(away_m - bound_m, closes_mps),
+                false if closes_mps > 0.0 => (away_m + bound_m) / closes_mps,
+                false => takes_s(bound_m - away_m, -closes_mps),
+            })
         };
         match &condition.kind {
-            When::Always => Some(0.0),
-            When::After(seconds) => Some(*seconds),
             When::Distance { pair, metres } => gap(source, pair, *metres),
             When::Headway { pair, seconds } => {
                 let bound_m = self.cast.begins_mps(source, mark, &pair.of)? * seconds;
                 gap(source, pair, bound_m)
             }
             When::Travelled { entity, metres } => {
-                let mps = self.cast.begins_mps(source, mark, entity)?;
-                (mps > 0.0).then(|| metres / mps)
+                Some(takes_s(*metres, self.cast.begins_mps(source, mark, entity)?))
             }
             When::Reaches { entity, position, within_m, is_less: true } => {
-                let mps = self.cast.begins_mps(source, mark, entity)?;
                 let way_m = (self.ahead_m(source, mark, entity, position)? - within_m).max(0.0);
-                (mps > 0.0).then(|| way_m / mps)
+                Some(takes_s(way_m, self.cast.begins_mps(source, mark, entity)?))
             }
+            When::Stands { entity, seconds } => {
+                let stands = self.cast.begins_mps(source, mark, entity)? == 0.0;
+                Some(if stands { *seconds } else { f64::INFINITY })
+            }
+            When::Speed { .. } | When::Faster { .. } | When::Always => {
+                Some(if self.holds(source, condition)? { 0.0 } else { f64::INFINITY })
+            }
+            When::Never => Some(f64::INFINITY),
             _ => None,
         }
+    }
+
+    /// The least time, s, in which a distance of the actor that does not come to hold by itself does so while the actor drives at speeds
+    /// in this range; `None` if that is not known.
+    pub fn takes_at_least_s(
+        &self,
+        source: &mut Source,
+        trigger: &Trigger,
+        (slowest_mps, fastest_mps): (f64, f64),
+    ) -> Option<f64> {
+        let [all] = trigger.as_slice() else { return None };
+        let mut own = all.iter().filter(|condition| condition.kind != When::Always);
+        let Some(Condition { kind: When::Distance { pair, metres }, mark, .. }) = own.next() else {
+            return None;
+        };
+        let actor = &self.actor.entity.name;
+        let other = if pair.of == *actor { &pair.to } else { &pair.of };
+        let is_own = (pair.of == *actor) != (pair.to == *actor);
+        if !is_own || self.face_each_other(source, mark, pair)? {
+            return None;
+        }
+        let other_mps = self.cast.begins_mps(source, mark, other)?;
+        let is_behind = self.is_behind(source, mark, pair)? == (pair.of == *actor);
+        let away_m = self.away_m(source, mark, pair)?;
+        let (closes_mps, parts_mps) = match is_behind {
+            true => (fastest_mps - other_mps, other_mps - slowest_mps),
+            false => (other_mps - slowest_mps, fastest_mps - other_mps),
+        };
+        let takes_s = |way_m: f64, mps: f64| if mps > 0.0 { way_m / mps } else { f64::INFINITY };
+        Some(match pair.rule.is_less() {
+            true => takes_s(away_m - metres, closes_mps),
+            false => takes_s(away_m + metres, closes_mps).min(takes_s(metres - away_m, parts_mps)),
+        })
+    }
+
+    /// When somebody comes to a place, as [`Self::comes_s`].
+    pub fn is_at_s(&self, source: &mut Source, mark: &Mark, entity: &str, place: &PlaceMark) -> Option<f64> {
+        let (way_m, mps) =
+            (self.ahead_m(source, mark, entity, place)?, self.cast.begins_mps(source, mark, entity)?);
+        (way_m > 0.0 && mps > 0.0).then(|| way_m / mps)
     }
 
     /// How fast two come nearer to each other as they begin, m/s.

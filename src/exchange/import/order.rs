@@ -9,82 +9,292 @@ use super::said::Said;
 use super::scene::{Cast, Moving};
 use super::source::{Mark, Source};
 use super::story::Event;
-use super::trigger::{Condition, Edge, Trigger, When};
+use super::trigger::{Condition, Edge, Pair, PlaceMark, Rule, Trigger, When};
 
 /// What is estimated to come so much later is later, s.
 const LATER_S: f64 = 0.5;
 
-impl<'a> Cast<'a> {
-    /// Refuses events of which a later one comes first, as those who are there begin.
-    pub fn come_in_order(&self, source: &mut Source, moving: &Moving<'a>, events: &[&Event]) -> Option<()> {
-        let waiting = Waiting::at_first(self, moving);
-        let mut latest_s: f64 = 0.0;
-        for event in events {
-            let waits_for_another =
-                |condition: &Condition| matches!(condition.kind, When::Ended { .. } | When::Begun { .. });
-            if event.when.iter().any(|all| all.iter().any(waits_for_another)) {
-                // What comes after another one comes in its own time.
-                latest_s = 0.0;
-                continue;
-            }
-            let Some(comes_s) = waiting.comes_s(source, &event.when) else { continue };
-            let reason = format!(
-                "as they begin, it comes at {comes_s:.1} s, and what stands before it at {latest_s:.1} s: what one does is read in the order in which it comes"
-            );
-            source.refuse_if(comes_s < latest_s - LATER_S, &event.mark, reason)?;
-            latest_s = latest_s.max(comes_s);
-        }
-        Some(())
-    }
+/// Times that differ by less are the same, s.
+const LEAST_S: f64 = 1e-6;
 
-    /// The field that ends a speed which an event overwrites and says nothing of; to the side nothing may be under way.
-    pub fn ends_what_goes_on(
+/// When what somebody does comes, and when it is over, if everybody goes on as they begin; `None`: it is not known.
+#[derive(Debug, Clone, Copy, Default)]
+struct Times {
+    comes_s: Option<f64>,
+    ends_s: Option<f64>,
+    takes_s: Option<f64>,
+    /// The least time by which it comes after what stands before it.
+    later_s: f64,
+}
+
+/// What somebody does, in its order, and what is known of when.
+pub struct Sequence<'e> {
+    events: Vec<(&'e Event, Times)>,
+}
+
+impl<'a> Cast<'a> {
+    /// The events of somebody in this order, where each is known to come after those before it; others are refused.
+    pub fn in_sequence<'e>(
         &self,
         source: &mut Source,
         moving: &Moving<'a>,
-        event: &Event,
-    ) -> Option<Option<Said>> {
+        events: &[&'e Event],
+    ) -> Option<Sequence<'e>> {
         let waiting = Waiting::at_first(self, moving);
-        let is_aside = |act: &Act| matches!(act.kind, ActKind::Lane(..) | ActKind::Offset(..));
-        let mut field = None;
-        let earlier = moving.entity.events.iter().take_while(|other| !core::ptr::eq(*other, event));
-        for other in earlier.filter(|other| event.overwrites && other.is_beside(event)) {
-            let follows = |condition: &Condition| match &condition.kind {
-                When::Ended { kind, name } => is_called(other, kind, name),
-                _ => false,
+        let mut sequence = Sequence { events: Vec::new() };
+        let mut mps = Some(moving.mps);
+        // The least and the greatest speed that it is told, as long as they are known.
+        let mut told_mps = Some((moving.mps, moving.mps));
+        for event in events {
+            let comes_s = waiting.comes_s(source, &event.when, &|when| sequence.time_s(when));
+            let takes_s = event.acts.iter().map(|act| takes_s(act, &mut mps));
+            let takes_s =
+                takes_s.collect::<Option<Vec<f64>>>().map(|all| all.into_iter().fold(0.0, f64::max));
+            let ends_s = match event.acts.as_slice() {
+                // It ends when the other one is at its place.
+                [Act { kind: ActKind::Meet(meeting), mark }] => {
+                    waiting.is_at_s(source, mark, &meeting.master, &PlaceMark(meeting.master_at.clone()))
+                }
+                _ => comes_s.zip(takes_s).map(|(comes_s, takes_s)| comes_s + takes_s),
             };
-            if same_moment(other, event) || event.when.iter().all(|all| all.iter().any(follows)) {
+            let later_s =
+                told_mps.and_then(|told_mps| waiting.takes_at_least_s(source, &event.when, told_mps));
+            let later_s = later_s.unwrap_or(0.0);
+            sequence.events.push((event, Times { comes_s, ends_s, takes_s, later_s }));
+            if event.acts.iter().any(is_speed) {
+                told_mps = told_mps.zip(mps).map(|((least, most), mps)| (mps.min(least), mps.max(most)));
+            }
+        }
+        for pair in sequence.events.windows(2) {
+            let [(before, earlier), (event, later)] = pair else { continue };
+            if before.when.is_empty() || event.waits_for(before) || is_implied(&before.when, &event.when) {
                 continue;
             }
-            for act in &other.acts {
-                let takes_s = match &act.kind {
-                    ActKind::Speed(_, dynamics)
-                    | ActKind::Lane(_, _, dynamics)
-                    | ActKind::Offset(_, dynamics) => match dynamics.over {
-                        _ if dynamics.is_continuous => None,
-                        Over::AtOnce => Some(0.0),
-                        Over::Time(time_s) => Some(time_s),
-                        _ => None,
-                    },
-                    ActKind::Profile(_) | ActKind::Meet(_) | ActKind::Keep(_) => None,
-                    _ => Some(0.0),
-                };
-                let is_ended = event.acts.iter().any(|own| is_aside(own) == is_aside(act));
-                let ends_s = waiting
-                    .comes_s(source, &other.when)
-                    .zip(takes_s)
-                    .map(|(comes_s, takes_s)| comes_s + takes_s);
-                let comes_s = waiting.comes_s(source, &event.when);
-                let is_over = ends_s.zip(comes_s).is_some_and(|(ends_s, comes_s)| ends_s <= comes_s);
-                if takes_s == Some(0.0) || is_ended || is_over {
+            if same_moment(before, event) {
+                let is_cut = event.overwrites && event.is_beside(before) && earlier.comes_s != earlier.ends_s;
+                let reason = "it ends another event of its manoeuvre at the moment at which that begins";
+                source.refuse_if(is_cut, &event.mark, reason)?;
+                continue;
+            }
+            let reason = match (earlier.comes_s, later.comes_s) {
+                (Some(earlier_s), Some(later_s))
+                    if earlier_s.is_finite() && later_s >= earlier_s - LATER_S =>
+                {
                     continue;
                 }
-                let reason = "it ends another event of its manoeuvre, which would go on here: `parallel` is read, and what waits for its end";
+                // As they begin it never comes: what stands before it changes that.
+                (None, Some(f64::INFINITY)) => continue,
+                (Some(earlier_s), Some(later_s)) if earlier_s.is_finite() => format!(
+                    "as they begin, it comes at {later_s:.1} s, and what stands before it at {earlier_s:.1} s: what one does is read in the order in which it comes"
+                ),
+                _ => {
+                    let other = before.name();
+                    format!(
+                        "whether it comes after `{other}` is not known, and what one does is read in the order in which it comes"
+                    )
+                }
+            };
+            return source.refuse(&event.mark, reason);
+        }
+        Some(sequence)
+    }
+}
+
+impl<'e> Sequence<'e> {
+    pub fn events(&self) -> Vec<&'e Event> {
+        self.events.iter().map(|(event, _)| *event).collect()
+    }
+
+    /// When something of this sequence has begun or ended, if that is known.
+    fn time_s(&self, when: &When) -> Option<f64> {
+        let (kind, name, of): (_, _, fn(&Times) -> Option<f64>) = match when {
+            When::Ended { kind, name } => (kind, name, |times| times.ends_s),
+            When::Begun { kind, name } => (kind, name, |times| times.comes_s),
+            _ => return None,
+        };
+        let own = self.events.iter().filter(|(event, _)| is_called(event, kind, name));
+        let times: Option<Vec<f64>> = own.map(|(_, times)| of(times)).collect();
+        times?.into_iter().reduce(f64::max)
+    }
+
+    /// What may still be under way when an event comes: events before it that take a time and of which it is not known that they are over.
+    fn under_way(&self, event: &Event) -> impl Iterator<Item = &'e Event> {
+        let at = self.events.iter().position(|(own, _)| core::ptr::eq(*own, event)).unwrap_or(0);
+        let (comes_s, later_s) =
+            self.events.get(at).map_or((None, 0.0), |(_, times)| (times.comes_s, times.later_s));
+        let before: Vec<&(&Event, Times)> = self.events.iter().take(at).collect();
+        let is_over = |(other, times): &(&Event, Times)| {
+            // What waits for the end of what waits for its end comes later still.
+            let mut ended = vec![event];
+            while let Some(last) = ended.pop() {
+                if last.waits_for_the_end_of(other) {
+                    return true;
+                }
+                let earlier = self.events.iter().map(|(own, _)| *own);
+                ended.extend(
+                    earlier.take_while(|own| !core::ptr::eq(*own, last)).filter(|own| last.waits_for(own)),
+                );
+            }
+            times.takes_s.is_some_and(|takes_s| takes_s <= later_s + LEAST_S)
+                || times
+                    .ends_s
+                    .zip(comes_s)
+                    .is_some_and(|(ends_s, comes_s)| ends_s <= comes_s && comes_s.is_finite())
+        };
+        let found: Vec<&'e Event> = before
+            .into_iter()
+            .filter(|other| !same_moment(other.0, event) && !is_over(other))
+            .map(|(other, _)| *other)
+            .collect();
+        found.into_iter()
+    }
+
+    /// Whether its speed may still change when an event comes.
+    pub fn changes_speed_at(&self, event: &Event) -> bool {
+        self.under_way(event).any(|other| other.acts.iter().any(|act| is_speed(act) && takes_time(act)))
+    }
+
+    /// The field that ends a speed which an event overwrites and says nothing of. To the side nothing may be under way.
+    pub fn ends_what_goes_on(&self, source: &mut Source, event: &Event) -> Option<Option<Said>> {
+        let mut field = None;
+        for other in self.under_way(event) {
+            let is_cut = event.overwrites && event.is_beside(other);
+            for act in other.acts.iter().filter(|act| takes_time(act)) {
+                let says_the_same = event.acts.iter().any(|own| is_aside(own) && is_aside(act));
+                let reason = "it begins while another move to the side may be under way: where that has come to by then is not known";
+                source.refuse_if(says_the_same, &event.mark, reason)?;
+                if !is_cut || event.acts.iter().any(|own| is_aside(own) == is_aside(act)) {
+                    continue;
+                }
+                let reason = "it may end another event of its manoeuvre, which goes on here: `parallel` is read, and what waits for its end";
                 source.refuse_if(!matches!(act.kind, ActKind::Speed(..)), &event.mark, reason)?;
                 field = Some(Said::text("speed: npc.speed"));
             }
         }
         Some(field)
+    }
+}
+
+impl Event {
+    /// Whether it waits, whatever else comes, for the beginning or the end of another one.
+    fn waits_for(&self, other: &Event) -> bool {
+        self.waits_in_all(|when| match when {
+            When::Ended { kind, name } | When::Begun { kind, name } => is_called(other, kind, name),
+            _ => false,
+        })
+    }
+
+    fn waits_for_the_end_of(&self, other: &Event) -> bool {
+        self.waits_in_all(|when| matches!(when, When::Ended { kind, name } if is_called(other, kind, name)))
+    }
+
+    fn waits_in_all(&self, is_meant: impl Fn(&When) -> bool) -> bool {
+        !self.when.is_empty() && self.when.iter().all(|all| all.iter().any(|one| is_meant(&one.kind)))
+    }
+}
+
+fn is_aside(act: &Act) -> bool {
+    matches!(act.kind, ActKind::Lane(..) | ActKind::Offset(..))
+}
+
+fn is_speed(act: &Act) -> bool {
+    matches!(act.kind, ActKind::Speed(..) | ActKind::Profile(_) | ActKind::Meet(_) | ActKind::Keep(_))
+}
+
+/// Whether something is not done at once.
+fn takes_time(act: &Act) -> bool {
+    match &act.kind {
+        ActKind::Speed(_, dynamics) | ActKind::Lane(_, _, dynamics) | ActKind::Offset(_, dynamics) => {
+            dynamics.is_continuous || !matches!(dynamics.over, Over::AtOnce)
+        }
+        ActKind::Profile(_) | ActKind::Meet(_) | ActKind::Keep(_) => true,
+        _ => false,
+    }
+}
+
+/// How long something takes, s, of one that has a speed before it, and then the one that it is told.
+fn takes_s(act: &Act, mps: &mut Option<f64>) -> Option<f64> {
+    let dynamics = match &act.kind {
+        ActKind::Speed(wanted, dynamics) => {
+            let from_mps = mps.take();
+            if let Speed::Absolute(to_mps) = wanted {
+                *mps = Some(*to_mps);
+                let over_mps = from_mps.map(|from_mps| (to_mps - from_mps).abs());
+                return match dynamics.over {
+                    Over::AtOnce => Some(0.0),
+                    Over::Time(time_s) => Some(time_s),
+                    Over::Rate(rate_mps2) => Some(over_mps? * dynamics.peak / rate_mps2.abs()),
+                    Over::Way(way_m) => Some(2.0 * way_m / (from_mps? + to_mps)),
+                    Over::Never => None,
+                };
+            }
+            dynamics
+        }
+        ActKind::Lane(_, _, dynamics) | ActKind::Offset(_, dynamics) => dynamics,
+        ActKind::Profile(entries) => {
+            *mps = entries.last().map(|entry| entry.mps);
+            return Some(entries.iter().map(|entry| entry.time_s).sum());
+        }
+        ActKind::Meet(_) | ActKind::Keep(_) | ActKind::Follow(_) => {
+            *mps = None;
+            return None;
+        }
+        ActKind::Placed(_) | ActKind::Ahead(..) | ActKind::Route(_) => return Some(0.0),
+    };
+    match dynamics.over {
+        _ if dynamics.is_continuous => None,
+        Over::AtOnce => Some(0.0),
+        Over::Time(time_s) => Some(time_s),
+        Over::Rate(_) | Over::Way(_) | Over::Never => None,
+    }
+}
+
+/// Whether what one trigger waits for holds only once what another one waits for has held: the same of the same two, and farther on.
+fn is_implied(before: &Trigger, then: &Trigger) -> bool {
+    let (before, then) = (only(before), only(then));
+    let ([before], [then]) = (before.as_slice(), then.as_slice()) else { return false };
+    if before.delay_s > then.delay_s {
+        return false;
+    }
+    let is_farther = |first: (Rule, f64), second: (Rule, f64)| match (first.0.is_less(), second.0.is_less()) {
+        (true, true) => second.1 <= first.1,
+        (false, false) => second.1 >= first.1,
+        // It must first not be so, which is beyond the first bound.
+        _ => {
+            then.edge == Edge::Rising
+                && if first.0.is_less() { second.1 <= first.1 } else { second.1 >= first.1 }
+        }
+    };
+    match (&before.kind, &then.kind) {
+        (When::Distance { pair, metres }, When::Distance { pair: other, metres: second })
+        | (When::Headway { pair, seconds: metres }, When::Headway { pair: other, seconds: second }) => {
+            is_of_the_same(pair, other) && is_farther((pair.rule, *metres), (other.rule, *second))
+        }
+        (When::Speed { entity, mps, rule }, When::Speed { entity: other, mps: second, rule: then }) => {
+            entity == other && is_farther((*rule, *mps), (*then, *second))
+        }
+        (When::Travelled { entity, metres }, When::Travelled { entity: other, metres: second }) => {
+            entity == other && metres <= second
+        }
+        _ => false,
+    }
+}
+
+/// Whether the second is about the way of the same two as the first, or about the way between outlines, which is shorter than that
+/// between reference points, where more is asked for, and the other way round.
+fn is_of_the_same(pair: &Pair, then: &Pair) -> bool {
+    let is_as_far = match pair.rule.is_less() {
+        false => then.is_free_space || !pair.is_free_space,
+        true => pair.is_free_space || !then.is_free_space,
+    };
+    pair.of == then.of && pair.to == then.to && pair.is_straight == then.is_straight && is_as_far
+}
+
+/// The conditions of a trigger with one group, but for what always holds.
+fn only(trigger: &Trigger) -> Vec<&Condition> {
+    match trigger.as_slice() {
+        [all] => all.iter().filter(|one| one.kind != When::Always).collect(),
+        _ => Vec::new(),
     }
 }
 
@@ -139,9 +349,6 @@ impl Waiting<'_, '_> {
             return Some(());
         }
         // What cuts it short ends it, too, and then the speed is another one.
-        let is_speed = |act: &Act| {
-            matches!(act.kind, ActKind::Speed(..) | ActKind::Profile(_) | ActKind::Meet(_) | ActKind::Keep(_))
-        };
         let later = moving.entity.events.iter().skip_while(|other| !core::ptr::eq(*other, event)).skip(1);
         for other in later
             .filter(|other| other.acts.iter().any(is_speed) || other.overwrites && other.is_beside(event))

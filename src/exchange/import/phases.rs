@@ -52,7 +52,7 @@ impl<'a> Cast<'a> {
         } else if events.iter().filter(|event| waits_by_itself(event)).count() > 1 {
             source.note(format!("what `{}` does is taken to come in the order of the file", entity.name));
         }
-        self.come_in_order(source, moving, &events)?;
+        let sequence = self.in_sequence(source, moving, &events)?;
         let mut told = Told {
             mps: Some(moving.mps),
             offset_m: moving.offset_m,
@@ -136,10 +136,17 @@ impl<'a> Cast<'a> {
             if let Some(event) = event {
                 before = entity.events.iter().filter(|other| same_moment(other, event)).collect();
             }
-            let mut fields = match event {
-                Some(event) => self.ends_what_goes_on(source, moving, event)?.into_iter().collect(),
-                None => Vec::new(),
-            };
+            let mut fields = Vec::new();
+            if let Some(event) = event {
+                for event in sequence.events().into_iter().filter(|other| same_moment(other, event)) {
+                    if fields.is_empty() {
+                        fields.extend(sequence.ends_what_goes_on(source, event)?);
+                    }
+                    if sequence.changes_speed_at(event) {
+                        told.mps = None;
+                    }
+                }
+            }
             let mut timed = Vec::new();
             let mut own: Option<Takes> = None;
             for act in acts {

@@ -82,6 +82,11 @@ impl Event {
         Event { mark, names: Vec::new(), when: Vec::new(), acts, overwrites: false }
     }
 
+    pub fn name(&self) -> &str {
+        let own = self.names.iter().find(|(kind, _)| *kind == "event");
+        own.map_or("what the beginning lets it do", |(_, name)| name)
+    }
+
     /// Whether two stand in one manoeuvre.
     pub fn is_beside(&self, other: &Event) -> bool {
         let within = |event: &Event| {

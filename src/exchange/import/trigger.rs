@@ -64,6 +64,49 @@ pub enum Edge {
     Either,
 }
 
+/// How a value is to compare with a bound.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rule {
+    Less,
+    AtMost,
+    More,
+    AtLeast,
+}
+
+impl Rule {
+    pub fn is_less(self) -> bool {
+        matches!(self, Rule::Less | Rule::AtMost)
+    }
+
+    pub fn holds(self, value: f64, bound: f64) -> bool {
+        match self {
+            Rule::Less => value < bound,
+            Rule::AtMost => value <= bound,
+            Rule::More => value > bound,
+            Rule::AtLeast => value >= bound,
+        }
+    }
+
+    pub fn sign(self) -> &'static str {
+        match self {
+            Rule::Less => "<",
+            Rule::AtMost => "<=",
+            Rule::More => ">",
+            Rule::AtLeast => ">=",
+        }
+    }
+
+    /// What it is for the same values with the other sign.
+    pub fn against(self) -> Rule {
+        match self {
+            Rule::Less => Rule::More,
+            Rule::AtMost => Rule::AtLeast,
+            Rule::More => Rule::Less,
+            Rule::AtLeast => Rule::AtMost,
+        }
+    }
+}
+
 #[derive(Debug, Clone, PartialEq)]
 pub enum When {
     /// It holds from the beginning.
@@ -116,14 +159,14 @@ pub enum When {
     Speed {
         entity: String,
         mps: f64,
-        is_less: bool,
+        rule: Rule,
     },
     /// How much faster the first one is than the second, m/s.
     Faster {
         of: String,
         to: String,
         mps: f64,
-        is_less: bool,
+        rule: Rule,
     },
     /// An entity would reach a place in less than `seconds`.
     Nears {
@@ -174,7 +217,7 @@ pub struct Clearance {
 pub struct Pair {
     pub of: String,
     pub to: String,
-    pub is_less: bool,
+    pub rule: Rule,
     /// Between the outlines, not the reference points.
     pub is_free_space: bool,
     /// As the crow flies, and not along the road.
@@ -343,9 +386,9 @@ fn of_entity(source: &mut Source, inner: Node, of: &str) -> Option<When> {
         "TimeToCollisionCondition" => {
             frame(source, inner)?;
             let target = source.required(inner, "TimeToCollisionConditionTarget")?;
-            let is_less = is_less(source, inner)?;
+            let rule = rule(source, inner)?;
             let is_free_space = source.switch(inner, "freespace", false)?;
-            source.refuse_if(!is_less, inner, "only `lessThan` is read")?;
+            source.refuse_if(!rule.is_less(), inner, "only `lessThan` is read")?;
             let seconds = source.amount(inner, "value")?;
             if let Some(place) = element(target, "Position") {
                 When::Nears { entity, position: PlaceMark(position(source, place)?), seconds }
@@ -353,7 +396,7 @@ fn of_entity(source: &mut Source, inner: Node, of: &str) -> Option<When> {
                 let to = source.required(target, "EntityRef")?;
                 let to = source.text(to, "entityRef")?;
                 let is_straight = is_straight(inner);
-                When::Collides { pair: Pair { of: entity, to, is_less, is_free_space, is_straight }, seconds }
+                When::Collides { pair: Pair { of: entity, to, rule, is_free_space, is_straight }, seconds }
             }
         }
         "ReachPositionCondition" => {
@@ -379,12 +422,12 @@ fn of_entity(source: &mut Source, inner: Node, of: &str) -> Option<When> {
         "StandStillCondition" => When::Stands { entity, seconds: source.amount(inner, "duration")? },
         "SpeedCondition" => {
             along(source, inner)?;
-            When::Speed { entity, mps: source.number(inner, "value")?, is_less: is_less(source, inner)? }
+            When::Speed { entity, mps: source.number(inner, "value")?, rule: rule(source, inner)? }
         }
         "RelativeSpeedCondition" => {
             along(source, inner)?;
             let (to, mps) = (source.text(inner, "entityRef")?, source.number(inner, "value")?);
-            When::Faster { of: entity, to, mps, is_less: is_less(source, inner)? }
+            When::Faster { of: entity, to, mps, rule: rule(source, inner)? }
         }
         _ => return source.refuse(inner, "this condition is not read"),
     };
@@ -482,13 +525,20 @@ fn pair(source: &mut Source, node: Node, of: &str) -> Option<Pair> {
     let to = source.text(node, "entityRef")?;
     let is_free_space = source.switch(node, "freespace", false)?;
     let is_straight = is_straight(node);
-    Some(Pair { of: of.to_owned(), to, is_less: is_less(source, node)?, is_free_space, is_straight })
+    Some(Pair { of: of.to_owned(), to, rule: rule(source, node)?, is_free_space, is_straight })
 }
 
+/// Whether a rule asks for less.
 pub fn is_less(source: &mut Source, node: Node) -> Option<bool> {
+    Some(rule(source, node)?.is_less())
+}
+
+fn rule(source: &mut Source, node: Node) -> Option<Rule> {
     match source.text(node, "rule")?.as_str() {
-        "lessThan" | "lessOrEqual" => Some(true),
-        "greaterThan" | "greaterOrEqual" => Some(false),
+        "lessThan" => Some(Rule::Less),
+        "lessOrEqual" => Some(Rule::AtMost),
+        "greaterThan" => Some(Rule::More),
+        "greaterOrEqual" => Some(Rule::AtLeast),
         other => source.refuse(node, format!("the rule `{other}` is not read: more or less is")),
     }
 }
